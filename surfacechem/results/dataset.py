@@ -6,12 +6,14 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from surfacechem.errors import InputError, suggestion
 from surfacechem.model.system import Profile, System
 from surfacechem.quantities import Quantity
 from surfacechem.results import exports
@@ -20,6 +22,7 @@ from surfacechem.solve.run import Run, Trajectory
 
 if TYPE_CHECKING:
     import xarray
+    from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
 
@@ -79,6 +82,11 @@ def profile_columns(trajectory: Trajectory) -> list[Column]:
     return found
 
 
+def _above(module: str) -> Any:
+    """A module of a room above, by name: what draws results imports them, and they cannot import it."""
+    return import_module(f"surfacechem.{module}")
+
+
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Results(ABC):
     """What a run and a sweep hand back: ``dataset`` is the xarray Dataset, ``write`` saves the same as netCDF."""
@@ -121,6 +129,39 @@ class Results(ABC):
         names = [c.name for c in self.columns if c.dimensions == (c.name,) or c.name == "time"]
         coordinates = {name: data.pop(name) for name in names}
         return xarray.Dataset(data, coords=coordinates, attrs=dict(self.attributes))
+
+    def __getitem__(self, name: str) -> xarray.DataArray:
+        """A variable of the dataset, by its name; InputError where it has none of that name."""
+        if name not in self.dataset:
+            raise InputError(f"no variable '{name}'.{suggestion(name, map(str, self.dataset))}")
+        return self.dataset[name]
+
+    def plot(self, variables: Sequence[str] | None = None, against: str | None = None) -> Figure:
+        """The figure of the dataset, which a notebook shows; ``savefig`` writes it.
+
+        Parameters
+        ----------
+        variables
+            Names of the variables to show, instead of the usual choice.
+        against
+            The variable along the axis, instead of time.
+
+        Raises
+        ------
+        InputError
+            Where the dataset has no variable of a name.
+        """
+        figure: Figure = _above("plots").figure(self.dataset, variables, against)
+        return figure
+
+    def report(self, path: str | Path = "report.html") -> Path:
+        """Write one page of it all, which needs no other file and no network; returns the file."""
+        written: Path = _above("studies.run_report").write(self.dataset, path)
+        return written
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: the summary and a small figure."""
+        return str(_above("studies.run_report").glance(self))
 
     def write(self, path: str | Path) -> Path:
         """Save as netCDF, or as a table where the name ends with .csv or .parquet; whole or not at all."""

@@ -57,6 +57,10 @@ class PointResults(Results):
     refused: Sequence[str]
     """Why the laws do not hold at a point, by point; empty where they do."""
 
+    def __repr__(self) -> str:
+        """Number of points in a line."""
+        return f"<Points of {self.title!r}: {len(self.refused)}, {len(self.values)} quantities>"
+
     @property
     def columns(self) -> Sequence[Column]:
         """Every variable of the dataset."""

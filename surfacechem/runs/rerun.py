@@ -88,6 +88,8 @@ def run_again(record: Record, allow_code: bool = False) -> Solution | SweepSolut
     """The case of a record, run or swept as it was; with ``allow_code`` by laws whose source the record keeps."""
     mechanism = record.attribute("mechanism", str) if "mechanism" in record.attributes else None
     text = record.attribute("case", str)
+    if not text:
+        raise record.error("holds no case, as its scene was built in Python; run it there.")
     where = f"case in {record.path}"
     case = cases.load_text(text, record.path.stem, record.path.parent, mechanism, file=where, allow_code=allow_code)
     departures = _departures(record)

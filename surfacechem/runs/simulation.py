@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cache, cached_property
+from html import escape
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -94,9 +95,33 @@ class Simulation:
         """Simulations of the same case by the cells of their bodies."""
         self._grids.setdefault(spatial.grid(case.scene), self)
 
+    def _repr_html_(self) -> str:
+        """What a notebook shows: the title, what is solved for, and the summary of ``check``."""
+        from surfacechem.runs.check import warnings
+        from surfacechem.runs.summaries import check_summary
+
+        case, system = self.case, self.system
+        return f"<pre>{escape(check_summary(case.title, system, case.scene, case.own_run, [], warnings(system)))}</pre>"
+
     def __repr__(self) -> str:
         """Title and states in a line."""
         return f"<Simulation {self.case.title!r}: {', '.join(state.name for state in self.system.states)}>"
+
+    @classmethod
+    def of(cls, scene: Scene, run: Run | None = None, title: str = "a scene in Python") -> Simulation:
+        """The simulation of a scene that is built in Python, which does all that one of a case does.
+
+        Parameters
+        ----------
+        scene
+            Two bodies, the interface, heat paths, loading and initial values, in SI.
+        run
+            Output times and tolerances; needed to run it, not to evaluate it.
+        title
+            Its name in figures and datasets. These hold no case, so that they cannot be run again from themselves.
+        """
+        times = run and replace(run, times=tuple(map(float, run.times)))  # an array would do as well
+        return cls(Case("scene", title, "", "", scene, times, None, None, "", None, {"": Place(title)}, ""))
 
     @cached_property
     def system(self) -> System:
@@ -405,6 +430,9 @@ class Simulation:
         departing = {path: x for path, x in values.items() if path in constants and x != constants[path][1]}
         if not departing:
             return self
+        if not self.case.text:
+            path = next(iter(departing))
+            raise InputError(f"{path} is at its default; a scene in Python gives another value to its law itself.")
         paths = frozenset(departing)
         if paths not in self._freed:
             case = self.case

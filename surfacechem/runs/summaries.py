@@ -225,7 +225,7 @@ def check_summary(
 def _plan(system: System, run: Run | None) -> str:
     """How a scene is run, and where its steps end."""
     if run is None:
-        return "none, as everything is prescribed: `surfacechem evaluate` gives its quantities at any state"
+        return "not said; `surfacechem evaluate` gives its quantities at any state"
     parts = [f"{run.solver} at rtol {run.rtol:g}, {len(run.times)} output times to t = {run.times[-1]:g} s"]
     if inside := sum(0 < t < run.times[-1] for t in system.breakpoints):
         parts.append(f"{inside} breakpoint{'s' if inside > 1 else ''}")

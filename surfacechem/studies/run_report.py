@@ -5,8 +5,11 @@ All of it is from the dataset; the scene is read from the case that it keeps.
 
 from __future__ import annotations
 
+import html
+from base64 import b64encode
 from collections.abc import Iterator
 from dataclasses import replace
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,13 +17,16 @@ from surfacechem import format as cases
 from surfacechem.compile import printing
 from surfacechem.errors import InputError
 from surfacechem.model.system import System
-from surfacechem.plots import drawing, figure, opened
+from surfacechem.plots import drawing, figure, opened, save
 from surfacechem.results import spatial
+from surfacechem.results.dataset import Results
 from surfacechem.results.netcdf import replacing
+from surfacechem.results.solution import Solution
 from surfacechem.runs.check import laws_of
 from surfacechem.runs.listing import formulas, source
 from surfacechem.runs.simulation import Simulation
-from surfacechem.runs.summaries import REGIMES, duration
+from surfacechem.runs.summaries import REGIMES, duration, points_summary, run_summary, sweep_summary
+from surfacechem.runs.sweeps import SweepSolution
 from surfacechem.studies.report import Page, PageSection, PageTable
 
 if TYPE_CHECKING:
@@ -44,6 +50,8 @@ def page(data: xarray.Dataset | str | Path) -> Page:
     attributes, omissions = dataset.attrs, []
     sections = [PageSection("What happened", [_ending(attributes), *_warnings(attributes)], figure=True)]
     try:
+        if not attributes["case"]:
+            raise InputError("the scene was built in Python, and the dataset holds no case.")
         case = cases.load_text(attributes["case"], mechanism_text=attributes.get("mechanism"))
         sections += [*_scene(case), *_events(dataset), _balances(attributes), *_precision(case, attributes)]
     except InputError as error:  # code that the dataset carries is not run to draw it
@@ -60,6 +68,20 @@ def write(data: xarray.Dataset | str | Path, path: str | Path) -> Path:
     with replacing(Path(path)) as temporary:
         temporary.write_text(text, encoding="utf-8")
     return Path(path)
+
+
+def glance(results: Results) -> str:
+    """A summary and a small figure, for a notebook."""
+    if isinstance(results, Solution):
+        text = run_summary(results, None)
+    else:
+        text = sweep_summary(results, None) if isinstance(results, SweepSolution) else points_summary(results, None)  # type: ignore[arg-type]
+    shown = f"<pre>{html.escape(text)}</pre>"
+    if "status" not in results.attributes:  # points have no figure of their own
+        return shown
+    picture = BytesIO()
+    save(results.plot(), picture, "png")
+    return f'{shown}<img style="max-width:34em" src="data:image/png;base64,{b64encode(picture.getvalue()).decode()}">'
 
 
 def _ending(attributes: Any) -> str:

@@ -166,3 +166,28 @@ def test_a_dataset_is_a_table_by_its_suffix(simulation, tmp_path):
     swept = simulation.sweep({"initial.T": [300.0, 310.0]})
     table = pandas.read_csv(swept.write(tmp_path / "sweep.csv"))
     assert np.array_equal(table["phi [1]"].to_numpy(), swept.dataset["phi"].values.ravel())
+
+
+@pytest.mark.parametrize("swept", [False, True])
+def test_a_solution_is_read_drawn_and_told_by_itself(simulation, tmp_path, swept):
+    solution = simulation.sweep({"initial.T": [300.0, 310.0]}) if swept else simulation.run()
+    assert solution["T"].identical(solution.dataset["T"])
+    assert solution.plot(["T"]).axes[0].lines
+    assert solution.report(tmp_path / "page.html").read_text().startswith("<!DOCTYPE html>")
+    assert "data:image/png;base64," in solution._repr_html_()
+    with pytest.raises(InputError, match=r"no variable 'phy'\. Did you mean 'phi'\?"):
+        solution["phy"]
+
+
+def test_a_scene_in_python_offers_what_a_case_does(simulation, tmp_path):
+    scene, run = simulation.case.scene, dataclasses.replace(simulation.case.run, times=np.linspace(0, 2.5, 5))
+    own = surfacechem.Simulation.of(scene, run, "mine")
+    assert repr(own) == "<Simulation 'mine': phi, T>"
+    assert "<pre>mine" in own._repr_html_()
+    solution = own.run({"initial.T": 310.0})
+    expected = simulation.run({"initial.T": 310.0}, dataclasses.replace(run, times=tuple(run.times)))
+    assert np.array_equal(solution["T"], expected["T"])
+    assert own.sweep({"initial.T": [300.0, 310.0]})["T"].shape == (2, 5)
+    assert own.evaluate({"phi": 0.5})["q_reaction"].identical(simulation.evaluate({"phi": 0.5})["q_reaction"])
+    with pytest.raises(InputError, match="holds no case, as its scene was built in Python"):
+        rerun.run_again(rerun.read(solution.write(tmp_path / "mine.nc")))
