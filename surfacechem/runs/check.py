@@ -21,7 +21,7 @@ from surfacechem.scene import Scene
 from surfacechem.solve.contract import Problem
 from surfacechem.solve.diagnose import paces
 from surfacechem.solve.run import Model
-from surfacechem.tolerances import CONSERVED, DIGITS, ROUNDING, SOLVED, TINY
+from surfacechem.tolerances import CONSERVED, DIGITS, ROUNDING, TINY
 
 Array = NDArray[np.float64]
 
@@ -83,14 +83,14 @@ def consistent_start(model: Model, values: Mapping[str, float]) -> Start | None:
 
 def rates(start: Start) -> NDArray[np.complex128]:
     """Finite growth rates [1/s] of small disturbances at the start; conserved quantities are left out."""
-    from scipy.linalg import eigvals
-
     # Rows in units of their own, since balances of energy and of sites differ by many decades.
     rows = np.maximum(np.abs(start.M).max(axis=1), np.abs(start.K).max(axis=1))
     scale = np.where(rows > 0, rows, 1.0)[:, None]
-    alpha, beta = eigvals(-start.K / scale, start.M / scale, homogeneous_eigvals=True)
-    finite = np.abs(beta) > SOLVED * np.abs(alpha)
-    values = np.asarray(alpha[finite] / beta[finite], dtype=np.complex128)
+    evolves = np.any(start.M != 0, axis=0)
+    unknown = np.where(evolves, start.M, start.K) / scale
+    # By the rates of what evolves and the values of what is algebraic, of which only the former are kept.
+    growth = np.linalg.solve(unknown, -start.K[:, evolves] / scale)[evolves]
+    values = np.asarray(np.linalg.eigvals(growth), dtype=np.complex128)
     largest = np.max(np.abs(values), initial=0.0)
     return np.asarray(values[np.abs(values) > CONSERVED * largest])
 

@@ -14,6 +14,9 @@ STIFF = 1e3
 steps, at the limit of their stability, cost what the implicit ones of a smooth run do.
 """
 
+MANY = 50
+"""States of a network beyond which a second function of its rates takes longer to compile than any run gains by it."""
+
 
 def method(problem: Problem) -> tuple[str, str]:
     """The solver of a problem, and why, in words.
@@ -36,6 +39,8 @@ def _why_implicit(problem: Problem) -> str:
         return "some states are algebraic"
     if program.chains:
         return "heat conducted between cells is stiff"
+    if program.n > MANY:
+        return f"{program.n} states, whose rates would be compiled for it"
     if program.rates is None:
         return "the equations determine their rates together"
     if problem.rtol <= TIGHTEST:
