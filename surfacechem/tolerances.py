@@ -66,6 +66,9 @@ LONGEST_STEP = 3e-5
 layer that none of its three stages lies in.
 """
 
+PICTURE = 1e-3
+"""Part of its range by which a straight line between two outputs may miss a quantity: a pixel of a large figure."""
+
 MOMENT = 1e-12
 """Part of the time that has passed that no run resolves, in which nothing that stops is followed any more: ROUNDING of
 what is summed along it, to the next power of ten.

@@ -5,10 +5,11 @@
 writes golden/ anew, or the files of some cases. A difference to the one before is a change of what a run gives:
 exact solutions and the estimated errors say whether it is right.
 
-Kept are states, named quantities, accounts of works, heats and entropies at some of the output times, the events with
-the states beside them, and how the run ended. A variable is held to RELATIVE of its size, the largest value it takes.
-Not every one is known to that: a machine that rounds otherwise may take other steps, and then the result differs by
-what the tolerance leaves; a flux that is a difference of large terms has no digits at all. How far this goes is
+Kept are states, named quantities, accounts of works, heats and entropies at some times, the events with the states
+beside them, and how the run ended. Where the outputs of a case follow its run, the run is made once more with outputs
+at the times that are kept: no step depends on them. A variable is held to RELATIVE of its size, the largest value it
+takes. Not every one is known to that: a machine that rounds otherwise may take other steps, and then the result differs
+by what the tolerance leaves; a flux that is a difference of large terms has no digits at all. How far this goes is
 measured: the case is run at tolerances a little apart, and where these runs differ by more, their difference is kept
 as the variable's ``spread`` and counts instead.
 """
@@ -17,7 +18,7 @@ import json
 import random
 import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -48,7 +49,7 @@ EQUATIONS = 1e-12
 """Relative difference of an equation's value that counts: its numbers are doubles, the rest is exact."""
 
 TIMES = 12
-"""At most so many output times are kept, the first and the last among them."""
+"""At most so many times are kept, the first and the last among them."""
 
 WORDS = ("status", "regime", "reaction")
 """Attributes that are kept as they stand; of the reason, numbers have the nine digits that it prints."""
@@ -94,18 +95,26 @@ def equations(name: str) -> dict[str, float]:
     return {part: float(laws.number(system.expand(value), point)) for part, value in parts.items()}
 
 
+def sampled(name: str, times: Sequence[float] = ()) -> Solution:
+    """The run of a case, with outputs at these times where the case leaves them to the run."""
+    case = load(name)
+    settings = case.case.run
+    if times and settings.picture is not None:
+        settings = replace(settings, times=tuple(dict.fromkeys((0.0, *times, settings.times[-1]))))
+    return case.run(run=replace(settings, picture=None), error="balances")
+
+
 def computed(name: str) -> dict[str, Any]:
     """What is kept of a case."""
-    case = load(name)
-    solution, settings = case.run(error="balances"), case.case.run
-    own = columns(solution)
+    case, solution = load(name), sampled(name)
+    settings, own = solution.trajectory.run, columns(solution)
     others = [columns(case.run(run=replace(settings, rtol=settings.rtol * f), error="balances")) for f in APART]
     shared = {dimension: min(_alike(own, other, dimension) for other in others) for dimension in ("time", "event")}
     picked = np.unique(np.linspace(0, shared["time"] - 1, TIMES).round().astype(int))
     return {
         **words(solution),
         "equations": equations(name),
-        "times": picked.tolist(),
+        "times": own["time"][1][picked].tolist(),
         "variables": {
             variable: _entry(solution, variable, dimension, values, others, shared, picked)
             for variable, (dimension, values) in own.items()
@@ -149,9 +158,10 @@ def differences(name: str, golden: dict[str, Any], solution: Solution) -> Iterat
     if present.keys() != kept.keys():
         yield f"{name}: without {sorted(kept.keys() - present.keys())}, new {sorted(present.keys() - kept.keys())}"
     times = {"time": present["time"][1], "event": present.get("event_time", ("", []))[1]}
+    picked = np.searchsorted(times["time"], golden["times"]).tolist()
     for variable in present.keys() & kept.keys():
         dimension, values = present[variable]
-        yield from _apart(name, variable, kept[variable], dimension, values, times.get(dimension), golden["times"])
+        yield from _apart(name, variable, kept[variable], dimension, values, times.get(dimension), picked)
 
 
 def _apart(name, variable, kept, dimension, values, times, picked) -> Iterator[str]:

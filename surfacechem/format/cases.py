@@ -23,6 +23,7 @@ from surfacechem.format.reader import ExactSolution, exact_solution_of, read_doc
 from surfacechem.format.sections import NOTHING_SWEPT, SweepSection
 from surfacechem.model.assemble import assemble
 from surfacechem.model.system import System
+from surfacechem.results import spatial
 from surfacechem.scene import Scene
 from surfacechem.solve.run import Run
 
@@ -124,13 +125,18 @@ def load_text(
         case, mechanism = read_document(tree, str(base), mechanism_text)
     if case.sweep and not case.sweep.tree.value:
         raise case.sweep.error(NOTHING_SWEPT)
+    scene = scene_of(case, mechanism)
+    run = run_of(case.run) if case.run else None
+    if run is not None and spatial.divided(scene):
+        # Cells resolve what has lasted from one output to the next, which is then not for the run to choose.
+        run = replace(run, picture=None)
     return Case(
         name=name,
         title=case.title or name,
         source=case.source,
         description=case.description,
-        scene=scene_of(case, mechanism),
-        own_run=run_of(case.run) if case.run else None,
+        scene=scene,
+        own_run=run,
         reference=exact_solution_of(case.reference) if case.reference else None,
         sweep=case.sweep,
         text=text,

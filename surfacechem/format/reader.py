@@ -20,6 +20,7 @@ from surfacechem.format.sections import (
     BODY_NAME,
     LINEAR,
     LUMP,
+    OUTPUTS,
     REFERENCE,
     BodySection,
     CellAccuracy,
@@ -37,7 +38,7 @@ from surfacechem.quantities import VARIABLES
 from surfacechem.results.accuracy import first_tolerance
 from surfacechem.scene import Body, Conduction, Interface, Medium, Mounting, Scene, Sites, Stage
 from surfacechem.solve.run import OWN, Run
-from surfacechem.tolerances import DEFAULT_RTOL, NOTHING
+from surfacechem.tolerances import DEFAULT_RTOL, NOTHING, PICTURE
 
 if TYPE_CHECKING:
     from surfacechem.mechanism import Mechanism
@@ -407,11 +408,12 @@ def run_of(section: RunSection) -> Run:
         max_steps=section.max_steps,
         max_seconds=section.max_seconds,
         accuracy=section.accuracy,
+        picture=None if any(map(section.has, ("times", "outputs", "spacing", "first"))) else PICTURE,
     )
 
 
 def _times(section: RunSection) -> tuple[float, ...]:
-    """Output times [s], listed or spaced."""
+    """Output times [s], listed or spaced; where they follow the run those at which runs are compared."""
     if (listed := section.times) is not None:
         for name in ("until", "outputs", "spacing", "first"):
             if section.has(name):
@@ -432,7 +434,7 @@ def _times(section: RunSection) -> tuple[float, ...]:
 
 def _spaced(section: RunSection, end: float) -> tuple[float, ...]:
     """Output times [s], evenly or by ratios."""
-    count, first = section.outputs, section.first
+    count, first = section.outputs or OUTPUTS, section.first
     if section.spacing == LINEAR:
         if first is not None:
             raise section.error("`first` belongs to `spacing: logarithmic`.", "first")

@@ -69,6 +69,7 @@ LUMP, INSULATED, QUADRATIC = "lump", "insulated", "quadratic"
 LINEAR, LOGARITHMIC = SPACINGS = ("linear", "logarithmic")
 GRID = "grid"
 
+OUTPUTS = 201
 MOST_OUTPUTS = MOST_RUNS = 1_000_000
 
 # Parameters of a grid, and values of one or draws of a sample: of Sobol' points there are no more.
@@ -329,7 +330,9 @@ class RunSection(Section):
     """times, accuracy, solver, for example `run: {until: 5 s}`"""
 
     until: float | None = quantity("s", "end of the run", above=0)
-    outputs: int = key(Whole(2, MOST_OUTPUTS), "number of output times, both ends included", 201)
+    outputs: int | None = key(
+        Whole(2, MOST_OUTPUTS), "number of output times, both ends included; they follow the run if not given", None
+    )
     spacing: str = key(OneOf("spacing", lambda: SPACINGS), "of the output times", LINEAR)
     first: float | None = quantity("s", "first output time after 0, for logarithmic spacing", above=0)
     times: Sequence[float] | None = key(

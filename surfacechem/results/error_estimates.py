@@ -109,6 +109,15 @@ def against_exact(
     return Accuracy(stated(errors), f"exact solution {name}", errors, exact)
 
 
+def beside(found: Accuracy, shown: Trajectory, scene: Scene, exact: tuple[str, Mapping[str, float]] | None) -> Accuracy:
+    """The accuracy with exact values at outputs that follow a run, where it has exact values at all."""
+    if exact is None or not found.exact or shown.run.picture is None:
+        return found
+    from surfacechem.results.matching import exact_values
+
+    return replace(found, exact=exact_values(*exact, scene, shown, to_the_end=True))
+
+
 def _second(trajectory: Trajectory) -> Trajectory:
     """The run at another tolerance."""
     return trajectory.model.resolve(trajectory, second_tolerance(trajectory.run.rtol))

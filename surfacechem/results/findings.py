@@ -94,9 +94,9 @@ def findings(trajectory: Trajectory, accuracy: Accuracy | None) -> list[str]:
     system, rows = trajectory.model.system, np.empty((0, 0))
     if system.capped or system.cautions:  # arguments of compiled functions at the outputs and steps
         model, result, steps = trajectory.model, trajectory.result, trajectory.result.steps
-        rows = model.inputs(result, result.times, result.outputs, trajectory.rates)
+        rows = model.inputs(result, result.times, result.outputs, trajectory.rates, result.segment)
         if steps is not None:
-            rows = np.concatenate([rows, model.inputs(result, steps.t, steps.y, steps.ydot)])
+            rows = np.concatenate([rows, model.inputs(result, steps.t, steps.y, steps.ydot, steps.segment)])
     return [
         *_extrapolations(trajectory),
         *_capped_rates(system, rows),

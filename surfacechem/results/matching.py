@@ -51,12 +51,17 @@ order, 2e-16, and rounding 1e-12.
 """
 
 
-def exact_values(name: str, options: Mapping[str, float], scene: Scene, run: Trajectory) -> dict[str, Array]:
-    """Exact values at the output times by the names of the scene's variables; InputError if it is another scene's."""
+def exact_values(
+    name: str, options: Mapping[str, float], scene: Scene, run: Trajectory, to_the_end: bool = False
+) -> dict[str, Array]:
+    """Exact values at the output times by the names of the scene's variables; InputError if it is another scene's.
+
+    A run with outputs ``to_the_end`` may have them beyond that of the solution, by the error of its own.
+    """
     view = SceneView(scene, run)
     reference = match(references.get(name), options, view)
     solution = partial(_solution, reference, view)
-    times = run.result.times
+    times = np.minimum(run.result.times, reference.end_time) if to_the_end else run.result.times
     before_end = times[-1] * (1 - SIDE * np.array([2.0, 4.0]))
     tested = len(times) > 1 and not reference.continuous  # a run that ends at its start meets no equation
     probes, since = _probes(*_edges(run)) if tested else (np.empty(0), np.empty(0))

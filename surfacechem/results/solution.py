@@ -18,7 +18,7 @@ from surfacechem.solve import solver
 from surfacechem.solve.contract import Status
 from surfacechem.solve.run import Run, Trajectory
 
-RECORDED = ("times", "atol", "max_steps")
+RECORDED = ("times", "picture", "atol", "max_steps")
 """Settings of a run that a dataset records where they are not those of its case; others are attributes."""
 
 CLASSES = {"exothermic": 1, "endothermic": -1}

@@ -26,6 +26,7 @@ A = TypeVar("A")
 DEPARTURES: Mapping[str, tuple[type, ...]] = {
     "changes": (dict,),
     "times": (list,),
+    "picture": (float, type(None)),
     "atol": (float, int, type(None)),
     "max_steps": (int,),
     "error": (str,),
@@ -102,6 +103,7 @@ def run_again(record: Record, allow_code: bool = False) -> Solution | SweepSolut
             solver=solver,
             rtol=rtol,
             times=tuple(departures.get("times", case.run.times)),
+            picture=departures.get("picture", case.run.picture),
             atol=departures.get("atol", case.run.atol),
             max_steps=departures.get("max_steps", case.run.max_steps),
             max_seconds=None,  # seconds are not the same twice
@@ -125,6 +127,7 @@ def _departures(record: Record) -> Mapping[str, Any]:
     if not isinstance(found, dict) or any(not isinstance(found[k], DEPARTURES.get(k, ())) for k in found):
         raise record.error(f"the attribute 'departures' may hold {', '.join(DEPARTURES)}, each of its kind.")
     numbers = [*found.get("times", []), *found.get("changes", {}).values(), found.get("max_steps", 1)]
+    numbers += [found["picture"]] if found.get("picture") is not None else []
     if not all(isinstance(value, float | int) and math.isfinite(value) for value in numbers):
         raise record.error("the attribute 'departures' holds what is no number where one is needed.")
     return found

@@ -21,11 +21,12 @@ from surfacechem.format import Case, Overrides, Source
 from surfacechem.model.system import System
 from surfacechem.results import spatial
 from surfacechem.results.accuracy import Accuracy, CellErrors
-from surfacechem.results.error_estimates import accuracy, check_way, verified
+from surfacechem.results.error_estimates import accuracy, beside, check_way, verified
 from surfacechem.results.event_table import event_times
 from surfacechem.results.solution import Solution
 from surfacechem.scene import Scene
 from surfacechem.solve import AUTO
+from surfacechem.solve.picture import followed
 from surfacechem.solve.run import Model, Run, Trajectory, values_of
 
 if TYPE_CHECKING:
@@ -202,12 +203,14 @@ class Simulation:
                 errors.append(chosen._cell_errors(trajectory))
             return errors[0]
 
-        found = accuracy(trajectory, case.scene, exact, error, cells, estimate)
+        shown = followed(trajectory)
+        compared = shown if error == "balances" else trajectory
+        found = accuracy(compared, case.scene, exact, error, cells, estimate)
         if unused and error == "auto":
             found = replace(found, source=f"{found.source}; {unused}")
         return Solution(
-            trajectory,
-            accuracy=found,
+            shown,
+            accuracy=beside(found, shown, case.scene, exact),
             case_run=case.run,
             error_from=error,
             notes=spatial.missed(case.scene, (errors or [CellErrors()])[0], found),

@@ -66,7 +66,10 @@ def solve(
 
 
 def settings(system: System, plan: Plan, run: Run, values: Sequence[Mapping[str, float]]) -> list[Run]:
-    """The settings of each run, its output times stretched to where a load is reached that the plan names."""
+    """The settings of each run: the same output times for all, or stretched to where a load is reached that the plan
+    names.
+    """
+    run = replace(run, picture=None)
     if plan.until is None:
         return [run] * len(values)
     variable, target = plan.until

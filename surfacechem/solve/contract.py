@@ -114,6 +114,11 @@ class Problem:
     """Longest time [s] of a step that is left without a look at the equations: what is briefer may be passed over."""
     in_play: tuple[bool, ...] | None = None
     """Which margins are in play in the modes that hold throughout; None where all are. The others may be anything."""
+    picture: float = 0.0
+    """Part of its range by which a straight line may miss a state between two that are known; 0 where none are added
+    to the outputs and the ends of steps."""
+    extremes: Array | None = None
+    """Least and largest states of what the problem continues, shape (2, states)."""
     goes_on: bool = False
     """Whether another problem continues this one: then a kink at its very end counts, as one between segments."""
     explicit: bool = False
@@ -172,6 +177,15 @@ class Counters(NamedTuple):
     iterations: int = 0
 
 
+class States(NamedTuple):
+    """States and ledgers at a row of times, with their segments where these do not tell."""
+
+    t: Array
+    y: Array
+    ledger: Array
+    segment: NDArray[np.int64] | None = None
+
+
 @dataclass(frozen=True)
 class Points:
     """States at a row of times: steps or events."""
@@ -216,6 +230,10 @@ class Result:
     """Time inside a library's own steps [s], without outputs and events; NaN for a method that does them itself."""
     segment: NDArray[np.int64] | None = None
     """Segment of each output, where their times do not tell."""
+    inside: States | None = None
+    """What a picture needs inside steps and at the start of segments."""
+    known: States | None = None
+    """All states that are known, where the result is of several arcs and a picture is wanted."""
 
     def segments_at(self, t: Array, known: NDArray[np.int64] | None = None) -> NDArray[np.int64]:
         """Segment of each time; a breakpoint belongs to the one that it ends."""

@@ -19,10 +19,11 @@ from numpy.typing import NDArray
 
 from surfacechem.model.system import START, System
 from surfacechem.quantities import GAPS
-from surfacechem.solve.contract import Counters, Events, Points, Problem, Result, Solver, Status
+from surfacechem.solve.contract import Counters, Events, Points, Problem, Result, Solver, States, Status
 from surfacechem.solve.equilibria import Point
 from surfacechem.solve.instant import ENDLESS, MANY, MISSED, REACHED, Instant
 from surfacechem.solve.jumps import Jumper
+from surfacechem.solve.picture import known
 from surfacechem.tolerances import ATOM, BRIEF, ULPS
 
 Array = NDArray[np.float64]
@@ -111,6 +112,7 @@ class Hybrid:
         self.instant = Instant(system, jumper, problem, first)
         self.arcs: list[Arc] = []
         self.exchanged = np.zeros(problem.program.n_ledger)
+        self.extremes = np.array([problem.y0, problem.y0])
         self.deadline = None if problem.max_seconds is None else time.monotonic() + problem.max_seconds
         self._steps = self._written = 0
         """Steps taken and outputs written."""
@@ -192,6 +194,7 @@ class Hybrid:
             goes_on=end < problem.segments[-1],
             seen=instant.rebounds.seen(start.t, instant.sizes(start)),
             in_play=self.system.in_play(local),
+            extremes=self.extremes,
         )
         result = yield from without_stall(problem, self.system.sliding)
         reached, status = min(start.t + result.t, end), result.status
@@ -205,7 +208,10 @@ class Hybrid:
         self.exchanged = np.maximum(self.exchanged, np.abs(instant.booked))
         self._steps += result.counters.steps
         self._written += len(result.times)
-        instant.see(np.vstack((start.y, result.y, *(() if result.steps is None else (result.steps.y,)))))
+        seen = np.vstack((start.y, result.y, *(() if result.steps is None else (result.steps.y,))))
+        least, largest = self.extremes
+        self.extremes = np.array([np.minimum(least, seen.min(axis=0)), np.maximum(largest, seen.max(axis=0))])
+        instant.see(seen)
         if instant.rebounds.missed(result):
             instant.status, instant.reason = Status.FAILED, MISSED
             return None
@@ -245,6 +251,21 @@ def merged(problem: Problem, arcs: Sequence[Arc], status: Status, end: float, le
         steps=_steps(arcs) if problem.record_steps else None,
         stepping=sum((result.stepping for result in results), 0.0),
         segment=np.repeat(np.arange(len(arcs)), [len(arc.times) for arc in arcs]),
+        known=_known(arcs),
+    )
+
+
+def _known(arcs: Sequence[Arc]) -> States | None:
+    """What is known of the arcs, in the time and ledger of the run, where a picture is wanted."""
+    if not arcs[0].result.problem.picture:
+        return None
+    parts = [known(arc.result) for arc in arcs]
+    pairs = list(zip(arcs, parts, strict=True))
+    return States(
+        np.concatenate([np.minimum(arc.start.t + part.t, arc.end) for arc, part in pairs]),
+        np.concatenate([part.y for part in parts]),
+        np.concatenate([arc.booked + part.ledger for arc, part in pairs]),
+        np.repeat(np.arange(len(arcs)), [len(part.t) for part in parts]),
     )
 
 

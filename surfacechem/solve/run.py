@@ -26,6 +26,7 @@ from surfacechem.solve.diagnose import ROUNDED, cause, is_led_back
 from surfacechem.solve.equilibria import Equilibria, Point
 from surfacechem.solve.hybrid import Flow, Hybrid, solve_together, without_stall
 from surfacechem.solve.jumps import Jump, Jumper
+from surfacechem.solve.picture import FINER
 from surfacechem.solve.radau.solver import output_rates
 from surfacechem.solve.segments import Passing
 from surfacechem.solve.start import stable_start
@@ -64,6 +65,9 @@ class Run:
     max_seconds: float | None = None
     accuracy: float | None = None
     """Relative accuracy that was asked for, if no tolerances were given."""
+    picture: float | None = None
+    """Part of its range by which straight lines between outputs, which then follow the run, may miss a quantity; runs
+    are compared at ``times``, which are the outputs where this is None."""
     samples: float = SAMPLES
     """Parts of the run in each of which its steps are held against the equations at least once."""
 
@@ -124,7 +128,8 @@ class Trajectory:
             nudged = np.array([result.outputs] * len(some))
             nudged[range(len(some)), :, some] *= 1 + EPS
             rows = nudged.reshape(-1, len(system.states)), np.concatenate([self.rates] * len(some))
-            values = self.model.evaluate(result, np.concatenate([times] * len(some)), *rows)
+            segment = None if result.segment is None else np.tile(result.segment, len(some))
+            values = self.model.evaluate(result, np.tile(times, len(some)), *rows, segment)
             with np.errstate(invalid="ignore"):  # quantities may be infinite, whatever the last bit is
                 changes = np.abs(values.reshape(len(some), *self.outputs.shape) - self.outputs)
                 worst = np.fmax(worst, np.fmax.reduce(changes.max(axis=1, initial=0.0)))
@@ -157,7 +162,8 @@ class Trajectory:
     @cached_property
     def outputs(self) -> Array:
         """Named quantities at the output times, shape (times, outputs)."""
-        return self.model.evaluate(self.result, self.result.times, self.result.outputs, self.rates)
+        result = self.result
+        return self.model.evaluate(result, result.times, result.outputs, self.rates, result.segment)
 
 
 def values_of(system: System, changes: Mapping[str, float] | None = None) -> dict[str, float]:
@@ -276,6 +282,7 @@ class Model:
             max_steps=run.max_steps,
             max_seconds=run.max_seconds,
             record_steps=True,
+            picture=(run.picture or 0.0) / FINER,
             spacing=end / run.samples,
             in_play=system.in_play(parameters[0]),
         )

@@ -125,7 +125,7 @@ def test_a_file_is_replaced_whole(solution, tmp_path):
     path.write_text("old")
     solution.write(path)
     assert [file.name for file in tmp_path.iterdir()] == ["out.nc"]
-    assert xarray.open_dataset(path)["T"].size == 201
+    assert xarray.open_dataset(path)["T"].size == solution.dataset.sizes["time"]
 
 
 def full_disk(folder):
@@ -148,7 +148,7 @@ def test_what_has_no_room_is_kept_elsewhere(solution, tmp_path, monkeypatch):
         solution.write(tmp_path / "full" / "out.nc")
     assert list((tmp_path / "full").iterdir()) == []
     (kept,) = (tmp_path / "other").iterdir()
-    assert xarray.open_dataset(kept)["T"].size == 201
+    assert xarray.open_dataset(kept)["T"].size == solution.dataset.sizes["time"]
 
 
 def test_where_there_is_no_room_at_all_nothing_stays_behind(solution, tmp_path, monkeypatch):
@@ -199,7 +199,7 @@ def test_a_link_is_followed_and_what_is_no_file_is_left_alone(solution, tmp_path
     (tmp_path / "link.nc").symlink_to(real)
     solution.write(tmp_path / "link.nc")
     assert (tmp_path / "link.nc").is_symlink()
-    assert xarray.open_dataset(real)["T"].size == 201
+    assert xarray.open_dataset(real)["T"].size == solution.dataset.sizes["time"]
     os.mkfifo(tmp_path / "pipe")
     with pytest.raises(InputError, match="is no regular file"):
         solution.write(tmp_path / "pipe")

@@ -9,7 +9,7 @@ from surfacechem.solve.radau.consistency import find_consistent
 from surfacechem.solve.radau.dense import finish_step, hold_rates
 from surfacechem.solve.radau.guards import AT_START, find_event, keep_sides, mark_at_end, restore_sides, start_margins
 from surfacechem.solve.radau.newton import stage_count
-from surfacechem.solve.radau.outputs import write_outputs
+from surfacechem.solve.radau.outputs import write_outputs, write_picture
 from surfacechem.solve.radau.quadrature import ledger_norm
 from surfacechem.solve.radau.step import (
     BRIEF,
@@ -24,7 +24,7 @@ from surfacechem.solve.radau.step import (
     store_polynomial,
     unseen,
 )
-from surfacechem.solve.radau.stepper import END, EVENTS, FIRST_COUNTER, OUTPUTS, RECORDS
+from surfacechem.solve.radau.stepper import END, EVENTS, FIRST_COUNTER, INSIDE, OUTPUTS, RECORDS
 from surfacechem.solve.radau.work import any_true, clear, compiled, copy, lay_out, row_of
 from surfacechem.tolerances import NEGLIGIBLE, ROUNDING, SHALLOW, SQRT_EPS
 
@@ -106,6 +106,13 @@ def _start(w: Any, i: int) -> int:
         counts[OUTPUTS] = 1
     if counts[RECORDS] == 0:
         _record(w, w.records[i], counts)
+    elif w.picture > 0.0 and w.tau == 0.0:
+        # The other side of where a segment begins.
+        if counts[INSIDE] < w.inside_times.shape[1]:
+            w.inside_times[i, counts[INSIDE]] = w.base
+            copy(w.y, w.inside[i, counts[INSIDE]])
+            copy(w.q, w.inside[i, counts[INSIDE], w.n :])
+        counts[INSIDE] += 1
     return GOOD
 
 
@@ -174,6 +181,8 @@ def _accept(w: Any, i: int, size: float, end: float, goes_on: bool) -> None:
     whole = size == (end - w.base) - w.tau or reached >= end
     times = w.times[row_of(w.times, i)]
     counts[OUTPUTS] = write_outputs(w, times, w.outputs[i], counts[OUTPUTS], size, end if whole else reached)
+    if w.picture > 0.0:
+        counts[INSIDE] = write_picture(w, w.inside_times[i], w.inside[i], counts[INSIDE], size)
     store_polynomial(w, size, 1.0)
     accept(w, size)
     _record(w, w.records[i], counts)
@@ -243,9 +252,13 @@ def _run(w: Any, i: int) -> None:
     clear(w.q)
     peaks = w.peaks[row_of(w.peaks, i)]
     copy(peaks[: w.n_ledger], w.q_largest)
-    copy(peaks[w.n_ledger :], w.margin_largest)
+    copy(peaks[w.n_ledger : w.n_ledger + w.n_margins], w.margin_largest)
     w.explicit, w.stiff_steps = w.explicitly, 0
     copy(w.y0[i], w.y)
+    extremes = peaks[w.n_ledger + w.n_margins :]
+    for j in range(w.n):
+        w.least[j] = extremes[j] if extremes.shape[0] > 0 else np.inf
+        w.largest[j] = extremes[w.n + j] if extremes.shape[0] > 0 else -np.inf
     clear(w.ydot)
     status = GOOD
     for segment in range(segments.shape[0] - 1):

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from surfacechem.solve.radau.dense import integrate_ledger, interpolate, keep_polynomial, probe_ledger
+from surfacechem.solve.radau.dense import integrate_ledger, interpolate, keep_polynomial, probe_ledger, scan_step
 from surfacechem.solve.radau.explicit import step_explicitly
 from surfacechem.solve.radau.newton import (
     CONVERGED,
@@ -22,11 +22,17 @@ from surfacechem.solve.radau.newton import (
 )
 from surfacechem.solve.radau.roundoff import find_noise
 from surfacechem.solve.radau.step import MAGNIFIED, defect_inside, store_polynomial
-from surfacechem.solve.radau.tables import PROBE, PROBE_RATE, PROBE_SHAPE
+from surfacechem.solve.radau.tables import PROBE, PROBE_RATE, PROBE_SHAPE, SCANNED
 from surfacechem.solve.radau.work import compiled, copy
 
 ALLOWED = 2.0
 """Error of the polynomial between its stages, in units of the tolerance."""
+
+MOST_PARTS = 64
+"""Parts of a step between which states are added for a picture: a polynomial of order 7 needs no more."""
+
+UNSEEN = 1e3
+"""A range of so many tolerances of a state is no picture but its error."""
 
 
 @compiled
@@ -81,8 +87,8 @@ def write_four(w: Any, times: Any, outputs: Any, first: int, end: int, h: float)
 
 
 @compiled
-def _write_inside(w: Any, times: Any, outputs: Any, first: int, last: int, h: float) -> None:
-    """Outputs between the ends of the step."""
+def _polynomial_serves(w: Any, h: float) -> bool:
+    """Prepare the polynomials of state and ledger; whether that of the state is as good as the ends of the step."""
     k = w.member
     keep_polynomial(w)
     # Midway between the stages the polynomial is worst: do the equations hold there?
@@ -100,7 +106,13 @@ def _write_inside(w: Any, times: Any, outputs: Any, first: int, last: int, h: fl
                 defect -= PROBE_RATE[k, i] * w.rates[i, m]
             for i in range(stage_count(k) + 2):
                 w.q_polynomial[m, i] += PROBE_SHAPE[k, i] * (h * defect)
-    if serves:
+    return serves
+
+
+@compiled
+def _write_inside(w: Any, times: Any, outputs: Any, first: int, last: int, h: float) -> None:
+    """States at times between the ends of the step."""
+    if _polynomial_serves(w, h):
         for i in range(first, last, 4):
             write_four(w, times, outputs, i, last, h)
         return
@@ -111,7 +123,7 @@ def _write_inside(w: Any, times: Any, outputs: Any, first: int, last: int, h: fl
     # The main step as it was: its stages, quadratures and factors, and what Newton's method knew.
     if w.explicit != 0:
         step_explicitly(w, h, np.inf)
-    for i in range(stage_count(k)):
+    for i in range(stage_count(w.member)):
         copy(w.z_last[i], w.z[i])
     if w.n_ledger > 0:
         integrate_ledger(w, h)
@@ -132,4 +144,35 @@ def write_outputs(w: Any, times: Any, outputs: Any, first: int, h: float, end: f
     if last < times.shape[0] and times[last] == end:
         end_of_step(w, h, outputs[last], w.trial_dot, outputs[last, w.n :])
         last += 1
+    return last
+
+
+@compiled
+def _parts(w: Any) -> int:
+    """Parts of the step in each of which a straight line misses no state by more than the picture allows."""
+    scan_step(w)
+    last, worst = 4 * w.member + 8, 0.0
+    for m in range(w.n):
+        low, high, missed = min(w.least[m], w.y[m]), max(w.largest[m], w.y[m]), 0.0
+        for i in range(last + 1):
+            change = w.scanned[i, m]
+            low, high = min(low, w.y[m] + change), max(high, w.y[m] + change)
+            missed = max(missed, abs(change - SCANNED[w.member, i] * w.scanned[last, m]))
+        w.least[m], w.largest[m] = low, high
+        worst = max(worst, missed / (high - low + UNSEEN * w.weight[m]))
+    # What a line misses goes with the square of its length.
+    return min(int(np.ceil(np.sqrt(worst / w.picture))), MOST_PARTS)
+
+
+@compiled
+def write_picture(w: Any, times: Any, states: Any, first: int, h: float) -> int:
+    """States inside the step without which its picture would not be true; returns how many the run has now, those
+    among them for which there was no room.
+    """
+    parts = _parts(w)
+    last = max(first + parts - 1, first)
+    if first < last <= times.shape[0]:
+        for i in range(first, last):
+            times[i] = w.base + (w.tau + h * (i + 1 - first) / parts)
+        _write_inside(w, times, states, first, last, h)
     return last

@@ -5,19 +5,22 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cache, lru_cache
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from surfacechem.compile.program import Program
-from surfacechem.solve.contract import Array, Counters, Events, Margin, Points, Problem, Result, Solver, Status
+from surfacechem.solve.contract import Array, Counters, Events, Margin, Points, Problem, Result, Solver, States, Status
 from surfacechem.solve.radau import stepper
-from surfacechem.solve.radau.stepper import COLUMNS, END, EVENTS, OUTPUTS, RECORDS, STOP, Batch
+from surfacechem.solve.radau.stepper import COLUMNS, END, EVENTS, FIRST_COUNTER, INSIDE, OUTPUTS, RECORDS, STOP, Batch
 from surfacechem.tolerances import LONGEST_STEP
 
 EVENT_ROWS = 64
 STEP_ROWS = 512
+INSIDE_ROWS = 1024
+Room: TypeAlias = tuple[int, int, int]
+"""So many steps, events, and states inside steps of a run."""
 CHUNK = 256
 """Runs a thread takes at a time."""
 _STATUSES = tuple(Status)
@@ -42,12 +45,13 @@ def _zeros(count: int) -> Array:
 
 
 def _peaks(problem: Problem) -> Array:
-    """Largest accounts and guards of what a problem continues; none where it continues nothing."""
+    """Largest accounts and guards, and extremes, of what a problem continues; none where it continues nothing."""
     accounts, guards = problem.exchanged, problem.seen
     none, unseen = _zeros(problem.program.n_ledger), _zeros(problem.program.n_margins)
     if accounts is None and guards is None:
         return _zeros(len(none) + len(unseen))
-    return np.concatenate((none if accounts is None else accounts, unseen if guards is None else guards))
+    extremes = (problem.extremes.ravel(),) if problem.extremes is not None else ()
+    return np.concatenate((none if accounts is None else accounts, unseen if guards is None else guards, *extremes))
 
 
 def _contiguous(values: ArrayLike) -> Array:
@@ -56,15 +60,14 @@ def _contiguous(values: ArrayLike) -> Array:
     return np.ascontiguousarray(values, dtype=float)
 
 
-def _batch(problem: Problem, runs: Sequence[Array], room: tuple[int, int] | None = None) -> Any:
+def _batch(problem: Problem, runs: Sequence[Array], room: Room | None = None) -> Any:
     """Runs that share with a problem all but their y0, parameters, spacing, max_steps, peaks, segments and times,
-    which are given in this order with the run as first axis; with room for so many steps and events of each, or as many
-    as are usual.
+    which are given in this order with the run as first axis; with this room for each, or as much as is usual.
     """
     program, times = problem.program, runs[-1]
     explicit = problem.explicit and program.rates is not None
-    usual = STEP_ROWS if problem.record_steps else 0, EVENT_ROWS if problem.margins else 0
-    step_rows, event_rows = usual if room is None else room
+    steps, filled = STEP_ROWS if problem.record_steps else 0, INSIDE_ROWS if problem.picture else 0
+    step_rows, event_rows, rows = room or (steps, EVENT_ROWS if problem.margins else 0, filled)
     n, q, m, count = program.n, program.n_ledger, program.n_margins, len(runs[0])
     return Batch(
         *(program.explicit_tables if explicit else program.tables),
@@ -73,16 +76,19 @@ def _batch(problem: Problem, runs: Sequence[Array], room: tuple[int, int] | None
         int(explicit),
         _kinds(problem.margins, problem.in_play),
         int(problem.goes_on),
+        problem.picture,
         *runs,
         np.empty((count, 1 + 2 * n + q + m)),
         np.zeros((count, COLUMNS), np.int64),
         np.empty((count, times.shape[1], n + q)),
         np.empty((count, step_rows, 1 + 2 * n + q)) if step_rows else _no_rows(count),
         np.empty((count, event_rows, 2 + 2 * n + q)) if event_rows else _no_rows(count),
+        np.empty((count, rows, n + q)) if rows else _no_rows(count),
+        np.empty((count, rows)),
     )
 
 
-def _run_one(problem: Problem, room: tuple[int, int] | None = None) -> Any:
+def _run_one(problem: Problem, room: Room | None = None) -> Any:
     """A batch of one, run; the compiled loop looks at the stop flag before every step."""
     y0, parameters, segments, times = (
         _contiguous(values)[None] for values in (problem.y0, problem.parameters, problem.segments, problem.times)
@@ -129,7 +135,7 @@ class Radau(Solver):
         for i, problem in enumerate(problems):
             # What problems of one batch have in common, beside the model and its margins.
             shape = len(problem.segments), len(problem.times), problem.atol.tobytes(), problem.rtol
-            alike.setdefault((*shape, problem.in_play, problem.goes_on), []).append(i)
+            alike.setdefault((*shape, problem.in_play, problem.goes_on, problem.picture), []).append(i)
         most = min(CHUNK, -(-len(problems) // threads))
         chunks = [group[k : k + most] for group in alike.values() for k in range(0, len(group), most)]
         with ThreadPoolExecutor(threads) as pool:
@@ -181,10 +187,11 @@ def _whole(problem: Problem, batch: Any, i: int) -> Result:
     need, which a limit in seconds may change.
     """
     while True:
-        needed, records = int(batch.counts[i, EVENTS]), int(batch.counts[i, RECORDS]) if problem.record_steps else 0
-        if needed <= batch.events.shape[1] and records <= batch.records.shape[1]:
+        events, records, inside = batch.counts[i, [EVENTS, RECORDS, INSIDE]].tolist()
+        needed = records if problem.record_steps else 0, events, inside
+        if all(rows <= table.shape[1] for rows, table in zip(needed, batch[-4:-1], strict=True)):
             return _result(problem, batch, i)
-        batch, i = _run_one(problem, (records, needed)), 0
+        batch, i = _run_one(problem, needed), 0
 
 
 def _result(problem: Problem, batch: Any, i: int) -> Result:
@@ -194,6 +201,7 @@ def _result(problem: Problem, batch: Any, i: int) -> Result:
     m = 1 + 2 * n + program.n_ledger
     values = batch.outputs[i, :outputs]
     events, steps = batch.events[i, : counts[EVENTS]], batch.records[i, : counts[RECORDS]]
+    inside, moments = batch.inside[i, : counts[INSIDE]], batch.inside_times[i, : counts[INSIDE]]
     if len(batch.counts) > 1:  # the room for the steps of many runs is not kept for those that they took
         events, steps = events.copy(), steps.copy()
     return Result(
@@ -212,8 +220,9 @@ def _result(problem: Problem, batch: Any, i: int) -> Result:
             if counts[EVENTS]
             else _no_events(n, program.n_ledger)
         ),
-        counters=Counters(*counts[RECORDS + 1 : STOP]),
+        counters=Counters(*counts[FIRST_COUNTER:STOP]),
         steps=Points(*_points(steps, n)) if problem.record_steps else None,
+        inside=States(moments, inside[:, :n], inside[:, n:]) if problem.picture else None,
     )
 
 
@@ -261,7 +270,7 @@ def solve_many(
     fixed = table[0] if len(table) else np.zeros((len(breaks) - 1, program.n_parameters))
     shared = Problem(program, first, outputs, breaks, fixed, rtol, weights, kinds, max_steps)
     limits = np.array((np.inf,)), np.array((max_steps,)), _peaks(shared)[None]
-    batch = _batch(shared, (states, table, *limits, breaks[None], outputs[None]), (0, 0))
+    batch = _batch(shared, (states, table, *limits, breaks[None], outputs[None]), (0, 0, 0))
     with ThreadPoolExecutor(threads) as pool:
         list(pool.map(lambda i: stepper.run(batch, i, min(i + CHUNK, len(states))), range(0, len(states), CHUNK)))
     return BatchResult(
@@ -303,8 +312,8 @@ def search_batch(program: Program, ends: Array, table: Array, counts: NDArray[np
     rows, nothing = np.zeros((1, 0)), _no_rows(len(ends))
     return Batch(
         *program.tables,
-        1.0, np.ones(program.n), 0, _kinds(()), 0,
-        ends, table, np.zeros(0), np.empty(0, np.int64), rows, rows, rows, ends, counts, nothing, nothing, nothing,
+        1.0, np.ones(program.n), 0, _kinds(()), 0, 0.0,
+        ends, table, np.zeros(0), np.empty(0, np.int64), rows, rows, rows, ends, counts, *(nothing,) * 4, rows,
     )  # fmt: skip
 
 

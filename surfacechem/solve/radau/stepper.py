@@ -31,12 +31,14 @@ BATCH: dict[str, tuple[Any, int]] = {
     "kinds": (np.int64, 2),
     # runs that others follow
     "goes_on": (int, 0),
+    # part of its range by which a straight line between known states may miss another one; 0 where none are added
+    "picture": (float, 0),
     # the runs; all but the first two have one row for all where these are alike
     "y0": (float, 2),
     "parameters": (float, 3),
     "spacing": (float, 1),
     "max_steps": (np.int64, 1),
-    # largest accounts and guards of what a run continues
+    # largest accounts and guards of what a run continues, least and largest states where a picture is wanted
     "peaks": (float, 2),
     "segments": (float, 2),
     "times": (float, 2),
@@ -46,6 +48,9 @@ BATCH: dict[str, tuple[Any, int]] = {
     "outputs": (float, 3),
     "records": (float, 3),
     "events": (float, 3),
+    # states inside steps, and their times
+    "inside": (float, 3),
+    "inside_times": (float, 2),
 }
 """Entries of a batch of runs: type and number of axes. The first axis of the last two groups is the run."""
 
@@ -53,9 +58,9 @@ _named: Any = namedtuple
 Batch: Any = _named("Batch", BATCH)
 """What a batch of runs reads, and the rows that it writes."""
 
-END, OUTPUTS, EVENTS, RECORDS, FIRST_COUNTER, STOP, COLUMNS = 0, 1, 2, 3, 4, 10, 11
-"""Columns of the table of counts: status, outputs written, events, recorded steps; then six counters, and a flag that
-is set from outside to end the run.
+END, OUTPUTS, EVENTS, RECORDS, INSIDE, FIRST_COUNTER, STOP, COLUMNS = 0, 1, 2, 3, 4, 5, 11, 12
+"""Columns of the table of counts: status, outputs written, events, recorded steps, states inside steps; then six
+counters, and a flag that is set from outside to end the run.
 """
 
 SIZES = ("n", "n_ledger", "n_margins", "n_inputs", "core", "links", "cells")
@@ -130,6 +135,8 @@ MEMORY = {
     **_arrays("q_polynomial", "n_ledger", 9),
     # change of the state and its rate at the points where guards are examined
     **_arrays("scanned scanned_rates", SCAN_POINTS + WIDTH - 1, "n"),
+    # least and largest values of the states so far
+    **_arrays("least largest", "n"),
     # ledger: now, as a trial, correction of its polynomial, a probe; errors, what they are held against, the largest so
     # far, rates at a state that differs by its tolerance; at the stages; rates there and, last, at the start
     **_arrays("q q_trial q_correction q_probe q_miss q_scale q_largest q_nudged", "n_ledger"),

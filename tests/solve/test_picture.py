@@ -1,0 +1,81 @@
+"""Outputs that follow a run."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from case_runs import load, solved
+
+import surfacechem
+from surfacechem.results.event_table import events_of
+from surfacechem.solve.picture import needed
+from surfacechem.tolerances import PICTURE
+
+FOLLOWED = ("exothermic", "stick-slip", "press-hold-pull", "rate-and-state-stick-slip", "dna-adhesive", "debonding")
+"""Smooth, with many jumps, with stages, with slips that are brief, with two time scales, with one jump."""
+
+each = pytest.mark.parametrize("name", FOLLOWED)
+
+
+@each
+def test_no_step_depends_on_the_outputs(name):
+    case = load(name)
+    run, trajectory = case.case.run, solved(name).trajectory
+    for times in ((0.0, run.times[-1]), tuple(np.linspace(0.0, run.times[-1], 37).tolist())):
+        other = case.model.solve(replace(run, times=times, picture=None))
+        first = case.model.solve(replace(run, rtol=trajectory.run.rtol))
+        assert other.result.ledger.tobytes() == first.result.ledger.tobytes()
+        assert other.result.counters[:2] == first.result.counters[:2]
+        for column in ("t", "y", "ydot", "ledger"):
+            assert getattr(other.result.steps, column).tobytes() == getattr(first.result.steps, column).tobytes()
+
+
+@each
+def test_lines_between_outputs_show_the_run(name):
+    """Against a run with many outputs, beside the events and the breakpoints."""
+    case, solution = load(name), solved(name)
+    run, data = solution.trajectory.run, solution.dataset
+    times = tuple(np.linspace(0.0, run.times[-1], 1234).tolist())
+    dense = case.run(run=replace(run, times=times, picture=None), error="balances").dataset
+    beside = [*case.system.breakpoints, *(data.event_time.values if "event_time" in data else ())]
+    smooth = np.all(np.abs(np.subtract.outer(dense.time.values, beside)) > 1e-9 * run.times[-1], axis=1)
+    for state in case.system.states:
+        found, known = dense[state.name].values[smooth], data[state.name]
+        missed = np.abs(np.interp(dense.time.values[smooth], data.time.values, known.values) - found)
+        assert missed.max() <= 1.05 * PICTURE * np.ptp(known.values)
+
+
+def test_both_sides_of_every_event_and_the_extremes_of_the_steps_are_outputs():
+    solution = solved("stick-slip")
+    data, trajectory = solution.dataset, solution.trajectory
+    times = data.time.values
+    assert np.all(np.diff(times) > 0)
+    events = events_of(trajectory)
+    assert len(events) == 12
+    for event in events:
+        i = int(np.searchsorted(times, event.t))
+        assert times[i] == event.t == np.nextafter(times[i - 1], 1e9)
+        for state, before, after in zip(trajectory.model.system.states, event.before, event.after, strict=True):
+            np.testing.assert_allclose(data[state.name].values[i - 1 : i + 1], [before, after], rtol=1e-12, atol=1e-15)
+    steps = trajectory.result.steps.y[:, trajectory.model.system.state_columns["v"]]
+    assert data.v.max() >= steps.max()
+    assert data.v.min() <= steps.min()
+
+
+def test_a_person_may_ask_for_times():
+    even = surfacechem.run("stick-slip", {"run.outputs": 11}).dataset
+    np.testing.assert_allclose(even.time, np.linspace(0.0, 3.0, 11), rtol=1e-15)
+    listed = surfacechem.run("exothermic", {"run": {"times": ["1 s", "2 s"]}}).dataset
+    assert listed.time.values.tolist() == [0.0, 1.0, 2.0]
+
+
+def test_rows_are_needed_where_a_line_over_time_or_its_logarithm_would_miss():
+    t = np.array([0.0, 1e-3, 1e-2, 0.1, 0.2, 0.3, 1.0])
+    straight, kink = 2.0 * t, np.maximum(t - 0.2, 0.0)
+    none = np.zeros(len(t), bool)
+    kept = needed(t, np.column_stack([straight, kink]), np.array([1e9, 1e-3]), none)
+    assert t[kept].tolist() == [0.0, 0.2, 0.3, 1.0]
+    t = np.append(0.0, np.geomspace(1e-6, 1.0, 200))
+    kept = needed(t, t[:, None], np.array([0.1]), np.zeros(len(t), bool))
+    assert np.abs(np.interp(np.log(t[1:]), np.log(t[1:][kept[1:]]), t[1:][kept[1:]]) - t[1:]).max() <= 0.1
+    assert 3 < kept.sum() < 12
