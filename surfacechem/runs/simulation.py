@@ -23,10 +23,10 @@ from surfacechem.results import spatial
 from surfacechem.results.accuracy import Accuracy, CellErrors
 from surfacechem.results.error_estimates import accuracy, beside, check_way, verified
 from surfacechem.results.event_table import event_times
+from surfacechem.results.picture import followed
 from surfacechem.results.solution import Solution
 from surfacechem.scene import Scene
 from surfacechem.solve import AUTO
-from surfacechem.solve.picture import followed
 from surfacechem.solve.run import Model, Run, Trajectory, values_of
 
 if TYPE_CHECKING:

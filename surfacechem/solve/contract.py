@@ -239,6 +239,22 @@ class Result:
         """Segment of each time; a breakpoint belongs to the one that it ends."""
         return np.searchsorted(self.problem.segments[1:-1], t, side="left") if known is None else known
 
+    def states(self) -> States:
+        """All states that are known, in order of time, each once on each side of a breakpoint."""
+        parts = [States(self.times, self.outputs, self.ledger_outputs)]
+        if self.steps is not None:
+            parts.append(States(self.steps.t, self.steps.y, self.steps.ledger))
+        if self.inside is not None:
+            parts.append(self.inside)
+        t, y, ledger = (np.concatenate(columns) for columns in zip(*(part[:3] for part in parts), strict=True))
+        segment = self.segments_at(t)
+        if self.inside is not None:  # what is added at a breakpoint is its other side
+            segment[len(t) - len(self.inside.t) :] += np.isin(self.inside.t, self.problem.segments[1:-1])
+        order = np.lexsort((segment, t))
+        t, segment = t[order], segment[order]
+        new = (np.diff(t, prepend=-1.0) > 0) | (np.diff(segment, prepend=-1) > 0)
+        return States(t[new], y[order[new]], ledger[order[new]], segment[new])
+
     @property
     def success(self) -> bool:
         return self.status.success

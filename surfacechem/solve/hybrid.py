@@ -23,7 +23,6 @@ from surfacechem.solve.contract import Counters, Events, Points, Problem, Result
 from surfacechem.solve.equilibria import Point
 from surfacechem.solve.instant import ENDLESS, MANY, MISSED, REACHED, Instant
 from surfacechem.solve.jumps import Jumper
-from surfacechem.solve.picture import known
 from surfacechem.tolerances import ATOM, BRIEF, ULPS
 
 Array = NDArray[np.float64]
@@ -259,7 +258,7 @@ def _known(arcs: Sequence[Arc]) -> States | None:
     """What is known of the arcs, in the time and ledger of the run, where a picture is wanted."""
     if not arcs[0].result.problem.picture:
         return None
-    parts = [known(arc.result) for arc in arcs]
+    parts = [arc.result.states() for arc in arcs]
     pairs = list(zip(arcs, parts, strict=True))
     return States(
         np.concatenate([np.minimum(arc.start.t + part.t, arc.end) for arc, part in pairs]),

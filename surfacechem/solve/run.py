@@ -26,13 +26,15 @@ from surfacechem.solve.diagnose import ROUNDED, cause, is_led_back
 from surfacechem.solve.equilibria import Equilibria, Point
 from surfacechem.solve.hybrid import Flow, Hybrid, solve_together, without_stall
 from surfacechem.solve.jumps import Jump, Jumper
-from surfacechem.solve.picture import FINER
 from surfacechem.solve.radau.solver import output_rates
 from surfacechem.solve.segments import Passing
 from surfacechem.solve.start import stable_start
 from surfacechem.tolerances import DEFAULT_RTOL, EPS, NONE_OF_SCALE
 
 Array = NDArray[np.float64]
+
+FINER = 16
+"""The stepper follows the states so many times closer, as quantities that depend on them may bend more."""
 
 GROUPS = {"energy supply": 0, "dissipation": 0, "heat": 0, "entropy supply": 1, "entropy production": 1, "bonds": 2}
 """Accounts whose quadratures are measured together."""

@@ -8,43 +8,20 @@ outputs, over time as over its logarithm, miss no quantity by more than a part o
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from surfacechem.solve.contract import Array, Result, States
-
-if TYPE_CHECKING:
-    from surfacechem.solve.run import Run, Trajectory
+from surfacechem.solve.contract import Array, States
+from surfacechem.solve.run import Run, Trajectory
 
 Flags = NDArray[np.bool_]
-
-FINER = 16
-"""The stepper follows the states so many times closer, as quantities that depend on them may bend more."""
 
 SAMPLED = 100
 """Rows that tell how large rounding is."""
 
 UNRESOLVED = 100.0
 """Tolerances of a value below which a change may be an error of the run."""
-
-
-def known(result: Result) -> States:
-    """All states that a result tells, in order of time, each once on each side of a breakpoint."""
-    parts = [States(result.times, result.outputs, result.ledger_outputs)]
-    if result.steps is not None:
-        parts.append(States(result.steps.t, result.steps.y, result.steps.ledger))
-    if result.inside is not None:
-        parts.append(result.inside)
-    t, y, ledger = (np.concatenate(columns) for columns in zip(*(part[:3] for part in parts), strict=True))
-    segment = result.segments_at(t)
-    if result.inside is not None:  # what is added at a breakpoint is its other side
-        segment[len(t) - len(result.inside.t) :] += np.isin(result.inside.t, result.problem.segments[1:-1])
-    order = np.lexsort((segment, t))
-    t, segment = t[order], segment[order]
-    new = (np.diff(t, prepend=-1.0) > 0) | (np.diff(segment, prepend=-1) > 0)
-    return States(t[new], y[order[new]], ledger[order[new]], segment[new])
 
 
 def _two_sided(t: Array) -> tuple[Array, Flags]:
@@ -131,7 +108,7 @@ def _chosen(rows: States, which: Flags) -> States:
 def followed(trajectory: Trajectory) -> Trajectory:
     """The trajectory with the outputs that its picture needs, instead of those at which runs are compared."""
     result, part, system = trajectory.result, trajectory.run.picture, trajectory.model.system
-    rows = result.known or known(result)
+    rows = result.known or result.states()
     if part is None or len(rows.t) < 2:
         return trajectory
     t, sides = _two_sided(rows.t)

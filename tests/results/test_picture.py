@@ -8,7 +8,7 @@ from case_runs import load, solved
 
 import surfacechem
 from surfacechem.results.event_table import events_of
-from surfacechem.solve.picture import needed
+from surfacechem.results.picture import needed
 from surfacechem.tolerances import PICTURE
 
 FOLLOWED = ("exothermic", "stick-slip", "press-hold-pull", "rate-and-state-stick-slip", "dna-adhesive", "debonding")
