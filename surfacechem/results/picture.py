@@ -16,6 +16,7 @@ from surfacechem.solve.contract import Array, States
 from surfacechem.solve.run import Run, Trajectory
 
 Flags = NDArray[np.bool_]
+Rows = NDArray[np.int64]
 
 SAMPLED = 100
 """Rows that tell how large rounding is."""
@@ -46,26 +47,30 @@ def needed(t: Array, values: Array, allowed: Array, kept: Flags) -> Flags:
     kept = kept.copy()
     kept[[0, -1]] = True
     scaled = np.divide(values, allowed, out=np.zeros_like(values), where=allowed > 0)
-    log = np.log(np.maximum(t, t[t > 0].min(initial=1.0)))
-    open_rows = np.flatnonzero(~kept)
-    while len(open_rows):
+    rows = np.flatnonzero(~kept)
+    while len(rows):
         ends = np.flatnonzero(kept)
-        right = np.searchsorted(ends, open_rows)
-        left, right = ends[right - 1], ends[right]
-        missed = np.zeros(len(open_rows))
-        for over in (t, log):
-            length = over[right] - over[left]
-            part = np.divide(over[open_rows] - over[left], length, out=np.zeros_like(length), where=length > 0)
-            line = scaled[left] + part[:, None] * (scaled[right] - scaled[left])
-            missed = np.fmax(missed, np.abs(scaled[open_rows] - line).max(axis=1, initial=0.0))
+        right = np.searchsorted(ends, rows)
+        left = ends[right - 1]
+        missed = _missed(t, scaled, left, rows, ends[right])
         # The worst row of each interval that is missed; what lies in the others is not looked at again.
         order = np.lexsort((missed, left))
-        last = np.append(np.diff(left[order]) > 0, True)
-        worst = order[last]
+        worst = order[np.append(np.diff(left[order]) > 0, True)]
         worst = worst[missed[worst] > 1]
-        kept[open_rows[worst]] = True
-        open_rows = open_rows[np.isin(left, left[worst]) & ~kept[open_rows]]
+        kept[rows[worst]] = True
+        rows = rows[np.isin(left, left[worst]) & ~kept[rows]]
     return kept
+
+
+def _missed(t: Array, values: Array, left: Rows, rows: Rows, right: Rows) -> Array:
+    """By how much lines from one row to another miss rows between them, over time or its logarithm, at worst."""
+    missed = np.zeros(len(rows))
+    for over in (t, np.log(np.maximum(t, t[t > 0].min(initial=1.0)))):
+        length = over[right] - over[left]
+        part = np.divide(over[rows] - over[left], length, out=np.zeros_like(length), where=length > 0)
+        line = values[left] + part[:, None] * (values[right] - values[left])
+        missed = np.fmax(missed, np.abs(values[rows] - line).max(axis=1, initial=0.0))
+    return missed
 
 
 def _edges(values: Array) -> Flags:
@@ -107,18 +112,28 @@ def _chosen(rows: States, which: Flags) -> States:
 
 def followed(trajectory: Trajectory) -> Trajectory:
     """The trajectory with the outputs that its picture needs, instead of those at which runs are compared."""
-    result, part, system = trajectory.result, trajectory.run.picture, trajectory.model.system
-    rows = result.known or result.states()
+    part, rows = trajectory.run.picture, trajectory.result.known or trajectory.result.states()
     if part is None or len(rows.t) < 2:
         return trajectory
     t, sides = _two_sided(rows.t)
     rows = _chosen(rows._replace(t=t), sides)
-    moments = np.array([*result.events.t, *(jump.t for jump in trajectory.jumps)])
-    beside = np.isin(rows.t, moments) | np.isin(np.nextafter(rows.t, np.inf), moments)
-    sampled = np.arange(len(rows.t)) % max(len(rows.t) // SAMPLED, 1) == 0
-    noise = _at(trajectory, _chosen(rows, sampled)).roundings
+    values, noise = _quantities(trajectory, rows)
+    kept = _kept(trajectory.run, rows.t, values, noise, part, _beside_events(trajectory, rows.t))
+    return _at(trajectory, _chosen(rows, kept))
+
+
+def _beside_events(trajectory: Trajectory, t: Array) -> Flags:
+    """Which of the times are those of events, or just before them."""
+    moments = np.array([*trajectory.result.events.t, *(jump.t for jump in trajectory.jumps)])
+    return np.isin(t, moments) | np.isin(np.nextafter(t, np.inf), moments)
+
+
+def _quantities(trajectory: Trajectory, rows: States) -> tuple[Array, Array]:
+    """What is shown over time, shape (times, quantities), and how much of it may be rounding."""
+    system = trajectory.model.system
     shown = [j for j, state in enumerate(system.states) if state.name not in system.inside]
     states = np.hstack([rows.y[:, shown], rows.ledger])
-    every = np.hstack([states, _at(trajectory, rows).outputs])
-    unknown = np.array([0.0] * states.shape[1] + [UNRESOLVED * noise[name] for name in system.output_columns])
-    return _at(trajectory, _chosen(rows, _kept(trajectory.run, rows.t, every, unknown, part, beside)))
+    sampled = np.arange(len(rows.t)) % max(len(rows.t) // SAMPLED, 1) == 0
+    noise = _at(trajectory, _chosen(rows, sampled)).roundings
+    unknown = [0.0] * states.shape[1] + [UNRESOLVED * noise[name] for name in system.output_columns]
+    return np.hstack([states, _at(trajectory, rows).outputs]), np.array(unknown)

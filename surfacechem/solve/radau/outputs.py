@@ -87,25 +87,30 @@ def write_four(w: Any, times: Any, outputs: Any, first: int, end: int, h: float)
 
 
 @compiled
+def _correct_ledger(w: Any, h: float) -> None:
+    """The next term of the ledger's polynomial, from the defect of its rates at the probe."""
+    k = w.member
+    probe_ledger(w, h)
+    for m in range(w.n_ledger):
+        defect = w.q_probe[m] - PROBE_RATE[k, 7] * w.rates[7, m]
+        for i in range(stage_count(k)):
+            defect -= PROBE_RATE[k, i] * w.rates[i, m]
+        for i in range(stage_count(k) + 2):
+            w.q_polynomial[m, i] += PROBE_SHAPE[k, i] * (h * defect)
+
+
+@compiled
 def _polynomial_serves(w: Any, h: float) -> bool:
     """Prepare the polynomials of state and ledger; whether that of the state is as good as the ends of the step."""
-    k = w.member
     keep_polynomial(w)
     # Midway between the stages the polynomial is worst: do the equations hold there?
-    defect_inside(w, h, PROBE[k])
+    defect_inside(w, h, PROBE[w.member])
     serves = _largest(w, 0.0) <= ALLOWED
     if not serves:
         find_noise(w)
         serves = _largest(w, MAGNIFIED) <= ALLOWED
     if w.n_ledger > 0:
-        # The next term of the ledger's polynomial, from the defect of its rates there.
-        probe_ledger(w, h)
-        for m in range(w.n_ledger):
-            defect = w.q_probe[m] - PROBE_RATE[k, 7] * w.rates[7, m]
-            for i in range(stage_count(k)):
-                defect -= PROBE_RATE[k, i] * w.rates[i, m]
-            for i in range(stage_count(k) + 2):
-                w.q_polynomial[m, i] += PROBE_SHAPE[k, i] * (h * defect)
+        _correct_ledger(w, h)
     return serves
 
 
