@@ -115,6 +115,19 @@ def _polynomial_serves(w: Any, h: float) -> bool:
 
 
 @compiled
+def _restore_step(w: Any, h: float) -> None:
+    """The main step as it was before others were made inside it: its stages, quadratures and factors."""
+    if w.explicit != 0:
+        step_explicitly(w, h, np.inf)
+    for i in range(stage_count(w.member)):
+        copy(w.z_last[i], w.z[i])
+    if w.n_ledger > 0:
+        integrate_ledger(w, h)
+    if w.explicit == 0:
+        factor_newton(w, h)
+
+
+@compiled
 def _write_inside(w: Any, times: Any, outputs: Any, first: int, last: int, h: float) -> None:
     """States at times between the ends of the step."""
     if _polynomial_serves(w, h):
@@ -125,16 +138,8 @@ def _write_inside(w: Any, times: Any, outputs: Any, first: int, last: int, h: fl
     store_polynomial(w, h, 0.0)
     for i in range(first, last):
         _write_by_step(w, (times[i] - w.base) - w.tau, h, outputs[i])
-    # The main step as it was: its stages, quadratures and factors, and what Newton's method knew.
-    if w.explicit != 0:
-        step_explicitly(w, h, np.inf)
-    for i in range(stage_count(w.member)):
-        copy(w.z_last[i], w.z[i])
-    if w.n_ledger > 0:
-        integrate_ledger(w, h)
-    if w.explicit == 0:
-        factor_newton(w, h)
-    # They decide on the next step, which must not depend on the outputs that were asked for.
+    _restore_step(w, h)
+    # What Newton's method knew decides on the next step, which must not depend on the outputs that were asked for.
     w.theta, w.contraction, w.guessed, w.tries = theta, contraction, guessed, tries
 
 
