@@ -43,6 +43,9 @@ _BASES: Mapping[str, Mapping[str, int]] = {
 _KILOGRAM = Decimal(1000)
 _PREFIXES = {"G": 9, "M": 6, "k": 3, "m": -3, "u": -6, "µ": -6, "μ": -6, "n": -9, "p": -12}
 _PREFIXED = ("m", "g", "s", "mol", "Hz", "N", "Pa", "J", "W")
+THERMAL_ENERGY = Decimal("1.380649e-23") * Decimal("298.15")
+"""kT [J] at 25 degC, in which energies of single bonds are given: 4.116 pN nm."""
+
 _OTHERS: Mapping[str, tuple[Decimal | int, str]] = {
     "min": (60, "s"),
     "minute": (60, "s"),
@@ -50,6 +53,7 @@ _OTHERS: Mapping[str, tuple[Decimal | int, str]] = {
     "hour": (3600, "s"),
     "day": (86400, "s"),
     "cm": (Decimal("0.01"), "m"),
+    "kT": (THERMAL_ENERGY, "J"),
     "bar": (100_000, "Pa"),
     "atm": (101_325, "Pa"),
     "percent": (Decimal("0.01"), "1"),

@@ -26,6 +26,9 @@ _QUANTITY = re.compile(rf"({_NUMBER})\s*(.*)", re.DOTALL)
 _NOT_FINITE = re.compile(r"[-+]?\.?(?:inf|nan)", re.IGNORECASE)
 
 _EXPONENT = re.compile(r"(?:\^|\*\*)\s*\(?\s*[-+]?\s*\d{1,2}(?![\d.])")
+_POWER = re.compile(r"(?<![A-Za-z0-9_µμ])([A-Za-zµμ]+)([-+]\d|[2-4])(?![\w.])")
+"""Powers as CF conventions and many papers write them: s-1, W m-2 K-1, um2."""
+
 _LONGEST = 100
 """Characters of a quantity; longer texts are no quantities."""
 
@@ -70,6 +73,9 @@ WORDS = {
 """Dimensions in words, for messages, each with a unit that has it."""
 
 _HINT = ' Write it like "J/(m^2 K)" or "1/um^2".'
+
+PER_PARTICLE = {"electron_volt", "millielectron_volt", "kiloelectron_volt", "kT"}
+"""Energies that are of one particle where a molar one is needed."""
 
 COMMON = (
     *("K", "degC", "degF", "m", "mm", "um", "nm", "pm", "s", "ms", "us", "ns", "min", "h", "day", "kg", "g", "percent"),
@@ -135,6 +141,7 @@ def _short(text: str) -> str:
 
 
 def _converted(number: str, given: str, unit: str, name: str, difference: bool) -> float:
+    given = _POWER.sub(r"\1^\2", given)
     try:
         if (factor := si_units.factor(given, unit)) is not None:
             return float(Decimal(number) * factor)
@@ -173,7 +180,11 @@ def _has_angle(unit: Any) -> bool:
 def _per_particle(source: Any, target: Any) -> Any:
     """The same unit per mole where it is meant per particle, and the other way round: eV for J/mol, kJ/mol for J."""
     registry = _registry()
-    if target.is_compatible_with("J/mol") and source.is_compatible_with("J") and "electron_volt" in str(source):
+    if (
+        target.is_compatible_with("J/mol")
+        and source.is_compatible_with("J")
+        and PER_PARTICLE & {*map(str, source._units)}
+    ):
         return source / registry.particle
     if target.is_compatible_with("J") and source.is_compatible_with("J/mol"):
         return source * registry.particle
@@ -242,7 +253,10 @@ def _registry() -> Any:
     """Pint's registry, from a file in the user's cache folder if possible; in decimals, so that 1/um^2 is 1e12."""
     import pint
 
+    registry: Any
     try:
-        return pint.UnitRegistry(cache_folder=":auto:", non_int_type=Decimal)
+        registry = pint.UnitRegistry(cache_folder=":auto:", non_int_type=Decimal)
     except Exception:  # the folder may be read-only, the file half written by another process
-        return pint.UnitRegistry(non_int_type=Decimal)
+        registry = pint.UnitRegistry(non_int_type=Decimal)
+    registry.define(f"kT = {si_units.THERMAL_ENERGY} joule")  # and not a thousand tesla
+    return registry

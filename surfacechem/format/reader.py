@@ -12,7 +12,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, TypeVar
 
 from surfacechem import solve as solvers
-from surfacechem.contracts.terms import Law, Property
+from surfacechem.contracts.terms import Law, Load, Property
 from surfacechem.documents.document import Tree
 from surfacechem.errors import InputError, Place, suggestion
 from surfacechem.format.declarations import UNITS, Context, is_name, keys, number, read
@@ -45,6 +45,10 @@ if TYPE_CHECKING:
     from surfacechem.mechanism.mixture import Species
 
 L = TypeVar("L", bound=Law)
+
+UNNAMED = ("lower", "upper")
+SHARED = "T"
+"""Names of bodies that a case leaves out, and of the temperature that they share with the interface."""
 
 # Names that stand for the temperature of body 1, of body 2 and of the interface.
 OWNERS = {"T_1": 0, "T_2": 1, "T_c": 2}
@@ -91,7 +95,7 @@ def read_document(tree: Tree, base: str = ".", mechanism_text: str | None = None
     # A temperature that several owners name is shared: they are in perfect contact.
     owners = [body.mapping().get("temperature") for body in bodies.values()]
     temperatures = _temperature_names([*owners, interface.get("temperature")])
-    context = Context({**UNITS, **dict.fromkeys(temperatures, "K")}, temperatures, tuple(bodies))
+    context = Context({**UNITS, **dict.fromkeys(temperatures, "K")}, temperatures, tuple(bodies) or UNNAMED)
     mechanism = None
     if "mechanism" in interface:
         # Which solver runs decides whether a mechanism may ask Cantera for its rates.
@@ -118,9 +122,8 @@ def _temperature_names(owners: Sequence[Tree | None]) -> tuple[str, ...]:
 
 def scene_of(case: Document, mechanism: Mechanism | None) -> Scene:
     """The scene that the sections state."""
-    first, second = (_body(name, section) for name, section in case.bodies.items())
-    return Scene(
-        bodies=(first, second),
+    scene = Scene(
+        bodies=_bodies(case),
         interface=_interface(case, mechanism),
         heat=case.heat,
         loading=case.loading or {},
@@ -132,6 +135,24 @@ def scene_of(case: Document, mechanism: Mechanism | None) -> Scene:
         transverse=case.mechanics.transverse,
         programme=_stages(case),
     )
+    if case.bodies:
+        return scene
+    # One history for all three, so that a change of it is one of all.
+    given: Load = case.interface.temperature  # type: ignore[assignment]
+    return replace(
+        scene, interface=replace(scene.interface, temperature=SHARED), loading={SHARED: given, **scene.loading}
+    )
+
+
+def _bodies(case: Document) -> tuple[Body, Body]:
+    """The two bodies; where a case leaves them out reservoirs at the given temperature of the interface."""
+    if not case.bodies and not isinstance(case.interface.temperature, Load):
+        message = "the two bodies, of which the first is body 1, for example `bodies: {lower: {...}, upper: {...}}`"
+        raise case.tree.error(f"the case needs `bodies`: {message}; or `interface: {{temperature: 300 K}}`.")
+    if not case.bodies:
+        return Body(UNNAMED[0], SHARED), Body(UNNAMED[1], SHARED)
+    first, second = (_body(*item) for item in case.bodies.items())
+    return first, second
 
 
 def _body(name: str, section: BodySection) -> Body:
@@ -165,7 +186,7 @@ def _interface(case: Document, mechanism: Mechanism | None) -> Interface:
         section.potential,
         section.friction,
         section.bonding,
-        _sites(section, list(case.bodies)),
+        _sites(section, list(case.bodies or UNNAMED)) or _one_site(case),
         partition,
         limits=section.limits,
         loss=loss,
@@ -202,6 +223,13 @@ def _partition(case: Document) -> tuple[float, float]:
         message = "the surroundings have no temperature. Add `surroundings: {temperature: ...}`."
         raise section.error(message, "partition")
     return shares.get(next(iter(case.bodies)), 0.0), shares.get("surroundings", 0.0)
+
+
+def _one_site(case: Document) -> Sites | None:
+    """One site per square metre for bonds whose density nothing reads: under a given force, without stored energy."""
+    section = case.interface
+    alone = section.bonding and not section.potential and not section.has("mechanism")
+    return Sites(1.0, 1.0) if alone and "f" in (case.loading or {}) else None
 
 
 def _sites(section: InterfaceSection, bodies: Sequence[str]) -> Sites | None:

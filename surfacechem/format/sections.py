@@ -575,8 +575,9 @@ class Document(Section):
     )
     bodies: Mapping[str, BodySection] = key(
         Entries(others=Nested(BodySection), pattern=BODY_NAME, words="two bodies by name"),
-        "the two bodies, of which the first is body 1, for example `bodies: {lower: {...}, upper: {...}}`",
-        REQUIRED,
+        "the two bodies, of which the first is body 1, for example `bodies: {lower: {...}, upper: {...}}`; where the "
+        "interface has a given temperature they may be left out, and have it too",
+        MappingProxyType({}),
     )
     interface: InterfaceSection = key(Nested(InterfaceSection), default=InterfaceSection())
     heat: Sequence[HeatTransfer] = key(ListOf(OneLaw(HeatTransfer)), "heat paths", ())

@@ -12,6 +12,7 @@ from case_runs import load, solved
 import surfacechem
 from surfacechem.errors import InputError
 from surfacechem.format import load_text, names
+from surfacechem.quantities import BOLTZMANN
 from surfacechem.results.accuracy import largest_errors
 from surfacechem.results.error_estimates import against_exact, against_tighter, floors
 from surfacechem.runs.simulation import Simulation
@@ -186,3 +187,17 @@ def test_the_error_estimate_is_true():
     )
     for name in estimate.variables:
         assert 0.1 < estimate.variables[name] / exact.variables[name] < 10
+
+
+def test_a_single_bond_needs_a_bond_a_force_and_a_temperature():
+    bond = (
+        "bonding: [bell: {k_off: 0.1 s-1, x_off: 0.4 nm}]}\nloading: {f: {ramp: {rate: 100 pN/s}}}\ninitial: {phi: 1}\n"
+    )
+    short = surfacechem.load("interface: {temperature: 300 K, " + bond + "run: {until: 0.8 s}\n")
+    solution, growth = short.run(), 0.4e-9 * 1e-10 / (BOLTZMANN * 300)  # of the rate of rupture [1/s]
+    survival = np.exp(-0.1 / growth * np.expm1(growth * solution["time"].values))
+    np.testing.assert_allclose(solution["phi"], survival, rtol=0, atol=1e-10)
+    warmer = short.run({"interface.temperature.level": "310 K"})
+    assert float(warmer["T"][0]) == 310.0
+    with pytest.raises(InputError, match=r"the case needs `bodies`: .*; or `interface: \{temperature: 300 K\}`"):
+        surfacechem.load("interface: {" + bond + "run: {until: 0.8 s}\n")
