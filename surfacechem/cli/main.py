@@ -310,7 +310,9 @@ def mechanism(
 
 @app.command(epilog=EXIT_CODES)
 def plot(
-    source: Annotated[str, Argument(metavar="FILE.nc|CASE", help="A dataset, or a case to run first.")],
+    source: Annotated[
+        str, Argument(metavar="FILE.nc|CASE", help="A dataset, a store (.zarr), or a case to run first.")
+    ],
     output: Annotated[Path | None, written_to(".png, .svg or .pdf; <name>.png if not given.")] = None,
     variables: Annotated[str | None, Option("--variables", help="Variables to plot, with commas between.")] = None,
     against: Annotated[
@@ -324,7 +326,7 @@ def plot(
     from surfacechem.runs.simulation import load
 
     # By its suffix, as a dataset that is missing must not be taken for the name of a case.
-    is_file = source.endswith(SUFFIXES)
+    is_file = source.rstrip("/").endswith((*SUFFIXES, ".zarr"))
     if is_file and changes:
         raise InputError("a dataset is plotted as it is; give a case to change values of.", Place(path="--set"))
     target = output or Path(f"{Path(source).stem}.png")

@@ -87,6 +87,10 @@ def opened(data: xarray.Dataset | str | Path) -> xarray.Dataset:
     if isinstance(data, xarray.Dataset):
         return data
     path = Path(data)
+    if path.suffix == ".zarr":
+        from surfacechem.results import store
+
+        return store.opened(path)
 
     def load() -> xarray.Dataset:
         with xarray.open_dataset(path, engine="netcdf4") as file:

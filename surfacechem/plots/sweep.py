@@ -11,8 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from surfacechem.errors import InputError, suggestion
-from surfacechem.format.plans import STATISTICS, recorded_plan
-from surfacechem.plots import style
+from surfacechem.format.plans import RUN, STATISTICS, recorded_plan
+from surfacechem.plots import members, style
 from surfacechem.plots.run import KINDS, of_kind
 from surfacechem.plots.style import COLOURS, Array, meaning, symbol, unit, unit_text, varies
 
@@ -29,6 +29,9 @@ def figure(dataset: xarray.Dataset, variables: Sequence[str] | None = None) -> F
     """The figure of a sweep: the load at rupture, else final values."""
     axes = _axes(dataset) if "status" in dataset else []
     style.check(dataset, {}, {"status": tuple(axes)})
+    plan = recorded_plan(dataset.attrs["sweep"])
+    if are_many(dataset, axes):
+        return members.figure(dataset, plan, variables)
     if not all(name in dataset.coords for name in axes) or not 1 <= len(axes) <= MOST_DRAWN:
         raise InputError("the dataset does not hold the parameters of a sweep.")
     style.check(dataset, {"time_reached": tuple(axes), **{name: (name,) for name in axes}})
@@ -38,12 +41,19 @@ def figure(dataset: xarray.Dataset, variables: Sequence[str] | None = None) -> F
         for ax, draw in zip(grid[:, 0], panels, strict=True):
             draw(ax)
             style.legend(ax)
-            if recorded_plan(str(dataset.attrs["sweep"])).axes[0].logarithmic:
+            if plan.axes[0].logarithmic:
                 ax.set_xscale("log")
         parameter = dataset[axes[0]]
         grid[-1, 0].set_xlabel(f"{meaning(parameter, ' (')} [{unit_text(unit(parameter))}]")
         style.headings(plot, grid[0, 0], dataset)
     return plot
+
+
+def are_many(dataset: xarray.Dataset, axes: Sequence[str]) -> bool:
+    """Whether curves over the first parameter, one for each value of another, do not show the runs."""
+    spectral = any(str(name).endswith("_mode") for name in dataset)
+    curves = len(axes) == MOST_DRAWN and dataset.sizes[axes[1]] > MOST_CURVES
+    return not spectral and (RUN in axes or len(axes) > MOST_DRAWN or curves)
 
 
 def _axes(dataset: xarray.Dataset) -> list[str]:

@@ -219,7 +219,10 @@ def opened(path: str | Path) -> xarray.Dataset:
     import xarray
 
     _zarr()
-    found: xarray.Dataset = xarray.open_zarr(path, chunks=None)
+    try:
+        found: xarray.Dataset = xarray.open_zarr(path, chunks=None)
+    except (OSError, LookupError, ValueError, TypeError) as error:
+        raise InputError(f"is no readable store: {' '.join(str(error).split())}.", Place(str(path))) from None
     return found
 
 

@@ -133,7 +133,7 @@ class Job:
 def _runs_of(job: Job) -> ChunkRuns:
     from surfacechem.runs.simulation import Simulation
 
-    case = cases.load_text(job.case, job.name, mechanism_text=job.mechanism)
+    case = cases.load_text(job.case, job.name, mechanism_text=job.mechanism, allow_code=True)
     simulation = Simulation(replace(case, own_run=job.run))
     return ChunkRuns(simulation, recorded_plan(job.plan), keeping.recorded_keep(job.keep), json.loads(job.changes))
 
@@ -229,11 +229,10 @@ def failed_runs(path: Path, status: str) -> Plan:
     """The plan of the runs of a store that ended in one way; InputError where none has, or nothing is stored."""
     if status not in STATUSES:
         raise InputError(f"no runs are called '{status}'.{suggestion(status, STATUSES)}", Place(path="--only"))
-    try:
-        data = opened(path)
-        codes, plan = data["status"].values.ravel(), recorded_plan(data.attrs["sweep"])
-    except (OSError, LookupError, ValueError) as error:
-        raise InputError(f"is no store of a sweep: {' '.join(str(error).split())}.", Place(str(path))) from None
+    data = opened(path)
+    if "sweep" not in data.attrs:
+        raise InputError("is no store of a sweep.", Place(str(path)))
+    codes, plan = data["status"].values.ravel(), recorded_plan(data.attrs["sweep"])
     found = np.flatnonzero(codes == STATUSES.index(status))
     if not len(found):
         raise InputError(f"no run of it is {status}.", Place(str(path)))
@@ -303,6 +302,7 @@ def _attributes(chunks: ChunkRuns, job: Job) -> dict[str, Any]:
         "changes": job.changes,
         "run": json.dumps({**asdict(chunks.run), "times": list(chunks.run.times)}),
         "runs": chunks.plan.size,
+        "coordinates": " ".join(sweeps.parameter_names(chunks.model.system, chunks.plan)),
         "check": chunks.checked,
         "regime": chunks.model.system.regime,
         "reasons": chunks.one_by_one.reasons,

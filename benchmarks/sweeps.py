@@ -1,0 +1,191 @@
+"""Sweeps into a store: time of all and of the stepper alone, memory, and the same work by other libraries.
+
+Times are seconds of processors, so that what else a machine does counts as little as can be; each figure is that of a
+process of its own. ``python benchmarks/sweeps.py [RUNS]``; peers that are not installed are left out.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import time
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+K_0 = "interface.potential.bond-energy.K_0"
+ENDS = {"last": ["T", "phi"]}
+SWEPT = {
+    "exothermic": (K_0, 1.0, 300.0, ENDS),
+    "shared-load-rupture": ("loading.t_n", 600.0, 1000.0, {"last": ["phi"]}),
+    "stick-slip": ("interface.friction.coulomb.mu_s", 0.5, 0.7, {"last": ["u_t"], "events": "all"}),
+    "debonding": ("interface.limits.tensile-strength.t_max", 2e7, 1e9, {"last": ["T"], "events": "all"}),
+}
+
+
+def stored(case: str, runs: int) -> dict[str, float]:
+    """A sweep into a store, and the same columns without one."""
+    import resource
+
+    import numpy as np
+    import xarray  # noqa: F401 - how long it takes to import is not that of opening a store
+
+    import surfacechem
+    from surfacechem.runs.checking import check
+    from surfacechem.solve.radau import stepper
+
+    path, low, high, keep = SWEPT[case]
+    section = {"over": {path: {"from": low, "to": high, "points": runs}}, "keep": keep}
+    simulation = surfacechem.load(case, {"sweep": section})
+    inside, run = [0.0], stepper.run
+
+    def timed(*given: object) -> None:
+        begun = time.thread_time()
+        run(*given)
+        inside[0] += time.thread_time() - begun
+
+    stepper.run = timed
+    with TemporaryDirectory() as folder:
+        stream = simulation.stream(simulation.plan(), Path(folder) / "o.zarr")
+        stream.chunks.columns(np.arange(2))  # what is compiled when it is first needed
+        inside[0], wall, processors = 0.0, time.perf_counter(), time.process_time()
+        store = stream.run()
+        found = {"wall": time.perf_counter() - wall, "all": time.process_time() - processors, "stepper": inside[0]}
+        found["MB"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+        begun = time.process_time()
+        checked = check(stream)
+        begun = time.process_time() - begun
+        opened = time.perf_counter()
+        store.dataset  # noqa: B018
+        found |= {"check": begun, "error": checked.error, "open": time.perf_counter() - opened}
+    return found
+
+
+def peer(name: str, runs: int) -> dict[str, float]:
+    """End values of exothermic bonding by another library, as its documentation says many runs are made."""
+    import numpy as np
+
+    # phi' = (c_r / n_c) (K_0 (1 - phi) ...): the equations that `surfacechem equations exothermic` prints.
+    import surfacechem
+
+    case = surfacechem.load("exothermic")
+    values = np.linspace(1.0, 300.0, runs)
+    exact = case.run({K_0: float(values[runs // 2])}).dataset
+    end, truth = float(exact["time"][-1]), np.array([exact["phi"].values[-1], exact["T"].values[-1]])
+    times = []
+    for some in (values[: runs // 10], values):  # what is set up once for all counts in neither
+        begun = time.process_time()
+        ends = PEERS[name](case, some, end)
+        times.append(time.process_time() - begun)
+    return {"all": (times[1] - times[0]) / 0.9, "error": float(np.max(np.abs(ends[runs // 2] / truth - 1)))}
+
+
+RATE = 6.6666666666666667e15 / 1e18
+"""Bonding coefficient over the density of sites; both bodies together take up 2 J/(m^2 K) times T / T_0."""
+
+
+def _heyoka(case, values, end):
+    import heyoka
+    import numpy as np
+
+    phi, T = heyoka.make_vars("phi", "T")
+    rate = RATE * heyoka.par[0] * (1 - phi)
+    heat = heyoka.par[0] * (1 - phi) * rate * 300.0 / (2.0 * T)
+    width = heyoka.recommended_simd_size()
+    solver = heyoka.taylor_adaptive_batch([(phi, rate), (T, heat)], np.zeros((2, width)), tol=1e-11)
+    found = np.empty((len(values), 2))
+    for first in range(0, len(values), width):
+        some = np.resize(values[first : first + width], width)
+        solver.set_time(0.0)
+        solver.state[:] = [np.zeros(width), np.full(width, 300.0)]
+        solver.pars[:] = some
+        solver.propagate_until(end)
+        found[first : first + width] = solver.state.T[: len(found) - first]
+    return found
+
+
+SBML = """<sbml xmlns="http://www.sbml.org/sbml/level3/version1/core" level="3" version="1"><model>
+<listOfParameters><parameter id="phi" value="0" constant="false"/><parameter id="T" value="300" constant="false"/>
+<parameter id="K" value="300" constant="true"/><parameter id="r" value="{rate!r}" constant="true"/></listOfParameters>
+<listOfRules><rateRule variable="phi"><math xmlns="http://www.w3.org/1998/Math/MathML"><apply><times/><ci>r</ci>
+<ci>K</ci><apply><minus/><cn>1</cn><ci>phi</ci></apply></apply></math></rateRule><rateRule variable="T">
+<math xmlns="http://www.w3.org/1998/Math/MathML"><apply><divide/><apply><times/><cn>150</cn><ci>r</ci><ci>K</ci><ci>K</ci>
+<apply><minus/><cn>1</cn><ci>phi</ci></apply><apply><minus/><cn>1</cn><ci>phi</ci></apply></apply><ci>T</ci></apply>
+</math></rateRule></listOfRules></model></sbml>"""
+
+
+def _roadrunner(case, values, end):
+    import numpy as np
+    import roadrunner
+
+    model = roadrunner.RoadRunner(SBML.format(rate=RATE))
+    model.integrator.relative_tolerance, model.integrator.absolute_tolerance = 1e-12, 1e-14
+    found = np.empty((len(values), 2))
+    for i, value in enumerate(values):
+        model.reset()
+        model["K"] = value
+        model.simulate(0, end, 2)
+        found[i] = model["phi"], model["T"]
+    return found
+
+
+def _sundae(case, values, end):
+    import numpy as np
+    from sksundae.cvode import CVODE
+
+    found, state = np.empty((len(values), 2)), [0.0]
+
+    def rates(_t, y, yp):
+        rate = RATE * state[0] * (1 - y[0])
+        yp[0] = rate
+        yp[1] = state[0] * (1 - y[0]) * rate * 300.0 / (2.0 * y[1])
+
+    solver = CVODE(rates, rtol=1e-12, atol=1e-14)
+    for i, value in enumerate(values):
+        state[0] = value
+        found[i] = solver.solve(np.array([0.0, end]), np.array([0.0, 300.0])).y[-1]
+    return found
+
+
+PEERS = {"heyoka": _heyoka, "libroadrunner": _roadrunner, "scikit-sundae": _sundae}
+
+
+def measured(*what: str) -> dict[str, float] | None:
+    """A figure from a process of its own; None where its library is missing."""
+    done = subprocess.run([sys.executable, __file__, "--one", *what], capture_output=True, text=True, check=False)
+    if done.returncode:
+        print(f"{what[0]:20} {done.stderr.strip().splitlines()[-1]}")
+        return None
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+def main(runs: int) -> None:
+    """Print a row for each case and each peer."""
+    print(
+        f"{'case':20} {'runs':>8} {'us/run':>8} {'stepper':>8} {'s':>7} {'MB':>6} {'check s':>8} {'open s':>7}  error"
+    )
+    for case, count in (
+        ("exothermic", runs // 10),
+        ("exothermic", runs),
+        ("shared-load-rupture", runs // 10),
+        ("stick-slip", runs // 1000),
+        ("debonding", runs // 1000),
+    ):
+        if found := measured(case, str(count)):
+            each, alone = (found[name] / count * 1e6 for name in ("all", "stepper"))
+            print(
+                f"{case:20} {count:8} {each:8.1f} {alone:8.1f} {found['wall']:7.1f} {found['MB']:6.0f}"
+                f" {found['check']:8.1f} {found['open']:7.2f}  {found['error']:.0e}"
+            )
+    for name in PEERS:
+        count = max(1000, runs // 100)
+        if found := measured(name, str(count)):
+            print(f"{name:20} {count:8} {found['all'] / count * 1e6:8.1f} {'':32}  error {found['error']:.0e}")
+
+
+if __name__ == "__main__":
+    if sys.argv[1:2] == ["--one"]:
+        name, count = sys.argv[2], int(sys.argv[3])
+        print(json.dumps(stored(name, count) if name in SWEPT else peer(name, count)))
+    else:
+        main(int(float(sys.argv[1])) if len(sys.argv) > 1 else 1_000_000)

@@ -1,0 +1,165 @@
+"""Figures of many runs: heat maps over two parameters, distributions of samples, effects of many parameters, curves."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import xarray
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from surfacechem.errors import InputError, suggestion
+from surfacechem.format.plans import RUN, Plan
+from surfacechem.plots import style
+from surfacechem.plots.style import COLOURS, Array, symbol, unit, unit_text, varies
+
+MOST_MEMBERS = 100
+"""Curves that are drawn of a sample; of more runs a fair part, evenly spread over their numbers."""
+
+MOST_POINTS = 2**20
+"""Runs whose values are drawn; of more a fair part."""
+
+MOST_PANELS = 3
+
+TIME_UNIT = "s"
+
+BINS, PARTS = 40, 12
+"""Bars of a distribution, and parts of the range of a parameter in each of which the effect is shown."""
+
+BAND = (5.0, 50.0, 95.0)
+"""Percentiles of a distribution that are drawn."""
+
+
+def figure(dataset: xarray.Dataset, plan: Plan, variables: Sequence[str] | None = None) -> Figure:
+    """The figure of a grid of two parameters, of a sample, or of more parameters."""
+    axes = [str(name) for name in dataset["status"].dims]
+    parameters = [str(name) for name, x in dataset.coords.items() if len(x.dims) == 1 and x.dims[0] in axes]
+    names = chosen(dataset, axes, variables)
+    if dataset[names[0]].ndim > len(axes):
+        return curves(dataset, axes, names)
+    if len(axes) == 2 and RUN not in axes:
+        return maps(dataset, plan, axes, names)
+    return effects(dataset, plan, axes, parameters, names)
+
+
+def chosen(dataset: xarray.Dataset, axes: Sequence[str], variables: Sequence[str] | None) -> list[str]:
+    """The variables that are drawn: those asked for, else those of the ends that differ from run to run."""
+    known = [str(n) for n, x in dataset.data_vars.items() if x.dtype.kind == "f" and x.dims[: len(axes)] == tuple(axes)]
+    for name in variables or ():
+        if name not in known:
+            raise InputError(f"no variable '{name}' in the sweep.{suggestion(name, known)}")
+    return list(dict.fromkeys(variables)) if variables else differing(dataset, axes, known)
+
+
+def differing(dataset: xarray.Dataset, axes: Sequence[str], known: Sequence[str]) -> list[str]:
+    """Of the numbers of each run those that differ from run to run: of phases and temperatures, then of events."""
+    ranks = ("phi", "T", "time_to", "time", "")
+    found = sorted(known, key=lambda name: next(k for k, start in enumerate(ranks) if name.startswith(start)))
+    ends = [name for name in found if dataset[name].ndim == len(axes) and "error" not in name]
+    return ([name for name in ends if varies(fair(dataset, name))] or ["time_reached"])[:MOST_PANELS]
+
+
+def fair(dataset: xarray.Dataset, name: str) -> Array:
+    """Finite values of a variable, of a fair part of the runs where they are many."""
+    values = dataset[name].values.ravel()
+    return np.asarray(values[:: -(-values.size // MOST_POINTS)], dtype=float)
+
+
+def axis_label(values: xarray.DataArray) -> str:
+    """Name and unit of a parameter, or of a time."""
+    name = str(values.name)
+    words = name.replace("_", " ") if len(name.partition("_")[0]) > 1 else symbol(name)
+    return f"{words} [{unit_text(unit(values))}]"
+
+
+def quantity_label(values: xarray.DataArray) -> str:
+    """Name and unit of a variable."""
+    is_time = unit(values) == TIME_UNIT
+    return axis_label(values) if is_time else f"{symbol(str(values.name))} [{unit_text(unit(values))}]"
+
+
+def maps(dataset: xarray.Dataset, plan: Plan, axes: Sequence[str], names: Sequence[str]) -> Figure:
+    """Colours over two parameters, a map for each variable; white where a run has no value."""
+    x, y = (dataset[name] for name in axes)
+    with style.panels(5.6, 0.6 + 3.3 * len(names), len(names), sharex=True) as (plot, grid):
+        for ax, name in zip(grid[:, 0], names, strict=True):
+            values = np.ma.masked_invalid(dataset[name].values)
+            image = ax.pcolormesh(x.values, y.values, values.T, shading="nearest", cmap="viridis", rasterized=True)
+            plot.colorbar(image, ax=ax, label=quantity_label(dataset[name]))
+            ax.set_ylabel(axis_label(y))
+            if plan.axes[0].logarithmic:
+                ax.set_xscale("log")
+            if plan.axes[1].logarithmic:
+                ax.set_yscale("log")
+        grid[-1, 0].set_xlabel(axis_label(x))
+        style.headings(plot, grid[0, 0], dataset)
+    return plot
+
+
+def curves(dataset: xarray.Dataset, axes: Sequence[str], names: Sequence[str]) -> Figure:
+    """Series of all runs, or of a fair part of them, which the figure says."""
+    count = int(np.prod([dataset.sizes[name] for name in axes]))
+    members = np.unique(np.linspace(0, count - 1, min(count, MOST_MEMBERS)).round().astype(np.int64))
+    with style.panels(6.4, 0.9 + 2.2 * len(names), len(names), sharex=True) as (plot, grid):
+        for ax, name in zip(grid[:, 0], names, strict=True):
+            values = dataset[name].values.reshape(count, -1)[members]
+            along = dataset[dataset[name].dims[-1]]
+            ax.plot(along.values, values.T, color=COLOURS[0], linewidth=0.7, alpha=0.35)
+            ax.set_ylabel(quantity_label(dataset[name]))
+            ax.set_xlabel(axis_label(along) if ax is grid[-1, 0] else "")
+        style.headings(plot, grid[0, 0], dataset)
+        grid[0, 0].set_title(f"{len(members)} of {count} runs", loc="left", fontsize=8, color="#555555")
+    return plot
+
+
+def effects(
+    dataset: xarray.Dataset, plan: Plan, axes: Sequence[str], parameters: Sequence[str], names: Sequence[str]
+) -> Figure:
+    """The distribution of each variable, and its median and band over each parameter, whatever the others are."""
+    logarithmic = [axis.logarithmic for axis in plan.axes] + [False] * len(parameters)
+    with style.panels(
+        2.2 + 2.0 * len(parameters), 0.8 + 2.1 * len(names), len(names), 1 + len(parameters), sharey="row"
+    ) as (plot, grid):
+        for row, name in zip(grid, names, strict=True):
+            whole = dataset[name]
+            values = fair(dataset, name)
+            distribution(row[0], values)
+            row[0].set_ylabel(quantity_label(whole))
+            for ax, parameter, ratios in zip(row[1:], parameters, logarithmic, strict=False):
+                over = dataset[parameter].broadcast_like(whole).transpose(*axes).values.ravel()
+                effect(ax, over[:: -(-over.size // MOST_POINTS)], values, ratios)
+        for ax, parameter in zip(grid[-1, 1:], parameters, strict=True):
+            ax.set_xlabel(axis_label(dataset[parameter]), fontsize=8)
+        grid[-1, 0].set_xlabel("runs")
+        style.headings(plot, grid[0, 0], dataset)
+        grid[0, 0].set_title("5, 50 and 95 % of the runs", loc="left", fontsize=8, color="#555555")
+    return plot
+
+
+def distribution(ax: Axes, values: Array) -> None:
+    """Bars along the axis of the values, with the median and the band."""
+    known = values[np.isfinite(values)]
+    if len(known):
+        ax.hist(known, bins=BINS, orientation="horizontal", color=COLOURS[0], alpha=0.6)
+        for level, width in zip(np.percentile(known, BAND), (0.8, 1.6, 0.8), strict=True):
+            ax.axhline(level, color="black", linewidth=width)
+
+
+def effect(ax: Axes, over: Array, values: Array, logarithmic: bool) -> None:
+    """Median and band of the values in parts of a parameter with as many runs each, or at each of its values."""
+    known = np.isfinite(values) & np.isfinite(over)
+    over, values = over[known], values[known]
+    if not len(over):
+        return
+    if len(places := np.unique(over)) > PARTS:
+        ends = np.unique(np.quantile(over, np.linspace(0, 1, PARTS + 1)))
+        part = np.clip(np.searchsorted(ends, over, side="right") - 1, 0, len(ends) - 2)
+        places = np.array([np.median(over[part == k]) for k in range(len(ends) - 1)])
+    else:
+        part = np.searchsorted(places, over)
+    low, middle, high = np.array([np.percentile(values[part == k], BAND) for k in range(len(places))]).T
+    ax.fill_between(places, low, high, color=COLOURS[1], alpha=0.25, linewidth=0)
+    ax.plot(places, middle, color=COLOURS[1], marker="o", markersize=2.5)
+    if logarithmic:
+        ax.set_xscale("log")

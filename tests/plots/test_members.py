@@ -1,0 +1,77 @@
+"""Figures of many runs: what they show is what the dataset holds."""
+
+import numpy as np
+import pytest
+
+import surfacechem
+from surfacechem import plots
+from surfacechem.errors import InputError
+from surfacechem.results.store import opened
+
+pytestmark = pytest.mark.around
+
+K_0, C_R = "interface.potential.bond-energy.K_0", "interface.bonding.linear-affinity.c_r"
+SAMPLE = {
+    "of": {K_0: {"normal": {"mean": 200, "std": 20}}, C_R: {"lognormal": {"median": 6e15, "sigma": 0.2}}},
+    "runs": 128,
+}
+
+
+def stored(folder, **section):
+    simulation = surfacechem.load("exothermic", {"sweep": {"checked": 0, **section}})
+    simulation.stream(simulation.plan(), folder / "o.zarr").run()
+    return folder / "o.zarr"
+
+
+@pytest.fixture(scope="module")
+def drawn(tmp_path_factory):
+    keep = {"last": ["T", "phi"], "series": ["phi"]}
+    return stored(tmp_path_factory.mktemp("drawn"), sample=SAMPLE, keep=keep)
+
+
+def test_a_map_over_two_parameters(tmp_path):
+    over = {
+        K_0: {"from": 1, "to": 300, "points": 9, "spacing": "logarithmic"},
+        "initial.T": [290 + k for k in range(8)],
+    }
+    path = stored(tmp_path, over=over, keep={"last": ["T"]})
+    plot = plots.figure(path)
+    ax = plot.axes[0]
+    assert np.array_equal(ax.collections[0].get_array(), opened(path)["T_last"].values.T)
+    assert (ax.get_xscale(), ax.get_yscale()) == ("log", "linear")
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("$K_{0}$ [J m$^{-2}$]", "initial T [K]")
+
+
+def test_distributions_and_effects_of_a_sample(drawn):
+    data = opened(drawn)
+    plot = plots.figure(drawn)
+    rows = np.array(plot.axes).reshape(2, 3)
+    heights = [sum(bar.get_width() for bar in row[0].patches) for row in rows]
+    assert heights == [128, 128]
+    middle = rows[1, 0].lines[1].get_ydata()[0]
+    assert middle == np.median(data["T_last"].values)
+    assert {ax.get_xlabel() for ax in rows[1, 1:]} == {"$K_{0}$ [J m$^{-2}$]", "$c_{r}$ [J$^{-1}$ s$^{-1}$]"}
+    (effect,) = (ax for ax in rows[1] if ax.get_xlabel().startswith("$K"))
+    assert np.all(np.diff(effect.lines[0].get_ydata()) > 0)
+
+
+def test_curves_of_a_sample_are_a_fair_part_that_is_said(drawn):
+    (ax,) = plots.figure(drawn, ["phi"]).axes
+    assert (len(ax.lines), ax.get_title("left")) == (100, "100 of 128 runs")
+    assert np.array_equal(ax.lines[-1].get_ydata(), opened(drawn)["phi"].values[-1])
+
+
+def test_effects_of_three_parameters_of_a_grid(tmp_path):
+    over = {K_0: [100.0, 200.0, 300.0], "initial.T": [290.0, 310.0], C_R: [5e15, 7e15]}
+    path = stored(tmp_path, over=over, keep={"last": ["T"]})
+    effect = next(ax for ax in plots.figure(path, ["T_last"]).axes if ax.get_xlabel().startswith("$K"))
+    x, y = effect.lines[0].get_data()
+    assert x.tolist() == [100, 200, 300]
+    assert y.tolist() == np.median(opened(path)["T_last"].values, axis=(1, 2)).tolist()
+
+
+def test_what_cannot_be_drawn_is_refused(drawn, tmp_path):
+    with pytest.raises(InputError, match=r"no variable 'T_lst' in the sweep. Did you mean 'T_last'"):
+        plots.figure(drawn, ["T_lst"])
+    with pytest.raises(InputError, match="is no readable store"):
+        plots.figure(tmp_path / "missing.zarr")
