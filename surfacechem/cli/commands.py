@@ -99,6 +99,11 @@ def _tell(message: object) -> None:
 class Commands(TyperGroup):
     """Commands whose errors are one message on stderr and an exit code."""
 
+    def list_commands(self, ctx: Any) -> list[str]:
+        """Names of the commands, in the order in which one uses them."""
+        names = super().list_commands(ctx)
+        return sorted(names, key=lambda name: ORDER.index(name) if name in ORDER else len(ORDER))
+
     def main(self, *arguments: Any, **options: Any) -> Any:
         """Run the command line, with fewer collections of garbage: at the usual rate they are a tenth of a command,
         for what imports make is never garbage.
@@ -138,9 +143,43 @@ def written_to(text: str) -> Any:
     return Option("--output", "-o", help=text)
 
 
-CaseName = Annotated[str, Argument(metavar="CASE", help="A case file, or the name of a shipped case.")]
+ORDER = (
+    *("new", "cases", "laws", "check", "run", "plot", "report", "sweep", "evaluate", "equations", "mechanism", "rerun"),
+    *("precision", "stability", "figures", "schema"),
+)
+"""Commands in the order in which one uses them; others follow."""
+
+
+def case_names(incomplete: str) -> list[str]:
+    """Shipped cases and case files that begin so, for the completion of shells."""
+    from surfacechem.format import names
+
+    files = [str(path) for path in Path().glob("*.yaml")]
+    return [name for name in (*names(), *files) if name.startswith(incomplete)]
+
+
+def law_names(incomplete: str) -> list[str]:
+    """Laws that begin so."""
+    from surfacechem.laws import FAMILIES, laws
+
+    return [name for contract in FAMILIES for name in laws(contract) if name.startswith(incomplete)]
+
+
+def paths(ctx: typer.Context, incomplete: str) -> list[str]:
+    """Paths of the parameters and initial values of the case on the line, for what is changed."""
+    from surfacechem.runs.simulation import load
+
+    with suppress(SurfacechemError):
+        return [f"{path}=" for path in load(ctx.params["case"]).model.values() if path.startswith(incomplete)]
+    return []
+
+
+CaseName = Annotated[
+    str, Argument(metavar="CASE", help="A case file, or the name of a shipped case.", autocompletion=case_names)
+]
 Changes = Annotated[
-    list[str] | None, Option("--set", metavar="PATH=VALUE", help="Change a value of the case; repeatable.")
+    list[str] | None,
+    Option("--set", metavar="PATH=VALUE", help="Change a value of the case; repeatable.", autocompletion=paths),
 ]
 SolverName = Annotated[str | None, Option("--solver", help="Another solver than the case's.")]
 SolverNames = Annotated[

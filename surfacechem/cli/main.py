@@ -25,8 +25,10 @@ from surfacechem.cli.commands import (
     SolverNames,
     Tolerance,
     Wanted,
+    case_names,
     check_picture,
     chosen,
+    law_names,
     leave_with,
     listed,
     refuse_unwritable,
@@ -44,7 +46,6 @@ app = typer.Typer(
     cls=Commands,
     help="Contact interfaces that bond, slide, break and heat.",
     epilog=EXIT_CODES,
-    add_completion=False,
     no_args_is_help=True,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
@@ -202,7 +203,10 @@ def evaluate(
     changes: Changes = None,
     quiet: Quiet = False,
 ) -> None:
-    """Evaluate a case at given states: tractions, fluxes, rates, energies and their exact derivatives."""
+    """Evaluate a case at given states, with exact derivatives.
+
+    Tractions, fluxes, rates, energies, entropies and heat capacities, without a run.
+    """
     from surfacechem.results.netcdf import dataset_path
     from surfacechem.runs.points import read_points
     from surfacechem.runs.simulation import load
@@ -242,7 +246,9 @@ def equations(
 
 @app.command(epilog=EXIT_CODES)
 def laws(
-    name: Annotated[str | None, Argument(help="Show all about this law, or about those of this contract.")] = None,
+    name: Annotated[
+        str | None, Argument(help="Show all about this law, or about those of this contract.", autocompletion=law_names)
+    ] = None,
     file: Annotated[
         Path | None, Option("--from", metavar="FILE.py", help="A file with laws of your own, whose code is run.")
     ] = None,
@@ -274,12 +280,37 @@ def schema() -> None:
     typer.echo(text(), nl=False)
 
 
-@app.command()
-def cases() -> None:
-    """List the cases that come with the package."""
-    from surfacechem.runs.listing import case_table
+@app.command(epilog=EXIT_CODES)
+def cases(
+    show: Annotated[
+        str | None, Option("--show", metavar="NAME", help="Print this case.", autocompletion=case_names)
+    ] = None,
+) -> None:
+    """List the cases that come with the package, or print one."""
+    from surfacechem.runs.listing import case_table, case_text
 
-    typer.echo(case_table())
+    typer.echo(case_text(show) if show else case_table(), nl=not show)
+
+
+@app.command(epilog=EXIT_CODES)
+def new(
+    file: Annotated[Path, Argument(metavar="FILE.yaml", help="The case file to write; none is overwritten.")],
+    like: Annotated[
+        str, Option("--from", metavar="NAME", help="The shipped case to begin with.", autocompletion=case_names)
+    ] = "exothermic",
+) -> None:
+    """Begin a case of your own from a shipped one."""
+    from surfacechem.results.netcdf import replacing
+    from surfacechem.runs.listing import case_text
+
+    if file.suffix.lower() not in (".yaml", ".yml"):
+        raise InputError(f"a case is YAML: give {file.with_suffix('.yaml').name}.", Place(path=str(file)))
+    if file.exists():
+        raise InputError("is there already; give another name.", Place(path=str(file)))
+    text = case_text(like)
+    with replacing(file) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+    typer.echo(f"{file}, from {like}. Next: `surfacechem check {file}`, then `surfacechem run {file}`.")
 
 
 @app.command(epilog=EXIT_CODES)
@@ -290,7 +321,7 @@ def mechanism(
     force: Annotated[str, Option("--force", help="Range of the force per bond, or one value.")] = "0..100 pN",
     output: Annotated[Path | None, written_to("Plot to .png, .svg or .pdf.")] = None,
 ) -> None:
-    """Print species, reactions, rates over temperature and force, and what is consistent."""
+    """Print species, reactions and rates, and what is consistent."""
     from surfacechem.mechanism import load_mechanism
     from surfacechem.studies import mechanism_report as report
     from surfacechem.studies.mechanism_rates import Curves
@@ -320,7 +351,7 @@ def plot(
     ] = None,
     changes: Changes = None,
 ) -> None:
-    """Plot a dataset or a case over time or one of its variables, or a sweep over its parameters."""
+    """Plot a run over time or a variable, or a sweep over parameters."""
     from surfacechem import plots
     from surfacechem.results.netcdf import SUFFIXES
     from surfacechem.runs.simulation import load
@@ -345,7 +376,10 @@ def figures(
     output: Annotated[Path, Option("-o", "--output", help="Folder of the figures.")] = Path("figures"),
     suffix: Annotated[str, Option("--format", help="svg, png or pdf.")] = "svg",
 ) -> None:
-    """Draw the figures of a list from runs, each with its exact curve and its distance from that."""
+    """Draw the figures of a list from runs.
+
+    Each with its exact curve and its distance from that.
+    """
     from surfacechem import plots
     from surfacechem.studies.figures import pictures, read_list
 
@@ -369,7 +403,10 @@ def report(
     output: Annotated[Path | None, written_to("HTML file; <name>.html if not given.")] = None,
     changes: Changes = None,
 ) -> None:
-    """Write one page about a run or a sweep that needs no network: scene, equations, figures, events, balances."""
+    """Write one page about a run or a sweep.
+
+    It needs no network: scene, equations, figures, events, balances, error against run time.
+    """
     from surfacechem.results.netcdf import SUFFIXES
     from surfacechem.runs.simulation import load
     from surfacechem.studies import run_report
@@ -433,7 +470,10 @@ def precision(
     changes: Changes = None,
     quiet: Quiet = False,
 ) -> None:
-    """Run cases with several solvers over tolerances: error against run time, as table, netCDF, figure and report."""
+    """Measure error against run time of several solvers.
+
+    As table, netCDF, figure and report.
+    """
     from surfacechem.studies import precision as studies
 
     settings = {
@@ -460,7 +500,10 @@ def stability(
     output: Annotated[Path | None, written_to("Name of .nc, .svg, .png and .html; stability if not given.")] = None,
     quiet: Quiet = False,
 ) -> None:
-    """Solve dangerous regimes over decades of their parameter with several solvers, and report what each keeps."""
+    """Solve dangerous regimes with several solvers.
+
+    Over decades of their parameter; reports how many digits each keeps.
+    """
     from surfacechem.studies import stability as studies
 
     settings = {"solvers": None if solvers is None else listed(solvers), "rtol": rtol, "rounds": search}

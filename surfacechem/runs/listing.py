@@ -148,6 +148,14 @@ def case_table() -> str:
     return "\n".join(f"{name:{width}}  {text}" for name, text in titles.items())
 
 
+def case_text(name: str) -> str:
+    """The text of a shipped case; InputError with the nearest name where there is none."""
+    known = {path.stem: path for path in cases().glob("*.yaml")}
+    if name not in known:
+        raise InputError(f"no case '{name}' comes with the package.{suggestion(name, known)}")
+    return known[name].read_text(encoding="utf-8")
+
+
 def title(path: Path) -> str:
     """The title of a case file."""
     from ruamel.yaml import YAML

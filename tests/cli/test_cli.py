@@ -5,6 +5,7 @@ import json
 import re
 import signal
 from importlib.metadata import version
+from types import SimpleNamespace
 
 import netCDF4
 import numpy as np
@@ -252,6 +253,31 @@ class TestListings:
         text = call(*command, "--help").stdout
         assert "130  interrupted" in text
         assert "3    the run was stopped by physics" in text
+
+
+def test_a_case_of_ones_own_begins_with_a_shipped_one(call, tmp_path):
+    text = (data.cases() / "stick-slip.yaml").read_text()
+    assert call("cases", "--show", "stick-slip").stdout == text
+    assert call("new", "mine.yaml", "--from", "stick-slip").exit_code == 0
+    assert (tmp_path / "mine.yaml").read_text() == text
+    again = call("new", "mine.yaml")
+    assert (again.exit_code, again.stderr) == (2, "surfacechem: mine.yaml: is there already; give another name.\n")
+    assert (
+        "no case 'stik-slip' comes with the package. Did you mean 'stick-slip'?"
+        in call("new", "other.yaml", "--from", "stik-slip").stderr
+    )
+    assert "a case is YAML: give other.yaml" in call("new", "other.txt").stderr
+
+
+def test_shells_complete_cases_laws_and_paths(call):
+    assert commands.case_names("stick-slip-r") == ["stick-slip-rebonding"]
+    assert commands.case_names("bond") == ["bond-constant-force", "bonding.yaml"]
+    assert commands.law_names("coul") == ["coulomb"]
+    on_the_line = SimpleNamespace(params={"case": "bonding.yaml"})
+    assert commands.paths(on_the_line, "initial.p") == ["initial.phi="]
+    assert commands.paths(SimpleNamespace(params={"case": "nowhere"}), "") == []
+    listed = re.findall(r"^  (\w+)", call("--help").stdout.partition("Commands:")[2], re.MULTILINE)
+    assert listed[: len(commands.ORDER)] == list(commands.ORDER)
 
 
 class TestRerun:
