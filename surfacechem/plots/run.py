@@ -19,7 +19,7 @@ from matplotlib.figure import Figure
 
 from surfacechem.errors import InputError, suggestion
 from surfacechem.plots import style
-from surfacechem.plots.style import Array, meaning, symbol, unit, unit_text, varies
+from surfacechem.plots.style import Array, meaning, symbol, unit, varies
 from surfacechem.tolerances import EPS, ROUNDING
 
 # Panels of the usual figure: title, unit and pattern of the names.
@@ -42,6 +42,10 @@ LEAST = EPS / 256
 
 # Times that span more than this go on a logarithmic axis, unless they are evenly spaced.
 DECADES = 1e3
+
+# Part of the run that is too short to be seen on a linear axis, and the part of its range by which a quantity has to
+# change within it to be shown on a logarithmic one; what comes before SHOWN of the run is left out of that.
+EARLY, MUCH, SHOWN = 5e-3, 0.3, 1e-7
 
 # A title of so many letters does not fit beside a panel.
 TOO_LONG = 26
@@ -87,10 +91,12 @@ def figure(dataset: xarray.Dataset, variables: Sequence[str] | None = None, agai
         if balances:
             _draw_balances(axes[-1], dataset)
         if against is None:
-            _draw_time(axes, dataset)
+            # Fluxes and powers follow from what changes: where they start is no reason for another axis.
+            _draw_time(axes, dataset, [name for p in panels if p.unit != "W m-2" for name in p.names])
         else:
-            axes[-1].set_xlabel(f"{meaning(dataset[against])} {symbol(against)} [{unit_text(unit(dataset[against]))}]")
-            axes[-1].ticklabel_format(axis="x", useOffset=False, scilimits=(-3, 5))
+            text, size = style.prefixed(unit(dataset[against]), dataset[against].values)
+            axes[-1].set_xlabel(f"{meaning(dataset[against])} {symbol(against)} [{text}]")
+            style.label_ticks(axes[-1].xaxis, size)
         style.headings(plot, axes[0], dataset)
     return plot
 
@@ -137,7 +143,10 @@ def _by_kind(dataset: xarray.Dataset, known: Sequence[str]) -> list[Panel]:
         names = of_kind(dataset, known, wanted, pattern)
         if title == "Heat flux" and {"q_1", "q_2"} & set(names):
             names = [name for name in names if name in ("q_1", "q_2")]
-        if any(varies(dataset[name].values) for name in names):
+        # What is nothing beside another quantity of its unit is rounding of what both are made of.
+        sizes = {name: style.largest(dataset[name].values) for name in known if unit(dataset[name]) == wanted}
+        felt = EPS * max(sizes.values(), default=0.0)
+        if any(varies(dataset[name].values) and sizes[name] > felt for name in names):
             panels.append(Panel(title, wanted, names))
     return panels
 
@@ -169,10 +178,11 @@ def _draw(ax: Axes, dataset: xarray.Dataset, panel: Panel, over: str) -> None:
     for name in exact:
         label = "exact" if name == exact[0] else "_"
         ax.plot(t, dataset[name].values, "--", color="black", linewidth=0.9, label=label)
-    ax.set_ylabel(f"{panel.title} [{unit_text(panel.unit)}]".strip())
-    ax.ticklabel_format(axis="y", useOffset=False, scilimits=(-4, 5))
     drawn = np.concatenate([dataset[name].values for name in panel.names])
     drawn = drawn[np.isfinite(drawn)]
+    text, size = style.prefixed(panel.unit, drawn)
+    ax.set_ylabel(f"{panel.title} [{text}]".strip())
+    style.label_ticks(ax.yaxis, size)
     if len(drawn) and not varies(drawn):  # a line, not rounding blown up to the panel's height
         middle = float(drawn.mean())
         ax.set_ylim(middle - 0.05 * abs(middle or 1.0), middle + 0.05 * abs(middle or 1.0))
@@ -206,15 +216,29 @@ def _draw_balances(ax: Axes, dataset: xarray.Dataset) -> None:
     style.legend(ax)
 
 
-def _draw_time(axes: Sequence[Axes], dataset: xarray.Dataset) -> None:
-    """The axis of time, with bands of modes and lines at events."""
+def _draw_time(axes: Sequence[Axes], dataset: xarray.Dataset, names: Sequence[str]) -> None:
+    """The axis of time, on which these quantities can be followed, with bands of modes and lines at events."""
     times = dataset["time"].values
-    axes[-1].set_xlabel("Time [s]")
-    for ax in axes if logarithmic(times) else ():
-        ax.set(xscale="log", xlim=(times[times > 0][0], times[-1]))
+    over_decades = logarithmic(times, [dataset[name].values for name in names])
+    text, size = ("s", 1.0) if over_decades else style.prefixed("s", times)
+    axes[-1].set_xlabel(f"Time [{text}]")
+    if not over_decades:
+        style.label_ticks(axes[-1].xaxis, size)
+    for ax in axes if over_decades else ():
+        _show_decades(ax, max(times[times > 0][0], SHOWN * times[-1]), times[-1])
     if len(times) > 1:
         _draw_bands(axes, dataset)
     _draw_events(axes, dataset)
+
+
+def _show_decades(ax: Axes, first: float, last: float) -> None:
+    """A logarithmic axis of time, without what has happened before it begins."""
+    drawn = [np.asarray(line.get_ydata())[np.asarray(line.get_xdata()) >= first] for line in ax.get_lines()]
+    seen = np.concatenate([values[np.isfinite(values)] for values in drawn])
+    if ax.get_yscale() == "linear" and varies(seen):
+        margin = 0.05 * np.ptp(seen)
+        ax.set_ylim(seen.min() - margin, seen.max() + margin)
+    ax.set(xscale="log", xlim=(first, last))
 
 
 def _draw_events(axes: Sequence[Axes], dataset: xarray.Dataset) -> None:
@@ -268,13 +292,22 @@ def _write(ax: Axes, x: float, text: str, y: float, **how: Any) -> None:
         ax.text(x, y, text, transform=ax.get_xaxis_transform(), fontsize=7, color="#555555", clip_on=True, **how)
 
 
-def logarithmic(times: Array) -> bool:
-    """True for times that want a logarithmic axis: they span decades and most of them are not in the last one.
+def logarithmic(times: Array, quantities: Sequence[Array] = ()) -> bool:
+    """True for times that want a logarithmic axis: they have a ratio, or span decades and much happens in so small a
+    part of them that nobody would see it.
 
-    >>> logarithmic(np.logspace(-6, 2, 50)), logarithmic(np.linspace(0, 5, 100_001))
+    >>> t = np.append(0.0, np.logspace(-6, 2, 50))
+    >>> logarithmic(t), logarithmic(np.linspace(0, 5, 100_001))
     (True, False)
+    >>> t = np.append(t, np.linspace(1, 90, 10))
+    >>> logarithmic(np.sort(t), [np.exp(-np.sort(t))]), logarithmic(np.sort(t), [np.exp(-1000 * np.sort(t))])
+    (False, True)
     """
     after = times[times > 0]
     if len(after) < 2 or after[-1] / after[0] <= DECADES:
         return False
-    return bool(np.mean(after > 0.1 * after[-1]) < 0.6)
+    ratios = after[1:] / after[:-1]
+    if np.ptp(ratios) < style.FLAT * ratios[0]:
+        return True
+    early = times <= EARLY * times[-1]
+    return any(np.ptp(values[early]) > MUCH * np.ptp(values) for values in quantities if varies(values))

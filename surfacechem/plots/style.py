@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -13,6 +14,7 @@ import matplotlib
 import numpy as np
 import xarray
 from matplotlib.axes import Axes
+from matplotlib.axis import XAxis, YAxis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.rcsetup import cycler
@@ -47,6 +49,12 @@ STYLE: Any = {
 
 # A curve that changes by less than this part of its size, 9e-10, is constant: rounding may be all of it.
 FLAT = 1000 * ROUNDING
+
+# Units that take a prefix, and the largest values between which they need none.
+TAKES_PREFIX = ("J", "N", "Pa", "W", "m", "s")
+PLAIN = (0.1, 1e3)
+
+PREFIXES = {-5: "f", -4: "p", -3: "n", -2: "µ", -1: "m", 0: "", 1: "k", 2: "M", 3: "G", 4: "T"}
 
 GREEK = ("alpha", "beta", "epsilon", "eta", "kappa", "lambda", "mu", "phi", "rho", "sigma", "tau", "theta")
 
@@ -188,6 +196,33 @@ def unit_text(unit: str) -> str:
     'W m$^{-2}$ K$^{-1}$'
     """
     return re.sub(r"([A-Za-z])(-?\d+)", r"\1$^{\2}$", unit)
+
+
+def prefixed(unit: str, values: Array) -> tuple[str, float]:
+    """The unit with the prefix that suits the largest of the values, as text, and how large it is.
+
+    >>> prefixed("Pa", np.array([0.0, 3e6])), prefixed("m s-1", np.array([-2e-8])), prefixed("K", np.array([3e4]))
+    (('MPa', 1000000.0), ('nm s$^{-1}$', 1e-09), ('K', 1.0))
+    """
+    size = largest(values)
+    if unit.partition(" ")[0] not in TAKES_PREFIX or size == 0 or PLAIN[0] <= size < PLAIN[1]:
+        return unit_text(unit), 1.0
+    most = 0 if unit == "s" else max(PREFIXES)
+    thousands = min(max(math.floor(math.log10(size) / 3), min(PREFIXES)), most)
+    return PREFIXES[thousands] + unit_text(unit), 10.0 ** (3 * thousands)
+
+
+def largest(values: Array) -> float:
+    """The largest magnitude of those that are finite; 0 where none is."""
+    return float(np.max(np.abs(values), initial=0.0, where=np.isfinite(values)))
+
+
+def label_ticks(axis: XAxis | YAxis, size: float) -> None:
+    """Labels of a linear axis in units of this size."""
+    if size == 1.0:
+        axis.axes.ticklabel_format(axis="x" if isinstance(axis, XAxis) else "y", useOffset=False, scilimits=(-4, 5))
+    else:
+        axis.set_major_formatter(lambda value, _: f"{value / size:.10g}")
 
 
 def varies(values: Array) -> bool:
