@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Any, Protocol
 
 from surfacechem.contracts import grids
 from surfacechem.contracts.terms import (
@@ -22,6 +22,7 @@ from surfacechem.contracts.terms import (
     parameter,
 )
 from surfacechem.errors import InputError, Place
+from surfacechem.quantities import Quantity
 
 MOST_CELLS = 4096
 """Cells across a body at most that a case may give."""
@@ -183,6 +184,23 @@ class Engine(Protocol):
     @property
     def gives(self) -> tuple[str, ...]:
         """Paths of the parameters."""
+
+    @property
+    def histories(self) -> Sequence[tuple[Quantity, Load]]:
+        """Histories of what it reads beside the state of the scene."""
+
+    def limits(self, values: Mapping[str, Any]) -> Iterable[tuple[str, Any, str]]:
+        """What must stay positive of these histories, by name, each with its name and with the reason where it does
+        not.
+        """
+
+    @property
+    def names(self) -> Mapping[str, str]:
+        """What the species that reactions make beside the interface are called in names of quantities."""
+
+    @property
+    def charges(self) -> Mapping[str, Mapping[str, float]]:
+        """Charge [C] of a molecule of each of them that has any, by phase."""
 
     def __call__(self, values: Sequence[float]) -> Sequence[float]:
         """Values of the parameters at values of the variables."""

@@ -452,6 +452,11 @@ class RateLaw(Law):
         return None
 
     @property
+    def made(self) -> Mapping[str, float]:
+        """Molecules that one reaction makes beside the interface, by species."""
+        return {}
+
+    @property
     def log_ratio(self) -> Callable[..., Expression] | None:
         """Logarithm of the forward over the backward rate where the law states both; None where they are not its own.
 

@@ -179,13 +179,14 @@ class MediumSection(Section):
 
 
 class NeighbourSection(Section):
-    """state in which a phase beside the surface is held"""
+    """state in which a phase beside the surface is held, each value a number or a history"""
 
-    pressure: float | None = quantity("Pa", "pressure", above=0)
-    composition: Mapping[str, float] | None = key(
-        Entries(others=amount("1", at_least=0, at_most=1)), "mole fractions by species"
+    pressure: Load | None = key(Prescribed("Pa"), "pressure [Pa]")
+    composition: Mapping[str, Load] | None = key(Entries(others=Prescribed("1")), "mole fractions by species")
+    rest: str = key(Text(), "the species whose mole fraction is what the others leave", "")
+    electric_potential: Load | None = key(
+        Prescribed("V"), "electric potential against the surface [V]", name="electric-potential"
     )
-    electric_potential: float = quantity("V", "electric potential against the surface", 0.0, name="electric-potential")
 
 
 NUMBERS = Entries(others=amount("1"))

@@ -8,22 +8,27 @@ take from them, or give to them, leaves them as they are, and brings its enthalp
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+import symengine
 
-from surfacechem.contracts.terms import RateLaw, option, parameter
+from surfacechem.contracts.terms import Load, RateLaw, option, parameter
 from surfacechem.errors import InputError, Place, suggestion
-from surfacechem.mechanism.mixture import Formula, Species
+from surfacechem.expressions import Expression, absolute
+from surfacechem.mechanism.mixture import Formula, Species, identifiers, word
 from surfacechem.mechanism.rates import MechanismReaction
-from surfacechem.quantities import MOLECULAR
+from surfacechem.quantities import MOLECULAR, Quantity
 
 GASES = frozenset(("ideal-gas", "Redlich-Kwong", "Peng-Robinson", "plasma"))
 """Cantera's models of phases whose pressure matters."""
 
-FARADAY = 9.648533212331001e7
+CHARGE = 1.602176634e-19
+"""Elementary charge [C] (exact, SI 2019)."""
+
+FARADAY = CHARGE * MOLECULAR
 """Charge of a kmol of elementary charges [C/kmol]."""
 
 SUM_TOLERANCE = 1e-6
@@ -32,21 +37,25 @@ SUM_TOLERANCE = 1e-6
 
 @dataclass(frozen=True)
 class Neighbour:
-    """The state in which a phase beside the surface is held."""
+    """The state in which a phase beside the surface is held: histories, a constant being one."""
 
-    pressure: float | None = None
+    pressure: Load | None = None
     """[Pa]; None where it is not given."""
-    composition: Mapping[str, float] = field(default_factory=dict)
+    composition: Mapping[str, Load] = field(default_factory=dict)
     """Mole fractions."""
-    electric_potential: float = 0.0
-    """Against the surface [V]."""
+    rest: str = ""
+    """The species whose mole fraction is what the others leave; none where they sum to one."""
+    electric_potential: Load | None = None
+    """Against the surface [V]; None where it is zero."""
     place: Place | None = None
 
 
-def hold(surface: Any, given: Mapping[str, Neighbour], place: Place | None) -> tuple[str, ...]:
-    """Bring the neighbours of a surface to their states, and say what they lack; InputError where a state is missing,
-    unknown or odd.
+def hold(surface: Any, given: Mapping[str, Neighbour] | None, place: Place | None) -> tuple[str, ...]:
+    """Bring the neighbours of a surface to the states in which they start, and say what they lack; InputError where a
+    state is missing, unknown or odd. None leaves them as they are.
     """
+    if given is None:
+        return ()
     for name, state in given.items():
         if name not in surface.adjacent:
             message = f"the surface {surface.name} has no neighbour '{name}'.{suggestion(name, surface.adjacent)}"
@@ -55,18 +64,14 @@ def hold(surface: Any, given: Mapping[str, Neighbour], place: Place | None) -> t
         state = given.get(name, Neighbour(place=place))
         if problem := _problem(phase, state):
             raise InputError(problem, state.place)
-        if state.composition:
-            phase.X = dict(state.composition)
-        # At the temperature that it has: the engine brings it to that of the interface.
-        if state.pressure is not None:
-            phase.TP = phase.T, state.pressure
-        phase.electric_potential = state.electric_potential
+        held = HeldPhase(phase, state)
+        held.put(phase.T, [load.at_start() for _, load in held.histories])
     return lacking(surface)
 
 
 def _problem(phase: Any, state: Neighbour) -> str:
     """What is wrong with the state of a phase; nothing where it can be held so."""
-    name, known, given = phase.name, phase.species_names, state.composition
+    name, known, given = phase.name, phase.species_names, [*state.composition, *([state.rest] if state.rest else [])]
     pressureless = phase.thermo_model in GASES and state.pressure is None
     if pressureless or (len(known) > 1 and not given):
         pressure = "pressure: 1 atm, " if phase.thermo_model in GASES else ""
@@ -76,9 +81,81 @@ def _problem(phase: Any, state: Neighbour) -> str:
     for species in given:
         if species not in known:
             return f"the neighbour {name} has no species '{species}'.{suggestion(species, known)}"
-    total = sum(given.values())
-    wrong = given and abs(total - 1) > SUM_TOLERANCE
+    if state.rest in state.composition:
+        return f"the mole fraction of {state.rest} in the neighbour {name} has two roles: give it, or `rest`."
+    if state.pressure is not None and not state.pressure.at_start() > 0:
+        return f"the pressure of the neighbour {name} is {state.pressure.at_start():g} Pa, not above zero."
+    return uneven(name, {species: load.at_start() for species, load in state.composition.items()}, bool(state.rest))
+
+
+def uneven(name: str, parts: Mapping[str, float], rest: bool) -> str:
+    """What is wrong with mole fractions in a phase, all of them or all but a ``rest``; nothing where they are some."""
+    for species, part in parts.items():
+        if not 0 <= part <= 1:
+            return f"the mole fraction {species} = {part:g} in the neighbour {name} is outside its range: 0 to 1."
+    total = sum(parts.values())
+    wrong = total > 1 + SUM_TOLERANCE if rest else parts and abs(total - 1) > SUM_TOLERANCE
     return f"the mole fractions of the neighbour {name} sum to {total:.9g}, not to 1." if wrong else ""
+
+
+class HeldPhase:
+    """A phase beside the surface, and the histories of its state in the order in which :meth:`put` takes them."""
+
+    def __init__(self, phase: Any, state: Neighbour) -> None:
+        self.phase, self.pressure = phase, float(phase.P)
+        self.species = [phase.species_index(name) for name in state.composition]
+        self.rest = phase.species_index(state.rest) if state.rest else None
+        self.charges = FARADAY * np.asarray(phase.charges)
+        name, found = word(phase.name), []
+        if state.pressure is not None:
+            found.append((Quantity(f"p_{name}", "Pa", f"pressure of {phase.name}"), state.pressure))
+        if state.electric_potential is not None:
+            text = f"electric potential of {phase.name}"
+            found.append((Quantity(f"V_{name}", "V", text), state.electric_potential))
+        names = identifiers(state.composition, f"x_{name}_")
+        for species, load in state.composition.items():
+            found.append((Quantity(names[species], "1", f"mole fraction of {species} in {phase.name}"), load))
+        self.histories = tuple(found)
+        self._fractions = [*names.values()]
+        self._pressed, self._charged = state.pressure is not None, state.electric_potential is not None
+
+    def put(self, T: float, values: Sequence[float]) -> None:
+        """Go to a temperature [K] and to values of the histories."""
+        given = iter(values)
+        pressure = next(given) if self._pressed else self.pressure
+        if self._charged:
+            self.phase.electric_potential = next(given)
+        if not self.species and self.rest is None:
+            self.phase.TP = T, pressure
+            return
+        fractions = np.zeros(self.phase.n_species)
+        fractions[self.species] = list(given)
+        if self.rest is not None:
+            fractions[self.rest] = max(1.0 - fractions.sum(), 0.0)
+        self.phase.TPX = T, pressure, fractions
+
+    def limits(self, values: Mapping[str, Expression]) -> Iterator[tuple[str, Expression, str]]:
+        """What of the histories, by name, must stay positive, with its name and the reason where it does not."""
+        name, parts = self.phase.name, [values[q.name] for q, _ in self.histories if q.name in self._fractions]
+        if self._pressed:
+            yield f"pressure of {name} > 0", values[f"p_{word(name)}"], f"the pressure of {name} reached zero"
+        for species, part in zip(self._fractions, parts, strict=True):
+            yield f"{species} >= 0", part + SUM_TOLERANCE, f"the mole fraction {species} fell below zero"
+        if self.rest is not None:
+            text = f"the mole fractions given in {name} add up to more than one"
+            yield f"rest of {name} >= 0", 1 + SUM_TOLERANCE - symengine.Add(*parts), text
+        elif parts:
+            text = f"the mole fractions of {name} no longer add up to one; let one species be its `rest`"
+            yield f"sum in {name} = 1", SUM_TOLERANCE - absolute(symengine.Add(*parts) - 1), text
+
+    def charged(self, names: Iterable[str]) -> dict[str, float]:
+        """Charge [C] of a molecule of each of these species that is its own and has any."""
+        charges = dict(zip(self.phase.species_names, self.phase.charges.tolist(), strict=True))
+        return {name: CHARGE * charges[name] for name in names if charges.get(name)}
+
+    def energy(self, name: str) -> Any:
+        """A partial molar energy of its species [J/kmol], with that of their charge."""
+        return getattr(self.phase, name) + self.charges * self.phase.electric_potential
 
 
 def lacking(surface: Any) -> tuple[str, ...]:
@@ -126,11 +203,23 @@ class NeighbourReaction(EvaluatedReaction):
 
     enthalpy: float = parameter("J", "enthalpy taken from neighbours, evaluated by Cantera", varies=False)
     gibbs: float = parameter("J", "Gibbs energy taken from neighbours, evaluated by Cantera", varies=False)
+    beside: Mapping[str, float] = option("molecules of each species that it makes in neighbours")
+
+    @property
+    def made(self) -> Mapping[str, float]:
+        """Molecules that one reaction makes in neighbours, by species."""
+        return self.beside
 
     @property
     def taken(self) -> tuple[Formula, Formula]:
         """Enthalpy and Gibbs energy [J] that one reaction takes from the neighbours."""
         return Formula((), lambda _: self.enthalpy), Formula((), lambda _: self.gibbs)
+
+
+def taken(surface: Any, phases: Sequence[Any]) -> Any:
+    """Amount of each species of these phases, one after another, that each reaction takes: a row for a reaction."""
+    places = [surface.kinetics_species_index(name) for phase in phases for name in phase.species_names]
+    return np.asarray(surface.reactant_stoich_coeffs - surface.product_stoich_coeffs)[places].T
 
 
 class SurfaceEngine:
@@ -139,51 +228,77 @@ class SurfaceEngine:
     ``reactions`` are the laws of all its reactions, in its order.
     """
 
-    def __init__(self, surface: Any, species: Sequence[Species], reactions: Sequence[RateLaw]) -> None:
+    def __init__(
+        self,
+        surface: Any,
+        species: Sequence[Species],
+        reactions: Sequence[RateLaw],
+        neighbours: Mapping[str, Neighbour],
+    ) -> None:
         self.surface = surface
         self.positions = [i for i, law in enumerate(reactions) if isinstance(law, EvaluatedReaction)]
         open_ones = [i for i, law in enumerate(reactions) if isinstance(law, NeighbourReaction)]
         energies = [f"{reactions[i].path}.{name}" for name in ("enthalpy", "gibbs") for i in open_ones]
         self.gives = (*(f"{reactions[i].path}.value" for i in self.positions), *energies)
-        first = species[0]
-        self.reads = ("T_c", first.concentration, *(item.variable for item in species))
-        self._sites = first.sites
-        self._phases = list(surface.adjacent.values()) if open_ones else []
-        self._pressures = [float(phase.P) for phase in self._phases]
-        # Amount of each neighbour's species that a reaction takes, and the electric energy that comes with it.
-        rows = [surface.kinetics_species_index(name) for phase in self._phases for name in phase.species_names]
-        lost = surface.reactant_stoich_coeffs - surface.product_stoich_coeffs
-        self._taken = np.asarray(lost)[np.ix_(rows, open_ones)].T
-        self._charged = [FARADAY * phase.electric_potential * phase.charges for phase in self._phases]
+        beside = surface.adjacent.items() if open_ones else ()
+        self.held = [HeldPhase(phase, neighbours.get(name, Neighbour())) for name, phase in beside]
+        self.names = identifiers(dict.fromkeys(name for law in reactions for name in law.made), "")
+        first, own = species[0], [item.variable for item in species]
+        self._own = "T_c", first.concentration, *own
+        self._sites, self._count = first.sites, len(own)
+        self._taken = taken(surface, [held.phase for held in self.held])[open_ones]
         self._last: tuple[Sequence[float], Sequence[float]] = (), ()
-        self._at, self._energies = math.nan, list[float]()
+        self._around: Sequence[float] = ()
+        self._energies: list[float] = []
+
+    @property
+    def charges(self) -> dict[str, dict[str, float]]:
+        """Charge [C] of a molecule of each species that reactions make in neighbours and that has any, by phase."""
+        return {word(held.phase.name): held.charged(self.names) for held in self.held}
+
+    @property
+    def histories(self) -> tuple[tuple[Quantity, Load], ...]:
+        """Histories of the neighbours."""
+        return tuple(item for held in self.held for item in held.histories)
+
+    @property
+    def reads(self) -> tuple[str, ...]:
+        """Names of the variables."""
+        return (*self._own, *(quantity.name for quantity, _ in self.histories))
+
+    def limits(self, values: Mapping[str, Expression]) -> Iterator[tuple[str, Expression, str]]:
+        """What of the histories, by name, must stay positive, with its name and the reason where it does not."""
+        for held in self.held:
+            yield from held.limits(values)
 
     def __call__(self, values: Sequence[float]) -> Sequence[float]:
-        """Net rates [1/(m^2 s)] at a temperature, the amount of the first species at full coverage, and coverages.
+        """Net rates [1/(m^2 s)] at a temperature, the amount of the first species at full coverage, coverages, and the
+        state of the neighbours.
 
         Then the enthalpy and the Gibbs energy [J] that each reaction with neighbours takes from them.
         """
         # The residual, its outputs and the ledger ask at the same state one after another.
         if values == self._last[0]:
             return self._last[1]
-        T, amount, *coverages = values
+        T, amount, end = values[0], values[1], 2 + self._count
         found = [math.nan] * len(self.gives)
         if T > 0 and amount > 0:
-            if self._at != T:
-                self._warm(T)
+            if [T, *values[end:]] != self._around:
+                self._bring(T, values[end:])
             # A stretched surface has fewer sites per area; coverages that a step tries need not sum to one.
             self.surface.site_density = amount * self._sites / MOLECULAR
-            self.surface.set_unnormalized_coverages(coverages)
+            self.surface.set_unnormalized_coverages(values[2:end])
             found = (self.surface.net_rates_of_progress[self.positions] * MOLECULAR).tolist() + self._energies
         self._last = values, found
         return found
 
-    def _warm(self, T: float) -> None:
-        """Bring the surface and its neighbours, which are held, to a temperature [K]."""
-        self._at, self.surface.TP = T, (T, None)
-        for phase, pressure in zip(self._phases, self._pressures, strict=True):
-            phase.TP = T, pressure
+    def _bring(self, T: float, states: Sequence[float]) -> None:
+        """Bring the surface and its neighbours to a temperature [K], and these to their states."""
+        self._around, self.surface.TP = [T, *states], (T, None)
+        given = iter(states)
+        for held in self.held:
+            held.put(T, [next(given) for _ in held.histories])
         self._energies = []
-        for energy in ("partial_molar_enthalpies", "chemical_potentials") if self._phases else ():
-            own = [getattr(x, energy) + charged for x, charged in zip(self._phases, self._charged, strict=True)]
-            self._energies += (self._taken @ np.concatenate(own) / MOLECULAR).tolist()
+        for energy in ("partial_molar_enthalpies", "chemical_potentials") if self.held else ():
+            own = np.concatenate([held.energy(energy) for held in self.held])
+            self._energies += (self._taken @ own / MOLECULAR).tolist()

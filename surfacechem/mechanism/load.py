@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import accumulate
@@ -25,7 +25,7 @@ from surfacechem.mechanism.evaluated import (
 )
 from surfacechem.mechanism.interaction import KEY, interactions
 from surfacechem.mechanism.keys import Check, has_neighbours, is_evaluated
-from surfacechem.mechanism.mixture import IdealMixture, Species, Spring, unpaired
+from surfacechem.mechanism.mixture import IdealMixture, Species, Spring, identifiers, unpaired
 from surfacechem.mechanism.rate_types import kind_of
 from surfacechem.mechanism.rates import plain
 from surfacechem.mechanism.source import LIMITS, Source, own_parameters, sides
@@ -97,7 +97,7 @@ def load_mechanism(
     # Before Cantera, which ignores what it does not know.
     Check(source, entry, evaluate).run()
     surface, said = _cantera(source, entry)
-    odd = hold(surface, neighbours, place) if neighbours is not None else ()
+    odd = hold(surface, neighbours, place)
     kept = _kept(source, entry, surface)
     species = _species(surface, source, entry, any(outside for _, _, outside in kept))
     by_name = {item.name: item for item in species}
@@ -112,7 +112,7 @@ def load_mechanism(
     mixture_place = source.place(entry, path="interface.mechanism")
     mixture = IdealMixture(species=species, temperatures=temperatures, place=mixture_place)
     reactions = tuple(_reaction(source, f"R{i}", *one, species) for i, one in enumerate(kept, start=1))
-    engine = SurfaceEngine(surface, species, reactions)
+    engine = SurfaceEngine(surface, species, reactions, neighbours or {})
     return Mechanism(
         potentials=(mixture,),
         reactions=reactions,
@@ -215,20 +215,6 @@ def _species(surface: Any, source: Source, phase: Any, fixed: bool) -> tuple[Spe
     return tuple(result)
 
 
-def identifiers(names: Iterable[str]) -> dict[str, str]:
-    """A unique valid name of a coverage for each species.
-
-    >>> identifiers(["free(s)", "bond(s)", "free-s"])
-    {'free(s)': 'theta_free_s', 'bond(s)': 'theta_bond_s', 'free-s': 'theta_free_s_2'}
-    """
-    result: dict[str, str] = {}
-    for name in names:
-        base = "theta_" + (re.sub(r"[^0-9A-Za-z]+", "_", name).strip("_") or "species")
-        taken = set(result.values())
-        result[name] = next(n for n in (base, *(f"{base}_{i}" for i in range(2, 10000))) if n not in taken)
-    return result
-
-
 def _kept(source: Source, phase: Any, surface: Any) -> list[tuple[Any, Any, bool]]:
     """Every reaction as Cantera and as the file has it, and whether only Cantera can say how fast it is.
 
@@ -276,8 +262,14 @@ def _reaction(
         message = f"{title}: {elastic[0]} is elastic, which Cantera's equilibrium constant does not know. "
         raise InputError(f"{message}Write two one-way reactions.", place)
     given |= {"whole": whole, "value": 0.0}
-    closed = len(given["change"]) == len(whole)
-    return EvaluatedReaction(**given) if closed else NeighbourReaction(enthalpy=0.0, gibbs=0.0, **given)
+    if beside := _outside(whole, variables):
+        return NeighbourReaction(enthalpy=0.0, gibbs=0.0, beside=beside, **given)
+    return EvaluatedReaction(**given)
+
+
+def _outside(whole: Mapping[str, float], own: Mapping[str, str]) -> dict[str, float]:
+    """What of a change belongs to no species of the surface."""
+    return {name: nu for name, nu in whole.items() if name not in own}
 
 
 def _lowered(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Self
@@ -163,3 +164,26 @@ def unpaired(species: Sequence[Species]) -> tuple[str, str] | None:
             if abs(x - y) > SAME * max(abs(x), abs(y)):
                 return item.name, other.name
     return None
+
+
+def word(name: str) -> str:
+    """A name of Cantera's as part of the name of a quantity.
+
+    >>> word("Li+[elyt]")
+    'Li_elyt'
+    """
+    return re.sub(r"[^0-9A-Za-z]+", "_", name).strip("_") or "species"
+
+
+def identifiers(names: Iterable[str], prefix: str = "theta_") -> dict[str, str]:
+    """A unique valid name of a coverage, or of something else, for each species.
+
+    >>> identifiers(["free(s)", "bond(s)", "free-s"])
+    {'free(s)': 'theta_free_s', 'bond(s)': 'theta_bond_s', 'free-s': 'theta_free_s_2'}
+    """
+    result: dict[str, str] = {}
+    for name in names:
+        base = f"{prefix}{word(name)}"
+        taken = set(result.values())
+        result[name] = next(n for n in (base, *(f"{base}_{i}" for i in range(2, 10000))) if n not in taken)
+    return result

@@ -30,7 +30,7 @@ from surfacechem.model.system import (
     Role,
     State,
 )
-from surfacechem.model.variables import Parameters, Variables, unit_of
+from surfacechem.model.variables import Parameters, Variables
 from surfacechem.quantities import Quantity
 from surfacechem.scene import Interface, Scene
 from surfacechem.tolerances import NOTHING
@@ -202,7 +202,7 @@ class Build:
         """Make a prescribed history a named quantity; its breakpoints will end a step."""
         name = quantity.name
         self.loads[name] = load
-        return self.name(quantity, self.variables.bind(load, f"loading.{name}", unit=unit_of(name)).value(self.t))
+        return self.name(quantity, self.variables.bind(load, f"loading.{name}", unit=quantity.unit).value(self.t))
 
     def slope_of(self, name: str) -> Expression:
         """Time derivative of a prescribed variable between its jumps."""

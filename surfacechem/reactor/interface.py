@@ -20,7 +20,7 @@ from surfacechem.reactor.coupling import Port, node_of, refuse, suffix_of
 from surfacechem.reactor.embedded import EmbeddedScene, EndError
 from surfacechem.reactor.history import History
 from surfacechem.runs.simulation import Simulation
-from surfacechem.solve.adapters.cantera_network import BackOffError, HeldReactor, contents
+from surfacechem.solve.adapters.cantera_network import LEDGER_UNIT, BackOffError, HeldReactor, contents
 from surfacechem.solve.contract import Array
 from surfacechem.tolerances import DIGITS, ROUNDING
 
@@ -28,9 +28,6 @@ if TYPE_CHECKING:
     import xarray
 
 AREA = Spec("m^2", "area of the interface", above=0)
-
-LEDGER_UNIT = 1e100
-"""Ledgers are counted in this many of their SI units, so that they stay out of the integrator's error norm."""
 
 
 class InterfaceStopped(Exception):  # noqa: N818 - physics ends here, nothing went wrong

@@ -1,6 +1,7 @@
 """Surfaces beside gases, solids and electrodes: rates, heat and entropy are Cantera's, and the books close."""
 
 import shutil
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from test_mechanism_cantera import FOLDER, SURFACES
 
 import surfacechem
 from surfacechem.errors import InputError
+from surfacechem.mechanism.mixture import word
 from surfacechem.quantities import BOLTZMANN
 from surfacechem.reactor import InterfaceReactor, ReactorNet
 from surfacechem.runs import rerun
@@ -253,6 +255,76 @@ def test_in_a_network(tmp_path):
         assert interface[state.name] == pytest.approx(value, rel=1e-6, abs=1e-12)
 
 
+@dataclass(frozen=True)
+class Changing:
+    """Neighbours whose state is a history, and what it is at a time."""
+
+    neighbours: str
+    state: Callable[[ct.Interface, float], None]
+
+
+def fuel_at(surface: ct.Interface, t: float) -> None:
+    surface.adjacent["gas"].TPX = surface.T, 1e5 + 2e9 * t, {"H2O": 0.05 + 1e4 * t, "H2": 0.95 - 1e4 * t}
+
+
+def anode_at(surface: ct.Interface, t: float) -> None:
+    surface.adjacent["electron"].electric_potential = -3.1 + 0.2 * t
+
+
+CHANGING = {
+    ("sofc.yaml", "metal_surface"): Changing(
+        """{gas: {pressure: {ramp: {start: 1e5 Pa, rate: 2e9 Pa/s}},
+      composition: {H2O: {ramp: {start: 0.05, rate: 1e4 1/s}}}, rest: H2}}""",
+        fuel_at,
+    ),
+    ("lithium_ion_battery.yaml", "edge_anode_electrolyte"): Changing(
+        CASES["lithium_ion_battery.yaml", "edge_anode_electrolyte"].neighbours.replace(
+            "-3.1 V", "{ramp: {start: -3.1 V, rate: 0.2 V/s}}"
+        ),
+        anode_at,
+    ),
+}
+
+
+@pytest.mark.parametrize("which", CHANGING)
+def test_what_reactions_make_while_neighbours_change_is_cantera_s_at_every_time(which, tmp_path):
+    changing = CHANGING[which]
+    case = surfacechem.load(written(tmp_path, which, neighbours=changing.neighbours))
+    data = case.run(error="balances").dataset
+    surface, own = alone(which), coverages(data, alone(which))
+    for k, t in enumerate(data["time"].values):
+        changing.state(surface, t)
+        surface.set_unnormalized_coverages(own[k])
+        current = {}
+        both = (surface.forward_rates_of_progress + surface.reverse_rates_of_progress).sum() * 1e3 * AVOGADRO
+        for phase in surface.adjacent.values():
+            made = dict(zip(phase.species_names, surface.get_net_production_rates(phase) * 1e3 * AVOGADRO, strict=True))
+            current[word(phase.name)] = ct.electron_charge * float(phase.charges @ [*made.values()])
+            for name, rate in made.items():
+                if rate:
+                    assert float(data[f"production_{word(name)}"][k]) == pytest.approx(rate, rel=1e-9, abs=1e-10 * both)
+        for name in (name for name in data if name.startswith("i_")):
+            assert float(data[name][k]) == pytest.approx(current[name[2:]], rel=1e-9, abs=1e-29 * both)
+    # What was made is the integral of the rate.
+    for name in (name for name in data if name.startswith("made_")):
+        rates = data[name.replace("made_", "production_")].values
+        assert rates.min() * data["time"].values[-1] <= float(data[name][-1]) <= rates.max() * data["time"].values[-1]
+
+
+def test_neighbours_are_swept_without_compiling_again(tmp_path):
+    """A parameter like any other; fractions that add up to more than one are refused."""
+    which = "sofc.yaml", "metal_surface"
+    file = written(tmp_path, which, neighbours=f"{{{FUEL}}}".replace("H2: 0.95, ", "").replace("}}", "}, rest: H2}"))
+    path = "interface.mechanism.neighbours.gas.composition.H2O.level"
+    model = surfacechem.load(file).model
+    run = surfacechem.load(file).case.run
+    changed = model.solve(run, {path: 0.2})
+    again = surfacechem.load(file, {path.removesuffix(".level"): 0.2})
+    assert np.array_equal(changed.result.outputs, again.model.solve(again.case.run).result.outputs)
+    with pytest.raises(InputError, match=r"the mole fractions given in gas add up to more than one"):
+        model.solve(run, {path: 1.2})
+
+
 FUELLED = f"{{{FUEL}}}"
 
 
@@ -267,8 +339,10 @@ FUELLED = f"{{{FUEL}}}"
         ("{gass: {pressure: 1 atm}}", "has no neighbour 'gass'. Did you mean 'gas'"),
         (FUELLED.replace("H2O", "HH2O"), "the neighbour gas has no species 'HH2O'. Did you mean 'H2O'"),
         (FUELLED.replace("0.95", "0.9"), "mole fractions of the neighbour gas sum to 0.95, not to 1"),
-        (FUELLED.replace("0.95", "1.95"), "H2 = 1.95 is outside its range"),
-        (FUELLED.replace("1 atm", "0 Pa"), "pressure = 0 is outside its range"),
+        (FUELLED.replace("0.95", "1.95"), "H2 = 1.95 in the neighbour gas is outside its range"),
+        (FUELLED.replace("1 atm", "0 Pa"), "the pressure of the neighbour gas is 0 Pa, not above zero"),
+        (FUELLED.replace("}}", "}, rest: H2}"), "the mole fraction of H2 in the neighbour gas has two roles"),
+        (FUELLED.replace("}}", "}, rest: HH}"), "the neighbour gas has no species 'HH'. Known: H2, H2O, N2, O2."),
         (FUELLED.replace("pressure", "presure"), "unknown key 'presure'"),
     ],
 )

@@ -23,7 +23,7 @@ from surfacechem.model.components.pairs import Opposed, by_affinity, dead_load, 
 from surfacechem.model.constraints.bound import bound
 from surfacechem.model.constraints.envelope import softening
 from surfacechem.model.constraints.unilateral import TOUCHING
-from surfacechem.model.system import Account, Capped, Caution, Pair
+from surfacechem.model.system import Account, Capped, Caution, Margin, Pair
 from surfacechem.quantities import Quantity
 from surfacechem.tolerances import MOMENT
 
@@ -50,8 +50,9 @@ class Reaction:
     """Net rate per current area [1/(m^2 s)]."""
 
 
-def laws(build: Build) -> Iterator[Power | Account | Caution | Pair]:
+def laws(build: Build) -> Iterator[Power | Account | Caution | Pair | Margin]:
     """Chemical potentials, rates, bond balances and what the reactions dissipate."""
+    yield from _beside(build)
     mu = _chemical_potentials(build)
     kinetics = {}
     for law in build.interface.reactions:
@@ -69,6 +70,7 @@ def laws(build: Build) -> Iterator[Power | Account | Caution | Pair]:
     for account, power in dissipated.items():
         yield Power(DISSIPATION, INTERFACE, INTERFACE, power, account)
     yield from _from_neighbours(build, found)
+    yield from _made(build, found)
     work = symengine.Add(*(-build.stretch * item.rate * item.load for item in found))
     if work != 0:
         yield Power(WORK, OUTSIDE, INTERFACE, work, "W_f", "work of the prescribed force on bonds")
@@ -223,3 +225,33 @@ def _from_neighbours(build: Build, found: Sequence[Reaction]) -> Iterator[Power]
         power = build.name(Quantity("q_n", "W/m^2", text), symengine.Add(*heat))
         S = symengine.Add(*entropy) / build.variables.get("T_c", "the neighbours")
         yield Power(HEAT, OUTSIDE, INTERFACE, power, NEIGHBOURS, text, entropy=S)
+
+
+def _beside(build: Build) -> Iterator[Margin]:
+    """The histories of what is beside the interface, as variables."""
+    if (engine := build.interface.engine) is None:
+        return
+    values = {}
+    for quantity, history in engine.histories:
+        values[quantity.name] = build.prescribe(quantity, history)
+        build.variables.define(quantity.name, values[quantity.name], "prescribed", quantity.long_name)
+    for name, expression, reason in engine.limits(values):
+        yield Margin(name, expression, reason, path="interface.mechanism.neighbours")
+
+
+def _made(build: Build, found: Sequence[Reaction]) -> Iterator[Account]:
+    """What reactions make in neighbours: each species per area, and the electric current into each phase."""
+    engine, made = build.interface.engine, dict[str, Expression]()
+    for item in found:
+        for species, nu in item.law.made.items():
+            made[species] = made.get(species, 0) + nu * build.stretch * item.rate
+    if engine is None or not made:
+        return
+    for species, total in made.items():
+        name, text = engine.names[species], f"of {species} that reactions make, per reference area"
+        rate = build.name(Quantity(f"production_{name}", "1/(m^2 s)", f"rate {text}"), total)
+        yield Account(Quantity(f"made_{name}", "1/m^2", f"amount {text}"), rate, "production", species)
+    for phase, charges in engine.charges.items():
+        current = symengine.Add(*(charge * made[species] for species, charge in charges.items()))
+        if charges:
+            build.name(Quantity(f"i_{phase}", "A/m^2", f"current into {phase}, per reference area"), current)

@@ -20,6 +20,9 @@ from surfacechem.tolerances import NOISE, TINY
 
 NAMES = ("cantera",)
 
+LEDGER_UNIT = 1e100
+"""Ledgers are counted in this many of their SI units, so that they stay out of the integrator's error norm."""
+
 LONGEST = 0.1
 """Part of a stretch that a step may take: Cantera cannot be told to end a step at an event."""
 
@@ -127,15 +130,21 @@ class HeldReactor(cantera.ExtensibleReactor):
 
 
 class _SystemReactor(HeldReactor):
-    """The equations of a stretch, in units of their tolerances."""
+    """The equations of a stretch, in units of their tolerances, and the ledger where rates come from outside.
+
+    Published mechanisms have reactions that run both ways far faster than anything changes. What the integrator's
+    polynomial misses of their balance they magnify in a quadrature along it, not in sums by the integrator's own rule.
+    """
 
     def __init__(self, surface: Any, view: View, x: Array) -> None:
         super().__init__(surface)
         self.view = view
         self.evaluation = Evaluation(view.problem.program, view.evaluation.y, view.parameters)
-        self.unit = np.maximum(view.atol, TINY)
-        self.scaled = x / self.unit
-        self.names = tuple(f"x{i}" for i in range(len(x)))
+        self.count = len(x)
+        lines = view.problem.program.n_ledger if view.problem.program.filler else 0
+        self.unit = np.concatenate((np.maximum(view.atol, TINY), np.full(lines, LEDGER_UNIT)))
+        self.scaled = np.concatenate((x, np.zeros(lines))) / self.unit
+        self.names = tuple(f"x{i}" for i in range(len(self.unit)))
 
     def start(self) -> Array:
         return self.scaled
@@ -145,9 +154,12 @@ class _SystemReactor(HeldReactor):
 
     def rates(self, t: float) -> Array:
         self.view.residuals += 1
-        if not self.evaluation.put(t, self.scaled * self.unit):
+        if not self.evaluation.put(t, self.scaled[: self.count] * self.unit[: self.count]):
             raise BackOffError("no consistent state")
-        return np.asarray(self.evaluation.ydot[self.evaluation.free] / self.unit)
+        rates = self.evaluation.ydot[self.evaluation.free]
+        if len(self.unit) > self.count:
+            rates = np.concatenate((rates, self.evaluation.ledger()))
+        return np.asarray(rates / self.unit)
 
 
 def last_step(net: Any, start: float, end: float, unit: Array, columns: slice = slice(None)) -> DenseStep:
@@ -179,9 +191,20 @@ class _Stretch(Method):
             # Cantera knows no time to stop at: a step beyond it would not have felt what is there.
             self.net.max_time_step = min(self.longest, max(self.end - self.t, NOISE * self.end))
             self.t = float(self.net.step())
-            return last_step(self.net, before, self.t, self.reactor.unit)
+            return self._step(last_step(self.net, before, self.t, self.reactor.unit))
         except (cantera.CanteraError, ArithmeticError) as error:
             raise StepError(str(error)) from error
+
+    def _step(self, whole: DenseStep) -> DenseStep:
+        """The step with its ledger, where the integrator has that."""
+        n = self.reactor.count
+        if len(self.reactor.unit) == n:
+            return whole
+
+        def y(t: Any) -> Array:
+            return whole.y(t)[..., :n]
+
+        return DenseStep(whole.start, whole.end, y, y, lambda t: whole.y(t)[n:])
 
     @property
     def factorizations(self) -> int:

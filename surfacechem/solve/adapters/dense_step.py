@@ -18,13 +18,15 @@ POINTS = 16
 class DenseStep:
     """A step from ``start`` to ``end`` [s], with the variables at any time in it.
 
-    ``many`` gives a row of them for each of several times, where a library can do so at once.
+    ``many`` gives a row of them for each of several times, where a library can do so at once; ``ledger`` is what the
+    ledger has gained since the library began, where that integrates it.
     """
 
     start: float
     end: float
     y: Callable[[float], Array]
     many: Callable[[Array], Array] | None = None
+    ledger: Callable[[float], Array] | None = None
 
     def rows(self, times: Array) -> Array:
         """Variables at several times, a row each."""

@@ -15,6 +15,9 @@ from surfacechem.solve.contract import Array, Counters, Events, Points, Problem,
 from surfacechem.solve.radau import stepper
 from surfacechem.tolerances import SQRT_EPS, ULPS
 
+ENTROPY = 1
+"""The group of the ledger's lines of entropy."""
+
 MISSED = 100.0
 """Errors in units of the tolerance beyond which a step has not seen what lies before an event."""
 
@@ -156,6 +159,7 @@ class _Run:
         self.t, self.y, self.ydot = float(problem.segments[0]), problem.y0, np.zeros(program.n)
         self.ledger, self.ledger_rates = np.zeros(program.n_ledger), np.zeros(program.n_ledger)
         self.margins = np.zeros(0)
+        self.entropic = np.array(program.groups) == ENTROPY
         self.guards = Guards.of(problem.margins, self._guards, problem.seen)
         self.in_play = np.array((True,) * program.n_margins if problem.in_play is None else problem.in_play, bool)
         self.outputs: list[Array] = []
@@ -238,16 +242,23 @@ class _Run:
     def _accept(self, step: DenseStep, inside: StateRows, reached: float, fired: Iterable[int]) -> None:
         """Move on to a time within the step, with its outputs and events."""
         rates = np.vstack((self.ledger_rates, inside.ledger()))
-        ledger = StepLedger(self.t, reached - self.t, self.ledger, rates)
+        along, gained = StepLedger(self.t, reached - self.t, self.ledger, rates), step.ledger
+        start, began = self.ledger, self.t
+
+        def ledger(t: float) -> Array:
+            """By quadrature, or as the library integrates it; entropy never, whose production it does not resolve."""
+            found = along.at(t)
+            return found if gained is None else np.where(self.entropic, found, start + gained(t) - gained(began))
+
         for t in self.problem.times[len(self.outputs) :]:
             if t > reached:
                 break
-            row = np.concatenate((self._state(step, float(t))[0], ledger.at(t)))
+            row = np.concatenate((self._state(step, float(t))[0], ledger(float(t))))
             if not np.all(np.isfinite(row)):
                 raise StepError("an output is not finite")
             self.outputs.append(row)
         # The last node is the end; outputs lie elsewhere and have not changed it.
-        y, ydot, q = inside.y[-1].copy(), inside.ydot[-1].copy(), ledger.at(reached)
+        y, ydot, q = inside.y[-1].copy(), inside.ydot[-1].copy(), ledger(reached)
         if not (np.all(np.isfinite(y)) and np.all(np.isfinite(ydot)) and np.all(np.isfinite(q))):
             raise StepError("a state is not finite")
         if self.aim is not None and self.aim <= self.t:
