@@ -45,7 +45,9 @@ DECADES = 1e3
 
 # Part of the run that is too short to be seen on a linear axis, and the part of its range by which a quantity has to
 # change within it to be shown on a logarithmic one; what comes before SHOWN of the run is left out of that.
-EARLY, MUCH, SHOWN = 5e-3, 0.3, 1e-7
+FLUX = "W m-2"
+
+EARLY, MUCH, SHOWN = 1 / 200, 0.3, 1 / 1e7
 
 # A title of so many letters does not fit beside a panel.
 TOO_LONG = 26
@@ -90,15 +92,20 @@ def figure(dataset: xarray.Dataset, variables: Sequence[str] | None = None, agai
             _draw(ax, dataset, panel, against or "time")
         if balances:
             _draw_balances(axes[-1], dataset)
-        if against is None:
-            # Fluxes and powers follow from what changes: where they start is no reason for another axis.
-            _draw_time(axes, dataset, [name for p in panels if p.unit != "W m-2" for name in p.names])
-        else:
-            text, size = style.prefixed(unit(dataset[against]), dataset[against].values)
-            axes[-1].set_xlabel(f"{meaning(dataset[against])} {symbol(against)} [{text}]")
-            style.label_ticks(axes[-1].xaxis, size)
+        draw_axis(axes, dataset, panels, against)
         style.headings(plot, axes[0], dataset)
     return plot
+
+
+def draw_axis(axes: Sequence[Axes], dataset: xarray.Dataset, panels: Sequence[Panel], against: str | None) -> None:
+    """Label the axis that all panels share: time, or the variable that takes its place."""
+    if against is None:
+        # Fluxes and powers follow from what changes: where they start is no reason for another axis.
+        _draw_time(axes, dataset, [name for p in panels if p.unit != FLUX for name in p.names])
+    else:
+        text, size = style.prefixed(unit(dataset[against]), dataset[against].values)
+        axes[-1].set_xlabel(f"{meaning(dataset[against])} {symbol(against)} [{text}]")
+        style.label_ticks(axes[-1].xaxis, size)
 
 
 def curves(dataset: xarray.Dataset) -> list[str]:
