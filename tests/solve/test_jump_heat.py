@@ -153,7 +153,7 @@ def test_libraries_and_sweeps_heat_the_same():
     simulation = Simulation(case)
     run = simulation.run(error="balances").dataset
     for method in ("lsoda", "bdf"):
-        other = Simulation(replace(case, run=replace(case.run, solver=method))).run(error="balances").dataset
+        other = Simulation(replace(case, own_run=replace(case.run, solver=method))).run(error="balances").dataset
         np.testing.assert_allclose(other["T_1"], run["T_1"], atol=1e-6)
     partition = Simulation(load_text(pressure_falls("slider", "rigid", 0)))
     swept = partition.sweep({"interface.partition": [1.0, 0.75, 0.0]}).dataset
@@ -370,7 +370,7 @@ def test_what_a_pressure_stops_does_not_cool_the_interface_first(method):
         loads = f"p: {{table: {{times: [0, 3, {3 + rise}, 4], values: [0.5e6, 0.5e6, 2e6, 2e6]}}}}"
         given = text("paths", f"{loads}, w_t: {{ramp: {{rate: 0.25 mm/s}}}}", "tangential: {k: 1e9 Pa/m}")
         case = load_text(given)
-        runs.append(Simulation(replace(case, run=replace(case.run, solver=method))).run(error="balances"))
+        runs.append(Simulation(replace(case, own_run=replace(case.run, solver=method))).run(error="balances"))
     assert [run.status for run in runs] == ["finished", "finished"]
     assert runs[1].dataset.event_name.values.tolist() == ["slip forward", "stop"]
     for name in ("u_t", "T_1", "T_2", "T_c"):
