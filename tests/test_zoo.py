@@ -159,6 +159,17 @@ def test_a_case_meets_its_exact_solution(name):
         assert accuracy.error < CELLS.get(name, 1e-7)
 
 
+@pytest.mark.parametrize("name", [name for name in names() if name not in CELLS])
+def test_explicit_steps_serve_a_case_as_well(name):
+    """Held against the exact solution, else against implicit steps."""
+    simulation = load(name)
+    solution = simulation.run(run=replace(simulation.case.run, solver="dop853", accuracy=None))
+    assert solution.status == ("stopped" if name in STOPPED else "finished")
+    assert solution.accuracy.error < (1e-8 if simulation.case.reference else 1e-7)
+    assert solution.audit.energy_error < 1e-9
+    assert solution.audit.violations == ()
+
+
 @every_case
 def test_a_repeated_run_has_the_same_bytes(name):
     first = {column.name: column.values for column in solved(name).columns}

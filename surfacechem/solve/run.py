@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import operator
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -75,7 +75,7 @@ class Run:
 
     def __post_init__(self) -> None:
         """Output times start at zero, where the initial values hold, and increase; tolerances have a meaning."""
-        if len(self.times) < 2 or self.times[0] != 0 or any(b <= a for a, b in pairwise(self.times)):
+        if len(self.times) < 2 or self.times[0] != 0 or any(map(operator.le, self.times[1:], self.times)):
             raise InputError("output times must start at 0 and increase from each to the next, at least two.")
         if not (0 < self.rtol < 1 and 0 <= (self.atol or 0.0) < np.inf):
             raise InputError(
