@@ -253,6 +253,8 @@ class Scene:
 
     bodies: tuple[Body, Body]
     interface: Interface
+    surface: Potential | None = None
+    """Free energy of two surfaces of given shapes; what is per area elsewhere is then that of the whole pair."""
     heat: Sequence[HeatTransfer] = ()
     loading: Mapping[str, Load] = field(default_factory=dict)
     surroundings: Load | None = None

@@ -231,6 +231,22 @@ def quotient(unit: str, per: str) -> str:
     return "/".join([" ".join(top) or "1", *([below] if below else [])])
 
 
+WHOLE = {
+    "Pa": "N",
+    "Pa/s": "N/s",
+    "Pa/m": "N/m",
+    "Pa s/m": "N s/m",
+    "kg/m^2": "kg",
+    "J/m^2": "J",
+    "W/m^2": "W",
+    "J/(m^2 K)": "J/K",
+    "W/(m^2 K)": "W/K",
+    "1/m^2": "1",
+    "1/(m^2 s)": "1/s",
+}
+"""Units of what is per area, and of the same for a whole pair of bodies."""
+
+
 def needed(unit: str) -> str:
     """What a unit measures, in words: ``a length [m]``."""
     exact = next((words for words, known in WORDS.items() if known == unit), None)

@@ -28,8 +28,8 @@ from typing import Any, ClassVar, TypeVar
 
 from surfacechem import laws
 from surfacechem.contracts.terms import Factor, Law, Load, Spec, Varying, resolved_unit
+from surfacechem.contracts.units import WHOLE, quotient
 from surfacechem.contracts.units import parse as si
-from surfacechem.contracts.units import quotient
 from surfacechem.documents.document import Tree
 from surfacechem.errors import InputError, Place
 from surfacechem.format import csvtable
@@ -65,6 +65,8 @@ class Context:
     bodies: Sequence[str] = ()
     x: str = "1"
     """The unit that "[x]" stands for."""
+    whole: bool = False
+    """Whether what is per area elsewhere is that of the whole pair of bodies."""
 
 
 # -- what a key holds -------------------------------------------------------------------------------------------------
@@ -99,6 +101,8 @@ class Number(Content):
     def read(self, tree: Tree, name: str, context: Context) -> float | Varying:
         """The value in SI."""
         spec = self.spec.resolved(context.x)
+        if context.whole:
+            spec = replace(spec, unit=WHOLE.get(spec.unit, spec.unit))
         if not (isinstance(tree.value, dict) and "value" in tree.value):
             return number(tree, spec, name, difference=self.difference)
         if not spec.varies:
@@ -346,6 +350,15 @@ class Nested(Content):
     def schema(self) -> Schema:
         """Its keys."""
         return schema_of(self.cls)
+
+
+@dataclass(frozen=True)
+class PerArea(Nested):
+    """A section in which what is per area is so in every scene."""
+
+    def read(self, tree: Tree, name: str, context: Context) -> Any:
+        """The section."""
+        return super().read(tree, name, replace(context, whole=False))
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,8 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, TypeVar
 
 from surfacechem import solve as solvers
-from surfacechem.contracts.terms import Law, Load, Property
+from surfacechem.contracts.terms import Law, Load, Potential, Property
+from surfacechem.contracts.units import WHOLE
 from surfacechem.documents.document import Tree
 from surfacechem.errors import InputError, Place, suggestion
 from surfacechem.format.declarations import UNITS, Context, is_name, keys, number, read
@@ -95,7 +96,10 @@ def read_document(tree: Tree, base: str = ".", mechanism_text: str | None = None
     # A temperature that several owners name is shared: they are in perfect contact.
     owners = [body.mapping().get("temperature") for body in bodies.values()]
     temperatures = _temperature_names([*owners, interface.get("temperature")])
-    context = Context({**UNITS, **dict.fromkeys(temperatures, "K")}, temperatures, tuple(bodies) or UNNAMED)
+    whole = "surface" in top
+    units = {name: WHOLE.get(unit, unit) for name, unit in UNITS.items()} if whole else UNITS
+    names = {**units, **dict.fromkeys(temperatures, "K")}
+    context = Context(names, temperatures, tuple(bodies) or UNNAMED, whole=whole)
     mechanism = None
     if "mechanism" in interface:
         # Which solver runs decides whether a mechanism may ask Cantera for its rates.
@@ -122,9 +126,13 @@ def _temperature_names(owners: Sequence[Tree | None]) -> tuple[str, ...]:
 
 def scene_of(case: Document, mechanism: Mechanism | None) -> Scene:
     """The scene that the sections state."""
+    interface, surface = _interface(case, mechanism), _surface(case)
+    if surface is not None:
+        interface = replace(interface, potentials=(*interface.potentials, surface))
     scene = Scene(
         bodies=_bodies(case),
-        interface=_interface(case, mechanism),
+        interface=interface,
+        surface=surface,
         heat=case.heat,
         loading=case.loading or {},
         surroundings=case.surroundings.temperature if case.surroundings else None,
@@ -205,6 +213,33 @@ def _interface(case: Document, mechanism: Mechanism | None) -> Interface:
         bonds=mechanism.bonds,
         engine=mechanism.engine,
         remarks=mechanism.remarks,
+    )
+
+
+def _surface(case: Document) -> Potential | None:
+    """The free energy of two surfaces of given shapes, a function of their approach."""
+    section = case.surface
+    if section is None:
+        return None
+    from surfacechem.surfaces.potential import CurvedSurfaces
+
+    first, second = tuple(case.bodies or ()) or UNNAMED
+    missing = [name for name in (first, second) if name not in section.bodies]
+    if missing:
+        raise section.error(f"{missing[0]} has no shape: give one to both bodies.", "bodies")
+    if not (section.pair or section.laws):
+        raise section.error("nothing acts between the surfaces: give a law under `pair` or `laws`.")
+    low, high = section.approach.low, section.approach.high
+    if not low < high:
+        raise section.approach.error(f"the least approach {low:g} m must be below the largest, {high:g} m.", "from")
+    return CurvedSurfaces(
+        shapes=(section.bodies[first], section.bodies[second]),
+        pairs=section.pair,
+        gap_laws=section.laws,
+        heat_laws=section.heat,
+        approach=(low, high),
+        accuracy=section.accuracy,
+        place=section.tree.place,
     )
 
 

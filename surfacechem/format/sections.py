@@ -20,9 +20,11 @@ from surfacechem.contracts.terms import (
     HeatTransfer,
     Limit,
     Load,
+    PairEnergy,
     Potential,
     Property,
     RateLaw,
+    Shape,
     Spec,
 )
 from surfacechem.contracts.units import quotient
@@ -41,6 +43,7 @@ from surfacechem.format.declarations import (
     Number,
     OneLaw,
     OneOf,
+    PerArea,
     Prescribed,
     Section,
     Shapes,
@@ -58,7 +61,7 @@ from surfacechem.model.components.mounting import TRACTIONS
 from surfacechem.quantities import VARIABLES
 from surfacechem.scene import MOST_CELLS, Conduction, Mounting
 from surfacechem.solve.run import OWN
-from surfacechem.tolerances import DEFAULT_RTOL
+from surfacechem.tolerances import DEFAULT_RTOL, FLOOR
 
 BODY_NAME = r"[A-Za-z][A-Za-z0-9_-]*"
 
@@ -237,6 +240,35 @@ class InterfaceSection(Section):
     mechanism: str | MechanismSection | None = key(
         Shapes(Text(), Nested(MechanismSection)), "Cantera surface mechanism, instead of `sites`"
     )
+
+
+# -- surfaces ---------------------------------------------------------------------------------------------------------
+
+
+class ApproachSection(Section):
+    """approaches between which the force is integrated; a run that reaches an end of them stops"""
+
+    called = "the approach"
+
+    low: float = quantity("m", "least approach", REQUIRED, name="from")
+    high: float = quantity("m", "largest approach", REQUIRED, name="to")
+
+
+class SurfaceSection(Section):
+    """shapes of the two bodies; what is per area elsewhere is then that of the whole pair, N for Pa and J for J/m^2"""
+
+    called = "the section surface"
+
+    bodies: Mapping[str, Shape] = key(
+        Entries(others=OneLaw(Shape), names=lambda case: case.bodies, what="bodies", words="shapes by body"),
+        "the shape of each body",
+        REQUIRED,
+    )
+    pair: Sequence[PairEnergy] = key(ListOf(OneLaw(PairEnergy)), "energies of two points at a distance", ())
+    laws: Sequence[Potential] = key(ListOf(OneLaw(Potential)), "laws of the gap, integrated over it", ())
+    heat: Sequence[HeatTransfer] = key(ListOf(OneLaw(HeatTransfer)), "conductances over the gap, integrated", ())
+    approach: ApproachSection = key(Nested(ApproachSection), default=REQUIRED)
+    accuracy: float = quantity("1", "relative accuracy of the force", FLOOR, above=0, at_most=0.1)
 
 
 # -- heat, mechanics, loading -----------------------------------------------------------------------------------------
@@ -581,6 +613,7 @@ class Document(Section):
         MappingProxyType({}),
     )
     interface: InterfaceSection = key(Nested(InterfaceSection), default=InterfaceSection())
+    surface: SurfaceSection | None = key(PerArea(SurfaceSection))
     heat: Sequence[HeatTransfer] = key(ListOf(OneLaw(HeatTransfer)), "heat paths", ())
     surroundings: SurroundingsSection | None = key(Nested(SurroundingsSection))
     mechanics: MechanicsSection = key(Nested(MechanicsSection), default=MechanicsSection())

@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import pkgutil
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache, partial
 from importlib import import_module
 
 from surfacechem.contracts.terms import Spec
+from surfacechem.contracts.units import WHOLE
 from surfacechem.errors import InputError, Place
 from surfacechem.model import components, constraints, ledger, sliding
 from surfacechem.model.build import Build
@@ -29,7 +31,11 @@ from surfacechem.model.system import (
     Range,
     System,
 )
+from surfacechem.quantities import Quantity
 from surfacechem.scene import Scene
+
+OF_SURFACE = "surface"
+"""Start of the paths of parameters that are per area in every scene."""
 
 PHASES = ("variables", "energies", "laws"), ("rows", "jumps", "stages"), ("outputs",)
 """What components state first, and what from all powers, and when all is known that a run may show.
@@ -97,7 +103,7 @@ def assemble(scene: Scene) -> System:
                 for record in getattr(component, phase, lambda _: None)(build) or ():
                     ledger.take(build, record)
         follow(build)
-    return _system(build)
+    return _system(build) if scene.surface is None else _of_pair(_system(build))
 
 
 def _close(build: Build) -> None:
@@ -149,6 +155,30 @@ def _system(build: Build) -> System:
         warnings=(*build.interface.remarks, *build.warnings),
         outside=_outside(build),
         origin=partial(assemble, build.scene),
+    )
+
+
+def _of_pair(system: System) -> System:
+    """The same where what is per area elsewhere is that of a pair of bodies: other units, other words."""
+
+    def renamed(item: Quantity) -> Quantity:
+        unit, words = WHOLE.get(item.unit, item.unit), item.long_name
+        words = words.replace("traction", "force") if unit != item.unit else words
+        return replace(item, unit=unit, long_name=words)
+
+    def spec(item: Spec) -> Spec:
+        return replace(item, unit=WHOLE.get(item.unit, item.unit))
+
+    return replace(
+        system,
+        states=tuple(replace(item, quantity=renamed(item.quantity)) for item in system.states),
+        named=tuple(replace(item, quantity=renamed(item.quantity)) for item in system.named),
+        ledger=tuple(replace(item, quantity=renamed(item.quantity)) for item in system.ledger),
+        parameters=tuple(
+            item if item.path.startswith(OF_SURFACE) else replace(item, spec=spec(item.spec))
+            for item in system.parameters
+        ),
+        whole=True,
     )
 
 

@@ -313,6 +313,8 @@ class System:
     conductances: Mapping[tuple[str, str], Sequence[Expression]] = field(default_factory=dict)
     """Conductances in parallel between two ends [W/(m^2 K)]."""
     outside: Outside | None = None
+    whole: bool = False
+    """Whether what is per area elsewhere is that of a pair of bodies."""
     constants: Mapping[str, tuple[Spec, float]] = field(default_factory=dict)
     """Parameters of laws that are left at their defaults, by path: numbers in the equations, which no run may change
     unless they are assembled with another value."""

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
+from surfacechem.contracts.units import WHOLE
 from surfacechem.results.accuracy import Accuracy
 from surfacechem.results.audit import Audit, audit
 from surfacechem.results.dataset import DATASET_NAMES, Results, profile_columns, quantity_columns
@@ -35,6 +37,8 @@ class Solution(Results):
     """What else a reader of the results has to know."""
     case_run: Run | None = None
     """How the case would be run; where the run was another, the dataset says so."""
+    surface: Any = None
+    """Free energy of two curved surfaces, where the scene has any."""
     error_from: str = "auto"
     """Where the error was asked to be from."""
 
@@ -101,7 +105,13 @@ class Solution(Results):
         for name, values in (self.accuracy.exact if self.accuracy else {}).items():
             c = computed[name]
             columns.append(Column(f"{name}_exact", c.dimensions, values, c.unit, f"exact {c.long_name}"))
-        return (*columns, *event_columns([trajectory]))
+        columns += event_columns([trajectory])
+        if not trajectory.model.system.whole:
+            return tuple(columns)
+        from surfacechem.results.surface_fields import surface_columns
+
+        named = (replace(column, unit=WHOLE.get(column.unit, column.unit)) for column in columns)
+        return (*named, *surface_columns(trajectory, self.surface))
 
     @cached_property
     def attributes(self) -> dict[str, str | float | int]:

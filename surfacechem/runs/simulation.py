@@ -212,6 +212,7 @@ class Simulation:
             shown,
             accuracy=beside(found, shown, case.scene, exact),
             case_run=case.run,
+            surface=case.scene.surface,
             error_from=error,
             notes=spatial.missed(case.scene, (errors or [CellErrors()])[0], found),
             **chosen._origin(values),

@@ -16,7 +16,7 @@ from surfacechem.contracts.terms import HeatTransfer, PairEnergy, Potential, Var
 from surfacechem.errors import InputError
 from surfacechem.surfaces.nodes import integral, outer_nodes
 from surfacechem.surfaces.pairwise import check_finite, kernel, length
-from surfacechem.surfaces.projection import Array, Surface
+from surfacechem.surfaces.projection import Array, Projection, Surface
 from surfacechem.tolerances import PRECISE, TINY, ULPS
 
 GAP = "g_n"
@@ -26,6 +26,9 @@ Density = Callable[[Array], Array]
 
 SAMPLES = 400
 """Places between which gaps are looked at for where a law bends."""
+
+LARGE = 1e300
+"""Size of what need not be accurate."""
 
 FAR = 1e6
 """Extent of an endless surface over the largest length of the two."""
@@ -100,10 +103,12 @@ def over_gap(
     levels: Sequence[float] = (0.0,),
     heat: Sequence[Callable[[Array], Array]] = (),
     rtol: float = PRECISE,
+    floor: float = 0.0,
 ) -> Contact:
     """Integral of laws of the gap over body 1; ``levels`` are gaps [m] at which the laws bend.
 
-    InputError where an accuracy is out of reach.
+    Errors are relative to the force, or to a ``floor`` [N] where that is larger. InputError where an accuracy is out of
+    reach.
     """
     check_finite(lower, upper)
     size = length(lower, upper)
@@ -111,28 +116,16 @@ def over_gap(
 
     def integrand(t: Array, order: int) -> Array:
         x, vectors = around.nodes(t)
-        near = upper.nearest(x)
-        area, count = np.linalg.norm(vectors, axis=-1), np.zeros((*near.gap.shape, 15))
-        for law in laws:
-            psi, traction = np.moveaxis(law(near.gap), -1, 0)
-            pull = -traction[..., None] * near.normal
-            count[..., 0] += psi
-            count[..., 1:4] += pull
-            count[..., 4:7] -= pull
-            count[..., 7:10] += np.cross(x, pull)
-            count[..., 10:13] -= np.cross(near.point, pull)
-        count[..., 13] = near.gap <= 0
-        for path in heat:
-            count[..., 14] += path(near.gap)[..., 0]
-        return np.asarray(np.sum(count * area[..., None], axis=1))
+        counts = counts_at(x, upper.nearest(x), laws, heat)
+        return np.asarray(np.sum(counts * np.linalg.norm(vectors, axis=-1, keepdims=True), axis=1))
 
     def sizes(found: Array) -> Array:
         force, moment = (float(np.linalg.norm(found[k])) for k in (slice(1, 4), slice(7, 10)))
-        force = max(force, TINY)
-        parts = [max(abs(found[0]), force * abs(gap)), *[force] * 6, *[max(moment, force * abs(gap), TINY)] * 6]
-        return np.array([*parts, np.inf, max(abs(found[14]), TINY)])
+        force = max(force, floor, TINY)
+        parts = [max(abs(found[0]), force * size), *[force] * 6, *[max(moment, force * size)] * 6]
+        return np.array([*parts, LARGE, max(abs(found[14]), TINY)])
 
-    pieces = [integral(integrand, box, sizes, rtol) for box in _boxes(around.box, around.nodes, upper, levels)]
+    pieces = [integral(integrand, box, sizes, rtol) for box in boxes(around.box, around.nodes, upper, levels)]
     whole = np.sum([part for part, _ in pieces], axis=0)
     force_1, force_2, moment_1, moment_2 = np.split(whole[1:13], 4)
     energy, area, conductance = map(float, whole[[0, 13, 14]])
@@ -140,7 +133,23 @@ def over_gap(
     return Contact(energy, force_1, force_2, moment_1, moment_2, area, conductance, gap, error)
 
 
-def _boxes(
+def counts_at(x: Array, near: Projection, laws: Sequence[Density], heat: Sequence[Callable[[Array], Array]]) -> Array:
+    """What is integrated, per area, at points (n, k, 3) of body 1, in the order of :class:`Contact`."""
+    count = np.zeros((*near.gap.shape, 15))
+    for law in laws:
+        psi, traction = np.moveaxis(law(near.gap), -1, 0)
+        # Tension pulls body 1 against the normal of body 2, which points at it.
+        pull = -traction[..., None] * near.normal
+        count[..., 0] += psi
+        count[..., 1:7] += np.concatenate([pull, -pull], axis=-1)
+        count[..., 7:13] += np.concatenate([np.cross(x, pull), -np.cross(near.point, pull)], axis=-1)
+    count[..., 13] = near.gap <= 0
+    for path in heat:
+        count[..., 14] += path(near.gap)[..., 0]
+    return count
+
+
+def boxes(
     box: tuple[Array, Array], nodes: Callable[[Array], tuple[Array, Array]], upper: Surface, levels: Sequence[float]
 ) -> list[tuple[Array, Array]]:
     """The box of an integral in one direction, cut where the gap passes a level; others as they are."""

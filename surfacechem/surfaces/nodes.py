@@ -79,7 +79,7 @@ def inner_nodes(surface: Surface, x: Array, order: int, law: PairEnergy, rtol: f
     """Nodes around the nearest point of the surface for each point (n, 3); InputError where it is in the body."""
     found = surface.nearest(x)
     if not np.all(found.gap > 0):
-        raise InputError("the surfaces overlap; a law of the distance of their points holds outside only.")
+        raise InputError("the surfaces overlap; a law of pairs of points holds outside only.")
     # Of what lies beyond, a part of size (h / reach)^(decay - 2) of all is missed.
     reach = np.minimum(found.gap * (rtol / 10) ** (-1 / (law.decay - 2)), law.cutoff)
     if is_round(surface):
@@ -191,7 +191,7 @@ class Outer:
 
 def outer_nodes(outer: Surface, inner: Surface, size: float, reach: float) -> tuple[Outer, float]:
     """The nodes over a surface that are graded towards the other, and the gap where they are nearest."""
-    alike = _alike_along(outer, inner), _alike_around(outer, inner)
+    alike = _alike_along(outer, inner), alike_around(outer, inner)
     at, gap = closest(outer, inner, size, alike)
     low, high = np.transpose(outer.shape.span)
     _, x_u, x_v = outer.derivatives(at, FIRST)
@@ -202,7 +202,7 @@ def outer_nodes(outer: Surface, inner: Surface, size: float, reach: float) -> tu
     return Outer(outer, at, scale, low, high, alike), gap
 
 
-def _alike_around(outer: Surface, inner: Surface) -> bool:
+def alike_around(outer: Surface, inner: Surface) -> bool:
     """Whether nothing changes around a common axis."""
     axial = all(s.shape.tilt == 0 for s in (outer, inner)) and outer.shape.about_axis
     return axial and (inner.shape.about_axis or is_round(inner))
@@ -221,6 +221,13 @@ def _scaled(integrand: Callable[[Array, int], Array], order: int, usual: Array, 
     return integrand(t, order) / usual
 
 
+def product_rule(box: Sequence[Array], order: int) -> tuple[Array, Array]:
+    """Nodes (n, directions) and weights (n,) over a box."""
+    rules = [gauss(low[None], high[None], order) for low, high in zip(*box, strict=True)]
+    at = np.stack(np.meshgrid(*(t[0] for t, _ in rules), indexing="ij"), axis=-1).reshape(-1, len(rules))
+    return at, np.prod(np.stack(np.meshgrid(*(w[0] for _, w in rules), indexing="ij")), axis=0).ravel()
+
+
 def integral(
     integrand: Callable[[Array, int], Array], box: Sequence[Array], sizes: Callable[[Array], Array], rtol: float
 ) -> tuple[Array, float]:
@@ -229,19 +236,27 @@ def integral(
     """
     before: Array | None = None
     for order in ORDERS:
-        rules = [gauss(low[None], high[None], order) for low, high in zip(*box, strict=True)]
-        at = np.stack(np.meshgrid(*(t[0] for t, _ in rules), indexing="ij"), axis=-1).reshape(-1, len(rules))
-        weights = np.prod(np.stack(np.meshgrid(*(w[0] for _, w in rules), indexing="ij")), axis=0).ravel()
+        at, weights = product_rule(box, order)
         now = np.tensordot(weights, integrand(at, order), axes=1)
         if before is not None:
             error = float(np.max(np.abs(now - before) / sizes(now)))
             if error <= rtol:
                 return now, error
         before = now
-    # Something narrow is elsewhere than at the foot: divide where it is.
+    return _adaptive(integrand, box, sizes, rtol, now)
+
+
+def _adaptive(
+    integrand: Callable[[Array, int], Array],
+    box: Sequence[Array],
+    sizes: Callable[[Array], Array],
+    rtol: float,
+    about: Array,
+) -> tuple[Array, float]:
+    """The same where something narrow is elsewhere than at the foot: the box is divided where it is."""
     from scipy.integrate import cubature
 
-    usual, most = sizes(now), MOST_DIVISIONS
+    usual, most = sizes(about), MOST_DIVISIONS
     scaled = partial(_scaled, integrand, ORDERS[WITHIN], usual)
     found: Any = cubature(scaled, *box, rule="gk15", rtol=0.0, atol=rtol, max_subdivisions=most)
     error = float(np.max(np.abs(found.error * usual) / sizes(found.estimate * usual)))

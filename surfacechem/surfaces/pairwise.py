@@ -21,7 +21,7 @@ from surfacechem.errors import InputError
 from surfacechem.surfaces.nodes import MOST_NODES, inner_nodes, integral, is_round, outer_nodes
 from surfacechem.surfaces.projection import Array, Surface
 from surfacechem.surfaces.shapes import Plane
-from surfacechem.tolerances import PRECISE, TINY
+from surfacechem.tolerances import NOISE, PRECISE, TINY
 
 COUNT = 13
 """Energy, and three components of two forces and two moments."""
@@ -69,9 +69,9 @@ def interaction(lower: Surface, upper: Surface, laws: Sequence[PairEnergy], rtol
     slowest = min(laws, key=lambda law: law.decay)
     size = length(lower, upper)
     around, gap = outer_nodes(outer, inner, size, size * rtol ** (-1 / (slowest.decay - 2)))
-    if not gap > 0:
+    if not gap > NOISE * size:
         raise InputError(
-            f"the surfaces overlap by {-gap:.3g} m; a law of the distance of their points holds outside only."
+            f"the surfaces overlap or touch, their gap is {gap:.3g} m; a law of pairs of points holds outside only."
         )
     amounts = np.array([law.n_1 * law.n_2 for law in laws])[:, None]
 

@@ -178,7 +178,7 @@ def test_a_table_and_a_penalty_of_pairs_end_where_they_say():
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: pair(Sphere(R=1.0), Plane(), -0.1, [power(4)]), "the surfaces overlap by 0.1 m"),
+        (lambda: pair(Sphere(R=1.0), Plane(), -0.1, [power(4)]), "overlap or touch, their gap is -0.1 m"),
         (lambda: pair(Plane(), Plane(), 0.1, [power(4)]), "no end: give one of them a length"),
         (lambda: density(BondedContact(E_n=1.0)), "reads bonded; .* the gap g_n alone"),
         (lambda: PairTable(n_1=1, n_2=1, distances=[1, 2, 3], energies=[1, 2, 3]), "the last energy is 3 J"),

@@ -1,0 +1,98 @@
+"""What two curved surfaces carry at some output times of a run: moment, area of contact, and fields over body 1."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surfacechem.results.netcdf import Column
+from surfacechem.solve.run import Trajectory
+
+if TYPE_CHECKING:
+    from surfacechem.surfaces.potential import CurvedSurfaces
+
+Array = NDArray[np.float64]
+
+TIMES = 9
+"""Output times, evenly spread, at which the surfaces are looked at."""
+
+ALONG, AROUND = 33, 16
+"""Points of the fields from the nearest point on, and across that."""
+
+AT = "surface_time"
+
+
+def surface_columns(trajectory: Trajectory, surface: CurvedSurfaces) -> list[Column]:
+    """Columns over their own times and over the surface of body 1."""
+    times = trajectory.result.times
+    chosen = np.unique(np.linspace(0, len(times) - 1, TIMES).round().astype(int))
+    gaps = trajectory.everywhere["g_n"][: len(times)][chosen]
+    # A run may end a rounding beyond the approaches that are known.
+    approaches = np.clip(gaps, *surface.approach)
+    return [
+        Column(AT, (AT,), times[chosen], "s", "times at which the surfaces are looked at"),
+        *_totals(surface, approaches),
+        *_fields(surface, approaches),
+    ]
+
+
+def _totals(surface: CurvedSurfaces, approaches: Array) -> list[Column]:
+    """Moment, area of contact, conductance, and how far off the local law is."""
+    from surfacechem.surfaces.nodes import alike_around
+
+    local = [surface.contact(d) for d in approaches]
+    exact = [surface.forces(d) for d in approaches]
+    columns = []
+    if not alike_around(*surface.surfaces(0.0)):
+        moments = np.array([moment for _, moment in exact])
+        columns = [
+            Column(f"moment_{axis}", (AT,), moments[:, k], "N m", f"moment on body 1 about the {axis} axis")
+            for k, axis in enumerate("xy")
+        ]
+    area = np.array([item.area for item in local])
+    columns += [
+        Column("gap_least", (AT,), np.array([item.gap for item in local]), "m", "least gap of the surfaces"),
+        Column("contact_area", (AT,), area, "m^2", "area of body 1 that touches or overlaps body 2"),
+        Column("contact_radius", (AT,), np.sqrt(area / math.pi), "m", "radius of a circle of the area of contact"),
+    ]
+    if surface.pairs:
+        off = np.array([mine.force_1[2] - force[2] for mine, (force, _) in zip(local, exact, strict=True)])
+        columns.append(Column("local_difference", (AT,), off, "N", "force of the local law minus the integral"))
+    if surface.heat_laws:
+        across = np.array([item.conductance for item in local])
+        columns.append(Column("conductance", (AT,), across, "W/K", "heat conductance over the gap"))
+    return columns
+
+
+def _fields(surface: CurvedSurfaces, approaches: Array) -> Sequence[Column]:
+    """Gap and traction over points of body 1, which gather where body 2 is nearest."""
+    from surfacechem.surfaces.curved_gap import FAR
+    from surfacechem.surfaces.nodes import outer_nodes
+    from surfacechem.surfaces.pairwise import length
+
+    lower, upper = surface.surfaces(float(approaches.min()))
+    size = length(lower, upper)
+    around, _ = outer_nodes(lower, upper, size, min(size, size * FAR))
+    ends = np.arcsinh((np.stack([around.low, around.high]) - around.at) / around.scale)
+    counts = [AROUND if lower.shape.about_axis and k == 1 else ALONG for k in range(2)]
+    t = [np.linspace(low, high, count) for low, high, count in zip(*ends, counts, strict=True)]
+    grid = np.stack(np.meshgrid(*t, indexing="ij"), axis=-1)
+    x = lower.derivatives(around.at + around.scale * np.sinh(grid))[0]
+    gap, traction = np.empty((2, len(approaches), *x.shape[:-1]))
+    for k, d in enumerate(approaches):
+        near = surface.surfaces(float(d))[1].nearest(x)
+        gap[k], traction[k] = near.gap, surface.traction(near.gap)
+    over = ("u", "v")
+    places = [
+        Column(f"surface_{axis}", over, x[..., k], "m", f"{axis} of points of body 1") for k, axis in enumerate("xyz")
+    ]
+    text = "normal traction on body 1 by the local law, tension positive"
+    return [
+        *places,
+        Column("gap", (AT, *over), gap, "m", "gap between the surfaces"),
+        Column("traction", (AT, *over), traction, "Pa", text),
+    ]

@@ -1,0 +1,129 @@
+"""Cases with surfaces: every gap model against an independent integration, units of a pair of bodies, bad input."""
+
+import numpy as np
+import pytest
+import symengine
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+import surfacechem
+from surfacechem.errors import InputError
+from surfacechem.expressions import derivative
+from surfacechem.laws.longrange import LennardJonesSpherePlane
+
+SCENE = """
+T_0: 300 K
+bodies:
+  ball: {temperature: T, C: 1e-18 J/K}
+  plane: {temperature: 300 K}
+surface:
+  bodies:
+    ball: {sphere: {R: 50 nm}}
+    plane: plane
+  pair:
+    - lennard-jones-pair: {n_1: 5e18 1/m^2, n_2: 5e18 1/m^2, psi_0: 4e-21 J, g_0: 0.3 nm}
+  approach: {from: 0.4 nm, to: 9 nm}
+"""
+RUN = "run: {until: 1 us, outputs: 41, rtol: 1e-11}\n"
+START = "initial: {T: 300 K}\n"
+LAW = LennardJonesSpherePlane(n_1=5e18, n_2=5e18, psi_0=4e-21, g_0=3e-10, R=5e-8, area=1.0)
+G = symengine.Symbol("g_n")
+FORCE = symengine.Lambdify([G], [derivative(LAW.energy(G), G)])
+
+
+def force(g):
+    return float(FORCE([g])[0])
+
+
+def data(tmp_path, text):
+    path = tmp_path / "case.yaml"
+    path.write_text(SCENE + text)
+    return surfacechem.run(path).dataset
+
+
+def test_a_prescribed_gap_bears_the_force_in_newtons(tmp_path):
+    found = data(tmp_path, "loading: {g_n: {ramp: {start: 5 nm, rate: -4 mm/s}}}\n" + START + RUN)
+    assert found.t_n.attrs["units"] == "N"
+    assert found.W_g_n.attrs["units"] == found.energy_residual.attrs["units"] == "J"
+    exact = [force(g) for g in found.g_n.values]
+    assert found.t_n.values == pytest.approx(exact, rel=1e-8)
+    work = LAW.energy(5e-9) - LAW.energy(1e-9)
+    assert found.W_g_n.values[-1] == pytest.approx(-work, rel=1e-8)
+
+
+def test_a_quasi_static_gap_is_where_spring_and_force_balance(tmp_path):
+    drive = "mechanics: {normal: {k: 5 N/m}}\nloading: {w_n: {ramp: {start: 6 nm, rate: -4 mm/s}}}\n"
+    found = data(tmp_path, drive + "initial: {T: 300 K, g_n: 6 nm}\n" + RUN)
+    for w, g in zip(found.w_n.values[::5], found.g_n.values[::5], strict=True):
+        exact = brentq(lambda x, w=w: 5.0 * (w - x) - force(x), w - 0.4e-9, w, xtol=1e-20, rtol=1e-14)
+        assert g == pytest.approx(exact, rel=1e-8)
+
+
+@pytest.mark.parametrize(("m", "c"), [(2e-15, 0.0), (2e-15, 1e-9), (0.0, 1e-9)])
+def test_a_mass_or_a_damper_moves_as_integrated_by_itself(tmp_path, m, c):
+    holds = ", ".join(f"{name}: {value} {unit}" for name, value, unit in (("m", m, "kg"), ("c_g", c, "N s/m")) if value)
+    text = f"mechanics: {{normal: {{k: 0.5 N/m, {holds}}}}}\nloading: {{w_n: 5 nm}}\ninitial: {{T: 300 K, g_n: 4 nm}}\n"
+    found = data(tmp_path, text + RUN)
+
+    # In nm and us.
+    def scaled(t, y):
+        if m:
+            pull = 0.5 * (5e-9 - y[0] * 1e-9) - force(y[0] * 1e-9)
+            return [y[1], (pull - c * y[1] * 1e-3) / m * 1e-3]
+        return [(0.5 * (5e-9 - y[0] * 1e-9) - force(y[0] * 1e-9)) / c * 1e3]
+
+    start = [4.0, 0.0] if m else [4.0]
+    exact = solve_ivp(scaled, (0, 1), start, "DOP853", found.time.values * 1e6, rtol=1e-13, atol=1e-13).y[0]
+    assert found.g_n.values == pytest.approx(exact * 1e-9, rel=1e-8)
+    assert found.attrs["energy_error"] < 1e-9
+
+
+def test_other_numbers_of_the_pair_can_be_swept_and_change_the_force(tmp_path):
+    path = tmp_path / "case.yaml"
+    path.write_text(SCENE + "loading: {g_n: 1 nm}\n" + START + RUN)
+    simulation, changed = surfacechem.load(path), {"surface.pair.lennard-jones-pair.n_1": 1e19}
+    usual, doubled = (simulation.run(changes).dataset.t_n.values[-1] for changes in ({}, changed))
+    assert doubled == pytest.approx(2 * usual, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("from: 0.4 nm", "from: 0 nm", r"case.yaml:\d+: .*the surfaces overlap"),
+        ("from: 0.4 nm", "from: 10 nm", "must be below the largest"),
+        ("{sphere: {R: 50 nm}}", "{spere: {R: 50 nm}}", "Did you mean 'sphere'"),
+        ("    plane: plane\n", "", "plane has no shape"),
+        ("ball: {sphere: {R: 50 nm}}", "ball: plane", "no end: give one of them a length"),
+        ("ball: {sphere: {R: 50 nm}}", "ball: {sphere: {R: -1 nm}}", "outside its range"),
+        ("to: 9 nm}", "to: 9 nm}\n  acuracy: 1e-3", "Did you mean 'accuracy'"),
+    ],
+)
+def test_bad_input_is_one_line_with_its_place(tmp_path, old, new, message):
+    path = tmp_path / "case.yaml"
+    assert old in SCENE
+    path.write_text(SCENE.replace(old, new) + "loading: {g_n: 1 nm}\n" + START + RUN)
+    with pytest.raises(InputError, match=message):
+        surfacechem.run(path)
+
+
+def test_a_scene_without_surfaces_imports_nothing_of_them():
+    import subprocess
+    import sys
+
+    code = "import sys, surfacechem; surfacechem.run('exothermic'); print([m for m in sys.modules if 'surfaces' in m])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_a_ball_pressed_into_a_penalty_has_its_area_of_contact(tmp_path):
+    path = tmp_path / "case.yaml"
+    law = "  laws: [penalty: {E_n: 1e15 Pa/m}]\n  approach: {from: -2 nm, to: 9 nm}\n"
+    text = (
+        SCENE[: SCENE.index("  pair:")] + law + "loading: {g_n: {ramp: {start: 1 nm, rate: -2 mm/s}}}\n" + START + RUN
+    )
+    path.write_text(text)
+    found = surfacechem.run(path).dataset
+    inside = np.maximum(-found.g_n.values, 0.0)
+    assert found.t_n.values == pytest.approx(-np.pi * 1e15 * 5e-8 * inside**2, rel=1e-8, abs=1e-18)
+    assert found.contact_area.values[-1] == pytest.approx(2 * np.pi * 5e-8 * 1e-9, rel=1e-9)
+    assert found.gap.dims == ("surface_time", "u", "v")
