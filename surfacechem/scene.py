@@ -253,8 +253,6 @@ class Scene:
 
     bodies: tuple[Body, Body]
     interface: Interface
-    surface: Potential | None = None
-    """Free energy of two surfaces of given shapes; what is per area elsewhere is then that of the whole pair."""
     heat: Sequence[HeatTransfer] = ()
     loading: Mapping[str, Load] = field(default_factory=dict)
     surroundings: Load | None = None
@@ -268,3 +266,5 @@ class Scene:
     """How the displacement across it is held, where not as ``tangential``; the mass is the same."""
     programme: Sequence[Stage] = ()
     """Stages of the loading, one after the other."""
+    surface: Potential | None = None
+    """Free energy of two surfaces of given shapes; what is per area elsewhere is then that of the whole pair."""
