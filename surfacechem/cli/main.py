@@ -185,7 +185,7 @@ def check(
     start, end = consistent_start(model, values), settings.times[-1]
     numbers = groups(model, scene, values, start, end)
     found = [*warnings(system), *start_warnings(model, problem, start, end)]
-    why = reasons(problem, settings) if settings.solver == AUTO else ()
+    why = reasons(problem, settings, system.moves) if settings.solver == AUTO else ()
     settings = model.chosen(settings, values)
     typer.echo(check_summary(simulation.case.title, system, scene, settings, numbers, found, why))
 

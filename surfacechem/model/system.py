@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from surfacechem.contracts.terms import Load, Spec
 from surfacechem.expressions import Expression
 from surfacechem.model.automaton import Edge, Equilibrium, Mode, Register, Sink, When, masked
-from surfacechem.quantities import VELOCITIES, Quantity
+from surfacechem.quantities import GAPS, VELOCITIES, Quantity
 from surfacechem.scene import Engine
 
 Array = NDArray[np.float64]
@@ -456,6 +456,11 @@ class System:
     def in_play(self, parameters: Array) -> tuple[bool, ...]:
         """Which guards are in play in the modes among the parameters: the moving margins, then the edges."""
         return tuple(all(parameters[j] in values for j, values in when) for when in self._when)
+
+    @property
+    def moves(self) -> bool:
+        """Whether a gap moves by a balance."""
+        return not GAPS.isdisjoint(self.state_columns)
 
     @property
     def in_stretches(self) -> bool:

@@ -328,13 +328,13 @@ def rounding_of_time(trajectory: Trajectory) -> float:
     return float(np.max(np.divide(change, size, out=np.zeros_like(change), where=size > 0), initial=0.0))
 
 
-def reasons(problem: Problem, run: Run) -> list[tuple[str, str, str]]:
-    """What was chosen for a run and why, a row each."""
+def reasons(problem: Problem, run: Run, moves: bool) -> list[tuple[str, str, str]]:
+    """What was chosen for a run, of a scene whose gap ``moves`` by a balance or does not, and why, a row each."""
     part = f"a hundredth of the accuracy {asked(run):.0e}, as errors of smooth runs are below 100 rtol"
     if run.rtol == TIGHTEST:
         part = f"for the accuracy {asked(run):.0e}; below this is rounding"
     return [
-        ("solver", *method(problem)),
+        ("solver", *method(problem, moves)),
         ("rtol", f"{run.rtol:.0e}", part),
         (
             "verified",

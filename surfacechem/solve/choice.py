@@ -18,15 +18,16 @@ MANY = 50
 """States of a network beyond which a second function of its rates takes longer to compile than any run gains by it."""
 
 
-def method(problem: Problem) -> tuple[str, str]:
-    """The solver of a problem, and why, in words.
+def method(problem: Problem, moves: bool) -> tuple[str, str]:
+    """The solver of a problem, of a scene whose gap ``moves`` by a balance or does not, and why, in words.
 
     What becomes stiff on the way only is seen there: explicit steps are followed by implicit ones in the same run.
     """
     program = problem.program
     if program.filler is not None:
         return ASKING[0], "rates of the mechanism come from Cantera itself, which it can ask"
-    why = _why_implicit(problem)
+    # The last digit of a gap that touches decides what follows, and implicit steps meet it closer.
+    why = _why_implicit(problem) or ("a gap moves, and may touch or stop" if moves else "")
     if why:
         return IMPLICIT, f"implicit, order 5 to 13 by tolerance: {why}"
     return EXPLICIT, "explicit, order 8, as the start is not stiff; implicit from where the run becomes so"

@@ -318,7 +318,7 @@ class Model:
         if run.solver != AUTO:
             return run
         try:
-            return replace(run, solver=method(self.problem(run, values))[0])
+            return replace(run, solver=method(self.problem(run, values), self.system.moves)[0])
         except InputError:  # the run says so itself
             return replace(run, solver=OWN)
 

@@ -91,7 +91,8 @@ def test_without_a_solver_an_accuracy_leaves_the_choice():
 @pytest.mark.parametrize(
     ("case", "words"),
     {
-        "stick-slip": "solver dop853 explicit, order 8, as the start is not stiff",
+        "exothermic": "solver dop853 explicit, order 8, as the start is not stiff",
+        "stick-slip": "solver radau implicit, order 5 to 13 by tolerance: a gap moves, and may touch or stop",
         "dna-adhesive": "solver radau implicit, order 5 to 13 by tolerance: stiff, as",
         "hot-plate-bonds": "solver radau implicit, order 5 to 13 by tolerance: some states are algebraic",
         "sudden-contact": "solver radau implicit, order 5 to 13 by tolerance: heat conducted between cells is stiff",
@@ -101,7 +102,7 @@ def test_the_choice_explains_itself(case, words):
     simulation = surfacechem.load(case)
     run = replace(simulation.case.run, solver="auto", accuracy=1e-8, rtol=first_tolerance(1e-8))
     problem = simulation.model.problem(run, simulation.model.values())
-    told = "\n".join(" ".join(row) for row in error_estimates.reasons(problem, run))
+    told = "\n".join(" ".join(row) for row in error_estimates.reasons(problem, run, simulation.system.moves))
     assert told.startswith(words)
     assert "a hundredth of the accuracy 1e-08" in told
     assert "a second run must agree" in told
