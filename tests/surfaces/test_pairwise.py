@@ -17,7 +17,11 @@ from surfacechem.surfaces.pairwise import interaction
 from surfacechem.surfaces.projection import Surface
 from surfacechem.surfaces.shapes import Cavity, Cylinder, Paraboloid, Plane, Sphere, Torus
 
-mpmath.mp.dps = 40
+
+@pytest.fixture(autouse=True)
+def forty_digits():
+    with mpmath.workdps(40):
+        yield
 
 
 def power(m):
