@@ -165,6 +165,8 @@ def closing(build: Build, g: Any) -> Iterator[Margin | str]:
     """End a run as the gap closes, unless a potential bears the bodies there, or a law ends there by itself."""
     if any(margin.domain and margin.expression == g for margin in build.margins):
         return
+    if build.scene.surface is not None:  # whose range of approach a run does not leave
+        return
     # What the potentials bear deep in contact, unless it is the same as at touch.
     t_n, side = build.expanded(derivative(build.psi, g)), symengine.Symbol("side")
     deep = t_n.subs({g: OVERLAP, side: -1})
