@@ -87,7 +87,7 @@ class TestRun:
         labels = ["solved", "finished", "error", "time", "balances", "written"]
         assert [line.split()[0] for line in done.stdout.splitlines()[1:]] == labels
         assert done.stdout.startswith("Bonding in contact\n")
-        assert "phi, T; perfect contact; radau at rtol 1e-10" in done.stdout
+        assert "phi, T; perfect contact; dop853 at rtol 1e-10" in done.stdout
         assert files(tmp_path) == {"bonding.nc"}
 
     def test_settings_and_changes_are_recorded(self, call):
