@@ -27,16 +27,13 @@ from surfacechem.solve.choice import EXPLICIT, IMPLICIT
 from surfacechem.solve.contract import Problem, Status
 from surfacechem.solve.diagnose import are_led_back
 from surfacechem.solve.radau.solver import consistent, solve_arrays
-from surfacechem.solve.radau.stepper import END, EVENTS, OUTPUTS, RECORDS
+from surfacechem.solve.radau.stepper import END, EVENTS, FIRST_COUNTER, OUTPUTS, RECORDS
 from surfacechem.solve.run import Model, Run
 from surfacechem.tolerances import CROSSED, EPS, MICROMETRE, PICOMETRE
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Index = NDArray[np.int64]
-
-FIRST_STEP = 4
-"""Column of the counts that holds the number of steps."""
 
 TRIED = 100
 """Runs of a plan that are tried for one that is admissible, whose problem the others share."""
@@ -228,7 +225,7 @@ class ArrayRuns:
             "status": status,
             "reason": reason,
             "time_reached": end[:, 0].copy(),
-            "steps": counts[:, FIRST_STEP].astype(np.int32),
+            "steps": counts[:, FIRST_COUNTER].astype(np.int32),
         }
         values = self._values(last)
         columns |= {f"{name}_last": values[name] for name in self.keep.last}

@@ -1,6 +1,7 @@
 """Numbers of a mechanism as run-time parameters: changed, swept and checked as if the file had them."""
 
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -45,9 +46,11 @@ EDITS = {
 @pytest.mark.parametrize("path", EDITS, ids=lambda path: path.rpartition(".")[2])
 def test_a_number_that_is_changed_is_that_of_the_file(tmp_path, path):
     value, edit = EDITS[path]
-    expected = surfacechem.load(case(tmp_path, edit)).run(error="balances")
-    check(surfacechem.load("press-hold-pull", {path: value}).run(error="balances"), expected)
-    check(surfacechem.load("press-hold-pull").run({path: value}, error="balances"), expected)
+    changed = surfacechem.load(case(tmp_path, edit))
+    even = replace(changed.case.run, picture=None)
+    expected = changed.run(run=even, error="balances")
+    check(surfacechem.load("press-hold-pull", {path: value}).run(run=even, error="balances"), expected)
+    check(surfacechem.load("press-hold-pull").run({path: value}, even, error="balances"), expected)
 
 
 def test_the_equations_name_what_may_change():

@@ -232,7 +232,7 @@ def test_creep_reverses_a_hundred_times(law, mount, elastic):
 
 def test_the_age_at_the_start_is_changed_in_seconds():
     """What is solved for is its logarithm, which is nothing that a case gives."""
-    simulation = surfacechem.load("rate-and-state-velocity-steps")
+    simulation = surfacechem.load("rate-and-state-velocity-steps", ["run.outputs=201"])
     assert "initial.theta" in simulation.system.changeable
     data = simulation.sweep({"initial.theta": ["5 s", 10.0]}).dataset
     np.testing.assert_allclose(data["theta"].values[:, 0], [5.0, 10.0], rtol=1e-14)

@@ -43,7 +43,7 @@ def compare(interface, solution, within):
 
 @pytest.mark.parametrize("name", CASES)
 def test_events_and_states_of_the_compiled_path(name):
-    solution = surfacechem.load(name).run(error="balances")
+    solution = surfacechem.load(name, ["run.outputs=201"]).run(error="balances")
     interface, net = network(name)
     for t in solution.dataset["time"].values[1:]:
         net.advance(float(t))

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -75,7 +76,7 @@ def test_what_is_kept_of_a_run_is_that_of_the_run_by_itself(name, tmp_path):
     data, points = store.dataset, simulation.plan().points
     for i, point in enumerate(points):
         one = {key: values.values.ravel()[i] for key, values in data.data_vars.items()}
-        alone = simulation.run(point)
+        alone = simulation.run(point, replace(simulation.case.run, picture=None))
         run = alone.trajectory
         assert STATUSES[one["status"]] == run.status
         assert run.reason.startswith(data.attrs["reasons"][one["reason"]])
@@ -96,7 +97,7 @@ def test_times_of_values_and_states_at_events(tmp_path):
     keep = {"reach": {"phi": 0.5, "T": "310 K"}, "series": ["T"]}
     simulation = case(keep=keep, over={K_0: [300.0, 30.0]})
     data = stored(tmp_path / "o.zarr", simulation).dataset
-    alone = simulation.run({K_0: 300.0})
+    alone = simulation.run({K_0: 300.0}, replace(simulation.case.run, picture=None))
     np.testing.assert_allclose(data["T"].values[0], alone.dataset["T"].values, rtol=1e-9)  # its steps end elsewhere
     for name, value in (("phi", 0.5), ("T", 310.0)):
         t = data[f"time_to_{name}"].values[0]
