@@ -21,6 +21,9 @@ Rows = NDArray[np.int64]
 SAMPLED = 100
 """Rows that tell how large rounding is."""
 
+LONG = 64
+"""Rows between two that are kept of which one in the middle is kept, too, where the line between the two misses any."""
+
 UNRESOLVED = 100.0
 """Tolerances of a value below which a change may be an error of the run."""
 
@@ -58,7 +61,11 @@ def needed(t: Array, values: Array, allowed: Array, kept: Flags) -> Flags:
         worst = order[np.append(np.diff(left[order]) > 0, True)]
         worst = worst[missed[worst] > 1]
         kept[rows[worst]] = True
-        rows = rows[np.isin(left, left[worst]) & ~kept[rows]]
+        again = np.isin(left, left[worst])
+        # Where all swings are alike the worst is next to an end each time: halves come to an end, too.
+        middle = (rows == (left + ends[right]) // 2) & (ends[right] - left > LONG)
+        kept[rows[again & middle]] = True
+        rows = rows[again & ~kept[rows]]
     return kept
 
 
