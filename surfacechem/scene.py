@@ -6,6 +6,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
+import numpy as np
+from numpy.typing import NDArray
+
 from surfacechem.contracts import grids
 from surfacechem.contracts.terms import (
     BodyEnergy,
@@ -202,7 +205,7 @@ class Engine(Protocol):
     def charges(self) -> Mapping[str, Mapping[str, float]]:
         """Charge [C] of a molecule of each of them that has any, by phase."""
 
-    def __call__(self, values: Sequence[float]) -> Sequence[float]:
+    def __call__(self, values: Sequence[float]) -> NDArray[np.float64]:
         """Values of the parameters at values of the variables."""
 
 

@@ -56,7 +56,7 @@ class Filler:
     reads: Function
     positions: NDArray[np.int64]
     """Of the parameters in the inputs."""
-    evaluate: Callable[[Sequence[float]], Sequence[float]]
+    evaluate: Callable[[Sequence[float]], NDArray[np.float64]]
 
     def __call__(self, inputs: NDArray[np.float64]) -> NDArray[np.float64]:
         """The inputs, one row or many, filled in place."""
@@ -303,17 +303,17 @@ def compile_program(
         algebraic=tuple(all(entry == 0 for entry in by_rate[j::core]) for j in range(core)) + (False,) * (n - core),
         filler=filler,
         chains=tuple(chains),
-        solved=partial(_compiled_rates, inputs, residual, derivatives, chains or filler),
+        solved=partial(_compiled_rates, inputs, residual, derivatives, chains),
         plain_margins=not read & {*derivatives, *outside},
     )
 
 
 @PREPARING
 def _compiled_rates(
-    inputs: Sequence[Any], residual: Sequence[Any], derivatives: Sequence[Any], others: object
+    inputs: Sequence[Any], residual: Sequence[Any], derivatives: Sequence[Any], chains: Sequence[Chain]
 ) -> Function | None:
-    """The code of the rates; none where ``others`` are found beside them: chains, or what comes from outside."""
-    rates = None if others else solved_rates(residual, derivatives)
+    """The code of the rates; none where there are chains."""
+    rates = None if chains else solved_rates(residual, derivatives)
     return compile_function(inputs, rates) if rates else None
 
 

@@ -7,6 +7,7 @@ take from them, or give to them, leaves them as they are, and brings its enthalp
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -14,6 +15,7 @@ from typing import Any
 
 import numpy as np
 import symengine
+from numpy.typing import NDArray
 
 from surfacechem.contracts.terms import Load, RateLaw, option, parameter
 from surfacechem.errors import InputError, Place, suggestion
@@ -21,6 +23,8 @@ from surfacechem.expressions import Expression, absolute
 from surfacechem.mechanism.mixture import Formula, Species, identifiers, word
 from surfacechem.mechanism.rates import MechanismReaction
 from surfacechem.quantities import MOLECULAR, Quantity
+
+Array = NDArray[np.float64]
 
 GASES = frozenset(("ideal-gas", "Redlich-Kwong", "Peng-Robinson", "plasma"))
 """Cantera's models of phases whose pressure matters."""
@@ -117,6 +121,8 @@ class HeldPhase:
             found.append((Quantity(names[species], "1", f"mole fraction of {species} in {phase.name}"), load))
         self.histories = tuple(found)
         self._fractions = [*names.values()]
+        self.enthalpies = np.zeros(phase.n_species)
+        """Of its species where it was put last [J/kmol]."""
         self._pressed, self._charged = state.pressure is not None, state.electric_potential is not None
 
     def put(self, T: float, values: Sequence[float]) -> None:
@@ -153,9 +159,11 @@ class HeldPhase:
         charges = dict(zip(self.phase.species_names, self.phase.charges.tolist(), strict=True))
         return {name: CHARGE * charges[name] for name in names if charges.get(name)}
 
-    def energy(self, name: str) -> Any:
-        """A partial molar energy of its species [J/kmol], with that of their charge."""
-        return getattr(self.phase, name) + self.charges * self.phase.electric_potential
+    def energies(self) -> Any:
+        """Partial molar enthalpies and Gibbs energies of its species [J/kmol], with those of their charges."""
+        self.enthalpies = self.phase.partial_molar_enthalpies
+        both = np.array((self.enthalpies, self.phase.chemical_potentials))
+        return both + self.charges * self.phase.electric_potential if self._charged else both
 
 
 def lacking(surface: Any) -> tuple[str, ...]:
@@ -246,10 +254,28 @@ class SurfaceEngine:
         first, own = species[0], [item.variable for item in species]
         self._own = "T_c", first.concentration, *own
         self._sites, self._count = first.sites, len(own)
-        self._taken = taken(surface, [held.phase for held in self.held])[open_ones]
-        self._last: tuple[Sequence[float], Sequence[float]] = (), ()
-        self._around: Sequence[float] = ()
-        self._energies: list[float] = []
+        self._taken = taken(surface, [held.phase for held in self.held])[open_ones].T / MOLECULAR
+        self._last: tuple[Sequence[float], Array] = (), np.empty(0)
+        self._energies = np.empty(0)
+        self._brought: list[tuple[int, Sequence[float]]] = [(0, ())]
+        """Who has brought the surface where, as several may share it."""
+
+    def beside(self, neighbours: Mapping[str, Neighbour]) -> SurfaceEngine:
+        """The same with other states of some neighbours; InputError where no reaction has such a neighbour."""
+        known = {held.phase.name: held for held in self.held}
+        for name, state in neighbours.items():
+            if name not in known:
+                found = suggestion(name, known)
+                raise InputError(f"no reaction of the surface {self.surface.name} has a neighbour '{name}'.{found}")
+            own = known[name].phase.species_names
+            if state.composition and list(state.composition) != own:
+                raise InputError(
+                    f"the reactor of the neighbour {name} has other species than the mechanism: {', '.join(own)}."
+                )
+            known[name] = HeldPhase(known[name].phase, state)
+        made = copy.copy(self)
+        made.held = list(known.values())
+        return made
 
     @property
     def charges(self) -> dict[str, dict[str, float]]:
@@ -271,7 +297,7 @@ class SurfaceEngine:
         for held in self.held:
             yield from held.limits(values)
 
-    def __call__(self, values: Sequence[float]) -> Sequence[float]:
+    def __call__(self, values: Sequence[float]) -> Array:
         """Net rates [1/(m^2 s)] at a temperature, the amount of the first species at full coverage, coverages, and the
         state of the neighbours.
 
@@ -281,24 +307,26 @@ class SurfaceEngine:
         if values == self._last[0]:
             return self._last[1]
         T, amount, end = values[0], values[1], 2 + self._count
-        found = [math.nan] * len(self.gives)
         if T > 0 and amount > 0:
-            if [T, *values[end:]] != self._around:
+            around = id(self), [T, *values[end:]]
+            if around != self._brought[0]:
                 self._bring(T, values[end:])
+                self._brought[0] = around
             # A stretched surface has fewer sites per area; coverages that a step tries need not sum to one.
             self.surface.site_density = amount * self._sites / MOLECULAR
             self.surface.set_unnormalized_coverages(values[2:end])
-            found = (self.surface.net_rates_of_progress[self.positions] * MOLECULAR).tolist() + self._energies
+            rates = self.surface.net_rates_of_progress[self.positions] * MOLECULAR
+            found = np.concatenate((rates, self._energies))
+        else:
+            found = np.full(len(self.gives), math.nan)
         self._last = values, found
         return found
 
     def _bring(self, T: float, states: Sequence[float]) -> None:
         """Bring the surface and its neighbours to a temperature [K], and these to their states."""
-        self._around, self.surface.TP = [T, *states], (T, None)
+        self.surface.TP = T, None
         given = iter(states)
         for held in self.held:
             held.put(T, [next(given) for _ in held.histories])
-        self._energies = []
-        for energy in ("partial_molar_enthalpies", "chemical_potentials") if self.held else ():
-            own = np.concatenate([held.energy(energy) for held in self.held])
-            self._energies += (self._taken @ own / MOLECULAR).tolist()
+        if self.held:
+            self._energies = (np.concatenate([held.energies() for held in self.held], axis=1) @ self._taken).ravel()

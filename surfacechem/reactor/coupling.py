@@ -18,9 +18,11 @@ import symengine
 from surfacechem.contracts.terms import Load, Spec
 from surfacechem.errors import InputError, suggestion
 from surfacechem.laws.loading import Hold
+from surfacechem.mechanism.evaluated import Neighbour, SurfaceEngine
 from surfacechem.model.components.interface import LOADABLE
 from surfacechem.model.system import Parameter, System
 from surfacechem.quantities import VARIABLES
+from surfacechem.reactor.gas import ReactingGas
 from surfacechem.scene import Body, Scene
 
 FORCES = ("Pa", "N", "W/m^2")
@@ -75,6 +77,27 @@ def with_loads(scene: Scene, values: Mapping[str, float]) -> Scene:
             reason = "" if name not in LOADABLE else " Its rate takes part; prescribe its history under `loading`."
             raise InputError(f"'{name}' is no load that a network can give.{suggestion(name, forces)}{reason}")
     return replace(scene, loading={**scene.loading, **{name: Hold(level=value) for name, value in values.items()}})
+
+
+def with_neighbours(scene: Scene, reactors: Mapping[str, Any]) -> Scene:
+    """The scene with phases beside its surface whose pressures and compositions are given while it runs."""
+    if not reactors:
+        return scene
+    engine = scene.interface.engine
+    if not isinstance(engine, SurfaceEngine):
+        raise InputError("no reaction of the scene has a neighbour, so no reactor can be one.")
+    for name, reactor in reactors.items():
+        if not isinstance(reactor, ReactingGas | cantera.Reservoir):
+            raise InputError(f"the neighbour {name} must be a ReactingGas, as {type(reactor).__name__} takes nothing.")
+    states = {name: _state(reactor.phase) for name, reactor in reactors.items()}
+    return replace(scene, interface=replace(scene.interface, engine=engine.beside(states)))
+
+
+def _state(phase: Any) -> Neighbour:
+    """The state of a phase as it is now."""
+    parts = zip(phase.species_names, phase.X.tolist(), strict=True)
+    several = phase.n_species > 1
+    return Neighbour(Hold(level=float(phase.P)), {name: Hold(level=part) for name, part in parts} if several else {})
 
 
 def with_reactors(scene: Scene, reactors: Mapping[str, Any]) -> Scene:

@@ -4,16 +4,20 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from surfacechem.errors import InputError, suggestion
 from surfacechem.expressions import depends
 from surfacechem.format import Case
+from surfacechem.mechanism.evaluated import HeldPhase
 from surfacechem.model.assemble import assemble
 from surfacechem.model.system import System
+from surfacechem.quantities import MOLECULAR
 from surfacechem.reactor import coupling
 from surfacechem.reactor.moments import Moments
 from surfacechem.solve.adapters.evaluation import Evaluation
@@ -31,6 +35,34 @@ NONE: Mapping[str, Callable[[float], float]] = {}
 
 DIFFERENCE = 8 * SQRT_EPS
 """A few of the steps by which Cantera's integrator differentiates, which bounds must not take for the solution."""
+
+
+@dataclass(frozen=True)
+class Beside:
+    """A reactor beside the surface, as the scene sees it."""
+
+    reactor: Any
+    held: HeldPhase
+    """The same at the temperature of the surface."""
+    places: NDArray[np.int64]
+    """Of its pressure and mole fractions among the parameters."""
+    species: NDArray[np.int64]
+    """Those which reactions make."""
+    accounts: NDArray[np.int64]
+    """Where the variables say how much of each."""
+
+    def state(self) -> list[float]:
+        """Its present pressure and mole fractions."""
+        phase = self.reactor.phase
+        return [phase.P, *(phase.X.tolist() if len(self.places) > 1 else ())]
+
+    def given(self, rates: Array) -> tuple[Array, float]:
+        """Amounts of all species [kmol/(m^2 s)] that reactions give, and their enthalpy [W/m^2], from the rates of the
+        variables.
+        """
+        amounts = np.zeros(len(self.held.enthalpies))
+        amounts[self.species] = rates[self.accounts] / MOLECULAR
+        return amounts, float(amounts @ self.held.enthalpies)
 
 
 class EndError(Exception):
@@ -59,12 +91,14 @@ class EmbeddedScene:
         reactors: Mapping[str, Any],
         heated: Iterable[str] = (),
         loads: Mapping[str, Callable[[float], float]] = NONE,
+        neighbours: Mapping[str, Any] | None = None,
     ) -> None:
         self.case = case
         self.loads = {f"loading.{name}.level": function for name, function in loads.items()}
         try:
             scene = coupling.with_heat(coupling.with_reactors(case.scene, reactors), heated)
             scene = coupling.with_loads(scene, {name: float(function(0.0)) for name, function in loads.items()})
+            scene = coupling.with_neighbours(scene, neighbours or {})
             system, self.reactions = coupling.with_multipliers(assemble(scene))
             _refuse_folds(system)
             self.model = Model(system)
@@ -79,6 +113,19 @@ class EmbeddedScene:
         self._terminal = np.array([margin.terminal for margin in self.model.margins], dtype=bool)
         self._position = {parameter.path: j for j, parameter in enumerate(system.parameters)}
         self.states = tuple(system.states[j].name for j in self.evaluation.free)
+        self.beside = [self._beside(scene.interface.engine, *item) for item in (neighbours or {}).items()]
+        """The reactors beside the surface."""
+
+    def _beside(self, engine: Any, name: str, reactor: Any) -> Beside:
+        held = next(held for held in engine.held if held.phase.name == name)
+        made = {name: f"made_{engine.names[name]}" for name in held.phase.species_names if name in engine.names}
+        return Beside(
+            reactor=reactor,
+            held=held,
+            places=np.array([self._position[f"loading.{quantity.name}.level"] for quantity, _ in held.histories]),
+            species=np.array([held.phase.species_index(species) for species in made]),
+            accounts=np.array([len(self.states) + self.accounts.index(account) for account in made.values()]),
+        )
 
     def start(self) -> Array:
         """Initial values of the variables."""
@@ -109,6 +156,10 @@ class EmbeddedScene:
             message = f"no heat flows into {name}, so no reactor can take its place. Give it a path under `heat`."
             raise InputError(message)
         return len(self.states) + self.accounts.index(wanted)
+
+    def place(self, path: str) -> int:
+        """Place of a parameter."""
+        return self._position[path]
 
     def give(self, path: str, value: float) -> None:
         """Set a parameter of the present piece of time."""
@@ -163,7 +214,7 @@ class EmbeddedScene:
             raise InputError(f"the scene has no quantity '{name}'.{suggestion(name, [*found, *names])}")
         return float(self.model.output_function(evaluation.inputs)[names.index(name)])
 
-    @property
+    @cached_property
     def breakpoints(self) -> tuple[float, ...]:
         """Times [s] at which a history or its slope jumps."""
         return tuple(float(t) for t in self.problem.segments[1:-1])

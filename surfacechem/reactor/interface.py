@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import time
 from bisect import bisect_right
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -18,6 +19,7 @@ from surfacechem.errors import InputError
 from surfacechem.format import Case
 from surfacechem.reactor.coupling import Port, node_of, refuse, suffix_of
 from surfacechem.reactor.embedded import EmbeddedScene, EndError
+from surfacechem.reactor.gas import ReactingGas
 from surfacechem.reactor.history import History
 from surfacechem.runs.simulation import Simulation
 from surfacechem.solve.adapters.cantera_network import LEDGER_UNIT, BackOffError, HeldReactor, contents
@@ -39,8 +41,9 @@ class InterfaceReactor(HeldReactor):
 
     ``case`` is a case file, the name of a shipped case, a Case or a Simulation; ``overrides`` change it as in
     ``surfacechem.load``. ``area``, in m^2 or a text with a unit, turns what the scene counts per area into what the
-    network counts. ``bodies`` names reactors that take the place of bodies: {body: reactor}. InputError where the scene
-    does not allow it.
+    network counts. ``bodies`` names reactors that take the place of bodies: {body: reactor}; ``neighbours`` gases
+    beside the surface of its mechanism, by their names there: {phase: ReactingGas}. InputError where the scene does
+    not allow it.
     """
 
     scene: EmbeddedScene
@@ -50,12 +53,13 @@ class InterfaceReactor(HeldReactor):
         case: str | Path | Case | Simulation,
         *,
         bodies: Mapping[str, Any] | None = None,
+        neighbours: Mapping[str, Any] | None = None,
         overrides: Sequence[str] | Mapping[str, object] = (),
         name: str = "interface",
         **_: Any,
     ) -> Self:
         """Read the scene, whose reactions Cantera has to know from the start."""
-        scene = EmbeddedScene(_case(case, overrides), bodies or {})
+        scene = EmbeddedScene(_case(case, overrides), bodies or {}, neighbours=neighbours)
         made = super().__new__(cls, contents(scene.reactions or ("bond",)), name=name)
         made.scene = scene
         return made
@@ -66,11 +70,13 @@ class InterfaceReactor(HeldReactor):
         *,
         area: float | str = 1.0,
         bodies: Mapping[str, Any] | None = None,
+        neighbours: Mapping[str, Any] | None = None,
         overrides: Sequence[str] | Mapping[str, object] = (),
         name: str = "interface",
     ) -> None:
         super().__init__(self.surface, name=name)  # Cantera's own part was made in __new__
         self.area, self.bodies = parse(area, "m^2", name="area"), dict(bodies or {})
+        self.neighbours = dict(neighbours or {})
         AREA.check("area", self.area)
         self.ports: dict[str, Port] = {}
         self.loads: dict[str, Callable[[float], float]] = {}
@@ -87,6 +93,9 @@ class InterfaceReactor(HeldReactor):
         self._take_up(self.scene)
         for body, reactor in self.bodies.items():
             self._connect(reactor, self.scene.account(body))
+        for gas in self.neighbours.values():
+            if isinstance(gas, ReactingGas):
+                gas.sources.append(partial(self._given, gas))
 
     def __repr__(self) -> str:
         """Title and states in a line."""
@@ -104,6 +113,9 @@ class InterfaceReactor(HeldReactor):
         """Time, variables and rates of the last evaluation."""
         self._current = False
         """Whether that is of the variables last put."""
+        self._asked: object = None
+        """All that those rates depend on; None where they may depend on more."""
+        self._heard = np.array([*self._paths()], dtype=np.int64)
         self.history = History(scene)
 
     def _connect(self, reactor: Any, account: int) -> None:
@@ -111,6 +123,12 @@ class InterfaceReactor(HeldReactor):
         self._connecting = True
         cantera.Wall(self, reactor, A=self.area, Q=lambda t: -float(self.attempt(lambda: self._rates(t))[account]))
         self._connecting = False
+
+    def _given(self, gas: ReactingGas, t: float) -> tuple[Array, float]:
+        """Amounts of species [kmol/s] that reactions give to a neighbour at a time [s], and their enthalpy [W]."""
+        rates = self.attempt(lambda: self._rates(t))
+        amounts, enthalpy = next(item for item in self.scene.beside if item.reactor is gas).given(rates)
+        return amounts * self.area, enthalpy * self.area
 
     def _add_wall(self, wall: Any) -> None:
         """Called by Cantera where a wall is made on this reactor itself, which is two bodies and what is between."""
@@ -153,8 +171,9 @@ class InterfaceReactor(HeldReactor):
             if node not in self.scene.states:
                 raise InputError(f"{node} stores no heat, so a wall cannot give it any. Put the wall on a body.")
             port = Port(name, node, f"Q_{suffix_of(case.scene, name)}")
-            self._take_up(EmbeddedScene(case, self.bodies, [*self.ports, name], self.loads))
+            scene = EmbeddedScene(case, self.bodies, [*self.ports, name], self.loads, self.neighbours)
             self.ports[name] = port
+            self._take_up(scene)
             self.put(self.start())
         return self.ports[name].reservoir
 
@@ -166,7 +185,7 @@ class InterfaceReactor(HeldReactor):
         """
         self._refuse_late(f"the load {name}")
         loads = {**self.loads, name: function}
-        self._take_up(EmbeddedScene(self.scene.case, self.bodies, self.ports, loads))
+        self._take_up(EmbeddedScene(self.scene.case, self.bodies, self.ports, loads, self.neighbours))
         self.loads = loads
 
     def press(self, gas: Any, outside: Any) -> None:
@@ -224,9 +243,14 @@ class InterfaceReactor(HeldReactor):
 
     def _rates(self, t: float) -> Array:
         """Rates [SI per s] for the values last put. Where there are none the integrator comes closer, up to the end."""
+        # All reactors of a network have been put before it asks for rates.
         if self._current and self._last is not None and self._last[0] == t:
             return self._last[2]
-        self._listen()
+        asked = t, self.x[: len(self.scene.states)].tobytes(), self._listen(), [f(t) for f in self.loads.values()]
+        # The integrator differentiates by every variable in turn, and most are lines of the ledger.
+        if asked == self._asked and self._last is not None:
+            self._current = True
+            return self._last[2]
         if self._stands_still(t) and self._last is not None:
             self.reason = f"{self.scene.closest(self._last[0], self._last[1])} near t = {t:.9g} s"
             self.error = InterfaceStopped(self.reason)
@@ -238,7 +262,7 @@ class InterfaceReactor(HeldReactor):
             if self._last is None or abs(t - self._last[0]) <= ROUNDING * abs(t):
                 self.reason, self.error = stop, InterfaceStopped(stop)
             raise self.error or BackOffError(stop) from None
-        self._last, self._current = (t, self.x, rates), True
+        self._last, self._asked, self._current = (t, self.x, rates), asked, True
         return rates
 
     def _stands_still(self, t: float) -> bool:
@@ -246,14 +270,25 @@ class InterfaceReactor(HeldReactor):
         step = t - self._last[0] if self._last is not None else 0.0
         return 0 < step <= 2 * DIGITS * t and t - self._restarted > ROUNDING * t
 
-    def _listen(self) -> None:
-        """Take over temperatures, heats and multipliers from the network."""
-        for name, reactor in self.bodies.items():
-            self.scene.give(f"loading.T_{suffix_of(self.scene.case.scene, name)}.level", reactor.T)
-        for port in self.ports.values():
-            self.scene.give(f"loading.{port.heat_name}.level", port.heat() / self.area)
-        for i, label in enumerate(self.scene.reactions):
-            self.scene.give(f"multiplier.{label}", self.surface.multiplier(i))
+    def _listen(self) -> bytes:
+        """Take over temperatures, heats, multipliers and compositions from the network, and tell them as bytes."""
+        values = [reactor.T for reactor in self.bodies.values()]
+        values += [port.heat() / self.area for port in self.ports.values()]
+        values += self.surface.forward_rate_constants[: len(self.scene.reactions)].tolist()
+        for item in self.scene.beside:
+            values += item.state()
+        self.scene.evaluation.parameters[self._heard] = values
+        return np.array(values).tobytes()
+
+    def _paths(self) -> Iterator[int]:
+        """Places among the scene's parameters of what the network gives, in the order of ``_listen``."""
+        names = [f"T_{suffix_of(self.scene.case.scene, name)}" for name in self.bodies]
+        names += [port.heat_name for port in self.ports.values()]
+        paths = [f"loading.{name}.level" for name in names]
+        paths += [f"multiplier.{label}" for label in self.scene.reactions]
+        yield from map(self.scene.place, paths)
+        for item in self.scene.beside:
+            yield from item.places
 
     def _check_piece(self, t: float) -> None:
         breakpoints = self.scene.breakpoints
@@ -279,13 +314,13 @@ class InterfaceReactor(HeldReactor):
 
     def ledger_rates(self, t: float, x: Array) -> Array:
         """Rates of the ledger [SI per s] at given variables."""
-        self._current = False
+        self._asked, self._current = None, False
         self._listen()
         return self.scene.ledger_rates(t, x)
 
     def begin_piece(self, t: float, rtol: float) -> None:
         """Go on with the pieces of the histories that hold from time t [s] on, at a relative tolerance."""
-        self.t, self._current, self._dated = t, False, True
+        self.t, self._asked, self._current, self._dated = t, None, False, True
         self.scene.begin_piece(t, rtol)
 
     def jump(self, t: float, index: int | None = None) -> None:
@@ -298,7 +333,7 @@ class InterfaceReactor(HeldReactor):
             self.reason = f"{end} at t = {t:.9g} s"
             self.error = InterfaceStopped(self.reason)
             raise self.error from None
-        self._last, self._current, self._restarted = None, False, t
+        self._last, self._asked, self._current, self._restarted = None, None, False, t
         for port in self.ports.values():
             port.warm(float(self.x[self.scene.states.index(port.node)]))
 
@@ -341,7 +376,7 @@ class InterfaceReactor(HeldReactor):
     @property
     def coupled(self) -> bool:
         """Whether anything comes from the network or the script."""
-        return bool(self.bodies or self.ports or self.loads)
+        return bool(self.bodies or self.ports or self.loads or self.neighbours)
 
     def record(self, t: float) -> None:
         """Keep the present state, at time t [s], for the dataset."""

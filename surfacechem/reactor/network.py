@@ -39,7 +39,8 @@ class ReactorNet(cantera.ReactorNet):
         self._last_step = 0.0
         self._steps = 0
         self._fresh = True
-        super().__init__(reactors)
+        # What others take of an interface has to be evaluated with the multipliers that Cantera gives it in its turn.
+        super().__init__(sorted(reactors, key=lambda reactor: not isinstance(reactor, InterfaceReactor)))
         self.interfaces += [reactor for reactor in reactors if isinstance(reactor, InterfaceReactor)]
 
     @cached_property
@@ -192,13 +193,14 @@ class ReactorNet(cantera.ReactorNet):
         """A reactor in the place of a body, or behind a wall on one, changes only if it is in the network."""
         for interface in self.interfaces:
             others = [(f"stands for the body {body}", reactor) for body, reactor in interface.bodies.items()]
+            others += [(f"is the neighbour {name}", reactor) for name, reactor in interface.neighbours.items()]
             for name, port in interface.ports.items():
                 others += [(f"has a wall to {name}", reactor) for reactor in port.others()]
             for role, reactor in others:
                 if not isinstance(reactor, cantera.Reservoir) and all(item is not reactor for item in self.reactors):
                     raise InputError(
-                        f"the reactor that {role} of {interface.name} is not in the network, so its "
-                        "temperature would never change: give it to ReactorNet too, or let it be a Reservoir."
+                        f"the reactor that {role} of {interface.name} is not in the network, so it "
+                        "would never change: give it to ReactorNet too, or let it be a Reservoir."
                     )
 
     def _arrive(self, t: float) -> None:

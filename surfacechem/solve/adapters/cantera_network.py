@@ -46,9 +46,9 @@ reactions:
 
 
 def contents(reactions: Sequence[str] = ("bond",)) -> Any:
-    """A Cantera surface that stands for a scene: one reaction for each of ours, to carry its multiplier."""
+    """A Cantera surface that stands for a scene: one reaction for each of ours, its rate constant the multiplier."""
     species = (f"- {{name: {name}, composition: {{}}, thermo: {{model: constant-cp}}}}" for name in reactions)
-    entries = (f"- {{equation: open => {name}, rate-constant: {{A: 0, b: 0, Ea: 0}}}}" for name in reactions)
+    entries = (f"- {{equation: open => {name}, rate-constant: {{A: 1, b: 0, Ea: 0}}}}" for name in reactions)
     text = CONTENTS.format(names=", ".join(reactions), species="\n".join(species), reactions="\n".join(entries))
     return cantera.Interface(yaml=text, name="interface")
 

@@ -34,6 +34,7 @@ class Evaluation:
         self.guess = y[self.algebraic]
         self._counts = np.zeros((1, COLUMNS), np.int64)
         ends, table = self.inputs[: 2 * n + 1][None], self.parameters[None, None]
+        self._rates = _Code(program.rates, self.inputs[None]) if program.rates else None
         self._search = stepper.Repeated(search_batch(program, ends, table, self._counts))
         self._fill = _Fill(program, self.inputs[None])
         self._ledger = _Code(program.ledger, self.inputs[None])
@@ -45,8 +46,11 @@ class Evaluation:
         self.y[self.free] = differential
         self.y[self.algebraic] = self.guess
         self.ydot[:] = 0.0
-        self._counts[:] = 0
         self._fill()
+        if self._rates is not None:
+            self.ydot[:] = self._rates()[0]
+            return bool(np.isfinite(self.ydot).all())
+        self._counts[:] = 0
         self._search()
         found = bool(self._counts[0, END] == 0)
         if found:
@@ -154,5 +158,5 @@ class _Fill:
 
     def __call__(self) -> None:
         if self.filler is not None:
-            values = self._reads().tolist()
-            self.inputs[:, self.filler.positions] = [self.filler.evaluate(row) for row in values]
+            for row, values in zip(self.inputs, self._reads().tolist(), strict=True):
+                row[self.filler.positions] = self.filler.evaluate(values)

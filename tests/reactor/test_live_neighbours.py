@@ -1,0 +1,169 @@
+"""Gases of a network beside a surface: what reactions take they lose, and the books of both close."""
+
+import cantera as ct
+import numpy as np
+import pytest
+
+import surfacechem
+from surfacechem.errors import InputError
+from surfacechem.reactor import InterfaceReactor, ReactingGas, ReactorNet
+
+pytestmark = pytest.mark.around
+
+AREA = 0.1
+FUEL = "H2:0.5, O2:0.1, H2O:0.4"
+CASE = """
+T_0: 298.15 K
+bodies:
+  wall: {{temperature: {T}{C}}}
+  core: {{temperature: {T}{C}}}
+interface:
+  temperature: {T}
+  mechanism:
+    file: sofc.yaml
+    phase: metal_surface
+    neighbours: {{gas: {{pressure: 1 atm, composition: {{H2: 0.5, O2: 0.1}}, rest: H2O}}}}
+initial: {{{start}coverages: {{(m): 1}}}}
+run: {{until: 1 s, solver: cantera}}
+"""
+WARM = CASE.format(T="T", C=", C: 100 J/m^2/K, capacity: constant", start="T: 900 K, ")
+HELD = CASE.format(T="1000 K", C="", start="")
+
+
+def fuel(kind=ReactingGas, **options):
+    gas = ct.Solution("sofc.yaml", "gas")
+    gas.TPX = 1000, ct.one_atm, FUEL
+    return kind(gas, clone=True, volume=1e-4, **options)
+
+
+def interface_of(tmp_path, text, gas, **options):
+    path = tmp_path / "case.yaml"
+    path.write_text(text)
+    return InterfaceReactor(path, neighbours={"gas": gas}, **options)
+
+
+def network(*reactors):
+    net = ReactorNet(reactors)
+    net.rtol, net.atol = 1e-10, 1e-18
+    return net
+
+
+def test_mass_elements_and_energy_stay_what_they_are(tmp_path):
+    """A closed box: what the gas loses the surface and the bodies have."""
+    gas = fuel()
+    interface = interface_of(tmp_path, WARM, gas, area=AREA)
+    net, surface = network(gas, interface), ct.Interface("sofc.yaml", "metal_surface")
+
+    def books():
+        kmol = gas.mass / gas.phase.mean_molecular_weight * gas.phase.X
+        sites = AREA * surface.site_density * np.array([interface[name] for name in interface.scene.states[:-1]])
+        atoms = np.array([[gas.phase.n_atoms(s, x) for s in gas.phase.species_names] for x in ("H", "O")])
+        held = np.array([[surface.n_atoms(s, x) for s in surface.species_names] for x in ("H", "O")])
+        energy = gas.mass * gas.phase.int_energy_mass
+        mass = sites @ surface.molecular_weights
+        return np.array([gas.mass, energy]), np.array([mass, AREA * interface["E_total"]]), atoms @ kmol + held @ sites
+
+    net.advance(1e-12)
+    gas_before, surface_before, elements = books()
+    for t in (1e-7, 1e-5, 1e-3):
+        net.advance(t)
+    gas_after, surface_after, elements_after = books()
+    given, taken = gas_before - gas_after, surface_after - surface_before
+    assert given[1] > 10  # J
+    np.testing.assert_allclose(taken, given, rtol=1e-9)
+    np.testing.assert_allclose(elements_after, elements, rtol=1e-12)
+    data = interface.dataset
+    assert max(data.attrs[f"{kind}_error"] for kind in ("energy", "site")) < 1e-9
+    # Outputs of the past are those of the gas as it was then.
+    assert data["x_gas_H2O"].values[0] == pytest.approx(0.4, rel=1e-6)
+    assert float(data["x_gas_H2O"][-1]) == pytest.approx(gas.phase["H2O"].X[0], rel=1e-12)
+    made = np.gradient(data["made_H2O"].values, data["time"].values)
+    assert data["production_H2O"].values[0] == pytest.approx(made[0], rel=1e-2)
+
+
+def test_at_constant_temperature_as_cantera_s_own_surface(tmp_path):
+    gas, theirs = fuel(energy="off"), fuel(ct.IdealGasReactor, energy="off")
+    interface = interface_of(tmp_path, HELD, gas, area=AREA)
+    surface = ct.Interface("sofc.yaml", "metal_surface")
+    surface.TP = 1000, ct.one_atm
+    surface.coverages = "(m):1"
+    beside = ct.ReactorSurface(surface, theirs, A=AREA, clone=True)
+    ours, alone = network(interface, gas), ct.ReactorNet([theirs])
+    alone.rtol, alone.atol = 1e-10, 1e-18
+    for t in (1e-8, 1e-6, 1e-4):
+        ours.advance(t)
+        alone.advance(t)
+        np.testing.assert_allclose(gas.phase.X, theirs.phase.X, atol=1e-8)
+        np.testing.assert_allclose([interface[name] for name in interface.scene.states], beside.coverages, atol=1e-8)
+        assert gas.mass == pytest.approx(theirs.mass, rel=1e-9)
+    assert np.abs(gas.phase.X - fuel().phase.X).max() > 0.1
+
+
+def test_two_halves_of_a_case_beside_one_gas_are_the_whole(tmp_path):
+    whole, shared = fuel(), fuel()
+    one = interface_of(tmp_path, WARM, whole, area=AREA)
+    case = surfacechem.load(tmp_path / "case.yaml").case
+    halves = [InterfaceReactor(case, area=AREA / 2, neighbours={"gas": shared}, name=name) for name in "ab"]
+    network(whole, one).advance(1e-4)
+    network(shared, *halves).advance(1e-4)
+    np.testing.assert_allclose(shared.phase.X, whole.phase.X, atol=1e-8)
+    for half in halves:
+        np.testing.assert_allclose(half.T, one.T, rtol=1e-8)
+
+
+def test_a_reservoir_is_a_neighbour_that_stays_as_it_is(tmp_path):
+    gas = ct.Solution("sofc.yaml", "gas")
+    gas.TPX = 1000, ct.one_atm, FUEL
+    interface = interface_of(tmp_path, HELD, ct.Reservoir(gas, clone=True))
+    network(interface).advance(1e-5)
+    held = InterfaceReactor(tmp_path / "case.yaml")
+    network(held).advance(1e-5)
+    count = len(held.scene.states)
+    np.testing.assert_allclose(interface.x[:count], held.x[:count], atol=1e-9)
+
+
+def test_sensitivity_of_the_gas_to_a_reaction_of_the_surface(tmp_path):
+    """Against the change by another rate: what the gas receives feels the multiplier."""
+
+    def water(multiplier, wanted):
+        gas = fuel(energy="off")
+        interface = interface_of(tmp_path, HELD, gas, area=AREA)
+        net = network(gas, interface)
+        interface.phase.set_multiplier(multiplier, 1)
+        if wanted:
+            interface.add_sensitivity_reaction(1)
+            net.rtol_sensitivity = net.atol_sensitivity = 1e-6
+        net.advance(1e-6)
+        return gas.phase["O2"].Y[0], net.sensitivity("O2", 0, 1) if wanted else None
+
+    (more, _), (less, _), (_, found) = water(1.01, False), water(0.99, False), water(1.0, True)
+    assert abs(found) > 1e-3
+    assert found == pytest.approx((np.log(more) - np.log(less)) / (np.log(1.01) - np.log(0.99)), rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("neighbours", "message"),
+    [
+        (
+            {"gas": lambda: fuel(ct.IdealGasReactor)},
+            "the neighbour gas must be a ReactingGas, as IdealGasReactor takes",
+        ),
+        ({"gass": fuel}, "no reaction of the surface metal_surface has a neighbour 'gass'. Did you mean 'gas'"),
+        (
+            {"gas": lambda: ReactingGas(ct.Solution("h2o2.yaml"), clone=True)},
+            "gas has other species than the mechanism: H2, H2O",
+        ),
+    ],
+)
+def test_what_is_no_neighbour(neighbours, message, tmp_path):
+    (tmp_path / "case.yaml").write_text(WARM)
+    with pytest.raises(InputError, match=message):
+        InterfaceReactor(tmp_path / "case.yaml", neighbours={name: make() for name, make in neighbours.items()})
+
+
+def test_a_gas_that_is_not_in_the_network(tmp_path):
+    interface = interface_of(tmp_path, WARM, fuel())
+    with pytest.raises(InputError, match="the reactor that is the neighbour gas of interface is not in the network"):
+        ReactorNet([interface]).advance(1.0)
+    with pytest.raises(InputError, match="no reaction of the scene has a neighbour"):
+        InterfaceReactor("exothermic", neighbours={"gas": fuel()})
