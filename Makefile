@@ -69,6 +69,7 @@ $(VENV)/bin/python:
 
 $(RUNTIME): pyproject.toml | $(VENV)/bin/python
 	$(BIN)/pip install --quiet --editable .
+	$(BIN)/python -m compileall -q surfacechem
 	$(BIN)/python -m surfacechem.solve
 	$(BIN)/surfacechem run exothermic -q -o $(VENV)/exothermic.nc  # with nothing but what it declares to need
 	touch $@

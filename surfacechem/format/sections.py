@@ -136,7 +136,9 @@ class BodySection(Section):
 
     temperature: str | Load = key(Temperature(), "a name such as T, or a value or a history", REQUIRED)
     capacity: str = key(
-        OneOf("capacity", lambda: sorted(laws.laws(BodyEnergy))), "energy as a function of temperature", QUADRATIC
+        OneOf("capacity", lambda: sorted(laws.laws(BodyEnergy)), lambda name: laws.knows(BodyEnergy, name)),
+        "energy as a function of temperature",
+        QUADRATIC,
     )
     conduction: ConductionSection | None = key(Nested(ConductionSection))
     stiffness: float | None = quantity("Pa/m", "normal stiffness of the body; both are in series", above=0)
@@ -146,9 +148,11 @@ class BodySection(Section):
     @staticmethod
     def energy(tree: Tree) -> type[BodyEnergy]:
         """The law of the energy, whose parameters stand beside the other keys."""
-        known = laws.laws(BodyEnergy)
         capacity = tree.mapping().get("capacity")
-        return cast("type[BodyEnergy]", known[capacity.choice("capacity", known) if capacity else QUADRATIC])
+        name = capacity.value if capacity else QUADRATIC
+        if capacity and not (isinstance(name, str) and laws.knows(BodyEnergy, name)):
+            name = capacity.choice("capacity", laws.laws(BodyEnergy))
+        return cast("type[BodyEnergy]", laws.find(BodyEnergy, name))
 
     @classmethod
     def more_keys(cls, tree: Tree | None) -> Mapping[str, Key]:

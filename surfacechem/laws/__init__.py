@@ -75,17 +75,26 @@ def _shipped(contract: type[Law]) -> dict[str, type[Law]]:
     return {law.name(): law for family in FAMILIES[contract] for law in _in_module(contract, family)}
 
 
+def knows(contract: type[Law], name: str) -> bool:
+    """Whether a law of that name fulfils a contract."""
+    return _found(contract, name) is not None
+
+
 def find(contract: type[Law], name: str) -> type[Law]:
     """The law of that name; imports no family beyond the one that holds it."""
+    found = _found(contract, name)
+    if found is None:
+        raise InputError(f"no {contract.contract} law '{name}'.{suggestion(name, laws(contract))}")
+    return found
+
+
+def _found(contract: type[Law], name: str) -> type[Law] | None:
     # One family after the other, so that a case imports no more than those before its own.
     for family in FAMILIES[contract]:
         for law in _in_module(contract, family):
             if law.name() == name:
                 return law
-    every = laws(contract)
-    if name in every:
-        return every[name]
-    raise InputError(f"no {contract.contract} law '{name}'.{suggestion(name, every)}")
+    return laws(contract).get(name)
 
 
 # -- laws of one's own ------------------------------------------------------------------------------------------------

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -109,13 +110,15 @@ def against_exact(
     return Accuracy(stated(errors), f"exact solution {name}", errors, exact)
 
 
-def beside(found: Accuracy, shown: Trajectory, scene: Scene, exact: tuple[str, Mapping[str, float]] | None) -> Accuracy:
-    """The accuracy with exact values at outputs that follow a run, where it has exact values at all."""
-    if exact is None or not found.exact or shown.run.picture is None:
-        return found
+def exact_outputs(
+    found: Accuracy, exact: tuple[str, Mapping[str, float]] | None, scene: Scene
+) -> Callable[[Trajectory], dict[str, Array]] | None:
+    """What gives the exact values at the outputs of a run; None where its accuracy is from elsewhere."""
+    if exact is None or not found.exact:
+        return None
     from surfacechem.results.matching import exact_values
 
-    return replace(found, exact=exact_values(*exact, scene, shown, to_the_end=True))
+    return partial(exact_values, *exact, scene, to_the_end=True)
 
 
 def _second(trajectory: Trajectory) -> Trajectory:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -12,10 +13,11 @@ import numpy as np
 from surfacechem.contracts.units import WHOLE
 from surfacechem.results.accuracy import Accuracy
 from surfacechem.results.audit import Audit, audit
-from surfacechem.results.dataset import DATASET_NAMES, Results, profile_columns, quantity_columns
+from surfacechem.results.dataset import DATASET_NAMES, Array, Results, profile_columns, quantity_columns
 from surfacechem.results.event_table import event_columns, event_findings, event_violations, event_waits
 from surfacechem.results.findings import Verdict, findings, verdicts
 from surfacechem.results.netcdf import Column, versions
+from surfacechem.results.picture import followed
 from surfacechem.solve import solver
 from surfacechem.solve.contract import Status
 from surfacechem.solve.run import Run, Trajectory
@@ -32,7 +34,10 @@ class Solution(Results):
     """What a run hands back. ``dataset`` is the xarray Dataset; ``write`` saves the same as netCDF."""
 
     trajectory: Trajectory
+    """The run, with its states at the times at which runs are compared."""
     accuracy: Accuracy | None = None
+    exact: Callable[[Trajectory], Mapping[str, Array]] | None = None
+    """Exact values at the outputs of a run, by variable, where the case has any."""
     notes: tuple[str, ...] = ()
     """What else a reader of the results has to know."""
     case_run: Run | None = None
@@ -56,6 +61,11 @@ class Solution(Results):
     def reason(self) -> str:
         """Why the run ended."""
         return self.trajectory.reason
+
+    @cached_property
+    def shown(self) -> Trajectory:
+        """The run with its states at the times of the dataset, which follow it where none were asked for."""
+        return followed(self.trajectory)
 
     @cached_property
     def audit(self) -> Audit:
@@ -84,7 +94,8 @@ class Solution(Results):
     @cached_property
     def columns(self) -> tuple[Column, ...]:
         """Every variable of the dataset, the time coordinate first."""
-        trajectory, books, accounts = self.trajectory, self.audit, self.trajectory.model.system.ledger
+        trajectory, accounts = self.shown, self.trajectory.model.system.ledger
+        books = self.audit if trajectory is self.trajectory else audit(trajectory)
         along = [*quantity_columns([trajectory]), *profile_columns(trajectory)]
         columns = [Column("time", ("time",), trajectory.result.times, "s", "time since the start"), *along]
         for account, values in zip(accounts, trajectory.result.ledger_outputs.T, strict=True):
@@ -102,7 +113,7 @@ class Solution(Results):
             text = f"least entropy production of {law.replace('_', ' ')}"
             columns.append(Column(f"least_sigma_{law}", (), np.float64(low), "W/(m^2 K)", text))
         computed = {column.name: column for column in along}
-        for name, values in (self.accuracy.exact if self.accuracy else {}).items():
+        for name, values in (self.exact(trajectory) if self.exact else {}).items():
             c = computed[name]
             columns.append(Column(f"{name}_exact", c.dimensions, values, c.unit, f"exact {c.long_name}"))
         columns += event_columns([trajectory])

@@ -21,9 +21,8 @@ from surfacechem.format import Case, Overrides, Source
 from surfacechem.model.system import System
 from surfacechem.results import spatial
 from surfacechem.results.accuracy import Accuracy, CellErrors
-from surfacechem.results.error_estimates import accuracy, beside, check_way, verified
+from surfacechem.results.error_estimates import accuracy, check_way, exact_outputs, verified
 from surfacechem.results.event_table import event_times
-from surfacechem.results.picture import followed
 from surfacechem.results.solution import Solution
 from surfacechem.scene import Scene
 from surfacechem.solve import AUTO
@@ -203,14 +202,13 @@ class Simulation:
                 errors.append(chosen._cell_errors(trajectory))
             return errors[0]
 
-        shown = followed(trajectory)
-        compared = shown if error == "balances" else trajectory
-        found = accuracy(compared, case.scene, exact, error, cells, estimate)
+        found = accuracy(trajectory, case.scene, exact, error, cells, estimate)
         if unused and error == "auto":
             found = replace(found, source=f"{found.source}; {unused}")
         return Solution(
-            shown,
-            accuracy=beside(found, shown, case.scene, exact),
+            trajectory,
+            accuracy=found,
+            exact=exact_outputs(found, exact, case.scene),
             case_run=case.run,
             surface=case.scene.surface,
             error_from=error,
