@@ -341,32 +341,40 @@ def mechanism(
 
 @app.command(epilog=EXIT_CODES)
 def plot(
-    source: Annotated[
-        str, Argument(metavar="FILE.nc|CASE", help="A dataset, a store (.zarr), or a case to run first.")
+    sources: Annotated[
+        list[str],
+        Argument(
+            metavar="FILE.nc|CASE...",
+            help="A dataset, a store (.zarr), or a case to run first; several go into one figure.",
+        ),
     ],
-    output: Annotated[Path | None, written_to(".png, .svg or .pdf; <name>.png if not given.")] = None,
+    output: Annotated[
+        Path | None, written_to(".png, .svg or .pdf; <name>.png if not given, of several comparison.png.")
+    ] = None,
     variables: Annotated[str | None, Option("--variables", help="Variables to plot, with commas between.")] = None,
     against: Annotated[
-        str | None, Option("--against", metavar="VARIABLE", help="A variable as the axis, instead of time.")
+        str | None,
+        Option("--against", metavar="VARIABLE", help="A variable as the axis, instead of time or what is swept."),
     ] = None,
     changes: Changes = None,
 ) -> None:
-    """Plot a run over time or a variable, or a sweep over parameters."""
+    """Plot runs over time or a variable, or sweeps over parameters."""
     from surfacechem import plots
     from surfacechem.results.netcdf import SUFFIXES
     from surfacechem.runs.simulation import load
 
     # By its suffix, as a dataset that is missing must not be taken for the name of a case.
-    is_file = source.rstrip("/").endswith((*SUFFIXES, ".zarr"))
-    if is_file and changes:
+    cases = [source for source in sources if not source.rstrip("/").endswith((*SUFFIXES, ".zarr"))]
+    if changes and not cases:
         raise InputError("a dataset is plotted as it is; give a case to change values of.", Place(path="--set"))
-    target = output or Path(f"{Path(source).stem}.png")
+    target = output or Path("comparison.png" if len(sources) > 1 else f"{Path(sources[0]).stem}.png")
     check_picture(target)
-    solution = None if is_file else solved(load(source, changes or ()).run, quiet=False, brief=True)
+    solutions = {case: solved(load(case, changes or ()).run, quiet=False, brief=True) for case in cases}
     names = listed(variables) if variables else None
-    plots.write(plots.figure(solution.dataset if solution else source, names, against), target)
+    shown = [solutions[source].dataset if source in solutions else source for source in sources]
+    plots.write(plots.figure(shown, names, against), target)
     typer.echo(str(target))
-    if solution:
+    for solution in solutions.values():
         leave_with(solution.status, solution.reason)
 
 

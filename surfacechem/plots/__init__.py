@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from surfacechem.errors import InputError, Place
+from surfacechem.errors import InputError
 from surfacechem.plots.style import COLOURS, STYLE, opened, save, write
 
 if TYPE_CHECKING:
@@ -20,21 +20,38 @@ __all__ = ["COLOURS", "STYLE", "figure", "opened", "save", "write"]
 
 
 def figure(
-    data: xarray.Dataset | str | Path, variables: Sequence[str] | None = None, against: str | None = None
+    data: xarray.Dataset | str | Path | Sequence[xarray.Dataset | str | Path],
+    variables: Sequence[str] | None = None,
+    against: str | None = None,
 ) -> Figure:
-    """The figure that suits a dataset or its netCDF file: of a run, of a sweep, or of a study.
+    """The figure that suits a dataset or its netCDF file, of a run, of a sweep, or of a study; or of several of them.
 
-    ``variables`` are shown instead of the usual choice; those of a run over the variable ``against`` instead of time.
+    Parameters
+    ----------
+    data
+        A dataset, or the path of its file; or a list of them, whose curves are named by what differs.
+    variables
+        Names of the variables to show, instead of the usual choice.
+    against
+        The variable along the axis: instead of time, and of a sweep, whose runs are then drawn each, instead of what is
+        swept.
+
+    Raises
+    ------
+    InputError
+        Where a file is no dataset of surfacechem, or has no variable of a name.
     """
-    from surfacechem.plots import run, study, sweep
+    from surfacechem.plots import comparison, run, study, sweep
 
-    dataset = opened(data)
+    several = [data] if isinstance(data, str | Path) or not isinstance(data, Sequence) else data
+    datasets = [opened(each) for each in several]
+    if len(datasets) > 1:
+        return comparison.figure(datasets, variables, against)
+    (dataset,) = datasets
     if "study" in dataset.attrs:
         if variables or against:
             raise InputError("the figure of a study has no choice of variables.")
         return study.figure(dataset)
-    if "sweep" not in dataset.attrs:
-        return run.figure(dataset, variables, against)
-    if against:
-        raise InputError("a sweep is plotted over what it sweeps; runs have other axes.", Place(path="--against"))
-    return sweep.figure(dataset, variables)
+    if "sweep" in dataset.attrs:
+        return sweep.figure(dataset, variables, against)
+    return run.figure(dataset, variables, against)

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import xarray
 from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 
 from surfacechem.errors import InputError, suggestion
 from surfacechem.format.plans import RUN, Plan
 from surfacechem.plots import style
+from surfacechem.plots.run import KINDS, of_kind
 from surfacechem.plots.style import COLOURS, Array, symbol, unit, unit_text, varies
 
 MOST_MEMBERS = 100
@@ -68,9 +72,13 @@ def fair(dataset: xarray.Dataset, name: str) -> Array:
 
 def axis_label(values: xarray.DataArray) -> str:
     """Name and unit of a parameter, or of a time."""
+    return f"{axis_words(values)} [{unit_text(unit(values))}]"
+
+
+def axis_words(values: xarray.DataArray) -> str:
+    """Name of a parameter."""
     name = str(values.name)
-    words = name.replace("_", " ") if len(name.partition("_")[0]) > 1 else symbol(name)
-    return f"{words} [{unit_text(unit(values))}]"
+    return name.replace("_", " ") if len(name.partition("_")[0]) > 1 else symbol(name)
 
 
 def quantity_label(values: xarray.DataArray) -> str:
@@ -97,20 +105,68 @@ def maps(dataset: xarray.Dataset, plan: Plan, axes: Sequence[str], names: Sequen
     return plot
 
 
-def curves(dataset: xarray.Dataset, axes: Sequence[str], names: Sequence[str]) -> Figure:
-    """Series of all runs, or of a fair part of them, which the figure says."""
+def portraits(dataset: xarray.Dataset, axes: Sequence[str], variables: Sequence[str] | None, against: str) -> Figure:
+    """Each run of a sweep over one of its variables, or over time."""
+    series = along(dataset, axes)
+    for name in (*(variables or ()), against):
+        if name not in (*series, "time"):
+            raise InputError(f"no variable '{name}' along the runs of the sweep.{suggestion(name, series)}")
+    usual = [name for _, *kind in KINDS[:2] for name in of_kind(dataset, series, *kind)]
+    moving = [name for name in usual if name != against and varies(fair(dataset, name))]
+    if not (names := list(dict.fromkeys(variables or moving[:MOST_PANELS]))):
+        raise InputError(f"neither bonds nor temperatures change: name variables to show over {against}.")
+    return curves(dataset, axes, names, against)
+
+
+def along(dataset: xarray.Dataset, axes: Sequence[str]) -> list[str]:
+    """Numbers along the runs of a sweep."""
+    many = [str(n) for n, x in dataset.variables.items() if x.dtype.kind == "f" and x.ndim == len(axes) + 1]
+    return [name for name in many if "event" not in dataset[name].dims]
+
+
+def curves(dataset: xarray.Dataset, axes: Sequence[str], names: Sequence[str], against: str | None = None) -> Figure:
+    """Series of all runs, or of a fair part of them, which the figure says; over ``against`` instead of time."""
     count = int(np.prod([dataset.sizes[name] for name in axes]))
     members = np.unique(np.linspace(0, count - 1, min(count, MOST_MEMBERS)).round().astype(np.int64))
+    over = dataset[against or str(dataset[names[0]].dims[-1])]
+    x = np.broadcast_to(over.values, dataset[names[0]].shape).reshape(count, -1)[members]
+    text, size = style.prefixed(unit(over), x)
     with style.panels(6.4, 0.9 + 2.2 * len(names), len(names), sharex=True) as (plot, grid):
         for ax, name in zip(grid[:, 0], names, strict=True):
             values = dataset[name].values.reshape(count, -1)[members]
-            along = dataset[dataset[name].dims[-1]]
-            ax.plot(along.values, values.T, color=COLOURS[0], linewidth=0.7, alpha=0.35)
-            ax.set_ylabel(quantity_label(dataset[name]))
-            ax.set_xlabel(axis_label(along) if ax is grid[-1, 0] else "")
+            for line, run, k in zip(values, x, members.tolist(), strict=True):
+                ax.plot(run / size, line, **looks(dataset, axes, k))
+            words, high = style.prefixed(unit(dataset[name]), values)
+            ax.set_ylabel(f"{symbol(name)} [{words}]")
+            style.label_ticks(ax.yaxis, high)
+            style.legend(ax)
+        grid[-1, 0].set_xlabel(f"{'Time' if against in (None, 'time') else symbol(against)} [{text}]")
+        if len(axes) == 1 and RUN not in axes and count > style.MOST_CURVES:
+            bar = plot.colorbar(colours(dataset, axes), ax=grid[:, 0].tolist())
+            words, size = style.prefixed(unit(dataset[axes[0]]), dataset[axes[0]].values)
+            bar.set_label(f"{axis_words(dataset[axes[0]])} [{words}]")
+            style.label_ticks(bar.ax.yaxis, size)
         style.headings(plot, grid[0, 0], dataset)
-        grid[0, 0].set_title(f"{len(members)} of {count} runs", loc="left", fontsize=8, color="#555555")
+        if len(members) < count:
+            grid[0, 0].set_title(f"{len(members)} of {count} runs", loc="left", fontsize=8, color="#555555")
     return plot
+
+
+def colours(dataset: xarray.Dataset, axes: Sequence[str]) -> ScalarMappable:
+    """Colours of the values of a parameter."""
+    values = dataset[axes[0]].values
+    scale = LogNorm if style.over_decades(values) else Normalize
+    return ScalarMappable(scale(values.min(), values.max()), "viridis")
+
+
+def looks(dataset: xarray.Dataset, axes: Sequence[str], member: int) -> dict[str, Any]:
+    """How the curve of a run looks: a colour that tells its parameter where there is one, a legend where few are."""
+    if len(axes) > 1 or RUN in axes:
+        return {"color": COLOURS[0], "linewidth": 0.7, "alpha": 0.35}
+    parameter = dataset[axes[0]]
+    if len(parameter) <= style.MOST_CURVES:
+        return {"color": COLOURS[member], "linewidth": 1.3, "label": style.valued(parameter, member)}
+    return {"color": colours(dataset, axes).to_rgba(parameter.values[member]), "linewidth": 0.9}
 
 
 def effects(

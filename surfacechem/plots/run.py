@@ -6,10 +6,10 @@ Events are thin lines with their names, stages and modes are bands.
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
-from typing import Any
 
 import matplotlib
 import numpy as np
@@ -40,6 +40,9 @@ RESIDUALS = {"energy_residual": "energy_error", "entropy_residual": "entropy_err
 # Residuals below this, which is far below the last digit of what is balanced, are drawn as this.
 LEAST = EPS / 256
 
+# Dashes of exact solutions, far enough from each other that the colour of a run below them is seen.
+EXACT = (0, (3, 5))
+
 # Times that span more than this go on a logarithmic axis, unless they are evenly spaced.
 DECADES = 1e3
 
@@ -58,11 +61,18 @@ PROFILE = re.compile("profile_[12]")
 # Times at which profiles are drawn, evenly spread over the outputs.
 PROFILE_TIMES = 6
 
-# Up to this many events have their names written to them; above so many lines nothing could be told from them.
+# Up to this many events have their names written above them; above so many lines nothing could be told from them.
 FEW, MANY = 8, 60
 
-# Part of the run that a stage must last for its name to fit.
-WIDE = 0.09
+# Rows of names above the first panel; width of a letter and of the space between two, in widths of the panel, and
+# height of a row in points.
+LANES, LETTER, BETWEEN, LANE = 3, 0.0128, 0.02, 9.0
+
+# Curves of a panel that have colours of their own: the largest; more would not be told apart.
+COLOURED = len(style.COLOURS) - 1
+
+# Names in a label of curves that coincide.
+MOST_NAMES = 3
 
 
 @dataclass(frozen=True)
@@ -81,31 +91,35 @@ def figure(dataset: xarray.Dataset, variables: Sequence[str] | None = None, agai
         raise InputError("time does not hold finite numbers.", style.place(dataset))
     if variables and any(map(PROFILE.fullmatch, variables)):
         return _across(dataset, variables)
-    panels = _panels(dataset, variables, against)
+    shown = panels(dataset, variables, against)
     balances = not variables and against is None and any(name in dataset for name in RESIDUALS)
-    rows = len(panels) + balances
+    rows = len(shown) + balances
     if rows == 0 or dataset.sizes["time"] == 0:
         raise InputError("there is nothing to plot: the dataset holds no output times or none of its variables varies.")
     with style.panels(6.4, 0.9 + (2.6 if against else 1.55) * rows, rows, sharex=True) as (plot, grid):
         axes = grid[:, 0].tolist()
-        for ax, panel in zip(axes, panels, strict=False):
+        for ax, panel in zip(axes, shown, strict=False):
             _draw(ax, dataset, panel, against or "time")
         if balances:
             _draw_balances(axes[-1], dataset)
-        draw_axis(axes, dataset, panels, against)
-        style.headings(plot, axes[0], dataset)
+        above, more = draw_axis(axes, dataset, shown, against)
+        style.headings(plot, axes[0], dataset, above, more)
     return plot
 
 
-def draw_axis(axes: Sequence[Axes], dataset: xarray.Dataset, panels: Sequence[Panel], against: str | None) -> None:
-    """Label the axis that all panels share: time, or the variable that takes its place."""
+def draw_axis(
+    axes: Sequence[Axes], dataset: xarray.Dataset, panels: Sequence[Panel], against: str | None
+) -> tuple[float, str]:
+    """Label the axis that all panels share: time, or the variable that takes its place; returns how many points names
+    need above the panels, and the events that have none there.
+    """
     if against is None:
         # Fluxes and powers follow from what changes: where they start is no reason for another axis.
-        _draw_time(axes, dataset, [name for p in panels if p.unit != FLUX for name in p.names])
-    else:
-        text, size = style.prefixed(unit(dataset[against]), dataset[against].values)
-        axes[-1].set_xlabel(f"{meaning(dataset[against])} {symbol(against)} [{text}]")
-        style.label_ticks(axes[-1].xaxis, size)
+        return _draw_time(axes, dataset, [name for p in panels if p.unit != FLUX for name in p.names])
+    text, size = style.prefixed(unit(dataset[against]), dataset[against].values)
+    axes[-1].set_xlabel(f"{meaning(dataset[against])} {symbol(against)} [{text}]")
+    style.label_ticks(axes[-1].xaxis, size)
+    return 0.0, ""
 
 
 def curves(dataset: xarray.Dataset) -> list[str]:
@@ -124,15 +138,15 @@ def of_kind(dataset: xarray.Dataset, names: Sequence[str], unit_wanted: str, pat
     return [name for name in fitting if not (name.endswith("_exact") or is_mode(dataset[name]))]
 
 
-def _panels(dataset: xarray.Dataset, variables: Sequence[str] | None, against: str | None) -> list[Panel]:
+def panels(dataset: xarray.Dataset, variables: Sequence[str] | None, against: str | None) -> list[Panel]:
     """Panels of the variables by unit, or of all that vary by kind, without the variable that is their axis."""
     known = curves(dataset)
     for name in (*(variables or ()), *([against] if against else ())):
         if name not in known:
             raise InputError(f"no variable '{name}' over time in the dataset.{suggestion(name, known)}")
-    panels = _by_unit(dataset, list(dict.fromkeys(variables))) if variables else _by_kind(dataset, known)
-    panels = [replace(panel, names=[name for name in panel.names if name != against]) for panel in panels]
-    return [panel for panel in panels if panel.names]
+    found = _by_unit(dataset, list(dict.fromkeys(variables))) if variables else _by_kind(dataset, known)
+    found = [replace(panel, names=[name for name in panel.names if name != against]) for panel in found]
+    return [panel for panel in found if panel.names]
 
 
 def _by_unit(dataset: xarray.Dataset, names: Sequence[str]) -> list[Panel]:
@@ -179,12 +193,11 @@ def _across(dataset: xarray.Dataset, names: Sequence[str]) -> Figure:
 
 def _draw(ax: Axes, dataset: xarray.Dataset, panel: Panel, over: str) -> None:
     t = dataset[over].values
-    for names in merged(dataset, panel.names):
-        ax.plot(t, dataset[names[0]].values, label=" = ".join(map(symbol, names)), marker="o" if len(t) == 1 else "")
+    _draw_curves(ax, dataset, panel, t)
     exact = [f"{name}_exact" for name in panel.names if f"{name}_exact" in curves(dataset)]
     for name in exact:
         label = "exact" if name == exact[0] else "_"
-        ax.plot(t, dataset[name].values, "--", color="black", linewidth=0.9, label=label)
+        ax.plot(t, dataset[name].values, linestyle=EXACT, color="black", linewidth=0.9, label=label)
     drawn = np.concatenate([dataset[name].values for name in panel.names])
     drawn = drawn[np.isfinite(drawn)]
     text, size = style.prefixed(panel.unit, drawn)
@@ -194,6 +207,21 @@ def _draw(ax: Axes, dataset: xarray.Dataset, panel: Panel, over: str) -> None:
         middle = float(drawn.mean())
         ax.set_ylim(middle - 0.05 * abs(middle or 1.0), middle + 0.05 * abs(middle or 1.0))
     style.legend(ax)
+
+
+def _draw_curves(ax: Axes, dataset: xarray.Dataset, panel: Panel, t: Array) -> None:
+    """The curves of a panel; where they are many, the largest in colours and the rest in grey."""
+    groups, marker = merged(dataset, panel.names), "o" if len(t) == 1 else ""
+    rest: list[list[str]] = []
+    if len(groups) > len(style.COLOURS):
+        groups.sort(key=lambda names: -style.largest(dataset[names[0]].values))
+        groups, rest = groups[:COLOURED], groups[COLOURED:]
+    for names in groups:
+        label = " = ".join([*map(symbol, names[:MOST_NAMES]), *(["..."] if len(names) > MOST_NAMES else [])])
+        ax.plot(t, dataset[names[0]].values, label=label, marker=marker)
+    for k, names in enumerate(rest):
+        label = "_" if k else f"{len(rest)} smaller"
+        ax.plot(t, dataset[names[0]].values, label=label, marker=marker, color="0.75", linewidth=0.8, zorder=1)
 
 
 def merged(dataset: xarray.Dataset, names: Sequence[str]) -> list[list[str]]:
@@ -223,8 +251,10 @@ def _draw_balances(ax: Axes, dataset: xarray.Dataset) -> None:
     style.legend(ax)
 
 
-def _draw_time(axes: Sequence[Axes], dataset: xarray.Dataset, names: Sequence[str]) -> None:
-    """The axis of time, on which these quantities can be followed, with bands of modes and lines at events."""
+def _draw_time(axes: Sequence[Axes], dataset: xarray.Dataset, names: Sequence[str]) -> tuple[float, str]:
+    """The axis of time, on which these quantities can be followed, with bands of modes and lines at events; returns
+    what :func:`draw_axis` does.
+    """
     times = dataset["time"].values
     over_decades = logarithmic(times, [dataset[name].values for name in names])
     text, size = ("s", 1.0) if over_decades else style.prefixed("s", times)
@@ -233,9 +263,12 @@ def _draw_time(axes: Sequence[Axes], dataset: xarray.Dataset, names: Sequence[st
         style.label_ticks(axes[-1].xaxis, size)
     for ax in axes if over_decades else ():
         _show_decades(ax, max(times[times > 0][0], SHOWN * times[-1]), times[-1])
-    if len(times) > 1:
-        _draw_bands(axes, dataset)
-    _draw_events(axes, dataset)
+    stages = _draw_bands(axes, dataset) if len(times) > 1 else []
+    events = _draw_events(axes, dataset)
+    below = _write(axes[0], stages, 0)
+    rows = _write(axes[0], events, below) if len(events) <= FEW else 0
+    counts = Counter(name for _, name in events if not rows).most_common(MOST_NAMES)
+    return LANE * (below + rows), ", ".join(f"{count} {name}" if count > 1 else name for name, count in counts)
 
 
 def _show_decades(ax: Axes, first: float, last: float) -> None:
@@ -248,37 +281,43 @@ def _show_decades(ax: Axes, first: float, last: float) -> None:
     ax.set(xscale="log", xlim=(first, last))
 
 
-def _draw_events(axes: Sequence[Axes], dataset: xarray.Dataset) -> None:
-    """Thin vertical lines at the events; ends of stages show as bands."""
+def _draw_events(axes: Sequence[Axes], dataset: xarray.Dataset) -> list[tuple[float, str]]:
+    """Thin vertical lines at the events, whose times and names it returns; ends of stages show as bands."""
     if "event_time" not in dataset:
-        return
-    named = {"event_name": ("event",)} if "event_name" in dataset else {}
-    style.check(dataset, {"event_time": ("event",)}, named)
-    times = dataset["event_time"].values
-    names = dataset["event_name"].values.astype(str) if named else np.full(times.shape, "")
-    moments = dict(zip(times.tolist(), names.tolist(), strict=True))
+        return []
+    style.check(dataset, {"event_time": ("event",)})
+    moments = dict(zip(dataset["event_time"].values.tolist(), _words(dataset), strict=True))
     for moment in moments if len(moments) <= MANY else ():
         for ax in axes:
             ax.axvline(moment, color="black", linewidth=0.6, linestyle=":")
-    told = {t: name for t, name in moments.items() if not name.startswith("end of ")}
-    for moment, name in told.items() if len(told) <= FEW else ():
-        _write(axes[0], moment, name, rotation=90, ha="right", va="top", y=0.97)
+    return [(t, name) for t, name in moments.items() if name and not name.startswith("end of ")]
 
 
-def _draw_bands(axes: Sequence[Axes], dataset: xarray.Dataset) -> None:
-    """The stages of a programme, every other one; else times in which a mode is not what it was at the start."""
+def _words(dataset: xarray.Dataset) -> list[str]:
+    """What each event is called: its name, or its reason where the name is the variable that passes zero."""
+    named = {name: ("event",) for name in ("event_name", "event_reason") if name in dataset}
+    style.check(dataset, {}, named)
+    texts = [dataset[name].values.astype(str).tolist() for name in named] or [[""] * dataset.sizes["event"]]
+    quantities = [name for name in curves(dataset) if not is_mode(dataset[name])]
+    return [
+        why if name.partition(" ")[0] in quantities else name for name, why in zip(texts[0], texts[-1], strict=True)
+    ]
+
+
+def _draw_bands(axes: Sequence[Axes], dataset: xarray.Dataset) -> list[tuple[float, str]]:
+    """The stages of a programme, every other one, whose middles and names it returns; else times in which a mode is not
+    what it was at the start.
+    """
     modes = [str(name) for name, values in dataset.data_vars.items() if is_mode(values) and values.dims == ("time",)]
-    times = dataset["time"].values
-    staged = "stage" in modes
+    staged, named = "stage" in modes, []
     for name in ["stage"] if staged else modes:
         spans = _spans(dataset, name)
         shaded = [span for span in spans if (span[2] % 2 if staged else span[2] != spans[0][2])]
         for (start, end, _), ax in product(shaded if len(shaded) <= MANY else (), axes):
             ax.axvspan(start, end, color="black", alpha=0.05, linewidth=0)
         words = dict(re.findall(r"(-?\d+): ([^,)]+)", str(dataset[name].attrs["long_name"])))
-        for start, end, value in spans if staged else ():
-            if end - start > WIDE * float(np.ptp(times)):
-                _write(axes[0], (start + end) / 2, words.get(f"{value:.0f}", ""), ha="center", va="bottom", y=0.02)
+        named += [((start + end) / 2, words.get(f"{value:.0f}", "")) for start, end, value in spans if staged]
+    return named
 
 
 def _spans(dataset: xarray.Dataset, name: str) -> list[tuple[float, float, float]]:
@@ -293,10 +332,29 @@ def _spans(dataset: xarray.Dataset, name: str) -> list[tuple[float, float, float
     return list(zip(edges, [*edges[1:], float(times[-1])], values[[0, *changes]].tolist(), strict=True))
 
 
-def _write(ax: Axes, x: float, text: str, y: float, **how: Any) -> None:
-    """A small word at a time, at a height relative to the panel."""
-    if text:
-        ax.text(x, y, text, transform=ax.get_xaxis_transform(), fontsize=7, color="#555555", clip_on=True, **how)
+def _write(ax: Axes, items: Sequence[tuple[float, str]], below: int) -> int:
+    """Small words above a panel, each over its time, in as many rows as they need so that none is on another; returns
+    how many. Nothing is written where there is no room for all.
+    """
+    ax.get_xlim()  # limits that follow from what is drawn are not known before
+    across = ax.transScale + ax.transLimits
+    placed: list[tuple[float, int, str]] = []
+    ends = [0.0] * LANES
+    for x, text in sorted(items):
+        half = LETTER * len(text) / 2
+        middle = min(max(float(across.transform((x, 0.0))[0]), half), 1 - half)
+        lane = next((k for k, end in enumerate(ends) if middle - half >= end), None)
+        if lane is None:
+            return 0
+        ends[lane] = middle + half + BETWEEN
+        placed.append((middle, lane, text))
+    for middle, lane, text in placed:
+        above = (0, LANE * (below + lane) + 2)
+        ax.annotate(
+            text, (middle, 1.0), above, "axes fraction", "offset points", ha="center", va="bottom", fontsize=7,
+            color="#555555",
+        )  # fmt: skip
+    return 1 + max((lane for _, lane, _ in placed), default=-1)
 
 
 def logarithmic(times: Array, quantities: Sequence[Array] = ()) -> bool:

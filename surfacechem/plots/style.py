@@ -59,6 +59,13 @@ PREFIXES = {-5: "f", -4: "p", -3: "n", -2: "µ", -1: "m", 0: "", 1: "k", 2: "M",
 GREEK = ("alpha", "beta", "epsilon", "eta", "kappa", "lambda", "mu", "phi", "rho", "sigma", "tau", "theta")
 
 
+WIDE = 90
+"""Letters of a line of facts above the panels."""
+
+MOST_CURVES = 7
+"""Values of a parameter that are drawn as curves of their own: as many as there are colours."""
+
+
 class Plot(Figure):
     """A figure that notebooks show by themselves."""
 
@@ -136,8 +143,8 @@ def place(dataset: xarray.Dataset) -> Place | None:
     return Place(str(source)) if source else None
 
 
-def headings(plot: Figure, ax: Axes, dataset: xarray.Dataset) -> None:
-    """Title, how it ended, error and solver."""
+def headings(plot: Figure, ax: Axes, dataset: xarray.Dataset, above: float = 0.0, more: str = "") -> None:
+    """Title, how it ended, error, solver and what ``more`` there is to say, so many points above the axes."""
     attributes = dataset.attrs
     plot.suptitle(str(attributes.get("title", "")), x=0.01, ha="left", fontsize=11, fontweight="bold")
     facts = [str(attributes.get("reason", ""))]
@@ -147,9 +154,13 @@ def headings(plot: Figure, ax: Axes, dataset: xarray.Dataset) -> None:
         facts.append(f"error {error:.1e} ({'exact solution' if exact else 'estimate'})")
     if "solver" in attributes and (rtol := number(dataset, "rtol")) is not None:
         facts.append(f"{attributes['solver']}, rtol {rtol:g}")
-    if dataset.sizes.get("event", 0) > dataset.sizes.get("time", 0):
-        facts.append(f"{dataset.sizes['event']} events between {dataset.sizes.get('time', 0)} outputs")
-    ax.set_title("   ".join(fact for fact in facts if fact), loc="left", fontsize=8, color="#555555")
+    if "time" in dataset.sizes and dataset.sizes.get("event", 0) > dataset.sizes["time"]:
+        facts.append(f"{dataset.sizes['event']} events between {dataset.sizes['time']} outputs")
+    shown = "   ".join(fact for fact in facts if fact)
+    over = len(shown) + len(more) > WIDE
+    lines = f"{shown}\n{more}" if over else f"{shown}   {more}".rstrip()
+    plot.set_figheight(plot.get_figheight() + (above + 10 * over) / 72)  # the panels keep their height
+    ax.set_title(lines, loc="left", fontsize=8, color="#555555", pad=6 + above)
 
 
 def legend(ax: Axes) -> None:
@@ -215,6 +226,44 @@ def prefixed(unit: str, values: Array) -> tuple[str, float]:
 def largest(values: Array) -> float:
     """The largest magnitude of those that are finite; 0 where none is."""
     return float(np.max(np.abs(values), initial=0.0, where=np.isfinite(values)))
+
+
+def over_decades(values: Array) -> bool:
+    """True for values of a parameter that want a logarithmic axis: positive, over decades and not evenly spaced.
+
+    >>> over_decades(np.array([1e-12, 1e-10, 1e-9])), over_decades(np.linspace(1, 1e4, 9))
+    (True, False)
+    """
+    if len(values) < 3 or values.min() <= 0 or values.max() < 100 * values.min():
+        return False
+    steps = np.diff(values)
+    return bool(np.ptp(steps) > FLAT * np.max(np.abs(steps)))
+
+
+def parameter_label(values: xarray.DataArray) -> str:
+    """Meaning and unit of a swept parameter."""
+    return f"{meaning(values, ' (')} [{unit_text(unit(values))}]"
+
+
+def valued(values: xarray.DataArray, place: int) -> str:
+    """A value of a swept parameter with its name and unit.
+
+    >>> valued(xarray.DataArray([1e-10, 1e-9], name="rate", attrs={"units": "N s-1"}), 0)
+    'rate = 100 pN s$^{-1}$'
+    """
+    value = values.values[place]
+    text, size = prefixed(unit(values), values.values[place : place + 1])
+    return f"{str(values.name).replace('_', ' ')} = {value / size:.4g} {'' if text == '1' else text}".rstrip()
+
+
+def by_second(dataset: xarray.Dataset, values: Array) -> list[tuple[Array, str]]:
+    """Values of a sweep over the first parameter, a curve for each value of the second, or for some of many."""
+    if values.ndim == 1:
+        return [(values, "")]
+    second = dataset[str(dataset["status"].dims[1])]
+    chosen = np.unique(np.linspace(0, values.shape[1] - 1, MOST_CURVES).round().astype(int)).tolist()
+    left = f" ({len(chosen)} of {values.shape[1]})" if len(chosen) < values.shape[1] else ""
+    return [(values[:, j], valued(second, j) + (left if j == chosen[-1] else "")) for j in chosen]
 
 
 def label_ticks(axis: XAxis | YAxis, size: float) -> None:

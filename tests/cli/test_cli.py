@@ -328,12 +328,12 @@ class TestPlot:
 
 
 class TestSweep:
-    def test_has_no_other_axis(self, call, tmp_path):
+    def test_has_phase_portraits_and_is_not_mixed_with_runs(self, call, tmp_path):
         assert call("sweep", "bonding.yaml", "--over", "initial.T=[300, 310]", "-o", "s.nc", "-q").exit_code == 0
-        done = call("plot", "s.nc", "--against", "phi")
-        assert done.exit_code == 2
-        assert "--against: a sweep is plotted over what it sweeps" in done.stderr
-        assert files(tmp_path) == {"s.nc"}
+        assert call("plot", "s.nc", "--against", "phi").exit_code == 0
+        assert "no variable 'phy' along the runs" in call("plot", "s.nc", "--against", "phy").stderr
+        assert "only runs with runs" in call("plot", "s.nc", "bonding.yaml").stderr
+        assert files(tmp_path) == {"s.nc", "s.png"}
 
     def test_all_of_whose_runs_stop_is_stopped(self, call):
         done = call("sweep", "cooling.yaml", "--over", "initial.T=[280, 300]", "-o", "s.nc")

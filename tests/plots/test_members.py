@@ -61,6 +61,17 @@ def test_curves_of_a_sample_are_a_fair_part_that_is_said(drawn):
     assert np.array_equal(ax.lines[-1].get_ydata(), opened(drawn)["phi"].values[-1])
 
 
+def test_each_run_of_a_sweep_over_a_variable_or_time():
+    sweep = surfacechem.load("exothermic").sweep({K_0: [200.0, 300.0]}).dataset
+    (ax,) = plots.figure(sweep, ["T"], "phi").axes
+    assert (ax.get_xlabel(), ax.get_ylabel()) == (r"$\phi$ [1]", "$T$ [K]")
+    assert np.array_equal(ax.lines[1].get_data(), [sweep["phi"].values[1], sweep["T"].values[1]])
+    assert [text.get_text() for text in ax.get_legend().get_texts()] == ["K 0 = 200 J m$^{-2}$", "K 0 = 300 J m$^{-2}$"]
+    assert plots.figure(sweep, against="time").axes[-1].get_xlabel() == "Time [s]"
+    with pytest.raises(InputError, match="no variable 'T_last' along the runs"):
+        plots.figure(sweep, ["T_last"], "phi")
+
+
 def test_effects_of_three_parameters_of_a_grid(tmp_path):
     over = {K_0: [100.0, 200.0, 300.0], "initial.T": [290.0, 310.0], C_R: [5e15, 7e15]}
     path = stored(tmp_path, over=over, keep={"last": ["T"]})

@@ -96,6 +96,17 @@ def test_chosen_variables_are_grouped_by_unit():
             figure(dataset(), *arguments)
 
 
+def test_the_largest_of_many_have_colours_and_names():
+    t = np.linspace(0.0, 2.0, 21)
+    many = {f"theta_{k}": ("1", (k + 1) * t / 40) for k in range(20)}
+    ax = figure(dataset(**many), [*many]).axes[0]
+    assert [text.get_text() for text in ax.get_legend().get_texts()] == [
+        *(rf"$\theta_{{{k}}}$" for k in range(19, 13, -1)),
+        "14 smaller",
+    ]
+    assert [line.get_color() for line in ax.get_lines()][6:] == 14 * ["0.75"]
+
+
 def test_another_axis_than_time():
     (ax,) = figure(dataset(), ["T_1", "phi"], "phi").axes
     assert ax.get_xlabel() == r"Phi $\phi$ [1]"
@@ -115,9 +126,12 @@ def test_few_events_have_lines_and_names_and_many_are_counted():
     few = figure(with_events([0.5, 1.5], ["debond", "touch"])).axes[0]
     assert any(line.get_linestyle() == ":" for line in few.get_lines())
     assert texts(few) == ["debond", "touch"]
+    assert [text.xyann[1] for text in few.texts] == [2, 2]  # beside each other
+    near = figure(with_events([0.5, 0.51], ["debond", "touch"])).axes[0]
+    assert [text.xyann[1] for text in near.texts] == [2, 11]  # one above the other
     many = figure(with_events(np.linspace(0.1, 1.9, 22), ["snap"] * 22)).axes[0]
     assert texts(many) == []
-    assert many.get_title(loc="left").endswith("22 events between 21 outputs")
+    assert many.get_title(loc="left").endswith("22 events between 21 outputs   22 snap")
     assert "events" not in few.get_title(loc="left")
 
 

@@ -1,0 +1,164 @@
+"""Several runs, or several sweeps of one parameter, in one figure: a colour for each, named by what differs."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from itertools import cycle
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+import xarray
+from matplotlib.axes import Axes
+from matplotlib.colors import to_hex
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from surfacechem.documents import document
+from surfacechem.errors import InputError
+from surfacechem.plots import run, style, sweep
+from surfacechem.plots.run import Panel
+from surfacechem.plots.style import COLOURS, symbol, unit
+
+DASHES = ("-", "--", ":", "-.")
+"""Lines of the variables of a panel, whose colours say of which dataset they are."""
+
+WORDS = ("title", "description", "source", "reference")
+"""Keys of a case that say nothing about its scene."""
+
+LONG = 40
+"""Letters of a label that does not leave room for another beside it."""
+
+MOST_DIFFERENCES = 4
+"""Parameters that a legend names; of more the titles or the files tell more."""
+
+
+def figure(
+    datasets: Sequence[xarray.Dataset], variables: Sequence[str] | None = None, against: str | None = None
+) -> Figure:
+    """The figure of several datasets, all of runs or all of sweeps over the same parameter."""
+    over, panels = _content(datasets, variables, against)
+    if not panels:
+        raise InputError("there is nothing to plot: none of the variables varies.")
+    names, colours = labels(datasets), colours_of(len(datasets))
+    with style.panels(6.4, 1.2 + 0.17 * len(datasets) + 1.7 * len(panels), len(panels), sharex=True) as (plot, grid):
+        for ax, panel in zip(grid[:, 0], panels, strict=True):
+            _draw(ax, datasets, panel, over, colours)
+        _label_axis(grid[:, 0].tolist(), datasets, panels, over)
+        handles = [Line2D([], [], color=colour, label=name) for colour, name in zip(colours, names, strict=True)]
+        plot.legend(handles=handles, loc="outside lower left", ncols=1 if len(max(names, key=len)) > LONG else 2)
+        titles = {str(dataset.attrs.get("title", "")) for dataset in datasets}
+        title = titles.pop() if len(titles) == 1 else f"{len(datasets)} datasets"
+        plot.suptitle(title, x=0.01, ha="left", fontsize=11, fontweight="bold")
+    return plot
+
+
+def _content(
+    datasets: Sequence[xarray.Dataset], variables: Sequence[str] | None, against: str | None
+) -> tuple[str, list[Panel]]:
+    """What lies along the axis, and the panels."""
+    sweeps = ["sweep" in dataset.attrs for dataset in datasets]
+    if any("study" in dataset.attrs for dataset in datasets) or any(sweeps) != all(sweeps):
+        raise InputError("only runs with runs, and sweeps with sweeps, go into one figure.")
+    if not any(sweeps):
+        return against or "time", _united([run.panels(each, variables, against) for each in datasets])
+    axes = {tuple(sweep.axes_of(each)) for each in datasets}
+    if len(axes) > 1 or len(min(axes)) > 1:
+        raise InputError("sweeps go into one figure where all are over one and the same parameter.")
+    return min(axes)[0], _united([sweep.groups(each, variables) for each in datasets])
+
+
+def colours_of(count: int) -> list[str]:
+    """Colours that do not repeat."""
+    if count <= len(COLOURS):
+        return list(COLOURS[:count])
+    return [to_hex(colour) for colour in matplotlib.colormaps["viridis"](np.linspace(0, 0.9, count))]
+
+
+def labels(datasets: Sequence[xarray.Dataset]) -> list[str]:
+    """What differs between datasets, for each of them: parameters and solver, else the title, else the file.
+
+    >>> cases = [f"interface: {{friction: [coulomb: {{mu: {mu}}}]}}" for mu in (0.3, 0.6)]
+    >>> labels([xarray.Dataset(attrs={"case": text, "solver": "radau"}) for text in cases])
+    ['mu = 0.3', 'mu = 0.6']
+    """
+    known = [_settings(dataset) for dataset in datasets]
+    every = dict.fromkeys(path for each in known for path in each)
+    paths = [path for path in every if len({each.get(path) for each in known}) > 1]
+    texts = [str(dataset.attrs.get("title", "")) for dataset in datasets]
+    if 0 < len(paths) <= MOST_DIFFERENCES:
+        names = _short(paths)
+        texts = [", ".join(f"{name} = {each.get(path, 'not given')}" for path, name in names.items()) for each in known]
+    # Datasets that still have the same name are told apart by their files.
+    files = [Path(str(d.encoding.get("source", f"dataset {k}"))).stem for k, d in enumerate(datasets, 1)]
+    return [text if texts.count(text) == 1 else file for text, file in zip(texts, files, strict=True)]
+
+
+def _short(paths: Sequence[str]) -> dict[str, str]:
+    """The last words of paths, as many as tell them apart."""
+    last = [path.rpartition(".")[2] for path in paths]
+    return {
+        path: name if last.count(name) == 1 else " ".join(path.split(".")[-2:])
+        for path, name in zip(paths, last, strict=True)
+    }
+
+
+def _settings(dataset: xarray.Dataset) -> dict[str, str]:
+    """Values of the case of a dataset by path, as they are written, with what the run has changed."""
+    text, attributes = str(dataset.attrs.get("case", "")), dataset.attrs
+    found: dict[str, str] = {}
+    leaves = [document.parse(text)] if text else []
+    while leaves:
+        tree = leaves.pop(0)
+        if isinstance(tree.value, dict | list):
+            leaves = [*(tree.value.values() if isinstance(tree.value, dict) else tree.value), *leaves]
+        else:
+            found[tree.place.path] = str(tree.value)
+    changes = json.loads(str(attributes.get("departures", "{}"))).get("changes", {})
+    found |= {path: f"{value:g}" for path, value in changes.items()}
+    found |= {name: str(attributes[name]) for name in ("solver", "rtol") if name in attributes}
+    return {path: value for path, value in found.items() if path.partition(".")[0] not in WORDS}
+
+
+def _united(found: Sequence[Sequence[Panel]]) -> list[Panel]:
+    """Panels of all datasets, those with the same title and unit as one."""
+    names: dict[tuple[str, str], dict[str, None]] = {}
+    for panel in (panel for each in found for panel in each):
+        names.setdefault((panel.title, panel.unit), {}).update(dict.fromkeys(panel.names))
+    return [Panel(*key, list(several)) for key, several in names.items()]
+
+
+def _draw(ax: Axes, datasets: Sequence[xarray.Dataset], panel: Panel, over: str, colours: Sequence[str]) -> None:
+    """The variables of a panel, each in its kind of line, of all datasets that have them."""
+    drawn = []
+    for dataset, colour in zip(datasets, colours, strict=False):
+        for name, dash in zip(panel.names, cycle(DASHES), strict=False):
+            if name in dataset:
+                values = sweep.final(dataset, name) if "sweep" in dataset.attrs else dataset[name].values
+                drawn.append(values)
+                marker = "o" if len(values) < 3 else ""
+                ax.plot(dataset[over].values, values, color=colour, linestyle=dash, linewidth=1.3, marker=marker)
+    text, size = style.prefixed(panel.unit, np.concatenate(drawn))
+    ax.set_ylabel(f"{panel.title or ', '.join(map(symbol, panel.names[:2]))} [{text}]")
+    style.label_ticks(ax.yaxis, size)
+    several = panel.names if len(panel.names) > 1 else ()
+    for name, dash in zip(several, cycle(DASHES), strict=False):
+        ax.plot([], [], color="black", linestyle=dash, linewidth=1.3, label=symbol(name))
+    style.legend(ax)
+
+
+def _label_axis(axes: Sequence[Axes], datasets: Sequence[xarray.Dataset], panels: Sequence[Panel], over: str) -> None:
+    """The axis that all panels share: time, a variable, or the swept parameter."""
+    first, values = datasets[0][over], np.concatenate([dataset[over].values for dataset in datasets])
+    if over != "time" and "sweep" in datasets[0].attrs:
+        axes[-1].set_xlabel(style.parameter_label(first))
+        axes[-1].set_xscale("log" if style.over_decades(first.values) else "linear")
+        return
+    names = [name for panel in panels if panel.unit != run.FLUX for name in panel.names]
+    if over == "time" and all(run.logarithmic(d.time.values, [d[n].values for n in names if n in d]) for d in datasets):
+        axes[-1].set(xscale="log", xlabel="Time [s]")
+        return
+    text, size = style.prefixed(unit(first), values)
+    axes[-1].set_xlabel(f"Time [{text}]" if over == "time" else f"{style.meaning(first)} {symbol(over)} [{text}]")
+    style.label_ticks(axes[-1].xaxis, size)

@@ -1,0 +1,58 @@
+"""Several datasets in one figure: a colour for each, named by what differs."""
+
+import numpy as np
+import pytest
+
+import surfacechem
+from surfacechem.errors import InputError
+from surfacechem.plots import COLOURS, figure
+from surfacechem.plots.comparison import labels
+
+pytestmark = pytest.mark.around
+
+
+@pytest.fixture(scope="module")
+def runs():
+    case = surfacechem.load("reservoir-exchange")
+    return [case.run().dataset, case.run({"initial.T_1": 450.0}).dataset]
+
+
+@pytest.fixture(scope="module")
+def sweeps():
+    over = {"initial.T_1": [350.0, 400.0, 450.0]}
+    return [
+        surfacechem.load("reservoir-exchange", changes).sweep(over).dataset for changes in ((), ("run.until=10 s",))
+    ]
+
+
+def entries(legend):
+    return [text.get_text() for text in legend.get_texts()]
+
+
+def test_runs_have_colours_and_variables_have_dashes(runs):
+    plot = figure(runs)
+    assert entries(plot.legends[0]) == ["T_1 = 500 K", "T_1 = 450"]
+    lines = [line for line in plot.axes[0].get_lines() if len(line.get_xdata())]
+    assert [(line.get_color(), line.get_linestyle()) for line in lines] == [
+        (colour, dash) for colour in COLOURS[:2] for dash in ["-", "--"]
+    ]
+    assert lines[2].get_ydata()[0] == 450
+    assert entries(plot.axes[0].get_legend()) == ["$T_{1}$", "$T_{2}$"]
+    (phases,) = figure(runs, ["q_1"], "T_1").axes
+    assert np.array_equal(phases.get_lines()[1].get_xdata(), runs[1]["T_1"])
+
+
+def test_sweeps_over_the_same_parameter_are_compared(sweeps, runs):
+    (ax,) = figure(sweeps, ["T_1"]).axes
+    assert [line.get_ydata()[1] for line in ax.get_lines()] == [each["T_1"].values[1, -1] for each in sweeps]
+    assert labels(sweeps) == ["until = 200 s", "until = 10 s"]
+    with pytest.raises(InputError, match="only runs with runs"):
+        figure([sweeps[0], runs[0]])
+
+
+def test_datasets_that_differ_in_all_are_named_by_title_or_file(runs):
+    other = surfacechem.run("pair-exchange").dataset
+    assert labels([runs[0], other]) == ["A body cools to a reservoir", "Two bodies exchange heat"]
+    assert labels([runs[0], runs[0]]) == ["dataset 1", "dataset 2"]
+    with pytest.raises(InputError, match="no variable 'T_3'"):
+        figure([runs[0], other], ["T_3"])

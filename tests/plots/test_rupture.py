@@ -1,0 +1,46 @@
+"""Figures of ruptures: distributions and lifetimes are those of the law."""
+
+import numpy as np
+import pytest
+
+import surfacechem
+from surfacechem import plots
+from surfacechem.plots.rupture import lifetimes
+from surfacechem.quantities import BOLTZMANN
+
+pytestmark = pytest.mark.around
+
+
+@pytest.fixture(scope="module")
+def spectrum():
+    rates = {"loading.f.ramp.rate": [1e-12, 1e-10, 1e-9]}
+    return surfacechem.load("force-spectroscopy").sweep(rates, {"f": "150 pN"}).dataset
+
+
+def test_lifetimes_are_those_under_a_constant_force_at_every_rate(spectrum):
+    exact = np.exp(-spectrum["f"].values * 0.4e-9 / (BOLTZMANN * 300)) / 0.1
+    found = lifetimes(spectrum, "f")
+    known = np.isfinite(found)
+    assert np.all(known.sum(axis=1) > 30)
+    assert np.allclose(found[known], np.broadcast_to(exact, found.shape)[known], rtol=1e-9)
+
+
+def test_the_figure_has_spectrum_distributions_and_lifetimes(spectrum):
+    forces, density, lifetime = plots.figure(spectrum).axes
+    assert (forces.get_xlabel(), forces.get_xscale()) == ("Rate of change [pN s$^{-1}$]", "log")
+    assert [text.get_text() for text in density.get_legend().get_texts()] == [
+        "rate = 100 pN s$^{-1}$",
+        "rate = 1 nN s$^{-1}$",
+    ]  # at 1 pN/s most bonds break before there is a force
+    assert (density.get_title("right"), lifetime.get_yscale()) == ("2 of 3 runs", "log")
+    for line in density.get_lines():
+        x, y = (values[np.isfinite(line.get_ydata())] for values in line.get_data())
+        assert np.trapezoid(y, x) == pytest.approx(1, abs=2e-3)  # [1/pN] over [pN]
+        assert y.min() >= 0
+
+
+def test_variables_are_drawn_over_the_load_or_over_the_rate(spectrum):
+    over_load = plots.figure(spectrum, ["density_f", "survival"]).axes
+    assert {ax.get_xlabel() for ax in over_load} == {"Force per bond, tension positive $f$ [pN]"}
+    (over_rate,) = plots.figure(spectrum, ["f_mean"]).axes
+    assert over_rate.get_lines()[0].get_xdata().tolist() == [1e-12, 1e-10, 1e-9]
