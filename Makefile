@@ -3,6 +3,8 @@ PYTHON ?= $(shell for p in python3.11 python3; do \
   $$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$p && break; done)
 VENV ?= .venv
 BIN := $(abspath $(VENV))/bin
+# Of the tools only what is imported is compiled, and kept.
+export PYTHONDONTWRITEBYTECODE :=
 RUNTIME := $(VENV)/.installed
 TOOLS := $(VENV)/.installed-tools
 # Tests that share what they assemble, compile and run stay with one worker (tests/conftest.py).
@@ -15,7 +17,8 @@ run: $(RUNTIME)  ## the main case: its error, its run time, its plot
 	$(BIN)/surfacechem run exothermic -o results/exothermic.nc
 	$(BIN)/surfacechem plot results/exothermic.nc -o results/exothermic.png
 
-test: lint unit docs  ## everything; the tests run every case, and the wheel by itself
+test:  ## everything, side by side; the tests run every case, and the wheel by itself
+	$(MAKE) --jobs=3 --output-sync=target lint unit docs
 
 lint: $(TOOLS)  ## style, types and which room imports which
 	$(BIN)/ruff check
@@ -75,5 +78,5 @@ $(RUNTIME): pyproject.toml | $(VENV)/bin/python
 	touch $@
 
 $(TOOLS): $(RUNTIME)
-	$(BIN)/pip install --quiet --editable '.[test,docs]'
+	$(BIN)/pip install --quiet --no-compile --editable '.[test,docs]'
 	touch $@

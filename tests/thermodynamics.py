@@ -15,19 +15,25 @@ mpmath.mp.prec = BITS
 
 def number(expression, point) -> mpmath.mpf:
     """The value of an expression at a point, to BITS bits; doubles in it count as the exact numbers they are."""
-    expression = symengine.sympify(expression)
-    if expression.is_Symbol:
-        return point[expression]
+    return _value(symengine.sympify(expression), dict(point))
+
+
+def _value(expression, known) -> mpmath.mpf:
+    """The value of an expression, and in ``known`` that of each of its parts, which may occur many times."""
+    if expression in known:
+        return known[expression]
     if expression.is_Number:
         return _mpf(expression)
     if expression == symengine.E:
         return +mpmath.e
     name = type(expression).__name__
     if name == "Piecewise":
-        pairs = list(zip(expression.args[::2], expression.args[1::2], strict=True))
-        return next(number(value, point) for value, condition in pairs if _holds(condition, point))
-    arguments = [number(argument, point) for argument in expression.args]
-    return OPERATIONS.get(name, getattr(mpmath, name.lower(), None))(*arguments)
+        pairs = zip(expression.args[::2], expression.args[1::2], strict=True)
+        known[expression] = next(_value(value, known) for value, condition in pairs if _holds(condition, known))
+    else:
+        arguments = [_value(argument, known) for argument in expression.args]
+        known[expression] = OPERATIONS.get(name, getattr(mpmath, name.lower(), None))(*arguments)
+    return known[expression]
 
 
 def _mpf(value) -> mpmath.mpf:
@@ -37,10 +43,10 @@ def _mpf(value) -> mpmath.mpf:
     return mpmath.mpf(float(value))
 
 
-def _holds(condition, point) -> bool:
+def _holds(condition, known) -> bool:
     if condition in (True, symengine.true):
         return True
-    left, right = (number(argument, point) for argument in condition.args)
+    left, right = (_value(argument, known) for argument in condition.args)
     return {"StrictLessThan": left < right, "LessThan": left <= right}[type(condition).__name__]
 
 

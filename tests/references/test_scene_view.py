@@ -1,10 +1,9 @@
 """What exact solutions read from scenes: none takes the scene of another for its own."""
 
 from contextlib import suppress
-from dataclasses import replace
 
 import pytest
-from case_runs import load, solved
+from case_runs import at_even_times, load, solved
 
 from surfacechem import format as cases
 from surfacechem import references
@@ -19,12 +18,10 @@ CELLS = ("sudden-contact", "epoxy-cure-thick")
 @pytest.mark.parametrize("name", [name for name in cases.names() if name not in CELLS])
 def test_no_exact_solution_claims_a_case_that_it_does_not_solve(name):
     """Every one is named for every case: it is refused, or meets the run."""
-    case = load(name).case
-    # At even times: outputs that follow a run stand on both sides of its jumps, whose times are known to an error.
-    run = load(name).run(run=replace(case.run, picture=None), error="balances").trajectory
+    scene, run = load(name).case.scene, at_even_times(name).trajectory
     for other in references.names():
         with suppress(InputError):
-            assert against_exact(run, case.scene, other, {}).error < 1e-6, other
+            assert against_exact(run, scene, other, {}).error < 1e-6, other
 
 
 @pytest.mark.parametrize(

@@ -1,9 +1,11 @@
 """The heat of a jump goes where that of the same process goes if it takes some time, in every temperature."""
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
+from sampling import every
 from scipy.integrate import quad, solve_ivp
 
 from surfacechem.format import load_text
@@ -141,7 +143,7 @@ def pressure_falls(thermal, slider, jump):
     return text(thermal, f"{normal}, w_t: {{ramp: {{rate: 0.4 mm/s}}}}", mechanics, potential)
 
 
-@pytest.mark.parametrize(("thermal", "slider"), SCENES)
+@pytest.mark.parametrize(("thermal", "slider"), every(2, SCENES))
 def test_a_pressure_that_jumps_is_one_that_falls_fast(thermal, slider):
     jumped, swift = (solved(pressure_falls(thermal, slider, jump)) for jump in (0, 1e-6))
     assert max(jump.released for jump in jumped.trajectory.jumps) > 100
@@ -201,7 +203,7 @@ def pressing(thermal, slider, load, rate, static, jump, low=0.2):
     return text(thermal, loads, *SLIDER[slider], static)
 
 
-@pytest.mark.parametrize(("thermal", "slider", "load", "rate", "static"), VARIED)
+@pytest.mark.parametrize(("thermal", "slider", "load", "rate", "static"), every(4, VARIED))
 def test_friction_heats_by_the_conductances_of_each_moment_of_a_jump(thermal, slider, load, rate, static):
     """The normal gap, where there is one, follows a jump by more work than a ramp: its heat of 2 mJ is known."""
     jumped = solved(pressing(thermal, slider, load, rate, static, 0))
@@ -280,7 +282,7 @@ def test_heat_is_shared_along_a_way_within_the_tolerance(feeds_back):
 # -- what gives way by itself
 
 
-@pytest.mark.parametrize("thermal", THERMAL)
+@pytest.mark.parametrize("thermal", every(2, THERMAL))
 def test_slips_without_a_mass_are_heat_of_friction(thermal):
     """Each joule of a slip from a static limit goes where one of a slip under a falling pressure goes."""
     falls = f"{table('p', [2, 2, 0.2, 0.2], 'MPa', 0)}, w_t: {{ramp: {{rate: 0.4 mm/s}}}}"
@@ -301,8 +303,7 @@ TEARING = "  sites: 1e18\n  bonding: [compliant-debonding: {t_max: 10 MPa, E_b: 
 TOUCHED = ("slider", "paths", "stores", "perfect", "held", "cells")
 
 
-@pytest.mark.parametrize("law", ["snap", "tear"])
-@pytest.mark.parametrize("thermal", TOUCHED)
+@pytest.mark.parametrize(("thermal", "law"), every(3, product(TOUCHED, ["snap", "tear"])))
 def test_a_snap_heats_as_the_interface_would_in_a_little_time(thermal, law):
     """A faint damper in parallel with the interface turns the same energy into heat there."""
     potential, laws = (ZONE, "") if law == "snap" else (SOFTENING, TEARING)
@@ -321,8 +322,7 @@ def test_a_snap_heats_as_the_interface_would_in_a_little_time(thermal, law):
 # -- what the supports dissipate
 
 
-@pytest.mark.parametrize("axis", ["n", "t"])
-@pytest.mark.parametrize("thermal", TOUCHED)
+@pytest.mark.parametrize(("thermal", "axis"), every(3, product(TOUCHED, ["n", "t"])))
 def test_what_follows_a_traction_that_jumps_is_damped_by_its_own_support(thermal, axis):
     potential, support = "penalty: {E_n: 1e15}, tangential-stiffness: {E_t: 3e9}", "k: 1e9, beta_1: 0.25"
     loads = table(f"F_{axis}", [0, 0, 3, 3], "MPa", 0) + f", w_{axis}: 0, "
