@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import tables
-from solver_problems import exothermic_exact, exothermic_problem, problem, robertson, robertson_dae, robertson_sums
+from solver_problems import problem, robertson, robertson_dae, robertson_sums
 from test_tables import MAKERS, SMOOTH, errors
 
 from surfacechem.model.assemble import assemble
@@ -38,14 +38,6 @@ def test_robertson(make, digits: float, rtol: float) -> None:
     assert np.max(np.abs(result.y[:2] / ROBERTSON - 1)) < 10 * rtol + digits
     assert result.counters.steps < 400
     assert result.counters.rejected < 0.15 * result.counters.steps
-
-
-@each_tolerance
-def test_exothermic(rtol: float) -> None:
-    result = radau.solve(exothermic_problem(rtol))
-    assert result.status == Status.FINISHED
-    assert np.max(np.abs(result.outputs / exothermic_exact(result.times) - 1)) < 3 * rtol + 2e-15
-    assert result.counters.steps < 50
 
 
 @pytest.mark.parametrize("name", SMOOTH)
