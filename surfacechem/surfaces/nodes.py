@@ -20,7 +20,7 @@ import numpy as np
 
 from surfacechem.contracts.terms import PairEnergy
 from surfacechem.errors import InputError
-from surfacechem.surfaces.projection import FIRST, POLE, Array, Surface
+from surfacechem.surfaces.projection import FIRST, POLE, Array, Projection, Surface
 from surfacechem.surfaces.shapes import Cavity, Cylinder, Plane, Sphere
 
 ORDERS = (4, 6, 9, 13, 18, 25)
@@ -41,16 +41,48 @@ MOST_DIVISIONS = 400
 SHALLOWEST = 2.0**-20
 """Part of the size of a surface below which a gap is one of contact."""
 
-TIMES_AROUND = 4
-"""Points on a circle that integrate what is of second degree in its sine and cosine exactly."""
+Sums = tuple[Array, Array, Array]
+"""For n points of the outer surface: energy (n,), force on them and force-weighted points of the inner surface (n, 3)."""
 
 
 @dataclass(frozen=True)
-class Nodes:
+class Grid:
     """Points (n, k, 3) of the inner surface for each of n points of the outer one, with their areas (n, k)."""
 
+    outer: Array
     x: Array
     area: Array
+
+    def sums(self, law: Callable[[Array], Array]) -> Sums:
+        """Sums over the inner points of a law of the distance."""
+        away = self.outer[:, None] - self.x
+        r = np.sqrt(np.einsum("nkc,nkc->nk", away, away))
+        psi, slope = np.moveaxis(law(r), -1, 0)
+        strength = -slope * self.area / r
+        push, theirs = (np.einsum("nk,nkc->nc", strength, arms) for arms in (away, self.x))
+        return np.einsum("nk,nk->n", psi, self.area), push, theirs
+
+
+@dataclass(frozen=True)
+class Circles:
+    """Circles around the feet (n, 3) on a plane, a sphere or a cavity: how far they lie from the outer points (n, k) and
+    below the feet (n, k), and their areas (n, k).
+    """
+
+    foot: Array
+    normal: Array
+    gap: Array
+    r: Array
+    down: Array
+    area: Array
+
+    def sums(self, law: Callable[[Array], Array]) -> Sums:
+        """Sums over the circles of a law of the distance; what points across the normal cancels."""
+        psi, slope = np.moveaxis(law(self.r), -1, 0)
+        strength = -slope * self.area / self.r
+        whole, lower = strength.sum(axis=-1)[:, None], np.einsum("nk,nk->n", strength, self.down)[:, None]
+        push = (whole * self.gap[:, None] + lower) * self.normal
+        return np.einsum("nk,nk->n", psi, self.area), push, whole * self.foot - lower * self.normal
 
 
 def is_round(surface: Surface) -> bool:
@@ -75,7 +107,7 @@ def gauss(low: Array, high: Array, order: int) -> tuple[Array, Array]:
     return low[:, None] + length * at, length * np.tile(w / 2, pieces) / pieces
 
 
-def inner_nodes(surface: Surface, x: Array, order: int, law: PairEnergy, rtol: float) -> Nodes:
+def inner_nodes(surface: Surface, x: Array, order: int, law: PairEnergy, rtol: float) -> Grid | Circles:
     """Nodes around the nearest point of the surface for each point (n, 3); InputError where it is in the body."""
     found = surface.nearest(x)
     if not np.all(found.gap > 0):
@@ -83,7 +115,7 @@ def inner_nodes(surface: Surface, x: Array, order: int, law: PairEnergy, rtol: f
     # Of what lies beyond, a part of size (h / reach)^(decay - 2) of all is missed.
     reach = np.minimum(found.gap * (rtol / 10) ** (-1 / (law.decay - 2)), law.cutoff)
     if is_round(surface):
-        return _around(surface, found.point, found.normal, found.gap, reach, order, law.cutoff)
+        return _around(surface, found, reach, order, law.cutoff)
     low, high = np.transpose(surface.shape.span)
     _, x_u, x_v = surface.derivatives(found.at, FIRST)
     axes = []
@@ -98,12 +130,12 @@ def inner_nodes(surface: Surface, x: Array, order: int, law: PairEnergy, rtol: f
     u, v = np.broadcast_arrays(u[:, :, None], v[:, None, :])
     points, x_u, x_v = surface.derivatives(np.stack([u, v], axis=-1).reshape(len(x), -1, 2), FIRST)
     E, F, G = (np.einsum("nkc,nkc->nk", *pair) for pair in ((x_u, x_u), (x_u, x_v), (x_v, x_v)))
-    return Nodes(points, np.sqrt(E * G - F**2) * (du[:, :, None] * dv[:, None, :]).reshape(len(x), -1))
+    return Grid(x, points, np.sqrt(E * G - F**2) * (du[:, :, None] * dv[:, None, :]).reshape(len(x), -1))
 
 
-def _around(surface: Surface, foot: Array, normal: Array, gap: Array, reach: Array, order: int, cutoff: float) -> Nodes:
-    """Nodes on circles around the feet on a plane, a sphere or a cavity, up to where a law ends."""
-    shape = surface.shape
+def _around(surface: Surface, near: Projection, reach: Array, order: int, cutoff: float) -> Circles:
+    """Circles around the feet on a plane, a sphere or a cavity, up to where a law ends."""
+    shape, gap = surface.shape, near.gap
     bent = 0.0 if isinstance(shape, Plane) else getattr(shape, "bulge") / getattr(shape, "R")  # noqa: B009
     end = np.minimum(reach, math.pi / abs(bent)) if bent else reach
     if math.isfinite(cutoff):
@@ -111,20 +143,12 @@ def _around(surface: Surface, foot: Array, normal: Array, gap: Array, reach: Arr
         chord = np.maximum(cutoff**2 - gap**2, 0.0) / (1 + bent * gap)
         end = 2 / abs(bent) * np.arcsin(np.minimum(np.sqrt(chord) * abs(bent) / 2, 1)) if bent else np.sqrt(chord)
     t, w = gauss(np.zeros_like(gap), np.arcsinh(end / gap), order)
-    s, ds = gap[:, None] * np.sinh(t), w * gap[:, None] * np.cosh(t)
+    s = gap[:, None] * np.sinh(t)
+    ds = w * np.hypot(gap[:, None], s)
+    chord = 2 * np.sin(bent * s / 2) / bent if bent else s
     out = np.sin(bent * s) / bent if bent else s
-    down = 2 * np.sin(bent * s / 2) ** 2 / bent if bent else 0 * s
-    # Two directions along the surface, from the axis that is the least along the normal.
-    aside = np.eye(3)[np.argmin(np.abs(normal), axis=-1)]
-    first = np.cross(normal, aside)
-    first /= np.linalg.norm(first, axis=-1, keepdims=True)
-    second = np.cross(normal, first)
-    angles = 2 * math.pi * np.arange(TIMES_AROUND) / TIMES_AROUND
-    along = np.cos(angles)[:, None] * first[:, None] + np.sin(angles)[:, None] * second[:, None]
-    centres = foot[:, None] - down[..., None] * normal[:, None]
-    points = centres[:, :, None] + out[:, :, None, None] * along[:, None]
-    areas = np.repeat(np.abs(out) * ds * 2 * math.pi / TIMES_AROUND, TIMES_AROUND, axis=-1)
-    return Nodes(points.reshape(len(foot), -1, 3), areas)
+    r = np.sqrt(gap[:, None] ** 2 + (1 + bent * gap[:, None]) * chord**2)
+    return Circles(near.point, near.normal, gap, r, bent * chord**2 / 2, 2 * math.pi * np.abs(out) * ds)
 
 
 def closest(outer: Surface, inner: Surface, size: float, alike: tuple[bool, bool]) -> tuple[Array, float]:

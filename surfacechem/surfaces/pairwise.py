@@ -26,6 +26,9 @@ from surfacechem.tolerances import NOISE, PRECISE, TINY
 COUNT = 13
 """Energy, and three components of two forces and two moments."""
 
+FIRST_BATCH = 64
+"""Points of the outer surface that are looked at together before it is known how many inner ones each has."""
+
 
 @dataclass(frozen=True)
 class PairForces:
@@ -115,22 +118,17 @@ def _sums(
     """Integrals (n, laws, 13) over the inner surface for nodes (n, k, 3) of the outer one, and the number of pairs."""
     n, k = x.shape[:2]
     flat, found, pairs = x.reshape(-1, 3), np.empty((n * k, len(kernels), COUNT)), 0
-    first = inner_nodes(inner, flat[:1], order, law, rtol)
-    batch = max(1, MOST_NODES // first.area.size)
-    for begin in range(0, n * k, batch):
+    begin, batch = 0, FIRST_BATCH
+    while begin < n * k:
         part = slice(begin, begin + batch)
         nodes = inner_nodes(inner, flat[part], order, law, rtol)
         pairs += nodes.area.size
-        ours, away = flat[part], flat[part][:, None] - nodes.x
-        r = np.sqrt(np.einsum("nkc,nkc->nk", away, away))
         for j, one in enumerate(kernels):
-            psi, slope = np.moveaxis(one(r), -1, 0)
-            strength = -slope * nodes.area / r
-            push, theirs = (np.einsum("nk,nkc->nc", strength, arms) for arms in (away, nodes.x))
-            found[part, j, 0] = np.einsum("nk,nk->n", psi, nodes.area)
-            found[part, j, 1:4], found[part, j, 4:7] = push, -push
+            energy, push, theirs = nodes.sums(one)
+            found[part, j, 0], found[part, j, 1:4], found[part, j, 4:7] = energy, push, -push
             # The moment of -strength * away at the other end is x2 x away = x2 x x1, the same for all but the arm.
-            found[part, j, 7:10], found[part, j, 10:13] = np.cross(ours, push), np.cross(ours, theirs)
+            found[part, j, 7:10], found[part, j, 10:13] = np.cross(flat[part], push), np.cross(flat[part], theirs)
+        begin, batch = begin + batch, max(1, MOST_NODES * len(flat[part]) // nodes.area.size)
     found *= np.linalg.norm(area, axis=-1).reshape(-1, 1, 1)
     return found.reshape(n, k, len(kernels), COUNT).sum(axis=1), pairs
 
