@@ -57,6 +57,9 @@ WORDS = ("status", "regime", "reaction")
 UNKEPT = ("energy_residual", "entropy_residual", "site_residual", "least_sigma_", "_exact")
 """What is rounding, what belongs to the steps rather than to the solution, and the exact solutions."""
 
+OVER = ("surface_time", "u")
+"""First dimensions of what is not kept: what surfaces carry, at times that follow the outputs."""
+
 NUMBER = re.compile(r"[-+]?\d+\.?\d*(?:e[-+]?\d+)?")
 
 
@@ -69,7 +72,7 @@ def columns(solution: Solution) -> dict[str, tuple[str, np.ndarray]]:
     return {
         c.name: (c.dimensions[0], np.asarray(c.values))
         for c in solution.columns
-        if c.dimensions and not any(part in c.name for part in UNKEPT)
+        if c.dimensions and c.dimensions[0] not in OVER and not any(part in c.name for part in UNKEPT)
     }
 
 

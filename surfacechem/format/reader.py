@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
@@ -12,7 +12,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, TypeVar
 
 from surfacechem import solve as solvers
-from surfacechem.contracts.terms import Law, Load, Potential, Property
+from surfacechem.contracts.terms import HeatTransfer, Law, Load, Property
 from surfacechem.contracts.units import WHOLE
 from surfacechem.documents.document import Tree
 from surfacechem.errors import InputError, Place, suggestion
@@ -44,6 +44,7 @@ from surfacechem.tolerances import DEFAULT_RTOL, NOTHING, PICTURE
 if TYPE_CHECKING:
     from surfacechem.mechanism import Mechanism
     from surfacechem.mechanism.mixture import Species
+    from surfacechem.surfaces.potential import CurvedSurfaces
 
 L = TypeVar("L", bound=Law)
 
@@ -126,14 +127,15 @@ def _temperature_names(owners: Sequence[Tree | None]) -> tuple[str, ...]:
 
 def scene_of(case: Document, mechanism: Mechanism | None) -> Scene:
     """The scene that the sections state."""
-    interface, surface = _interface(case, mechanism), _surface(case)
+    interface, surface, heat = _interface(case, mechanism), _surface(case), case.heat
     if surface is not None:
         interface = replace(interface, potentials=(*interface.potentials, surface))
+        heat = (*heat, *_heat_over(surface))
     scene = Scene(
         bodies=_bodies(case),
         interface=interface,
         surface=surface,
-        heat=case.heat,
+        heat=heat,
         loading=case.loading or {},
         surroundings=case.surroundings.temperature if case.surroundings else None,
         T_0=case.T_0,
@@ -216,7 +218,16 @@ def _interface(case: Document, mechanism: Mechanism | None) -> Interface:
     )
 
 
-def _surface(case: Document) -> Potential | None:
+def _heat_over(surface: CurvedSurfaces) -> Iterator[HeatTransfer]:
+    """Heat paths over the gap of two surfaces."""
+    if surface.heat_laws:
+        from surfacechem.surfaces.conductance import CurvedConductance
+
+        for law in surface.heat_laws:
+            yield CurvedConductance(law=law, pair=surface, between=law.between, closure=law.closure, place=law.place)
+
+
+def _surface(case: Document) -> CurvedSurfaces | None:
     """The free energy of two surfaces of given shapes, a function of their approach."""
     section = case.surface
     if section is None:

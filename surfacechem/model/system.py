@@ -14,6 +14,7 @@ import symengine
 from numpy.typing import NDArray
 
 from surfacechem.contracts.terms import Load, Spec
+from surfacechem.contracts.units import WHOLE
 from surfacechem.expressions import Expression
 from surfacechem.model.automaton import Edge, Equilibrium, Mode, Register, Sink, When, masked
 from surfacechem.quantities import GAPS, VELOCITIES, Quantity
@@ -338,6 +339,10 @@ class System:
     def expand(self, expression: Expression) -> Expression:
         """The expression in t, states, derivatives and parameters only."""
         return symengine.sympify(expression).subs(self.definitions)
+
+    def unit(self, unit: str) -> str:
+        """A unit per area, or that of the same for a pair of bodies."""
+        return WHOLE.get(unit, unit) if self.whole else unit
 
     @cached_property
     def changeable(self) -> dict[str, str]:

@@ -32,6 +32,10 @@ KINDS: tuple[tuple[str, str, str], ...] = (
     ("Traction", "Pa", r"(?!.*_nominal$).*"),
     ("Heat flux", "W m-2", r"q_(?!m$|t$|.*_nominal$)\w+"),
     ("Dissipation", "W m-2", r"D_\w+"),
+    # Of a pair of bodies.
+    ("Force", "N", r"t_(?!.*_nominal$)\w+"),
+    ("Heat flow", "W", r"q_(?!m$|t$|.*_nominal$)\w+"),
+    ("Dissipated power", "W", r"D_\w+"),
 )
 
 # Residuals and the attributes that hold their largest relative values.

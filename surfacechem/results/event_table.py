@@ -79,7 +79,7 @@ def event_columns(runs: Sequence[Trajectory], axes: Mapping[str, int] | None = N
         table = np.full((len(runs), most), unset, dtype=object if unset == "" else float)
         for row, own in zip(table, events, strict=True):
             row[: len(own)] = [value(event) for event in own]
-        return Column(name, tuple(sizes), table.reshape(*sizes.values()), unit, text)
+        return Column(name, tuple(sizes), table.reshape(*sizes.values()), system.unit(unit), text)
 
     if not most:
         return []
@@ -141,8 +141,10 @@ def entropy_destroyed(jumps: Sequence[Jump]) -> float:
     return max((-jump.entropy for jump in jumps if jump.verdict == VIOLATES and not jump.stops), default=0.0)
 
 
-def event_findings(jumps: Sequence[Jump]) -> list[str]:
-    """Jumps against the second law that the case did not accept, in words; those that repeat in one line."""
+def event_findings(jumps: Sequence[Jump], unit: str = "J/(m^2 K)") -> list[str]:
+    """Jumps against the second law that the case did not accept, in words; those that repeat in one line. ``unit`` is
+    that of the entropy.
+    """
     flagged: dict[tuple[str, str], list[Jump]] = {}
     for jump in jumps:
         if jump.verdict != ADMISSIBLE and jump.edge.violation != "accept":
@@ -150,7 +152,7 @@ def event_findings(jumps: Sequence[Jump]) -> list[str]:
     findings = []
     for (reason, verdict), same in flagged.items():
         worst = min(same, key=lambda jump: jump.entropy)
-        first, lost = f"t = {same[0].t:.9g} s", f"{worst.entropy:.3g} J/(m^2 K)"
+        first, lost = f"t = {same[0].t:.9g} s", f"{worst.entropy:.3g} {unit}"
         if len(same) == 1:
             findings.append(f"{reason} at {first}: {verdict} ({lost})")
         else:
@@ -182,9 +184,9 @@ def event_counts(jumps: Sequence[Jump]) -> str:
     return ", ".join(f"{names.count(name)} {name}" if names.count(name) > 1 else name for name in dict.fromkeys(names))
 
 
-def event_summary(jumps: Sequence[Jump], exchanged: float) -> str:
-    """The transitions of a run in one line; ``exchanged`` is the largest energy that anything exchanged [J/m^2]."""
+def event_summary(jumps: Sequence[Jump], exchanged: float, unit: str = "J/m^2") -> str:
+    """The transitions of a run in one line; ``exchanged`` is the largest energy that anything exchanged."""
     released = sum(jump.released for jump in jumps)
     verdicts = {jump.verdict for jump in jumps} - {ADMISSIBLE}
-    heat = f"; released {released:.4g} J/m^2" if abs(released) > len(jumps) * ROUNDING * exchanged else ""
+    heat = f"; released {released:.4g} {unit}" if abs(released) > len(jumps) * ROUNDING * exchanged else ""
     return f"{event_counts(jumps)}{heat}; {'all admissible' if not verdicts else ', '.join(sorted(verdicts))}"

@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from surfacechem.contracts.units import WHOLE
 from surfacechem.results.accuracy import Accuracy
 from surfacechem.results.audit import Audit, audit
 from surfacechem.results.dataset import DATASET_NAMES, Array, Results, profile_columns, quantity_columns
@@ -84,7 +83,7 @@ class Solution(Results):
         return (
             *self.audit.findings,
             *(str(verdict) for verdict in self.verdicts if not verdict.consistent),
-            *event_findings(trajectory.jumps),
+            *event_findings(trajectory.jumps, trajectory.model.system.unit("J/(m^2 K)")),
             *event_waits(trajectory),
             *findings(trajectory, self.accuracy),
             *trajectory.model.system.warnings,
@@ -121,7 +120,7 @@ class Solution(Results):
             return tuple(columns)
         from surfacechem.results.surface_fields import surface_columns
 
-        named = (replace(column, unit=WHOLE.get(column.unit, column.unit)) for column in columns)
+        named = (replace(column, unit=trajectory.model.system.unit(column.unit)) for column in columns)
         return (*named, *surface_columns(trajectory, self.surface))
 
     @cached_property

@@ -78,6 +78,7 @@ def _fields(surface: CurvedSurfaces, approaches: Array) -> Sequence[Column]:
     size = length(lower, upper)
     around, _ = outer_nodes(lower, upper, size, min(size, size * FAR))
     ends = np.arcsinh((np.stack([around.low, around.high]) - around.at) / around.scale)
+    lower = around.surface
     counts = [AROUND if lower.shape.about_axis and k == 1 else ALONG for k in range(2)]
     t = [np.linspace(low, high, count) for low, high, count in zip(*ends, counts, strict=True)]
     grid = np.stack(np.meshgrid(*t, indexing="ij"), axis=-1)

@@ -296,7 +296,7 @@ def _capacities(system: System, scene: Scene, given: Mapping[str, Argument]) -> 
         node = temperature if isinstance(temperature, str) else f"T_{end}"
         if f"U_{end}" in system.output_columns and node in given and owner not in divided:
             U, T = system.definitions[symengine.Symbol(f"U_{end}")], system.inputs[given[node].column]
-            yield Named(Quantity(f"C_{end}", "J/(m^2 K)", f"heat capacity of {owner}"), derivative(U, T))
+            yield Named(Quantity(f"C_{end}", system.unit("J/(m^2 K)"), f"heat capacity of {owner}"), derivative(U, T))
 
 
 def _numbers(name: str, value: ArrayLike, unit: str) -> Array:

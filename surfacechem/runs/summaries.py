@@ -78,6 +78,7 @@ def run_summary(solution: Solution, written: Path | None) -> str:
     trajectory, books, counters = solution.trajectory, solution.audit, solution.trajectory.result.counters
     run, model = trajectory.run, trajectory.model
     speed = f"run {duration(trajectory.seconds)}, compile {duration(model.compile_seconds)}"
+    jumped = event_summary(trajectory.jumps, books.energy_scale, model.system.unit("J/m^2"))
     rejected = f", {counters.rejected} rejected" if solver(run.solver).counts_rejected else ""
     lines = [
         solution.title or "untitled",
@@ -85,8 +86,8 @@ def run_summary(solution: Solution, written: Path | None) -> str:
         labelled(solution.status, solution.reason),
         *([labelled("error", _accuracy(solution.accuracy))] if solution.accuracy else []),
         labelled("time", f"{speed}; {counters.steps} steps{rejected}, {counters.residuals} residuals"),
-        *([labelled("events", event_summary(trajectory.jumps, books.energy_scale))] if trajectory.jumps else []),
-        labelled("balances", _balances(books)),
+        *([labelled("events", jumped)] if trajectory.jumps else []),
+        labelled("balances", _balances(books, model.system.unit("W/(m^2 K)"))),
         *(labelled("pair", str(verdict)) for verdict in solution.verdicts if verdict.consistent),
         *(labelled("warning", warning) for warning in solution.warnings),
         *([labelled("written", str(written))] if written else []),
@@ -105,18 +106,18 @@ def _accuracy(accuracy: Accuracy) -> str:
     return accuracy.source if math.isnan(accuracy.error) else f"{accuracy.error:.2g}{where}{asked} ({accuracy.source})"
 
 
-def _balances(books: Audit) -> str:
+def _balances(books: Audit, unit: str) -> str:
     residuals = f"energy {books.energy_error:.1e}, entropy {books.entropy_error:.1e}, sites {books.site_error:.1e}"
     if not books.least:
         return f"{residuals}; nothing dissipates"
     if books.violations:
-        worst = ", ".join(f"{law} ({books.least[law]:.3g} W/(m^2 K))" for law in books.violations)
+        worst = ", ".join(f"{law} ({books.least[law]:.3g} {unit})" for law in books.violations)
         return f"{residuals}; ENTROPY DESTROYED by {worst}"
     if books.destroys:
         return f"{residuals}; ENTROPY DESTROYED by all laws together"
     least = min(books.least.values())
     error = ", within the error of the run" if least < 0 else ""
-    return f"{residuals}; every law dissipates (least {least:.2g} W/(m^2 K){error})"
+    return f"{residuals}; every law dissipates (least {least:.2g} {unit}{error})"
 
 
 def sweep_summary(solution: SweepSolution, written: Path | None) -> str:
@@ -189,7 +190,7 @@ def _sweep_events(solution: SweepSolution) -> str:
     if (most := max(destroyed)) > 0:
         values = solution.plan.at(np.array([destroyed.index(most)]))
         at = ", ".join(f"{name} = {values[path][0]:g}" for name, path in solution.parameters.items())
-        found.append(f"at worst {-most:.3g} J/(m^2 K) at {at}")
+        found.append(f"at worst {-most:.3g} {solution.system.unit('J/(m^2 K)')} at {at}")
     return f"{event_counts(jumps)}; {', '.join(found) or 'all admissible'}"
 
 

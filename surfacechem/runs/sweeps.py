@@ -343,7 +343,7 @@ class SweepSolution(Results):
     def _of_each(self, name: str, values: Sequence[Any] | NDArray[np.float64], unit: str, text: str) -> Column:
         """A column of one value a run."""
         shaped = np.array(values, object if isinstance(values[0], str) else float).reshape(self.plan.shape)
-        return Column(name, tuple(self.axes), shaped, unit, text)
+        return Column(name, tuple(self.axes), shaped, self.system.unit(unit), text)
 
     @cached_property
     def attributes(self) -> dict[str, str | float | int]:

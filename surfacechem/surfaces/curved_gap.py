@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from surfacechem.contracts.terms import HeatTransfer, PairEnergy, Potential, Varying, reads
+from surfacechem.contracts.terms import HeatTransfer, PairEnergy, Potential, Varying, optional, reads
 from surfacechem.errors import InputError
 from surfacechem.surfaces.nodes import integral, outer_nodes
 from surfacechem.surfaces.pairwise import check_finite, kernel, length
@@ -37,7 +37,8 @@ FAR = 1e6
 @dataclass(frozen=True)
 class Contact:
     """Energy [J], forces [N] and moments about the origin [N m] on both bodies, area where they touch or overlap [m^2],
-    heat conductance [W/K], least gap [m], and the error relative to the size of each, of the area aside.
+    heat conductance [W/K] and its slope over the approach [W/(K m)], least gap [m], and the error relative to the size
+    of each, of the area aside.
     """
 
     energy: float
@@ -47,6 +48,7 @@ class Contact:
     moment_2: Array
     area: float
     conductance: float
+    conductance_slope: float
     gap: float
     error: float
 
@@ -55,7 +57,7 @@ def density(law: Potential | HeatTransfer) -> Callable[[Array], Array]:
     """Value and slope of a law over the gap as machine code; InputError where it reads anything else."""
     import symengine
 
-    foreign = [name for name in reads(law.statement) if name != GAP]
+    foreign = [name for name in reads(law.statement) if name != GAP and name not in optional(law.statement)]
     varying = [name for name, _ in law.specs() if isinstance(getattr(law, name), Varying)]
     if foreign or varying:
         what = f"reads {foreign[0]}" if foreign else f"has a {varying[0]} that varies"
@@ -73,6 +75,15 @@ def between_flats(law: PairEnergy) -> Density:
     The energy is counted from a gap of a thousand times the least of those that are asked for.
     """
     psi, amount = kernel(law), 2 * np.pi * law.n_1 * law.n_2
+    if law.parts is not None:
+        # The integral of a power of the distance is one.
+        parts = [(amount * factor / (part.decay - 2), kernel(part)) for factor, part in law.parts(1.0)]
+
+        def summed(gaps: Array) -> Array:
+            whole = sum(size * one(gaps)[..., 0] for size, one in parts) * gaps**2
+            return np.stack([whole, -amount * gaps * psi(gaps)[..., 0]], axis=-1)
+
+        return summed
     x, w = np.polynomial.legendre.leggauss(24)
     t = (np.arange(8)[:, None] + (x + 1) / 2).ravel()  # r = g exp(t), up to exp(8) g
 
@@ -87,7 +98,7 @@ def between_flats(law: PairEnergy) -> Density:
     return at
 
 
-def bends(laws: Iterable[Potential]) -> list[float]:
+def bends(laws: Iterable[Potential | HeatTransfer]) -> list[float]:
     """Gaps at which laws bend or are narrow, and zero."""
     found = {0.0}
     for law in laws:
@@ -123,19 +134,20 @@ def over_gap(
         force, moment = (float(np.linalg.norm(found[k])) for k in (slice(1, 4), slice(7, 10)))
         force = max(force, floor, TINY)
         parts = [max(abs(found[0]), force * size), *[force] * 6, *[max(moment, force * size)] * 6]
-        return np.array([*parts, LARGE, max(abs(found[14]), TINY)])
+        flow = max(abs(found[14]), TINY)
+        return np.array([*parts, LARGE, flow, max(abs(found[15]), flow / size)])
 
     pieces = [integral(integrand, box, sizes, rtol) for box in boxes(around.box, around.nodes, upper, levels)]
     whole = np.sum([part for part, _ in pieces], axis=0)
     force_1, force_2, moment_1, moment_2 = np.split(whole[1:13], 4)
-    energy, area, conductance = map(float, whole[[0, 13, 14]])
+    energy, area, conductance, slope = map(float, whole[[0, 13, 14, 15]])
     error = max(error for _, error in pieces)
-    return Contact(energy, force_1, force_2, moment_1, moment_2, area, conductance, gap, error)
+    return Contact(energy, force_1, force_2, moment_1, moment_2, area, conductance, slope, gap, error)
 
 
 def counts_at(x: Array, near: Projection, laws: Sequence[Density], heat: Sequence[Callable[[Array], Array]]) -> Array:
     """What is integrated, per area, at points (n, k, 3) of body 1, in the order of :class:`Contact`."""
-    count = np.zeros((*near.gap.shape, 15))
+    count = np.zeros((*near.gap.shape, 16))
     for law in laws:
         psi, traction = np.moveaxis(law(near.gap), -1, 0)
         # Tension pulls body 1 against the normal of body 2, which points at it.
@@ -145,7 +157,9 @@ def counts_at(x: Array, near: Projection, laws: Sequence[Density], heat: Sequenc
         count[..., 7:13] += np.concatenate([np.cross(x, pull), -np.cross(near.point, pull)], axis=-1)
     count[..., 13] = near.gap <= 0
     for path in heat:
-        count[..., 14] += path(near.gap)[..., 0]
+        h, slope = np.moveaxis(path(near.gap), -1, 0)
+        count[..., 14] += h
+        count[..., 15] -= slope * near.normal[..., 2]
     return count
 
 

@@ -21,13 +21,14 @@ import numpy as np
 from surfacechem.contracts.terms import PairEnergy
 from surfacechem.errors import InputError
 from surfacechem.surfaces.projection import FIRST, POLE, Array, Projection, Surface
-from surfacechem.surfaces.shapes import Cavity, Cylinder, Plane, Sphere
+from surfacechem.surfaces.shapes import Cavity, Cylinder, Disc, Plane, Sphere
+from surfacechem.tolerances import FLOOR
 
 ORDERS = (4, 6, 9, 13, 18, 25)
 """Points of Gauss's rule on each piece, more and more of them until two in a row agree."""
 
-WITHIN = 3
-"""Number in ORDERS of the inner rule where the outer surface is divided adaptively."""
+WITHIN = {FLOOR: 13, 0.0: 25}
+"""Order of the inner rule where the outer surface is divided adaptively, by the least accuracy it is enough for."""
 
 PIECE = 2.0
 """Length of a piece in t."""
@@ -42,7 +43,7 @@ SHALLOWEST = 2.0**-20
 """Part of the size of a surface below which a gap is one of contact."""
 
 Sums = tuple[Array, Array, Array]
-"""For n points of the outer surface: energy (n,), force on them and force-weighted points of the inner surface (n, 3)."""
+"""For n outer points: energy (n,), force on them (n, 3), and inner points weighted by what acts on each (n, 3)."""
 
 
 @dataclass(frozen=True)
@@ -65,8 +66,8 @@ class Grid:
 
 @dataclass(frozen=True)
 class Circles:
-    """Circles around the feet (n, 3) on a plane, a sphere or a cavity: how far they lie from the outer points (n, k) and
-    below the feet (n, k), and their areas (n, k).
+    """Circles around the feet (n, 3) on a plane, a sphere or a cavity: their distances from the outer points, how far
+    they lie below the feet, and their areas, each (n, k).
     """
 
     foot: Array
@@ -215,6 +216,10 @@ class Outer:
 
 def outer_nodes(outer: Surface, inner: Surface, size: float, reach: float) -> tuple[Outer, float]:
     """The nodes over a surface that are graded towards the other, and the gap where they are nearest."""
+    if type(outer.shape) is Plane and is_round(outer) and outer.shape.tilt == 0:
+        # Polar coordinates, in which nothing may change around an axis.
+        polar = Surface(Disc(), outer.upper, outer.approach)
+        outer = polar if alike_around(polar, inner) else outer
     alike = _alike_along(outer, inner), alike_around(outer, inner)
     at, gap = closest(outer, inner, size, alike)
     low, high = np.transpose(outer.shape.span)
@@ -281,7 +286,8 @@ def _adaptive(
     from scipy.integrate import cubature
 
     usual, most = sizes(about), MOST_DIVISIONS
-    scaled = partial(_scaled, integrand, ORDERS[WITHIN], usual)
+    order = next(order for least, order in WITHIN.items() if rtol >= least)
+    scaled = partial(_scaled, integrand, order, usual)
     found: Any = cubature(scaled, *box, rule="gk15", rtol=0.0, atol=rtol, max_subdivisions=most)
     error = float(np.max(np.abs(found.error * usual) / sizes(found.estimate * usual)))
     if not error <= rtol:

@@ -187,6 +187,29 @@ class Turned(Shape):
         """Point at the distance u from the axis and the angle v about it."""
 
 
+class Disc(Turned):
+    r"""Circular disc; without a radius a plane in polar coordinates.
+
+    .. math:: x = (u \cos v,\; u \sin v,\; 0)
+
+    Source: elementary.
+
+    >>> Disc(radius=2.0).point(2.0, 0.0)
+    (2.0, 0.0, 0.0)
+    """
+
+    radii = ("radius",)
+
+    def point(self, u: Expression, v: Expression) -> Point:
+        """Point at the distance u from the axis and the angle v about it."""
+        return u * cos(v), u * sin(v), 0 * u
+
+    def foot(self, x: Array) -> Array:
+        """Below the point, or on the edge."""
+        at = np.stack([np.hypot(x[..., 0], x[..., 1]), np.arctan2(x[..., 1], x[..., 0])], axis=-1)
+        return np.asarray(np.clip(at, *np.transpose(self.span)))
+
+
 class Paraboloid(Turned):
     r"""Paraboloid of revolution.
 

@@ -1,0 +1,315 @@
+"""A sphere that attracts or sticks: over a plane on a spring, with snap-in and pull-off, and in a cavity."""
+
+from __future__ import annotations
+
+import math
+from abc import abstractmethod
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from surfacechem.contracts.terms import Law, parameter
+from surfacechem.errors import InputError
+from surfacechem.references._numerics import increasing_root
+from surfacechem.references.base import Array, Parameters, Quantities, Reference, SceneView, read
+
+if TYPE_CHECKING:
+    from surfacechem.surfaces.potential import CurvedSurfaces
+
+PLACES = 4001
+"""Approaches among which the steepest attraction is looked for before it is found to rounding."""
+
+SHALLOW, DEEP = 1e-2, 1e3
+"""Approaches over the range of the interaction between which it is looked for."""
+
+POWERS = {10: 1 / 45, 4: -1 / 3}
+"""Powers of a pair energy of Lennard-Jones type, eq. e:psi12ex."""
+
+
+def pair_of(scene: SceneView) -> CurvedSurfaces:
+    """The two surfaces of a scene."""
+    from surfacechem.surfaces.potential import CurvedSurfaces
+
+    if not isinstance(scene.scene.surface, CurvedSurfaces):
+        raise InputError("it is of two bodies with shapes; the scene has no `surface`.")
+    return scene.scene.surface
+
+
+def surface_values(scene: SceneView, *names: str) -> dict[str, float | None]:
+    """Parameters of the shapes and laws of a scene with surfaces by name; None where none of them has it."""
+    laws: list[Law] = [*pair_of(scene).shapes, *pair_of(scene).gap_laws]
+    found = {name: getattr(law, name) for law in laws for name, _ in law.specs()}
+    # Those of pairs of points may have been changed for this run alone.
+    found |= {path.rpartition(".")[2]: x for path, x in scene.run.values.items() if path.startswith("surface.pair.")}
+    return {name: found.get(name) for name in names}
+
+
+@dataclass(frozen=True)
+class SphereJump:
+    """An approach at which equilibrium is lost, the far-field displacement, and the energy [J] that the jump frees."""
+
+    g: float
+    w: float
+    g_after: float
+    release: float
+
+
+class SphereOnSpring(Reference):
+    """A sphere on a spring is brought to something that attracts it and is drawn off again, slowly."""
+
+    k: float = parameter("N/m", "stiffness of the spring", above=0)
+    g_0: float = parameter("m", "range of the interaction", above=0)
+    R: float = parameter("m", "radius of the sphere", above=0)
+    w_i: float = parameter("m", "far-field displacement at first and at last", above=0)
+    w_turn: float = parameter("m", "displacement at which it turns")
+    speed: float = parameter("m/s", "speed both ways", above=0)
+
+    told = read(normal="k")
+
+    @classmethod
+    def from_scene(cls, scene: SceneView) -> Parameters:
+        load = scene.scene.loading.get("w_n")
+        times, values = (list(getattr(load, name, ())) for name in ("times", "values"))
+        if len(times) != 3 or values[0] != values[2] or times[2] != 2 * times[1]:
+            raise InputError("it is of a table of `w_n` that goes to one displacement and back at one speed.")
+        speed = (values[0] - values[1]) / times[1]
+        drive = {"w_i": values[0], "w_turn": values[1], "speed": speed}
+        return {**super().from_scene(scene), **drive, **surface_values(scene, "R", "g_0")}
+
+    @abstractmethod
+    def energy(self, g: Array) -> Array:
+        """Energy [J] at an approach."""
+
+    @abstractmethod
+    def force(self, g: Array) -> Array:
+        """Force [N] at an approach, tension positive: the slope of the energy."""
+
+    @abstractmethod
+    def slope(self, g: Array) -> Array:
+        """Slope of the force [N/m]."""
+
+    @property
+    def end_time(self) -> float:
+        """When it is back where it started [s]."""
+        return 2 * (self.w_i - self.w_turn) / self.speed
+
+    def displacement(self, g: Array) -> tuple[Array, Array]:
+        """Displacement [m] at which an approach is in equilibrium, and its slope."""
+        return g + self.force(g) / self.k, 1 + self.slope(g) / self.k
+
+    def gap(self, w: Array, low: float, high: float) -> Array:
+        """Approach [m] in equilibrium at displacements on a stable branch between two approaches."""
+        return increasing_root(self.displacement, w, np.full_like(w, low), np.full_like(w, high))
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Approaches far beyond all that is met [m]."""
+        return self.lowest, self.w_i + DEEP * self.g_0
+
+    @property
+    @abstractmethod
+    def lowest(self) -> float:
+        """An approach that is less than any that is met [m]."""
+
+    @cached_property
+    def folds(self) -> tuple[float, float]:
+        """Approaches [m] at which equilibrium is lost, on opening and on closing."""
+        near, far = self.ends
+        places = np.geomspace(SHALLOW * self.g_0, far, PLACES)
+        softest = float(places[np.argmin(self.slope(places))])
+        if self.slope(np.array([softest]))[0] >= -self.k:
+            raise InputError(f"{self.name}: the spring holds it everywhere; there is no jump.")
+        return self._fold(near, softest, -1.0), self._fold(softest, far, 1.0)
+
+    def _fold(self, low: float, high: float, sign: float) -> float:
+        """Where the slope of the force is that of the spring, by halving."""
+        for _ in range(200):
+            middle = (low + high) / 2
+            held = sign * (float(self.slope(np.array([middle]))[0]) + self.k)
+            low, high = (middle, high) if held < 0 else (low, middle)
+        return (low + high) / 2
+
+    @property
+    def jumps(self) -> tuple[SphereJump, SphereJump]:
+        """The pull-off and the snap-in."""
+        (off, on), (near, far) = self.folds, self.ends
+        return self._jump(off, on, far), self._jump(on, near, off)
+
+    def _jump(self, g: float, low: float, high: float) -> SphereJump:
+        w = self.displacement(np.array([g]))[0]
+        both = np.array([g, self.gap(w, low, high)[0]])
+        before, after = self.k / 2 * (w - both) ** 2 + self.energy(both)
+        return SphereJump(g, float(w[0]), float(both[1]), float(before - after))
+
+    def quantities(self, t: Array) -> Quantities:
+        before = self.w_i - self.w_turn - self.speed * t
+        w, (off, on), (near, far) = self.w_turn + np.abs(before), self.folds, self.ends
+        w_off, w_on = self.displacement(np.array([off, on]))[0]
+        apart = np.where(before > 0, w >= w_on, (w > w_off) | (self.w_turn > w_on))
+        open_gap, closed = self.gap(np.maximum(w, w_on), on, far), self.gap(np.minimum(w, w_off), near, off)
+        g = np.where(apart, open_gap, closed)
+        return {"w_n": w, "g_n": g, "t_n": self.force(g)}
+
+
+class AttractingSphereOnSpring(SphereOnSpring):
+    r"""A sphere on a spring whose points attract those of a plane, and repel them when near: snap-in and pull-off.
+
+    .. math:: k (w - g) = F, \quad F = -\sum_m \frac{4 \pi^2 R\,a_m}{m - 2} \left[ g^{2-m} - (g + 2R)^{2-m} \right]
+
+    with the energy of a pair, :math:`\psi = \sum_m a_m r^{-m}`, of Lennard-Jones type: over a plane the integral of
+    :math:`r^{-m}` is :math:`2 \pi g^{2-m} / (m - 2)`, and over a sphere :math:`dA = 2 \pi R\,dz`. Equilibrium is lost
+    where the slope of F is -k, and what the jump frees is the drop of :math:`\tfrac12 k (w - g)^2 + E`.
+
+    Source: Hamaker (1937), doi 10.1016/S0031-8914(37)80203-7, for a pair energy like Sauer, Duong & Mandadapu (2021),
+    eq. e:psi12ex, of points on both surfaces.
+
+    >>> tip = AttractingSphereOnSpring(n_1=5e18, n_2=5e18, psi_0=4e-21, g_0=3e-10, R=5e-8, k=0.5, w_i=6e-9,
+    ...                                 w_turn=-1e-9, speed=1e-8)
+    >>> [f"{jump.g:.6e} {jump.release:.6e}" for jump in tip.jumps]
+    ['1.912417e-10 2.867271e-17', '1.021492e-09 8.347971e-19']
+    """
+
+    n_1: float = parameter("1/m^2", "density of points on body 1", above=0)
+    n_2: float = parameter("1/m^2", "density of points on body 2", above=0)
+    psi_0: float = parameter("J", "interaction energy of a pair", above=0)
+
+    @classmethod
+    def from_scene(cls, scene: SceneView) -> Parameters:
+        return {**super().from_scene(scene), **surface_values(scene, "n_1", "n_2", "psi_0")}
+
+    @property
+    def lowest(self) -> float:
+        """Well within the repulsion [m]."""
+        return SHALLOW * self.g_0
+
+    def _sum(self, g: Array, order: int) -> Array:
+        """A derivative of the energy over the approach."""
+        whole = np.zeros_like(g)
+        for m, a in POWERS.items():
+            # In units of the range, so that no power is out of the range of numbers.
+            near, far = g / self.g_0, (g + 2 * self.R) / self.g_0
+            factor = math.prod(3 - m - k for k in range(order)) / ((m - 2) * (m - 3))
+            whole += a * factor * (near ** (3 - m - order) - far ** (3 - m - order))
+        size = 4 * math.pi**2 * self.R * self.n_1 * self.n_2 * self.psi_0
+        return np.asarray(size * self.g_0 ** (3 - order) * whole)
+
+    def energy(self, g: Array) -> Array:
+        return self._sum(g, 0)
+
+    def force(self, g: Array) -> Array:
+        return self._sum(g, 1)
+
+    def slope(self, g: Array) -> Array:
+        return self._sum(g, 2)
+
+
+class CohesiveSphereOnSpring(SphereOnSpring):
+    r"""A sphere on a spring that sticks to a plane by an exponential cohesive zone: snap-in and pull-off.
+
+    .. math:: k (w - g) = F, \quad F = 2 \pi R \left[ \Psi(g + 2R) - \Psi(g) \right], \quad
+              A = 2 \pi R \langle -g \rangle
+
+    Over a sphere :math:`dA = 2 \pi R\,dz`, so that the force is the energy per area between flats, :math:`\Psi`, for
+    any law of the gap to the plane. Its largest value is about :math:`2 \pi R` times the work of separation.
+
+    Source: Derjaguin, Muller & Toporov (1975), doi 10.1016/0021-9797(75)90018-1, exact for a rigid sphere; the zone of
+    Sauer, Duong & Mandadapu (2021), eq. ex:psi_czm.
+
+    >>> tip = CohesiveSphereOnSpring(t_max=5e6, g_0=5e-9, E_n=2e17, R=1e-6, k=20.0, w_i=6e-8, w_turn=-2e-8, speed=8e-8)
+    >>> [f"{jump.w:.6e} {jump.release:.6e}" for jump in tip.jumps]
+    ['2.206377e-08 7.832043e-16', '1.856246e-08 4.128297e-16']
+    """
+
+    t_max: float = parameter("Pa", "strength", above=0)
+    E_n: float = parameter("Pa/m", "contact stiffness in compression", above=0)
+
+    @classmethod
+    def from_scene(cls, scene: SceneView) -> Parameters:
+        return {**super().from_scene(scene), **surface_values(scene, "t_max", "E_n")}
+
+    @property
+    def lowest(self) -> float:
+        """An overlap that bears more than adhesion and spring can press [m]."""
+        adhesion = math.e * self.t_max * self.g_0
+        pressed = 2 * adhesion + 4 * self.k * (self.w_i - self.w_turn) / (2 * math.pi * self.R)
+        return -math.sqrt(2 * pressed / self.E_n)
+
+    def flats(self, g: Array, order: int) -> Array:
+        """Energy between flats [J/m^2] integrated over the gap (order -1), itself (0), and its slope (1)."""
+        apart, pressed = np.maximum(g, 0) / self.g_0, np.minimum(g, 0)
+        zone = {-1: (apart + 2), 0: -(apart + 1), 1: apart}[order] * np.exp(1 - apart)
+        depth = self.t_max * self.g_0
+        contact = {
+            -1: self.E_n * pressed**3 / 6 - math.e * depth * pressed,
+            0: self.E_n * pressed**2 / 2,
+            1: self.E_n * pressed,
+        }
+        return np.asarray(depth * self.g_0**-order * zone + contact[order])
+
+    def energy(self, g: Array) -> Array:
+        return 2 * math.pi * self.R * (self.flats(g + 2 * self.R, -1) - self.flats(g, -1))
+
+    def force(self, g: Array) -> Array:
+        return 2 * math.pi * self.R * (self.flats(g + 2 * self.R, 0) - self.flats(g, 0))
+
+    def slope(self, g: Array) -> Array:
+        return 2 * math.pi * self.R * (self.flats(g + 2 * self.R, 1) - self.flats(g, 1))
+
+
+class AttractingSphereInCavity(Reference):
+    r"""A sphere in a hollow sphere whose points attract each other: the force while it moves at a given speed.
+
+    .. math:: E = \sum_m \frac{4 \pi^2 R H a_m}{c (m-2)(m-3)} \left[ (H-R-c)^{3-m} - (H-R+c)^{3-m}
+              - (H+R-c)^{3-m} + (H+R+c)^{3-m} \right], \quad F = -\frac{dE}{dc}
+
+    with the distance of the centres :math:`c = H - R - g` and the energy of a pair :math:`\sum_m a_m r^{-m}` of
+    Lennard-Jones type. Off the centre only, where the terms cancel.
+
+    Source: elementary, by rings of equal distance on both spheres; Hamaker (1937), doi 10.1016/S0031-8914(37)80203-7.
+    The pair energy is that of Sauer, Duong & Mandadapu (2021), eq. e:psi12ex.
+
+    >>> ball = AttractingSphereInCavity(n_1=5e18, n_2=5e18, psi_0=4e-21, g_0=3e-10, R=2e-8, H=2.5e-8, g_i=1e-9,
+    ...                                rate=0, T_i=300.0)
+    >>> f"{float(ball.solution(0.0)['t_n']):.6e}"
+    '5.263605e-10'
+    """
+
+    n_1: float = parameter("1/m^2", "density of points on body 1", above=0)
+    n_2: float = parameter("1/m^2", "density of points on body 2", above=0)
+    psi_0: float = parameter("J", "interaction energy of a pair", above=0)
+    g_0: float = parameter("m", "range of the interaction", above=0)
+    R: float = parameter("m", "radius of the sphere", above=0)
+    H: float = parameter("m", "radius of the cavity", above=0)
+    g_i: float = parameter("m", "approach at the start", above=0)
+    rate: float = parameter("m/s", "rate of the approach")
+
+    T_i: float = parameter("K", "temperature, which stays", above=0)
+
+    told = read(ramp="rate=g_n", initial="g_i=g_n", temperature="T_i")
+
+    @classmethod
+    def from_scene(cls, scene: SceneView) -> Parameters:
+        from surfacechem.surfaces.shapes import Sphere
+
+        own = surface_values(scene, "n_1", "n_2", "psi_0", "g_0")
+        radii = [shape.R for shape in pair_of(scene).shapes if isinstance(shape, Sphere)]
+        if len(radii) != 2:
+            raise InputError("it is of a sphere in a cavity.")
+        return {**super().from_scene(scene), **own, "R": min(radii), "H": max(radii)}
+
+    def quantities(self, t: Array) -> Quantities:
+        g = self.g_i + self.rate * t
+        c, whole = self.H - self.R - g, np.zeros_like(g)
+        ends = {1: (self.H - self.R, self.H + self.R), -1: (self.H + self.R, self.H - self.R)}
+        for m, a in POWERS.items():
+            p, terms, slopes = 3 - m, np.zeros_like(g), np.zeros_like(g)
+            for sign, (minus, plus) in ends.items():
+                # Lengths in units of the range, as above.
+                near, far = (minus - c) / self.g_0, (plus + c) / self.g_0
+                terms += sign * (near**p + far**p)
+                slopes += sign * p * (far ** (p - 1) - near ** (p - 1)) / self.g_0
+            whole += a / ((m - 2) * (m - 3)) * (terms / c - slopes)
+        size = 4 * math.pi**2 * self.R * self.H * self.n_1 * self.n_2 * self.psi_0 * self.g_0**3
+        return {"g_n": g, "t_n": size * whole / c, "T": self.T_i}

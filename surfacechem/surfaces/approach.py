@@ -1,0 +1,149 @@
+"""A function of the approach from its values and slopes at a few approaches: an energy with its force, for instance.
+
+Between two approaches the slope is a polynomial through Chebyshev's points, refined until it is one to the accuracy.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from surfacechem.errors import InputError
+from surfacechem.expressions import Expression, decay, log, where
+from surfacechem.surfaces.projection import Array
+
+DEGREE = 14
+"""Degree of the polynomials in the approach."""
+
+SHORTEST = 2.0**-26
+"""Part of the range of approaches below which no piece is divided; at a kink of the force its error does not count."""
+
+MOST_PIECES = 200
+
+Samples = Callable[[float], tuple[float, float]]
+"""Energy [J] and force [N], tension positive, at an approach [m]."""
+
+
+@dataclass(frozen=True)
+class ApproachPiece:
+    """Between two approaches the force as a polynomial of x, -1 to 1; where ``powers`` the slope of ln E over ln d."""
+
+    low: float
+    high: float
+    coefficients: tuple[float, ...]
+    start: float
+    """Energy [J] at the lower end, or its logarithm."""
+    powers: bool
+
+    def energy(self, d: Expression) -> Expression:
+        """Energy at an approach [J]."""
+        ends = (math.log(self.low), math.log(self.high)) if self.powers else (self.low, self.high)
+        half = (ends[1] - ends[0]) / 2
+        x = ((log(d) if self.powers else d) - (ends[0] + half)) / half
+        whole = np.polynomial.Polynomial(self.coefficients).integ(lbnd=-1).coef.tolist()
+        # A sum of powers, whose higher derivatives are no longer than itself.
+        found = self.start + half * sum(c * x**k for k, c in enumerate(whole))
+        return decay(-found) if self.powers else found
+
+
+@dataclass(frozen=True)
+class ApproachEnergy:
+    """Energy over the approach in pieces; a sign where it is a power law of one sign."""
+
+    pieces: tuple[ApproachPiece, ...]
+    force: float
+    """Its slope at the least approach [N]."""
+    sign: float = 1.0
+
+    def energy(self, d: Expression) -> Expression:
+        """Energy at an approach [J]; nearer than the first, where only trial states of a solver are, along a line."""
+        first, result = self.pieces[0], self.pieces[-1].energy(d)
+        for piece in reversed(self.pieces[:-1]):
+            result = where(d < piece.high, piece.energy(d), result)
+        wall = first.energy(first.low) + self.force * (d - first.low)
+        return self.sign * where(d < first.low, wall, result)
+
+
+def fitted(samples: Samples, low: float, high: float, rtol: float, cuts: Sequence[float] = ()) -> ApproachEnergy:
+    """The energy between two approaches, so that its slope is the force within a relative error.
+
+    It bends at the approaches ``cuts``. InputError where it is not smooth elsewhere.
+
+    An energy of one sign at positive approaches is fitted by its logarithm, in which a power is a straight line.
+    """
+    at: dict[float, tuple[float, float]] = {}
+
+    def sample(d: float) -> tuple[float, float]:
+        if d not in at:
+            at[d] = samples(d)
+        return at[d]
+
+    first = sample(low)  # what has no force there is refused before anything else is computed
+    inside = [cut for cut in cuts if low < cut < high]
+    powers = low > 0 and not inside and one_sign([sample(d)[0] for d in (low, math.sqrt(low * high), high)])
+    found = divided(sample, [low, *inside, high], powers, rtol)
+    return joined(found, *first, powers)
+
+
+def one_sign(energies: Sequence[float]) -> bool:
+    """Whether energies are all above or all below zero."""
+    return min(energies) > 0 or max(energies) < 0
+
+
+def divided(sample: Samples, ends: Sequence[float], powers: bool, rtol: float) -> list[tuple[float, float, Array]]:
+    """Pieces that are halved until a polynomial is the force on each; at a kink until they are too short to count."""
+    found: list[tuple[float, float, Array]] = []
+    waiting = list(pairwise(ends))[::-1]
+    while waiting:
+        a, b = waiting.pop()
+        if len(found) + len(waiting) > MOST_PIECES:
+            raise InputError(f"the accuracy {rtol:g} over the approach is out of reach near {a:.4g} m.")
+        coefficients = polynomial(sample, a, b, powers, rtol)
+        if coefficients is not None:
+            found.append((a, b, coefficients))
+        elif b - a > SHORTEST * (ends[-1] - ends[0]):
+            middle = math.sqrt(a * b) if powers else (a + b) / 2
+            # The lower half is the next, so that pieces are found in order.
+            waiting += [(middle, b), (a, middle)]
+        else:
+            found.append((a, b, np.zeros(1)))
+    return found
+
+
+def approach_at(x: float, a: float, b: float, powers: bool) -> float:
+    """The approach at -1 <= x <= 1."""
+    return math.sqrt(a * b) * (b / a) ** (x / 2) if powers else (a + b) / 2 + x * (b - a) / 2
+
+
+def polynomial(sample: Samples, a: float, b: float, powers: bool, rtol: float) -> Array | None:
+    """Coefficients of what is fitted between two approaches; None where they miss what is between the nodes."""
+
+    def value(x: float) -> float:
+        d = approach_at(x, a, b, powers)
+        energy, force = sample(d)
+        return force * d / energy if powers else force
+
+    nodes = np.cos(np.pi * (np.arange(DEGREE + 1) + 0.5) / (DEGREE + 1))
+    values = np.array([value(x) for x in nodes])
+    fit = np.polynomial.chebyshev.Chebyshev.fit(nodes, values, DEGREE, domain=[-1, 1])
+    size = float(np.max(np.abs(values)))
+    # Between the nodes, and near the ends, where an interpolation errs most.
+    if any(abs(fit(x) - value(x)) > rtol * size for x in (-0.97, -0.52, 0.14, 0.71, 0.99)):
+        return None
+    return np.asarray(fit.convert(kind=np.polynomial.Polynomial, domain=[-1, 1], window=[-1, 1]).coef)
+
+
+def joined(found: list[tuple[float, float, Array]], energy: float, force: float, powers: bool) -> ApproachEnergy:
+    """Pieces whose energies go on where the one before ends."""
+    start, pieces = math.log(abs(energy)) if powers else energy, []
+    for a, b, coefficients in found:
+        piece = ApproachPiece(a, b, tuple(map(float, coefficients)), start, powers)
+        pieces.append(piece)
+        end = piece.energy(b)
+        start = math.log(end) if powers else end
+    sign = math.copysign(1.0, energy) if powers else 1.0
+    return ApproachEnergy(tuple(pieces), sign * force, sign)

@@ -1,0 +1,53 @@
+"""Heat conductance over the gap of two curved surfaces as a function of their approach."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cached_property
+
+from surfacechem.contracts.terms import HeatTransfer, option
+from surfacechem.expressions import Expression
+from surfacechem.surfaces.approach import ApproachEnergy, fitted
+from surfacechem.surfaces.curved_gap import bends, density, over_gap
+from surfacechem.surfaces.potential import CurvedSurfaces
+from surfacechem.tolerances import ROUNDING
+
+KNOWN: dict[str, ApproachEnergy] = {}
+"""Conductances that have been integrated, by what they are the conductances of."""
+
+
+class CurvedConductance(HeatTransfer):
+    """Conductance [W/K] between two curved bodies at the approach g_n, from one per area over the gap."""
+
+    law: HeatTransfer = option("conductance per area, a law of the gap")
+    pair: CurvedSurfaces = option("the two surfaces")
+
+    @property
+    def channel(self) -> str:  # type: ignore[override]
+        """What carries the heat."""
+        return self.law.channel
+
+    @property
+    def limits(self) -> Mapping[str, tuple[float, float]]:
+        """The approaches between which it is known."""
+        return self.pair.limits
+
+    @cached_property
+    def curve(self) -> ApproachEnergy:
+        """The conductance over the approach."""
+        pair, law, levels = self.pair, density(self.law), bends([self.law])
+        key = repr((pair.shapes, self.law, pair.approach, pair.accuracy))
+
+        def sample(d: float) -> tuple[float, float]:
+            found = pair.at_approach(
+                d, lambda: over_gap(*pair.surfaces(d), [], levels, [law], max(pair.accuracy / 64, ROUNDING))
+            )
+            return found.conductance, found.conductance_slope
+
+        if key not in KNOWN:
+            KNOWN[key] = fitted(sample, *pair.approach, pair.accuracy, levels)
+        return KNOWN[key]
+
+    def conductance(self, g_n: Expression) -> Expression:
+        """Conductance [W/K]."""
+        return self.curve.energy(g_n)
