@@ -39,6 +39,8 @@ class Quantity:
     long_name: str
     latex: str = ""
     tag: str = ""
+    species: str = ""
+    """Where it is the coverage of a species, its name in the mechanism."""
 
 
 def _table(*rows: tuple[str, ...]) -> dict[str, Quantity]:

@@ -175,6 +175,8 @@ class BondingVariable:
     name: str
     density: float
     long_name: str = ""
+    species: str = ""
+    """Name in the mechanism."""
 
 
 class Engine(Protocol):

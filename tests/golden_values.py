@@ -54,8 +54,8 @@ TIMES = 12
 WORDS = ("status", "regime", "reaction")
 """Attributes that are kept as they stand; of the reason, numbers have the nine digits that it prints."""
 
-UNKEPT = ("energy_residual", "entropy_residual", "site_residual", "least_sigma_", "_exact")
-"""What is rounding, what belongs to the steps rather than to the solution, and the exact solutions."""
+UNKEPT = ("energy_residual", "entropy_residual", "site_residual", "least_sigma_", "_exact", "coverage", "species")
+"""What is rounding, what belongs to the steps rather than to the solution, exact solutions, and coverages once more."""
 
 OVER = ("surface_time", "u")
 """First dimensions of what is not kept: what surfaces carry, at times that follow the outputs."""

@@ -123,6 +123,7 @@ class HeldPhase:
         self._fractions = [*names.values()]
         self.enthalpies = np.zeros(phase.n_species)
         """Of its species where it was put last [J/kmol]."""
+        self._parts, self._all = [math.nan], np.empty(0)
         self._pressed, self._charged = state.pressure is not None, state.electric_potential is not None
 
     def put(self, T: float, values: Sequence[float]) -> None:
@@ -134,11 +135,13 @@ class HeldPhase:
         if not self.species and self.rest is None:
             self.phase.TP = T, pressure
             return
-        fractions = np.zeros(self.phase.n_species)
-        fractions[self.species] = list(given)
-        if self.rest is not None:
-            fractions[self.rest] = max(1.0 - fractions.sum(), 0.0)
-        self.phase.TPX = T, pressure, fractions
+        parts = list(given)
+        if parts != self._parts:
+            self._parts, self._all = parts, np.zeros(self.phase.n_species)
+            self._all[self.species] = parts
+            if self.rest is not None:
+                self._all[self.rest] = max(1.0 - self._all.sum(), 0.0)
+        self.phase.TPX = T, pressure, self._all
 
     def limits(self, values: Mapping[str, Expression]) -> Iterator[tuple[str, Expression, str]]:
         """What of the histories, by name, must stay positive, with its name and the reason where it does not."""

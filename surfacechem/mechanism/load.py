@@ -116,7 +116,9 @@ def load_mechanism(
     return Mechanism(
         potentials=(mixture,),
         reactions=reactions,
-        variables=tuple(BondingVariable(s.variable, density / s.sites, f"coverage of {s.name}") for s in species),
+        variables=tuple(
+            BondingVariable(s.variable, density / s.sites, f"coverage of {s.name}", s.name) for s in species
+        ),
         bonds=tuple(item.variable for item in chosen),
         sites=Sites(possible, possible),
         text=source.text,

@@ -65,6 +65,19 @@ def quantity_columns(
     ]
 
 
+def coverage_columns(trajectory: Trajectory) -> list[Column]:
+    """Coverages along the names that species have in the mechanism, which names of variables cannot be."""
+    states = {j: state.quantity.species for j, state in enumerate(trajectory.model.system.states)}
+    found = {name: j for j, name in states.items() if name}
+    if not found:
+        return []
+    values = trajectory.result.outputs[:, [*found.values()]]
+    return [
+        Column("species", ("species",), np.array([*found], dtype=object), "1", "species of the surface"),
+        Column("coverage", ("time", "species"), values, "1", "coverage of each species"),
+    ]
+
+
 def profile_values(trajectory: Trajectory, profile: Profile) -> Array:
     """Temperatures across a body at the output times, shape (times, points)."""
     names = [profile.surface, *profile.states, *([profile.far] if profile.far else [])]

@@ -12,7 +12,14 @@ import numpy as np
 
 from surfacechem.results.accuracy import Accuracy
 from surfacechem.results.audit import Audit, audit
-from surfacechem.results.dataset import DATASET_NAMES, Array, Results, profile_columns, quantity_columns
+from surfacechem.results.dataset import (
+    DATASET_NAMES,
+    Array,
+    Results,
+    coverage_columns,
+    profile_columns,
+    quantity_columns,
+)
 from surfacechem.results.event_table import event_columns, event_findings, event_violations, event_waits
 from surfacechem.results.findings import Verdict, findings, verdicts
 from surfacechem.results.netcdf import Column, versions
@@ -95,7 +102,7 @@ class Solution(Results):
         """Every variable of the dataset, the time coordinate first."""
         trajectory, accounts = self.shown, self.trajectory.model.system.ledger
         books = self.audit if trajectory is self.trajectory else audit(trajectory)
-        along = [*quantity_columns([trajectory]), *profile_columns(trajectory)]
+        along = [*quantity_columns([trajectory]), *profile_columns(trajectory), *coverage_columns(trajectory)]
         columns = [Column("time", ("time",), trajectory.result.times, "s", "time since the start"), *along]
         for account, values in zip(accounts, trajectory.result.ledger_outputs.T, strict=True):
             q = account.quantity

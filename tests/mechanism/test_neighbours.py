@@ -13,6 +13,7 @@ from scipy.integrate import solve_ivp
 from test_mechanism_cantera import FOLDER, SURFACES
 
 import surfacechem
+from surfacechem.documents.shipped import mechanisms
 from surfacechem.errors import InputError
 from surfacechem.mechanism.mixture import word
 from surfacechem.quantities import BOLTZMANN
@@ -393,3 +394,28 @@ def test_species_in_another_case_than_declared_are_told(tmp_path):
     file.write_text(file.read_text().replace("equation: H + PT(S) => H(S)", "equation: H + Pt(s) => H(S)"))
     with pytest.raises(InputError, match=r"ptcombust\.yaml:\d+: reaction H \+ Pt\(s\) .* Write 'PT\(S\)'"):
         surfacechem.load(case)
+
+
+def test_desorption_as_the_temperature_rises_is_what_cantera_gives_point_by_point():
+    """Coverages and the rate at which the gas receives, against SciPy's integrator on Cantera's rates."""
+    data = surfacechem.load("temperature-programmed-desorption").run(error="balances").dataset
+    surface = ct.Interface(str(mechanisms() / "co-platinum.yaml"), "platinum")
+    gas = surface.adjacent["gas"]
+    gas.X = {"CO": 1e-6, "AR": 1 - 1e-6}
+    surface.coverages = "PT(S):0.4, CO(S):0.6"
+
+    def rates(t, y):
+        surface.TP = gas.TP = 430 + 10 * t, 1e-3
+        surface.set_unnormalized_coverages(y)
+        return surface.get_net_production_rates(surface) / surface.site_density
+
+    times = data["time"].values
+    exact = solve_ivp(rates, (0, times[-1]), surface.coverages, method="BDF", rtol=1e-11, atol=1e-18, t_eval=times).y
+    np.testing.assert_allclose(coverages(data, surface), exact.T, atol=3e-8, rtol=0)
+    assert np.array_equal(data["coverage"].sel(species=surface.species_names).values, coverages(data, surface))
+    desorbed = []
+    for t, y in zip(times, exact.T, strict=True):
+        rates(t, y)
+        desorbed.append(surface.get_net_production_rates(gas)[gas.species_index("CO")] * 1e3 * AVOGADRO)
+    np.testing.assert_allclose(data["production_CO"].values, desorbed, atol=1e-7 * max(desorbed), rtol=0)
+    assert times[np.argmax(desorbed)] == pytest.approx(6.6, abs=0.2)  # the peak, at 496 K

@@ -64,7 +64,7 @@ def variables(build: Build) -> Iterator[Bond]:
         name, by = variable.name, f"interface.{variable.name}"
         spec = Spec("1/m^2", "site density", above=0)
         amount = build.constant(f"N_{name}", f"{by}.density", spec, variable.density)
-        yield _bonding_state(build, Quantity(name, "1", variable.long_name), amount, 1.0)
+        yield _bonding_state(build, Quantity(name, "1", variable.long_name, species=variable.species), amount, 1.0)
         # What it amounts to where it is one: N_x per reference area, n_x per current area.
         build.variables.define(f"N_{name}", symengine.sympify(amount), "constant", by)
         build.variables.define(f"n_{name}", partial(_per_current_area, build, amount), "derived", by)
