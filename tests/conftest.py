@@ -3,8 +3,9 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-# The first example of a test assembles and compiles its scene, so a deadline per example would measure that.
-settings.register_profile("surfacechem", deadline=None)
+# The first example of a test assembles and compiles its scene, so a deadline per example would measure that. Few
+# examples for each run of the tests: they are others the next time.
+settings.register_profile("surfacechem", deadline=None, max_examples=30)
 settings.load_profile("surfacechem")
 
 EVERY_CASE = ("test_zoo", "test_cases", "test_dataset", "test_scene_view")

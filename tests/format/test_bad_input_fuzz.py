@@ -83,7 +83,7 @@ def test_a_message_is_one_line_whatever_it_quotes(text, message):
 
 
 @given(name=st.sampled_from(SAMPLES), data=st.data())
-@settings(max_examples=300, derandomize=True, suppress_health_check=list(HealthCheck))
+@settings(max_examples=60, derandomize=True, suppress_health_check=list(HealthCheck))
 def test_mutated_documents(name, data):
     _, plain = sample(name)
     for _ in range(data.draw(st.integers(1, 3))):
@@ -92,7 +92,7 @@ def test_mutated_documents(name, data):
 
 
 @given(name=st.sampled_from(SAMPLES), data=st.data())
-@settings(max_examples=200, derandomize=True, suppress_health_check=list(HealthCheck))
+@settings(max_examples=60, derandomize=True, suppress_health_check=list(HealthCheck))
 def test_mutated_texts(name, data):
     text, _ = sample(name)
     loads_or_is_refused(garbled(text, data))

@@ -65,7 +65,7 @@ def surface_alone(file: str, phase: str, folder: Path) -> tuple[Path, int]:
 
 @pytest.mark.parametrize(("file", "phase"), [surface for surface, count in SURFACES.items() if count])
 @given(data=st.data())
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 def test_reactions_between_surface_species_agree(folder, file, phase, data):
     path, count = surface_alone(file, phase, folder)
     assert count == SURFACES[file, phase]
@@ -88,7 +88,7 @@ def test_other_phases_are_refused_by_name(file, phase):
 
 @pytest.mark.parametrize(("file", "phase"), LOWERED)
 @given(data=st.data())
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=10)
 def test_coverage_dependent_thermo_agrees(file, phase, data):
     mechanism = load_mechanism(FOLDER / file, phase)
     compare(mechanism, *data.draw(states(len(mechanism.variables))))

@@ -113,7 +113,7 @@ def file(tmp_path_factory):
 
 
 @given(data=st.data())
-@settings(max_examples=25)
+@settings(max_examples=10)
 def test_random_mechanisms_in_a_scene(file, data):
     ct.suppress_thermo_warnings(True)
     file.write_text(data.draw(mechanism_texts()), encoding="utf-8")

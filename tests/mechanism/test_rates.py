@@ -103,7 +103,7 @@ def file(tmp_path_factory):
 
 
 @given(data=st.data())
-@settings(max_examples=150)
+@settings(max_examples=40)
 def test_random_mechanisms_agree_with_cantera(file, data):
     file.write_text(data.draw(mechanism_texts()), encoding="utf-8")
     mechanism = load_mechanism(file)

@@ -115,7 +115,7 @@ def entropy_is_produced(solution: Solution, scene: Scene) -> None:
         assert any("destroys entropy" in warning for warning in solution.warnings)
 
 
-@settings(max_examples=25, deadline=None, derandomize=True)
+@settings(max_examples=10, deadline=None, derandomize=True)
 @given(st.integers(0, 10**6))
 def test_random_scenes(seed):
     if check(seed).startswith(REFUSED):
@@ -123,12 +123,13 @@ def test_random_scenes(seed):
 
 
 UNTRUE = [
-    *(1019, 1021, 1029, 2011, 2015, 4016, 4032, 7012, 8028, 10000, 11002, 11028, 14017, 14019, 18006, 18030, 20005),
-    *(20037, 22010, 22021, 22030, 25001, 25022, 26030, 27003, 29005, 32022, 34015, 38031),
+    *(1019, 1021, 1029, 2011, 2015, 4016, 7012, 10000, 14017, 14019, 18006, 18030, 20005, 20037, 22010, 22021, 22030),
+    *(25001, 26030, 27003, 32022, 34015, 38031),
 ]
+LONG = [4032, 8028, 11002, 11028, 25022, 29005]
 
 
-@pytest.mark.parametrize("seed", UNTRUE)
+@pytest.mark.parametrize("seed", [*UNTRUE, *(pytest.param(seed, marks=pytest.mark.slow) for seed in LONG)])
 def test_scenes_that_once_ended_untruly(seed):
     check(seed)
 
