@@ -188,6 +188,15 @@ SolverNames = Annotated[
 Tolerance = Annotated[float | None, Option("--rtol", help="Another relative tolerance than the case's.")]
 Wanted = Annotated[float | None, Option("--accuracy", help="Relative accuracy; solver and tolerance follow.")]
 Quiet = Annotated[bool, Option("--quiet", "-q", help="Print nothing unless something is wrong.")]
+Talk = Annotated[
+    bool | None,
+    Option(
+        "--verbose/--quiet",
+        "-v/-q",
+        help="Tell what is being done and more about the result, or nothing unless something is wrong.",
+        show_default=False,
+    ),
+]
 
 
 def chosen(simulation: Simulation, solver: str | None, rtol: float | None, accuracy: float | None = None) -> Run:
@@ -213,8 +222,9 @@ def chosen(simulation: Simulation, solver: str | None, rtol: float | None, accur
     return replace(run, solver=OWN if run.solver == AUTO else run.solver, rtol=rtol, accuracy=None)
 
 
-def wait_for(work: Callable[[], R]) -> R:
-    """Do the work in another thread, as compiled code does not look at signals: an interrupt is answered meanwhile.
+def wait_for(work: Callable[[], R], tick: Callable[[], None] = lambda: None) -> R:
+    """Do the work in another thread, as compiled code does not look at signals: an interrupt is answered meanwhile, and
+    each half a second ``tick`` is called.
 
     >>> wait_for(lambda: 42)
     42
@@ -226,22 +236,26 @@ def wait_for(work: Callable[[], R]) -> R:
         future = pool.submit(work)
         while not future.done():
             wait([future], 0.5)  # without a limit, no signal would be answered in between
+            tick()
         return future.result()
     finally:
         pool.shutdown(wait=False)
 
 
-def solved(run: Callable[[], R], quiet: bool, brief: bool = False) -> R:
-    """The solution, its dataset's columns and audit included, so that what follows only writes; ``brief`` where the
-    stepper is called a few times only.
+def solved(run: Callable[[], R], talk: bool | None, brief: bool = False) -> R:
+    """The solution, its dataset's columns and audit included, so that what follows only writes; ``talk`` as the command
+    line says, ``brief`` where the stepper is called a few times only. A terminal shows a bar after a while.
     """
+    from surfacechem.cli.terminal import following
     from surfacechem.solve.radau import stepper
 
     if brief:
         stepper.load_briefly()
-    if not (quiet or stepper.is_compiled()):
+    if not (talk is False or stepper.is_compiled()):
         typer.echo("compiling the stepper, once on this machine; this takes a minute or less ...", err=True)
-    return wait_for(run)
+    with following(talk) as bar:
+        bar.tell("running")
+        return wait_for(run, bar.tick)
 
 
 def refuse_unwritable(*targets: Path) -> None:

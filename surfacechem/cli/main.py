@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -23,6 +22,7 @@ from surfacechem.cli.commands import (
     Quiet,
     SolverName,
     SolverNames,
+    Talk,
     Tolerance,
     Wanted,
     case_names,
@@ -35,6 +35,7 @@ from surfacechem.cli.commands import (
     solved,
     written_to,
 )
+from surfacechem.cli.terminal import show
 from surfacechem.errors import InputError, Place, suggestion
 
 if TYPE_CHECKING:
@@ -83,7 +84,7 @@ def run(
             "tighter tolerance), balances (no second run).",
         ),
     ] = "auto",
-    quiet: Quiet = False,
+    talk: Talk = None,
 ) -> None:
     """Run a case, write its dataset and print a summary."""
     from surfacechem.results.netcdf import dataset_path
@@ -96,13 +97,13 @@ def run(
     if target.exists() and Path(simulation.case.file).exists() and target.samefile(simulation.case.file):
         raise InputError("is the case itself; give another file to write to.", Place(str(target)))
     refuse_unwritable(dataset_path(target))
-    solution = solved(lambda: simulation.run(run=settings, error=error), quiet, brief=True)
+    solution = solved(lambda: simulation.run(run=settings, error=error), talk, brief=True)
     solution.write(target)  # also of a run that failed: what it reached tells why
-    if not quiet:
-        typer.echo(run_summary(solution, target))
-    for warning in solution.warnings if quiet else ():
+    if talk is not False:
+        show(run_summary(solution, target, details=talk is True))
+    for warning in solution.warnings if talk is False else ():
         typer.echo(f"surfacechem: warning: {warning}", err=True)
-    leave_with(solution.status, solution.reason if quiet else "")
+    leave_with(solution.status, solution.reason if talk is False else "")
 
 
 @app.command(epilog=EXIT_CODES)
@@ -131,7 +132,7 @@ def sweep(
         str | None, Option("--only", metavar="STATUS", help="Run those runs of the store again that are failed, say.")
     ] = None,
     changes: Changes = None,
-    quiet: Quiet = False,
+    talk: Talk = None,
 ) -> None:
     """Run a case over values of its parameters and write one dataset, or a store (.zarr) of any size."""
     from surfacechem.cli import stores
@@ -145,13 +146,13 @@ def sweep(
     if stores.asked_for(output, {"--resume": resume, "--part": part, "--cluster": cluster, "--only": only}):
         assert output is not None
         plan = simulation.plan(values, end)
-        return stores.write(simulation, plan, output, stores.Options(resume, part, cluster, only, quiet))
+        return stores.write(simulation, plan, output, stores.Options(resume, part, cluster, only, talk))
     target = dataset_path(output or f"{simulation.case.name}-sweep.nc")
     refuse_unwritable(target)
-    solution = solved(lambda: simulation.sweep(values, end), quiet)
+    solution = solved(lambda: simulation.sweep(values, end), talk)
     solution.write(target)
-    if not quiet:
-        typer.echo(sweep_summary(solution, target))
+    if talk is not False:
+        show(sweep_summary(solution, target, details=talk is True))
     leave_with(solution.status)
 
 
@@ -173,7 +174,7 @@ def check(
     simulation = load(case, changes or ())
     system, scene = simulation.system, simulation.case.scene
     if not system.states:
-        typer.echo(check_summary(simulation.case.title, system, scene, None, [], warnings(system)))
+        show(check_summary(simulation.case.title, system, scene, None, [], warnings(system)))
         return
     settings = chosen(simulation, solver, rtol, accuracy)
     model = simulation.model
@@ -187,7 +188,7 @@ def check(
     found = [*warnings(system), *start_warnings(model, problem, start, end)]
     why = reasons(problem, settings, system.moves) if settings.solver == AUTO else ()
     settings = model.chosen(settings, values)
-    typer.echo(check_summary(simulation.case.title, system, scene, settings, numbers, found, why))
+    show(check_summary(simulation.case.title, system, scene, settings, numbers, found, why))
 
 
 @app.command(epilog=EXIT_CODES)
@@ -220,7 +221,7 @@ def evaluate(
     if target:
         found.write(target)
     if not quiet:
-        typer.echo(points_summary(found, target))
+        show(points_summary(found, target))
 
 
 @app.command()
@@ -269,7 +270,10 @@ def laws(
         typer.echo(text)
         raise typer.Exit(0 if well else DIFFERENT)
     with every.known(own):
-        typer.echo(law_page(name) if name else law_list())
+        if name:
+            typer.echo(law_page(name))
+        else:
+            show(*law_list())
 
 
 @app.command()
@@ -282,14 +286,17 @@ def schema() -> None:
 
 @app.command(epilog=EXIT_CODES)
 def cases(
-    show: Annotated[
+    name: Annotated[
         str | None, Option("--show", metavar="NAME", help="Print this case.", autocompletion=case_names)
     ] = None,
 ) -> None:
     """List the cases that come with the package, or print one."""
     from surfacechem.runs.listing import case_table, case_text
 
-    typer.echo(case_text(show) if show else case_table(), nl=not show)
+    if name:
+        typer.echo(case_text(name), nl=False)
+    else:
+        show(case_table())
 
 
 @app.command(epilog=EXIT_CODES)
@@ -357,6 +364,7 @@ def plot(
         Option("--against", metavar="VARIABLE", help="A variable as the axis, instead of time or what is swept."),
     ] = None,
     changes: Changes = None,
+    talk: Talk = None,
 ) -> None:
     """Plot runs over time or a variable, or sweeps over parameters."""
     from surfacechem import plots
@@ -369,11 +377,12 @@ def plot(
         raise InputError("a dataset is plotted as it is; give a case to change values of.", Place(path="--set"))
     target = output or Path("comparison.png" if len(sources) > 1 else f"{Path(sources[0]).stem}.png")
     check_picture(target)
-    solutions = {case: solved(load(case, changes or ()).run, quiet=False, brief=True) for case in cases}
+    solutions = {case: solved(load(case, changes or ()).run, talk, brief=True) for case in cases}
     names = listed(variables) if variables else None
     shown = [solutions[source].dataset if source in solutions else source for source in sources]
     plots.write(plots.figure(shown, names, against), target)
-    typer.echo(str(target))
+    if talk is not False:
+        typer.echo(str(target))
     for solution in solutions.values():
         leave_with(solution.status, solution.reason)
 
@@ -383,13 +392,13 @@ def figures(
     name: Annotated[str, Argument(metavar="LIST", help="A list of figures, or a shipped one: paper, published.")],
     output: Annotated[Path, Option("-o", "--output", help="Folder of the figures.")] = Path("figures"),
     suffix: Annotated[str, Option("--format", help="svg, png or pdf.")] = "svg",
+    talk: Talk = None,
 ) -> None:
     """Draw the figures of a list from runs.
 
     Each with its exact curve and its distance from that.
     """
-    from surfacechem import plots
-    from surfacechem.studies.figures import pictures, read_list
+    from surfacechem.studies.figures import read_list, write_all
 
     content = read_list(name)
     try:
@@ -397,10 +406,10 @@ def figures(
     except OSError as error:
         raise InputError(f"cannot be made: {error.strerror}.", Place(path=str(output))) from None
     check_picture(output / f"figure.{suffix}")
-    for picture in pictures(content):
-        target = output / f"{picture.section.name}.{suffix}"
-        plots.write(picture.draw(), target)
-        typer.echo(f"{target}\n  {picture.caption}")
+
+    for target, caption in solved(lambda: write_all(content, output, suffix), talk):
+        if talk is not False:
+            typer.echo(f"{target}\n  {caption}")
 
 
 @app.command(epilog=EXIT_CODES)
@@ -410,6 +419,7 @@ def report(
     ],
     output: Annotated[Path | None, written_to("HTML file; <name>.html if not given.")] = None,
     changes: Changes = None,
+    talk: Talk = None,
 ) -> None:
     """Write one page about a run or a sweep.
 
@@ -426,9 +436,10 @@ def report(
     if target.suffix.lower() not in (".html", ".htm"):
         raise InputError(f"a report is HTML: give {target.with_suffix('.html').name}.", Place(path=str(target)))
     refuse_unwritable(target)
-    solution = None if is_file else solved(load(source, changes or ()).run, quiet=False, brief=True)
-    run_report.write(solution.dataset if solution else source, target)
-    typer.echo(str(target))
+    solution = None if is_file else solved(load(source, changes or ()).run, talk, brief=True)
+    solved(lambda: run_report.write(solution.dataset if solution else source, target), talk)
+    if talk is not False:
+        typer.echo(str(target))
     if solution:
         leave_with(solution.status, solution.reason)
 
@@ -441,7 +452,7 @@ def rerun(
         bool,
         Option("--allow-code", help="Run the laws of its own whose source the dataset keeps: code, so read it before."),
     ] = False,
-    quiet: Quiet = False,
+    talk: Talk = None,
 ) -> None:
     """Run a dataset from itself and compare bit for bit."""
     from surfacechem.results.netcdf import dataset_path
@@ -450,14 +461,14 @@ def rerun(
     record = again.read(file)
     if output:
         refuse_unwritable(dataset_path(output))
-    solution = solved(lambda: again.run_again(record, allow_code), quiet, brief=True)
+    solution = solved(lambda: again.run_again(record, allow_code), talk, brief=True)
     if output:
         solution.write(output)
     different = again.differences(record, solution)
     if different:
         typer.echo(f"surfacechem: {file}: {len(different)} variables differ: {', '.join(different)}", err=True)
         raise typer.Exit(DIFFERENT)
-    if not quiet:
+    if talk is not False:
         typer.echo(f"{file}: all {len(record.variables)} variables are bit for bit the same")
         if output:
             typer.echo(f"written to {output}")
@@ -476,7 +487,7 @@ def precision(
     repeat: Annotated[int | None, Option("--repeat", help="Timed rounds; 5 if not given.")] = None,
     output: Annotated[Path | None, written_to("Name of .nc, .svg, .png and .html; precision if not given.")] = None,
     changes: Changes = None,
-    quiet: Quiet = False,
+    talk: Talk = None,
 ) -> None:
     """Measure error against run time of several solvers.
 
@@ -491,7 +502,11 @@ def precision(
         "repeat": repeat,
     }
     given = {name: value for name, value in settings.items() if value is not None}
-    _conduct(lambda: studies.precision(cases, overrides=changes or (), **given), output or Path("precision"), quiet)  # type: ignore[arg-type]
+
+    def study() -> Study:
+        return studies.precision(cases, overrides=changes or (), **given)  # type: ignore[arg-type]
+
+    _conduct(study, output or Path("precision"), talk)
 
 
 @app.command(epilog=STABILITY_CODES)
@@ -506,7 +521,7 @@ def stability(
     ] = None,
     rtol: Tolerance = None,
     output: Annotated[Path | None, written_to("Name of .nc, .svg, .png and .html; stability if not given.")] = None,
-    quiet: Quiet = False,
+    talk: Talk = None,
 ) -> None:
     """Solve dangerous regimes with several solvers.
 
@@ -516,24 +531,22 @@ def stability(
 
     settings = {"solvers": None if solvers is None else listed(solvers), "rtol": rtol, "rounds": search}
     given = {name: value for name, value in settings.items() if value is not None}
-    _conduct(lambda: studies.stability(*(regimes or ()), quick=quick, **given), output or Path("stability"), quiet)  # type: ignore[arg-type]
+
+    def study() -> Study:
+        return studies.stability(*(regimes or ()), quick=quick, **given)  # type: ignore[arg-type]
+
+    _conduct(study, output or Path("stability"), talk)
 
 
-def _conduct(run: Callable[[], Study], target: Path, quiet: bool) -> None:
-    """Run a study, which takes minutes, so that it says on a terminal what it is at; write and print it."""
+def _conduct(run: Callable[[], Study], target: Path, talk: bool | None) -> None:
+    """Run a study, which takes minutes; write and print it."""
     from surfacechem.studies.report import targets
 
     files = targets(target).values()
     refuse_unwritable(*files)
-    # Files and pipes keep free of progress.
-    if sys.stderr.isatty() and not quiet:
-        import logging
-
-        logging.basicConfig(format="%(message)s ...")
-        logging.getLogger("surfacechem").setLevel(logging.INFO)
-    study = solved(run, quiet)
+    study = solved(run, talk)
     study.write(target)
-    if not quiet:
+    if talk is not False:
         typer.echo(study.page.text())
         typer.echo(f"\nwritten to {', '.join(map(str, files))}")
     leave_with(study.status)

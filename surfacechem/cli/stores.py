@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import re
 import signal
-import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -15,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from surfacechem.cli.commands import SIGNALLED, SignalledError, leave_with, solved
+from surfacechem.cli.terminal import PATIENCE, show
 from surfacechem.errors import InputError, Place
 
 if TYPE_CHECKING:
@@ -24,8 +26,7 @@ if TYPE_CHECKING:
     from surfacechem.runs.simulation import Simulation
     from surfacechem.runs.streaming import Progress
 
-PATIENCE = 2.0
-"""Seconds after which a bar tells how far a sweep is."""
+log = logging.getLogger(__name__)
 
 
 def asked_for(output: Path | None, options: dict[str, object]) -> bool:
@@ -47,23 +48,23 @@ class Options:
     cluster: str | None
     only: str | None
     """How the runs of a store ended that are run again, beside it."""
-    quiet: bool
+    talk: bool | None
 
 
 def write(simulation: Simulation, plan: Plan, target: Path, options: Options) -> None:
-    """Run a sweep into a store, with a bar on a terminal; an interrupt says how to go on."""
+    """Run a sweep into a store; an interrupt says how to go on."""
     from surfacechem.runs.checking import check
     from surfacechem.runs.streaming import failed_runs
     from surfacechem.runs.summaries import store_summary
 
-    quiet, part = options.quiet, part_of(options.part)
+    talk, part = options.talk, part_of(options.part)
     if options.only is not None:
         plan, target = failed_runs(target, options.only), target.with_name(f"{target.stem}-{options.only}.zarr")
-    with client_at(options.cluster) as client, bar_of(quiet) as told:
+    with client_at(options.cluster) as client:
         stream = simulation.stream(plan, target, resume=options.resume, part=part)
         try:
-            store = solved(lambda: stream.run(None, client, told), quiet)
-            errors = solved(lambda: check(stream), quiet)
+            store = solved(lambda: stream.run(None, client, counting()), talk)
+            errors = solved(lambda: check(stream), talk)
         except SignalledError as error:
             (number,) = error.args
             word = "interrupted" if number == signal.SIGINT else f"ended by {signal.Signals(number).name}"
@@ -71,9 +72,9 @@ def write(simulation: Simulation, plan: Plan, target: Path, options: Options) ->
             os._exit(
                 SIGNALLED + number
             )  # at once, as compiled code may run on; a chunk without its mark does not count
-    status, text = store_summary(stream, store, errors)
-    if not quiet:
-        typer.echo(text)
+    status, sheet = store_summary(stream, store, errors)
+    if talk is not False:
+        show(sheet)
     leave_with(status)
 
 
@@ -111,31 +112,13 @@ def client_at(address: str | None) -> Iterator[Any]:
         yield client
 
 
-@contextmanager
-def bar_of(quiet: bool) -> Iterator[Callable[[Progress], None]]:
-    """What is told how far a sweep is: a bar on a terminal, nothing else."""
-    if quiet or not sys.stderr.isatty():
-        yield lambda _: None
-        return
-    import time
+def counting() -> Callable[[Progress], None]:
+    """What is told how far a sweep is, and logs it with its speed."""
+    begun = time.monotonic()
 
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-    columns = BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[more]}"), TimeRemainingColumn()
-    bar = Progress(*columns, console=Console(stderr=True), transient=True)
-    task, begun = bar.add_task("runs", total=None, more=""), time.monotonic()
-
-    def told(now: Any) -> None:
-        seconds = time.monotonic() - begun
+    def told(now: Progress) -> None:
         # What was there before says nothing about the speed now.
-        rate = (now.done - now.resumed) / max(seconds, PATIENCE)
-        more = f"{rate:.0f}/s, {now.failed} failed"
-        bar.update(task, total=now.runs, completed=now.done, more=more)
-        if seconds > PATIENCE and not bar.live.is_started:
-            bar.start()
+        rate = (now.done - now.resumed) / max(time.monotonic() - begun, PATIENCE)
+        log.info("%.0f runs/s, %d failed", rate, now.failed, extra={"done": now.done, "total": now.runs})
 
-    try:
-        yield told
-    finally:
-        bar.stop()
+    return told

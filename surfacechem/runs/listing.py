@@ -13,6 +13,7 @@ from surfacechem.contracts.terms import Law
 from surfacechem.documents.shipped import cases
 from surfacechem.errors import InputError, suggestion
 from surfacechem.laws import FAMILIES, laws
+from surfacechem.runs.sheet import Sheet
 
 WIDTH = 110
 TABLE = """
@@ -70,16 +71,13 @@ def _atom(text: str) -> str:
     return text.strip() if re.fullmatch(r"\s*-?[\w.^]+\s*", text) else f"({text.strip()})"
 
 
-def law_list() -> str:
+def law_list() -> list[Sheet]:
     """The laws by contract, one a line."""
-    parts: list[str] = []
+    sheets = []
     for contract in FAMILIES:
-        lines = [f"{contract.contract.upper()}: {_first_line(contract)}"]
-        own = laws(contract)
-        width = max(map(len, own), default=0)
-        lines += [f"  {name:{width}}  {textwrap.shorten(_first_line(law), WIDTH - width)}" for name, law in own.items()]
-        parts.append("\n".join(lines))
-    return "\n\n".join([*parts, "`surfacechem laws NAME` shows all about a law, or about those of a contract."])
+        rows = [(name, _first_line(law)) for name, law in laws(contract).items()]
+        sheets.append(Sheet(f"{contract.contract.upper()}: {_first_line(contract)}", tables={"": rows}))
+    return [*sheets, Sheet("`surfacechem laws NAME` shows all about a law, or about those of a contract.")]
 
 
 def law_table(contract: type[Law]) -> str:
@@ -139,13 +137,10 @@ def law_page(name: str) -> str:
     return "\n\n".join(pages)
 
 
-def case_table() -> str:
+def case_table() -> Sheet:
     """Names and titles of the shipped cases."""
-    titles = {path.stem: title(path) for path in sorted(cases().glob("*.yaml"))}
-    if not titles:
-        return "no cases are installed"
-    width = max(len(name) for name in titles)
-    return "\n".join(f"{name:{width}}  {text}" for name, text in titles.items())
+    rows = [(path.stem, title(path)) for path in sorted(cases().glob("*.yaml"))]
+    return Sheet(tables={"": rows}) if rows else Sheet("no cases are installed")
 
 
 def case_text(name: str) -> str:

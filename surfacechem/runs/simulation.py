@@ -101,7 +101,8 @@ class Simulation:
         from surfacechem.runs.summaries import check_summary
 
         case, system = self.case, self.system
-        return f"<pre>{escape(check_summary(case.title, system, case.scene, case.own_run, [], warnings(system)))}</pre>"
+        told = check_summary(case.title, system, case.scene, case.own_run, [], warnings(system))
+        return f"<pre>{escape(str(told))}</pre>"
 
     def __repr__(self) -> str:
         """Title and states in a line."""

@@ -1,15 +1,16 @@
-"""What the command line prints about a run and about a scene: plain text, one fact a line."""
+"""What the command line tells about a run and about a scene: one fact a line."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from surfacechem.results.event_table import entropy_destroyed, event_counts, event_summary
+from surfacechem.runs.sheet import Rows, Sheet
 from surfacechem.solve.jumps import ADMISSIBLE
 
 if TYPE_CHECKING:
@@ -39,16 +40,8 @@ REGIMES = {
 }
 
 
-def labelled(label: str, text: str) -> str:
-    """A fact under its label."""
-    return f"  {label:<10} {text}"
-
-
-def columns(rows: Iterable[Sequence[str]]) -> list[str]:
-    """Rows as text in columns."""
-    table = [list(row) for row in rows]
-    widths = [max(len(cell) for cell in column) for column in zip(*table, strict=True)]
-    return ["  ".join(f"{cell:<{w}}" for cell, w in zip(row, widths, strict=True)).rstrip() for row in table]
+MOST_EVENTS, MOST_RUNS = 30, 100
+"""Events of a run and runs of a sweep that are listed."""
 
 
 def duration(seconds: float) -> str:
@@ -71,8 +64,10 @@ def states(system: System) -> str:
     return ", ".join(names) or "nothing: everything is prescribed"
 
 
-def run_summary(solution: Solution, written: Path | None) -> str:
-    """What was solved, how it ended, how accurate and how fast it was, and where it is."""
+def run_summary(solution: Solution, written: Path | None, details: bool = False) -> Sheet:
+    """What was solved, how it ended, how accurate and how fast it was, and where it is; with ``details`` every error
+    and count, and the events.
+    """
     from surfacechem.solve import solver
 
     trajectory, books, counters = solution.trajectory, solution.audit, solution.trajectory.result.counters
@@ -80,19 +75,31 @@ def run_summary(solution: Solution, written: Path | None) -> str:
     speed = f"run {duration(trajectory.seconds)}, compile {duration(model.compile_seconds)}"
     jumped = event_summary(trajectory.jumps, books.energy_scale, model.system.unit("J/m^2"))
     rejected = f", {counters.rejected} rejected" if solver(run.solver).counts_rejected else ""
-    lines = [
-        solution.title or "untitled",
-        labelled("solved", _solved(model.system, run)),
-        labelled(solution.status, solution.reason),
-        *([labelled("error", _accuracy(solution.accuracy))] if solution.accuracy else []),
-        labelled("time", f"{speed}; {counters.steps} steps{rejected}, {counters.residuals} residuals"),
-        *([labelled("events", jumped)] if trajectory.jumps else []),
-        labelled("balances", _balances(books, model.system.unit("W/(m^2 K)"))),
-        *(labelled("pair", str(verdict)) for verdict in solution.verdicts if verdict.consistent),
-        *(labelled("warning", warning) for warning in solution.warnings),
-        *([labelled("written", str(written))] if written else []),
+    facts = [
+        ("solved", _solved(model.system, run)),
+        (solution.status, solution.reason),
+        *([("error", _accuracy(solution.accuracy))] if solution.accuracy else []),
+        ("time", f"{speed}; {counters.steps} steps{rejected}, {counters.residuals} residuals"),
+        *([("events", jumped)] if trajectory.jumps else []),
+        ("balances", _balances(books, model.system.unit("W/(m^2 K)"))),
+        *(("pair", str(verdict)) for verdict in solution.verdicts if verdict.consistent),
+        *(("warning", warning) for warning in solution.warnings),
+        *([("written", str(written))] if written else []),
     ]
-    return "\n".join(lines)
+    return Sheet(solution.title or "untitled", facts, run_details(solution) if details else {})
+
+
+def run_details(solution: Solution) -> dict[str, Rows]:
+    """The error of each variable, every count, and the events of a run."""
+    found = {name: value for name, value in solution.attributes.items() if name.startswith("count_")}
+    errors = solution.accuracy.variables if solution.accuracy else {}
+    jumps = solution.trajectory.jumps
+    more = [("...", f"{len(jumps) - MOST_EVENTS} more", "")] if len(jumps) > MOST_EVENTS else []
+    return {
+        "Errors": [(name, f"{error:.2g}") for name, error in errors.items()],
+        "Counts": [(name.removeprefix("count_"), str(value)) for name, value in found.items()],
+        "Events": [(f"{j.t:.9g} s", j.edge.name, j.verdict) for j in jumps[:MOST_EVENTS]] + more,
+    }
 
 
 def _solved(system: System, run: Run) -> str:
@@ -120,29 +127,49 @@ def _balances(books: Audit, unit: str) -> str:
     return f"{residuals}; every law dissipates (least {least:.2g} {unit}{error})"
 
 
-def sweep_summary(solution: SweepSolution, written: Path | None) -> str:
-    """What was swept, how the runs ended, how accurate and how fast they were, and where they are."""
-    lines = [solution.title or "untitled"]
-    lines.append(labelled("swept", swept_in_words(solution.plan, solution.parameters)))
-    lines.append(labelled("solved", _solved(solution.system, solution.run)))
-    lines.append(labelled("ended", f"{len(solution.runs)} runs: {solution.ends}"))
+def sweep_summary(solution: SweepSolution, written: Path | None, details: bool = False) -> Sheet:
+    """What was swept, how the runs ended, how accurate and how fast they were, and where they are; with ``details`` how
+    each run ended.
+    """
+    facts = []
+    facts.append(("swept", swept_in_words(solution.plan, solution.parameters)))
+    facts.append(("solved", _solved(solution.system, solution.run)))
+    facts.append(("ended", f"{len(solution.runs)} runs: {solution.ends}"))
     if accuracy := solution.accuracy:
         known = accuracy.known
         missing = len(accuracy.errors) - len(known)
         unknown = f"; unknown in {missing} runs" if missing else ""
         error = f"{known.max():.2g} ({accuracy.source}){unknown}" if len(known) else f"unknown ({accuracy.source})"
-        lines.append(labelled("error", error))
+        facts.append(("error", error))
     speed = f"run {duration(solution.seconds)}, compile {duration(solution.model.compile_seconds)}"
-    lines.append(labelled("time", f"{speed}; {solution.steps} steps"))
+    facts.append(("time", f"{speed}; {solution.steps} steps"))
     if events := _sweep_events(solution):
-        lines.append(labelled("events", events))
+        facts.append(("events", events))
     energy, entropy, sites = (f"{solution.worst(balance):.1e}" for balance in ("energy", "entropy", "site"))
     count = sum(books.destroys for books in solution.audits)
     verdict = f"ENTROPY DESTROYED in {count} runs" if count else "no law destroys entropy"
-    lines.append(labelled("balances", f"energy {energy}, entropy {entropy}, sites {sites}; {verdict}"))
+    facts.append(("balances", f"energy {energy}, entropy {entropy}, sites {sites}; {verdict}"))
     if written:
-        lines.append(labelled("written", str(written)))
-    return "\n".join(lines)
+        facts.append(("written", str(written)))
+    return Sheet(solution.title or "untitled", facts, sweep_details(solution) if details else {})
+
+
+def sweep_details(solution: SweepSolution) -> dict[str, Rows]:
+    """How each run of a sweep ended, or each of the first ones, with its parameters."""
+    errors = solution.accuracy.errors if solution.accuracy else np.full(len(solution.runs), np.nan)
+    shown = range(min(len(solution.runs), MOST_RUNS))
+    points = solution.plan.at(np.arange(len(shown)))
+    rows = [
+        (
+            ", ".join(f"{name} = {points[path][k]:g}" for name, path in solution.parameters.items()),
+            solution.runs[k].status,
+            f"error {errors[k]:.2g}",
+            solution.runs[k].reason,
+        )
+        for k in shown
+    ]
+    more = len(solution.runs) - len(shown)
+    return {"Runs": [*rows, *([("...", f"{more} more", "", "")] if more else [])]}
 
 
 def swept_in_words(plan: Plan, names: Mapping[str, str]) -> str:
@@ -160,20 +187,20 @@ def swept_in_words(plan: Plan, names: Mapping[str, str]) -> str:
     return f"{text} by {sample}" if text else sample
 
 
-def points_summary(found: PointResults, written: Path | None) -> str:
+def points_summary(found: PointResults, written: Path | None) -> Sheet:
     """Every quantity of a single point; of many, what there is of them and where it is."""
     refused = [(i, why) for i, why in enumerate(found.refused) if why]
-    lines, count = [found.title or "untitled"], len(found.refused)
+    facts, rows, count = [], [], len(found.refused)
     if count == 1:
-        table = [(c.name, f"{c.values[0]:.12g}", c.unit, c.long_name) for c in (*found.values, *found.slopes)]
-        lines += [f"  {line}" for line in columns(table)]
+        rows = [(c.name, f"{c.values[0]:.12g}", c.unit, c.long_name) for c in (*found.values, *found.slopes)]
     else:
         text = f"{count}, with {len(found.values)} quantities and {len(found.slopes)} derivatives each"
-        lines.append(labelled("points", text))
+        facts.append(("points", text))
     if refused:
         more = f", and {len(refused) - 1} more" if len(refused) > 1 else ""
-        lines.append(labelled("refused", f"point {refused[0][0]}: {refused[0][1]}{more}"))
-    return "\n".join([*lines, *([labelled("written", str(written))] if written else [])])
+        facts.append(("refused", f"point {refused[0][0]}: {refused[0][1]}{more}"))
+    facts += [("written", str(written))] if written else []
+    return Sheet(found.title or "untitled", facts, {"": rows})
 
 
 def _sweep_events(solution: SweepSolution) -> str:
@@ -202,7 +229,7 @@ def check_summary(
     groups: Sequence[Group],
     warnings: Sequence[str],
     choices: Sequence[Sequence[str]] = (),
-) -> str:
+) -> Sheet:
     """A scene said back in words, with its numbers and what is odd about it."""
     from surfacechem.runs.check import laws_of
 
@@ -216,18 +243,16 @@ def check_summary(
         "Numbers": [(g.name, f"{g.value:.4g} {g.unit if g.unit != '1' else ''}".rstrip(), g.text) for g in groups],
         "Warnings": [(warning,) for warning in warnings],
     }
-    lines = [title or "untitled", labelled("regime", f"{system.regime}: {REGIMES.get(system.regime, '')}")]
-    lines.append(labelled("run", _plan(system, run)))
-    for heading, rows in sections.items():
-        lines += [heading, *(f"  {line}" for line in columns(rows))] if rows else []
-    return "\n".join(lines)
+    facts = [("regime", f"{system.regime}: {REGIMES.get(system.regime, '')}"), ("run", _plan(system, run))]
+    return Sheet(title or "untitled", facts, sections)
 
 
 def _plan(system: System, run: Run | None) -> str:
     """How a scene is run, and where its steps end."""
     if run is None:
         return "not said; `surfacechem evaluate` gives its quantities at any state"
-    parts = [f"{run.solver} at rtol {run.rtol:g}, {len(run.times)} output times to t = {run.times[-1]:g} s"]
+    outputs = f"{len(run.times)} output times" if run.picture is None else "outputs that follow the run"
+    parts = [f"{run.solver} at rtol {run.rtol:g}, {outputs} to t = {run.times[-1]:g} s"]
     if inside := sum(0 < t < run.times[-1] for t in system.breakpoints):
         parts.append(f"{inside} breakpoint{'s' if inside > 1 else ''}")
     if kinks := [margin.reason for margin in system.margins if not margin.terminal]:
@@ -249,7 +274,7 @@ def _state_rows(system: System) -> list[tuple[str, ...]]:
     return rows
 
 
-def store_summary(stream: Stream, store: Store, checked: Checked | None) -> tuple[str, str]:
+def store_summary(stream: Stream, store: Store, checked: Checked | None) -> tuple[str, Sheet]:
     """How a sweep ended that went into a store, in a word; and what it was and how its runs ended, in words."""
     from surfacechem.runs.keeping import STATUSES
     from surfacechem.runs.sweeps import parameter_names
@@ -262,16 +287,16 @@ def store_summary(stream: Stream, store: Store, checked: Checked | None) -> tupl
         worst = np.fmax(worst, np.fmax.reduce(store.read("energy_error", number), initial=0.0))
     names = parameter_names(chunks.model.system, chunks.plan)
     counted = ", ".join(f"{count} {word}" for count, word in zip(ends.tolist(), STATUSES, strict=True) if count)
-    lines = [chunks.simulation.case.title or "untitled"]
-    lines.append(labelled("swept", swept_in_words(chunks.plan, names)))
-    lines.append(labelled("solved", _solved(chunks.model.system, chunks.run)))
-    lines.append(labelled("ended", f"{ends.sum()} of {chunks.plan.size} runs: {counted}"))
+    facts = []
+    facts.append(("swept", swept_in_words(chunks.plan, names)))
+    facts.append(("solved", _solved(chunks.model.system, chunks.run)))
+    facts.append(("ended", f"{ends.sum()} of {chunks.plan.size} runs: {counted}"))
     if checked is not None:
         unknown = f"; unknown in {checked.unknown}" if checked.unknown else ""
-        lines.append(labelled("error", f"{checked.error:.2g} of {checked.count} runs ({checked.source}){unknown}"))
+        facts.append(("error", f"{checked.error:.2g} of {checked.count} runs ({checked.source}){unknown}"))
     destroyed = f"; ENTROPY DESTROYED in {checked.destroys} runs" if checked and checked.destroys else ""
-    lines.append(labelled("balances", f"energy {worst:.1e} at worst{destroyed}"))
-    lines.append(labelled("written", f"{store.path}, {len(done)} of {layout.chunks} chunks"))
+    facts.append(("balances", f"energy {worst:.1e} at worst{destroyed}"))
+    facts.append(("written", f"{store.path}, {len(done)} of {layout.chunks} chunks"))
     stopped = ends[STATUSES.index("stopped")] == ends.sum()
     status = "failed" if ends[STATUSES.index("failed")] else "stopped" if stopped else "finished"
-    return status, "\n".join(lines)
+    return status, Sheet(chunks.simulation.case.title or "untitled", facts)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -39,6 +40,11 @@ BALANCES = {
 """Balances of a run, and what their errors are in words."""
 
 
+PORTION = 256
+"""Runs that are solved at a time; between portions a sweep tells how far it is."""
+
+log = logging.getLogger(__name__)
+
 # -- runs over a plan -------------------------------------------------------------------------------------------------
 
 
@@ -62,7 +68,11 @@ def solve(
     """The runs of a :func:`prepared` system over the plan; how a run ends is its status, never an exception."""
     values = [model.values({**changes, **point}) for point in plan.points]
     pairs = list(zip(settings(model.system, plan, model.chosen(run, values[0]), values), values, strict=True))
-    return model.solve_all(pairs, threads or os.cpu_count() or 1)
+    done: list[Trajectory] = []
+    for start in range(0, len(pairs), PORTION):
+        log.info("runs", extra={"done": start, "total": len(pairs)})
+        done += model.solve_all(pairs[start : start + PORTION], threads or os.cpu_count() or 1)
+    return done
 
 
 def settings(system: System, plan: Plan, run: Run, values: Sequence[Mapping[str, float]]) -> list[Run]:

@@ -6,6 +6,7 @@ drawn, and its largest distance from the exact curve stands below it.
 
 from __future__ import annotations
 
+import logging
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -44,6 +45,8 @@ if TYPE_CHECKING:
     from surfacechem.plots.style import Plot
 
 Array = NDArray[np.float64]
+
+log = logging.getLogger(__name__)
 
 SCALES = "linear", "log"
 
@@ -217,8 +220,20 @@ def read_list(name: str) -> ListSection:
 
 def pictures(content: ListSection) -> Iterator[Picture]:
     """The figures of a list, one after another, each when its runs are done."""
-    for section in content.figures:
+    for number, section in enumerate(content.figures):
+        log.info("%s", section.name, extra={"done": number, "total": len(content.figures)})
         yield Picture(section, [_curve(section, curve) for curve in section.curves])
+
+
+def write_all(content: ListSection, folder: Path, suffix: str) -> list[tuple[Path, str]]:
+    """Draw the figures of a list into a folder; returns the files and what stands below each."""
+    from surfacechem.plots import write
+
+    written = []
+    for picture in pictures(content):
+        written.append((folder / f"{picture.section.name}.{suffix}", picture.caption))
+        write(picture.draw(), written[-1][0])
+    return written
 
 
 def _curve(figure: FigureSection, section: CurveSection) -> Line:

@@ -6,6 +6,7 @@ moment of the machine does not hit one solver alone; brief runs are repeated wit
 
 from __future__ import annotations
 
+import logging
 import math
 import warnings
 from collections.abc import Callable, Mapping, Sequence
@@ -79,6 +80,9 @@ def attempt(solve: Callable[[], Trajectory], judge: Callable[[Trajectory | Excep
     return cell
 
 
+log = logging.getLogger(__name__)
+
+
 def filled(
     solvers: Sequence[str], prepared: Mapping[float, Callable[[str], C]], rounds: int = 0
 ) -> dict[tuple[str, float], C]:
@@ -86,7 +90,8 @@ def filled(
     then timed in so many rounds.
     """
     cells = {(name, value): run(name) for name in solvers for value, run in prepared.items()}
-    for _ in range(rounds):
+    for number in range(rounds):
+        log.info("timed again", extra={"done": number, "total": rounds})
         for cell in cells.values():
             if cell.outcome in ("finished", "stopped") and sum(cell.seconds) < BUDGET:
                 _time_again(cell)

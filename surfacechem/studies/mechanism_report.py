@@ -17,7 +17,7 @@ from surfacechem.errors import InputError, Place
 from surfacechem.mechanism.source import Source
 from surfacechem.results.findings import said
 from surfacechem.runs.listing import WIDTH, source
-from surfacechem.runs.summaries import columns
+from surfacechem.runs.sheet import columns
 from surfacechem.studies.mechanism_rates import Curves, cycle_verdict, cycles
 from surfacechem.tolerances import ROUNDING
 

@@ -7,6 +7,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import count
 from pathlib import Path
 from statistics import median
 
@@ -172,9 +173,10 @@ def _compared(
         reference = truth.source
     except InputError as error:
         reference = error.message
-    log.info("%s: %d solvers at %d tolerances", name, len(solvers), len(tolerances))
+    numbers, cells = count(), len(solvers) * len(tolerances)
 
     def measured(rtol: float, solver: str) -> WorkPoint:
+        log.info("%s: %s at rtol %g", name, solver, rtol, extra={"done": next(numbers), "total": cells})
         if unable := subject.unable(solver):
             return WorkPoint("omitted", unable)
         return attempt(partial(subject.solve, solver, rtol), partial(_judged, truth))

@@ -35,7 +35,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from surfacechem.results.netcdf import CONVENTIONS, Column, replacing, save
-from surfacechem.runs.summaries import columns
+from surfacechem.runs.sheet import columns
 
 if TYPE_CHECKING:
     import xarray

@@ -6,6 +6,7 @@ All of it is from the dataset; the scene is read from the case that it keeps.
 from __future__ import annotations
 
 import html
+import logging
 from base64 import b64encode
 from collections.abc import Iterator
 from dataclasses import replace
@@ -31,6 +32,8 @@ from surfacechem.studies.report import Page, PageSection, PageTable
 
 if TYPE_CHECKING:
     import xarray
+
+log = logging.getLogger(__name__)
 
 MOST_EVENTS = 100
 """Events that a page lists."""
@@ -73,10 +76,10 @@ def write(data: xarray.Dataset | str | Path, path: str | Path) -> Path:
 def glance(results: Results) -> str:
     """A summary and a small figure, for a notebook."""
     if isinstance(results, Solution):
-        text = run_summary(results, None)
+        sheet = run_summary(results, None)
     else:
-        text = sweep_summary(results, None) if isinstance(results, SweepSolution) else points_summary(results, None)  # type: ignore[arg-type]
-    shown = f"<pre>{html.escape(text)}</pre>"
+        sheet = sweep_summary(results, None) if isinstance(results, SweepSolution) else points_summary(results, None)  # type: ignore[arg-type]
+    shown = f"<pre>{html.escape(str(sheet))}</pre>"
     if "status" not in results.attributes:  # points have no figure of their own
         return shown
     picture = BytesIO()
@@ -151,7 +154,9 @@ def _precision(case: cases.Case, attributes: Any) -> Iterator[PageSection]:
     if "sweep" in attributes or "departures" in attributes or attributes["run_seconds"] > QUICK:
         return
     simulation, rows = Simulation(case), []
-    for rtol in (*(tolerance for tolerance in TOLERANCES if tolerance > case.run.rtol), case.run.rtol):
+    tolerances = [*(tolerance for tolerance in TOLERANCES if tolerance > case.run.rtol), case.run.rtol]
+    for number, rtol in enumerate(tolerances):
+        log.info("again at rtol %g", rtol, extra={"done": number, "total": len(tolerances)})
         solution = simulation.run(run=replace(case.run, rtol=rtol, solver=attributes["solver"], accuracy=None))
         error = f"{solution.accuracy.error:.1e}" if solution.accuracy else ""
         steps = f"{solution.attributes['count_steps']}"

@@ -119,9 +119,10 @@ def stability(
     found = chosen(regimes)
     check_options(solvers, [rtol], rounds, (0, MOST_ROUNDS), ("--solvers", "--rtol", "--search"))
     rows = []
-    for number, regime in enumerate(found, 1):
+    for number, regime in enumerate(found):
         values = few(regime.values) if quick else list(regime.values)
-        log.info("%s: %d values, regime %d of %d", regime.name, len(values), number, len(found))
+        done = {"done": number, "total": len(found)}
+        log.info("%s: %d values", regime.name, len(values), extra=done)
         runs = {value: prepared(regime.problem(value), rtol) for value in values}
         rows.append(MatrixRow(regime, values, filled(solvers, runs)))
     corners = [worst_corner(regime, rounds, rtol) for regime in found if regime.space] if rounds else []

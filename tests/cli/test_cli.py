@@ -327,6 +327,17 @@ class TestPlot:
         assert files(tmp_path) == {"bonding.png", "cooling.png"}
 
 
+class TestVerbosity:
+    def test_more_and_less_is_told(self, call):
+        told = call("run", "bonding.yaml", "-v")
+        assert "running" in told.stderr
+        for heading in ("Errors", "Counts", "  steps"):
+            assert f"\n{heading}" in told.stdout
+        swept = call("sweep", "bonding.yaml", "--over", "initial.T=[300, 310]", "-v", "-o", "s.nc")
+        assert "Runs\n  initial_T = 300  finished  error " in swept.stdout
+        assert call("plot", "bonding.nc", "-q").output == ""
+
+
 class TestSweep:
     def test_has_phase_portraits_and_is_not_mixed_with_runs(self, call, tmp_path):
         assert call("sweep", "bonding.yaml", "--over", "initial.T=[300, 310]", "-o", "s.nc", "-q").exit_code == 0

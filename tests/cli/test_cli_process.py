@@ -59,10 +59,10 @@ def imported(code, folder):
 
 def test_run_imports_only_what_it_needs(tmp_path):
     surfacechem("run", "exothermic", "-q", folder=tmp_path)  # so that the stepper is compiled
-    found = imported("from surfacechem.cli.main import app; app(['run', 'sliding-dry', '-q'])", tmp_path)
+    found = imported("from surfacechem.cli.main import app; app(['run', 'sliding-dry'])", tmp_path)
     assert (tmp_path / "sliding-dry.nc").exists()
     assert {"netCDF4", "symengine"} <= found
-    assert not found & {"numba", "scipy.interpolate", "scipy.optimize", "scipy.special", *HEAVY}
+    assert not found & {"numba", "rich", "scipy.interpolate", "scipy.optimize", "scipy.special", *HEAVY}
 
 
 def test_the_command_line_itself_imports_little(tmp_path):

@@ -163,7 +163,7 @@ def test_a_run_that_ends_before_its_second_output_knows_its_end(reference):
 def test_balances_tell_nothing_of_a_run_that_ends_before_its_second_output():
     solution = surfacechem.load("cooling-to-zero", {"run": {"until": "1e5 s", "outputs": 3}}).run(error="balances")
     assert np.isnan(solution.accuracy.error)
-    assert "unknown: the run ended before its second output" in run_summary(solution, None)
+    assert "unknown: the run ended before its second output" in str(run_summary(solution, None))
     assert np.isnan(solution.attributes["error"])
 
 
@@ -245,5 +245,5 @@ def test_a_sweep_of_which_no_error_is_known_says_so(tmp_path):
     )
     assert np.all((swept.accuracy.errors > 0) & (swept.accuracy.errors < 1e-9))
     nothing = replace(swept, accuracy=replace(swept.accuracy, errors=np.full(2, np.nan)))
-    assert "error      unknown (estimate: a second sweep at rtol 1e-13 that" in sweep_summary(nothing, None)
+    assert "error      unknown (estimate: a second sweep at rtol 1e-13 that" in str(sweep_summary(nothing, None))
     assert np.isnan(nothing.attributes["error"])

@@ -207,7 +207,7 @@ def test_jumps_of_a_sweep_are_judged_as_those_of_a_run():
         assert data[name].dims == ("t_max", "event")
         assert data[name].values[0].tobytes() == single.dataset[name].values.tobytes()
         assert np.isnan(data[name].values[2]).all()
-    (events,) = (line for line in sweep_summary(solution, None).splitlines() if line.startswith("  events"))
+    (events,) = (line for line in str(sweep_summary(solution, None)).splitlines() if line.startswith("  events"))
     assert "2 debond; destroys entropy in 1 of 3 runs, at worst -0." in events
     assert events.endswith("at t_max = 2e+07")
     refused = surfacechem.load("debonding", {"interface.limits.tensile-strength.violation": "refuse"})
@@ -302,9 +302,9 @@ def test_a_case_without_a_sweep(bonding):
 
 def test_figure_of_a_spectrum(spectrum):
     plot = plots.figure(spectrum.dataset)
-    (ax,) = plot.axes
+    ax = plot.axes[0]
     assert [text.get_text() for text in ax.get_legend().get_texts()] == ["most probable", "median", "mean", "exact"]
-    assert (ax.get_xscale(), ax.get_xlabel()) == ("log", "Rate of change [N s$^{-1}$]")
+    assert (ax.get_xscale(), ax.get_xlabel()) == ("log", "Rate of change [pN s$^{-1}$]")
     assert ax.get_ylabel() == "$f$ at rupture [pN]"
 
 

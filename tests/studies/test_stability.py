@@ -236,7 +236,7 @@ def test_runs_that_take_too_many_steps_are_counted_and_a_study_tells_what_it_is_
     with caplog.at_level("INFO", "surfacechem"):
         found = stability("capacity", solvers=["radau"], quick=True, rounds=0)
     assert "what lies beyond 20 steps of a run: 4 took as many, and count as failed" in found.page.omissions
-    assert caplog.messages == ["capacity: 4 values, regime 1 of 1"]
+    assert caplog.messages == ["capacity: 4 values"]
 
 
 @pytest.mark.parametrize(("name", "value"), SENSITIVE_CELLS)
@@ -246,7 +246,7 @@ def test_where_an_answer_has_no_digits_the_summary_of_the_run_says_so(name, valu
     unknown = "ended earlier" in solution.accuracy.source
     assert unknown or solution.accuracy.error > 10.0**-LEAST_DIGITS
     assert any("error" in warning for warning in solution.warnings), solution.warnings
-    assert "warning" in run_summary(solution, None)
+    assert "warning" in str(run_summary(solution, None))
 
 
 @pytest.mark.parametrize(

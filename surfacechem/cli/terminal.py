@@ -1,0 +1,148 @@
+"""What a terminal shows: sheets with colours and columns that fit it, and bars of what takes longer than two seconds.
+
+Files and pipes get plain text and no bars. Rich is imported where a terminal shows something, never else.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import sys
+import time
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any, TextIO
+
+import typer
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+    from rich.text import Text
+
+    from surfacechem.runs.sheet import Sheet
+
+PATIENCE = 2.0
+"""Seconds after which a bar tells how far a command is."""
+
+COLOURS = {"finished": "green", "stopped": "yellow", "failed": "red", "warning": "yellow", "refused": "yellow"}
+"""Of labels; others are cyan."""
+
+ALARM = "ENTROPY DESTROYED"
+
+LOGGER = "surfacechem"
+
+
+def is_terminal(stream: TextIO) -> bool:
+    """Whether a stream is a terminal that can do more than letters."""
+    return stream.isatty() and os.environ.get("TERM") != "dumb"
+
+
+def show(*sheets: Sheet) -> None:
+    """Print sheets, with a line between them."""
+    if not is_terminal(sys.stdout):
+        typer.echo("\n\n".join(map(str, sheets)))
+        return
+    from rich.console import Console
+
+    console = Console(highlight=False)
+    for number, sheet in enumerate(sheets):
+        console.print(*([""] if number else []), *_rendered(sheet), sep="\n")
+
+
+def _rendered(sheet: Sheet) -> Iterator[RenderableType]:
+    """A sheet for rich: texts are wrapped beside their labels."""
+    from rich.text import Text
+
+    if sheet.title:
+        yield Text(sheet.title, style="bold")
+    if sheet.facts:
+        facts = (
+            (Text(label, style=COLOURS.get(label, "cyan")), Text(text, style="bold red" if ALARM in text else ""))
+            for label, text in sheet.facts
+        )
+        yield _grid(facts, indent=2)
+    for heading, rows in sheet.tables.items():
+        if heading and rows:
+            yield Text(heading, style="bold")
+        if rows:
+            cells = ((Text(row[0], style="cyan", no_wrap=True), *map(Text, row[1:])) for row in rows)
+            yield _grid(cells, indent=2 if heading or sheet.title else 0)
+
+
+def _grid(rows: Iterable[Sequence[Text]], indent: int) -> RenderableType:
+    """Rows in columns, so many letters from the left."""
+    from rich.padding import Padding
+    from rich.table import Table
+
+    grid = Table.grid(padding=(0, 2))
+    for row in rows:
+        grid.add_row(*row)
+    return Padding(grid, (0, 0, 0, indent))
+
+
+class Bar:
+    """How far a command is, on a terminal, once it has taken some time; nothing elsewhere."""
+
+    def __init__(self, talk: bool | None) -> None:
+        self.wanted, self.verbose = talk is None and is_terminal(sys.stderr), talk is True
+        self.begun = time.monotonic()
+        self.words, self.done, self.total = "", 0, 0
+        self.shown: Any = None
+
+    def tell(self, words: str, done: int = 0, total: int = 0) -> None:
+        """What is being done, and how much of it is; nothing is drawn before :meth:`tick`."""
+        self.words, self.done, self.total = words, done, total
+        if self.verbose:
+            counted = f" ({done}/{total})" if total else ""
+            typer.echo(f"{time.monotonic() - self.begun:8.2f} s  {words}{counted}", err=True)
+
+    def tick(self) -> None:
+        """Draw what was told last."""
+        if not self.wanted or time.monotonic() - self.begun < PATIENCE:
+            return
+        if self.shown is None:
+            from rich.console import Console
+            from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+            parts = TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[counted]}")
+            times = TimeElapsedColumn(), TextColumn("left"), TimeRemainingColumn()
+            self.shown = Progress(*parts, *times, console=Console(stderr=True), transient=True)
+            self.shown.add_task("", counted="")
+            self.shown.start()
+        counted = f"{self.done}/{self.total}" if self.total else ""
+        (task,) = self.shown.task_ids
+        self.shown.update(task, description=self.words, completed=self.done, total=self.total or None, counted=counted)
+
+    def close(self) -> None:
+        """Remove it."""
+        if self.shown is not None:
+            self.shown.stop()
+
+
+class _Followed(logging.Handler):
+    """Tells a bar what the package logs, with the numbers ``done`` and ``total`` of a message."""
+
+    def __init__(self, bar: Bar) -> None:
+        super().__init__(logging.INFO)
+        self.bar = bar
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self.bar.tell(record.getMessage(), getattr(record, "done", 0), getattr(record, "total", 0))
+
+
+@contextmanager
+def following(talk: bool | None) -> Iterator[Bar]:
+    """A bar that shows what the package logs meanwhile; each message with its time as a line on stderr where ``talk``
+    is true, and nothing where it is false.
+    """
+    bar, logger = Bar(talk), logging.getLogger(LOGGER)
+    handler, level = _Followed(bar), logger.level
+    logger.addHandler(handler)
+    if bar.wanted or bar.verbose:
+        logger.setLevel(logging.INFO)
+    try:
+        yield bar
+    finally:
+        bar.close()
+        logger.removeHandler(handler)
+        logger.setLevel(level)
