@@ -113,12 +113,13 @@ app(["run", "exothermic", "-q"], prog_name="surfacechem")
 def ended_by(number, script, told, folder, pause=0.0):
     """Exit code and outputs of a process that gets a signal once it has told something.
 
-    A shell starts what runs in its background without interrupts, which this process then hands on.
+    A shell starts what runs in its background without interrupts, nohup without hang-ups, which this process then hands
+    on.
     """
-    own = signal.signal(signal.SIGINT, signal.default_int_handler)
+    own = signal.signal(number, signal.SIG_DFL)
     command = [sys.executable, "-c", script]
     process = subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    signal.signal(signal.SIGINT, own)
+    signal.signal(number, own)
     try:
         assert process.stdout.readline() == told, process.communicate()
         time.sleep(pause)
