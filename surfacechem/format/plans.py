@@ -40,6 +40,9 @@ from surfacechem.format.sections import (
 # Statistics of the load at rupture, with their words, where runs end at a load.
 STATISTICS = {"mode": "most probable", "median": "median", "mean": "mean"}
 
+INTEGRATED = ("surface.bodies.", "surface.laws.", "surface.heat.", "surface.approach.", "surface.accuracy")
+"""Beginnings of the paths of what is in integrals over surfaces."""
+
 RUN = "run"
 """The dimension along which several parameters change together."""
 
@@ -245,6 +248,9 @@ def read_until(tree: Tree) -> Mapping[str, float]:
 def _known(path: str, tree: Tree, units: Mapping[str, str]) -> str:
     """The path of a parameter; InputError where there is none."""
     path = parameter_path(path, units)
+    if path.startswith(INTEGRATED):
+        text = "shapes and laws of the gap are in integrals that are made once; give each value a run, by --set."
+        raise InputError(f"{path} cannot be swept: {text}", tree.place)
     if path not in units:
         raise InputError(f"no parameter '{path}' to sweep.{suggestion(path, units)}", tree.place)
     return path

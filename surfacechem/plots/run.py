@@ -18,7 +18,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from surfacechem.errors import InputError, suggestion
-from surfacechem.plots import style
+from surfacechem.plots import curved, style
 from surfacechem.plots.style import Array, meaning, symbol, unit, varies
 from surfacechem.tolerances import EPS, ROUNDING
 
@@ -95,13 +95,27 @@ def figure(dataset: xarray.Dataset, variables: Sequence[str] | None = None, agai
         raise InputError("time does not hold finite numbers.", style.place(dataset))
     if variables and any(map(PROFILE.fullmatch, variables)):
         return _across(dataset, variables)
+    if variables and set(variables) <= set(curved.FIELDS) and curved.carries(dataset):
+        return curved.figure(dataset)
     shown = panels(dataset, variables, against)
-    balances = not variables and against is None and any(name in dataset for name in RESIDUALS)
-    rows = len(shown) + balances
-    if rows == 0 or dataset.sizes["time"] == 0:
+    usual = not variables and against is None
+    balances = usual and any(name in dataset for name in RESIDUALS)
+    if len(shown) + balances == 0 or dataset.sizes["time"] == 0:
         raise InputError("there is nothing to plot: the dataset holds no output times or none of its variables varies.")
-    with style.panels(6.4, 0.9 + (2.6 if against else 1.55) * rows, rows, sharex=True) as (plot, grid):
-        axes = grid[:, 0].tolist()
+    below = curved.ROWS if usual and curved.carries(dataset) else 0
+    return _stacked(dataset, shown, against, balances, below)
+
+
+def _stacked(
+    dataset: xarray.Dataset, shown: Sequence[Panel], against: str | None, balances: bool, below: int
+) -> Figure:
+    """Panels that share an axis, the balances, and rows of surfaces below, if any."""
+    rows = len(shown) + balances
+    height = 0.9 + (2.6 if against else 1.55) * rows + curved.HEIGHT * below
+    with style.panels(6.4, height, rows + below, sharex=not below) as (plot, grid):
+        axes = grid[:rows, 0].tolist()
+        if below:
+            curved.draw_below(grid[:, 0].tolist(), dataset)
         for ax, panel in zip(axes, shown, strict=False):
             _draw(ax, dataset, panel, against or "time")
         if balances:

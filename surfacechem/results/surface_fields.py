@@ -54,13 +54,16 @@ def _totals(surface: CurvedSurfaces, approaches: Array) -> list[Column]:
             for k, axis in enumerate("xy")
         ]
     area = np.array([item.area for item in local])
+    force = np.array([item[2] for item, _ in exact])
     columns += [
+        Column("approach", (AT,), approaches, "m", "approach of the surfaces"),
+        Column("force", (AT,), force, "N", "normal force on body 1, tension positive"),
         Column("gap_least", (AT,), np.array([item.gap for item in local]), "m", "least gap of the surfaces"),
         Column("contact_area", (AT,), area, "m^2", "area of body 1 that touches or overlaps body 2"),
         Column("contact_radius", (AT,), np.sqrt(area / math.pi), "m", "radius of a circle of the area of contact"),
     ]
     if surface.pairs:
-        off = np.array([mine.force_1[2] - force[2] for mine, (force, _) in zip(local, exact, strict=True)])
+        off = np.array([item.force_1[2] for item in local]) - force
         columns.append(Column("local_difference", (AT,), off, "N", "force of the local law minus the integral"))
     if surface.heat_laws:
         across = np.array([item.conductance for item in local])
@@ -84,12 +87,17 @@ def _fields(surface: CurvedSurfaces, approaches: Array) -> Sequence[Column]:
     grid = np.stack(np.meshgrid(*t, indexing="ij"), axis=-1)
     x = lower.derivatives(around.at + around.scale * np.sinh(grid))[0]
     gap, traction = np.empty((2, len(approaches), *x.shape[:-1]))
+    opposite = np.empty((len(approaches), *x.shape))
     for k, d in enumerate(approaches):
         near = surface.surfaces(float(d))[1].nearest(x)
-        gap[k], traction[k] = near.gap, surface.traction(near.gap)
+        gap[k], traction[k], opposite[k] = near.gap, surface.traction(near.gap), near.point
     over = ("u", "v")
     places = [
         Column(f"surface_{axis}", over, x[..., k], "m", f"{axis} of points of body 1") for k, axis in enumerate("xyz")
+    ]
+    places += [
+        Column(f"opposite_{axis}", (AT, *over), opposite[..., k], "m", f"{axis} of the nearest point of body 2")
+        for k, axis in enumerate("xyz")
     ]
     text = "normal traction on body 1 by the local law, tension positive"
     return [

@@ -3,13 +3,17 @@
 import numpy as np
 import pytest
 import symengine
+from case_runs import load, solved
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import surfacechem
+from surfacechem import references
 from surfacechem.errors import InputError
 from surfacechem.expressions import derivative
 from surfacechem.laws.longrange import LennardJonesSpherePlane
+from surfacechem.references.scene_view import SceneView
+from surfacechem.results.matching import match
 
 SCENE = """
 T_0: 300 K
@@ -84,6 +88,33 @@ def test_other_numbers_of_the_pair_can_be_swept_and_change_the_force(tmp_path):
     simulation, changed = surfacechem.load(path), {"surface.pair.lennard-jones-pair.n_1": 1e19}
     usual, doubled = (simulation.run(changes).dataset.t_n.values[-1] for changes in ({}, changed))
     assert doubled == pytest.approx(2 * usual, rel=1e-12)
+
+
+def test_what_the_integrals_hold_is_refused_in_a_sweep():
+    with pytest.raises(InputError, match=r"surface.bodies.sphere.sphere.R cannot be swept: .* by --set"):
+        surfacechem.sweep("sticky-sphere", {"surface.bodies.sphere.sphere.R": [1e-6, 2e-6]})
+
+
+@pytest.mark.parametrize("name", ["van-der-waals-sphere", "sticky-sphere"])
+def test_snap_in_and_pull_off_free_the_energy_that_closed_forms_say(name):
+    found = solved(name).dataset
+    case = load(name).case
+    view = SceneView(case.scene, solved(name).trajectory)
+    off, on = match(references.get(case.reference.name), {}, view).jumps
+    assert found.event_released.values == pytest.approx([on.release, off.release], rel=1e-8)
+    assert found.g_n_after.values == pytest.approx([on.g_after, off.g_after], rel=1e-7)
+
+
+def test_heat_flows_over_the_curved_gap_as_integrated_over_the_sphere():
+    """Over the sphere dA = 2 pi R dz, so that k / (z + M) gives a logarithm."""
+    found, R, M = solved("sticky-sphere").dataset, 1e-6, 301e-9
+    g = found.g_n.values
+    apart, touching = np.maximum(g, 0), np.maximum(-g, 0)
+    conductance = 2 * np.pi * R * 0.026 * (np.log((g + 2 * R + M) / (apart + M)) + touching / M)
+    assert found.q_12.values == pytest.approx(conductance * 30, rel=1e-8)
+    assert found.q_12.attrs["units"] == "W"
+    area = 2 * np.pi * R * np.maximum(-found.approach.values, 0)
+    assert found.contact_area.values == pytest.approx(area, rel=1e-9, abs=1e-30)
 
 
 @pytest.mark.parametrize(

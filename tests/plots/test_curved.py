@@ -1,0 +1,33 @@
+"""Figures of two curved surfaces: what is drawn is what the dataset holds."""
+
+import numpy as np
+import pytest
+from case_runs import solved
+
+from surfacechem.plots import figure
+
+
+@pytest.fixture(scope="module")
+def dataset():
+    return solved("ball-in-a-socket").dataset
+
+
+def test_a_run_of_surfaces_shows_profiles_tractions_and_force_below_what_runs_show(dataset):
+    usual, own = figure(dataset), figure(dataset, ["traction"])
+    profiles, tractions, force = own.axes
+    assert [ax.get_ylabel() for ax in usual.axes[-3:]] == [ax.get_ylabel() for ax in own.axes]
+    assert len(usual.axes) > 3
+    x, z = profiles.lines[0].get_data()
+    assert np.hypot(x, z - 25e-9) == pytest.approx(np.full(len(x), 25e-9), rel=1e-12)
+    drawn = max(np.max(line.get_ydata()) for line in tractions.lines)
+    assert drawn == pytest.approx(dataset.traction.values.max(), rel=1e-12)
+    line, local = force.lines
+    assert (line.get_ydata() == dataset.t_n.values).all()
+    assert local.get_ydata() == pytest.approx((dataset.force + dataset.local_difference).values)
+
+
+def test_without_an_axis_of_symmetry_the_traction_is_a_field(dataset):
+    tilted = dataset.copy(deep=True)
+    tilted["gap"] = dataset.gap * (1 + 1e-3 * dataset.surface_x / 1e-8)
+    drawn = figure(tilted, ["traction"]).axes[1].collections[0].get_array()
+    assert np.abs(drawn).max() == pytest.approx(np.abs(dataset.traction.values).max() / 1e6, rel=1e-12)
