@@ -73,6 +73,7 @@ def _section(dataset: xarray.Dataset) -> tuple[Array, int]:
 def _reach(dataset: xarray.Dataset, along: Array, column: int) -> float:
     """Distance to which the traction is felt [m]."""
     size = np.abs(dataset["traction"].values[:, :, column]).max(axis=0)
+    # Bodies are much larger than what acts between them, of which nothing would be seen at their size.
     felt = np.abs(along[size > NEGLIGIBLE * size.max()])
     return BEYOND * float(felt.max(initial=0.0)) or float(np.abs(along).max())
 
@@ -80,6 +81,7 @@ def _reach(dataset: xarray.Dataset, along: Array, column: int) -> float:
 def _chosen(dataset: xarray.Dataset) -> Iterator[tuple[int, Any, str]]:
     """Times that are drawn, with colour and words: the least and the largest approach and some between."""
     approach = dataset["approach"].values
+    # Runs linger where little changes: approaches are spread by their rank, not by time.
     order = np.argsort(approach)
     for k in dict.fromkeys(order[np.linspace(0, len(order) - 1, 4).round().astype(int)].tolist()):
         share = float(np.mean(approach < approach[k]))
@@ -137,6 +139,7 @@ def _draw_field(ax: Axes, dataset: xarray.Dataset) -> None:
     k = int(np.argmax(np.abs(values).max(axis=(1, 2))))
     text, size = style.prefixed("Pa", values[k])
     x, y = (dataset[f"surface_{axis}"].values for axis in "xy")
+    # White is no traction, whatever the least and the largest are.
     most = float(np.abs(values[k]).max()) / size
     mesh = ax.pcolormesh(x, y, values[k] / size, cmap="RdBu_r", vmin=-most, vmax=most, shading="gouraud")
     ax.figure.colorbar(mesh, ax=ax, label=f"Traction [{text}]")

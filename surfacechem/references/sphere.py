@@ -123,6 +123,7 @@ class SphereOnSpring(Reference):
             raise InputError(f"{self.name}: the spring holds it everywhere; there is no jump.")
         return self._fold(near, softest, -1.0), self._fold(softest, far, 1.0)
 
+    # The slope falls and rises once, so that it passes -k once on either side of its lowest value.
     def _fold(self, low: float, high: float, sign: float) -> float:
         """Where the slope of the force is that of the spring, by halving."""
         for _ in range(200):
@@ -147,6 +148,7 @@ class SphereOnSpring(Reference):
         before = self.w_i - self.w_turn - self.speed * t
         w, (off, on), (near, far) = self.w_turn + np.abs(before), self.folds, self.ends
         w_off, w_on = self.displacement(np.array([off, on]))[0]
+        # On the way in the open branch ends at its own fold, on the way out the closed one at the other.
         apart = np.where(before > 0, w >= w_on, (w > w_off) | (self.w_turn > w_on))
         open_gap, closed = self.gap(np.maximum(w, w_on), on, far), self.gap(np.minimum(w, w_off), near, off)
         g = np.where(apart, open_gap, closed)
@@ -233,6 +235,7 @@ class CohesiveSphereOnSpring(SphereOnSpring):
     def lowest(self) -> float:
         """An overlap that bears more than adhesion and spring can press [m]."""
         adhesion = math.e * self.t_max * self.g_0
+        # Twice and four times what both can be at most.
         pressed = 2 * adhesion + 4 * self.k * (self.w_i - self.w_turn) / (2 * math.pi * self.R)
         return -math.sqrt(2 * pressed / self.E_n)
 

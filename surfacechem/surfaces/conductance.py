@@ -44,6 +44,7 @@ class CurvedConductance(HeatTransfer):
             )
             return found.conductance, found.conductance_slope
 
+        # A conductance and its slope are fitted like an energy and its force.
         if key not in KNOWN:
             KNOWN[key] = fitted(sample, *pair.approach, pair.accuracy, levels)
         return KNOWN[key]

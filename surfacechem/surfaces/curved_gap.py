@@ -159,6 +159,7 @@ def counts_at(x: Array, near: Projection, laws: Sequence[Density], heat: Sequenc
     for path in heat:
         h, slope = np.moveaxis(path(near.gap), -1, 0)
         count[..., 14] += h
+        # As body 2 moves up, the gap to its nearest point grows by the vertical part of its normal.
         count[..., 15] -= slope * near.normal[..., 2]
     return count
 

@@ -148,6 +148,7 @@ def _around(surface: Surface, near: Projection, reach: Array, order: int, cutoff
     ds = w * np.hypot(gap[:, None], s)
     chord = 2 * np.sin(bent * s / 2) / bent if bent else s
     out = np.sin(bent * s) / bent if bent else s
+    # The law of cosines for a chord, which does not cancel next to the foot.
     r = np.sqrt(gap[:, None] ** 2 + (1 + bent * gap[:, None]) * chord**2)
     return Circles(near.point, near.normal, gap, r, bent * chord**2 / 2, 2 * math.pi * np.abs(out) * ds)
 

@@ -138,6 +138,7 @@ class CurvedSurfaces(Potential):
     def contact(self, d: float, pairs: bool = True) -> Contact:
         """What the laws of the gap, and the pair laws by their energy between flats, give at an approach."""
         heat = [density(law) for law in self.heat_laws]
+        # Conductances bend where laws of force may not.
         levels = bends((*self.gap_laws, *self.heat_laws))
         return over_gap(*self.surfaces(d), self._local(pairs), levels, heat, self.accuracy, self._floor)
 
