@@ -239,7 +239,11 @@ def made_cases() -> str:
         )
         for case in found
     ]
-    parts = [table(("case", "title", "thermal regime", "exact solution"), rows)]
+    thumbnails = [
+        f"[![](images/gallery-{case.name}.svg){{ loading=lazy }}{case.title}](#{case.name})" for case in found
+    ]
+    parts = ['<div class="thumbnails" markdown>', *thumbnails, "</div>"]
+    parts += [table(("case", "title", "thermal regime", "exact solution"), rows)]
     for case in found:
         parts += [f"## `{case.name}` {{ #{case.name} }}", f"```yaml\n{case.text.rstrip()}\n```"]
         parts += [f"![{case.title}](images/gallery-{case.name}.svg)"]

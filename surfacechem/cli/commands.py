@@ -38,10 +38,10 @@ CODES = {
     0: "finished",
     DIFFERENT: "rerun: the new values are not bit for bit those of the file",
     BAD_INPUT: "bad input; nothing was computed",
-    3: "the run was stopped by physics, of a sweep every run; what it reached is written, with the reason",
+    3: "physics stopped the run (of a sweep, every run) before its end; what it reached is written, with the reason",
     4: "the run failed numerically; what it reached is written",
-    UNWRITTEN: "what was computed could not be written where it should be",
-    SIGNALLED + 2: "interrupted, or 128 and the number of another signal; nothing was written",
+    UNWRITTEN: "the result could not be written",
+    SIGNALLED + 2: "interrupted (128 plus its number for another signal); nothing was written",
 }
 
 
@@ -181,19 +181,19 @@ Changes = Annotated[
     list[str] | None,
     Option("--set", metavar="PATH=VALUE", help="Change a value of the case; repeatable.", autocompletion=paths),
 ]
-SolverName = Annotated[str | None, Option("--solver", help="Another solver than the case's.")]
-SolverNames = Annotated[
-    str | None, Option("--solvers", help="Names of solvers, with commas between; all if not given.")
+SolverName = Annotated[str | None, Option("--solver", help="Solver, instead of that of the case.")]
+SolverNames = Annotated[str | None, Option("--solvers", help="Names of solvers, separated by commas; default: all.")]
+Tolerance = Annotated[float | None, Option("--rtol", help="Relative tolerance, instead of that of the case.")]
+Wanted = Annotated[
+    float | None, Option("--accuracy", help="Relative accuracy to reach; solver and tolerance are chosen for it.")
 ]
-Tolerance = Annotated[float | None, Option("--rtol", help="Another relative tolerance than the case's.")]
-Wanted = Annotated[float | None, Option("--accuracy", help="Relative accuracy; solver and tolerance follow.")]
 Quiet = Annotated[bool, Option("--quiet", "-q", help="Print nothing unless something is wrong.")]
 Talk = Annotated[
     bool | None,
     Option(
         "--verbose/--quiet",
         "-v/-q",
-        help="Tell what is being done and more about the result, or nothing unless something is wrong.",
+        help="Print progress and more about the result, or nothing unless something is wrong.",
         show_default=False,
     ),
 ]

@@ -71,7 +71,7 @@ def main(
 @app.command(epilog=EXIT_CODES)
 def run(
     case: CaseName,
-    output: Annotated[Path | None, written_to("netCDF file; <case name>.nc if not given.")] = None,
+    output: Annotated[Path | None, written_to("netCDF file; default <case name>.nc.")] = None,
     changes: Changes = None,
     solver: SolverName = None,
     rtol: Tolerance = None,
@@ -111,30 +111,36 @@ def sweep(
     case: CaseName,
     output: Annotated[
         Path | None,
-        written_to("netCDF file, or a Zarr store, NAME.zarr, of any size; <case name>-sweep.nc if not given."),
+        written_to("netCDF file, or NAME.zarr for a store of any size; default <case name>-sweep.nc."),
     ] = None,
     over: Annotated[
         list[str] | None,
         Option("--over", metavar="PATH=VALUES", help="Values, [1, 2] or {from, to, points, spacing}; repeatable."),
     ] = None,
     until: Annotated[
-        str | None, Option("--until", metavar="NAME=VALUE", help="End each run where this ramp is there.")
+        str | None, Option("--until", metavar="NAME=VALUE", help="End each run when this ramp reaches the value.")
     ] = None,
-    resume: Annotated[bool, Option("--resume", help="Go on with a store that is not finished.")] = False,
+    resume: Annotated[bool, Option("--resume", help="Continue an unfinished store.")] = False,
     part: Annotated[
         str | None,
-        Option("--part", metavar="K/N", help="Compute the K-th of N parts of a store, as a job of an array."),
+        Option("--part", metavar="K/N", help="Compute part K of N of a store, for example as one job of an array job."),
     ] = None,
     cluster: Annotated[
         str | None, Option("--cluster", metavar="ADDRESS", help="Compute on the workers of this Dask scheduler.")
     ] = None,
     only: Annotated[
-        str | None, Option("--only", metavar="STATUS", help="Run those runs of the store again that are failed, say.")
+        str | None,
+        Option(
+            "--only", metavar="STATUS", help="Repeat only the runs of the store with this status, for example failed."
+        ),
     ] = None,
     changes: Changes = None,
     talk: Talk = None,
 ) -> None:
-    """Run a case over values of its parameters and write one dataset, or a store (.zarr) of any size."""
+    """Sweep parameters of a case into one dataset or store.
+
+    A store (.zarr) may be of any size, is resumed where it was interrupted, and may be computed in parts.
+    """
     from surfacechem.cli import stores
     from surfacechem.documents.overrides import assignments
     from surfacechem.results.netcdf import dataset_path
@@ -164,7 +170,7 @@ def check(
     rtol: Tolerance = None,
     accuracy: Wanted = None,
 ) -> None:
-    """Say a case back in words, without running it."""
+    """Describe a case in words, without running it."""
     from surfacechem.results.error_estimates import reasons
     from surfacechem.runs.check import consistent_start, groups, start_warnings, warnings
     from surfacechem.runs.simulation import load
@@ -196,10 +202,12 @@ def evaluate(
     case: CaseName,
     points: Annotated[
         Path | None,
-        Argument(metavar="[POINTS.csv]", help="States, one a row; the first line is like g_n [nm], T_1 [K]."),
+        Argument(
+            metavar="[POINTS.csv]", help="States, one per row; the first line names them with units: g_n [nm], T_1 [K]."
+        ),
     ] = None,
     output: Annotated[
-        Path | None, written_to(".nc, .csv or .parquet; <case name>-points.nc if points are given.")
+        Path | None, written_to(".nc, .csv or .parquet; default with points: <case name>-points.nc.")
     ] = None,
     changes: Changes = None,
     quiet: Quiet = False,
@@ -227,7 +235,7 @@ def evaluate(
 @app.command()
 def equations(
     case: CaseName,
-    form: Annotated[str, Option("--format", help="python (runs) or latex.")] = "python",
+    form: Annotated[str, Option("--format", help="python, which runs, or latex.")] = "python",
     changes: Changes = None,
 ) -> None:
     """Print the equations of a case, as Python that runs or as LaTeX."""
@@ -248,12 +256,14 @@ def equations(
 @app.command(epilog=EXIT_CODES)
 def laws(
     name: Annotated[
-        str | None, Argument(help="Show all about this law, or about those of this contract.", autocompletion=law_names)
+        str | None, Argument(help="Show this law, or all laws of this contract, in full.", autocompletion=law_names)
     ] = None,
     file: Annotated[
-        Path | None, Option("--from", metavar="FILE.py", help="A file with laws of your own, whose code is run.")
+        Path | None, Option("--from", metavar="FILE.py", help="A file with laws of your own; its code is executed.")
     ] = None,
-    check: Annotated[bool, Option("--check", help="Try what every law has to keep on those of the file.")] = False,
+    check: Annotated[
+        bool, Option("--check", help="Check the laws of the file: documentation, units, derivatives, thermodynamics.")
+    ] = False,
 ) -> None:
     """List the laws by contract, show one, or check laws of your own."""
     from surfacechem import laws as every
@@ -301,12 +311,14 @@ def cases(
 
 @app.command(epilog=EXIT_CODES)
 def new(
-    file: Annotated[Path, Argument(metavar="FILE.yaml", help="The case file to write; none is overwritten.")],
+    file: Annotated[
+        Path, Argument(metavar="FILE.yaml", help="The case file to write; an existing file is never overwritten.")
+    ],
     like: Annotated[
-        str, Option("--from", metavar="NAME", help="The shipped case to begin with.", autocompletion=case_names)
+        str, Option("--from", metavar="NAME", help="The shipped case to copy.", autocompletion=case_names)
     ] = "exothermic",
 ) -> None:
-    """Begin a case of your own from a shipped one."""
+    """Start a case of your own from a shipped one."""
     from surfacechem.results.netcdf import replacing
     from surfacechem.runs.listing import case_text
 
@@ -324,11 +336,11 @@ def new(
 def mechanism(
     file: Annotated[str, Argument(metavar="FILE", help="A Cantera surface mechanism, or a shipped one.")],
     phase: Annotated[str | None, Option("--phase", help="The phase, where the file has several.")] = None,
-    temperature: Annotated[str, Option("--temperature", "-T", help="Range, or one value.")] = "280..360 K",
-    force: Annotated[str, Option("--force", help="Range of the force per bond, or one value.")] = "0..100 pN",
+    temperature: Annotated[str, Option("--temperature", "-T", help="Range or single value.")] = "280..360 K",
+    force: Annotated[str, Option("--force", help="Force per bond: range or single value.")] = "0..100 pN",
     output: Annotated[Path | None, written_to("Plot to .png, .svg or .pdf.")] = None,
 ) -> None:
-    """Print species, reactions and rates, and what is consistent."""
+    """Print species, reactions and rates of a mechanism, and check their consistency."""
     from surfacechem.mechanism import load_mechanism
     from surfacechem.studies import mechanism_report as report
     from surfacechem.studies.mechanism_rates import Curves
@@ -356,9 +368,9 @@ def plot(
         ),
     ],
     output: Annotated[
-        Path | None, written_to(".png, .svg or .pdf; <name>.png if not given, of several comparison.png.")
+        Path | None, written_to(".png, .svg or .pdf; default <name>.png, for several comparison.png.")
     ] = None,
-    variables: Annotated[str | None, Option("--variables", help="Variables to plot, with commas between.")] = None,
+    variables: Annotated[str | None, Option("--variables", help="Variables to plot, separated by commas.")] = None,
     against: Annotated[
         str | None,
         Option("--against", metavar="VARIABLE", help="A variable as the axis, instead of time or what is swept."),
@@ -394,9 +406,9 @@ def figures(
     suffix: Annotated[str, Option("--format", help="svg, png or pdf.")] = "svg",
     talk: Talk = None,
 ) -> None:
-    """Draw the figures of a list from runs.
+    """Run and draw all figures of a list.
 
-    Each with its exact curve and its distance from that.
+    Each with its exact curve and the distance from it.
     """
     from surfacechem.studies.figures import read_list, write_all
 
@@ -417,13 +429,13 @@ def report(
     source: Annotated[
         str, Argument(metavar="FILE.nc|CASE", help="A dataset of a run or a sweep, or a case to run first.")
     ],
-    output: Annotated[Path | None, written_to("HTML file; <name>.html if not given.")] = None,
+    output: Annotated[Path | None, written_to("HTML file; default <name>.html.")] = None,
     changes: Changes = None,
     talk: Talk = None,
 ) -> None:
-    """Write one page about a run or a sweep.
+    """Write a report about a run or a sweep: one HTML page.
 
-    It needs no network: scene, equations, figures, events, balances, error against run time.
+    Scene, equations, figures, events, balances, error against run time. It needs no network.
     """
     from surfacechem.results.netcdf import SUFFIXES
     from surfacechem.runs.simulation import load
@@ -450,11 +462,11 @@ def rerun(
     output: Annotated[Path | None, written_to("Write the new dataset here.")] = None,
     allow_code: Annotated[
         bool,
-        Option("--allow-code", help="Run the laws of its own whose source the dataset keeps: code, so read it before."),
+        Option("--allow-code", help="Execute the laws whose source code the dataset contains; read it first."),
     ] = False,
     talk: Talk = None,
 ) -> None:
-    """Run a dataset from itself and compare bit for bit."""
+    """Repeat the run of a dataset and compare bit for bit."""
     from surfacechem.results.netcdf import dataset_path
     from surfacechem.runs import rerun as again
 
@@ -479,19 +491,21 @@ def precision(
     cases: Annotated[list[str], Argument(metavar="CASE...", help="Case files, or names of shipped cases.")],
     solvers: SolverNames = None,
     tolerances: Annotated[
-        str | None, Option("--tolerances", help="Relative tolerances, 1e-4,1e-8, or their decades, 1e-4..1e-8.")
+        str | None, Option("--tolerances", help="Relative tolerances: a list, 1e-4,1e-8, or all decades, 1e-4..1e-8.")
     ] = None,
     variables: Annotated[
-        str | None, Option("--variables", help="Variables whose errors count; the states if not given.")
+        str | None, Option("--variables", help="Variables whose errors count; default: the states.")
     ] = None,
-    repeat: Annotated[int | None, Option("--repeat", help="Timed rounds; 5 if not given.")] = None,
-    output: Annotated[Path | None, written_to("Name of .nc, .svg, .png and .html; precision if not given.")] = None,
+    repeat: Annotated[int | None, Option("--repeat", help="Number of timed rounds; default 5.")] = None,
+    output: Annotated[
+        Path | None, written_to("Base name of the .nc, .svg, .png and .html files; default precision.")
+    ] = None,
     changes: Changes = None,
     talk: Talk = None,
 ) -> None:
     """Measure error against run time of several solvers.
 
-    As table, netCDF, figure and report.
+    Writes a table, netCDF, a figure and a report.
     """
     from surfacechem.studies import precision as studies
 
@@ -512,20 +526,23 @@ def precision(
 @app.command(epilog=STABILITY_CODES)
 def stability(
     regimes: Annotated[
-        list[str] | None, Argument(metavar="[REGIME]...", help="Names of regimes; all if none is given.")
+        list[str] | None, Argument(metavar="[REGIME]...", help="Names of regimes; default: all.")
     ] = None,
     solvers: SolverNames = None,
     quick: Annotated[bool, Option("--quick", help="Four values of each regime, from mild to extreme.")] = False,
     search: Annotated[
-        int | None, Option("--search", help="Rounds of the search for worst corners; 12 if not given, 0: none.")
+        int | None,
+        Option("--search", help="Rounds of the search for the worst corner of each regime; default 12, 0 for none."),
     ] = None,
     rtol: Tolerance = None,
-    output: Annotated[Path | None, written_to("Name of .nc, .svg, .png and .html; stability if not given.")] = None,
+    output: Annotated[
+        Path | None, written_to("Base name of the .nc, .svg, .png and .html files; default stability.")
+    ] = None,
     talk: Talk = None,
 ) -> None:
-    """Solve dangerous regimes with several solvers.
+    """Solve difficult regimes with several solvers.
 
-    Over decades of their parameter; reports how many digits each keeps.
+    Each over decades of its parameter; reports how many digits each solver keeps.
     """
     from surfacechem.studies import stability as studies
 

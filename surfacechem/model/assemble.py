@@ -93,7 +93,23 @@ def _places() -> dict[str, str]:
 
 
 def assemble(scene: Scene) -> System:
-    """The system of a scene; InputError where a variable that is read has no role, or two."""
+    """The equations of a scene.
+
+    Parameters
+    ----------
+    scene
+        Two bodies, the interface, heat paths, loading and initial values, in SI.
+
+    Returns
+    -------
+    System
+        States, rows, ledger, modes and transitions as one symbolic graph.
+
+    Raises
+    ------
+    InputError
+        Where a variable that is read has no role, or two.
+    """
     build = Build(scene)
     needed = [place for name, place in _places().items() if name not in ASKED_FOR or ASKED_FOR[name](scene)]
     found = [import_module(place) for place in needed]

@@ -29,7 +29,7 @@ def figure(scene: Scene) -> Figure:
         axes = drawing.add_subplot()
         axes.set_axis_off()
         axes.set_xlim(-2.9 if scene.heat else -0.1, WIDTH + (1.0 if scene.tangential else 0.1))
-        axes.set_ylim(-HEIGHT - 0.35, GAP + HEIGHT + 0.75)
+        axes.set_ylim(-HEIGHT - 0.35, GAP + HEIGHT + (0.1 if scene.normal is None else 0.75))
         # Body 1 is below, as the gap g = x_2 - x_1 opens upwards.
         lower, upper = scene.bodies
         _body(axes, lower, -HEIGHT)

@@ -31,8 +31,25 @@ def known(name: str) -> bool:
 
 @cache
 def get(name: str) -> type[Reference]:
-    """The exact solution called `name`.
+    """The exact solution of a name.
 
+    Parameters
+    ----------
+    name
+        One of :func:`names`.
+
+    Returns
+    -------
+    type
+        Its class, whose parameters in SI make one solution: ``get("bell-ramp")(k_off=0.1, ...)``.
+
+    Raises
+    ------
+    InputError
+        Where there is none of that name; the message has the nearest.
+
+    Examples
+    --------
     >>> get("sliding-constant-capacity").__name__
     'SlidingConstantCapacity'
     """

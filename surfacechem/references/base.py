@@ -82,7 +82,23 @@ class Reference(ABC):
         return math.inf
 
     def solution(self, t: ArrayLike) -> dict[str, Array]:
-        """Exact values of the named quantities at the times `t` [s] after the start."""
+        """Exact values of the named quantities.
+
+        Parameters
+        ----------
+        t
+            Times [s] after the start, of any shape.
+
+        Returns
+        -------
+        dict
+            Values in SI by name, each of the shape of `t`.
+
+        Raises
+        ------
+        InputError
+            Where a time is before the start or after the time up to which the solution holds.
+        """
         times = np.asarray(t, dtype=np.float64)
         if not np.all((times >= 0.0) & (times <= self.end_time)):
             raise InputError(f"{self.name}: exact for 0 <= t <= {self.end_time!r} s only.")

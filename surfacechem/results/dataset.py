@@ -168,7 +168,18 @@ class Results(ABC):
         return figure
 
     def report(self, path: str | Path = "report.html") -> Path:
-        """Write one page of it all, which needs no other file and no network; returns the file."""
+        """Write one page of it all, which needs no other file and no network.
+
+        Parameters
+        ----------
+        path
+            The HTML file.
+
+        Returns
+        -------
+        Path
+            The file.
+        """
         written: Path = _above("studies.run_report").write(self.dataset, path)
         return written
 
@@ -177,7 +188,23 @@ class Results(ABC):
         return str(_above("studies.run_report").glance(self))
 
     def write(self, path: str | Path) -> Path:
-        """Save as netCDF, or as a table where the name ends with .csv or .parquet; whole or not at all."""
+        """Save as netCDF, or as a table where the name ends with .csv or .parquet; whole or not at all.
+
+        Parameters
+        ----------
+        path
+            The file; without a suffix it gets .nc.
+
+        Returns
+        -------
+        Path
+            The file.
+
+        Raises
+        ------
+        OutputError
+            Where it cannot be written.
+        """
         target = dataset_path(path)
         if target.suffix.lower() in TABLES:
             exports.save_table(target, self.dataset)

@@ -70,7 +70,23 @@ def load(source: Source, overrides: Overrides = ()) -> Simulation:
 
 
 def run(source: Source, overrides: Overrides = ()) -> Solution:
-    """Read a case, as :func:`load` does, and run it."""
+    """Read a case and run it.
+
+    Parameters
+    ----------
+    source, overrides
+        As for :func:`load`.
+
+    Returns
+    -------
+    Solution
+        How it ended, its dataset, error and balances.
+
+    Raises
+    ------
+    InputError
+        Where the case is no case that can be run; how a run ends is its status, never an exception.
+    """
     return load(source, overrides).run()
 
 
@@ -80,7 +96,25 @@ def sweep(
     until: Mapping[str, object] | None = None,
     overrides: Overrides = (),
 ) -> SweepSolution:
-    """Read a case, as :func:`load` does, and run its sweep, or the one given: see :meth:`Simulation.sweep`."""
+    """Read a case and run its sweep, or the one given.
+
+    Parameters
+    ----------
+    source, overrides
+        As for :func:`load`.
+    over, until
+        As for :meth:`Simulation.sweep`.
+
+    Returns
+    -------
+    SweepSolution
+        All runs and their dataset.
+
+    Raises
+    ------
+    InputError
+        Where the case has no sweep and none is given, or a path or value of it is wrong.
+    """
     return load(source, overrides).sweep(over, until)
 
 
@@ -180,10 +214,27 @@ class Simulation:
     def run(
         self, changes: Mapping[str, float | str] | None = None, run: Run | None = None, error: str = "auto"
     ) -> Solution:
-        """Run with some parameters or initial values changed, by path; nothing is compiled again.
+        """Run with some parameters or initial values changed; nothing is compiled again.
 
-        ``error`` says where the error of the run is from: "auto", the exact solution of the case if there is one, else
-        a second run at a tighter tolerance; "estimate", always a second run; "balances", no second run.
+        Parameters
+        ----------
+        changes
+            Values by path: numbers in SI, or texts with a unit.
+        run
+            Other output times, solver and tolerances than the case's.
+        error
+            Where the error of the run is from: "auto", the exact solution of the case if there is one, else a second
+            run at a tighter tolerance; "estimate", always a second run; "balances", no second run.
+
+        Returns
+        -------
+        Solution
+            How it ended, its dataset, error and balances.
+
+        Raises
+        ------
+        InputError
+            Where there is no parameter of a path, or a value is outside its range.
         """
         check_way(error)  # before anything is computed
         settings = run or self.case.run
@@ -331,9 +382,32 @@ class Simulation:
     ) -> SweepSolution:
         """Run over values of parameters in one call of the compiled loop; nothing is compiled twice.
 
-        ``over`` maps paths to lists of values or to ranges {from, to, points, spacing}, which are a grid unless
-        ``combine`` is "zip"; ``sample`` is {of: distributions by path, runs, method, seed}, ``until`` a prescribed ramp
-        to the value at which each run ends. What is not given is that of the section ``sweep`` of the case.
+        What is not given is that of the section ``sweep`` of the case.
+
+        Parameters
+        ----------
+        over
+            Lists of values, or ranges {from, to, points, spacing}, by path: numbers in SI or texts with a unit.
+        until
+            A prescribed ramp, and the value of it at which each run ends.
+        changes
+            Other values that differ from the case, by path, the same for all runs.
+        threads
+            How many runs are solved at a time; as many as there are processors if not given.
+        sample
+            {of: distributions by path, runs, method, seed}.
+        combine
+            "grid", every value with every other, or "zip", the first of all, then the second of all.
+
+        Returns
+        -------
+        SweepSolution
+            All runs and their dataset, along a dimension for each parameter.
+
+        Raises
+        ------
+        InputError
+            Where there is no parameter of a path, or a value is outside its range.
         """
         return self.sweep_plan(self.plan(over, until, sample, combine), changes, threads)
 

@@ -303,7 +303,20 @@ class Model:
         return (*limits, *(Margin.bear() if edge.strict else Margin.stop() for edge in self.system.edges))
 
     def solve(self, run: Run, changes: Mapping[str, float] | None = None) -> Trajectory:
-        """Run the model; the end is a status with a reason, never an exception, once the input was admissible."""
+        """Run the model.
+
+        Parameters
+        ----------
+        run
+            Output times, solver, tolerances.
+        changes
+            Values that differ from those of the scene, by path, in SI.
+
+        Returns
+        -------
+        Trajectory
+            Its end is a status with a reason, never an exception, once the input was admissible.
+        """
         return self.solve_values(run, self.values(changes))
 
     def resolve(self, trajectory: Trajectory, rtol: float) -> Trajectory:
@@ -390,7 +403,20 @@ class Model:
     def evaluate(
         self, result: Result, t: Array, y: Array, ydot: Array, segment: NDArray[np.int64] | None = None
     ) -> Array:
-        """Named quantities along a trajectory, shape (len(t), outputs); times tell the segments that are not given."""
+        """Named quantities along a trajectory.
+
+        Parameters
+        ----------
+        result, t, y, ydot
+            A result, and times [s], states and their slopes along it, shapes (n,), (n, states), (n, states).
+        segment
+            Number of the segment between breakpoints that each time is in; the times tell it where it is not given.
+
+        Returns
+        -------
+        ndarray
+            Shape (n, outputs).
+        """
         inputs = self.inputs(result, t, y, ydot, segment)
         return (
             self.output_function(self.program.filled(inputs)) if len(t) else np.empty((0, self.output_function.n_out))

@@ -103,9 +103,28 @@ def precision(
 ) -> Study:
     """Run cases with several solvers over tolerances and hold them against a reference: error against run time.
 
-    ``variables`` are states or named quantities whose errors count, the states if none are given; ``repeat`` is the
-    number of timed rounds; ``overrides`` change values of every case, as for ``load``. InputError for what is unknown,
-    before anything runs.
+    Parameters
+    ----------
+    cases
+        Names or files of cases.
+    solvers, tolerances
+        Names of solvers, and relative tolerances.
+    variables
+        States or named quantities whose errors count, the states if none are given.
+    repeat
+        Number of timed rounds.
+    overrides
+        Changes of values of every case, as for :func:`load`.
+
+    Returns
+    -------
+    Study
+        Dataset, figure and report.
+
+    Raises
+    ------
+    InputError
+        Where something is unknown, before anything runs.
     """
     check_options(solvers, tolerances, repeat, (1, MOST_REPEAT), ("solvers", "tolerances", "repeat"))
     cases = [cases] if isinstance(cases, str | Path) else cases

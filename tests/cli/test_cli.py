@@ -252,7 +252,7 @@ class TestListings:
     def test_help_documents_exit_codes(self, call, command):
         text = call(*command, "--help").stdout
         assert "130  interrupted" in text
-        assert "3    the run was stopped by physics" in text
+        assert "3    physics stopped the run" in text
 
 
 def test_a_case_of_ones_own_begins_with_a_shipped_one(call, tmp_path):
