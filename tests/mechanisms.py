@@ -18,7 +18,8 @@ from surfacechem.mechanism.rate_types import LoadedReaction, kind_of
 from surfacechem.quantities import AVOGADRO
 
 KMOL = 1000 * AVOGADRO
-SHIPPED = sorted(path.name for path in mechanisms().glob("*.yaml"))
+SHIPPED = sorted(path.name for path in mechanisms().glob("*.yaml") if "adjacent-phases" not in path.read_text())
+"""Those of surface species alone, which become formulas."""
 
 
 def load(name, bonds=()):

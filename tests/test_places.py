@@ -26,12 +26,12 @@ interface: {temperature: T, friction: [coulomb: {mu: 0.25}]}
 mechanics: {tangential: {m: 5 kg/m^2}}
 loading: {p: 30 kPa}
 initial: {T: 300 K, v: 2 m/s}
-run: {until: 1 ms, solver: lsoda}
+run: {until: 1 ms, solver: radau}
 """
 RUN = """
 import json, surfacechem
 solution = surfacechem.run("case.yaml")
-end = {name: float(values[-1]) for name, values in solution.dataset.data_vars.items() if values.dims == ("time",)}
+end = {column.name: float(column.values[-1]) for column in solution.columns if column.dimensions == ("time",)}
 text = f"{solution.reason} {solution.audit.violations} {solution.accuracy and solution.accuracy.source}"
 print(json.dumps({**end, "text": text}))
 """
@@ -185,7 +185,7 @@ PLACES = {
     ),
     "a solver": Place(
         {"solve/adapters/explicit.py": ("", ADAPTER)},
-        {"lsoda": "rk45"},
+        {"radau": "rk45"},
         {"v": V_I - MU_P / M * 1e-3},
     ),
 }

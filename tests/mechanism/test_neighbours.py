@@ -161,7 +161,13 @@ def test_every_surface_of_cantera_runs():
     assert set(CASES) == set(SURFACES)
 
 
-@pytest.mark.parametrize("which", CASES)
+LARGE = [("ptcombust.yaml", "Pt_surf"), ("methane_pox_on_pt.yaml", "Pt_surf")]
+"""Surfaces whose integration takes long, in Cantera too."""
+
+
+@pytest.mark.parametrize(
+    "which", [pytest.param(which, marks=[pytest.mark.slow] if which in LARGE else []) for which in CASES]
+)
 def test_at_constant_temperature_as_in_cantera(which, tmp_path):
     solution = surfacechem.load(written(tmp_path, which)).run(error="balances")
     assert solution.status == "finished"

@@ -376,7 +376,7 @@ def test_a_run_that_reaches_the_pole_of_a_viscosity_stops():
     ("name", "wanted"), [("exothermic", False), ("lubricated-sliding", False), ("closing-gas-gap", True)]
 )
 def test_coolprop_is_imported_only_for_a_fluid(name, wanted):
-    code = f"import sys, surfacechem\nsurfacechem.run('{name}').dataset\nprint('CoolProp' in sys.modules)"
+    code = f"import sys, surfacechem\nsurfacechem.run('{name}')\nprint('CoolProp' in sys.modules)"
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert found.stdout.strip() == str(wanted)
 

@@ -2,9 +2,11 @@
 
 import math
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
+from sampling import every
 
 import surfacechem
 from surfacechem.contracts.terms import RateLaw
@@ -127,8 +129,10 @@ def test_every_law_that_says_a_length_is_tried_below():
     assert {law.name() for law in laws(RateLaw).values() if "length" in vars(law)} == {"bell", "reversible-bell"}
 
 
-@pytest.mark.parametrize("law", [BELL, REVERSIBLE, BESIDE])
-@pytest.mark.parametrize("load", ["loading: {{f: {0} pN}}", "loading: {{t_n: {0} kPa}}", PROGRAMME])
+LOADS = ["loading: {{f: {0} pN}}", "loading: {{t_n: {0} kPa}}", PROGRAMME]
+
+
+@pytest.mark.parametrize(("law", "load"), every(4, product([BELL, REVERSIBLE, BESIDE], LOADS)))
 def test_the_equilibrium_feels_the_work_of_the_force(law, load, tmp_path):
     """d ln(phi / (1 - phi)) / df = l / k_B T, with the force or the share of a traction that each bond bears."""
     found = []

@@ -48,8 +48,7 @@ def test_elastic_sticking_that_touches_its_limit_sticks(amplitude, rtol):
     np.testing.assert_allclose(trajectory["g_t"], gap, rtol=0, atol=max(10 * rtol, 1e-10) * amplitude)
 
 
-@pytest.mark.parametrize("rtol", [1e-9, 1e-11, 1e-13])
-@pytest.mark.parametrize("amplitude", [60.001e-6, 60.1e-6, 66e-6])
+@pytest.mark.parametrize(("rtol", "amplitude"), [(1e-9, 60.001e-6), (1e-11, 60.1e-6), (1e-13, 66e-6)])
 def test_a_limit_that_is_just_passed_slides_from_there_to_the_peak(amplitude, rtol):
     """From a peak the gap has to swing by twice the limit: it slides in each half of a period, for a moment."""
     trajectory = elastic(amplitude, rtol)

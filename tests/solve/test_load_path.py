@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from sampling import every
 from scenes import bodies, together
 from solved import closed, solve
 
@@ -229,7 +230,7 @@ run: {until: 2 s}
     assert at(solution, "u_t", 2.0) == pytest.approx(0.5e-6, rel=1e-11)
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", every(3, range(12)))
 def test_random_steps_of_the_loads(seed):
     """Rate-independent friction against its own rule: the traction is brought back to the limit, and no further."""
     draw = np.random.default_rng(seed)

@@ -16,7 +16,7 @@ from surfacechem.compile.program import compile_program
 from surfacechem.contracts.terms import HeatTransfer, parameter
 from surfacechem.format import load_text
 from surfacechem.runs.simulation import Simulation
-from surfacechem.solve import names, solver
+from surfacechem.solve import solver
 from surfacechem.solve.segments import Passing
 
 CLOSE = 1e-8
@@ -98,7 +98,7 @@ def tapped():
     return y
 
 
-@pytest.mark.parametrize("name", names[::2])
+@pytest.mark.parametrize("name", ["radau", "lsoda"])
 def test_taps_are_felt(name):
     """They are where the gap turns; 5 K are missed with one of them."""
     simulation = Simulation(load_text(TAPPING))
@@ -106,7 +106,7 @@ def test_taps_are_felt(name):
     np.testing.assert_allclose([found["T_1"], found["T_2"]], tapped(), rtol=1e-6 if name != "radau" else 1e-10)
 
 
-@pytest.mark.parametrize("name", ["radau", *names[1::2]])
+@pytest.mark.parametrize("name", ["radau", "cvode"])
 def test_a_layer_is_felt(name):
     """The temperatures of the plates are all but equal then."""
     simulation = Simulation(load_text(LAYER))
