@@ -161,13 +161,10 @@ def test_every_surface_of_cantera_runs():
     assert set(CASES) == set(SURFACES)
 
 
-LARGE = [("ptcombust.yaml", "Pt_surf"), ("methane_pox_on_pt.yaml", "Pt_surf")]
-"""Surfaces whose integration takes long, in Cantera too."""
+PLATINUM = [pytest.param(which, marks=pytest.mark.slow) for which in list(CASES)[:2]]
 
 
-@pytest.mark.parametrize(
-    "which", [pytest.param(which, marks=[pytest.mark.slow] if which in LARGE else []) for which in CASES]
-)
+@pytest.mark.parametrize("which", [*PLATINUM, *list(CASES)[2:]])
 def test_at_constant_temperature_as_in_cantera(which, tmp_path):
     solution = surfacechem.load(written(tmp_path, which)).run(error="balances")
     assert solution.status == "finished"
