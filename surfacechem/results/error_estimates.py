@@ -118,7 +118,7 @@ def exact_outputs(
         return None
     from surfacechem.results.matching import exact_values
 
-    return partial(exact_values, *exact, scene, to_the_end=True)
+    return partial(exact_values, *exact, scene, to_the_end=True, side=max(SIDE, found.error))
 
 
 def _second(trajectory: Trajectory) -> Trajectory:

@@ -52,11 +52,17 @@ order, 2e-16, and rounding 1e-12.
 
 
 def exact_values(
-    name: str, options: Mapping[str, float], scene: Scene, run: Trajectory, to_the_end: bool = False
+    name: str,
+    options: Mapping[str, float],
+    scene: Scene,
+    run: Trajectory,
+    to_the_end: bool = False,
+    side: float = SIDE,
 ) -> dict[str, Array]:
     """Exact values at the output times by the names of the scene's variables; InputError if it is another scene's.
 
-    A run with outputs ``to_the_end`` may have them beyond that of the solution, by the error of its own.
+    A run with outputs ``to_the_end`` may have them beyond that of the solution, by the error of its own; its jumps may
+    be those of the solution where their times differ by the part ``side`` of them.
     """
     view = SceneView(scene, run)
     reference = match(references.get(name), options, view)
@@ -71,7 +77,7 @@ def exact_values(
     every = solution(np.concatenate([times, before_end, *around]))
     first = len(times) + len(before_end)
     exact = {each: values[: len(times)].copy() for each, values in every.items()}
-    _choose_sides(exact, {each: values[len(times) : first] for each, values in every.items()}, solution, run)
+    _choose_sides(exact, {each: values[len(times) : first] for each, values in every.items()}, solution, run, side)
     if reference.continuous:
         return _with_profiles(reference, exact, scene, run)
     _check_start(exact, run)
@@ -82,20 +88,20 @@ def exact_values(
 
 
 def _choose_sides(
-    exact: dict[str, Array], before_end: Mapping[str, Array], solution: Solution, run: Trajectory
+    exact: dict[str, Array], before_end: Mapping[str, Array], solution: Solution, run: Trajectory, side: float
 ) -> None:
     """Where an output time is that of a jump, take the exact values on the side on which the run has it.
 
-    That may be a jump of the run, or one of the solution at the very end, of which rounding decides whether a run
-    still has it.
+    That may be a jump of the run or of its loads, or one of the solution at the very end, of which rounding decides
+    whether a run still has it.
     """
     times = run.result.times
-    near = np.zeros(len(times), dtype=bool)
-    if run.jumps:
-        jumps = np.array([jump.t for jump in run.jumps])
-        near = np.any(np.abs(times[:, None] - jumps) <= SIDE * times[:, None], axis=1)
-        for way in (-SIDE, SIDE) if near.any() else ():
-            _take_nearer(exact, solution(times[near] * (1 + 2 * way)), run, near)
+    moments = np.union1d(run.result.problem.segments[1:-1], [jump.t for jump in run.jumps])
+    around = np.pad(moments, 1, constant_values=np.inf)
+    k = np.searchsorted(moments, times)
+    near = np.minimum(np.abs(times - around[k]), np.abs(around[k + 1] - times)) <= SIDE * times
+    for way in (-SIDE, SIDE, -side, side) if near.any() else ():
+        _take_nearer(exact, solution(times[near] * (1 + 2 * way)), run, near)
     if near[-1]:
         return
     jumped = {
