@@ -359,6 +359,21 @@ def mechanism(
 
 
 @app.command(epilog=EXIT_CODES)
+def steady(
+    case: CaseName,
+    of: Annotated[
+        list[str] | None,
+        Option("--of", metavar="NAME", help="A rate, production_CO2 say; repeatable. All that is made, if not given."),
+    ] = None,
+    changes: Changes = None,
+) -> None:
+    """Find the steady state of a mechanism, and what controls its rates."""
+    from surfacechem.studies.steady import steady
+
+    typer.echo(steady(case, of or (), changes or ()))
+
+
+@app.command(epilog=EXIT_CODES)
 def plot(
     sources: Annotated[
         list[str],

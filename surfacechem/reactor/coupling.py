@@ -7,20 +7,17 @@ is then the reactor's, and what flows into it the reactor receives.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from functools import partial
 from typing import Any, NoReturn
 
 import cantera
-import symengine
 
-from surfacechem.contracts.terms import Load, Spec
+from surfacechem.contracts.terms import Load
 from surfacechem.errors import InputError, suggestion
 from surfacechem.laws.loading import Hold
 from surfacechem.mechanism.evaluated import Neighbour, SurfaceEngine
 from surfacechem.model.components.interface import LOADABLE
-from surfacechem.model.system import Parameter, System
 from surfacechem.quantities import VARIABLES
 from surfacechem.reactor.gas import ReactingGas
 from surfacechem.scene import Body, Scene
@@ -118,26 +115,6 @@ def _replaced(body: Body, reactor: Any) -> Body:
             f"that it shares. Write `{body.name}: {{temperature: 300 K}}`; the value is not used."
         )
     return replace(body, temperature=Hold(level=float(reactor.T)))
-
-
-def with_multipliers(system: System) -> tuple[System, tuple[str, ...]]:
-    """The system with a factor on each reaction rate, and the labels of the reactions in the order of the scene."""
-    labels = tuple(item.name[2:] for item in system.named if item.quantity.tag == "e:R")
-    return _multiplied(system, labels), labels
-
-
-def _multiplied(system: System, labels: Sequence[str]) -> System:
-    symbols = {f"R_{label}": symengine.Symbol(f"multiplier_{label}") for label in labels}
-    named = tuple(
-        replace(item, expression=symbols[item.name] * item.expression) if item.name in symbols else item
-        for item in system.named
-    )
-    factors = tuple(
-        Parameter(symbol, f"multiplier.{name[2:]}", Spec("1", "factor on a rate"), 1.0)
-        for name, symbol in symbols.items()
-    )
-    origin = partial(_multiplied, system, labels)
-    return replace(system, named=named, parameters=(*system.parameters, *factors), origin=origin)
 
 
 REFUSED: list[Any] = []

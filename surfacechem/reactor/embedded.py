@@ -16,6 +16,7 @@ from surfacechem.expressions import depends
 from surfacechem.format import Case
 from surfacechem.mechanism.evaluated import HeldPhase
 from surfacechem.model.assemble import assemble
+from surfacechem.model.multipliers import with_multipliers
 from surfacechem.model.system import System
 from surfacechem.quantities import MOLECULAR
 from surfacechem.reactor import coupling
@@ -99,7 +100,7 @@ class EmbeddedScene:
             scene = coupling.with_heat(coupling.with_reactors(case.scene, reactors), heated)
             scene = coupling.with_loads(scene, {name: float(function(0.0)) for name, function in loads.items()})
             scene = coupling.with_neighbours(scene, neighbours or {})
-            system, self.reactions = coupling.with_multipliers(assemble(scene))
+            system, self.reactions = with_multipliers(assemble(scene))
             _refuse_folds(system)
             self.model = Model(system)
             self.values = self.model.values()

@@ -1,0 +1,229 @@
+"""Steady states of mechanisms, and how much each reaction and the temperature control what is made there.
+
+Source of the degree of rate control: Campbell (2017), ACS Catal. 7, 2770, doi 10.1021/acscatal.7b00115.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from surfacechem.errors import InputError, suggestion
+from surfacechem.expressions import depends
+from surfacechem.format import Overrides, Source
+from surfacechem.model.multipliers import with_multipliers
+from surfacechem.model.system import System
+from surfacechem.quantities import GAS_CONSTANT
+from surfacechem.runs.sheet import Rows, Sheet
+from surfacechem.runs.simulation import load
+from surfacechem.solve.adapters.evaluation import Evaluation
+from surfacechem.solve.contract import Array
+from surfacechem.solve.run import Model, Run
+from surfacechem.tolerances import CBRT_EPS, EPS, NEGLIGIBLE, PICTURE, ROUNDING, SHALLOW, TINY
+
+LONGER, ATTEMPTS = 10.0, 16
+"""By how much longer the next attempt runs that has not reached the steady state, and how many there are."""
+
+TRACE = EPS**2
+"""Coverage [1] below which a change is no longer one in proportion: the rounding of a rounding."""
+
+
+@dataclass(frozen=True)
+class SteadyState:
+    """Where a mechanism comes to rest: coverages by species, and rates of what was asked for, in SI units.
+
+    ``control`` are degrees of rate control, d ln(rate) / d ln(factor on a reaction), by rate and reaction; they sum to
+    one. ``barriers`` are apparent activation energies, R T^2 d ln(rate) / dT [J/mol], where the temperature is held.
+    """
+
+    title: str
+    time: float
+    """Of a run that has come there [s]."""
+    coverages: Mapping[str, float]
+    rates: Mapping[str, float]
+    control: Mapping[str, Mapping[str, float]]
+    barriers: Mapping[str, float]
+    equations: Mapping[str, str]
+    """Of the reactions."""
+
+    def __str__(self) -> str:
+        """Tables of coverages, rates and control."""
+        names = [*self.rates]
+        barriers = {name: f"apparent barrier {value / 1e3:.4g} kJ/mol" for name, value in self.barriers.items()}
+        control = [
+            (label, equation, *(f"{self.control[name][label]:+.4f}" for name in names))
+            for label, equation in self.equations.items()
+            if any(abs(self.control[name][label]) >= PICTURE / 10 for name in names)
+        ]
+        tables: dict[str, Rows] = {
+            "Coverages": [(name, f"{value:.6g}") for name, value in self.coverages.items()],
+            "Rates": [(name, f"{value:.6g}", barriers.get(name, "")) for name, value in self.rates.items()],
+            "Degree of rate control": [("", "", *names), *control],
+        }
+        return str(Sheet(self.title, [("steady", f"after {self.time:.3g} s")], tables))
+
+
+def steady(source: Source, of: Sequence[str] = (), overrides: Overrides = ()) -> SteadyState:
+    """The steady state of a case with a mechanism, and what controls its rates.
+
+    Parameters
+    ----------
+    source, overrides
+        As for :func:`surfacechem.load`. Nothing may change in time but the state.
+    of
+        Names of quantities, ``production_CO2`` for instance; all productions in neighbours if not given.
+
+    Raises
+    ------
+    InputError
+        Where the case has a history, jumps, or comes to no rest.
+    """
+    simulation = load(source, overrides)
+    system, labels = with_multipliers(simulation.system)
+    _refuse_changes(system)
+    rest = _Rest(Model(system), simulation.case.run, _wanted(system, of))
+    if not of:
+        rest.drop_small()
+    rates, held = rest.outputs(rest.x), _held(system, rest.values)
+    for (name, j), rate in zip(rest.wanted.items(), rates, strict=True):
+        if abs(rate) <= SHALLOW * rest.largest[j]:
+            raise InputError(f"{name} is zero at rest, so nothing controls it. Ask for what goes on there.")
+    changes = np.array([rest.response([f"multiplier.{label}"]) / rates for label in labels])
+    barriers = GAS_CONSTANT * rest.values[held[0]] * rest.response(held) / rates if held else np.empty(0)
+    return SteadyState(
+        simulation.case.title,
+        rest.time,
+        dict(zip(rest.species, np.where(rest.x > TRACE, rest.x, 0.0).tolist(), strict=True)),
+        dict(zip(rest.wanted, rates.tolist(), strict=True)),
+        {
+            name: dict(zip(labels, column, strict=True))
+            for name, column in zip(rest.wanted, changes.T.tolist(), strict=True)
+        },
+        dict(zip(rest.wanted, barriers.tolist(), strict=False)),
+        dict(zip(labels, _equations(system, labels), strict=True)),
+    )
+
+
+def _wanted(system: System, of: Sequence[str]) -> dict[str, int]:
+    """Places of quantities among the outputs; of all productions if none is named."""
+    names = [item.name for item in system.outputs]
+    for name in of:
+        if name not in names:
+            raise InputError(f"the case has no quantity '{name}'.{suggestion(name, names)}")
+    wanted = [*of] or [name for name in names if name.startswith("production_")]
+    if not wanted:
+        raise InputError("nothing is made in a neighbour: name the rates that matter, `--of R_R1` for instance.")
+    return {name: names.index(name) for name in wanted}
+
+
+def _equations(system: System, labels: Sequence[str]) -> list[str]:
+    """Equations of the reactions."""
+    titles = {item.name: item.quantity.long_name.removeprefix("net rate of ") for item in system.named}
+    return [titles[f"R_{label}"] for label in labels]
+
+
+def _refuse_changes(system: System) -> None:
+    """InputError where no steady state can be."""
+    moving = [item.name for item in system.named if depends(system.expand(item.expression), system.t)]
+    if moving:
+        raise InputError(f"{moving[0]} changes in time, so there is no steady state: give it one value.")
+    if system.in_stretches:
+        raise InputError("the scene jumps, so that its steady states are none of one set of equations.")
+
+
+HELD = re.compile(r"(bodies\..+|interface)\.temperature\.level|loading\.T\w*\.level")
+"""Parameters that are temperatures of bodies and interface."""
+
+
+def _held(system: System, values: Mapping[str, float]) -> list[str]:
+    """Parameters that are the temperatures of bodies and interface, where all are held at the same one."""
+    if not all(state.quantity.species for state in system.states):
+        return []
+    paths = [parameter.path for parameter in system.parameters if HELD.fullmatch(parameter.path)]
+    return paths if len({values[path] for path in paths}) == 1 else []
+
+
+class _Rest:
+    """The equations at their steady state, with multipliers and temperatures that may change."""
+
+    def __init__(self, model: Model, run: Run, wanted: dict[str, int]) -> None:
+        self.model, self.values, self.wanted = model, model.values(), wanted
+        self._place = {parameter.path: j for j, parameter in enumerate(model.system.parameters)}
+        self.time = run.times[-1]
+        for _ in range(ATTEMPTS):
+            reached = model.solve(replace(run, times=(0.0, self.time), picture=None))
+            if reached.status != "finished":
+                raise InputError(f"the case comes to no rest: {reached.reason}.")
+            problem = reached.result.problem
+            self.evaluation = Evaluation(problem.program, reached.result.y, problem.parameters[-1])
+            states = [model.system.states[j] for j in self.evaluation.free]
+            self.species = [state.quantity.species or state.name for state in states]
+            self._sites = np.array([[bool(state.quantity.species) for state in states]], dtype=float)
+            found = self._root(start := reached.result.y[self.evaluation.free])
+            if found is not None and np.all(np.abs(found - start) <= NEGLIGIBLE * np.abs(found) + run.rtol):
+                self.x, self.largest = found, np.abs(reached.outputs).max(axis=0)
+                return
+            self.time *= LONGER
+        raise InputError(f"the case has come to no rest in {self.time / LONGER:.3g} s.")
+
+    def rates(self, x: Array) -> Array:
+        """Time derivatives of the states."""
+        self.evaluation.put(0.0, x)
+        return self.evaluation.ydot[self.evaluation.free].copy()
+
+    def outputs(self, x: Array) -> Array:
+        """The quantities that were asked for."""
+        self.evaluation.put(0.0, x)
+        return np.asarray(self.model.output_function(self.evaluation.inputs)[[*self.wanted.values()]])
+
+    def drop_small(self) -> None:
+        """Leave out what is not made."""
+        sizes = np.abs(self.outputs(self.x))
+        kept = zip(self.wanted.items(), sizes > SHALLOW * sizes.max(), strict=True)
+        self.wanted = dict(item for item, made in kept if made)
+
+    def response(self, paths: Sequence[str]) -> Array:
+        """Change of the quantities where these parameters all change in proportion, and the state follows."""
+        parameters, columns = self.evaluation.parameters, [self._place[path] for path in paths]
+        first = parameters[columns].copy()
+        ends = []
+        for sign in (1, -1):
+            parameters[columns] = first * (1 + sign * CBRT_EPS)
+            ends.append((self.rates(self.x), self.outputs(self.x)))
+            parameters[columns] = first
+        (up, out_up), (down, out_down) = ends
+        moved = self._solve(self._slopes(self.x), -(up - down) / (2 * CBRT_EPS), self.x)
+        part = CBRT_EPS / max(float(np.max(np.abs(moved) / (np.abs(self.x) + TRACE))), 1.0)
+        following = (self.outputs(self.x + part * moved) - self.outputs(self.x - part * moved)) / (2 * part)
+        return np.asarray((out_up - out_down) / (2 * CBRT_EPS) + following)
+
+    def _root(self, x: Array) -> Array | None:
+        """The steady state near x, by Newton's method among states of the same sites; None where there is none."""
+        for _ in range(20):
+            step = self._solve(self._slopes(x), -self.rates(x), x)
+            x = x + step
+            if not np.all(np.isfinite(x)):
+                return None
+            if np.all(np.abs(step) <= ROUNDING * np.abs(x) + TRACE):
+                return x
+        return None
+
+    def _slopes(self, x: Array) -> Array:
+        """Derivatives of the rates by the states, in proportion to these."""
+        columns = []
+        for j, size in enumerate(np.abs(x) + TRACE):
+            step = np.zeros(len(x))
+            step[j] = CBRT_EPS * size
+            columns.append((self.rates(x + step) - self.rates(x - step)) / (2 * CBRT_EPS))
+        return np.array(columns).T
+
+    def _solve(self, slopes: Array, right: Array, x: Array) -> Array:
+        """The change of the state that changes the rates by so much and keeps the sites."""
+        sizes = np.abs(x) + TRACE
+        matrix = np.vstack((slopes, self._sites * sizes))
+        rows = np.maximum(np.abs(matrix).max(axis=1), TINY)
+        found, *_ = np.linalg.lstsq(matrix / rows[:, None], np.append(right, 0.0) / rows, rcond=None)
+        return np.asarray(found * sizes)

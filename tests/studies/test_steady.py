@@ -1,0 +1,84 @@
+"""Steady states against Cantera alone: coverages, degrees of rate control, apparent barriers."""
+
+import cantera as ct
+import numpy as np
+import pytest
+
+from surfacechem.errors import InputError
+from surfacechem.studies.steady import steady
+
+pytestmark = pytest.mark.around
+
+CASE = """
+title: Oxidation of carbon monoxide on platinum
+bodies: {lower: {temperature: 650 K}, upper: {temperature: 650 K}}
+interface:
+  temperature: 650 K
+  mechanism:
+    file: ptcombust.yaml
+    phase: Pt_surf
+    neighbours: {gas: {pressure: 1 atm, composition: {CO: 0.02, O2: 0.21}, rest: N2}}
+initial: {coverages: {PT(S): 0.5, O(S): 0.5}}
+run: {until: 1 ms, solver: cantera, rtol: 1e-8}
+"""
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory):
+    path = tmp_path_factory.mktemp("steady") / "case.yaml"
+    path.write_text(CASE)
+    return steady(path)
+
+
+def alone(T=650.0, reaction=0, factor=1.0):
+    """Coverages, and the rate at which CO2 is made, of Cantera alone [1/(m^2 s)]."""
+    surface = ct.Interface("ptcombust.yaml", "Pt_surf")
+    gas = surface.adjacent["gas"]
+    gas.TPX, surface.TP = (T, ct.one_atm, "CO:0.02, O2:0.21, N2:0.77"), (T, None)
+    surface.coverages = "PT(S):0.5, O(S):0.5"
+    surface.set_multiplier(factor, reaction)
+    surface.advance_coverages(1.0, rtol=1e-12, atol=1e-22, max_steps=100000)
+    return surface.coverages, surface.get_net_production_rates(gas)[gas.species_index("CO2")] * 6.02214076e26
+
+
+def test_coverages_and_rates(found):
+    coverages, rate = alone()
+    np.testing.assert_allclose([*found.coverages.values()], coverages, rtol=1e-8, atol=1e-14)
+    assert found.rates["production_CO2"] == pytest.approx(rate, rel=1e-8)
+    assert set(found.rates) == {"production_CO2", "production_CO", "production_O2"}
+    assert "CH2(S)s" in found.coverages
+
+
+def test_degrees_of_rate_control_sum_to_one(found):
+    """All reactions faster by a factor: the same coverages, all rates faster by it."""
+    for control in found.control.values():
+        assert sum(control.values()) == pytest.approx(1.0, abs=1e-7)
+
+
+@pytest.mark.parametrize("number", [4, 15, 16])
+def test_a_degree_of_rate_control_is_the_change_by_a_faster_reaction(number, found):
+    (_, more), (_, less) = (alone(reaction=number - 1, factor=factor) for factor in (1.001, 0.999))
+    exact = np.log(more / less) / np.log(1.001 / 0.999)
+    assert found.control["production_CO2"][f"R{number}"] == pytest.approx(exact, rel=1e-5)
+
+
+def test_an_apparent_barrier_is_the_change_with_temperature(found):
+    (_, more), (_, less) = alone(T=650.1), alone(T=649.9)
+    exact = 8.31446261815324 * 650.0**2 * np.log(more / less) / 0.2
+    assert found.barriers["production_CO2"] == pytest.approx(exact, rel=1e-5)
+    assert f"apparent barrier {exact / 1e3:.4g} kJ/mol" in str(found)
+
+
+@pytest.mark.parametrize(
+    ("case", "of", "message"),
+    [
+        ("diamond-growth", (), "x_gas_H changes in time, so there is no steady state"),
+        ("dna-adhesive", (), "nothing is made in a neighbour: name the rates that matter"),
+        ("dna-adhesive", ("R_R2",), "the case has no quantity 'R_R2'. Did you mean 'R_R1'"),
+        ("dna-adhesive", ("R_R1",), "R_R1 is zero at rest, so nothing controls it"),
+        ("stick-slip", ("p",), "changes in time"),
+    ],
+)
+def test_what_has_no_steady_state(case, of, message):
+    with pytest.raises(InputError, match=message):
+        steady(case, of)
