@@ -152,8 +152,7 @@ def _label_axis(axes: Sequence[Axes], datasets: Sequence[xarray.Dataset], panels
     """The axis that all panels share: time, a variable, or the swept parameter."""
     first, values = datasets[0][over], np.concatenate([dataset[over].values for dataset in datasets])
     if over != "time" and "sweep" in datasets[0].attrs:
-        axes[-1].set_xlabel(style.parameter_label(first))
-        axes[-1].set_xscale("log" if style.over_decades(first.values) else "linear")
+        style.draw_parameter(axes[-1], first)
         return
     names = [name for panel in panels if panel.unit != run.FLUX for name in panel.names]
     if over == "time" and all(run.logarithmic(d.time.values, [d[n].values for n in names if n in d]) for d in datasets):

@@ -56,8 +56,8 @@ FLUX = "W m-2"
 
 EARLY, MUCH, SHOWN = 1 / 200, 0.3, 1 / 1e7
 
-# A title of so many letters does not fit beside a panel.
-TOO_LONG = 26
+# A title of so many letters does not fit beside a panel; one of fewer does not with its unit in one line.
+TOO_LONG, ONE_LINE = 24, 14
 
 # Names of the temperatures across bodies, functions of time and place.
 PROFILE = re.compile("profile_[12]")
@@ -219,7 +219,9 @@ def _draw(ax: Axes, dataset: xarray.Dataset, panel: Panel, over: str) -> None:
     drawn = np.concatenate([dataset[name].values for name in panel.names])
     drawn = drawn[np.isfinite(drawn)]
     text, size = style.prefixed(panel.unit, drawn)
-    ax.set_ylabel(f"{panel.title} [{text}]".strip())
+    words = panel.title or ", ".join(map(symbol, panel.names[:MOST_NAMES]))
+    between = " " if len(panel.title) < ONE_LINE else "\n"
+    ax.set_ylabel(f"{words}{between}[{text}]")
     style.label_ticks(ax.yaxis, size)
     if len(drawn) and not varies(drawn):  # a line, not rounding blown up to the panel's height
         middle = float(drawn.mean())

@@ -240,9 +240,16 @@ def over_decades(values: Array) -> bool:
     return bool(np.ptp(steps) > FLAT * np.max(np.abs(steps)))
 
 
-def parameter_label(values: xarray.DataArray) -> str:
-    """Meaning and unit of a swept parameter."""
-    return f"{meaning(values, ' (')} [{unit_text(unit(values))}]"
+def draw_parameter(ax: Axes, values: xarray.DataArray) -> None:
+    """The axis of a swept parameter: its meaning, or its name where that tells more, and unit."""
+    decades = over_decades(values.values)
+    text, size = (unit_text(unit(values)), 1.0) if decades else prefixed(unit(values), values.values)
+    words = meaning(values, " (")
+    ax.set_xlabel(f"{str(values.name).replace('_', ' ') if words == 'Value' else words} [{text}]")
+    if decades:
+        ax.set_xscale("log")
+    else:
+        label_ticks(ax.xaxis, size)
 
 
 def valued(values: xarray.DataArray, place: int) -> str:

@@ -13,7 +13,7 @@ from surfacechem.errors import InputError, suggestion
 from surfacechem.format.plans import RUN, Plan, recorded_plan
 from surfacechem.plots import members, rupture, style
 from surfacechem.plots.run import KINDS, Panel, of_kind
-from surfacechem.plots.style import MOST_CURVES, Array, symbol, unit, unit_text, varies
+from surfacechem.plots.style import MOST_CURVES, Array, symbol, unit, varies
 
 # Parameters of a grid that are drawn.
 MOST_DRAWN = 2
@@ -36,8 +36,7 @@ def figure(dataset: xarray.Dataset, variables: Sequence[str] | None = None, agai
         for ax, panel in zip(grid[:, 0], shown, strict=True):
             _draw_final(ax, dataset, panel.names)
             style.legend(ax)
-        grid[-1, 0].set_xlabel(style.parameter_label(dataset[axes[0]]))
-        grid[-1, 0].set_xscale("log" if style.over_decades(dataset[axes[0]].values) else "linear")
+        style.draw_parameter(grid[-1, 0], dataset[axes[0]])
         style.headings(plot, grid[0, 0], dataset)
     return plot
 
@@ -93,12 +92,14 @@ def _dependent(dataset: xarray.Dataset) -> list[list[str]]:
 def _draw_final(ax: Axes, dataset: xarray.Dataset, names: Sequence[str]) -> None:
     """Values at the end of each run."""
     x = dataset[axes_of(dataset)[0]].values
-    for name in names:
-        for values, label in style.by_second(dataset, final(dataset, name)):
+    ends = {name: final(dataset, name) for name in names}
+    for name, end in ends.items():
+        for values, label in style.by_second(dataset, end):
             marker = "o" if len(x) < 3 else ""
             ax.plot(x, values, marker=marker, label=f"{symbol(name)} {label}".strip())
-    ax.set_ylabel(f"final [{unit_text(unit(dataset[names[0]]))}]")
-    ax.ticklabel_format(axis="y", useOffset=False, scilimits=(-4, 5))
+    text, size = style.prefixed(unit(dataset[names[0]]), np.stack(list(ends.values())))
+    ax.set_ylabel(f"final [{text}]")
+    style.label_ticks(ax.yaxis, size)
 
 
 def final(dataset: xarray.Dataset, name: str) -> Array:
