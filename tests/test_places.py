@@ -16,6 +16,8 @@ from typing import NamedTuple
 
 import pytest
 
+pytestmark = pytest.mark.around
+
 ROOT = Path(__file__).parents[1]
 CASE = """\
 T_0: 300 K

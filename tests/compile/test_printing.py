@@ -21,6 +21,8 @@ from surfacechem.model.assemble import assemble
 from surfacechem.solve.run import Model
 from surfacechem.tolerances import NOISE
 
+pytestmark = pytest.mark.around
+
 APPROVED = Path(__file__).parents[1] / "approved"
 
 

@@ -10,6 +10,8 @@ import pytest
 from surfacechem.contracts import si_units, units
 from surfacechem.errors import InputError
 
+pytestmark = pytest.mark.around
+
 
 def by_pint(number, given, unit):
     try:

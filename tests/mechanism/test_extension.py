@@ -16,6 +16,8 @@ from surfacechem.mechanism import load_mechanism
 from surfacechem.mechanism.rate_types import AffinityReaction, kinds
 from surfacechem.quantities import BOLTZMANN
 
+pytestmark = pytest.mark.around
+
 HEAD = """
 units: {length: m, quantity: mol, activation-energy: kJ/mol}
 extensions: [{type: python, name: surfacechem.extension}]

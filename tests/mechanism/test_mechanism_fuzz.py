@@ -18,6 +18,8 @@ from surfacechem.format import load_text
 from surfacechem.mechanism import load_mechanism
 from surfacechem.mechanism.rate_types import AffinityReaction, kinds
 
+pytestmark = pytest.mark.around
+
 FREE = ("description", "note")
 """Text that is not read."""
 

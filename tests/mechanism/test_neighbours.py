@@ -20,6 +20,8 @@ from surfacechem.quantities import BOLTZMANN
 from surfacechem.reactor import InterfaceReactor, ReactorNet
 from surfacechem.runs import rerun
 
+pytestmark = pytest.mark.around
+
 AVOGADRO = 6.02214076e23
 RTOL = 1e-9
 BOOKS = 100 * RTOL

@@ -11,6 +11,8 @@ import surfacechem
 from surfacechem.errors import InputError
 from surfacechem.reactor import InterfaceReactor, InterfaceStopped, ReactorNet
 
+pytestmark = pytest.mark.around
+
 CASES = {
     "debonding": 1e-12,
     "debonding-cooling": 1e-12,

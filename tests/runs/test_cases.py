@@ -34,19 +34,6 @@ def test_the_error_of_cells_chosen_by_an_accuracy_is_that_against_many():
         assert chosen.accuracy.variables[name] == pytest.approx(error, rel=0.1)
 
 
-@pytest.mark.parametrize(
-    ("name", "regime"),
-    [
-        ("closing-gas-gap", "medium without temperature"),
-        ("thermal-press", "medium without temperature"),
-        ("press-conductance", "no medium"),
-        ("no-medium", "no medium"),
-    ],
-)
-def test_a_gas_gap_is_a_medium(name, regime):
-    assert load(name).system.regime == regime
-
-
 def test_a_stage_that_does_not_end_is_reported():
     press = load("press-hold-pull")
     assert press.run().warnings == ()

@@ -7,6 +7,8 @@ import surfacechem
 from surfacechem.errors import InputError
 from surfacechem.runs.points import read_points
 
+pytestmark = pytest.mark.around
+
 ELEMENT = """
 title: A contact element, all of it prescribed
 T_0: 300 K

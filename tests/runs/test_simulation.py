@@ -14,6 +14,8 @@ from surfacechem.documents import shipped
 from surfacechem.errors import InputError
 from surfacechem.runs import rerun
 
+pytestmark = pytest.mark.around
+
 K_0 = "interface.potential.bond-energy.K_0"
 
 

@@ -19,6 +19,8 @@ from surfacechem.runs.summaries import sweep_summary
 from surfacechem.solve import run as integrate
 from surfacechem.solve.radau.solver import Radau
 
+pytestmark = pytest.mark.around
+
 RATE = "loading.f.ramp.rate"
 K_0 = "interface.potential.bond-energy.K_0"
 

@@ -13,6 +13,8 @@ from surfacechem.results.event_table import event_times
 from surfacechem.solve import names, solver
 from surfacechem.solve.contract import Problem
 
+pytestmark = pytest.mark.around
+
 
 def test_unknown_name() -> None:
     with pytest.raises(ValueError, match="Did you mean 'cvode'"):

@@ -15,6 +15,8 @@ from surfacechem.laws.longrange import LennardJonesSpherePlane
 from surfacechem.references.scene_view import SceneView
 from surfacechem.results.matching import match
 
+pytestmark = pytest.mark.around
+
 SCENE = """
 T_0: 300 K
 bodies:
