@@ -118,7 +118,12 @@ def load_text(
         tree, unused = _without_stale_reference(before, tree)
         text = document.dump(tree)
     # With the text of its tables a case can be read again without their files.
-    whole, own = own_laws.embedded(csvtable.embedded(tree, str(base)), Path(base), allow_code)
+    whole = csvtable.embedded(tree, str(base))
+    if isinstance(tree.value, dict) and "surface" in tree.value:
+        from surfacechem.format import height_files
+
+        whole = height_files.embedded(whole, str(base))
+    whole, own = own_laws.embedded(whole, Path(base), allow_code)
     if whole != tree:
         tree, text = whole, document.dump(whole)
     with laws.known(own):

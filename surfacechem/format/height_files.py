@@ -1,0 +1,94 @@
+"""Heights of a surface from files: a CSV file with the columns x, y and z, or a netCDF file with z over x and y."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+from surfacechem.contracts.units import parse
+from surfacechem.documents import document
+from surfacechem.documents.document import Tree
+from surfacechem.errors import InputError, Place
+from surfacechem.format.csvtable import CSVText
+
+AXES = "xyz"
+NETCDF = ".nc"
+
+Numbers = dict[str, list[float]]
+"""Places along x and y, increasing, and heights, all along y for the first x, then for the next [m]."""
+
+
+def embedded(tree: Tree, base: str) -> Tree:
+    """A case with the numbers of the files that heights name; InputError, with file and place, for holes."""
+    if not isinstance(tree.value, dict):
+        return tree
+    read = {key: (_numbers if key == "heights" else embedded)(child, base) for key, child in tree.value.items()}
+    return replace(tree, value=read)
+
+
+def _numbers(tree: Tree, base: str) -> Tree:
+    """The parameters of heights, from their file if they name one."""
+    if not (isinstance(tree.value, dict) and "file" in tree.value):
+        return tree
+    file = tree.mapping(("file",))["file"]
+    name = file.text("the file of heights")
+    path = document.beside(Path(base), name, file.place)
+    if path is None:
+        raise file.error(f"no file {name} beside the case.")
+    place = Place(str(path))
+    numbers = from_netcdf(path) if path.suffix == NETCDF else from_csv(Tree(document.read(path), place))
+    found = {axis: Tree([Tree(value, place) for value in values], place) for axis, values in numbers.items()}
+    return replace(tree, value=found)
+
+
+def from_csv(content: Tree) -> Numbers:
+    """Heights of a table with a row for each place, in any order."""
+    table = CSVText(content)
+    x, y, z = (table.column(axis, "m", axis) for axis in AXES)
+    heights: dict[tuple[float, float], float] = {}
+    for (line, _), place, height in zip(table.rows, zip(x, y, strict=True), z, strict=True):
+        if place in heights:
+            raise table.error(line, f"a second height at x = {place[0]:g} m, y = {place[1]:g} m.")
+        if not math.isfinite(height):
+            raise table.error(line, "the heights have a hole: z is no finite number there.")
+        heights[place] = height
+    along = sorted(set(x)), sorted(set(y))
+    for place in product(*along):
+        if place not in heights:
+            grid = (
+                f"on {len(along[0])} x {len(along[1])} places none is given at x = {place[0]:g} m, y = {place[1]:g} m"
+            )
+            raise InputError(f"the heights have holes: {grid}.", content.place)
+    return {"x": along[0], "y": along[1], "z": [heights[place] for place in product(*along)]}
+
+
+def from_netcdf(path: Path) -> Numbers:
+    """Heights of a variable z over the coordinates x and y, each with its unit."""
+    import xarray
+
+    place = Place(str(path))
+    try:
+        with xarray.open_dataset(path, engine="netcdf4") as file:
+            data = file.load()
+    except (OSError, ValueError) as error:
+        raise InputError(f"no netCDF file: {error}.", place) from None
+    if not {*AXES} <= {*data.variables} or {*data["z"].dims} != {"x", "y"}:
+        raise InputError("heights are a variable z over the coordinates x and y.", place)
+    x, y, z = (_in_metres(data[axis], axis, place) for axis in AXES)
+    z = z.transpose("x", "y")
+    holes = [(i, j) for i, j in product(range(len(x)), range(len(y))) if not math.isfinite(z.values[i, j])]
+    if holes:
+        where = f"x = {float(x[holes[0][0]]):g} m, y = {float(y[holes[0][1]]):g} m"
+        raise InputError(f"the heights have holes: {len(holes)} of them, the first at {where}.", place)
+    return {"x": x.values.tolist(), "y": y.values.tolist(), "z": z.values.ravel().tolist()}
+
+
+def _in_metres(values: Any, axis: str, place: Place) -> Any:
+    """A variable of a file in metres."""
+    try:
+        return values.astype(float) * parse(f"1 {values.attrs.get('units', '1')}", "m", name=axis)
+    except InputError as error:
+        raise error.at(place) from None
