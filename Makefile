@@ -63,6 +63,7 @@ bench: $(TOOLS)  ## time against error of every solver beside what was kept in b
 	$(BIN)/python benchmarks/steppers.py
 	$(BIN)/python benchmarks/startup.py
 	$(BIN)/python benchmarks/accuracy.py
+	$(BIN)/python benchmarks/surfaces.py
 
 clean:  ## all that make has made
 	rm -rf $(VENV) build dist results site

@@ -264,6 +264,11 @@ def gallery(name: str) -> Figure:
     return plots.figure(surfacechem.run(name).dataset, variables, against)
 
 
+def surfaces(name: str) -> Figure:
+    """Profiles, tractions and force of a case with curved surfaces."""
+    return plots.figure(surfacechem.run(name).dataset, ["traction"])
+
+
 def gas_network() -> Figure:
     """The figure of the notebook."""
     return runpy.run_path(str(Path(__file__).parent / "notebooks" / "gas_network.py"))["figure"]
@@ -311,4 +316,6 @@ FIGURES: dict[str, Callable[[], Figure]] = {
     "oil-film.svg": oil_film,
     "dna-adhesive.svg": adhesive,
     "force-spectrum.svg": force_spectrum,
+    "surfaces-attraction.svg": partial(surfaces, "van-der-waals-sphere"),
+    "surfaces-contact.svg": partial(surfaces, "sticky-sphere"),
 }

@@ -1,0 +1,95 @@
+"""What the force between two curved surfaces costs: errors, pairs of points and processor time over accuracy and gap.
+
+    python benchmarks/surfaces.py
+
+prints three tables and keeps them in benchmarks/results/surfaces.csv: a sphere over a plane at gaps of a thousandth of
+its radius and more, against the closed form; pairs of other shapes; and the error of each rule of the quadrature.
+"""
+
+import csv
+import math
+import time
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from surfacechem.contracts.terms import Shape
+from surfacechem.errors import InputError
+from surfacechem.surfaces import nodes
+from surfacechem.surfaces.pair_laws import InversePower
+from surfacechem.surfaces.pairwise import PairForces, interaction
+from surfacechem.surfaces.projection import Surface
+from surfacechem.surfaces.shapes import Cavity, Cylinder, Paraboloid, Plane, Sphere, Torus
+
+TARGET = Path(__file__).parent / "results" / "surfaces.csv"
+LAW = InversePower(n_1=1.0, n_2=1.0, psi_0=1.0, r_0=1.0, m=6)
+ROUND = {
+    "sphere, plane": (Sphere(R=1.0), Plane()),
+    "sphere, sphere": (Sphere(R=1.0), Sphere(R=2.0)),
+    "sphere in a cavity": (Cavity(R=3.0), Sphere(R=1.0)),
+    "paraboloid, plane": (Paraboloid(R=1.0), Plane()),
+    "torus, plane": (Torus(hole=1.0, r=0.5), Plane()),
+    "parallel cylinders": (Cylinder(R=1.0, length=2.0), Cylinder(R=2.0)),
+}
+PLATES = (Plane(length=1.0, width=0.7), Plane(length=0.8, width=1.0, tilt=0.2))
+REPEAT = 3
+
+
+def measured(shapes: Sequence[Shape], d: float, rtol: float) -> tuple[PairForces, float]:
+    """The forces at a gap, and the least processor time of a few evaluations [ms]."""
+    times = []
+    for _ in range(REPEAT):
+        begin = time.process_time()
+        found = interaction(Surface(shapes[0]), Surface(shapes[1], True, d), [LAW], rtol)
+        times.append(time.process_time() - begin)
+    return found, 1e3 * min(times)
+
+
+def sphere_over_plane(d: float) -> float:
+    """Energy for r^-6 and a radius of one."""
+    return math.pi**2 / 3 * (d**-3 - (d + 2) ** -3)
+
+
+def rows() -> Iterator[tuple[str, float, str, float, int, float]]:
+    """Pair of shapes, gap, accuracy or rule, error, pairs of points and processor time."""
+    for d in (1e-3, 1e-2, 1e-1, 1.0):
+        for digits in (2, 4, 6, 8, 10, 12):
+            found, cost = measured(ROUND["sphere, plane"], d, 10.0**-digits)
+            error = abs(float(found.energy[0]) / sphere_over_plane(d) - 1)
+            yield "sphere, plane", d, f"{10.0**-digits:.0e}", error, found.pairs, cost
+    for name, shapes in ROUND.items():
+        found, cost = measured(shapes, 0.1, 1e-9)
+        yield name, 0.1, "1e-09", found.error, found.pairs, cost
+    for rtol in (1e-2, 1e-3, 1e-4):
+        found, cost = measured(PLATES, 0.6, rtol)
+        yield "tilted plates", 0.6, f"{rtol:.0e}", found.error, found.pairs, cost
+    yield from rules()
+
+
+def rules() -> Iterator[tuple[str, float, str, float, int, float]]:
+    """The error of each rule of Gauss alone, against the closed form."""
+    usual, most = nodes.ORDERS, nodes.MOST_DIVISIONS
+    for order in usual:
+        # A rule that is asked for twice agrees with itself.
+        nodes.ORDERS = (order, order)
+        found, cost = measured(ROUND["sphere, plane"], 0.01, 1e-15)
+        error = abs(float(found.energy[0]) / sphere_over_plane(0.01) - 1)
+        yield "sphere, plane", 0.01, f"{order} points", error, found.pairs, cost
+    nodes.ORDERS, nodes.MOST_DIVISIONS = usual, most
+
+
+def main() -> None:
+    """Print the tables and keep them."""
+    found = []
+    print(f"{'shapes':20s} {'gap/R':>6s} {'asked':>9s} {'error':>8s} {'pairs':>9s} {'ms':>8s}")
+    try:
+        for name, d, asked, error, pairs, cost in rows():
+            print(f"{name:20s} {d:6g} {asked:>9s} {error:8.1e} {pairs:9d} {cost:8.1f}", flush=True)
+            found.append((name, d, asked, f"{error:.1e}", pairs, f"{cost:.1f}"))
+    except InputError as error:
+        print(error)
+    with TARGET.open("w", newline="", encoding="utf-8") as file:
+        csv.writer(file, lineterminator="\n").writerows([("shapes", "gap", "asked", "error", "pairs", "ms"), *found])
+
+
+if __name__ == "__main__":
+    main()

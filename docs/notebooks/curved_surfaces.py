@@ -1,0 +1,101 @@
+# %% [markdown]
+# # The integral, the local law and Derjaguin
+#
+# Two bodies whose points interact pull at each other over their whole surfaces. Three ways lead to the force. The
+# *integral* sums the energy of pairs of points over both surfaces, Sauer, Duong & Mandadapu (2021), eq. e:bt_lr. The
+# *local law* takes the traction between flats at the gap to the nearest point, eq. e:bt_sr, and integrates that over
+# one surface. *Derjaguin* takes the energy between flats at the least gap times $2\pi R$. How far are they apart?
+
+# %%
+import math
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+from surfacechem.surfaces.curved_gap import between_flats, over_gap
+from surfacechem.surfaces.pair_laws import InversePower
+from surfacechem.surfaces.pairwise import interaction
+from surfacechem.surfaces.projection import Surface
+from surfacechem.surfaces.shapes import Cavity, Paraboloid, Plane, Sphere
+
+law = InversePower(n_1=1.0, n_2=1.0, psi_0=-1.0, r_0=1.0, m=6)
+flats = between_flats(law)
+
+# %% [markdown]
+# ## A sphere over a plane
+#
+# For a power $r^{-m}$ the integral is a closed form, here for $R = 1$. Numbers are in units of the radius and of the
+# strength of the pair.
+
+# %%
+gaps = np.geomspace(1e-3, 1.0, 13)
+
+
+def three(shapes, radius, gap):
+    """Force by the integral, by the local law and after Derjaguin, tension positive."""
+    lower, upper = Surface(shapes[0]), Surface(shapes[1], True, gap)
+    local = over_gap(lower, upper, [flats])
+    derjaguin = -2 * math.pi * radius * flats(np.array([gap]))[0, 0]
+    return interaction(lower, upper, [law]).force_1[0, 2], local.force_1[2], derjaguin
+
+
+def closed(gap, m=6):
+    """Force of a sphere of radius one over a plane."""
+    return 4 * math.pi**2 / (m - 2) * (gap ** (2 - m) - (gap + 2) ** (2 - m))
+
+
+forces = np.array([three((Sphere(R=1.0), Plane()), 1.0, gap) for gap in gaps])
+exact = np.array([closed(gap) for gap in gaps])
+print(f"the integral is off by {abs(forces[:, 0] / exact - 1).max():.1e}")
+assert abs(forces[:, 0] / exact - 1).max() < 1e-9
+
+# %% [markdown]
+# What a point of the sphere feels of an endless plane is what it feels of a flat, so that the local law, integrated
+# over the sphere, is exact. Derjaguin leaves out the far side of the sphere.
+
+# %%
+figure, (left, right) = plt.subplots(1, 2, figsize=(8.4, 3.4), layout="constrained")
+left.semilogx(gaps, forces[:, 0] / forces[:, 2], label="integral")
+left.semilogx(gaps, forces[:, 1] / forces[:, 2], "--", label="local law")
+left.axhline(1.0, linestyle=":", color="black", label="Derjaguin")
+left.set(xlabel="gap / radius", ylabel="force / that after Derjaguin", title="Sphere over a plane")
+left.legend()
+
+# %% [markdown]
+# ## Other pairs
+#
+# Between two curved surfaces it is not: each point sees the other surface bend. $R$ is that of the sum of both
+# curvatures at the nearest point.
+# What the local law misses falls like the gap over the radius; Derjaguin is the limit of both.
+
+# %%
+pairs = {
+    "two spheres": ((Sphere(R=1.0), Sphere(R=1.0)), 0.5),
+    "sphere in a cavity": ((Sphere(R=1.0), Cavity(R=3.0)), 1.5),
+    "paraboloid, sphere": ((Paraboloid(R=1.0), Sphere(R=1.0)), 0.5),
+}
+for name, (shapes, radius) in pairs.items():
+    found = np.array([three(shapes, radius, gap) for gap in gaps])
+    off = abs(found[:, 1:] / found[:, :1] - 1)
+    slope = np.log(off[4] / off[0]) / np.log(gaps[4] / gaps[0])
+    (line,) = right.loglog(gaps, off[:, 0], label=name)
+    right.loglog(gaps, off[:, 1], ":", color=line.get_color())
+    print(f"{name:20s} at {gaps[0]:g} R: local law off by {off[0, 0]:.1e}, Derjaguin by {off[0, 1]:.1e}, slopes", slope)
+    assert off[0, 1] < 0.01
+right.loglog(gaps, gaps, color="0.7", linewidth=0.8)
+right.set(xlabel="gap / radius", ylabel="difference to the integral", title="Local law, and Derjaguin dotted")
+right.legend()
+figure
+
+# %% [markdown]
+# ## In a run
+#
+# A case with `surface:` integrates the force once and then drives any gap model. The dataset keeps the integral,
+# `force`, and how far the local law is from it, `local_difference`, at some approaches.
+
+# %%
+import surfacechem
+
+run = surfacechem.run("ball-in-a-socket").dataset
+for approach, force, difference in zip(run.approach.values, run.force.values, run.local_difference.values, strict=True):
+    print(f"{approach * 1e9:6.3f} nm  {force * 1e9:9.5f} nN  local law {difference / force:+.1%}")
