@@ -40,6 +40,7 @@ def _numbers(tree: Tree, base: str) -> Tree:
         raise file.error(f"no file {name} beside the case.")
     place = Place(str(path))
     numbers = from_netcdf(path) if path.suffix == NETCDF else from_csv(Tree(document.read(path), place))
+    # Errors of the numbers, as of places that do not increase, are errors of the file.
     found = {axis: Tree([Tree(value, place) for value in values], place) for axis, values in numbers.items()}
     return replace(tree, value=found)
 
@@ -55,6 +56,7 @@ def from_csv(content: Tree) -> Numbers:
         if not math.isfinite(height):
             raise table.error(line, "the heights have a hole: z is no finite number there.")
         heights[place] = height
+    # Equal places are equal texts, so that no tolerance is needed to find the grid.
     along = sorted(set(x)), sorted(set(y))
     for place in product(*along):
         if place not in heights:

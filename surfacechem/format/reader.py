@@ -58,6 +58,9 @@ OWNERS = {"T_1": 0, "T_2": 1, "T_c": 2}
 RESERVED = ("T_a", "T_from", "T_to")
 TAKEN = ("interface", "surroundings", "reference")
 
+# Keys of the interface under which all bonds would be at the least gap of curved surfaces.
+OF_FLATS = ("sites", "bonding", "mechanism", "friction")
+
 # Cells of a body before a run has chosen them.
 FIRST_CELLS = 16
 
@@ -98,6 +101,8 @@ def read_document(tree: Tree, base: str = ".", mechanism_text: str | None = None
     owners = [body.mapping().get("temperature") for body in bodies.values()]
     temperatures = _temperature_names([*owners, interface.get("temperature")])
     whole = "surface" in top
+    if whole:
+        _refuse_bonds(interface)
     units = {name: WHOLE.get(unit, unit) for name, unit in UNITS.items()} if whole else UNITS
     names = {**units, **dict.fromkeys(temperatures, "K")}
     context = Context(names, temperatures, tuple(bodies) or UNNAMED, whole=whole)
@@ -111,6 +116,15 @@ def read_document(tree: Tree, base: str = ".", mechanism_text: str | None = None
         coverages = (variable.name for variable in mechanism.variables)
         context = replace(context, units={**context.units, **dict.fromkeys(coverages, "1")})
     return read(Document, tree, context), mechanism
+
+
+def _refuse_bonds(interface: Mapping[str, Tree]) -> None:
+    """InputError where an interface of bodies with shapes has bonds or friction of its own."""
+    # Before numbers are read, whose units would be those of a pair.
+    for name in OF_FLATS:
+        if name in interface:
+            text = "is of flats. Over curved surfaces bonds may be in equilibrium with the gap: put the law"
+            raise interface[name].error(f"`{name}` {text} equilibrium-bonds under `surface: {{laws: ...}}`.")
 
 
 def _temperature_names(owners: Sequence[Tree | None]) -> tuple[str, ...]:

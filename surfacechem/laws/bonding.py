@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from surfacechem.contracts.terms import Potential, parameter
-from surfacechem.expressions import Expression, log, mixing
+from surfacechem.expressions import Expression, decay, log, mixing
 from surfacechem.quantities import BOLTZMANN
 
 
@@ -120,3 +120,30 @@ class BondSprings(Potential):
     def energy(self, phi: Expression, g_n: Expression, N_c: Expression) -> Expression:
         """Free energy [J/m^2]."""
         return N_c * phi * self.k_b * (g_n - self.l_0) ** 2 / 2
+
+
+class EquilibriumBonds(Potential):
+    r"""Bonds in equilibrium with the gap at a given temperature: they form and break at once, each a spring across it.
+
+    .. math:: \Psi = -N k_B T \ln (1 + K s), \quad s = e^{-k_b (g_n - l_0)^2 / 2 k_B T}, \quad
+              \phi = \frac{K s}{1 + K s}, \quad t_n = N \phi\,k_b (g_n - l_0)
+
+    The least over :math:`\phi` of ideal mixing with the energy of the springs, with no bonds at zero; for loads that
+    are slow against bonding, at one temperature, that of a bath. For flats and, as it reads the gap alone, for
+    curved surfaces. It bears no contact. Source: Bell, Dembo & Bongrand (1984), doi 10.1016/S0006-3495(84)84252-6, for
+    sites that do not move. Any g_n.
+
+    >>> round(EquilibriumBonds(N=1e16, K=50.0, k_b=1e-3, T=300.0).energy(g_n=0.0) / (1.380649e-23 * 300 * 1e16), 9)
+    -3.931825633
+    """
+
+    N: float = parameter("1/m^2", "density of sites", above=0)
+    K: float = parameter("1", "bonded over free sites where bonds are not stretched", above=0)
+    k_b: float = parameter("N/m", "stiffness of a bond", above=0)
+    T: float = parameter("K", "temperature at which they form and break", above=0)
+    l_0: float = parameter("m", "gap at which bonds are not stretched", default=0.0)
+
+    def energy(self, g_n: Expression) -> Expression:
+        """Free energy [J/m^2]."""
+        heat = BOLTZMANN * self.T
+        return -self.N * heat * log(1 + self.K * decay(self.k_b * (g_n - self.l_0) ** 2 / (2 * heat)))

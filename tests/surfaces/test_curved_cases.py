@@ -129,6 +129,7 @@ def test_heat_flows_over_the_curved_gap_as_integrated_over_the_sphere():
         ("ball: {sphere: {R: 50 nm}}", "ball: plane", "no end: give one of them a length"),
         ("ball: {sphere: {R: 50 nm}}", "ball: {sphere: {R: -1 nm}}", "outside its range"),
         ("to: 9 nm}", "to: 9 nm}\n  acuracy: 1e-3", "Did you mean 'accuracy'"),
+        ("surface:", "interface: {sites: 1e16 1/m^2}\nsurface:", "`sites` is of flats.* equilibrium-bonds"),
     ],
 )
 def test_bad_input_is_one_line_with_its_place(tmp_path, old, new, message):

@@ -6,10 +6,13 @@ import math
 import mpmath
 import numpy as np
 import pytest
+from scipy.optimize import minimize_scalar
 
 from surfacechem.errors import InputError
+from surfacechem.laws.bonding import EquilibriumBonds
 from surfacechem.laws.contact import BondedContact, Penalty
 from surfacechem.laws.longrange import LennardJonesSpherePlane
+from surfacechem.quantities import BOLTZMANN
 from surfacechem.surfaces import nodes
 from surfacechem.surfaces.curved_gap import between_flats, density, over_gap
 from surfacechem.surfaces.pair_laws import InversePower, LennardJonesPair, PairTable, PenaltyPair
@@ -164,6 +167,21 @@ def test_a_sphere_pressed_into_a_penalty():
     assert found.energy == pytest.approx(math.pi * E * R * delta**3 / 3, rel=1e-12)
     assert found.area == pytest.approx(2 * math.pi * R * delta, rel=1e-12)
     assert np.abs(found.moment_1 + found.moment_2).max() <= 1e-13
+
+
+def test_bonds_in_equilibrium_are_the_least_free_energy_and_hold_a_sphere_by_their_energy_between_flats():
+    law = EquilibriumBonds(N=1e16, K=50.0, k_b=1e-3, T=300.0, l_0=1e-9)
+    heat, g = BOLTZMANN * 300.0, 3e-9
+
+    def free(phi):
+        mixing = heat * (phi * math.log(phi) + (1 - phi) * math.log(1 - phi) - phi * math.log(50.0))
+        return 1e16 * (mixing + phi * 1e-3 * (g - 1e-9) ** 2 / 2)
+
+    least = minimize_scalar(free, bounds=(1e-6, 1 - 1e-6), method="bounded", options={"xatol": 1e-10})
+    assert law.energy(g) == pytest.approx(least.fun, rel=1e-12)
+    R = 1e-6
+    found = over_gap(Surface(Sphere(R=R)), Surface(Plane(), True, g), [density(law)])
+    assert found.force_1[2] == pytest.approx(2 * math.pi * R * (law.energy(g + 2 * R) - law.energy(g)), rel=1e-10)
 
 
 def test_a_table_and_a_penalty_of_pairs_end_where_they_say():
