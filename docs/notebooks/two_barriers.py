@@ -67,12 +67,10 @@ spectrum.plot()
 # runs tell, one curve for all rates, are those of the formula:
 
 # %%
-from surfacechem.plots.rupture import lifetimes
-
 data = spectrum.dataset
 work = data["f"].values / (BOLTZMANN * 298.15)
 exact = np.exp(-work * 0.4e-9) / 3 + np.exp(-work * 0.06e-9) / 100
-found = lifetimes(data, "f")
+found = data["lifetime"].values
 known = np.isfinite(found)
 print(f"largest difference: {np.max(np.abs(found / exact - 1)[known]):.1e}")
 assert np.allclose(found[known], np.broadcast_to(exact, found.shape)[known], rtol=1e-8)

@@ -100,6 +100,7 @@ class Bar:
         """Draw what was told last."""
         if not self.wanted or time.monotonic() - self.begun < PATIENCE:
             return
+        # Rich is imported now, so that what is over sooner does not wait for it.
         if self.shown is None:
             from rich.console import Console
             from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
@@ -138,6 +139,7 @@ def following(talk: bool | None) -> Iterator[Bar]:
     bar, logger = Bar(talk), logging.getLogger(LOGGER)
     handler, level = _Followed(bar), logger.level
     logger.addHandler(handler)
+    # Where nobody listens messages are not even put together.
     if bar.wanted or bar.verbose:
         logger.setLevel(logging.INFO)
     try:

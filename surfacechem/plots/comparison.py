@@ -87,6 +87,7 @@ def labels(datasets: Sequence[xarray.Dataset]) -> list[str]:
     every = dict.fromkeys(path for each in known for path in each)
     paths = [path for path in every if len({each.get(path) for each in known}) > 1]
     texts = [str(dataset.attrs.get("title", "")) for dataset in datasets]
+    # More differences than fit into a legend are those of two different cases, whose titles tell them apart.
     if 0 < len(paths) <= MOST_DIFFERENCES:
         names = _short(paths)
         texts = [", ".join(f"{name} = {each.get(path, 'not given')}" for path, name in names.items()) for each in known]
@@ -115,6 +116,7 @@ def _settings(dataset: xarray.Dataset) -> dict[str, str]:
             leaves = [*(tree.value.values() if isinstance(tree.value, dict) else tree.value), *leaves]
         else:
             found[tree.place.path] = str(tree.value)
+    # A run from Python may differ from its case, which the dataset says apart.
     changes = json.loads(str(attributes.get("departures", "{}"))).get("changes", {})
     found |= {path: f"{value:g}" for path, value in changes.items()}
     found |= {name: str(attributes[name]) for name in ("solver", "rtol") if name in attributes}

@@ -234,6 +234,7 @@ def _draw_curves(ax: Axes, dataset: xarray.Dataset, panel: Panel, t: Array) -> N
     groups, marker = merged(dataset, panel.names), "o" if len(t) == 1 else ""
     rest: list[list[str]] = []
     if len(groups) > len(style.COLOURS):
+        # A trace gas beside a full surface is nothing to be told by its colour.
         groups.sort(key=lambda names: -style.largest(dataset[names[0]].values))
         groups, rest = groups[:COLOURED], groups[COLOURED:]
     for names in groups:

@@ -13,7 +13,6 @@ from matplotlib.figure import Figure
 from surfacechem.format.plans import STATISTICS
 from surfacechem.plots import style
 from surfacechem.plots.style import COLOURS, MOST_CURVES, Array, symbol, unit
-from surfacechem.runs.spectrum import INTACT
 
 
 def load_of(dataset: xarray.Dataset) -> str:
@@ -48,27 +47,13 @@ def figure(dataset: xarray.Dataset, load: str, variables: Sequence[str] | None =
 
 def has_series(dataset: xarray.Dataset, load: str) -> bool:
     """Whether a dataset holds what its runs were at each load, too."""
-    return all(name in dataset and load in dataset[name].dims for name in (f"density_{load}", "survival", "time"))
-
-
-def lifetimes(dataset: xarray.Dataset, load: str) -> Array:
-    r"""Mean lifetimes [s] at each load, which a run at a growing load tells: :math:`\tau=S/(p\dot f)`, the survivors
-    over their rate of rupture; not a number where hardly a bond is left. Shape: that of the survival.
-
-    It is the lifetime at a constant load where bonds have no memory, and the same for all rates. Source: Dudko, Hummer
-    & Szabo (2008), PNAS 105, 15755, doi 10.1073/pnas.0806085105.
-    """
-    survival, density = dataset["survival"].values, dataset[f"density_{load}"].values
-    # The load is a straight line in time, so that its first step tells its rate.
-    steps = np.diff(dataset[load].values[:2]) / np.diff(dataset["time"].values[..., :2], axis=-1)
-    known = (survival > INTACT) & (density > 0)
-    found: Array = np.divide(survival, density * steps, out=np.full(survival.shape, np.nan), where=known)
-    return found
+    return all(name in dataset and load in dataset[name].dims for name in (f"density_{load}", "lifetime"))
 
 
 def _members(dataset: xarray.Dataset, load: str) -> list[tuple[tuple[int, ...], str]]:
     """Places of some runs, evenly spread over those whose most probable load is inside the range, with their names."""
     modes = dataset[f"{load}_mode"].values
+    # At slow loads most bonds break before there is any load, and their peak at zero would dwarf all others.
     inside = np.argwhere(modes > dataset[load].values[0])
     places = inside if len(inside) else np.argwhere(np.isfinite(modes))
     chosen = places[np.unique(np.linspace(0, len(places) - 1, MOST_CURVES).round().astype(int))] if len(places) else []
@@ -100,7 +85,7 @@ def _draw_density(ax: Axes, dataset: xarray.Dataset, load: str) -> None:
 
 
 def _draw_lifetime(ax: Axes, dataset: xarray.Dataset, load: str) -> None:
-    _draw_over(ax, dataset, load, lifetimes(dataset, load), below=0.7)
+    _draw_over(ax, dataset, load, dataset["lifetime"].values, below=0.7)
     ax.set(ylabel=rf"Lifetime $\tau$({symbol(load)}) [s]", yscale="log")
 
 
@@ -108,6 +93,8 @@ def _draw_series(ax: Axes, dataset: xarray.Dataset, load: str, name: str) -> Non
     """A variable over the load."""
     if name == f"density_{load}":
         return _draw_density(ax, dataset, load)
+    if name == "lifetime":
+        return _draw_lifetime(ax, dataset, load)
     values = dataset[name].values
     _draw_over(ax, dataset, load, values)
     text, size = style.prefixed(unit(dataset[name]), values)

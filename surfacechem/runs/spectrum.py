@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import symengine
+from numpy.typing import NDArray
 
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, derivative
@@ -21,6 +22,8 @@ from surfacechem.model.system import Account, Margin, Named, System
 from surfacechem.quantities import Quantity
 from surfacechem.solve.run import Trajectory
 from surfacechem.tolerances import FEWEST
+
+Array = NDArray[np.float64]
 
 INTACT = FEWEST**0.5
 """With more survivors at the end, 1e-6, the mean is not known: what is left then is less than half of the decades to
@@ -96,6 +99,21 @@ def with_rupture(system: System, variable: str) -> System:
             Margin("mode", _total(system, falling), MODE, terminal=False),
         ),
     )
+
+
+def lifetimes(survival: Array, density: Array, speed: Array) -> Array:
+    r"""Mean lifetimes [s] at each load from runs at growing loads: :math:`\tau=S/(p\,\dot x)`, the survivors over how
+    fast they break; not a number where hardly a bond is left. The ``speed`` of the load is one for each run.
+
+    It is the lifetime at a constant load where bonds have no memory, and the same for all speeds. Source: Dudko, Hummer
+    & Szabo (2008), PNAS 105, 15755, doi 10.1073/pnas.0806085105.
+
+    >>> lifetimes(np.array([1.0, 0.5]), np.array([2e9, 1e9]), np.array([1e-10]))
+    array([5., 5.])
+    """
+    known = (survival > INTACT) & (density > 0)
+    found: Array = np.divide(survival, density * speed, out=np.full(survival.shape, np.nan), where=known)
+    return found
 
 
 def _total(system: System, expression: Expression) -> Expression:

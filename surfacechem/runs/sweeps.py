@@ -314,7 +314,16 @@ class SweepSolution(Results):
             if self.accuracy and which in self.accuracy.exact:
                 exact = self.accuracy.exact[which]
                 columns.append(self._of_each(f"{name}_exact", exact, quantity.unit, f"exact {text}"))
-        return tuple(columns)
+        return (*columns, *([self._lifetime(columns)] if self.statistics else []))
+
+    def _lifetime(self, columns: Sequence[Column]) -> Column:
+        """Lifetimes over the load, which grows at the same speed all along each run."""
+        known, load = {column.name: column for column in columns}, self.inner
+        # Runs until a load are refused where it is no straight line in time.
+        speed = np.diff(known[load].values[:2]) / np.diff(known["time"].values[..., :2], axis=-1)
+        values = spectrum.lifetimes(known["survival"].values, known[f"density_{load}"].values, speed)
+        text = f"mean lifetime at a constant {known[load].long_name}, of bonds without memory"
+        return Column("lifetime", (*self.axes, load), values, "s", text)
 
     def _coordinates(self, load: Column | None) -> list[Column]:
         """The swept parameters, and the times or, where a load ends the runs, the values of this."""
