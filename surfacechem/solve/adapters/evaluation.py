@@ -98,6 +98,7 @@ class StateRows:
         self._ends = np.zeros((count, 1 + 2 * n))
         self._counts = np.zeros((count, COLUMNS), np.int64)
         self._table = np.ascontiguousarray(self.inputs[:, None, 1 + 2 * n :])
+        self._rates = _Code(program.rates, self.inputs) if program.rates else None
         self._search = stepper.Repeated(search_batch(program, self._ends, self._table, self._counts))
         self._fill = _Fill(program, self.inputs)
         self._ledger = _Code(program.ledger, self.inputs)
@@ -113,6 +114,10 @@ class StateRows:
         """Go to states, and find derivatives and algebraic variables of each; not a number where there are none."""
         self.hold(times, y)
         self._fill()
+        if self._rates is not None:
+            self.ydot[:] = self._rates()
+            self.inputs[~np.isfinite(self.ydot).all(axis=1), 1 : 1 + 2 * self.program.n] = np.nan
+            return
         n = self.program.n
         if self.program.filler is not None:
             self._table[:, 0] = self.inputs[:, 1 + 2 * n :]
