@@ -17,7 +17,7 @@ from surfacechem.errors import InputError
 from surfacechem.surfaces.nodes import integral, outer_nodes
 from surfacechem.surfaces.pairwise import check_finite, kernel, length
 from surfacechem.surfaces.projection import Array, Projection, Surface
-from surfacechem.tolerances import PRECISE, TINY, ULPS
+from surfacechem.tolerances import NEGLIGIBLE, PRECISE, TINY, ULPS
 
 GAP = "g_n"
 
@@ -139,10 +139,22 @@ def over_gap(
 
     pieces = [integral(integrand, box, sizes, rtol) for box in boxes(around.box, around.nodes, upper, levels)]
     whole = np.sum([part for part, _ in pieces], axis=0)
+    if not np.all(np.isfinite(around.surface.shape.span)):
+        _check_end(integrand(around.box[1][None], 1)[0], sizes(whole))
     force_1, force_2, moment_1, moment_2 = np.split(whole[1:13], 4)
     energy, area, conductance, slope = map(float, whole[[0, 13, 14, 15]])
     error = max(error for _, error in pieces)
     return Contact(energy, force_1, force_2, moment_1, moment_2, area, conductance, slope, gap, error)
+
+
+def _check_end(edge: Array, sizes: Array) -> None:
+    """InputError where what is integrated over an endless surface does not fall off on the way to its far end."""
+    share = np.abs(edge / sizes)
+    # Energies may count from anywhere; a force or a conductance that has no end is none.
+    for name, part in (("force", share[1:7]), ("conductance", share[14:15])):
+        if part.max() > NEGLIGIBLE:
+            text = f"the {name} over a surface without end has no end either: give that body a radius or a length"
+            raise InputError(f"{text}, or name the other one first.")
 
 
 def counts_at(x: Array, near: Projection, laws: Sequence[Density], heat: Sequence[Callable[[Array], Array]]) -> Array:
