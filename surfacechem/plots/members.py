@@ -108,8 +108,10 @@ def maps(dataset: xarray.Dataset, plan: Plan, axes: Sequence[str], names: Sequen
 def portraits(dataset: xarray.Dataset, axes: Sequence[str], variables: Sequence[str] | None, against: str) -> Figure:
     """Each run of a sweep over one of its variables, or over time."""
     series = along(dataset, axes)
+    # Along the runs there is time, or where a load ends them, the load.
+    inner = [str(dim) for name in series for dim in dataset[name].dims if dim not in axes]
     for name in (*(variables or ()), against):
-        if name not in (*series, "time"):
+        if name not in (*series, *inner):
             raise InputError(f"no variable '{name}' along the runs of the sweep.{suggestion(name, series)}")
     usual = [name for _, *kind in KINDS[:2] for name in of_kind(dataset, series, *kind)]
     moving = [name for name in usual if name != against and varies(fair(dataset, name))]
@@ -161,12 +163,14 @@ def colours(dataset: xarray.Dataset, axes: Sequence[str]) -> ScalarMappable:
 
 def looks(dataset: xarray.Dataset, axes: Sequence[str], member: int) -> dict[str, Any]:
     """How the curve of a run looks: a colour that tells its parameter where there is one, a legend where few are."""
+    shape = dataset["status"].shape
+    if RUN not in axes and np.prod(shape) <= style.MOST_CURVES:
+        place = [int(k) for k in np.unravel_index(member, shape)]
+        return {"color": COLOURS[member], "linewidth": 1.3, "label": style.member_name(dataset, place)}
     if len(axes) > 1 or RUN in axes:
         return {"color": COLOURS[0], "linewidth": 0.7, "alpha": 0.35}
-    parameter = dataset[axes[0]]
-    if len(parameter) <= style.MOST_CURVES:
-        return {"color": COLOURS[member], "linewidth": 1.3, "label": style.valued(parameter, member)}
-    return {"color": colours(dataset, axes).to_rgba(parameter.values[member]), "linewidth": 0.9}
+    value = dataset[axes[0]].values[member]
+    return {"color": colours(dataset, axes).to_rgba(value), "linewidth": 0.9}
 
 
 def effects(

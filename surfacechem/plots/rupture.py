@@ -57,11 +57,7 @@ def _members(dataset: xarray.Dataset, load: str) -> list[tuple[tuple[int, ...], 
     inside = np.argwhere(modes > dataset[load].values[0])
     places = inside if len(inside) else np.argwhere(np.isfinite(modes))
     chosen = places[np.unique(np.linspace(0, len(places) - 1, MOST_CURVES).round().astype(int))] if len(places) else []
-    names = [str(name) for name in dataset["status"].dims]
-    return [
-        (tuple(at), ", ".join(style.valued(dataset[name], i) for name, i in zip(names, at, strict=True)))
-        for at in np.asarray(chosen, dtype=int).tolist()
-    ]
+    return [(tuple(at), style.member_name(dataset, at)) for at in np.asarray(chosen, dtype=int).tolist()]
 
 
 def _draw_over(ax: Axes, dataset: xarray.Dataset, load: str, values: Array, below: float = 0.0) -> None:

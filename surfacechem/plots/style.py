@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
@@ -261,6 +261,11 @@ def valued(values: xarray.DataArray, place: int) -> str:
     value = values.values[place]
     text, size = prefixed(unit(values), values.values[place : place + 1])
     return f"{str(values.name).replace('_', ' ')} = {value / size:.4g} {'' if text == '1' else text}".rstrip()
+
+
+def member_name(dataset: xarray.Dataset, place: Sequence[int]) -> str:
+    """The parameters of a run of a sweep, by its place along each of them."""
+    return ", ".join(valued(dataset[str(name)], k) for name, k in zip(dataset["status"].dims, place, strict=True))
 
 
 def by_second(dataset: xarray.Dataset, values: Array) -> list[tuple[Array, str]]:

@@ -41,5 +41,7 @@ def test_the_figure_has_spectrum_distributions_and_lifetimes(spectrum):
 def test_variables_are_drawn_over_the_load_or_over_the_rate(spectrum):
     over_load = plots.figure(spectrum, ["density_f", "survival"]).axes
     assert {ax.get_xlabel() for ax in over_load} == {"Force per bond, tension positive $f$ [pN]"}
+    (each,) = plots.figure(spectrum, ["phi"], "f").axes
+    assert [len(line.get_xdata()) for line in each.get_lines()] == 3 * [spectrum.sizes["f"]]
     (over_rate,) = plots.figure(spectrum, ["f_mean"]).axes
     assert over_rate.get_lines()[0].get_xdata().tolist() == [1e-12, 1e-10, 1e-9]
