@@ -5,8 +5,8 @@
 through, as a dataset).
 """
 
-from surfacechem.reactor.gas import ReactingGas
+from surfacechem.reactor.gas import ReactingGas, ReactingGasAtPressure
 from surfacechem.reactor.interface import InterfaceReactor, InterfaceStopped
 from surfacechem.reactor.network import ReactorNet
 
-__all__ = ["InterfaceReactor", "InterfaceStopped", "ReactingGas", "ReactorNet"]
+__all__ = ["InterfaceReactor", "InterfaceStopped", "ReactingGas", "ReactingGasAtPressure", "ReactorNet"]

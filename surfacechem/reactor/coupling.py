@@ -19,7 +19,7 @@ from surfacechem.laws.loading import Hold
 from surfacechem.mechanism.evaluated import Neighbour, SurfaceEngine
 from surfacechem.model.components.interface import LOADABLE
 from surfacechem.quantities import VARIABLES
-from surfacechem.reactor.gas import ReactingGas
+from surfacechem.reactor.gas import Receiver
 from surfacechem.scene import Body, Scene
 
 FORCES = ("Pa", "N", "W/m^2")
@@ -84,7 +84,7 @@ def with_neighbours(scene: Scene, reactors: Mapping[str, Any]) -> Scene:
     if not isinstance(engine, SurfaceEngine):
         raise InputError("no reaction of the scene has a neighbour, so no reactor can be one.")
     for name, reactor in reactors.items():
-        if not isinstance(reactor, ReactingGas | cantera.Reservoir):
+        if not isinstance(reactor, Receiver | cantera.Reservoir):
             raise InputError(f"the neighbour {name} must be a ReactingGas, as {type(reactor).__name__} takes nothing.")
     states = {name: _state(reactor.phase) for name, reactor in reactors.items()}
     return replace(scene, interface=replace(scene.interface, engine=engine.beside(states)))

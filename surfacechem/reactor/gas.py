@@ -10,22 +10,24 @@ import numpy as np
 
 from surfacechem.solve.contract import Array
 
-MASS, TEMPERATURE, SPECIES = 0, 2, 3
-"""Places of an IdealGasReactor's variables: mass, volume, temperature, and then mass fractions."""
 
+class Receiver:
+    """What a gas beside interfaces adds to Cantera's own balances.
 
-class ReactingGas(cantera.ExtensibleIdealGasReactor):
-    """Cantera's IdealGasReactor for a gas beside the surface of an interface.
-
-    It takes what an IdealGasReactor takes. ``InterfaceReactor(..., neighbours={name: gas})`` makes it a neighbour, of
-    one interface or of several.
+    ``temperature`` is the place of that among its variables: after it come mass fractions, the first is the mass.
     """
+
+    temperature: int
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
-        self.weights = self.phase.molecular_weights
         self.sources: list[Callable[[float], tuple[Array, float]]] = []
         """Amounts of species [kmol/s] and enthalpy [W] that come in at a time [s]."""
+        self.weights = self.phase.molecular_weights  # type: ignore[attr-defined]
+
+    def energies(self) -> Array:
+        """What a species holds of the quantity in whose balance the temperature is [J/kmol]."""
+        raise NotImplementedError
 
     def after_eval(self, t: float, _lhs: Any, rhs: Any) -> None:
         """Called by Cantera after its own balances of mass, energy and species, which this adds to."""
@@ -33,8 +35,30 @@ class ReactingGas(cantera.ExtensibleIdealGasReactor):
             amounts, enthalpy = source(t)
             masses = amounts * self.weights
             total = masses.sum()
-            rhs[MASS] += total
-            if self.energy_enabled:  # its left side is the heat capacity at constant volume
-                rhs[TEMPERATURE] += enthalpy - amounts @ self.phase.partial_molar_int_energies
-            own = np.asarray(rhs)[SPECIES : SPECIES + len(masses)]
-            own += masses - total * self.phase.Y
+            rhs[0] += total
+            if self.energy_enabled:  # type: ignore[attr-defined]  # its left side is the heat capacity
+                rhs[self.temperature] += enthalpy - amounts @ self.energies()
+            own = np.asarray(rhs)[self.temperature + 1 : self.temperature + 1 + len(masses)]
+            own += masses - total * self.phase.Y  # type: ignore[attr-defined]
+
+
+class ReactingGas(Receiver, cantera.ExtensibleIdealGasReactor):
+    """Cantera's IdealGasReactor for a gas beside the surface of an interface.
+
+    It takes what an IdealGasReactor takes. ``InterfaceReactor(..., neighbours={name: gas})`` makes it a neighbour, of
+    one interface or of several.
+    """
+
+    temperature = 2
+
+    def energies(self) -> Array:
+        return np.asarray(self.phase.partial_molar_int_energies)
+
+
+class ReactingGasAtPressure(Receiver, cantera.ExtensibleIdealGasConstPressureReactor):
+    """Cantera's IdealGasConstPressureReactor for a gas beside the surface of an interface."""
+
+    temperature = 1
+
+    def energies(self) -> Array:
+        return np.asarray(self.phase.partial_molar_enthalpies)

@@ -19,7 +19,7 @@ from surfacechem.errors import InputError
 from surfacechem.format import Case
 from surfacechem.reactor.coupling import Port, node_of, refuse, suffix_of
 from surfacechem.reactor.embedded import EmbeddedScene, EndError
-from surfacechem.reactor.gas import ReactingGas
+from surfacechem.reactor.gas import Receiver
 from surfacechem.reactor.history import History
 from surfacechem.runs.simulation import Simulation
 from surfacechem.solve.adapters.cantera_network import LEDGER_UNIT, BackOffError, HeldReactor, contents
@@ -94,7 +94,7 @@ class InterfaceReactor(HeldReactor):
         for body, reactor in self.bodies.items():
             self._connect(reactor, self.scene.account(body))
         for gas in self.neighbours.values():
-            if isinstance(gas, ReactingGas):
+            if isinstance(gas, Receiver):
                 gas.sources.append(partial(self._given, gas))
 
     def __repr__(self) -> str:
@@ -124,7 +124,7 @@ class InterfaceReactor(HeldReactor):
         cantera.Wall(self, reactor, A=self.area, Q=lambda t: -float(self.attempt(lambda: self._rates(t))[account]))
         self._connecting = False
 
-    def _given(self, gas: ReactingGas, t: float) -> tuple[Array, float]:
+    def _given(self, gas: Receiver, t: float) -> tuple[Array, float]:
         """Amounts of species [kmol/s] that reactions give to a neighbour at a time [s], and their enthalpy [W]."""
         rates = self.attempt(lambda: self._rates(t))
         amounts, enthalpy = next(item for item in self.scene.beside if item.reactor is gas).given(rates)
