@@ -58,6 +58,10 @@ def schema() -> Schema:
             kind = {} if _is_required(law) else {"type": ["object", "null"]}
             definitions[f"{contract.contract}.{name}"] = {**schema_of(law), **kind}
         definitions[contract.contract] = _any_law(contract)
+    # Heights from a file become the numbers of the law before it is read.
+    heights = f"{Shape.contract}.heights"
+    measured = {"type": "string", "description": "a CSV or netCDF file of x, y and z beside the case"}
+    definitions[heights] = {"anyOf": [definitions[heights], closed({"file": measured}, ["file"])]}
     document = schema_of(Document)
     document["properties"]["bodies"] |= {"minProperties": 2, "maxProperties": 2}
     document["properties"]["run"]["anyOf"] = [{"required": ["until"]}, {"required": ["times"]}]

@@ -1,5 +1,6 @@
 """Heights of a surface from files: the same from either kind, and holes told with file and place."""
 
+import jsonschema
 import numpy as np
 import pytest
 import xarray
@@ -7,6 +8,7 @@ import xarray
 from surfacechem.documents.document import parse
 from surfacechem.errors import InputError
 from surfacechem.format import height_files
+from surfacechem.format.schema import schema
 from surfacechem.laws import find
 from surfacechem.surfaces.projection import Shape, Surface
 
@@ -38,6 +40,8 @@ def given(folder, name):
 def test_both_kinds_of_files_give_the_surface_that_was_measured(tmp_path):
     (tmp_path / "scan.csv").write_text(table(reversed(ROWS)))
     netcdf(tmp_path, Z)
+    shape = {"$ref": "#/$defs/shape.heights", "$defs": schema()["$defs"]}
+    assert jsonschema.Draft202012Validator(shape).is_valid({"file": "scan.csv"})
     csv, nc = (given(tmp_path, name) for name in ("scan.csv", "scan.nc"))
     for axis in "xyz":
         assert nc[axis] == pytest.approx(csv[axis], rel=1e-15)
