@@ -12,17 +12,21 @@ EVERY_CASE = ("test_zoo", "test_cases", "test_dataset", "test_scene_view")
 """Files of tests that ask for a run of every shipped case, which case_runs.py keeps for all in a worker."""
 
 
-LONG = (*EVERY_CASE, "test_docs", "test_random_scenes", "test_jump_heat", "test_conduction")
+LONG = (
+    *EVERY_CASE,
+    *("test_docs", "test_random_scenes", "test_jump_heat", "test_rate_and_state", "test_cli_process", "test_streaming"),
+    *("test_reactor", "test_reactor_jumps", "test_conduction", "test_plane", "test_stability", "test_precision"),
+)
 """Files that take longest: they go first, so that no worker is left alone with one of them at the end."""
 
 
 def pytest_collection_modifyitems(items):
-    items.sort(key=lambda item: item.path.stem not in LONG)
+    items.sort(key=lambda item: LONG.index(item.path.stem) if item.path.stem in LONG else len(LONG))
 
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config, log):
-    """With ``--dist loadfile``, files that run every case go to the same worker."""
+    """With ``--dist loadfile``, files that run every case go to the same worker, and files in the order of above."""
     from xdist.scheduler import LoadFileScheduling
 
     class LoadSharedRuns(LoadFileScheduling):
@@ -30,4 +34,7 @@ def pytest_xdist_make_scheduler(config, log):
             file = super()._split_scope(nodeid)
             return "every case" if Path(file).stem in EVERY_CASE else file
 
-    return LoadSharedRuns(config, log) if config.getvalue("dist") == "loadfile" else None
+    if config.getvalue("dist") != "loadfile":
+        return None
+    config.option.loadscopereorder = False
+    return LoadSharedRuns(config, log)
