@@ -8,8 +8,8 @@ from hypothesis import settings
 settings.register_profile("surfacechem", deadline=None, max_examples=30)
 settings.load_profile("surfacechem")
 
-EVERY_CASE = ("test_zoo", "test_cases", "test_dataset", "test_scene_view")
-"""Files of tests that ask for a run of every shipped case, which case_runs.py keeps for all in a worker."""
+EVERY_CASE = ("test_zoo", "test_cases", "test_dataset", "test_scene_view", "test_case_files")
+"""Files of tests that ask for every shipped case or its run, which case_runs.py keeps for all in a worker."""
 
 
 LONG = (

@@ -2,13 +2,14 @@
 
 import json
 
+import case_runs
 import jsonschema
 import pytest
 
 from surfacechem import references
 from surfacechem.documents import document
 from surfacechem.documents import shipped as data
-from surfacechem.format import load, names, schema
+from surfacechem.format import names, schema
 
 VALIDATOR = jsonschema.Draft202012Validator(schema.schema())
 
@@ -34,10 +35,10 @@ def test_every_law_has_its_entry():
 
 @pytest.mark.parametrize("name", names())
 def test_case(name):
-    case = load(name)
+    case = case_runs.load(name).case
     assert case.title != name
     assert case.source
-    assert case.system().warnings == ()
+    assert case_runs.load(name).system.warnings == ()
     assert case.reference is None or case.reference.name in references.names()
     assert [error.message for error in VALIDATOR.iter_errors(plain(name))] == []
 
