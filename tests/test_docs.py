@@ -134,7 +134,7 @@ def test_a_law_is_known_once_its_class_is_in_the_file(tmp_path):
     """Nothing but the class of the page "Adding a law" is put into the package."""
     shown = {block.title: block.body for block in blocks(ROOT / "docs" / "adding-a-law.md") if block.title}
     for folder in ("surfacechem", "cases", "mechanisms"):
-        shutil.copytree(ROOT / folder, tmp_path / folder)
+        shutil.copytree(ROOT / folder, tmp_path / folder, ignore=shutil.ignore_patterns("*.pyc.*"))
     with (tmp_path / "surfacechem/laws/friction.py").open("a") as file:
         file.write("\n\n" + shown["surfacechem/laws/friction.py"])
     (tmp_path / "eyring.yaml").write_text(shown["eyring.yaml"])

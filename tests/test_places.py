@@ -198,7 +198,7 @@ def test_places(name, tmp_path):
     place = PLACES[name]
     assert len(place.added) == 1
     for folder in ("surfacechem", "mechanisms"):
-        shutil.copytree(ROOT / folder, tmp_path / folder)
+        shutil.copytree(ROOT / folder, tmp_path / folder, ignore=shutil.ignore_patterns("*.pyc.*"))
     for file, (anchor, text) in place.added.items():
         path = tmp_path / "surfacechem" / file
         before = path.read_text(encoding="utf-8") if path.exists() else ""
