@@ -390,6 +390,7 @@ def plot(
         str | None,
         Option("--against", metavar="VARIABLE", help="A variable as the axis, instead of time or what is swept."),
     ] = None,
+    celsius: Annotated[bool, Option("--celsius", help="Temperatures in degrees Celsius.")] = False,
     changes: Changes = None,
     talk: Talk = None,
 ) -> None:
@@ -407,7 +408,7 @@ def plot(
     solutions = {case: solved(load(case, changes or ()).run, talk, brief=True) for case in cases}
     names = listed(variables) if variables else None
     shown = [solutions[source].dataset if source in solutions else source for source in sources]
-    plots.write(plots.figure(shown, names, against), target)
+    plots.write(plots.figure(shown, names, against, celsius), target)
     if talk is not False:
         typer.echo(str(target))
     for solution in solutions.values():

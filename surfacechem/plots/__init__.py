@@ -23,6 +23,7 @@ def figure(
     data: xarray.Dataset | str | Path | Sequence[xarray.Dataset | str | Path],
     variables: Sequence[str] | None = None,
     against: str | None = None,
+    celsius: bool = False,
 ) -> Figure:
     """The figure that suits a dataset or its netCDF file, of a run, of a sweep, or of a study; or of several of them.
 
@@ -35,16 +36,20 @@ def figure(
     against
         The variable along the axis: instead of time, and of a sweep, whose runs are then drawn each, instead of what is
         swept.
+    celsius
+        Whether temperatures are in degrees Celsius instead of kelvins.
 
     Raises
     ------
     InputError
         Where a file is no dataset of surfacechem, or has no variable of a name.
     """
-    from surfacechem.plots import comparison, run, study, sweep
+    from surfacechem.plots import comparison, run, study, style, sweep
 
     several = [data] if isinstance(data, str | Path) or not isinstance(data, Sequence) else data
     datasets = [opened(each) for each in several]
+    if celsius:
+        datasets = [style.in_celsius(dataset) for dataset in datasets]
     if len(datasets) > 1:
         return comparison.figure(datasets, variables, against)
     (dataset,) = datasets

@@ -22,9 +22,9 @@ from surfacechem.plots import curved, style
 from surfacechem.plots.style import Array, meaning, symbol, unit, varies
 from surfacechem.tolerances import EPS, ROUNDING
 
-# Panels of the usual figure: title, unit and pattern of the names.
+# Panels of the usual figure: title, and patterns of the unit and of the names.
 KINDS: tuple[tuple[str, str, str], ...] = (
-    ("Temperature", "K", r".*"),
+    ("Temperature", "K|degC", r".*"),
     ("Bonding", "1", r"(?!formed_|departure_|.*_residual$|J_c$|n_c$|gamma_m$|ln_theta$|drive$).*"),
     ("Gap", "m", r"g_\w*"),
     ("Displacement", "m", r"u_t2?"),
@@ -150,9 +150,9 @@ def is_mode(values: xarray.DataArray) -> bool:
     return str(values.attrs.get("long_name", "")).startswith("mode (")
 
 
-def of_kind(dataset: xarray.Dataset, names: Sequence[str], unit_wanted: str, pattern: str) -> list[str]:
+def of_kind(dataset: xarray.Dataset, names: Sequence[str], units: str, pattern: str) -> list[str]:
     """Those of the names that a panel of the usual figure shows; modes are shown as bands, exact values dashed."""
-    fitting = [name for name in names if unit(dataset[name]) == unit_wanted and re.fullmatch(pattern, name)]
+    fitting = [name for name in names if re.fullmatch(units, unit(dataset[name])) and re.fullmatch(pattern, name)]
     return [name for name in fitting if not (name.endswith("_exact") or is_mode(dataset[name]))]
 
 
@@ -178,15 +178,17 @@ def _by_unit(dataset: xarray.Dataset, names: Sequence[str]) -> list[Panel]:
 
 def _by_kind(dataset: xarray.Dataset, known: Sequence[str]) -> list[Panel]:
     panels = []
-    for title, wanted, pattern in KINDS:
-        names = of_kind(dataset, known, wanted, pattern)
+    for title, units, pattern in KINDS:
+        names = of_kind(dataset, known, units, pattern)
         if title == "Heat flux" and {"q_1", "q_2"} & set(names):
             names = [name for name in names if name in ("q_1", "q_2")]
         # What is nothing beside another quantity of its unit is rounding of what both are made of.
-        sizes = {name: style.largest(dataset[name].values) for name in known if unit(dataset[name]) == wanted}
+        sizes = {
+            name: style.largest(dataset[name].values) for name in known if re.fullmatch(units, unit(dataset[name]))
+        }
         felt = EPS * max(sizes.values(), default=0.0)
         if any(varies(dataset[name].values) and sizes[name] > felt for name in names):
-            panels.append(Panel(title, wanted, names))
+            panels.append(Panel(title, unit(dataset[names[0]]), names))
     return panels
 
 
@@ -196,6 +198,7 @@ def _across(dataset: xarray.Dataset, names: Sequence[str]) -> Figure:
         if not PROFILE.fullmatch(name) or name not in dataset:
             raise InputError(f"{name} goes over time, a profile over places; show them in figures of their own.")
     shown = np.unique(np.linspace(0, dataset.sizes["time"] - 1, PROFILE_TIMES).round().astype(int))
+    shown_unit = style.unit_text(unit(dataset[names[0]]))
     with style.panels(6.4, 3.4) as (plot, ((ax,),)):
         for j, i in enumerate(shown.tolist()):
             colour = matplotlib.colormaps["viridis"](j / max(len(shown) - 1, 1) * 0.9)
@@ -203,7 +206,7 @@ def _across(dataset: xarray.Dataset, names: Sequence[str]) -> Figure:
                 side = -1e3 if name == "profile_1" else 1e3  # [mm]
                 label = f"{float(dataset.time[i]):.3g} s" if name == names[0] else None
                 ax.plot(side * dataset[f"x_{name[-1]}"].values, dataset[name].values[i], color=colour, label=label)
-        ax.set(xlabel="Distance from the contact [mm], body 1 to the left", ylabel="Temperature [K]")
+        ax.set(xlabel="Distance from the contact [mm], body 1 to the left", ylabel=f"Temperature [{shown_unit}]")
         style.legend(ax)
         style.headings(plot, ax, dataset)
     return plot

@@ -54,6 +54,9 @@ FLAT = 1000 * ROUNDING
 TAKES_PREFIX = ("J", "N", "Pa", "W", "m", "s")
 PLAIN = (0.1, 1e3)
 
+FREEZING = 273.15
+"""Zero degrees Celsius [K]."""
+
 PREFIXES = {-5: "f", -4: "p", -3: "n", -2: "µ", -1: "m", 0: "", 1: "k", 2: "M", 3: "G", 4: "T"}
 
 GREEK = ("alpha", "beta", "epsilon", "eta", "kappa", "lambda", "mu", "phi", "rho", "sigma", "tau", "theta")
@@ -112,6 +115,15 @@ def opened(data: xarray.Dataset | str | Path) -> xarray.Dataset:
             return file.load()
 
     return reading(path, load)
+
+
+def in_celsius(dataset: xarray.Dataset) -> xarray.Dataset:
+    """The dataset with its temperatures in degrees Celsius."""
+    found = dataset.assign_coords()  # a copy that shares all else
+    for name, values in dataset.variables.items():
+        if values.attrs.get("units") == "K":
+            found[name] = (values.dims, values.values - FREEZING, {**values.attrs, "units": "degC"})
+    return found
 
 
 def check(
@@ -206,7 +218,7 @@ def unit_text(unit: str) -> str:
     >>> unit_text("W m-2 K-1")
     'W m$^{-2}$ K$^{-1}$'
     """
-    return re.sub(r"([A-Za-z])(-?\d+)", r"\1$^{\2}$", unit)
+    return re.sub(r"([A-Za-z])(-?\d+)", r"\1$^{\2}$", unit).replace("degC", "°C")
 
 
 def prefixed(unit: str, values: Array) -> tuple[str, float]:

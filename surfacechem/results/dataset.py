@@ -149,7 +149,7 @@ class Results(ABC):
             raise InputError(f"no variable '{name}'.{suggestion(name, map(str, self.dataset))}")
         return self.dataset[name]
 
-    def plot(self, variables: Sequence[str] | None = None, against: str | None = None) -> Figure:
+    def plot(self, variables: Sequence[str] | None = None, against: str | None = None, celsius: bool = False) -> Figure:
         """The figure of the dataset, which a notebook shows; ``savefig`` writes it.
 
         Parameters
@@ -158,13 +158,15 @@ class Results(ABC):
             Names of the variables to show, instead of the usual choice.
         against
             The variable along the axis, instead of time.
+        celsius
+            Whether temperatures are in degrees Celsius instead of kelvins.
 
         Raises
         ------
         InputError
             Where the dataset has no variable of a name.
         """
-        figure: Figure = _above("plots").figure(self.dataset, variables, against)
+        figure: Figure = _above("plots").figure(self.dataset, variables, against, celsius)
         return figure
 
     def report(self, path: str | Path = "report.html") -> Path:

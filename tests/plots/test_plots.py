@@ -180,3 +180,10 @@ def test_runs_that_ended_at_once_and_values_that_are_not_finite():
 
 def test_symbols():
     assert symbol("theta_bond_s") == r"$\theta_{\mathrm{bond\ s}}$"
+
+
+def test_temperatures_in_degrees_celsius():
+    kelvins, celsius = (figure(dataset(), celsius=wanted).axes[0] for wanted in (False, True))
+    assert (kelvins.get_ylabel(), celsius.get_ylabel()) == ("Temperature [K]", "Temperature [°C]")
+    curves = zip(kelvins.lines, celsius.lines, strict=True)
+    assert all(np.allclose(one.get_ydata() - other.get_ydata(), 273.15, rtol=1e-12) for one, other in curves)
