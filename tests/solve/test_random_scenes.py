@@ -115,7 +115,7 @@ def entropy_is_produced(solution: Solution, scene: Scene) -> None:
         assert any("destroys entropy" in warning for warning in solution.warnings)
 
 
-@settings(max_examples=10, deadline=None, derandomize=True)
+@settings(max_examples=25, deadline=None, derandomize=True)
 @given(st.integers(0, 10**6))
 def test_random_scenes(seed):
     if check(seed).startswith(REFUSED):
