@@ -10,6 +10,7 @@ Source: Sauer, Duong & Mandadapu (2021), eqs. e:bt_lr and e:psi12ex.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -22,6 +23,12 @@ from surfacechem.surfaces.nodes import MOST_NODES, inner_nodes, integral, is_rou
 from surfacechem.surfaces.projection import Array, Surface
 from surfacechem.surfaces.shapes import Plane
 from surfacechem.tolerances import NOISE, PRECISE, TINY
+
+REMOTE = np.array([1e3, 2e3])
+"""Distances over the size of the surfaces at which it is seen how a law falls off."""
+
+MOST_DECADES = 100
+"""Reach over gap, in decades, at most: the largest area is its square."""
 
 COUNT = 13
 """Energy, and three components of two forces and two moments."""
@@ -71,6 +78,9 @@ def interaction(lower: Surface, upper: Surface, laws: Sequence[PairEnergy], rtol
     kernels, pairs = [kernel(law) for law in laws], 0
     slowest = min(laws, key=lambda law: law.decay)
     size = length(lower, upper)
+    for law in laws:
+        _check_decay(law, size, rtol)
+    _check_energy(lower, upper, slowest)
     around, gap = outer_nodes(outer, inner, size, size * rtol ** (-1 / (slowest.decay - 2)))
     if not gap > NOISE * size:
         raise InputError(
@@ -100,10 +110,39 @@ def check_finite(lower: Surface, upper: Surface) -> None:
         raise InputError("both surfaces have no end: give one of them a length, so that the force has one.")
 
 
+def _check_decay(law: PairEnergy, size: float, rtol: float) -> None:
+    """InputError where a law falls off slower than it says, or so slowly that no reach is far enough."""
+    if math.isfinite(law.cutoff):
+        return
+    near, far = np.abs(kernel(law)(size * REMOTE)[:, 0])
+    power = math.log2(near / far) if far > 0 else math.inf
+    if power < law.decay - NOISE:
+        text = f"{law.name()} falls off like r^-{power:.3g} over long distances, slower than r^-{law.decay:g}"
+        raise InputError(f"{text} as its `decay` says; state a `decay` that it has, above 2.", law.place)
+    if -math.log10(rtol) > MOST_DECADES * (law.decay - 2):
+        text = f"{law.name()} falls off like r^-{law.decay:g}, too slowly for the accuracy {rtol:.2g}"
+        raise InputError(f"{text}; a plane takes no end of energy where it is r^-2.", law.place)
+
+
+def _check_energy(lower: Surface, upper: Surface, law: PairEnergy) -> None:
+    """InputError where two surfaces without end separate so slowly that their energy has no end."""
+    shapes = [surface.shape for surface in (lower, upper)]
+    turned = [shape for shape in shapes if shape.about_axis and not np.all(np.isfinite(shape.span))]
+    endless = turned and not any(np.all(np.isfinite(shape.span)) for shape in shapes)
+    # At the distance u their gap is u^p, and what flats have of a power m of it is 2 pi u du u^(p (2 - m)).
+    separation = max(shape.rises for shape in shapes)
+    if endless and math.isinf(law.cutoff) and separation * (law.decay - 2) <= 2:
+        text = f"two surfaces without end have no end of energy where points interact like r^-{law.decay:g}"
+        raise InputError(f"{text}: give the {' and the '.join(shape.name() for shape in turned)} a radius.")
+
+
 def length(lower: Surface, upper: Surface) -> float:
     """A length of the surfaces [m]: the largest radius or extent."""
-    spans = [b - a for s in (lower, upper) if not s.shape.about_axis for a, b in s.shape.span if np.isfinite(b - a)]
-    return float(max([*lower.shape.lengths, *upper.shape.lengths, *spans], default=1.0))
+    shapes = [surface.shape for surface in (lower, upper)]
+    # What comes round is an angle.
+    ends = [end for s in shapes if not s.about_axis for end, closed in zip(s.span, s.closed, strict=True) if not closed]
+    spans = [b - a for a, b in ends if np.isfinite(b - a)]
+    return float(max([*shapes[0].lengths, *shapes[1].lengths, *spans], default=1.0))
 
 
 def _sums(

@@ -221,6 +221,8 @@ class Paraboloid(Turned):
     (2.0, 0.0, -1.0)
     """
 
+    rises = 2
+
     R: float = parameter("m", "radius of curvature at the highest point", above=0, varies=False)
 
     def point(self, u: Expression, v: Expression) -> Point:
@@ -240,6 +242,7 @@ class Cone(Turned):
     """
 
     radii = ("radius",)
+    rises = 1
 
     slope: float = parameter("rad", "angle between its side and the plane", above=0, at_most=STEEPEST, varies=False)
 

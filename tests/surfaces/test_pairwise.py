@@ -19,7 +19,7 @@ from surfacechem.surfaces.curved_gap import between_flats, density, over_gap
 from surfacechem.surfaces.pair_laws import InversePower, LennardJonesPair, PairTable, PenaltyPair
 from surfacechem.surfaces.pairwise import interaction
 from surfacechem.surfaces.projection import Surface
-from surfacechem.surfaces.shapes import Cavity, Cylinder, Paraboloid, Plane, Sphere, Torus
+from surfacechem.surfaces.shapes import Cavity, Cone, Cylinder, Disc, Paraboloid, Plane, Sphere, Torus
 
 GAS = density(GasGap(between=("a", "b"), k=0.026, M=0.3))
 
@@ -236,3 +236,39 @@ def test_what_has_no_integral_is_refused(make, message, monkeypatch):
     monkeypatch.setattr(nodes, "MOST_DIVISIONS", 3)
     with pytest.raises(InputError, match=message):
         make()
+
+
+def test_cylinders_that_overlap_are_seen_however_large_their_angles_are_as_numbers():
+    """Crossed cylinders are, near their point of contact, a paraboloid whose flats at one gap are ellipses."""
+    R, r, depth, stiffness = 5e-8, 2e-8, 1e-10, 1e16
+    lower, upper = Surface(Cylinder(R=R)), Surface(Cylinder(R=r, turn=math.pi / 2), True, -depth)
+    found = over_gap(lower, upper, [density(Penalty(E_n=stiffness))], rtol=1e-3)
+    shallow = math.pi * math.sqrt(R * r) * depth**2 * stiffness
+    assert math.isclose(-found.force_1[2], shallow, rel_tol=5 * depth / r)
+
+
+@pytest.mark.parametrize(
+    ("shape", "m", "words"),
+    [
+        (Disc(), 4.0, "give the disc a radius"),
+        (Cone(slope=0.7), 3.0, "give the cone a radius"),
+        (Paraboloid(R=1e-8), 3.0, "give the paraboloid a radius"),
+        (Sphere(R=1e-8), 2.01, "too slowly for the accuracy 1e-10"),
+    ],
+)
+def test_sums_without_end_are_refused(shape, m, words):
+    with pytest.raises(InputError, match=words):
+        pair(Plane(), shape, 1e-9, [power(m)])
+
+
+class Slow(InversePower):
+    """A law that says that it falls off faster than it does."""
+
+    decay = 4.0
+    parts = None
+
+
+def test_a_law_that_falls_off_slower_than_it_says_is_refused():
+    law = Slow(n_1=1e18, n_2=1e18, psi_0=-4e-21, r_0=1e-9, m=2.2)
+    with pytest.raises(InputError, match=r"slow falls off like r\^-2.2 .* slower than r\^-4"):
+        pair(Plane(), Sphere(R=5e-8), 1e-9, [law])
