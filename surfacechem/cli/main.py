@@ -460,9 +460,7 @@ def report(
     is_file = source.endswith(SUFFIXES)
     if is_file and changes:
         raise InputError("a dataset is reported as it is; give a case to change values of.", Place(path="--set"))
-    target = output or Path(f"{Path(source).stem}.html")
-    if target.suffix.lower() not in (".html", ".htm"):
-        raise InputError(f"a report is HTML: give {target.with_suffix('.html').name}.", Place(path=str(target)))
+    target = run_report.report_path(output or f"{Path(source).stem}.html")
     refuse_unwritable(target)
     solution = None if is_file else solved(load(source, changes or ()).run, talk, brief=True)
     solved(lambda: run_report.write(solution.dataset if solution else source, target), talk)

@@ -181,6 +181,11 @@ class Results(ABC):
         -------
         Path
             The file.
+
+        Raises
+        ------
+        InputError
+            Where the name of the file is that of another format.
         """
         written: Path = _above("studies.run_report").write(self.dataset, path)
         return written

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from surfacechem import format as cases
 from surfacechem.compile import printing
-from surfacechem.errors import InputError
+from surfacechem.errors import InputError, Place
 from surfacechem.model.system import System
 from surfacechem.plots import drawing, figure, opened, save
 from surfacechem.results import spatial
@@ -65,12 +65,21 @@ def page(data: xarray.Dataset | str | Path) -> Page:
     return Page(attributes.get("title", "untitled"), command, sections, omissions, lambda: figure(dataset))
 
 
+def report_path(path: str | Path) -> Path:
+    """The path of a report; InputError where its suffix is that of another format."""
+    target = Path(path)
+    if target.suffix.lower() not in (".html", ".htm"):
+        raise InputError(f"a report is HTML: give {target.stem or 'report'}.html.", Place(str(path)))
+    return target
+
+
 def write(data: xarray.Dataset | str | Path, path: str | Path) -> Path:
     """Save the report of a dataset as one HTML file, whole or not at all."""
+    target = report_path(path)
     text = page(data).html()
-    with replacing(Path(path)) as temporary:
+    with replacing(target) as temporary:
         temporary.write_text(text, encoding="utf-8")
-    return Path(path)
+    return target
 
 
 def glance(results: Results) -> str:

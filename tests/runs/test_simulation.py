@@ -177,6 +177,8 @@ def test_a_solution_is_read_drawn_and_told_by_itself(simulation, tmp_path, swept
     assert solution["T"].identical(solution.dataset["T"])
     assert solution.plot(["T"]).axes[0].lines
     assert solution.report(tmp_path / "page.html").read_text().startswith("<!DOCTYPE html>")
+    with pytest.raises(InputError, match=r"page.pdf: a report is HTML: give page.html"):
+        solution.report("page.pdf")
     assert "data:image/png;base64," in solution._repr_html_()
     with pytest.raises(InputError, match=r"no variable 'phy'\. Did you mean 'phi'\?"):
         solution["phy"]
