@@ -18,7 +18,7 @@ from surfacechem import laws
 from surfacechem.contracts.terms import Law
 from surfacechem.documents import document
 from surfacechem.documents.document import Tree
-from surfacechem.errors import InputError, Place
+from surfacechem.errors import InputError, Place, PlacedError
 
 KEYS = ("file", "sha256", "python")
 
@@ -80,12 +80,11 @@ def read(source: str, name: str, place: Place | None = None) -> Sequence[type[La
         linecache.cache[name] = (len(source), None, source.splitlines(keepends=True), name)
         try:
             exec(compile(source, name, "exec"), vars(module))
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             del sys.modules[module.__name__]
             lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == name]
             line = error.lineno if isinstance(error, SyntaxError) else (lines or [0])[-1]
-            message = f"{type(error).__name__}: {error.msg if isinstance(error, SyntaxError) else error}"
-            raise InputError(message, Place(name, line or 0)) from error
+            raise InputError(_failure(error), Place(name, line or 0)) from error
         _run[checksum] = module
     found = laws.in_module(_run[checksum])
     if not found:
@@ -93,3 +92,12 @@ def read(source: str, name: str, place: Place | None = None) -> Sequence[type[La
     for law in found:
         laws.check_own(law)
     return found
+
+
+def _failure(error: BaseException) -> str:
+    """What an error in the code says."""
+    if isinstance(error, PlacedError):
+        return error.message
+    if isinstance(error, SystemExit):
+        return "the file ends the process (SystemExit); it is to define laws only."
+    return f"{type(error).__name__}: {error.msg if isinstance(error, SyntaxError) else error}"

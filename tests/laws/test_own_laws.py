@@ -98,6 +98,8 @@ def test_a_checksum_tells_which_file_is_meant(folder):
     [
         ("x = 1 / 0\n", "slime.py:1: ZeroDivisionError: division by zero"),
         ("\nx = (\n", r"slime.py:2: SyntaxError: '\(' was never closed"),
+        ("\nraise SystemExit(0)\n", r"slime.py:2: the file ends the process \(SystemExit\)"),
+        ("import surfacechem\nsurfacechem.load('no-case')\n", "^slime.py:2: no file and no case 'no-case'"),
         ("x = 1\n", "slime.py defines no law: a law is a subclass of Friction"),
         (LAW.replace("Slime", "Coulomb"), "Coulomb has the name of the friction law 'coulomb' of the package"),
     ],
