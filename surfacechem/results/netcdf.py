@@ -201,11 +201,13 @@ def write_netcdf(path: Path, columns: Sequence[Column], attributes: Mapping[str,
 
 
 def reading(path: Path, read: Callable[[], R]) -> R:
-    """What is read from a netCDF file; InputError where it is none, or damaged."""
+    """What is read from a netCDF file; InputError where there is none, or it is damaged."""
     try:
         size = path.stat().st_size
         _try_elsewhere(path, PATIENCE + size / SLOWEST)
         return read()
+    except FileNotFoundError:
+        raise InputError(f"there is no file {path}.") from None
     except Exception as error:  # of a damaged file the library may meet anything
         reason = " ".join(str(getattr(error, "strerror", None) or error).split()) or type(error).__name__
         raise InputError(f"is not a readable netCDF dataset: {reason}.", Place(str(path))) from error

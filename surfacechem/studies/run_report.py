@@ -48,7 +48,8 @@ def page(data: xarray.Dataset | str | Path) -> Page:
     """The report of a dataset of a run or a sweep, or of its file."""
     dataset = opened(data)
     if "case" not in dataset.attrs or "status" not in dataset.attrs:
-        raise InputError("is no dataset of a run or of a sweep.")
+        place = Place(str(data)) if isinstance(data, str | Path) else None
+        raise InputError("this is no dataset of a run or of a sweep.", place)
     command = f"surfacechem rerun {Path(data).name}" if isinstance(data, str | Path) else "surfacechem rerun RUN.nc"
     attributes, omissions = dataset.attrs, []
     sections = [PageSection("What happened", [_ending(attributes), *_warnings(attributes)], figure=True)]

@@ -145,7 +145,7 @@ class TestRun:
         ),
         (["equations", "bonding.yaml", "--format", "pyton"], "Did you mean 'python'?"),
         (["laws", "colomb"], "Did you mean 'coulomb'?"),
-        (["plot", "nothing.nc"], "nothing.nc: is not a readable netCDF dataset"),
+        (["plot", "nothing.nc"], "there is no file nothing.nc."),
         (["plot", "bonding.yaml", "-o", "x.gif"], "no format 'gif'"),
         (["plot", "bonding.yaml", "-o", "no/x.png"], "no/x.png: cannot be written"),
         (["plot", "bonding.yaml", "--variables", "T,fi"], "no variable 'fi'"),

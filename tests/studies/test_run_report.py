@@ -67,10 +67,13 @@ def test_nothing_overflows_on_a_phone_or_in_print(report, tmp_path):
     assert print_out.read_bytes().startswith(b"%PDF")
 
 
-def test_a_report_of_events_lists_them_with_verdicts():
+def test_a_report_of_events_lists_them_with_verdicts(tmp_path):
     dataset = surfacechem.run("stick-slip").dataset
     text = run_report.page(dataset).text()
     assert text.count("slip forward") == 6
     assert "Error against run time" in text
-    with pytest.raises(InputError, match="is no dataset of a run or of a sweep"):
+    with pytest.raises(InputError, match="this is no dataset of a run or of a sweep"):
         run_report.page(dataset.drop_attrs())
+    dataset[["time"]].drop_attrs().to_netcdf(tmp_path / "bare.nc")
+    with pytest.raises(InputError, match=r"bare.nc: this is no dataset of a run or of a sweep"):
+        run_report.page(tmp_path / "bare.nc")
