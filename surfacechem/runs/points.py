@@ -211,6 +211,10 @@ class Evaluator:
         return values, slopes, margins
 
 
+FLUXES = ("Pa", "W/m^2", "N", "W")
+"""Units of tractions and heat fluxes, whose derivatives a contact element takes by name, zeros among them."""
+
+
 class Slopes:
     """Rows of expressions with their exact derivatives by some arguments, compiled together, and with some margins."""
 
@@ -324,9 +328,9 @@ def _column(quantity: Quantity, values: Array) -> Column:
 
 
 def _by(x: Quantity, shown: Sequence[Quantity], slopes: Array, there: NDArray[np.bool_]) -> Iterator[Column]:
-    """Derivatives of quantities by one, of those that depend on it."""
+    """Derivatives of quantities by one, of those that depend on it; of tractions and heat fluxes all of them."""
     for quantity, values, depends in zip(shown, slopes, there, strict=True):
-        if depends:
+        if depends or quantity.unit in FLUXES:
             name = "_by_".join(DATASET_NAMES.get(name, name) for name in (quantity.name, x.name))
             text = f"derivative of the {quantity.long_name} by the {x.long_name}"
             yield Column(name, POINT, values, quotient(quantity.unit, x.unit), text)

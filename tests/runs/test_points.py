@@ -59,6 +59,7 @@ def test_a_prescribed_contact_gives_what_its_formulas_say(element):
     }
     assert found["t_n_by_phi"].values == pytest.approx(np.where(gaps < 0, 0, 2e12 * gaps), rel=1e-14)
     assert found["t_coulomb_by_g_n"].values == pytest.approx(np.where(gaps < 0, -0.3 * 50e12, 0), rel=1e-14)
+    assert np.array_equal(found["t_n_by_T_c"].values, np.zeros(3))  # a tangent has its zeros, too
     assert found["q_1"].values == pytest.approx(1500.0, rel=1e-14)
     assert found["q_2_by_T_c"].values == pytest.approx(250.0, rel=1e-14)
     assert found["C_1"].values == pytest.approx(1000.0, rel=1e-14)
