@@ -131,6 +131,11 @@ def read(path: Path, name: str = "", limits: Limits = CASE) -> str:
         raise InputError(f"cannot be read: {error.strerror or error}.", place) from None
     if len(data) > limits.largest:
         raise InputError(f"larger than {limits.largest} bytes.", place)
+    return decoded(data, place)
+
+
+def decoded(data: bytes, place: Place) -> str:
+    """The text of bytes in UTF-8."""
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError:

@@ -19,7 +19,7 @@ NO_VALUE = (None, "")
 WHOLE = {"interface.mechanism": "file"}
 
 
-def apply(tree: Tree, overrides: Sequence[str] | Mapping[str, object]) -> Tree:
+def apply(tree: Tree, overrides: str | Sequence[str] | Mapping[str, object]) -> Tree:
     """The tree with the given values; texts are "path=value" with the value in YAML.
 
     A number for a parameter that varies replaces its value and keeps its factors. No value, or null, removes the key
@@ -43,14 +43,14 @@ def assignments(texts: Sequence[str]) -> dict[str, object]:
     return {path: tree.plain() for path, tree in _pairs(texts)}
 
 
-def written(overrides: Sequence[str] | Mapping[str, object]) -> list[str]:
+def written(overrides: str | Sequence[str] | Mapping[str, object]) -> list[str]:
     """Given values as texts "path=value" that give the same values again.
 
     >>> written({"f": 3e-12, "reference": None, "loading.v": {"level": "3 nm/s"}})
     ['f=3e-12', 'reference=null', 'loading.v={"level": "3 nm/s"}']
     """
     if not isinstance(overrides, Mapping):
-        return list(overrides)
+        return [overrides] if isinstance(overrides, str) else list(overrides)
     # Texts are read as YAML, of which JSON is a part; from_plain turns numbers of NumPy into plain ones.
     plain = {p: v if isinstance(v, str) else json.dumps(from_plain(v, Place()).plain()) for p, v in overrides.items()}
     return [f"{path}={text}" for path, text in plain.items()]
@@ -69,9 +69,9 @@ def parameter_path(path: str, known: Container[str]) -> str:
     return next((other for other in others if other in known), path)
 
 
-def _pairs(overrides: Sequence[str] | Mapping[str, object]) -> Iterator[tuple[str, Tree]]:
+def _pairs(overrides: str | Sequence[str] | Mapping[str, object]) -> Iterator[tuple[str, Tree]]:
     given: list[tuple[str, object]] = list(overrides.items()) if isinstance(overrides, Mapping) else []
-    for text in () if isinstance(overrides, Mapping) else overrides:
+    for text in () if isinstance(overrides, Mapping) else written(overrides):
         path, equals, after = text.partition("=")
         if not equals or not path.strip():
             raise InputError(f"'{text}' is not of the form path=value, for example `run.until=5 s`.", Place(ORIGIN))

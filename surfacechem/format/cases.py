@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from io import TextIOBase
+from io import BufferedIOBase, TextIOBase
 from pathlib import Path
 
 from surfacechem import laws
@@ -25,9 +25,9 @@ from surfacechem.model.assemble import assemble
 from surfacechem.model.system import System
 from surfacechem.results import spatial
 from surfacechem.scene import Scene
-from surfacechem.solve.run import Run
+from surfacechem.solve.run import Run, refuse_nothing
 
-Overrides = Sequence[str] | Mapping[str, object]
+Overrides = str | Sequence[str] | Mapping[str, object]
 
 
 @dataclass(frozen=True)
@@ -54,6 +54,10 @@ class Case:
     def run(self) -> Run:
         """How it is run; InputError where it does not say it."""
         if self.own_run is None:
+            try:
+                refuse_nothing(self.system())
+            except InputError as error:
+                raise self.located(error) from None
             message = "the case needs `run`: times, accuracy, solver, for example `run: {until: 5 s}`."
             raise InputError(message, self.places[""])
         return self.own_run
@@ -75,22 +79,26 @@ class Case:
         return InputError(error.message, self.places[path])
 
 
-Source = str | Path | Mapping[str, object] | TextIOBase
+Source = str | Path | Mapping[str, object] | TextIOBase | BufferedIOBase
 """A case: its file, the name of a shipped one, its text, its keys and values, or an open file."""
 
 
 def load(source: Source, overrides: Overrides = ()) -> Case:
     """Read a case from a file, a text of several lines, a mapping or an open file, or a shipped one by its name.
 
-    ``overrides`` are texts "path=value" or a mapping from path to value, put into the document before it is read.
+    ``overrides`` are a text "path=value", several of them, or a mapping from path to value, put into the document
+    before it is read.
     """
     if isinstance(source, Mapping):
         return load_text(document.dump(document.from_plain(dict(source), Place())), overrides=overrides)
+    if isinstance(source, str) and not source.strip():
+        raise InputError("the text of the case is empty.")
     if isinstance(source, str) and "\n" in source:
         return load_text(source, overrides=overrides)
-    if isinstance(source, TextIOBase):
-        file = Path(str(getattr(source, "name", "case.yaml")))
-        return load_text(source.read(), file.stem, file.parent, overrides=overrides, file=str(file))
+    if isinstance(source, TextIOBase | BufferedIOBase):
+        file, content = Path(str(getattr(source, "name", "case.yaml"))), source.read()
+        text = content if isinstance(content, str) else document.decoded(content, Place(str(file)))
+        return load_text(text, file.stem, file.parent, overrides=overrides, file=str(file))
     if not isinstance(source, str | Path):
         message = f"a case is a path, a name, a text, a mapping or an open file, not {type(source).__name__}."
         raise InputError(message)

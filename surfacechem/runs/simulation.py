@@ -48,8 +48,8 @@ def load(source: Source, overrides: Overrides = ()) -> Simulation:
         The path of a case file or the name of a shipped case; a text of several lines, a mapping of the keys of a case,
         or an open file. Files that a text or a mapping names are looked for in the working directory.
     overrides
-        What to change in the case before it is read: texts "path=value", or a mapping from path to value, as numbers in
-        SI or as texts with units.
+        What to change in the case before it is read: a text "path=value", a list of them, or a mapping from path to
+        value, as numbers in SI or as texts with units.
 
     Returns
     -------
@@ -140,7 +140,8 @@ class Simulation:
 
     def __repr__(self) -> str:
         """Title and states in a line."""
-        return f"<Simulation {self.case.title!r}: {', '.join(state.name for state in self.system.states)}>"
+        states = ", ".join(state.name for state in self.system.states) or "nothing to solve"
+        return f"<Simulation {self.case.title!r}: {states}>"
 
     @classmethod
     def of(cls, scene: Scene, run: Run | None = None, title: str = "a scene in Python") -> Simulation:

@@ -183,7 +183,7 @@ def values_of(system: System, changes: Mapping[str, float] | None = None) -> dic
     return values
 
 
-def _refuse_nothing(system: System) -> None:
+def refuse_nothing(system: System) -> None:
     """InputError where a scene has no state."""
     if not system.states:
         remedy = "Let a temperature or bonds evolve, or give the case to `surfacechem evaluate`."
@@ -194,7 +194,7 @@ class Model:
     """A system with its machine code, made when it is built."""
 
     def __init__(self, system: System) -> None:
-        _refuse_nothing(system)
+        refuse_nothing(system)
         start = time.perf_counter()
         n, inputs = len(system.states), system.inputs
         filler, outside = None, system.outside

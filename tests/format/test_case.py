@@ -162,6 +162,7 @@ def test_an_override_without_a_value_removes_its_key_or_law(nothing):
 
 
 def test_overrides_come_in_order_and_make_what_is_missing():
+    assert load("cooling-to-zero", "run.until=1 s").run.times[-1] == 1.0
     changed = load("cooling-to-zero", ["run.until=1 s", "run.until=2 s", "interface.partition=0.25", "run.outputs=3"])
     assert changed.run.times == (0.0, 1.0, 2.0)
     assert changed.scene.interface.partition == 0.25

@@ -143,6 +143,8 @@ def test_what_cannot_be_a_point_is_refused(points, message, element):
         element.evaluate(points)
 
 
-def test_a_run_of_what_is_prescribed_names_the_command_that_evaluates_it(element):
+@pytest.mark.parametrize("changes", [(), "run="])
+def test_a_run_of_what_is_prescribed_names_the_command_that_evaluates_it(element, tmp_path, changes):
+    assert repr(element).endswith(": nothing to solve>")
     with pytest.raises(InputError, match=r"element.yaml:4: bodies: there is nothing to solve.*`surfacechem evaluate`"):
-        element.run()
+        surfacechem.load(tmp_path / "element.yaml", changes).run()

@@ -140,8 +140,9 @@ def test_a_case_is_a_path_a_text_a_mapping_or_an_open_file(tmp_path):
     text = path.read_text()
     content = YAML(typ="safe").load(text)
     content["initial"]["T"] = np.float64(300)
-    with path.open() as file:
-        found = [surfacechem.load(source) for source in (path, str(path), text, content, file, io.StringIO(text))]
+    with path.open() as file, path.open("rb") as raw:
+        sources = (path, str(path), text, content, file, raw, io.StringIO(text))
+        found = [surfacechem.load(source) for source in sources]
     first = found[0].run().dataset["T"].values
     assert all(np.array_equal(simulation.run().dataset["T"].values, first) for simulation in found[1:])
 
@@ -149,6 +150,8 @@ def test_a_case_is_a_path_a_text_a_mapping_or_an_open_file(tmp_path):
 @pytest.mark.parametrize(
     ("source", "message"),
     [
+        ("", "the text of the case is empty"),
+        (io.BytesIO(b"\xff"), "case.yaml: no text in UTF-8"),
         (3, "a case is a path, a name, a text, a mapping or an open file, not int"),
         ({"bodies": object()}, "a case holds numbers, texts, lists and mappings, not object"),
         ("title: none\n", "case.yaml:1: the case needs `bodies`"),
