@@ -5,6 +5,7 @@ from functools import cache
 
 from random_laws import T_0, Dice, laws
 
+from mechanisms import SHIPPED
 from surfacechem.contracts.terms import (
     BodyEnergy,
     Friction,
@@ -130,7 +131,7 @@ class Composer:
     # -- laws -----------------------------------------------------------------------------------------------------
 
     def _mechanism(self) -> None:
-        self.mechanism, self.bonds = _mechanism(self.dice.pick(*sorted(mechanisms().glob("*.yaml")))), False
+        self.mechanism, self.bonds = _mechanism(mechanisms() / self.dice.pick(*SHIPPED)), False
         first, *_, last = self.mechanism.species
         share = self.dice.pick(0.0, 1e-9, self.dice.random.random(), 1.0)
         self.initial |= self.mechanism.coverages({first: 1 - share, last: share})
