@@ -38,7 +38,7 @@ CODES = {
     0: "finished",
     DIFFERENT: "rerun: the new values are not bit for bit those of the file",
     BAD_INPUT: "bad input; nothing was computed",
-    3: "physics stopped the run (of a sweep, every run) before its end; what it reached is written, with the reason",
+    3: "physics stopped the run (of a sweep, every run) or refuses a point; what was reached is written, and why",
     4: "the run failed numerically; what it reached is written",
     UNWRITTEN: "the result could not be written",
     SIGNALLED + 2: "interrupted (128 plus its number for another signal); nothing was written",

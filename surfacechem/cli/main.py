@@ -203,7 +203,7 @@ def evaluate(
     points: Annotated[
         Path | None,
         Argument(
-            metavar="[POINTS.csv]", help="States, one per row; the first line names them with units: g_n [nm], T_1 [K]."
+            metavar="[POINTS.csv]", help="States, one per row; the first line names them with units: g_n [nm], phi [1]."
         ),
     ] = None,
     output: Annotated[
@@ -230,6 +230,8 @@ def evaluate(
         found.write(target)
     if not quiet:
         show(points_summary(found, target))
+    if reason := next(filter(None, found.refused), ""):
+        leave_with("stopped", reason if quiet else "")
 
 
 @app.command()

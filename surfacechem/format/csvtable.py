@@ -21,7 +21,7 @@ TEXTS = {
     "column": "the column of the values, if not named after the variable",
 }
 KEYS = tuple(TEXTS)
-HEADING = re.compile(r"(?P<name>[A-Za-z]\w*)\s*\[(?P<unit>[^\]]+)\]")
+HEADING = re.compile(r"(?P<name>[A-Za-z]\w*)(\s*\[(?P<unit>[^\]]+)\])?")
 EXAMPLE = '"t [s], w_n [um]"'
 
 
@@ -73,25 +73,36 @@ def digest(text: str) -> str:
 
 
 class CSVText:
-    """A table as text: a heading of names and units, and rows; lines that are empty or comments do not count."""
+    """A table as text: a heading of names and units, and rows; lines that are empty or comments do not count.
 
-    def __init__(self, content: Tree) -> None:
+    A name without a unit is that of a dimensionless quantity. Messages quote a heading only where the user has named
+    the file, since a case may come from anywhere.
+    """
+
+    def __init__(self, content: Tree, quoted: bool = False) -> None:
         self.place = content.place
-        lines = enumerate(content.text("the table").splitlines(), start=1)
+        given = content.value if isinstance(content.value, str) else content.text("the table")
+        lines = enumerate(given.splitlines(), start=1)
         kept = [(line, text) for line, text in lines if text.strip() and not text.lstrip().startswith("#")]
         cells = csv.reader(text for _, text in kept)
         rows = [(line, [cell.strip() for cell in row]) for (line, _), row in zip(kept, cells, strict=True)]
         if not rows:
             raise content.error(f"the table is empty; its first line names the columns and their units: {EXAMPLE}.")
         self.heading, *self.rows = rows
-        found = [HEADING.fullmatch(cell) for cell in self.heading[1]]
-        if None in found:
-            column = f"the heading of column {found.index(None) + 1} is no name with a unit"
-            raise self.error(self.heading[0], f"{column}; the first line is like {EXAMPLE}.")
-        self.columns = [(match["name"], match["unit"].strip()) for match in found if match]
+        self.columns = self._columns(quoted)
         for line, row in self.rows:
             if len(row) != len(self.columns):
                 raise self.error(line, f"{len(row)} values for {len(self.columns)} columns.")
+
+    def _columns(self, quoted: bool) -> list[tuple[str, str]]:
+        """Names and units of the columns; a unit may be empty."""
+        line, cells = self.heading
+        found = [HEADING.fullmatch(cell) for cell in cells]
+        if None in found:
+            column = found.index(None)
+            which = f"'{cells[column]}'" if quoted else f"of column {column + 1}"
+            raise self.error(line, f"the heading {which} is no name with a unit, like w_n [um] or phi [1].")
+        return [(match["name"], (match["unit"] or "").strip()) for match in found if match]
 
     def error(self, line: int, message: str) -> InputError:
         """An input error at a line, of the file or of the text that stands in the case itself."""
@@ -101,17 +112,10 @@ class CSVText:
 
     def column(self, name: str, unit: str, variable: str) -> list[float]:
         """The numbers of a column, which are values of a variable, in SI."""
-        names = [known for known, _ in self.columns]
-        if names.count(name) > 1:
-            raise self.error(self.heading[0], f"the column {name} is there {names.count(name)} times.")
-        if name not in names:
-            others = [other for other in names if other != "t"]
-            other = others[0] if len(others) == 1 else "NAME"
-            # A column of another name is never meant by itself.
-            remedy = f" To take one of another name, write `column: {other}`." if others and name != "t" else ""
-            raise self.error(self.heading[0], f"no column '{name}'.{suggestion(name, names)}{remedy}")
-        index, found = names.index(name), []
-        given = self.columns[index][1]
+        index, found = self._index(name), []
+        given = self.columns[index][1] or "1"
+        if not self.columns[index][1] and unit != "1":
+            raise self.error(self.heading[0], f"the heading '{name}' needs a unit: {name} [{unit}].")
         whose = name if name == variable else f"{variable}, from the column {name},"
         for line, row in self.rows:
             try:
@@ -123,3 +127,16 @@ class CSVText:
             except InputError as error:
                 raise self.error(line, error.message) from None
         return found
+
+    def _index(self, name: str) -> int:
+        """The place of a column."""
+        names = [known for known, _ in self.columns]
+        if names.count(name) > 1:
+            raise self.error(self.heading[0], f"the column {name} is there {names.count(name)} times.")
+        if name not in names:
+            others = [other for other in names if other != "t"]
+            other = others[0] if len(others) == 1 else "NAME"
+            # A column of another name is never meant by itself.
+            remedy = f" To take one of another name, write `column: {other}`." if others and name != "t" else ""
+            raise self.error(self.heading[0], f"no column '{name}'.{suggestion(name, names)}{remedy}")
+        return names.index(name)

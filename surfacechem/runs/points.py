@@ -340,7 +340,7 @@ def read_points(path: Path, evaluator: Evaluator) -> dict[str, list[float]]:
     """Points from a CSV file, whose first line has names and units: ``g_n [nm], T_1 [K]``."""
     if not path.is_file():
         raise InputError("there is no such file of points.", Place(str(path)))
-    text = CSVText(Tree(document.read(path, str(path)), Place(str(path))))
+    text = CSVText(Tree(document.read(path, str(path)), Place(str(path))), quoted=True)
     for name, _ in text.columns:
         if name not in evaluator.given:
             raise text.error(text.heading[0], f"points cannot give '{name}'.{suggestion(name, evaluator.given)}")

@@ -81,7 +81,8 @@ def test_editors_know_both_ways(table):
     [
         ("t [s], Q_1 [W/m^2]\n0, 0\n1, x\n", r"heat.csv:3: Q_1 is no number there"),
         ("t [s], Q_1 [K]\n0, 0\n1, 1\n", r"heat.csv:2: 0 K is a temperature; Q_1 needs"),
-        ("t, Q_1 [W/m^2]\n0, 0\n1, 1\n", r"heat.csv:1: the heading of column 1 is no name with a unit"),
+        ("t, Q_1 [W/m^2]\n0, 0\n1, 1\n", r"heat.csv:1: the heading 't' needs a unit: t \[s\]"),
+        ("t s, Q_1 [W/m^2]\n0, 0\n1, 1\n", r"heat.csv:1: the heading of column 1 is no name with a unit, like"),
         ("t [s], Q_1 [W/m^2]\n0, 0\n1, 1, 1\n", r"heat.csv:3: 3 values for 2 columns"),
         ("t [s], Q_1 [W/m^2]\n\n2, 0\n1, 1\n", r"heat.csv:4: times must never decrease"),
         (
@@ -93,7 +94,8 @@ def test_editors_know_both_ways(table):
         ("t [s]\n0\n1\n", r"heat.csv:1: no column 'Q_1'"),
         ("t [s], Q_1 [W/m^2], Q_1 [W/m^2]\n0, 0, 0\n1, 1, 1\n", r"heat.csv:1: the column Q_1 is there 2 times"),
         ("t [s], Q_1 [W/m^2]\n0, 0\n", r"heat.csv: a table needs as many times \(1\)"),
-        ("# nothing\n", r"heat.csv: the table is empty"),
+        ("# nothing\n", r"heat.csv: the table is empty; its first line"),
+        ("", r"heat.csv: the table is empty; its first line"),
         ("t [s], Q_1 [W/m^2]\n0, nan\n1, 1\n", r"heat.csv:2: .*nan"),
     ],
 )

@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import surfacechem
+from surfacechem.cli import app
 from surfacechem.errors import InputError
 from surfacechem.runs.points import read_points
 
@@ -114,7 +116,13 @@ def test_a_point_is_the_scene_with_these_values(element, tmp_path):
     assert all(one[name].values == other[name].values for name in other)
 
 
-def test_points_where_a_law_does_not_hold_say_so():
+def test_points_where_a_law_does_not_hold_say_so(tmp_path):
+    path = tmp_path / "points.csv"
+    path.write_text("g_n [um]\n1\n-1\n")
+    output = tmp_path / "found.nc"
+    done = CliRunner().invoke(app, ["evaluate", "viscous-heating", str(path), "-o", str(output), "-q"])
+    assert (done.exit_code, output.exists()) == (3, True)
+    assert done.stderr.startswith("surfacechem: stopped: g_n reached zero, where the law viscous")
     found = surfacechem.load("viscous-heating").evaluate({"g_n": [1e-6, -1e-6]})
     assert found["admissible"].values.tolist() == [1, 0]
     assert found["reason"].values[1].startswith("g_n reached zero, where the law viscous")
@@ -122,10 +130,14 @@ def test_points_where_a_law_does_not_hold_say_so():
 
 def test_points_come_from_a_table_with_units(element, tmp_path):
     path = tmp_path / "points.csv"
-    path.write_text("g_n [nm], T_c [degC]\n-1, 20\n2, 30\n")
+    path.write_text("g_n [nm], T_c [degC], phi\n-1, 20, 0.5\n2, 30, 1\n")
     found = element.evaluate(read_points(path, element.evaluator))
     assert found["g_n"].values.tolist() == [-1e-9, 2e-9]
     assert found["T_c"].values.tolist() == [293.15, 303.15]
+    assert found["phi"].values.tolist() == [0.5, 1.0]
+    path.write_text("g_n nm\n-1\n")
+    with pytest.raises(InputError, match=r"points.csv:1: the heading 'g_n nm' is no name with a unit"):
+        read_points(path, element.evaluator)
 
 
 @pytest.mark.parametrize(
