@@ -17,7 +17,7 @@ from matplotlib.lines import Line2D
 
 from surfacechem.documents import document
 from surfacechem.errors import InputError
-from surfacechem.plots import run, style, sweep
+from surfacechem.plots import members, run, style, sweep
 from surfacechem.plots.run import Panel
 from surfacechem.plots.style import COLOURS, symbol, unit
 
@@ -137,7 +137,7 @@ def _draw(ax: Axes, datasets: Sequence[xarray.Dataset], panel: Panel, over: str,
     for dataset, colour in zip(datasets, colours, strict=False):
         for name, dash in zip(panel.names, cycle(DASHES), strict=False):
             if name in dataset:
-                values = sweep.final(dataset, name) if "sweep" in dataset.attrs else dataset[name].values
+                values = members.final(dataset, name) if "sweep" in dataset.attrs else dataset[name].values
                 drawn.append(values)
                 marker = "o" if len(values) < 3 else ""
                 ax.plot(dataset[over].values, values, color=colour, linestyle=dash, linewidth=1.3, marker=marker)

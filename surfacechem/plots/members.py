@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from typing import Any
 
@@ -28,6 +29,12 @@ MOST_PANELS = 3
 
 TIME_UNIT = "s"
 
+COUNTED = ("steps", "destroys_entropy")
+"""What tells of the solver or the laws, not of what happens."""
+
+RANKS = (r"(phi|theta).*_last", r"T.*_max", r"phi.*", r"T.*", r"time_to.*", r"time.*", r".*")
+"""Names in the order in which they are shown: bonds at the end, largest temperatures, what else tells of the ends."""
+
 BINS, PARTS = 40, 12
 """Bars of a distribution, and parts of the range of a parameter in each of which the effect is shown."""
 
@@ -38,6 +45,7 @@ BAND = (5.0, 50.0, 95.0)
 def figure(dataset: xarray.Dataset, plan: Plan, variables: Sequence[str] | None = None) -> Figure:
     """The figure of a grid of two parameters, of a sample, or of more parameters."""
     axes = [str(name) for name in dataset["status"].dims]
+    dataset = with_ends(dataset, axes)
     parameters = [str(name) for name, x in dataset.coords.items() if len(x.dims) == 1 and x.dims[0] in axes]
     names = chosen(dataset, axes, variables)
     if dataset[names[0]].ndim > len(axes):
@@ -58,10 +66,33 @@ def chosen(dataset: xarray.Dataset, axes: Sequence[str], variables: Sequence[str
 
 def differing(dataset: xarray.Dataset, axes: Sequence[str], known: Sequence[str]) -> list[str]:
     """Of the numbers of each run those that differ from run to run: of phases and temperatures, then of events."""
-    ranks = ("phi", "T", "time_to", "time", "")
-    found = sorted(known, key=lambda name: next(k for k, start in enumerate(ranks) if name.startswith(start)))
-    ends = [name for name in found if dataset[name].ndim == len(axes) and "error" not in name]
+    found = sorted(known, key=lambda name: next(k for k, rank in enumerate(RANKS) if re.fullmatch(rank, name)))
+    ends = [name for name in found if dataset[name].ndim == len(axes) and "error" not in name and name not in COUNTED]
     return ([name for name in ends if varies(fair(dataset, name))] or ["time_reached"])[:MOST_PANELS]
+
+
+def with_ends(dataset: xarray.Dataset, axes: Sequence[str]) -> xarray.Dataset:
+    """The dataset with bonds at the end and the largest temperatures of each run, or where none of them varies with
+    what else varies at the end; as it is where it holds such numbers already.
+    """
+    series = [name for name in along(dataset, axes) if name in dataset.data_vars]
+    if any(str(name).endswith(("_last", "_max")) for name in dataset):
+        return dataset
+    temperatures, bonds = (of_kind(dataset, series, *kind) for _, *kind in KINDS[:2])
+    moving = [name for name in (*bonds, *temperatures) if varies(fair(dataset, name))]
+    largest = {f"{name}_max": dataset[name].max([dataset[name].dims[-1]], keep_attrs=True) for name in temperatures}
+    last = [name for name in series if not name.endswith(("_exact", "_residual"))] if not moving else bonds
+    ends = {f"{n}_last": xarray.Variable(axes, final(dataset, n), dataset[n].attrs) for n in last}
+    return dataset.assign({**ends, **largest})
+
+
+def final(dataset: xarray.Dataset, name: str) -> Array:
+    """The last value that each run reached."""
+    values: Array = dataset[name].values
+    if values.ndim == dataset["status"].ndim:
+        return values
+    last = values.shape[-1] - 1 - np.argmax(np.isfinite(values)[..., ::-1], axis=-1)
+    return np.asarray(np.take_along_axis(values, last[..., None], axis=-1)[..., 0])
 
 
 def fair(dataset: xarray.Dataset, name: str) -> Array:
@@ -76,9 +107,10 @@ def axis_label(values: xarray.DataArray) -> str:
 
 
 def axis_words(values: xarray.DataArray) -> str:
-    """Name of a parameter."""
+    """Name of a parameter, and whose it is."""
     name = str(values.name)
-    return name.replace("_", " ") if len(name.partition("_")[0]) > 1 else symbol(name)
+    words = name.replace("_", " ") if len(name.partition("_")[0]) > 1 else symbol(name)
+    return words + style.owner(values)
 
 
 def quantity_label(values: xarray.DataArray) -> str:
@@ -190,7 +222,8 @@ def effects(
                 over = dataset[parameter].broadcast_like(whole).transpose(*axes).values.ravel()
                 effect(ax, over[:: -(-over.size // MOST_POINTS)], values, ratios)
         for ax, parameter in zip(grid[-1, 1:], parameters, strict=True):
-            ax.set_xlabel(axis_label(dataset[parameter]), fontsize=8)
+            # Beside a short first line there is room for the power of ten of the axis.
+            ax.set_xlabel(axis_label(dataset[parameter]).replace(" of ", "\nof ").replace(" [", "\n["), fontsize=8)
         grid[-1, 0].set_xlabel("runs")
         style.headings(plot, grid[0, 0], dataset)
         grid[0, 0].set_title("5, 50 and 95 % of the runs", loc="left", fontsize=8, color="#555555")

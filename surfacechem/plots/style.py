@@ -257,11 +257,22 @@ def draw_parameter(ax: Axes, values: xarray.DataArray) -> None:
     decades = over_decades(values.values)
     text, size = (unit_text(unit(values)), 1.0) if decades else prefixed(unit(values), values.values)
     words = meaning(values, " (")
-    ax.set_xlabel(f"{str(values.name).replace('_', ' ') if words == 'Value' else words} [{text}]")
+    words = str(values.name).replace("_", " ") if words == "Value" else words
+    ax.set_xlabel(f"{words}{owner(values)} [{text}]")
     if decades:
         ax.set_xscale("log")
     else:
         label_ticks(ax.xaxis, size)
+
+
+def owner(values: xarray.DataArray) -> str:
+    """Whose a swept parameter is, by the path that its long name ends with; '' where its own name tells that.
+
+    >>> owner(xarray.DataArray(1.0, name="C", attrs={"long_name": "heat capacity per area (bodies.upper.C)"}))
+    ' of upper'
+    """
+    path = str(values.attrs.get("long_name", "")).rpartition("(")[2].removesuffix(")").split(".")
+    return f" of {' '.join(path[1:-1])}" if len(path) > 2 and path[-1] == values.name else ""
 
 
 def valued(values: xarray.DataArray, place: int) -> str:

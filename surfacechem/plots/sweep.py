@@ -13,7 +13,7 @@ from surfacechem.errors import InputError, suggestion
 from surfacechem.format.plans import RUN, Plan, recorded_plan
 from surfacechem.plots import members, rupture, style
 from surfacechem.plots.run import KINDS, Panel, of_kind
-from surfacechem.plots.style import MOST_CURVES, Array, symbol, unit, varies
+from surfacechem.plots.style import MOST_CURVES, symbol, unit, varies
 
 # Parameters of a grid that are drawn.
 MOST_DRAWN = 2
@@ -84,7 +84,7 @@ def _dependent(dataset: xarray.Dataset) -> list[list[str]]:
     axes, found = axes_of(dataset), []
     along = [name for name in _numbers(dataset) if dataset[name].ndim > len(axes)]
     for _, *kind in KINDS[:2]:
-        names = [name for name in of_kind(dataset, along, *kind) if varies(final(dataset, name).ravel())]
+        names = [name for name in of_kind(dataset, along, *kind) if varies(members.final(dataset, name).ravel())]
         found += [[name] for name in names] if len(axes) > 1 else [names] if names else []
     return found
 
@@ -92,7 +92,7 @@ def _dependent(dataset: xarray.Dataset) -> list[list[str]]:
 def _draw_final(ax: Axes, dataset: xarray.Dataset, names: Sequence[str]) -> None:
     """Values at the end of each run."""
     x = dataset[axes_of(dataset)[0]].values
-    ends = {name: final(dataset, name) for name in names}
+    ends = {name: members.final(dataset, name) for name in names}
     for name, end in ends.items():
         for values, label in style.by_second(dataset, end):
             marker = "o" if len(x) < 3 else ""
@@ -100,12 +100,3 @@ def _draw_final(ax: Axes, dataset: xarray.Dataset, names: Sequence[str]) -> None
     text, size = style.prefixed(unit(dataset[names[0]]), np.stack(list(ends.values())))
     ax.set_ylabel(f"final [{text}]")
     style.label_ticks(ax.yaxis, size)
-
-
-def final(dataset: xarray.Dataset, name: str) -> Array:
-    """The last value that each run reached."""
-    values: Array = dataset[name].values
-    if values.ndim == len(axes_of(dataset)):
-        return values
-    last = values.shape[-1] - 1 - np.argmax(np.isfinite(values)[..., ::-1], axis=-1)
-    return np.asarray(np.take_along_axis(values, last[..., None], axis=-1)[..., 0])

@@ -39,7 +39,21 @@ def test_a_map_over_two_parameters(tmp_path):
     ax = plot.axes[0]
     assert np.array_equal(ax.collections[0].get_array(), opened(path)["T_last"].values.T)
     assert (ax.get_xscale(), ax.get_yscale()) == ("log", "linear")
-    assert (ax.get_xlabel(), ax.get_ylabel()) == ("$K_{0}$ [J m$^{-2}$]", "initial T [K]")
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("$K_{0}$ of potential bond-energy [J m$^{-2}$]", "initial T [K]")
+
+
+@pytest.fixture(scope="module")
+def grid():
+    over = {K_0: [200.0, 300.0], "initial.T": [290.0 + k for k in range(8)]}
+    return surfacechem.load("exothermic").sweep(over).dataset
+
+
+def test_a_map_of_whole_runs_shows_bonds_at_the_end_and_the_largest_temperatures(grid):
+    """And neither steps nor errors, which differ from run to run as well."""
+    maps = [ax.collections[0].get_array() for ax in plots.figure(grid).axes[:2]]
+    bonds, largest = grid["phi"].values[..., -1], grid["T"].values.max(axis=-1)
+    assert np.array_equal(maps[0], bonds.T)
+    assert np.array_equal(maps[1], largest.T)
 
 
 def test_distributions_and_effects_of_a_sample(drawn):
@@ -50,7 +64,10 @@ def test_distributions_and_effects_of_a_sample(drawn):
     assert heights == [128, 128]
     middle = rows[1, 0].lines[1].get_ydata()[0]
     assert middle == np.median(data["T_last"].values)
-    assert {ax.get_xlabel() for ax in rows[1, 1:]} == {"$K_{0}$ [J m$^{-2}$]", "$c_{r}$ [J$^{-1}$ s$^{-1}$]"}
+    assert {ax.get_xlabel() for ax in rows[1, 1:]} == {
+        "$K_{0}$\nof potential bond-energy\n[J m$^{-2}$]",
+        "$c_{r}$\nof bonding linear-affinity\n[J$^{-1}$ s$^{-1}$]",
+    }
     (effect,) = (ax for ax in rows[1] if ax.get_xlabel().startswith("$K"))
     assert np.all(np.diff(effect.lines[0].get_ydata()) > 0)
 
