@@ -103,10 +103,9 @@ def _draw_spectrum(ax: Axes, dataset: xarray.Dataset, load: str) -> None:
     """Most probable, median and mean load at rupture, the exact ones as lines."""
     parameter, mean = dataset[str(dataset["status"].dims[0])], dataset[f"{load}_mean"]
     text, size = style.prefixed(unit(mean), mean.values)
-    # Between the ends of a range of decades, as nobody reads 100 pN/s from an axis in nN/s.
-    words, scale = style.prefixed(unit(parameter), np.sqrt(np.abs(parameter.values[:1] * parameter.values[-1:])))
+    words, scale = style.parameter_unit(parameter)
     x = parameter.values / scale
-    ax.set_xlabel(f"{style.meaning(parameter, ' (')} [{words}]")
+    ax.set_xlabel(f"{style.parameter_words(parameter)} [{words}]")
     for (which, word), colour, marker in zip(STATISTICS.items(), COLOURS, "osD", strict=False):
         for j, (values, label) in enumerate(style.by_second(dataset, dataset[f"{load}_{which}"].values)):
             (points,) = ax.plot(x, values / size, marker, color=colour, markersize=3.5)

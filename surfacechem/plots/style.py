@@ -255,14 +255,33 @@ def over_decades(values: Array) -> bool:
 def draw_parameter(ax: Axes, values: xarray.DataArray) -> None:
     """The axis of a swept parameter: its meaning, or its name where that tells more, and unit."""
     decades = over_decades(values.values)
-    text, size = (unit_text(unit(values)), 1.0) if decades else prefixed(unit(values), values.values)
-    words = meaning(values, " (")
-    words = str(values.name).replace("_", " ") if words == "Value" else words
-    ax.set_xlabel(f"{words}{owner(values)} [{text}]")
+    text, size = parameter_unit(values) if decades else prefixed(unit(values), values.values)
+    ax.set_xlabel(f"{parameter_words(values)} [{text}]")
     if decades:
         ax.set_xscale("log")
+        ax.xaxis.set_major_formatter(lambda value, _: f"$10^{{{round(math.log10(value / size))}}}$")
     else:
         label_ticks(ax.xaxis, size)
+
+
+def parameter_unit(values: xarray.DataArray) -> tuple[str, float]:
+    """The unit of a parameter over decades, with the prefix that suits the middle of them, and how large it is."""
+    # At their upper end, nobody reads 100 pN/s from an axis in nN/s.
+    return prefixed(unit(values), np.sqrt(np.abs(values.values[:1] * values.values[-1:])))
+
+
+def parameter_words(values: xarray.DataArray) -> str:
+    """What a swept parameter is, and whose.
+
+    >>> said = {"long_name": "rate of change (loading.f.ramp.rate)", "units": "N s-1"}
+    >>> parameter_words(xarray.DataArray(1e-9, name="rate", attrs=said))
+    'Loading rate of $f$'
+    """
+    load = re.search(r"\(loading\.(\w+)\.[\w.-]*rate\)$", str(values.attrs.get("long_name", "")))
+    if load and unit(values).startswith(("N", "Pa")):
+        return f"Loading rate of {symbol(load[1])}"
+    words = meaning(values, " (")
+    return (str(values.name).replace("_", " ") if words == "Value" else words) + owner(values)
 
 
 def owner(values: xarray.DataArray) -> str:

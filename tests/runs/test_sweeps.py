@@ -306,7 +306,7 @@ def test_figure_of_a_spectrum(spectrum):
     plot = plots.figure(spectrum.dataset)
     ax = plot.axes[0]
     assert [text.get_text() for text in ax.get_legend().get_texts()] == ["most probable", "median", "mean", "exact"]
-    assert (ax.get_xscale(), ax.get_xlabel()) == ("log", "Rate of change [pN s$^{-1}$]")
+    assert (ax.get_xscale(), ax.get_xlabel()) == ("log", "Loading rate of $f$ [pN s$^{-1}$]")
     assert ax.get_ylabel() == "$f$ at rupture [pN]"
 
 
