@@ -175,12 +175,14 @@ def curves(dataset: xarray.Dataset, axes: Sequence[str], names: Sequence[str], a
             style.label_ticks(ax.yaxis, high)
             style.legend(ax)
         grid[-1, 0].set_xlabel(f"{'Time' if against in (None, 'time') else symbol(against)} [{text}]")
-        if len(axes) == 1 and RUN not in axes and count > style.MOST_CURVES:
+        many = RUN not in axes and count > style.MOST_CURVES
+        if many:
             bar = plot.colorbar(colours(dataset, axes), ax=grid[:, 0].tolist())
             words, size = style.prefixed(unit(dataset[axes[0]]), dataset[axes[0]].values)
             bar.set_label(f"{axis_words(dataset[axes[0]])} [{words}]")
             style.label_ticks(bar.ax.yaxis, size)
-        style.headings(plot, grid[0, 0], dataset)
+        others = ", ".join(axis_words(dataset[name]) for name in axes[1:]) if many else ""
+        style.headings(plot, grid[0, 0], dataset, more=f"curves of one colour differ in {others}" if others else "")
         if len(members) < count:
             grid[0, 0].set_title(f"{len(members)} of {count} runs", loc="left", fontsize=8, color="#555555")
     return plot
@@ -199,9 +201,9 @@ def looks(dataset: xarray.Dataset, axes: Sequence[str], member: int) -> dict[str
     if RUN not in axes and np.prod(shape) <= style.MOST_CURVES:
         place = [int(k) for k in np.unravel_index(member, shape)]
         return {"color": COLOURS[member], "linewidth": 1.3, "label": style.member_name(dataset, place)}
-    if len(axes) > 1 or RUN in axes:
+    if RUN in axes:
         return {"color": COLOURS[0], "linewidth": 0.7, "alpha": 0.35}
-    value = dataset[axes[0]].values[member]
+    value = dataset[axes[0]].values[np.unravel_index(member, shape)[0]]
     return {"color": colours(dataset, axes).to_rgba(value), "linewidth": 0.9}
 
 

@@ -56,6 +56,14 @@ def test_a_map_of_whole_runs_shows_bonds_at_the_end_and_the_largest_temperatures
     assert np.array_equal(maps[1], largest.T)
 
 
+def test_curves_over_two_parameters_have_the_colours_of_the_first(grid):
+    curves, bar = plots.figure(grid, ["phi"]).axes
+    assert [len({line.get_color() for line in curves.lines[k : k + 8]}) for k in (0, 8)] == [1, 1]
+    assert curves.lines[0].get_color() != curves.lines[8].get_color()
+    assert curves.get_title("left").endswith("curves of one colour differ in initial T")
+    assert bar.get_ylabel() == "$K_{0}$ of potential bond-energy [J m$^{-2}$]"
+
+
 def test_distributions_and_effects_of_a_sample(drawn):
     data = opened(drawn)
     plot = plots.figure(drawn)
