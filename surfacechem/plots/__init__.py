@@ -46,6 +46,8 @@ def figure(
     """
     from surfacechem.plots import comparison, run, study, style, sweep
 
+    if isinstance(variables, str):
+        raise InputError(f"variables are a list of names, not '{variables}'; a figure is written by its savefig.")
     several = [data] if isinstance(data, str | Path) or not isinstance(data, Sequence) else data
     datasets = [opened(each) for each in several]
     if celsius:

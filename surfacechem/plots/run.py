@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -32,6 +32,7 @@ KINDS: tuple[tuple[str, str, str], ...] = (
     ("Traction", "Pa", r"(?!.*_nominal$).*"),
     ("Heat flux", "W m-2", r"q_(?!m$|t$|.*_nominal$)\w+"),
     ("Dissipation", "W m-2", r"D_\w+"),
+    ("Force per bond", "N", r"f"),
     # Of a pair of bodies.
     ("Force", "N", r"t_(?!.*_nominal$)\w+"),
     ("Heat flow", "W", r"q_(?!m$|t$|.*_nominal$)\w+"),
@@ -43,6 +44,9 @@ RESIDUALS = {"energy_residual": "energy_error", "entropy_residual": "entropy_err
 
 # Residuals below this, which is far below the last digit of what is balanced, are drawn as this.
 LEAST = EPS / 256
+
+# Residuals whose largest is below this are rounding of the last digit, and need no panel.
+CLOSED = 4 * EPS
 
 # Dashes of exact solutions, far enough from each other that the colour of a run below them is seen.
 EXACT = (0, (3, 5))
@@ -67,6 +71,9 @@ PROFILE_TIMES = 6
 
 # Up to this many events have their names written above them; above so many lines nothing could be told from them.
 FEW, MANY = 8, 60
+
+# Lines of events whose names repeat, those of the most frequent name first.
+KIND_LINES = ("dotted", "dashed", "dashdot")
 
 # Rows of names above the first panel; width of a letter and of the space between two, in widths of the panel, and
 # height of a row in points.
@@ -99,11 +106,17 @@ def figure(dataset: xarray.Dataset, variables: Sequence[str] | None = None, agai
         return curved.figure(dataset)
     shown = panels(dataset, variables, against)
     usual = not variables and against is None
-    balances = usual and any(name in dataset for name in RESIDUALS)
+    balances = usual and _balances_err(dataset)
     if len(shown) + balances == 0 or dataset.sizes["time"] == 0:
         raise InputError("there is nothing to plot: the dataset holds no output times or none of its variables varies.")
     below = curved.ROWS if usual and curved.carries(dataset) else 0
     return _stacked(dataset, shown, against, balances, below)
+
+
+def _balances_err(dataset: xarray.Dataset) -> bool:
+    """Whether a balance closes to less than the last digit, or it is not known how far it does."""
+    largest = [style.number(dataset, error) for name, error in RESIDUALS.items() if name in dataset]
+    return any(error is None or not error < CLOSED for error in largest)
 
 
 def _stacked(
@@ -137,7 +150,7 @@ def draw_axis(
     text, size = style.prefixed(unit(dataset[against]), dataset[against].values)
     axes[-1].set_xlabel(f"{meaning(dataset[against])} {symbol(against)} [{text}]")
     style.label_ticks(axes[-1].xaxis, size)
-    return 0.0, ""
+    return 0.0, _counted(_named(_moments(dataset)), {})
 
 
 def curves(dataset: xarray.Dataset) -> list[str]:
@@ -288,11 +301,11 @@ def _draw_time(axes: Sequence[Axes], dataset: xarray.Dataset, names: Sequence[st
     for ax in axes if over_decades else ():
         _show_decades(ax, max(times[times > 0][0], SHOWN * times[-1]), times[-1])
     stages = _draw_bands(axes, dataset) if len(times) > 1 else []
-    events = _draw_events(axes, dataset)
+    moments = _moments(dataset)
+    events, lines = _named(moments), _draw_events(axes, moments)
     below = _write(axes[0], stages, 0)
     rows = _write(axes[0], events, below) if len(events) <= FEW else 0
-    counts = Counter(name for _, name in events if not rows).most_common(MOST_NAMES)
-    return LANE * (below + rows), ", ".join(f"{count} {name}" if count > 1 else name for name, count in counts)
+    return LANE * (below + rows), "" if rows else _counted(events, lines)
 
 
 def _show_decades(ax: Axes, first: float, last: float) -> None:
@@ -305,16 +318,36 @@ def _show_decades(ax: Axes, first: float, last: float) -> None:
     ax.set(xscale="log", xlim=(first, last))
 
 
-def _draw_events(axes: Sequence[Axes], dataset: xarray.Dataset) -> list[tuple[float, str]]:
-    """Thin vertical lines at the events, whose times and names it returns; ends of stages show as bands."""
+def _moments(dataset: xarray.Dataset) -> dict[float, str]:
+    """What the events are called, by their times."""
     if "event_time" not in dataset:
-        return []
+        return {}
     style.check(dataset, {"event_time": ("event",)})
-    moments = dict(zip(dataset["event_time"].values.tolist(), _words(dataset), strict=True))
-    for moment in moments if len(moments) <= MANY else ():
-        for ax in axes:
-            ax.axvline(moment, color="black", linewidth=0.6, linestyle=":")
+    return dict(zip(dataset["event_time"].values.tolist(), _words(dataset), strict=True))
+
+
+def _named(moments: Mapping[float, str]) -> list[tuple[float, str]]:
+    """Times and names of the events that have one; ends of stages show as bands."""
     return [(t, name) for t, name in moments.items() if name and not name.startswith("end of ")]
+
+
+def _draw_events(axes: Sequence[Axes], moments: Mapping[float, str]) -> dict[str, str]:
+    """Thin vertical lines at the events; returns the kind of line of each name where names repeat."""
+    names = Counter(name for _, name in _named(moments))
+    drawn = moments if len(moments) <= MANY else {}
+    repeat = drawn and 1 < len(names) < names.total()
+    kinds = [name for name, _ in names.most_common()] if repeat else []
+    lines = dict(zip(kinds, KIND_LINES, strict=False))
+    for (moment, name), ax in product(drawn.items(), axes):
+        ax.axvline(moment, color="black", linewidth=0.6, linestyle=lines.get(name, KIND_LINES[0]))
+    return lines
+
+
+def _counted(events: Sequence[tuple[float, str]], lines: Mapping[str, str]) -> str:
+    """How often the most frequent events happen, and their kinds of lines."""
+    counts = Counter(name for _, name in events).most_common(MOST_NAMES)
+    kinds = {name: f" ({line})" for name, line in lines.items()}
+    return ", ".join(f"{f'{count} ' if count > 1 else ''}{name}{kinds.get(name, '')}" for name, count in counts)
 
 
 def _words(dataset: xarray.Dataset) -> list[str]:

@@ -94,6 +94,8 @@ def test_chosen_variables_are_grouped_by_unit():
     for arguments in ((["phy"],), (None, "phy")):
         with pytest.raises(InputError, match="Did you mean 'phi'"):
             figure(dataset(), *arguments)
+    with pytest.raises(InputError, match=r"a list of names, not 'x\.png'; a figure is written by its savefig"):
+        figure(dataset(), "x.png")
 
 
 def test_the_largest_of_many_have_colours_and_names():
@@ -135,6 +137,19 @@ def test_few_events_have_lines_and_names_and_many_are_counted():
     assert "events" not in few.get_title(loc="left")
 
 
+def test_events_whose_names_repeat_have_a_kind_of_line_each():
+    stick_slip = with_events(np.linspace(0.1, 1.9, 12), ["slip", "stop"] * 6)
+    ax = figure(stick_slip).axes[0]
+    assert [line.get_linestyle() for line in ax.get_lines()[-12:]] == [":", "--"] * 6
+    assert ax.get_title(loc="left").endswith("6 slip (dotted), 6 stop (dashed)")
+    assert figure(stick_slip, against="phi").axes[0].get_title(loc="left").endswith("6 slip, 6 stop")
+
+
+def test_the_force_on_a_bond_has_a_panel_and_balances_that_close_have_none():
+    closed = dataset(f=("N", 1e-10 * np.linspace(0.0, 2.0, 21))).assign_attrs(energy_error=1e-18)
+    assert titles(figure(closed))[-1] == "Force per bond\n[pN]"
+
+
 def test_modes_and_stages_are_bands():
     plot = figure(with_events([0.55], ["debond"], "bonded", "mode (0: bonded, 1: debonded)"))
     (band,) = plot.axes[0].patches
@@ -165,7 +180,7 @@ def test_files_are_read_and_those_of_others_refused(tmp_path):
     xarray.Dataset({"a": ("x", [1.0, 2.0])}).to_netcdf(tmp_path / "foreign.nc")
     with pytest.raises(InputError, match=r"foreign\.nc: has no variable 'time'"):
         figure(tmp_path / "foreign.nc")
-    with pytest.raises(InputError, match="not a readable"):
+    with pytest.raises(InputError, match="there is no file"):
         figure(tmp_path / "nothing.nc")
 
 
