@@ -250,7 +250,7 @@ def check_summary(
 def _plan(system: System, run: Run | None) -> str:
     """How a scene is run, and where its steps end."""
     if run is None:
-        return "not said; `surfacechem evaluate` gives its quantities at any state"
+        return "none, as everything is given; `surfacechem evaluate` gives its quantities at any state"
     outputs = f"{len(run.times)} output times" if run.picture is None else "outputs that follow the run"
     parts = [f"{run.solver} at rtol {run.rtol:g}, {outputs} to t = {run.times[-1]:g} s"]
     if inside := sum(0 < t < run.times[-1] for t in system.breakpoints):

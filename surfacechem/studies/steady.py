@@ -48,6 +48,8 @@ class SteadyState:
     barriers: Mapping[str, float]
     equations: Mapping[str, str]
     """Of the reactions."""
+    units: Mapping[str, str]
+    """Of the rates."""
 
     def __str__(self) -> str:
         """Tables of coverages, rates and control."""
@@ -60,7 +62,9 @@ class SteadyState:
         ]
         tables: dict[str, Rows] = {
             "Coverages": [(name, f"{value:.6g}") for name, value in self.coverages.items()],
-            "Rates": [(name, f"{value:.6g}", barriers.get(name, "")) for name, value in self.rates.items()],
+            "Rates": [
+                (name, f"{value:.6g} {self.units[name]}", barriers.get(name, "")) for name, value in self.rates.items()
+            ],
             "Degree of rate control": [("", "", *names), *control],
         }
         return str(Sheet(self.title, [("steady", f"after {self.time:.3g} s")], tables))
@@ -104,6 +108,7 @@ def steady(source: Source, of: Sequence[str] = (), overrides: Overrides = ()) ->
         },
         dict(zip(rest.wanted, barriers.tolist(), strict=False)),
         dict(zip(labels, _equations(system, labels), strict=True)),
+        {name: system.outputs[j].quantity.unit for name, j in rest.wanted.items()},
     )
 
 

@@ -46,6 +46,7 @@ def test_coverages_and_rates(found):
     np.testing.assert_allclose([*found.coverages.values()], coverages, rtol=1e-8, atol=1e-14)
     assert found.rates["production_CO2"] == pytest.approx(rate, rel=1e-8)
     assert set(found.rates) == {"production_CO2", "production_CO", "production_O2"}
+    assert set(found.units.values()) == {"1/(m^2 s)"}
     assert "CH2(S)s" in found.coverages
 
 
