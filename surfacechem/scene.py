@@ -65,6 +65,7 @@ class Conduction(Law):
     )
     cells: int = option("number of cells; 0 for a lump", default=0)
     accuracy: float | None = option("relative accuracy of temperatures, by which a run chooses the cells", default=None)
+    after: float | None = option("time after something sudden from which on the accuracy holds", default=None)
     grading: float = option("width of the cells at the far side over that at the contact", default=1.0)
     far: Load | None = option("temperature at the far side, or beyond it; none where insulated", default=None)
     layer: float = option(

@@ -23,7 +23,6 @@ from surfacechem.format.reader import ExactSolution, exact_solution_of, read_doc
 from surfacechem.format.sections import NOTHING_SWEPT, SweepSection
 from surfacechem.model.assemble import assemble
 from surfacechem.model.system import System
-from surfacechem.results import spatial
 from surfacechem.scene import Scene
 from surfacechem.solve.run import Run, refuse_nothing
 
@@ -140,9 +139,6 @@ def load_text(
         raise case.sweep.error(NOTHING_SWEPT)
     scene = scene_of(case, mechanism)
     run = run_of(case.run) if case.run else None
-    if run is not None and spatial.divided(scene):
-        # Cells resolve what has lasted from one output to the next, which is then not for the run to choose.
-        run = replace(run, picture=None)
     return Case(
         name=name,
         title=case.title or name,

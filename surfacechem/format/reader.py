@@ -184,7 +184,7 @@ def _body(name: str, section: BodySection) -> Body:
     energy = BodySection.energy(section.tree)(**section.more, place=section.tree.place) if stores else None
     if (given := section.conduction) is None:
         return Body(name, section.temperature, energy)
-    accuracy = given.cells.accuracy if isinstance(given.cells, CellAccuracy) else None
+    chosen = given.cells if isinstance(given.cells, CellAccuracy) else None
     cells = 0 if given.cells == LUMP else given.cells if isinstance(given.cells, int) else FIRST_CELLS
     if cells % 2:
         raise given.error(f"cells must be even, so that half of them show the error; got {cells}.", "cells")
@@ -193,7 +193,8 @@ def _body(name: str, section: BodySection) -> Body:
         thickness=given.thickness,
         conductivity=given.conductivity,
         cells=cells,
-        accuracy=accuracy,
+        accuracy=chosen.accuracy if chosen else None,
+        after=chosen.after if chosen else None,
         grading=given.grading,
         far=far.temperature if far else None,
         h_far=far.h if far else None,

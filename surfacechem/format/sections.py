@@ -96,6 +96,9 @@ class CellAccuracy(Section):
     called = "a choice of cells"
 
     accuracy: float = quantity("1", "relative accuracy of temperatures", REQUIRED, above=0, at_most=0.1)
+    after: float | None = quantity(
+        "s", "time after the start, or a step of a load, from which on it holds; 1/200 of the run if not given", above=0
+    )
 
 
 class FarSide(Section):

@@ -247,6 +247,8 @@ class Profile:
     """Names of the temperatures inside, in order."""
     far: str = ""
     """Name of the temperature at the far side where it is given."""
+    after: float | None = None
+    """Time after something sudden from which on the cells are to resolve it, where the scene says so."""
 
     @property
     def name(self) -> str:

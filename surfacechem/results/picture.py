@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from surfacechem.results.spatial import begun, unresolved
 from surfacechem.solve.contract import Array, States
 from surfacechem.solve.run import Run, Trajectory
 
@@ -94,10 +95,13 @@ def _edges(values: Array) -> Flags:
     return found
 
 
-def _kept(run: Run, t: Array, quantities: Array, noise: Array, part: float, sides: Flags) -> Flags:
-    """Rows that the picture of these quantities needs, ``sides`` of events among them; ``noise`` is not pictured."""
+def _kept(run: Run, t: Array, quantities: Array, noise: Array, part: float, sides: Flags, early: Flags) -> Flags:
+    """Rows that the picture of these quantities needs, ``sides`` of events among them; ``noise`` is not pictured, and
+    what is ``early`` counts for no range.
+    """
     values = np.where(np.isfinite(quantities), quantities, 0.0)
-    allowed = part * np.ptp(values, axis=0) + UNRESOLVED * run.rtol * np.abs(values).max(axis=0) + noise
+    known = values if early.all() else values[~early]
+    allowed = part * np.ptp(known, axis=0) + UNRESOLVED * run.rtol * np.abs(values).max(axis=0) + noise
     seen = np.ptp(values, axis=0) > allowed
     return needed(t, values[:, seen], allowed[seen], sides | _edges(quantities[:, seen]))
 
@@ -123,9 +127,14 @@ def followed(trajectory: Trajectory) -> Trajectory:
     if part is None or len(rows.t) < 2:
         return trajectory
     t, sides = _two_sided(rows.t)
-    rows = _chosen(rows._replace(t=t), sides)
+    # What cells do not resolve yet is no part of the picture, but for how it begins.
+    system, end = trajectory.model.system, trajectory.run.times[-1]
+    early = unresolved(system, end, t)
+    sides &= ~early | np.isin(t, begun(system, end))
+    rows, early = _chosen(rows._replace(t=t), sides), early[sides]
     values, noise = _quantities(trajectory, rows)
-    kept = _kept(trajectory.run, rows.t, values, noise, part, _beside_events(trajectory, rows.t))
+    beside = _beside_events(trajectory, rows.t)
+    kept = _kept(trajectory.run, rows.t, values, noise, part, beside, early)
     return _at(trajectory, _chosen(rows, kept))
 
 
@@ -138,8 +147,7 @@ def _beside_events(trajectory: Trajectory, t: Array) -> Flags:
 def _quantities(trajectory: Trajectory, rows: States) -> tuple[Array, Array]:
     """What is shown over time, shape (times, quantities), and how much of it may be rounding."""
     system = trajectory.model.system
-    shown = [j for j, state in enumerate(system.states) if state.name not in system.inside]
-    states = np.hstack([rows.y[:, shown], rows.ledger])
+    states = np.hstack([rows.y, rows.ledger])
     sampled = np.arange(len(rows.t)) % max(len(rows.t) // SAMPLED, 1) == 0
     noise = _at(trajectory, _chosen(rows, sampled)).roundings
     unknown = [0.0] * states.shape[1] + [UNRESOLVED * noise[name] for name in system.output_columns]

@@ -2,9 +2,9 @@
 
 Heat that begins to enter through a face has reached the depth sqrt(alpha t) a time t later. An error of cells can only
 be told from other cells where both resolve that layer: cells far wider than it agree on almost nothing having happened.
-Where an accuracy asks for cells they are therefore graded towards the layer of what is looked at first, and as many as
-their error needs; where their number is given and too small for the layer, cells that are not are what they are held
-against.
+Where an accuracy asks for cells they are therefore graded towards the layer of the time from which it is to hold, and
+as many as their error needs there, whatever the outputs are; where their number is given and too small for the layer of
+what is looked at first, cells that are not are what they are held against.
 
 The cells are of second order: half of them have four times the error.
 """
@@ -27,6 +27,7 @@ from surfacechem.results.error_estimates import EVENTS, apart
 from surfacechem.results.findings import WITHIN
 from surfacechem.scene import Body, Conduction, Scene
 from surfacechem.solve.run import Run, Trajectory
+from surfacechem.tolerances import ROUNDING
 
 Array = NDArray[np.float64]
 
@@ -48,6 +49,12 @@ grows with their square."""
 
 TRIALS = 6
 """Grids after which a search for an accuracy ends; two or three are the rule."""
+
+SOON = 200
+"""Part of a run that has passed when cells resolve what began at once, where nothing says when."""
+
+RATIO = 2.0
+"""Ratio of the times at which the errors of cells are told behind something sudden."""
 
 ORDER, LEAST_ORDER = 4.0, 2.0
 """By how much half of the cells err more: at second order, and at first, below which nothing converges."""
@@ -109,15 +116,48 @@ def grid(scene: Scene) -> tuple[object, ...]:
     return tuple((law.cells, law.layer, law.accuracy) for _, law in _laws(scene))
 
 
+def first_look(system: System, end: float) -> float:
+    """Time [s] after something sudden from which on cells are to resolve it, in a run of this length [s]."""
+    return min([p.after for p in system.profiles if p.after is not None], default=end / SOON)
+
+
+def begun(system: System, end: float) -> Array:
+    """Times [s] at which something sudden may begin a layer: the start, and the breakpoints of loads."""
+    return np.unique([0.0, *(t for t in system.breakpoints if 0 < t < end)])
+
+
+def unresolved(system: System, end: float, t: Array) -> NDArray[np.bool_]:
+    """At which of these times something sudden has just begun that cells do not resolve yet; at none without cells."""
+    if not system.profiles:
+        return np.zeros(len(t), bool)
+    starts = begun(system, end)
+    since = t - starts[np.searchsorted(starts, t, side="right") - 1]
+    # Times and their differences are rounded.
+    return np.asarray(since < first_look(system, end) - ROUNDING * t)
+
+
+def looked_at(system: System, run: Run) -> Run:
+    """The run at the times at which the errors of cells are told, which are the case's and not those of the outputs."""
+    end = run.times[-1]
+    after = first_look(system, end)
+    times = [end * (i / SOON) for i in range(SOON)]
+    for start in begun(system, end).tolist():
+        doublings = range(max(math.ceil(math.log2(end / (SOON * after))), 0))
+        times += [start + after * RATIO**k for k in doublings]
+    seen = np.unique([t for t in times if 0 < t < end])
+    return replace(run, times=(0.0, *seen[~unresolved(system, end, seen)].tolist(), end), picture=None)
+
+
 def shortest(system: System, run: Run, values: Mapping[str, float], events: Iterable[float] = ()) -> float:
-    """Shortest time [s] between what starts a layer, a load or an event, and what is looked at, an output or an event.
+    """Shortest time [s] between what starts a layer, a load or an event, and what is looked at, one of the times of the
+    run or an event.
 
     What follows within the tolerance is at the same instant.
     """
     events = list(events)
-    begun = np.unique([0.0, *(t for t in system.breakpoints if 0 < t < run.times[-1]), *events])
+    starts = np.unique([*begun(system, run.times[-1]), *events])
     seen = np.unique([*run.times[1:], *(t for t in events if t > 0)])
-    since = seen - begun[np.searchsorted(begun, seen) - 1]
+    since = seen - starts[np.searchsorted(starts, seen) - 1]
     since = since[since > run.rtol * seen]
     swinging = [1 / (2 * math.pi * values[path]) for path in system.cycles if values[path] > 0]
     return min([*since.tolist(), *swinging], default=run.times[-1])
@@ -238,13 +278,13 @@ def missed(scene: Scene, errors: CellErrors, found: Accuracy | None = None) -> t
     cells does not.
     """
     if not errors.converged:
-        return (f"{UNKNOWN}. Let outputs begin later after what is sudden, or give more of them",)
+        return (f"{UNKNOWN}. Let outputs begin later after what is sudden, or say `after`, or give more of them",)
     accuracy, names = wanted(scene), fixed(scene)
     if accuracy is not None and not errors.largest <= accuracy:
         most = max(law.cells for _, law in _laws(scene) if law.accuracy is not None)
         text = (
             f"the accuracy {accuracy:g} of the cells is not reached with {most} of them: the error is about "
-            f"{errors.largest:.2g}. Ask for less, let outputs begin later, or give the other body more."
+            f"{errors.largest:.2g}. Ask for less, or for it to hold `after` a longer time, or give the other body more."
         )
         return (text,)
     if not names or found is None or found.asked is None or found.error <= WITHIN * found.asked:

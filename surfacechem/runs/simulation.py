@@ -304,7 +304,8 @@ class Simulation:
         from surfacechem.runs import sweeps
 
         points = [values_of(system, {**values, **point}) for point in (plan.points if plan else [{}])]
-        runs = sweeps.settings(system, plan, settings, points) if plan else [settings]
+        looked = spatial.looked_at(system, settings)
+        runs = sweeps.settings(system, plan, looked, points) if plan else [looked]
         # Of a sweep all runs have the same cells, those of the run that needs the most.
         times = [spatial.shortest(system, *pair) for pair in zip(runs, points, strict=True)]
         cells: Scene | None = spatial.suited(scene, spatial.layers(system, points, times))
@@ -312,10 +313,14 @@ class Simulation:
             if cells is None:
                 break
             chosen = self._with(cells)
-            done = chosen._solved(settings, values, plan, threads)
+            done = chosen._solved(looked, values, plan, threads)
             errors = [chosen._halved(run, given=False) for run in done]
             cells = spatial.refined(cells, spatial.worst(errors), chosen._layers(*done))
-        return chosen, done, [] if spatial.fixed(scene) else errors
+        if settings.times != looked.times or settings.picture is not None:
+            done = chosen._solved(settings, values, plan, threads)
+        # Errors at outputs that are asked for are told at these.
+        known = not spatial.fixed(scene) and (settings.picture is not None or settings.times == looked.times)
+        return chosen, done, errors if known else []
 
     def _solved(
         self, settings: Run, values: Mapping[str, float], plan: Plan | None = None, threads: int | None = None

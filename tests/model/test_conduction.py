@@ -166,7 +166,7 @@ def test_a_joint_jump_heats_the_volume_of_the_bodies():
 
 def test_a_search_that_ends_early_states_the_error_of_its_last_cells(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(spatial, "TRIALS", 1)
-    simulation = two("{accuracy: 1e-5}")
+    simulation = Simulation(load_text(two("{accuracy: 1e-5}").case.text.replace("times: [1, 3, 10, 30]", "until: 30")))
     chosen, (trajectory,), errors = simulation._resolved(simulation.case.run, {})
     assert spatial.grid(chosen.case.scene) != spatial.grid(simulation.case.scene)
     assert errors == [chosen._halved(trajectory, given=False)]
@@ -333,11 +333,32 @@ def test_a_number_of_cells_that_is_too_small_for_the_layer_says_so(cells):
 
 def test_each_pulse_starts_a_layer_of_its_own():
     pulses = "{table: {times: [0 s, 0.1 s, 0.1 s, 0.2 s, 0.2 s, 1 s], values: [0, 0, 1e6, 1e6, 0, 0]}}"
-    run = one("{accuracy: 1e-4}", "times: [0.1, 0.10001, 0.15, 0.2, 0.20001, 1.0]", flux=pulses).run()
+    run = one("{accuracy: 1e-4, after: 10 us}", "times: [0.1, 0.10001, 0.15, 0.2, 0.20001, 1.0]", flux=pulses).run()
     t = run.dataset.time.values
     since = [np.sqrt(np.maximum(t - start, 0) / np.pi) for start in (0.1, 0.2)]
     exact = 300 + 2 * 1e6 * (since[0] - since[1]) / EFFUSIVITY
     assert abs(run.dataset["T_1"] / exact - 1).max() <= run.accuracy.error < 1e-4
+
+
+def test_cells_follow_from_the_case_and_never_from_the_outputs():
+    asked = ("until: 0.2 s", "until: 0.2 s, outputs: 3", "times: [1 us, 0.2]")
+    runs = [one("{accuracy: 1e-3}", run, h=2e3, hot=400.0).run(error="balances") for run in asked]
+    assert len({run.attributes["cells_1"] for run in runs}) == 1
+    assert len({run.dataset.T_1.values[-1] for run in runs}) == 1
+    sooner = one("{accuracy: 1e-3, after: 0.1 ms}", asked[0], h=2e3, hot=400.0).run(error="balances")
+    assert sooner.attributes["cells_1"] > runs[0].attributes["cells_1"]
+
+
+def test_outputs_follow_a_run_with_cells_from_where_these_resolve_it():
+    run = one("{accuracy: 1e-3}", "until: 0.2 s", flux=1e6).run(error="balances")
+    t = run.dataset.time.values
+    assert t[0] == 0.0
+    assert 1e-3 <= t[1] < 2e-3
+    exact = 300 + 2 * 1e6 * np.sqrt(t / np.pi) / EFFUSIVITY
+    np.testing.assert_allclose(run.dataset.T_1, exact, rtol=1e-3)
+    between = np.linspace(1e-3, 0.2, 999)
+    missed = 300 + 2 * 1e6 * np.sqrt(between / np.pi) / EFFUSIVITY - np.interp(between, t, run.dataset.T_1)
+    assert abs(missed).max() < 2e-3 * np.ptp(exact)
 
 
 def test_an_error_that_does_not_converge_is_unknown():
@@ -360,6 +381,7 @@ def random_slab(random: np.random.Generator) -> tuple[Simulation, float, object]
     outputs, end = int(random.integers(3, 60)), length * time
     first = float(end * 10 ** random.uniform(-4, -0.5))
     spacing = f", spacing: logarithmic, first: {first!r}" if random.random() < 0.5 else ""
+    after = f", after: {first!r}" if spacing else ""
     rise, biot = float(random.uniform(10, 300)), float(10 ** random.uniform(-3, 3))
     flux = float(rise / heated(0.0, length)[0, 0] * k / L)
     heats = bool(random.random() < 0.5)
@@ -373,7 +395,7 @@ bodies:
     conduction:
       thickness: {L!r}
       conductivity: {k!r}
-      cells: {f"{{accuracy: {asked}}}" if np.isfinite(asked) else 2 * random.integers(1, 40)}
+      cells: {f"{{accuracy: {asked}{after}}}" if np.isfinite(asked) else 2 * random.integers(1, 40)}
   b: {{temperature: {300 + rise!r}}}
 heat: [conductance: {{between: [a, b], h: {0.0 if heats else biot * k / L!r}}}]
 loading: {{Q_1: {flux if heats else 0.0!r}}}

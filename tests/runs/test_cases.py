@@ -14,7 +14,7 @@ from surfacechem.errors import InputError
 from surfacechem.format import load_text, names
 from surfacechem.quantities import BOLTZMANN
 from surfacechem.results.accuracy import largest_errors
-from surfacechem.results.error_estimates import against_exact, against_tighter, floors
+from surfacechem.results.error_estimates import against_exact, against_tighter, computed, floors
 from surfacechem.runs.simulation import Simulation
 
 CELLS = ("sudden-contact", "epoxy-cure-thick")
@@ -27,7 +27,7 @@ def test_the_error_of_cells_chosen_by_an_accuracy_is_that_against_many():
     many = surfacechem.run(
         "epoxy-cure-thick", {"bodies.laminate.conduction.cells": 128, "bodies.tool.conduction.cells": 32}
     )
-    ours, theirs = ({name: run.dataset[name].values for name in ("phi", "T", "T_2")} for run in (chosen, many))
+    ours, theirs = ({name: computed(run.trajectory)[name] for name in ("phi", "T", "T_2")} for run in (chosen, many))
     for name, error in largest_errors(ours, theirs, floors(chosen.trajectory)).items():
         assert error < 1e-4
         # An estimate from two grids leaves out the next order, a few hundredths of itself here.

@@ -178,4 +178,5 @@ def _profile(build: Build, slab: Slab) -> Iterator[State | Profile]:
         anchored=not surface.prescribed,
         states=tuple(node.name for node in slab.inner),
         far=last.name if last.prescribed else "",
+        after=slab.law.after,
     )
