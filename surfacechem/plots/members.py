@@ -32,8 +32,10 @@ TIME_UNIT = "s"
 COUNTED = ("steps", "destroys_entropy")
 """What tells of the solver or the laws, not of what happens."""
 
-RANKS = (r"(phi|theta).*_last", r"T.*_max", r"phi.*", r"T.*", r"time_to.*", r"time.*", r".*")
-"""Names in the order in which they are shown: bonds at the end, largest temperatures, what else tells of the ends."""
+RANKS = (r"(phi|theta).*_last", r"T.*_max", r"(phi|T).*(?<!_m..)", r"time_to.*", r"time.*", r".*(?<!_m..)", r".*")
+"""Names in the order in which they are shown: bonds at the end, largest temperatures, what else tells of the ends,
+other extremes.
+"""
 
 BINS, PARTS = 40, 12
 """Bars of a distribution, and parts of the range of a parameter in each of which the effect is shown."""
@@ -72,18 +74,17 @@ def differing(dataset: xarray.Dataset, axes: Sequence[str], known: Sequence[str]
 
 
 def with_ends(dataset: xarray.Dataset, axes: Sequence[str]) -> xarray.Dataset:
-    """The dataset with bonds at the end and the largest temperatures of each run, or where none of them varies with
-    what else varies at the end; as it is where it holds such numbers already.
+    """The dataset with bonds at the end of each run, or where neither they nor temperatures vary with what else varies
+    at the end; as it is where it holds such numbers already.
     """
     series = [name for name in along(dataset, axes) if name in dataset.data_vars]
-    if any(str(name).endswith(("_last", "_max")) for name in dataset):
+    if not series or any(str(name).endswith("_last") for name in dataset):
         return dataset
     temperatures, bonds = (of_kind(dataset, series, *kind) for _, *kind in KINDS[:2])
     moving = [name for name in (*bonds, *temperatures) if varies(fair(dataset, name))]
-    largest = {f"{name}_max": dataset[name].max([dataset[name].dims[-1]], keep_attrs=True) for name in temperatures}
     last = [name for name in series if not name.endswith(("_exact", "_residual"))] if not moving else bonds
     ends = {f"{n}_last": xarray.Variable(axes, final(dataset, n), dataset[n].attrs) for n in last}
-    return dataset.assign({**ends, **largest})
+    return dataset.assign(ends)
 
 
 def final(dataset: xarray.Dataset, name: str) -> Array:

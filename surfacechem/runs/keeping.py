@@ -30,6 +30,9 @@ STATUSES = ("finished", "stopped", "failed", "refused")
 
 REFUSED, OTHER = "the values are not admissible at the start", "another reason"
 
+EXTREMES = {"max": (np.fmax, "at most, over outputs and steps"), "min": (np.fmin, "at least, over the same")}
+"""Extremes of a run: what the names of their columns end with, what finds them, and words."""
+
 REACHED = "reaches "
 """How the names of margins begin that tell when a quantity reaches a value."""
 
@@ -134,11 +137,7 @@ def described(system: System, keep: Keep) -> dict[str, tuple[str, str, str]]:
         "entropy_error": ("float64", "1", "largest entropy residual relative to what was exchanged"),
         "site_error": ("float64", "1", "largest residual of the site balances"),
     }
-    words = {
-        "last": "at the end of the run",
-        "max": "at most, over outputs and steps",
-        "min": "at least, over the same",
-    }
+    words = {"last": "at the end of the run", **{which: word for which, (_, word) in EXTREMES.items()}}
     for which, word in words.items():
         for name in getattr(keep, which):
             found[f"{name}_{which}"] = ("float64", q[name].unit, f"{q[name].long_name} {word}")
@@ -156,6 +155,12 @@ def series(system: System, keep: Keep) -> dict[str, Quantity]:
     """The quantities that are kept at every output time."""
     q = quantities(system)
     return {name: q[name] for name in keep.series}
+
+
+def extreme(run: Trajectory, name: str, which: str) -> float:
+    """The largest or the smallest value of a quantity over the outputs and the steps of a run."""
+    with np.errstate(invalid="ignore"):
+        return float(EXTREMES[which][0].reduce(run.everywhere[name], initial=np.nan))
 
 
 class RunByRun:
@@ -191,9 +196,7 @@ class RunByRun:
         end = np.array([result.t]), result.y[None], result.ydot[None]
         last = dict(zip(names, [*result.y, *self.model.evaluate(result, *end)[0]], strict=True)) if keep.last else {}
         row |= {f"{name}_last": last[name] for name in keep.last}
-        with np.errstate(invalid="ignore"):
-            row |= {f"{name}_max": np.fmax.reduce(run.everywhere[name], initial=np.nan) for name in keep.max}
-            row |= {f"{name}_min": np.fmin.reduce(run.everywhere[name], initial=np.nan) for name in keep.min}
+        row |= {f"{name}_{which}": extreme(run, name, which) for which in EXTREMES for name in getattr(keep, which)}
         reached = len(result.times)
         for name in keep.series:
             row[name] = np.append(run.everywhere[name][:reached], np.full(times - reached, np.nan))

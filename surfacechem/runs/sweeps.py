@@ -22,12 +22,13 @@ from surfacechem.model.system import System
 from surfacechem.references.base import SceneView
 from surfacechem.results.accuracy import UNKNOWN, CellErrors, second_tolerance
 from surfacechem.results.audit import Audit, audit
-from surfacechem.results.dataset import Results, quantities, quantity_columns
+from surfacechem.results.dataset import DATASET_NAMES, Results, quantities, quantity_columns
 from surfacechem.results.error_estimates import against_exact, estimated, second_run, with_cells
 from surfacechem.results.event_table import entropy_destroyed, event_columns, event_times
 from surfacechem.results.matching import exact_values, match
 from surfacechem.results.netcdf import Column, versions
 from surfacechem.runs import spectrum
+from surfacechem.runs.keeping import EXTREMES, extreme
 from surfacechem.runs.spectrum import Statistics
 from surfacechem.solve.run import Model, Run, Trajectory
 from surfacechem.tolerances import EPS
@@ -306,6 +307,7 @@ class SweepSolution(Results):
         along = {column.name: column for column in quantity_columns(self.runs, self.inner, shape)}
         load = along.pop(self.inner, None)
         columns = [*self._coordinates(load), *along.values(), *self._of_runs(), *event_columns(self.runs, shape)]
+        columns += self._extremes() if load is None else []
         for which, word in STATISTICS.items() if self.statistics else ():
             quantity = quantities(self.system)[self.inner]
             name, text = f"{self.inner}_{which}", f"{word} {quantity.long_name} at rupture"
@@ -315,6 +317,19 @@ class SweepSolution(Results):
                 exact = self.accuracy.exact[which]
                 columns.append(self._of_each(f"{name}_exact", exact, quantity.unit, f"exact {text}"))
         return (*columns, *([self._lifetime(columns)] if self.statistics else []))
+
+    def _extremes(self) -> list[Column]:
+        """The largest and the smallest values of each run, which may lie between the times that all share."""
+        return [
+            self._of_each(
+                f"{DATASET_NAMES.get(name, name)}_{which}",
+                [extreme(run, name, which) for run in self.runs],
+                quantity.unit,
+                f"{quantity.long_name} {words}",
+            )
+            for name, quantity in quantities(self.system).items()
+            for which, (_, words) in EXTREMES.items()
+        ]
 
     def _lifetime(self, columns: Sequence[Column]) -> Column:
         """Lifetimes over the load, which grows at the same speed all along each run."""

@@ -105,6 +105,15 @@ def test_a_run_of_a_sweep_is_the_run_by_itself(bonding):
     assert one["time_reached"] == single.attrs["time_reached"]
 
 
+def test_extremes_are_those_of_the_runs_whatever_lies_between_the_times_that_all_share():
+    data = surfacechem.sweep("stick-slip", {"loading.w_t.ramp.rate": ["1 mm/s", "2 mm/s"]}).dataset
+    for at, speed in enumerate(("1 mm/s", "2 mm/s")):
+        single = surfacechem.run("stick-slip", {"loading.w_t.ramp.rate": speed}).dataset
+        assert data.v_max[at] == pytest.approx(single.v.max().item(), rel=0.01)
+        assert data.v_max[at] > 5 * data.v[at].max()
+        assert data.t_t_min[at] == pytest.approx(single.t_t.min().item(), rel=0.01)
+
+
 def test_the_number_of_threads_changes_nothing(bonding):
     one, two = (bonding.sweep({K_0: np.linspace(1, 300, 600)}, threads=n).dataset for n in (1, 2))
     assert one["T"].values.tobytes() == two["T"].values.tobytes()
