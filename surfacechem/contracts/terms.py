@@ -576,6 +576,8 @@ class Shape(Law):
     """Parameters that are lengths of the whole shape."""
     rises: ClassVar[int] = 0
     """Power of the distance from the axis with which it falls away, far from there."""
+    grain: ClassVar[float] = math.inf
+    """Length within which it is smooth [m]: a cell of measured heights, a part of a wave."""
 
     turn: float = parameter("rad", "angle by which it is turned about z", default=0.0, varies=False)
     tilt: float = parameter("rad", "angle by which it is tilted about y", default=0.0, varies=False)

@@ -73,19 +73,15 @@ def _totals(surface: CurvedSurfaces, approaches: Array) -> list[Column]:
 
 def _fields(surface: CurvedSurfaces, approaches: Array) -> Sequence[Column]:
     """Gap and traction over points of body 1, which gather where body 2 is nearest."""
-    from surfacechem.surfaces.curved_gap import FAR
-    from surfacechem.surfaces.nodes import outer_nodes
     from surfacechem.surfaces.pairwise import length
+    from surfacechem.surfaces.patches import outer_patches
 
     lower, upper = surface.surfaces(float(approaches.min()))
     size = length(lower, upper)
-    around, _ = outer_nodes(lower, upper, size, min(size, size * FAR))
-    ends = np.arcsinh((np.stack([around.low, around.high]) - around.at) / around.scale)
-    lower = around.surface
+    patches, _ = outer_patches(lower, upper, size, size)
+    lower = patches.surface
     counts = [AROUND if lower.shape.about_axis and k == 1 else ALONG for k in range(2)]
-    t = [np.linspace(low, high, count) for low, high, count in zip(*ends, counts, strict=True)]
-    grid = np.stack(np.meshgrid(*t, indexing="ij"), axis=-1)
-    x = lower.derivatives(around.at + around.scale * np.sinh(grid))[0]
+    x = lower.derivatives(np.stack(np.meshgrid(*map(patches.line, (0, 1), counts), indexing="ij"), axis=-1))[0]
     gap, traction = np.empty((2, len(approaches), *x.shape[:-1]))
     opposite = np.empty((len(approaches), *x.shape))
     for k, d in enumerate(approaches):

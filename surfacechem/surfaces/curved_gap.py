@@ -14,21 +14,19 @@ import numpy as np
 
 from surfacechem.contracts.terms import HeatTransfer, PairEnergy, Potential, Varying, optional, reads
 from surfacechem.errors import InputError
-from surfacechem.surfaces.nodes import integral, outer_nodes
+from surfacechem.surfaces.level_cuts import with_levels
 from surfacechem.surfaces.pairwise import check_finite, kernel, length
+from surfacechem.surfaces.patches import Integrand, Patches, Rules, integral, outer_patches
 from surfacechem.surfaces.projection import Array, Projection, Surface
-from surfacechem.tolerances import NEGLIGIBLE, PRECISE, TINY, ULPS
+from surfacechem.tolerances import EPS, NEGLIGIBLE, NOISE, PRECISE, TINY
 
 GAP = "g_n"
 
 Density = Callable[[Array], Array]
 """Energy per area [J/m^2] and traction [Pa], tension positive, (n, 2) for n gaps [m]."""
 
-SAMPLES = 400
-"""Places between which gaps are looked at for where a law bends."""
-
-LARGE = 1e300
-"""Size of what need not be accurate."""
+OF_AREA = 1e-6
+"""Relative accuracy of the area of contact, which no force follows from, unless less is asked for."""
 
 FAR = 1e6
 """Extent of an endless surface over the largest length of the two."""
@@ -37,8 +35,8 @@ FAR = 1e6
 @dataclass(frozen=True)
 class Contact:
     """Energy [J], forces [N] and moments about the origin [N m] on both bodies, area where they touch or overlap [m^2],
-    heat conductance [W/K] and its slope over the approach [W/(K m)], least gap [m], and the error relative to the size
-    of each, of the area aside.
+    heat conductance [W/K] and its slope over the approach [W/(K m)], least gap [m] and at how many places it is, and
+    the error relative to the size of each.
     """
 
     energy: float
@@ -50,6 +48,7 @@ class Contact:
     conductance: float
     conductance_slope: float
     gap: float
+    places: int
     error: float
 
 
@@ -123,33 +122,37 @@ def over_gap(
     """
     check_finite(lower, upper)
     size = length(lower, upper)
-    around, gap = outer_nodes(lower, upper, size, size * FAR)
+    patches, near = outer_patches(lower, upper, size, size * FAR)
+    patches = with_levels(patches, upper, levels, NOISE * size)
 
-    def integrand(t: Array, order: int) -> Array:
-        x, vectors = around.nodes(t)
-        counts = counts_at(x, upper.nearest(x), laws, heat)
-        return np.asarray(np.sum(counts * np.linalg.norm(vectors, axis=-1, keepdims=True), axis=1))
+    def integrand(x: Array, order: int) -> tuple[Array, int]:
+        return counts_at(x, upper.nearest(x), laws, heat), len(x)
 
     def sizes(found: Array) -> Array:
         force, moment = (float(np.linalg.norm(found[k])) for k in (slice(1, 4), slice(7, 10)))
         force = max(force, floor, TINY)
         parts = [max(abs(found[0]), force * size), *[force] * 6, *[max(moment, force * size)] * 6]
+        area = max(abs(found[13]), EPS * size**2) * max(1.0, OF_AREA / rtol)
         flow = max(abs(found[14]), TINY)
-        return np.array([*parts, LARGE, flow, max(abs(found[15]), flow / size)])
+        return np.array([*parts, area, flow, max(abs(found[15]), flow / size)])
 
-    pieces = [integral(integrand, box, sizes, rtol) for box in boxes(around.box, around.nodes, upper, levels)]
-    whole = np.sum([part for part, _ in pieces], axis=0)
-    if not np.all(np.isfinite(around.surface.shape.span)):
-        _check_end(integrand(around.box[1][None], 1)[0], sizes(whole))
+    whole, error, _ = integral(patches, integrand, sizes, rtol)
+    _check_end(patches, integrand, sizes(whole))
     force_1, force_2, moment_1, moment_2 = np.split(whole[1:13], 4)
     energy, area, conductance, slope = map(float, whole[[0, 13, 14, 15]])
-    error = max(error for _, error in pieces)
-    return Contact(energy, force_1, force_2, moment_1, moment_2, area, conductance, slope, gap, error)
+    gap = float(near.gap[0])
+    return Contact(energy, force_1, force_2, moment_1, moment_2, area, conductance, slope, gap, near.count, error)
 
 
-def _check_end(edge: Array, sizes: Array) -> None:
+def _check_end(patches: Patches, integrand: Integrand, sizes: Array) -> None:
     """InputError where what is integrated over an endless surface does not fall off on the way to its far end."""
-    share = np.abs(edge / sizes)
+    low, high = np.isinf(np.transpose(patches.surface.shape.span))
+    last = (high & (patches.high == patches.high.max(axis=0))) | (low & (patches.low == patches.low.min(axis=0)))
+    if not last.any():
+        return
+    ends = patches[last.any(axis=1)]
+    none = np.zeros(len(ends), dtype=int)
+    share = np.abs(Rules(integrand, 1.0)(ends, none, none).sum(axis=0) / sizes)
     # Energies may count from anywhere; a force or a conductance that has no end is none.
     for name, part in (("force", share[1:7]), ("conductance", share[14:15])):
         if part.max() > NEGLIGIBLE:
@@ -158,7 +161,7 @@ def _check_end(edge: Array, sizes: Array) -> None:
 
 
 def counts_at(x: Array, near: Projection, laws: Sequence[Density], heat: Sequence[Callable[[Array], Array]]) -> Array:
-    """What is integrated, per area, at points (n, k, 3) of body 1, in the order of :class:`Contact`."""
+    """What is integrated, per area, at points (n, 3) of body 1, in the order of :class:`Contact`."""
     count = np.zeros((*near.gap.shape, 16))
     for law in laws:
         psi, traction = np.moveaxis(law(near.gap), -1, 0)
@@ -174,26 +177,3 @@ def counts_at(x: Array, near: Projection, laws: Sequence[Density], heat: Sequenc
         # As body 2 moves up, the gap to its nearest point grows by the vertical part of its normal.
         count[..., 15] -= slope * near.normal[..., 2]
     return count
-
-
-def boxes(
-    box: tuple[Array, Array], nodes: Callable[[Array], tuple[Array, Array]], upper: Surface, levels: Sequence[float]
-) -> list[tuple[Array, Array]]:
-    """The box of an integral in one direction, cut where the gap passes a level; others as they are."""
-    low, high = box
-    if len(low) != 1:
-        return [box]
-    from scipy.optimize import brentq
-
-    def gap(t: float) -> float:
-        return float(upper.nearest(nodes(np.array([[t]]))[0]).gap.flat[0])
-
-    places = np.linspace(low[0], high[0], SAMPLES)
-    gaps = upper.nearest(nodes(places[:, None])[0]).gap[:, 0]
-    cuts = []
-    for level in levels:
-        for k in np.flatnonzero((gaps[:-1] - level) * (gaps[1:] - level) < 0):
-            ends = float(places[k]), float(places[k + 1])
-            cuts += [float(brentq(lambda t, level=level: gap(t) - level, *ends, xtol=ULPS))]
-    at = np.array([low[0], *sorted(cuts), high[0]])
-    return [(at[k : k + 1], at[k + 1 : k + 2]) for k in range(len(at) - 1)]

@@ -1,46 +1,28 @@
-"""Integrals over two surfaces: nodes that gather where the other surface is near, refined until they are accurate.
+"""Sums over the inner of two surfaces: nodes that gather around the nearest point.
 
 Around the foot of a point at the distance h the parameters are x = h sinh t. In t the distance has no feature narrower
 than pi/2 whatever h is, so that Gauss's rule on pieces of a fixed length converges geometrically for any gap; the
-number of pieces grows with the logarithm of size over gap. The outer surface is divided adaptively.
+number of pieces grows with the logarithm of size over gap. Feet that are as near lie within 2 h, so that one is enough.
 
-Source: Johnston & Elliott (2005), doi 10.1002/nme.1208, for the substitution; Genz & Malik (1980),
-doi 10.1016/0771-050X(80)90039-X, for the adaptive subdivision, which is SciPy's.
+Source: Johnston & Elliott (2005), doi 10.1002/nme.1208, for the substitution.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache, partial
-from typing import Any
+from functools import lru_cache
 
 import numpy as np
 
 from surfacechem.contracts.terms import PairEnergy
 from surfacechem.errors import InputError
 from surfacechem.surfaces.projection import FIRST, POLE, Array, Projection, Surface
-from surfacechem.surfaces.shapes import Cavity, Cylinder, Disc, Plane, Sphere
-from surfacechem.tolerances import FLOOR
-
-ORDERS = (4, 6, 9, 13, 18, 25)
-"""Points of Gauss's rule on each piece, more and more of them until two in a row agree."""
-
-WITHIN = {FLOOR: 13, 0.0: 25}
-"""Order of the inner rule where the outer surface is divided adaptively, by the least accuracy it is enough for."""
+from surfacechem.surfaces.shapes import Cavity, Cylinder, Plane, Sphere
 
 PIECE = 2.0
 """Length of a piece in t."""
-
-MOST_NODES = 400_000
-"""Pairs of points that are looked at together."""
-
-MOST_DIVISIONS = 400
-"""Divisions of the outer surface after which an accuracy is out of reach."""
-
-SHALLOWEST = 2.0**-20
-"""Part of the size of a surface below which a gap is one of contact."""
 
 Sums = tuple[Array, Array, Array]
 """For n outer points: energy (n,), force on them (n, 3), and inner points weighted by what acts on each (n, 3)."""
@@ -99,13 +81,31 @@ def _legendre(order: int) -> tuple[Array, Array]:
     return np.polynomial.legendre.leggauss(order)
 
 
-def gauss(low: Array, high: Array, order: int) -> tuple[Array, Array]:
-    """Nodes and weights (n, k) of Gauss's rule on pieces of the intervals between two arrays (n,)."""
-    pieces = max(1, math.ceil(float(np.max(high - low)) / PIECE))
+def gauss(edges: Array, order: int) -> tuple[Array, Array]:
+    """Nodes and weights (n, k) of Gauss's rule on each of the pieces between edges (n, pieces + 1)."""
     x, w = _legendre(order)
-    at = ((np.arange(pieces)[:, None] + (x + 1) / 2) / pieces).ravel()
-    length = (high - low)[:, None]
-    return low[:, None] + length * at, length * np.tile(w / 2, pieces) / pieces
+    length = np.diff(edges)[..., None]
+    at = edges[:, :-1, None] + length * (x + 1) / 2
+    return at.reshape(len(edges), -1), (length * w / 2).reshape(len(edges), -1)
+
+
+def piece_edges(low: Array, high: Array, grain: Array | float = math.inf) -> Array:
+    """Edges (n, k) of pieces from parameters ``low`` to ``high`` (n,) around zero, none longer than PIECE, nor than the
+    grain of the surface, in units of the scale of sinh t.
+    """
+    if np.all(np.isinf(grain)):
+        count = max(1, math.ceil(float(np.max(high - low)) / PIECE))
+        return low[:, None] + (high - low)[:, None] * np.arange(count + 1) / count
+    return np.concatenate([-_outward(-low, grain)[:, ::-1], _outward(high, grain)[:, 1:]], axis=1)
+
+
+def _outward(end: Array, grain: Array | float) -> Array:
+    """Edges from zero to an end; where that is reached sooner than elsewhere the last pieces are empty."""
+    found = [np.zeros_like(end)]
+    while np.any(found[-1] < end):
+        wide = np.minimum(found[-1] + PIECE, np.arcsinh(np.sinh(found[-1]) + grain))
+        found.append(np.minimum(wide, end))
+    return np.stack(found, axis=1)
 
 
 def inner_nodes(surface: Surface, x: Array, order: int, law: PairEnergy, rtol: float) -> Grid | Circles:
@@ -125,7 +125,9 @@ def inner_nodes(surface: Surface, x: Array, order: int, law: PairEnergy, rtol: f
         ends = (at - math.pi, at + math.pi) if surface.shape.closed[k] else (low[k], high[k])
         scale, far = found.gap / size, reach / size
         below, above = np.minimum(at - ends[0], far), np.minimum(ends[1] - at, far)
-        t, w = gauss(-np.arcsinh(below / scale), np.arcsinh(above / scale), order)
+        grain = surface.shape.grain / size / scale
+        edges = piece_edges(-np.arcsinh(below / scale), np.arcsinh(above / scale), grain)
+        t, w = gauss(edges, order)
         axes.append((at[:, None] + scale[:, None] * np.sinh(t), w * scale[:, None] * np.cosh(t)))
     (u, du), (v, dv) = axes
     u, v = np.broadcast_arrays(u[:, :, None], v[:, None, :])
@@ -143,7 +145,7 @@ def _around(surface: Surface, near: Projection, reach: Array, order: int, cutoff
         # The circle at which the distance is the cut-off, from the law of cosines.
         chord = np.maximum(cutoff**2 - gap**2, 0.0) / (1 + bent * gap)
         end = 2 / abs(bent) * np.arcsin(np.minimum(np.sqrt(chord) * abs(bent) / 2, 1)) if bent else np.sqrt(chord)
-    t, w = gauss(np.zeros_like(gap), np.arcsinh(end / gap), order)
+    t, w = gauss(piece_edges(np.zeros_like(gap), np.arcsinh(end / gap)), order)
     s = gap[:, None] * np.sinh(t)
     ds = w * np.hypot(gap[:, None], s)
     chord = 2 * np.sin(bent * s / 2) / bent if bent else s
@@ -153,146 +155,16 @@ def _around(surface: Surface, near: Projection, reach: Array, order: int, cutoff
     return Circles(near.point, near.normal, gap, r, bent * chord**2 / 2, 2 * math.pi * np.abs(out) * ds)
 
 
-def closest(outer: Surface, inner: Surface, size: float, alike: tuple[bool, bool]) -> tuple[Array, float]:
-    """Parameters of the point of one surface that is nearest to the other, and the gap there [m].
-
-    It is sought near the origin within ``size`` [m] where a surface has no end.
-    """
-    low, high = np.nan_to_num(np.transpose(outer.shape.span), posinf=size, neginf=-size)
-    grid = np.stack(np.meshgrid(*np.linspace(low, high, 33).T, indexing="ij"), axis=-1).reshape(-1, 2)
-    if outer.shape.about_axis and low[0] == 0:
-        grid = np.maximum(grid, [POLE, -np.inf])
-    gaps = inner.nearest(outer.derivatives(grid, FIRST)[0]).gap
-    at = grid[np.argmin(gaps)]
-    if any(alike):
-        return at, float(gaps.min())
-    from scipy.optimize import minimize
-
-    scale = (high - low) / 32
-
-    def gap(z: Array) -> float:
-        return float(inner.nearest(outer.derivatives(np.clip(at + z * scale, low, high), FIRST)[0]).gap)
-
-    found: Any = minimize(gap, np.zeros(2), method="Nelder-Mead", options={"xatol": SHALLOWEST})
-    return np.clip(at + found.x * scale, low, high), float(found.fun)
-
-
-@dataclass(frozen=True)
-class Outer:
-    """Nodes over the outer surface around its nearest point; directions in which nothing changes have two of them."""
-
-    surface: Surface
-    at: Array
-    scale: Array
-    low: Array
-    high: Array
-    alike: tuple[bool, bool]
-
-    @property
-    def box(self) -> tuple[Array, Array]:
-        """Ends of the substituted parameters in the directions in which something changes."""
-        free = [k for k in range(2) if not self.alike[k]]
-        ends = np.arcsinh((np.stack([self.low, self.high]) - self.at) / self.scale)
-        return ends[0, free], ends[1, free]
-
-    def nodes(self, t: Array) -> tuple[Array, Array]:
-        """Points (n, k, 3) and vectors of their area (n, k, 3) at substituted parameters (n, free)."""
-        rows, weights, free = [], [], iter(t.T)
-        for k in range(2):
-            if self.alike[k]:
-                middle, half = (self.low[k] + self.high[k]) / 2, (self.high[k] - self.low[k]) / 2
-                # Across a closed direction what points there cancels, along a length Gauss's rule of two points.
-                shift = half / 2 if self.surface.shape.closed[k] else half / math.sqrt(3)
-                rows.append(np.broadcast_to([middle - shift, middle + shift], (len(t), 2)))
-                weights.append(np.full((len(t), 2), half))
-            else:
-                z = next(free)
-                rows.append((self.at[k] + self.scale[k] * np.sinh(z))[:, None])
-                weights.append((self.scale[k] * np.cosh(z))[:, None])
-        u, v = np.broadcast_arrays(rows[0][:, :, None], rows[1][:, None, :])
-        at = np.stack([u, v], axis=-1).reshape(len(t), -1, 2)
-        x, area = self.surface.elements(at)
-        return x, area * (weights[0][:, :, None] * weights[1][:, None, :]).reshape(len(t), -1, 1)
-
-
-def outer_nodes(outer: Surface, inner: Surface, size: float, reach: float) -> tuple[Outer, float]:
-    """The nodes over a surface that are graded towards the other, and the gap where they are nearest."""
-    if type(outer.shape) is Plane and is_round(outer) and outer.shape.tilt == 0:
-        # Polar coordinates, in which nothing may change around an axis.
-        polar = Surface(Disc(), outer.upper, outer.approach)
-        outer = polar if alike_around(polar, inner) else outer
-    alike = _alike_along(outer, inner), alike_around(outer, inner)
-    at, gap = closest(outer, inner, size, alike)
-    low, high = np.transpose(outer.shape.span)
-    _, x_u, x_v = outer.derivatives(at, FIRST)
-    lengths = np.maximum(np.linalg.norm([x_u, x_v], axis=-1), POLE)
-    scale = max(abs(gap), size * SHALLOWEST) / lengths
-    closed, far = np.array(outer.shape.closed), reach / lengths
-    low, high = (np.where(closed, at + s * math.pi, np.clip(e, -far, far)) for s, e in ((-1, low), (1, high)))
-    return Outer(outer, at, scale, low, high, alike), gap
-
-
 def alike_around(outer: Surface, inner: Surface) -> bool:
     """Whether nothing changes around a common axis."""
     axial = all(s.shape.tilt == 0 for s in (outer, inner)) and outer.shape.about_axis
     return axial and (inner.shape.about_axis or is_round(inner))
 
 
-def _alike_along(outer: Surface, inner: Surface) -> bool:
+def alike_along(outer: Surface, inner: Surface) -> bool:
     """Whether nothing changes along a cylinder over something without end in its direction."""
     shapes = outer.shape, inner.shape
     if not isinstance(shapes[0], Cylinder) or any(shape.tilt for shape in shapes):
         return False
     same = shapes[0].turn == shapes[1].turn and isinstance(shapes[1], Cylinder) and shapes[1].length is None
     return same or (is_round(inner) and isinstance(shapes[1], Plane))
-
-
-def _scaled(integrand: Callable[[Array, int], Array], order: int, usual: Array, t: Array) -> Array:
-    return integrand(t, order) / usual
-
-
-def product_rule(box: Sequence[Array], order: int) -> tuple[Array, Array]:
-    """Nodes (n, directions) and weights (n,) over a box."""
-    rules = [gauss(low[None], high[None], order) for low, high in zip(*box, strict=True)]
-    at = np.stack(np.meshgrid(*(t[0] for t, _ in rules), indexing="ij"), axis=-1).reshape(-1, len(rules))
-    return at, np.prod(np.stack(np.meshgrid(*(w[0] for _, w in rules), indexing="ij")), axis=0).ravel()
-
-
-def integral(
-    integrand: Callable[[Array, int], Array], box: Sequence[Array], sizes: Callable[[Array], Array], rtol: float
-) -> tuple[Array, float]:
-    """Integral over a box of an array, a function of nodes and of the order of rules inside it, and its error relative
-    to the ``sizes`` of the entries; InputError where the accuracy is out of reach.
-    """
-    before: Array | None = None
-    for order in ORDERS:
-        at, weights = product_rule(box, order)
-        now = np.tensordot(weights, integrand(at, order), axes=1)
-        if before is not None:
-            error = float(np.max(np.abs(now - before) / sizes(now)))
-            if error <= rtol:
-                return now, error
-        before = now
-    return _adaptive(integrand, box, sizes, rtol, now)
-
-
-def _adaptive(
-    integrand: Callable[[Array, int], Array],
-    box: Sequence[Array],
-    sizes: Callable[[Array], Array],
-    rtol: float,
-    about: Array,
-) -> tuple[Array, float]:
-    """The same where something narrow is elsewhere than at the foot: the box is divided where it is."""
-    from scipy.integrate import cubature
-
-    usual, most = sizes(about), MOST_DIVISIONS
-    order = next(order for least, order in WITHIN.items() if rtol >= least)
-    scaled = partial(_scaled, integrand, order, usual)
-    found: Any = cubature(scaled, *box, rule="gk15", rtol=0.0, atol=rtol, max_subdivisions=most)
-    error = float(np.max(np.abs(found.error * usual) / sizes(found.estimate * usual)))
-    if not error <= rtol:
-        raise InputError(
-            f"the accuracy {rtol:g} of an integral over the surfaces is out of reach: it errs by {error:.2g}."
-        )
-    return found.estimate * usual, error

@@ -19,7 +19,8 @@ import numpy as np
 
 from surfacechem.contracts.terms import PairEnergy
 from surfacechem.errors import InputError
-from surfacechem.surfaces.nodes import MOST_NODES, inner_nodes, integral, is_round, outer_nodes
+from surfacechem.surfaces.nodes import inner_nodes, is_round
+from surfacechem.surfaces.patches import integral, outer_patches
 from surfacechem.surfaces.projection import Array, Surface
 from surfacechem.surfaces.shapes import Plane
 from surfacechem.tolerances import NOISE, PRECISE, TINY
@@ -32,9 +33,6 @@ MOST_DECADES = 100
 
 COUNT = 13
 """Energy, and three components of two forces and two moments."""
-
-FIRST_BATCH = 64
-"""Points of the outer surface that are looked at together before it is known how many inner ones each has."""
 
 
 @dataclass(frozen=True)
@@ -51,6 +49,8 @@ class PairForces:
     error: float
     gap: float
     """Least gap of the surfaces [m]."""
+    places: int
+    """Places at which they are as near."""
     pairs: int
     """Pairs of points that were looked at."""
 
@@ -74,33 +74,32 @@ def interaction(lower: Surface, upper: Surface, laws: Sequence[PairEnergy], rtol
     check_finite(lower, upper)
     # The inner surface is the simpler one, if any.
     swapped = is_round(lower) and (not is_round(upper) or isinstance(lower.shape, Plane))
+    swapped |= not is_round(upper) and lower.shape.grain > upper.shape.grain
     outer, inner = (upper, lower) if swapped else (lower, upper)
-    kernels, pairs = [kernel(law) for law in laws], 0
+    kernels = [kernel(law) for law in laws]
     slowest = min(laws, key=lambda law: law.decay)
     size = length(lower, upper)
     for law in laws:
         _check_decay(law, size, rtol)
     _check_energy(lower, upper, slowest)
-    around, gap = outer_nodes(outer, inner, size, size * rtol ** (-1 / (slowest.decay - 2)))
+    patches, near = outer_patches(outer, inner, size, size * rtol ** (-1 / (slowest.decay - 2)))
+    gap = float(near.gap[0])
     if not gap > NOISE * size:
         raise InputError(
             f"the surfaces overlap or touch, their gap is {gap:.3g} m; a law of pairs of points holds outside only."
         )
     amounts = np.array([law.n_1 * law.n_2 for law in laws])[:, None]
 
-    def integrand(t: Array, order: int) -> Array:
-        nonlocal pairs
-        x, area = around.nodes(t)
-        found, count = _sums(x, area, inner, kernels, slowest, order, rtol)
-        pairs += count
-        return np.asarray(found * amounts)
+    def integrand(x: Array, order: int) -> tuple[Array, int]:
+        found, pairs = _sums(x, inner, kernels, slowest, order, rtol)
+        return found * amounts, pairs
 
-    found, error = integral(integrand, around.box, lambda found: _sizes(found, gap), rtol)
+    found, error, pairs = integral(patches, integrand, lambda found: _sizes(found, gap), rtol)
     energy, on_outer, on_inner, moment, opposite = np.split(found, [1, 4, 7, 10], axis=-1)
     forces, moments = (on_outer, on_inner), (moment, opposite)
     if swapped:
         forces, moments = forces[::-1], moments[::-1]
-    return PairForces(energy[:, 0], *forces, *moments, error, gap, pairs)
+    return PairForces(energy[:, 0], *forces, *moments, error, gap, near.count, pairs)
 
 
 def check_finite(lower: Surface, upper: Surface) -> None:
@@ -146,30 +145,16 @@ def length(lower: Surface, upper: Surface) -> float:
 
 
 def _sums(
-    x: Array,
-    area: Array,
-    inner: Surface,
-    kernels: Sequence[Callable[[Array], Array]],
-    law: PairEnergy,
-    order: int,
-    rtol: float,
+    x: Array, inner: Surface, kernels: Sequence[Callable[[Array], Array]], law: PairEnergy, order: int, rtol: float
 ) -> tuple[Array, int]:
-    """Integrals (n, laws, 13) over the inner surface for nodes (n, k, 3) of the outer one, and the number of pairs."""
-    n, k = x.shape[:2]
-    flat, found, pairs = x.reshape(-1, 3), np.empty((n * k, len(kernels), COUNT)), 0
-    begin, batch = 0, FIRST_BATCH
-    while begin < n * k:
-        part = slice(begin, begin + batch)
-        nodes = inner_nodes(inner, flat[part], order, law, rtol)
-        pairs += nodes.area.size
-        for j, one in enumerate(kernels):
-            energy, push, theirs = nodes.sums(one)
-            found[part, j, 0], found[part, j, 1:4], found[part, j, 4:7] = energy, push, -push
-            # The moment of -strength * away at the other end is x2 x away = x2 x x1, the same for all but the arm.
-            found[part, j, 7:10], found[part, j, 10:13] = np.cross(flat[part], push), np.cross(flat[part], theirs)
-        begin, batch = begin + batch, max(1, MOST_NODES * len(flat[part]) // nodes.area.size)
-    found *= np.linalg.norm(area, axis=-1).reshape(-1, 1, 1)
-    return found.reshape(n, k, len(kernels), COUNT).sum(axis=1), pairs
+    """Integrals (n, laws, 13) over the inner surface for points (n, 3), and the number of pairs."""
+    nodes, found = inner_nodes(inner, x, order, law, rtol), np.empty((len(x), len(kernels), COUNT))
+    for j, one in enumerate(kernels):
+        energy, push, theirs = nodes.sums(one)
+        found[:, j, 0], found[:, j, 1:4], found[:, j, 4:7] = energy, push, -push
+        # The moment of -strength * away at the other end is x2 x away = x2 x x1, the same for all but the arm.
+        found[:, j, 7:10], found[:, j, 10:13] = np.cross(x, push), np.cross(x, theirs)
+    return found, nodes.area.size
 
 
 def _sizes(found: Array, gap: float) -> Array:

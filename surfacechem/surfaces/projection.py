@@ -166,25 +166,18 @@ class Surface:
         # What comes round has no edge that a step could leave.
         low = np.where(self.shape.closed, -np.inf, low) + (POLE if self.shape.about_axis else 0.0)
         high = np.where(self.shape.closed, np.inf, high)
-        at = np.clip(start, low, high)
-        for _ in range(NEWTONS):
+
+        def value(at: Array) -> Array:
+            return np.asarray(np.linalg.norm(x - self.derivatives(at, FIRST)[0], axis=-1))
+
+        def step(at: Array) -> Array:
             D = self.derivatives(at, SECOND)
-            step = _step(D, x - D[0], at <= low, at >= high)
+            move = _step(D, x - D[0], at <= low, at >= high)
             if self.shape.about_axis:
-                step[..., 1] = 0.0  # the angle about the axis is that of the start
-            distance, length = np.linalg.norm(x - D[0], axis=-1), np.ones(at.shape[:-1])
-            for _ in range(40):
-                tried = np.clip(at + length[..., None] * step, low, high)
-                # Close to the end distances agree to rounding, while steps still get shorter.
-                worse = np.linalg.norm(x - self.derivatives(tried, FIRST)[0], axis=-1) > distance * (1 + DIGITS)
-                if not worse.any():
-                    break
-                length = np.where(worse, length / 2, length)
-            moved = np.where(worse[..., None], 0.0, tried - at)
-            at = at + moved
-            if np.all(np.abs(moved) <= ULPS * np.abs(at)):
-                break
-        return np.asarray(at)
+                move[..., 1] = 0.0  # the angle about the axis is that of the start
+            return move
+
+        return descended(np.clip(start, low, high), low, high, value, step)
 
     def curvature(self, at: Array, rate: Array | None = None) -> Curvature:
         """Curvature at parameters (..., 2), and its rate where they move at a rate."""
@@ -253,12 +246,47 @@ def _forms(D: Array, away: Array) -> tuple[tuple[Array, Array, Array], tuple[Arr
     return (E, F, G), (E - _dot(away, D[3]), F - _dot(away, D[4]), G - _dot(away, D[5]))
 
 
-def _step(D: Array, away: Array, lowest: Any, highest: Any) -> Array:
-    """Newton's step towards the nearest point, that of the metric where the distance is not convex; along an edge where
-    it would leave the surface.
+def descended(
+    at: Array,
+    low: Array,
+    high: Array,
+    value: Callable[[Array], Array],
+    step: Callable[[Array], Array],
+    noise: float = 0.0,
+) -> Array:
+    """Parameters (..., 2) between bounds at which a value is least, from steps that are halved where they do not lower
+    it by more than its ``noise``.
     """
+    for _ in range(NEWTONS):
+        now, move, length = value(at), step(at), np.ones(at.shape[:-1])
+        # Close to the end values agree to rounding, while steps still get shorter.
+        most = now + np.maximum(noise, DIGITS * np.abs(now))
+        for _ in range(40):
+            tried = np.clip(at + length[..., None] * move, low, high)
+            worse = value(tried) > most
+            if not worse.any():
+                break
+            length = np.where(worse, length / 2, length)
+        moved = np.where(worse[..., None], 0.0, tried - at)
+        at = at + moved
+        if np.all(np.abs(moved) <= ULPS * np.abs(at)):
+            break
+    return np.asarray(at)
+
+
+def _step(D: Array, away: Array, lowest: Any, highest: Any) -> Array:
+    """Newton's step towards the nearest point."""
     metric, hessian = _forms(D, away)
     slope = np.stack([-_dot(away, D[1]), -_dot(away, D[2])], axis=-1)
+    return newton_step(slope, hessian, metric, lowest, highest)
+
+
+def newton_step(
+    slope: Array, hessian: tuple[Array, Array, Array], metric: tuple[Array, Array, Array], lowest: Any, highest: Any
+) -> Array:
+    """Newton's step (..., 2) from a slope (..., 2) and second derivatives uu, uv, vv, or with the metric for these
+    where they are not convex; none across an edge.
+    """
     convex = (_determinant(hessian) > SAME * _determinant(metric)) & (hessian[0] > 0)
     a, b, c = (np.where(convex, mine, usual) for mine, usual in zip(hessian, metric, strict=True))
     held = (lowest & (slope > 0)) | (highest & (slope < 0))

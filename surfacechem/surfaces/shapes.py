@@ -310,6 +310,11 @@ class Wavy(Plane):
         across = 1 if self.wavelength_2 is None else cos(2 * math.pi / self.wavelength_2 * v)
         return u, v, self.amplitude * (cos(2 * math.pi / self.wavelength * u) * across - 1)
 
+    @property
+    def grain(self) -> float:  # type: ignore[override]
+        """A quarter of a wave."""
+        return min(self.wavelength, self.wavelength_2 or math.inf) / 4
+
     def starts(self, x: Array) -> Sequence[Array]:
         """Below the point, and on the crests and flanks around it."""
         steps = (-0.25, 0.0, 0.25)
@@ -363,6 +368,11 @@ class Heights(Shape):
     def span(self) -> Span:
         """The grid."""
         return (float(self.x[0]), float(self.x[-1])), (float(self.y[0]), float(self.y[-1]))
+
+    @property
+    def grain(self) -> float:  # type: ignore[override]
+        """The smallest cell of the grid, in which heights are a polynomial."""
+        return float(min(np.diff(self.x).min(), np.diff(self.y).min()))
 
     def starts(self, x: Array) -> Sequence[Array]:
         """Below the point, and the nearest of the places that were measured."""

@@ -1,0 +1,121 @@
+"""Patches that are cut where the gap passes a level at which a law bends, so that rules stay accurate on both sides.
+
+Source: Saye (2015), doi 10.1137/140966290: along the direction in which the gap changes most its level is found on each
+line of nodes; the other direction is cut where the level leaves the patch.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from surfacechem.surfaces.nodes import gauss
+from surfacechem.surfaces.patches import Levels, Patches
+from surfacechem.surfaces.projection import FIRST, Array, Surface
+
+SAMPLES = 5
+"""Points along each side of a patch at which it is seen whether it has a level."""
+
+
+@dataclass(frozen=True)
+class LevelPatches(Patches):
+    """Patches with the level (n,) [m] of the gap to another surface that each has, and the direction (n,) along which
+    it is found; minus one where there is none. Gaps that differ by less than the ``noise`` [m] are the same.
+    """
+
+    arrays: ClassVar[Sequence[str]] = (*Patches.arrays, "level", "along")
+
+    other: Surface
+    levels: tuple[float, ...]
+    noise: float
+    level: Array
+    along: Levels
+
+    @property
+    def kinds(self) -> Levels:
+        """The direction of each."""
+        return self.along
+
+    def halved(self) -> Self:
+        """Their halves, each with the level it has itself."""
+        return super().halved().marked()
+
+    def marked(self) -> Self:
+        """With the level and its direction as the gap now has them."""
+        share = np.linspace(0, 1, SAMPLES)
+        u, v = (self.low[:, k, None] + (self.high - self.low)[:, k, None] * share for k in range(2))
+        gaps = self.gaps(*np.broadcast_arrays(u[:, :, None], v[:, None, :]))
+        steepness = np.stack([np.abs(np.diff(gaps, axis=k + 1)).mean(axis=(1, 2)) for k in range(2)])
+        along = np.argmax(np.where(np.array(self.alike)[:, None], -1.0, steepness), axis=0)
+        # Of several levels the one that divides a patch most evenly.
+        below, above = (np.mean(s * (gaps[..., None] - self.levels) > self.noise, axis=(1, 2)) for s in (-1, 1))
+        best = np.argmax(below * above, axis=1)
+        inside = np.max(below * above, axis=1) > 0
+        return replace(self, level=np.array(self.levels)[best], along=np.where(inside, along, -1))
+
+    def nodes(self, order: int) -> tuple[Array, Array]:
+        """Points (n, k, 3) of a rule, and their areas (n, k), on both sides of the level; all of one kind."""
+        k = int(self.along[0])
+        if k < 0:
+            return super().nodes(order)
+        across, width = self._across(1 - k, order)
+        n, m = across.shape
+        each = self[np.repeat(np.arange(n), m)]
+        t, w = gauss(np.stack([each.low[:, k], each.crossing(k, across.ravel()), each.high[:, k]], axis=1), order)
+        there, thickness = self.parameters(1 - k, across, width)
+        here, length = (part.reshape(n, m, -1) for part in each.parameters(k, t, w))
+        at = (here, np.broadcast_to(there[..., None], here.shape))
+        return self.points(np.stack(at if k == 0 else at[::-1], axis=-1), length * thickness[..., None])
+
+    def _across(self, j: int, order: int) -> tuple[Array, Array]:
+        """Nodes and weights (n, m) across the direction of the level, cut where it leaves the patch."""
+        if self.alike[j]:
+            return self.rule(j, order)
+        k, leaves = 1 - j, []
+        for side in (self.low, self.high):
+            edge = replace(self, low=np.where(np.arange(2) == k, side, self.low))
+            leaves.append(edge.crossing(j, side[:, k]))
+        edges = np.stack([self.low[:, j], *leaves, self.high[:, j]], axis=1)
+        return gauss(np.sort(edges, axis=1), order)
+
+    def divided(self, k: int) -> Self:
+        """The same where nothing changes across a direction: divided at the levels once for all."""
+        passed, rest = self[self.along == k], self[self.along != k]
+        cut = passed.crossing(k, passed.low[:, 1 - k])
+        below, above = passed.high.copy(), passed.low.copy()
+        below[:, k], above[:, k] = cut, cut
+        return rest.joined(replace(passed, high=below), replace(passed, low=above))
+
+    def crossing(self, k: int, across: Array) -> Array:
+        """Where along a direction each patch passes its level, at a place (n,) across it; its end where it does not."""
+        from scipy.optimize.elementwise import find_root
+
+        def above(t: Array, across: Array, which: Array) -> Array:
+            gaps = self[which].gaps(*((t, across) if k == 0 else (across, t)))
+            return np.asarray(gaps - self.level[which])
+
+        ends = self.low[:, k], self.high[:, k]
+        found: Any = find_root(above, ends, args=(across, np.arange(len(self))))
+        return np.asarray(np.where(found.success, found.x, ends[1]))
+
+    def gaps(self, u: Array, v: Array) -> Array:
+        """Gaps at substituted parameters (n, ...)."""
+        at = np.stack([self.parameters(k, t)[0] for k, t in enumerate((u, v))], axis=-1)
+        return np.asarray(self.other.nearest(self.surface.derivatives(at, FIRST)[0]).gap)
+
+
+def with_levels(patches: Patches, other: Surface, levels: Sequence[float], noise: float) -> LevelPatches:
+    """Patches of a surface, each with the level of the gap to the other that passes through it, if one does."""
+    parts = {name: getattr(patches, name) for name in ("surface", "alike", *Patches.arrays)}
+    none = np.zeros(len(patches))
+    found = LevelPatches(**parts, other=other, levels=tuple(levels), noise=noise, level=none, along=none.astype(int))
+    found = found.marked()
+    if any(found.alike):
+        for _ in levels:
+            if np.all(found.along < 0):
+                break
+            found = found.divided(found.alike.index(False)).marked()
+    return found

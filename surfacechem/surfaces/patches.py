@@ -1,0 +1,284 @@
+"""Integrals over the outer of two surfaces: patches around each place that is near, divided until they are accurate.
+
+Each place has a rectangle of parameters, in which nodes gather around it; a patch is no larger than the grain of the
+surfaces. Patches on which two rules do not agree have more points, or are divided. What is looked at thus does not
+depend on the accuracy, so that no place is missed at a low one.
+
+Source: Bentley (1975), doi 10.1145/361002.361007, for rectangles around points; Berntsen, Espelid & Genz (1991),
+doi 10.1145/210232.210233, for the adaptive subdivision of many regions at a time.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any, ClassVar, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surfacechem.errors import InputError
+from surfacechem.surfaces.nearest_places import NearPlaces, near_places
+from surfacechem.surfaces.nodes import alike_along, alike_around, gauss, is_round, piece_edges
+from surfacechem.surfaces.projection import FIRST, POLE, Array, Surface
+from surfacechem.surfaces.shapes import Disc, Plane
+
+ORDERS = (4, 6, 9, 13, 18, 25)
+"""Points of Gauss's rule on each patch, more and more of them until two in a row agree."""
+
+LAST = len(ORDERS) - 1
+"""Level of the last of the orders."""
+
+STUCK, ENOUGH = 4.0, 2
+"""A rule of a level above enough gains as much at least, or the patch is divided."""
+
+MOST_POINTS = 300_000_000
+"""Pairs of points after which an accuracy is out of reach."""
+
+TOGETHER = 400_000
+"""Pairs of points that are looked at together."""
+
+SHALLOWEST = 2.0**-20
+"""Part of the size of a surface below which a gap is one of contact."""
+
+Levels = NDArray[np.int_]
+"""Which of the orders each patch has."""
+
+Integrand = Callable[[Array, int], tuple[Array, int]]
+"""Values (n, ...) per area at points (n, 3), with rules of an order inside, and how many points these took."""
+
+
+@dataclass(frozen=True)
+class Patches:
+    """Patches of a surface between substituted parameters ``low`` and ``high`` (n, 2), around ``at`` with ``scale``
+    (n, 2); directions in which nothing changes have two nodes.
+    """
+
+    surface: Surface
+    at: Array
+    scale: Array
+    low: Array
+    high: Array
+    alike: tuple[bool, bool]
+
+    arrays: ClassVar[Sequence[str]] = ("at", "scale", "low", "high")
+    """What each patch has of its own."""
+
+    @property
+    def kinds(self) -> Levels:
+        """Numbers (n,): patches of one kind have rules of as many points."""
+        return np.zeros(len(self), dtype=int)
+
+    def __getitem__(self, chosen: NDArray[Any] | slice) -> Self:
+        """Some of them."""
+        return replace(self, **{name: getattr(self, name)[chosen] for name in self.arrays})
+
+    def __len__(self) -> int:
+        """How many they are."""
+        return len(self.at)
+
+    def nodes(self, order: int) -> tuple[Array, Array]:
+        """Points (n, k, 3) of a rule, and their areas (n, k); all patches are of one kind."""
+        (u, du), (v, dv) = (self.parameters(k, *self.rule(k, order)) for k in range(2))
+        u, v = np.broadcast_arrays(u[:, :, None], v[:, None, :])
+        return self.points(np.stack([u, v], axis=-1), du[:, :, None] * dv[:, None, :])
+
+    def points(self, at: Array, lengths: Array) -> tuple[Array, Array]:
+        """Points (n, k, 3) at parameters (n, ..., 2), and their areas (n, k) from products of lengths (n, ...)."""
+        x, vectors = self.surface.elements(at.reshape(len(at), -1, 2))
+        return x, np.linalg.norm(vectors, axis=-1) * lengths.reshape(len(at), -1)
+
+    def rule(self, k: int, order: int) -> tuple[Array, Array]:
+        """Nodes and weights (n, m) along a direction."""
+        ends = np.stack([self.low[:, k], self.high[:, k]], axis=1)
+        if not self.alike[k]:
+            return gauss(ends, order)
+        middle, half = ends.mean(axis=1)[:, None], np.diff(ends) / 2
+        # Across a closed direction what points there cancels, along a length Gauss's rule of two points.
+        shift = half / 2 if self.surface.shape.closed[k] else half / math.sqrt(3)
+        return middle + shift * [-1, 1], half * np.ones(2)
+
+    def parameters(self, k: int, t: Array, w: Array | float = 1.0) -> tuple[Array, Array]:
+        """Parameters (n, ...) from substituted ones along a direction, and their lengths for some weights."""
+        shape = -1, *[1] * (t.ndim - 1)
+        at, scale = self.at[:, k].reshape(shape), self.scale[:, k].reshape(shape)
+        if self.alike[k]:
+            return at + scale * t, scale * w
+        return at + scale * np.sinh(t), scale * np.cosh(t) * w
+
+    def line(self, k: int, count: int) -> Array:
+        """Parameters along a direction, from end to end of all patches; graded where they are around one place."""
+        ends = [self.parameters(k, edge[:, k, None])[0] for edge in (self.low, self.high)]
+        low, high = float(ends[0].min()), float(ends[1].max())
+        if self.alike[k] or np.ptp(self.at[:, k]):
+            return np.linspace(low, high, count)
+        t = np.arcsinh((np.array([low, high]) - self.at[0, k]) / self.scale[0, k])
+        return np.asarray(self.at[0, k] + self.scale[0, k] * np.sinh(np.linspace(t[0], t[1], count)))
+
+    def halved(self) -> Self:
+        """Their halves in each direction in which something changes."""
+        found = self
+        for k in range(2):
+            if not self.alike[k]:
+                middle = (found.low[:, k] + found.high[:, k]) / 2
+                low, high = found.low.copy(), found.high.copy()
+                low[:, k], high[:, k] = middle, middle
+                found = replace(found, high=high).joined(replace(found, low=low))
+        return found
+
+    def joined(self, *others: Self) -> Self:
+        """These and others."""
+        parts: dict[str, Any] = {
+            name: np.concatenate([getattr(part, name) for part in (self, *others)]) for name in self.arrays
+        }
+        return replace(self, **parts)
+
+
+def outer_patches(outer: Surface, inner: Surface, size: float, reach: float) -> tuple[Patches, NearPlaces]:
+    """The patches of a surface, graded towards the other up to a ``reach`` [m], and where that is nearest."""
+    if type(outer.shape) is Plane and is_round(outer) and outer.shape.tilt == 0:
+        # Polar coordinates, in which nothing may change around an axis.
+        polar = Surface(Disc(), outer.upper, outer.approach)
+        outer = polar if alike_around(polar, inner) else outer
+    alike = alike_along(outer, inner), alike_around(outer, inner)
+    grain = min(outer.shape.grain, inner.shape.grain)
+    near = near_places(outer, inner, size, alike, grain)
+    tangents = outer.derivatives(near.at, FIRST)[1:]
+    lengths = np.maximum(np.linalg.norm(tangents, axis=-1).T, POLE)
+    first, low, high = near.at[0], *np.transpose(outer.shape.span)
+    far = reach / lengths[0]
+    closed = np.array(outer.shape.closed)
+    low, high = (np.where(closed, first + s * math.pi, np.clip(e, -far, far)) for s, e in ((-1, low), (1, high)))
+    at = np.where(closed, first + np.remainder(near.at - first + math.pi, 2 * math.pi) - math.pi, near.at)
+    at = np.clip(at, low, high)
+    scales = np.maximum(np.abs(near.gap), size * SHALLOWEST)[:, None] / lengths
+    # Lengths of a direction in which nothing changes are those of the parameter.
+    scales = np.where(alike, 1.0, scales)
+    rectangles = around_each(at, low, high, lengths[0])
+    patches = [
+        _patches(outer, at[k], scales[k], box, np.where(alike, math.inf, grain / lengths[k]), alike)
+        for k, box in rectangles
+    ]
+    return patches[0].joined(*patches[1:]), near
+
+
+def around_each(at: Array, low: Array, high: Array, lengths: Array) -> list[tuple[int, tuple[Array, Array]]]:
+    """A rectangle around each of some places (n, 2) within one, cut where they are the farthest apart."""
+    waiting, found = [(np.arange(len(at)), low, high)], []
+    while waiting:
+        group, low, high = waiting.pop()
+        if len(group) == 1:
+            found.append((int(group[0]), (low, high)))
+            continue
+        sorts = np.sort(at[group], axis=0)
+        steps = np.diff(sorts, axis=0) * lengths
+        row, k = np.unravel_index(np.argmax(steps), steps.shape)
+        cut = (sorts[row, k] + sorts[row + 1, k]) / 2
+        below = at[group, k] < cut
+        middle = np.where(np.arange(2) == k, cut, high), np.where(np.arange(2) == k, cut, low)
+        waiting += [(group[~below], middle[1], high), (group[below], low, middle[0])]
+    return found
+
+
+def _patches(
+    outer: Surface, at: Array, scale: Array, box: tuple[Array, Array], grain: Array, alike: tuple[bool, bool]
+) -> Patches:
+    """Patches of one rectangle of parameters."""
+    pairs = []
+    for k in range(2):
+        ends = (np.stack(box)[:, k] - at[k]) / scale[k]
+        if alike[k]:
+            edges = ends
+        else:
+            ends = np.arcsinh(ends)
+            edges = piece_edges(ends[:1], ends[1:], grain[k] / scale[k])[0]
+        pairs.append(list(pairwise(edges)))
+    low, high = np.moveaxis(np.array([(a, b) for a in pairs[0] for b in pairs[1]]), 2, 0)
+    return Patches(outer, np.tile(at, (len(low), 1)), np.tile(scale, (len(low), 1)), low, high, alike)
+
+
+class Rules:
+    """Values of an integrand over patches by rules of some orders; InputError before they take too long."""
+
+    def __init__(self, integrand: Integrand, rtol: float) -> None:
+        """For an accuracy that messages name."""
+        self.integrand, self.rtol, self.points = integrand, rtol, 0
+
+    def __call__(self, patches: Patches, levels: Levels, inside: Levels) -> Array:
+        """Integrals (n, ...) over each patch, with the order of its level, and with that of another one inside."""
+        found: dict[int, Array] = {}
+        ranks = np.stack([levels, inside, patches.kinds], axis=1)
+        for rank in np.unique(ranks, axis=0):
+            where = np.flatnonzero((ranks == rank).all(axis=1))
+            values = self._of_order(patches[where], ORDERS[rank[0]], ORDERS[rank[1]])
+            found |= dict(zip(where.tolist(), values, strict=True))
+        return np.array([found[k] for k in range(len(levels))])
+
+    def _of_order(self, patches: Patches, order: int, inside: int) -> Array:
+        """The same by one rule."""
+        found, begin, batch = [], 0, 1
+        while begin < len(patches):
+            part = patches[begin : begin + batch]
+            x, area = part.nodes(order)
+            values, points = self.integrand(x.reshape(-1, 3), inside)
+            found.append(np.einsum("nk...,nk->n...", values.reshape(*area.shape, *values.shape[1:]), area))
+            self.points += points
+            begin += batch
+            ahead = self.points + points / len(part) * (len(patches) - begin)
+            if ahead > MOST_POINTS:
+                text = f"the accuracy {self.rtol:.2g} of an integral over the surfaces is out of reach"
+                raise InputError(f"{text}: it takes {ahead:.1g} pairs of points; ask for less, or smaller surfaces.")
+            batch = max(1, TOGETHER * len(part) // points)
+        return np.concatenate(found)
+
+
+def integral(
+    patches: Patches, integrand: Integrand, sizes: Callable[[Array], Array], rtol: float
+) -> tuple[Array, float, int]:
+    """Integral over patches, its error relative to the ``sizes`` of the entries, and how many points it took.
+
+    InputError where the accuracy is out of reach.
+    """
+    rules, level = Rules(integrand, rtol), np.ones(len(patches), dtype=int)
+    inside, stuck = level.copy(), np.zeros(len(patches), dtype=bool)
+    value = rules(patches, level, inside)
+    change = value - rules(patches, level - 1, inside - 1)
+    while True:
+        whole = value.sum(axis=0)
+        size = sizes(whole)
+        share = _largest(change, size)
+        error = float(share.sum())
+        if error <= rtol:
+            return whole, error, rules.points
+        rank = np.argsort(share)
+        worst = np.zeros(len(patches), dtype=bool)
+        worst[rank[~(np.cumsum(share[rank]) <= rtol / 2)]] = True
+        # What is inside has an error of its own, which rules of the last order alone would not show.
+        halved = worst & (stuck | (level == LAST) | (inside == LAST))
+        raised = worst & ~halved
+        if raised.any():
+            level[raised] += 1
+            inside[raised] += 1
+            finer = rules(patches[raised], level[raised], inside[raised])
+            change[raised] = finer - value[raised]
+            stuck[raised] = (level[raised] > ENOUGH) & (_largest(change[raised], size) * STUCK > share[raised])
+            value[raised] = finer
+        if halved.any():
+            halves = patches[halved].halved()
+            # A rule on half of a patch is as good as one of higher order, but for what is inside.
+            times = len(halves) // int(halved.sum())
+            start = np.tile(np.maximum(level[halved] - 1, 1), times)
+            deep = np.tile(np.minimum(inside[halved] + 1, LAST), times)
+            theirs = rules(halves, start, deep)
+            changes = theirs - rules(halves, start - 1, deep - 1)
+            patches = patches[~halved].joined(halves)
+            value, change = np.concatenate([value[~halved], theirs]), np.concatenate([change[~halved], changes])
+            level, inside = np.append(level[~halved], start), np.append(inside[~halved], deep)
+            stuck = np.append(stuck[~halved], np.zeros(len(start), dtype=bool))
+
+
+def _largest(change: Array, size: Array) -> Array:
+    """Errors (n,) of patches, the largest of all entries."""
+    return np.asarray(np.abs(change / size).reshape(len(change), -1).max(axis=1, initial=0.0))
