@@ -25,7 +25,7 @@ GAP = "g_n"
 Density = Callable[[Array], Array]
 """Energy per area [J/m^2] and traction [Pa], tension positive, (n, 2) for n gaps [m]."""
 
-OF_AREA = 1e-6
+OF_AREA = NEGLIGIBLE**2
 """Relative accuracy of the area of contact, which no force follows from, unless less is asked for."""
 
 FAR = 1e6
@@ -131,7 +131,7 @@ def over_gap(
     def sizes(found: Array) -> Array:
         force, moment = (float(np.linalg.norm(found[k])) for k in (slice(1, 4), slice(7, 10)))
         force = max(force, floor, TINY)
-        parts = [max(abs(found[0]), force * size), *[force] * 6, *[max(moment, force * size)] * 6]
+        parts = [max(abs(found[0]), force * size * NEGLIGIBLE**2), *[force] * 6, *[max(moment, force * size)] * 6]
         area = max(abs(found[13]), EPS * size**2) * max(1.0, OF_AREA / rtol)
         flow = max(abs(found[14]), TINY)
         return np.array([*parts, area, flow, max(abs(found[15]), flow / size)])
