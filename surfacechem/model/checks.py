@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from fractions import Fraction
+from functools import lru_cache
 from typing import Any
 
 import symengine
@@ -117,6 +118,7 @@ def check_start(system: System, values: Mapping[str, float], initial: Mapping[st
             raise InputError(message, path=margin.path)
 
 
+@lru_cache(maxsize=1024)
 def _exact(value: float) -> Any:
     """A double as the rational number it is, so that a vanishing capacity is seen to vanish."""
     fraction = Fraction(value)

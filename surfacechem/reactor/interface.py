@@ -121,12 +121,12 @@ class InterfaceReactor(HeldReactor):
     def _connect(self, reactor: Any, account: int) -> None:
         """What must be given to the body to keep the reactor's temperature, the reactor loses."""
         self._connecting = True
-        cantera.Wall(self, reactor, A=self.area, Q=lambda t: -float(self.attempt(lambda: self._rates(t))[account]))
+        cantera.Wall(self, reactor, A=self.area, Q=lambda t: -float(self.attempt(self._rates, t)[account]))
         self._connecting = False
 
     def _given(self, gas: Receiver, t: float) -> tuple[Array, float]:
         """Amounts of species [kmol/s] that reactions give to a neighbour at a time [s], and their enthalpy [W]."""
-        rates = self.attempt(lambda: self._rates(t))
+        rates = self.attempt(self._rates, t)
         amounts, enthalpy = next(item for item in self.scene.beside if item.reactor is gas).given(rates)
         return amounts * self.area, enthalpy * self.area
 
@@ -204,7 +204,7 @@ class InterfaceReactor(HeldReactor):
                 f"{read[0]} depends on the load of the gap, which a reactor gives at the ends of steps. Prescribe F_n."
             )
         gap = self.scene.states.index("g_n")
-        rate = lambda t: float(self.attempt(lambda: self._rates(t))[gap])  # noqa: E731
+        rate = lambda t: float(self.attempt(self._rates, t)[gap])  # noqa: E731
         cantera.Wall(gas, outside, A=self.area, velocity=rate)
 
     def _refuse_late(self, what: str) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from ruamel.yaml import YAML
 from scipy.integrate import solve_ivp
+from scipy.interpolate import CubicSpline
 from test_mechanism_cantera import FOLDER, SURFACES
 
 import surfacechem
@@ -424,3 +425,11 @@ def test_desorption_as_the_temperature_rises_is_what_cantera_gives_point_by_poin
         desorbed.append(surface.get_net_production_rates(gas)[gas.species_index("CO")] * 1e3 * AVOGADRO)
     np.testing.assert_allclose(data["production_CO"].values, desorbed, atol=1e-7 * max(desorbed), rtol=0)
     assert times[np.argmax(desorbed)] == pytest.approx(6.6, abs=0.2)  # the peak, at 496 K
+
+
+def test_the_charge_of_a_sweep_of_the_potential_is_the_integral_of_its_current():
+    """Nothing evolves, so that the integrator takes steps of seconds in which the current changes by half."""
+    data = surfacechem.load("lithium-polarisation").run(error="balances").dataset
+    production = CubicSpline(data["time"], data["production_Li_elyt"])
+    charge = [production.integrate(0, t) for t in data["time"].values[1:]]
+    np.testing.assert_allclose(data["made_Li_elyt"][1:], charge, rtol=3e-6)

@@ -1,5 +1,7 @@
 """Crossings inside a step of a library: the same ones as the compiled stepper finds, on random polynomials."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 import symengine as se
@@ -7,7 +9,16 @@ from solver_problems import problem
 
 from surfacechem.compile.program import compile_program
 from surfacechem.solve import solver
-from surfacechem.solve.adapters.dense_step import NODES, DenseStep, Guards, StepLedger, first_crossing
+from surfacechem.solve.adapters.dense_step import (
+    NODES,
+    DenseStep,
+    Guards,
+    StepLedger,
+    at_nodes,
+    first_crossing,
+    hermite,
+    on_step,
+)
 from surfacechem.solve.contract import Margin
 
 GUARDS, DEGREE = 3, 4
@@ -81,13 +92,24 @@ def test_guards_far_from_zero_follow_a_step_at_once(values, far):
     rows = np.array(values)[:, None]
     for each in (guards, stepwise):
         each.start(rows[0])
-    assert guards.far(rows[1:], np.ones(1, bool)) == far
+    assert guards.far(rows[None, 1:], np.ones(1, bool)) == far
     if far:
         for row in rows[1:]:
             stepwise.follow(row)
         assert [vars(guards)[name] for name in ("sides", "largest", "now")] == [
             vars(stepwise)[name] for name in ("sides", "largest", "now")
         ]
+
+
+def test_a_polynomial_follows_from_its_derivatives_at_the_ends_of_a_step():
+    power = np.polynomial.Polynomial([3.0, -1.0, 4.0, 1.0, -5.0, 9.0])
+    times = np.array([0.5, 2.0, 2.25])
+    ends = np.array([[[power.deriv(k)(t)] for k in range(3)] for t in times])
+    rows = hermite(np.diff(times), ends)
+    for k, (start, end) in enumerate(pairwise(times)):
+        nodes = start + (end - start) * NODES
+        np.testing.assert_allclose(on_step(end, end - start, rows[k], nodes)[:, 0], power(nodes), atol=1e-12)
+        np.testing.assert_allclose(at_nodes(rows)[k, :, 0], power(nodes[1:]), atol=1e-12)
 
 
 def test_a_ledger_is_the_integral_of_its_rates():

@@ -7,12 +7,13 @@ inside the last step come from the integrator's own polynomial, whose derivative
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any, Self
 
 import cantera
 import numpy as np
 
-from surfacechem.solve.adapters.dense_step import DenseStep
+from surfacechem.solve.adapters.dense_step import DenseStep, at_nodes, hermite, on_step
 from surfacechem.solve.adapters.evaluation import Evaluation
 from surfacechem.solve.adapters.stepping import Method, StepError, SteppingSolver, View
 from surfacechem.solve.contract import Array
@@ -87,12 +88,12 @@ class HeldReactor(cantera.ExtensibleReactor):
         """Time derivatives of the variables at time t [s], for the values last put."""
         raise NotImplementedError
 
-    def attempt(self, evaluate: Callable[[], Array]) -> Array:
-        """What Cantera asks for; an error is raised again whenever it asks for more."""
+    def attempt(self, evaluate: Callable[[float], Array], t: float) -> Array:
+        """What Cantera asks for at a time [s]; an error is raised again whenever it asks for more."""
         if self.error is not None:
             raise self._failure(self.error)
         try:
-            return evaluate()
+            return evaluate(t)
         except BackOffError:
             raise
         except Exception as error:
@@ -117,10 +118,9 @@ class HeldReactor(cantera.ExtensibleReactor):
     def replace_update_connected(self, _pressure: bool) -> None:
         """Nothing of the contents is read by others."""
 
-    def replace_eval(self, t: float, lhs: Any, rhs: Any) -> None:
-        lhs[:] = 1.0
+    def replace_eval(self, t: float, _lhs: Any, rhs: Any) -> None:  # its left side is one
         self.asked = t
-        rhs[:] = self.attempt(lambda: self.rates(t))
+        rhs[:] = self.attempt(self.rates, t)
 
     def replace_component_name(self, i: int) -> str:
         return self.names[i]
@@ -142,6 +142,7 @@ class _SystemReactor(HeldReactor):
         self.evaluation = Evaluation(view.problem.program, view.evaluation.y, view.parameters)
         self.count = len(x)
         lines = view.problem.program.n_ledger if view.problem.program.filler else 0
+        self.counts = lines > 0
         self.unit = np.concatenate((np.maximum(view.atol, TINY), np.full(lines, LEDGER_UNIT)))
         self.scaled = np.concatenate((x, np.zeros(lines))) / self.unit
         self.names = tuple(f"x{i}" for i in range(len(self.unit)))
@@ -154,11 +155,10 @@ class _SystemReactor(HeldReactor):
 
     def rates(self, t: float) -> Array:
         self.view.residuals += 1
-        if not self.evaluation.put(t, self.scaled[: self.count] * self.unit[: self.count]):
+        evaluation, x = self.evaluation, self.scaled * self.unit
+        if not evaluation.put(t, x[: self.count] if self.counts else x):
             raise BackOffError("no consistent state")
-        rates = self.evaluation.ydot[self.evaluation.free]
-        if len(self.unit) > self.count:
-            rates = np.concatenate((rates, self.evaluation.ledger()))
+        rates = evaluation.rates() if self.counts else evaluation.ydot[evaluation.free]
         return np.asarray(rates / self.unit)
 
 
@@ -184,27 +184,53 @@ class _Stretch(Method):
         self.net.initial_time = t
         self.longest = min(LONGEST * (end - t), view.problem.spacing)
         self.t, self.end = t, end
+        self.net.max_time_step = self.longest
+        self.last: list[Array] = []
+        self.failure: Exception | None = None
 
     def advance(self) -> DenseStep:
-        before = self.t
-        try:
+        return self.several(1)[0]
+
+    def several(self, most: int) -> list[DenseStep]:
+        times, ends = [self.t], self.last or [self.reactor.scaled]
+        while len(times) <= most and self.t < self.end and self.failure is None:
             # Cantera knows no time to stop at: a step beyond it would not have felt what is there.
-            self.net.max_time_step = min(self.longest, max(self.end - self.t, NOISE * self.end))
-            self.t = float(self.net.step())
-            return self._step(last_step(self.net, before, self.t, self.reactor.unit))
-        except (cantera.CanteraError, ArithmeticError) as error:
-            raise StepError(str(error)) from error
+            if self.end - self.t < self.longest:
+                self.net.max_time_step = max(self.end - self.t, NOISE * self.end)
+            try:
+                self.t = self.net.step()
+                ends += self._present()
+                times.append(self.t)
+            except (cantera.CanteraError, ArithmeticError) as error:
+                self.failure = error  # an event may lie before it
+        if len(times) == 1:
+            raise StepError(str(self.failure)) from self.failure
+        if not self.last:
+            ends[1:1] = ends[2:4]  # the first polynomial is a straight line
+        self.last = ends[-3:]
+        unit = self.reactor.unit
+        return self._steps(
+            np.array(times), hermite(np.diff(times), np.concatenate(ends).reshape(-1, 3, len(unit)) * unit)
+        )
 
-    def _step(self, whole: DenseStep) -> DenseStep:
-        """The step with its ledger, where the integrator has that."""
-        n = self.reactor.count
-        if len(self.reactor.unit) == n:
-            return whole
+    def _present(self) -> list[Array]:
+        """State, its rate and second derivative by the integrator's polynomial, a straight line at first."""
+        state, rate = self.net.get_derivative(0), self.net.get_derivative(1)
+        try:
+            return [state, rate, self.net.get_derivative(2)]
+        except cantera.CanteraError:
+            return [state, rate, np.zeros_like(rate)]
 
-        def y(t: Any) -> Array:
-            return whole.y(t)[..., :n]
-
-        return DenseStep(whole.start, whole.end, y, y, lambda t: whole.y(t)[n:])
+    def _steps(self, times: Array, rows: Array) -> list[DenseStep]:
+        """Steps from and to these times by the coefficients of their polynomials, and their ledger if it is there."""
+        n, sizes = self.reactor.count, np.diff(times)
+        inside = at_nodes(rows[..., :n])
+        steps = []
+        for k, end in enumerate(times[1:].tolist()):
+            y = partial(on_step, end, sizes[k], rows[k][:, :n])
+            gained = partial(on_step, end, sizes[k], rows[k][:, n:]) if rows.shape[2] > n else None
+            steps.append(DenseStep(float(times[k]), end, y, y, gained, inside[k]))
+        return steps
 
     @property
     def factorizations(self) -> int:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +20,8 @@ class DenseStep:
     """A step from ``start`` to ``end`` [s], with the variables at any time in it.
 
     ``many`` gives a row of them for each of several times, where a library can do so at once; ``ledger`` is what the
-    ledger has gained since the library began, where that integrates it.
+    ledger has gained since the library began, where that integrates it; ``inside`` are the variables at NODES but the
+    first, where they are known.
     """
 
     start: float
@@ -27,6 +29,11 @@ class DenseStep:
     y: Callable[[float], Array]
     many: Callable[[Array], Array] | None = None
     ledger: Callable[[float], Array] | None = None
+    inside: Array | None = None
+
+    def at_nodes(self, times: Array) -> Array:
+        """Variables at the times of NODES but the first, a row each."""
+        return self.rows(times) if self.inside is None or times[-1] < self.end else self.inside
 
     def rows(self, times: Array) -> Array:
         """Variables at several times, a row each."""
@@ -76,20 +83,24 @@ class Guards:
         across = np.where(self.strict, now < -NOISE * self.largest, now * self.sides <= 0.0)
         return across & (self.sides != 0.0) & (self.sides * self.directions <= 0.0)
 
-    def far(self, values: Array, active: NDArray[np.bool_]) -> bool:
-        """Whether no guard changes as much in a step as it is away from zero; they have then followed it to its end.
+    def far(self, values: Array, active: NDArray[np.bool_]) -> int:
+        """Number of first steps in which no guard changes as much as it is away from zero; all have then followed them.
 
-        ``values`` are those at some points of the step, a row each, its end last. Most guards are bounds of states that
-        are far from them in all steps of a run.
+        ``values`` [step, point, guard] are those at some points of steps one after another, the end of each last. Most
+        guards are bounds of states that are far from them in all steps of a run.
         """
-        values = np.where(active, np.vstack((self.now, values)), 1.0)
+        values = np.where(active, values, 1.0)
+        starts = np.concatenate((np.where(active, self.now, 1.0)[None], values[:-1, -1]))
+        values = np.concatenate((starts[:, None], values), axis=1)
         heights = values * self.sides
-        lowest, highest = heights.min(axis=0), heights.max(axis=0)
-        if not np.all((lowest > highest - lowest) | ~np.any(values, axis=0)):
-            return False
-        self.largest = np.fmax(self.largest, highest)
-        self.now = values[-1]
-        return True
+        lowest, highest = heights.min(axis=1), heights.max(axis=1)
+        clear = (lowest > highest - lowest) | ~np.any(values, axis=1)
+        near = np.flatnonzero(~clear.all(axis=1))
+        count = int(near[0]) if len(near) else len(values)
+        if count:
+            self.largest = np.fmax(self.largest, highest[:count].max(axis=0))
+            self.now = values[count - 1, -1]
+        return count
 
 
 def first_crossing(
@@ -171,8 +182,39 @@ def _bottom(value: Callable[[float], float], a: float, b: float, c: float) -> fl
 NODES = np.array([0.0, 0.11747233803526766, 0.35738424175967742, 0.64261575824032258, 0.88252766196473235, 1.0])
 """Gauss-Lobatto points of a step: the polynomials of the libraries have order five at most."""
 
+
+HERMITE = np.linalg.inv(
+    [[power.deriv(k)(x) for power in map(np.polynomial.Polynomial, np.identity(6))] for x in (-1, 0) for k in range(3)]
+)
+"""From values, slopes and second derivatives at -1 and at 0 to the coefficients of their polynomial."""
+
+AT_NODES = np.power.outer(NODES[1:] - 1.0, np.arange(6.0))
+"""Powers of (time - end) / size at the nodes but the first."""
+
+
+def hermite(sizes: Array, ends: Array) -> Array:
+    """Coefficients [step, power, variable] of polynomials in (time - end) / size, for steps of these sizes one after
+    another, from value, slope and second derivative at their ends: [end, derivative, variable].
+    """
+    scales = np.power.outer(sizes, np.tile(np.arange(3.0), 2))[..., None]
+    return np.asarray(HERMITE @ (np.concatenate((ends[:-1], ends[1:]), axis=1) * scales))
+
+
+def at_nodes(rows: Array) -> Array:
+    """Values [step, node, variable] of such polynomials at the nodes but the first."""
+    return np.asarray(AT_NODES @ rows)
+
+
+def on_step(end: float, size: float, rows: Array, t: Any) -> Array:
+    """Values of one such polynomial at a time, or at several in a row each."""
+    return np.asarray(np.power.outer((t - end) / size, np.arange(len(rows))) @ rows)
+
+
 TO_POWERS = np.linalg.inv(np.vander(NODES, increasing=True)) / np.arange(1.0, len(NODES) + 1)[:, None]
 """From values at the nodes to the coefficients of the integral of their polynomial."""
+
+WEIGHTS = 1 / (30 * np.polynomial.Legendre.basis(5)(2 * NODES - 1) ** 2)
+"""Of the values at the nodes in that integral over the whole step."""
 
 
 class StepLedger:

@@ -5,9 +5,11 @@ twice.
 from __future__ import annotations
 
 import ctypes
+import math
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from surfacechem.compile.program import Function, Program
 from surfacechem.solve.contract import Array
@@ -34,22 +36,24 @@ class Evaluation:
         self.guess = y[self.algebraic]
         self._counts = np.zeros((1, COLUMNS), np.int64)
         ends, table = self.inputs[: 2 * n + 1][None], self.parameters[None, None]
-        self._rates = _Code(program.rates, self.inputs[None]) if program.rates else None
+        self._rates = _Code(program.rates, self.inputs) if program.rates else None
         self._search = stepper.Repeated(search_batch(program, ends, table, self._counts))
-        self._fill = _Fill(program, self.inputs[None])
-        self._ledger = _Code(program.ledger, self.inputs[None])
-        self._margins = _Code(program.margins, self.inputs[None])
+        self._reads = _Code(program.filler.reads if program.filler else None, self.inputs)
+        self._ledger = _Code(program.ledger, self.inputs)
+        self._margins = _Code(program.margins, self.inputs)
 
     def put(self, t: float, differential: Array) -> bool:
         """Go to a state; whether derivatives and algebraic variables were found there."""
         self.inputs[0] = t
+        if self._rates is not None:
+            self.y[:] = differential
+            self._fill()
+            self.ydot[:] = self._rates()
+            return all(map(math.isfinite, self.ydot.tolist()))
         self.y[self.free] = differential
         self.y[self.algebraic] = self.guess
         self.ydot[:] = 0.0
         self._fill()
-        if self._rates is not None:
-            self.ydot[:] = self._rates()[0]
-            return bool(np.isfinite(self.ydot).all())
         self._counts[:] = 0
         self._search()
         found = bool(self._counts[0, END] == 0)
@@ -65,6 +69,11 @@ class Evaluation:
         if whole:
             self._fill()
 
+    def _fill(self) -> None:
+        filler = self.program.filler
+        if filler is not None:
+            self.inputs[filler.positions] = filler.evaluate(self._reads().tolist())
+
     def restart(self, y: Array) -> None:
         """Take over a state after a jump; algebraic variables are searched from there."""
         self.y[:] = y
@@ -76,11 +85,11 @@ class Evaluation:
 
     def ledger(self) -> Array:
         """Rates of the ledger."""
-        return self._ledger()[0].copy()
+        return self._ledger().copy()
 
     def margins(self) -> Array:
         """Values of the margins."""
-        return self._margins()[0].copy()
+        return self._margins().copy()
 
 
 class StateRows:
@@ -95,14 +104,6 @@ class StateRows:
         self.inputs = np.zeros((count, program.n_inputs))
         self.inputs[:, 1 + 2 * n :] = parameters
         self.y, self.ydot = self.inputs[:, 1 : 1 + n], self.inputs[:, 1 + n : 1 + 2 * n]
-        self._ends = np.zeros((count, 1 + 2 * n))
-        self._counts = np.zeros((count, COLUMNS), np.int64)
-        self._table = np.ascontiguousarray(self.inputs[:, None, 1 + 2 * n :])
-        self._rates = _Code(program.rates, self.inputs) if program.rates else None
-        self._search = stepper.Repeated(search_batch(program, self._ends, self._table, self._counts))
-        self._fill = _Fill(program, self.inputs)
-        self._ledger = _Code(program.ledger, self.inputs)
-        self._margins = _Code(program.margins, self.inputs)
 
     def hold(self, times: Array, y: Array) -> None:
         """Go to states whose derivatives are not known."""
@@ -113,55 +114,45 @@ class StateRows:
     def put(self, times: Array, y: Array) -> None:
         """Go to states, and find derivatives and algebraic variables of each; not a number where there are none."""
         self.hold(times, y)
-        self._fill()
-        if self._rates is not None:
-            self.ydot[:] = self._rates()
-            self.inputs[~np.isfinite(self.ydot).all(axis=1), 1 : 1 + 2 * self.program.n] = np.nan
-            return
-        n = self.program.n
-        if self.program.filler is not None:
-            self._table[:, 0] = self.inputs[:, 1 + 2 * n :]
-        self._ends[:], self._counts[:] = self.inputs[:, : 1 + 2 * n], 0
-        self._search()
-        self._ends[self._counts[:, END] != 0, 1:] = np.nan
-        self.inputs[:, : 1 + 2 * n] = self._ends
+        self.program.filled(self.inputs)
+        if self.program.rates is not None:
+            self.ydot[:] = self.program.rates(self.inputs)
+            found = np.isfinite(self.ydot).all(axis=1)
+        else:
+            found = self._search()
+        self.inputs[~found, 1 : 1 + 2 * self.program.n] = np.nan
 
-    def ledger(self) -> Array:
-        """Rates of the ledger, a row each."""
-        return self._ledger().copy()
+    def _search(self) -> NDArray[np.bool_]:
+        """Find derivatives and algebraic variables; where they were found."""
+        n, count = self.program.n, len(self.inputs)
+        ends, counts = self.inputs[:, : 1 + 2 * n].copy(), np.zeros((count, COLUMNS), np.int64)
+        table = np.ascontiguousarray(self.inputs[:, None, 1 + 2 * n :])
+        stepper.run(search_batch(self.program, ends, table, counts), 0, count)
+        self.inputs[:, : 1 + 2 * n] = ends
+        return np.asarray(counts[:, END] == 0)
 
-    def margins(self) -> Array:
-        """Values of the margins, a row each."""
-        return self._margins().copy()
+    def values(self) -> tuple[Array, Array]:
+        """Rates of the ledger and values of the margins, a row for each state."""
+        ledger, margins = (
+            function(self.inputs) if function else np.zeros((len(self.inputs), 0))
+            for function in (self.program.ledger, self.program.margins)
+        )
+        return ledger, margins
 
 
 class _Code:
-    """A compiled function of fixed rows of inputs, each of its pieces: a call from NumPy takes five times as long."""
+    """A compiled function of a buffer of inputs, each of its pieces: a call from NumPy takes five times as long."""
 
     def __init__(self, function: Function | None, inputs: Array) -> None:
-        self.out = np.zeros((len(inputs), function.size if function else 0))
+        self.out = np.zeros(function.size if function else 0)
         self._calls: list[tuple[Any, int, int, int]] = []
-        for row, result in zip(inputs, self.out, strict=True):
-            place = result.ctypes.data
-            for part in (function, *function.rest) if function else ():
-                self._calls.append((CODE(part.address), place, row.ctypes.data, part.user))
-                place += part.n_out * self.out.itemsize
+        place = self.out.ctypes.data
+        for part in (function, *function.rest) if function else ():
+            self._calls.append((CODE(part.address), place, inputs.ctypes.data, part.user))
+            place += part.n_out * self.out.itemsize
         self._keep = function
 
     def __call__(self) -> Array:
         for code, *arguments in self._calls:
             code(*arguments)
         return self.out
-
-
-class _Fill:
-    """Fills rows of inputs with what comes from outside, if anything does."""
-
-    def __init__(self, program: Program, inputs: Array) -> None:
-        self.inputs, self.filler = inputs, program.filler
-        self._reads = _Code(program.filler.reads if program.filler else None, inputs)
-
-    def __call__(self) -> None:
-        if self.filler is not None:
-            for row, values in zip(self.inputs, self._reads().tolist(), strict=True):
-                row[self.filler.positions] = self.filler.evaluate(values)

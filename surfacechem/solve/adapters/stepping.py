@@ -8,18 +8,22 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from surfacechem.solve.adapters.dense_step import NODES, DenseStep, Guards, StepLedger, first_crossing
+from surfacechem.solve.adapters.dense_step import NODES, WEIGHTS, DenseStep, Guards, StepLedger, first_crossing
 from surfacechem.solve.adapters.evaluation import Evaluation, StateRows
 from surfacechem.solve.contract import Array, Counters, Events, Points, Problem, Result, Solver, Status
 from surfacechem.solve.radau import stepper
-from surfacechem.tolerances import SQRT_EPS, ULPS
+from surfacechem.tolerances import NEGLIGIBLE, SQRT_EPS, ULPS
 
 ENTROPY = 1
 """The group of the ledger's lines of entropy."""
 
 MISSED = 100.0
 """Errors in units of the tolerance beyond which a step has not seen what lies before an event."""
+
+SEVERAL = 64
+"""Steps at a time that the equations are looked at together."""
 
 LONGEST_FIRST = 1e3
 """First change of a state that its rate may predict, in units of the state."""
@@ -52,8 +56,6 @@ class View:
     def __post_init__(self) -> None:
         """Its buffer serves all states of the segment."""
         self.evaluation = Evaluation(self.problem.program, self.start, self.parameters)
-        self.inside = StateRows(self.problem.program, self.parameters, len(NODES) - 1)
-        """At the nodes of a step but the first."""
         self.differential = ~self.problem.program.algebraic_mask
         self.atol = self.problem.atol[self.differential]
 
@@ -102,6 +104,10 @@ class Method(ABC):
     def advance(self) -> DenseStep:
         """Take one step of the library's choice."""
 
+    def several(self, _most: int) -> list[DenseStep]:
+        """Take at least one step, and up to so many where earlier ones can still be looked into after later ones."""
+        return [self.advance()]
+
     @property
     def factorizations(self) -> int:
         """Matrices factored so far; 0 where the library does not tell."""
@@ -147,6 +153,37 @@ class SteppingSolver(Solver):
             if status != Status.FINISHED:
                 break
         return run.result(status)
+
+
+@dataclass(frozen=True)
+class _Inside:
+    """The equations at the quadrature points of steps one after another: arrays [step, point, ...]."""
+
+    times: Array
+    y: Array
+    ydot: Array
+    ledger: Array
+    """Rates of the ledger."""
+    margins: Array
+
+    @classmethod
+    def of(cls, times: Array, parts: Iterable[tuple[Array, Array]]) -> "_Inside":
+        """From values at the start of the first step, and rows at all points of all steps but their starts."""
+
+        def whole(start: Array, rows: Array) -> Array:
+            inside = rows.reshape(len(times), len(NODES) - 1, len(start))
+            starts = np.concatenate((start[None], inside[:-1, -1]))
+            return np.concatenate((starts[:, None], inside), axis=1)
+
+        return cls(times, *(whole(*part) for part in parts))
+
+    def part(self, first: int, end: int) -> "_Inside":
+        """Those of some of the steps."""
+        return _Inside(*(each[first:end] for each in (self.times, self.y, self.ydot, self.ledger, self.margins)))
+
+    def integral(self, rates: Array) -> Array:
+        """Of rates at the points over each step."""
+        return (self.times[:, -1] - self.times[:, 0])[:, None] * (WEIGHTS @ rates)
 
 
 class _Run:
@@ -213,75 +250,101 @@ class _Run:
 
     def _to_event(self, method: Method, end: float) -> list[int]:
         """Step until an event, the end or the budget's; returns the margins that fired."""
-        start = self.t
+        start, most = self.t, 1
         while self.t < end and self._over_budget() is None:
             before = time.perf_counter()
-            step = method.advance()
-            reached = min(step.end, end)
+            steps = method.several(min(most, self.problem.max_steps - self.count))
             self.stepping += time.perf_counter() - before
-            if not reached > self.t:
+            if not steps[0].end > self.t:
                 raise StepError("the step size fell to zero")
             if self.t == start:
-                self._check_first(step, reached)
-            fired: list[int] = []
-            inside = self._inside(step, reached)
-            if self.problem.margins and not self.guards.far(inside.margins(), self.in_play):
-                within = replace(step, start=self.t, end=reached)
-                # Guards that are zero at one instant are so up to the error of the library's polynomial.
-                resolution = min(self.problem.rtol, SQRT_EPS) * (reached - self.t) + ULPS * abs(reached)
-                reached, fired = first_crossing(within, self.guards, self.in_play, resolution)
-                if fired and self.aim is None and not self._has_seen(step, reached):
-                    self.aim = reached
-                    return []
-                inside = self._inside(step, reached)
-            self._accept(step, inside, reached, fired)
-            if fired:
-                return fired
+                self._check_first(steps[0], min(steps[0].end, end))
+            # Where algebraic variables are searched from the state before, that is to be close.
+            most = 1 if len(self.view.evaluation.algebraic) else min(4 * most, SEVERAL)
+            inside = self._inside(steps, min(steps[-1].end, end))
+            while steps:
+                far = self.guards.far(inside.margins[:, 1:], self.in_play) if self.problem.margins else len(steps)
+                if far:
+                    self._accept(steps[:far], inside.part(0, far))
+                else:
+                    far, fired = 1, self._through(steps[0], end)
+                    if fired is not None:
+                        return fired
+                steps, inside = steps[far:], inside.part(far, len(steps))
         return []
 
-    def _accept(self, step: DenseStep, inside: StateRows, reached: float, fired: Iterable[int]) -> None:
-        """Move on to a time within the step, with its outputs and events."""
-        rates = np.vstack((self.ledger_rates, inside.ledger()))
-        along, gained = StepLedger(self.t, reached - self.t, self.ledger, rates), step.ledger
-        start, began = self.ledger, self.t
+    def _through(self, step: DenseStep, end: float) -> list[int] | None:
+        """Go through a step in which something may happen; where the library has to start anew, what has fired."""
+        within = replace(step, start=self.t, end=min(step.end, end))
+        # Guards that are zero at one instant are so up to the error of the library's polynomial.
+        resolution = min(self.problem.rtol, SQRT_EPS) * (within.end - self.t) + ULPS * abs(within.end)
+        reached, fired = first_crossing(within, self.guards, self.in_play, resolution)
+        if fired and self.aim is None and not self._adds_up(self._inside([step], reached), MISSED)[0]:
+            self.aim = reached
+            return []
+        self._accept([step], self._inside([step], reached), fired)
+        return fired or None
 
-        def ledger(t: float) -> Array:
-            """By quadrature, or as the library integrates it; entropy never, whose production it does not resolve."""
-            found = along.at(t)
-            return found if gained is None else np.where(self.entropic, found, start + gained(t) - gained(began))
-
-        for t in self.problem.times[len(self.outputs) :]:
-            if t > reached:
-                break
-            row = np.concatenate((self._state(step, float(t))[0], ledger(float(t))))
-            if not np.all(np.isfinite(row)):
-                raise StepError("an output is not finite")
-            self.outputs.append(row)
-        # The last node is the end; outputs lie elsewhere and have not changed it.
-        y, ydot, q = inside.y[-1].copy(), inside.ydot[-1].copy(), ledger(reached)
-        if not (np.all(np.isfinite(y)) and np.all(np.isfinite(ydot)) and np.all(np.isfinite(q))):
+    def _accept(self, steps: Sequence[DenseStep], inside: "_Inside", fired: Iterable[int] = ()) -> None:
+        """Move on to the end of these steps, with their outputs and events."""
+        times, y, ydot = (rows[:, -1] for rows in (inside.times, inside.y, inside.ydot))
+        gains = inside.integral(inside.ledger)
+        relied = np.full(len(steps), steps[0].ledger is None) | self._adds_up(inside, NEGLIGIBLE)
+        for k in np.flatnonzero(~relied).tolist():
+            gains[k] = self._gained(steps[k], inside.times[k, 0], times[k], gains[k])
+        ledgers = self.ledger + np.cumsum(np.vstack((np.zeros_like(self.ledger), gains)), axis=0)
+        self._put_out(steps, inside, ledgers, relied)
+        if not all(np.all(np.isfinite(rows)) for rows in (y, ydot, ledgers)):
             raise StepError("a state is not finite")
         if self.aim is not None and self.aim <= self.t:
             self.aim = None
-        self.t, self.y, self.ydot, self.ledger, self.ledger_rates = reached, y, ydot, q, rates[-1]
-        self.margins = inside.margins()[-1]
-        self.view.evaluation.guess = y[self.view.evaluation.algebraic]
-        self.count += 1
+        self.t, self.y, self.ydot, self.ledger = float(times[-1]), y[-1], ydot[-1], ledgers[-1]
+        self.ledger_rates, self.margins = inside.ledger[-1, -1], inside.margins[-1, -1]
+        self.view.evaluation.guess = self.y[self.view.evaluation.algebraic]
+        self.count += len(steps)
         if self.problem.record_steps:
-            self.steps.append((reached, y, ydot, q))
-        self.events.extend((i, reached, y, ydot, q) for i in fired)
+            self.steps.extend(zip(times.tolist(), y, ydot, ledgers[1:], strict=True))
+        self.events.extend((i, self.t, self.y, self.ydot, self.ledger) for i in fired)
 
-    def _inside(self, step: DenseStep, reached: float) -> StateRows:
-        """The equations at the quadrature points up to a time within the step, but the first."""
-        view = self.view
-        times = self.t + (reached - self.t) * NODES[1:]
-        times[-1] = reached
-        x = y = step.rows(times)
+    def _put_out(
+        self, steps: Sequence[DenseStep], inside: "_Inside", ledgers: Array, relied: NDArray[np.bool_]
+    ) -> None:
+        """Keep the outputs within steps, from the ledger at their ends and its rates inside."""
+        ends = inside.times[:, -1]
+        for t in self.problem.times[len(self.outputs) :].tolist():
+            if t > ends[-1]:
+                break
+            k = int(np.searchsorted(ends, t))
+            start, ledger = float(inside.times[k, 0]), ledgers[k + 1]
+            if t < ends[k]:
+                gain = StepLedger(start, ends[k] - start, np.zeros_like(ledger), inside.ledger[k]).at(t)
+                ledger = ledgers[k] + (gain if relied[k] else self._gained(steps[k], start, t, gain))
+            row = np.concatenate((self._state(steps[k], t)[0], ledger))
+            if not np.all(np.isfinite(row)):
+                raise StepError("an output is not finite")
+            self.outputs.append(row)
+
+    def _gained(self, step: DenseStep, start: float, end: float, quadrature: Array) -> Array:
+        """What the ledger gains in a part of a step as the library integrates it; entropy by quadrature all the same,
+        whose production the library does not resolve.
+        """
+        assert step.ledger is not None
+        return np.where(self.entropic, quadrature, step.ledger(end) - step.ledger(start))
+
+    def _inside(self, steps: Sequence[DenseStep], reached: float) -> "_Inside":
+        """The equations at the quadrature points of steps up to a time within the last of them."""
+        view, ends = self.view, np.array([self.t, *(step.end for step in steps)])
+        ends[-1] = reached
+        times = ends[:-1, None] + np.diff(ends)[:, None] * NODES
+        times[:, -1] = ends[1:]
+        x = y = np.concatenate([step.at_nodes(row[1:]) for step, row in zip(steps, times, strict=True)])
         if not self.solver.keeps_algebraic:
-            y = np.empty((len(times), len(self.y)))
+            y = np.empty((len(x), len(self.y)))
             y[:, view.evaluation.free], y[:, view.evaluation.algebraic] = x, view.evaluation.guess
-        view.inside.put(times, y)
-        return view.inside
+        rows = StateRows(self.problem.program, view.parameters, len(y))
+        rows.put(times[:, 1:].ravel(), y)
+        starts = self.y, self.ydot, self.ledger_rates, self.margins
+        return _Inside.of(times, zip(starts, (rows.y, rows.ydot, *rows.values()), strict=True))
 
     def _state(self, step: DenseStep, t: float) -> tuple[Array, Array]:
         """State and derivative inside the last step."""
@@ -306,15 +369,14 @@ class _Run:
         if np.any((moved > LONGEST_FIRST * seen)[self.view.differential]):
             raise StepError("the first step is longer than the layer it starts in")
 
-    def _has_seen(self, step: DenseStep, reached: float) -> bool:
-        """Whether the rates up to an event inside the last step add up to its increment; a step that is tested at its
-        end alone passes over a peak on the way.
+    def _adds_up(self, inside: _Inside, factor: float) -> NDArray[np.bool_]:
+        """In which steps the rates add up to the increment, to so many tolerances; a step that is tested at its end
+        alone passes over a peak on the way.
         """
-        inside = self._inside(step, reached)
-        rates, y = np.vstack((self.ydot, inside.ydot)), inside.y[-1].copy()
-        missed = np.abs(StepLedger(self.t, reached - self.t, self.y, rates).at(reached) - y)
-        allowed = MISSED * (self.problem.rtol * np.maximum(np.abs(y), np.abs(self.y)) + self.problem.atol)
-        return bool(np.all((missed <= allowed)[self.view.differential]))
+        y = inside.y
+        missed = np.abs(inside.integral(inside.ydot) - (y[:, -1] - y[:, 0]))
+        sizes = self.problem.rtol * np.maximum(np.abs(y[:, -1]), np.abs(y[:, 0])) + self.problem.atol
+        return np.asarray(np.all((missed <= factor * sizes)[:, self.view.differential], axis=1))
 
     def result(self, status: Status) -> Result:
         """What the contract asks for."""
