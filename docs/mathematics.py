@@ -5,7 +5,7 @@ import logging
 import re
 from typing import Any
 
-from latex2mathml.converter import convert
+from surfacechem.studies.mathml import mathml
 
 MARKED = re.compile(r'<(span|div) class="arithmatex">\\([(\[])(.+?)\\[)\]]</\1>', re.DOTALL)
 """Formulas that Markdown has marked."""
@@ -22,11 +22,6 @@ FETCHED = re.compile(r"""<(?:script|link|img)\b[^>]*(?:src|rel="stylesheet" href
 """What a page would load from a network."""
 
 LOG = logging.getLogger("mkdocs.hooks.mathematics")
-
-SPACING = {
-    "<mo>&#x02202;</mo>": "<mi>&#x02202;</mi>",  # a partial derivative is no binary operator
-    "<mo>&#x0002F;</mo>": '<mo lspace="0" rspace="0">&#x0002F;</mo>',
-}
 
 
 def on_page_content(content: str, page: Any, **_: Any) -> str:
@@ -50,7 +45,5 @@ def on_post_page(output: str, page: Any, **_: Any) -> str:
 
 def _mathml(latex: str, *, display: bool) -> str:
     """A formula; a wide one scrolls by itself."""
-    found: str = convert(html.unescape(latex).strip(), display="block" if display else "inline")
-    for given, better in SPACING.items():
-        found = found.replace(given, better)
+    found = mathml(html.unescape(latex), display=display)
     return f'<div class="formula">{found}</div>' if display else found

@@ -20,7 +20,6 @@ import symengine
 import sympy  # type: ignore[import-untyped]
 from sympy.core.parameters import distribute  # type: ignore[import-untyped]
 from sympy.printing.latex import LatexPrinter  # type: ignore[import-untyped]
-from sympy.printing.mathml import MathMLPresentationPrinter  # type: ignore[import-untyped]
 from sympy.printing.printer import Printer  # type: ignore[import-untyped]
 from sympy.printing.pycode import PythonCodePrinter  # type: ignore[import-untyped]
 
@@ -60,7 +59,7 @@ def _apart(expression: Expression) -> tuple[Any, dict[str, Any]]:
 
 
 @lru_cache(maxsize=1000)
-def _sympy(expression: Expression) -> Any:
+def sympy_form(expression: Expression) -> Any:
     """The same expression in SymPy, with products of sums left as they are: expanded, they would round differently.
 
     Several functions print the same quantities, and SymPy looks long at the conditions of a piecewise one.
@@ -78,7 +77,7 @@ class _Printer(Printer):  # type: ignore[misc]
         around = self._terms
         whole, self._terms = _apart(expression)
         try:
-            return str(self.doprint(_sympy(whole)))
+            return str(self.doprint(sympy_form(whole)))
         finally:
             self._terms = around
 
@@ -306,7 +305,9 @@ GREEK = {
 SPACE = r"\,"
 
 
-class _Latex(_Printer, LatexPrinter):  # type: ignore[misc]
+class Latex(_Printer, LatexPrinter):  # type: ignore[misc]
+    """LaTeX with the symbols of the package."""
+
     def _print_Float(self, expression: Any) -> str:
         mantissa, _, power = f"{float(expression)!r}".partition("e")
         number = mantissa.removesuffix(".0")
@@ -361,7 +362,7 @@ def unit(text: str) -> str:
 
 def latex(system: System, title: str = "") -> str:
     """The equations as a LaTeX align environment, the values of the parameters as comments."""
-    printer = _Latex({"mul_symbol": r"\,", "fold_short_frac": False})
+    printer = Latex({"mul_symbol": r"\,", "fold_short_frac": False})
     heading = f"{title}: {system.regime}" if title else system.regime
     values = [f"%   {p.symbol} = {float(p.at(0.0))!r} {_parameter_text(p)}" for p in system.parameters]
     names = [str(system.parameters[j].symbol) for j in changing(system)]
@@ -384,48 +385,6 @@ def latex(system: System, title: str = "") -> str:
 SPECIAL: Mapping[int, str] = {ord(c): f"\\{c}" for c in "_%&#$"}
 
 
-def _latex_row(printer: _Latex, left: str, right: Expression, text: str, in_unit: str) -> str:
+def _latex_row(printer: Latex, left: str, right: Expression, text: str, in_unit: str) -> str:
     note = text.translate(SPECIAL) + (f" $[{unit(in_unit)}]$" if in_unit else "")
     return rf"  {left} &= {printer.text(right)} && \text{{{note}}}"
-
-
-class _MathML(MathMLPresentationPrinter):  # type: ignore[misc]
-    def _print_Symbol(self, symbol: Any, style: str = "plain") -> Any:
-        rate = re.fullmatch(r"d(\w+)_dt", str(symbol))
-        if rate is None:
-            return super()._print_Symbol(symbol, style)
-        over, dot = self.dom.createElement("mover"), self.dom.createElement("mo")
-        dot.appendChild(self.dom.createTextNode("\u02d9"))
-        over.appendChild(self._print(sympy.Symbol(rate[1])))
-        over.appendChild(dot)
-        return over
-
-    def _print_Piecewise(self, expression: Any) -> Any:
-        """Cases under a brace, which SymPy prints for LaTeX only."""
-        whole, brace, table = (self.dom.createElement(tag) for tag in ("mrow", "mo", "mtable"))
-        brace.appendChild(self.dom.createTextNode("{"))
-        for value, condition in expression.args:
-            word, row = self.dom.createElement("mtext"), self.dom.createElement("mtr")
-            word.appendChild(self.dom.createTextNode("otherwise" if condition is sympy.true else "for\u00a0"))
-            cells = [[self._print(value)], [word] if condition is sympy.true else [word, self._print(condition)]]
-            for cell in cells:
-                held = self.dom.createElement("mtd")
-                for part in cell:
-                    held.appendChild(part)
-                row.appendChild(held)
-            table.appendChild(row)
-        whole.appendChild(brace)
-        whole.appendChild(table)
-        return whole
-
-
-def mathml(name: str, expression: Expression) -> str:
-    """An equation as MathML, which browsers show without scripts; piecewise terms of its conditions stand below."""
-    whole, terms = _apart(expression)
-    # Short names for what stands below.
-    short = {symengine.Symbol(long): symengine.Symbol(f"c_{k}") for k, long in enumerate(terms)}
-    printer = _MathML({"mul_symbol": "dot"})
-    left = "<mn>0</mn>" if name == "0" else printer.doprint(sympy.Symbol(name))
-    right = printer.doprint(_sympy(whole.xreplace(short)))
-    equation = f'<math display="block"><mrow>{left}<mo>=</mo>{right}</mrow></math>'
-    return equation + "".join(mathml(str(x), terms[str(long)]) for long, x in short.items())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from textwrap import wrap
 
 import matplotlib
 import numpy as np
@@ -12,36 +13,52 @@ from matplotlib.patches import FancyArrowPatch, Rectangle
 
 from surfacechem.contracts.terms import Load
 from surfacechem.plots import style
+from surfacechem.plots.style import symbol
 from surfacechem.scene import Body, Mounting, Scene
 
 BODY, MEDIUM, HEAT, SPRING, GIVEN = "#e8eaee", "#f6d8a8", "#c0392b", "#33475b", "#1f6f4a"
-WIDTH, HEIGHT, GAP = 4.0, 1.25, 0.34
-"""Of the drawing: width and height of a body, and the height of the interface between the two."""
+WIDTH, HEIGHT, GAP = 2.7, 0.95, 0.26
+"""Of the drawing [inch]: width and height of a body, and the height of the interface between the two."""
 
-PLACES = {"interface": GAP / 2, "surroundings": 0.0}
+BESIDE, OVER, LINE = 1.6, 0.5, 0.145
+"""Room [inch] beside the bodies for heat paths, over them for springs and far sides, and of a line of text."""
+
+SMALL = 7.5
 COILS = 5
+LETTERS = 44
+"""Of a line below the drawing."""
+
+HEAT_TO = {"Q_1": 0, "Q_2": 1, "Q_c": None}
+"""Heat that a case supplies, and the number of the body that receives it; None for the interface."""
 
 
 def figure(scene: Scene) -> Figure:
     """The drawing; body 1 is the lower one."""
+    below = _given(scene)
+    left = BESIDE if scene.heat else 0.1
+    right = 0.85 if scene.tangential or any(name in scene.loading for name in HEAT_TO) else 0.1
+    over = [scene.normal is not None or _far(scene.bodies[1]), _far(scene.bodies[0])]
+    low, high = -HEIGHT - over[1] * OVER - LINE * len(below) - 0.15, GAP + HEIGHT + over[0] * OVER + 0.15
     with matplotlib.rc_context(style.STYLE):
-        drawing = Figure(figsize=(6.4, 3.9), layout="constrained")
-        axes = drawing.add_subplot()
+        drawing = Figure(figsize=(left + WIDTH + right, high - low))
+        axes = drawing.add_axes((0, 0, 1, 1))
         axes.set_axis_off()
-        axes.set_xlim(-2.9 if scene.heat else -0.1, WIDTH + (1.0 if scene.tangential else 0.1))
-        axes.set_ylim(-HEIGHT - 0.35, GAP + HEIGHT + (0.1 if scene.normal is None else 0.75))
+        axes.set(xlim=(-left, WIDTH + right), ylim=(low, high))
         # Body 1 is below, as the gap g = x_2 - x_1 opens upwards.
         lower, upper = scene.bodies
         _body(axes, lower, -HEIGHT)
         _body(axes, upper, GAP)
         _interface(axes, scene)
         _heat(axes, scene)
+        _far_side(axes, lower, -HEIGHT, -1)
+        _far_side(axes, upper, GAP + HEIGHT, 1)
         if scene.normal is not None:
-            _spring(axes, scene.normal, (WIDTH / 2, GAP + HEIGHT), (WIDTH / 2, GAP + HEIGHT + 0.55))
+            _spring(axes, scene.normal, (WIDTH / 4, GAP + HEIGHT), (WIDTH / 4, GAP + HEIGHT + OVER))
         if scene.tangential is not None:
             middle = GAP + HEIGHT / 2
-            _spring(axes, scene.tangential, (WIDTH, middle), (WIDTH + 0.85, middle))
-        _given(axes, scene)
+            _spring(axes, scene.tangential, (WIDTH, middle), (WIDTH + 0.65, middle))
+        for k, line in enumerate(below):
+            axes.text(0.0, low + LINE * (len(below) - 0.5 - k) + 0.05, line, va="center", fontsize=SMALL, color=GIVEN)
         return drawing
 
 
@@ -51,7 +68,7 @@ def _temperature(temperature: str | Load | None) -> str:
         return "no temperature of its own"
     if isinstance(temperature, Load):
         return f"{temperature.at_start():g} K, given"
-    return f"temperature {temperature}"
+    return f"temperature {symbol(temperature)}"
 
 
 def _body(axes: Axes, body: Body, bottom: float) -> None:
@@ -60,68 +77,101 @@ def _body(axes: Axes, body: Body, bottom: float) -> None:
     lines += [f"capacity: {body.energy.title}"] if body.energy else ["reservoir"]
     lines += [f"conducts, {body.conduction.cells or 'as one lump:'} cells"] if body.conduction else []
     middle = bottom + HEIGHT / 2
-    axes.text(WIDTH / 2, middle + 0.24, body.name, ha="center", va="center", weight="bold", fontsize=10)
-    axes.text(WIDTH / 2, middle - 0.04, "\n".join(lines), ha="center", va="top", fontsize=8, linespacing=1.4)
+    axes.text(WIDTH / 2, middle + 0.26, body.name, ha="center", va="center", weight="bold", fontsize=9)
+    axes.text(WIDTH / 2, middle + 0.12, "\n".join(lines), ha="center", va="top", fontsize=SMALL, linespacing=1.35)
 
 
 def _interface(axes: Axes, scene: Scene) -> None:
     interface = scene.interface
     axes.add_patch(Rectangle((0, 0), WIDTH, GAP, facecolor=MEDIUM, edgecolor=SPRING, hatch="..", alpha=0.6))
     axes.text(
-        WIDTH / 2, GAP / 2, f"interface: {_temperature(interface.temperature)}", ha="center", va="center", fontsize=8,
-        bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.5},
+        WIDTH / 2, GAP / 2, f"interface: {_temperature(interface.temperature)}", ha="center", va="center",
+        fontsize=SMALL, bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.5},
     )  # fmt: skip
 
 
+def _arrow(axes: Axes, start: tuple[float, float], end: tuple[float, float], kind: str = "<->") -> None:
+    axes.add_patch(FancyArrowPatch(start, end, arrowstyle=kind, mutation_scale=9, color=HEAT, linewidth=1.2))
+
+
 def _heat(axes: Axes, scene: Scene) -> None:
-    """Heat paths as arrows beside the bodies, one for all that run between the same ends."""
-    first, second = (body.name for body in scene.bodies)
-    ends = {first: -HEIGHT / 2, second: GAP + HEIGHT / 2, **PLACES}
+    """Heat paths as arrows beside the bodies, one for all that run between the same ends; heat that is supplied."""
+    levels = [-HEIGHT / 2, GAP + HEIGHT / 2]
+    ends = {body.name: level for body, level in zip(scene.bodies, levels, strict=True)} | {"interface": GAP / 2}
     paths: dict[tuple[str, ...], list[str]] = {}
     for law in scene.heat:
         paths.setdefault(tuple(sorted(law.between)), []).append(law.title)
-    for k, (between, titles) in enumerate(paths.items()):
-        low, high = sorted(ends[end] for end in between)
-        x = -0.22 - 0.3 * k  # beside each other, as several may reach from body to body
-        start, stop, text = (x, low), (x, high), "\n".join(titles)
+    inside = [between for between in paths if "surroundings" not in between]
+    for between, titles in paths.items():
+        words = [line for title in titles for line in wrap(title, 17)]
         if "surroundings" in between:
-            level = ends[next(end for end in between if end != "surroundings")]
-            start, stop, text = (0.0, level), (-0.9, level), f"{text}\nto the surroundings"
-        axes.add_patch(FancyArrowPatch(start, stop, arrowstyle="<->", mutation_scale=10, color=HEAT, linewidth=1.3))
-        axes.text(-1.05, (start[1] + stop[1]) / 2, text, color=HEAT, ha="right", va="center", fontsize=8)
+            level = ends[next(end for end in between if end != "surroundings")] - 0.22
+            _arrow(axes, (0.0, level), (-0.5, level))
+            words = [r"$\bf{surroundings}$", *words]
+            at = -0.55, level
+        else:
+            low, high = sorted(ends[end] for end in between)
+            # Beside each other, as several may reach from body to body.
+            x = -0.12 - 0.2 * inside.index(between)
+            _arrow(axes, (x, low), (x, high))
+            at = -0.2 - 0.2 * (len(inside) - 1), (low + high) / 2 + 0.1
+        axes.text(*at, "\n".join(words), color=HEAT, ha="right", va="center", fontsize=SMALL)
+    for name in HEAT_TO.keys() & scene.loading.keys():
+        k = HEAT_TO[name]
+        level = GAP / 2 if k is None else levels[k]
+        _arrow(axes, (WIDTH + 0.45, level), (WIDTH, level), "->")
+        axes.text(WIDTH + 0.5, level, symbol(name), color=HEAT, va="center", fontsize=9)
+
+
+def _far(body: Body) -> bool:
+    """Whether heat passes the far side of a body."""
+    return body.conduction is not None and body.conduction.far is not None
+
+
+def _far_side(axes: Axes, body: Body, edge: float, way: int) -> None:
+    """What the far side of a body that conducts is held at, or cooled by."""
+    if body.conduction is None or body.conduction.far is None:
+        return
+    end = edge + way * 0.3
+    _arrow(axes, (WIDTH / 2, edge), (WIDTH / 2, end))
+    text = f"far side: {body.conduction.far.at_start():g} K"
+    if not body.conduction.held:
+        text += f"\nthrough {body.conduction.h_far:g} W/(m² K)"
+    axes.text(WIDTH / 2 + 0.1, edge + way * 0.2, text, color=HEAT, va="center", fontsize=SMALL)
 
 
 def _spring(axes: Axes, mounting: Mounting, start: tuple[float, float], end: tuple[float, float]) -> None:
     """A spring from a body to a wall, with what the mounting has."""
     along, across = np.subtract(end, start), np.subtract(end, start)[::-1]
+    across = across / np.linalg.norm(across)
     ways = np.concatenate([[0.0, 0.2], np.linspace(0.2, 0.8, 2 * COILS), [0.8, 1.0]])
-    sides = np.concatenate([[0.0, 0.0], 0.12 * (-1.0) ** np.arange(2 * COILS), [0.0, 0.0]])
-    line = np.array(start) + ways[:, None] * along + sides[:, None] * across / np.linalg.norm(across)
-    axes.plot(*line.T, color=SPRING, linewidth=1.2)
-    wall = np.array(end) + np.array([[-0.35], [0.35]]) * across / np.linalg.norm(across)
-    axes.plot(*wall.T, color=SPRING, linewidth=2.5)
+    sides = np.concatenate([[0.0, 0.0], 0.08 * (-1.0) ** np.arange(2 * COILS), [0.0, 0.0]])
+    axes.plot(*(np.array(start) + ways[:, None] * along + sides[:, None] * across).T, color=SPRING, linewidth=1.2)
+    axes.plot(*(np.array(end) + np.array([[-0.25], [0.25]]) * across).T, color=SPRING, linewidth=2.5)
     parts = {"k": mounting.k, "m": mounting.m, "damper": mounting.c_b + mounting.c_g}
     text = ", ".join(name for name, value in parts.items() if value) or "dead load"
     # Beside a spring that stands upright there is room for its words, over one that lies.
     above = end[0] == start[0]
-    place = (end[0] + 0.45, end[1] - 0.2) if above else ((start[0] + end[0]) / 2, end[1] + 0.42)
-    axes.text(*place, text, ha="left" if above else "center", va="center", fontsize=8, color=SPRING)
+    place = (end[0] + 0.32, end[1] - 0.1) if above else (start[0] + 0.05, end[1] + 0.33)
+    axes.text(*place, text, va="center", fontsize=SMALL, color=SPRING)
 
 
-def _given(axes: Axes, scene: Scene) -> None:
-    """What acts in the interface, and what is given, beside it."""
+def _given(scene: Scene) -> list[str]:
+    """Lines about what acts in the interface, and what is given."""
     interface = scene.interface
     rows: list[tuple[str, Sequence[str]]] = [
         ("energy", [law.title for law in interface.potentials]),
         ("bonds", [law.title for law in interface.reactions]),
         ("friction", [law.title for law in interface.frictions]),
         ("gives way", [law.title for law in interface.limits]),
-        ("given", list(scene.loading)),
+        ("given", [symbol(name) for name in scene.loading]),
         ("stages", [stage.name for stage in scene.programme]),
     ]
-    shown = [f"{word}: {_few(names)}" for word, names in rows if names]
-    axes.text(WIDTH / 2, -HEIGHT - 0.1, "\n".join(shown), ha="center", va="top", fontsize=8, color=GIVEN)
-    axes.set_ylim(-HEIGHT - 0.35 - 0.2 * len(shown), axes.get_ylim()[1])
+    return [line for word, names in rows if names for line in _filled(f"{word}: {_few(names)}")]
+
+
+def _filled(text: str) -> list[str]:
+    return [text] if "$" in text else wrap(text, LETTERS, subsequent_indent="    ")
 
 
 def _few(names: Sequence[str]) -> str:

@@ -75,9 +75,9 @@ FEW, MANY = 8, 60
 # Lines of events whose names repeat, those of the most frequent name first.
 KIND_LINES = ("dotted", "dashed", "dashdot")
 
-# Rows of names above the first panel; width of a letter and of the space between two, in widths of the panel, and
-# height of a row in points.
-LANES, LETTER, BETWEEN, LANE = 3, 0.0128, 0.02, 9.0
+# Rows of names above the first panel; width of a letter and of the space beside panels [inch], space between two names
+# in widths of the panel, and height of a row in points.
+LANES, LETTER, BESIDE, BETWEEN, LANE = 3, 0.06, 1.7, 0.02, 9.0
 
 # Curves of a panel that have colours of their own: the largest; more would not be told apart.
 COLOURED = len(style.COLOURS) - 1
@@ -302,9 +302,10 @@ def _draw_time(axes: Sequence[Axes], dataset: xarray.Dataset, names: Sequence[st
         _show_decades(ax, max(times[times > 0][0], SHOWN * times[-1]), times[-1])
     stages = _draw_bands(axes, dataset) if len(times) > 1 else []
     moments = _moments(dataset)
+    width = float(axes[0].figure.bbox.width / axes[0].figure.dpi)
     events, lines = _named(moments), _draw_events(axes, moments)
-    below = _write(axes[0], stages, 0)
-    rows = _write(axes[0], events, below) if len(events) <= FEW else 0
+    below = _write(axes[0], width, stages, 0)
+    rows = _write(axes[0], width, events, below) if len(events) <= FEW else 0
     return LANE * (below + rows), "" if rows else _counted(events, lines)
 
 
@@ -389,7 +390,7 @@ def _spans(dataset: xarray.Dataset, name: str) -> list[tuple[float, float, float
     return list(zip(edges, [*edges[1:], float(times[-1])], values[[0, *changes]].tolist(), strict=True))
 
 
-def _write(ax: Axes, items: Sequence[tuple[float, str]], below: int) -> int:
+def _write(ax: Axes, width: float, items: Sequence[tuple[float, str]], below: int) -> int:
     """Small words above a panel, each over its time, in as many rows as they need so that none is on another; returns
     how many. Nothing is written where there is no room for all.
     """
@@ -397,8 +398,9 @@ def _write(ax: Axes, items: Sequence[tuple[float, str]], below: int) -> int:
     across = ax.transScale + ax.transLimits
     placed: list[tuple[float, int, str]] = []
     ends = [0.0] * LANES
+    letter = LETTER / (width - BESIDE)
     for x, text in sorted(items):
-        half = LETTER * len(text) / 2
+        half = letter * len(text) / 2
         middle = min(max(float(across.transform((x, 0.0))[0]), half), 1 - half)
         lane = next((k for k, end in enumerate(ends) if middle - half >= end), None)
         if lane is None:

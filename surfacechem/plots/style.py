@@ -6,8 +6,10 @@ import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from contextvars import ContextVar
 from io import BytesIO
 from pathlib import Path
+from textwrap import wrap
 from typing import Any
 
 import matplotlib
@@ -62,11 +64,18 @@ PREFIXES = {-5: "f", -4: "p", -3: "n", -2: "µ", -1: "m", 0: "", 1: "k", 2: "M",
 GREEK = ("alpha", "beta", "epsilon", "eta", "kappa", "lambda", "mu", "phi", "rho", "sigma", "tau", "theta")
 
 
-WIDE = 90
-"""Letters of a line of facts above the panels."""
+LETTERS, TITLE_LETTERS = 16, 9.5
+"""Of a line of facts above the panels, and of the title, in an inch."""
 
 MOST_CURVES = 7
 """Values of a parameter that are drawn as curves of their own: as many as there are colours."""
+
+
+WIDEST = ContextVar("widest", default=6.4)
+"""Width of a figure of one column [inch]."""
+
+PHONE = 4.4
+"""Width [inch] at which letters can be read on a phone."""
 
 
 class Plot(Figure):
@@ -81,10 +90,21 @@ class Plot(Figure):
 @contextmanager
 def panels(width: float, height: float, rows: int = 1, columns: int = 1, **sharing: Any) -> Iterator[tuple[Plot, Any]]:
     """A figure of this size [inch] and its axes, shape (rows, columns), in the style of this package meanwhile."""
+    width = min(width, WIDEST.get()) if columns == 1 else width
     with matplotlib.rc_context(STYLE):
         plot = Plot(figsize=(width, height), layout="constrained")
         FigureCanvasAgg(plot)
         yield plot, plot.subplots(rows, columns, squeeze=False, **sharing)
+
+
+@contextmanager
+def narrow() -> Iterator[None]:
+    """Figures are narrow meanwhile, for a page that a phone shows."""
+    usual = WIDEST.set(PHONE)
+    try:
+        yield
+    finally:
+        WIDEST.reset(usual)
 
 
 def save(plot: Figure, target: Any, kind: str) -> None:
@@ -158,7 +178,8 @@ def place(dataset: xarray.Dataset) -> Place | None:
 def headings(plot: Figure, ax: Axes, dataset: xarray.Dataset, above: float = 0.0, more: str = "") -> None:
     """Title, how it ended, error, solver and what ``more`` there is to say, so many points above the axes."""
     attributes = dataset.attrs
-    plot.suptitle(str(attributes.get("title", "")), x=0.01, ha="left", fontsize=11, fontweight="bold")
+    title = wrap(str(attributes.get("title", "")), int(TITLE_LETTERS * plot.get_figwidth())) or [""]
+    plot.suptitle("\n".join(title), x=0.01, ha="left", fontsize=11, fontweight="bold")
     facts = [str(attributes.get("reason", ""))]
     if (error := number(dataset, "error")) is not None:
         exact = str(attributes.get("error_source", "")).startswith("exact")
@@ -169,10 +190,12 @@ def headings(plot: Figure, ax: Axes, dataset: xarray.Dataset, above: float = 0.0
     if "time" in dataset.sizes and dataset.sizes.get("event", 0) > dataset.sizes["time"]:
         facts.append(f"{dataset.sizes['event']} events between {dataset.sizes['time']} outputs")
     shown = "   ".join(fact for fact in facts if fact)
-    over = len(shown) + len(more) > WIDE
-    lines = f"{shown}\n{more}" if over else f"{shown}   {more}".rstrip()
-    plot.set_figheight(plot.get_figheight() + (above + 10 * over) / 72)  # the panels keep their height
-    ax.set_title(lines, loc="left", fontsize=8, color="#555555", pad=6 + above)
+    room = int(LETTERS * (plot.get_figwidth() - 0.8))
+    both = f"{shown}   {more}".rstrip()
+    lines = [both] if len(both) <= room else [*wrap(shown, room), *wrap(more, room)]
+    more_lines = above + 10 * (len(lines) - 1) + 14 * (len(title) - 1)
+    plot.set_figheight(plot.get_figheight() + more_lines / 72)  # the panels keep their height
+    ax.set_title("\n".join(lines), loc="left", fontsize=8, color="#555555", pad=6 + above)
 
 
 def legend(ax: Axes) -> None:

@@ -35,17 +35,24 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from surfacechem.results.netcdf import CONVENTIONS, Column, replacing, save
+from surfacechem.runs.listing import plain
 from surfacechem.runs.sheet import columns
+from surfacechem.studies import mathml
 
 if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure
+
+    from surfacechem.compile.typeset import Equation
 
 # Packages whose versions a report states.
 LIBRARIES = ("surfacechem", "numpy", "scipy", "numba", "symengine", "cantera", "scikit-sundae", "xarray", "matplotlib")
 
 # The files of a study, in the order in which they are written.
 SUFFIXES = (".nc", ".svg", ".png", ".html")
+
+
+SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 class PageTable(NamedTuple):
@@ -67,8 +74,8 @@ class PageSection(NamedTuple):
     details: bool = False
     drawings: Sequence[Callable[[], Figure]] = ()
     """Figures of this section alone, each with its words as the first paragraph says them."""
-    formulas: Sequence[tuple[str, str]] = ()
-    """Formulas as MathML, which browsers show without scripts, each with what it is."""
+    equations: Sequence[Equation] = ()
+    """Equations, which a page typesets without scripts."""
     code: str = ""
     """Text that is shown as it is, of a case for instance."""
 
@@ -89,6 +96,7 @@ class Page:
         parts = [self.title]
         for section in self.sections:
             lines = [section.title, *(f"  {line}" for line in section.paragraphs)]
+            lines += [f"  {e.text}: {plain(' '.join((e.left, *e.pieces)))}" for e in section.equations]
             lines += [f"  {line}" for line in section.code.splitlines()]
             for table in section.tables:
                 lines += [table.caption] if table.caption else []
@@ -103,13 +111,25 @@ class Page:
         from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
         loader = FileSystemLoader(Path(__file__).parent)
-        template = Environment(loader=loader, autoescape=True, undefined=StrictUndefined).get_template("page.html")
+        environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined)
+        environment.filters |= {"equation": mathml.equation, "raised": raised}
+        template = environment.get_template("page.html")
         figure = inline_svg(self.draw()) if self.draw else ""
         drawn = [
             [inline_svg(draw(), f"s{i}f{k}-") for k, draw in enumerate(section.drawings)]
             for i, section in enumerate(self.sections)
         ]
-        return template.render(page=self, figure=figure, drawn=drawn, machine=machine())
+        font = mathml.font() if any(section.equations for section in self.sections) else ""
+        return template.render(page=self, figure=figure, drawn=drawn, machine=machine(), font=font)
+
+
+def raised(text: str) -> str:
+    """Text with its powers raised.
+
+    >>> raised("J/(m^2 K)"), raised("m^-1")
+    ('J/(m² K)', 'm⁻¹')
+    """
+    return re.sub(r"\^(-?\d+)", lambda m: m[1].translate(SUPERSCRIPTS), text)
 
 
 def inline_svg(figure: Figure, prefix: str = "f0-") -> str:

@@ -6,7 +6,9 @@ All of it is from the dataset; the scene is read from the case that it keeps.
 from __future__ import annotations
 
 import html
+import inspect
 import logging
+import re
 from base64 import b64encode
 from collections.abc import Iterator
 from dataclasses import replace
@@ -15,23 +17,26 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from surfacechem import format as cases
-from surfacechem.compile import printing
+from surfacechem.compile.typeset import Equation, equations
+from surfacechem.contracts.terms import Law
 from surfacechem.errors import InputError, Place
-from surfacechem.model.system import System
 from surfacechem.plots import drawing, figure, opened, save
+from surfacechem.plots.style import narrow
 from surfacechem.results import spatial
 from surfacechem.results.dataset import Results
 from surfacechem.results.netcdf import replacing
 from surfacechem.results.solution import Solution
 from surfacechem.runs.check import laws_of
-from surfacechem.runs.listing import formulas, source
+from surfacechem.runs.listing import FORMULA, source
 from surfacechem.runs.simulation import Simulation
 from surfacechem.runs.summaries import REGIMES, duration, points_summary, run_summary, sweep_summary
 from surfacechem.runs.sweeps import SweepSolution
+from surfacechem.studies.mathml import Typeset
 from surfacechem.studies.report import Page, PageSection, PageTable
 
 if TYPE_CHECKING:
     import xarray
+    from matplotlib.figure import Figure
 
 log = logging.getLogger(__name__)
 
@@ -63,7 +68,13 @@ def page(data: xarray.Dataset | str | Path) -> Page:
         omissions.append(f"The scene and its equations: {error.message}")
     again = "The dataset holds the case, the mechanism and the settings of the run."
     sections.append(PageSection("How to run it again", [again, f"$ {command}"], code=attributes["case"], details=True))
-    return Page(attributes.get("title", "untitled"), command, sections, omissions, lambda: figure(dataset))
+    return Page(attributes.get("title", "untitled"), command, sections, omissions, lambda: _narrow(dataset))
+
+
+def _narrow(dataset: xarray.Dataset) -> Figure:
+    """The figure of a dataset, legible on a phone."""
+    with narrow():
+        return figure(dataset)
 
 
 def report_path(path: str | Path) -> Path:
@@ -115,26 +126,29 @@ def _scene(case: cases.Case) -> Iterator[PageSection]:
     system = case.system()
     regime = f"{system.regime}: {REGIMES.get(system.regime, '')}"
     rows = [(role.variable, role.role, role.by) for role in system.roles if role.role != "internal"]
-    kinds = [(law, type(law)) for law in laws_of(case.scene)]
-    stated = [(law.contract, law.title, "; ".join(formulas(kind)), source(kind)) for law, kind in kinds]
-    tables = [
-        PageTable(("variable", "role", "by"), rows, "Variables"),
-        PageTable(("contract", "law", "formula", "source"), stated, "Laws"),
-    ]
     words = [text for text in (case.description, case.source and f"Source: {case.source}", regime) if text]
-    yield PageSection("The scene", words, tables, drawings=[lambda: drawing.figure(case.scene)])
+    variables = PageTable(("variable", "role", "by"), rows, "Variables")
+    stated = list(dict.fromkeys(law for kind in laws_of(case.scene) for law in _stated(type(kind))))
+    yield PageSection("The scene", words, [variables], drawings=[lambda: drawing.figure(case.scene)])
+    yield PageSection("Laws", equations=stated)
     if spatial.divided(case.scene):  # equations of many cells read alike
         system = replace(case, scene=spatial.few(case.scene)).system()
-    numbers = [(p.path, f"{p.at(0.0):.6g}", p.spec.unit, p.spec.text) for p in system.parameters if p.changeable]
-    table = PageTable(("parameter", "value", "unit", "meaning"), numbers, "Numbers")
-    yield PageSection("Equations", tables=[table], formulas=_formulas(system), details=True)
+    lines, symbols = equations(system)
+    numbers = [
+        (Typeset(symbols[p.path]), f"{p.at(0.0):.6g}", p.spec.unit, f"{p.spec.text} ({p.path})")
+        for p in system.parameters
+        if p.changeable
+    ]
+    table = PageTable(("symbol", "value", "unit", "meaning"), numbers, "Numbers")
+    yield PageSection("Equations", tables=[table], equations=lines, details=True)
 
 
-def _formulas(system: System) -> list[tuple[str, str]]:
-    """The balances, and the named quantities that they read, as MathML."""
-    wanted = printing.needed(system.named, system.rows.values())
-    found = [(printing.mathml(i.name, i.expression), f"{i.quantity.long_name} [{i.quantity.unit}]") for i in wanted]
-    return found + [(printing.mathml("0", row), f"balance of {name}") for name, row in system.rows.items()]
+def _stated(law: type[Law]) -> Iterator[Equation]:
+    """The formulas of a law as its docstring states them."""
+    name = law.name().replace("-", " ")
+    for block in FORMULA.findall(f"{inspect.getdoc(law)}\n"):
+        pieces = re.split(r"(?<=[,;]) *\\quad *", " ".join(block.split()))
+        yield Equation("", tuple(pieces), f"{law.contract}: {name}", source(law))
 
 
 def _events(dataset: xarray.Dataset) -> list[PageSection]:

@@ -19,7 +19,7 @@ const f = document.getElementById("f");
 f.onload = () => {
   const beyond = [];
   for (const e of f.contentDocument.body.querySelectorAll("*")) {
-    const inner = e.closest("table,pre,.formula,svg");  // what scrolls or scales by itself
+    const inner = e.closest("table,pre,.equation,svg");  // what scrolls or scales by itself
     if ((!inner || inner === e) && e.getBoundingClientRect().right > %d + 0.5) beyond.push(e.tagName);
   }
   const d = f.contentDocument.documentElement;
@@ -27,7 +27,7 @@ f.onload = () => {
 };
 f.srcdoc = %s;
 </script>"""
-PARTS = ["What happened", "The scene", "Equations", "Balances", "How to run it again", "Machine and versions"]
+PARTS = ["What happened", "The scene", "Laws", "Equations", "Balances", "How to run it again", "Machine and versions"]
 
 
 @pytest.fixture(scope="module", params=["stick-slip", "force-spectroscopy"])

@@ -1,0 +1,335 @@
+r"""The equations of an assembled scene as a paper prints them.
+
+The program evaluates formulas that are guarded against overflow, division by zero and rates that no clock resolves
+(:mod:`surfacechem.expressions`). Here they stand without their guards, with the names of constants in place of digits,
+a line for each mode (sticking, sliding), and solved for the rate that they evolve.
+
+>>> from surfacechem.expressions import exp, log_fraction
+>>> x, y = symengine.symbols("x y")
+>>> readable(exp(x) * log_fraction(y))
+exp(x)*log(y)
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import product
+from typing import Any, NamedTuple
+
+import symengine
+import sympy  # type: ignore[import-untyped]
+
+from surfacechem.compile.printing import RELATIONS, SPECIAL, Latex, needed, symbol, sympy_form
+from surfacechem.expressions import EXPONENT_CAP, LARGE_EXPONENT, LITERAL, Expression, derivative
+from surfacechem.model.system import Named, System
+from surfacechem.quantities import AVOGADRO, BOLTZMANN, GAPS, GAS_CONSTANT, STEFAN_BOLTZMANN
+from surfacechem.tolerances import FEWEST, FRACTION_FLOOR, LEAST_COVERAGE, SAME
+
+CAPS = (EXPONENT_CAP, LARGE_EXPONENT, LITERAL, -30.0)
+"""Exponents below which a formula holds as it stands."""
+
+FLOORS = (FRACTION_FLOOR, FEWEST, LEAST_COVERAGE)
+"""Amounts above which a formula holds as it stands."""
+
+K_B, R, N_A = map(symengine.Symbol, ("Boltzmann constant", "gas constant", "Avogadro constant"))
+
+CONSTANTS = {
+    K_B: (BOLTZMANN, r"k_{\mathrm{B}}"),
+    R: (GAS_CONSTANT, "R"),
+    N_A: (AVOGADRO, r"N_{\mathrm{A}}"),
+    symengine.Symbol("Stefan-Boltzmann constant"): (STEFAN_BOLTZMANN, r"\sigma_{\mathrm{SB}}"),
+    symengine.pi: (math.pi, ""),
+    symengine.sqrt(2 * symengine.pi): (math.sqrt(2 * math.pi), ""),
+    symengine.E: (math.e, ""),
+}
+"""Constants that formulas hold as digits, and their LaTeX, by what stands for them."""
+
+FACTORS = [symengine.Rational(*parts) for parts in ((1, 1), (2, 1), (4, 1), (8, 1), (1, 2), (1, 4), (3, 2), (2, 3))]
+
+COMBINATIONS = 12
+"""Of modes, up to which each has its line."""
+
+LONG = 300
+"""Letters of LaTeX that do not fit into a line."""
+
+SIMPLE = 40
+"""Operations of an expression up to which SymPy looks for a shorter form of it."""
+
+TABULATED = 12
+"""Numbers in a piecewise expression from which on it is a table rather than a formula."""
+
+TABLE = "table over "
+"""How the names begin of symbols that stand for a table."""
+
+HALF = symengine.Rational(1, 2)
+
+GOLDEN = 0.6180339887
+"""Its multiples fill an interval evenly."""
+
+
+class Equation(NamedTuple):
+    """An equation as LaTeX: its left side, and what follows in pieces between which a line may break."""
+
+    left: str
+    pieces: Sequence[str]
+    text: str
+    """What it is."""
+    when: str
+    """In which modes it holds, where not in all."""
+
+
+class Statement(NamedTuple):
+    """An equation before it is printed, of a state or of a named quantity."""
+
+    name: str
+    left: Expression
+    right: Expression
+    text: str
+    when: str
+
+
+def equations(system: System) -> tuple[list[Equation], dict[str, str]]:
+    """The balances of a scene and the quantities that they read; and the LaTeX of its parameters, by their paths."""
+    printer = Paper(_names(system))
+    return [printer.equation(line) for line in lines(system)], {
+        p.path: printer.text(p.symbol) for p in system.parameters
+    }
+
+
+def lines(system: System) -> list[Statement]:
+    """Every equation of a scene that a reader needs: the balances, then what they read."""
+    levels = _levels(system)
+    named = [Named(item.quantity, _plain(item)) for item in system.named if item.expression not in levels]
+    rows = [line for name, row in system.rows.items() for line in _balance(system, name, row)]
+    read = needed(named, [line.right for line in rows])
+    return [*rows, *(line for item in reversed(read) for line in _definition(system, item))]
+
+
+def _levels(system: System) -> set[Expression]:
+    """The numbers that are the value of a variable, and no more."""
+    return {p.symbol for p in system.parameters if p.path.endswith(".level")}
+
+
+def _names(system: System) -> dict[str, str]:
+    """LaTeX of symbols that are not named like variables."""
+    names = {str(name): latex for name, (_, latex) in CONSTANTS.items()}
+    for p in system.parameters:
+        place = p.path.split(".")
+        if place[0] == "loading" and len(place) > 1:  # the rate of a ramp of the load w_t is w_t,rate
+            base, _, index = symbol(place[1]).partition("_")
+            inside = index.strip("{}") + "," if index else ""
+            names[str(p.symbol)] = rf"{base}_{{{inside}\mathrm{{{place[-1]}}}}}"
+    levels = _levels(system)
+    names |= {str(item.expression): symbol(item.name) for item in system.named if item.expression in levels}
+    for item in system.named:
+        names[f"{item.name} of a fit"] = rf"{symbol(item.name)}\!\left(T\right)"
+    for state in system.states:
+        if species := state.quantity.species:
+            index = rf"\mathrm{{{species.translate(SPECIAL)}}}"
+            names |= {state.name: rf"\theta_{{{index}}}", f"N_{state.name}": f"N_{{{index}}}"}
+    return names
+
+
+# -- without guards ---------------------------------------------------------------------------------------------------
+
+
+def readable(expression: Expression) -> Expression:
+    """The expression without its guards: what it is wherever none of them is in play."""
+    whole = symengine.sympify(expression)
+    if isinstance(whole, symengine.Piecewise):
+        return _unguarded([*map(readable, whole.args[::2])], [*map(readable, whole.args[1::2])])
+    if isinstance(whole, symengine.Float):
+        return _constant(float(whole))
+    if not whole.args:
+        return whole
+    make = type(whole) if isinstance(whole, RELATIONS) else whole.func
+    return make(*map(readable, whole.args))
+
+
+def _constant(value: float) -> Expression:
+    """A number as a simple multiple of a constant of nature, or as an integer, where it is one."""
+    if value == round(value) and abs(value) < 1 / SAME:
+        return symengine.Integer(round(value))
+    for (name, (size, _)), power, factor in product(CONSTANTS.items(), (1, -1), FACTORS):
+        if math.isclose(abs(value), float(factor) * size**power, rel_tol=SAME):
+            return (factor if value > 0 else -factor) * name**power
+    return symengine.Float(value)
+
+
+def _unguarded(values: Sequence[Any], conditions: Sequence[Any]) -> Expression:
+    """A piecewise expression by its plain name, or by its value beside its guard."""
+    first, condition = values[0], conditions[0]
+    if condition == False:  # noqa: E712 - an expression, not a flag
+        return _unguarded(values[1:], conditions[1:])
+    if len(values) == 1 or condition == True or _caps(condition):  # noqa: E712
+        return first
+    low, high = condition.args
+    if [*values] == [1, -1, 0]:
+        return symengine.sign(high)
+    if len(values) == 2 and (plain := _either(first, values[1], low, high)) is not None:
+        return plain
+    if all(_agree(first, value) for value in values[1:]):
+        return min(values, key=lambda value: len(str(value)))
+    return symengine.Piecewise(*zip(values, conditions, strict=True))
+
+
+def _either(first: Any, other: Any, low: Any, high: Any) -> Expression | None:
+    """What is ``first`` for low < high and else ``other``, where it has a plain form."""
+    if {first, other} == {low, high}:
+        return symengine.Min(low, high) if first == low else symengine.Max(low, high)
+    if (first, other, high) == (-low, low, 0) or (first, other, low) == (high, -high, 0):
+        return symengine.Abs(low if high == 0 else high)
+    if other == 1 and first * high == low:  # no rate is faster than the clock
+        return other
+    if low == 0 and not other.free_symbols and not first.is_Number:  # a divisor, or the base of a power
+        return first.xreplace({symengine.Max(0, high): high})
+    return None
+
+
+def _caps(condition: Any) -> bool:
+    """Whether a condition keeps an exponent or a logarithm within what numbers hold."""
+    low, high = condition.args
+    return (high.is_Number and float(high) in CAPS) or (low.is_Number and float(low) in FLOORS)
+
+
+def _agree(one: Expression, other: Expression) -> bool:
+    """Whether two expressions are one in other words, as far as some states tell."""
+    symbols = sorted(one.free_symbols | other.free_symbols, key=str)
+    for place in range(1, 4):
+        state = {x: 0.3 + math.fmod(place * (k + 1) * GOLDEN, 0.5) for k, x in enumerate(symbols)}
+        first, second = (complex(e.xreplace(state).n()) for e in (one, other))
+        if not first or not cmath.isclose(first, second, rel_tol=SAME):
+            return False
+    return True
+
+
+# -- an equation a line -----------------------------------------------------------------------------------------------
+
+
+Split = Callable[[Expression], tuple[Expression, Expression]]
+
+
+def _balance(system: System, name: str, row: Expression) -> Iterator[Statement]:
+    """A balance, solved for the rate that it evolves."""
+    state = next(state for state in system.states if state.name == name)
+
+    def sides(expression: Expression) -> tuple[Expression, Expression]:
+        slope = derivative(expression, state.dot)
+        if slope == 0 or state.dot in slope.free_symbols:
+            return symengine.Integer(0), expression
+        rest = expression.xreplace({state.dot: symengine.Integer(0)})
+        slope, rest = (-slope, rest) if _is_negative(slope) else (slope, -rest)
+        return _short(slope) * state.dot, _short(rest)
+
+    yield from _grouped(system, Named(state.quantity, row), sides, state.quantity.long_name)
+
+
+def _definition(system: System, item: Named) -> Iterator[Statement]:
+    """What a named quantity is, unless it is a mode, which is no more than its own name."""
+    if str(item.expression) == item.name:
+        return
+    text = f"{item.quantity.long_name} [{item.quantity.unit}]"
+    yield from _grouped(system, item, lambda e: (symengine.Symbol(item.name), _short(e)), text)
+
+
+def _grouped(system: System, item: Named, sides: Split, text: str) -> Iterator[Statement]:
+    """An equation once for every group of modes in which it is the same."""
+    expression = item.expression
+    modes = [mode for mode in system.modes if mode.symbol in expression.free_symbols]
+    if math.prod(len(mode.words) for mode in modes) > COMBINATIONS:
+        modes = []
+    found: dict[tuple[Expression, Expression], list[str]] = {}
+    for values in product(*(mode.words for mode in modes)):
+        at = {mode.symbol: symengine.Integer(round(value)) for mode, value in zip(modes, values, strict=True)}
+        words = ", ".join(mode.words[value] for mode, value in zip(modes, values, strict=True))
+        found.setdefault(sides(_tabulated(readable(expression.xreplace(at)))), []).append(words)
+    for (left, right), holds in sorted(found.items(), key=lambda item: item[0][1] == 0):
+        when = "otherwise" if right == 0 and len(holds) > 2 else " or ".join(holds)
+        yield Statement(item.name, left, right, text, when if len(found) > 1 else "")
+
+
+def _plain(item: Named) -> Expression:
+    """The expression of a named quantity without its guards; that of a fit by its name."""
+    if any(str(x).startswith(f"{item.name}_ends_") for x in symengine.sympify(item.expression).free_symbols):
+        return symengine.Symbol(f"{item.name} of a fit")
+    return readable(item.expression)
+
+
+def _tabulated(expression: Expression) -> Expression:
+    """The expression with a symbol in place of each table of numbers, as interpolations are."""
+    tables = [p for p in expression.atoms(symengine.Piecewise) if len(p.atoms(symengine.Float)) > TABULATED]
+    return expression.xreplace({p: symengine.Symbol(TABLE + str(max(map(str, p.free_symbols)))) for p in tables})
+
+
+def _is_negative(expression: Expression) -> bool:
+    """Whether a capacity or a stiffness is written with the other sign, as a state of open bodies tells."""
+    state = {x: symengine.Integer(8) if str(x) in GAPS else HALF for x in expression.free_symbols}
+    return bool(sympy_form(expression.xreplace(state)).n() < 0)
+
+
+def _short(expression: Expression) -> Expression:
+    """The shortest of an expression, its common factors taken out, and what SymPy makes of it."""
+    if {K_B, R} <= expression.free_symbols and not expression.has(symengine.E):
+        expression = expression.xreplace({K_B: R / N_A})
+    whole = sympy_form(expression)
+    forms = [whole, sympy.factor_terms(whole, sign=True)]
+    if not whole.has(sympy.Piecewise, sympy.Float) and sympy.count_ops(whole) <= SIMPLE:
+        if whole.is_rational_function():
+            over, under = sympy.fraction(sympy.cancel(sympy.together(whole)))
+            forms += [sympy.expand(whole), *(sympy.collect(over, x, sympy.factor) / under for x in over.free_symbols)]
+        else:
+            forms.append(sympy.simplify(whole))
+    return symengine.sympify(min(forms, key=sympy.count_ops))
+
+
+class Paper(Latex):
+    """A printer of formulas for readers: few digits, positive terms first, functions by their usual names."""
+
+    def __init__(self, names: Mapping[str, str]) -> None:
+        super().__init__({"mul_symbol": r"\,", "fold_short_frac": False, "ln_notation": True})
+        self.names = names
+
+    def equation(self, line: Statement) -> Equation:
+        """A line as LaTeX, the right side in its terms."""
+        right = sympy_form(line.right)
+        # A minus before a sum, and a product that is too long for a line, are those of each term.
+        if right.as_coeff_Mul()[1].is_Add or len(self.text(right)) > LONG:
+            right = sympy.expand_mul(right, deep=False)
+        terms = [self.text(term) for term in self._as_ordered_terms(right)]
+        signed = [term if term.startswith("-") else f"+ {term}" for term in terms[1:]]
+        return Equation(self.text(line.left), [f"= {terms[0]}", *signed], line.text, line.when)
+
+    def _as_ordered_terms(self, expr: Any, order: Any = None) -> list[Any]:
+        terms = super()._as_ordered_terms(expr, order)
+        return sorted(terms, key=lambda term: bool(term.could_extract_minus_sign()))
+
+    def _print_Symbol(self, expression: Any, style: str = "plain") -> str:
+        name = str(expression)
+        if rate := re.fullmatch(r"d(\w+)_dt", name):
+            return self._rate(self.names.get(rate[1]) or symbol(rate[1]))
+        if name.startswith(TABLE):
+            return rf"\mathcal{{F}}\left({symbol(name.removeprefix(TABLE))}\right)"
+        latex = self.names.get(name) or str(super()._print_Symbol(expression, style))
+        return rf"\left({latex}\right)" if " / " in latex else latex
+
+    def _rate(self, latex: str) -> str:
+        """The dot stands over the letter, not over its index."""
+        base, line, index = latex.partition("_")
+        if base.startswith((r"\ln", "|")):
+            return rf"\frac{{\mathrm{{d}} {latex}}}{{\mathrm{{d}} t}}"
+        accent, base = (r"\ddot", base[5:]) if base.startswith(r"\dot ") else (r"\dot", base)
+        return rf"{accent}{{{base}}}{line}{index}"
+
+    def _print_Float(self, expression: Any) -> str:
+        return str(super()._print_Float(sympy.Float(f"{float(expression):.4g}")))
+
+    def _print_exp(self, expression: Any, exp: Any = None) -> str:
+        inside = self._print(expression.args[0])
+        plain = rf"e^{{{inside}}}" if r"\frac" not in inside else rf"\exp\left({inside}\right)"
+        return plain if exp is None else rf"\left({plain}\right)^{{{exp}}}"
+
+    def _print_sign(self, expression: Any, exp: Any = None) -> str:
+        return rf"\operatorname{{sgn}}\left({self._print(expression.args[0])}\right)" + (f"^{{{exp}}}" if exp else "")

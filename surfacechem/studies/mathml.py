@@ -1,0 +1,93 @@
+r"""Formulas in LaTeX as MathML, which browsers draw without a script and without a network.
+
+>>> mathml("a_1")
+'<math><mrow><msub><mi>a</mi><mn>1</mn></msub></mrow></math>'
+"""
+
+from __future__ import annotations
+
+import re
+from base64 import b64encode
+from pathlib import Path
+from typing import TYPE_CHECKING
+from xml.etree import ElementTree
+
+if TYPE_CHECKING:
+    from xml.etree.ElementTree import Element
+
+    from surfacechem.compile.typeset import Equation
+
+WORDS = re.compile(r"\\mathrm\{([^{}]{2,})\}")
+"""Upright words, which are text rather than a product of letters."""
+
+TAG = re.compile(r"<math [^>]*>")
+
+SPACING = {
+    "<mo>&#x02202;</mo>": "<mi>&#x02202;</mi>",  # a partial derivative is no binary operator
+    "<mo>&#x0002F;</mo>": '<mo lspace="0" rspace="0">&#x0002F;</mo>',
+    'width="negativethinmathspace"': 'width="-0.167em"',
+}
+
+SCRIPT = 0.75
+"""Size of an index or exponent, relative to what it belongs to."""
+
+LETTER, OPERATOR, BRACKET, MARGIN = 0.56, 1.3, 0.4, 0.25
+"""Widths of parts of a formula [em], rather too wide than too narrow."""
+
+FONT = Path(__file__).with_name("stix-two-math.woff2")
+"""Letters, signs and brackets of STIX Two Math that formulas need."""
+
+
+class Typeset(str):
+    """LaTeX that a page typesets; as text it is what it is."""
+
+    def __html__(self) -> str:
+        """For templates, which would escape a text."""
+        return mathml(self)
+
+
+def mathml(latex: str, *, display: bool = False) -> str:
+    """A formula; fractions in a ``display`` are large."""
+    from latex2mathml.converter import convert
+
+    words = WORDS.sub(lambda m: rf"\text{{{m[1].replace(chr(92) + ',', ' ')}}}", latex)
+    found: str = convert(words.strip())
+    for given, better in SPACING.items():
+        found = found.replace(given, better)
+    return TAG.sub('<math displaystyle="true">' if display else "<math>", found, count=1)
+
+
+def equation(line: Equation) -> str:
+    """An equation whose lines break between its terms; a term that is wider than the page is drawn smaller."""
+    first = mathml(f"{line.left} {line.pieces[0]}", display=True)
+    # A sign at the beginning of a line has the room of one between two terms.
+    rest = [mathml(piece, display=True).replace("<mo>", '<mo form="infix">', 1) for piece in line.pieces[1:]]
+    return " ".join(map(_fitted, [first, *rest]))
+
+
+def font() -> str:
+    """The font of formulas as a data address, so that a page needs no other file."""
+    return f"data:font/woff2;base64,{b64encode(FONT.read_bytes()).decode()}"
+
+
+def _fitted(formula: str) -> str:
+    wide = _width(ElementTree.fromstring(formula))
+    return formula.replace("<math ", f'<math style="--w:{wide:.0f}" ', 1)
+
+
+def _width(element: Element) -> float:
+    """Width of an element [em], estimated from above."""
+    tag = str(element.tag)
+    parts: list[float] = [_width(part) for part in element]
+    if tag in ("mi", "mn", "mtext", "ms"):
+        return LETTER * len(element.text or "")
+    if tag == "mo":
+        return BRACKET if element.get("fence") else OPERATOR
+    if tag == "mfrac":
+        return max(parts) + MARGIN
+    if tag in ("msub", "msup", "msubsup", "munder", "mover", "munderover"):
+        return parts[0] + (SCRIPT * max(parts[1:]) if tag.startswith("ms") else 0.0)
+    if tag == "mtable":
+        rows = [[_width(cell) + 2 * MARGIN for cell in row] for row in element]
+        return sum((max(column) for column in zip(*rows, strict=True)), 0.0)
+    return sum(parts)

@@ -1,0 +1,72 @@
+"""Equations for readers: they hold where the guarded ones do, name no guard, and read as a paper would print them."""
+
+import numpy as np
+import pytest
+import symengine
+
+import surfacechem
+from surfacechem.compile.typeset import CONSTANTS, equations, lines, readable
+from surfacechem.expressions import where
+
+pytestmark = pytest.mark.around
+
+SHOWN = [
+    *("stick-slip", "endothermic", "elastic-bonds-at-a-gap", "vinculin-catch-bond", "cohesive-cycles", "thermal-press"),
+    "dna-adhesive",
+]
+
+
+def assembled(name):
+    return surfacechem.load(name).case.system()
+
+
+def a_state(system):
+    """Numbers for every symbol of a scene, the named quantities among them, near its start."""
+    random = np.random.default_rng(3)
+    point = {p.symbol: p.at(0.0) for p in system.parameters} | {symengine.Symbol("t"): 0.5}
+    for state in system.states:
+        point |= {state.symbol: state.scale * random.uniform(0.6, 0.9), state.dot: state.scale * random.normal()}
+    for item in system.named:
+        point[symengine.Symbol(item.name)] = number(item.expression, point)
+    return point | {symbol: value for symbol, (value, _) in CONSTANTS.items() if symbol.is_Symbol}
+
+
+def number(expression, point):
+    return float(symengine.sympify(expression).subs(point).n(53, real=True))
+
+
+@pytest.mark.parametrize("name", SHOWN)
+def test_what_is_shown_holds_wherever_no_guard_is_in_play(name):
+    system = assembled(name)
+    point, found = a_state(system), lines(system)
+    for state, row in system.rows.items():
+        sides = [(number(line.left, point), number(line.right, point)) for line in found if line.name == state]
+        exact = abs(number(row, point))
+        errors = [abs(abs(left - right) - exact) / max(abs(left), abs(right), exact) for left, right in sides]
+        assert min(errors) < 1e-7, state
+    for item in system.named:
+        shown = [number(line.right, point) for line in found if line.name == item.name]
+        exact = number(item.expression, point)
+        assert not shown or min(abs(each - exact) for each in shown) <= 1e-7 * abs(exact), item.name
+
+
+def test_a_slide_and_its_bonds_read_as_in_a_paper():
+    found = [(line.left, " ".join(line.pieces), line.when) for line in equations(assembled("stick-slip"))[0]]
+    force = r"= \frac{k_{t}\,\left(w_t - u_t\right) - t_{\mathrm{coulomb}}}{m_{t}}"
+    assert found[:3] == [
+        (r"\dot{u}_t", "= v", ""),
+        (r"\dot{v}", force, "slides backward or slides forward"),
+        (r"\dot{v}", "= 0", "sticks"),
+    ]
+    rates, symbols = equations(assembled("elastic-bonds-at-a-gap"))
+    rate = next(line for line in rates if line.when == "between its bounds")
+    assert r"\exp\left(\frac{f\,x_{\mathrm{off}}}{k_{\mathrm{B}}\,T_c}\right)" in rate.pieces[0]
+    assert symbols["loading.g_n.level"] == "g_n"
+
+
+def test_what_is_no_guard_stays():
+    x, y = symengine.symbols("x y")
+    assert readable(where(x > 0, x, 0.0 * x)) == symengine.Max(0, x)
+    assert readable(where(x < 0, -x, x)) == abs(x)
+    kept = where(x > y, x**2, y)
+    assert readable(kept) == kept
