@@ -252,7 +252,10 @@ GALLERY: dict[str, tuple[list[str], str | None]] = {
 }
 """What is plotted of a case, and over what if not time; of others the usual panels."""
 
-SWEPT = ("biotin-streptavidin", "catch-bond", "force-spectroscopy", "l-selectin-tether", "vinculin-catch-bond")
+SWEPT = (
+    *("biotin-streptavidin", "bond-lifetimes", "catch-bond", "force-spectroscopy"),
+    *("l-selectin-tether", "vinculin-catch-bond"),
+)
 """Cases of the gallery whose sweep is plotted."""
 
 

@@ -38,6 +38,9 @@ from surfacechem.format.sections import (
 )
 
 # Statistics of the load at rupture, with their words, where runs end at a load.
+SURVIVAL = "survival"
+"""What stands for a load in `until` where each run ends when so few of its bonds are left."""
+
 STATISTICS = {"mode": "most probable", "median": "median", "mean": "mean"}
 
 INTEGRATED = ("surface.bodies.", "surface.laws.", "surface.heat.", "surface.approach.", "surface.accuracy")
@@ -120,7 +123,9 @@ class Axis:
 
 @dataclass(frozen=True)
 class Plan:
-    """What is swept. With ``until`` every run ends where that prescribed variable, a ramp, reaches the value."""
+    """What is swept. With ``until`` every run ends where that prescribed variable, a ramp, reaches the value, or where
+    the survival of its bonds has fallen to it.
+    """
 
     axes: Sequence[Axis] = ()
     until: tuple[str, float] | None = None
@@ -177,6 +182,11 @@ class Plan:
         """The swept values of each run by path, the last dimension fastest."""
         values = self.at(np.arange(self.size))
         return [dict(zip(values, row, strict=True)) for row in zip(*(x.tolist() for x in values.values()), strict=True)]
+
+    @property
+    def load(self) -> str:
+        """The prescribed variable whose value ends every run; '' where there is none."""
+        return self.until[0] if self.until and self.until[0] != SURVIVAL else ""
 
     @property
     def record(self) -> str:

@@ -527,13 +527,13 @@ class SampleSection(Section):
     seed: int = key(Whole(0, 2**31), "another number, another sample", 0)
 
 
-# A prescribed variable and the value at which each run of a sweep ends.
+# A prescribed variable and the value at which each run of a sweep ends, or the survival of bonds.
 UNTIL = Entries(
     others=amount("[x]"),
-    names=lambda _: UNITS,
+    names=lambda _: {**UNITS, "survival": "1"},
     what="variables",
     at_most=1,
-    wanted="`until` is one prescribed variable and its value, for example `until: {f: 200 pN}`",
+    wanted="`until` is one prescribed variable and its value, `until: {f: 200 pN}`, or `until: {survival: 1e-12}`",
 )
 
 
@@ -577,7 +577,9 @@ class SweepSection(Section):
     )
     sample: SampleSection | None = key(Nested(SampleSection))
     until: Mapping[str, float] | None = key(
-        UNTIL, "a prescribed ramp and the value at which each run ends, instead of `run.until`"
+        UNTIL,
+        "a prescribed ramp and the value at which each run ends, instead of `run.until`; or the survival of bonds at "
+        "which it ends, for lifetimes",
     )
     checked: int | str = key(
         Whole(0, word=ALL),

@@ -32,9 +32,12 @@ TIME_UNIT = "s"
 COUNTED = ("steps", "destroys_entropy")
 """What tells of the solver or the laws, not of what happens."""
 
-RANKS = (r"(phi|theta).*_last", r"T.*_max", r"(phi|T).*(?<!_m..)", r"time_to.*", r"time.*", r".*(?<!_m..)", r".*")
-"""Names in the order in which they are shown: bonds at the end, largest temperatures, what else tells of the ends,
-other extremes.
+RANKS = (
+    *(r"lifetime", r"(phi|theta).*_last", r"T.*_max", r"(phi|T).*(?<!_m..)"),
+    *(r"time_to.*", r"time.*", r".*(?<!_m..)", r".*"),
+)
+"""Names in the order in which they are shown: lifetimes, bonds at the end, largest temperatures, what else tells of the
+ends, other extremes.
 """
 
 BINS, PARTS = 40, 12

@@ -1,8 +1,8 @@
-"""Figures of ruptures under a growing load: the load at rupture over what is swept, its distributions, lifetimes."""
+"""Figures of ruptures: the load at rupture over what is swept, its distributions, lifetimes."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
 import numpy as np
@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 
 from surfacechem.format.plans import STATISTICS
 from surfacechem.plots import style
+from surfacechem.plots.run import logarithmic
 from surfacechem.plots.style import COLOURS, MOST_CURVES, Array, symbol, unit
 
 
@@ -39,8 +40,6 @@ def figure(dataset: xarray.Dataset, load: str, variables: Sequence[str] | None =
         for ax in grid[2:, 0] if not variables else ():
             ax.sharex(grid[1, 0])
             ax.get_legend().remove()  # the colours are those of the distributions
-        if not variables and style.over_decades(dataset[str(dataset["status"].dims[0])].values):
-            grid[0, 0].set_xscale("log")
         style.headings(plot, grid[0, 0], dataset)
     return plot
 
@@ -101,17 +100,55 @@ def _draw_series(ax: Axes, dataset: xarray.Dataset, load: str, name: str) -> Non
 
 def _draw_spectrum(ax: Axes, dataset: xarray.Dataset, load: str) -> None:
     """Most probable, median and mean load at rupture, the exact ones as lines."""
-    parameter, mean = dataset[str(dataset["status"].dims[0])], dataset[f"{load}_mean"]
+    mean = dataset[f"{load}_mean"]
     text, size = style.prefixed(unit(mean), mean.values)
-    words, scale = style.parameter_unit(parameter)
+    _draw_told(ax, dataset, {f"{load}_{which}": word for which, word in STATISTICS.items()}, size)
+    ax.set_ylabel(f"{symbol(load)} at rupture [{text}]")
+
+
+def _draw_told(ax: Axes, dataset: xarray.Dataset, told: Mapping[str, str], size: float) -> None:
+    """What each run tells over what is swept, by name with its label in the legend; exact values as lines."""
+    parameter = dataset[str(dataset["status"].dims[0])]
+    decades = style.over_decades(parameter.values)
+    words, scale = style.parameter_unit(parameter) if decades else style.prefixed(unit(parameter), parameter.values)
     x = parameter.values / scale
+    if decades:
+        ax.set_xscale("log")
     ax.set_xlabel(f"{style.parameter_words(parameter)} [{words}]")
-    for (which, word), colour, marker in zip(STATISTICS.items(), COLOURS, "osD", strict=False):
-        for j, (values, label) in enumerate(style.by_second(dataset, dataset[f"{load}_{which}"].values)):
+    for (name, word), colour, marker in zip(told.items(), COLOURS, "osD", strict=False):
+        for j, (values, label) in enumerate(style.by_second(dataset, dataset[name].values)):
             (points,) = ax.plot(x, values / size, marker, color=colour, markersize=3.5)
             points.set(label=f"{word} {label}".strip(), alpha=1 / (1 + 0.5 * j))
-        if f"{load}_{which}_exact" in dataset:
-            for values, _ in style.by_second(dataset, dataset[f"{load}_{which}_exact"].values):
+        if f"{name}_exact" in dataset:
+            for values, _ in style.by_second(dataset, dataset[f"{name}_exact"].values):
                 ax.plot(x, values / size, color=colour, linewidth=0.9, label="_")
-    ax.plot([], [], color="black", linewidth=0.9, label="exact" if f"{load}_mode_exact" in dataset else "_")
-    ax.set_ylabel(f"{symbol(load)} at rupture [{text}]")
+    ax.plot([], [], color="black", linewidth=0.9, label="exact" if any(f"{n}_exact" in dataset for n in told) else "_")
+
+
+def lifetimes(dataset: xarray.Dataset) -> Figure:
+    """The lifetime over what is swept, the exact one as a line, and the survival over time of some of the runs."""
+    with style.panels(6.4, 5.3, 2) as (plot, grid):
+        above, below = grid[:, 0]
+        _draw_told(above, dataset, {"lifetime": "runs"}, 1.0)
+        above.set(ylabel=r"Lifetime $\tau$ [s]", yscale="log")
+        _draw_survival(below, dataset)
+        for ax in (above, below):
+            style.legend(ax)
+        style.headings(plot, above, dataset)
+    return plot
+
+
+def _draw_survival(ax: Axes, dataset: xarray.Dataset) -> None:
+    """Bonds that are left over time, of runs evenly spread over those whose lifetime is known."""
+    known = np.argwhere(np.isfinite(dataset["lifetime"].values))
+    chosen = np.unique(np.linspace(0, len(known) - 1, min(MOST_CURVES, len(known))).round().astype(int))
+    times, survival = dataset["time"].values, dataset["survival"].values
+    for place, colour in zip(known[chosen], COLOURS, strict=False):
+        # Where all have broken a run has ended.
+        values = np.nan_to_num(survival[tuple(place)])
+        ax.plot(times, values, color=colour, label=style.member_name(dataset, place))
+    if logarithmic(times):
+        ax.set(xscale="log", xlim=(times[times > 0][0], dataset["time_reached"].values.max()))
+    else:
+        ax.set(xlim=(0, dataset["time_reached"].values.max()))
+    ax.set(xlabel="Time [s]", ylabel="Survival $S$ [1]")

@@ -23,6 +23,7 @@ from matplotlib.rcsetup import cycler
 from numpy.typing import NDArray
 
 from surfacechem.errors import InputError, Place
+from surfacechem.quantities import VARIABLES
 from surfacechem.results.netcdf import reading, replacing
 from surfacechem.tolerances import ROUNDING
 
@@ -299,11 +300,17 @@ def parameter_words(values: xarray.DataArray) -> str:
     >>> said = {"long_name": "rate of change (loading.f.ramp.rate)", "units": "N s-1"}
     >>> parameter_words(xarray.DataArray(1e-9, name="rate", attrs=said))
     'Loading rate of $f$'
+    >>> parameter_words(xarray.DataArray(1e-9, name="loading_f", attrs={"long_name": "value (loading.f.level)"}))
+    'Force per bond $f$'
     """
     load = re.search(r"\(loading\.(\w+)\.[\w.-]*rate\)$", str(values.attrs.get("long_name", "")))
     if load and unit(values).startswith(("N", "Pa")):
         return f"Loading rate of {symbol(load[1])}"
     words = meaning(values, " (")
+    held = re.search(r"\(loading\.(\w+)(\.level)?\)$", str(values.attrs.get("long_name", "")))
+    if held and held[1] in VARIABLES:
+        text = VARIABLES[held[1]].long_name.partition(",")[0]
+        return f"{text[:1].upper()}{text[1:]} {symbol(held[1])}"
     return (str(values.name).replace("_", " ") if words == "Value" else words) + owner(values)
 
 

@@ -56,6 +56,8 @@ class Reference(ABC):
     `from_scene` alone tells whether it is the scene's."""
     told: ClassVar[Mapping[str, tuple[str, str]]] = {}
     """How its parameters are read off a scene, those of its bases among them."""
+    statistics: ClassVar[tuple[str, ...]] = ()
+    """Names of its properties that a sweep tells of each run."""
 
     def __init_subclass__(cls, **keywords: Any) -> None:
         super().__init_subclass__(**keywords)

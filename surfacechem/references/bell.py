@@ -48,11 +48,17 @@ class BellConstantForce(BellBond):
     f: float = parameter("N", "force per bond")
 
     told = read(initial="f")
+    statistics = ("lifetime",)
 
     @property
     def log_rate(self) -> float:
         """Logarithm of the rupture rate in 1/s."""
         return math.log(self.k_off) + self.f / self.force_scale
+
+    @property
+    def lifetime(self) -> float:
+        """Mean time [s] to rupture, 1/k; zero below 1e-323 s."""
+        return math.exp(-max(self.log_rate, -700.0))
 
     @property
     def half_life(self) -> float:
@@ -85,6 +91,7 @@ class BellRamp(BellBond):
     rate: float = parameter("N/s", "loading rate", above=0)
 
     told = read(ramp="rate=f")
+    statistics = ("mode", "median", "mean")
 
     @property
     def severity(self) -> float:

@@ -107,8 +107,9 @@ class SceneView:
     @property
     def temperature(self) -> float | None:
         """The first temperature that evolves, or that of the interface [K]."""
-        own = next((state.name for state in self._system.states if state.is_temperature), "T_c")
-        return self.initial(own)
+        # A scene without bodies has one temperature, T.
+        own = [state.name for state in self._system.states if state.is_temperature]
+        return next((T for name in (*own[:1], "T_c", "T") if (T := self.initial(name)) is not None), None)
 
     @property
     def surroundings_temperature(self) -> float | None:

@@ -116,10 +116,10 @@ class ArrayRuns:
     @cached_property
     def ramp(self) -> Function | None:
         """Value and slope at the start of the load that ends the runs, where one does."""
-        if self.plan.until is None:
+        if not self.plan.load:
             return None
         system = self.model.system
-        line = spectrum.history(system, self.plan.until[0])
+        line = spectrum.history(system, self.plan.load)
         return compile_function(system.inputs, [line, derivative(line, system.t)])
 
     # -- from values to arrays ----------------------------------------------------------------------------------------

@@ -456,6 +456,8 @@ class Simulation:
         if spatial.wanted(self.case.scene) is not None:
             message = "cells that follow from an accuracy need all runs at once; give a number of cells for a store."
             raise InputError(message, path="bodies")
+        if plan.until and not plan.load:
+            raise InputError("a store keeps no lifetimes. Write the sweep to a file, -o NAME.nc.", path="sweep.until")
         values = {path: value for path, value in values.items() if path not in self.system.constants}
         try:
             return streaming.stream(self, plan, path, changes=values, resume=resume, part=part)

@@ -2,7 +2,8 @@ r"""Force spectra: at which value of a growing load bonds break, from the run it
 
 Along a run in which a prescribed variable x grows, the survival is :math:`S=\phi/\phi_i` and the density of ruptures
 :math:`-dS/dx`. The median is where S crosses one half, the mode where the density is largest, and both are located as
-events; the mean is :math:`x_0+\int S\,dx`, integrated beside the state.
+events; the mean is :math:`x_0+\int S\,dx`, integrated beside the state. Under a constant load the integral of S over
+time is the mean lifetime.
 
 Source: Evans & Ritchie (1997), Biophys. J. 72, 1541-1555, doi 10.1016/S0006-3495(97)78802-7.
 """
@@ -42,6 +43,13 @@ class Statistics:
     mean: float
 
 
+@dataclass(frozen=True)
+class Lifetime:
+    """Mean lifetime of the bonds of a run [s]."""
+
+    lifetime: float
+
+
 def history(system: System, variable: str) -> Expression:
     """A prescribed variable that is a straight line in time, as an expression; InputError for any other."""
     named = next((item for item in system.named if item.name == variable), None)
@@ -79,13 +87,8 @@ def with_rupture(system: System, variable: str) -> System:
     """The system that also records where its bonds break as the variable grows, and ends when all are broken."""
     unit = next(item.quantity.unit for item in system.named if item.name == variable)
     speed = derivative(history(system, variable), system.t)
-    # The bonding state over its initial value, which is a parameter.
-    phi = system.expand(symengine.Symbol("phi"))
-    paths = {p.path: p.symbol for p in system.parameters}
-    start = {s.symbol: paths[f"initial.{s.name}"] for s in system.states if f"initial.{s.name}" in paths}
-    survival = phi / phi.subs(start)
+    left, survival = _survival(system)
     falling = _total(system, survival)
-    left = Quantity("survival", "1", "bonds that are left, of those at the start")
     density = Quantity(f"density_{variable}", f"1/{unit}", f"density of ruptures over {variable}")
     mean = Quantity(f"mean_{variable}", unit, f"integral of the survival over {variable}")
     return replace(
@@ -99,6 +102,34 @@ def with_rupture(system: System, variable: str) -> System:
             Margin("mode", _total(system, falling), MODE, terminal=False),
         ),
     )
+
+
+def with_lifetime(system: System, least: float) -> System:
+    """The system that also integrates the survival over time, and ends when it has fallen to the ``least``; InputError
+    where bonds can form again, or too many would be left.
+    """
+    if not breaks_bonds(system):
+        message = "no lifetimes: no bonds evolve here, or they can form again, and none breaks once."
+        raise InputError(message, path="sweep.until")
+    if not 0 < least <= INTACT:
+        message = f"lifetimes need few bonds to be left: the survival must be in (0, {INTACT:g}], not {least:g}."
+        raise InputError(message, path="sweep.until")
+    left, survival = _survival(system)
+    integral = Quantity("lifetime", "s", "integral of the survival over time")
+    return replace(
+        system,
+        named=(*system.named, Named(left, survival)),
+        ledger=(*system.ledger, Account(integral, survival, "statistics")),
+        margins=(*system.margins, Margin("intact", survival - least, "all bonds broke")),
+    )
+
+
+def _survival(system: System) -> tuple[Quantity, Expression]:
+    """The bonding state over its initial value, which is a parameter."""
+    phi = system.expand(symengine.Symbol("phi"))
+    paths = {p.path: p.symbol for p in system.parameters}
+    start = {s.symbol: paths[f"initial.{s.name}"] for s in system.states if f"initial.{s.name}" in paths}
+    return Quantity("survival", "1", "bonds that are left, of those at the start"), phi / phi.subs(start)
 
 
 def lifetimes(survival: Array, density: Array, speed: Array) -> Array:
@@ -143,3 +174,12 @@ def statistics(trajectory: Trajectory, variable: str) -> Statistics:
         median=float(halves[0, column]) if len(halves) else math.nan,
         mean=float(trajectory.outputs[0, column] + integral) if survivors < INTACT else math.nan,
     )
+
+
+def lifetime(trajectory: Trajectory) -> Lifetime:
+    """Mean lifetime of a run of a system :func:`with_lifetime`; not a number where too many bonds are left."""
+    system, result = trajectory.model.system, trajectory.result
+    end = trajectory.model.evaluate(result, np.array([result.t]), result.y[None], result.ydot[None])[0]
+    survivors = end[system.output_columns["survival"]]
+    accounts = [account.quantity.name for account in system.ledger]
+    return Lifetime(float(result.ledger[accounts.index("lifetime")]) if survivors <= 1.01 * INTACT else math.nan)

@@ -6,7 +6,7 @@ import json
 import logging
 import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cache, cached_property, partial
 from typing import Any
 
@@ -29,7 +29,7 @@ from surfacechem.results.matching import exact_values, match
 from surfacechem.results.netcdf import Column, versions
 from surfacechem.runs import spectrum
 from surfacechem.runs.keeping import EXTREMES, extreme
-from surfacechem.runs.spectrum import Statistics
+from surfacechem.runs.spectrum import Lifetime, Statistics
 from surfacechem.solve.run import Model, Run, Trajectory
 from surfacechem.tolerances import EPS
 
@@ -41,6 +41,8 @@ BALANCES = {
 """Balances of a run, and what their errors are in words."""
 
 
+Rupture = Statistics | Lifetime
+
 PORTION = 256
 """Runs that are solved at a time; between portions a sweep tells how far it is."""
 
@@ -50,10 +52,14 @@ log = logging.getLogger(__name__)
 
 
 def prepared(system: System, plan: Plan) -> System:
-    """The system that a sweep compiles: with statistics of rupture where a load grows until bonds break."""
+    """The system that a sweep compiles: with statistics of rupture where a load grows until bonds break, with their
+    lifetime where they do under any load.
+    """
     if plan.until is None:
         return system
     origin = partial(prepared, system, plan)
+    if not plan.load:
+        return replace(spectrum.with_lifetime(system, plan.until[1]), origin=origin)
     spectrum.history(system, plan.until[0])
     if spectrum.breaks_bonds(system):
         return replace(spectrum.with_rupture(system, plan.until[0]), origin=origin)
@@ -81,7 +87,7 @@ def settings(system: System, plan: Plan, run: Run, values: Sequence[Mapping[str,
     names.
     """
     run = replace(run, picture=None)
-    if plan.until is None:
+    if plan.until is None or not plan.load:
         return [run] * len(values)
     variable, target = plan.until
     if system.breakpoints:
@@ -163,7 +169,7 @@ def _against_exact(case: Case, done: SweepSolution, name: str, second: Callable[
     if not begun:
         raise InputError("no run reached a second output.")
     errors = np.full(len(done.runs), np.nan)
-    exact = {which: errors.copy() for which in STATISTICS if done.statistics}
+    exact = {which: errors.copy() for which in done.told if which in references.get(name).statistics}
     for i, run in enumerate(done.runs):
         if len(run.result.times) < 2:
             errors[i] = estimated(run, second().runs[i]).error if len(run.result.times) else np.nan
@@ -179,9 +185,9 @@ def _against_exact(case: Case, done: SweepSolution, name: str, second: Callable[
     return SweepAccuracy(errors, f"exact solution {name}", exact)
 
 
-def _of_statistics(found: Statistics, exact: references.Reference | Statistics) -> float:
-    """Largest error of the load at rupture; that of one which is exactly zero is absolute."""
-    pairs = [(getattr(found, which), getattr(exact, which)) for which in STATISTICS]
+def _of_statistics(found: Rupture, exact: references.Reference | Rupture) -> float:
+    """Largest error of the load at rupture, or that of the lifetime; that of one which is exactly zero is absolute."""
+    pairs = [(getattr(found, each.name), getattr(exact, each.name)) for each in fields(found)]
     errors = [float(abs(ours - true) / abs(true) if true else abs(ours)) for ours, true in pairs]
     return max(max(errors), EPS)
 
@@ -263,11 +269,18 @@ class SweepSolution(Results):
         return float(np.max([getattr(books, f"{balance}_error") for books in self.audits]))
 
     @cached_property
-    def statistics(self) -> list[Statistics]:
-        """Mode, median and mean of the load at rupture of each run; empty where the sweep has none."""
+    def statistics(self) -> Sequence[Rupture]:
+        """Mode, median and mean of the load at rupture of each run, or its lifetime; empty where the sweep has none."""
         if self.plan.until is None or not spectrum.breaks_bonds(self.system):
             return []
-        return [spectrum.statistics(run, self.plan.until[0]) for run in self.runs]
+        if not self.plan.load:
+            return [spectrum.lifetime(run) for run in self.runs]
+        return [spectrum.statistics(run, self.plan.load) for run in self.runs]
+
+    @cached_property
+    def told(self) -> list[str]:
+        """Names of the statistics."""
+        return [each.name for each in fields(self.statistics[0])] if self.statistics else []
 
     @property
     def ends(self) -> str:
@@ -298,7 +311,7 @@ class SweepSolution(Results):
     @property
     def inner(self) -> str:
         """The dimension along each run: time, or the load that all runs grow to."""
-        return self.plan.until[0] if self.plan.until else "time"
+        return self.plan.load or "time"
 
     @cached_property
     def columns(self) -> tuple[Column, ...]:
@@ -308,15 +321,21 @@ class SweepSolution(Results):
         load = along.pop(self.inner, None)
         columns = [*self._coordinates(load), *along.values(), *self._of_runs(), *event_columns(self.runs, shape)]
         columns += self._extremes() if load is None else []
-        for which, word in STATISTICS.items() if self.statistics else ():
-            quantity = quantities(self.system)[self.inner]
-            name, text = f"{self.inner}_{which}", f"{word} {quantity.long_name} at rupture"
+        for which in self.told:
+            name, unit, text = self._statistic(which)
             found = [getattr(statistics, which) for statistics in self.statistics]
-            columns.append(self._of_each(name, found, quantity.unit, text))
+            columns.append(self._of_each(name, found, unit, text))
             if self.accuracy and which in self.accuracy.exact:
                 exact = self.accuracy.exact[which]
-                columns.append(self._of_each(f"{name}_exact", exact, quantity.unit, f"exact {text}"))
-        return (*columns, *([self._lifetime(columns)] if self.statistics else []))
+                columns.append(self._of_each(f"{name}_exact", exact, unit, f"exact {text}"))
+        return (*columns, *([self._lifetime(columns)] if self.told and self.plan.load else []))
+
+    def _statistic(self, which: str) -> tuple[str, str, str]:
+        """Name, unit and meaning of a statistic in the dataset."""
+        if not self.plan.load:
+            return which, "s", "mean lifetime"
+        load = quantities(self.system)[self.plan.load]
+        return f"{self.plan.load}_{which}", load.unit, f"{STATISTICS[which]} {load.long_name} at rupture"
 
     def _extremes(self) -> list[Column]:
         """The largest and the smallest values of each run, which may lie between the times that all share."""
@@ -344,7 +363,7 @@ class SweepSolution(Results):
         """The swept parameters, and the times or, where a load ends the runs, the values of this."""
         columns = parameter_columns(self.system, self.plan, self.parameters)
         times = np.array([run.result.problem.times for run in self.runs])
-        if self.plan.until is None or load is None:
+        if self.plan.until is None or not self.plan.load or load is None:
             return [*columns, Column("time", ("time",), times[0], "s", "time since the start")]
         start = float(load.values.flat[0])
         values = start + (self.plan.until[1] - start) * times[0] / times[0, -1]

@@ -38,6 +38,16 @@ def test_the_figure_has_spectrum_distributions_and_lifetimes(spectrum):
         assert y.min() >= 0
 
 
+def test_lifetimes_under_constant_forces_have_a_figure():
+    data = surfacechem.sweep("bond-lifetimes", {"loading.f": [0, 1e-11, 4e-11]}).dataset
+    above, below = plots.figure(data).axes
+    points, exact = above.get_lines()[:2]
+    assert points.get_xdata().tolist() == pytest.approx([0, 10, 40])
+    assert points.get_ydata() == pytest.approx(exact.get_ydata(), rel=1e-11)
+    assert (above.get_xlabel(), above.get_yscale()) == ("Force per bond $f$ [pN]", "log")
+    assert (len(below.get_lines()), below.get_xscale()) == (3, "log")
+
+
 def test_variables_are_drawn_over_the_load_or_over_the_rate(spectrum):
     over_load = plots.figure(spectrum, ["density_f", "survival"]).axes
     assert {ax.get_xlabel() for ax in over_load} == {"Force per bond, tension positive $f$ [pN]"}

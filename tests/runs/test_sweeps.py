@@ -74,6 +74,30 @@ def test_outputs_of_a_spectrum_are_at_equal_forces(spectrum):
     )
 
 
+def test_lifetimes_over_the_force_meet_the_exact_rates():
+    data = surfacechem.sweep("bond-lifetimes").dataset
+    f = data["loading_f"].values
+    np.testing.assert_allclose(data["lifetime"], 10.0 * np.exp(-f * 4e-10 / (1.380649e-23 * 300.0)), rtol=1e-11)
+    np.testing.assert_allclose(data["lifetime_exact"], data["lifetime"], rtol=1e-11)
+    assert data.attrs["error"] < 1e-11
+    assert data.attrs["error_source"] == "exact solution bell-constant-force"
+    catch = surfacechem.load("catch-bond", {"run.until": "1 min"}).sweep(until={"survival": 1e-12}).dataset
+    rates = [k * np.exp(catch["loading_f"] * x / (1.380649e-23 * 298.15)) for k, x in ((20.0, -8e-10), (0.2, 2e-10))]
+    np.testing.assert_allclose(catch["lifetime"], 1 / sum(rates), rtol=1e-11)
+
+
+def test_what_has_no_lifetime_says_so(tmp_path):
+    early = surfacechem.load("bond-lifetimes", {"run.until": "3 s"}).sweep({"loading.f": ["0 pN", "80 pN"]}).dataset
+    assert np.isnan(early["lifetime"].values).tolist() == [True, False]
+    with pytest.raises(InputError, match=r"must be in \(0, 1e-06\], not 0.5"):
+        surfacechem.sweep("bond-lifetimes", until={"survival": 0.5})
+    with pytest.raises(InputError, match="no lifetimes: no bonds evolve here, or they can form again"):
+        surfacechem.sweep("exothermic", {"T_0": [300.0]}, {"survival": 1e-9})
+    case = surfacechem.load("bond-lifetimes")
+    with pytest.raises(InputError, match="a store keeps no lifetimes"):
+        case.stream(case.plan(), tmp_path / "lifetimes.zarr")
+
+
 def test_bonds_of_a_mechanism_have_a_spectrum():
     data = surfacechem.sweep("l-selectin-tether").dataset
     for one in data["rate"]:
