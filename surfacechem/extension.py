@@ -8,24 +8,24 @@ of this package (``type: Bell`` and so on), in every Cantera script. What a rate
 
 from __future__ import annotations
 
+import ctypes
 import math
 import warnings
 import weakref
-from collections.abc import Collection, Mapping
-from functools import cached_property
+from collections.abc import Callable, Collection, Mapping
+from functools import cached_property, partial
 from typing import Any, ClassVar
 
 import cantera
-import numpy as np
 import symengine
 
+from surfacechem.compile.program import CODE, compile_function
 from surfacechem.errors import InputError, suggestion
 from surfacechem.expressions import EXPONENT_CAP
 from surfacechem.mechanism.rate_types import AffinityReaction, kinds
 from surfacechem.mechanism.rates import CoverageTerm, InterfaceArrhenius
 from surfacechem.mechanism.source import REACTION, converted, own_parameters, sides
 from surfacechem.quantities import BOLTZMANN, KILO, MOLECULAR, VARIABLES
-from surfacechem.solve.contract import Array
 from surfacechem.tolerances import TINY
 
 __all__ = ["LoadedInterface"]
@@ -35,6 +35,8 @@ PER_KMOL = {"J/mol": KILO, "J": MOLECULAR}
 
 LARGEST = 700.0
 """Affinity over k_B T above which its exponential counts as this one's."""
+
+TOP = math.exp(EXPONENT_CAP)
 
 FLOOR = TINY ** (1 / 3)
 """Coverages below this count as this where mass action of up to third order has to be divided out."""
@@ -55,18 +57,25 @@ class Surroundings(cantera.ExtensibleRateData):
         self.T = 0.0
         self.names: list[str] = []
         self.surface: Any = None
+        self.loads: Mapping[str, Any] = {}
+        """Attributes that the surface itself has."""
         self._coverages: dict[str, float] | None = None
 
     def update(self, surface: Any) -> bool:
         """Take over the state; always, since a force can change at constant temperature."""
         self.T, self._coverages = surface.T, None
+        if self.surface is None or self.surface() is not surface:
+            self._meet(surface)
+        return True
+
+    def _meet(self, surface: Any) -> None:
         if not self.names:
             self.names = [surface.species(k).name for k in range(surface.n_species)]
         # Only what takes attributes can be referred to weakly; a strong reference would keep the surface alive.
         self.surface = weakref.ref(surface) if hasattr(surface, "__weakref__") else None
+        self.loads = getattr(surface, "__dict__", {})
         if self.surface is None:
             self._coverages = self._of(surface)
-        return True
 
     @property
     def coverages(self) -> dict[str, float]:
@@ -192,38 +201,49 @@ class LoadedRate(cantera.ExtensibleRate):
             )
 
     @cached_property
-    def coefficient(self) -> tuple[tuple[str, ...], Any, Array, Array]:
-        """What the coefficient reads beside the temperature, its function, and room for arguments and value."""
+    def coefficient(self) -> tuple[list[tuple[int, str]], Any, Any, Callable[[], None]]:
+        """What the coefficient reads beside the temperature with its place, arguments, value, and what computes it."""
         assert self.bound is not None
         symbols = _Symbols(T_c=symengine.Symbol("T_c"))
         expression = self.bound.coefficient(symbols, 0.0)
-        made = symengine.Lambdify(list(symbols.values()), [expression])
-        _, *names = symbols
-        return tuple(names), made.unsafe_real, np.zeros(len(symbols)), np.zeros(1)
+        code = compile_function(list(symbols.values()), [expression], pieces=1)
+        arguments, value = (ctypes.c_double * len(symbols))(), (ctypes.c_double * 1)()
+        function = CODE(code.address)
+        places = ctypes.addressof(value), ctypes.addressof(arguments), code.user
+        self._code = code
+        return list(enumerate(symbols))[1:], arguments, value, partial(function, *places)
 
     def eval(self, data: Any) -> float:
         """Rate coefficient in kmol, m and s."""
+        reads, arguments, value, evaluate = self.coefficient
+        arguments[0] = data.T
+        for i, name in reads:
+            load = data.loads.get(name)
+            arguments[i] = load if isinstance(load, float) else self._read_from(data, name)
+        evaluate()
+        found: float = value[0]
+        if found > TOP:
+            self._tell_of_cap(found, data.T)
+        return found
+
+    def _tell_of_cap(self, found: float, T: float) -> None:
         assert self.bound is not None
-        names, evaluate, values, result = self.coefficient
-        values[0] = data.T
-        for i, name in enumerate(names, start=1):
-            values[i] = data.coverages[name] if name in data.names else self._load(data, name)
-        evaluate(values, result)
-        found = float(result[0])
-        largest = max(self.bound.A * data.T**self.bound.b, 1.0) * math.exp(EXPONENT_CAP)
+        largest = max(self.bound.A * T**self.bound.b, 1.0) * TOP
         if not self.capped and found > largest:
             self.capped = True
             warnings.warn(
                 f"reaction {self.bound.equation}: the logarithm of its rate of type {self.kind} is above "
                 f"{EXPONENT_CAP:g}; beyond that the rate goes on along its tangent.",
                 RuntimeWarning,
-                stacklevel=2,
+                stacklevel=3,
             )
-        return found
 
-    def _load(self, data: Surroundings, name: str) -> float:
+    def _read_from(self, data: Surroundings, name: str) -> float:
+        """A coverage or a load, which may be given by species."""
+        if name in data.names:
+            return data.coverages[name]
         value = data.read(name, self.kind)
-        if isinstance(value, float) or not isinstance(value, Mapping):  # the first is by far the cheaper question
+        if not isinstance(value, Mapping):
             return float(value)
         found = next((species for species in self.species if species in value), None)
         if found is None:

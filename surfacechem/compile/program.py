@@ -18,6 +18,9 @@ from numpy.typing import ArrayLike, NDArray
 from surfacechem.compile.preparing import PREPARING
 from surfacechem.expressions import gradient
 
+CODE = ctypes.PYFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
+"""The C signature of machine code, for calls from Python with addresses."""
+
 
 @dataclass(frozen=True)
 class Function:

@@ -4,20 +4,17 @@ twice.
 
 from __future__ import annotations
 
-import ctypes
 import math
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from surfacechem.compile.program import Function, Program
+from surfacechem.compile.program import CODE, Function, Program
 from surfacechem.solve.contract import Array
 from surfacechem.solve.radau import stepper
 from surfacechem.solve.radau.solver import search_batch
 from surfacechem.solve.radau.stepper import COLUMNS, END
-
-CODE = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
 
 
 class Evaluation:
