@@ -3,7 +3,7 @@ PYTHON ?= $(shell for p in python3.11 python3; do \
   $$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$p && break; done)
 VENV ?= .venv
 BIN := $(abspath $(VENV))/bin
-# Of the tools only what is imported is compiled, and kept.
+# Of what is installed only what is imported is compiled, and kept.
 export PYTHONDONTWRITEBYTECODE :=
 RUNTIME := $(VENV)/.installed
 TOOLS := $(VENV)/.installed-tools
@@ -72,7 +72,7 @@ $(VENV)/bin/python:
 	$(or $(PYTHON),$(error No Python >= 3.11 found. Name one: make PYTHON=/path/to/python3.11)) -m venv $(VENV)
 
 $(RUNTIME): pyproject.toml | $(VENV)/bin/python
-	$(BIN)/pip install --quiet --editable .
+	$(BIN)/pip install --quiet --no-compile --editable .
 	$(BIN)/python -m compileall -q surfacechem
 	$(BIN)/python -m surfacechem.solve
 	$(BIN)/surfacechem run exothermic -q -o $(VENV)/exothermic.nc  # with nothing but what it declares to need

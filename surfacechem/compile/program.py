@@ -8,7 +8,7 @@ raw pointer by the stepper and as a vectorised function from Python.
 import ctypes
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property, lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -193,9 +193,14 @@ def compile_function(inputs: Sequence[Any], expressions: Sequence[Any], pieces: 
     return _compiled(inputs, expressions)
 
 
+def _compiled(inputs: Sequence[Any], expressions: Sequence[Any], opt_level: int = 3) -> Function:
+    return _machine_code(tuple(inputs), tuple(expressions), opt_level)
+
+
+@lru_cache(maxsize=128)  # a scene that is loaded again, or differs in numbers alone, has the same expressions
 @PREPARING
-def _compiled(inputs: Sequence[Any], expressions: Sequence[Any], **options: int) -> Function:
-    code = symengine.Lambdify(list(inputs), list(expressions), backend="llvm", cse=True, **options)
+def _machine_code(inputs: tuple[Any, ...], expressions: tuple[Any, ...], opt_level: int) -> Function:
+    code = symengine.Lambdify(list(inputs), list(expressions), backend="llvm", cse=True, opt_level=opt_level)
     function, user = code.as_ctypes()
     address = ctypes.cast(function, ctypes.c_void_p).value
     return Function(int(address or 0), int(user.value), len(expressions), code)

@@ -9,6 +9,7 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import MISSING, fields
 from difflib import get_close_matches
+from functools import lru_cache
 from typing import Any
 
 from surfacechem.contracts.terms import Law, Spec
@@ -124,13 +125,18 @@ def _placed(tree: Tree) -> Any:
     return made(tree) if made else tree.value
 
 
+@lru_cache(maxsize=16)  # runs, sweeps and tables of one mechanism read its file again and again
+def _tree(text: str, file: str) -> Tree:
+    return document.build(text, file, LIMITS)
+
+
 class Source:
     """The text of a mechanism with the place of every entry."""
 
     def __init__(self, file: str, text: str) -> None:
         self.file = file
         self.text = text
-        self.data = _placed(document.build(text, file, LIMITS))
+        self.data = _placed(_tree(text, file))
         if not isinstance(self.data, Mapped):
             raise InputError("a mechanism is a mapping with `phases`, `species` and `reactions`.", Place(file))
         self._check(self.data, FILE)

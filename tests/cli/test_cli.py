@@ -10,6 +10,7 @@ from types import SimpleNamespace
 import netCDF4
 import numpy as np
 import pytest
+from sampling import every
 from typer.testing import CliRunner
 
 from surfacechem.cli import commands
@@ -312,7 +313,7 @@ class TestRerun:
 
 
 class TestPlot:
-    @pytest.mark.parametrize("kind", ["png", "svg", "pdf"])
+    @pytest.mark.parametrize("kind", every(3, ["png", "svg", "pdf"]))
     def test_of_a_dataset(self, call, tmp_path, kind):
         call("run", "bonding.yaml")
         done = call("plot", "bonding.nc", "-o", f"x.{kind}")

@@ -7,6 +7,7 @@ import time
 from pathlib import Path
 
 import pytest
+from sampling import every
 
 pytestmark = pytest.mark.around
 
@@ -132,7 +133,7 @@ def ended_by(number, script, told, folder, pause=0.0):
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no signals to one process")
 @pytest.mark.parametrize(
-    ("number", "words"), [(signal.SIGINT, "interrupted"), (signal.SIGTERM, "ended by SIGTERM")], ids=["int", "term"]
+    ("number", "words"), every(2, [(signal.SIGINT, "interrupted"), (signal.SIGTERM, "ended by SIGTERM")])
 )
 def test_a_signal_ends_a_long_run_at_once_and_nothing_is_written(tmp_path, number, words):
     (tmp_path / "long.yaml").write_text(LONG)

@@ -98,6 +98,7 @@ def test_two_processes_at_once(start) -> None:
     assert finish(start()) == FOUND
 
 
+@pytest.mark.slow
 def test_no_process_sees_what_another_has_not_finished(start, tmp_path: Path, monkeypatch) -> None:
     """A filled cache stays filled while a late process writes to it; what killed ones leave is in nobody's way."""
     cache = tmp_path / "cache"

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 import surfacechem
-from surfacechem.compile import preparing
+from surfacechem.compile import preparing, program
 from surfacechem.compile.preparing import PREPARING
 from surfacechem.format.cases import load_text
 from surfacechem.solve.run import Model
@@ -34,6 +34,7 @@ run: {until: 1 s}
 
 @pytest.mark.parametrize("name", ["debonding", "bouncing-plate", "at rest"])
 def test_the_code_of_jumps_and_of_gaps_at_rest_is_compiled_once_and_counts_as_compiled(name, monkeypatch):
+    program._machine_code.cache_clear()
     case = load_text(RESTING) if name == "at rest" else surfacechem.load(name).case
     model = Model(case.system())
     spent = model.compile_seconds

@@ -130,7 +130,7 @@ def test_a_module_shows_in_tracebacks_what_its_functions_read_and_no_more():
 WITH_TABLES = sorted(path.stem for path in shipped.cases().glob("*.yaml") if "table:" in path.read_text())
 
 
-@pytest.mark.parametrize("name", WITH_TABLES)
+@pytest.mark.parametrize("name", every(2, WITH_TABLES))
 def test_every_piece_of_a_history_is_printed(name):
     """The printed module finds the numbers that the compiled code is given, on both sides of every breakpoint."""
     case = cases.load(name)

@@ -123,7 +123,7 @@ def reversals(trajectory):
 
 
 @pytest.mark.parametrize(
-    ("law", "V", "reference"), every(3, [
+    ("law", "V", "reference"), every(4, [
         (LAWS[0], 1e-9, forward), (LAWS[0], 1e-3, plain), (LAWS[1], 1e-8, forward), (LAWS[1], 1e-6, plain)]),
 )  # fmt: skip
 def test_stick_slip_is_that_of_the_plain_equations(law, V, reference):
@@ -143,7 +143,7 @@ def test_stick_slip_is_that_of_the_plain_equations(law, V, reference):
     assert trajectory.result.counters.steps < 1000
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", every(2, LAWS))
 def test_a_block_swings_through_its_turning_points(law):
     """Friction is a tenth of the pull of the spring: at a turn the velocity passes all decades in no time."""
     item = scene(law, Mounting(k=K, m=1e6), {"w_t": Hold(level=0.0)}, WEAKENING, {"v": 1.0})
@@ -200,7 +200,7 @@ def test_parameters_that_vary_with_temperature():
     np.testing.assert_allclose(found[1], found[0], rtol=0, atol=1e-10)
 
 
-@pytest.mark.parametrize(("law", "mount"), every(2, [(LAWS[1], Mounting(k=K)), (LAWS[0], Mounting(k=K, c_g=1e9))]))
+@pytest.mark.parametrize(("law", "mount"), every(2, [(LAWS[0], Mounting(k=K, c_g=1e9)), (LAWS[1], Mounting(k=K))]))
 def test_sliding_follows_a_load_that_swings(law, mount):
     trajectory = solved(scene(law, mount, {"w_t": Harmonic(amplitude=5e-3, frequency=0.05)}), 40.0)
     assert reversals(trajectory) == 4

@@ -53,7 +53,7 @@ def test_events_and_states_of_the_compiled_path(name):
     compare(interface, solution, CASES[name])
 
 
-@pytest.mark.parametrize("name", ["debonding", "stick-slip-debonding", "compliant-debonding"])
+@pytest.mark.parametrize("name", every(3, ["debonding", "stick-slip-debonding", "compliant-debonding"]))
 def test_the_books_hold_what_jumps_release(name):
     solution = surfacechem.load(name).run(error="balances")
     interface, net = network(name)

@@ -90,7 +90,7 @@ for name in sys.argv[1:]:
 
 
 @pytest.mark.parametrize("which", ["run", "sweep", "study"])
-@pytest.mark.parametrize("count", [12, pytest.param(1000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [4, pytest.param(1000, marks=pytest.mark.slow)])
 def test_damaged_bytes(files, which, count, tmp_path, monkeypatch):
     monkeypatch.setattr(netcdf, "PATIENCE", 5.0)
     data, random = files[which].read_bytes(), Random(count)
@@ -172,7 +172,7 @@ def edited(dataset: xarray.Dataset, random: Random) -> xarray.Dataset:
 
 
 @pytest.mark.parametrize("which", ["run", "sweep", "study"])
-@pytest.mark.parametrize("count", [12, pytest.param(1000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [4, pytest.param(1000, marks=pytest.mark.slow)])
 @pytest.mark.filterwarnings("ignore")
 def test_edited_datasets(files, which, count, tmp_path, monkeypatch):
     monkeypatch.setattr(netcdf, "_try_elsewhere", lambda path, seconds: None)  # the files themselves are sound

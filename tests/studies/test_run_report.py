@@ -6,6 +6,7 @@ import shutil
 import subprocess
 
 import pytest
+from sampling import every
 
 import surfacechem
 from surfacechem.errors import InputError
@@ -30,7 +31,7 @@ f.srcdoc = %s;
 PARTS = ["What happened", "The scene", "Laws", "Equations", "Balances", "How to run it again", "Machine and versions"]
 
 
-@pytest.fixture(scope="module", params=["stick-slip", "force-spectroscopy"])
+@pytest.fixture(scope="module", params=every(2, ["stick-slip", "force-spectroscopy"]))
 def report(request, tmp_path_factory):
     simulation = surfacechem.load(request.param)
     swept = simulation.case.sweep is not None
