@@ -196,6 +196,11 @@ class Law(ABC):
         """The law in words."""
         return self.name().replace("-", " ")
 
+    @property
+    def called(self) -> str:
+        """What a run says whose range it left."""
+        return f"the law {self.name()}"
+
     @classmethod
     def specs(cls) -> Iterator[tuple[str, Spec]]:
         """Names and specifications of the numeric parameters."""
@@ -223,6 +228,10 @@ class Law(ABC):
         """The same law with the laws that it shares with others, if any, put through ``bind``, each with the path under
         which a case finds its parameters and what is added to their names.
         """
+        return self
+
+    def outline(self) -> Self:
+        """The same without what is costly to compute, so that all else can be checked before."""
         return self
 
     def given(self, numbers: Mapping[str, float]) -> Self:

@@ -21,7 +21,7 @@ from surfacechem.errors import InputError, Place, nearest
 from surfacechem.format import csvtable, own_laws
 from surfacechem.format.reader import ExactSolution, exact_solution_of, read_document, run_of, scene_of
 from surfacechem.format.sections import NOTHING_SWEPT, SweepSection
-from surfacechem.model.assemble import assemble
+from surfacechem.model.assemble import assemble, outline
 from surfacechem.model.system import System
 from surfacechem.scene import Scene
 from surfacechem.solve.run import Run, refuse_nothing
@@ -53,13 +53,17 @@ class Case:
     def run(self) -> Run:
         """How it is run; InputError where it does not say it."""
         if self.own_run is None:
-            try:
-                refuse_nothing(self.system())
-            except InputError as error:
-                raise self.located(error) from None
+            self.refuse_nothing()
             message = "the case needs `run`: times, accuracy, solver, for example `run: {until: 5 s}`."
             raise InputError(message, self.places[""])
         return self.own_run
+
+    def refuse_nothing(self) -> None:
+        """InputError where the scene has no state; no integral is made for it."""
+        try:
+            refuse_nothing(assemble(outline(self.scene)))
+        except InputError as error:
+            raise self.located(error) from None
 
     def system(self) -> System:
         """The assembled scene; errors have their place in the case file."""

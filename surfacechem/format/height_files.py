@@ -15,6 +15,9 @@ from surfacechem.errors import InputError, Place
 from surfacechem.format.csvtable import CSVText
 
 AXES = "xyz"
+HOLES = ("", "nan", "na", "inf", "-inf")
+"""What tables of instruments say where a height is missing."""
+
 NETCDF = ".nc"
 
 Numbers = dict[str, list[float]]
@@ -48,13 +51,12 @@ def _numbers(tree: Tree, base: str) -> Tree:
 def from_csv(content: Tree) -> Numbers:
     """Heights of a table with a row for each place, in any order."""
     table = CSVText(content)
+    _refuse_holes(table)
     x, y, z = (table.column(axis, "m", axis) for axis in AXES)
     heights: dict[tuple[float, float], float] = {}
     for (line, _), place, height in zip(table.rows, zip(x, y, strict=True), z, strict=True):
         if place in heights:
             raise table.error(line, f"a second height at x = {place[0]:g} m, y = {place[1]:g} m.")
-        if not math.isfinite(height):
-            raise table.error(line, "the heights have a hole: z is no finite number there.")
         heights[place] = height
     # Equal places are equal texts, so that no tolerance is needed to find the grid.
     along = sorted(set(x)), sorted(set(y))
@@ -65,6 +67,13 @@ def from_csv(content: Tree) -> Numbers:
             )
             raise InputError(f"the heights have holes: {grid}.", content.place)
     return {"x": along[0], "y": along[1], "z": [heights[place] for place in product(*along)]}
+
+
+def _refuse_holes(table: CSVText) -> None:
+    """InputError where a table says itself that a height is missing."""
+    for line, row in table.rows:
+        if any(cell.lower() in HOLES for cell in row):
+            raise table.error(line, "the heights have a hole: z is no finite number there.")
 
 
 def from_netcdf(path: Path) -> Numbers:

@@ -258,6 +258,9 @@ def _surface(case: Document) -> CurvedSurfaces | None:
     low, high = section.approach.low, section.approach.high
     if not low < high:
         raise section.approach.error(f"the least approach {low:g} m must be below the largest, {high:g} m.", "from")
+    start = (case.initial or {}).get("g_n", low)
+    if not low <= start <= high:
+        raise case.error(f"g_n = {start:g} m is not among the approaches, {low:g} to {high:g} m.", "initial")
     return CurvedSurfaces(
         shapes=(section.bodies[first], section.bodies[second]),
         pairs=section.pair,

@@ -110,6 +110,22 @@ def assemble(scene: Scene) -> System:
     InputError
         Where a variable that is read has no role, or two.
     """
+    if scene.surface is None:
+        return _system(_built(scene))
+    # What is wrong with the scene is told before the integrals over its surfaces are made.
+    _built(outline(scene))
+    return _of_pair(_system(_built(scene)))
+
+
+def outline(scene: Scene) -> Scene:
+    """The same scene with laws that cost nothing, for checks of all else."""
+    potentials = tuple(law.outline() for law in scene.interface.potentials)
+    heat = tuple(law.outline() for law in scene.heat)
+    return replace(scene, interface=replace(scene.interface, potentials=potentials), heat=heat)
+
+
+def _built(scene: Scene) -> Build:
+    """All that the components state of a scene."""
     build = Build(scene)
     needed = [place for name, place in _places().items() if name not in ASKED_FOR or ASKED_FOR[name](scene)]
     found = [import_module(place) for place in needed]
@@ -119,7 +135,7 @@ def assemble(scene: Scene) -> System:
                 for record in getattr(component, phase, lambda _: None)(build) or ():
                     ledger.take(build, record)
         follow(build)
-    return _system(build) if scene.surface is None else _of_pair(_system(build))
+    return build
 
 
 def _close(build: Build) -> None:

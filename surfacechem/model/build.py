@@ -364,7 +364,7 @@ class Build:
         for name, (low, high) in law.limits.items():
             value = self.variables.get(name, law)
             slack = NOTHING * max(abs(end) for end in (low, high) if math.isfinite(end))
-            reason = f"{name} left the range of the law {law.name()}, {low:g} to {high:g}"
+            reason = f"{name} left the range of {law.called}, {low:g} to {high:g}"
             if math.isfinite(low):
                 self.margins.append(Margin(f"{name} >= {low:g}", value - low + slack, reason, domain=True))
             if math.isfinite(high):

@@ -239,6 +239,8 @@ class Simulation:
         """
         check_way(error)  # before anything is computed
         settings = run or self.case.run
+        if self.case.scene.surface is not None:
+            self.case.refuse_nothing()
         values = self._values(changes or {})
         if (freed := self._with_freed(values)) is not self:
             return freed.run(values, settings, error)

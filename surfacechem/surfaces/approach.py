@@ -68,6 +68,11 @@ class ApproachEnergy:
         return self.sign * where(d < first.low, wall, result)
 
 
+def straight(low: float, high: float) -> ApproachEnergy:
+    """An energy that grows along a line, for one that is not known yet."""
+    return ApproachEnergy((ApproachPiece(low, high, (1.0,), 0.0, powers=False),), 0.0)
+
+
 def fitted(samples: Samples, low: float, high: float, rtol: float, cuts: Sequence[float] = ()) -> ApproachEnergy:
     """The energy between two approaches, so that its slope is the force within a relative error.
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cached_property
+from typing import Self
 
 from surfacechem.contracts.terms import HeatTransfer, option
 from surfacechem.expressions import Expression
-from surfacechem.surfaces.approach import ApproachEnergy, fitted
+from surfacechem.surfaces.approach import ApproachEnergy, fitted, straight
 from surfacechem.surfaces.curved_gap import bends, density, over_gap
 from surfacechem.surfaces.potential import CurvedSurfaces
 from surfacechem.tolerances import ROUNDING
@@ -31,6 +32,15 @@ class CurvedConductance(HeatTransfer):
     def limits(self) -> Mapping[str, tuple[float, float]]:
         """The approaches between which it is known."""
         return self.pair.limits
+
+    @property
+    def called(self) -> str:
+        """The key of its range."""
+        return self.pair.called
+
+    def outline(self) -> Self:
+        """The same with a conductance that is a straight line."""
+        return self.bind({"curve": straight(*self.pair.approach)})
 
     @cached_property
     def curve(self) -> ApproachEnergy:

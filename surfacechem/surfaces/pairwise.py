@@ -23,7 +23,7 @@ from surfacechem.surfaces.nodes import inner_nodes, is_round
 from surfacechem.surfaces.patches import integral, outer_patches
 from surfacechem.surfaces.projection import Array, Surface
 from surfacechem.surfaces.shapes import Plane
-from surfacechem.tolerances import NOISE, PRECISE, TINY
+from surfacechem.tolerances import ATOM, NOISE, PRECISE, TINY
 
 REMOTE = np.array([1e3, 2e3])
 """Distances over the size of the surfaces at which it is seen how a law falls off."""
@@ -85,9 +85,10 @@ def interaction(lower: Surface, upper: Surface, laws: Sequence[PairEnergy], rtol
     patches, near = outer_patches(outer, inner, size, size * rtol ** (-1 / (slowest.decay - 2)))
     gap = float(near.gap[0])
     if not gap > NOISE * size:
-        raise InputError(
-            f"the surfaces overlap or touch, their gap is {gap:.3g} m; a law of pairs of points holds outside only."
-        )
+        text = f"the surfaces overlap or touch, their gap is {gap:.3g} m; a law of pairs of points holds outside only"
+        if gap > ATOM:
+            text = f"a gap of {gap:.3g} m is lost in the rounding of bodies of {size:.3g} m; give smaller ones"
+        raise InputError(f"{text}.")
     amounts = np.array([law.n_1 * law.n_2 for law in laws])[:, None]
 
     def integrand(x: Array, order: int) -> tuple[Array, int]:

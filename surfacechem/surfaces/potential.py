@@ -15,14 +15,36 @@ import numpy as np
 from surfacechem.contracts.terms import HeatTransfer, Law, PairEnergy, Potential, Shape, option
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, derivative
-from surfacechem.surfaces.approach import ApproachEnergy, fitted
-from surfacechem.surfaces.curved_gap import Contact, bends, between_flats, density, over_gap
-from surfacechem.surfaces.pairwise import PairForces, interaction
+from surfacechem.surfaces.approach import ApproachEnergy, fitted, straight
+from surfacechem.surfaces.curved_gap import GAP, Contact, bends, between_flats, density, over_gap
+from surfacechem.surfaces.pairwise import PairForces, interaction, kernel, length
 from surfacechem.surfaces.projection import Array, Surface
-from surfacechem.tolerances import NEGLIGIBLE, ROUNDING
+from surfacechem.tolerances import ATOM, NEGLIGIBLE, ROUNDING, SQRT_EPS
 
 KNOWN: dict[str, tuple[tuple[ApproachEnergy, ...], ApproachEnergy | None]] = {}
 """Curves that have been integrated, by what they are the curves of."""
+
+
+LOOKS = 2000
+"""Places between which it is seen whether a law jumps."""
+
+
+def jump(law: Callable[[Array], Array], places: Array) -> float | None:
+    """Where the energy of a law, the first of its values (n, 2), jumps between increasing places, if it does."""
+    a, b = places[:-1], places[1:]
+    low, high = law(a)[:, 0], law(b)[:, 0]
+    least = NEGLIGIBLE * np.maximum(np.abs(low), np.abs(high))
+    while np.any(b - a > SQRT_EPS * (np.abs(a) + np.abs(b))):
+        middle = (a + b) / 2
+        between = law(middle)[:, 0]
+        lower = np.abs(between - low) > np.abs(high - between)
+        a, low = np.where(lower, a, middle), np.where(lower, low, between)
+        b, high = np.where(lower, middle, b), np.where(lower, between, high)
+        # A change that is left of next to nothing is one at a place.
+        if np.all(b - a <= ATOM):
+            break
+    jumps = np.abs(high - low) > least
+    return float(a[jumps][0]) if jumps.any() else None
 
 
 class CurvedSurfaces(Potential):
@@ -42,6 +64,11 @@ class CurvedSurfaces(Potential):
         """The approaches between which it is known."""
         return {"g_n": self.approach}
 
+    @property
+    def called(self) -> str:
+        """The key of its range."""
+        return "`surface.approach`"
+
     def surfaces(self, d: float) -> tuple[Surface, Surface]:
         """The two surfaces at an approach [m]."""
         return Surface(self.shapes[0]), Surface(self.shapes[1], True, d)
@@ -50,6 +77,12 @@ class CurvedSurfaces(Potential):
         """The same with the parameters of the pair laws as symbols; those of the gap are in its integrals."""
         bound = tuple(bind(law, f"surface.pair.{law.name()}", "") for law in self.pairs)
         return self.bind({"pairs": bound, "curves": self.curves, "strongest": self.strongest})
+
+    def outline(self) -> Self:
+        """The same with energies that are straight lines."""
+        line = straight(*self.approach)
+        curves = tuple(line for law in self.pairs for _ in self.parts(law)), line if self.gap_laws else None
+        return self.bind({"curves": curves, "strongest": self.approach[0]})
 
     @cached_property
     def strongest(self) -> float:
@@ -90,6 +123,7 @@ class CurvedSurfaces(Potential):
 
     def _integrated(self, parts: Sequence[PairEnergy]) -> tuple[tuple[ApproachEnergy, ...], ApproachEnergy | None]:
         """Those energies from their integrals."""
+        self._refuse_jumps()
         # Errors of the samples must not look like what a polynomial misses.
         rtol, finer = self.accuracy, max(self.accuracy / 64, ROUNDING)
 
@@ -114,6 +148,20 @@ class CurvedSurfaces(Potential):
         # Where bodies just touch the force is that of rounding; what counts is that in the range.
         floor = NEGLIGIBLE * max(abs(of_gap(d)[1]) for d in self.approach)
         return tuple(found), fitted(of_gap, *self.approach, rtol, levels)
+
+    def _refuse_jumps(self) -> None:
+        """InputError where the energy of a law jumps, so that no force is its slope."""
+        least, largest = self.approach
+        far = largest + length(*self.surfaces(largest))
+        beyond = np.geomspace(abs(largest) or far * NEGLIGIBLE, far, LOOKS)
+        gaps = np.concatenate([np.linspace(least, largest, LOOKS)[:-1], beyond])
+        distances = np.geomspace(max(least, far * SQRT_EPS), far, LOOKS)
+        known = [(law, kernel(law), distances, "r") for law in self.pairs]
+        for law, energy, places, name in [*known, *((law, density(law), gaps, GAP) for law in self.gap_laws)]:
+            at = jump(energy, places)
+            if at is not None:
+                text = f"the energy of {law.name()} jumps at {name} = {at:.6g} m, where it has no force"
+                raise InputError(f"{text}; let it change over a length.", law.place)
 
     def at_approach(self, d: float, compute: Callable[[], Any]) -> Any:
         """What is computed at an approach, which messages name."""

@@ -14,6 +14,7 @@ from surfacechem.expressions import derivative
 from surfacechem.laws.longrange import LennardJonesSpherePlane
 from surfacechem.references.scene_view import SceneView
 from surfacechem.results.matching import match
+from surfacechem.surfaces import potential
 
 pytestmark = pytest.mark.around
 
@@ -123,6 +124,7 @@ def test_heat_flows_over_the_curved_gap_as_integrated_over_the_sphere():
     ("old", "new", "message"),
     [
         ("from: 0.4 nm", "from: 0 nm", r"case.yaml:\d+: .*the surfaces overlap"),
+        ("R: 50 nm", "R: 1e30 m", r"lost in the rounding of bodies of 1e\+30 m"),
         ("from: 0.4 nm", "from: 10 nm", "must be below the largest"),
         ("{sphere: {R: 50 nm}}", "{spere: {R: 50 nm}}", "Did you mean 'sphere'"),
         ("    plane: plane\n", "", "plane has no shape"),
@@ -138,6 +140,42 @@ def test_bad_input_is_one_line_with_its_place(tmp_path, old, new, message):
     path.write_text(SCENE.replace(old, new) + "loading: {g_n: 1 nm}\n" + START + RUN)
     with pytest.raises(InputError, match=message):
         surfacechem.run(path)
+
+
+JUMP = """
+from surfacechem.contracts.terms import PairEnergy, parameter
+from surfacechem.expressions import where
+
+
+class Jump(PairEnergy):
+    "A step."
+
+    psi_0: float = parameter("J", "energy")
+    g_0: float = parameter("m", "length")
+
+    def energy(self, r):
+        "Energy."
+        return where(r < 1e-9, 0.0 * r, (1e-9 / r) ** 6)
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("T: 300 K}", "T: 300 K, gn: 1 nm}", r"case.yaml:\d+: initial.gn: nothing that evolves"),
+        ("T: 300 K}", "T: 300 K, g_n: 10 nm}", r"case.yaml:\d+: initial: g_n = 1e-08 m is not among the approaches"),
+        ("temperature: T, C: 1e-18 J/K", "temperature: 300 K", "nothing that evolves is called 'T'. Known: none"),
+        ("lennard-jones-pair", "jump", r"case.yaml:\d+: .*jump jumps at r = 1e-09 m"),
+    ],
+)
+def test_what_is_wrong_is_told_before_anything_is_integrated(tmp_path, monkeypatch, old, new, message):
+    (tmp_path / "jump.py").write_text(JUMP)
+    monkeypatch.setattr(potential, "fitted", None)
+    text = "laws: [jump.py]" + SCENE + "loading: {g_n: {ramp: {start: 5 nm, rate: -4 mm/s}}}\n" + START + RUN
+    assert old in text
+    (tmp_path / "case.yaml").write_text(text.replace(old, new))
+    with pytest.raises(InputError, match=message):
+        surfacechem.run(tmp_path / "case.yaml")
 
 
 def test_a_scene_without_surfaces_imports_nothing_of_them():
