@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Sequence
 from itertools import cycle
 from pathlib import Path
@@ -27,6 +28,8 @@ DASHES = ("-", "--", ":", "-.")
 WORDS = ("title", "description", "source", "reference")
 """Keys of a case that say nothing about its scene."""
 
+LONG_NUMBER = re.compile(r"\b\d\.?\d{7,}(?:e[+-]?\d+)?|\b\d+\.\d{7,}(?:e[+-]?\d+)?")
+
 LONG = 40
 """Letters of a label that does not leave room for another beside it."""
 
@@ -42,10 +45,13 @@ def figure(
     if not panels:
         raise InputError("there is nothing to plot: none of the variables varies.")
     names, colours = labels(datasets), colours_of(len(datasets))
+    starts = [run.first_shown(dataset, panels) for dataset in datasets] if over == "time" else []
+    # What needs decades is lost on a linear axis; what does not can be read on both.
+    begin = min((start for start in starts if start is not None), default=None)
     with style.panels(6.4, 1.2 + 0.17 * len(datasets) + 1.7 * len(panels), len(panels), sharex=True) as (plot, grid):
         for ax, panel in zip(grid[:, 0], panels, strict=True):
-            _draw(ax, datasets, panel, over, colours)
-        _label_axis(grid[:, 0].tolist(), datasets, panels, over)
+            _draw(ax, datasets, panel, over, colours, begin)
+        _label_axis(grid[:, 0].tolist(), datasets, over, begin)
         handles = [Line2D([], [], color=colour, label=name) for colour, name in zip(colours, names, strict=True)]
         plot.legend(handles=handles, loc="outside lower left", ncols=1 if len(max(names, key=len)) > LONG else 2)
         titles = {str(dataset.attrs.get("title", "")) for dataset in datasets}
@@ -120,7 +126,16 @@ def _settings(dataset: xarray.Dataset) -> dict[str, str]:
     changes = json.loads(str(attributes.get("departures", "{}"))).get("changes", {})
     found |= {path: f"{value:g}" for path, value in changes.items()}
     found |= {name: str(attributes[name]) for name in ("solver", "rtol") if name in attributes}
-    return {path: value for path, value in found.items() if path.partition(".")[0] not in WORDS}
+    return {path: _brief(value) for path, value in found.items() if path.partition(".")[0] not in WORDS}
+
+
+def _brief(text: str) -> str:
+    """A number, with its unit if it has one, in as many digits as a legend needs.
+
+    >>> _brief("6.6666666666666667e15 1/J/s"), _brief("radau"), _brief("0.1 MPa")
+    ('6.66667e+15 1/J/s', 'radau', '0.1 MPa')
+    """
+    return LONG_NUMBER.sub(lambda m: f"{float(m[0]):.6g}", text)
 
 
 def _united(found: Sequence[Sequence[Panel]]) -> list[Panel]:
@@ -131,14 +146,16 @@ def _united(found: Sequence[Sequence[Panel]]) -> list[Panel]:
     return [Panel(*key, list(several)) for key, several in names.items()]
 
 
-def _draw(ax: Axes, datasets: Sequence[xarray.Dataset], panel: Panel, over: str, colours: Sequence[str]) -> None:
+def _draw(
+    ax: Axes, datasets: Sequence[xarray.Dataset], panel: Panel, over: str, colours: Sequence[str], begin: float | None
+) -> None:
     """The variables of a panel, each in its kind of line, of all datasets that have them."""
     drawn = []
     for dataset, colour in zip(datasets, colours, strict=False):
         for name, dash in zip(panel.names, cycle(DASHES), strict=False):
             if name in dataset:
                 values = members.final(dataset, name) if "sweep" in dataset.attrs else dataset[name].values
-                drawn.append(values)
+                drawn.append(values if begin is None else values[dataset[over].values >= begin])
                 marker = "o" if len(values) < 3 else ""
                 ax.plot(dataset[over].values, values, color=colour, linestyle=dash, linewidth=1.3, marker=marker)
     text, size = style.prefixed(panel.unit, np.concatenate(drawn))
@@ -150,15 +167,16 @@ def _draw(ax: Axes, datasets: Sequence[xarray.Dataset], panel: Panel, over: str,
     style.legend(ax)
 
 
-def _label_axis(axes: Sequence[Axes], datasets: Sequence[xarray.Dataset], panels: Sequence[Panel], over: str) -> None:
-    """The axis that all panels share: time, a variable, or the swept parameter."""
+def _label_axis(axes: Sequence[Axes], datasets: Sequence[xarray.Dataset], over: str, begin: float | None) -> None:
+    """The axis that all panels share: time, over decades from ``begin`` on, a variable, or the swept parameter."""
     first, values = datasets[0][over], np.concatenate([dataset[over].values for dataset in datasets])
     if over != "time" and "sweep" in datasets[0].attrs:
         style.draw_parameter(axes[-1], first)
         return
-    names = [name for panel in panels if panel.unit != run.FLUX for name in panel.names]
-    if over == "time" and all(run.logarithmic(d.time.values, [d[n].values for n in names if n in d]) for d in datasets):
-        axes[-1].set(xscale="log", xlabel="Time [s]")
+    if begin is not None:
+        axes[-1].set_xlabel("Time [s]")
+        for ax in axes:
+            run.show_decades(ax, begin, float(values.max()))
         return
     text, size = style.prefixed(unit(first), values)
     axes[-1].set_xlabel(f"Time [{text}]" if over == "time" else f"{style.meaning(first)} {symbol(over)} [{text}]")

@@ -73,7 +73,12 @@ def differing(dataset: xarray.Dataset, axes: Sequence[str], known: Sequence[str]
     """Of the numbers of each run those that differ from run to run: of phases and temperatures, then of events."""
     found = sorted(known, key=lambda name: next(k for k, rank in enumerate(RANKS) if re.fullmatch(rank, name)))
     ends = [name for name in found if dataset[name].ndim == len(axes) and "error" not in name and name not in COUNTED]
-    return ([name for name in ends if varies(fair(dataset, name))] or ["time_reached"])[:MOST_PANELS]
+    shown: list[str] = []
+    for name in ends:
+        # What is largest at the end tells no more than the end.
+        twin = any(np.array_equal(fair(dataset, name), fair(dataset, other), equal_nan=True) for other in shown)
+        shown += [name] if varies(fair(dataset, name)) and not twin else []
+    return (shown or ["time_reached"])[:MOST_PANELS]
 
 
 def with_ends(dataset: xarray.Dataset, axes: Sequence[str]) -> xarray.Dataset:

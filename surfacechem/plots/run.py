@@ -69,6 +69,9 @@ PROFILE = re.compile("profile_[12]")
 # Times at which profiles are drawn, evenly spread over the outputs.
 PROFILE_TIMES = 6
 
+# Part of the width of a panel in which lines of events are one line.
+CLOSE = 1 / 120
+
 # Up to this many events have their names written above them; above so many lines nothing could be told from them.
 FEW, MANY = 8, 60
 
@@ -129,28 +132,38 @@ def _stacked(
         axes = grid[:rows, 0].tolist()
         if below:
             curved.draw_below(grid[:, 0].tolist(), dataset)
+        first = None if against else first_shown(dataset, shown)
         for ax, panel in zip(axes, shown, strict=False):
-            _draw(ax, dataset, panel, against or "time")
+            _draw(ax, dataset, panel, against or "time", first)
         if balances:
             _draw_balances(axes[-1], dataset)
-        above, more = draw_axis(axes, dataset, shown, against)
+        above, more = draw_axis(axes, dataset, against, first)
         style.headings(plot, axes[0], dataset, above, more)
     return plot
 
 
 def draw_axis(
-    axes: Sequence[Axes], dataset: xarray.Dataset, panels: Sequence[Panel], against: str | None
+    axes: Sequence[Axes], dataset: xarray.Dataset, against: str | None, first: float | None
 ) -> tuple[float, str]:
-    """Label the axis that all panels share: time, or the variable that takes its place; returns how many points names
-    need above the panels, and the events that have none there.
+    """Label the axis that all panels share: time, logarithmic from ``first`` on where that is given, or the variable
+    that takes its place; returns how many points names need above the panels, and the events that have none there.
     """
     if against is None:
-        # Fluxes and powers follow from what changes: where they start is no reason for another axis.
-        return _draw_time(axes, dataset, [name for p in panels if p.unit != FLUX for name in p.names])
+        return _draw_time(axes, dataset, first)
     text, size = style.prefixed(unit(dataset[against]), dataset[against].values)
     axes[-1].set_xlabel(f"{meaning(dataset[against])} {symbol(against)} [{text}]")
     style.label_ticks(axes[-1].xaxis, size)
-    return 0.0, _counted(_named(_moments(dataset)), {})
+    return 0.0, _counted([name for _, name in _named(_moments(dataset))], {})
+
+
+def first_shown(dataset: xarray.Dataset, panels: Sequence[Panel]) -> float | None:
+    """Where a logarithmic axis of time begins; None where a linear one shows what the panels hold."""
+    times = dataset["time"].values
+    # Fluxes and powers follow from what changes: where they start is no reason for another axis.
+    names = [name for panel in panels if panel.unit != FLUX for name in panel.names if name in dataset]
+    if not logarithmic(times, [dataset[name].values for name in names]):
+        return None
+    return float(max(times[times > 0][0], SHOWN * times[-1]))
 
 
 def curves(dataset: xarray.Dataset) -> list[str]:
@@ -225,14 +238,16 @@ def _across(dataset: xarray.Dataset, names: Sequence[str]) -> Figure:
     return plot
 
 
-def _draw(ax: Axes, dataset: xarray.Dataset, panel: Panel, over: str) -> None:
+def _draw(ax: Axes, dataset: xarray.Dataset, panel: Panel, over: str, first: float | None) -> None:
+    """The curves of a panel, with the unit that suits what is seen of them from ``first`` on."""
     t = dataset[over].values
     _draw_curves(ax, dataset, panel, t)
     exact = [f"{name}_exact" for name in panel.names if f"{name}_exact" in curves(dataset)]
     for name in exact:
         label = "exact" if name == exact[0] else "_"
         ax.plot(t, dataset[name].values, linestyle=EXACT, color="black", linewidth=0.9, label=label)
-    drawn = np.concatenate([dataset[name].values for name in panel.names])
+    seen = slice(None) if first is None else t >= first
+    drawn = np.concatenate([dataset[name].values[seen] for name in panel.names])
     drawn = drawn[np.isfinite(drawn)]
     text, size = style.prefixed(panel.unit, drawn)
     words = panel.title or ", ".join(map(symbol, panel.names[:MOST_NAMES]))
@@ -288,28 +303,24 @@ def _draw_balances(ax: Axes, dataset: xarray.Dataset) -> None:
     style.legend(ax)
 
 
-def _draw_time(axes: Sequence[Axes], dataset: xarray.Dataset, names: Sequence[str]) -> tuple[float, str]:
-    """The axis of time, on which these quantities can be followed, with bands of modes and lines at events; returns
-    what :func:`draw_axis` does.
-    """
+def _draw_time(axes: Sequence[Axes], dataset: xarray.Dataset, first: float | None) -> tuple[float, str]:
+    """The axis of time, with bands of modes and lines at events; returns what :func:`draw_axis` does."""
     times = dataset["time"].values
-    over_decades = logarithmic(times, [dataset[name].values for name in names])
-    text, size = ("s", 1.0) if over_decades else style.prefixed("s", times)
+    text, size = style.prefixed("s", times) if first is None else ("s", 1.0)
     axes[-1].set_xlabel(f"Time [{text}]")
-    if not over_decades:
+    if first is None:
         style.label_ticks(axes[-1].xaxis, size)
-    for ax in axes if over_decades else ():
-        _show_decades(ax, max(times[times > 0][0], SHOWN * times[-1]), times[-1])
+    for ax in axes if first is not None else ():
+        show_decades(ax, first or 0.0, times[-1])
     stages = _draw_bands(axes, dataset) if len(times) > 1 else []
     moments = _moments(dataset)
     width = float(axes[0].figure.bbox.width / axes[0].figure.dpi)
-    events, lines = _named(moments), _draw_events(axes, moments)
     below = _write(axes[0], width, stages, 0)
-    rows = _write(axes[0], width, events, below) if len(events) <= FEW else 0
-    return LANE * (below + rows), "" if rows else _counted(events, lines)
+    rows, more = _draw_events(axes, width, moments, below)
+    return LANE * (below + rows), more
 
 
-def _show_decades(ax: Axes, first: float, last: float) -> None:
+def show_decades(ax: Axes, first: float, last: float) -> None:
     """A logarithmic axis of time, without what has happened before it begins."""
     drawn = [np.asarray(line.get_ydata())[np.asarray(line.get_xdata()) >= first] for line in ax.get_lines()]
     seen = np.concatenate([values[np.isfinite(values)] for values in drawn])
@@ -332,21 +343,54 @@ def _named(moments: Mapping[float, str]) -> list[tuple[float, str]]:
     return [(t, name) for t, name in moments.items() if name and not name.startswith("end of ")]
 
 
-def _draw_events(axes: Sequence[Axes], moments: Mapping[float, str]) -> dict[str, str]:
-    """Thin vertical lines at the events; returns the kind of line of each name where names repeat."""
-    names = Counter(name for _, name in _named(moments))
-    drawn = moments if len(moments) <= MANY else {}
-    repeat = drawn and 1 < len(names) < names.total()
-    kinds = [name for name, _ in names.most_common()] if repeat else []
-    lines = dict(zip(kinds, KIND_LINES, strict=False))
-    for (moment, name), ax in product(drawn.items(), axes):
-        ax.axvline(moment, color="black", linewidth=0.6, linestyle=lines.get(name, KIND_LINES[0]))
-    return lines
+def _draw_events(axes: Sequence[Axes], width: float, moments: Mapping[float, str], below: int) -> tuple[int, str]:
+    """Thin vertical lines at the events, one for those that follow each other closely; returns the rows of names above
+    the panels, and the events that have none there.
+    """
+    named = _named(moments)
+    if len(moments) > MANY:
+        return 0, _counted([name for _, name in named], {})
+    places = _places(axes[0], named)
+    names = Counter(text for _, text in places)
+    repeat = 1 < len(names) < names.total()
+    lines = dict(zip([name for name, _ in names.most_common()], KIND_LINES, strict=False)) if repeat else {}
+    ends = [(t, "") for t in moments if t not in dict(named)]
+    for (moment, text), ax in product([*places, *ends], axes):
+        ax.axvline(moment, color="black", linewidth=0.6, linestyle=lines.get(text, KIND_LINES[0]))
+    if len(names) == 1 and len(places) > 1:
+        return _numbered(axes[0], width, places, below)
+    rows = _write(axes[0], width, places, below) if len(places) <= FEW else 0
+    return rows, "" if rows else _counted([text for _, text in places], lines)
 
 
-def _counted(events: Sequence[tuple[float, str]], lines: Mapping[str, str]) -> str:
+def _places(ax: Axes, events: Sequence[tuple[float, str]]) -> list[tuple[float, str]]:
+    """Times and names of events, those that a figure cannot tell apart as one: a slip, and the stop that ends it."""
+    ax.get_xlim()  # limits that follow from what is drawn are not known before
+    across = ax.transScale + ax.transLimits
+    found: list[tuple[float, list[str]]] = []
+    last = -np.inf
+    for t, name in sorted(events):
+        at = float(across.transform((t, 0.0))[0])
+        if at - last > CLOSE:
+            found.append((t, []))
+            last = at
+        if name not in found[-1][1]:
+            found[-1][1].append(name)
+    return [(t, " and ".join(names)) for t, names in found]
+
+
+def _numbered(ax: Axes, width: float, places: Sequence[tuple[float, str]], below: int) -> tuple[int, str]:
+    """Names above the panels where they fit beside each other, else numbers, and the name that all of them have."""
+    text = places[0][1]
+    if rows := _write(ax, width, places, below, lanes=1):
+        return rows, ""
+    rows = _write(ax, width, [(t, str(k)) for k, (t, _) in enumerate(places, 1)], below, lanes=1)
+    return rows, f"1 to {len(places)}: {text}" if rows else f"{len(places)} {text}"
+
+
+def _counted(names: Sequence[str], lines: Mapping[str, str]) -> str:
     """How often the most frequent events happen, and their kinds of lines."""
-    counts = Counter(name for _, name in events).most_common(MOST_NAMES)
+    counts = Counter(names).most_common(MOST_NAMES)
     kinds = {name: f" ({line})" for name, line in lines.items()}
     return ", ".join(f"{f'{count} ' if count > 1 else ''}{name}{kinds.get(name, '')}" for name, count in counts)
 
@@ -390,14 +434,14 @@ def _spans(dataset: xarray.Dataset, name: str) -> list[tuple[float, float, float
     return list(zip(edges, [*edges[1:], float(times[-1])], values[[0, *changes]].tolist(), strict=True))
 
 
-def _write(ax: Axes, width: float, items: Sequence[tuple[float, str]], below: int) -> int:
+def _write(ax: Axes, width: float, items: Sequence[tuple[float, str]], below: int, lanes: int = LANES) -> int:
     """Small words above a panel, each over its time, in as many rows as they need so that none is on another; returns
     how many. Nothing is written where there is no room for all.
     """
     ax.get_xlim()  # limits that follow from what is drawn are not known before
     across = ax.transScale + ax.transLimits
     placed: list[tuple[float, int, str]] = []
-    ends = [0.0] * LANES
+    ends = [0.0] * lanes
     letter = LETTER / (width - BESIDE)
     for x, text in sorted(items):
         half = letter * len(text) / 2
@@ -433,5 +477,6 @@ def logarithmic(times: Array, quantities: Sequence[Array] = ()) -> bool:
     ratios = after[1:] / after[:-1]
     if np.ptp(ratios) < style.FLAT * ratios[0]:
         return True
-    early = times <= EARLY * times[-1]
+    # What jumps as the run starts, such as the direction of friction, needs no decades.
+    early = (times > 0) & (times <= EARLY * times[-1])
     return any(np.ptp(values[early]) > MUCH * np.ptp(values) for values in quantities if varies(values))

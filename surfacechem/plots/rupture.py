@@ -23,6 +23,10 @@ def load_of(dataset: xarray.Dataset) -> str:
     return loads[0] if loads else ""
 
 
+DENSE = 30
+"""Points from which on large ones would hide each other."""
+
+
 def figure(dataset: xarray.Dataset, load: str, variables: Sequence[str] | None = None) -> Figure:
     """The spectrum, the distribution p(f) at some of its places and the lifetime against the load, or ``variables``
     over the load.
@@ -117,7 +121,7 @@ def _draw_told(ax: Axes, dataset: xarray.Dataset, told: Mapping[str, str], size:
     ax.set_xlabel(f"{style.parameter_words(parameter)} [{words}]")
     for (name, word), colour, marker in zip(told.items(), COLOURS, "osD", strict=False):
         for j, (values, label) in enumerate(style.by_second(dataset, dataset[name].values)):
-            (points,) = ax.plot(x, values / size, marker, color=colour, markersize=3.5)
+            (points,) = ax.plot(x, values / size, marker, color=colour, markersize=3.5 if len(x) < DENSE else 2.0)
             points.set(label=f"{word} {label}".strip(), alpha=1 / (1 + 0.5 * j))
         if f"{name}_exact" in dataset:
             for values, _ in style.by_second(dataset, dataset[f"{name}_exact"].values):

@@ -190,13 +190,22 @@ def headings(plot: Figure, ax: Axes, dataset: xarray.Dataset, above: float = 0.0
         facts.append(f"{attributes['solver']}, rtol {rtol:g}")
     if "time" in dataset.sizes and dataset.sizes.get("event", 0) > dataset.sizes["time"]:
         facts.append(f"{dataset.sizes['event']} events between {dataset.sizes['time']} outputs")
-    shown = "   ".join(fact for fact in facts if fact)
     room = int(LETTERS * (plot.get_figwidth() - 0.8))
-    both = f"{shown}   {more}".rstrip()
-    lines = [both] if len(both) <= room else [*wrap(shown, room), *wrap(more, room)]
+    lines = _packed([*facts, more], room)
     more_lines = above + 10 * (len(lines) - 1) + 14 * (len(title) - 1)
     plot.set_figheight(plot.get_figheight() + more_lines / 72)  # the panels keep their height
     ax.set_title("\n".join(lines), loc="left", fontsize=8, color="#555555", pad=6 + above)
+
+
+def _packed(facts: Sequence[str], room: int) -> list[str]:
+    """Facts in lines of so many letters; only one that is longer than a line is broken itself."""
+    lines: list[str] = []
+    for fact in filter(None, facts):
+        if lines and len(lines[-1]) + 3 + len(fact) <= room:
+            lines[-1] += f"   {fact}"
+        else:
+            lines += wrap(fact, room)
+    return lines
 
 
 def legend(ax: Axes) -> None:

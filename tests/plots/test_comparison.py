@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import xarray
 
 import surfacechem
 from surfacechem.errors import InputError
@@ -56,3 +57,15 @@ def test_datasets_that_differ_in_all_are_named_by_title_or_file(runs):
     assert labels([runs[0], runs[0]]) == ["dataset 1", "dataset 2"]
     with pytest.raises(InputError, match="no variable 'T_3'"):
         figure([runs[0], other], ["T_3"])
+
+
+def test_one_run_that_needs_decades_gives_them_to_all():
+    t = np.append(0.0, np.geomspace(1e-6, 10.0, 80) * np.linspace(1.0, 1.2, 80))
+
+    def run(rate):
+        values = ("time", 300 + np.exp(-rate * t), {"units": "K"})
+        return xarray.Dataset({"T": values}, {"time": t}, {"status": "finished", "title": f"rate {rate:g}"})
+
+    slow, fast = run(0.1), run(1e4)
+    scales = [figure(each).axes[-1].get_xscale() for each in ([slow, slow], [slow, fast], [fast, slow])]
+    assert scales == ["linear", "log", "log"]

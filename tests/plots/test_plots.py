@@ -129,12 +129,20 @@ def test_few_events_have_lines_and_names_and_many_are_counted():
     assert any(line.get_linestyle() == ":" for line in few.get_lines())
     assert texts(few) == ["debond", "touch"]
     assert [text.xyann[1] for text in few.texts] == [2, 2]  # beside each other
-    near = figure(with_events([0.5, 0.51], ["debond", "touch"])).axes[0]
+    near = figure(with_events([0.5, 0.53], ["debond", "touch"])).axes[0]
     assert [text.xyann[1] for text in near.texts] == [2, 11]  # one above the other
     many = figure(with_events(np.linspace(0.1, 1.9, 22), ["snap"] * 22)).axes[0]
     assert texts(many) == []
     assert many.get_title(loc="left").endswith("22 events between 21 outputs   22 snap")
     assert "events" not in few.get_title(loc="left")
+
+
+def test_a_slip_and_the_stop_that_ends_it_are_one_line_with_a_number():
+    slips = [moment for k in range(6) for moment in (0.1 + 0.3 * k, 0.1 + 0.3 * k + 1e-3)]
+    ax = figure(with_events(slips, ["slip forward", "stop"] * 6)).axes[0]
+    assert texts(ax) == ["1", "2", "3", "4", "5", "6"]
+    assert [line.get_xdata()[0] for line in ax.get_lines()[-6:]] == slips[::2]
+    assert ax.get_title(loc="left").endswith("1 to 6: slip forward and stop")
 
 
 def test_events_whose_names_repeat_have_a_kind_of_line_each():
