@@ -134,6 +134,25 @@ def number(tree: Tree, spec: Spec, name: str, *, difference: bool = False) -> fl
 
 
 @dataclass(frozen=True)
+class OrWord(Number):
+    """A number with a unit, or the one word that may stand in its place."""
+
+    word: str = ""
+
+    def __post_init__(self) -> None:
+        """Both are told."""
+        object.__setattr__(self, "words", f"quantity or `{self.word}`")
+
+    def read(self, tree: Tree, name: str, context: Context) -> Any:
+        """The value in SI, or the word."""
+        return self.word if tree.value == self.word else super().read(tree, name, context)
+
+    def schema(self) -> Schema:
+        """Either."""
+        return {"anyOf": [super().schema(), {"const": self.word}]}
+
+
+@dataclass(frozen=True)
 class Whole(Content):
     """A whole number in a range, or the one word that may stand in its place."""
 

@@ -23,6 +23,7 @@ from surfacechem.format.sections import (
     LUMP,
     OUTPUTS,
     REFERENCE,
+    STEADY,
     BodySection,
     CellAccuracy,
     Document,
@@ -501,6 +502,7 @@ def run_of(section: RunSection) -> Run:
         max_seconds=section.max_seconds,
         accuracy=section.accuracy,
         picture=None if any(map(section.has, ("times", "outputs", "spacing", "first"))) else PICTURE,
+        steady=section.until == STEADY,
     )
 
 
@@ -517,7 +519,9 @@ def _times(section: RunSection) -> tuple[float, ...]:
     elif section.until is None:
         raise section.error("the run needs an end. Add `until: 1 s`, or a list of `times`.")
     else:
-        times = _spaced(section, section.until)
+        if section.until == STEADY and section.spacing != LINEAR:
+            raise section.error("logarithmic spacing needs an end in time, not `until: steady`.", "spacing")
+        times = _spaced(section, 1.0 if isinstance(section.until, str) else section.until)
     if any(b <= a for a, b in pairwise(times)):
         message = "output times must increase from each to the next."
         raise section.error(message, "until" if listed is None else "times")

@@ -43,6 +43,7 @@ from surfacechem.format.declarations import (
     Number,
     OneLaw,
     OneOf,
+    OrWord,
     PerArea,
     Prescribed,
     Section,
@@ -69,6 +70,9 @@ BODY_NAME = r"[A-Za-z][A-Za-z0-9_-]*"
 EVOLVING = ("g_n", "v_n", "u_t", "u_t2", "v_t", "v", "v_2", "g_t", "w_n", "w_t", "w_t2", "F_n", "F_t", "F_t2", "p")
 
 LUMP, INSULATED, QUADRATIC = "lump", "insulated", "quadratic"
+STEADY = "steady"
+"""What stands for the end of a run that ends where nothing changes any more."""
+
 LINEAR, LOGARITHMIC = SPACINGS = ("linear", "logarithmic")
 GRID = "grid"
 
@@ -369,7 +373,10 @@ INITIAL = Entries(
 class RunSection(Section):
     """times, accuracy, solver, for example `run: {until: 5 s}`"""
 
-    until: float | None = quantity("s", "end of the run", above=0)
+    until: float | str | None = key(
+        OrWord(Spec("s", "end of the run", varies=False, above=0), word=STEADY),
+        "end of the run [s], or where nothing changes any more",
+    )
     outputs: int | None = key(
         Whole(2, MOST_OUTPUTS), "number of output times, both ends included; they follow the run if not given", None
     )

@@ -330,8 +330,11 @@ class Simulation:
         """The run with these values, or the runs over a plan: a run is a batch of one."""
         try:
             if plan is None:
-                return [self.model.solve(settings, values)]
+                return [self._solved_alone(settings, values)]
             from surfacechem.runs import sweeps
+
+            if settings.steady:
+                raise InputError("the runs of a sweep end at a time that is given, not `steady`.", path="run.until")
 
             # Statistics of rupture are part of what is compiled.
             key = plan.until[0] if plan.until else ""
@@ -340,6 +343,13 @@ class Simulation:
             return sweeps.solve(self._sweep_models[key], plan, settings, values, threads)
         except InputError as error:
             raise self.case.located(error) from None
+
+    def _solved_alone(self, settings: Run, values: Mapping[str, float]) -> Trajectory:
+        if settings.steady:
+            from surfacechem.runs.at_rest import to_rest
+
+            settings = to_rest(self.model, settings, values)
+        return self.model.solve(settings, values)
 
     def _layers(self, *runs: Trajectory) -> dict[str, float]:
         """By body, the least layer that heat has reached when runs, or events in them, are first looked at."""

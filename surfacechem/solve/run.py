@@ -70,6 +70,8 @@ class Run:
     picture: float | None = None
     """Part of its range by which straight lines between outputs, which then follow the run, may miss a quantity; runs
     are compared at ``times``, which are the outputs where this is None."""
+    steady: bool = False
+    """Whether it ends where nothing changes any more; the times are then those of a run of any length."""
     samples: float = SAMPLES
     """Parts of the run in each of which its steps are held against the equations at least once."""
 
@@ -372,7 +374,7 @@ class Model:
         self.compile_seconds += PREPARING.seconds - before
         done = []
         for (run, values), (result, jumps, ended) in zip(pairs, ends, strict=True):
-            status, reason = ended or self.verdict(result, values)
+            status, reason = ended or self.verdict(run, result, values)
             done.append(Trajectory(self, run, result, values, status, reason, seconds, jumps))
         return done
 
@@ -386,11 +388,14 @@ class Model:
         ended = (word, f"{instant.reason} at t = {result.t:.9g} s") if instant.reason else None
         return result, tuple(instant.jumps), ended
 
-    def verdict(self, result: Result, values: Mapping[str, float]) -> tuple[str, str]:
+    def verdict(self, run: Run, result: Result, values: Mapping[str, float]) -> tuple[str, str]:
         """How a run ended, and why, in words."""
         where = f"t = {result.t:.9g} s"
         if result.status is Status.FINISHED:
-            return "finished", f"reached the end at {where}"
+            return (
+                "finished",
+                f"came to rest at {where}, a steady state" if run.steady else f"reached the end at {where}",
+            )
         if result.status is Status.EVENT:
             margin = self.margins[int(result.events.index[-1])]
             if is_led_back(self.system, self.program, margin, result):

@@ -12,11 +12,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from surfacechem.errors import InputError, suggestion
-from surfacechem.expressions import depends
 from surfacechem.format import Overrides, Source
 from surfacechem.model.multipliers import with_multipliers
 from surfacechem.model.system import System
 from surfacechem.quantities import GAS_CONSTANT
+from surfacechem.runs.at_rest import refuse_histories
 from surfacechem.runs.sheet import Rows, Sheet
 from surfacechem.runs.simulation import load
 from surfacechem.solve.adapters.evaluation import Evaluation
@@ -87,7 +87,9 @@ def steady(source: Source, of: Sequence[str] = (), overrides: Overrides = ()) ->
     """
     simulation = load(source, overrides)
     system, labels = with_multipliers(simulation.system)
-    _refuse_changes(system)
+    refuse_histories(system)
+    if system.in_stretches:
+        raise InputError("the scene jumps, so that its steady states are none of one set of equations.")
     rest = _Rest(Model(system), simulation.case.run, _wanted(system, of))
     if not of:
         rest.drop_small()
@@ -128,15 +130,6 @@ def _equations(system: System, labels: Sequence[str]) -> list[str]:
     """Equations of the reactions."""
     titles = {item.name: item.quantity.long_name.removeprefix("net rate of ") for item in system.named}
     return [titles[f"R_{label}"] for label in labels]
-
-
-def _refuse_changes(system: System) -> None:
-    """InputError where no steady state can be."""
-    moving = [item.name for item in system.named if depends(system.expand(item.expression), system.t)]
-    if moving:
-        raise InputError(f"{moving[0]} changes in time, so there is no steady state: give it one value.")
-    if system.in_stretches:
-        raise InputError("the scene jumps, so that its steady states are none of one set of equations.")
 
 
 HELD = re.compile(r"(bodies\..+|interface)\.temperature\.level|loading\.T\w*\.level")

@@ -1,0 +1,39 @@
+"""Runs until nothing changes any more."""
+
+import numpy as np
+import pytest
+
+import surfacechem
+from surfacechem.errors import InputError
+
+STEADY = ["run.until=steady"]
+
+
+@pytest.mark.parametrize("solver", ["radau", "cantera"])
+@pytest.mark.parametrize("case", ["dna-adhesive", "exothermic"])
+def test_a_run_ends_where_a_run_ten_times_as_long_ends(case, solver):
+    simulation = surfacechem.load(case, [*STEADY, f"run.solver={solver}", "run.rtol=1e-9"])
+    solution = simulation.run(error="balances")
+    assert solution.status == "finished"
+    assert "came to rest" in solution.reason
+    end = solution.trajectory.result
+    later = surfacechem.load(case, [f"run.until={10 * end.t!r}", "run.rtol=1e-9"]).run(error="balances").trajectory
+    np.testing.assert_allclose(end.y, later.result.y, rtol=1e-7)
+    assert np.abs(later.result.ydot).max() * end.t < 1e-7 * np.abs(end.y).min()
+
+
+@pytest.mark.parametrize(
+    ("case", "message"),
+    [
+        ("stick-slip", "w_t changes in time, so there is no steady state"),
+        ("sliding-dry", "has come to no rest in 1e"),
+    ],
+)
+def test_what_comes_to_no_rest_is_refused(case, message):
+    with pytest.raises(InputError, match=message):
+        surfacechem.load(case, STEADY).run()
+
+
+def test_runs_of_a_sweep_end_at_a_time():
+    with pytest.raises(InputError, match="a sweep end at a time"):
+        surfacechem.load("exothermic", STEADY).sweep({"T_0": [300.0, 310.0]})
