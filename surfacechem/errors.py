@@ -8,11 +8,14 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Self
 
-MANY = 100
-"""Names that a message lists."""
+LINES, NEAR = 240, 6
+"""Characters of names that a message lists all, some two lines, and how many it lists of more: the nearest."""
+
+LAWS, PATHS = "`surfacechem laws`", "`surfacechem equations CASE`"
+"""What lists all laws, and all paths of parameters of a case."""
 
 LONGEST = 2000
-"""Characters of a message: a hundred names and a sentence."""
+"""Characters of a message: more is not read."""
 
 LIKE = 0.6
 """Part of two names that is the same, above which one is a guess for the other: a choice, that of `difflib`."""
@@ -77,29 +80,40 @@ def shortened(text: str) -> str:
     return text if len(text) <= LONGEST else f"{text[:half]} [...] {text[-half:]}"
 
 
-def suggestion(name: str, known: Iterable[str]) -> str:
-    """``" Did you mean 'x'? Known: x, y."`` for a name that is not among the known ones."""
+def suggestion(name: str, known: Iterable[str], listed_by: str = "") -> str:
+    """``" Did you mean 'x'? Known: x, y."`` for a name that is not among the known ones; of many the nearest, and the
+    command or the page that lists all.
+
+    >>> suggestion("mu_s", ["k", "mu"])
+    " Did you mean 'mu'? Known: k, mu."
+    >>> suggestion("k99", [f"k_{i}" for i in range(100)], "`surfacechem laws`")
+    " Did you mean 'k_99'? Nearest of 100: k_99, k_9, k_19, k_29, k_39, k_49. `surfacechem laws` lists all."
+    """
     names = sorted(map(str, known))
-    shown = ", ".join(names[:MANY]) + (f" and {len(names) - MANY} more" if len(names) > MANY else "")
-    return f"{nearest(name, names)} Known: {shown or 'none'}."
+    if len(every := ", ".join(names)) <= LINES:
+        return f"{nearest(name, names)} Known: {every or 'none'}."
+    like = sorted(names, key=lambda other: likeness(name, other), reverse=True)[:NEAR]
+    more = f" {listed_by} lists all." if listed_by else ""
+    return f"{nearest(name, names)} Nearest of {len(names)}: {', '.join(like)}.{more}"
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
     """``" Did you mean 'x'?"`` for a name that is not among the known ones, nothing where none of them is like it.
 
-    What the names of files end with counts only where all else is the same. A name that has the words of the other
-    among its own is nearer than its spelling says.
-
     >>> nearest("cluster", ["bouncing-plate", "adhesion-cluster-held"]), nearest("debonding.yml", ["ends.yaml"])
     (" Did you mean 'adhesion-cluster-held'?", '')
     """
+    guess = max(sorted(map(str, known)), key=lambda other: likeness(name, other), default="")
+    return f" Did you mean '{guess}'?" if guess and likeness(name, guess)[0] >= LIKE else ""
 
-    def likeness(other: str) -> tuple[float, float]:
-        one, two = (SUFFIX.sub("", text.lower()) for text in (name[:LONGEST], other))
-        words = [word for word in re.split(r"[^a-z0-9]+", one) if word]
-        inside = bool(words) and all(re.search(rf"(?<![a-z0-9]){word}", two) for word in words)
-        same = difflib.SequenceMatcher(None, two, one).ratio()
-        return (1 + same) / 2 if inside else same, difflib.SequenceMatcher(None, other, name[:LONGEST]).ratio()
 
-    guess = max(sorted(map(str, known)), key=likeness, default="")
-    return f" Did you mean '{guess}'?" if guess and likeness(guess)[0] >= LIKE else ""
+def likeness(name: str, other: str) -> tuple[float, float]:
+    """Part of two names that is the same, without what the names of files end with, then with it.
+
+    A name that has the words of the other among its own is nearer than its spelling says.
+    """
+    one, two = (SUFFIX.sub("", text.lower()) for text in (name[:LONGEST], other))
+    words = [word for word in re.split(r"[^a-z0-9]+", one) if word]
+    inside = bool(words) and all(re.search(rf"(?<![a-z0-9]){word}", two) for word in words)
+    same = difflib.SequenceMatcher(None, two, one).ratio()
+    return (1 + same) / 2 if inside else same, difflib.SequenceMatcher(None, other, name[:LONGEST]).ratio()

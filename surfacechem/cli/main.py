@@ -398,11 +398,11 @@ def plot(
 ) -> None:
     """Plot runs over time or a variable, or sweeps over parameters."""
     from surfacechem import plots
-    from surfacechem.results.netcdf import SUFFIXES
+    from surfacechem.results.netcdf import WRITTEN
     from surfacechem.runs.simulation import load
 
     # By its suffix, as a dataset that is missing must not be taken for the name of a case.
-    cases = [source for source in sources if not source.rstrip("/").endswith((*SUFFIXES, ".zarr"))]
+    cases = [source for source in sources if not source.rstrip("/").endswith((*WRITTEN, ".zarr"))]
     if changes and not cases:
         raise InputError("a dataset is plotted as it is; give a case to change values of.", Place(path="--set"))
     target = output or Path("comparison.png" if len(sources) > 1 else f"{Path(sources[0]).stem}.png")
@@ -455,11 +455,11 @@ def report(
 
     Scene, equations, figures, events, balances, error against run time. It needs no network.
     """
-    from surfacechem.results.netcdf import SUFFIXES
+    from surfacechem.results.netcdf import WRITTEN
     from surfacechem.runs.simulation import load
     from surfacechem.studies import run_report
 
-    is_file = source.endswith(SUFFIXES)
+    is_file = source.endswith(WRITTEN)
     if is_file and changes:
         raise InputError("a dataset is reported as it is; give a case to change values of.", Place(path="--set"))
     target = run_report.report_path(output or f"{Path(source).stem}.html")

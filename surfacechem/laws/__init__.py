@@ -25,7 +25,7 @@ from surfacechem.contracts.terms import (
     RateLaw,
     Shape,
 )
-from surfacechem.errors import InputError, suggestion
+from surfacechem.errors import LAWS, InputError, suggestion
 
 L = TypeVar("L", bound=type[Law])
 
@@ -84,7 +84,7 @@ def find(contract: type[Law], name: str) -> type[Law]:
     """The law of that name; imports no family beyond the one that holds it."""
     found = _found(contract, name)
     if found is None:
-        raise InputError(f"no {contract.contract} law '{name}'.{suggestion(name, laws(contract))}")
+        raise InputError(f"no {contract.contract} law '{name}'.{suggestion(name, laws(contract), LAWS)}")
     return found
 
 

@@ -54,6 +54,9 @@ CSV, PARQUET = ".csv", ".parquet"
 TABLES = (CSV, PARQUET)
 """What names of files end with that hold a dataset as a table."""
 
+WRITTEN = (*SUFFIXES, *TABLES)
+"""What names of files end with that a run is written to."""
+
 
 @dataclass(frozen=True)
 class Column:
@@ -106,8 +109,8 @@ def dataset_path(path: str | Path) -> Path:
     """
     target = Path(path)
     suffix = target.suffix.lower()
-    if suffix and suffix not in (*SUFFIXES, *TABLES):
-        remedy = f"{', '.join((*SUFFIXES, *TABLES))}. Give {target.with_suffix('.nc').name}, or a name without suffix."
+    if suffix and suffix not in WRITTEN:
+        remedy = f"{', '.join(WRITTEN)}. Give {target.with_suffix('.nc').name}, or a name without suffix."
         raise InputError(f"no dataset is written as '{target.suffix}': {remedy}", Place(str(path)))
     if suffix == PARQUET and find_spec("pyarrow") is None:
         message = "Parquet needs PyArrow: `pip install 'surfacechem[parquet]'`. A .csv needs nothing more."
@@ -201,7 +204,10 @@ def write_netcdf(path: Path, columns: Sequence[Column], attributes: Mapping[str,
 
 
 def reading(path: Path, read: Callable[[], R]) -> R:
-    """What is read from a netCDF file; InputError where there is none, or it is damaged."""
+    """What is read from a netCDF file; InputError where there is none, it is a table, or damaged."""
+    if path.suffix.lower() in TABLES:
+        remedy = f"Write the run to {path.with_suffix('.nc').name}, which holds events, errors and the case, too."
+        raise InputError(f"is a table of numbers, which is for other programs. {remedy}", Place(str(path)))
     try:
         size = path.stat().st_size
         _try_elsewhere(path, PATIENCE + size / SLOWEST)

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from surfacechem.contracts.terms import Law
 from surfacechem.documents.shipped import cases
-from surfacechem.errors import InputError, suggestion
+from surfacechem.errors import LAWS, InputError, suggestion
 from surfacechem.laws import FAMILIES, laws
 from surfacechem.runs.sheet import Sheet
 
@@ -127,7 +127,7 @@ def law_page(name: str) -> str:
     every = [(contract, law) for contract in FAMILIES for law in laws(contract).values()]
     found = [(contract, law) for contract, law in every if law.name() == name]
     if not found:
-        raise InputError(f"no law '{name}'.{suggestion(name, {law.name() for _, law in every})}")
+        raise InputError(f"no law '{name}'.{suggestion(name, {law.name() for _, law in every}, LAWS)}")
     pages = []
     for contract, law in found:
         doc = FORMULA.sub(lambda m: f"    {plain(' '.join(m[1].split()))}\n", f"{inspect.getdoc(law)}\n")

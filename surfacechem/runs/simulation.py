@@ -16,7 +16,7 @@ from surfacechem import format as cases
 from surfacechem.contracts.units import parse
 from surfacechem.documents.document import from_plain
 from surfacechem.documents.overrides import parameter_path
-from surfacechem.errors import InputError, Place, suggestion
+from surfacechem.errors import PATHS, InputError, Place, suggestion
 from surfacechem.format import Case, Overrides, Source
 from surfacechem.model.system import System
 from surfacechem.results import spatial
@@ -542,5 +542,5 @@ class Simulation:
         changes = {parameter_path(path, units): value for path, value in changes.items()}
         unknown = next((path for path in changes if path not in units), None)
         if unknown is not None:
-            raise InputError(f"no parameter '{unknown}' to change.{suggestion(unknown, self.system.changeable)}")
+            raise InputError(f"no parameter '{unknown}' to change.{suggestion(unknown, self.system.changeable, PATHS)}")
         return {path: parse(value, units[path], name=path) for path, value in changes.items()}

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from surfacechem.compile.preparing import PREPARING
 from surfacechem.compile.program import PIECE, Chain, Filler, Function, compile_function, compile_program
 from surfacechem.contracts.terms import Spec
-from surfacechem.errors import InputError, suggestion
+from surfacechem.errors import PATHS, InputError, suggestion
 from surfacechem.model.checks import check_start
 from surfacechem.model.system import System
 from surfacechem.solve import ASKING, AUTO, solver
@@ -179,7 +179,7 @@ def values_of(system: System, changes: Mapping[str, float] | None = None) -> dic
     known = system.changeable if changes else {}
     for path, value in (changes or {}).items():
         if path not in known:
-            raise InputError(f"no parameter '{path}' to change.{suggestion(path, known)}")
+            raise InputError(f"no parameter '{path}' to change.{suggestion(path, known, PATHS)}")
         specs[path].check(path, float(value))
         values[path] = float(value)
     return values

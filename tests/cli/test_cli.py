@@ -150,6 +150,8 @@ class TestRun:
         (["plot", "bonding.yaml", "-o", "x.gif"], "no format 'gif'"),
         (["plot", "bonding.yaml", "-o", "no/x.png"], "no/x.png: cannot be written"),
         (["plot", "bonding.yaml", "--variables", "T,fi"], "no variable 'fi'"),
+        (["plot", "run.csv"], "run.csv: is a table of numbers, which is for other programs. Write the run to run.nc"),
+        (["report", "run.parquet"], "run.parquet: is a table of numbers"),
         (["rerun", "bonding.yaml"], "bonding.yaml: is not a readable netCDF dataset"),
         (["check", "bonding.yaml", "--set", "interface.potential.bond-energy.K_2=700 J/m^2"], "capacity at T was lost"),
     ],
@@ -272,7 +274,7 @@ def test_a_case_of_ones_own_begins_with_a_shipped_one(call, tmp_path):
 
 def test_shells_complete_cases_laws_and_paths(call):
     assert commands.case_names("stick-slip-r") == ["stick-slip-rebonding"]
-    assert commands.case_names("bond") == ["bond-constant-force", "bonding.yaml"]
+    assert commands.case_names("bond") == ["bond-constant-force", "bond-lifetimes", "bonding.yaml"]
     assert commands.law_names("coul") == ["coulomb"]
     on_the_line = SimpleNamespace(params={"case": "bonding.yaml"})
     assert commands.paths(on_the_line, "initial.p") == ["initial.phi="]

@@ -34,10 +34,7 @@ def test_every_solution_says_what_it_is(name):
 def test_unknown_name():
     with pytest.raises(InputError) as error:
         references.get("endotermic-bonding")
-    assert (
-        "no exact solution 'endotermic-bonding'. Did you mean 'endothermic-bonding'? Known: adiabatic-arrhenius,"
-        in str(error.value)
-    )
+    assert "no exact solution 'endotermic-bonding'. Did you mean 'endothermic-bonding'? Nearest of" in str(error.value)
 
 
 def test_one_name_imports_one_file_and_no_scipy():

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import surfacechem
+from surfacechem import errors
 from surfacechem.errors import InputError
 from surfacechem.format import load_text
 from surfacechem.results.event_table import event_columns, event_findings, event_summary
@@ -107,7 +108,8 @@ def test_a_stage_waits_for_a_temperature_by_its_own_name():
         ("{J_c: 2}", "the stage warm waits for 'J_c'"),
     ],
 )
-def test_what_is_known_is_told_once_and_can_be_written(end, message):
+def test_what_is_known_is_told_once_and_can_be_written(end, message, monkeypatch):
+    monkeypatch.setattr(errors, "LINES", 10_000)
     with pytest.raises(InputError, match=message) as error:
         load_text(HEATS.replace("{T: 302 K}", end)).system()
     known = str(error.value).partition("Known: ")[2].rstrip(".").split(", ")
