@@ -34,6 +34,15 @@ def depends(expression: Expression, symbol: Expression) -> bool:
     return is_symbolic(expression) and symbol in expression.free_symbols
 
 
+def without(expression: Expression, known: Mapping[Any, Expression]) -> Expression:
+    """The expression without the symbols that are known; offered all of them, SymEngine would look for each."""
+    import symengine
+
+    whole = symengine.sympify(expression)
+    parts = {symbol: known[symbol] for symbol in whole.free_symbols if symbol in known}
+    return whole.subs(parts) if parts else whole
+
+
 def derivative(expression: Expression, symbol: Expression) -> Expression:
     """Derivative of an expression, without the empty pieces that differentiation leaves of guarded functions.
 

@@ -194,7 +194,10 @@ def compile_function(inputs: Sequence[Any], expressions: Sequence[Any], pieces: 
 
 
 def _compiled(inputs: Sequence[Any], expressions: Sequence[Any], opt_level: int = 3) -> Function:
-    return _machine_code(tuple(inputs), tuple(expressions), opt_level)
+    # Of many expressions LLVM makes little more at its highest level than at its first, in twice the time.
+    return _machine_code(
+        tuple(inputs), tuple(expressions), opt_level if len(expressions) < PIECE else min(opt_level, 1)
+    )
 
 
 @lru_cache(maxsize=128)  # a scene that is loaded again, or differs in numbers alone, has the same expressions

@@ -11,7 +11,7 @@ import symengine
 
 from surfacechem.contracts.terms import Friction, Law, Load, Spec, optional
 from surfacechem.errors import InputError
-from surfacechem.expressions import Expression, absolute, derivative
+from surfacechem.expressions import Expression, absolute, derivative, without
 from surfacechem.model import balances
 from surfacechem.model.automaton import Constraint, Edge, Equilibrium, Mode, Register
 from surfacechem.model.balances import Node, Power, Rows
@@ -437,5 +437,5 @@ class Build:
         """The expression without names of quantities."""
         result: dict[Any, Expression] = {}
         for item in self.named:
-            result[symengine.Symbol(item.name)] = symengine.sympify(item.expression).subs(result)
-        return symengine.sympify(expression).subs(result)
+            result[symengine.Symbol(item.name)] = without(item.expression, result)
+        return without(expression, result)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from surfacechem.contracts.terms import Load, Spec
 from surfacechem.contracts.units import WHOLE
-from surfacechem.expressions import Expression
+from surfacechem.expressions import Expression, without
 from surfacechem.model.automaton import Edge, Equilibrium, Mode, Register, Sink, When, masked
 from surfacechem.quantities import GAPS, VELOCITIES, Quantity
 from surfacechem.scene import Engine
@@ -335,12 +335,12 @@ class System:
         """Every name with its expression in t, states, derivatives and parameters only."""
         result: dict[Any, Expression] = {}
         for item in self.named:
-            result[symengine.Symbol(item.name)] = symengine.sympify(item.expression).subs(result)
+            result[symengine.Symbol(item.name)] = without(item.expression, result)
         return result
 
     def expand(self, expression: Expression) -> Expression:
         """The expression in t, states, derivatives and parameters only."""
-        return symengine.sympify(expression).subs(self.definitions)
+        return without(expression, self.definitions)
 
     def unit(self, unit: str) -> str:
         """A unit per area, or that of the same for a pair of bodies."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Container, Iterable, Mapping
 from dataclasses import replace
 from typing import Any, TypeVar
 
@@ -68,6 +68,9 @@ class Parameters:
         self.constants: dict[str, tuple[Spec, float]] = {}
         """Specification and value of parameters of laws that are at their defaults, hence numbers in formulas."""
         self._taken = {*VARIABLES, *reserved}
+        self._paths: set[str] = set()
+        self._numbers: dict[str, int] = {}
+        """Up to which number names and paths that need one are taken."""
 
     def add(
         self, name: str, path: str, spec: Spec, value: float, load: Load | None = None, field: str = ""
@@ -75,8 +78,7 @@ class Parameters:
         """A new parameter of a law as a symbol; its name gives way to names that are taken."""
         owners = [part for part in path.replace("-", "_").split(".")[:-1] if part.isidentifier()]
         candidates = [name, *(f"{name}_{owner}" for owner in reversed(owners))]
-        numbered = (f"{name}_{i}" for i in range(2, 1000))
-        free = next(c for c in (*candidates, *numbered) if c not in self._taken)
+        free = next((c for c in candidates if c not in self._taken), "") or self._numbered(name, "_{}", self._taken)
         self._taken.add(free)
         return self._append(Parameter(symengine.Symbol(free), path, spec, value, load, field))
 
@@ -87,11 +89,20 @@ class Parameters:
         return self._append(Parameter(symengine.Symbol(name), path, spec, value, internal=internal))
 
     def _append(self, parameter: Parameter) -> Expression:
-        taken = {item.path for item in self.items}
-        numbered = (f"{parameter.path}[{i}]" for i in range(2, 1000))
-        path = next(path for path in (parameter.path, *numbered) if path not in taken)
+        path = parameter.path
+        if path in self._paths:
+            path = self._numbered(path, "[{}]", self._paths)
+        self._paths.add(path)
         self.items.append(replace(parameter, path=path))
         return parameter.symbol
+
+    def _numbered(self, name: str, ending: str, taken: Container[str]) -> str:
+        """The name with the first number at its end that is not taken."""
+        i = self._numbers.get(name + ending, 2)
+        while (found := name + ending.format(i)) in taken:
+            i += 1
+        self._numbers[name + ending] = i
+        return found
 
 
 class Variables:

@@ -76,8 +76,9 @@ def laws(build: Build) -> Iterator[Power | Account | Caution | Pair | Margin]:
         yield Power(WORK, OUTSIDE, INTERFACE, work, "W_f", "work of the prescribed force on bonds")
     for pair in pairs:
         yield from departure(build, pair, {name: value + load.get(name, 0) for name, value in mu.items()})
+    changes = [(item.law.stoichiometry(), item.rate) for item in found]
     for name, bond in build.bonding.items():
-        change = sum((item.law.stoichiometry().get(name, 0) * item.rate for item in found), symengine.Integer(0))
+        change = symengine.Add(*(nu[name] * rate for nu, rate in changes if name in nu))
         build.rows.sites(name, change, bond.density, build.stretch)
         formed = Quantity(f"formed_{name}", "1", f"change of {name} by all reactions")
         yield Account(formed, bond.dot - build.rows[name], "bonds", name)

@@ -77,17 +77,16 @@ class Opposed:
 
 def opposed(laws: Mapping[str, RateLaw]) -> list[Opposed]:
     """The one-way laws that have a counterpart; all that share a stoichiometry belong together."""
+    alike: dict[frozenset[tuple[str, float]], dict[str, RateLaw]] = {}
+    for label, law in laws.items():
+        if law.one_way and (change := law.turnover()):
+            alike.setdefault(frozenset(change.items()), {})[label] = law
     groups: list[Opposed] = []
-    one_way = {label: law for label, law in laws.items() if law.one_way}
-    for label, law in one_way.items():
-        change = law.turnover()
-        if not change or any(label in group.labels for group in groups):
-            continue
-        back = {name: -n for name, n in change.items()}
-        forward = {name: other for name, other in one_way.items() if other.turnover() == change}
-        backward = {name: other for name, other in one_way.items() if other.turnover() == back}
-        if backward:
-            groups.append(Opposed(change, forward, backward))
+    for key, forward in alike.items():
+        backward = alike.get(frozenset((name, -n) for name, n in key))
+        # The first of a pair in the order of the laws is its forward side.
+        if backward and not any(group.backward is forward for group in groups):
+            groups.append(Opposed(next(iter(forward.values())).turnover(), forward, backward))
     return groups
 
 
