@@ -76,10 +76,9 @@ def laws(build: Build) -> Iterator[Power | Account | Caution | Pair | Margin]:
         yield Power(WORK, OUTSIDE, INTERFACE, work, "W_f", "work of the prescribed force on bonds")
     for pair in pairs:
         yield from departure(build, pair, {name: value + load.get(name, 0) for name, value in mu.items()})
-    changes = [(item.law.stoichiometry(), item.rate) for item in found]
+    changes = _changes(found)
     for name, bond in build.bonding.items():
-        change = symengine.Add(*(nu[name] * rate for nu, rate in changes if name in nu))
-        build.rows.sites(name, change, bond.density, build.stretch)
+        build.rows.sites(name, symengine.Add(*changes.get(name, ())), bond.density, build.stretch)
         formed = Quantity(f"formed_{name}", "1", f"change of {name} by all reactions")
         yield Account(formed, bond.dot - build.rows[name], "bonds", name)
     phi = symengine.Symbol("phi")
@@ -87,6 +86,15 @@ def laws(build: Build) -> Iterator[Power | Account | Caution | Pair | Margin]:
         M, rate = _potential_per_area(build, "phi", phi), build.rate_of("phi")
         if rate != 0:
             yield Power(DISSIPATION, INTERFACE, INTERFACE, -M * rate, "prescribed_bonding")
+
+
+def _changes(found: Iterable[Reaction]) -> dict[str, list[Expression]]:
+    """Changes of each bonding variable by reactions."""
+    changes: dict[str, list[Expression]] = {}
+    for item in found:
+        for name, nu in item.law.stoichiometry().items():
+            changes.setdefault(name, []).append(nu * item.rate)
+    return changes
 
 
 def _chemical_potentials(build: Build) -> dict[str, Expression]:
