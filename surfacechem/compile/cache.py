@@ -13,9 +13,7 @@ import hashlib
 import os
 import pickle
 import platform
-import stat
 import sys
-import tempfile
 import warnings
 from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
@@ -23,23 +21,11 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-OTHERS = stat.S_IWGRP | stat.S_IWOTH
-"""Permission of others to write."""
+from surfacechem.documents import cache_folder
+from surfacechem.documents.cache_folder import cache_root, keep_file, make_folder, sealed, unsealed
 
 FILE = "kernel.numba"
 """File of what Numba loads; others of the folder that begin with `kernel.` hold the same code in other forms."""
-
-
-def cache_root() -> Path:
-    """SURFACECHEM_CACHE, else NUMBA_CACHE_DIR, else the user's cache folder."""
-    for variable in ("SURFACECHEM_CACHE", "NUMBA_CACHE_DIR"):
-        if os.environ.get(variable):
-            return Path(os.environ[variable])
-    if sys.platform == "win32":
-        base = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
-    else:
-        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    return base / "surfacechem"
 
 
 def _processor() -> str:
@@ -56,8 +42,8 @@ def kernel_folder(sources: Sequence[Path]) -> Path:
     digest = hashlib.sha256()
     for text in (version("numba"), version("llvmlite"), sys.version, platform.machine(), _processor()):
         digest.update(text.encode())
-    # This file and the one beside it decide in which form code is kept.
-    for source in (Path(__file__), Path(__file__).with_name("objectcode.py"), *sources):
+    # These files decide in which form code is kept.
+    for source in (Path(cache_folder.__file__), Path(__file__), Path(__file__).with_name("objectcode.py"), *sources):
         digest.update(source.read_bytes())
     return cache_root() / f"kernel-{digest.hexdigest()[:16]}"
 
@@ -76,50 +62,10 @@ def _content(folder: Path) -> bytes | None:
     return None if None in contents.values() else contents.get(FILE)
 
 
-def sealed(content: bytes) -> bytes:
-    """Content behind its SHA-256, so that it is known when it is damaged."""
-    return hashlib.sha256(content).hexdigest().encode() + b"\n" + content
-
-
-def unsealed(data: bytes) -> bytes | None:
-    """The content of sealed data; None where it is damaged."""
-    content = data[2 * hashlib.sha256().digest_size + 1 :]
-    return content if sealed(content) == data else None
-
-
-def keep_file(path: Path, data: bytes) -> None:
-    """Write a file whole or not at all, even where the machine stops meanwhile."""
-    handle, name = tempfile.mkstemp(dir=path.parent)
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(handle)
-        Path(name).chmod(0o644)
-        Path(name).replace(path)
-    except BaseException:
-        Path(name).unlink(missing_ok=True)
-        raise
-
-
 def untrusted(folder: Path) -> str | None:
     """Why code in this folder could be another user's; None where it cannot be, or the folder is not there."""
-    if not hasattr(os, "getuid"):
-        return None  # on Windows a user's folder is writable to that user alone
-    root = cache_root()
-    # What another process removes meanwhile is passed over.
     inside = (Path(place, name) for place, folders, files in os.walk(folder) for name in (*folders, *files))
-    for path in (root, folder, *inside):
-        try:
-            found = path.stat() if path == root else path.lstat()
-        except OSError:
-            continue
-        if found.st_uid not in (os.getuid(), 0):
-            return f"{path} belongs to another user"
-        shared = path == root and found.st_mode & stat.S_ISVTX  # there others cannot replace what is ours
-        if stat.S_ISLNK(found.st_mode) or (found.st_mode & OTHERS and not shared):
-            return f"{path} can be written by other users"
-    return None
+    return cache_folder.untrusted((folder, *inside))
 
 
 class _Kept:
@@ -151,8 +97,7 @@ class _Kept:
             return
         data = sealed(numbas.dumps((compiled.codegen.magic_tuple(), compiled._reduce())))
         try:
-            for path in (cache_root(), self.folder):
-                path.mkdir(mode=0o755, parents=True, exist_ok=True)  # writable to oneself alone from the start
+            make_folder(self.folder)
             keep_file(self.folder / FILE, data)
         except OSError as error:
             _warn(self.folder, str(error))

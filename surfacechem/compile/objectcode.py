@@ -19,7 +19,8 @@ from typing import Any
 
 import numpy as np
 
-from surfacechem.compile.cache import keep_file, sealed, unsealed, untrusted
+from surfacechem.compile.cache import untrusted
+from surfacechem.documents.cache_folder import keep_file, sealed, unsealed
 
 FILE = "kernel.object"
 

@@ -10,6 +10,8 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
+from importlib.metadata import version
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,6 +19,7 @@ from numpy.typing import NDArray
 
 from surfacechem.contracts import fits
 from surfacechem.contracts.terms import Fluid, FluidRange
+from surfacechem.documents.cache_folder import fingerprint, kept
 from surfacechem.errors import InputError
 
 Array = NDArray[np.float64]
@@ -59,12 +62,11 @@ class CoolPropFluid(Fluid):
 
     def range(self, T: float) -> FluidRange:
         """Temperatures around T [K] at which the fluid stays what it is; InputError where it has no properties."""
-        low, high = self._call("Tmin"), self._call("Tmax")
+        low, high, boils, condenses = _limits(self)
         if not low <= T <= high:
             span = f"CoolProp's range is {low:g} to {high:g} K"
             raise InputError(f"{self.title} has no properties at {T:g} K: {span}.")
         end = f"{self.title} has no known properties"
-        boils, condenses = self._saturation(0), self._saturation(1)
         # Saturation ends the range on the side on which it lies.
         if boils is not None and boils > T:
             return FluidRange(low, boils * (1 - BESIDE), end, f"{self.title} boils")
@@ -76,7 +78,7 @@ class CoolPropFluid(Fluid):
 
     def check(self) -> None:
         """Raise InputError unless CoolProp knows the fluid."""
-        self._call("Tmin")
+        _limits(self)
 
     @property
     def title(self) -> str:
@@ -106,6 +108,10 @@ class CoolPropFluid(Fluid):
             raise InputError(f"{self.title}: {reason}")
         return found
 
+    def limits(self) -> list[float | None]:
+        """Least and largest temperature [K] of the properties, those of boiling and of condensing if it does."""
+        return [self._call("Tmin"), self._call("Tmax"), self._saturation(0), self._saturation(1)]
+
     def _call(self, letter: str) -> float:
         try:
             return float(_coolprop().PropsSI(letter, "T", 0, "P", 0, self.name))
@@ -123,11 +129,25 @@ class CoolPropFluid(Fluid):
 
 
 @cache
+def _limits(fluid: CoolPropFluid) -> tuple[float, float, float | None, float | None]:
+    low, high, boils, condenses = kept(fingerprint(fluid, "limits", version("CoolProp")), [], fluid.limits)
+    return low, high, boils, condenses
+
+
+@cache
 def _fit(fluid: CoolPropFluid, quantity: str, low: float, high: float) -> tuple[fits.Piece, ...]:
-    try:
-        return fits.fit(lambda T: fluid.values(quantity, T), low, high)
-    except fits.NoFitError as error:
-        raise InputError(f"the {WORDS[quantity]} of {fluid.title} cannot be fitted: {error}") from None
+    def find() -> list[Any] | str:
+        try:
+            found = fits.fit(lambda T: fluid.values(quantity, T), low, high)
+        except fits.NoFitError as error:
+            return str(error)
+        return [[piece.low, piece.high, piece.coefficients] for piece in found]
+
+    mark = fingerprint(fluid, quantity, low, high, version("CoolProp"))
+    found = kept(mark, [Path(fits.__file__)], find)
+    if isinstance(found, str):
+        raise InputError(f"the {WORDS[quantity]} of {fluid.title} cannot be fitted: {found}")
+    return tuple(fits.Piece(low, high, tuple(coefficients)) for low, high, coefficients in found)
 
 
 def _coolprop() -> Any:

@@ -39,11 +39,6 @@ def figure(
     celsius
         Whether temperatures are in degrees Celsius instead of kelvins.
 
-    Returns
-    -------
-    matplotlib.figure.Figure
-        What ``savefig`` writes, and a notebook shows.
-
     Raises
     ------
     InputError

@@ -45,9 +45,8 @@ class Receiver:
 class ReactingGas(Receiver, cantera.ExtensibleIdealGasReactor):
     """Cantera's IdealGasReactor for a gas beside the surface of an interface.
 
-    ``InterfaceReactor(..., neighbours={name: gas})`` makes it a neighbour, of one interface or of several.
-
-    Its arguments are those of an IdealGasReactor, first the gas, a ``cantera.Solution``.
+    It takes what an IdealGasReactor takes. ``InterfaceReactor(..., neighbours={name: gas})`` makes it a neighbour, of
+    one interface or of several.
     """
 
     temperature = 2
@@ -57,10 +56,7 @@ class ReactingGas(Receiver, cantera.ExtensibleIdealGasReactor):
 
 
 class ReactingGasAtPressure(Receiver, cantera.ExtensibleIdealGasConstPressureReactor):
-    """Cantera's IdealGasConstPressureReactor for a gas beside the surface of an interface.
-
-    Its arguments are those of an IdealGasConstPressureReactor, first the gas, a ``cantera.Solution``.
-    """
+    """Cantera's IdealGasConstPressureReactor for a gas beside the surface of an interface."""
 
     temperature = 1
 

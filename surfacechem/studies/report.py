@@ -237,13 +237,7 @@ class Study:
         return xarray.Dataset(data, coords=coordinates, attrs=self.attributes)
 
     def figure(self) -> Figure:
-        """The figure of the study, which its dataset alone is enough for.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
-            What ``savefig`` writes.
-        """
+        """The figure of the study, which its dataset alone is enough for."""
         from surfacechem.plots.study import figure
 
         return figure(self.dataset)
@@ -254,23 +248,7 @@ class Study:
         return Page(self.title, self.command, self.sections, self.omissions, self.figure)
 
     def write(self, path: str | Path) -> list[Path]:
-        """Save as netCDF, SVG, PNG and HTML side by side.
-
-        Parameters
-        ----------
-        path
-            What the names of the files begin with.
-
-        Returns
-        -------
-        list
-            The files.
-
-        Raises
-        ------
-        OutputError
-            Where one of them cannot be written.
-        """
+        """Save as netCDF, SVG, PNG and HTML side by side; returns the files."""
         from surfacechem import plots
 
         files, figure = targets(path), self.figure()

@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -58,6 +59,18 @@ class ApproachEnergy:
     force: float
     """Its slope at the least approach [N]."""
     sign: float = 1.0
+
+    @property
+    def numbers(self) -> list[Any]:
+        """All that it is made of, to be kept in a file."""
+        return [[astuple(piece) for piece in self.pieces], self.force, self.sign]
+
+    @classmethod
+    def of(cls, numbers: Sequence[Any]) -> ApproachEnergy:
+        """The energy made of numbers that have been kept."""
+        pieces, force, sign = numbers
+        made = (ApproachPiece(a, b, tuple(coefficients), *rest) for a, b, coefficients, *rest in pieces)
+        return cls(tuple(made), force, sign)
 
     def energy(self, d: Expression) -> Expression:
         """Energy at an approach [J]; nearer than the first, where only trial states of a solver are, along a line."""

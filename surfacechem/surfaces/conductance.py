@@ -7,13 +7,14 @@ from functools import cached_property
 from typing import Self
 
 from surfacechem.contracts.terms import HeatTransfer, option
+from surfacechem.documents.cache_folder import Fingerprint, fingerprint, kept
 from surfacechem.expressions import Expression
 from surfacechem.surfaces.approach import ApproachEnergy, fitted, straight
 from surfacechem.surfaces.curved_gap import bends, density, over_gap
-from surfacechem.surfaces.potential import CurvedSurfaces
+from surfacechem.surfaces.potential import CODE, CurvedSurfaces
 from surfacechem.tolerances import ROUNDING
 
-KNOWN: dict[str, ApproachEnergy] = {}
+KNOWN: dict[Fingerprint, ApproachEnergy] = {}
 """Conductances that have been integrated, by what they are the conductances of."""
 
 
@@ -46,7 +47,7 @@ class CurvedConductance(HeatTransfer):
     def curve(self) -> ApproachEnergy:
         """The conductance over the approach."""
         pair, law, levels = self.pair, density(self.law), bends([self.law])
-        key = repr((pair.shapes, self.law, pair.approach, pair.accuracy))
+        mark = fingerprint(pair.shapes, self.law, pair.approach, pair.accuracy)
 
         def sample(d: float) -> tuple[float, float]:
             found = pair.at_approach(
@@ -55,9 +56,10 @@ class CurvedConductance(HeatTransfer):
             return found.conductance, found.conductance_slope
 
         # A conductance and its slope are fitted like an energy and its force.
-        if key not in KNOWN:
-            KNOWN[key] = fitted(sample, *pair.approach, pair.accuracy, levels)
-        return KNOWN[key]
+        if mark not in KNOWN:
+            found = kept(mark, CODE, lambda: fitted(sample, *pair.approach, pair.accuracy, levels).numbers)
+            KNOWN[mark] = ApproachEnergy.of(found)
+        return KNOWN[mark]
 
     def conductance(self, g_n: Expression) -> Expression:
         """Conductance [W/K]."""

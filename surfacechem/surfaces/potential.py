@@ -8,11 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property, partial
+from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
 
+from surfacechem import expressions, tolerances
 from surfacechem.contracts.terms import HeatTransfer, Law, PairEnergy, Potential, Shape, option
+from surfacechem.documents.cache_folder import Fingerprint, fingerprint, kept
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, derivative
 from surfacechem.surfaces.approach import ApproachEnergy, fitted, straight
@@ -21,8 +24,11 @@ from surfacechem.surfaces.pairwise import PairForces, interaction, kernel, lengt
 from surfacechem.surfaces.projection import Array, Surface
 from surfacechem.tolerances import ATOM, NEGLIGIBLE, ROUNDING, SQRT_EPS
 
-KNOWN: dict[str, tuple[tuple[ApproachEnergy, ...], ApproachEnergy | None]] = {}
+KNOWN: dict[Fingerprint, tuple[tuple[ApproachEnergy, ...], ApproachEnergy | None]] = {}
 """Curves that have been integrated, by what they are the curves of."""
+
+CODE = [*sorted(Path(__file__).parent.glob("*.py")), Path(expressions.__file__), Path(tolerances.__file__)]
+"""What integrals follow from, beside the laws."""
 
 
 LOOKS = 2000
@@ -116,12 +122,14 @@ class CurvedSurfaces(Potential):
         """Energies over the approach of the parts of all pair laws per product of densities, and of the gap laws."""
         parts = [part for law in self.pairs for _, part in self.parts(law)]
         # Other numbers of the same surfaces, as in a sweep, have the same integrals.
-        key = repr((self.shapes, parts, self.gap_laws, self.approach, self.accuracy))
-        if key not in KNOWN:
-            KNOWN[key] = self._integrated(parts)
-        return KNOWN[key]
+        mark = fingerprint(self.shapes, parts, self.gap_laws, self.approach, self.accuracy)
+        if mark not in KNOWN:
+            found = kept(mark, CODE, lambda: [curve.numbers for curve in self._integrated(parts)])
+            curves = tuple(map(ApproachEnergy.of, found))
+            KNOWN[mark] = curves[: len(parts)], next(iter(curves[len(parts) :]), None)
+        return KNOWN[mark]
 
-    def _integrated(self, parts: Sequence[PairEnergy]) -> tuple[tuple[ApproachEnergy, ...], ApproachEnergy | None]:
+    def _integrated(self, parts: Sequence[PairEnergy]) -> list[ApproachEnergy]:
         """Those energies from their integrals."""
         self._refuse_jumps()
         # Errors of the samples must not look like what a polynomial misses.
@@ -136,7 +144,7 @@ class CurvedSurfaces(Potential):
 
         found = [fitted(partial(of_pairs, k), *self.approach, rtol) for k in range(len(parts))]
         if not self.gap_laws:
-            return tuple(found), None
+            return found
         laws, levels = [density(law) for law in self.gap_laws], bends(self.gap_laws)
 
         floor = 0.0
@@ -147,7 +155,7 @@ class CurvedSurfaces(Potential):
 
         # Where bodies just touch the force is that of rounding; what counts is that in the range.
         floor = NEGLIGIBLE * max(abs(of_gap(d)[1]) for d in self.approach)
-        return tuple(found), fitted(of_gap, *self.approach, rtol, levels)
+        return [*found, fitted(of_gap, *self.approach, rtol, levels)]
 
     def _refuse_jumps(self) -> None:
         """InputError where the energy of a law jumps, so that no force is its slope."""

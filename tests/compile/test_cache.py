@@ -13,7 +13,8 @@ import pytest
 
 from surfacechem.compile import cache as kernelcache
 from surfacechem.compile import objectcode
-from surfacechem.compile.cache import is_filled, unsealed
+from surfacechem.compile.cache import is_filled
+from surfacechem.documents.cache_folder import unsealed
 from surfacechem.solve.radau import stepper
 
 pytestmark = pytest.mark.around

@@ -1,0 +1,185 @@
+"""The user's cache folder, and numbers in it that take long to find: fits of properties, integrals over surfaces.
+
+A file is named by a digest of all that its numbers follow from, the code that finds them included, so that they are
+never used where they do not hold. It holds numbers and texts, no code, behind their SHA-256. What cannot be written,
+read or trusted costs time, never a result.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import stat
+import sys
+import tempfile
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, fields, is_dataclass
+from functools import cache
+from itertools import count
+from pathlib import Path
+from typing import Any
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+PACKAGE = Path(__file__).parents[1]
+
+OTHERS = stat.S_IWGRP | stat.S_IWOTH
+"""Permission of others to write."""
+
+
+def cache_root() -> Path:
+    """SURFACECHEM_CACHE, else NUMBA_CACHE_DIR, else the user's cache folder."""
+    for variable in ("SURFACECHEM_CACHE", "NUMBA_CACHE_DIR"):
+        if os.environ.get(variable):
+            return Path(os.environ[variable])
+    if sys.platform == "win32":
+        base = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
+    else:
+        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    return base / "surfacechem"
+
+
+# -- files ------------------------------------------------------------------------------------------------------------
+
+
+def sealed(content: bytes) -> bytes:
+    """Content behind its SHA-256, so that it is known when it is damaged."""
+    return hashlib.sha256(content).hexdigest().encode() + b"\n" + content
+
+
+def unsealed(data: bytes) -> bytes | None:
+    """The content of sealed data; None where it is damaged."""
+    content = data[2 * hashlib.sha256().digest_size + 1 :]
+    return content if sealed(content) == data else None
+
+
+def make_folder(folder: Path) -> None:
+    """A folder of the cache, writable to oneself alone from the start."""
+    for path in (cache_root(), folder):
+        path.mkdir(mode=0o755, parents=True, exist_ok=True)
+
+
+def keep_file(path: Path, data: bytes) -> None:
+    """Write a file whole or not at all, even where the machine stops meanwhile."""
+    handle, name = tempfile.mkstemp(dir=path.parent)
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(handle)
+        Path(name).chmod(0o644)
+        Path(name).replace(path)
+    except BaseException:
+        Path(name).unlink(missing_ok=True)
+        raise
+
+
+def untrusted(paths: Iterable[Path]) -> str | None:
+    """Why what is at paths of the cache could be another user's; None where it cannot be, or nothing is there."""
+    if not hasattr(os, "getuid"):
+        return None  # on Windows a user's folder is writable to that user alone
+    root = cache_root()
+    for path in (root, *paths):
+        # What another process removes meanwhile is passed over.
+        try:
+            found = path.stat() if path == root else path.lstat()
+        except OSError:
+            continue
+        if found.st_uid not in (os.getuid(), 0):
+            return f"{path} belongs to another user"
+        shared = path == root and found.st_mode & stat.S_ISVTX  # there others cannot replace what is ours
+        if stat.S_ISLNK(found.st_mode) or (found.st_mode & OTHERS and not shared):
+            return f"{path} can be written by other users"
+    return None
+
+
+# -- numbers ----------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Fingerprint:
+    """A digest of what things hold; equal only where they hold the same."""
+
+    digest: str
+    lasts: bool
+    """Whether it is the same in every process: laws of one's own may use anything, which nobody can compare."""
+
+
+_SERIAL: WeakKeyDictionary[type, int] = WeakKeyDictionary()
+_NUMBERS = count()
+
+
+def fingerprint(*things: Any) -> Fingerprint:
+    """The fingerprint of numbers, texts, arrays, and of laws and other records of them.
+
+    >>> fingerprint([1.0, 2.0]) == fingerprint((1.0, 2.0)), fingerprint(0.1) == fingerprint(0.1 + 1e-17)
+    (True, True)
+    >>> fingerprint(1.0) == fingerprint("1.0")
+    False
+    """
+    digest, lasts = hashlib.sha256(), True
+    for thing in things:
+        for part, lasting in _told(thing):
+            digest.update(str(len(part)).encode() + b":" + part)
+            lasts = lasts and lasting
+    return Fingerprint(digest.hexdigest(), lasts)
+
+
+def _told(thing: Any) -> Iterator[tuple[bytes, bool]]:
+    """All that a thing holds, each with whether it is the same in every process."""
+    if isinstance(thing, float):
+        yield float(thing).hex().encode(), True
+    elif thing is None or isinstance(thing, bool | int | str):
+        yield repr(thing).encode(), True
+    elif isinstance(thing, np.ndarray):
+        yield f"{thing.dtype.str} {thing.shape}".encode() + np.ascontiguousarray(thing).tobytes(), True
+    elif isinstance(thing, Mapping):
+        yield f"mapping of {len(thing)}".encode(), True
+        for item in thing.items():
+            yield from _told(item)
+    elif isinstance(thing, Sequence):
+        yield f"sequence of {len(thing)}".encode(), True
+        for item in thing:
+            yield from _told(item)
+    elif is_dataclass(thing) and not isinstance(thing, type):
+        yield _code(type(thing))
+        for name in (item.name for item in fields(thing) if item.repr):
+            yield from _told((name, getattr(thing, name)))
+    else:  # equal to nothing
+        yield str(next(_NUMBERS)).encode(), False
+
+
+def _code(kind: type) -> tuple[bytes, bool]:
+    """A class by its name and source; one that is not of the package by a number of its own."""
+    source = getattr(sys.modules.get(kind.__module__), "__file__", None)
+    if source is None or not Path(source).is_relative_to(PACKAGE):
+        return f"{_SERIAL.setdefault(kind, next(_NUMBERS))}".encode(), False
+    return f"{kind.__module__}.{kind.__qualname__} {_source(source)}".encode(), True
+
+
+@cache
+def _source(file: str) -> str:
+    return hashlib.sha256(Path(file).read_bytes()).hexdigest()
+
+
+def kept(mark: Fingerprint, code: Iterable[Path], find: Callable[[], Any]) -> Any:
+    """What ``find`` gives, made of numbers, texts and lists; from its file where that is.
+
+    ``code`` are the files, beside those of the classes in ``mark``, that it follows from.
+    """
+    if not mark.lasts:
+        return find()
+    sources = sorted(_source(str(path)) for path in code)
+    folder = cache_root() / "numbers"
+    path = folder / f"{fingerprint(mark.digest, sources, np.__version__).digest[:32]}.json"
+    with suppress(OSError, ValueError):
+        if untrusted((folder, path)) is None and (content := unsealed(path.read_bytes())) is not None:
+            return json.loads(content)
+    found = find()
+    with suppress(OSError):
+        make_folder(folder)
+        keep_file(path, sealed(json.dumps(found).encode()))
+    return found
