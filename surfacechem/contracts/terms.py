@@ -609,7 +609,7 @@ class Shape(Law):
     starts: ClassVar[Callable[..., Sequence[Any]]]
     """Parameters from which a search for the nearest point begins where there is none, two or more for each point."""
     derivatives: ClassVar[Callable[..., Any] | None] = None
-    """Derivatives (10, ..., 3) where they are no formulas: 1, u, v, uu, uv, vv, uuu, uuv, uvv, vvv."""
+    """So many derivatives (count, ..., 3) where they are no formulas: 1, u, v, uu, uv, vv, uuu, uuv, uvv, vvv."""
 
 
 class PairEnergy(Law):

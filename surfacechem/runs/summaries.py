@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from surfacechem.runs.sheet import Rows, Sheet
 from surfacechem.solve.jumps import ADMISSIBLE
 
 if TYPE_CHECKING:
+    from surfacechem.contracts.terms import Law
     from surfacechem.format.plans import Plan
     from surfacechem.model.system import System
     from surfacechem.results.accuracy import Accuracy
@@ -240,11 +242,37 @@ def check_summary(
         "Modes": [(mode.name, mode.legend) for mode in system.modes if len(mode.words) > 1],
         "Transitions": list(dict.fromkeys((item.name, item.reason) for item in system.edges)),
         "Laws": [(law.contract, law.name()) for law in laws_of(scene)],
+        "Surfaces": _surface_rows(scene),
         "Numbers": [(g.name, f"{g.value:.4g} {g.unit if g.unit != '1' else ''}".rstrip(), g.text) for g in groups],
         "Warnings": [(warning,) for warning in warnings],
     }
     facts = [("regime", f"{system.regime}: {REGIMES.get(system.regime, '')}"), ("run", _plan(system, run))]
     return Sheet(title or "untitled", facts, sections)
+
+
+def _surface_rows(scene: Scene) -> list[tuple[str, ...]]:
+    """Shapes of both bodies, what acts between them, and where that is integrated."""
+    surface: Any = scene.surface
+    if surface is None:
+        return []
+    rows = [(body.name, law.name(), _numbers(law)) for body, law in zip(scene.bodies, surface.shapes, strict=True)]
+    for words, laws in (("pair", surface.pairs), ("gap", surface.gap_laws), ("heat", surface.heat_laws)):
+        rows += [(words, law.name(), _numbers(law)) for law in laws]
+    low, high = surface.approach
+    return [*rows, ("approach", f"{low:g} to {high:g} m", f"integrated to {surface.accuracy:g}")]
+
+
+def _numbers(law: Law) -> str:
+    """The parameters of a law that are not their defaults, and how many numbers its lists have."""
+    found = []
+    for item in dataclasses.fields(law):
+        value = getattr(law, item.name)
+        if isinstance(value, float) and value != item.default:
+            unit = dict(law.specs())[item.name].unit
+            found.append(f"{item.name} = {value:g}{'' if unit == '1' else f' {unit}'}")
+        elif isinstance(value, Sequence) and not isinstance(value, str):
+            found.append(f"{len(value)} {item.name}")
+    return ", ".join(found)
 
 
 def _plan(system: System, run: Run | None) -> str:

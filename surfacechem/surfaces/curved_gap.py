@@ -125,7 +125,7 @@ def over_gap(
     patches, near = outer_patches(lower, upper, size, size * FAR)
     patches = with_levels(patches, upper, levels, NOISE * size)
 
-    def integrand(x: Array, order: int) -> tuple[Array, int]:
+    def integrand(x: Array, level: int) -> tuple[Array, int]:
         return counts_at(x, upper.nearest(x), laws, heat), len(x)
 
     def sizes(found: Array) -> Array:
@@ -136,7 +136,7 @@ def over_gap(
         flow = max(abs(found[14]), TINY)
         return np.array([*parts, area, flow, max(abs(found[15]), flow / size)])
 
-    whole, error, _ = integral(patches, integrand, sizes, rtol)
+    whole, error, _ = integral(patches, integrand, sizes, rtol, nested=False)
     _check_end(patches, integrand, sizes(whole))
     force_1, force_2, moment_1, moment_2 = np.split(whole[1:13], 4)
     energy, area, conductance, slope = map(float, whole[[0, 13, 14, 15]])

@@ -10,7 +10,7 @@ Source: Johnston & Elliott (2005), doi 10.1002/nme.1208, for the substitution.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -20,9 +20,19 @@ from surfacechem.contracts.terms import PairEnergy
 from surfacechem.errors import InputError
 from surfacechem.surfaces.projection import FIRST, POLE, Array, Projection, Surface
 from surfacechem.surfaces.shapes import Cavity, Cylinder, Plane, Sphere
+from surfacechem.tolerances import NEGLIGIBLE, TINY
+
+ORDERS = (4, 6, 9, 13, 18, 25)
+"""Points of Gauss's rule on each piece, more and more of them until two in a row agree."""
+
+LAST = len(ORDERS) - 1
+"""Level of the last of the orders; rules of higher levels inside have pieces that are half as long."""
 
 PIECE = 2.0
 """Length of a piece in t."""
+
+TABLE, BETWEEN = 24, np.array([-0.97, -0.52, 0.14, 0.71])
+"""Gaps for a polynomial of their logarithm, and places between them at which it is tried."""
 
 Sums = tuple[Array, Array, Array]
 """For n outer points: energy (n,), force on them (n, 3), and inner points weighted by what acts on each (n, 3)."""
@@ -48,24 +58,22 @@ class Grid:
 
 @dataclass(frozen=True)
 class Circles:
-    """Circles around the feet (n, 3) on a plane, a sphere or a cavity: their distances from the outer points, how far
+    """Circles around the feet on a plane, a sphere or a cavity: their distances from points at the gaps (n,), how far
     they lie below the feet, and their areas, each (n, k).
     """
 
-    foot: Array
-    normal: Array
     gap: Array
     r: Array
     down: Array
     area: Array
 
-    def sums(self, law: Callable[[Array], Array]) -> Sums:
-        """Sums over the circles of a law of the distance; what points across the normal cancels."""
+    def profile(self, law: Callable[[Array], Array]) -> Array:
+        """Sums (n, 3) over the circles: energy, strength of what acts along the arms, and that times how low they are;
+        what points across the normal cancels.
+        """
         psi, slope = np.moveaxis(law(self.r), -1, 0)
         strength = -slope * self.area / self.r
-        whole, lower = strength.sum(axis=-1)[:, None], np.einsum("nk,nk->n", strength, self.down)[:, None]
-        push = (whole * self.gap[:, None] + lower) * self.normal
-        return np.einsum("nk,nk->n", psi, self.area), push, whole * self.foot - lower * self.normal
+        return np.stack([(psi * self.area).sum(-1), strength.sum(-1), (strength * self.down).sum(-1)], axis=-1)
 
 
 def is_round(surface: Surface) -> bool:
@@ -89,34 +97,80 @@ def gauss(edges: Array, order: int) -> tuple[Array, Array]:
     return at.reshape(len(edges), -1), (length * w / 2).reshape(len(edges), -1)
 
 
-def piece_edges(low: Array, high: Array, grain: Array | float = math.inf) -> Array:
+def piece_edges(low: Array, high: Array, grain: Array | float = math.inf, level: int = 0) -> Array:
     """Edges (n, k) of pieces from parameters ``low`` to ``high`` (n,) around zero, none longer than PIECE, nor than the
-    grain of the surface, in units of the scale of sinh t.
+    grain of the surface, in units of the scale of sinh t; shorter ones for a level above the last.
     """
+    parts = 2 ** max(level - LAST, 0)
     if np.all(np.isinf(grain)):
-        count = max(1, math.ceil(float(np.max(high - low)) / PIECE))
-        return low[:, None] + (high - low)[:, None] * np.arange(count + 1) / count
-    return np.concatenate([-_outward(-low, grain)[:, ::-1], _outward(high, grain)[:, 1:]], axis=1)
+        count = max(1, math.ceil(float(np.max(high - low)) / PIECE)) * parts
+        return np.asarray(low[:, None] + (high - low)[:, None] * np.arange(count + 1) / count)
+    return np.concatenate([-_outward(-low, grain, parts)[:, ::-1], _outward(high, grain, parts)[:, 1:]], axis=1)
 
 
-def _outward(end: Array, grain: Array | float) -> Array:
-    """Edges from zero to an end; where that is reached sooner than elsewhere the last pieces are empty."""
+def _outward(end: Array, grain: Array | float, parts: int) -> Array:
+    """Edges of parts of pieces from zero to an end; where that is reached sooner the last pieces are empty."""
     found = [np.zeros_like(end)]
     while np.any(found[-1] < end):
-        wide = np.minimum(found[-1] + PIECE, np.arcsinh(np.sinh(found[-1]) + grain))
+        wide = np.minimum(found[-1] + PIECE / parts, np.arcsinh(np.sinh(found[-1]) + grain / parts))
         found.append(np.minimum(wide, end))
     return np.stack(found, axis=1)
 
 
-def inner_nodes(surface: Surface, x: Array, order: int, law: PairEnergy, rtol: float) -> Grid | Circles:
-    """Nodes around the nearest point of the surface for each point (n, 3); InputError where it is in the body."""
-    found = surface.nearest(x)
-    if not np.all(found.gap > 0):
+def inner_sums(
+    surface: Surface, x: Array, kernels: Sequence[Callable[[Array], Array]], level: int, law: PairEnergy, rtol: float
+) -> tuple[list[Sums], int]:
+    """Sums over the inner surface for points (n, 3), of each law, and the number of pairs of points.
+
+    The ``law`` that falls off most slowly says how far they reach. InputError where a point is in the body.
+    """
+    near = surface.nearest(x)
+    if not np.all(near.gap > 0):
         raise InputError("the surfaces overlap; a law of pairs of points holds outside only.")
     # Of what lies beyond, a part of size (h / reach)^(decay - 2) of all is missed.
-    reach = np.minimum(found.gap * (rtol / 10) ** (-1 / (law.decay - 2)), law.cutoff)
-    if is_round(surface):
-        return _around(surface, found, reach, order, law.cutoff)
+    farther = (rtol / 10) ** (-1 / (law.decay - 2))
+    if not is_round(surface):
+        nodes = _inner_grid(surface, x, near, np.minimum(near.gap * farther, law.cutoff), level)
+        return [nodes.sums(one) for one in kernels], nodes.area.size
+    pairs = len(x)
+
+    def profiles(gaps: Array) -> Array:
+        nonlocal pairs
+        circles = _around(surface, gaps, np.minimum(gaps * farther, law.cutoff), level, law.cutoff)
+        pairs += circles.area.size
+        return np.concatenate([circles.profile(one) for one in kernels], axis=-1)
+
+    found, sums = tabulated(profiles, near.gap, rtol), []
+    for energy, whole, lower in np.split(found.T, len(kernels)):
+        push = (whole * near.gap + lower)[:, None] * near.normal
+        sums.append((energy, push, whole[:, None] * near.point - lower[:, None] * near.normal))
+    return sums, pairs
+
+
+def tabulated(function: Callable[[Array], Array], gaps: Array, rtol: float) -> Array:
+    """A function (n, k) of many gaps by polynomials of their logarithm, if these are accurate enough."""
+    low, high = math.log(gaps.min()), math.log(gaps.max())
+    pieces = max(1, math.ceil(high - low))
+    if len(gaps) < 2 * pieces * (TABLE + len(BETWEEN)):
+        return function(gaps)
+    step = (high - low) / pieces
+    edges, nodes = low + step * np.arange(pieces), np.cos(np.pi * (np.arange(TABLE) + 0.5) / TABLE)
+    x = np.concatenate([nodes, BETWEEN])
+    values = function(np.exp(edges[:, None] + step * (x + 1) / 2).ravel()).reshape(pieces, len(x), -1)
+    which = np.clip(((np.log(gaps) - low) / max(step, TINY)).astype(int), 0, pieces - 1)
+    z = np.clip(2 * (np.log(gaps) - edges[which]) / max(step, TINY) - 1, -1, 1)
+    found = np.empty((len(gaps), values.shape[-1]))
+    for k, known in enumerate(values):
+        fit = np.polynomial.chebyshev.chebfit(nodes, known[:TABLE], TABLE - 1)
+        missed = np.polynomial.chebyshev.chebval(x[TABLE:], fit).T - known[TABLE:]
+        if np.any(np.abs(missed) > rtol * NEGLIGIBLE * np.abs(known).max(axis=0)):
+            return function(gaps)
+        found[which == k] = np.polynomial.chebyshev.chebval(z[which == k], fit).T
+    return found
+
+
+def _inner_grid(surface: Surface, x: Array, found: Projection, reach: Array, level: int) -> Grid:
+    """Nodes of a surface around the nearest point for each point (n, 3), up to a reach (n,)."""
     low, high = np.transpose(surface.shape.span)
     _, x_u, x_v = surface.derivatives(found.at, FIRST)
     axes = []
@@ -126,8 +180,8 @@ def inner_nodes(surface: Surface, x: Array, order: int, law: PairEnergy, rtol: f
         scale, far = found.gap / size, reach / size
         below, above = np.minimum(at - ends[0], far), np.minimum(ends[1] - at, far)
         grain = surface.shape.grain / size / scale
-        edges = piece_edges(-np.arcsinh(below / scale), np.arcsinh(above / scale), grain)
-        t, w = gauss(edges, order)
+        edges = piece_edges(-np.arcsinh(below / scale), np.arcsinh(above / scale), grain, level)
+        t, w = gauss(edges, ORDERS[min(level, LAST)])
         axes.append((at[:, None] + scale[:, None] * np.sinh(t), w * scale[:, None] * np.cosh(t)))
     (u, du), (v, dv) = axes
     u, v = np.broadcast_arrays(u[:, :, None], v[:, None, :])
@@ -136,23 +190,24 @@ def inner_nodes(surface: Surface, x: Array, order: int, law: PairEnergy, rtol: f
     return Grid(x, points, np.sqrt(E * G - F**2) * (du[:, :, None] * dv[:, None, :]).reshape(len(x), -1))
 
 
-def _around(surface: Surface, near: Projection, reach: Array, order: int, cutoff: float) -> Circles:
-    """Circles around the feet on a plane, a sphere or a cavity, up to where a law ends."""
-    shape, gap = surface.shape, near.gap
+def _around(surface: Surface, gap: Array, reach: Array, level: int, cutoff: float) -> Circles:
+    """Circles around the feet on a plane, a sphere or a cavity of points at gaps (n,), up to where a law ends."""
+    shape = surface.shape
     bent = 0.0 if isinstance(shape, Plane) else getattr(shape, "bulge") / getattr(shape, "R")  # noqa: B009
     end = np.minimum(reach, math.pi / abs(bent)) if bent else reach
     if math.isfinite(cutoff):
         # The circle at which the distance is the cut-off, from the law of cosines.
         chord = np.maximum(cutoff**2 - gap**2, 0.0) / (1 + bent * gap)
         end = 2 / abs(bent) * np.arcsin(np.minimum(np.sqrt(chord) * abs(bent) / 2, 1)) if bent else np.sqrt(chord)
-    t, w = gauss(piece_edges(np.zeros_like(gap), np.arcsinh(end / gap)), order)
+    edges = piece_edges(np.zeros_like(gap), np.arcsinh(end / gap), level=level)
+    t, w = gauss(edges, ORDERS[min(level, LAST)])
     s = gap[:, None] * np.sinh(t)
     ds = w * np.hypot(gap[:, None], s)
     chord = 2 * np.sin(bent * s / 2) / bent if bent else s
     out = np.sin(bent * s) / bent if bent else s
     # The law of cosines for a chord, which does not cancel next to the foot.
     r = np.sqrt(gap[:, None] ** 2 + (1 + bent * gap[:, None]) * chord**2)
-    return Circles(near.point, near.normal, gap, r, bent * chord**2 / 2, 2 * math.pi * np.abs(out) * ds)
+    return Circles(gap, r, bent * chord**2 / 2, 2 * math.pi * np.abs(out) * ds)
 
 
 def alike_around(outer: Surface, inner: Surface) -> bool:

@@ -19,7 +19,7 @@ import numpy as np
 
 from surfacechem.contracts.terms import PairEnergy
 from surfacechem.errors import InputError
-from surfacechem.surfaces.nodes import inner_nodes, is_round
+from surfacechem.surfaces.nodes import inner_sums, is_round
 from surfacechem.surfaces.patches import integral, outer_patches
 from surfacechem.surfaces.projection import Array, Surface
 from surfacechem.surfaces.shapes import Plane
@@ -91,8 +91,8 @@ def interaction(lower: Surface, upper: Surface, laws: Sequence[PairEnergy], rtol
         raise InputError(f"{text}.")
     amounts = np.array([law.n_1 * law.n_2 for law in laws])[:, None]
 
-    def integrand(x: Array, order: int) -> tuple[Array, int]:
-        found, pairs = _sums(x, inner, kernels, slowest, order, rtol)
+    def integrand(x: Array, level: int) -> tuple[Array, int]:
+        found, pairs = _sums(x, inner, kernels, slowest, level, rtol)
         return found * amounts, pairs
 
     found, error, pairs = integral(patches, integrand, lambda found: _sizes(found, gap), rtol)
@@ -146,16 +146,16 @@ def length(lower: Surface, upper: Surface) -> float:
 
 
 def _sums(
-    x: Array, inner: Surface, kernels: Sequence[Callable[[Array], Array]], law: PairEnergy, order: int, rtol: float
+    x: Array, inner: Surface, kernels: Sequence[Callable[[Array], Array]], law: PairEnergy, level: int, rtol: float
 ) -> tuple[Array, int]:
     """Integrals (n, laws, 13) over the inner surface for points (n, 3), and the number of pairs."""
-    nodes, found = inner_nodes(inner, x, order, law, rtol), np.empty((len(x), len(kernels), COUNT))
-    for j, one in enumerate(kernels):
-        energy, push, theirs = nodes.sums(one)
+    sums, pairs = inner_sums(inner, x, kernels, level, law, rtol)
+    found = np.empty((len(x), len(kernels), COUNT))
+    for j, (energy, push, theirs) in enumerate(sums):
         found[:, j, 0], found[:, j, 1:4], found[:, j, 4:7] = energy, push, -push
         # The moment of -strength * away at the other end is x2 x away = x2 x x1, the same for all but the arm.
         found[:, j, 7:10], found[:, j, 10:13] = np.cross(x, push), np.cross(x, theirs)
-    return found, nodes.area.size
+    return found, pairs
 
 
 def _sizes(found: Array, gap: float) -> Array:

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from itertools import pairwise
 from typing import Any, ClassVar, Self
 
@@ -21,15 +21,9 @@ from numpy.typing import NDArray
 
 from surfacechem.errors import InputError
 from surfacechem.surfaces.nearest_places import NearPlaces, near_places
-from surfacechem.surfaces.nodes import alike_along, alike_around, gauss, is_round, piece_edges
+from surfacechem.surfaces.nodes import LAST, ORDERS, alike_along, alike_around, gauss, is_round, piece_edges
 from surfacechem.surfaces.projection import FIRST, POLE, Array, Surface
 from surfacechem.surfaces.shapes import Disc, Plane
-
-ORDERS = (4, 6, 9, 13, 18, 25)
-"""Points of Gauss's rule on each patch, more and more of them until two in a row agree."""
-
-LAST = len(ORDERS) - 1
-"""Level of the last of the orders."""
 
 STUCK, ENOUGH = 4.0, 2
 """A rule of a level above enough gains as much at least, or the patch is divided."""
@@ -47,7 +41,7 @@ Levels = NDArray[np.int_]
 """Which of the orders each patch has."""
 
 Integrand = Callable[[Array, int], tuple[Array, int]]
-"""Values (n, ...) per area at points (n, 3), with rules of an order inside, and how many points these took."""
+"""Values (n, ...) per area at points (n, 3), with rules of a level inside, and how many points these took."""
 
 
 @dataclass(frozen=True)
@@ -212,7 +206,7 @@ class Rules:
         ranks = np.stack([levels, inside, patches.kinds], axis=1)
         for rank in np.unique(ranks, axis=0):
             where = np.flatnonzero((ranks == rank).all(axis=1))
-            values = self._of_order(patches[where], ORDERS[rank[0]], ORDERS[rank[1]])
+            values = self._of_order(patches[where], ORDERS[rank[0]], int(rank[1]))
             found |= dict(zip(where.tolist(), values, strict=True))
         return np.array([found[k] for k in range(len(levels))])
 
@@ -234,51 +228,83 @@ class Rules:
         return np.concatenate(found)
 
 
+@dataclass(frozen=True)
+class Known:
+    """What is known of some patches: levels of the rules over and inside each, values (n, ...), by how much these
+    change from the rule before over it and inside it, and whether a higher order gained little.
+    """
+
+    patches: Patches
+    level: Levels
+    inside: Levels
+    value: Array
+    over: Array
+    within: Array
+    stuck: NDArray[np.bool_]
+
+    def but(self, gone: NDArray[np.bool_], others: Known) -> Known:
+        """These without some, and others."""
+        kept = {
+            item.name: np.concatenate([getattr(self, item.name)[~gone], getattr(others, item.name)])
+            for item in fields(self)[1:]
+        }
+        return Known(self.patches[~gone].joined(others.patches), **kept)
+
+
 def integral(
-    patches: Patches, integrand: Integrand, sizes: Callable[[Array], Array], rtol: float
+    patches: Patches, integrand: Integrand, sizes: Callable[[Array], Array], rtol: float, nested: bool = True
 ) -> tuple[Array, float, int]:
     """Integral over patches, its error relative to the ``sizes`` of the entries, and how many points it took.
 
-    InputError where the accuracy is out of reach.
+    A ``nested`` integrand is a sum itself, with an error of its own. InputError where the accuracy is out of reach.
     """
-    rules, level = Rules(integrand, rtol), np.ones(len(patches), dtype=int)
-    inside, stuck = level.copy(), np.zeros(len(patches), dtype=bool)
-    value = rules(patches, level, inside)
-    change = value - rules(patches, level - 1, inside - 1)
+    rules, one = Rules(integrand, rtol), np.ones(len(patches), dtype=int)
+    known = _started(rules, patches, one, one, nested)
     while True:
-        whole = value.sum(axis=0)
+        whole = known.value.sum(axis=0)
         size = sizes(whole)
-        share = _largest(change, size)
-        error = float(share.sum())
+        over, within = _largest(known.over, size), _largest(known.within, size)
+        error = float((over + within).sum())
         if error <= rtol:
             return whole, error, rules.points
-        rank = np.argsort(share)
-        worst = np.zeros(len(patches), dtype=bool)
-        worst[rank[~(np.cumsum(share[rank]) <= rtol / 2)]] = True
-        # What is inside has an error of its own, which rules of the last order alone would not show.
-        halved = worst & (stuck | (level == LAST) | (inside == LAST))
-        raised = worst & ~halved
-        if raised.any():
-            level[raised] += 1
-            inside[raised] += 1
-            finer = rules(patches[raised], level[raised], inside[raised])
-            change[raised] = finer - value[raised]
-            stuck[raised] = (level[raised] > ENOUGH) & (_largest(change[raised], size) * STUCK > share[raised])
-            value[raised] = finer
+        rank = np.argsort(over + within)
+        worst = np.zeros(len(over), dtype=bool)
+        worst[rank[~(np.cumsum((over + within)[rank]) <= rtol / 2)]] = True
+        deeper = worst & (within > over)
+        halved = worst & ~deeper & (known.stuck | (known.level == LAST))
+        raised = worst & ~deeper & ~halved
+        for mask, steps in ((deeper, (0, 1)), (raised, (1, 0))):
+            if mask.any():
+                _raise(rules, known, mask, steps)
+        known.stuck[raised] = (known.level[raised] > ENOUGH) & (
+            _largest(known.over[raised], size) * STUCK > over[raised]
+        )
         if halved.any():
-            halves = patches[halved].halved()
-            # A rule on half of a patch is as good as one of higher order, but for what is inside.
+            halves = known.patches[halved].halved()
+            # A rule on half of a patch is as good as one of higher order.
             times = len(halves) // int(halved.sum())
-            start = np.tile(np.maximum(level[halved] - 1, 1), times)
-            deep = np.tile(np.minimum(inside[halved] + 1, LAST), times)
-            theirs = rules(halves, start, deep)
-            changes = theirs - rules(halves, start - 1, deep - 1)
-            patches = patches[~halved].joined(halves)
-            value, change = np.concatenate([value[~halved], theirs]), np.concatenate([change[~halved], changes])
-            level, inside = np.append(level[~halved], start), np.append(inside[~halved], deep)
-            stuck = np.append(stuck[~halved], np.zeros(len(start), dtype=bool))
+            start, inside = np.maximum(known.level[halved] - 1, 1), known.inside[halved]
+            known = known.but(halved, _started(rules, halves, np.tile(start, times), np.tile(inside, times), nested))
+
+
+def _started(rules: Rules, patches: Patches, level: Levels, inside: Levels, nested: bool) -> Known:
+    """What rules of some levels, and those before, say of patches."""
+    value = rules(patches, level, inside)
+    over = value - rules(patches, level - 1, inside)
+    within = value - rules(patches, level, inside - 1) if nested else np.zeros_like(value)
+    return Known(patches, level.copy(), inside.copy(), value, over, within, np.zeros(len(level), dtype=bool))
+
+
+def _raise(rules: Rules, known: Known, mask: NDArray[np.bool_], steps: tuple[int, int]) -> None:
+    """Rules of a higher level over, or inside, some patches."""
+    known.level[mask] += steps[0]
+    known.inside[mask] += steps[1]
+    finer = rules(known.patches[mask], known.level[mask], known.inside[mask])
+    (known.over if steps[0] else known.within)[mask] = finer - known.value[mask]
+    known.value[mask] = finer
 
 
 def _largest(change: Array, size: Array) -> Array:
     """Errors (n,) of patches, the largest of all entries."""
-    return np.asarray(np.abs(change / size).reshape(len(change), -1).max(axis=1, initial=0.0))
+    entries = tuple(range(1, change.ndim))
+    return np.asarray(np.abs(change / size).max(axis=entries, initial=0.0))

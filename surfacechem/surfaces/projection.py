@@ -106,11 +106,11 @@ class Surface:
     def derivatives(self, at: Array, count: int = THIRD) -> Array:
         """Points and derivatives (count, ..., 3) at parameters (..., 2)."""
         if self.shape.derivatives is not None:
-            own = self.shape.derivatives(at[..., 0], at[..., 1])
+            own = self.shape.derivatives(at[..., 0], at[..., 1], count)
         else:
             table = _compiled(self.shape, count)(np.ascontiguousarray(at))
             own = np.moveaxis(table.reshape(*at.shape[:-1], count, 3), -2, 0)
-        found: Array = own[:count] @ self.axes.T
+        found: Array = own @ self.axes.T
         found[0, ..., 2] += self.approach
         return found
 

@@ -383,9 +383,9 @@ class Heights(Shape):
         below = np.clip(x[..., :2], *np.transpose(self.span))
         return below, grid[KDTree(grid).query(x)[1]][..., :2]
 
-    def derivatives(self, u: Array, v: Array) -> Array:
+    def derivatives(self, u: Array, v: Array, count: int) -> Array:
         """Those of the spline."""
-        orders = [(i - j, j) for i in range(4) for j in range(i + 1)]
+        orders = [(i - j, j) for i in range(4) for j in range(i + 1)][:count]
         found = np.zeros((len(orders), *np.shape(u), 3))
         found[0, ..., 0], found[0, ..., 1], found[1, ..., 0], found[2, ..., 1] = u, v, 1.0, 1.0
         for k, (i, j) in enumerate(orders):
