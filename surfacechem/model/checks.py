@@ -39,8 +39,7 @@ def conductance_warnings(system: System) -> Iterator[str]:
         borne = (symengine.sympify(h).subs(point) for h in channels if depends(h, P) and not depends(h, G))
         if any(_value(h, P, 0.0) for h in borne):
             yield f"{ends} has a part that reads p and does not vanish without pressure, nor with the gap."
-        # Over curved bodies it is known over a range of approaches, and rises as one presses on the other.
-        if not held_open and not system.whole:
+        if not held_open:
             yield from _at_touch(ends, symengine.Add(*across))
 
 

@@ -126,7 +126,7 @@ def over_gap(
     patches = with_levels(patches, upper, levels, NOISE * size)
 
     def integrand(x: Array, level: int) -> tuple[Array, int]:
-        return counts_at(x, upper.nearest(x), laws, heat), len(x)
+        return counts_at(x, upper.nearest(x), laws, heat), len(x) * upper.search
 
     def sizes(found: Array) -> Array:
         force, moment = (float(np.linalg.norm(found[k])) for k in (slice(1, 4), slice(7, 10)))

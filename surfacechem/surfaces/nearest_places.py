@@ -7,21 +7,21 @@ Newton's method leads to the least gap.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from surfacechem.errors import InputError
-from surfacechem.surfaces.projection import FIRST, POLE, Array, Surface, descended, newton_step
+from surfacechem.surfaces.projection import FIRST, POLE, Array, Indices, Surface, descended, newton_step
 from surfacechem.tolerances import CBRT_EPS, NOISE, SAME, SQRT_EPS
 
 COARSE, PER_GRAIN = 32, 4
 """Steps along a surface between places that are looked at, at least, and per grain."""
 
-MOST_PLACES = 2_000_000
-"""Places that are looked at, at most."""
+MOST_PLACES = 5_000_000
+"""Places of the finest grid, at most."""
 
 TOGETHER = 100_000
 """Places that are looked at together."""
@@ -52,19 +52,49 @@ def near_places(
     """
     low, high = np.nan_to_num(np.transpose(outer.shape.span), posinf=size, neginf=-size)
     extents = _extents(outer, low, high)
-    counts = _counts(outer, extents, alike, grain)
-    ends = zip(low, high, counts, strict=True)
-    axes = [np.linspace(a, b, n) if n > 1 else np.array([(a + b) / 2]) for a, b, n in ends]
-    grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-    if outer.shape.about_axis and low[0] == 0:
-        grid = np.maximum(grid, [POLE, -np.inf])
-    gaps = _gaps(outer, inner, grid.reshape(-1, 2)).reshape(grid.shape[:2])
-    chosen = _lowest(gaps, outer.shape.closed, NOISE * size)
     wide = min(grain, extents.max() / COARSE * PER_GRAIN)
-    chosen = chosen[gaps.ravel()[chosen] <= gaps.min() + wide]
-    steps = np.where(alike, 0.0, (high - low) / np.maximum(np.subtract(counts, 1), 1))
-    at = _settled(outer, inner, grid.reshape(-1, 2)[chosen], steps, extents.max(), NOISE * size)
+    halvings = max(0, math.ceil(math.log2(PER_GRAIN * extents.max() / grain / COARSE))) if grain < math.inf else 0
+    steps = np.where(alike, 1, COARSE * 2**halvings)
+    if math.prod(int(n) for n in steps) > MOST_PLACES:
+        text = f"the {outer.shape.name()} has details of {grain:.3g} m on {extents[0]:.3g} by {extents[1]:.3g} m"
+        raise InputError(f"{text}, too many to look at: give it a smaller extent, or fewer and coarser details.")
+
+    def parameters(nodes: Indices) -> Array:
+        at = low + (high - low) * np.where(alike, 0.5, nodes / steps)
+        return np.asarray(np.maximum(at, [POLE, -np.inf]) if outer.shape.about_axis and low[0] == 0 else at)
+
+    gaps = _near_grid(lambda nodes: _gaps(outer, inner, parameters(nodes)), steps, halvings, extents, wide)
+    chosen = _lowest(gaps, outer.shape.closed, NOISE * size)
+    chosen = chosen[gaps[tuple(chosen.T)] <= gaps.min() + wide]
+    at = _settled(
+        outer, inner, parameters(chosen), np.where(alike, 0.0, (high - low) / steps), extents.max(), NOISE * size
+    )
     return _distinct(outer, at, _gaps(outer, inner, at), SQRT_EPS * extents.max())
+
+
+def _near_grid(gap: Callable[[Indices], Array], steps: Indices, halvings: int, extents: Array, wide: float) -> Array:
+    """Gaps on a grid of so many steps, infinite where they cannot be within a width of the least.
+
+    From one place to another a gap changes by no more than their distance, so that the grid is made finer only where a
+    place between those of a coarser one may be near.
+    """
+    found = np.full(steps + 1, np.inf)
+    stride = 2**halvings
+    axes = [np.arange(0, n + 1, stride) if n > 1 else np.zeros(1, dtype=int) for n in steps]
+    new = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
+    while True:
+        found[tuple(new.T)] = gap(new)
+        if stride == 1:
+            return found
+        reach = float(np.linalg.norm(extents * stride / np.maximum(steps, stride)))
+        near = np.argwhere(found <= found.min() + wide + reach)
+        stride //= 2
+        around = np.stack(
+            np.meshgrid(*[(-stride, 0, stride) if n > 1 else (0,) for n in steps], indexing="ij"), axis=-1
+        )
+        new = np.unique((near[:, None] + around.reshape(-1, 2)).reshape(-1, 2), axis=0)
+        new = new[np.all((new >= 0) & (new <= steps), axis=1)]
+        new = new[np.isinf(found[tuple(new.T)])]
 
 
 def _extents(outer: Surface, low: Array, high: Array) -> Array:
@@ -74,31 +104,22 @@ def _extents(outer: Surface, low: Array, high: Array) -> Array:
     return np.asarray(np.linalg.norm(tangents, axis=-1).max(axis=(1, 2)) * (high - low))
 
 
-def _counts(outer: Surface, extents: Array, alike: tuple[bool, bool], grain: float) -> list[int]:
-    """Numbers of places along both parameters."""
-    fine = [max(COARSE, math.ceil(PER_GRAIN * extent / grain)) for extent in extents]
-    counts = [1 if same else steps + 1 for same, steps in zip(alike, fine, strict=True)]
-    if math.prod(counts) > MOST_PLACES:
-        text = f"the {outer.shape.name()} has details of {grain:.3g} m on {extents[0]:.3g} by {extents[1]:.3g} m"
-        raise InputError(f"{text}, too many to look at: give it a smaller extent, or fewer and coarser details.")
-    return counts
-
-
 def _gaps(outer: Surface, inner: Surface, at: Array) -> Array:
     """Gaps at parameters (n, 2)."""
     parts = np.array_split(at, math.ceil(len(at) / TOGETHER))
     return np.concatenate([inner.nearest(outer.derivatives(part, FIRST)[0]).gap for part in parts])
 
 
-def _lowest(gaps: Array, closed: tuple[bool, bool], noise: float) -> NDArray[np.int_]:
-    """Indices of places of a grid that no neighbour is nearer than; one of those that are alike and side by side."""
+def _lowest(gaps: Array, closed: tuple[bool, bool], noise: float) -> Indices:
+    """Indices (n, 2) of places of a grid that no neighbour is nearer than; one of those alike and side by side."""
     from scipy.ndimage import label, minimum_filter, minimum_position
 
     modes: Any = ["wrap" if comes_round else "nearest" for comes_round in closed]
     least = gaps <= minimum_filter(gaps, 3, mode=modes) + noise
+    least &= np.isfinite(gaps)
     labels, count = label(least, np.ones((3, 3)))
     found = minimum_position(gaps, labels, range(1, count + 1))
-    return np.asarray(np.ravel_multi_index(np.transpose(found), gaps.shape))
+    return np.array(found, dtype=int)
 
 
 def _settled(outer: Surface, inner: Surface, at: Array, steps: Array, long: float, noise: float) -> Array:
@@ -117,7 +138,7 @@ def _settled(outer: Surface, inner: Surface, at: Array, steps: Array, long: floa
         along[beyond] = ((x - found.point) / found.gap[:, None])[beyond]
         return np.einsum("nc,knc->nk", along, tangents), tangents
 
-    def step(at: Array) -> Array:
+    def step(at: Array, _: Indices) -> Array:
         first, tangents = slope(at)
         small = CBRT_EPS * steps
         (uu, uv), (vu, vv) = (
@@ -131,7 +152,7 @@ def _settled(outer: Surface, inner: Surface, at: Array, steps: Array, long: floa
         hessian = long * uu, long * (uv + vu) / 2, long * vv
         return np.clip(newton_step(long * first, hessian, (E, F, G), at <= low, at >= high), -steps, steps)
 
-    return descended(at, low, high, lambda at: _gaps(outer, inner, at), step, noise)
+    return descended(at, low, high, lambda at, _: _gaps(outer, inner, at), step, noise)
 
 
 def _distinct(outer: Surface, at: Array, gap: Array, near: float) -> NearPlaces:

@@ -131,7 +131,7 @@ def inner_sums(
     farther = (rtol / 10) ** (-1 / (law.decay - 2))
     if not is_round(surface):
         nodes = _inner_grid(surface, x, near, np.minimum(near.gap * farther, law.cutoff), level)
-        return [nodes.sums(one) for one in kernels], nodes.area.size
+        return [nodes.sums(one) for one in kernels], nodes.area.size + surface.search * len(x)
     pairs = len(x)
 
     def profiles(gaps: Array) -> Array:

@@ -28,7 +28,7 @@ from surfacechem.surfaces.shapes import Disc, Plane
 STUCK, ENOUGH = 4.0, 2
 """A rule of a level above enough gains as much at least, or the patch is divided."""
 
-MOST_POINTS = 300_000_000
+MOST_POINTS = 100_000_000
 """Pairs of points after which an accuracy is out of reach."""
 
 TOGETHER = 400_000

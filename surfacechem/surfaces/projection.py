@@ -26,6 +26,14 @@ Array = NDArray[np.float64]
 NEWTONS = 100
 """Steps after which a search ends; some ten are the rule."""
 
+HALVINGS = 40
+"""Times that a step is halved at most."""
+
+SEARCH = 500
+"""Pairs of points that take as long as a projection without a closed form."""
+
+Indices = NDArray[np.int_]
+
 POLE = GONE
 """Parameter at the pole of a surface of revolution, where directions along it have no length."""
 
@@ -114,6 +122,11 @@ class Surface:
         found[0, ..., 2] += self.approach
         return found
 
+    @property
+    def search(self) -> int:
+        """Points that cost about as much as a projection."""
+        return 1 if self.shape.foot is not None else SEARCH
+
     def elements(self, at: Array) -> tuple[Array, Array]:
         """Points (..., 3) and vectors of the area per parameters (..., 3), which point out of the body."""
         x, x_u, x_v = self.derivatives(at, FIRST)
@@ -166,18 +179,20 @@ class Surface:
         # What comes round has no edge that a step could leave.
         low = np.where(self.shape.closed, -np.inf, low) + (POLE if self.shape.about_axis else 0.0)
         high = np.where(self.shape.closed, np.inf, high)
+        places = x.reshape(-1, 3)
 
-        def value(at: Array) -> Array:
-            return np.asarray(np.linalg.norm(x - self.derivatives(at, FIRST)[0], axis=-1))
+        def value(at: Array, which: Indices) -> Array:
+            return np.asarray(np.linalg.norm(places[which] - self.derivatives(at, FIRST)[0], axis=-1))
 
-        def step(at: Array) -> Array:
+        def step(at: Array, which: Indices) -> Array:
             D = self.derivatives(at, SECOND)
-            move = _step(D, x - D[0], at <= low, at >= high)
+            move = _step(D, places[which] - D[0], at <= low, at >= high)
             if self.shape.about_axis:
                 move[..., 1] = 0.0  # the angle about the axis is that of the start
             return move
 
-        return descended(np.clip(start, low, high), low, high, value, step)
+        found = descended(np.clip(start, low, high).reshape(-1, 2), low, high, value, step)
+        return found.reshape(start.shape)
 
     def curvature(self, at: Array, rate: Array | None = None) -> Curvature:
         """Curvature at parameters (..., 2), and its rate where they move at a rate."""
@@ -250,28 +265,33 @@ def descended(
     at: Array,
     low: Array,
     high: Array,
-    value: Callable[[Array], Array],
-    step: Callable[[Array], Array],
+    value: Callable[[Array, Indices], Array],
+    step: Callable[[Array, Indices], Array],
     noise: float = 0.0,
 ) -> Array:
-    """Parameters (..., 2) between bounds at which a value is least, from steps that are halved where they do not lower
-    it by more than its ``noise``.
+    """Parameters (n, 2) between bounds at which values are least, from steps that are halved where they do not lower
+    them by more than their ``noise``; values and steps are asked for where the search has not ended.
     """
+    found, which = at.copy(), np.arange(len(at))
     for _ in range(NEWTONS):
-        now, move, length = value(at), step(at), np.ones(at.shape[:-1])
+        here = found[which]
+        now, move, length = value(here, which), step(here, which), np.ones(len(which))
         # Close to the end values agree to rounding, while steps still get shorter.
         most = now + np.maximum(noise, DIGITS * np.abs(now))
-        for _ in range(40):
-            tried = np.clip(at + length[..., None] * move, low, high)
-            worse = value(tried) > most
+        tried = np.clip(here + move, low, high)
+        worse = value(tried, which) > most
+        for _ in range(HALVINGS):
             if not worse.any():
                 break
-            length = np.where(worse, length / 2, length)
-        moved = np.where(worse[..., None], 0.0, tried - at)
-        at = at + moved
-        if np.all(np.abs(moved) <= ULPS * np.abs(at)):
+            length[worse] /= 2
+            tried[worse] = np.clip(here + length[:, None] * move, low, high)[worse]
+            worse[worse] = value(tried[worse], which[worse]) > most[worse]
+        found[which] = np.where(worse[:, None], here, tried)
+        moving = np.any(np.abs(found[which] - here) > ULPS * np.abs(here), axis=1)
+        which = which[moving]
+        if len(which) == 0:
             break
-    return np.asarray(at)
+    return found
 
 
 def _step(D: Array, away: Array, lowest: Any, highest: Any) -> Array:
