@@ -44,7 +44,7 @@ def figure(
     InputError
         Where a file is no dataset of surfacechem, or has no variable of a name.
     """
-    from surfacechem.plots import comparison, run, study, style, sweep
+    from surfacechem.plots import comparison, pointwise, run, study, style, sweep
 
     if isinstance(variables, str):
         raise InputError(f"variables are a list of names, not '{variables}'; a figure is written by its savefig.")
@@ -55,6 +55,8 @@ def figure(
     if len(datasets) > 1:
         return comparison.figure(datasets, variables, against)
     (dataset,) = datasets
+    if "time" not in dataset and "point" in dataset.dims:
+        return pointwise.figure(dataset, variables, against)
     if "study" in dataset.attrs:
         if variables or against:
             raise InputError("the figure of a study has no choice of variables.")

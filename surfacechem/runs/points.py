@@ -307,11 +307,13 @@ def _numbers(name: str, value: ArrayLike, unit: str) -> Array:
     """Values of a column in SI; a text is a quantity with its unit."""
     if isinstance(value, str):
         return np.array([parse(value, unit, name=name)])
+    if isinstance(value, list | tuple) and any(isinstance(x, str) for x in value):
+        return np.array([parse(x, unit, name=name) for x in value])
     try:
         found = np.atleast_1d(np.asarray(value, dtype=float))
     except (TypeError, ValueError):
-        raise InputError(f"{name} takes numbers in SI, or one text with a unit.") from None
-    if found.ndim != 1 or not np.all(np.isfinite(found)):
+        raise InputError(f"{name} takes numbers in SI, or texts with a unit.") from None
+    if found.ndim != 1 or not len(found) or not np.all(np.isfinite(found)):
         raise InputError(f"{name} takes a list of finite numbers in {unit}.")
     return found
 
@@ -332,7 +334,9 @@ def _by(x: Quantity, shown: Sequence[Quantity], slopes: Array, there: NDArray[np
     for quantity, values, depends in zip(shown, slopes, there, strict=True):
         if depends or quantity.unit in FLUXES:
             name = "_by_".join(DATASET_NAMES.get(name, name) for name in (quantity.name, x.name))
-            text = f"derivative of the {quantity.long_name} by the {x.long_name}"
+            # What else the names say is theirs.
+            top, bottom = (re.split("[:,(]", q.long_name)[0].strip() for q in (quantity, x))
+            text = f"derivative of the {top} by the {bottom}"
             yield Column(name, POINT, values, quotient(quantity.unit, x.unit), text)
 
 

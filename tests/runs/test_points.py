@@ -146,7 +146,9 @@ def test_points_come_from_a_table_with_units(element, tmp_path):
         ({"g_m": 1.0}, "points cannot give 'g_m'. Did you mean 'g_n'?"),
         ({"g_n": "1 K"}, "1 K is a temperature; g_n needs a length"),
         ({"g_n": [1.0, np.nan]}, "g_n takes a list of finite numbers in m."),
-        ({"g_n": ["a"]}, "g_n takes numbers in SI, or one text with a unit."),
+        ({"g_n": ["a"]}, "'a' is not a number with a unit; g_n needs a length"),
+        ({"g_n": [{}]}, "g_n takes numbers in SI, or texts with a unit."),
+        ({"g_n": []}, "g_n takes a list of finite numbers in m."),
         ({"g_n": [1e-9, 2e-9], "v": [1.0, 2.0, 3.0]}, "there are 2 of g_n, 3 of v."),
     ],
 )

@@ -76,7 +76,7 @@ def _with_member(build: Build, thermal: Thermal, variable: str, temperature: str
         if load is None:
             node = Node(name, symbol, symengine.Symbol(f"d{name}_dt"))
         else:
-            build.prescribe(VARIABLES.get(name, Quantity(name, "K", f"temperature of node {name}", name)), load)
+            build.prescribe(VARIABLES.get(name, Quantity(name, "K", f"temperature {name}", name)), load)
             node = Node(name, symbol, build.slope_of(name), prescribed=True)
     role = "prescribed" if node.prescribed else ("temperature node" if name == variable else "merged")
     build.variables.define(variable, partial(symengine.Symbol, name), role, f"{member}: {name}")
