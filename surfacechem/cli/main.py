@@ -35,7 +35,7 @@ from surfacechem.cli.commands import (
     solved,
     written_to,
 )
-from surfacechem.cli.terminal import show
+from surfacechem.cli.terminal import show, show_page
 from surfacechem.errors import InputError, Place, suggestion
 
 if TYPE_CHECKING:
@@ -237,12 +237,14 @@ def evaluate(
 @app.command()
 def equations(
     case: CaseName,
-    form: Annotated[str, Option("--format", help="python, which runs, or latex.")] = "python",
+    form: Annotated[
+        str, Option("--format", help="python, which runs; latex, the same; text, to read: without guards, by mode.")
+    ] = "python",
     changes: Changes = None,
 ) -> None:
-    """Print the equations of a case, as Python that runs or as LaTeX."""
-    if form not in ("python", "latex"):
-        raise InputError(f"no format '{form}'.{suggestion(form, ('python', 'latex'))}", Place(path="--format"))
+    """Print the equations of a case, as Python that runs, as LaTeX, or as text."""
+    if form not in ("python", "latex", "text"):
+        raise InputError(f"no format '{form}'.{suggestion(form, ('python', 'latex', 'text'))}", Place(path="--format"))
     from surfacechem import format as cases
     from surfacechem.compile import printing
     from surfacechem.results import spatial
@@ -252,7 +254,12 @@ def equations(
     # Thousands of equations of cells read alike.
     if spatial.divided(read.scene):
         read, title = replace(read, scene=spatial.few(read.scene)), f"{title}, written out for {spatial.FEW} cells"
-    typer.echo(getattr(printing, form)(read.system(), title), nl=False)
+    if form == "text":
+        from surfacechem.studies.run_report import equation_sheet
+
+        show(equation_sheet(read.system(), title))
+    else:
+        typer.echo(getattr(printing, form)(read.system(), title), nl=False)
 
 
 @app.command(epilog=EXIT_CODES)
@@ -580,7 +587,7 @@ def _conduct(run: Callable[[], Study], target: Path, talk: bool | None) -> None:
     study = solved(run, talk)
     study.write(target)
     if talk is not False:
-        typer.echo(study.page.text())
+        show_page(study.page)
         typer.echo(f"\nwritten to {', '.join(map(str, files))}")
     leave_with(study.status)
 

@@ -20,12 +20,16 @@ if TYPE_CHECKING:
     from rich.text import Text
 
     from surfacechem.runs.sheet import Sheet
+    from surfacechem.studies.report import Page, PageTable
 
 PATIENCE = 2.0
 """Seconds after which a bar tells how far a command is."""
 
 COLOURS = {"finished": "green", "stopped": "yellow", "failed": "red", "warning": "yellow", "refused": "yellow"}
 """Of labels; others are cyan."""
+
+NAME = 40
+"""Letters from which on the first cell of a row is no name, and may be broken."""
 
 ALARM = "ENTROPY DESTROYED"
 
@@ -49,6 +53,37 @@ def show(*sheets: Sheet) -> None:
         console.print(*([""] if number else []), *_rendered(sheet), sep="\n")
 
 
+def show_page(page: Page) -> None:
+    """Print a report: on a terminal its tables in columns that fit it, with what failed in red."""
+    if not is_terminal(sys.stdout):
+        typer.echo(page.text())
+        return
+    from rich.console import Console
+    from rich.text import Text
+
+    console = Console(highlight=False)
+    console.print(Text(page.title, style="bold"))
+    for section in page.sections:
+        console.print("", Text(section.title, style="bold cyan"), *map(Text, section.paragraphs), sep="\n")
+        if not section.details:
+            console.print(*map(_table, section.tables), sep="\n")
+    if page.omissions:
+        console.print("", Text("Left out", style="bold yellow"), *map(Text, page.omissions), sep="\n")
+
+
+def _table(table: PageTable) -> RenderableType:
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+    from rich.text import Text
+
+    shown = Table(title=table.caption or None, title_justify="left", title_style="dim", box=SIMPLE_HEAD, pad_edge=False)
+    for name in table.heading:
+        shown.add_column(Text(name), overflow="fold")
+    for number, row in enumerate(table.rows):
+        shown.add_row(*map(Text, row), style="red" if number in table.marked else "")
+    return shown
+
+
 def _rendered(sheet: Sheet) -> Iterator[RenderableType]:
     """A sheet for rich: texts are wrapped beside their labels."""
     from rich.text import Text
@@ -65,7 +100,7 @@ def _rendered(sheet: Sheet) -> Iterator[RenderableType]:
         if heading and rows:
             yield Text(heading, style="bold")
         if rows:
-            cells = ((Text(row[0], style="cyan", no_wrap=True), *map(Text, row[1:])) for row in rows)
+            cells = ((Text(row[0], style="cyan", no_wrap=len(row[0]) < NAME), *map(Text, row[1:])) for row in rows)
             yield _grid(cells, indent=2 if heading or sheet.title else 0)
 
 

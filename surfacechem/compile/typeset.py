@@ -331,5 +331,9 @@ class Paper(Latex):
         plain = rf"e^{{{inside}}}" if r"\frac" not in inside else rf"\exp\left({inside}\right)"
         return plain if exp is None else rf"\left({plain}\right)^{{{exp}}}"
 
+    def _print_log(self, expression: Any, exp: Any = None) -> str:
+        plain = rf"\ln\left({self._print(expression.args[0])}\right)"
+        return plain if exp is None else rf"\left({plain}\right)^{{{exp}}}"
+
     def _print_sign(self, expression: Any, exp: Any = None) -> str:
         return rf"\operatorname{{sgn}}\left({self._print(expression.args[0])}\right)" + (f"^{{{exp}}}" if exp else "")

@@ -109,8 +109,22 @@ _of_the_case: ContextVar[tuple[type[Law], ...]] = ContextVar("laws of the case t
 def register(law: L) -> L:
     """Make a law known by its name to all cases that are read from now on; a decorator, too.
 
-    Registered again, as a notebook does when a cell is run again, it takes the place of the one before. InputError
-    where the class is no law, or has the name of one of the package.
+    Registered again, as a notebook does when a cell is run again, it takes the place of the one before.
+
+    Parameters
+    ----------
+    law
+        The class.
+
+    Returns
+    -------
+    type
+        The same class.
+
+    Raises
+    ------
+    InputError
+        Where the class is no law, or has the name of one of the package.
     """
     check_own(law)
     _registered[law.name()] = law

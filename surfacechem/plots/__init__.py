@@ -39,6 +39,11 @@ def figure(
     celsius
         Whether temperatures are in degrees Celsius instead of kelvins.
 
+    Returns
+    -------
+    matplotlib.figure.Figure
+        What ``savefig`` writes, and a notebook shows.
+
     Raises
     ------
     InputError

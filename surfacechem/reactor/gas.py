@@ -45,8 +45,9 @@ class Receiver:
 class ReactingGas(Receiver, cantera.ExtensibleIdealGasReactor):
     """Cantera's IdealGasReactor for a gas beside the surface of an interface.
 
-    It takes what an IdealGasReactor takes. ``InterfaceReactor(..., neighbours={name: gas})`` makes it a neighbour, of
-    one interface or of several.
+    ``InterfaceReactor(..., neighbours={name: gas})`` makes it a neighbour, of one interface or of several.
+
+    Its arguments are those of an IdealGasReactor, first the gas, a ``cantera.Solution``.
     """
 
     temperature = 2
@@ -56,7 +57,10 @@ class ReactingGas(Receiver, cantera.ExtensibleIdealGasReactor):
 
 
 class ReactingGasAtPressure(Receiver, cantera.ExtensibleIdealGasConstPressureReactor):
-    """Cantera's IdealGasConstPressureReactor for a gas beside the surface of an interface."""
+    """Cantera's IdealGasConstPressureReactor for a gas beside the surface of an interface.
+
+    Its arguments are those of an IdealGasConstPressureReactor, first the gas, a ``cantera.Solution``.
+    """
 
     temperature = 1
 

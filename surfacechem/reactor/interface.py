@@ -39,11 +39,25 @@ class InterfaceStopped(Exception):  # noqa: N818 - physics ends here, nothing we
 class InterfaceReactor(HeldReactor):
     """An interface between two bodies as a reactor of a Cantera network.
 
-    ``case`` is a case file, the name of a shipped case, a Case or a Simulation; ``overrides`` change it as in
-    ``surfacechem.load``. ``area``, in m^2 or a text with a unit, turns what the scene counts per area into what the
-    network counts. ``bodies`` names reactors that take the place of bodies: {body: reactor}; ``neighbours`` gases
-    beside the surface of its mechanism, by their names there: {phase: ReactingGas}. InputError where the scene does
-    not allow it.
+    Parameters
+    ----------
+    case
+        A case file, the name of a shipped case, a Case or a Simulation.
+    area
+        What turns what the scene counts per area into what the network counts: m^2, or a text with a unit.
+    bodies
+        Reactors that take the place of bodies: {body: reactor}.
+    neighbours
+        Gases beside the surface of its mechanism, by their names there: {phase: ReactingGas}.
+    overrides
+        Changes of the case, as in ``surfacechem.load``.
+    name
+        Its name in the network.
+
+    Raises
+    ------
+    InputError
+        Where the scene does not allow it.
     """
 
     scene: EmbeddedScene
@@ -163,7 +177,23 @@ class InterfaceReactor(HeldReactor):
         return self[own[0]]
 
     def body(self, name: str) -> Any:
-        """A reservoir that has the temperature of a body, or of 'interface'; walls on it give and take its heat."""
+        """A reservoir that has the temperature of a body, or of 'interface'; walls on it give and take its heat.
+
+        Parameters
+        ----------
+        name
+            The body, or 'interface'.
+
+        Returns
+        -------
+        cantera.Reservoir
+            Where walls are put.
+
+        Raises
+        ------
+        InputError
+            Where nothing of that name stores heat, or the network has run.
+        """
         case = self.scene.case
         if name not in self.ports:
             self._refuse_late(f"a wall on {name}")
@@ -180,8 +210,19 @@ class InterfaceReactor(HeldReactor):
     def load(self, name: str, function: Callable[[float], float]) -> None:
         """Let a function of time [s] be a load, in SI units, in place of one that the case prescribes.
 
-        Any load that acts by its present value: ``p``, ``F_n``, ``F_t``, ``f``, ``Q_1`` and the like. Where it jumps,
-        end an ``advance`` there and call ``reinitialize`` on the network. InputError for what is no such load.
+        Where it jumps, end an ``advance`` there and call ``reinitialize`` on the network.
+
+        Parameters
+        ----------
+        name
+            Any load that acts by its present value: ``p``, ``F_n``, ``F_t``, ``f``, ``Q_1`` and the like.
+        function
+            Its value in SI at a time [s].
+
+        Raises
+        ------
+        InputError
+            For what is no such load, or after the network has run.
         """
         self._refuse_late(f"the load {name}")
         loads = {**self.loads, name: function}
@@ -192,8 +233,18 @@ class InterfaceReactor(HeldReactor):
         """Let a reactor press the gap open against another one, ``outside``, and grow as the gap opens.
 
         The load ``F_n`` is the difference of their pressures, and a wall between them moves as the gap does, so that
-        what the gas loses is work on the interface and on what is outside. InputError where the gap has no rate of its
-        own, or where edges of the scene depend on F_n: they would be located at pressures of the past.
+        what the gas loses is work on the interface and on what is outside.
+
+        Parameters
+        ----------
+        gas, outside
+            Reactors on either side; pressures in Pa, the wall between them has the area of the interface.
+
+        Raises
+        ------
+        InputError
+            Where the gap has no rate of its own, or where edges of the scene depend on F_n: they would be located at
+            pressures of the past.
         """
         if "g_n" not in self.scene.states:
             raise InputError("a reactor presses on a gap that has a rate of its own: give it a damper or a mass.")
@@ -379,7 +430,13 @@ class InterfaceReactor(HeldReactor):
         return bool(self.bodies or self.ports or self.loads or self.neighbours)
 
     def record(self, t: float) -> None:
-        """Keep the present state, at time t [s], for the dataset."""
+        """Keep the present state for the dataset; a `ReactorNet` of this package does so after every step.
+
+        Parameters
+        ----------
+        t
+            Time [s].
+        """
         self.t, self._dated = t, True
         self._listen()
         x = self.x

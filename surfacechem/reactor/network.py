@@ -32,6 +32,11 @@ class ReactorNet(cantera.ReactorNet):
 
     ``advance`` and ``step`` end a step at every breakpoint of a prescribed history and at every event of a scene, whose
     jump they carry out, record the interfaces, and raise InterfaceStopped with the reason where a scene ends.
+
+    Parameters
+    ----------
+    reactors
+        Reactors of Cantera and interfaces, in any order.
     """
 
     def __init__(self, reactors: Sequence[Any] = ()) -> None:
@@ -48,7 +53,25 @@ class ReactorNet(cantera.ReactorNet):
         return Watch(self, self.interfaces)
 
     def advance(self, t: float, apply_limit: bool = True) -> float:
-        """Advance to time t [s], or to where a variable has changed by its advance limit; returns the time reached."""
+        """Advance to a time, or to where a variable has changed by its advance limit.
+
+        Parameters
+        ----------
+        t
+            Time [s].
+        apply_limit
+            Whether advance limits count.
+
+        Returns
+        -------
+        float
+            The time reached [s].
+
+        Raises
+        ------
+        InterfaceStopped
+            Where a scene ends, with the reason.
+        """
         while True:
             goal = min([t, *self._breakpoints()])
             with self._guarded():
@@ -117,7 +140,18 @@ class ReactorNet(cantera.ReactorNet):
         self._steps = 0
 
     def step(self) -> float:
-        """Take one step of the integrator, or go to the next breakpoint where a step could pass it."""
+        """Take one step of the integrator, or go to the next breakpoint where a step could pass it.
+
+        Returns
+        -------
+        float
+            The time reached [s].
+
+        Raises
+        ------
+        InterfaceStopped
+            Where a scene ends, with the reason.
+        """
         following = self._breakpoints()
         if self._watch.interfaces:
             return self._watched_step(following)
@@ -139,7 +173,29 @@ class ReactorNet(cantera.ReactorNet):
         atol: float = 0.0,
         return_residuals: bool = False,
     ) -> Array | None:
-        """Step until nothing changes any more, as Cantera's method of this name does, through the events on the way."""
+        """Step until nothing changes any more, as Cantera's method of this name does, through the events on the way.
+
+        Parameters
+        ----------
+        max_steps
+            Groups of ten steps after which the search ends.
+        residual_threshold
+            Relative change in ten steps that counts as none; ten times the tolerance of the network if zero.
+        atol
+            What is added to each variable's largest value, in its own unit; that of the network if zero.
+        return_residuals
+            Whether the changes are returned.
+
+        Returns
+        -------
+        ndarray or None
+            The relative change of each group of steps, where asked for.
+
+        Raises
+        ------
+        cantera.CanteraError
+            Where no steady state was reached.
+        """
         threshold, floor = residual_threshold or 10 * self.rtol, atol or self.atol
         self.step()  # initializes the network, which has no state before
         before = np.asarray(self.get_state())

@@ -161,6 +161,11 @@ class Results(ABC):
         celsius
             Whether temperatures are in degrees Celsius instead of kelvins.
 
+        Returns
+        -------
+        matplotlib.figure.Figure
+            What ``savefig`` writes, and a notebook shows.
+
         Raises
         ------
         InputError

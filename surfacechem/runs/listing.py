@@ -43,7 +43,7 @@ def plain(latex: str) -> str:
     text = re.sub(r"\\q?quad", "\0", re.sub(r"\\(?:left|right)\b|\\[,!; ]|&", " ", latex))
     text = re.sub(r"(?<=\w)(?=\\)", " ", text)
     text = re.sub(r"\\([A-Za-z]+)", lambda m: SIGN.get(m[1], m[0]), text)
-    text = re.sub(rf"\\dot{ONE}", r"d\1\2/dt ", text)
+    text = re.sub(rf"\\dot{ONE}(_\{{(?:[^{{}}]|\{{[^{{}}]*\}})*\}}|_\w)?", r"d\1\2\3/dt ", text)
     text = re.sub(rf"\\bar{ONE}", r"\1\2_mean ", text)
     text = re.sub(rf"\\hat{ONE}", r"\1\2_max ", text)
     text = re.sub(r"\\(?:text|mathrm|operatorname)\s*\{([^{}]*)\}", r"\1", text)
@@ -53,7 +53,8 @@ def plain(latex: str) -> str:
         text = reduced
     text = re.sub(r"\\([a-zA-Z]+)", r"\1", text).replace("\\{", "(").replace("\\}", ")")
     text = re.sub(r"\s+([,)\]⟩])|\s*(\0)\s*", r"\1\2", re.sub(r"\s+", " ", text))
-    return re.sub(r"([(\[/⟨]) ", r"\1", text.replace(" /", "/")).replace("\0", "  ").strip()
+    text = re.sub(r"([(\[/⟨]) ", r"\1", text.replace(" /", "/")).replace("\0", "  ").strip()
+    return re.sub(r"(?<=[=(,] -) (?=\w)|(?<=\(-) (?=\w)", "", re.sub(rf"\b({FUNCTIONS}) \(", r"\1(", text))
 
 
 def _unnested(text: str) -> str:
@@ -120,6 +121,12 @@ def source(law: type[Law]) -> str:
     return ROLE.sub(lambda m: plain(m[1]), text)
 
 
+def _apart(formula: str) -> str:
+    """Formulas in a line, or each in its own where they are too long for one."""
+    several = formula if len(formula) < WIDTH else formula.replace(",  ", ",\n").replace(";  ", ";\n")
+    return textwrap.indent(several, "    ")
+
+
 def law_page(name: str) -> str:
     """Everything about the laws of that name, or of that contract: docstring, parameters and their ranges."""
     if asked := [contract for contract in FAMILIES if contract.contract == name]:
@@ -130,7 +137,7 @@ def law_page(name: str) -> str:
         raise InputError(f"no law '{name}'.{suggestion(name, {law.name() for _, law in every}, LAWS)}")
     pages = []
     for contract, law in found:
-        doc = FORMULA.sub(lambda m: f"    {plain(' '.join(m[1].split()))}\n", f"{inspect.getdoc(law)}\n")
+        doc = FORMULA.sub(lambda m: f"{_apart(plain(' '.join(m[1].split())))}\n", f"{inspect.getdoc(law)}\n")
         text = textwrap.indent(ROLE.sub(lambda m: plain(m[1]), doc).rstrip(), "  ")
         listed = "\n".join(f"  {line}" for line in parameters(law)) or "  none"
         pages.append(f"{name} ({contract.contract})\n\n{text}\n\nParameters\n{listed}")

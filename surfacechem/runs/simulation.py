@@ -155,6 +155,11 @@ class Simulation:
             Output times and tolerances; needed to run it, not to evaluate it.
         title
             Its name in figures and datasets. These hold no case, so that they cannot be run again from themselves.
+
+        Returns
+        -------
+        Simulation
+            Assembled and compiled when first needed; an InputError of the scene comes then.
         """
         times = run and replace(run, times=tuple(map(float, run.times)))  # an array would do as well
         return cls(Case("scene", title, "", "", scene, times, None, None, "", None, {"": Place(title)}, ""))
@@ -460,7 +465,31 @@ class Simulation:
         resume: bool = False,
         part: tuple[int, int] = (1, 1),
     ) -> Stream:
-        """A sweep of any size that is about to go into a store, of which `run` computes what is missing."""
+        """A sweep of any size that is about to go into a store, of which `run` computes what is missing.
+
+        Parameters
+        ----------
+        plan
+            What is swept, from :meth:`plan`.
+        path
+            The store, a folder whose name ends with .zarr.
+        changes
+            Other values that differ from the case, by path, the same for all runs.
+        resume
+            Whether an unfinished store of the same plan goes on.
+        part
+            Which part of how many is computed.
+
+        Returns
+        -------
+        Stream
+            ``run()`` computes it and returns the store, whose ``dataset`` is the xarray Dataset.
+
+        Raises
+        ------
+        InputError
+            Where the store is there already, is another plan's, or cannot hold what is asked for.
+        """
         from surfacechem.runs import streaming
 
         if (freed := self._freed_for(plan, values := self._values(changes or {}))) is not self:
@@ -497,7 +526,23 @@ class Simulation:
         sample: Mapping[str, object] | None = None,
         combine: str | None = None,
     ) -> Plan:
-        """The plan of a sweep in SI, given as to :meth:`sweep`: a function from the number of a run to its values."""
+        """The plan of a sweep in SI: a function from the number of a run to its values.
+
+        Parameters
+        ----------
+        over, until, sample, combine
+            As for :meth:`sweep`.
+
+        Returns
+        -------
+        Plan
+            Its size, axes and values, for :meth:`stream`.
+
+        Raises
+        ------
+        InputError
+            Where there is no parameter of a path, or nothing to sweep.
+        """
         from surfacechem.format.plans import plan_of, read_sweep, read_until
 
         section = self.case.sweep

@@ -232,7 +232,23 @@ class Model:
         return type(self), (self.system,)
 
     def values(self, changes: Mapping[str, float] | None = None) -> dict[str, float]:
-        """Every parameter and initial value by path, with some of them changed."""
+        """Every parameter and initial value by path, in SI, with some of them changed.
+
+        Parameters
+        ----------
+        changes
+            Values that differ from those of the scene, by path, in SI.
+
+        Returns
+        -------
+        dict
+            Values by path: what `run` may change.
+
+        Raises
+        ------
+        InputError
+            Where there is no parameter of a path, or a value is outside its range.
+        """
         return values_of(self.system, changes)
 
     def _segments(self, end: float, values: Mapping[str, float]) -> Array:
@@ -318,6 +334,11 @@ class Model:
         -------
         Trajectory
             Its end is a status with a reason, never an exception, once the input was admissible.
+
+        Raises
+        ------
+        InputError
+            Where there is no parameter of a path, or the start is not admissible.
         """
         return self.solve_values(run, self.values(changes))
 
@@ -325,6 +346,18 @@ class Model:
         """The same run at another tolerance, looked at elsewhere and more often.
 
         Its loads differ in the last digit: where a result depends on that, two runs of the same numbers would agree.
+
+        Parameters
+        ----------
+        trajectory
+            A run of this model.
+        rtol
+            The other relative tolerance.
+
+        Returns
+        -------
+        Trajectory
+            The second run, from which an error is estimated.
         """
         return self.solve_values(trajectory.run.second(rtol), trajectory.values, nudged=True)
 

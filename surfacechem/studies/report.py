@@ -237,7 +237,13 @@ class Study:
         return xarray.Dataset(data, coords=coordinates, attrs=self.attributes)
 
     def figure(self) -> Figure:
-        """The figure of the study, which its dataset alone is enough for."""
+        """The figure of the study, which its dataset alone is enough for.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            What ``savefig`` writes.
+        """
         from surfacechem.plots.study import figure
 
         return figure(self.dataset)
@@ -248,7 +254,23 @@ class Study:
         return Page(self.title, self.command, self.sections, self.omissions, self.figure)
 
     def write(self, path: str | Path) -> list[Path]:
-        """Save as netCDF, SVG, PNG and HTML side by side; returns the files."""
+        """Save as netCDF, SVG, PNG and HTML side by side.
+
+        Parameters
+        ----------
+        path
+            What the names of the files begin with.
+
+        Returns
+        -------
+        list
+            The files.
+
+        Raises
+        ------
+        OutputError
+            Where one of them cannot be written.
+        """
         from surfacechem import plots
 
         files, figure = targets(path), self.figure()

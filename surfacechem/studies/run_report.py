@@ -20,6 +20,7 @@ from surfacechem import format as cases
 from surfacechem.compile.typeset import Equation, equations
 from surfacechem.contracts.terms import Law
 from surfacechem.errors import InputError, Place
+from surfacechem.model.system import System
 from surfacechem.plots import drawing, figure, opened, save
 from surfacechem.plots.style import narrow
 from surfacechem.results import spatial
@@ -27,7 +28,8 @@ from surfacechem.results.dataset import Results
 from surfacechem.results.netcdf import replacing
 from surfacechem.results.solution import Solution
 from surfacechem.runs.check import laws_of
-from surfacechem.runs.listing import FORMULA, source
+from surfacechem.runs.listing import FORMULA, plain, source
+from surfacechem.runs.sheet import Sheet
 from surfacechem.runs.simulation import Simulation
 from surfacechem.runs.summaries import REGIMES, duration, points_summary, run_summary, sweep_summary
 from surfacechem.runs.sweeps import SweepSolution
@@ -141,6 +143,15 @@ def _scene(case: cases.Case) -> Iterator[PageSection]:
     ]
     table = PageTable(("symbol", "value", "unit", "meaning"), numbers, "Numbers")
     yield PageSection("Equations", tables=[table], equations=lines, details=True)
+
+
+def equation_sheet(system: System, title: str) -> Sheet:
+    """The equations as text for a terminal: each with what it is, and with the modes in which it holds."""
+    rows = [
+        (plain(" ".join((line.left, *line.pieces))), "; ".join(filter(None, (line.text, line.when))))
+        for line in equations(system)[0]
+    ]
+    return Sheet(f"{title}: {system.regime}", tables={"": rows})
 
 
 def _stated(law: type[Law]) -> Iterator[Equation]:

@@ -112,9 +112,30 @@ def stability(
     quick: bool = False,
     rounds: int = ROUNDS,
 ) -> Study:
-    """Solve the regimes, all if none is named, with the solvers; ``quick`` takes four values of each.
+    """Solve difficult regimes over decades of their parameter and tell the digits that each solver keeps.
 
-    ``rounds`` of a search for the worst corner of each regime that has one; none where it is zero.
+    Parameters
+    ----------
+    *regimes
+        Names of regimes; all if none is named.
+    solvers
+        Names of solvers.
+    rtol
+        Relative tolerance of each.
+    quick
+        Whether four values of each parameter are enough.
+    rounds
+        Rounds of a search for the worst corner of each regime that has one; none where it is zero.
+
+    Returns
+    -------
+    Study
+        Digits over regimes, values and solvers.
+
+    Raises
+    ------
+    InputError
+        Where no regime or solver has a name.
     """
     found = chosen(regimes)
     check_options(solvers, [rtol], rounds, (0, MOST_ROUNDS), ("--solvers", "--rtol", "--search"))

@@ -80,6 +80,11 @@ def steady(source: Source, of: Sequence[str] = (), overrides: Overrides = ()) ->
     of
         Names of quantities, ``production_CO2`` for instance; all productions in neighbours if not given.
 
+    Returns
+    -------
+    SteadyState
+        Coverages, rates, degrees of rate control and apparent barriers [J/mol]; printed as a table.
+
     Raises
     ------
     InputError

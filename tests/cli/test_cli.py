@@ -217,6 +217,7 @@ def test_equations_run(call):
     assert balance_phi == pytest.approx(0.0, abs=1e-15)
     assert balance_T == pytest.approx(-300 * 6.7e15 * 300 / 1e18)
     assert r"\begin{align*}" in call("equations", "bonding.yaml", "--format", "latex").stdout
+    assert "  M = K_0 (φ - 1) " in call("equations", "bonding.yaml", "--format", "text").stdout
 
 
 class TestListings:

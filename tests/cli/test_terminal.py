@@ -1,12 +1,14 @@
 """What a terminal shows, and that files and pipes get plain text."""
 
 import logging
+import re
 from io import StringIO
 
 import pytest
 
 from surfacechem.cli import terminal
 from surfacechem.runs.sheet import Sheet
+from surfacechem.studies.report import Page, PageSection, PageTable
 
 pytestmark = pytest.mark.around
 
@@ -60,3 +62,17 @@ def test_a_bar_shows_what_is_logged_after_a_while(monkeypatch):
         log.info("runs", extra={"done": 4, "total": 12})
     assert streams["stderr"].getvalue().endswith("s  runs (4/12)\n")
     assert logging.getLogger("surfacechem").handlers == []
+
+
+def test_a_study_has_tables_in_which_failures_stand_out(monkeypatch):
+    streams = on_terminal(monkeypatch)
+    table = PageTable(("solver", "verdict"), [("radau", "right"), ("other", "wrong " * 12)], "Verdicts", marked=[1])
+    page = Page("A study", "surfacechem stability", [PageSection("Stiff", ["Words."], [table])], ["nothing to compare"])
+    terminal.show_page(page)
+    shown = streams["stdout"].getvalue()
+    red = [line for line in shown.splitlines() if "\x1b[31m" in line]
+    assert ("other" in red[0], len(red), "radau" in "".join(red)) == (True, 2, False)
+    assert max(len(re.sub(r"\x1b\[[\d;]*m", "", line)) for line in shown.splitlines()) <= 60
+    monkeypatch.setenv("TERM", "dumb")
+    terminal.show_page(page)
+    assert streams["stdout"].getvalue().endswith(f"{page.text()}\n")
