@@ -155,6 +155,8 @@ def sweep(
         return stores.write(simulation, plan, output, stores.Options(resume, part, cluster, only, talk))
     target = dataset_path(output or f"{simulation.case.name}-sweep.nc")
     refuse_unwritable(target)
+    if simulation.case.sweep is not None and simulation.case.sweep.keep is not None:
+        return stores.write_file(simulation, simulation.plan(values, end), target, talk)
     solution = solved(lambda: simulation.sweep(values, end), talk)
     solution.write(target)
     if talk is not False:

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import typer
@@ -73,6 +74,28 @@ def write(simulation: Simulation, plan: Plan, target: Path, options: Options) ->
                 SIGNALLED + number
             )  # at once, as compiled code may run on; a chunk without its mark does not count
     status, sheet = store_summary(stream, store, errors)
+    if talk is not False:
+        show(sheet)
+    leave_with(status)
+
+
+def write_file(simulation: Simulation, plan: Plan, target: Path, talk: bool | None) -> None:
+    """Run a sweep into a store that becomes one file, netCDF or a table, when it is whole."""
+    from surfacechem.results import exports
+    from surfacechem.results.netcdf import TABLES, replacing
+    from surfacechem.runs.checking import check
+    from surfacechem.runs.summaries import store_summary
+
+    with TemporaryDirectory(prefix=f".{target.stem}-", dir=target.parent) as folder:
+        stream = simulation.stream(plan, Path(folder) / "sweep.zarr")
+        store = solved(lambda: stream.run(told=counting()), talk)
+        status, sheet = store_summary(stream, store, solved(lambda: check(stream), talk), target)
+        with store.dataset as data:
+            if target.suffix.lower() in TABLES:
+                exports.save_table(target, data.drop_dims(["checked", "hardest"], errors="ignore"))
+            else:
+                with replacing(target) as path:
+                    data.to_netcdf(path)
     if talk is not False:
         show(sheet)
     leave_with(status)

@@ -80,7 +80,9 @@ def check(stream: Stream, threads: int | None = None) -> Checked | None:
     def both(key: str) -> Array:
         return np.concatenate([found[f"{which}_{key}"] for which in chosen])
 
-    errors, destroys = both("error"), np.nansum(both("destroys_entropy"))
+    numbers, once = np.unique(both("run"), return_index=True)
+    once = once[numbers >= 0]  # the hardest are filled up with -1 where fewer have not failed
+    errors, destroys = both("error")[once], np.nansum(both("destroys_entropy")[once])
     worst = float(np.fmax.reduce(errors, initial=-np.inf))
     return Checked(worst, int(np.isnan(errors).sum()), len(errors), int(destroys), "; ".join(dict.fromkeys(sources)))
 

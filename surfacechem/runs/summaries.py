@@ -302,8 +302,10 @@ def _state_rows(system: System) -> list[tuple[str, ...]]:
     return rows
 
 
-def store_summary(stream: Stream, store: Store, checked: Checked | None) -> tuple[str, Sheet]:
-    """How a sweep ended that went into a store, in a word; and what it was and how its runs ended, in words."""
+def store_summary(stream: Stream, store: Store, checked: Checked | None, file: Path | None = None) -> tuple[str, Sheet]:
+    """How a sweep ended that went into a store, or through one into a file, in a word; and what it was and how its runs
+    ended, in words.
+    """
     from surfacechem.runs.keeping import STATUSES
     from surfacechem.runs.sweeps import parameter_names
 
@@ -324,7 +326,7 @@ def store_summary(stream: Stream, store: Store, checked: Checked | None) -> tupl
         facts.append(("error", f"{checked.error:.2g} of {checked.count} runs ({checked.source}){unknown}"))
     destroyed = f"; ENTROPY DESTROYED in {checked.destroys} runs" if checked and checked.destroys else ""
     facts.append(("balances", f"energy {worst:.1e} at worst{destroyed}"))
-    facts.append(("written", f"{store.path}, {len(done)} of {layout.chunks} chunks"))
+    facts.append(("written", str(file) if file else f"{store.path}, {len(done)} of {layout.chunks} chunks"))
     stopped = ends[STATUSES.index("stopped")] == ends.sum()
     status = "failed" if ends[STATUSES.index("failed")] else "stopped" if stopped else "finished"
     return status, Sheet(chunks.simulation.case.title or "untitled", facts)

@@ -1,5 +1,6 @@
 """Sweeps into a store: each run as by itself; the same bytes however it was computed, interrupted and gone on with."""
 
+import csv
 import hashlib
 import os
 import resource
@@ -11,6 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import xarray
 from typer.testing import CliRunner
 
 import surfacechem
@@ -147,14 +149,23 @@ def slowly(self, number, columns):
     write(self, number, columns)
     time.sleep(0.2)
 Store.write = slowly
+"""
+STREAM = """
 simulation = surfacechem.load("exothermic", {over})
 simulation.stream(simulation.plan(), sys.argv[1], resume="resume" in sys.argv).run(1)
 """
+GIVEN = ["sweep", "exothermic", "--over", f"{K_0}={{from: 100, to: 300, points: 60}}", "--set"]
+GIVEN += ["sweep.keep={last: [T, phi]}", "-o"]
+COMMAND = """
+from surfacechem.cli import app
+app([*{given}, sys.argv[1]])
+"""
 
 
-def script():
-    text = {"sweep": {"over": {K_0: {"from": 100, "to": 300, "points": 60}}, "keep": ENDS}}
-    return SCRIPT.replace("{over}", repr(text))
+def script(last=STREAM):
+    """Code that computes a sweep, slowly."""
+    section = {"over": {K_0: {"from": 100, "to": 300, "points": 60}}, "keep": ENDS}
+    return SCRIPT + last.replace("{over}", repr({"sweep": section})).replace("{given}", repr(GIVEN))
 
 
 def test_a_killed_writer_loses_at_most_a_chunk_and_no_byte(whole, tmp_path):
@@ -174,6 +185,21 @@ def test_a_killed_writer_loses_at_most_a_chunk_and_no_byte(whole, tmp_path):
     assert told[0].resumed == 16 * (len(marks) - 1)
     assert told[-1].done == told[-1].runs == 60
     assert digest(path) == digest(whole)
+
+
+def test_an_interrupt_says_how_to_go_on(whole, tmp_path):
+    path = tmp_path / "o.zarr"
+    writer = subprocess.Popen([sys.executable, "-c", script(COMMAND), str(path)], stderr=subprocess.PIPE, text=True)
+    while not (path / ".marks" / "1").exists():
+        assert writer.poll() is None, writer.communicate()
+        time.sleep(0.01)
+    writer.send_signal(signal.SIGINT)
+    assert writer.communicate()[1] == "surfacechem: interrupted; what is stored is kept: go on with --resume.\n"
+    assert writer.returncode == 128 + signal.SIGINT
+    assert CliRunner().invoke(app, [*GIVEN, str(path), "--resume", "-q"]).exit_code == 0
+    # The command has also checked the errors of its runs.
+    found, wanted = (opened(which).drop_dims(["checked", "hardest"]).load() for which in (path, whole))
+    xarray.testing.assert_equal(found, wanted)
 
 
 def test_a_damaged_chunk_is_computed_again(whole, tmp_path):
@@ -270,6 +296,17 @@ def test_commands_write_a_store_and_go_on_with_it(tmp_path):
     assert data["T_max"].attrs["units"] == "K"
 
 
+def test_what_is_kept_goes_into_one_file_as_into_a_store(tmp_path):
+    for suffix in ("zarr", "nc", "csv"):
+        result = CliRunner().invoke(app, [*GIVEN, str(tmp_path / f"o.{suffix}")])
+        assert (result.exit_code, "error      1.1e-11 of 60 runs" in result.output) == (0, True), result.output
+    assert {path.name for path in tmp_path.iterdir()} == {"o.zarr", "o.nc", "o.csv"}
+    with opened(tmp_path / "o.zarr") as stored, xarray.open_dataset(tmp_path / "o.nc") as file:
+        xarray.testing.assert_equal(stored.load(), file.load())
+        with (tmp_path / "o.csv").open() as table:
+            assert [float(row["T_last [K]"]) for row in csv.DictReader(table)] == file["T_last"].values.tolist()
+
+
 def test_errors_of_runs_that_are_checked_are_those_of_a_sweep(tmp_path, monkeypatch):
     over = {"initial.phi": [0.0, 1.2], K_0: {"from": 50, "to": 300, "points": 7}}
     simulation = case(keep=ENDS, over=over, checked="all")
@@ -282,7 +319,7 @@ def test_errors_of_runs_that_are_checked_are_those_of_a_sweep(tmp_path, monkeypa
     for name in ("error", "energy_error", "entropy_error", "site_error", "destroys_entropy"):
         assert np.array_equal(data[f"checked_{name}"][:7], swept.dataset[name].values.ravel())
     assert np.isnan(data["checked_error"][7:]).all()
-    assert (found.error, found.unknown, found.count) == (swept.dataset.attrs["error"], 14, 28)
+    assert (found.error, found.unknown, found.count) == (swept.dataset.attrs["error"], 7, 14)
     assert found.source == swept.dataset.attrs["error_source"]
     steps, hardest = data["steps"].values.ravel(), data["hardest_run"].values
     assert sorted(hardest[hardest >= 0]) == list(range(7))
