@@ -59,6 +59,7 @@ def _totals(surface: CurvedSurfaces, approaches: Array) -> list[Column]:
         Column("approach", (AT,), approaches, "m", "approach of the surfaces"),
         Column("force", (AT,), force, "N", "normal force on body 1, tension positive"),
         Column("gap_least", (AT,), np.array([item.gap for item in local]), "m", "least gap of the surfaces"),
+        Column("gap_places", (AT,), np.array([float(item.places) for item in local]), "1", "places that are as near"),
         Column("contact_area", (AT,), area, "m^2", "area of body 1 that touches or overlaps body 2"),
         Column("contact_radius", (AT,), np.sqrt(area / math.pi), "m", "radius of a circle of the area of contact"),
     ]

@@ -31,7 +31,7 @@ LAST = len(ORDERS) - 1
 PIECE = 2.0
 """Length of a piece in t."""
 
-TABLE, BETWEEN = 24, np.array([-0.97, -0.52, 0.14, 0.71])
+CHEBYSHEV, BETWEEN = np.cos(np.pi * (np.arange(24) + 0.5) / 24), np.array([-0.97, -0.52, 0.14, 0.71])
 """Gaps for a polynomial of their logarithm, and places between them at which it is tried."""
 
 Sums = tuple[Array, Array, Array]
@@ -148,24 +148,31 @@ def inner_sums(
 
 
 def tabulated(function: Callable[[Array], Array], gaps: Array, rtol: float) -> Array:
-    """A function (n, k) of many gaps by polynomials of their logarithm, if these are accurate enough."""
-    low, high = math.log(gaps.min()), math.log(gaps.max())
-    pieces = max(1, math.ceil(high - low))
-    if len(gaps) < 2 * pieces * (TABLE + len(BETWEEN)):
-        return function(gaps)
-    step = (high - low) / pieces
-    edges, nodes = low + step * np.arange(pieces), np.cos(np.pi * (np.arange(TABLE) + 0.5) / TABLE)
-    x = np.concatenate([nodes, BETWEEN])
-    values = function(np.exp(edges[:, None] + step * (x + 1) / 2).ravel()).reshape(pieces, len(x), -1)
-    which = np.clip(((np.log(gaps) - low) / max(step, TINY)).astype(int), 0, pieces - 1)
-    z = np.clip(2 * (np.log(gaps) - edges[which]) / max(step, TINY) - 1, -1, 1)
-    found = np.empty((len(gaps), values.shape[-1]))
-    for k, known in enumerate(values):
-        fit = np.polynomial.chebyshev.chebfit(nodes, known[:TABLE], TABLE - 1)
-        missed = np.polynomial.chebyshev.chebval(x[TABLE:], fit).T - known[TABLE:]
-        if np.any(np.abs(missed) > rtol * NEGLIGIBLE * np.abs(known).max(axis=0)):
-            return function(gaps)
-        found[which == k] = np.polynomial.chebyshev.chebval(z[which == k], fit).T
+    """A function (n, k) of many gaps by polynomials of their logarithm, on pieces that are short enough."""
+    at, x = np.log(gaps), np.concatenate([CHEBYSHEV, BETWEEN])
+    pieces = max(1, math.ceil(np.ptp(at)))
+    edges = np.linspace(at.min(), at.max(), pieces + 1)
+    home = np.clip(np.searchsorted(edges, at, side="right") - 1, 0, pieces - 1)
+    waiting = [(np.flatnonzero(home == k), edges[k], edges[k + 1]) for k in range(pieces)]
+    parts = []
+    while waiting:
+        which, low, high = waiting.pop()
+        if len(which) < 2 * len(x):
+            parts += [(which, function(gaps[which]))] if len(which) else []
+            continue
+        middle, half = (low + high) / 2, max((high - low) / 2, TINY)
+        known = function(np.exp(middle + half * x))
+        fit = np.polynomial.chebyshev.chebfit(CHEBYSHEV, known[: len(CHEBYSHEV)], len(CHEBYSHEV) - 1)
+        missed = np.polynomial.chebyshev.chebval(BETWEEN, fit).T - known[len(CHEBYSHEV) :]
+        if np.all(np.abs(missed) <= rtol * NEGLIGIBLE * np.abs(known).max(axis=0)):
+            z = np.clip((at[which] - middle) / half, -1, 1)
+            parts.append((which, np.polynomial.chebyshev.chebval(z, fit).T))
+        else:
+            below = at[which] < middle
+            waiting += [(which[below], low, middle), (which[~below], middle, high)]
+    found = np.empty((len(gaps), parts[0][1].shape[-1]))
+    for which, values in parts:
+        found[which] = values
     return found
 
 
