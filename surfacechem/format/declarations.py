@@ -160,6 +160,8 @@ class Whole(Content):
     at_most: float = math.inf
     step: int = 1
     word: str = ""
+    wanted: str = ""
+    """What has to stand there, for the message where it is no number."""
 
     @property
     def words(self) -> str:  # type: ignore[override]
@@ -170,6 +172,8 @@ class Whole(Content):
         """The number, which may be written with an exponent."""
         if self.word and isinstance(tree.value, str) and not tree.value.isdigit():
             return tree.choice(f"choice of {name}", [self.word])
+        if self.wanted and not str(tree.value).strip("+-. ")[:1].isdigit():
+            raise tree.error(f"{self.wanted}, not {tree.shown}.")
         value = number(tree, Spec("1", name, at_least=self.at_least, at_most=self.at_most), name)
         if not value.is_integer():
             raise tree.error(f"{name} must be a whole number, got {value:g}.")

@@ -378,7 +378,13 @@ class RunSection(Section):
         "end of the run [s], or where nothing changes any more",
     )
     outputs: int | None = key(
-        Whole(2, MOST_OUTPUTS), "number of output times, both ends included; they follow the run if not given", None
+        Whole(
+            *(2, MOST_OUTPUTS),
+            wanted="outputs are a number, `outputs: 201`; a list is `times: [1 s, 5 s]`, even ratios are `spacing: "
+            "logarithmic` with a `first`",
+        ),
+        "number of output times, both ends included; they follow the run if not given",
+        None,
     )
     spacing: str = key(OneOf("spacing", lambda: SPACINGS), "of the output times", LINEAR)
     first: float | None = quantity("s", "first output time after 0, for logarithmic spacing", above=0)

@@ -122,6 +122,8 @@ MISTAKES = [
     ("{until: 5 s}", "{untill: 5 s}", f"19: run: unknown key 'untill'. Did you mean 'until'? {RUN_KEYS}"),
     ("{until: 5 s}", "{outputs: 5}", "19: run: the run needs an end. Add `until: 1 s`, or a list of `times`."),
     ("{until: 5 s}", "{until: 5 s, outputs: 1}", "19: run.outputs: outputs = 1 is outside its range: >= 2"),
+    ("{until: 5 s}", "{until: 5 s, outputs: [1 s]}", "19: run.outputs: outputs are a number, `outputs: 201`; a list"),
+    ("{until: 5 s}", "{until: 5 s, outputs: log}", "19: run.outputs: outputs are a number, `outputs: 201`; a list"),
     ("{until: 5 s}", "{until: 5 s, outputs: 2.5}", "19: run.outputs: outputs must be a whole number, got 2.5."),
     ("{until: 5 s}", "{until: 5 s, outputs: 1e99}", "19: run.outputs: outputs = 1e+99 is outside its range: >= 2 an"),
     ("{until: 5 s}", "{until: 5 s, spacing: log}", "19: run.spacing: no spacing 'log'. Did you mean 'logarithmic'?"),

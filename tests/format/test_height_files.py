@@ -54,7 +54,7 @@ def test_both_kinds_of_files_give_the_surface_that_was_measured(tmp_path):
     ("name", "rows", "message"),
     [
         ("scan.csv", ROWS[:9] + ROWS[10:], r"scan.csv: the heights have holes: on 7 x 6 .* x = 1e-08 m, y = 6e-08 m"),
-        ("scan.csv", [*ROWS[:3], (0.0, 60.0, "nan"), *ROWS[4:]], r"scan.csv:5: .*nan"),
+        ("scan.csv", [*ROWS[:3], (0.0, 60.0, "nan"), *ROWS[4:]], r"scan.csv:5: the heights have a hole"),
         ("scan.csv", [*ROWS, ROWS[0]], "scan.csv:44: a second height at x = 0 m, y = 0 m"),
         ("scan.nc", None, r"scan.nc: the heights have holes: 1 of them, the first at x = 3e-08 m, y = 4e-08 m"),
         ("other.csv", ROWS, r"case.yaml:1: .*no file other.csv beside the case"),
