@@ -24,6 +24,11 @@ MOST = 12
 TARGET = 2e-9
 """Largest relative error at the points of verification; between them it is of the same size."""
 
+ROUGH = 1000 * TARGET
+"""The same near a critical point, where published equations of state and their solvers are not smooth to TARGET; far
+below the uncertainty of any property there.
+"""
+
 CHECKS = 5
 """Points of verification for each coefficient."""
 
@@ -49,8 +54,8 @@ class Piece:
         return np.asarray(np.polynomial.polynomial.polyval(x, np.array(self.coefficients)))
 
 
-def fit(function: Callable[[Array], Array], low: float, high: float) -> tuple[Piece, ...]:
-    """The function on low <= T <= high, relative error below TARGET; NoFitError where that takes too many pieces.
+def fit(function: Callable[[Array], Array], low: float, high: float, target: float = TARGET) -> tuple[Piece, ...]:
+    """The function on low <= T <= high, relative error below a target; NoFitError where that takes too many pieces.
 
     >>> pieces = fit(lambda T: np.exp(600 / T), 280.0, 360.0)
     >>> len(pieces), bool(abs(pieces[0](300.0) / np.exp(2) - 1) < 1e-10)
@@ -61,7 +66,7 @@ def fit(function: Callable[[Array], Array], low: float, high: float) -> tuple[Pi
     while start < high:
         if len(pieces) == MOST:
             raise NoFitError(f"more than {MOST} polynomials would be needed between {low:g} and {high:g} K.")
-        pieces.append(_polynomial(function, start, high) or _longest(function, start, high))
+        pieces.append(_polynomial(function, start, high, target) or _longest(function, start, high, target))
         start = pieces[-1].high
     return tuple(pieces)
 
@@ -78,12 +83,12 @@ def _filled(powers: ArrayLike) -> tuple[float, ...]:
     return (*given, *[0.0] * (DEGREE + 1 - len(given)))
 
 
-def _longest(function: Callable[[Array], Array], low: float, high: float) -> Piece:
+def _longest(function: Callable[[Array], Array], low: float, high: float, target: float) -> Piece:
     """The longest piece from low on; it ends just beyond a kink, so that the next one starts on the other side."""
     good, bad, found = low, high, None  # by bisection: a piece that ends before a kink fits, one beyond it does not
     while bad - good > SHORTEST * (high - low):
         middle = (good + bad) / 2
-        piece = _polynomial(function, low, middle)
+        piece = _polynomial(function, low, middle, target)
         if piece is None:
             bad = middle
         else:
@@ -93,7 +98,7 @@ def _longest(function: Callable[[Array], Array], low: float, high: float) -> Pie
     return _moved(found, low, bad)
 
 
-def _polynomial(function: Callable[[Array], Array], low: float, high: float) -> Piece | None:
+def _polynomial(function: Callable[[Array], Array], low: float, high: float, target: float) -> Piece | None:
     """The polynomial through the Chebyshev nodes, unless it is off elsewhere."""
     nodes = np.cos(np.pi * (np.arange(DEGREE + 1) + 0.5) / (DEGREE + 1))
     values = function((low + high) / 2 + (high - low) / 2 * nodes)
@@ -102,4 +107,4 @@ def _polynomial(function: Callable[[Array], Array], low: float, high: float) -> 
     # Between the nodes, where the error of an interpolation is largest.
     T = np.linspace(low, high, CHECKS * (DEGREE + 1) + 1)
     exact = function(T)
-    return piece if bool(np.all(np.abs(piece(T) - exact) <= TARGET * np.abs(exact))) else None
+    return piece if bool(np.all(np.abs(piece(T) - exact) <= target * np.abs(exact))) else None

@@ -656,5 +656,10 @@ class Fluid(ABC):
         """Temperatures around T [K] at which it has properties; InputError where it has none at T."""
 
     @abstractmethod
-    def fit(self, quantity: str, low: float, high: float) -> tuple[Piece, ...]:
-        """A property between two temperatures [K]; InputError where it has none."""
+    def fit(self, quantity: str, low: float, high: float, target: float) -> tuple[Piece, ...]:
+        """A property between two temperatures [K] to a relative accuracy; InputError where it has none."""
+
+    @property
+    def remark(self) -> str:
+        """What its user should know before its properties are fitted; empty if nothing."""
+        return ""

@@ -85,9 +85,19 @@ class CoolPropFluid(Fluid):
         """The fluid and its pressure in words."""
         return f"{self.name} at {self.pressure:g} Pa"
 
-    def fit(self, quantity: str, low: float, high: float) -> tuple[fits.Piece, ...]:
-        """A property between two temperatures [K]; InputError where CoolProp has none."""
-        return _fit(self, quantity, low, high)
+    def fit(self, quantity: str, low: float, high: float, target: float = fits.TARGET) -> tuple[fits.Piece, ...]:
+        """A property between two temperatures [K] to a relative accuracy; InputError where CoolProp has none."""
+        return _fit(self, quantity, low, high, target)
+
+    @property
+    def remark(self) -> str:
+        """What a mixture costs."""
+        if len(self.name.split("&")) == 1:
+            return ""
+        return (
+            f"{self.name} is a mixture, of which CoolProp needs some 20 to 50 ms for each value: each property takes "
+            "seconds to fit, once on a machine. Give the properties that matter as numbers where that is too long."
+        )
 
     def values(self, quantity: str, T: Array) -> Array:
         """A property at temperatures [K] as CoolProp has it."""
@@ -135,15 +145,15 @@ def _limits(fluid: CoolPropFluid) -> tuple[float, float, float | None, float | N
 
 
 @cache
-def _fit(fluid: CoolPropFluid, quantity: str, low: float, high: float) -> tuple[fits.Piece, ...]:
+def _fit(fluid: CoolPropFluid, quantity: str, low: float, high: float, target: float) -> tuple[fits.Piece, ...]:
     def find() -> list[Any] | str:
         try:
-            found = fits.fit(lambda T: fluid.values(quantity, T), low, high)
+            found = fits.fit(lambda T: fluid.values(quantity, T), low, high, target)
         except fits.NoFitError as error:
             return str(error)
         return [[piece.low, piece.high, piece.coefficients] for piece in found]
 
-    mark = fingerprint(fluid, quantity, low, high, version("CoolProp"))
+    mark = fingerprint(fluid, quantity, low, high, target, version("CoolProp"))
     found = kept(mark, [Path(fits.__file__)], find)
     if isinstance(found, str):
         raise InputError(f"the {WORDS[quantity]} of {fluid.title} cannot be fitted: {found}")

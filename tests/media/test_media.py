@@ -90,6 +90,42 @@ def test_what_is_not_smooth_is_refused():
         fits.fit(lambda T: 1 + 1e-6 * noise.random(len(T)), 280.0, 330.0)
 
 
+def test_near_a_critical_point_a_fit_is_as_close_as_it_says():
+    """CoolProp's heat capacity of carbon dioxide at 80 bar is not smooth at 306.64 K, where it is largest."""
+    fluid = CoolPropFluid("CO2", 8e6)
+    pieces = fluid.fit("cp_m", 306.5, 306.8, fits.ROUGH)
+    T = np.random.default_rng(7).uniform(306.5, 306.8, 400)
+    index = np.searchsorted([piece.high for piece in pieces], T)
+    values = np.array([pieces[i](t) for i, t in zip(index, T, strict=True)])
+    assert np.max(np.abs(values / fluid.values("cp_m", T) - 1)) < 2 * fits.ROUGH
+
+
+@dataclasses.dataclass(frozen=True)
+class Bumpy(CoolPropFluid):
+    """Water with bumps of one part in a million, as between the steps of a solver."""
+
+    remark = "its use is told"
+
+    def fit(self, quantity: str, low: float, high: float, target: float) -> tuple[fits.Piece, ...]:
+        """As in CoolProp, but for its bumps."""
+        bumps = lambda T: 1 + 5e-7 * np.sin(1e9 * T)  # noqa: E731
+        try:
+            return fits.fit(lambda T: self.values(quantity, T) * bumps(T), low, high, target)
+        except fits.NoFitError as error:
+            raise InputError(str(error)) from None
+
+
+def test_how_close_a_fit_is_is_told_where_it_is_not_close():
+    scene = lubricated(Medium(Bumpy("Water", 1e6), {}, 2e-6), capacity=False)
+    warnings = " ".join(assemble(scene).warnings)
+    assert "the viscosity of the medium is known within 2e-06 only between 273.2 and 330 K" in warnings
+    assert "its use is told" in warnings
+
+
+def test_what_a_mixture_costs_is_told():
+    assert "20 to 50 ms for each value" in CoolPropFluid("Methane[0.9]&Ethane[0.1]", 1e5).remark
+
+
 @pytest.mark.parametrize("name", ["Water", "Nitrogen", "INCOMP::MEG-50%"])
 def test_properties_in_the_compiled_code(name):
     scene = lubricated(medium(name), v=2.0 if name != "Nitrogen" else 30.0)

@@ -14,7 +14,7 @@ from itertools import pairwise
 import numpy as np
 import symengine
 
-from surfacechem.contracts.fits import Piece
+from surfacechem.contracts.fits import ROUGH, TARGET, Piece
 from surfacechem.contracts.terms import Fluid, Property, Spec
 from surfacechem.errors import InputError, Place
 from surfacechem.expressions import Expression, log
@@ -121,6 +121,8 @@ class FluidFit:
         self.start = sum(self.known) / len(self.known)
         self.ranges: set[tuple[float, float]] = set()
         self._watch_walls()
+        if fluid.remark:
+            build.add(fluid.remark)
 
     def _watch_walls(self) -> None:
         """Tell where a wall is beyond the range of a film whose properties are those at its own temperature."""
@@ -181,13 +183,19 @@ class FluidFit:
     def _fit(self, quantity: str) -> tuple[Piece, ...]:
         """The fit over the widest range for which there is one."""
         span = self.fluid.range(self.start)
-        for reach in REACHES:
+        for reach, target in (*((reach, TARGET) for reach in REACHES), (REACHES[-1], ROUGH)):
             low, high = max(min(self.known) / reach, span.low), min(max(self.known) * reach, span.high)
             try:
-                return self.fluid.fit(quantity, low, high)
+                found = self.fluid.fit(quantity, low, high, target)
             except InputError:
-                if reach == REACHES[-1]:
+                if target == ROUGH:
                     raise
+                continue
+            if target == ROUGH:
+                named = VARIABLES[quantity].long_name if quantity in VARIABLES else "heat capacity of the medium"
+                where = f"between {low:.4g} and {high:.4g} K, where {self.fluid.name} at {self.fluid.pressure:g} Pa"
+                self.build.add(f"the {named} is known within {ROUGH:g} only {where} is not smooth.")
+            return found
         raise AssertionError
 
     def _end_there(self, ends: Sequence[Expression], fit: Sequence[Piece]) -> None:
