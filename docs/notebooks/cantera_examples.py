@@ -94,8 +94,8 @@ start = gas.mole_fraction_dict()
 
 expected, hydrogen = [], []
 fractions = gas.X
-for _ in range(10):
-    fractions[gas.species_index("H")] /= 1.4
+for _ in range(6):
+    fractions[gas.species_index("H")] /= 1.75
     gas.TPX = 1200.0, 20 * ct.one_atm / 760, fractions
     hydrogen.append(gas["H"].X[0])
     surface.advance_coverages(10.0, rtol=1e-10, atol=1e-16)

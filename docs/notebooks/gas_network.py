@@ -41,7 +41,8 @@ initial: {T_1: 298.15 K, T_c: 298.15 K, coverages: {bond(s): 0.99, free(s): 0.01
 run: {until: 50 s}
 """
 case = Path(tempfile.mkdtemp()) / "plate.yaml"
-case.write_text(CASE, encoding="utf-8")
+with case.open("w", encoding="utf-8") as file:
+    print(CASE, file=file)
 
 # %% [markdown]
 # ## The network

@@ -56,7 +56,7 @@ plots.figure(stored.dataset, ["time_to_phi", "T_max"])
 # %% [markdown]
 # ## A sample of uncertain parameters
 #
-# Twenty thousand draws go through the compiled loop as arrays into a store, which is opened without being read.
+# Ten thousand draws go through the compiled loop as arrays into a store, which is opened without being read.
 
 # %%
 of = {
@@ -64,7 +64,7 @@ of = {
     "interface.bonding.linear-affinity.c_r": {"lognormal": {"median": "6.7e15 1/J/s", "sigma": 0.3}},
     "initial.T": {"uniform": {"from": "290 K", "to": "310 K"}},
 }
-section = {"sample": {"of": of, "runs": 20_000}, "keep": {"last": ["T", "phi"], "reach": {"phi": 0.5}}, "checked": 0}
+section = {"sample": {"of": of, "runs": 10_000}, "keep": {"last": ["T", "phi"], "reach": {"phi": 0.5}}, "checked": 0}
 case = surfacechem.load("exothermic", {"sweep": section})
 data = case.stream(case.plan(), folder / "drawn.zarr").run().dataset
 late = float(np.nanpercentile(data["time_to_phi"], 95))

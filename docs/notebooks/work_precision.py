@@ -57,7 +57,6 @@ for ax, case in zip(axes, data["case"].values, strict=True):
     ax.set(title=case, xlabel="largest relative error")
 axes[0].set_ylabel("right-hand sides")
 axes[0].legend()
-figure
 
 # %% [markdown]
 # ## The time to reach an error

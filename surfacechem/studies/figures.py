@@ -50,6 +50,9 @@ log = logging.getLogger(__name__)
 
 SCALES = "linear", "log"
 
+HIDDEN = 1 / 200
+"""Part of its range by which a curve has to differ from another to be seen beside it."""
+
 EXACT: Mapping[str, Any] = {"color": "0.8", "linewidth": 4.5, "zorder": 1}
 """How an exact curve is drawn."""
 
@@ -159,6 +162,13 @@ def _distance(point: Array, line: Array) -> float:
     return float(np.min(np.hypot(*(point - start - along[:, None] * step).T)))
 
 
+def _coincide(one: Line, other: Line) -> bool:
+    """Whether two curves hide each other."""
+    span = float(np.ptp(other.y[np.isfinite(other.y)])) or 1.0
+    near = np.interp(one.x, other.x, other.y) - one.y
+    return bool(np.nanmax(np.abs(near)) < HIDDEN * span)
+
+
 @dataclass(frozen=True)
 class Picture:
     """A figure of a list with its curves."""
@@ -184,7 +194,9 @@ class Picture:
             for i, curve in enumerate(self.curves):
                 colour = COLOURS[i % len(COLOURS)]
                 shown = np.where(curve.refused, np.nan, curve.y)
-                ax.plot(curve.x, shown, color=colour, label=curve.label or None)
+                # One curve on another is dashed, so that both are seen.
+                dashed = any(_coincide(curve, other) for other in self.curves[:i])
+                ax.plot(curve.x, shown, "--" if dashed else "-", color=colour, label=curve.label or None)
                 if curve.refused.any():
                     ax.plot(curve.x, np.where(curve.refused, curve.y, np.nan), ":", color=colour)
                 if curve.data is not None:

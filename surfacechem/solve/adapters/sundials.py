@@ -1,5 +1,7 @@
 """SUNDIALS' CVODE and IDA under the contract, through scikit-sundae."""
 
+import os
+from contextlib import redirect_stdout
 from typing import Any
 
 import numpy as np
@@ -13,6 +15,9 @@ from surfacechem.tolerances import ROUNDING
 
 NAMES = ("cvode", "ida")
 
+# Warnings that steps are small would go to the terminal; what a step fails of is raised.
+os.environ.setdefault("SUNLOGGER_WARNING_FILENAME", os.devnull)
+
 
 class _Stretch(Method):
     """Single steps of either library; interpolation inside the last step is a step back to it."""
@@ -25,8 +30,10 @@ class _Stretch(Method):
         self._call(lambda: library.init_step(t, *start))
 
     def _call(self, action: Any) -> Any:
+        # The wrapper prints what it also raises.
         try:
-            answer = action()
+            with redirect_stdout(None):
+                answer = action()
         except (ValueError, RuntimeError, ArithmeticError, np.linalg.LinAlgError, SystemError) as error:
             raise StepError(str(error)) from error
         except KeyError as error:  # the library's wrapper has no words for this return code
