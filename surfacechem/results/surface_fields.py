@@ -76,18 +76,27 @@ def _fields(surface: CurvedSurfaces, approaches: Array) -> Sequence[Column]:
     """Gap and traction over points of body 1, which gather where body 2 is nearest."""
     from surfacechem.surfaces.pairwise import length
     from surfacechem.surfaces.patches import outer_patches
+    from surfacechem.surfaces.projection import FIRST, POLE
 
     lower, upper = surface.surfaces(float(approaches.min()))
     size = length(lower, upper)
     patches, _ = outer_patches(lower, upper, size, size)
     lower = patches.surface
     counts = [AROUND if lower.shape.about_axis and k == 1 else ALONG for k in range(2)]
-    x = lower.derivatives(np.stack(np.meshgrid(*map(patches.line, (0, 1), counts), indexing="ij"), axis=-1))[0]
+    at = np.stack(np.meshgrid(*map(patches.line, (0, 1), counts), indexing="ij"), axis=-1)
+    if lower.shape.about_axis and lower.shape.span[0][0] == 0:
+        at = np.maximum(at, [POLE, -np.inf])
+    D = lower.derivatives(at, FIRST)
+    x, normals = D[0], lower.normals(D)
+    # Around an axis all columns are alike.
+    some = slice(0, 1 if patches.alike[1] else None)
     gap, traction = np.empty((2, len(approaches), *x.shape[:-1]))
     opposite = np.empty((len(approaches), *x.shape))
     for k, d in enumerate(approaches):
         near = surface.surfaces(float(d))[1].nearest(x)
-        gap[k], traction[k], opposite[k] = near.gap, surface.traction(near.gap), near.point
+        gap[k], opposite[k] = near.gap, near.point
+        felt = surface.traction(x[:, some].reshape(-1, 3), normals[:, some].reshape(-1, 3), float(d))
+        traction[k] = felt.reshape(len(x), -1)
     over = ("u", "v")
     places = [
         Column(f"surface_{axis}", over, x[..., k], "m", f"{axis} of points of body 1") for k, axis in enumerate("xyz")
@@ -96,7 +105,8 @@ def _fields(surface: CurvedSurfaces, approaches: Array) -> Sequence[Column]:
         Column(f"opposite_{axis}", (AT, *over), opposite[..., k], "m", f"{axis} of the nearest point of body 2")
         for k, axis in enumerate("xyz")
     ]
-    text = "normal traction on body 1 by the local law, tension positive"
+    by = "" if surface.sums_tractions or not surface.pairs else " by the local law"
+    text = f"normal traction on body 1{by}, tension positive"
     return [
         *places,
         Column("gap", (AT, *over), gap, "m", "gap between the surfaces"),

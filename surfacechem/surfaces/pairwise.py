@@ -19,7 +19,7 @@ import numpy as np
 
 from surfacechem.contracts.terms import PairEnergy
 from surfacechem.errors import InputError
-from surfacechem.surfaces.nodes import inner_sums, is_round
+from surfacechem.surfaces.nodes import LAST, inner_sums, is_round
 from surfacechem.surfaces.patches import integral, outer_patches
 from surfacechem.surfaces.projection import Array, Surface
 from surfacechem.surfaces.shapes import Plane
@@ -30,6 +30,9 @@ REMOTE = np.array([1e3, 2e3])
 
 MOST_DECADES = 100
 """Reach over gap, in decades, at most: the largest area is its square."""
+
+POINTS = 8
+"""Points at which tractions are summed together where the other surface has no circles."""
 
 COUNT = 13
 """Energy, and three components of two forces and two moments."""
@@ -101,6 +104,18 @@ def interaction(lower: Surface, upper: Surface, laws: Sequence[PairEnergy], rtol
     if swapped:
         forces, moments = forces[::-1], moments[::-1]
     return PairForces(energy[:, 0], *forces, *moments, error, gap, near.count, pairs)
+
+
+def pair_traction(x: Array, normals: Array, inner: Surface, laws: Sequence[PairEnergy], rtol: float) -> Array:
+    """Normal tractions (n,) [Pa], tension positive, at points (n, 3) of a surface from all points of another."""
+    kernels, slowest = [kernel(law) for law in laws], min(laws, key=lambda law: law.decay)
+    found, together = np.zeros(len(x)), len(x) if is_round(inner) else POINTS
+    for begin in range(0, len(x), together):
+        part = slice(begin, begin + together)
+        sums, _ = inner_sums(inner, x[part], kernels, LAST, slowest, rtol)
+        for law, (_, push, _) in zip(laws, sums, strict=True):
+            found[part] += law.n_1 * law.n_2 * np.einsum("nc,nc->n", push, normals[part])
+    return found
 
 
 def check_finite(lower: Surface, upper: Surface) -> None:

@@ -6,6 +6,7 @@ that is per area elsewhere is that of the whole pair: N for Pa, J for J/m^2, kg 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property, partial
 from pathlib import Path
@@ -20,9 +21,9 @@ from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, derivative
 from surfacechem.surfaces.approach import ApproachEnergy, fitted, straight
 from surfacechem.surfaces.curved_gap import GAP, Contact, bends, between_flats, density, over_gap
-from surfacechem.surfaces.pairwise import PairForces, interaction, kernel, length
+from surfacechem.surfaces.pairwise import PairForces, interaction, kernel, length, pair_traction
 from surfacechem.surfaces.projection import Array, Surface
-from surfacechem.tolerances import ATOM, NEGLIGIBLE, ROUNDING, SQRT_EPS
+from surfacechem.tolerances import ATOM, FLOOR, NEGLIGIBLE, ROUNDING, SQRT_EPS
 
 KNOWN: dict[Fingerprint, tuple[tuple[ApproachEnergy, ...], ApproachEnergy | None]] = {}
 """Curves that have been integrated, by what they are the curves of."""
@@ -205,9 +206,19 @@ class CurvedSurfaces(Potential):
         found = [over_gap(*pair, self._local(True), bends(self.gap_laws), rtol=NEGLIGIBLE) for pair in ends]
         return NEGLIGIBLE * max(abs(float(item.force_1[2])) for item in found)
 
-    def traction(self, gap: Array) -> Array:
-        """Normal traction at a gap by the laws of the gap and by those of pairs between flats [Pa]."""
-        return np.asarray(sum(law(gap)[..., 1] for law in self._local(True)))
+    @property
+    def sums_tractions(self) -> bool:
+        """Whether tractions of pairs are sums over body 2; over a rough one they are those of the local law."""
+        return bool(self.pairs) and math.isinf(self.shapes[1].grain)
+
+    def traction(self, x: Array, normals: Array, d: float) -> Array:
+        """Normal tractions (n,) on body 1 [Pa], tension positive, at points (n, 3) with normals at an approach."""
+        upper = self.surfaces(d)[1]
+        gap = upper.nearest(x).gap
+        found = np.zeros(len(x)) + sum(law(gap)[..., 1] for law in self._local(not self.sums_tractions))
+        if self.sums_tractions:
+            found += pair_traction(x, normals, upper, self.pairs, max(self.accuracy, FLOOR))
+        return np.asarray(found)
 
     def _local(self, pairs: bool) -> list[Callable[[Array], Array]]:
         return [*map(density, self.gap_laws), *(map(between_flats, self.pairs) if pairs else ())]

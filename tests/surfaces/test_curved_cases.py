@@ -178,6 +178,25 @@ def test_what_is_wrong_is_told_before_anything_is_integrated(tmp_path, monkeypat
         surfacechem.run(tmp_path / "case.yaml")
 
 
+def test_the_field_of_tractions_is_that_of_the_sum_over_pairs():
+    """A sphere pulls at a point as its potential, 2 pi R / ((m - 2) rho) [(rho - R)^(2-m) - (rho + R)^(2-m)], falls."""
+    found, R = solved("ball-in-a-socket").dataset, 20e-9
+    psi, g_0, n = 4e-21, 3e-10, 25e36
+    x, y, z = (found[f"surface_{axis}"].values[:, 0] for axis in "xyz")
+    d = float(found.approach.values[0])
+    away = np.stack([x, y, z - R - d])
+    rho = np.linalg.norm(away, axis=0)
+    r = symengine.Symbol("r")
+    total = sum(
+        n * psi * c * g_0**m * 2 * symengine.pi * R / ((m - 2) * r) * ((r - R) ** (2 - m) - (r + R) ** (2 - m))
+        for m, c in ((10, 1 / 45), (4, -1 / 3))
+    )
+    slope = np.array([float(total.diff(r).subs({r: value})) for value in rho])
+    inward = np.stack([-x, -y, 25e-9 - z]) / 25e-9
+    exact = -slope * np.sum(away / rho * inward, axis=0)
+    assert found.traction.values[0, :, 0] == pytest.approx(exact, rel=1e-7, abs=1e-9 * np.abs(exact).max())
+
+
 def test_a_scene_without_surfaces_imports_nothing_of_them():
     import subprocess
     import sys
