@@ -1,7 +1,9 @@
 """Forces of pairs of points and of laws of the gap: closed forms, balance, order of convergence, limits."""
 
 import itertools
+import json
 import math
+from pathlib import Path
 
 import mpmath
 import numpy as np
@@ -95,15 +97,19 @@ def test_a_sphere_over_a_plane_is_the_law_that_is_there():
         assert found.force_1[0] == pytest.approx(-found.force_2[0], rel=1e-13)
 
 
-def test_parallel_cylinders_per_length():
-    """Along a line r^-6 gives 3 pi / (8 a^5) at the distance a of the axes' points."""
-    d, R_1, R_2 = 0.3, 1.0, 2.0
-    # The trapezium rule converges geometrically on circles.
-    v, w = np.meshgrid(*[2 * np.longdouble(np.pi) * np.arange(320, dtype=np.longdouble) / 320] * 2)
-    x, z = R_1 * np.sin(v) - R_2 * np.sin(w), R_1 + R_2 + d - R_1 * np.cos(v) - R_2 * np.cos(w)
-    exact = 2 * 3 * np.pi / 8 * np.sum(np.hypot(x, z) ** -5) * (2 * np.pi / 320) ** 2 * R_1 * R_2
-    found = pair(Cylinder(R=R_1, length=2.0), Cylinder(R=R_2), d, [power(6)])
-    assert found.energy[0] == pytest.approx(float(exact), rel=1e-10)
+@pytest.mark.parametrize(
+    ("name", "lower", "upper", "d", "rtol"),
+    [
+        ("parallel_cylinders", Cylinder(R=1.0, length=1.0), Cylinder(R=2.0), 0.3, 1e-10),
+        ("crossed_cylinders", Cylinder(R=1.0), Cylinder(R=2.0, turn=math.pi / 2), 0.3, 1e-5),
+        ("tilted_plates", Plane(length=1.0, width=0.7), Plane(length=0.8, width=1.0, tilt=0.2), 0.6, 1e-10),
+    ],
+)
+def test_cylinders_and_plates_are_integrals_of_twenty_digits(name, lower, upper, d, rtol):
+    """`python tests/surfaces/exact_pair_integrals.py` makes them."""
+    exact = json.loads(Path(__file__).with_name("exact_pair_integrals.json").read_text(encoding="utf-8"))[name]
+    assert len(exact) == 21
+    assert pair(lower, upper, d, [power(6)], rtol).energy[0] == pytest.approx(float(exact), rel=rtol)
 
 
 def test_tilted_plates_are_the_sum_over_both_and_balance_whichever_carries_the_nodes():
