@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from importlib import import_module
@@ -65,16 +65,19 @@ def quantity_columns(
     ]
 
 
-def coverage_columns(trajectory: Trajectory) -> list[Column]:
-    """Coverages along the names that species have in the mechanism, which names of variables cannot be."""
-    states = {j: state.quantity.species for j, state in enumerate(trajectory.model.system.states)}
-    found = {name: j for j, name in states.items() if name}
+def coverage_columns(system: System, columns: Iterable[Column]) -> list[Column]:
+    """Of these columns those that are coverages, along the names that species have in the mechanism, which names of
+    variables cannot be.
+    """
+    species = {state.name: state.quantity.species for state in system.states if state.quantity.species}
+    found = {column.name: column for column in columns if column.name in species}
     if not found:
         return []
-    values = trajectory.result.outputs[:, [*found.values()]]
+    names, first = np.array([species[name] for name in found], dtype=object), next(iter(found.values()))
+    values = np.stack([np.asarray(column.values) for column in found.values()], axis=-1)
     return [
-        Column("species", ("species",), np.array([*found], dtype=object), "1", "species of the surface"),
-        Column("coverage", ("time", "species"), values, "1", "coverage of each species"),
+        Column("species", ("species",), names, "1", "species of the surface"),
+        Column("coverage", (*first.dimensions, "species"), values, "1", "coverage of each species"),
     ]
 
 

@@ -102,7 +102,8 @@ class Solution(Results):
         """Every variable of the dataset, the time coordinate first."""
         trajectory, accounts = self.shown, self.trajectory.model.system.ledger
         books = self.audit if trajectory is self.trajectory else audit(trajectory)
-        along = [*quantity_columns([trajectory]), *profile_columns(trajectory), *coverage_columns(trajectory)]
+        own = quantity_columns([trajectory])
+        along = [*own, *profile_columns(trajectory), *coverage_columns(trajectory.model.system, own)]
         columns = [Column("time", ("time",), trajectory.result.times, "s", "time since the start"), *along]
         for account, values in zip(accounts, trajectory.result.ledger_outputs.T, strict=True):
             q = account.quantity

@@ -22,7 +22,7 @@ from surfacechem.model.system import System
 from surfacechem.references.base import SceneView
 from surfacechem.results.accuracy import UNKNOWN, CellErrors, second_tolerance
 from surfacechem.results.audit import Audit, audit
-from surfacechem.results.dataset import DATASET_NAMES, Results, quantities, quantity_columns
+from surfacechem.results.dataset import DATASET_NAMES, Results, coverage_columns, quantities, quantity_columns
 from surfacechem.results.error_estimates import against_exact, estimated, second_run, with_cells
 from surfacechem.results.event_table import entropy_destroyed, event_columns, event_times
 from surfacechem.results.matching import exact_values, match
@@ -319,7 +319,9 @@ class SweepSolution(Results):
         shape = self.axes
         along = {column.name: column for column in quantity_columns(self.runs, self.inner, shape)}
         load = along.pop(self.inner, None)
-        columns = [*self._coordinates(load), *along.values(), *self._of_runs(), *event_columns(self.runs, shape)]
+        species = coverage_columns(self.system, along.values())
+        columns = [*self._coordinates(load), *along.values(), *species, *self._of_runs()]
+        columns += event_columns(self.runs, shape)
         columns += self._extremes() if load is None else []
         for which in self.told:
             name, unit, text = self._statistic(which)

@@ -385,3 +385,9 @@ def test_an_exact_solution_is_that_of_every_run_or_of_none(tmp_path):
     assert "exact solution stick-slip is not of this scene" in alone.accuracy.source
     assert "exact solution stick-slip is not of this scene" in swept.accuracy.source
     assert swept.accuracy.errors[1] == pytest.approx(alone.accuracy.error, rel=1e-9, nan_ok=True)
+
+
+def test_species_of_a_sweep_have_the_names_of_the_mechanism():
+    data = surfacechem.load("dna-adhesive").sweep({"T_0": [298.0, 299.0]}).dataset
+    assert data["coverage"].dims == ("T_0", "time", "species")
+    np.testing.assert_array_equal(data["coverage"].sel(species="bond(s)"), data["theta_bond_s"])
