@@ -24,7 +24,7 @@ import sympy  # type: ignore[import-untyped]
 
 from surfacechem.compile.printing import RELATIONS, SPECIAL, Latex, needed, symbol, sympy_form
 from surfacechem.expressions import EXPONENT_CAP, LARGE_EXPONENT, LITERAL, Expression, derivative
-from surfacechem.model.system import Named, System
+from surfacechem.model.system import Named, Parameter, System
 from surfacechem.quantities import AVOGADRO, BOLTZMANN, GAPS, GAS_CONSTANT, STEFAN_BOLTZMANN
 from surfacechem.tolerances import FEWEST, FRACTION_FLOOR, LEAST_COVERAGE, SAME
 
@@ -113,6 +113,11 @@ def _levels(system: System) -> set[Expression]:
     return {p.symbol for p in system.parameters if p.path.endswith(".level")}
 
 
+def _outside(parameter: Parameter) -> bool:
+    """Whether a number is a rate that another program evaluates."""
+    return parameter.path.startswith("interface.mechanism.reactions.") and parameter.path.endswith(".value")
+
+
 def _names(system: System) -> dict[str, str]:
     """LaTeX of symbols that are not named like variables."""
     names = {str(name): latex for name, (_, latex) in CONSTANTS.items()}
@@ -124,8 +129,15 @@ def _names(system: System) -> dict[str, str]:
             names[str(p.symbol)] = rf"{base}_{{{inside}\mathrm{{{place[-1]}}}}}"
     levels = _levels(system)
     names |= {str(item.expression): symbol(item.name) for item in system.named if item.expression in levels}
+    names |= {str(p.symbol): rf"\text{{{p.spec.text}}}" for p in system.parameters if _outside(p)}
     for item in system.named:
         names[f"{item.name} of a fit"] = rf"{symbol(item.name)}\!\left(T\right)"
+    return names | _species(system)
+
+
+def _species(system: System) -> dict[str, str]:
+    """Coverages and site densities by the names of their species."""
+    names: dict[str, str] = {}
     for state in system.states:
         if species := state.quantity.species:
             index = rf"\mathrm{{{species.translate(SPECIAL)}}}"

@@ -73,12 +73,18 @@ def differing(dataset: xarray.Dataset, axes: Sequence[str], known: Sequence[str]
     """Of the numbers of each run those that differ from run to run: of phases and temperatures, then of events."""
     found = sorted(known, key=lambda name: next(k for k, rank in enumerate(RANKS) if re.fullmatch(rank, name)))
     ends = [name for name in found if dataset[name].ndim == len(axes) and "error" not in name and name not in COUNTED]
+    shown = _apart(dataset, [name for name in ends if varies(fair(dataset, name))])
+    telling = [name for name in shown if any(re.fullmatch(rank, name) for rank in RANKS[:-1])]
+    return (telling or shown or ["time_reached"])[:MOST_PANELS]
+
+
+def _apart(dataset: xarray.Dataset, names: Sequence[str]) -> list[str]:
+    """The names without those of equal values: what is largest at the end tells no more than the end."""
     shown: list[str] = []
-    for name in ends:
-        # What is largest at the end tells no more than the end.
-        twin = any(np.array_equal(fair(dataset, name), fair(dataset, other), equal_nan=True) for other in shown)
-        shown += [name] if varies(fair(dataset, name)) and not twin else []
-    return (shown or ["time_reached"])[:MOST_PANELS]
+    for name in names:
+        values = fair(dataset, name)
+        shown += [] if any(np.array_equal(values, fair(dataset, n), equal_nan=True) for n in shown) else [name]
+    return shown
 
 
 def with_ends(dataset: xarray.Dataset, axes: Sequence[str]) -> xarray.Dataset:
