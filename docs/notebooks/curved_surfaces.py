@@ -60,6 +60,7 @@ left.semilogx(gaps, forces[:, 1] / forces[:, 2], "--", label="local law")
 left.axhline(1.0, linestyle=":", color="black", label="Derjaguin")
 left.set(xlabel="gap / radius", ylabel="force / that after Derjaguin", title="Sphere over a plane")
 left.legend()
+left.grid(alpha=0.3)
 
 # %% [markdown]
 # ## Other pairs

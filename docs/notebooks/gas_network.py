@@ -92,6 +92,7 @@ left.set(xlabel="time [s]", ylabel="temperature [K]")
 left.legend()
 right.plot(history.time, history.phi)
 right.set(xlabel="time [s]", ylabel="closed bonds")
+right.grid(alpha=0.3)
 
 # %% [markdown]
 # ## The same without the network

@@ -39,8 +39,8 @@ for solver in data["solver"].values:
     kept = chosen["digits"].sel(solver=solver).where(chosen["outcome"].sel(solver=solver) == "solved")
     ax.semilogx(chosen["value"], kept, "o-", label=solver)
 ax.set(xlabel=str(chosen["symbol"].item()), ylabel="digits kept", ylim=(0, 12))
-ax.invert_xaxis()
 ax.legend()
+ax.invert_xaxis()
 
 # %% [markdown]
 # ## Where does a solver fail, and does it say so?

@@ -57,6 +57,7 @@ for ax, case in zip(axes, data["case"].values, strict=True):
     ax.set(title=case, xlabel="largest relative error")
 axes[0].set_ylabel("right-hand sides")
 axes[0].legend()
+axes[0].grid(alpha=0.3)
 
 # %% [markdown]
 # ## The time to reach an error
