@@ -14,7 +14,7 @@ from pathlib import Path
 
 from surfacechem.contracts.terms import Shape
 from surfacechem.errors import InputError
-from surfacechem.surfaces import nodes
+from surfacechem.surfaces import nodes, patches
 from surfacechem.surfaces.pair_laws import InversePower
 from surfacechem.surfaces.pairwise import PairForces, interaction
 from surfacechem.surfaces.projection import Surface
@@ -67,14 +67,14 @@ def rows() -> Iterator[tuple[str, float, str, float, int, float]]:
 
 def rules() -> Iterator[tuple[str, float, str, float, int, float]]:
     """The error of each rule of Gauss alone, against the closed form."""
-    usual, most = nodes.ORDERS, nodes.MOST_DIVISIONS
+    usual = nodes.ORDERS
     for order in usual:
         # A rule that is asked for twice agrees with itself.
-        nodes.ORDERS = (order, order)
+        nodes.ORDERS = patches.ORDERS = (order, order)
         found, cost = measured(ROUND["sphere, plane"], 0.01, 1e-15)
         error = abs(float(found.energy[0]) / sphere_over_plane(0.01) - 1)
         yield "sphere, plane", 0.01, f"{order} points", error, found.pairs, cost
-    nodes.ORDERS, nodes.MOST_DIVISIONS = usual, most
+    nodes.ORDERS = patches.ORDERS = usual
 
 
 def main() -> None:
