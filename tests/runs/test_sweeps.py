@@ -305,7 +305,7 @@ def test_a_run_that_ends_at_its_start_leaves_the_others_alone(tmp_path):
 
 
 REFUSED = [
-    ({"nothing": [1.0]}, None, r"no parameter 'nothing' to sweep. Known"),
+    ({"nothing": [1.0]}, None, r"no parameter 'nothing' to sweep. Nearest"),
     ({RATE: {"from": 1e-12, "to": 1e-9}}, None, r"a range needs `points`"),
     ({RATE: {"from": "-1 pN/s", "to": "1 pN/s", "points": 3, "spacing": "logarithmic"}}, None, r"ends above zero"),
     ({RATE: {"from": "1 pN", "to": "2 pN", "points": 3}}, None, r"1 pN is a force"),
