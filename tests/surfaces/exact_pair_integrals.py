@@ -15,9 +15,11 @@ from mpmath import mpf
 
 TARGET = Path(__file__).with_suffix(".json")
 DIGITS = 20
-mpmath.mp.dps = 30
-NEAR = mpf(3) / 10
-"""The gap, over the radius of the smaller cylinder."""
+
+
+def near():
+    """The gap, over the radius of the smaller cylinder."""
+    return mpf(3) / 10
 
 
 def circles(integrand, n):
@@ -30,7 +32,7 @@ def circles(integrand, n):
 
 def parallel_cylinders(n):
     """Per length: along a line r^-6 gives 3 pi / (8 a^5); not even in each angle, so that both have a whole turn."""
-    d, R_1, R_2 = NEAR, 1, 2
+    d, R_1, R_2 = near(), 1, 2
     angles = [2 * mpmath.pi * k / n for k in range(n)]
     points = [[(R * mpmath.sin(t), R * mpmath.cos(t)) for t in angles] for R in (R_1, R_2)]
     c = R_1 + R_2 + d
@@ -41,13 +43,13 @@ def parallel_cylinders(n):
 
 def crossed_cylinders(n):
     """Over a plane at the distance h r^-6 gives pi / (2 h^4), along both axes at once."""
-    d, R_1, R_2 = NEAR, 1, 2
+    d, R_1, R_2 = near(), 1, 2
     return R_1 * R_2 * circles(lambda x, y: mpmath.pi / 2 / (d + R_1 * (1 - x) + R_2 * (1 - y)) ** 4, n)
 
 
 def tilted_plates(degree):
     """1 by 0.7 below 0.8 by 1: across both, (rho^2 + y^2)^-3 has a second antiderivative."""
-    d, tilt = 2 * NEAR, mpf(1) / 5
+    d, tilt = 2 * near(), mpf(1) / 5
 
     def across(rho, y):
         return -1 / (8 * rho**2 * (rho**2 + y**2)) + 3 * y / (8 * rho**5) * mpmath.atan(y / rho)
@@ -75,4 +77,6 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    # Here alone, as the digits are those of all that uses the library in a process.
+    with mpmath.workdps(30):
+        main()
