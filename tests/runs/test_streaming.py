@@ -147,7 +147,7 @@ from surfacechem.results.store import Store
 write = Store.write
 def slowly(self, number, columns):
     write(self, number, columns)
-    time.sleep(0.2)
+    time.sleep({pause})
 Store.write = slowly
 """
 STREAM = """
@@ -162,10 +162,12 @@ app([*{given}, sys.argv[1]])
 """
 
 
-def script(last=STREAM):
-    """Code that computes a sweep, slowly."""
+def script(last=STREAM, pause="0.2"):
+    """Code that computes a sweep, with a pause [s] after each chunk."""
     section = {"over": {K_0: {"from": 100, "to": 300, "points": 60}}, "keep": ENDS}
-    return SCRIPT + last.replace("{over}", repr({"sweep": section})).replace("{given}", repr(GIVEN))
+    return SCRIPT.replace("{pause}", pause) + last.replace("{over}", repr({"sweep": section})).replace(
+        "{given}", repr(GIVEN)
+    )
 
 
 def test_a_killed_writer_loses_at_most_a_chunk_and_no_byte(whole, tmp_path):
@@ -189,7 +191,9 @@ def test_a_killed_writer_loses_at_most_a_chunk_and_no_byte(whole, tmp_path):
 
 def test_an_interrupt_says_how_to_go_on(whole, tmp_path):
     path = tmp_path / "o.zarr"
-    writer = subprocess.Popen([sys.executable, "-c", script(COMMAND), str(path)], stderr=subprocess.PIPE, text=True)
+    writer = subprocess.Popen(
+        [sys.executable, "-c", script(COMMAND, "60 if number else 0"), str(path)], stderr=subprocess.PIPE, text=True
+    )
     while not (path / ".marks" / "1").exists():
         assert writer.poll() is None, writer.communicate()
         time.sleep(0.01)
