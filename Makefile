@@ -5,7 +5,8 @@ VENV ?= .venv
 BIN := $(abspath $(VENV))/bin
 # Of what is installed only what is imported is compiled, and kept.
 export PYTHONDONTWRITEBYTECODE :=
-RUNTIME := $(VENV)/.installed
+PACKAGE := $(VENV)/.installed
+RUNTIME := $(VENV)/.compiled
 TOOLS := $(VENV)/.installed-tools
 # Tests that share what they assemble, compile and run stay with one worker (tests/conftest.py).
 PYTEST := $(BIN)/pytest -n 2 --dist loadfile
@@ -26,16 +27,16 @@ lint: $(TOOLS)  ## style, types and which room imports which
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-unit: $(TOOLS)  ## the tests, without the slow ones
+unit: $(RUNTIME) $(TOOLS)  ## the tests, without the slow ones
 	$(PYTEST)
 
-core: $(TOOLS)  ## of these the tests of assembly, laws, mechanisms, stepper and exact solutions
+core: $(RUNTIME) $(TOOLS)  ## of these the tests of assembly, laws, mechanisms, stepper and exact solutions
 	$(PYTEST) -m "not slow and not around"
 
-slow: $(TOOLS)  ## the slow tests
+slow: $(RUNTIME) $(TOOLS)  ## the slow tests
 	$(PYTEST) -m slow
 
-docs: $(TOOLS)  ## the documentation, notebooks executed, warnings are errors
+docs: $(RUNTIME) $(TOOLS)  ## the documentation, notebooks executed, warnings are errors
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 
 # A case that physics stops, by design, ends with status 3.
@@ -71,13 +72,17 @@ clean:  ## all that make has made
 $(VENV)/bin/python:
 	$(or $(PYTHON),$(error No Python >= 3.11 found. Name one: make PYTHON=/path/to/python3.11)) -m venv $(VENV)
 
-$(RUNTIME): pyproject.toml | $(VENV)/bin/python
+# Every module is imported with nothing but what the package declares to need.
+$(PACKAGE): pyproject.toml | $(VENV)/bin/python
 	$(BIN)/pip install --quiet --no-compile --editable .
-	$(BIN)/python -m compileall -q surfacechem
-	$(BIN)/python -m surfacechem.solve
-	$(BIN)/surfacechem run exothermic -q -o $(VENV)/exothermic.nc  # with nothing but what it declares to need
+	$(BIN)/python -c "from pkgutil import walk_packages as w; [__import__(m.name) for m in w(['surfacechem'], 'surfacechem.') if '__main__' not in m.name]"
 	touch $@
 
-$(TOOLS): $(RUNTIME)
+$(RUNTIME): $(PACKAGE)
+	$(BIN)/python -m surfacechem.solve
+	$(BIN)/surfacechem run exothermic -q -o $(VENV)/exothermic.nc
+	touch $@
+
+$(TOOLS): $(PACKAGE)
 	$(BIN)/pip install --quiet --no-compile --editable '.[test,docs]'
 	touch $@

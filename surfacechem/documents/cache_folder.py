@@ -115,7 +115,7 @@ _NUMBERS = count()
 def fingerprint(*things: Any) -> Fingerprint:
     """The fingerprint of numbers, texts, arrays, and of laws and other records of them.
 
-    >>> fingerprint([1.0, 2.0]) == fingerprint((1.0, 2.0)), fingerprint(0.1) == fingerprint(0.1 + 1e-17)
+    >>> fingerprint([1.0, 2.0]) == fingerprint((1.0, 2.0)), fingerprint(0.1) == fingerprint(0.1 + 1e-18)
     (True, True)
     >>> fingerprint(1.0) == fingerprint("1.0")
     False

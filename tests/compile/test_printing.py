@@ -52,7 +52,7 @@ def two_pathways_and_their_limits():
 
 
 each_scene = pytest.mark.parametrize(
-    "scene", every(2, [*scenes.ALL, two_pathways_and_their_limits]), ids=lambda scene: scene.__name__
+    "scene", every(4, [*scenes.ALL, two_pathways_and_their_limits]), ids=lambda scene: scene.__name__
 )
 assembled = cache(lambda scene: assemble(scene()))
 
@@ -130,7 +130,7 @@ def test_a_module_shows_in_tracebacks_what_its_functions_read_and_no_more():
 WITH_TABLES = sorted(path.stem for path in shipped.cases().glob("*.yaml") if "table:" in path.read_text())
 
 
-@pytest.mark.parametrize("name", every(2, WITH_TABLES))
+@pytest.mark.parametrize("name", every(4, WITH_TABLES))
 def test_every_piece_of_a_history_is_printed(name):
     """The printed module finds the numbers that the compiled code is given, on both sides of every breakpoint."""
     case = cases.load(name)

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from ruamel.yaml import YAML
+from sampling import every
 from test_rates import _quiet, compare  # noqa: F401 - a fixture
 
 from mechanisms import states
@@ -63,7 +64,7 @@ def surface_alone(file: str, phase: str, folder: Path) -> tuple[Path, int]:
     return path, len(kept)
 
 
-@pytest.mark.parametrize(("file", "phase"), [surface for surface, count in SURFACES.items() if count])
+@pytest.mark.parametrize(("file", "phase"), every(3, [surface for surface, count in SURFACES.items() if count]))
 @given(data=st.data())
 @settings(max_examples=10)
 def test_reactions_between_surface_species_agree(folder, file, phase, data):

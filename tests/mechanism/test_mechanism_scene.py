@@ -8,6 +8,7 @@ import pytest
 import symengine
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from sampling import every
 
 import surfacechem
 from mechanisms import KMOL, SHIPPED, load, loading_read, loads, mechanism_texts, pulled, species_of, states
@@ -97,7 +98,7 @@ def heat_row(system, names):
     return row - row.subs({symengine.Symbol(f"d{name}_dt"): 0 for name in names})
 
 
-@pytest.mark.parametrize("name", SHIPPED)
+@pytest.mark.parametrize("name", every(3, SHIPPED))
 @given(data=st.data(), under=loads, more=st.sampled_from([(None, 1.0), (42.0, 1.25)]))
 @settings(max_examples=4)
 def test_shipped_mechanisms_in_a_scene(name, data, under, more):

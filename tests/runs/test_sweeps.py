@@ -209,7 +209,9 @@ def test_forces_that_overflow(exponent):
 @pytest.mark.parametrize(
     ("case", "path", "values"),
     [
-        ("stick-slip", "interface.friction.coulomb.mu_s", 0.1 + np.linspace(0.2, 0.5, 7)),
+        pytest.param(
+            "stick-slip", "interface.friction.coulomb.mu_s", 0.1 + np.linspace(0.2, 0.5, 7), marks=pytest.mark.slow
+        ),
         ("press-hold-pull", "programme.approach.until.p", ["8 kPa", "10 kPa"]),
         ("exothermic", "initial.T", ["290 K", "300 K", "310 K"]),
         ("closing-gas-gap", "initial.T_2", [500.0, 600.0]),
