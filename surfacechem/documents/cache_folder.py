@@ -17,6 +17,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, fields, is_dataclass
 from functools import cache
+from importlib.metadata import version
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -168,13 +169,15 @@ def _source(file: str) -> str:
 def kept(mark: Fingerprint, code: Iterable[Path], find: Callable[[], Any]) -> Any:
     """What ``find`` gives, made of numbers, texts and lists; from its file where that is.
 
-    ``code`` are the files, beside those of the classes in ``mark``, that it follows from.
+    ``code`` are the files, beside those of the classes in ``mark``, that it follows from; versions of libraries other
+    than NumPy, SciPy and SymEngine belong into the mark.
     """
     if not mark.lasts:
         return find()
     sources = sorted(_source(str(path)) for path in code)
+    libraries = [version(name) for name in ("numpy", "scipy", "symengine")]
     folder = cache_root() / "numbers"
-    path = folder / f"{fingerprint(mark.digest, sources, np.__version__).digest[:32]}.json"
+    path = folder / f"{fingerprint(mark.digest, sources, libraries).digest[:32]}.json"
     with suppress(OSError, ValueError):
         if untrusted((folder, path)) is None and (content := unsealed(path.read_bytes())) is not None:
             return json.loads(content)

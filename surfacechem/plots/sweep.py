@@ -72,8 +72,9 @@ def axes_of(dataset: xarray.Dataset) -> list[str]:
 
 
 def _numbers(dataset: xarray.Dataset) -> list[str]:
-    """Names of the numbers that each run has at its end or along it."""
-    return [str(n) for n, v in dataset.data_vars.items() if v.dtype.kind == "f" and "event" not in v.dims]
+    """Names of the numbers that each run has at its end or along it; coverages also have names of their own."""
+    lists = {"event", "species"}
+    return [str(n) for n, v in dataset.data_vars.items() if v.dtype.kind == "f" and lists.isdisjoint(v.dims)]
 
 
 def groups(dataset: xarray.Dataset, variables: Sequence[str] | None) -> list[Panel]:

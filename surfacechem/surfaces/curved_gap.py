@@ -165,8 +165,8 @@ def counts_at(x: Array, near: Projection, laws: Sequence[Density], heat: Sequenc
     count = np.zeros((*near.gap.shape, 16))
     for law in laws:
         psi, traction = np.moveaxis(law(near.gap), -1, 0)
-        # Tension pulls body 1 against the normal of body 2, which points at it.
-        pull = -traction[..., None] * near.normal
+        # Tension pulls body 1 against the direction in which body 2 sees it.
+        pull = -traction[..., None] * near.direction
         count[..., 0] += psi
         count[..., 1:7] += np.concatenate([pull, -pull], axis=-1)
         count[..., 7:13] += np.concatenate([np.cross(x, pull), -np.cross(near.point, pull)], axis=-1)
@@ -174,6 +174,6 @@ def counts_at(x: Array, near: Projection, laws: Sequence[Density], heat: Sequenc
     for path in heat:
         h, slope = np.moveaxis(path(near.gap), -1, 0)
         count[..., 14] += h
-        # As body 2 moves up, the gap to its nearest point grows by the vertical part of its normal.
-        count[..., 15] -= slope * near.normal[..., 2]
+        # As body 2 moves up, the gap to its nearest point grows by the vertical part of their direction.
+        count[..., 15] -= slope * near.direction[..., 2]
     return count

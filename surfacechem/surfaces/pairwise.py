@@ -80,7 +80,7 @@ def interaction(lower: Surface, upper: Surface, laws: Sequence[PairEnergy], rtol
     swapped |= not is_round(upper) and lower.shape.grain > upper.shape.grain
     outer, inner = (upper, lower) if swapped else (lower, upper)
     kernels = [kernel(law) for law in laws]
-    slowest = min(laws, key=lambda law: law.decay)
+    slowest = farthest(laws)
     size = length(lower, upper)
     for law in laws:
         _check_decay(law, size, rtol)
@@ -108,7 +108,7 @@ def interaction(lower: Surface, upper: Surface, laws: Sequence[PairEnergy], rtol
 
 def pair_traction(x: Array, normals: Array, inner: Surface, laws: Sequence[PairEnergy], rtol: float) -> Array:
     """Normal tractions (n,) [Pa], tension positive, at points (n, 3) of a surface from all points of another."""
-    kernels, slowest = [kernel(law) for law in laws], min(laws, key=lambda law: law.decay)
+    kernels, slowest = [kernel(law) for law in laws], farthest(laws)
     found, together = np.zeros(len(x)), len(x) if is_round(inner) else POINTS
     for begin in range(0, len(x), together):
         part = slice(begin, begin + together)
@@ -118,10 +118,18 @@ def pair_traction(x: Array, normals: Array, inner: Surface, laws: Sequence[PairE
     return found
 
 
+def farthest(laws: Sequence[PairEnergy]) -> PairEnergy:
+    """The law that reaches farthest: of those without an end the one that falls off slowest."""
+    return min(laws, key=lambda law: (-law.cutoff, law.decay))
+
+
 def check_finite(lower: Surface, upper: Surface) -> None:
     """InputError where two surfaces without end run along each other, so that their energy has no end either."""
-    endless = [not s.shape.about_axis and not np.all(np.isfinite(s.shape.span)) for s in (lower, upper)]
-    if all(endless) and lower.shape.turn == upper.shape.turn:
+    shapes = [surface.shape for surface in (lower, upper)]
+    endless = [[not shape.about_axis and not np.all(np.isfinite(ends)) for ends in shape.span] for shape in shapes]
+    # What has no end in both directions shares one with anything that has none in one.
+    parallel = all(endless[0]) or all(endless[1]) or abs(math.sin(shapes[0].turn - shapes[1].turn)) < NOISE
+    if any(endless[0]) and any(endless[1]) and parallel:
         raise InputError("both surfaces have no end: give one of them a length, so that the force has one.")
 
 

@@ -142,7 +142,8 @@ def outer_patches(outer: Surface, inner: Surface, size: float, reach: float) -> 
     tangents = outer.derivatives(near.at, FIRST)[1:]
     lengths = np.maximum(np.linalg.norm(tangents, axis=-1).T, POLE)
     first, low, high = near.at[0], *np.transpose(outer.shape.span)
-    far = reach / lengths[0]
+    # Bodies that are far apart see each other from as far.
+    far = reach * max(1.0, float(near.gap[0]) / size) / lengths[0]
     closed = np.array(outer.shape.closed)
     low, high = (np.where(closed, first + s * math.pi, np.clip(e, -far, far)) for s, e in ((-1, low), (1, high)))
     at = np.where(closed, first + np.remainder(near.at - first + math.pi, 2 * math.pi) - math.pi, near.at)

@@ -14,7 +14,6 @@ from typing import Any, Self
 
 import numpy as np
 
-from surfacechem import expressions, tolerances
 from surfacechem.contracts.terms import HeatTransfer, Law, PairEnergy, Potential, Shape, option
 from surfacechem.documents.cache_folder import Fingerprint, fingerprint, kept
 from surfacechem.errors import InputError
@@ -28,8 +27,10 @@ from surfacechem.tolerances import ATOM, FLOOR, NEGLIGIBLE, ROUNDING, SQRT_EPS
 KNOWN: dict[Fingerprint, tuple[tuple[ApproachEnergy, ...], ApproachEnergy | None]] = {}
 """Curves that have been integrated, by what they are the curves of."""
 
-CODE = [*sorted(Path(__file__).parent.glob("*.py")), Path(expressions.__file__), Path(tolerances.__file__)]
-"""What integrals follow from, beside the laws."""
+PACKAGE = Path(__file__).parents[1]
+CODE = [*(path for room in ("surfaces", "laws", "contracts") for path in sorted((PACKAGE / room).glob("*.py")))]
+CODE += [PACKAGE / f"{name}.py" for name in ("expressions", "quantities", "tolerances")]
+"""What integrals follow from: of the laws all that they share, too."""
 
 
 LOOKS = 2000

@@ -62,13 +62,15 @@ def _compiled(shape: Shape, count: int) -> Callable[[Array], Array]:
 class Projection:
     """Nearest points of a surface; arrays over the points that were projected.
 
-    ``at`` holds the parameters (..., 2), ``gap`` the distance along ``normal``, negative inside the body [m], ``tied``
-    where another point is as near.
+    ``at`` holds the parameters (..., 2), ``gap`` the distance along ``direction``, negative inside the body [m],
+    ``tied`` where another point is as near. The direction is the normal, but at an edge and a tip that from the nearest
+    point.
     """
 
     at: Array
     point: Array
     normal: Array
+    direction: Array
     gap: Array
     tied: NDArray[np.bool_]
 
@@ -163,7 +165,16 @@ class Surface:
             rival = self.derivatives(places, FIRST)[0]
             near = np.linalg.norm(x - rival, axis=-1) <= size * (1 + SAME)
             tied |= near & (np.linalg.norm(rival - D[0], axis=-1) > np.sqrt(SAME) * size)
-        return Projection(at, D[0], normal, np.where(side < 0, -size, size), tied)
+        gap = np.where(side < 0, -size, size)
+        off = (self._at_edge(at) & (size > 0))[..., None]
+        direction = np.where(off, np.divide(away, gap[..., None], out=np.zeros_like(away), where=off), normal)
+        return Projection(at, D[0], normal, direction, gap, tied)
+
+    def _at_edge(self, at: Array) -> NDArray[np.bool_]:
+        """Whether parameters are those of an edge or a tip."""
+        low, high = np.transpose(self.shape.span)
+        ends = (at <= low + (POLE if self.shape.about_axis else 0.0)) | (at >= high)
+        return np.asarray(np.any(ends & ~np.array(self.shape.closed), axis=-1))
 
     def _degenerate(self, D: Array, away: Array) -> NDArray[np.bool_]:
         """Whether points are where normals meet, so that not one point is nearest but many."""

@@ -191,9 +191,11 @@ def test_a_killed_writer_loses_at_most_a_chunk_and_no_byte(whole, tmp_path):
 
 def test_an_interrupt_says_how_to_go_on(whole, tmp_path):
     path = tmp_path / "o.zarr"
-    writer = subprocess.Popen(
-        [sys.executable, "-c", script(COMMAND, "60 if number else 0"), str(path)], stderr=subprocess.PIPE, text=True
-    )
+    command = [sys.executable, "-c", script(COMMAND, "60 if number else 0"), str(path)]
+    # Processes in the background of a shell are started with interrupts ignored.
+    own = signal.signal(signal.SIGINT, signal.SIG_DFL)
+    writer = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    signal.signal(signal.SIGINT, own)
     while not (path / ".marks" / "1").exists():
         assert writer.poll() is None, writer.communicate()
         time.sleep(0.01)

@@ -21,7 +21,7 @@ from surfacechem.surfaces.curved_gap import between_flats, density, over_gap
 from surfacechem.surfaces.pair_laws import InversePower, LennardJonesPair, PairTable, PenaltyPair
 from surfacechem.surfaces.pairwise import interaction
 from surfacechem.surfaces.projection import Surface
-from surfacechem.surfaces.shapes import Cavity, Cone, Cylinder, Disc, Paraboloid, Plane, Sphere, Torus
+from surfacechem.surfaces.shapes import Cap, Cavity, Cone, Cylinder, Disc, Paraboloid, Plane, Sphere, Torus
 
 GAS = density(GasGap(between=("a", "b"), k=0.026, M=0.3))
 
@@ -279,3 +279,46 @@ def test_a_law_that_falls_off_slower_than_it_says_is_refused():
     law = Slow(n_1=1e18, n_2=1e18, psi_0=-4e-21, r_0=1e-9, m=2.2)
     with pytest.raises(InputError, match=r"slow falls off like r\^-2.2 .* slower than r\^-4"):
         pair(Plane(), Sphere(R=5e-8), 1e-9, [law])
+
+
+EDGED = [Cap(R=1.0, angle=0.3), Cone(slope=0.3, radius=0.5), Plane(length=1.0, width=1.0, tilt=0.2)]
+
+
+@pytest.mark.parametrize("upper", EDGED)
+def test_forces_are_the_slopes_of_energies_at_edges_and_tips(upper):
+    """Beyond an edge the distance is not along the normal; lines of action are those of the distances."""
+
+    def law(gap):
+        return np.stack([-np.exp(-5 * gap), 5 * np.exp(-5 * gap)], axis=-1)
+
+    def at(d):
+        return over_gap(Surface(Plane(length=1.5, width=1.2)), Surface(upper, True, d), [law], rtol=1e-4)
+
+    x, w = np.polynomial.legendre.leggauss(3)
+    found = [at(d) for d in 0.5 + 0.1 * x]
+    work = 0.1 * sum(w * [contact.force_1[2] for contact in found])
+    assert work == pytest.approx(at(0.6).energy - at(0.4).energy, rel=1e-3)
+    for contact in found:
+        np.testing.assert_allclose(contact.moment_1, -contact.moment_2, atol=1e-12 * np.linalg.norm(contact.force_1))
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_laws_side_by_side_are_what_they_are_alone(turned):
+    laws = [InversePower(n_1=1.0, n_2=1.0, psi_0=-1.0, r_0=1.0, m=6), PenaltyPair(n_1=1.0, n_2=1.0, k=1.0, r_0=1.5)]
+    lower, upper = Plane(), Sphere(R=2.0)
+    both = pair(lower, upper, 1.0, laws[::-1] if turned else laws, rtol=1e-4).energy
+    alone = [pair(lower, upper, 1.0, [law], rtol=1e-4).energy[0] for law in laws]
+    np.testing.assert_allclose(both[::-1] if turned else both, alone, rtol=1e-3)
+
+
+def test_bodies_that_are_far_apart_see_all_of_each_other():
+    """A sphere and a cylinder as a point and a line."""
+    found = pair(Cylinder(R=1.0), Sphere(R=1.0), 100.0, [power(6)], rtol=1e-6)
+    line = 4 * math.pi * 2 * math.pi * 3 * math.pi / 8 / 102.0**5
+    assert float(found.energy[0]) == pytest.approx(line, rel=2e-3)
+
+
+@pytest.mark.parametrize(("lower", "upper"), [(Plane(), Plane(turn=0.3)), (Plane(), Cylinder(R=1.0, turn=0.3))])
+def test_bodies_without_end_along_each_other_are_refused(lower, upper):
+    with pytest.raises(InputError, match="both surfaces have no end"):
+        pair(lower, upper, 1.0, [power(6)])
