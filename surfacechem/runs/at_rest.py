@@ -12,9 +12,9 @@ from surfacechem.expressions import depends
 from surfacechem.model.system import System
 from surfacechem.solve.run import Model, Run, Trajectory
 
-FIRST, LONGER, LONGEST = 1.0, 100.0, 1e8
-"""Time [s] of the first look, by how much longer the next one is, and the longest, three years: beyond, step sizes
-times the rates of a fast surface are more than a double resolves beside one.
+LONGEST = 1e8
+"""Time [s] for which rest is looked for, three years: beyond, step sizes times the rates of a fast surface are more
+than a double resolves beside one.
 """
 
 AFTER = 10.0
@@ -31,20 +31,18 @@ def refuse_histories(system: System) -> None:
 
 
 def to_rest(model: Model, run: Run, changes: Mapping[str, float]) -> Run:
-    """The run that ends where the states have come within their tolerances of values that they keep ten times as long;
-    the whole of a run that stops before. InputError where there is none.
+    """The run that ends where the states have come within their tolerances of values that they keep ten times as long,
+    and for three years; the whole of a run that stops before. InputError where there is none.
     """
     refuse_histories(model.system)
-    end = FIRST
-    while end <= LONGEST:
-        looked = replace(run, times=(0.0, end), picture=None, accuracy=None)
-        reached = model.solve(looked, changes)
-        time, name = _rest_of(reached)
-        if reached.status != "finished" or time * AFTER <= end:
-            last = time if reached.status == "finished" else end
-            return replace(run, times=tuple(last * t / run.times[-1] for t in run.times))
-        end *= LONGER
-    raise InputError(f"the case has come to no rest in {LONGEST:.3g} s: {name} still changes.", path=PATH)
+    # A shorter look would take slow changes, and those that follow when nothing happened for long, for none.
+    reached = model.solve(replace(run, times=(0.0, LONGEST), picture=None, accuracy=None), changes)
+    last = LONGEST
+    if reached.status == "finished":
+        last, name = _rest_of(reached)
+        if last * AFTER > LONGEST:
+            raise InputError(f"the case has come to no rest in {LONGEST:.3g} s: {name} still changes.", path=PATH)
+    return replace(run, times=tuple(last * t / run.times[-1] for t in run.times))
 
 
 def _rest_of(reached: Trajectory) -> tuple[float, str]:
