@@ -11,6 +11,7 @@ from surfacechem.errors import InputError
 from surfacechem.expressions import depends
 from surfacechem.model.system import System
 from surfacechem.solve.run import Model, Run, Trajectory
+from surfacechem.tolerances import PICTURE
 
 LONGEST = 1e8
 """Time [s] for which rest is looked for, three years: beyond, step sizes times the rates of a fast surface are more
@@ -36,7 +37,7 @@ def to_rest(model: Model, run: Run, changes: Mapping[str, float]) -> Run:
     """
     refuse_histories(model.system)
     # A shorter look would take slow changes, and those that follow when nothing happened for long, for none.
-    reached = model.solve(replace(run, times=(0.0, LONGEST), picture=None, accuracy=None), changes)
+    reached = model.solve(replace(run, times=(0.0, LONGEST), picture=PICTURE, accuracy=None), changes)
     last = LONGEST
     if reached.status == "finished":
         last, name = _rest_of(reached)
@@ -48,7 +49,7 @@ def to_rest(model: Model, run: Run, changes: Mapping[str, float]) -> Run:
 def _rest_of(reached: Trajectory) -> tuple[float, str]:
     """The first time of a run after which no state leaves the tolerance of its last value, and which state is last."""
     result = reached.result
-    known, problem = result.states(), result.problem
+    known, problem = result.known or result.states(), result.problem
     evolved = np.flatnonzero(~problem.program.algebraic_mask)
     y, last = known.y[:, evolved], result.y[evolved]
     away = np.abs(y - last) > problem.rtol * np.abs(last) + problem.atol[evolved]

@@ -22,6 +22,17 @@ def test_a_run_ends_where_a_run_ten_times_as_long_ends(case, solver):
     assert np.abs(later.result.ydot).max() * end.t < 1e-7 * np.abs(end.y).min()
 
 
+def test_what_hardly_changes_at_first_is_not_at_rest():
+    """A cure at 200 K that takes a month to ignite, and changes by less than its tolerance in the first second."""
+    cold = ["initial.T=200", "run.rtol=1e-6", "run.atol=1e-7"]
+    end = surfacechem.load("adiabatic-arrhenius", [*STEADY, *cold]).run(error="balances").trajectory.result
+    assert end.t > 1e6
+    np.testing.assert_allclose(end.y, [1.0, 280.0], rtol=1e-5)
+    slow = surfacechem.load("reservoir-exchange", [*STEADY, "run.rtol=1e-6", "bodies.body.C=1e13"])
+    with pytest.raises(InputError, match="no rest in 1e"):
+        slow.run()
+
+
 @pytest.mark.parametrize(
     ("case", "message"),
     [
