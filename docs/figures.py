@@ -244,6 +244,7 @@ GALLERY: dict[str, tuple[list[str], str | None]] = {
     "thermal-press": (["g_n", "T_1", "T_2"], None),
     "three-temperatures": (["T_1", "T_2", "T_c"], None),
     "three-temperatures-no-capacity": (["T_1", "T_2", "T_c"], None),
+    "tribofilm-growth": (["d_m", "T_c"], None),
     "two-way-linear": (["phi"], None),
     "unequal-sites": (["phi"], None),
     "van-der-waals-sphere": (["t_n"], "g_n"),

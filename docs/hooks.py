@@ -31,6 +31,7 @@ PLACES = {
     "bonding": "interface.bonding",
     "friction": "interface.friction",
     "heat": "heat",
+    "growth": "interface.medium.growth",
     "property": "interface.medium, under the name of the property",
     "loading": "loading.NAME",
     "shape": "surface, under the name of a body",

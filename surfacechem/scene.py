@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from surfacechem.contracts import grids
 from surfacechem.contracts.terms import (
     BodyEnergy,
+    FilmGrowth,
     Fluid,
     Friction,
     HeatTransfer,
@@ -216,7 +217,8 @@ class Engine(Protocol):
 class Medium:
     """What fills the space between the bodies: a fluid, or single properties by name (k_m, eta_m, rho_m, cp_m).
 
-    A property that is given goes before that of the fluid. Without ``thickness`` [m] it fills the normal gap.
+    A property that is given goes before that of the fluid. Without ``thickness`` [m] it fills the normal gap, or is a
+    film whose thickness changes by ``growth``.
     ``temperatures`` [K] are some that the fluid's properties must cover from the start.
     """
 
@@ -224,6 +226,7 @@ class Medium:
     properties: Mapping[str, float | Property] = field(default_factory=dict)
     thickness: float | None = None
     temperatures: tuple[float, ...] = ()
+    growth: Sequence[FilmGrowth] = ()
 
 
 @dataclass(frozen=True)

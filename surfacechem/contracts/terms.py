@@ -18,6 +18,7 @@ contract           states                                              audited f
 :class:`Property`      property of the medium between the bodies           --
 :class:`Shape`         surface of a body                                   --
 :class:`PairEnergy`    energy of two points at a distance                  --
+:class:`FilmGrowth`    rate at which the medium between the bodies thickens  --
 =================  ==================================================  ===========================
 
 A :class:`Fluid` is a medium whose properties have no formula.
@@ -565,6 +566,15 @@ class Property(Law):
     """Name of the property in the table of quantities."""
 
     value: ClassVar[Callable[..., Expression]]
+
+
+class FilmGrowth(Law):
+    """Rate at which the film between the bodies becomes thicker, or thinner [m/s]."""
+
+    contract = "growth"
+    formula = "rate"
+
+    rate: ClassVar[Callable[..., Expression]]
 
 
 class Shape(Law):

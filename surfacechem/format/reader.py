@@ -335,7 +335,9 @@ def _medium(section: MediumSection) -> Medium:
             fluid.check()
         except InputError as error:
             raise section.error(error.message, "fluid") from None
-    return Medium(fluid, properties, section.thickness, tuple(section.temperatures))
+    if section.growth and section.thickness is not None:
+        raise section.error("the film grows: give its thickness at the start as `d_m` under `initial`.", "thickness")
+    return Medium(fluid, properties, section.thickness, tuple(section.temperatures), tuple(section.growth))
 
 
 def _normal(case: Document) -> Mounting | None:

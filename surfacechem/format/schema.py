@@ -7,6 +7,7 @@ import json
 from surfacechem import laws
 from surfacechem.contracts.terms import (
     Factor,
+    FilmGrowth,
     Friction,
     HeatTransfer,
     Law,
@@ -33,6 +34,7 @@ CONTRACTS: tuple[type[Law], ...] = (
     Factor,
     Shape,
     PairEnergy,
+    FilmGrowth,
 )
 
 

@@ -16,6 +16,7 @@ from surfacechem import laws, references
 from surfacechem import solve as solvers
 from surfacechem.contracts.terms import (
     BodyEnergy,
+    FilmGrowth,
     Friction,
     HeatTransfer,
     Limit,
@@ -186,6 +187,9 @@ class MediumSection(Section):
     pressure: float | None = quantity("Pa", "pressure of the fluid", above=0)
     temperatures: Sequence[float] = key(ListOf(amount("K", above=0), "[300 K]"), "covered from the start [K]", ())
     thickness: float | None = quantity("m", "thickness, else the normal gap", above=0)
+    growth: Sequence[FilmGrowth] = key(
+        ListOf(OneLaw(FilmGrowth)), "laws by which a film grows and wears, instead of `thickness`", ()
+    )
     k_m: Any = _property("k_m", "conductivity")
     eta_m: Any = _property("eta_m", "viscosity")
     rho_m: Any = _property("rho_m", "density")
@@ -353,7 +357,7 @@ INITIAL = Entries(
     {
         "phi": Key(amount("1", "bonding state", at_least=0, at_most=1)),
         "ln_phi": Key(amount("1", "logarithm of the bonding state, instead of phi: for survival far below 1e-16")),
-        **_variables((*EVOLVING, "theta"), amount("[x]")),
+        **_variables((*EVOLVING, "theta", "d_m"), amount("[x]")),
         "profile_1": Key(amount("K", "temperature inside body 1, which conducts", above=0)),
         "profile_2": Key(amount("K", "temperature inside body 2, which conducts", above=0)),
         "coverages": Key(Entries(others=amount("1")), "coverages of a mechanism by species"),

@@ -14,6 +14,7 @@ from typing import TypeVar
 from surfacechem.contracts.terms import (
     BodyEnergy,
     Factor,
+    FilmGrowth,
     Friction,
     HeatTransfer,
     Law,
@@ -41,6 +42,7 @@ FAMILIES: dict[type[Law], tuple[str, ...]] = {
     Factor: ("factors",),
     Shape: ("shapes",),
     PairEnergy: ("pair_laws",),
+    FilmGrowth: ("films",),
 }
 """The modules in which the laws of a contract stand."""
 

@@ -1,12 +1,15 @@
-"""Films of a medium: conduction, rarefied gas, shear, heat capacity."""
+"""Films of a medium: conduction, rarefied gas, shear, heat capacity, growth and wear."""
 
 from __future__ import annotations
 
 import math
+from abc import abstractmethod
 from collections.abc import Mapping
+from typing import Any
 
-from surfacechem.contracts.terms import Friction, HeatTransfer, Potential, parameter
-from surfacechem.expressions import Expression, positive, sqrt
+from surfacechem.contracts.terms import FilmGrowth, Friction, HeatTransfer, Potential, UnderPressure, parameter
+from surfacechem.expressions import Expression, absolute, exp, positive, sqrt
+from surfacechem.quantities import BOLTZMANN
 
 
 class Film(HeatTransfer):
@@ -143,3 +146,77 @@ class FilmCapacity(Potential):
     def energy(self, d_m: Expression, f_m: Expression) -> Expression:
         """Free energy [J/m^2]."""
         return d_m * f_m
+
+
+class ActivatedGrowth(FilmGrowth):
+    """Growth of a tribofilm over a barrier that a stress lowers."""
+
+    G_0: float = parameter("m/s", "growth rate without a barrier", at_least=0)
+    E: float = parameter("J", "activation energy without stress", at_least=0)
+    V: float = parameter("m^3", "activation volume", at_least=0)
+
+    @abstractmethod
+    def rate(self, *_: Any, **__: Any) -> Expression:
+        """Growth rate [m/s]."""
+
+    def under(self, stress: Expression, T_c: Expression) -> Expression:
+        """Growth rate [m/s] under a stress [Pa]."""
+        return self.G_0 * exp((stress * self.V - self.E) / (BOLTZMANN * T_c))
+
+
+class PressureActivatedGrowth(UnderPressure, ActivatedGrowth):
+    r"""Growth of a tribofilm that pressure and heat activate.
+
+    .. math:: \dot d_m = G_0 \exp\left( -\frac{E - p V}{k_B T_c} \right)
+
+    Source: Gosvami, Bares, Mangolini, Konicek, Yablon & Carpick (2015), doi 10.1126/science.1258788, for films of zinc
+    dialkyldithiophosphate under the tip of an atomic force microscope; Bell (1978), doi 10.1126/science.347575. The
+    heat of what is formed, and what it stores, are left out: films are of nanometres.
+
+    >>> law = PressureActivatedGrowth(G_0=0.1, E=1.28e-19, V=4e-30)
+    >>> round(law.rate(p=4e9, T_c=373.0) / law.rate(p=0.0, T_c=373.0), 6)
+    22.353137
+    """
+
+    def rate(self, p: Expression, T_c: Expression) -> Expression:
+        """Growth rate [m/s]."""
+        return self.under(p, T_c)
+
+
+class ShearActivatedGrowth(ActivatedGrowth):
+    r"""Growth of a tribofilm that shear and heat activate.
+
+    .. math:: \dot d_m = G_0 \exp\left( -\frac{E - t_s V}{k_B T_c} \right)
+
+    :math:`t_s` is the magnitude of the traction that resists sliding. Source: Zhang & Spikes (2016), doi
+    10.1007/s11249-016-0706-7, for films of zinc dialkyldithiophosphate that grow in a lubricant between surfaces which
+    do not touch; Bell (1978), doi 10.1126/science.347575. The heat of what is formed, and what it stores, are left out.
+
+    >>> law = ShearActivatedGrowth(G_0=0.1, E=1.28e-19, V=9e-29)
+    >>> round(law.rate(t_s=2e8, T_c=353.0) / law.rate(t_s=0.0, T_c=353.0), 6)
+    40.185943
+    """
+
+    def rate(self, t_s: Expression, T_c: Expression) -> Expression:
+        """Growth rate [m/s]."""
+        return self.under(t_s, T_c)
+
+
+class FilmWear(FilmGrowth):
+    r"""Wear of a film by sliding, the faster the thicker it is.
+
+    .. math:: \dot d_m = -|v|\,d_m / L
+
+    Where growth is steady the film tends to the thickness at which both are alike. Source: wear in proportion to the
+    thickness, of which thicker films are softer, as in Akchurin & Bosman (2017), doi 10.1007/s11249-017-0842-8; here
+    per distance slid, as in Archard (1953), doi 10.1063/1.1721448.
+
+    >>> FilmWear(L=0.5).rate(v=-0.1, d_m=1e-7)
+    -2e-08
+    """
+
+    L: float = parameter("m", "distance slid over which the film wears to 1/e", above=0)
+
+    def rate(self, v: Expression, d_m: Expression) -> Expression:
+        """Rate of its thickness [m/s]."""
+        return -absolute(v) * d_m / self.L

@@ -39,6 +39,7 @@ REMEDIES = {
     "interface what resists sliding: `friction`, or a potential of the tangential gap.",
     "direction_2": "Prescribe `v` and `v_2` under `loading`, or mount the bodies: `mechanics: {tangential: ...}`.",
     "p": "Prescribe `p` under `loading`, or give the interface a potential that reads the normal gap.",
+    "t_s": "Give the interface a law of friction.",
     "p_contact": "Give the interface a potential that reads the normal gap, or prescribe `p`.",
     "t_n": "Prescribe `t_n` under `loading`, or give the interface a potential that reads the normal gap.",
     "f": "Prescribe `f` under `loading`, or a load on the bonds: `t_n`, or a potential that reads the normal gap.",

@@ -26,9 +26,11 @@ from surfacechem.tolerances import EPS, ROUNDING
 KINDS: tuple[tuple[str, str, str], ...] = (
     ("Temperature", "K|degC", r".*"),
     ("Bonding", "1", r"(?!formed_|departure_|.*_residual$|J_c$|n_c$|gamma_m$|ln_theta$|drive$).*"),
+    ("Film", "m", "d_m"),
+    ("Growth", "m s-1", r"growth_\w+"),
     ("Gap", "m", r"g_\w*"),
     ("Displacement", "m", r"u_t2?"),
-    ("Velocity", "m s-1", r"\w+"),
+    ("Velocity", "m s-1", r"(?!growth_)\w+"),
     ("Traction", "Pa", r"(?!.*_nominal$).*"),
     ("Heat flux", "W m-2", r"q_(?!m$|t$|.*_nominal$)\w+"),
     ("Dissipation", "W m-2", r"D_\w+"),

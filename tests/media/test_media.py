@@ -1,6 +1,7 @@
 """Media: fits against CoolProp, runs that leave their range, what is refused, and nothing imported without need."""
 
 import dataclasses
+import math
 import subprocess
 import sys
 
@@ -15,12 +16,13 @@ from surfacechem.errors import InputError
 from surfacechem.laws.bulk import Constant
 from surfacechem.laws.contact import ConstantInterfaceCapacity
 from surfacechem.laws.factors import Exponential
-from surfacechem.laws.films import Film, FilmCapacity, FilmShear, RarefiedFilm
+from surfacechem.laws.films import Film, FilmCapacity, FilmShear, FilmWear, RarefiedFilm
 from surfacechem.laws.friction import Viscous
 from surfacechem.laws.loading import Hold
 from surfacechem.laws.media import Roelands, Vogel
 from surfacechem.media.coolprop import COMBINED, CoolPropFluid
 from surfacechem.model.assemble import assemble
+from surfacechem.quantities import BOLTZMANN
 from surfacechem.results.audit import audit
 from surfacechem.results.error_estimates import computed
 from surfacechem.results.solution import Solution
@@ -333,6 +335,7 @@ def test_what_coolprop_has_not_is_refused_with_the_reason(fluid, p, T, message):
         ),
         (Medium(None, {"eta_m": 0.1, "k_m": 0.1, "rho_m": 800.0}, 1e-6), "needs the density and the heat capacity"),
         (Medium(CoolPropFluid("Water", 1e5), {}, None), "a film that stores heat needs a thickness"),
+        (Medium(growth=(FilmWear(L=1.0),)), "d_m evolves but has no initial value. Add `d_m:` under `initial`"),
     ],
 )
 def test_a_medium_that_lacks_what_is_asked_for(found, message):
@@ -361,6 +364,7 @@ run: {until: 1}
         ("pressure: 1 atm", "case.yaml:4: interface.medium.pressure: `pressure` belongs to a fluid"),
         ("conductivity: {vogel: {a: 1, b: 1, c: 1}}", "vogel is a law of the viscosity of the medium, not of the cond"),
         ("viscosity: 3 m", "viscosity"),
+        ("thickness: 1 um, growth: [film-wear: {L: 1}]", "medium.thickness: the film grows: give its thickness at the"),
         ("viscosty: 3", "unknown key 'viscosty'. Did you mean 'viscosity'?"),
     ],
 )
@@ -435,3 +439,24 @@ def test_what_is_not_smooth_everywhere_is_fitted_around_the_start():
     trajectory = solved(lubricated(medium("Methane", p=101325.0, thickness=5e-5), v=800.0), *np.linspace(0.0, 50.0, 3))
     assert trajectory.status == "stopped"
     assert "the properties of Methane are fitted no further (give `interface.medium.temperatures`" in trajectory.reason
+
+
+GROWING = """
+bodies: {lower: {temperature: 350}, upper: {temperature: 350}}
+interface:
+  temperature: 350
+  medium: {growth: [%s: {G_0: 0.1, E: 0.8 eV, V: 0.02 nm^3}, film-wear: {L: 2}]}
+  friction: [coulomb: {mu: 0.5}]
+loading: {p: 2 GPa, v: -0.1}
+initial: {d_m: 1 nm}
+run: {until: 50}
+"""
+
+
+@pytest.mark.parametrize(("law", "stress"), [("pressure-activated-growth", 2e9), ("shear-activated-growth", 1e9)])
+def test_a_film_grows_to_where_it_wears_as_fast(law, stress):
+    """The exact solution of h' = G - |v| h / L."""
+    solution = simulation.Simulation(case.load_text(GROWING % law)).run()
+    growth, pace = 0.1 * math.exp((2e-29 * stress - 0.8 * 1.602176634e-19) / (BOLTZMANN * 350)), 0.1 / 2
+    t, final = solution.dataset["time"].values, growth / pace
+    np.testing.assert_allclose(solution.dataset["d_m"], final + (1e-9 - final) * np.exp(-pace * t), rtol=1e-9)

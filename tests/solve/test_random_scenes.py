@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from random_scenes import random_scene
 from sampling import every
 
-from surfacechem.contracts.terms import BodyEnergy, Factor, Load, PairEnergy, Property, Shape, reads
+from surfacechem.contracts.terms import BodyEnergy, Factor, FilmGrowth, Load, PairEnergy, Property, Shape, reads
 from surfacechem.errors import InputError
 from surfacechem.laws import FAMILIES, laws
 from surfacechem.model.assemble import assemble
@@ -157,5 +157,6 @@ def test_every_law_is_drawn():
         found = [*interface.potentials, *interface.frictions, *interface.reactions, *interface.limits, *scene.heat]
         drawn.update(type(law).name() for law in found)
     kinds = {law for contract in FAMILIES for law in laws(contract)}
-    inside = {law for contract in (Factor, Property, BodyEnergy, Load, Shape, PairEnergy) for law in laws(contract)}
+    parts = (Factor, Property, BodyEnergy, Load, Shape, PairEnergy, FilmGrowth)
+    inside = {law for contract in parts for law in laws(contract)}
     assert kinds - inside - set(drawn) == set()

@@ -6,13 +6,13 @@ Such a variable, as the age of a contact, is evolved as its logarithm.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import symengine
 
 from surfacechem.contracts.terms import Friction
 from surfacechem.errors import InputError
-from surfacechem.expressions import Expression, derivative, exp, where
+from surfacechem.expressions import Expression, absolute, derivative, exp, sqrt, where
 from surfacechem.model.balances import DISSIPATION, INTERFACE, MECHANICS, OUTSIDE, WORK, Power
 from surfacechem.model.build import Build
 from surfacechem.model.components.mounting import ACROSS, ALONG
@@ -24,6 +24,9 @@ from surfacechem.quantities import VARIABLES, Quantity
 def laws(build: Build) -> Iterator[Power | State | Margin]:
     """Sliding tractions and what they dissipate; their power comes from outside."""
     rubs, total = build.energy.rubs, symengine.Integer(0)
+    resisting: dict[str, Expression] = {}
+    if build.interface.frictions:
+        build.variables.define("t_s", lambda: _magnitude(build, resisting), "derived", "interface.friction")
     for law in build.interface.frictions:
         label = build.unique(law.label)
         bound = build.bound(law)
@@ -35,7 +38,9 @@ def laws(build: Build) -> Iterator[Power | State | Margin]:
         for d, traction in resisted.items():
             across = " across v" if d is ACROSS else ""
             quantity = Quantity(f"{d.traction}_{label}", "Pa", f"tangential traction of {law.title}{across}")
-            nominal = build.stretch * build.name(quantity, traction)
+            named = build.name(quantity, traction)
+            nominal = build.stretch * named
+            resisting[d.axis] = resisting.get(d.axis, 0) + rubs * named
             power += rubs * nominal * build.variables.get(d.velocity, law)
             total += rubs * nominal
             resist(build, d, nominal)
@@ -52,6 +57,12 @@ def laws(build: Build) -> Iterator[Power | State | Margin]:
     if not build.motion.slips and in_parallel(build):
         t_a = derivative(build.psi, displacement(build))
         build.areal(Quantity(ALONG.total, "Pa", f"{ALONG.text} on body 1", ALONG.total), t_a + total)
+
+
+def _magnitude(build: Build, tractions: Mapping[str, Expression]) -> Expression:
+    """Of the traction with these components along the interface."""
+    along, *across = tractions.values()
+    return build.name(VARIABLES["t_s"], sqrt(along**2 + across[0] ** 2) if across else absolute(along))
 
 
 def pressed(build: Build, law: Friction) -> dict[str, Expression]:

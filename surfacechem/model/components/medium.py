@@ -7,7 +7,7 @@ is the double integral of such a polynomial, so that capacity, entropy and energ
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import cache, partial
 from itertools import pairwise
 
@@ -19,9 +19,10 @@ from surfacechem.contracts.terms import Fluid, Property, Spec
 from surfacechem.errors import InputError, Place
 from surfacechem.expressions import Expression, log
 from surfacechem.model.build import Build
-from surfacechem.model.system import Caution, Margin
+from surfacechem.model.system import Caution, Margin, State
 from surfacechem.quantities import VARIABLES, Quantity
 from surfacechem.scene import Medium
+from surfacechem.tolerances import NANOMETRE
 
 PATH = "interface.medium"
 
@@ -31,12 +32,16 @@ KEYS = {"k_m": "conductivity", "eta_m": "viscosity", "rho_m": "density", "cp_m":
 FITTED = (*KEYS, "gamma_m")
 
 
-def variables(build: Build) -> None:
-    """Properties of the medium; each comes to life when something reads it."""
+def variables(build: Build) -> Iterator[State]:
+    """Properties of the medium, each of which comes to life when something reads it; the thickness of a film that
+    grows.
+    """
     found = build.interface.medium
-    if found is None:
-        return
+    assert found is not None
     _film(build, found)
+    if found.growth:
+        symbol, dot = symengine.symbols("d_m dd_m_dt")
+        yield State(VARIABLES["d_m"], symbol, dot, build.initial("d_m"), NANOMETRE, algebraic=False)
     for name, value in found.properties.items():
         build.variables.define(name, partial(_given, build, name, value), "derived", f"{PATH}.{KEYS[name]}")
     fluid = None if found.fluid is None else cache(partial(FluidFit, build, found.fluid))
@@ -47,12 +52,29 @@ def variables(build: Build) -> None:
     build.variables.define("f_m", partial(_free_energy, build, found, fluid), "derived", PATH)
 
 
+def laws(build: Build) -> None:
+    """The balance of a film that grows and wears."""
+    found, total = build.interface.medium, symengine.Integer(0)
+    assert found is not None
+    for law in found.growth:
+        bound = build.variables.bind(law, f"{PATH}.growth.{law.name()}")
+        rate = build.variables.call(bound, bound.statement)
+        build.law_ranges(law)
+        build.law_margins(bound, {})
+        quantity = Quantity(f"growth_{build.unique(law.label)}", "m/s", f"rate of the film's thickness by {law.title}")
+        total += build.name(quantity, rate)
+    if found.growth:
+        build.rows.kinematics("d_m", total)
+
+
 def _property(fluid: Callable[[], FluidFit], name: str) -> Expression:
     return fluid().property(name)
 
 
 def _film(build: Build, found: Medium) -> None:
-    if found.thickness is None:
+    if found.growth:
+        build.variables.define("d_m", symengine.Symbol("d_m"), "evolved", f"{PATH}.growth")
+    elif found.thickness is None:
         build.variables.define(
             "d_m", lambda: build.variables.get("g_n", "the medium", PATH), "derived", "the normal gap"
         )
