@@ -13,6 +13,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 
@@ -28,11 +29,17 @@ ORDERS = (4, 6, 9, 13, 18, 25)
 LAST = len(ORDERS) - 1
 """Level of the last of the orders; rules of higher levels inside have pieces that are half as long."""
 
+LEFT_OUT = 0.01
+"""Part of the accuracy that is far away of one surface, and not summed."""
+
 PIECE = 2.0
 """Length of a piece in t."""
 
 CHEBYSHEV, BETWEEN = np.cos(np.pi * (np.arange(24) + 0.5) / 24), np.array([-0.97, -0.52, 0.14, 0.71])
 """Gaps for a polynomial of their logarithm, and places between them at which it is tried."""
+
+Kernel = Callable[[Array], Array]
+"""Energy of a law and its slope (n, 2) at n distances."""
 
 Sums = tuple[Array, Array, Array]
 """For n outer points: energy (n,), force on them (n, 3), and inner points weighted by what acts on each (n, 3)."""
@@ -101,11 +108,21 @@ def piece_edges(low: Array, high: Array, grain: Array | float = math.inf, level:
     """Edges (n, k) of pieces from parameters ``low`` to ``high`` (n,) around zero, none longer than PIECE, nor than the
     grain of the surface, in units of the scale of sinh t; shorter ones for a level above the last.
     """
-    parts = 2 ** max(level - LAST, 0)
     if np.all(np.isinf(grain)):
-        count = max(1, math.ceil(float(np.max(high - low)) / PIECE)) * parts
-        return np.asarray(low[:, None] + (high - low)[:, None] * np.arange(count + 1) / count)
+        return divided(np.stack([low, high], axis=1), level)
+    parts = 2 ** max(level - LAST, 0)
     return np.concatenate([-_outward(-low, grain, parts)[:, ::-1], _outward(high, grain, parts)[:, 1:]], axis=1)
+
+
+def divided(edges: Array, level: int) -> Array:
+    """Edges (n, k) of pieces between given ones (n, m), none longer than PIECE; shorter ones for a level above the
+    last.
+    """
+    found = [edges[:, :1]]
+    for low, high in pairwise(edges.T):
+        parts = math.ceil(float(np.max(high - low)) / PIECE) * 2 ** max(level - LAST, 0)
+        found.append(low[:, None] + (high - low)[:, None] * np.arange(1, parts + 1) / max(parts, 1))
+    return np.concatenate(found, axis=1)
 
 
 def _outward(end: Array, grain: Array | float, parts: int) -> Array:
@@ -117,43 +134,93 @@ def _outward(end: Array, grain: Array | float, parts: int) -> Array:
     return np.stack(found, axis=1)
 
 
-def inner_sums(
-    surface: Surface, x: Array, kernels: Sequence[Callable[[Array], Array]], level: int, law: PairEnergy, rtol: float
-) -> tuple[list[Sums], int]:
-    """Sums over the inner surface for points (n, 3), of each law, and the number of pairs of points.
+@dataclass(frozen=True)
+class Extent:
+    """How far laws of the distance reach: the power with which they fall off at least, the distance at which they end,
+    infinite where they do not, and distances (increasing) [m] at which they bend, their end the last of them.
+    """
 
-    The ``law`` that falls off most slowly says how far they reach. InputError where a point is in the body.
+    decay: float
+    cutoff: float
+    bends: tuple[float, ...]
+
+    def levels(self, surface: Surface) -> list[float]:
+        """Gaps to a surface [m] at which sums over it bend: there its nearest or its farthest point is at a bend."""
+        shape, found = surface.shape, set(self.bends)
+        if is_round(surface) and not isinstance(shape, Plane):
+            bulge, R = getattr(shape, "bulge"), getattr(shape, "R")  # noqa: B009
+            found |= {bulge * (bend - 2 * R) for bend in self.bends}
+        return sorted(gap for gap in found if gap > 0)
+
+
+def extents(laws: Sequence[PairEnergy]) -> dict[Extent, list[int]]:
+    """Which laws have nodes of their own: those that bend or end at distances of their own, all others together."""
+    found: dict[tuple[float, ...], list[int]] = {}
+    for k, law in enumerate(laws):
+        bends = law.kinks.get("r", ())
+        places = {float(r) for r in (bends if isinstance(bends, Sequence) else (bends,))}
+        if math.isfinite(law.cutoff):
+            places = {r for r in places if r < law.cutoff} | {law.cutoff}
+        found.setdefault((law.cutoff, *sorted(places)), []).append(k)
+    return {
+        Extent(min(laws[k].decay for k in which), cutoff, tuple(bends)): which
+        for (cutoff, *bends), which in found.items()
+    }
+
+
+def inner_sums(
+    surface: Surface, x: Array, laws: Sequence[PairEnergy], kernels: Sequence[Kernel], level: int, rtol: float
+) -> tuple[list[Sums], int]:
+    """Sums over the inner surface for points (n, 3), of each law with its kernel, and the number of pairs of points.
+
+    InputError where a point is in the body.
     """
     near = surface.nearest(x)
     if not np.all(near.gap > 0):
         raise InputError("the surfaces overlap; a law of pairs of points holds outside only.")
+    found: dict[int, Sums] = {}
+    pairs = surface.search * len(x)
+    for extent, which in extents(laws).items():
+        sums, more = _sums_of(surface, x, near, [kernels[k] for k in which], extent, level, rtol)
+        found |= dict(zip(which, sums, strict=True))
+        pairs += more
+    return [found[k] for k in range(len(laws))], pairs
+
+
+def _sums_of(
+    surface: Surface, x: Array, near: Projection, kernels: Sequence[Kernel], extent: Extent, level: int, rtol: float
+) -> tuple[list[Sums], int]:
+    """The same for laws of one extent."""
     # Of what lies beyond, a part of size (h / reach)^(decay - 2) of all is missed.
-    farther = (rtol / 10) ** (-1 / (law.decay - 2))
+    farther = (rtol * LEFT_OUT) ** (-1 / (extent.decay - 2))
     if not is_round(surface):
-        nodes = _inner_grid(surface, x, near, np.minimum(near.gap * farther, law.cutoff), level)
-        return [nodes.sums(one) for one in kernels], nodes.area.size + surface.search * len(x)
-    pairs = len(x)
+        nodes = _inner_grid(surface, x, near, np.minimum(near.gap * farther, extent.cutoff), level)
+        return [nodes.sums(one) for one in kernels], nodes.area.size
+    pairs = 0
 
     def profiles(gaps: Array) -> Array:
         nonlocal pairs
-        circles = _around(surface, gaps, np.minimum(gaps * farther, law.cutoff), level, law.cutoff)
+        circles = _around(surface, gaps, farther, extent, level)
         pairs += circles.area.size
         return np.concatenate([circles.profile(one) for one in kernels], axis=-1)
 
-    found, sums = tabulated(profiles, near.gap, rtol), []
+    found, sums = tabulated(profiles, near.gap, rtol, extent.levels(surface)), []
     for energy, whole, lower in np.split(found.T, len(kernels)):
         push = (whole * near.gap + lower)[:, None] * near.normal
         sums.append((energy, push, whole[:, None] * near.point - lower[:, None] * near.normal))
     return sums, pairs
 
 
-def tabulated(function: Callable[[Array], Array], gaps: Array, rtol: float) -> Array:
-    """A function (n, k) of many gaps by polynomials of their logarithm, on pieces that are short enough."""
+def tabulated(function: Callable[[Array], Array], gaps: Array, rtol: float, levels: Sequence[float] = ()) -> Array:
+    """A function (n, k) of many gaps by polynomials of their logarithm, on pieces that are short enough; it bends at
+    some ``levels``.
+    """
     at, x = np.log(gaps), np.concatenate([CHEBYSHEV, BETWEEN])
     pieces = max(1, math.ceil(np.ptp(at)))
-    edges = np.linspace(at.min(), at.max(), pieces + 1)
-    home = np.clip(np.searchsorted(edges, at, side="right") - 1, 0, pieces - 1)
-    waiting = [(np.flatnonzero(home == k), edges[k], edges[k + 1]) for k in range(pieces)]
+    inside = [math.log(gap) for gap in levels if at.min() < math.log(gap) < at.max()]
+    edges = np.sort([*np.linspace(at.min(), at.max(), pieces + 1), *inside])
+    home = np.clip(np.searchsorted(edges, at, side="right") - 1, 0, len(edges) - 2)
+    waiting = [(np.flatnonzero(home == k), edges[k], edges[k + 1]) for k in range(len(edges) - 1)]
     parts = []
     while waiting:
         which, low, high = waiting.pop()
@@ -197,16 +264,23 @@ def _inner_grid(surface: Surface, x: Array, found: Projection, reach: Array, lev
     return Grid(x, points, np.sqrt(E * G - F**2) * (du[:, :, None] * dv[:, None, :]).reshape(len(x), -1))
 
 
-def _around(surface: Surface, gap: Array, reach: Array, level: int, cutoff: float) -> Circles:
-    """Circles around the feet on a plane, a sphere or a cavity of points at gaps (n,), up to where a law ends."""
+def _around(surface: Surface, gap: Array, farther: float, extent: Extent, level: int) -> Circles:
+    """Circles around the feet on a plane, a sphere or a cavity of points at gaps (n,), up to where laws end or, where
+    they do not, so many times ``farther`` than the gap.
+    """
     shape = surface.shape
     bent = 0.0 if isinstance(shape, Plane) else getattr(shape, "bulge") / getattr(shape, "R")  # noqa: B009
-    end = np.minimum(reach, math.pi / abs(bent)) if bent else reach
-    if math.isfinite(cutoff):
-        # The circle at which the distance is the cut-off, from the law of cosines.
-        chord = np.maximum(cutoff**2 - gap**2, 0.0) / (1 + bent * gap)
-        end = 2 / abs(bent) * np.arcsin(np.minimum(np.sqrt(chord) * abs(bent) / 2, 1)) if bent else np.sqrt(chord)
-    edges = piece_edges(np.zeros_like(gap), np.arcsinh(end / gap), level=level)
+    last = math.pi / abs(bent) if bent else math.inf
+    ends = [np.zeros_like(gap)]
+    for bend in extent.bends:
+        # The circle at which the distance is that of a bend, from the law of cosines.
+        chord = np.sqrt(np.maximum(bend - gap, 0.0) * (bend + gap) / np.maximum(1 + bent * gap, TINY))
+        ends.append(2 / abs(bent) * np.arcsin(np.minimum(chord * abs(bent) / 2, 1)) if bent else chord)
+    if math.isinf(extent.cutoff):
+        ends.append(np.minimum(gap * farther, last))
+    edges = divided(
+        np.minimum.accumulate(np.arcsinh(np.stack(ends[::-1], axis=1) / gap[:, None]), axis=1)[:, ::-1], level
+    )
     t, w = gauss(edges, ORDERS[min(level, LAST)])
     s = gap[:, None] * np.sinh(t)
     ds = w * np.hypot(gap[:, None], s)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from functools import cached_property
 
 from surfacechem.contracts.terms import PairEnergy, option, parameter
 from surfacechem.errors import InputError
@@ -120,14 +121,24 @@ class PairTable(PairEnergy):
         """Where it ends [m]."""
         return self.distances[-1]
 
-    def energy(self, r: Expression) -> Expression:
-        """Energy of a pair [J]."""
+    @property
+    def kinks(self) -> Mapping[str, Sequence[float]]:
+        """Between its points it is smooth."""
+        return {"r": tuple(self.distances)}
+
+    @cached_property
+    def cubics(self) -> list[list[float]]:
+        """Coefficients between the points, of the third power first."""
         from scipy.interpolate import PchipInterpolator
 
+        coefficients: list[list[float]] = PchipInterpolator(self.distances, self.energies).c.T.tolist()
+        return coefficients
+
+    def energy(self, r: Expression) -> Expression:
+        """Energy of a pair [J]."""
         x, psi = self.distances, self.energies
         result = 0.0 * r
-        for low, high, cubic in reversed(list(zip(x, x[1:], PchipInterpolator(x, psi).c.T.tolist(), strict=False))):
-            a, b, c, d = cubic
+        for low, high, (a, b, c, d) in reversed(list(zip(x, x[1:], self.cubics, strict=False))):
             z = r - low
             result = where(r < high, d + z * (c + z * (b + z * a)), result)
         power = math.log(psi[0] / psi[1]) / math.log(x[0] / x[1]) if psi[0] * psi[1] > 0 else 0.0

@@ -11,7 +11,7 @@ Source: Sauer, Duong & Mandadapu (2021), eqs. e:bt_lr and e:psi12ex.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -19,17 +19,22 @@ import numpy as np
 
 from surfacechem.contracts.terms import PairEnergy
 from surfacechem.errors import InputError
-from surfacechem.surfaces.nodes import LAST, inner_sums, is_round
-from surfacechem.surfaces.patches import integral, outer_patches
-from surfacechem.surfaces.projection import Array, Surface
+from surfacechem.surfaces.level_cuts import with_levels
+from surfacechem.surfaces.nearest_places import NearPlaces
+from surfacechem.surfaces.nodes import LAST, LEFT_OUT, Extent, Kernel, extents, inner_sums, is_round
+from surfacechem.surfaces.patches import Patches, integral, outer_patches
+from surfacechem.surfaces.projection import FIRST, Array, Surface
 from surfacechem.surfaces.shapes import Plane
-from surfacechem.tolerances import ATOM, NOISE, PRECISE, TINY
+from surfacechem.tolerances import ATOM, NOISE, PRECISE, TINY, ULPS
 
 REMOTE = np.array([1e3, 2e3])
 """Distances over the size of the surfaces at which it is seen how a law falls off."""
 
 MOST_DECADES = 100
 """Reach over gap, in decades, at most: the largest area is its square."""
+
+FAR = 1e6
+"""Reach over the size of surfaces where a law has an end: over a surface without end it is looked for that far."""
 
 POINTS = 8
 """Points at which tractions are summed together where the other surface has no circles."""
@@ -59,14 +64,20 @@ class PairForces:
 
 
 @lru_cache(maxsize=64)
-def kernel(law: PairEnergy) -> Callable[[Array], Array]:
+def kernel(law: PairEnergy) -> Kernel:
     """Energy of a pair and its slope as machine code, (n, 2) for n distances."""
     import symengine
 
     r = symengine.Symbol("r")
     psi = symengine.sympify(law.energy(r))
-    compiled: Callable[[Array], Array] = symengine.Lambdify([r], [psi, psi.diff(r)], backend="llvm")
-    return lambda distances: np.asarray(compiled(distances.reshape(-1, 1))).reshape(*distances.shape, 2)
+    compiled: Kernel = symengine.Lambdify([r], [psi, psi.diff(r)], backend="llvm")
+
+    def values(distances: Array) -> Array:
+        # The machine code takes no empty array.
+        flat = compiled(distances.reshape(-1, 1)) if distances.size else np.empty(0)
+        return np.asarray(flat).reshape(*distances.shape, 2)
+
+    return values
 
 
 def interaction(lower: Surface, upper: Surface, laws: Sequence[PairEnergy], rtol: float = PRECISE) -> PairForces:
@@ -75,52 +86,70 @@ def interaction(lower: Surface, upper: Surface, laws: Sequence[PairEnergy], rtol
     Densities count as they are in each law.
     """
     check_finite(lower, upper)
+    for law in laws:
+        _check_decay(law, length(lower, upper), rtol)
+        _check_energy(lower, upper, law)
     # The inner surface is the simpler one, if any.
     swapped = is_round(lower) and (not is_round(upper) or isinstance(lower.shape, Plane))
     swapped |= not is_round(upper) and lower.shape.grain > upper.shape.grain
     outer, inner = (upper, lower) if swapped else (lower, upper)
-    kernels = [kernel(law) for law in laws]
-    slowest = farthest(laws)
-    size = length(lower, upper)
-    for law in laws:
-        _check_decay(law, size, rtol)
-    _check_energy(lower, upper, slowest)
-    patches, near = outer_patches(outer, inner, size, size * rtol ** (-1 / (slowest.decay - 2)))
+    kernels, found_extents = [kernel(law) for law in laws], list(extents(laws))
+    patches, near = _cut_patches(outer, inner, found_extents, rtol)
+    gap = float(near.gap[0])
+    rounded = _rounded(outer.derivatives(near.at[0], FIRST)[0], gap, found_extents, rtol)
+    amounts = np.array([law.n_1 * law.n_2 for law in laws])[:, None]
+
+    def integrand(x: Array, level: int) -> tuple[Array, int]:
+        found, pairs = _sums(x, inner, laws, kernels, level, rtol)
+        return found * amounts, pairs
+
+    # What is left out is a hundredth of the accuracy, but for factors of order one.
+    rounded += 0.0 if all(math.isfinite(law.cutoff) for law in laws) else 0.1 * rtol
+    left = max(rtol, 2 * rounded) - rounded
+    found, error, pairs = integral(patches, integrand, lambda found: _sizes(found, gap), left)
+    energy, on_outer, on_inner, moment, opposite = np.split(found, [1, 4, 7, 10], axis=-1)
+    forces, moments = (on_outer, on_inner), (moment, opposite)
+    if swapped:
+        forces, moments = forces[::-1], moments[::-1]
+    return PairForces(energy[:, 0], *forces, *moments, error + rounded, gap, near.count, pairs)
+
+
+def _cut_patches(outer: Surface, inner: Surface, found: Sequence[Extent], rtol: float) -> tuple[Patches, NearPlaces]:
+    """Patches of the outer surface, cut where sums over the inner one bend, and where the surfaces are nearest."""
+    size = length(outer, inner)
+    reach = max(_reach(outer, inner, extent, rtol) for extent in found)
+    patches, near = outer_patches(outer, inner, size, reach)
     gap = float(near.gap[0])
     if not gap > NOISE * size:
         text = f"the surfaces overlap or touch, their gap is {gap:.3g} m; a law of pairs of points holds outside only"
         if gap > ATOM:
             text = f"a gap of {gap:.3g} m is lost in the rounding of bodies of {size:.3g} m; give smaller ones"
         raise InputError(f"{text}.")
-    amounts = np.array([law.n_1 * law.n_2 for law in laws])[:, None]
+    levels = sorted({level for extent in found for level in extent.levels(inner)})
+    return (with_levels(patches, inner, levels, NOISE * size) if levels else patches), near
 
-    def integrand(x: Array, level: int) -> tuple[Array, int]:
-        found, pairs = _sums(x, inner, kernels, slowest, level, rtol)
-        return found * amounts, pairs
 
-    found, error, pairs = integral(patches, integrand, lambda found: _sizes(found, gap), rtol)
-    energy, on_outer, on_inner, moment, opposite = np.split(found, [1, 4, 7, 10], axis=-1)
-    forces, moments = (on_outer, on_inner), (moment, opposite)
-    if swapped:
-        forces, moments = forces[::-1], moments[::-1]
-    return PairForces(energy[:, 0], *forces, *moments, error, gap, near.count, pairs)
+def _rounded(x: Array, gap: float, found: Sequence[Extent], rtol: float) -> float:
+    """Relative error from rounding of coordinates x at a gap; InputError where an accuracy is out of reach by it."""
+    least = NOISE + ULPS * float(np.linalg.norm(x)) / gap
+    if least > rtol / 2:
+        text = f"the accuracy {rtol:.2g} of an integral over the surfaces is out of reach"
+        raise InputError(f"{text}: rounding leaves {least:.2g}.")
+    # Next to the end of a law there is next to nothing, which the distance to that end tells.
+    left = min((extent.cutoff - gap for extent in found if extent.cutoff > gap), default=math.inf)
+    return least + NOISE * gap / left
 
 
 def pair_traction(x: Array, normals: Array, inner: Surface, laws: Sequence[PairEnergy], rtol: float) -> Array:
     """Normal tractions (n,) [Pa], tension positive, at points (n, 3) of a surface from all points of another."""
-    kernels, slowest = [kernel(law) for law in laws], farthest(laws)
+    kernels = [kernel(law) for law in laws]
     found, together = np.zeros(len(x)), len(x) if is_round(inner) else POINTS
     for begin in range(0, len(x), together):
         part = slice(begin, begin + together)
-        sums, _ = inner_sums(inner, x[part], kernels, LAST, slowest, rtol)
+        sums, _ = inner_sums(inner, x[part], laws, kernels, LAST, rtol)
         for law, (_, push, _) in zip(laws, sums, strict=True):
             found[part] += law.n_1 * law.n_2 * np.einsum("nc,nc->n", push, normals[part])
     return found
-
-
-def farthest(laws: Sequence[PairEnergy]) -> PairEnergy:
-    """The law that reaches farthest: of those without an end the one that falls off slowest."""
-    return min(laws, key=lambda law: (-law.cutoff, law.decay))
 
 
 def check_finite(lower: Surface, upper: Surface) -> None:
@@ -147,6 +176,22 @@ def _check_decay(law: PairEnergy, size: float, rtol: float) -> None:
         raise InputError(f"{text}; a plane takes no end of energy where it is r^-2.", law.place)
 
 
+def _reach(lower: Surface, upper: Surface, extent: Extent, rtol: float) -> float:
+    """Distance from the nearest place up to which a surface is integrated over [m]: farther away is next to
+    nothing.
+    """
+    size, power = length(lower, upper), extent.decay - 2
+    if math.isfinite(extent.cutoff):
+        return FAR * max(size, extent.cutoff)
+    shapes = [surface.shape for surface in (lower, upper)]
+    rises = max(shape.rises for shape in shapes)
+    if not rises or any(np.all(np.isfinite(shape.span)) for shape in shapes):
+        return float(size * (rtol * LEFT_OUT) ** (-1 / power))
+    # At the distance u two without end are u^p apart, and flats there have u^(p (2 - m)) of a power m, on u du.
+    drop = max(-surface.shape.point(size, 0.0)[2] for surface in (lower, upper) if surface.shape.rises == rises)
+    return float(size * max(1.0, size / drop) ** (1 / rises) * (rtol * LEFT_OUT) ** (-1 / (rises * power - 2)))
+
+
 def _check_energy(lower: Surface, upper: Surface, law: PairEnergy) -> None:
     """InputError where two surfaces without end separate so slowly that their energy has no end."""
     shapes = [surface.shape for surface in (lower, upper)]
@@ -169,10 +214,10 @@ def length(lower: Surface, upper: Surface) -> float:
 
 
 def _sums(
-    x: Array, inner: Surface, kernels: Sequence[Callable[[Array], Array]], law: PairEnergy, level: int, rtol: float
+    x: Array, inner: Surface, laws: Sequence[PairEnergy], kernels: Sequence[Kernel], level: int, rtol: float
 ) -> tuple[Array, int]:
     """Integrals (n, laws, 13) over the inner surface for points (n, 3), and the number of pairs."""
-    sums, pairs = inner_sums(inner, x, kernels, level, law, rtol)
+    sums, pairs = inner_sums(inner, x, laws, kernels, level, rtol)
     found = np.empty((len(x), len(kernels), COUNT))
     for j, (energy, push, theirs) in enumerate(sums):
         found[:, j, 0], found[:, j, 1:4], found[:, j, 4:7] = energy, push, -push

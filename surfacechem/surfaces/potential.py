@@ -144,7 +144,13 @@ class CurvedSurfaces(Potential):
                 met[d] = self.at_approach(d, lambda: interaction(*self.surfaces(d), parts, finer))
             return float(met[d].energy[k]), float(met[d].force_1[k, 2])
 
-        found = [fitted(partial(of_pairs, k), *self.approach, rtol) for k in range(len(parts))]
+        ends = [law.cutoff for law in parts if math.isfinite(law.cutoff)]
+        if ends:
+            # The gap grows with the approach, from that at the least one.
+            of_pairs(0, self.approach[0])
+            behind = self.approach[0] - met[self.approach[0]].gap
+            ends = sorted({end + behind for end in ends})
+        found = [fitted(partial(of_pairs, k), *self.approach, rtol, ends) for k in range(len(parts))]
         if not self.gap_laws:
             return found
         laws, levels = [density(law) for law in self.gap_laws], bends(self.gap_laws)

@@ -1,0 +1,92 @@
+"""Whatever an integral is said to be off by, it is not off by more: against sums over pairs of points by hand.
+
+With P(g) the integral of psi r (r - g) from g on, a sphere over a plane has 4 pi^2 R times P at its nearest point less
+that at its farthest; two spheres whose centres are c apart have 4 pi^2 R_1 R_2 / c times the sum of P at the four
+distances along the line of their centres, with signs.
+"""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.interpolate import PchipInterpolator
+
+from surfacechem.surfaces.pair_laws import InversePower, LennardJonesPair, PairTable, PenaltyPair
+from surfacechem.surfaces.pairwise import interaction
+from surfacechem.surfaces.projection import Surface
+from surfacechem.surfaces.shapes import Cavity, Plane, Sphere
+
+DENSITIES = {"n_1": 1.0, "n_2": 1.0}
+R, PSI = [0.1, 0.4, 0.5, 0.9, 1.2], [8.0, 1.0, -1.0, -0.5, 0.0]
+ENDLESS, ENDED = 0.1 * 2.0 ** np.arange(60), [0.0, *R]
+LAWS = {
+    "power": (InversePower(**DENSITIES, psi_0=-1.0, r_0=1.0, m=6), lambda r: -(r**-6.0), ENDLESS),
+    "lennard-jones": (
+        LennardJonesPair(**DENSITIES, psi_0=1.0, g_0=0.3),
+        lambda r: (0.3 / r) ** 10 / 45 - (0.3 / r) ** 4 / 3,
+        ENDLESS,
+    ),
+    "penalty": (PenaltyPair(**DENSITIES, k=1.0, r_0=1.2), lambda r: (1.2 - r) ** 2 / 2, ENDED),
+    "table": (PairTable(**DENSITIES, distances=R, energies=PSI), PchipInterpolator(R, PSI), ENDED),
+}
+GAPS = 0.15, 1.0633, 1.1999, 1.3
+"""Near, where the end of a law lies between nodes, barely in reach, and beyond."""
+X, W = np.polynomial.legendre.leggauss(20)
+
+
+def moments(psi, ends, g):
+    """The integral of psi r (r - g) from g on, and its slope, between places at which a law bends."""
+    places = [g, *(end for end in ends if end > g)]
+    found = np.zeros(2)
+    for low, high in pairwise(places):
+        r = low + (high - low) * (X + 1) / 2
+        found += (high - low) / 2 * np.array([np.sum(W * psi(r) * r * (r - g)), -np.sum(W * psi(r) * r)])
+    return found
+
+
+def summed(parts, centres, psi, ends):
+    """Energy and its slope over the approach, from signs, distances and their rates, over that of the centres."""
+    whole, slope = np.zeros(2)
+    for sign, g, rate in parts:
+        value, bend = moments(psi, ends, g)
+        whole, slope = whole + sign * value, slope + sign * rate * bend
+    c, rate = centres
+    return whole / c, slope / c - rate * whole / c**2
+
+
+def sphere_over_plane(d):
+    """Of radius 50."""
+    return 4 * math.pi**2 * 50, [(1, d, 1), (-1, d + 100, 1)], (1.0, 0.0)
+
+
+def spheres(d):
+    """Of radii 1 and 3."""
+    return 4 * math.pi**2 * 3, [(1, d, 1), (-1, d + 2, 1), (-1, d + 6, 1), (1, d + 8, 1)], (d + 4, 1)
+
+
+def sphere_in_cavity(d):
+    """Of radii 2 and 10."""
+    return 4 * math.pi**2 * 20, [(1, d, 1), (-1, d + 4, 1), (-1, 16 - d, -1), (1, 20 - d, -1)], (8 - d, -1)
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize(
+    ("lower", "upper", "exact"),
+    [
+        (Sphere(R=50.0), Plane(), sphere_over_plane),
+        (Sphere(R=1.0), Sphere(R=3.0), spheres),
+        (Cavity(R=10.0), Sphere(R=2.0), sphere_in_cavity),
+    ],
+)
+def test_no_error_is_larger_than_claimed(lower, upper, exact, law):
+    law, psi, ends = LAWS[law]
+    for d in GAPS:
+        factor, parts, centres = exact(d)
+        energy, force = (factor * value for value in summed(parts, centres, psi, ends))
+        for rtol in (1e-3, 1e-6, 1e-10):
+            found = interaction(Surface(lower), Surface(upper, True, d), [law], rtol)
+            assert abs(found.energy[0] - energy) <= found.error * max(abs(energy), abs(force) * d)
+            assert abs(found.force_1[0, 2] - force) <= found.error * abs(force)
+            assert np.abs(found.force_1 + found.force_2).max() <= 1e-13 * abs(force)
+            assert found.error <= max(rtol, 1e-10)
