@@ -181,7 +181,7 @@ def check(
 
     simulation = load(case, changes or ())
     system, scene = simulation.system, simulation.case.scene
-    if not system.states:
+    if system.rests:
         show(check_summary(simulation.case.title, system, scene, None, [], warnings(system)))
         return
     settings = chosen(simulation, solver, rtol, accuracy)

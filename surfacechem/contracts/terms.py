@@ -235,6 +235,15 @@ class Law(ABC):
         """The same without what is costly to compute, so that all else can be checked before."""
         return self
 
+    @property
+    def error(self) -> float:
+        """Relative error of the numbers that the law computes for itself; zero where it states a formula."""
+        return 0.0
+
+    def erring(self) -> Self:
+        """The same law, wrong by that error."""
+        return self
+
     def given(self, numbers: Mapping[str, float]) -> Self:
         """The same law with other numbers, which are checked."""
         changed: Any = dict(numbers)

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import cache, partial
 from importlib import import_module
+from typing import Any
 
 from surfacechem.contracts.terms import Spec
 from surfacechem.contracts.units import WHOLE
@@ -119,9 +120,19 @@ def assemble(scene: Scene) -> System:
 
 def outline(scene: Scene) -> Scene:
     """The same scene with laws that cost nothing, for checks of all else."""
-    potentials = tuple(law.outline() for law in scene.interface.potentials)
-    heat = tuple(law.outline() for law in scene.heat)
-    return replace(scene, interface=replace(scene.interface, potentials=potentials), heat=heat)
+    return _with_laws(scene, lambda law: law.outline())
+
+
+def erring(scene: Scene) -> Scene:
+    """The same scene with laws that are wrong by the error of the numbers that they compute for themselves."""
+    return _with_laws(scene, lambda law: law.erring())
+
+
+def _with_laws(scene: Scene, change: Callable[[Any], Any]) -> Scene:
+    """The same scene with other potentials and heat paths."""
+    potentials = tuple(map(change, scene.interface.potentials))
+    interface = replace(scene.interface, potentials=potentials)
+    return replace(scene, interface=interface, heat=tuple(map(change, scene.heat)))
 
 
 def _built(scene: Scene) -> Build:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from pickle import PicklingError
 from typing import Any
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from surfacechem.contracts.terms import Load, Spec
 from surfacechem.contracts.units import WHOLE
-from surfacechem.expressions import Expression, without
+from surfacechem.expressions import Expression, depends, without
 from surfacechem.model.automaton import Edge, Equilibrium, Mode, Register, Sink, When, masked
 from surfacechem.quantities import GAPS, VELOCITIES, Quantity
 from surfacechem.scene import Engine
@@ -27,6 +27,9 @@ STABLE = "stable "
 
 START = "run.t_start"
 """Path of the time at which a stretch between events starts; within it time counts from there."""
+
+STAND_IN = "no_state"
+"""Name of the state, always zero, of a scene in which all is prescribed: what steps along a run takes at least one."""
 
 TOLERANCE = "run.rtol"
 """Path of the relative tolerance of a run, where what follows each other without end has to end."""
@@ -361,8 +364,21 @@ class System:
 
     @cached_property
     def inside(self) -> frozenset[str]:
-        """Names of the states inside bodies, which the profiles show together."""
-        return frozenset(name for profile in self.profiles for name in profile.states)
+        """Names of the states inside bodies, which the profiles show together, and of one that stands for none."""
+        return frozenset([STAND_IN, *(name for profile in self.profiles for name in profile.states)])
+
+    @property
+    def rests(self) -> bool:
+        """Whether nothing changes with time: nothing evolves, and no history that is read does."""
+        return not self.states and not any(depends(item.expression, self.t) for item in self.named)
+
+    def with_state(self) -> System:
+        """The same with a state that stands for none where it has none."""
+        if self.states:
+            return self
+        symbol, dot = symengine.symbols(f"{STAND_IN} d{STAND_IN}_dt")
+        state = State(Quantity(STAND_IN, "1", "stands for states"), symbol, dot, 0.0, 1.0, algebraic=False)
+        return replace(self, states=(state,), rows={STAND_IN: dot})
 
     @property
     def chains(self) -> list[tuple[int, int, int]]:

@@ -99,7 +99,9 @@ class Accuracy:
 
 @dataclass(frozen=True)
 class CellErrors:
-    """Relative errors that the cells leave, by variable; nothing where no body has any."""
+    """Relative errors that a second run at another tolerance does not see, by variable: those that cells across bodies
+    leave, or numbers that laws compute for themselves; nothing where there are none.
+    """
 
     variables: Mapping[str, float] = field(default_factory=dict)
     converged: bool = True
@@ -119,3 +121,8 @@ class CellErrors:
         names = {**self.variables, **other.variables}
         total = {name: self.variables.get(name, 0.0) + other.variables.get(name, 0.0) for name in names}
         return replace(other, variables=total, converged=self.converged and other.converged)
+
+    def beside(self, other: CellErrors) -> CellErrors:
+        """The same of two kinds, with the words for both."""
+        kinds = [found.source for found in (other, self) if found.variables]
+        return replace(self.added_to(other), source=", ".join(kinds), in_noise=self.in_noise or other.in_noise)

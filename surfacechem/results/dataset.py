@@ -114,6 +114,8 @@ class Results(ABC):
     mechanism: str = ""
     changes: Mapping[str, float] = field(default_factory=dict)
     """Parameters and initial values that differ from the case, by path."""
+    before_seconds: float = 0.0
+    """Time that integrals over surfaces took before anything was run [s]."""
 
     @property
     @abstractmethod

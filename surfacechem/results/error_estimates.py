@@ -9,13 +9,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from surfacechem.contracts.terms import Law
 from surfacechem.errors import InputError, Place, suggestion
 from surfacechem.results.accuracy import (
     MARGIN,
@@ -73,6 +74,7 @@ def accuracy(
             return unknown("the run ended before its second output")
         books = audit(trajectory)
         errors = {"energy": books.energy_error, "entropy": books.entropy_error, "sites": books.site_error}
+        errors |= {law.path: law.error for law in inexact(scene)}
         return Accuracy(stated(errors), "balances only: what they miss is not seen", errors)
     unused = ""
     if exact is not None and way != "estimate" and len(trajectory.result.times) < 2:
@@ -84,6 +86,21 @@ def accuracy(
             unused = f"; the exact solution {exact[0]} is not of this scene: {error.message}"
     estimate = with_cells(estimate, cells()) if estimate else against_tighter(trajectory, cells())
     return replace(estimate, source=f"{estimate.source}{unused}")
+
+
+def inexact(scene: Scene) -> list[Law]:
+    """Laws that compute numbers for themselves, with an error."""
+    return [law for law in (*scene.interface.potentials, *scene.heat) if law.error > 0]
+
+
+def of_laws(trajectory: Trajectory, other: Trajectory, scene: Scene) -> CellErrors:
+    """What errors of the numbers that laws compute make of a run, from another whose laws are wrong by these errors."""
+    also = [name for name in trajectory.model.system.output_columns if name == "t_n" or name.startswith("q_")]
+    errors, note = apart(trajectory, other, also=also)
+    if note or trajectory.status != other.status:
+        errors[EVENTS] = math.inf
+    most = max(law.error for law in inexact(scene))
+    return CellErrors(errors, source=f"and one with forces of the surfaces wrong by their error, {most:.1e}")
 
 
 def against_exact(
@@ -164,8 +181,11 @@ def second_run(run: Run, kind: str = "run") -> str:
     return f"estimate: a second {kind} at rtol {run.rtol:.0e} that sees what lasts 1/{run.samples:.0f} of it"
 
 
-def apart(ours: Trajectory, theirs: Trajectory, first: int = 0) -> tuple[dict[str, float], str]:
-    """Largest differences of two runs in each state and in the times of events, and in which events they differ.
+def apart(
+    ours: Trajectory, theirs: Trajectory, first: int = 0, also: Collection[str] = ()
+) -> tuple[dict[str, float], str]:
+    """Largest differences of two runs in each state, in named quantities that are ``also`` asked for, and in the times
+    of events; and in which events they differ.
 
     States are compared from the ``first`` output that both have; of a run that ended before its second one only the
     events and the end are known.
@@ -179,13 +199,22 @@ def apart(ours: Trajectory, theirs: Trajectory, first: int = 0) -> tuple[dict[st
         alike = np.full(count, True) if note else beside_jumps(times, ours, theirs)
         shared = first + np.flatnonzero(alike[first:])
         points = [{profile.name: profile.points for profile in run.model.system.profiles} for run in (ours, theirs)]
-        values, true = ({name: each[shared] for name, each in states(run).items()} for run in (ours, theirs))
+        values, true = (
+            {name: each[shared] for name, each in known.items()}
+            for known in (_compared(run, also) for run in (ours, theirs))
+        )
         for name in points[0].keys() & points[1].keys():
             values[name], true[name] = _at_same_places(values[name], true[name], points[0][name], points[1][name])
         errors = largest_errors(values, {name: true[name] for name in true if name in values}, floors(theirs))
     if found and not note:
         errors |= event_errors(found, expected, ours.run.times[-1])
     return errors, note
+
+
+def _compared(trajectory: Trajectory, also: Collection[str]) -> dict[str, Array]:
+    """States at the output times, and some named quantities; of a scene without states what is exchanged."""
+    own = states(trajectory) or exchanged(trajectory)
+    return own | {name: each for name, each in computed(trajectory).items() if name in also} if also else own
 
 
 def _at_same_places(a: Array, b: Array, x_a: Sequence[float], x_b: Sequence[float]) -> tuple[Array, Array]:
@@ -230,6 +259,12 @@ def states(trajectory: Trajectory) -> dict[str, Array]:
     return found | {profile.name: profile_values(trajectory, profile) for profile in system.profiles}
 
 
+def exchanged(trajectory: Trajectory) -> dict[str, Array]:
+    """Accounts of the ledger at the output times, by name."""
+    names = [account.quantity.name for account in trajectory.model.system.ledger]
+    return dict(zip(names, trajectory.result.ledger_outputs.T, strict=True))
+
+
 def computed(trajectory: Trajectory) -> dict[str, Array]:
     """States and named quantities at the output times, by name."""
     return states(trajectory) | dict(zip(trajectory.model.system.output_columns, trajectory.outputs.T, strict=True))
@@ -237,7 +272,8 @@ def computed(trajectory: Trajectory) -> dict[str, Array]:
 
 def floors(trajectory: Trajectory) -> dict[str, float]:
     """Sizes below which errors are relative to these. Of a state that at which the absolute tolerance is as much as the
-    relative one, and at most its scale; of a profile the largest of its states; of a named quantity its largest value.
+    relative one, and at most its scale; of a profile the largest of its states; of a named quantity and of an account
+    its largest value.
     """
     system = trajectory.model.system
     scales = np.array([state.scale for state in system.states])
@@ -248,8 +284,9 @@ def floors(trajectory: Trajectory) -> dict[str, float]:
     sizes = np.where(never, np.maximum(sizes, EPS * scales), sizes)
     found = {state.name: size for state, size in zip(system.states, sizes.tolist(), strict=True)}
     found |= {p.name: max((found[state] for state in p.states), default=0.0) for p in system.profiles}
-    largest = np.abs(trajectory.outputs).max(axis=0, initial=0.0).tolist()
-    return dict(zip(system.output_columns, largest, strict=True)) | found
+    others = dict(zip(system.output_columns, trajectory.outputs.T, strict=True)) | exchanged(trajectory)
+    largest = {name: float(np.max(np.abs(values), initial=0.0)) for name, values in others.items()}
+    return largest | found
 
 
 def difference(found: Mapping[str, Array], expected: Mapping[str, Array]) -> str:

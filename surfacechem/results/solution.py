@@ -126,10 +126,20 @@ class Solution(Results):
         columns += event_columns([trajectory])
         if not trajectory.model.system.whole:
             return tuple(columns)
+        named = (replace(column, unit=trajectory.model.system.unit(column.unit)) for column in columns)
+        return (*named, *self._surface_columns[0])
+
+    @cached_property
+    def _surface_columns(self) -> tuple[list[Column], float]:
+        """What two curved surfaces carry, and the time that it took [s]."""
         from surfacechem.results.surface_fields import surface_columns
 
-        named = (replace(column, unit=trajectory.model.system.unit(column.unit)) for column in columns)
-        return (*named, *surface_columns(trajectory, self.surface))
+        return surface_columns(self.shown, self.surface)
+
+    @property
+    def integrals_seconds(self) -> float:
+        """Time that integrals over surfaces took, before the run and for its dataset [s]."""
+        return self.before_seconds + self._surface_columns[1]
 
     @cached_property
     def attributes(self) -> dict[str, str | float | int]:
@@ -158,6 +168,7 @@ class Solution(Results):
             "time_reached": float(result.t),
             "run_seconds": float(self.trajectory.seconds),
             "compile_seconds": float(self.trajectory.model.compile_seconds),
+            **({"integrals_seconds": self.integrals_seconds} if system.whole else {}),
             **error,
             "energy_error": books.energy_error,
             "entropy_error": books.entropy_error,

@@ -26,8 +26,17 @@ ALONG, AROUND = 33, 16
 AT = "surface_time"
 
 
-def surface_columns(trajectory: Trajectory, surface: CurvedSurfaces) -> list[Column]:
-    """Columns over their own times and over the surface of body 1."""
+def surface_columns(trajectory: Trajectory, surface: CurvedSurfaces) -> tuple[list[Column], float]:
+    """Columns over their own times and over the surface of body 1, and the time that they took [s]."""
+    from surfacechem.surfaces.potential import SPENT, integrating
+
+    before = SPENT.seconds
+    with integrating():
+        columns = _columns(trajectory, surface.of_run(trajectory.values))
+    return columns, SPENT.seconds - before
+
+
+def _columns(trajectory: Trajectory, surface: CurvedSurfaces) -> list[Column]:
     times = trajectory.result.times
     chosen = np.unique(np.linspace(0, len(times) - 1, TIMES).round().astype(int))
     gaps = trajectory.everywhere["g_n"][: len(times)][chosen]
@@ -44,30 +53,25 @@ def _totals(surface: CurvedSurfaces, approaches: Array) -> list[Column]:
     """Moment, area of contact, conductance, and how far off the local law is."""
     from surfacechem.surfaces.nodes import alike_around
 
-    local = [surface.contact(d) for d in approaches]
-    exact = [surface.forces(d) for d in approaches]
+    force, moment_x, moment_y, local, least, places, area, across = surface.totals(approaches)
     columns = []
     if not alike_around(*surface.surfaces(0.0)):
-        moments = np.array([moment for _, moment in exact])
         columns = [
-            Column(f"moment_{axis}", (AT,), moments[:, k], "N m", f"moment on body 1 about the {axis} axis")
-            for k, axis in enumerate("xy")
+            Column(f"moment_{axis}", (AT,), moment, "N m", f"moment on body 1 about the {axis} axis")
+            for axis, moment in (("x", moment_x), ("y", moment_y))
         ]
-    area = np.array([item.area for item in local])
-    force = np.array([item[2] for item, _ in exact])
     columns += [
         Column("approach", (AT,), approaches, "m", "approach of the surfaces"),
         Column("force", (AT,), force, "N", "normal force on body 1, tension positive"),
-        Column("gap_least", (AT,), np.array([item.gap for item in local]), "m", "least gap of the surfaces"),
-        Column("gap_places", (AT,), np.array([float(item.places) for item in local]), "1", "places that are as near"),
+        Column("gap_least", (AT,), least, "m", "least gap of the surfaces"),
+        Column("gap_places", (AT,), places, "1", "places that are as near"),
         Column("contact_area", (AT,), area, "m^2", "area of body 1 that touches or overlaps body 2"),
         Column("contact_radius", (AT,), np.sqrt(area / math.pi), "m", "radius of a circle of the area of contact"),
     ]
     if surface.pairs:
-        off = np.array([item.force_1[2] for item in local]) - force
-        columns.append(Column("local_difference", (AT,), off, "N", "force of the local law minus the integral"))
+        text = "force of the local law minus the integral"
+        columns.append(Column("local_difference", (AT,), local - force, "N", text))
     if surface.heat_laws:
-        across = np.array([item.conductance for item in local])
         columns.append(Column("conductance", (AT,), across, "W/K", "heat conductance over the gap"))
     return columns
 

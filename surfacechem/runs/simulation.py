@@ -18,10 +18,11 @@ from surfacechem.documents.document import from_plain
 from surfacechem.documents.overrides import parameter_path
 from surfacechem.errors import PATHS, InputError, Place, suggestion
 from surfacechem.format import Case, Overrides, Source
+from surfacechem.model.assemble import erring
 from surfacechem.model.system import System
 from surfacechem.results import spatial
 from surfacechem.results.accuracy import Accuracy, CellErrors
-from surfacechem.results.error_estimates import accuracy, check_way, exact_outputs, verified
+from surfacechem.results.error_estimates import accuracy, check_way, exact_outputs, inexact, of_laws, verified
 from surfacechem.results.event_table import event_times
 from surfacechem.results.solution import Solution
 from surfacechem.scene import Scene
@@ -128,6 +129,8 @@ class Simulation:
         self._grids = {} if grids is None else grids
         """Simulations of the same case by the cells of their bodies."""
         self._grids.setdefault(spatial.grid(case.scene), self)
+        self.integrals_seconds = 0.0
+        """Time that the integrals over surfaces took."""
 
     def _repr_html_(self) -> str:
         """What a notebook shows: the title, what is solved for, and the summary of ``check``."""
@@ -167,7 +170,14 @@ class Simulation:
     @cached_property
     def system(self) -> System:
         """The assembled equations."""
-        return self.case.system()
+        if self.case.scene.surface is None:
+            return self.case.system()
+        from surfacechem.surfaces.potential import SPENT
+
+        before = SPENT.seconds
+        system = self.case.system()
+        self.integrals_seconds = SPENT.seconds - before
+        return system
 
     @cached_property
     def model(self) -> Model:
@@ -257,12 +267,12 @@ class Simulation:
         case, unused = chosen.case, self._unused(values)
         exact = (case.reference.name, case.reference.options) if case.reference and not unused else None
 
-        def cells() -> CellErrors:
+        def added() -> CellErrors:
             if not errors:
                 errors.append(chosen._cell_errors(trajectory))
-            return errors[0]
+            return errors[0].beside(chosen._law_errors(trajectory))
 
-        found = accuracy(trajectory, case.scene, exact, error, cells, estimate)
+        found = accuracy(trajectory, case.scene, exact, error, added, estimate)
         if unused and error == "auto":
             found = replace(found, source=f"{found.source}; {unused}")
         return Solution(
@@ -280,7 +290,8 @@ class Simulation:
         """Where results are from."""
         case = self.case
         texts = {"title": case.title, "source": case.source, "case": case.text, "mechanism": case.mechanism_text or ""}
-        return {**texts, "changes": changes}
+        spent = max(simulation.integrals_seconds for simulation in self._grids.values())
+        return {**texts, "changes": changes, "before_seconds": spent}
 
     def _unused(self, values: Mapping[str, float]) -> str:
         """Why the exact solution of the case does not count with these values; empty where it does."""
@@ -380,6 +391,17 @@ class Simulation:
         found = CellErrors(spatial.differences(held_against, trajectory), source="and one with cells that suit")
         return own.added_to(found)
 
+    def _law_errors(self, trajectory: Trajectory) -> CellErrors:
+        """What errors of the numbers that laws compute for themselves make of a run; nothing where none has any."""
+        if not inexact(self.case.scene):
+            return CellErrors()
+        return of_laws(trajectory, self._erring._as_before(trajectory), self.case.scene)
+
+    @cached_property
+    def _erring(self) -> Simulation:
+        """The simulation whose laws are wrong by the errors of the numbers that they compute for themselves."""
+        return Simulation(replace(self.case, scene=erring(self.case.scene)))
+
     def _halved(self, trajectory: Trajectory, given: bool = True) -> CellErrors:
         """Errors of the cells from runs with a half and a quarter of them; without ``given`` of those that an accuracy
         chooses only.
@@ -453,8 +475,13 @@ class Simulation:
         model = done[0].model
         run = model.chosen(self.case.run, done[0].values)
         solution = sweeps.SweepSolution(model, plan, run, done, **chosen._origin(values))
-        cells = cache(lambda: errors or [chosen._cell_errors(run) for run in done])
-        return replace(solution, accuracy=sweeps.accuracy(chosen.case, solution, threads, cells))
+
+        @cache
+        def added() -> list[CellErrors]:
+            of_cells = errors or [chosen._cell_errors(run) for run in done]
+            return [found.beside(chosen._law_errors(run)) for found, run in zip(of_cells, done, strict=True)]
+
+        return replace(solution, accuracy=sweeps.accuracy(chosen.case, solution, threads, added))
 
     def stream(
         self,

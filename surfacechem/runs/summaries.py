@@ -75,6 +75,8 @@ def run_summary(solution: Solution, written: Path | None, details: bool = False)
     trajectory, books, counters = solution.trajectory, solution.audit, solution.trajectory.result.counters
     run, model = trajectory.run, trajectory.model
     speed = f"run {duration(trajectory.seconds)}, compile {duration(model.compile_seconds)}"
+    if model.system.whole:
+        speed = f"surfaces {duration(solution.integrals_seconds)}, {speed}"
     jumped = event_summary(trajectory.jumps, books.energy_scale, model.system.unit("J/m^2"))
     rejected = f", {counters.rejected} rejected" if solver(run.solver).counts_rejected else ""
     facts = [
@@ -144,6 +146,8 @@ def sweep_summary(solution: SweepSolution, written: Path | None, details: bool =
         error = f"{known.max():.2g} ({accuracy.source}){unknown}" if len(known) else f"unknown ({accuracy.source})"
         facts.append(("error", error))
     speed = f"run {duration(solution.seconds)}, compile {duration(solution.model.compile_seconds)}"
+    if solution.system.whole:
+        speed = f"surfaces {duration(solution.before_seconds)}, {speed}"
     facts.append(("time", f"{speed}; {solution.steps} steps"))
     if events := _sweep_events(solution):
         facts.append(("events", events))

@@ -421,6 +421,7 @@ class SweepSolution(Results):
             "count_steps": self.steps,
             "run_seconds": float(self.seconds),
             "compile_seconds": float(self.model.compile_seconds),
+            **({"integrals_seconds": self.before_seconds} if self.system.whole else {}),
             **error,
             **{f"{balance}_error": self.worst(balance) for balance in BALANCES},
             "versions": versions(),

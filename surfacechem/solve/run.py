@@ -186,9 +186,9 @@ def values_of(system: System, changes: Mapping[str, float] | None = None) -> dic
 
 
 def refuse_nothing(system: System) -> None:
-    """InputError where a scene has no state."""
-    if not system.states:
-        remedy = "Let a temperature or bonds evolve, or give the case to `surfacechem evaluate`."
+    """InputError where nothing of a scene changes."""
+    if system.rests:
+        remedy = "Let a temperature or bonds evolve, or a history change, or give the case to `surfacechem evaluate`."
         raise InputError(f"there is nothing to solve: everything is prescribed. {remedy}", path="bodies")
 
 
@@ -197,6 +197,7 @@ class Model:
 
     def __init__(self, system: System) -> None:
         refuse_nothing(system)
+        system = system.with_state()
         start = time.perf_counter()
         n, inputs = len(system.states), system.inputs
         filler, outside = None, system.outside

@@ -115,7 +115,10 @@ def _ending(attributes: Any) -> str:
     text = f"{attributes['status']}: {attributes['reason']}; {attributes['solver']} at rtol {attributes['rtol']:g}."
     if "error" in attributes:
         text += f" Error {attributes['error']:.2g} ({attributes['error_source']})."
-    return f"{text} Run time {duration(attributes['run_seconds'])}, {attributes['count_steps']} steps."
+    text += f" Run time {duration(attributes['run_seconds'])}, {attributes['count_steps']} steps."
+    if "integrals_seconds" in attributes:
+        text += f" Integrals over the surfaces took {duration(attributes['integrals_seconds'])}."
+    return text
 
 
 def _warnings(attributes: Any) -> list[str]:

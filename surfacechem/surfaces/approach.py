@@ -6,8 +6,8 @@ Between two approaches the slope is a polynomial through Chebyshev's points, ref
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import astuple, dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import astuple, dataclass, replace
 from itertools import pairwise
 from typing import Any
 
@@ -16,6 +16,7 @@ import numpy as np
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, decay, log, where
 from surfacechem.surfaces.projection import Array
+from surfacechem.tolerances import TINY
 
 DEGREE = 14
 """Degree of the polynomials in the approach."""
@@ -25,8 +26,8 @@ SHORTEST = 2.0**-26
 
 MOST_PIECES = 200
 
-Samples = Callable[[float], tuple[float, float]]
-"""Energy [J] and force [N], tension positive, at an approach [m]."""
+Samples = Callable[[float], tuple[float, float, float]]
+"""Energy [J] and force [N], tension positive, at an approach [m], and the relative error of both."""
 
 
 @dataclass(frozen=True)
@@ -40,11 +41,20 @@ class ApproachPiece:
     """Energy [J] at the lower end, or its logarithm."""
     powers: bool
 
-    def energy(self, d: Expression) -> Expression:
-        """Energy at an approach [J]."""
+    def _place(self, d: Expression) -> tuple[Expression, float]:
+        """Where an approach is from -1 to 1, and half of the length of that."""
         ends = (math.log(self.low), math.log(self.high)) if self.powers else (self.low, self.high)
         half = (ends[1] - ends[0]) / 2
-        x = ((log(d) if self.powers else d) - (ends[0] + half)) / half
+        return ((log(d) if self.powers else d) - (ends[0] + half)) / half, half
+
+    def force(self, d: float) -> float:
+        """Slope of the energy at an approach [N]."""
+        value = float(np.polynomial.polynomial.polyval(self._place(d)[0], self.coefficients))
+        return value * self.energy(d) / d if self.powers else value
+
+    def energy(self, d: Expression) -> Expression:
+        """Energy at an approach [J]."""
+        x, half = self._place(d)
         whole = np.polynomial.Polynomial(self.coefficients).integ(lbnd=-1).coef.tolist()
         # A sum of powers, whose higher derivatives are no longer than itself.
         found = self.start + half * sum(c * x**k for k, c in enumerate(whole))
@@ -53,24 +63,30 @@ class ApproachPiece:
 
 @dataclass(frozen=True)
 class ApproachEnergy:
-    """Energy over the approach in pieces; a sign where it is a power law of one sign."""
+    """Energy over the approach in pieces, all times a factor: the sign of what is a power law."""
 
     pieces: tuple[ApproachPiece, ...]
     force: float
-    """Its slope at the least approach [N]."""
-    sign: float = 1.0
+    """Slope of the first piece at the least approach [N]."""
+    factor: float = 1.0
+    error: float = 0.0
+    """Largest error of the force relative to it, or where it changes its sign to its largest value in the piece."""
 
     @property
     def numbers(self) -> list[Any]:
         """All that it is made of, to be kept in a file."""
-        return [[astuple(piece) for piece in self.pieces], self.force, self.sign]
+        return [[astuple(piece) for piece in self.pieces], self.force, self.factor, self.error]
 
     @classmethod
     def of(cls, numbers: Sequence[Any]) -> ApproachEnergy:
         """The energy made of numbers that have been kept."""
-        pieces, force, sign = numbers
-        made = (ApproachPiece(a, b, tuple(coefficients), *rest) for a, b, coefficients, *rest in pieces)
-        return cls(tuple(made), force, sign)
+        pieces, *rest = numbers
+        made = (ApproachPiece(a, b, tuple(coefficients), *others) for a, b, coefficients, *others in pieces)
+        return cls(tuple(made), *rest)
+
+    def erring(self, sign: float = 1.0) -> ApproachEnergy:
+        """The same, larger by its error, or smaller where the sign is negative."""
+        return replace(self, factor=self.factor * (1 + sign * self.error))
 
     def energy(self, d: Expression) -> Expression:
         """Energy at an approach [J]; nearer than the first, where only trial states of a solver are, along a line."""
@@ -78,7 +94,7 @@ class ApproachEnergy:
         for piece in reversed(self.pieces[:-1]):
             result = where(d < piece.high, piece.energy(d), result)
         wall = first.energy(first.low) + self.force * (d - first.low)
-        return self.sign * where(d < first.low, wall, result)
+        return self.factor * where(d < first.low, wall, result)
 
 
 def straight(low: float, high: float) -> ApproachEnergy:
@@ -93,9 +109,9 @@ def fitted(samples: Samples, low: float, high: float, rtol: float, cuts: Sequenc
 
     An energy of one sign at positive approaches is fitted by its logarithm, in which a power is a straight line.
     """
-    at: dict[float, tuple[float, float]] = {}
+    at: dict[float, tuple[float, float, float]] = {}
 
-    def sample(d: float) -> tuple[float, float]:
+    def sample(d: float) -> tuple[float, float, float]:
         if d not in at:
             at[d] = samples(d)
         return at[d]
@@ -103,8 +119,24 @@ def fitted(samples: Samples, low: float, high: float, rtol: float, cuts: Sequenc
     first = sample(low)  # what has no force there is refused before anything else is computed
     inside = [cut for cut in cuts if low < cut < high]
     powers = low > 0 and not inside and one_sign([sample(d)[0] for d in (low, math.sqrt(low * high), high)])
-    found = divided(sample, [low, *inside, high], powers, rtol)
-    return joined(found, *first, powers)
+    curve = joined(divided(sample, [low, *inside, high], powers, rtol), *first[:2], powers)
+    return replace(curve, error=missed(curve, at) + max(error for _, _, error in at.values()))
+
+
+def missed(curve: ApproachEnergy, at: Mapping[float, tuple[float, float, float]]) -> float:
+    """Largest difference of the slope of a curve from the forces that it is made of, relative to them in each piece."""
+    worst = 0.0
+    for piece in curve.pieces:
+        if len(piece.coefficients) == 1:  # a kink, too short to count
+            continue
+        size, off = TINY, 0.0
+        for d, (energy, force, _) in at.items():
+            if piece.low <= d <= piece.high:
+                unit = abs(energy) / d if piece.powers else 1.0
+                size = max(size, abs(force) / unit)
+                off = max(off, abs(curve.factor * piece.force(d) - force) / unit)
+        worst = max(worst, off / size)
+    return worst
 
 
 def one_sign(energies: Sequence[float]) -> bool:
@@ -123,13 +155,24 @@ def divided(sample: Samples, ends: Sequence[float], powers: bool, rtol: float) -
         coefficients = polynomial(sample, a, b, powers, rtol)
         if coefficients is not None:
             found.append((a, b, coefficients))
-        elif b - a > SHORTEST * (ends[-1] - ends[0]):
+        elif _extent(a, b, powers) > SHORTEST * _extent(ends[0], ends[-1], powers):
             middle = math.sqrt(a * b) if powers else (a + b) / 2
             # The lower half is the next, so that pieces are found in order.
             waiting += [(middle, b), (a, middle)]
         else:
-            found.append((a, b, np.zeros(1)))
+            found.append((a, b, np.array([(value_at(sample, a, powers) + value_at(sample, b, powers)) / 2])))
     return found
+
+
+def _extent(a: float, b: float, powers: bool) -> float:
+    """Length between two approaches, of their logarithms where powers are fitted."""
+    return math.log(b / a) if powers else b - a
+
+
+def value_at(sample: Samples, d: float, powers: bool) -> float:
+    """What a polynomial is at an approach: the force, or the slope of ln E over ln d."""
+    energy, force, _ = sample(d)
+    return force * d / energy if powers else force
 
 
 def approach_at(x: float, a: float, b: float, powers: bool) -> float:
@@ -141,9 +184,7 @@ def polynomial(sample: Samples, a: float, b: float, powers: bool, rtol: float) -
     """Coefficients of what is fitted between two approaches; None where they miss what is between the nodes."""
 
     def value(x: float) -> float:
-        d = approach_at(x, a, b, powers)
-        energy, force = sample(d)
-        return force * d / energy if powers else force
+        return value_at(sample, approach_at(x, a, b, powers), powers)
 
     nodes = np.cos(np.pi * (np.arange(DEGREE + 1) + 0.5) / (DEGREE + 1))
     values = np.array([value(x) for x in nodes])
@@ -163,5 +204,5 @@ def joined(found: list[tuple[float, float, Array]], energy: float, force: float,
         pieces.append(piece)
         end = piece.energy(b)
         start = math.log(end) if powers else end
-    sign = math.copysign(1.0, energy) if powers else 1.0
-    return ApproachEnergy(tuple(pieces), sign * force, sign)
+    factor = math.copysign(1.0, energy) if powers else 1.0
+    return ApproachEnergy(tuple(pieces), factor * force, factor)

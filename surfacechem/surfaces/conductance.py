@@ -11,7 +11,7 @@ from surfacechem.documents.cache_folder import Fingerprint, fingerprint, kept
 from surfacechem.expressions import Expression
 from surfacechem.surfaces.approach import ApproachEnergy, fitted, straight
 from surfacechem.surfaces.curved_gap import bends, density, over_gap
-from surfacechem.surfaces.potential import CODE, CurvedSurfaces
+from surfacechem.surfaces.potential import CODE, CurvedSurfaces, integrating
 from surfacechem.tolerances import ROUNDING
 
 KNOWN: dict[Fingerprint, ApproachEnergy] = {}
@@ -43,21 +43,31 @@ class CurvedConductance(HeatTransfer):
         """The same with a conductance that is a straight line."""
         return self.bind({"curve": straight(*self.pair.approach)})
 
+    @property
+    def error(self) -> float:
+        """Relative error of the conductance, and of its slope."""
+        return self.curve.error
+
+    def erring(self) -> Self:
+        """The same, larger by its error."""
+        return self.bind({"curve": self.curve.erring()})
+
     @cached_property
     def curve(self) -> ApproachEnergy:
         """The conductance over the approach."""
         pair, law, levels = self.pair, density(self.law), bends([self.law])
         mark = fingerprint(pair.shapes, self.law, pair.approach, pair.accuracy)
 
-        def sample(d: float) -> tuple[float, float]:
+        def sample(d: float) -> tuple[float, float, float]:
             found = pair.at_approach(
                 d, lambda: over_gap(*pair.surfaces(d), [], levels, [law], max(pair.accuracy / 64, ROUNDING))
             )
-            return found.conductance, found.conductance_slope
+            return found.conductance, found.conductance_slope, found.error
 
         # A conductance and its slope are fitted like an energy and its force.
         if mark not in KNOWN:
-            found = kept(mark, CODE, lambda: fitted(sample, *pair.approach, pair.accuracy, levels).numbers)
+            with integrating():
+                found = kept(mark, CODE, lambda: fitted(sample, *pair.approach, pair.accuracy, levels).numbers)
             KNOWN[mark] = ApproachEnergy.of(found)
         return KNOWN[mark]
 

@@ -7,7 +7,11 @@ that is per area elsewhere is that of the whole pair: N for Pa, J for J/m^2, kg 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, Self
@@ -22,7 +26,7 @@ from surfacechem.surfaces.approach import ApproachEnergy, fitted, straight
 from surfacechem.surfaces.curved_gap import GAP, Contact, bends, between_flats, density, over_gap
 from surfacechem.surfaces.pairwise import PairForces, interaction, kernel, length, pair_traction
 from surfacechem.surfaces.projection import Array, Surface
-from surfacechem.tolerances import ATOM, FLOOR, NEGLIGIBLE, ROUNDING, SQRT_EPS
+from surfacechem.tolerances import ATOM, FLOOR, NEGLIGIBLE, NOISE, ROUNDING, SQRT_EPS
 
 KNOWN: dict[Fingerprint, tuple[tuple[ApproachEnergy, ...], ApproachEnergy | None]] = {}
 """Curves that have been integrated, by what they are the curves of."""
@@ -33,6 +37,25 @@ CODE += [PACKAGE / f"{name}.py" for name in ("expressions", "quantities", "toler
 """What integrals follow from: of the laws all that they share, too."""
 
 
+class _Spent(threading.local):
+    """Time that integrals over surfaces have taken so far, of each thread."""
+
+    seconds = 0.0
+
+
+SPENT = _Spent()
+
+
+@contextmanager
+def integrating() -> Iterator[None]:
+    """What is done meanwhile is time spent on integrals."""
+    start = time.perf_counter()
+    try:
+        yield
+    finally:
+        SPENT.seconds += time.perf_counter() - start
+
+
 LOOKS = 2000
 """Places between which it is seen whether a law jumps."""
 
@@ -41,7 +64,9 @@ def jump(law: Callable[[Array], Array], places: Array) -> float | None:
     """Where the energy of a law, the first of its values (n, 2), jumps between increasing places, if it does."""
     a, b = places[:-1], places[1:]
     low, high = law(a)[:, 0], law(b)[:, 0]
-    least = NEGLIGIBLE * np.maximum(np.abs(low), np.abs(high))
+    sizes = np.maximum(np.abs(low), np.abs(high))
+    # Far out a law may be the rounding of what it is a difference of.
+    least = np.maximum(NEGLIGIBLE * sizes, NOISE * sizes.max())
     while np.any(b - a > SQRT_EPS * (np.abs(a) + np.abs(b))):
         middle = (a + b) / 2
         between = law(middle)[:, 0]
@@ -77,6 +102,12 @@ class CurvedSurfaces(Potential):
         """The key of its range."""
         return "`surface.approach`"
 
+    def of_run(self, values: Mapping[str, float]) -> Self:
+        """The same with the numbers of the pair laws that a run has, by path."""
+        paths = [{name: f"{law.path}.{name}" for name, _ in law.specs()} for law in self.pairs]
+        own = [{name: values[path] for name, path in each.items() if path in values} for each in paths]
+        return replace(self, pairs=tuple(law.given(each) for law, each in zip(self.pairs, own, strict=True)))
+
     def surfaces(self, d: float) -> tuple[Surface, Surface]:
         """The two surfaces at an approach [m]."""
         return Surface(self.shapes[0]), Surface(self.shapes[1], True, d)
@@ -92,6 +123,19 @@ class CurvedSurfaces(Potential):
         curves = tuple(line for law in self.pairs for _ in self.parts(law)), line if self.gap_laws else None
         return self.bind({"curves": curves, "strongest": self.approach[0]})
 
+    @property
+    def error(self) -> float:
+        """Largest relative error of the force of a law."""
+        curves, over_the_gap = self.curves
+        return max(curve.error for curve in (*curves, *([over_the_gap] if over_the_gap else [])))
+
+    def erring(self) -> Self:
+        """The same where all that repels is too strong by its error, and all that attracts too weak."""
+        curves, over_the_gap = self.curves
+        signs = [math.copysign(1.0, factor) for law in self.pairs for factor, _ in self.parts(law)]
+        found = tuple(curve.erring(sign * curve.factor) for curve, sign in zip(curves, signs, strict=True))
+        return self.bind({"curves": (found, over_the_gap and over_the_gap.erring()), "strongest": self.strongest})
+
     @cached_property
     def strongest(self) -> float:
         """The approach at which the tension is largest [m]."""
@@ -100,8 +144,8 @@ class CurvedSurfaces(Potential):
         g = symengine.Symbol("g_n")
         force = symengine.Lambdify([g], [derivative(self.energy(g), g)])
         low, high = self.approach
-        places = np.geomspace(low, high, 2000) if low > 0 else np.linspace(low, high, 2000)
-        return float(places[np.argmax(force(places[1:-1, None]))])
+        places = (np.geomspace if low > 0 else np.linspace)(low, high, LOOKS)[1:-1]
+        return float(places[np.argmax(force(places[:, None]))])
 
     @property
     def peaks(self) -> Mapping[str, float]:
@@ -126,7 +170,8 @@ class CurvedSurfaces(Potential):
         # Other numbers of the same surfaces, as in a sweep, have the same integrals.
         mark = fingerprint(self.shapes, parts, self.gap_laws, self.approach, self.accuracy)
         if mark not in KNOWN:
-            found = kept(mark, CODE, lambda: [curve.numbers for curve in self._integrated(parts)])
+            with integrating():
+                found = kept(mark, CODE, lambda: [curve.numbers for curve in self._integrated(parts)])
             curves = tuple(map(ApproachEnergy.of, found))
             KNOWN[mark] = curves[: len(parts)], next(iter(curves[len(parts) :]), None)
         return KNOWN[mark]
@@ -139,10 +184,10 @@ class CurvedSurfaces(Potential):
 
         met: dict[float, PairForces] = {}
 
-        def of_pairs(k: int, d: float) -> tuple[float, float]:
+        def of_pairs(k: int, d: float) -> tuple[float, float, float]:
             if d not in met:
                 met[d] = self.at_approach(d, lambda: interaction(*self.surfaces(d), parts, finer))
-            return float(met[d].energy[k]), float(met[d].force_1[k, 2])
+            return float(met[d].energy[k]), float(met[d].force_1[k, 2]), met[d].error
 
         ends = [law.cutoff for law in parts if math.isfinite(law.cutoff)]
         if ends:
@@ -157,9 +202,9 @@ class CurvedSurfaces(Potential):
 
         floor = 0.0
 
-        def of_gap(d: float) -> tuple[float, float]:
+        def of_gap(d: float) -> tuple[float, float, float]:
             contact = self.at_approach(d, lambda: over_gap(*self.surfaces(d), laws, levels, rtol=finer, floor=floor))
-            return contact.energy, float(contact.force_1[2])
+            return contact.energy, float(contact.force_1[2]), contact.error
 
         # Where bodies just touch the force is that of rounding; what counts is that in the range.
         floor = NEGLIGIBLE * max(abs(of_gap(d)[1]) for d in self.approach)
@@ -205,6 +250,26 @@ class CurvedSurfaces(Potential):
         # Conductances bend where laws of force may not.
         levels = bends((*self.gap_laws, *self.heat_laws))
         return over_gap(*self.surfaces(d), self._local(pairs), levels, heat, self.accuracy, self._floor)
+
+    def totals(self, approaches: Array) -> Array:
+        """What is told of each approach, shape (8, n).
+
+        Force on body 1 [N], its moments about x and y [N m], force of the local law [N], least gap [m], number of
+        places that are as near, area of contact [m^2], conductance [W/K].
+        """
+
+        def found() -> list[list[float]]:
+            rows = []
+            for d in map(float, approaches):
+                (force, moment), local = self.forces(d), self.contact(d)
+                ours = [force[2], *moment[:2], local.force_1[2], local.gap, local.places, local.area, local.conductance]
+                rows.append([float(x) for x in ours])
+            return rows
+
+        laws = self.pairs, self.gap_laws, self.heat_laws
+        return np.transpose(
+            kept(fingerprint(self.shapes, *laws, self.accuracy, self.approach, approaches), CODE, found)
+        )
 
     @cached_property
     def _floor(self) -> float:

@@ -12,8 +12,10 @@ from surfacechem import references
 from surfacechem.errors import InputError
 from surfacechem.expressions import derivative
 from surfacechem.laws.longrange import LennardJonesSpherePlane
+from surfacechem.model.system import STAND_IN
 from surfacechem.references.scene_view import SceneView
 from surfacechem.results.matching import match
+from surfacechem.runs.summaries import run_summary
 from surfacechem.surfaces import potential
 
 pytestmark = pytest.mark.around
@@ -48,14 +50,38 @@ def data(tmp_path, text):
     return surfacechem.run(path).dataset
 
 
-def test_a_prescribed_gap_bears_the_force_in_newtons(tmp_path):
-    found = data(tmp_path, "loading: {g_n: {ramp: {start: 5 nm, rate: -4 mm/s}}}\n" + START + RUN)
+MOVED = "loading: {g_n: {ramp: {start: 5 nm, rate: -4 mm/s}}}\n"
+
+
+@pytest.mark.parametrize("evolves", [True, False])
+def test_a_prescribed_gap_bears_the_force_in_newtons(tmp_path, monkeypatch, evolves):
+    """Whether anything evolves beside it or not: a curve of force over distance is a run, too."""
+    if not evolves:
+        monkeypatch.setitem(globals(), "SCENE", SCENE.replace("temperature: T, C: 1e-18 J/K", "temperature: 300 K"))
+    found = data(tmp_path, MOVED + (START if evolves else "") + RUN)
     assert found.t_n.attrs["units"] == "N"
     assert found.W_g_n.attrs["units"] == found.energy_residual.attrs["units"] == "J"
     exact = [force(g) for g in found.g_n.values]
     assert found.t_n.values == pytest.approx(exact, rel=1e-8)
     work = LAW.energy(5e-9) - LAW.energy(1e-9)
     assert found.W_g_n.values[-1] == pytest.approx(-work, rel=1e-8)
+    assert STAND_IN not in found
+
+
+@pytest.mark.parametrize("rtol", [1e-2, 1e-6])
+def test_the_error_of_a_run_holds_that_of_its_integrals(tmp_path, rtol):
+    held = "mechanics: {normal: {k: 5 N/m}}\nloading: {w_n: {ramp: {start: 6 nm, rate: -4 mm/s}}}\n"
+    path = tmp_path / "case.yaml"
+    path.write_text(SCENE + f"  accuracy: {rtol}\n" + held + "initial: {T: 300 K, g_n: 6 nm}\n" + RUN)
+    found = surfacechem.run(path)
+    exact = np.array([force(g) for g in found.dataset.g_n.values])
+    off, told = np.abs(found.dataset.t_n.values / exact - 1).max(), found.accuracy.variables
+    assert off <= told["t_n"] < 10 * rtol
+    assert told["g_n"] > found.trajectory.run.rtol
+    assert "forces of the surfaces wrong by their error" in found.accuracy.source
+    summary = str(run_summary(found, None))
+    assert summary.index("surfaces ") < summary.index("compile ")
+    assert found.attributes["integrals_seconds"] > 0
 
 
 def test_a_quasi_static_gap_is_where_spring_and_force_balance(tmp_path):
@@ -89,8 +115,9 @@ def test_other_numbers_of_the_pair_can_be_swept_and_change_the_force(tmp_path):
     path = tmp_path / "case.yaml"
     path.write_text(SCENE + "loading: {g_n: 1 nm}\n" + START + RUN)
     simulation, changed = surfacechem.load(path), {"surface.pair.lennard-jones-pair.n_1": 1e19}
-    usual, doubled = (simulation.run(changes).dataset.t_n.values[-1] for changes in ({}, changed))
-    assert doubled == pytest.approx(2 * usual, rel=1e-12)
+    usual, doubled = (simulation.run(changes).dataset for changes in ({}, changed))
+    for name in ("t_n", "force"):
+        assert doubled[name].values == pytest.approx(2 * usual[name].values, rel=1e-12)
 
 
 def test_what_the_integrals_hold_is_refused_in_a_sweep():
