@@ -180,24 +180,22 @@ def _scattered(values: NDArray[np.float64], n: int, chains: Sequence[Chain]) -> 
     return both
 
 
-def compile_function(inputs: Sequence[Any], expressions: Sequence[Any], pieces: int | None = None) -> Function:
+def compile_function(
+    inputs: Sequence[Any], expressions: Sequence[Any], pieces: int | None = None, steps: bool = False
+) -> Function:
     """Compile a vector of expressions; inputs that no expression contains are allowed.
 
-    Compile time grows faster than the number of expressions: many alike are compiled in ``pieces`` of so many each,
-    which there is nothing to gain from optimising.
+    What ``steps`` call a thousand times is optimised; of other code, which takes twice as long to optimise as to make,
+    the calls are few. Compile time grows faster than the number of expressions: many alike are compiled in ``pieces``
+    of so many each, which there is nothing to gain from optimising.
     """
     if pieces:
         starts = range(0, len(expressions), pieces)
-        parts = [_compiled(inputs, expressions[start : start + pieces], opt_level=0) for start in starts]
+        parts = [_machine_code(tuple(inputs), tuple(expressions[start : start + pieces]), 0) for start in starts]
         return replace(parts[0], rest=tuple(parts[1:]))
-    return _compiled(inputs, expressions)
-
-
-def _compiled(inputs: Sequence[Any], expressions: Sequence[Any], opt_level: int = 3) -> Function:
     # Of many expressions LLVM makes little more at its highest level than at its first, in twice the time.
-    return _machine_code(
-        tuple(inputs), tuple(expressions), opt_level if len(expressions) < PIECE else min(opt_level, 1)
-    )
+    level = 0 if not steps else 3 if len(expressions) < PIECE else 1
+    return _machine_code(tuple(inputs), tuple(expressions), level)
 
 
 @lru_cache(maxsize=128)  # a scene that is loaded again, or differs in numbers alone, has the same expressions
@@ -307,10 +305,10 @@ def compile_program(
         n_parameters=len(parameters),
         n_ledger=len(ledger),
         n_margins=len(margins),
-        residual=compile_function(inputs, residual, pieces),
-        jacobian=compile_function(inputs, entries, pieces),
-        ledger=compile_function(inputs, ledger, pieces) if ledger else None,
-        margins=compile_function(inputs, margins, pieces) if margins else None,
+        residual=compile_function(inputs, residual, pieces, steps=True),
+        jacobian=compile_function(inputs, entries, pieces, steps=True),
+        ledger=compile_function(inputs, ledger, pieces, steps=True) if ledger else None,
+        margins=compile_function(inputs, margins, pieces, steps=True) if margins else None,
         algebraic=tuple(all(entry == 0 for entry in by_rate[j::core]) for j in range(core)) + (False,) * (n - core),
         filler=filler,
         chains=tuple(chains),
@@ -325,7 +323,7 @@ def _compiled_rates(
 ) -> Function | None:
     """The code of the rates; none where there are chains."""
     rates = None if chains else solved_rates(residual, derivatives)
-    return compile_function(inputs, rates) if rates else None
+    return compile_function(inputs, rates, steps=True) if rates else None
 
 
 def solved_rates(residual: Sequence[Any], rates: Sequence[Any]) -> list[Any] | None:
