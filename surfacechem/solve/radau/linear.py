@@ -29,19 +29,46 @@ def size_of(value: Any) -> float:
 
 
 @compiled
+def _scale_rows(a: Any, columns: Any, rows: Any) -> bool:
+    """Scales of the rows in units of the columns' typical sizes; False where a row is of zeros or not finite."""
+    for i in range(len(rows)):
+        largest = 0.0
+        for j in range(len(rows)):
+            size = size_of(a[i, j]) * columns[j]
+            if size > largest or size != size:  # numbers that are none count, too
+                largest = size
+        if not 0.0 < largest < np.inf:
+            return False
+        rows[i] = 1.0 / largest
+    return True
+
+
+@compiled
+def _eliminate(a: Any, k: int) -> None:
+    """Take multiples of row k from those below it, and keep them; its pivot becomes the inverse."""
+    # A division less for each right-hand side, of which there are many.
+    inverse = 1.0 / a[k, k]
+    a[k, k] = inverse
+    pivot = a[k, k + 1 :]
+    for i in range(k + 1, a.shape[0]):
+        # In a large mechanism most species do not take part in each other's reactions.
+        if a[i, k] == 0.0:
+            continue
+        multiple = a[i, k] * inverse
+        a[i, k] = multiple
+        row = a[i, k + 1 :]
+        for j in range(len(pivot)):
+            row[j] -= multiple * pivot[j]
+
+
+@compiled
 def factor(a: Any, order: Any, columns: Any, rows: Any, threshold: float) -> bool:
     """Replace a by its factors, the inverse pivots on the diagonal; False if a scaled pivot is not above the
     threshold.
     """
     n = a.shape[0]
-    # Scales of the rows in units of the columns' typical sizes; a row of zeros, or one that is not finite, has none.
-    for i in range(n):
-        largest = 0.0
-        for j in range(n):
-            largest = max(largest, size_of(a[i, j]) * columns[j])
-        if not 0.0 < largest < np.inf:
-            return False
-        rows[i] = 1.0 / largest
+    if not _scale_rows(a, columns, rows[:n]):
+        return False
     for k in range(n):
         p, best = k, -1.0
         for i in range(k, n):
@@ -55,14 +82,7 @@ def factor(a: Any, order: Any, columns: Any, rows: Any, threshold: float) -> boo
             for j in range(n):
                 a[k, j], a[p, j] = a[p, j], a[k, j]
             rows[k], rows[p] = rows[p], rows[k]
-        # A division less for each right-hand side, of which there are many.
-        inverse = 1.0 / a[k, k]
-        a[k, k] = inverse
-        for i in range(k + 1, n):
-            multiple = a[i, k] * inverse
-            a[i, k] = multiple
-            for j in range(k + 1, n):
-                a[i, j] -= multiple * a[k, j]
+        _eliminate(a, k)
     return True
 
 
