@@ -102,10 +102,18 @@ def straight(low: float, high: float) -> ApproachEnergy:
     return ApproachEnergy((ApproachPiece(low, high, (1.0,), 0.0, powers=False),), 0.0)
 
 
-def fitted(samples: Samples, low: float, high: float, rtol: float, cuts: Sequence[float] = ()) -> ApproachEnergy:
+def fitted(
+    samples: Samples,
+    low: float,
+    high: float,
+    rtol: float,
+    cuts: Sequence[float] = (),
+    floor: tuple[float, float] = (0.0, 0.0),
+) -> ApproachEnergy:
     """The energy between two approaches, so that its slope is the force within a relative error.
 
-    It bends at the approaches ``cuts``. InputError where it is not smooth elsewhere.
+    It bends at the approaches ``cuts``; energies [J] and forces [N] below a ``floor`` count as that. InputError where
+    it is not smooth elsewhere.
 
     An energy of one sign at positive approaches is fitted by its logarithm, in which a power is a straight line.
     """
@@ -118,18 +126,23 @@ def fitted(samples: Samples, low: float, high: float, rtol: float, cuts: Sequenc
 
     first = sample(low)  # what has no force there is refused before anything else is computed
     inside = [cut for cut in cuts if low < cut < high]
-    powers = low > 0 and not inside and one_sign([sample(d)[0] for d in (low, math.sqrt(low * high), high)])
-    curve = joined(divided(sample, [low, *inside, high], powers, rtol), *first[:2], powers)
-    return replace(curve, error=missed(curve, at) + max(error for _, _, error in at.values()))
+    powers = low > 0 and not inside and one_sign([sample(d)[0] for d in (low, math.sqrt(low * high), high)], floor[0])
+    least = 0.0 if powers else floor[1]
+    curve = joined(divided(sample, [low, *inside, high], powers, rtol, least), *first[:2], powers)
+    # Between the places that are looked at it may miss more, hardly twice as much.
+    error = 2 * missed(curve, at, least) + max(error for _, _, error in at.values())
+    return replace(curve, error=error)
 
 
-def missed(curve: ApproachEnergy, at: Mapping[float, tuple[float, float, float]]) -> float:
-    """Largest difference of the slope of a curve from the forces that it is made of, relative to them in each piece."""
+def missed(curve: ApproachEnergy, at: Mapping[float, tuple[float, float, float]], least: float) -> float:
+    """Largest difference of the slope of a curve from the forces that it is made of, relative to them in each piece, or
+    to the ``least`` that counts.
+    """
     worst = 0.0
     for piece in curve.pieces:
         if len(piece.coefficients) == 1:  # a kink, too short to count
             continue
-        size, off = TINY, 0.0
+        size, off = max(least, TINY), 0.0
         for d, (energy, force, _) in at.items():
             if piece.low <= d <= piece.high:
                 unit = abs(energy) / d if piece.powers else 1.0
@@ -139,12 +152,14 @@ def missed(curve: ApproachEnergy, at: Mapping[float, tuple[float, float, float]]
     return worst
 
 
-def one_sign(energies: Sequence[float]) -> bool:
-    """Whether energies are all above or all below zero."""
-    return min(energies) > 0 or max(energies) < 0
+def one_sign(energies: Sequence[float], floor: float) -> bool:
+    """Whether energies are all above or all below zero, and more than nothing."""
+    return min(energies) > floor or max(energies) < -floor
 
 
-def divided(sample: Samples, ends: Sequence[float], powers: bool, rtol: float) -> list[tuple[float, float, Array]]:
+def divided(
+    sample: Samples, ends: Sequence[float], powers: bool, rtol: float, least: float
+) -> list[tuple[float, float, Array]]:
     """Pieces that are halved until a polynomial is the force on each; at a kink until they are too short to count."""
     found: list[tuple[float, float, Array]] = []
     waiting = list(pairwise(ends))[::-1]
@@ -152,7 +167,7 @@ def divided(sample: Samples, ends: Sequence[float], powers: bool, rtol: float) -
         a, b = waiting.pop()
         if len(found) + len(waiting) > MOST_PIECES:
             raise InputError(f"the accuracy {rtol:g} over the approach is out of reach near {a:.4g} m.")
-        coefficients = polynomial(sample, a, b, powers, rtol)
+        coefficients = polynomial(sample, a, b, powers, rtol, least)
         if coefficients is not None:
             found.append((a, b, coefficients))
         elif _extent(a, b, powers) > SHORTEST * _extent(ends[0], ends[-1], powers):
@@ -180,7 +195,7 @@ def approach_at(x: float, a: float, b: float, powers: bool) -> float:
     return math.sqrt(a * b) * (b / a) ** (x / 2) if powers else (a + b) / 2 + x * (b - a) / 2
 
 
-def polynomial(sample: Samples, a: float, b: float, powers: bool, rtol: float) -> Array | None:
+def polynomial(sample: Samples, a: float, b: float, powers: bool, rtol: float, least: float) -> Array | None:
     """Coefficients of what is fitted between two approaches; None where they miss what is between the nodes."""
 
     def value(x: float) -> float:
@@ -189,7 +204,7 @@ def polynomial(sample: Samples, a: float, b: float, powers: bool, rtol: float) -
     nodes = np.cos(np.pi * (np.arange(DEGREE + 1) + 0.5) / (DEGREE + 1))
     values = np.array([value(x) for x in nodes])
     fit = np.polynomial.chebyshev.Chebyshev.fit(nodes, values, DEGREE, domain=[-1, 1])
-    size = float(np.max(np.abs(values)))
+    size = max(float(np.max(np.abs(values))), least)
     # Between the nodes, and near the ends, where an interpolation errs most.
     if any(abs(fit(x) - value(x)) > rtol * size for x in (-0.97, -0.52, 0.14, 0.71, 0.99)):
         return None

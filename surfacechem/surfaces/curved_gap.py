@@ -113,12 +113,12 @@ def over_gap(
     levels: Sequence[float] = (0.0,),
     heat: Sequence[Callable[[Array], Array]] = (),
     rtol: float = PRECISE,
-    floor: float = 0.0,
+    floor: tuple[float, float] = (0.0, 0.0),
 ) -> Contact:
     """Integral of laws of the gap over body 1; ``levels`` are gaps [m] at which the laws bend.
 
-    Errors are relative to the force, or to a ``floor`` [N] where that is larger. InputError where an accuracy is out of
-    reach.
+    Errors are relative to the energy and the force, or to a ``floor`` [J, N] where that is larger. InputError where an
+    accuracy is out of reach.
     """
     check_finite(lower, upper)
     size = length(lower, upper)
@@ -130,8 +130,12 @@ def over_gap(
 
     def sizes(found: Array) -> Array:
         force, moment = (float(np.linalg.norm(found[k])) for k in (slice(1, 4), slice(7, 10)))
-        force = max(force, floor, TINY)
-        parts = [max(abs(found[0]), force * size * NEGLIGIBLE**2), *[force] * 6, *[max(moment, force * size)] * 6]
+        force = max(force, floor[1], TINY)
+        parts = [
+            max(abs(found[0]), floor[0], force * size * NEGLIGIBLE**2),
+            *[force] * 6,
+            *[max(moment, force * size)] * 6,
+        ]
         area = max(abs(found[13]), EPS * size**2) * max(1.0, OF_AREA / rtol)
         flow = max(abs(found[14]), TINY)
         return np.array([*parts, area, flow, max(abs(found[15]), flow / size)])

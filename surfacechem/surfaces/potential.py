@@ -200,15 +200,17 @@ class CurvedSurfaces(Potential):
             return found
         laws, levels = [density(law) for law in self.gap_laws], bends(self.gap_laws)
 
-        floor = 0.0
+        floor = 0.0, 0.0
 
         def of_gap(d: float) -> tuple[float, float, float]:
             contact = self.at_approach(d, lambda: over_gap(*self.surfaces(d), laws, levels, rtol=finer, floor=floor))
             return contact.energy, float(contact.force_1[2]), contact.error
 
-        # Where bodies just touch the force is that of rounding; what counts is that in the range.
-        floor = NEGLIGIBLE * max(abs(of_gap(d)[1]) for d in self.approach)
-        return [*found, fitted(of_gap, *self.approach, rtol, levels)]
+        # Where bodies just touch, or a law has faded, the force is that of rounding; what counts is that in the range.
+        for d in self.approach:
+            energy, force, _ = of_gap(d)
+            floor = max(floor[0], NEGLIGIBLE * abs(energy)), max(floor[1], NEGLIGIBLE * abs(force))
+        return [*found, fitted(of_gap, *self.approach, rtol, levels, floor)]
 
     def _refuse_jumps(self) -> None:
         """InputError where the energy of a law jumps, so that no force is its slope."""
@@ -272,11 +274,14 @@ class CurvedSurfaces(Potential):
         )
 
     @cached_property
-    def _floor(self) -> float:
-        """A small part of the force of the laws of the gap at the ends of the range [N]."""
-        ends = [self.surfaces(d) for d in self.approach]
-        found = [over_gap(*pair, self._local(True), bends(self.gap_laws), rtol=NEGLIGIBLE) for pair in ends]
-        return NEGLIGIBLE * max(abs(float(item.force_1[2])) for item in found)
+    def _floor(self) -> tuple[float, float]:
+        """A small part of energy [J] and force [N] of the laws of the gap at the ends of the range."""
+        floor = 0.0, 0.0
+        for pair in map(self.surfaces, self.approach):
+            found = over_gap(*pair, self._local(True), bends(self.gap_laws), rtol=NEGLIGIBLE, floor=floor)
+            force = abs(float(found.force_1[2]))
+            floor = max(floor[0], NEGLIGIBLE * abs(found.energy)), max(floor[1], NEGLIGIBLE * force)
+        return floor
 
     @property
     def sums_tractions(self) -> bool:

@@ -9,14 +9,18 @@ from scipy.optimize import brentq
 
 import surfacechem
 from surfacechem import references
-from surfacechem.errors import InputError
+from surfacechem.errors import InputError, Place
 from surfacechem.expressions import derivative
+from surfacechem.laws.bonding import EquilibriumBonds
 from surfacechem.laws.longrange import LennardJonesSpherePlane
 from surfacechem.model.system import STAND_IN
 from surfacechem.references.scene_view import SceneView
 from surfacechem.results.matching import match
 from surfacechem.runs.summaries import run_summary
 from surfacechem.surfaces import potential
+from surfacechem.surfaces.approach import fitted
+from surfacechem.surfaces.potential import CurvedSurfaces
+from surfacechem.surfaces.shapes import Plane, Sphere
 
 pytestmark = pytest.mark.around
 
@@ -245,3 +249,32 @@ def test_a_ball_pressed_into_a_penalty_has_its_area_of_contact(tmp_path):
     assert found.t_n.values == pytest.approx(-np.pi * 1e15 * 5e-8 * inside**2, rel=1e-8, abs=1e-18)
     assert found.contact_area.values[-1] == pytest.approx(2 * np.pi * 5e-8 * 1e-9, rel=1e-9)
     assert found.gap.dims == ("surface_time", "u", "v")
+
+
+def test_bonds_that_fade_are_integrated_where_they_still_count():
+    """Over a sphere the force is 2 pi R times the energy between flats; far out that is rounding, and no jump."""
+    R, law = 1e-6, EquilibriumBonds(N=1e16, K=50.0, k_b=1e-3, T=300.0)
+    pair = CurvedSurfaces(
+        shapes=(Sphere(R=R), Plane()), gap_laws=[law], approach=(1e-9, 6e-8), accuracy=1e-4, place=Place(path="surface")
+    )
+    found = symengine.Lambdify([G], [derivative(pair.energy(G), G)])
+    flats = symengine.Lambdify([G], [law.energy(G)])
+    gaps = np.geomspace(1e-9, 6e-8, 500)
+    exact = 2 * np.pi * R * (flats(gaps + 2 * R) - flats(gaps))
+    off = np.abs(found(gaps[:, None])[:, 0] - exact).max() / exact.max()
+    assert off < pair.error < 1e-4
+    assert pair.strongest == pytest.approx(gaps[np.argmax(exact)], rel=0.01)
+
+
+def test_powers_that_change_are_followed_near_the_least_approach():
+    """A force over nine decades whose power changes at the second of them."""
+    bend = 2e-12
+
+    def samples(d):
+        m = 4 if d < bend else 6
+        energy = (d / bend) ** -m
+        return energy, -m * energy / d, 0.0
+
+    curve = fitted(samples, 1e-12, 1e-3, 1e-8)
+    for d in (1.5e-12, 1e-11, 1e-6, 1e-3):
+        assert curve.energy(d) == pytest.approx(samples(d)[0], rel=1e-6)
