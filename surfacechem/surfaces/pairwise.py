@@ -25,7 +25,7 @@ from surfacechem.surfaces.nodes import LAST, LEFT_OUT, Extent, Kernel, extents, 
 from surfacechem.surfaces.patches import Patches, integral, outer_patches
 from surfacechem.surfaces.projection import FIRST, Array, Surface
 from surfacechem.surfaces.shapes import Plane
-from surfacechem.tolerances import ATOM, NOISE, PRECISE, TINY, ULPS
+from surfacechem.tolerances import ATOM, NEGLIGIBLE, NOISE, PRECISE, TINY, ULPS
 
 REMOTE = np.array([1e3, 2e3])
 """Distances over the size of the surfaces at which it is seen how a law falls off."""
@@ -168,7 +168,8 @@ def _check_decay(law: PairEnergy, size: float, rtol: float) -> None:
         return
     near, far = np.abs(kernel(law)(size * REMOTE)[:, 0])
     power = math.log2(near / far) if far > 0 else math.inf
-    if power < law.decay - NOISE:
+    # What falls off faster beside it changes the power by little.
+    if power < law.decay - NEGLIGIBLE:
         text = f"{law.name()} falls off like r^-{power:.3g} over long distances, slower than r^-{law.decay:g}"
         raise InputError(f"{text} as its `decay` says; state a `decay` that it has, above 2.", law.place)
     if -math.log10(rtol) > MOST_DECADES * (law.decay - 2):

@@ -19,7 +19,10 @@ from surfacechem.results.matching import match
 from surfacechem.runs.summaries import run_summary
 from surfacechem.surfaces import potential
 from surfacechem.surfaces.approach import fitted
+from surfacechem.surfaces.pair_laws import InversePower
+from surfacechem.surfaces.pairwise import interaction
 from surfacechem.surfaces.potential import CurvedSurfaces
+from surfacechem.surfaces.projection import Surface
 from surfacechem.surfaces.shapes import Plane, Sphere
 
 pytestmark = pytest.mark.around
@@ -278,3 +281,22 @@ def test_powers_that_change_are_followed_near_the_least_approach():
     curve = fitted(samples, 1e-12, 1e-3, 1e-8)
     for d in (1.5e-12, 1e-11, 1e-6, 1e-3):
         assert curve.energy(d) == pytest.approx(samples(d)[0], rel=1e-6)
+
+
+class FourAndSix(InversePower):
+    """A law of one's own, of which nobody knows that it is a sum."""
+
+    decay = 4
+    parts = None
+
+    def energy(self, r):
+        """Energy of a pair [J]."""
+        return self.psi_0 * ((self.r_0 / r) ** 6 - (self.r_0 / r) ** 4)
+
+
+def test_a_law_that_falls_off_as_it_says_beside_a_steeper_part_is_integrated():
+    numbers = {"n_1": 1.0, "n_2": 1.0, "r_0": 0.1}
+    bodies = Surface(Sphere(R=1.0)), Surface(Plane(), True, 0.2)
+    parts = [InversePower(psi_0=sign, m=m, **numbers) for sign, m in ((1.0, 6), (-1.0, 4))]
+    (whole,) = interaction(*bodies, [FourAndSix(psi_0=1.0, m=4, **numbers)], 1e-8).force_1
+    assert whole == pytest.approx(interaction(*bodies, parts, 1e-8).force_1.sum(axis=0), rel=1e-7, abs=1e-9)
