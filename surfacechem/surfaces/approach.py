@@ -130,7 +130,7 @@ def fitted(
     least = 0.0 if powers else floor[1]
     curve = joined(divided(sample, [low, *inside, high], powers, rtol, least), *first[:2], powers)
     # Between the places that are looked at it may miss more, hardly twice as much.
-    error = 2 * missed(curve, at, least) + max(error for _, _, error in at.values())
+    error = float(2 * missed(curve, at, least) + max(error for _, _, error in at.values()))
     return replace(curve, error=error)
 
 
@@ -205,8 +205,10 @@ def polynomial(sample: Samples, a: float, b: float, powers: bool, rtol: float, l
     values = np.array([value(x) for x in nodes])
     fit = np.polynomial.chebyshev.Chebyshev.fit(nodes, values, DEGREE, domain=[-1, 1])
     size = max(float(np.max(np.abs(values))), least)
-    # Between the nodes, and near the ends, where an interpolation errs most.
-    if any(abs(fit(x) - value(x)) > rtol * size for x in (-0.97, -0.52, 0.14, 0.71, 0.99)):
+    # Between the nodes, and at the ends, where an interpolation errs most and which the next piece needs, too.
+    seen = {x: value(x) for x in (-0.52, 0.14, 0.71)}
+    seen |= {x: value_at(sample, end, powers) for x, end in ((-1.0, a), (1.0, b))}
+    if any(abs(fit(x) - true) > rtol * size for x, true in seen.items()):
         return None
     return np.asarray(fit.convert(kind=np.polynomial.Polynomial, domain=[-1, 1], window=[-1, 1]).coef)
 

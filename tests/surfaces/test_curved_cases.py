@@ -1,5 +1,7 @@
 """Cases with surfaces: every gap model against an independent integration, units of a pair of bodies, bad input."""
 
+import math
+
 import numpy as np
 import pytest
 import symengine
@@ -270,17 +272,17 @@ def test_bonds_that_fade_are_integrated_where_they_still_count():
 
 
 def test_powers_that_change_are_followed_near_the_least_approach():
-    """A force over nine decades whose power changes at the second of them."""
-    bend = 2e-12
+    """A force over nine decades whose power begins to grow at the second of them."""
 
     def samples(d):
-        m = 4 if d < bend else 6
-        energy = (d / bend) ** -m
-        return energy, -m * energy / d, 0.0
+        x = max(d / 2e-12, 1.0)
+        energy = (d / 2e-12) ** -4 * x**-2 * math.exp(2 - 2 / x)
+        return energy, (-6 + 2 / x) * energy / d, 0.0
 
     curve = fitted(samples, 1e-12, 1e-3, 1e-8)
+    assert curve.error < 1e-6
     for d in (1.5e-12, 1e-11, 1e-6, 1e-3):
-        assert curve.energy(d) == pytest.approx(samples(d)[0], rel=1e-6)
+        assert curve.energy(d) == pytest.approx(samples(d)[0], rel=1e-7)
 
 
 class FourAndSix(InversePower):
