@@ -20,6 +20,7 @@ from surfacechem.results import error_estimates
 from surfacechem.results.accuracy import first_tolerance
 from surfacechem.runs.simulation import Simulation
 from surfacechem.solve.run import Model, Run, Trajectory
+from surfacechem.tolerances import EPS
 
 ACCURACIES = tuple(10.0**-k for k in range(3, 12))
 
@@ -47,7 +48,10 @@ def settings(times, accuracy: float) -> Run:
 
 def achieved(trajectory: Trajectory, error: float, source: str) -> Achieved:
     steps = trajectory.result.counters.steps
-    return Achieved(error, error_estimates.rounding_of_time(trajectory), steps, trajectory.run.rtol, source)
+    known, result = error_estimates.state_floors(trajectory), trajectory.result
+    size = np.maximum(np.abs(result.outputs), [known[name] for name in trajectory.model.system.state_columns])
+    rounding = float(np.max(EPS * np.abs(trajectory.rates) * result.times[:, None] / size))
+    return Achieved(error, rounding, steps, trajectory.run.rtol, source)
 
 
 # -- tables of one trajectory ---------------------------------------------------------------------------------------

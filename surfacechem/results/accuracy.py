@@ -46,7 +46,7 @@ def second_tolerance(rtol: float) -> float:
     return LAST if rtol > LAST else TIGHTEST
 
 
-def relative_errors(values: Array, exact: Array, floor: float) -> Array:
+def relative_errors(values: Array, exact: Array, floor: float | Array) -> Array:
     """Errors relative to the exact value at the same time, or to ``floor`` if that is more; absolute where both are
     zero.
 
@@ -58,7 +58,7 @@ def relative_errors(values: Array, exact: Array, floor: float) -> Array:
 
 
 def errors_over_time(
-    values: Mapping[str, Array], true: Mapping[str, Array], floors: Mapping[str, float]
+    values: Mapping[str, Array], true: Mapping[str, Array], floors: Mapping[str, float | Array]
 ) -> dict[str, Array]:
     """Relative errors of the variables that have true values, at the times that both have; ``floors`` are sizes below
     which errors are relative to these.
@@ -71,7 +71,7 @@ def errors_over_time(
 
 
 def largest_errors(
-    values: Mapping[str, Array], true: Mapping[str, Array], floors: Mapping[str, float]
+    values: Mapping[str, Array], true: Mapping[str, Array], floors: Mapping[str, float | Array]
 ) -> dict[str, float]:
     """The largest relative error of each variable that has true values: how far a run is from an exact solution, or
     from another run.

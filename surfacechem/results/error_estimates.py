@@ -33,7 +33,7 @@ from surfacechem.scene import Scene
 from surfacechem.solve.choice import method
 from surfacechem.solve.contract import Problem
 from surfacechem.solve.run import Run, Trajectory
-from surfacechem.tolerances import EPS, FLOOR, TIGHTEST
+from surfacechem.tolerances import BRIEF, EPS, FLOOR, TIGHTEST
 
 Array = NDArray[np.float64]
 
@@ -43,6 +43,9 @@ EARLIER = "ended earlier"
 WAYS = ("auto", "estimate", "balances")
 """How a run tells its error: against the exact solution if there is one, else by a second run; always by a second run;
 from the balances, which costs nothing."""
+
+LOOKS = 400
+"""Times at which an exact solution is evaluated at most."""
 
 EVENTS = "event times"
 """What stands for the times of events among the compared variables."""
@@ -77,9 +80,7 @@ def accuracy(
         errors |= {law.path: law.error for law in inexact(scene)}
         return Accuracy(stated(errors), "balances only: what they miss is not seen", errors)
     unused = ""
-    if exact is not None and way != "estimate" and len(trajectory.result.times) < 2:
-        unused = f"; with one output nothing is compared with the exact solution {exact[0]}"
-    elif exact is not None and way != "estimate":
+    if exact is not None and way != "estimate":
         try:
             return replace(against_exact(trajectory, scene, *exact), asked=estimate.asked if estimate else None)
         except InputError as error:
@@ -110,20 +111,28 @@ def against_exact(
     options: Mapping[str, float],
     second: Trajectory | None = None,
 ) -> Accuracy:
-    """Largest errors at the output times, and those of the times of events, which a second run tells; it is made where
-    it is needed and none is given.
+    """Largest errors where the run is looked at, and those of the times of events, which a second run tells; it is
+    made where it is needed and none is given.
 
     InputError where the exact solution is another scene's.
     """
     from surfacechem.results.matching import exact_values
 
-    exact = exact_values(name, options, scene, trajectory)
-    errors = largest_errors(computed(trajectory), exact, floors(trajectory))
+    # How well cells resolve what has just begun is told at the times that are asked for.
+    seen = trajectory if trajectory.model.system.profiles else _fewer(trajectory.looked)
+    late: dict[str, float] = {}
     # Exact solutions have no events to compare with: the times of these come from a second run.
     if found := event_times(trajectory):
-        expected = event_times(second or _second(trajectory))
-        if not difference(found, expected):
-            errors |= event_errors(found, expected, trajectory.run.times[-1])
+        second = second or _second(trajectory)
+        if not difference(found, event_times(second)):
+            late = event_errors(found, event_times(second), trajectory.run.times[-1])
+    exact = exact_values(name, options, scene, seen, to_the_end=True, side=max([SIDE, *late.values()]))
+    alike = _off_events(seen, max(late.values(), default=0.0))
+    for values in exact.values():  # where a solution ends with an infinite slope its last moment has none
+        alike &= np.isfinite(values.reshape(len(values), -1)).all(axis=1)
+    known = sizes(seen, named=exact.keys() - states(seen).keys())
+    ours, true, known = ({key: x[alike] for key, x in each.items()} for each in (computed(seen), exact, known))
+    errors = largest_errors(ours, true, known) | late
     return Accuracy(stated(errors), f"exact solution {name}", errors, exact)
 
 
@@ -135,12 +144,44 @@ def exact_outputs(
         return None
     from surfacechem.results.matching import exact_values
 
-    return partial(exact_values, *exact, scene, to_the_end=True, side=max(SIDE, found.error))
+    side = max(SIDE, found.variables.get(EVENTS, 0.0))
+    return partial(exact_values, *exact, scene, to_the_end=True, side=side)
 
 
-def _second(trajectory: Trajectory) -> Trajectory:
-    """The run at another tolerance."""
-    return trajectory.model.resolve(trajectory, second_tolerance(trajectory.run.rtol))
+def _off_events(trajectory: Trajectory, late: float) -> NDArray[np.bool_]:
+    """Which outputs are no moments beside a jump or the end of what physics stopped, whose times may err by this part
+    of them: there the side on which an exact solution is, and its slope, are those of a time.
+    """
+    result, end = trajectory.result, trajectory.run.times[-1]
+    stopped = [result.t] if trajectory.status == "stopped" else []
+    moments = np.array([*(jump.t for jump in trajectory.jumps), *stopped])
+    away = np.abs(result.times[:, None] - moments)
+    return np.asarray(np.all(away > np.maximum(BRIEF * end, 2 * late * moments), axis=1))
+
+
+def _fewer(trajectory: Trajectory) -> Trajectory:
+    """The run with so few of its outputs that an exact solution is quick; where there are many stay many."""
+    times = trajectory.result.times
+    if len(times) <= LOOKS:
+        return trajectory
+    return trajectory.at_times(times[np.linspace(0, len(times) - 1, LOOKS).round().astype(int)])
+
+
+def closer(trajectory: Trajectory, known: bool = False) -> Run:
+    """The run that tells the error of another: at another tolerance, looked at elsewhere and more often, with outputs
+    also where the two are compared; ``known`` inside its steps, too, where it may be handed out.
+    """
+    run = trajectory.run.second(second_tolerance(trajectory.run.rtol))
+    run = replace(run, times=tuple(np.union1d(run.times, trajectory.looked.result.times).tolist()))
+    return run if known else replace(run, picture=None, looks=0.0)
+
+
+def _second(trajectory: Trajectory, known: bool = False) -> Trajectory:
+    """The closer run.
+
+    Its loads differ in the last digit: where a result depends on that, two runs of the same numbers would agree.
+    """
+    return trajectory.model.solve_values(closer(trajectory, known), trajectory.values, nudged=True)
 
 
 def against_tighter(trajectory: Trajectory, cells: CellErrors | None = None) -> Accuracy:
@@ -155,12 +196,13 @@ def estimated(trajectory: Trajectory, second: Trajectory) -> Accuracy:
         return unknown("the run ended at its start")
     if trajectory.status == "failed" and len(trajectory.result.times) < 2:
         return unknown(f"the run failed: {trajectory.reason}")
-    if second.status == "failed" or len(second.result.times) < len(trajectory.result.times):
-        fate = EARLIER if len(second.result.times) <= len(trajectory.result.times) else "failed later"
+    ends_late = second.result.t > trajectory.result.t
+    if second.status == "failed" or (second.status == "finished" and second.result.t < trajectory.result.t):
+        fate = "failed later" if ends_late else EARLIER
         return unknown(f"a second run at rtol {other:.0e} {fate}: {second.reason}")
-    errors, note = apart(trajectory, second)
+    errors, note = apart(trajectory.looked, second)
     if not errors:
-        return unknown("the run ended before its second output")
+        return unknown("the run ended at its start")
     if note:  # one of the two went another way
         return unknown(f"a second run at rtol {other:.0e}, which had {note}")
     return Accuracy(stated(errors), second_run(second.run), errors)
@@ -187,25 +229,25 @@ def apart(
     """Largest differences of two runs in each state, in named quantities that are ``also`` asked for, and in the times
     of events; and in which events they differ.
 
-    States are compared from the ``first`` output that both have; of a run that ended before its second one only the
-    events and the end are known.
+    States are compared from the ``first`` output that both have.
     """
     found, expected = event_times(ours), event_times(theirs)
     note = difference(found, expected)
-    count = min(len(ours.result.times), len(theirs.result.times))
+    times, *rows = np.intersect1d(ours.result.times, theirs.result.times, assume_unique=True, return_indices=True)
+    times, rows = times[first:], [own[first:] for own in rows]
     errors: dict[str, float] = {}
-    if count > 1:
-        times = theirs.result.times[:count]
-        alike = np.full(count, True) if note else beside_jumps(times, ours, theirs)
-        shared = first + np.flatnonzero(alike[first:])
+    if first + len(times) > 1:
+        alike = np.full(len(times), True) if note else beside_jumps(times, ours, theirs)
         points = [{profile.name: profile.points for profile in run.model.system.profiles} for run in (ours, theirs)]
         values, true = (
-            {name: each[shared] for name, each in known.items()}
-            for known in (_compared(run, also) for run in (ours, theirs))
+            {name: each[own[alike]] for name, each in _compared(run, also).items()}
+            for run, own in zip((ours, theirs), rows, strict=True)
         )
         for name in points[0].keys() & points[1].keys():
             values[name], true[name] = _at_same_places(values[name], true[name], points[0][name], points[1][name])
-        errors = largest_errors(values, {name: true[name] for name in true if name in values}, floors(theirs))
+        known = sizes(theirs, named=values.keys() - states(theirs).keys())
+        known = {name: size[rows[1][alike]] for name, size in known.items()}
+        errors = largest_errors(values, {name: true[name] for name in true if name in values}, known)
     if found and not note:
         errors |= event_errors(found, expected, ours.run.times[-1])
     return errors, note
@@ -270,23 +312,51 @@ def computed(trajectory: Trajectory) -> dict[str, Array]:
     return states(trajectory) | dict(zip(trajectory.model.system.output_columns, trajectory.outputs.T, strict=True))
 
 
-def floors(trajectory: Trajectory) -> dict[str, float]:
-    """Sizes below which errors are relative to these. Of a state that at which the absolute tolerance is as much as the
-    relative one, and at most its scale; of a profile the largest of its states; of a named quantity and of an account
-    its largest value.
+def sizes(trajectory: Trajectory, named: Collection[str] = ()) -> dict[str, Array]:
+    """What errors of states are relative to, at each output: their value and what it changes by within the time that
+    has passed, at most their largest value, but where it changes by itself in a moment. Of profiles the least that
+    counts, of what is ``named`` beside the states the largest value.
+
+    The error of a run is then such that every state is, to this part of itself, the value of a time that is right to
+    this part of itself, which is all that can be said near a zero; and that it is right to this part of its largest
+    value at its own time, too, but for moments.
     """
-    system = trajectory.model.system
-    scales = np.array([state.scale for state in system.states])
-    sizes = np.minimum(trajectory.result.problem.atol / trajectory.run.rtol, scales)
-    # What never exceeds the last digit of its scale is nothing, however tight the absolute tolerance: a species that no
-    # reaction makes has a coverage of rounding.
-    never = np.abs(trajectory.result.outputs).max(axis=0, initial=0.0) < EPS * scales
-    sizes = np.where(never, np.maximum(sizes, EPS * scales), sizes)
-    found = {state.name: size for state, size in zip(system.states, sizes.tolist(), strict=True)}
+    system, result, least = trajectory.model.system, trajectory.result, state_floors(trajectory)
+    found: dict[str, Array] = {
+        profile.name: np.full((len(result.times), 1), max((least[state] for state in profile.states), default=0.0))
+        for profile in system.profiles
+    }
+    if named:
+        found |= {name: np.full(len(result.times), size) for name, size in floors(trajectory).items() if name in named}
+    end, speeds = trajectory.run.times[-1], np.abs(trajectory.rates)
+    for name, j in system.state_columns.items():
+        size, speed = np.maximum(np.abs(result.outputs[:, j]), least[name]), speeds[:, j]
+        most = np.where(size < BRIEF * end * speed, np.inf, size.max(initial=0.0))
+        found[name] = np.fmin(size + result.times * speed, most)
+    return found
+
+
+def floors(trajectory: Trajectory) -> dict[str, float]:
+    """Sizes below which errors are relative to these: of states, and of named quantities and accounts their largest
+    value.
+    """
+    system, found = trajectory.model.system, state_floors(trajectory)
     found |= {p.name: max((found[state] for state in p.states), default=0.0) for p in system.profiles}
     others = dict(zip(system.output_columns, trajectory.outputs.T, strict=True)) | exchanged(trajectory)
     largest = {name: float(np.max(np.abs(values), initial=0.0)) for name, values in others.items()}
     return largest | found
+
+
+def state_floors(trajectory: Trajectory) -> dict[str, float]:
+    """Size of each state at which its absolute tolerance is as much as the relative one, and at most its scale."""
+    system = trajectory.model.system
+    scales = np.array([state.scale for state in system.states])
+    least = np.minimum(trajectory.result.problem.atol / trajectory.run.rtol, scales)
+    # What never exceeds the last digit of its scale is nothing, however tight the absolute tolerance: a species that no
+    # reaction makes has a coverage of rounding.
+    never = np.abs(trajectory.result.outputs).max(axis=0, initial=0.0) < EPS * scales
+    least = np.where(never, np.maximum(least, EPS * scales), least)
+    return {state.name: size for state, size in zip(system.states, least.tolist(), strict=True)}
 
 
 def difference(found: Mapping[str, Array], expected: Mapping[str, Array]) -> str:
@@ -328,7 +398,7 @@ def verified(first: Trajectory) -> tuple[Trajectory, Accuracy]:
     wanted = asked(first.run)
     while True:
         last = first.run.rtol <= TIGHTEST  # nothing tighter resolves more
-        second = _second(first)
+        second = _second(first, known=True)
         found = replace(compared(first, second), asked=wanted)
         if second.status == "failed" or found.error <= wanted:
             return first, found
@@ -337,7 +407,7 @@ def verified(first: Trajectory) -> tuple[Trajectory, Accuracy]:
             if (lost := rounding_of_time(first)) > wanted / 10:
                 missed = f"{wanted:.0e} is out of reach, as rounding of the time alone changes a state by {lost:.0e}"
             return first, replace(found, source=f"{found.source}; {missed}")
-        first = second
+        first = second.at_times(first.run.times)
 
 
 def compared(first: Trajectory, second: Trajectory) -> Accuracy:
@@ -348,23 +418,23 @@ def compared(first: Trajectory, second: Trajectory) -> Accuracy:
     source = second_run(second.run)
     if first.status != second.status:
         return Accuracy(math.inf, f"{source}, which {second.status}: {second.reason}")
-    errors, others = apart(first, second)
+    errors, others = apart(first.looked, second)
     if others and first.run.rtol > TIGHTEST:  # there rounding decides of events that change nothing
         return Accuracy(math.inf, f"{source}, which had {others}")
     if not errors:
-        return unknown("the run ended before its second output")
+        return unknown("the run ended at its start")
     return Accuracy(stated(errors), source, errors)
 
 
 def rounding_of_time(trajectory: Trajectory) -> float:
-    """Largest relative change of a state by the last bit of an output time: no run is nearer than that.
+    """Largest relative change of a state by the last bit of the time: no run is nearer than that.
 
     It is large where a state runs towards a singular end.
     """
-    result = trajectory.result
-    known = floors(trajectory)
-    size = np.maximum(np.abs(result.outputs), [known[name] for name in trajectory.model.system.state_columns])
-    change = EPS * np.abs(trajectory.rates) * result.times[:, None]
+    seen = trajectory.looked
+    known = sizes(seen)
+    size = np.transpose([known[name] for name in seen.model.system.state_columns])
+    change = EPS * np.abs(seen.rates) * seen.result.times[:, None]
     return float(np.max(np.divide(change, size, out=np.zeros_like(change), where=size > 0), initial=0.0))
 
 

@@ -77,7 +77,13 @@ def exact_values(
     every = solution(np.concatenate([times, before_end, *around]))
     first = len(times) + len(before_end)
     exact = {each: values[: len(times)].copy() for each, values in every.items()}
-    _choose_sides(exact, {each: values[len(times) : first] for each, values in every.items()}, solution, run, side)
+    _choose_sides(
+        exact,
+        {each: values[len(times) : first] for each, values in every.items()},
+        lambda t: solution(np.minimum(t, reference.end_time)),
+        run,
+        side,
+    )
     if reference.continuous:
         return _with_profiles(reference, exact, scene, run)
     _check_start(exact, run)

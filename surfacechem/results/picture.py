@@ -7,8 +7,6 @@ outputs, over time as over its logarithm, miss no quantity by more than a part o
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -106,15 +104,6 @@ def _kept(run: Run, t: Array, quantities: Array, noise: Array, part: float, side
     return needed(t, values[:, seen], allowed[seen], sides | _edges(quantities[:, seen]))
 
 
-def _at(trajectory: Trajectory, rows: States) -> Trajectory:
-    """The trajectory with these states at its outputs."""
-    t, y, ledger, segment = rows
-    return replace(
-        trajectory,
-        result=replace(trajectory.result, times=t, outputs=y, ledger_outputs=ledger, segment=segment),
-    )
-
-
 def _chosen(rows: States, which: Flags) -> States:
     """Some of the rows."""
     assert rows.segment is not None
@@ -135,7 +124,7 @@ def followed(trajectory: Trajectory) -> Trajectory:
     values, noise = _quantities(trajectory, rows)
     beside = _beside_events(trajectory, rows.t)
     kept = _kept(trajectory.run, rows.t, values, noise, part, beside, early)
-    return _at(trajectory, _chosen(rows, kept))
+    return trajectory.at(_chosen(rows, kept))
 
 
 def _beside_events(trajectory: Trajectory, t: Array) -> Flags:
@@ -149,6 +138,6 @@ def _quantities(trajectory: Trajectory, rows: States) -> tuple[Array, Array]:
     system = trajectory.model.system
     states = np.hstack([rows.y, rows.ledger])
     sampled = np.arange(len(rows.t)) % max(len(rows.t) // SAMPLED, 1) == 0
-    noise = _at(trajectory, _chosen(rows, sampled)).roundings
+    noise = trajectory.at(_chosen(rows, sampled)).roundings
     unknown = [0.0] * states.shape[1] + [UNRESOLVED * noise[name] for name in system.output_columns]
-    return np.hstack([states, _at(trajectory, rows).outputs]), np.array(unknown)
+    return np.hstack([states, trajectory.at(rows).outputs]), np.array(unknown)

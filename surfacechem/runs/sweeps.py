@@ -23,7 +23,7 @@ from surfacechem.references.base import SceneView
 from surfacechem.results.accuracy import UNKNOWN, CellErrors, second_tolerance
 from surfacechem.results.audit import Audit, audit
 from surfacechem.results.dataset import DATASET_NAMES, Results, coverage_columns, quantities, quantity_columns
-from surfacechem.results.error_estimates import against_exact, estimated, second_run, with_cells
+from surfacechem.results.error_estimates import against_exact, closer, estimated, second_run, with_cells
 from surfacechem.results.event_table import entropy_destroyed, event_columns, event_times
 from surfacechem.results.matching import exact_values, match
 from surfacechem.results.netcdf import Column, versions
@@ -86,7 +86,7 @@ def settings(system: System, plan: Plan, run: Run, values: Sequence[Mapping[str,
     """The settings of each run: the same output times for all, or stretched to where a load is reached that the plan
     names.
     """
-    run = replace(run, picture=None)
+    run = replace(run, picture=None, looks=0.0)
     if plan.until is None or not plan.load:
         return [run] * len(values)
     variable, target = plan.until
@@ -152,28 +152,26 @@ def accuracy(
 
 
 def _second(done: SweepSolution, threads: int | None) -> SweepSolution:
-    """The runs at another tolerance, as :meth:`Model.resolve` has each."""
-    rtol = second_tolerance(done.run.rtol)
-    pairs = [(run.run.second(rtol), run.values) for run in done.runs]
+    """The runs at another tolerance, as that of a single run."""
+    pairs = [(closer(run), run.values) for run in done.runs]
     runs = done.model.solve_all(pairs, threads or os.cpu_count() or 1, nudged=True)
-    return replace(done, run=done.run.second(rtol), runs=runs)
+    return replace(done, run=done.run.second(second_tolerance(done.run.rtol)), runs=runs)
 
 
 def _against_exact(case: Case, done: SweepSolution, name: str, second: Callable[[], SweepSolution]) -> SweepAccuracy:
     """Errors of the load at rupture, else of all; InputError where the solution is not that of every run.
 
-    For the loads at rupture that is tested on the outermost runs. A run with one output has nothing to compare but its
-    events, one without any has no error.
+    For the loads at rupture that is tested on the outermost runs. A run that ended at its start has no error.
     """
-    begun = [i for i, run in enumerate(done.runs) if len(run.result.times) > 1]
+    begun = [i for i, run in enumerate(done.runs) if len(run.looked.result.times) > 1]
     if not begun:
-        raise InputError("no run reached a second output.")
+        raise InputError("all runs ended at their start.")
     errors = np.full(len(done.runs), np.nan)
     exact = {which: errors.copy() for which in done.told if which in references.get(name).statistics}
     for i, run in enumerate(done.runs):
-        if len(run.result.times) < 2:
-            errors[i] = estimated(run, second().runs[i]).error if len(run.result.times) else np.nan
-        elif exact:
+        if len(run.looked.result.times) < 2:
+            continue
+        if exact:
             if i in (begun[0], begun[-1]):
                 exact_values(name, {}, case.scene, run)
             reference = match(references.get(name), {}, SceneView(case.scene, run))

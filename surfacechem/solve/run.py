@@ -21,7 +21,7 @@ from surfacechem.model.system import System
 from surfacechem.solve import ASKING, AUTO, solver
 from surfacechem.solve import segments as pieces
 from surfacechem.solve.choice import EXPLICIT, method
-from surfacechem.solve.contract import Margin, Problem, Result, Solver, Status
+from surfacechem.solve.contract import Margin, Problem, Result, Solver, States, Status
 from surfacechem.solve.diagnose import ROUNDED, cause, is_led_back
 from surfacechem.solve.equilibria import Equilibria, Point
 from surfacechem.solve.hybrid import Flow, Hybrid, solve_together, without_stall
@@ -29,7 +29,7 @@ from surfacechem.solve.jumps import Jump, Jumper
 from surfacechem.solve.radau.solver import output_rates
 from surfacechem.solve.segments import Passing
 from surfacechem.solve.start import stable_start
-from surfacechem.tolerances import DEFAULT_RTOL, EPS, NONE_OF_SCALE
+from surfacechem.tolerances import DEFAULT_RTOL, EPS, NONE_OF_SCALE, PICTURE
 
 Array = NDArray[np.float64]
 
@@ -68,8 +68,11 @@ class Run:
     accuracy: float | None = None
     """Relative accuracy that was asked for, if no tolerances were given."""
     picture: float | None = None
-    """Part of its range by which straight lines between outputs, which then follow the run, may miss a quantity; runs
-    are compared at ``times``, which are the outputs where this is None."""
+    """Part of its range by which straight lines between outputs, which then follow the run, may miss a quantity; the
+    outputs are ``times`` where this is None."""
+    looks: float = PICTURE
+    """Part of its range to which states are known inside steps that are too long for a straight line, whatever the
+    outputs are; 0 where the ends of steps and the outputs are all that is known."""
     steady: bool = False
     """Whether it ends where nothing changes any more; the times are then those of a run of any length."""
     samples: float = SAMPLES
@@ -114,6 +117,34 @@ class Trajectory:
         """Give the problem the machine code that the model has made anew."""
         problem = state["result"].problem.changed(program=state["model"].program)
         vars(self).update(state, result=replace(state["result"], problem=problem))
+
+    def at(self, rows: States) -> Trajectory:
+        """The trajectory with these states at its outputs."""
+        t, y, ledger, segment = rows
+        result = replace(self.result, times=t, outputs=y, ledger_outputs=ledger, segment=segment)
+        return replace(self, result=result)
+
+    def at_times(self, times: Sequence[float] | Array) -> Trajectory:
+        """The trajectory with those of its outputs alone that are at these times."""
+        result = self.result
+        kept = np.isin(result.times, times)
+        segment = result.segments_at(result.times, result.segment)
+        found = self.at(States(result.times[kept], result.outputs[kept], result.ledger_outputs[kept], segment[kept]))
+        return replace(found, run=replace(self.run, times=tuple(times)))
+
+    @cached_property
+    def looked(self) -> Trajectory:
+        """The trajectory with outputs where runs are compared: at the ends of its steps and at what the stepper knows
+        inside them, whatever outputs were asked for; at those, too, where nothing inside is known.
+        """
+        result = self.result
+        rows = result.known or result.states()
+        t = np.minimum(rows.t, self.run.times[-1])  # the last step may end beyond it by rounding
+        kept = np.diff(t, prepend=-1.0) > 0  # of two sides of a moment the first, which an output has, too
+        if (result.known or result.inside) is not None and result.steps is not None:
+            kept &= np.isin(rows.t, result.steps.t) | ~np.isin(rows.t, result.times)
+        assert rows.segment is not None
+        return self.at(States(t[kept], rows.y[kept], rows.ledger[kept], rows.segment[kept]))
 
     @cached_property
     def rates(self) -> Array:
@@ -303,7 +334,7 @@ class Model:
             max_steps=run.max_steps,
             max_seconds=run.max_seconds,
             record_steps=True,
-            picture=(run.picture or 0.0) / FINER,
+            picture=(run.picture or run.looks) / FINER,
             spacing=end / run.samples,
             in_play=system.in_play(parameters[0]),
         )
@@ -342,25 +373,6 @@ class Model:
             Where there is no parameter of a path, or the start is not admissible.
         """
         return self.solve_values(run, self.values(changes))
-
-    def resolve(self, trajectory: Trajectory, rtol: float) -> Trajectory:
-        """The same run at another tolerance, looked at elsewhere and more often.
-
-        Its loads differ in the last digit: where a result depends on that, two runs of the same numbers would agree.
-
-        Parameters
-        ----------
-        trajectory
-            A run of this model.
-        rtol
-            The other relative tolerance.
-
-        Returns
-        -------
-        Trajectory
-            The second run, from which an error is estimated.
-        """
-        return self.solve_values(trajectory.run.second(rtol), trajectory.values, nudged=True)
 
     def chosen(self, run: Run, values: Mapping[str, float]) -> Run:
         """The run with a method, where the choice is left to us the one that suits the scene with these values."""

@@ -40,14 +40,32 @@ def test_accuracy_is_achieved_everywhere(name, accuracy):
     assert_achieved(name, accuracy)
 
 
-def test_a_run_that_misses_is_run_again():
+SLIPS = [{"outputs": 4}, {"outputs": 600}, {"first": "1 ms", "spacing": "logarithmic", "outputs": 50}, {}]
+"""Outputs of which the first ones see no slip at all."""
+
+
+@pytest.mark.parametrize("outputs", SLIPS)
+def test_a_run_that_misses_is_run_again_whatever_its_outputs(outputs):
     """The velocity of a slip is known less well than its step; the looser run is not handed out."""
-    solution = surfacechem.run("stick-slip", {"run": {"until": 3, "outputs": 600, "accuracy": 1e-3}})
+    solution = surfacechem.run("stick-slip", {"run": {"until": 3, "accuracy": 1e-4, **outputs}})
     run = solution.trajectory.run
-    assert (run.solver, run.rtol) == ("radau", pytest.approx(1e-7))
-    assert solution.accuracy.asked == 1e-3
-    assert solution.attributes["error_asked"] == 1e-3
-    assert solution.accuracy.error < 1e-3
+    assert (run.solver, run.rtol) == ("radau", pytest.approx(1e-8))
+    assert solution.accuracy.asked == 1e-4
+    assert solution.attributes["error_asked"] == 1e-4
+    assert solution.accuracy.error < 1e-4
+    assert solution.dataset.sizes["time"] == outputs.get("outputs", solution.dataset.sizes["time"])
+
+
+@pytest.mark.parametrize("outputs", SLIPS)
+@pytest.mark.parametrize("reference", [{}, {"reference": ""}])
+def test_the_error_is_that_of_every_moment_whatever_the_outputs(outputs, reference):
+    """A slip lasts a thousandth of the run."""
+    data = surfacechem.run("stick-slip", {"run": {"until": 3, "rtol": 1e-5, **outputs}, **reference}).dataset
+    fine = surfacechem.run("stick-slip", {"run": {"until": 3, "rtol": 1e-5, "outputs": 6000}}).dataset
+    missed = float(abs(fine.v - fine.v_exact).max() / fine.v.max())
+    assert missed / 2 < data.error < 4 * missed
+    if not reference:
+        assert data.error == fine.error
 
 
 def test_cells_are_as_accurate_as_the_run_is_asked_to_be():

@@ -134,7 +134,7 @@ class Radau(Solver):
         alike: dict[tuple[Any, ...], list[int]] = {}
         for i, problem in enumerate(problems):
             # What problems of one batch have in common, beside the model and its margins.
-            shape = len(problem.segments), len(problem.times), problem.atol.tobytes(), problem.rtol
+            shape = len(problem.segments), problem.atol.tobytes(), problem.rtol
             alike.setdefault((*shape, problem.in_play, problem.goes_on, problem.picture), []).append(i)
         most = min(CHUNK, -(-len(problems) // threads))
         chunks = [group[k : k + most] for group in alike.values() for k in range(0, len(group), most)]
@@ -176,7 +176,10 @@ def _solved(problems: Sequence[Problem]) -> list[Result]:
     own = [(each.y0, each.parameters, each.spacing, _peaks(each)) for each in problems]
     y0, parameters, spacing, peaks = (np.array(values, float) for values in zip(*own, strict=True))
     max_steps = np.array([each.max_steps for each in problems])
-    segments, times = shared([each.segments for each in problems]), shared([each.times for each in problems])
+    most = max(len(each.times) for each in problems)
+    # Outputs that a run has not are at infinity, which none reaches.
+    times = shared([np.pad(each.times, (0, most - len(each.times)), constant_values=np.inf) for each in problems])
+    segments = shared([each.segments for each in problems])
     batch = _batch(problems[0], (y0, parameters, spacing, max_steps, peaks, segments, times))
     stepper.run(batch, 0, len(problems))
     return [_whole(problem, batch, i) for i, problem in enumerate(problems)]
