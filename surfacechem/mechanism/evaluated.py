@@ -10,7 +10,7 @@ from __future__ import annotations
 import copy
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -109,6 +109,7 @@ class HeldPhase:
         self.phase, self.pressure = phase, float(phase.P)
         self.species = [phase.species_index(name) for name in state.composition]
         self.rest = phase.species_index(state.rest) if state.rest else None
+        self.potential = state.electric_potential
         self.charges = FARADAY * np.asarray(phase.charges)
         name, found = word(phase.name), []
         if state.pressure is not None:
@@ -125,6 +126,11 @@ class HeldPhase:
         """Of its species where it was put last [J/kmol]."""
         self._parts, self._all = [math.nan], np.empty(0)
         self._pressed, self._charged = state.pressure is not None, state.electric_potential is not None
+
+    @property
+    def taken_over(self) -> list[tuple[Quantity, Load]]:
+        """Those of its pressure and composition, which a reactor may give."""
+        return [item for item in self.histories if item[1] is not self.potential]
 
     def put(self, T: float, values: Sequence[float]) -> None:
         """Go to a temperature [K] and to values of the histories."""
@@ -264,7 +270,7 @@ class SurfaceEngine:
         """Who has brought the surface where, as several may share it."""
 
     def beside(self, neighbours: Mapping[str, Neighbour]) -> SurfaceEngine:
-        """The same with other states of some neighbours; InputError where no reaction has such a neighbour."""
+        """The same with other pressures and compositions of neighbours; InputError where no reaction has such a one."""
         known = {held.phase.name: held for held in self.held}
         for name, state in neighbours.items():
             if name not in known:
@@ -275,7 +281,7 @@ class SurfaceEngine:
                 raise InputError(
                     f"the reactor of the neighbour {name} has other species than the mechanism: {', '.join(own)}."
                 )
-            known[name] = HeldPhase(known[name].phase, state)
+            known[name] = HeldPhase(known[name].phase, replace(state, electric_potential=known[name].potential))
         made = copy.copy(self)
         made.held = list(known.values())
         return made

@@ -1,12 +1,19 @@
 """A scene in a Cantera reactor network, beside gas reactors, reservoirs, walls and flow controllers.
 
 ``interface`` (the reactor that holds a scene), ``network`` (a ReactorNet that stops at breakpoints and limits),
-``coupling`` (how other reactors touch its bodies), ``gas`` (a gas that reacts with it), ``history`` (what it went
-through, as a dataset).
+``coupling`` (how other reactors touch its bodies), ``gas`` (gases and solids that react with it), ``history`` (what it
+went through, as a dataset).
 """
 
-from surfacechem.reactor.gas import ReactingGas, ReactingGasAtPressure
+from surfacechem.reactor.gas import ReactingGas, ReactingGasAtPressure, ReactingSolid
 from surfacechem.reactor.interface import InterfaceReactor, InterfaceStopped
 from surfacechem.reactor.network import ReactorNet
 
-__all__ = ["InterfaceReactor", "InterfaceStopped", "ReactingGas", "ReactingGasAtPressure", "ReactorNet"]
+__all__ = [
+    "InterfaceReactor",
+    "InterfaceStopped",
+    "ReactingGas",
+    "ReactingGasAtPressure",
+    "ReactingSolid",
+    "ReactorNet",
+]

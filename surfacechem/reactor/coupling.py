@@ -77,7 +77,9 @@ def with_loads(scene: Scene, values: Mapping[str, float]) -> Scene:
 
 
 def with_neighbours(scene: Scene, reactors: Mapping[str, Any]) -> Scene:
-    """The scene with phases beside its surface whose pressures and compositions are given while it runs."""
+    """The scene with phases beside its surface whose pressures and compositions are given while it runs; electric
+    potentials stay those of the case.
+    """
     if not reactors:
         return scene
     engine = scene.interface.engine
@@ -85,7 +87,8 @@ def with_neighbours(scene: Scene, reactors: Mapping[str, Any]) -> Scene:
         raise InputError("no reaction of the scene has a neighbour, so no reactor can be one.")
     for name, reactor in reactors.items():
         if not isinstance(reactor, Receiver | cantera.Reservoir):
-            raise InputError(f"the neighbour {name} must be a ReactingGas, as {type(reactor).__name__} takes nothing.")
+            kinds = "a ReactingGas or a ReactingSolid"
+            raise InputError(f"the neighbour {name} must be {kinds}, as {type(reactor).__name__} takes nothing.")
     states = {name: _state(reactor.phase) for name, reactor in reactors.items()}
     return replace(scene, interface=replace(scene.interface, engine=engine.beside(states)))
 

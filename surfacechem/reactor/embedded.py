@@ -123,7 +123,7 @@ class EmbeddedScene:
         return Beside(
             reactor=reactor,
             held=held,
-            places=np.array([self._position[f"loading.{quantity.name}.level"] for quantity, _ in held.histories]),
+            places=np.array([self._position[f"loading.{quantity.name}.level"] for quantity, _ in held.taken_over]),
             species=np.array([held.phase.species_index(species) for species in made]),
             accounts=np.array([len(self.states) + self.accounts.index(account) for account in made.values()]),
         )

@@ -1,18 +1,28 @@
-"""A gas that reacts with the surfaces beside it: what they take it loses, what they make it receives."""
+"""Gases and solids that react with the surfaces beside them: they lose what these take, and receive what they make."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Self
 
 import cantera
 import numpy as np
 
+from surfacechem.solve.adapters.cantera_network import HeldReactor
 from surfacechem.solve.contract import Array
 
 
 class Receiver:
-    """What a gas beside interfaces adds to Cantera's own balances.
+    """What is beside interfaces: what their reactions make it receives."""
+
+    def __init__(self, *arguments: Any, **options: Any) -> None:
+        super().__init__(*arguments, **options)
+        self.sources: list[Callable[[float], tuple[Array, float]]] = []
+        """Amounts of species [kmol/s] and enthalpy [W] that come in at a time [s]."""
+
+
+class Gas(Receiver):
+    """What a gas adds to Cantera's own balances.
 
     ``temperature`` is the place of that among its variables: after it come mass fractions, the first is the mass.
     """
@@ -21,8 +31,6 @@ class Receiver:
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
-        self.sources: list[Callable[[float], tuple[Array, float]]] = []
-        """Amounts of species [kmol/s] and enthalpy [W] that come in at a time [s]."""
         self.weights = self.phase.molecular_weights  # type: ignore[attr-defined]
 
     def energies(self) -> Array:
@@ -42,7 +50,7 @@ class Receiver:
             own += masses - total * self.phase.Y  # type: ignore[attr-defined]
 
 
-class ReactingGas(Receiver, cantera.ExtensibleIdealGasReactor):
+class ReactingGas(Gas, cantera.ExtensibleIdealGasReactor):
     """Cantera's IdealGasReactor for a gas beside the surface of an interface.
 
     ``InterfaceReactor(..., neighbours={name: gas})`` makes it a neighbour, of one interface or of several.
@@ -56,7 +64,7 @@ class ReactingGas(Receiver, cantera.ExtensibleIdealGasReactor):
         return np.asarray(self.phase.partial_molar_int_energies)
 
 
-class ReactingGasAtPressure(Receiver, cantera.ExtensibleIdealGasConstPressureReactor):
+class ReactingGasAtPressure(Gas, cantera.ExtensibleIdealGasConstPressureReactor):
     """Cantera's IdealGasConstPressureReactor for a gas beside the surface of an interface.
 
     Its arguments are those of an IdealGasConstPressureReactor, first the gas, a ``cantera.Solution``.
@@ -66,3 +74,58 @@ class ReactingGasAtPressure(Receiver, cantera.ExtensibleIdealGasConstPressureRea
 
     def energies(self) -> Array:
         return np.asarray(self.phase.partial_molar_enthalpies)
+
+
+class ReactingSolid(Receiver, HeldReactor):
+    """A solid or a liquid beside the surface of an interface, such as the particle of an electrode or its electrolyte.
+
+    ``InterfaceReactor(..., neighbours={name: solid})`` makes it a neighbour. Its amounts change, each a variable in
+    units of all that is there at the start; temperature and pressure are held as they are, whatever heat that takes.
+    An electric potential is that of the case.
+
+    Parameters
+    ----------
+    phase
+        A ``cantera.Solution`` in the state of the start, which is kept, not cloned.
+    mass
+        Its mass at the start [kg].
+    name
+        Its name in the network.
+    """
+
+    def __new__(cls, phase: Any, *, mass: float, name: str = "solid") -> Self:
+        """Keep the phase itself."""
+        return super().__new__(cls, phase, name=name)
+
+    def __init__(self, phase: Any, *, mass: float, name: str = "solid") -> None:
+        super().__init__(phase, name=name)
+        self.names = tuple(phase.species_names)
+        self.whole = mass / phase.mean_molecular_weight
+        """Amount at the start [kmol]."""
+        self.x = phase.X
+
+    @property
+    def phase(self) -> Any:
+        """The phase in its present state; Cantera's own would be brought back to that of the start."""
+        return self.surface
+
+    @property
+    def amounts(self) -> Array:
+        """Present amounts of its species [kmol]."""
+        return np.asarray(self.x * self.whole)
+
+    @property
+    def mass(self) -> float:
+        """Present mass [kg]."""
+        return float(self.amounts @ self.phase.molecular_weights)
+
+    def start(self) -> Array:
+        return np.asarray(self.x)
+
+    def put(self, x: Array) -> None:
+        self.x = x
+        self.phase.TPX = None, None, x
+
+    def rates(self, t: float) -> Array:
+        made = sum((source(t)[0] for source in self.sources), np.zeros(len(self.x)))
+        return np.asarray(made / self.whole)

@@ -3,10 +3,12 @@
 import cantera as ct
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 import surfacechem
 from surfacechem.errors import InputError
-from surfacechem.reactor import InterfaceReactor, ReactingGas, ReactingGasAtPressure, ReactorNet
+from surfacechem.quantities import MOLECULAR
+from surfacechem.reactor import InterfaceReactor, ReactingGas, ReactingGasAtPressure, ReactingSolid, ReactorNet
 
 pytestmark = pytest.mark.around
 
@@ -147,7 +149,7 @@ def test_sensitivity_of_the_gas_to_a_reaction_of_the_surface(tmp_path):
     [
         (
             {"gas": lambda: fuel(ct.IdealGasReactor)},
-            "the neighbour gas must be a ReactingGas, as IdealGasReactor takes",
+            "the neighbour gas must be a ReactingGas or a ReactingSolid, as IdealGasReactor takes",
         ),
         ({"gass": fuel}, "no reaction of the surface metal_surface has a neighbour 'gass'. Did you mean 'gas'"),
         (
@@ -212,3 +214,55 @@ def test_a_bed_is_cantera_s_chain_of_reactors_point_by_point(tmp_path):
 
     for ours, theirs in zip(chain(True), chain(False), strict=True):
         np.testing.assert_allclose(ours, theirs, atol=1e-8, rtol=0)
+
+
+ELECTRODE = """
+bodies: {particle: {temperature: 300 K}, cell: {temperature: 300 K}}
+interface:
+  temperature: 300 K
+  mechanism:
+    file: lithium_ion_battery.yaml
+    phase: edge_anode_electrolyte
+    neighbours:
+      anode: {composition: {"Li[anode]": 0.1}, rest: "V[anode]"}
+      electrolyte: {composition: {"C3H4O3[elyt]": 0.5, "C4H6O3[elyt]": 0.3, "Li+[elyt]": 0.1}, rest: "PF6-[elyt]"}
+      electron: {electric-potential: -3.2 V}
+initial: {coverages: {(dummy): 1}}
+run: {until: 40 s, solver: cantera}
+"""
+
+
+def test_a_particle_and_its_electrolyte_at_a_held_potential(tmp_path):
+    """What the anode takes the electrolyte loses; beside SciPy along Cantera's rates."""
+
+    def phase(name, *parts):
+        found = ct.Solution("lithium_ion_battery.yaml", name)
+        found.TPX = 300, ct.one_atm, parts
+        return found
+
+    anode = ReactingSolid(phase("anode", 0.5, 0.5), mass=0.02)
+    electrolyte = ReactingSolid(phase("electrolyte", 0.48, 0.37, 0.08, 0.07), mass=0.1, name="electrolyte")
+    path = tmp_path / "case.yaml"
+    path.write_text(ELECTRODE)
+    cell = InterfaceReactor(path, neighbours={"anode": anode, "electrolyte": electrolyte})
+    net, before, lithium = network(anode, electrolyte, cell), anode.mass, anode.amounts[0] + electrolyte.amounts[2]
+    start = np.concatenate((anode.x, electrolyte.x))
+    net.advance(40.0)
+    assert anode.amounts[0] + electrolyte.amounts[2] == pytest.approx(lithium, rel=1e-12)
+    full, empty = anode.phase.molecular_weights
+    gained = float(cell.dataset["made_Li_anode"][-1]) / MOLECULAR * (full - empty)
+    assert anode.mass - before == pytest.approx(gained, rel=1e-9)
+
+    edge = ct.Interface("lithium_ion_battery.yaml", "edge_anode_electrolyte")
+    edge.TP = 300, ct.one_atm
+    edge.adjacent["electron"].electric_potential = -3.2
+
+    def rates(_, x):
+        edge.adjacent["anode"].TPX = 300, ct.one_atm, x[:2]
+        edge.adjacent["electrolyte"].TPX = 300, ct.one_atm, x[2:]
+        made = edge.get_net_production_rates("anode"), edge.get_net_production_rates("electrolyte")
+        return np.concatenate((made[0] / anode.whole, made[1] / electrolyte.whole))
+
+    known = solve_ivp(rates, (0, 40), start, method="LSODA", rtol=1e-9, atol=1e-12).y[:, -1]
+    np.testing.assert_allclose(np.concatenate((anode.x, electrolyte.x)), known, atol=1e-7)
+    assert anode.x[0] > 0.7
