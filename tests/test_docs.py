@@ -1,6 +1,8 @@
 """What the documentation shows is true: its Python runs, its commands print what it says, its cases load."""
 
 import doctest
+import importlib
+import inspect
 import os
 import re
 import shlex
@@ -11,6 +13,7 @@ import warnings
 from dataclasses import dataclass
 from pathlib import Path
 
+import griffe
 import pytest
 from typer.testing import CliRunner
 
@@ -154,3 +157,41 @@ def test_links_of_the_readme_exist():
     links = re.findall(r"\]\(([^)#:]+)\)", (ROOT / "README.md").read_text(encoding="utf-8"))
     assert links
     assert all((ROOT / link).exists() for link in links), links
+
+
+SHOWN = re.compile(r"^::: (?P<path>[\w.]+)(?:\n    options: {(?:members: \[(?P<members>[^]]*)])?)?", re.MULTILINE)
+"""What the pages show of the Python API, and which members of a class."""
+
+NEVER_RAISE = {"Simulation.of", "Study.figure", "Model.evaluate", "InterfaceReactor.record", "Run.second"}
+
+
+def shown_functions():
+    """Every function and method that the pages document, by name."""
+    for page in PAGES:
+        for match in SHOWN.finditer(page.read_text(encoding="utf-8")):
+            module, _, name = match["path"].rpartition(".")
+            found = getattr(importlib.import_module(module), name)
+            if not inspect.isclass(found):
+                yield name, found
+                continue
+            every = [each for each in vars(found) if not each.startswith("_")]
+            members = every if match["members"] is None else filter(None, match["members"].split(", "))
+            methods = ((each, getattr(found, each, None)) for each in members)
+            yield from (
+                (f"{name}.{each}", method)
+                for each, method in methods
+                if inspect.isfunction(method) or inspect.ismethod(method)
+            )
+
+
+@pytest.mark.parametrize(("name", "function"), [pytest.param(*pair, id=pair[0]) for pair in shown_functions()])
+def test_what_the_pages_show_names_parameters_returns_and_errors(name, function):
+    signature = inspect.signature(function)
+    sections = griffe.Docstring(inspect.getdoc(function)).parse("numpy", warnings=False)
+    told = {section.kind.value: section.value for section in sections}
+    described = {item.name: item.description for item in told.get("parameters", [])}
+    wanted = [f"*{x.name}" if x.kind is x.VAR_POSITIONAL else x.name for x in signature.parameters.values()]
+    assert described.keys() == set(wanted) - {"self", "cls"}
+    assert all(described.values())
+    assert ("returns" in told) is (signature.return_annotation not in ("None", None))
+    assert ("raises" in told) is (name not in NEVER_RAISE)

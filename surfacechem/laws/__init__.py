@@ -169,8 +169,13 @@ def _of_packages() -> tuple[type[Law], ...]:
 
     found: list[type[Law]] = []
     for point in entry_points(group=GROUP):
-        given = point.load()
-        found += in_module(given) if isinstance(given, ModuleType) else [given]
-    for law in found:
-        check_own(law)
+        try:
+            given = point.load()
+            own = in_module(given) if isinstance(given, ModuleType) else [given]
+            for law in own:
+                check_own(law)
+        except Exception as error:  # whatever the code of another package does
+            said = error.message if isinstance(error, InputError) else f"{type(error).__name__}: {error}"
+            raise InputError(f"the entry point {point.value} of an installed package gives no laws: {said}") from error
+        found += own
     return tuple(found)

@@ -90,6 +90,16 @@ class Run:
     def second(self, rtol: float) -> Run:
         """The run that tells the error of this one: at another tolerance, the absolute one in proportion, and with more
         looks at the equations, elsewhere; of explicit steps by implicit ones, which do not share their blindness.
+
+        Parameters
+        ----------
+        rtol
+            The other relative tolerance.
+
+        Returns
+        -------
+        Run
+            The same outputs at that tolerance.
         """
         atol = None if self.atol is None else self.atol * rtol / self.rtol
         used = OWN if self.solver == EXPLICIT else self.solver

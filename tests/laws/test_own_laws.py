@@ -1,9 +1,8 @@
 """Laws of one's own: by a file that a case names, by registration, by an entry point; never by opening a dataset."""
 
 import hashlib
-import importlib.metadata
 import math
-from types import SimpleNamespace
+import sys
 
 import pytest
 from typer.testing import CliRunner
@@ -110,7 +109,7 @@ def test_a_file_that_gives_no_law_is_refused(folder, source, message):
         surfacechem.load("slime.yaml")
 
 
-def test_a_law_is_registered_or_comes_with_a_package(folder, monkeypatch):
+def test_a_law_is_registered(folder, monkeypatch):
     (law,) = own_laws.read(LAW, "slime.py")
     text = CASE.replace("laws: [slime.py]", "")
     monkeypatch.setattr(laws, "_registered", {})
@@ -118,16 +117,54 @@ def test_a_law_is_registered_or_comes_with_a_package(folder, monkeypatch):
         surfacechem.load(text)
     assert surfacechem.register(law) is law
     assert surfacechem.load(text).case.scene.interface.frictions[0].eta == 2e7
-    monkeypatch.setattr(laws, "_registered", {})
-    point = SimpleNamespace(load=lambda: law)
-    monkeypatch.setattr(importlib.metadata, "entry_points", lambda group: [point] if group == laws.GROUP else [])
-    laws._of_packages.cache_clear()
-    try:
-        assert laws.find(Friction, "slime") is law
-    finally:
-        laws._of_packages.cache_clear()
     with pytest.raises(InputError, match="int is no law"):
         surfacechem.register(int)
+
+
+@pytest.fixture
+def package(folder, monkeypatch):
+    """An installed package as pip leaves it: a module, and what its metadata say of it."""
+    site = folder / "site-packages"
+    (metadata := site / "slimes-1.0.dist-info").mkdir(parents=True)
+    (metadata / "METADATA").write_text("Metadata-Version: 2.1\nName: slimes\nVersion: 1.0\n")
+    (metadata / "entry_points.txt").write_text("[surfacechem.laws]\nslimes = slimes\n")
+    (site / "slimes.py").write_text(LAW)
+    (folder / "slime.yaml").write_text(CASE.replace("laws: [slime.py]", ""))
+    monkeypatch.syspath_prepend(site)
+    monkeypatch.delitem(sys.modules, "slimes", raising=False)
+    laws._of_packages.cache_clear()
+    yield site / "slimes.py"
+    laws._of_packages.cache_clear()
+    sys.modules.pop("slimes", None)
+
+
+def test_an_installed_package_gives_its_laws(folder, package):
+    call = CliRunner().invoke
+    assert "Friction of slime." in call(app, ["laws", "slime"]).stdout
+    assert call(app, ["run", "slime.yaml", "-o", "slime.nc"]).exit_code == 0
+    assert call(app, ["rerun", "slime.nc"]).exit_code == 0
+    assert float(surfacechem.run("slime.yaml").dataset["T"][-1]) == pytest.approx(T_END, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("source", "message"),
+    [
+        ("import no_such_module", "slimes of an installed package gives no laws: ModuleNotFoundError: No module named"),
+        (LAW.replace("Slime", "Coulomb"), "Coulomb has the name of the friction law 'coulomb' of the package"),
+    ],
+)
+def test_a_package_that_gives_none_is_named(folder, package, source, message):
+    package.write_text(source)
+    with pytest.raises(InputError, match=message):
+        surfacechem.load("slime.yaml")
+    assert surfacechem.load("exothermic").case.name == "exothermic"  # which needs no law of it
+
+
+@pytest.mark.parametrize(("checksum", "code"), [(hashlib.sha256(LAW.encode()).hexdigest(), 0), ("12ab", 2)])
+def test_the_command_line_runs_the_file_that_is_meant_alone(folder, checksum, code):
+    (folder / "slime.yaml").write_text(CASE.replace("[slime.py]", f"[{{file: slime.py, sha256: {checksum}}}]"))
+    assert CliRunner().invoke(app, ["run", "slime.yaml", "-o", "slime.nc"]).exit_code == code
+    assert (folder / "slime.nc").exists() is (code == 0)
 
 
 def test_what_every_law_keeps_is_tried_on_one_of_ones_own(folder):
