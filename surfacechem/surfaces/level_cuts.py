@@ -109,6 +109,7 @@ class LevelPatches(Patches):
 
 def with_levels(patches: Patches, other: Surface, levels: Sequence[float], noise: float) -> LevelPatches:
     """Patches of a surface, each with the level of the gap to the other that passes through it, if one does."""
+    patches = _at_corners(patches)
     parts = {name: getattr(patches, name) for name in ("surface", "alike", *Patches.arrays)}
     none = np.zeros(len(patches))
     found = LevelPatches(**parts, other=other, levels=tuple(levels), noise=noise, level=none, along=none.astype(int))
@@ -119,3 +120,19 @@ def with_levels(patches: Patches, other: Surface, levels: Sequence[float], noise
                 break
             found = found.divided(found.alike.index(False)).marked()
     return found
+
+
+def _at_corners(patches: Patches) -> Patches:
+    """Patches divided so that the places they gather around, where gaps are least, are at corners of them."""
+    for k in range(2):
+        if patches.alike[k]:
+            continue
+        around = (patches.low[:, k] < 0) & (patches.high[:, k] > 0)
+        side = np.arange(2) == k
+        passed = patches[around]
+        below, above = (
+            replace(passed, high=np.where(side, 0.0, passed.high)),
+            replace(passed, low=np.where(side, 0.0, passed.low)),
+        )
+        patches = patches[~around].joined(below, above)
+    return patches

@@ -19,9 +19,10 @@ import numpy as np
 
 from surfacechem.contracts.terms import PairEnergy
 from surfacechem.errors import InputError
+from surfacechem.surfaces.inner_sums import LEFT_OUT, extents, inner_sums
 from surfacechem.surfaces.level_cuts import with_levels
 from surfacechem.surfaces.nearest_places import NearPlaces
-from surfacechem.surfaces.nodes import LAST, LEFT_OUT, Extent, Kernel, extents, inner_sums, is_round
+from surfacechem.surfaces.nodes import LAST, Extent, Kernel, is_round
 from surfacechem.surfaces.patches import Patches, integral, outer_patches
 from surfacechem.surfaces.projection import FIRST, Array, Surface
 from surfacechem.surfaces.shapes import Plane
@@ -106,7 +107,9 @@ def interaction(lower: Surface, upper: Surface, laws: Sequence[PairEnergy], rtol
     # What is left out is a hundredth of the accuracy, but for factors of order one.
     rounded += 0.0 if all(math.isfinite(law.cutoff) for law in laws) else 0.1 * rtol
     left = max(rtol, 2 * rounded) - rounded
-    found, error, pairs = integral(patches, integrand, lambda found: _sizes(found, gap), left)
+    # Next to the end of a law the energy is its force times the distance to that.
+    arms = np.array([min(gap, law.cutoff - gap) if law.cutoff > gap else gap for law in laws])[:, None]
+    found, error, pairs = integral(patches, integrand, lambda found: _sizes(found, gap, arms), left)
     energy, on_outer, on_inner, moment, opposite = np.split(found, [1, 4, 7, 10], axis=-1)
     forces, moments = (on_outer, on_inner), (moment, opposite)
     if swapped:
@@ -227,11 +230,13 @@ def _sums(
     return found, pairs
 
 
-def _sizes(found: Array, gap: float) -> Array:
-    """Sizes of energies, forces and moments that errors are relative to, as some components vanish."""
+def _sizes(found: Array, gap: float, reach: Array) -> Array:
+    """Sizes of energies, forces and moments that errors are relative to, as some components vanish: of energies the
+    force over a ``reach`` [m] at least.
+    """
     force = np.maximum(np.linalg.norm(found[:, 1:4], axis=-1, keepdims=True), TINY)
     # What is nowhere anything has the size of the smallest number.
-    arms = np.linalg.norm(found[:, 7:10], axis=-1, keepdims=True)
-    moment = np.maximum(arms, force * gap)
-    energy = np.maximum(np.abs(found[:, :1]), force * gap)
+    turning = np.linalg.norm(found[:, 7:10], axis=-1, keepdims=True)
+    moment = np.maximum(turning, force * gap)
+    energy = np.maximum(np.abs(found[:, :1]), force * reach)
     return np.concatenate([energy, np.repeat(force, 6, axis=-1), np.repeat(moment, 6, axis=-1)], axis=-1)

@@ -26,7 +26,7 @@ from surfacechem.surfaces.projection import FIRST, POLE, Array, Surface
 from surfacechem.surfaces.shapes import Disc, Plane
 
 STUCK, ENOUGH = 4.0, 2
-"""A rule of a level above enough gains as much at least, or the patch is divided."""
+"""A rule of a level above enough gains as much at least, or the patch is divided; enough are those below to tell."""
 
 MOST_POINTS = 100_000_000
 """Pairs of points after which an accuracy is out of reach."""
@@ -64,6 +64,11 @@ class Patches:
     def kinds(self) -> Levels:
         """Numbers (n,): patches of one kind have rules of as many points."""
         return np.zeros(len(self), dtype=int)
+
+    @property
+    def fewest(self) -> int:
+        """Level of the rule that patches begin with: of few patches two rules may agree where neither is right."""
+        return ENOUGH if any(self.alike) else 1
 
     def __getitem__(self, chosen: NDArray[Any] | slice) -> Self:
         """Some of them."""
@@ -232,7 +237,8 @@ class Rules:
 @dataclass(frozen=True)
 class Known:
     """What is known of some patches: levels of the rules over and inside each, values (n, ...), by how much these
-    change from the rule before over it and inside it, and whether a higher order gained little.
+    changed with the last rule over it and inside it, and with the one before (n, 2, ...), and whether a higher order
+    gained little.
     """
 
     patches: Patches
@@ -259,8 +265,8 @@ def integral(
 
     A ``nested`` integrand is a sum itself, with an error of its own. InputError where the accuracy is out of reach.
     """
-    rules, one = Rules(integrand, rtol), np.ones(len(patches), dtype=int)
-    known = _started(rules, patches, one, one, nested)
+    rules, begin = Rules(integrand, rtol), np.full(len(patches), patches.fewest)
+    known = _started(rules, patches, begin, begin, nested)
     while True:
         whole = known.value.sum(axis=0)
         size = sizes(whole)
@@ -284,16 +290,24 @@ def integral(
             halves = known.patches[halved].halved()
             # A rule on half of a patch is as good as one of higher order.
             times = len(halves) // int(halved.sum())
-            start, inside = np.maximum(known.level[halved] - 1, 1), known.inside[halved]
+            start, inside = np.maximum(known.level[halved] - 1, patches.fewest), known.inside[halved]
             known = known.but(halved, _started(rules, halves, np.tile(start, times), np.tile(inside, times), nested))
 
 
 def _started(rules: Rules, patches: Patches, level: Levels, inside: Levels, nested: bool) -> Known:
     """What rules of some levels, and those before, say of patches."""
     value = rules(patches, level, inside)
-    over = value - rules(patches, level - 1, inside)
-    within = value - rules(patches, level, inside - 1) if nested else np.zeros_like(value)
+    steps = range(1, patches.fewest + 1)
+    over = _changes(value, *(rules(patches, level - k, inside) for k in steps))
+    within = np.zeros_like(over)
+    if nested:
+        within = _changes(value, *(rules(patches, level, inside - k) for k in steps))
     return Known(patches, level.copy(), inside.copy(), value, over, within, np.zeros(len(level), dtype=bool))
+
+
+def _changes(value: Array, before: Array, first: Array | None = None) -> Array:
+    """The last change of values (n, ...) and the one before (n, 2, ...), none where that is not known."""
+    return np.stack([value - before, np.zeros_like(before) if first is None else before - first], axis=1)
 
 
 def _raise(rules: Rules, known: Known, mask: NDArray[np.bool_], steps: tuple[int, int]) -> None:
@@ -301,11 +315,15 @@ def _raise(rules: Rules, known: Known, mask: NDArray[np.bool_], steps: tuple[int
     known.level[mask] += steps[0]
     known.inside[mask] += steps[1]
     finer = rules(known.patches[mask], known.level[mask], known.inside[mask])
-    (known.over if steps[0] else known.within)[mask] = finer - known.value[mask]
+    changes = known.over if steps[0] else known.within
+    if known.patches.fewest == ENOUGH:
+        changes[mask, 1] = changes[mask, 0]
+    changes[mask, 0] = finer - known.value[mask]
     known.value[mask] = finer
 
 
-def _largest(change: Array, size: Array) -> Array:
-    """Errors (n,) of patches, the largest of all entries."""
-    entries = tuple(range(1, change.ndim))
-    return np.asarray(np.abs(change / size).max(axis=entries, initial=0.0))
+def _largest(changes: Array, size: Array) -> Array:
+    """Errors (n,) of patches, the largest of all entries; what the change before the last says may have been missed."""
+    entries = tuple(range(1, changes.ndim - 1))
+    last, before = (np.abs(changes[:, k] / size).max(axis=entries, initial=0.0) for k in range(2))
+    return np.asarray(np.maximum(last, before / STUCK))

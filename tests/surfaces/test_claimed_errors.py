@@ -15,7 +15,7 @@ from scipy.interpolate import PchipInterpolator
 from surfacechem.surfaces.pair_laws import InversePower, LennardJonesPair, PairTable, PenaltyPair
 from surfacechem.surfaces.pairwise import interaction
 from surfacechem.surfaces.projection import Surface
-from surfacechem.surfaces.shapes import Cavity, Plane, Sphere
+from surfacechem.surfaces.shapes import Cavity, Cylinder, Disc, Plane, Sphere
 
 DENSITIES = {"n_1": 1.0, "n_2": 1.0}
 R, PSI = [0.1, 0.4, 0.5, 0.9, 1.2], [8.0, 1.0, -1.0, -0.5, 0.0]
@@ -82,11 +82,66 @@ def sphere_in_cavity(d):
 def test_no_error_is_larger_than_claimed(lower, upper, exact, law):
     law, psi, ends = LAWS[law]
     for d in GAPS:
+        reach = min(d, law.cutoff - d) if law.cutoff > d else d
         factor, parts, centres = exact(d)
         energy, force = (factor * value for value in summed(parts, centres, psi, ends))
         for rtol in (1e-3, 1e-6, 1e-10):
             found = interaction(Surface(lower), Surface(upper, True, d), [law], rtol)
-            assert abs(found.energy[0] - energy) <= found.error * max(abs(energy), abs(force) * d)
+            assert abs(found.energy[0] - energy) <= found.error * max(abs(energy), abs(force) * reach)
             assert abs(found.force_1[0, 2] - force) <= found.error * abs(force)
             assert np.abs(found.force_1 + found.force_2).max() <= 1e-13 * abs(force)
             assert found.error <= max(rtol, 1e-10)
+
+
+def legendre(f, low, high, ends=()):
+    """Gauss's rule between places, which gather at both ends of each part."""
+    found = 0.0
+    t = (X + 1) / 2
+    for a, b in pairwise([low, *sorted(end for end in ends if low < end < high), high]):
+        places = a + (b - a) * t**2 * (3 - 2 * t)
+        found += (b - a) * np.sum(W * 3 * t * (1 - t) * [f(x) for x in places])
+    return found
+
+
+def coaxial_discs(psi, ends, d):
+    """Of radii 2 and 1: two points are s apart sideways on 2 pi s times what both discs share, moved by s."""
+
+    def shared(s):
+        if s <= 1:
+            return math.pi
+        a, b = math.acos((s**2 + 3) / (4 * s)), math.acos((s**2 - 3) / (2 * s))
+        return 4 * a + b - 2 * s * math.sin(a)
+
+    places = [1.0, *(math.sqrt(r**2 - d**2) for r in ends if r > d)]
+    return legendre(lambda s: psi(math.hypot(d, s)) * 2 * math.pi * s * shared(s), 0, min(3, places[-1]), places)
+
+
+def crossed_cylinders(psi, ends, d):
+    """Of radii 5 and 8: along both axes at once points have the energy of one over a plane at the height of both."""
+
+    def over_angle(f, R, h):
+        """Twice the integral over an angle, of a function of the height that ends where a law does."""
+        places = [math.acos(1 - (r - h) / R) for r in ends if r > h]
+        return 2 * R * legendre(lambda t: f(h + 2 * R * math.sin(t / 2) ** 2), 0, places[-1], places)
+
+    return over_angle(lambda h: over_angle(lambda g: -2 * math.pi * moments(psi, ends, g)[1], 8, h), 5, d)
+
+
+@pytest.mark.parametrize("law", ["penalty", "table"])
+@pytest.mark.parametrize(
+    ("lower", "upper", "exact", "accuracies"),
+    [
+        (Disc(radius=2.0), Disc(radius=1.0), coaxial_discs, (1e-2, 1e-3)),
+        (Cylinder(R=5.0), Cylinder(R=8.0, turn=math.pi / 2), crossed_cylinders, (1e-2,)),
+    ],
+)
+def test_no_error_is_larger_than_claimed_where_the_inner_surface_is_cut_too(lower, upper, exact, accuracies, law):
+    law, psi, ends = LAWS[law]
+    for d in (1.0633, 1.1999):
+        energy = exact(psi, ends, d)
+        for rtol in accuracies:
+            found = interaction(Surface(lower), Surface(upper, True, d), [law], rtol)
+            size = max(abs(energy), abs(found.force_1[0, 2]) * min(d, law.cutoff - d))
+            assert abs(found.energy[0] - energy) <= found.error * size
+            assert found.error <= rtol
+            assert np.abs(found.force_1 + found.force_2).max() <= 1e-13 * abs(found.force_1[0, 2])

@@ -148,8 +148,8 @@ def test_the_force_is_the_slope_of_the_energy_and_the_moment_of_its_tilt():
 def test_each_rule_of_higher_order_gains_the_digits_that_it_should(monkeypatch):
     exact, errors = float(closed(3.01, 1, 2, 6)), []
     for order in (4, 6, 9, 13):
-        monkeypatch.setattr(nodes, "ORDERS", (order, order))
-        monkeypatch.setattr(patches, "ORDERS", (order, order))
+        monkeypatch.setattr(nodes, "ORDERS", (order,) * 3)
+        monkeypatch.setattr(patches, "ORDERS", (order,) * 3)
         errors.append(abs(pair(Sphere(R=1.0), Sphere(R=2.0), 0.01, [power(6)], 1e-13).energy[0] / exact - 1))
     # Geometric convergence: the logarithm of the error falls in proportion to the order.
     assert errors[0] < 0.05
