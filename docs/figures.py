@@ -177,7 +177,7 @@ def force_spectrum() -> Figure:
 def precision() -> Figure:
     """Run time against error of three solvers."""
     tolerances = [1e-4, 1e-6, 1e-8, 1e-10, 1e-12]
-    return surfacechem.precision("exothermic", ["radau", "lsoda", "scipy-radau"], tolerances, repeat=1).figure()
+    return surfacechem.precision("exothermic", ["radau", "lsoda", "cvode"], tolerances, repeat=1).figure()
 
 
 GALLERY: dict[str, tuple[list[str], str | None]] = {
