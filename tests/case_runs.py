@@ -20,4 +20,4 @@ def solved(name: str) -> Solution:
 def at_even_times(name: str) -> Solution:
     """A case without outputs that follow its run: those stand on both sides of jumps, whose times have an error."""
     settings = load(name).case.run
-    return solved(name) if settings.picture is None else load(name).run(run=replace(settings, picture=None))
+    return solved(name) if settings.picture is None else load(name).run(run=replace(settings, picture=None, looks=0.0))

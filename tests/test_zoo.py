@@ -184,7 +184,7 @@ def test_explicit_steps_serve_a_case_as_well(name):
     assert solution.audit.violations == ()
 
 
-@pytest.mark.parametrize("name", ["stick-slip", "sudden-contact", "diamond-growth"])
+@pytest.mark.parametrize("name", ["stick-slip", "sudden-contact", "temperature-programmed-desorption"])
 def test_a_repeated_run_has_the_same_bytes(name):
     """With events, with cells, with rates from outside; each other case is computed twice as a sweep of one."""
     first = {column.name: column.values for column in solved(name).columns}
@@ -223,7 +223,7 @@ def test_a_difference_names_case_variable_time_and_both_values():
     assert f"kept is {value!r}" in told
 
 
-@every_case
+@pytest.mark.parametrize("name", every(3, names()))
 def test_a_file_is_the_dataset_in_memory_and_tells_units_and_meanings(name, tmp_path):
     solution = solved(name)
     with xarray.open_dataset(solution.write(tmp_path / "case.nc")) as opened:
@@ -232,7 +232,7 @@ def test_a_file_is_the_dataset_in_memory_and_tells_units_and_meanings(name, tmp_
         assert all(isinstance(value, str | float | int | np.number) for value in opened.attrs.values())
 
 
-@every_case
+@pytest.mark.parametrize("name", every(3, names()))
 def test_a_case_is_the_same_as_a_sweep_of_one(name):
     """Status, events, balances, error and every other variable that a sweep has."""
     simulation, solution = load(name), at_even_times(name)
