@@ -25,6 +25,8 @@ steps, whose roundings add up to a tenth of those of 1e7.
 
 REST = "rest"
 
+STEADY = "steady"
+
 KINK = "kink of "
 """How the names of events begin that change nothing but a formula."""
 
@@ -58,6 +60,9 @@ def events_of(trajectory: Trajectory) -> list[EventRow]:
     for j in trajectory.jumps:
         row = EventRow(j.t, j.since, j.edge.name, j.edge.reason, j.before.y, j.after.y, j)
         found.append(replace(row, released=j.released, entropy=j.entropy, verdict=j.verdict))
+    if trajectory.run.rest is not None:
+        y = trajectory.result.y
+        found.append(EventRow(trajectory.run.rest, 0.0, STEADY, "came to rest, a steady state", y, y))
     last, told = 0.0, []
     for event in sorted(found, key=lambda event: event.t):
         told.append(event if event.jump else replace(event, since=event.t - last))
@@ -117,7 +122,7 @@ def event_times(trajectory: Trajectory) -> dict[str, Any]:
 
     Impacts slower than a thousandth of the fastest so far are left out, with what happens at their time but rest: of
     endless rebounds, how many there are is a matter of the tolerance. So is what falls on the very end of the run:
-    rounding decides whether it still happens.
+    rounding decides whether it still happens. When a run has come to rest is a matter of the tolerance, too.
     """
     columns = trajectory.model.system.state_columns
     end, fastest, slow = trajectory.run.times[-1] * (1 - SIDE), 0.0, -np.inf
@@ -129,7 +134,7 @@ def event_times(trajectory: Trajectory) -> dict[str, Any]:
             slow = event.t if speed < NEGLIGIBLE * fastest else -np.inf
         elif event.t != slow or event.name == REST:  # coming to rest ends the rebounds, and counts
             slow = -np.inf
-        if slow == -np.inf and event.t < end:
+        if slow == -np.inf and event.t < end and event.name != STEADY:
             times.setdefault(event.name if event.jump else f"{KINK}{event.name}", []).append(event.t)
     found = {name: np.array(values) for name, values in times.items()}
     ended = {"end": np.array([trajectory.result.t])} if trajectory.status == "stopped" else {}

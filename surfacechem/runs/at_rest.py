@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -10,8 +10,9 @@ import numpy as np
 from surfacechem.errors import InputError
 from surfacechem.expressions import depends
 from surfacechem.model.system import System
+from surfacechem.results.audit import audit
 from surfacechem.solve.run import Model, Run, Trajectory
-from surfacechem.tolerances import PICTURE
+from surfacechem.tolerances import NEGLIGIBLE, PICTURE
 
 LONGEST = 1e8
 """Time [s] for which rest is looked for, three years: beyond, step sizes times the rates of a fast surface are more
@@ -20,6 +21,11 @@ than a double resolves beside one.
 
 AFTER = 10.0
 """So many times as long as it takes to come to rest, a state is at rest."""
+
+SHORTER = (1e6, 1e4, 1e2, 1.0)
+"""Times [s] for which rest is looked for where roundings of a fast surface, summed over years, hide it: its sites do
+not stay what they are.
+"""
 
 PATH = "run.until"
 
@@ -31,19 +37,45 @@ def refuse_histories(system: System) -> None:
         raise InputError(f"{moving[0]} changes in time, so there is no steady state: give it one value.", path=PATH)
 
 
-def to_rest(model: Model, run: Run, changes: Mapping[str, float]) -> Run:
+def to_rest(model: Model, run: Run, values: Mapping[str, float]) -> Run:
     """The run that ends where the states have come within their tolerances of values that they keep ten times as long,
-    and for three years; the whole of a run that stops before. InputError where there is none.
+    and keep but for a thousandth for three years; twice as long as one that stops before. InputError where there is
+    none.
     """
     refuse_histories(model.system)
     # A shorter look would take slow changes, and those that follow when nothing happened for long, for none.
-    reached = model.solve(replace(run, times=(0.0, LONGEST), picture=PICTURE, accuracy=None), changes)
-    last = LONGEST
-    if reached.status == "finished":
-        last, name = _rest_of(reached)
-        if last * AFTER > LONGEST:
-            raise InputError(f"the case has come to no rest in {LONGEST:.3g} s: {name} still changes.", path=PATH)
-    return replace(run, times=tuple(last * t / run.times[-1] for t in run.times))
+    far = _looked(model, run, values, LONGEST)
+    if far.status == "stopped":
+        return replace(run, times=_until(run, min(2 * far.result.t, LONGEST) or LONGEST))
+    name = _rest_of(far)[1]
+    for end in (LONGEST, *(SHORTER if audit(far).site_error > run.rtol else ())):
+        near = far if end == LONGEST else _looked(model, run, values, end)
+        last = _rest_of(near)[0]
+        if near.status == "finished" and last * AFTER <= end and _alike(near, far):
+            return replace(run, times=_until(run, last), rest=last)
+    raise InputError(f"the case has come to no rest in {LONGEST:.3g} s: {name} still changes.", path=PATH)
+
+
+def _looked(model: Model, run: Run, values: Mapping[str, float], end: float) -> Trajectory:
+    return model.solve_values(replace(run, times=(0.0, end), picture=PICTURE, accuracy=None), values)
+
+
+def _alike(near: Trajectory, far: Trajectory) -> bool:
+    """Whether two runs end in states that differ slightly, or by a trace of something."""
+    scales = np.array([state.scale for state in near.model.system.states])
+    change = np.abs(near.result.y - far.result.y)
+    return bool(np.all(change <= NEGLIGIBLE * np.maximum(np.abs(near.result.y), scales)))
+
+
+def all_to_rest(model: Model, run: Run, points: Iterable[Mapping[str, float]]) -> list[Run]:
+    """The runs with these values, all of which end where the last of them has come to rest."""
+    found = [to_rest(model, run, values) for values in points]
+    last = max(each.times[-1] for each in found)
+    return [replace(each, times=_until(each, last)) for each in found]
+
+
+def _until(run: Run, end: float) -> tuple[float, ...]:
+    return tuple(end * t / run.times[-1] for t in run.times)
 
 
 def _rest_of(reached: Trajectory) -> tuple[float, str]:

@@ -349,9 +349,6 @@ class Simulation:
                 return [self._solved_alone(settings, values)]
             from surfacechem.runs import sweeps
 
-            if settings.steady:
-                raise InputError("the runs of a sweep end at a time that is given, not `steady`.", path="run.until")
-
             # Statistics of rupture are part of what is compiled.
             key = plan.until[0] if plan.until else ""
             if key not in self._sweep_models:
@@ -364,7 +361,7 @@ class Simulation:
         if settings.steady:
             from surfacechem.runs.at_rest import to_rest
 
-            settings = to_rest(self.model, settings, values)
+            settings = to_rest(self.model, settings, self.model.values(values))
         return self.model.solve(settings, values)
 
     def _layers(self, *runs: Trajectory) -> dict[str, float]:
@@ -526,6 +523,9 @@ class Simulation:
             raise InputError(message, path="bodies")
         if plan.until and not plan.load:
             raise InputError("a store keeps no lifetimes. Write the sweep to a file, -o NAME.nc.", path="sweep.until")
+        if self.case.run.steady:
+            message = "a store keeps runs of a given length, not `steady`. Write the sweep to a file, -o NAME.nc."
+            raise InputError(message, path="run.until")
         values = {path: value for path, value in values.items() if path not in self.system.constants}
         try:
             return streaming.stream(self, plan, path, changes=values, resume=resume, part=part)

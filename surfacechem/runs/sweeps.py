@@ -74,7 +74,12 @@ def solve(
 ) -> list[Trajectory]:
     """The runs of a :func:`prepared` system over the plan; how a run ends is its status, never an exception."""
     values = [model.values({**changes, **point}) for point in plan.points]
-    pairs = list(zip(settings(model.system, plan, model.chosen(run, values[0]), values), values, strict=True))
+    runs = settings(model.system, plan, model.chosen(run, values[0]), values)
+    if run.steady:
+        from surfacechem.runs.at_rest import all_to_rest
+
+        runs = all_to_rest(model, runs[0], values)
+    pairs = list(zip(runs, values, strict=True))
     done: list[Trajectory] = []
     for start in range(0, len(pairs), PORTION):
         log.info("runs", extra={"done": start, "total": len(pairs)})

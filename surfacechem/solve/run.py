@@ -75,6 +75,8 @@ class Run:
     outputs are; 0 where the ends of steps and the outputs are all that is known."""
     steady: bool = False
     """Whether it ends where nothing changes any more; the times are then those of a run of any length."""
+    rest: float | None = None
+    """When it comes to rest [s], where that was found before."""
     samples: float = SAMPLES
     """Parts of the run in each of which its steps are held against the equations at least once."""
 
@@ -450,7 +452,9 @@ class Model:
         if result.status is Status.FINISHED:
             return (
                 "finished",
-                f"came to rest at {where}, a steady state" if run.steady else f"reached the end at {where}",
+                f"came to rest at t = {run.rest:.9g} s, a steady state"
+                if run.rest is not None
+                else f"reached the end at {where}",
             )
         if result.status is Status.EVENT:
             margin = self.margins[int(result.events.index[-1])]

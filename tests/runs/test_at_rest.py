@@ -45,6 +45,15 @@ def test_what_comes_to_no_rest_is_refused(case, message):
         surfacechem.load(case, STEADY).run()
 
 
-def test_runs_of_a_sweep_end_at_a_time():
-    with pytest.raises(InputError, match="a sweep end at a time"):
-        surfacechem.load("exothermic", STEADY).sweep({"T_0": [300.0, 310.0]})
+def test_runs_of_a_sweep_end_where_the_last_is_at_rest(tmp_path):
+    """When each was, and its state, as alone."""
+    simulation = surfacechem.load("dna-adhesive", [*STEADY, "run.outputs=3"])
+    data = simulation.sweep({"initial.T_2": [300.0, 340.0]}).dataset
+    for i, start in enumerate(data["initial_T_2"].values.tolist()):
+        alone = surfacechem.load("dna-adhesive", [*STEADY, f"initial.T_2={start}"]).run(error="balances").dataset
+        assert data["event_name"].values[i].tolist() == alone["event_name"].values.tolist() == ["steady"]
+        assert data["event_time"].values[i, 0] == alone["event_time"].values[0] == alone["time"].values[-1]
+        assert float(data["phi"][i, -1]) == pytest.approx(float(alone["phi"][-1]), rel=1e-8)
+    assert float(data["time"][-1]) == data["event_time"].values.max()
+    with pytest.raises(InputError, match="a store keeps runs of a given length"):
+        simulation.stream(simulation.plan({"initial.T_2": [300.0]}), tmp_path / "x.zarr")
