@@ -433,3 +433,40 @@ def test_the_charge_of_a_sweep_of_the_potential_is_the_integral_of_its_current()
     production = CubicSpline(data["time"], data["production_Li_elyt"])
     charge = [production.integrate(0, t) for t in data["time"].values[1:]]
     np.testing.assert_allclose(data["made_Li_elyt"][1:], charge, rtol=3e-6)
+    # The polarisation curve, point by point.
+    anode = ct.Interface("lithium_ion_battery.yaml", "edge_anode_electrolyte")
+    electrons, others = anode.adjacent["electron"], YAML(typ="safe").load(ELECTROLYTE)["electrolyte"]["composition"]
+    anode.adjacent["anode"].X, anode.adjacent["electrolyte"].X = [0.5, 0.5], others
+    for phase in (anode, *anode.adjacent.values()):
+        phase.TP = 300.0, ct.one_atm
+    currents = []
+    for volts in data["V_electron"].values:
+        electrons.electric_potential = volts
+        currents.append(-anode.get_net_production_rates(electrons)[0] * ct.faraday)
+    assert min(currents) < 0 < max(currents)
+    np.testing.assert_allclose(data["i_electron"], currents, rtol=1e-8, atol=1e-9 * np.abs(currents).max())
+
+
+def test_diamond_grows_point_by_point_as_in_cantera():
+    """Its growth as atomic hydrogen becomes more, against SciPy's integrator on Cantera's rates."""
+    data = surfacechem.load("diamond-growth", ["run.outputs=9"]).run(error="balances").dataset
+    surface = ct.Interface("diamond.yaml", "diamond_100")
+    gas, bulk = surface.adjacent["gas"], surface.adjacent["diamond"]
+
+    def growth(t, y):
+        part = 1e-5 + 2e-4 * t
+        rest = 1 - part - 2e-4 - 0.01
+        gas.TPX = 1200.0, 20 * ct.one_atm / 760, {"H": part, "CH3": 2e-4, "CH4": 0.01, "H2": rest}
+        surface.TP = 1200.0, None
+        surface.set_unnormalized_coverages(y)
+        return surface.get_net_production_rates(bulk)[0] * 1e3 * AVOGADRO
+
+    def rates(t, y):
+        growth(t, y)
+        return surface.get_net_production_rates(surface) / surface.site_density
+
+    times, start = data["time"].values, np.array([1.0, *[0.0] * 7])
+    exact = solve_ivp(rates, (0, times[-1]), start, method="LSODA", rtol=1e-9, atol=1e-16, t_eval=times).y.T
+    np.testing.assert_allclose(coverages(data, surface), exact, atol=1e-6, rtol=0)
+    grown = [growth(t, y) for t, y in zip(times, exact, strict=True)]
+    np.testing.assert_allclose(data["production_C_d"], grown, rtol=1e-5, atol=1e-7 * max(grown))
