@@ -160,6 +160,10 @@ class Surface:
         size = np.linalg.norm(away, axis=-1)
         side = np.einsum("...i,...i", away, normal)
         tied = self._degenerate(D, normal * side[..., None])
+        if self.shape.about_axis:
+            # For a point on the axis all around is alike.
+            around = np.linalg.norm(D[2], axis=-1)
+            tied |= (np.hypot(own[..., 0], own[..., 1]) < SAME * around) & (around > SAME * size)
         # Searches from other starts may have ended elsewhere, as near.
         for places in () if other is None else other:
             rival = self.derivatives(places, FIRST)[0]
@@ -237,10 +241,7 @@ class Surface:
             raise InputError("two points of the surface are equally near, so that their distance has no rate.")
         D = self.derivatives(found.at, SECOND)
         relative = moves - np.asarray(shift, dtype=float) - np.cross(spin, x)
-        _, (a, b, c) = _forms(D, found.normal * found.gap[..., None])
-        along, across = _dot(relative, D[1]), _dot(relative, D[2])
-        det = a * c - b**2
-        at = np.stack([(c * along - b * across) / det, (a * across - b * along) / det], axis=-1)
+        at = self._moved(found.at, D, x - D[0], relative)
         glide = at[..., :1] * D[1] + at[..., 1:] * D[2]
         vector = relative - glide + np.cross(spin, x - D[0])
         # Weingarten: the normal turns with the second form.
@@ -251,7 +252,23 @@ class Surface:
         area = (E * G - F**2)[..., None]
         turned = (G * first - F * second)[..., None] * D[1] + (E * second - F * first)[..., None] * D[2]
         normal = -turned / area + np.cross(spin, found.normal)
-        return Rates(at, _dot(relative, found.normal), vector, normal, self.curvature(found.at, at))
+        return Rates(at, _dot(relative, found.direction), vector, normal, self.curvature(found.at, at))
+
+    def _moved(self, at: Array, D: Array, away: Array, relative: Array) -> Array:
+        """Rates of the parameters of nearest points that others, ``away`` from them, move relative to the surface."""
+        low, high = np.transpose(self.shape.span)
+        low = low + (POLE if self.shape.about_axis else 0.0)
+        slopes = np.stack([_dot(away, D[k]) for k in (1, 2)], axis=-1)
+        sizes = np.linalg.norm(away, axis=-1)[..., None] * np.moveaxis(np.linalg.norm(D[1:3], axis=-1), 0, -1)
+        # Beyond an edge, and at a tip, a point stays there.
+        held = ((at <= low) & (slopes < -SAME * sizes)) | ((at >= high) & (slopes > SAME * sizes))
+        held &= ~np.array(self.shape.closed)
+        _, (a, b, c) = _forms(D, away)
+        a, c = np.where(held[..., 0], 1.0, a), np.where(held[..., 1], 1.0, c)
+        b = np.where(held.any(axis=-1), 0.0, b)
+        along, across = (np.where(held[..., k], 0.0, _dot(relative, D[k + 1])) for k in range(2))
+        det = a * c - b**2
+        return np.stack([(c * along - b * across) / det, (a * across - b * along) / det], axis=-1)
 
 
 def _dot(a: Array, b: Array) -> Array:

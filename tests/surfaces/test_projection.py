@@ -37,9 +37,16 @@ SHAPES = [
     Wavy(amplitude=0.1, wavelength=3.0, turn=0.4),
     ROUGH,
 ]
+SURFACES = [Surface(shape, upper, 0.2 * upper) for shape in SHAPES for upper in (False, True)]
+BEYOND = [
+    (Plane(length=1.0, width=1.0), [1.0, 0.2, 0.3]),
+    (Plane(length=1.0, width=1.0), [1.0, 0.9, 0.3]),
+    (Cap(R=1.0, angle=0.5), [1.0, 0.3, 0.4]),
+    (Paraboloid(R=1.0, radius=0.5), [0.9, 0.4, 0.3]),
+]
 every_surface = pytest.mark.parametrize(
     "surface",
-    [Surface(shape, upper, 0.2 * upper) for shape in SHAPES for upper in (False, True)],
+    SURFACES,
     ids=lambda item: f"{item.shape.name()} {'above' if item.upper else 'below'}",
 )
 
@@ -66,9 +73,14 @@ def test_no_other_point_is_nearer_and_the_distance_is_along_the_normal(surface):
     assert not found.tied.any()
 
 
-@every_surface
-def test_rates_are_slopes_of_what_they_are_rates_of(surface):
-    x, h = points(surface), 1e-5
+@pytest.mark.parametrize(
+    ("surface", "x"),
+    [*((surface, None) for surface in SURFACES), *((Surface(shape), place) for shape, place in BEYOND)],
+    ids=lambda item: f"{item.shape.name()} {item.upper}" if isinstance(item, Surface) else "",
+)
+def test_rates_are_slopes_of_what_they_are_rates_of(surface, x):
+    """Beyond an edge, too, where the nearest point stays there."""
+    x, h = points(surface) if x is None else np.array([x]), 1e-5
     draw = np.random.default_rng(2)
     moves, shift, spin = (draw.normal(size=3) for _ in range(3))
     rates = surface.rates(x, moves, shift, spin)
@@ -97,6 +109,7 @@ def test_rates_are_slopes_of_what_they_are_rates_of(surface):
     [
         (Sphere(R=1.0), (0, 0, -1.0)),
         (Cavity(R=1.0), (0, 0, 1.0)),
+        (Cap(R=1.0, angle=0.5), (0, 0, -3.0)),
         (Cylinder(R=1.0), (0.2, 0, -1.0)),
         (Torus(hole=1.5, r=0.5), (0, 0, 1.0)),
         (Paraboloid(R=1.0), (0, 0, -3.0)),
