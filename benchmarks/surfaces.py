@@ -3,7 +3,8 @@
     python benchmarks/surfaces.py
 
 prints three tables and keeps them in benchmarks/results/surfaces.csv: a sphere over a plane at gaps of a thousandth of
-its radius and more, against the closed form; pairs of other shapes; and the error of each rule of the quadrature.
+its radius and more, against the closed form; pairs of other shapes; and the error of each rule of the quadrature. A
+fourth, in surface_curves.csv, is what the force over a range of approaches costs, which a case integrates once.
 """
 
 import csv
@@ -14,11 +15,13 @@ from pathlib import Path
 
 from surfacechem.contracts.terms import Shape
 from surfacechem.errors import InputError
+from surfacechem.laws.bonding import EquilibriumBonds
 from surfacechem.surfaces import nodes, patches
-from surfacechem.surfaces.pair_laws import InversePower
+from surfacechem.surfaces.pair_laws import InversePower, LennardJonesPair
 from surfacechem.surfaces.pairwise import PairForces, interaction
+from surfacechem.surfaces.potential import CurvedSurfaces
 from surfacechem.surfaces.projection import Surface
-from surfacechem.surfaces.shapes import Cavity, Cylinder, Paraboloid, Plane, Sphere, Torus
+from surfacechem.surfaces.shapes import Cavity, Cylinder, Paraboloid, Plane, Sphere, Torus, Wavy
 
 TARGET = Path(__file__).parent / "results" / "surfaces.csv"
 LAW = InversePower(n_1=1.0, n_2=1.0, psi_0=1.0, r_0=1.0, m=6)
@@ -77,6 +80,35 @@ def rules() -> Iterator[tuple[str, float, str, float, int, float]]:
     nodes.ORDERS = patches.ORDERS = usual
 
 
+CURVES: dict[str, tuple[tuple[Shape, Shape], str, tuple[float, ...]]] = {
+    "sphere, plane": ((Sphere(R=50e-9), Plane()), "pair", (1e-3, 1e-6, 1e-9)),
+    "sphere in a cavity": ((Cavity(R=75e-9), Sphere(R=50e-9)), "pair", (1e-3, 1e-6, 1e-9)),
+    "sphere, tilted plate": ((Sphere(R=50e-9), Plane(length=2e-7, width=2e-7, tilt=0.09)), "pair", (1e-2, 1e-3, 1e-4)),
+    "crossed cylinders": (
+        (Cylinder(R=50e-9, length=3e-7), Cylinder(R=50e-9, length=3e-7, turn=math.pi / 2)),
+        "pair",
+        (1e-2, 1e-3),
+    ),
+    "waves, plane": ((Wavy(amplitude=2e-9, wavelength=5e-8, length=2e-7, width=2e-7), Plane()), "pair", (1e-2, 1e-3)),
+    "sphere, plane: bonds": ((Sphere(R=50e-9), Plane()), "gap", (1e-3, 1e-6, 1e-9)),
+}
+"""Shapes, what acts between them, and accuracies of the force over approaches from 1 to 20 nm."""
+
+
+def curves() -> Iterator[tuple[str, str, str, float]]:
+    """Shapes, accuracy asked for, the error that is claimed, and processor time [s]."""
+    pair = [LennardJonesPair(n_1=5e18, n_2=5e18, psi_0=4e-21, g_0=3e-10)]
+    bonds = [EquilibriumBonds(N=1e16, K=50.0, k_b=1e-3, T=300.0)]
+    for name, (shapes, acting, accuracies) in CURVES.items():
+        laws = {"pairs": pair} if acting == "pair" else {"gap_laws": bonds}
+        for accuracy in accuracies:
+            both = CurvedSurfaces(shapes=shapes, approach=(1e-9, 2e-8), accuracy=accuracy, **laws)
+            parts = [part for law in both.pairs for _, part in both.parts(law)]
+            begin = time.process_time()
+            found = both.integrated(parts)  # not what the cache keeps
+            yield name, f"{accuracy:.0e}", f"{max(curve.error for curve in found):.1e}", time.process_time() - begin
+
+
 def main() -> None:
     """Print the tables and keep them."""
     found = []
@@ -87,8 +119,18 @@ def main() -> None:
             found.append((name, d, asked, f"{error:.1e}", pairs, f"{cost:.1f}"))
     except InputError as error:
         print(error)
-    with TARGET.open("w", newline="", encoding="utf-8") as file:
-        csv.writer(file, lineterminator="\n").writerows([("shapes", "gap", "asked", "error", "pairs", "ms"), *found])
+    keep(TARGET, [("shapes", "gap", "asked", "error", "pairs", "ms"), *found])
+    whole = [("shapes", "asked", "claimed", "seconds")]
+    for name, asked, claimed, cost in curves():
+        print(f"{name:22s} {asked:>9s} {claimed:>8s} {cost:8.1f} s", flush=True)
+        whole.append((name, asked, claimed, f"{cost:.1f}"))
+    keep(TARGET.with_name("surface_curves.csv"), whole)
+
+
+def keep(path: Path, rows: Sequence[tuple[object, ...]]) -> None:
+    """Write a table."""
+    with path.open("w", newline="", encoding="utf-8") as file:
+        csv.writer(file, lineterminator="\n").writerows(rows)
 
 
 if __name__ == "__main__":

@@ -61,7 +61,7 @@ class Case:
     def refuse_nothing(self) -> None:
         """InputError where the scene has no state; no integral is made for it."""
         try:
-            refuse_nothing(assemble(outline(self.scene)))
+            refuse_nothing(assemble(outline(self.scene)), self.file or "CASE")
         except InputError as error:
             raise self.located(error) from None
 

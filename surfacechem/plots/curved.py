@@ -10,6 +10,7 @@ import numpy as np
 import xarray
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from surfacechem.plots import style
 from surfacechem.plots.style import Array
@@ -63,19 +64,40 @@ def _around(dataset: xarray.Dataset) -> bool:
     return bool(np.ptp(gap, axis=2).max() <= SQRT_EPS * np.abs(gap).max())
 
 
-def _section(dataset: xarray.Dataset) -> tuple[Array, int]:
-    """Distances along a section through the nearest point [m], and which column of the points it is."""
+def _facing(dataset: xarray.Dataset) -> NDArray[np.bool_]:
+    """Which points are on the side that is nearest: seen from above a closed body covers itself."""
+    from scipy.ndimage import label
+
+    x, y = (dataset[f"surface_{axis}"].values for axis in "xy")
+    (x_u, x_v), (y_u, y_v) = np.gradient(x), np.gradient(y)
+    area = x_u * y_v - x_v * y_u
+    area *= np.sum(area * np.abs(dataset["traction"].values).max(axis=0))
+    parts, _ = label(area >= -SQRT_EPS * np.abs(area).max())
+    return np.asarray(parts == parts[np.unravel_index(np.argmin(dataset["gap"].values[0]), parts.shape)])
+
+
+def _section(dataset: xarray.Dataset) -> tuple[Array, Any]:
+    """Distances along a section through the nearest point [m], and which of the points it is."""
     column = int(np.unravel_index(np.argmin(dataset["gap"].values[0]), dataset["gap"].shape[1:])[1])
-    x, y = (dataset[f"surface_{axis}"].values[:, column] for axis in "xy")
-    return (np.hypot(x, y) if _around(dataset) else x if np.ptp(x) > np.ptp(y) else y), column
+    x, y = (dataset[f"surface_{axis}"].values for axis in "xy")
+    rows = np.flatnonzero(_facing(dataset)[:, column])
+    if _around(dataset):
+        return np.hypot(x, y)[rows, column], (rows, column)
+    columns, last = np.full(len(rows), column), x.shape[1] - 1
+    if np.ptp(x[:, [0, -1]], axis=1).max() <= SQRT_EPS * np.ptp(x):
+        # About an axis a section goes on where the opposite column begins.
+        rows, columns = np.append(rows[::-1], rows), np.append(np.full(len(rows), (column + last // 2) % last), columns)
+    at = rows, columns
+    return x[at] if np.ptp(x[at]) > np.ptp(y[at]) else y[at], at
 
 
-def _reach(dataset: xarray.Dataset, along: Array, column: int) -> float:
+def _reach(dataset: xarray.Dataset, along: Array, at: Any) -> float:
     """Distance to which the traction is felt [m]."""
-    size = np.abs(dataset["traction"].values[:, :, column]).max(axis=0)
+    size = np.abs(dataset["traction"].values[:, *at]).max(axis=0)
     # Bodies are much larger than what acts between them, of which nothing would be seen at their size.
     felt = np.abs(along[size > NEGLIGIBLE * size.max()])
-    return BEYOND * float(felt.max(initial=0.0)) or float(np.abs(along).max())
+    whole = float(np.abs(along).max())
+    return min(BEYOND * float(felt.max(initial=0.0)), whole) or whole
 
 
 def _chosen(dataset: xarray.Dataset) -> Iterator[tuple[int, Any, str]]:
@@ -91,17 +113,15 @@ def _chosen(dataset: xarray.Dataset) -> Iterator[tuple[int, Any, str]]:
 
 def _draw_profiles(ax: Axes, dataset: xarray.Dataset, even: bool) -> None:
     """Section through both bodies; the upper one at several approaches."""
-    along, column = _section(dataset)
-    reach = _reach(dataset, along, column)
+    along, at = _section(dataset)
+    reach = _reach(dataset, along, at)
     text, size = style.prefixed("m", np.array([reach]))
     signs = (1, -1) if even else (1,)
     for sign in signs:
-        ax.plot(
-            sign * along, dataset["surface_z"].values[:, column], color="black", label="body 1" if sign > 0 else "_"
-        )
-    heights = [dataset["surface_z"].values[np.abs(along) <= reach, column]]
+        ax.plot(sign * along, dataset["surface_z"].values[at], color="black", label="body 1" if sign > 0 else "_")
+    heights = [dataset["surface_z"].values[at][np.abs(along) <= reach]]
     for k, colour, label in _chosen(dataset):
-        x, y, z = (dataset[f"opposite_{axis}"].values[k, :, column] for axis in "xyz")
+        x, y, z = (dataset[f"opposite_{axis}"].values[k][at] for axis in "xyz")
         across = np.hypot(x, y) if even else x if np.ptp(x) > np.ptp(y) else y
         for sign in signs:
             ax.plot(sign * across, z, color=colour, label=label if sign > 0 else "_")
@@ -119,10 +139,10 @@ def _draw_profiles(ax: Axes, dataset: xarray.Dataset, even: bool) -> None:
 
 def _draw_tractions(ax: Axes, dataset: xarray.Dataset) -> None:
     """Traction over the distance from the axis at several approaches."""
-    along, column = _section(dataset)
-    reach = _reach(dataset, along, column)
+    along, at = _section(dataset)
+    reach = _reach(dataset, along, at)
     shown = np.abs(along) <= reach
-    values = dataset["traction"].values[:, :, column]
+    values = dataset["traction"].values[:, *at]
     for k, colour, _ in _chosen(dataset):
         ax.plot(along[shown], values[k][shown], color=colour)
         ax.plot(-along[shown], values[k][shown], color=colour)
@@ -136,10 +156,12 @@ def _draw_tractions(ax: Axes, dataset: xarray.Dataset) -> None:
 
 def _draw_field(ax: Axes, dataset: xarray.Dataset) -> None:
     """Traction over the surface where it is the largest."""
-    values = dataset["traction"].values
+    facing = _facing(dataset)
+    seen: Any = np.ix_(facing.any(axis=1), facing.any(axis=0))
+    values = dataset["traction"].values[:, *seen]
     k = int(np.argmax(np.abs(values).max(axis=(1, 2))))
     text, size = style.prefixed("Pa", values[k])
-    x, y = (dataset[f"surface_{axis}"].values for axis in "xy")
+    x, y = (dataset[f"surface_{axis}"].values[seen] for axis in "xy")
     # White is no traction, whatever the least and the largest are.
     most = float(np.abs(values[k]).max()) / size
     mesh = ax.pcolormesh(x, y, values[k] / size, cmap="RdBu_r", vmin=-most, vmax=most, shading="gouraud")
@@ -153,7 +175,13 @@ def _draw_field(ax: Axes, dataset: xarray.Dataset) -> None:
 def _draw_force(ax: Axes, dataset: xarray.Dataset) -> None:
     """Force over the approach, and what the local law gives."""
     approach, force = dataset["g_n"].values, dataset["t_n"].values
-    ax.plot(approach, force, label="force")
+    # What jumps on the way passes no force in between.
+    events = dataset["event_time"].values if "event_time" in dataset else np.empty(0)
+    jumps = np.searchsorted(dataset["time"].values, events)
+    for number, part in enumerate(np.split(np.arange(len(force)), jumps)):
+        ax.plot(approach[part], force[part], color="C0", label="_" if number else "force")
+    for number, k in enumerate(jumps):
+        ax.plot(approach[k - 1 : k + 1], force[k - 1 : k + 1], ":", color="0.4", label="_" if number else "jump")
     if "local_difference" in dataset:
         local = dataset["force"].values + dataset["local_difference"].values
         ax.plot(dataset["approach"].values, local, "o", color="black", markersize=4, label="local law")

@@ -20,8 +20,8 @@ Array = NDArray[np.float64]
 TIMES = 9
 """Output times, evenly spread, at which the surfaces are looked at."""
 
-ALONG, AROUND = 33, 16
-"""Points of the fields from the nearest point on, and across that."""
+ALONG, AROUND, ACROSS = 81, 16, 33
+"""Points of the fields from an axis on and around it; both ways where there is none."""
 
 AT = "surface_time"
 
@@ -86,7 +86,7 @@ def _fields(surface: CurvedSurfaces, approaches: Array) -> Sequence[Column]:
     size = length(lower, upper)
     patches, _ = outer_patches(lower, upper, size, size)
     lower = patches.surface
-    counts = [AROUND if lower.shape.about_axis and k == 1 else ALONG for k in range(2)]
+    counts = [ALONG, AROUND] if patches.alike[1] else [ACROSS, ACROSS]
     at = np.stack(np.meshgrid(*map(patches.line, (0, 1), counts), indexing="ij"), axis=-1)
     if lower.shape.about_axis and lower.shape.span[0][0] == 0:
         at = np.maximum(at, [POLE, -np.inf])

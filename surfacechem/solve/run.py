@@ -228,10 +228,11 @@ def values_of(system: System, changes: Mapping[str, float] | None = None) -> dic
     return values
 
 
-def refuse_nothing(system: System) -> None:
+def refuse_nothing(system: System, case: str = "CASE") -> None:
     """InputError where nothing of a scene changes."""
     if system.rests:
-        remedy = "Let a temperature or bonds evolve, or a history change, or give the case to `surfacechem evaluate`."
+        command = f"`surfacechem evaluate {case}` gives its quantities"
+        remedy = f"Let a temperature or bonds evolve, or a history change; {command}."
         raise InputError(f"there is nothing to solve: everything is prescribed. {remedy}", path="bodies")
 
 

@@ -171,12 +171,12 @@ class CurvedSurfaces(Potential):
         mark = fingerprint(self.shapes, parts, self.gap_laws, self.approach, self.accuracy)
         if mark not in KNOWN:
             with integrating():
-                found = kept(mark, CODE, lambda: [curve.numbers for curve in self._integrated(parts)])
+                found = kept(mark, CODE, lambda: [curve.numbers for curve in self.integrated(parts)])
             curves = tuple(map(ApproachEnergy.of, found))
             KNOWN[mark] = curves[: len(parts)], next(iter(curves[len(parts) :]), None)
         return KNOWN[mark]
 
-    def _integrated(self, parts: Sequence[PairEnergy]) -> list[ApproachEnergy]:
+    def integrated(self, parts: Sequence[PairEnergy]) -> list[ApproachEnergy]:
         """Those energies from their integrals."""
         self._refuse_jumps()
         # Errors of the samples must not look like what a polynomial misses.

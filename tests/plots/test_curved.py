@@ -31,3 +31,16 @@ def test_without_an_axis_of_symmetry_the_traction_is_a_field(dataset):
     tilted["gap"] = dataset.gap * (1 + 1e-3 * dataset.surface_x / 1e-8)
     drawn = figure(tilted, ["traction"]).axes[1].collections[0].get_array()
     assert np.abs(drawn).max() == pytest.approx(np.abs(dataset.traction.values).max() / 1e6, rel=1e-12)
+
+
+def test_the_far_side_of_a_closed_body_does_not_cover_the_near_one(dataset):
+    whole = dataset.copy(deep=True)
+    u, v = np.meshgrid(np.linspace(0, np.pi, dataset.sizes["u"]), np.linspace(0, 2 * np.pi, dataset.sizes["v"]))
+    for axis, value in zip("xyz", (np.sin(u) * np.cos(v), np.sin(u) * np.sin(v), np.cos(u) - 1), strict=True):
+        whole[f"surface_{axis}"].values[:] = 1e-8 * value.T
+    whole["gap"] = dataset.gap * (1 + 1e-3 * whole.surface_x / 1e-8)
+    profile, field, _ = figure(whole, ["traction"]).axes[:3]
+    x, z = profile.lines[0].get_data()
+    assert z.min() == pytest.approx(-1e-8, rel=0.05)
+    assert x.min() < -9e-9 and x.max() > 9e-9
+    assert field.collections[0].get_array().shape[0] == pytest.approx(dataset.sizes["u"] / 2, abs=1)
