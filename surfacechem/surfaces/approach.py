@@ -18,8 +18,11 @@ from surfacechem.expressions import Expression, decay, log, where
 from surfacechem.surfaces.projection import Array
 from surfacechem.tolerances import TINY
 
-DEGREE = 14
-"""Degree of the polynomials in the approach."""
+DEGREE, LEAST_DEGREE = 14, 5
+"""Largest degree of the polynomials in the approach, and that to which each digit asked for adds one."""
+
+CLOSER = 8
+"""How much closer a second fit is held, which the errors of the integrals leave room for."""
 
 SHORTEST = 2.0**-26
 """Part of the range of approaches below which no piece is divided; at a kink of the force its error does not count."""
@@ -128,9 +131,13 @@ def fitted(
     inside = [cut for cut in cuts if low < cut < high]
     powers = low > 0 and not inside and one_sign([sample(d)[0] for d in (low, math.sqrt(low * high), high)], floor[0])
     least = 0.0 if powers else floor[1]
-    curve = joined(divided(sample, [low, *inside, high], powers, rtol, least), *first[:2], powers)
-    # Between the places that are looked at it may miss more, hardly twice as much.
-    error = float(2 * missed(curve, at, least) + max(error for _, _, error in at.values()))
+    # What pieces miss of a slope of ln E adds up along them: then they are made once more, closer.
+    for aim in (rtol, rtol / CLOSER):
+        curve = joined(divided(sample, [low, *inside, high], powers, aim, least), *first[:2], powers)
+        # Between the places that are looked at it may miss more, hardly twice as much.
+        error = float(2 * missed(curve, at, least) + max(error for _, _, error in at.values()))
+        if error <= rtol:
+            break
     return replace(curve, error=error)
 
 
@@ -201,9 +208,10 @@ def polynomial(sample: Samples, a: float, b: float, powers: bool, rtol: float, l
     def value(x: float) -> float:
         return value_at(sample, approach_at(x, a, b, powers), powers)
 
-    nodes = np.cos(np.pi * (np.arange(DEGREE + 1) + 0.5) / (DEGREE + 1))
+    degree = min(DEGREE, LEAST_DEGREE + round(-math.log10(rtol)))
+    nodes = np.cos(np.pi * (np.arange(degree + 1) + 0.5) / (degree + 1))
     values = np.array([value(x) for x in nodes])
-    fit = np.polynomial.chebyshev.Chebyshev.fit(nodes, values, DEGREE, domain=[-1, 1])
+    fit = np.polynomial.chebyshev.Chebyshev.fit(nodes, values, degree, domain=[-1, 1])
     size = max(float(np.max(np.abs(values))), least)
     # Between the nodes, and at the ends, where an interpolation errs most and which the next piece needs, too.
     seen = {x: value(x) for x in (-0.52, 0.14, 0.71)}
