@@ -566,7 +566,9 @@ class KeepSection(Section):
     last: str | Sequence[str] = key(NAMES, "quantities at the end, a list or `all`", ())
     max: str | Sequence[str] = key(NAMES, "quantities whose largest value is kept", ())
     min: str | Sequence[str] = key(NAMES, "quantities whose least value is kept", ())
-    series: str | Sequence[str] = key(NAMES, "quantities at every output time", ())
+    series: str | Sequence[str] = key(
+        NAMES, "quantities at every output time; `max` and `min` beside them tell what is brief", ()
+    )
     events: str | Sequence[str] = key(NAMES, "events whose first time is kept", ())
     at_events: str | Sequence[str] = key(NAMES, "states as they are at these events, just before", (), name="at-events")
     reach: Mapping[str, float] = key(

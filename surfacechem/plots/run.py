@@ -10,6 +10,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -61,6 +62,12 @@ DECADES = 1e3
 FLUX = "W m-2"
 
 EARLY, MUCH, SHOWN = 1 / 200, 0.3, 1 / 1e7
+
+# So many events in the last decade of the time, most of all, would be crowded on a logarithmic axis.
+CROWD = 3
+
+# A flux that is so many times larger before EARLY than after it would be a spike and a line at zero.
+SUDDEN = 20.0
 
 # A title of so many letters does not fit beside a panel; one of fewer does not with its unit in one line.
 TOO_LONG, ONE_LINE = 24, 14
@@ -163,7 +170,10 @@ def first_shown(dataset: xarray.Dataset, panels: Sequence[Panel]) -> float | Non
     times = dataset["time"].values
     # Fluxes and powers follow from what changes: where they start is no reason for another axis.
     names = [name for panel in panels if panel.unit != FLUX for name in panel.names if name in dataset]
-    if not logarithmic(times, [dataset[name].values for name in names]):
+    moments = np.array(list(_moments(dataset)))
+    late = int(np.sum(moments > times[-1] / 10))
+    crowded = late >= CROWD and 2 * late > len(moments) and not logarithmic(times)
+    if crowded or not logarithmic(times, [dataset[name].values for name in names]):
         return None
     return float(max(times[times > 0][0], SHOWN * times[-1]))
 
@@ -244,13 +254,12 @@ def _draw(ax: Axes, dataset: xarray.Dataset, panel: Panel, over: str, first: flo
     """The curves of a panel, with the unit that suits what is seen of them from ``first`` on."""
     t = dataset[over].values
     _draw_curves(ax, dataset, panel, t)
-    exact = [f"{name}_exact" for name in panel.names if f"{name}_exact" in curves(dataset)]
-    for name in exact:
-        label = "exact" if name == exact[0] else "_"
-        ax.plot(t, dataset[name].values, linestyle=EXACT, color="black", linewidth=0.9, label=label)
-    seen = slice(None) if first is None else t >= first
-    drawn = np.concatenate([dataset[name].values[seen] for name in panel.names])
-    drawn = drawn[np.isfinite(drawn)]
+    _draw_exact(ax, dataset, panel, t)
+    start = first or 0.0
+    if first is None and over == "time" and _begins_suddenly(dataset, panel):
+        start = EARLY * t[-1]
+        _show_behind_spike(ax, dataset, panel, start)
+    drawn = _drawn(dataset, panel, t >= start if start else slice(None))
     text, size = style.prefixed(panel.unit, drawn)
     words = panel.title or ", ".join(map(symbol, panel.names[:MOST_NAMES]))
     between = " " if len(panel.title) < ONE_LINE else "\n"
@@ -260,6 +269,37 @@ def _draw(ax: Axes, dataset: xarray.Dataset, panel: Panel, over: str, first: flo
         middle = float(drawn.mean())
         ax.set_ylim(middle - 0.05 * abs(middle or 1.0), middle + 0.05 * abs(middle or 1.0))
     style.legend(ax)
+
+
+def _draw_exact(ax: Axes, dataset: xarray.Dataset, panel: Panel, t: Array) -> None:
+    """The exact curves that the dataset has of those of a panel."""
+    exact = [f"{name}_exact" for name in panel.names if f"{name}_exact" in curves(dataset)]
+    for name in exact:
+        label = "exact" if name == exact[0] else "_"
+        ax.plot(t, dataset[name].values, linestyle=EXACT, color="black", linewidth=0.9, label=label)
+
+
+def _drawn(dataset: xarray.Dataset, panel: Panel, rows: Any = slice(None)) -> Array:
+    """What a panel shows at some of its points, as far as it is finite."""
+    values = np.concatenate([dataset[name].values[rows] for name in panel.names])
+    return np.asarray(values[np.isfinite(values)])
+
+
+def _begins_suddenly(dataset: xarray.Dataset, panel: Panel) -> bool:
+    """Whether nothing would be seen of fluxes but how they begin."""
+    t = dataset["time"].values
+    late = _drawn(dataset, panel, t >= EARLY * t[-1]) if panel.unit == FLUX else np.empty(0)
+    return bool(late.size and np.ptp(_drawn(dataset, panel)) > SUDDEN * np.ptp(late) > 0)
+
+
+def _show_behind_spike(ax: Axes, dataset: xarray.Dataset, panel: Panel, start: float) -> None:
+    """Limit the panel to what its curves are from a time on, and say how large they are before."""
+    late, largest = _drawn(dataset, panel, dataset["time"].values >= start), style.largest(_drawn(dataset, panel))
+    margin = 0.1 * np.ptp(late)
+    ax.set_ylim(late.min() - margin, late.max() + margin)
+    text, size = style.prefixed(panel.unit, np.array([largest]))
+    told = f"{largest / size:.2g} {text} at the start"
+    ax.annotate(told, (0.98, 0.95), xycoords="axes fraction", va="top", ha="right", color="0.4", fontsize=8)
 
 
 def _draw_curves(ax: Axes, dataset: xarray.Dataset, panel: Panel, t: Array) -> None:
@@ -350,19 +390,19 @@ def _draw_events(axes: Sequence[Axes], width: float, moments: Mapping[float, str
     the panels, and the events that have none there.
     """
     named = _named(moments)
-    if len(moments) > MANY:
-        return 0, _counted([name for _, name in named], {})
     places = _places(axes[0], named)
+    if len(places) > MANY:
+        return 0, _counted([name for _, name in named], {})
     names = Counter(text for _, text in places)
     repeat = 1 < len(names) < names.total()
     lines = dict(zip([name for name, _ in names.most_common()], KIND_LINES, strict=False)) if repeat else {}
-    ends = [(t, "") for t in moments if t not in dict(named)]
+    ends = _places(axes[0], [(t, "") for t in moments if t not in dict(named)])
     for (moment, text), ax in product([*places, *ends], axes):
         ax.axvline(moment, color="black", linewidth=0.6, linestyle=lines.get(text, KIND_LINES[0]))
     if len(names) == 1 and len(places) > 1:
         return _numbered(axes[0], width, places, below)
     rows = _write(axes[0], width, places, below) if len(places) <= FEW else 0
-    return rows, "" if rows else _counted([text for _, text in places], lines)
+    return rows, "" if rows else _counted([name for _, name in named], lines)
 
 
 def _places(ax: Axes, events: Sequence[tuple[float, str]]) -> list[tuple[float, str]]:

@@ -153,6 +153,28 @@ def test_events_whose_names_repeat_have_a_kind_of_line_each():
     assert figure(stick_slip, against="phi").axes[0].get_title(loc="left").endswith("6 slip, 6 stop")
 
 
+def test_rebounds_without_end_have_lines_as_far_as_they_are_told_apart():
+    """Their number is that of the events, not that of the lines."""
+    ax = figure(with_events(2 - 2 * 0.7 ** np.arange(1, 100), ["impact"] * 98 + ["rest"])).axes[0]
+    assert 10 < sum(line.get_linestyle() in (":", "--") for line in ax.get_lines()) < 30
+    assert ax.get_title(loc="left").endswith("98 impact (dotted), rest")
+
+
+def test_events_that_decades_would_crowd_keep_the_time_linear():
+    t = np.append(0.0, np.geomspace(1e-5, 2, 61) + np.linspace(0, 1e-6, 61))
+    early = {"w": ("m", 1 - np.exp(-1e3 * t))}
+    assert figure(dataset(t, **early), ["w"]).axes[0].get_xscale() == "log"
+    late = {"event_time": ("event", [0.5, 1.0, 1.5]), "event_name": ("event", np.array(["stop"] * 3, dtype=object))}
+    assert figure(dataset(t, **early).assign(late), ["w"]).axes[0].get_xscale() == "linear"
+
+
+def test_a_flux_that_is_a_spike_at_the_start_is_shown_behind_it():
+    spike = np.where(np.linspace(0.0, 2.0, 2001) < 0.001, 1e6, 50 * np.exp(-np.linspace(0.0, 2.0, 2001)))
+    (ax,) = figure(dataset(np.linspace(0.0, 2.0, 2001), q_1=("W m-2", spike)), ["q_1"]).axes
+    assert 50 < ax.get_ylim()[1] < 60
+    assert texts(ax) == ["1 MW m$^{-2}$ at the start"]
+
+
 def test_the_force_on_a_bond_has_a_panel_and_balances_that_close_have_none():
     closed = dataset(f=("N", 1e-10 * np.linspace(0.0, 2.0, 21))).assign_attrs(energy_error=1e-18)
     assert titles(figure(closed))[-1] == "Force per bond\n[pN]"
