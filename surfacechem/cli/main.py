@@ -408,7 +408,6 @@ def plot(
     """Plot runs over time or a variable, or sweeps over parameters."""
     from surfacechem import plots
     from surfacechem.results.netcdf import WRITTEN
-    from surfacechem.runs.simulation import load
 
     # By its suffix, as a dataset that is missing must not be taken for the name of a case.
     cases = [source for source in sources if not source.rstrip("/").endswith((*WRITTEN, ".zarr"))]
@@ -416,7 +415,11 @@ def plot(
         raise InputError("a dataset is plotted as it is; give a case to change values of.", Place(path="--set"))
     target = output or Path("comparison.png" if len(sources) > 1 else f"{Path(sources[0]).stem}.png")
     check_picture(target)
-    solutions = {case: solved(load(case, changes or ()).run, talk, brief=True) for case in cases}
+    solutions = {}
+    if cases:
+        from surfacechem.runs.simulation import load
+
+        solutions = {case: solved(load(case, changes or ()).run, talk, brief=True) for case in cases}
     names = listed(variables) if variables else None
     shown = [solutions[source].dataset if source in solutions else source for source in sources]
     plots.write(plots.figure(shown, names, against, celsius), target)

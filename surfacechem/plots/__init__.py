@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from surfacechem.errors import InputError
-from surfacechem.plots.style import COLOURS, STYLE, opened, save, write
+from surfacechem.plots.style import COLOURS, STYLE, in_celsius, opened, save, write
 
 if TYPE_CHECKING:
     import xarray
@@ -49,23 +49,32 @@ def figure(
     InputError
         Where a file is no dataset of surfacechem, or has no variable of a name.
     """
-    from surfacechem.plots import comparison, pointwise, run, study, style, sweep
-
     if isinstance(variables, str):
         raise InputError(f"variables are a list of names, not '{variables}'; a figure is written by its savefig.")
     several = [data] if isinstance(data, str | Path) or not isinstance(data, Sequence) else data
     datasets = [opened(each) for each in several]
     if celsius:
-        datasets = [style.in_celsius(dataset) for dataset in datasets]
+        datasets = [in_celsius(dataset) for dataset in datasets]
+    # What draws other datasets than this one is not imported.
     if len(datasets) > 1:
+        from surfacechem.plots import comparison
+
         return comparison.figure(datasets, variables, against)
     (dataset,) = datasets
     if "time" not in dataset and "point" in dataset.dims:
+        from surfacechem.plots import pointwise
+
         return pointwise.figure(dataset, variables, against)
     if "study" in dataset.attrs:
         if variables or against:
             raise InputError("the figure of a study has no choice of variables.")
+        from surfacechem.plots import study
+
         return study.figure(dataset)
     if "sweep" in dataset.attrs:
+        from surfacechem.plots import sweep
+
         return sweep.figure(dataset, variables, against)
+    from surfacechem.plots import run
+
     return run.figure(dataset, variables, against)

@@ -64,6 +64,8 @@ def test_run_imports_only_what_it_needs(tmp_path):
     assert (tmp_path / "sliding-dry.nc").exists()
     assert {"netCDF4", "symengine"} <= found
     assert not found & {"numba", "rich", "scipy.interpolate", "scipy.optimize", "scipy.special", *HEAVY}
+    drawn = imported("from surfacechem.cli.main import app; app(['plot', 'sliding-dry.nc'])", tmp_path)
+    assert not drawn & {"surfacechem.format", "surfacechem.model", "surfacechem.solve", "symengine"}
 
 
 def test_the_command_line_itself_imports_little(tmp_path):
