@@ -39,6 +39,7 @@ from surfacechem.cli.terminal import show, show_page
 from surfacechem.errors import InputError, Place, suggestion
 
 if TYPE_CHECKING:
+    from surfacechem.results.solution import Solution
     from surfacechem.studies.report import Study
 
 MOST_DECADES = 20
@@ -415,11 +416,7 @@ def plot(
         raise InputError("a dataset is plotted as it is; give a case to change values of.", Place(path="--set"))
     target = output or Path("comparison.png" if len(sources) > 1 else f"{Path(sources[0]).stem}.png")
     check_picture(target)
-    solutions = {}
-    if cases:
-        from surfacechem.runs.simulation import load
-
-        solutions = {case: solved(load(case, changes or ()).run, talk, brief=True) for case in cases}
+    solutions = {case: _run(case, changes, talk) for case in cases}
     names = listed(variables) if variables else None
     shown = [solutions[source].dataset if source in solutions else source for source in sources]
     plots.write(plots.figure(shown, names, against, celsius), target)
@@ -427,6 +424,13 @@ def plot(
         typer.echo(str(target))
     for solution in solutions.values():
         leave_with(solution.status, solution.reason)
+
+
+def _run(case: str, changes: Changes, talk: bool | None) -> Solution:
+    """A case that is run to be plotted; a dataset is plotted without what runs cases being imported."""
+    from surfacechem.runs.simulation import load
+
+    return solved(load(case, changes or ()).run, talk, brief=True)
 
 
 @app.command(epilog=EXIT_CODES)
