@@ -27,6 +27,9 @@ Array = NDArray[np.float64]
 BESIDE = 1e-5
 """Relative distance from saturation at which properties end."""
 
+CRITICAL = 0.1
+"""Relative distance from the critical pressure within which properties may have no fit."""
+
 WORDS = {
     "k_m": "conductivity",
     "eta_m": "viscosity",
@@ -99,6 +102,19 @@ class CoolPropFluid(Fluid):
             "seconds to fit, once on a machine. Give the properties that matter as numbers where that is too long."
         )
 
+    def beside_critical(self) -> str:
+        """What to do where the critical pressure is so near that properties are not smooth; empty where it is not."""
+        try:
+            critical = float(_coolprop().PropsSI("Pcrit", self.name))
+        except ValueError:  # a mixture, or a liquid that has none
+            return ""
+        if abs(self.pressure / critical - 1) > CRITICAL:
+            return ""
+        return (
+            f" The critical pressure is {critical:.6g} Pa; within a tenth of it CoolProp's properties jump from "
+            "temperature to temperature. Give them as numbers under `interface.medium`, or another pressure."
+        )
+
     def values(self, quantity: str, T: Array) -> Array:
         """A property at temperatures [K] as CoolProp has it."""
         return COMBINED[quantity](lambda letter: self._properties(letter, T), T)
@@ -156,7 +172,8 @@ def _fit(fluid: CoolPropFluid, quantity: str, low: float, high: float, target: f
     mark = fingerprint(fluid, quantity, low, high, target, version("CoolProp"))
     found = kept(mark, [Path(fits.__file__)], find)
     if isinstance(found, str):
-        raise InputError(f"the {WORDS[quantity]} of {fluid.title} cannot be fitted: {found}")
+        message = f"the {WORDS[quantity]} of {fluid.title} cannot be fitted: {found}"
+        raise InputError(message + fluid.beside_critical())
     return tuple(fits.Piece(low, high, tuple(coefficients)) for low, high, coefficients in found)
 
 

@@ -92,6 +92,14 @@ def test_what_is_not_smooth_is_refused():
         fits.fit(lambda T: 1 + 1e-6 * noise.random(len(T)), 280.0, 330.0)
 
 
+def test_beside_a_critical_pressure_a_message_says_what_to_do():
+    told = CoolPropFluid("CarbonDioxide", 74e5).beside_critical()
+    assert "critical pressure is 7.3773e+06 Pa" in told
+    assert "as numbers under `interface.medium`" in told
+    for other in (CoolPropFluid("CarbonDioxide", 1e7), CoolPropFluid("INCOMP::MEG-50%", 1e5)):
+        assert other.beside_critical() == ""
+
+
 def test_near_a_critical_point_a_fit_is_as_close_as_it_says():
     """CoolProp's heat capacity of carbon dioxide at 80 bar is not smooth at 306.64 K, where it is largest."""
     fluid = CoolPropFluid("CO2", 8e6)
