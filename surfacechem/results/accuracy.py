@@ -66,7 +66,8 @@ def errors_over_time(
     found = {}
     for name, exact in true.items():
         n = min(len(values[name]), len(exact))
-        found[name] = relative_errors(values[name][:n], np.asarray(exact)[:n], floors[name])
+        floor = np.broadcast_to(floors[name], np.shape(exact))
+        found[name] = relative_errors(values[name][:n], np.asarray(exact)[:n], floor[:n])
     return found
 
 

@@ -119,7 +119,7 @@ def against_exact(
     from surfacechem.results.matching import exact_values
 
     # How well cells resolve what has just begun is told at the times that are asked for.
-    seen = trajectory if trajectory.model.system.profiles else _fewer(trajectory.looked)
+    seen = trajectory if trajectory.model.system.profiles else fewer(trajectory.looked)
     late: dict[str, float] = {}
     # Exact solutions have no events to compare with: the times of these come from a second run.
     if found := event_times(trajectory):
@@ -159,7 +159,7 @@ def _off_events(trajectory: Trajectory, late: float) -> NDArray[np.bool_]:
     return np.asarray(np.all(away > np.maximum(BRIEF * end, 2 * late * moments), axis=1))
 
 
-def _fewer(trajectory: Trajectory) -> Trajectory:
+def fewer(trajectory: Trajectory) -> Trajectory:
     """The run with so few of its outputs that an exact solution is quick; where there are many stay many."""
     times = trajectory.result.times
     if len(times) <= LOOKS:

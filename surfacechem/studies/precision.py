@@ -22,7 +22,7 @@ from surfacechem.solve import names as known_solvers
 from surfacechem.solve.run import Trajectory
 from surfacechem.studies.grid import BRIEF, BUDGET, Cell, attempt, check_options, filled
 from surfacechem.studies.report import PageSection, PageTable, Study, Variable
-from surfacechem.studies.truth import KINDS, MEANING, TOLERANCES, Errors, Subject, Truth, establish
+from surfacechem.studies.truth import KINDS, MEANING, TOLERANCES, Errors, Subject, Truth, establish, looked_at
 from surfacechem.tolerances import LONGEST_STEP
 
 log = logging.getLogger(__name__)
@@ -41,10 +41,12 @@ COUNTS = {
 HEADING = ("solver", "rtol", "final", "max", "L2", "events", "energy", "time", "median", "longest", "in steps", *COUNTS)
 
 METHOD = f"""\
-Errors are relative to the true value at the same time, or to 1e-9 (states; 1 for other variables) of its largest value
-if that is more; of the compared variables the worst counts. L2 is the root mean square in time. Errors of events are
-relative to the time of the event. Errors marked < are below the uncertainty of the reference and say no more than that.
-Energy is the largest energy residual of the run relative to the energy exchanged; it needs no reference.
+Runs are compared where a tight one is looked at: at the ends of its steps and inside them, 400 times at most. Errors of
+states are relative to the true value at the same time and what it changes by within the time that has passed, at most
+to its largest value; of other variables to that. Of the compared variables the worst counts. L2 is the root mean square
+in time. Errors of events are relative to the time of the event. Errors marked < are below the uncertainty of the
+reference and say no more than that. Energy is the largest
+energy residual of the run relative to the energy exchanged; it needs no reference.
 
 Times are of the run alone, with all output times, events and the ledger of the balances, after a first run that warms
 up. Rounds are interleaved over solvers and tolerances; runs below {BRIEF:g} s are repeated within a round, solves that
@@ -187,6 +189,7 @@ def _compared(
     variables = tuple(name for name in wanted if name in known) or tuple(subject.states)
     log.info("%s: its reference", name)
     truth: Truth | None = None
+    subject = looked_at(subject)
     try:
         truth = establish(subject, variables)
         reference = truth.source

@@ -5,8 +5,7 @@ be proportional. Of several methods the two that agree best are believed, and ho
 how far the extrapolation went if that is more. The uncertainty of an exact solution is that of its evaluation: how far
 it moves when the times move by their last bit.
 
-Errors are relative to the true value at the same time, or to a floor if that is more: of a state the size at which its
-absolute tolerance is as much as the relative one, of another variable its largest value.
+Runs are compared where a tight one is looked at, and errors are relative to what those of every run are.
 """
 
 from __future__ import annotations
@@ -22,8 +21,8 @@ from numpy.typing import NDArray
 from surfacechem.errors import InputError
 from surfacechem.format import Case
 from surfacechem.results.accuracy import errors_over_time
-from surfacechem.results.error_estimates import computed, difference, event_errors, floors
-from surfacechem.results.event_table import event_times
+from surfacechem.results.error_estimates import computed, difference, event_errors, fewer, floors, sizes
+from surfacechem.results.event_table import SIDE, event_times
 from surfacechem.results.matching import exact_values
 from surfacechem.solve import ASKING, solver
 from surfacechem.solve.run import Model, Trajectory
@@ -151,7 +150,7 @@ class Truth:
     status: str
     times: Array
     values: Values
-    floors: Mapping[str, float]
+    floors: Mapping[str, float | Array]
     events: Values
     end: float
     """End of the run as it was asked for [s]."""
@@ -160,12 +159,17 @@ class Truth:
     @classmethod
     def of(cls, run: Trajectory, source: str, variables: Sequence[str]) -> Truth:
         """That of a run, without values and events."""
-        found = {name: floor for name, floor in floors(run).items() if name in variables}
+        known: dict[str, float | Array] = {**floors(run), **sizes(run)}
+        found = {name: size for name, size in known.items() if name in variables}
         return cls(source, run.status, run.result.times, {}, found, {}, run.run.times[-1])
 
     def errors(self, values: Values, events: Values) -> Errors:
         """Errors of values and of times of events, over the output times that both have reached."""
-        found = errors_over_time(values, self.values, self.floors)
+        alike = self._beside_events(events)
+        found = {
+            name: np.where(alike[: len(error)], error, 0.0)
+            for name, error in errors_over_time(values, self.values, self.floors).items()
+        }
         return Errors(
             {
                 "final": {name: float(error[-1]) for name, error in found.items()},
@@ -174,6 +178,15 @@ class Truth:
                 "event": dict(zip([""], event_errors(events, self.events, self.end).values(), strict=False)),
             }
         )
+
+    def _beside_events(self, events: Values) -> NDArray[np.bool_]:
+        """At which times a run with these events has had the same as this: where it has not, its error is of a time."""
+        both = [(events.get(name, ()), times) for name, times in self.events.items()]
+        ways = np.concatenate(
+            [np.array(pair) for pair in both if len(pair[0]) == len(pair[1])] or [np.empty((2, 0))], 1
+        )
+        early, late = ways.min(axis=0) * (1 - SIDE), ways.max(axis=0) * (1 + SIDE)
+        return np.asarray(np.all((self.times[:, None] < early) | (self.times[:, None] > late), axis=1))
 
     def objection(self, trajectory: Trajectory) -> str:
         """The reason for which a run has no errors: it failed, or came to another end; empty where it has."""
@@ -184,6 +197,17 @@ class Truth:
         if abs(len(trajectory.result.times) - len(self.times)) > 1:  # an output may lie between the two ends
             return f"ended elsewhere than the reference: {trajectory.reason}"
         return difference(event_times(trajectory), self.events)
+
+
+def looked_at(subject: Subject) -> Subject:
+    """The subject with outputs where a tight run is looked at; as it is where that comes to nothing."""
+    try:
+        found = subject.tight(subject.methods()[0], TIGHTEST)
+    except InputError:
+        return subject
+    run = subject.case.run
+    times = np.union1d(fewer(found.looked).result.times, [0.0, run.times[-1]])
+    return replace(subject, case=replace(subject.case, own_run=replace(run, times=tuple(times.tolist()), picture=None)))
 
 
 def establish(subject: Subject, variables: Sequence[str]) -> Truth:
