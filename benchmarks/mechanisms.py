@@ -104,7 +104,7 @@ def surface_of(file: Path) -> ct.Interface:
 
 def by_case(simulation: Simulation, solver: str, rtol: float) -> Callable[[], np.ndarray]:
     """The end of a run of the case."""
-    run = replace(simulation.case.run, solver=solver, rtol=rtol, picture=None)
+    run = replace(simulation.case.run, solver=solver, rtol=rtol, picture=None, looks=0.0)
     return lambda: simulation.model.solve(run).result.y
 
 
