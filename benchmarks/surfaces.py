@@ -87,7 +87,7 @@ CURVES: dict[str, tuple[tuple[Shape, Shape], str, tuple[float, ...]]] = {
     "crossed cylinders": (
         (Cylinder(R=50e-9, length=3e-7), Cylinder(R=50e-9, length=3e-7, turn=math.pi / 2)),
         "pair",
-        (1e-2, 1e-3),
+        (1e-1, 1e-2),
     ),
     "waves, plane": ((Wavy(amplitude=2e-9, wavelength=5e-8, length=2e-7, width=2e-7), Plane()), "pair", (1e-2, 1e-3)),
     "sphere, plane: bonds": ((Sphere(R=50e-9), Plane()), "gap", (1e-3, 1e-6, 1e-9)),

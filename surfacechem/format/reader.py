@@ -259,9 +259,7 @@ def _surface(case: Document) -> CurvedSurfaces | None:
     low, high = section.approach.low, section.approach.high
     if not low < high:
         raise section.approach.error(f"the least approach {low:g} m must be below the largest, {high:g} m.", "from")
-    start = (case.initial or {}).get("g_n", low)
-    if not low <= start <= high:
-        raise case.error(f"g_n = {start:g} m is not among the approaches, {low:g} to {high:g} m.", "initial")
+    _refuse_outside(case, low, high)
     return CurvedSurfaces(
         shapes=(section.bodies[first], section.bodies[second]),
         pairs=section.pair,
@@ -271,6 +269,16 @@ def _surface(case: Document) -> CurvedSurfaces | None:
         accuracy=section.accuracy,
         place=section.tree.place,
     )
+
+
+def _refuse_outside(case: Document, low: float, high: float) -> None:
+    """InputError where the gap is not among the approaches at the start."""
+    history, starts = (case.loading or {}).get("g_n"), {"initial": (case.initial or {}).get("g_n", low)}
+    if history is not None:
+        starts["loading"] = history.at_start()
+    for where, start in starts.items():
+        if not low <= start <= high:
+            raise case.error(f"g_n = {start:g} m is not among the approaches, {low:g} to {high:g} m.", where)
 
 
 def _partition(case: Document) -> tuple[float, float]:

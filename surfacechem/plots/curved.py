@@ -164,8 +164,10 @@ def _draw_field(ax: Axes, dataset: xarray.Dataset) -> None:
     x, y = (dataset[f"surface_{axis}"].values[seen] for axis in "xy")
     # White is no traction, whatever the least and the largest are.
     most = float(np.abs(values[k]).max()) / size
-    mesh = ax.pcolormesh(x, y, values[k] / size, cmap="RdBu_r", vmin=-most, vmax=most, shading="gouraud")
-    ax.figure.colorbar(mesh, ax=ax, label=f"Traction [{text}]")
+    colours: dict[str, Any] = {"cmap": "RdBu_r", "vmin": -most, "vmax": most}
+    # As an image, since a page would hold each triangle.
+    mesh = ax.pcolormesh(x, y, values[k] / size, shading="gouraud", rasterized=True, **colours)
+    ax.figure.colorbar(mesh, cax=ax.inset_axes((1.05, 0, 0.05, 1)), label=f"Traction [{text}]")
     text, size = style.prefixed("m", np.concatenate([x.ravel(), y.ravel()]))
     ax.set(xlabel=f"x [{text}]", ylabel=f"y [{text}]", aspect="equal")
     for axis in (ax.xaxis, ax.yaxis):

@@ -246,7 +246,7 @@ def check_summary(
         "Modes": [(mode.name, mode.legend) for mode in system.modes if len(mode.words) > 1],
         "Transitions": list(dict.fromkeys((item.name, item.reason) for item in system.edges)),
         "Laws": [(law.contract, law.name()) for law in laws_of(scene)],
-        "Surfaces": _surface_rows(scene),
+        "Surfaces": surface_rows(scene),
         "Numbers": [(g.name, f"{g.value:.4g} {g.unit if g.unit != '1' else ''}".rstrip(), g.text) for g in groups],
         "Warnings": [(warning,) for warning in warnings],
     }
@@ -254,7 +254,7 @@ def check_summary(
     return Sheet(title or "untitled", facts, sections)
 
 
-def _surface_rows(scene: Scene) -> list[tuple[str, ...]]:
+def surface_rows(scene: Scene) -> list[tuple[str, ...]]:
     """Shapes of both bodies, what acts between them, and where that is integrated."""
     surface: Any = scene.surface
     if surface is None:

@@ -31,7 +31,7 @@ from surfacechem.runs.check import laws_of
 from surfacechem.runs.listing import FORMULA, plain, source
 from surfacechem.runs.sheet import Sheet
 from surfacechem.runs.simulation import Simulation
-from surfacechem.runs.summaries import REGIMES, duration, points_summary, run_summary, sweep_summary
+from surfacechem.runs.summaries import REGIMES, duration, points_summary, run_summary, surface_rows, sweep_summary
 from surfacechem.runs.sweeps import SweepSolution
 from surfacechem.studies.mathml import Typeset
 from surfacechem.studies.report import Page, PageSection, PageTable
@@ -133,8 +133,13 @@ def _scene(case: cases.Case) -> Iterator[PageSection]:
     rows = [(role.variable, role.role, role.by) for role in system.roles if role.role != "internal"]
     words = [text for text in (case.description, case.source and f"Source: {case.source}", regime) if text]
     variables = PageTable(("variable", "role", "by"), rows, "Variables")
-    stated = list(dict.fromkeys(law for kind in laws_of(case.scene) for law in _stated(type(kind))))
-    yield PageSection("The scene", words, [variables], drawings=[lambda: drawing.figure(case.scene)])
+    tables, acting = [variables], laws_of(case.scene)
+    surface: Any = case.scene.surface
+    if surface is not None:
+        tables.append(PageTable(("body or law", "kind", "numbers"), surface_rows(case.scene), "Surfaces"))
+        acting += [*surface.pairs, *surface.gap_laws, *surface.heat_laws]
+    stated = list(dict.fromkeys(law for kind in acting for law in _stated(type(kind))))
+    yield PageSection("The scene", words, tables, drawings=[lambda: drawing.figure(case.scene)])
     yield PageSection("Laws", equations=stated)
     if spatial.divided(case.scene):  # equations of many cells read alike
         system = replace(case, scene=spatial.few(case.scene)).system()
@@ -197,7 +202,7 @@ def _precision(case: cases.Case, attributes: Any) -> Iterator[PageSection]:
         log.info("again at rtol %g", rtol, extra={"done": number, "total": len(tolerances)})
         solution = simulation.run(run=replace(case.run, rtol=rtol, solver=attributes["solver"], accuracy=None))
         error = f"{solution.accuracy.error:.1e}" if solution.accuracy else ""
-        steps = f"{solution.attributes['count_steps']}"
+        steps = f"{solution.trajectory.result.counters.steps}"
         rows.append((f"{rtol:g}", error, duration(solution.trajectory.seconds), steps))
     heading = ("relative tolerance", "error", "run time", "steps")
     table = PageTable(heading, rows, f"error: {attributes.get('error_source', 'unknown')}")

@@ -200,6 +200,7 @@ class Jump(PairEnergy):
     [
         ("T: 300 K}", "T: 300 K, gn: 1 nm}", r"case.yaml:\d+: initial.gn: nothing that evolves"),
         ("T: 300 K}", "T: 300 K, g_n: 10 nm}", r"case.yaml:\d+: initial: g_n = 1e-08 m is not among the approaches"),
+        ("start: 5 nm", "start: 10 nm", r"case.yaml:\d+: loading: g_n = 1e-08 m is not among the approaches"),
         ("temperature: T, C: 1e-18 J/K", "temperature: 300 K", "nothing that evolves is called 'T'. Known: none"),
         ("lennard-jones-pair", "jump", r"case.yaml:\d+: .*jump jumps at r = 1e-09 m"),
     ],
