@@ -20,7 +20,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from surfacechem.errors import InputError, OutputError, Place, SurfacechemError
+from surfacechem.errors import InputError, OutputError, Place, SurfacechemError, nearest
 
 R = TypeVar("R")
 
@@ -213,7 +213,8 @@ def reading(path: Path, read: Callable[[], R]) -> R:
         _try_elsewhere(path, PATIENCE + size / SLOWEST)
         return read()
     except FileNotFoundError:
-        raise InputError(f"there is no file {path}.") from None
+        beside = [other.name for other in path.parent.glob(f"*{path.suffix}")]  # a sweep has its own name
+        raise InputError(f"there is no file {path}.{nearest(path.name, beside)}") from None
     except Exception as error:  # of a damaged file the library may meet anything
         reason = " ".join(str(getattr(error, "strerror", None) or error).split()) or type(error).__name__
         raise InputError(f"is not a readable netCDF dataset: {reason}.", Place(str(path))) from error

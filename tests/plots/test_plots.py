@@ -210,8 +210,8 @@ def test_files_are_read_and_those_of_others_refused(tmp_path):
     xarray.Dataset({"a": ("x", [1.0, 2.0])}).to_netcdf(tmp_path / "foreign.nc")
     with pytest.raises(InputError, match=r"foreign\.nc: has no variable 'time'"):
         figure(tmp_path / "foreign.nc")
-    with pytest.raises(InputError, match="there is no file"):
-        figure(tmp_path / "nothing.nc")
+    with pytest.raises(InputError, match=r"there is no file .*foreing\.nc\. Did you mean 'foreign\.nc'\?"):
+        figure(tmp_path / "foreing.nc")
 
 
 def test_runs_that_ended_at_once_and_values_that_are_not_finite():
