@@ -182,6 +182,8 @@ class Simulation:
     @cached_property
     def model(self) -> Model:
         """The compiled system."""
+        if self.system.rests:
+            self.case.refuse_nothing()
         try:
             return Model(self.system)
         except InputError as error:

@@ -164,6 +164,9 @@ def _subjects(
     names = [one.case.name for one in subjects]
     if twice := next((name for name in names if names.count(name) > 1), None):
         raise InputError(f"the case {twice} is given twice.")
+    if lone := next((one.case for one in subjects if not (variables or one.states)), None):
+        text = "nothing evolves whose error could be compared; name what follows, `--variables t_n` for instance."
+        raise lone.located(InputError(text, Place(path="bodies")))
     known = {name for one in subjects for name in one.names}
     for name in variables:
         if name not in known:

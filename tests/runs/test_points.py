@@ -8,6 +8,7 @@ import surfacechem
 from surfacechem.cli import app
 from surfacechem.errors import InputError
 from surfacechem.runs.points import read_points
+from surfacechem.studies.precision import precision
 
 pytestmark = pytest.mark.around
 
@@ -160,5 +161,23 @@ def test_what_cannot_be_a_point_is_refused(points, message, element):
 @pytest.mark.parametrize("changes", [(), "run="])
 def test_a_run_of_what_is_prescribed_names_the_command_that_evaluates_it(element, tmp_path, changes):
     assert repr(element).endswith(": nothing to solve>")
-    with pytest.raises(InputError, match=r"element.yaml:4: bodies: there is nothing to solve.*`surfacechem evaluate`"):
+    with pytest.raises(
+        InputError, match=r"element.yaml:4: bodies: there is nothing.*`surfacechem evaluate .*element.yaml`"
+    ):
         surfacechem.load(tmp_path / "element.yaml", changes).run()
+
+
+def test_what_is_prescribed_runs_along_histories_that_change(tmp_path):
+    """Its work is the energy that the contact gives back."""
+    path = tmp_path / "moved.yaml"
+    path.write_text(
+        "bodies: {lower: {temperature: 300 K}, upper: {temperature: 300 K}}\n"
+        "interface: {potential: [penalty: {E_n: 50 MPa/um}]}\n"
+        "loading: {g_n: {ramp: {start: -2 nm, rate: 2 nm/s}}}\nrun: {until: 1 s}\n"
+    )
+    found = surfacechem.run(path)
+    assert found.dataset.t_n.values == pytest.approx(5e13 * found.dataset.g_n.values, rel=1e-12)
+    assert found.dataset.W_g_n.values[-1] == pytest.approx(-5e13 * 2e-9**2 / 2, rel=1e-9)
+    assert found.accuracy.error < 1e-9
+    with pytest.raises(InputError, match=r"moved.yaml:1: bodies: nothing evolves whose error could be compared"):
+        precision(path)
