@@ -21,6 +21,9 @@ from surfacechem.tolerances import NEGLIGIBLE, TINY
 LEFT_OUT = 0.01
 """Part of the accuracy that is far away of one surface, and not summed."""
 
+SOUGHT = 4
+"""Points that are looked at for one on a ray, as bends are sought along it."""
+
 CHEBYSHEV, BETWEEN = np.cos(np.pi * (np.arange(24) + 0.5) / 24), np.array([-0.97, -0.52, 0.14, 0.71])
 """Gaps for a polynomial of their logarithm, and places between them at which it is tried."""
 
@@ -87,11 +90,10 @@ def _sums_of(
     farther = (rtol * LEFT_OUT) ** (-1 / (extent.decay - 2))
     if not is_round(surface):
         reach = np.minimum(near.gap * farther, extent.cutoff)
-        nodes = (
-            ray_grid(surface, x, near, reach, extent, level)
-            if extent.bends
-            else tensor_grid(surface, x, near, reach, level)
-        )
+        if extent.bends:
+            nodes = ray_grid(surface, x, near, reach, extent, level)
+            return [nodes.sums(one) for one in kernels], SOUGHT * nodes.area.size
+        nodes = tensor_grid(surface, x, near, reach, level)
         return [nodes.sums(one) for one in kernels], nodes.area.size
     pairs = 0
 

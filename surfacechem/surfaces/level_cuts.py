@@ -13,11 +13,17 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from surfacechem.surfaces.nodes import gauss
-from surfacechem.surfaces.patches import Levels, Patches
+from surfacechem.surfaces.patches import ENOUGH, Levels, Patches
 from surfacechem.surfaces.projection import FIRST, Array, Surface
 
 SAMPLES = 5
 """Points along each side of a patch at which it is seen whether it has a level."""
+
+SLIGHT, HALVINGS = 0.1, 30
+"""A patch of which a level cuts off less, as part times rest, is halved at first, so many times at most."""
+
+PARTS, ROOTS = 3, 30
+"""Parts of a side on each of which there are lines of nodes, and gaps that are looked at to find a level on a line."""
 
 
 @dataclass(frozen=True)
@@ -26,13 +32,20 @@ class LevelPatches(Patches):
     it is found; minus one where there is none. Gaps that differ by less than the ``noise`` [m] are the same.
     """
 
-    arrays: ClassVar[Sequence[str]] = (*Patches.arrays, "level", "along")
+    arrays: ClassVar[Sequence[str]] = (*Patches.arrays, "level", "along", "share")
 
     other: Surface
     levels: tuple[float, ...]
     noise: float
     level: Array
     along: Levels
+    share: Array
+    """Part of each below the level times that above."""
+
+    @property
+    def fewest(self) -> int:
+        """Level of the rule that patches begin with: a level may bulge between the lines on which it is found."""
+        return ENOUGH if self.other.search == 1 else super().fewest
 
     @property
     def kinds(self) -> Levels:
@@ -53,8 +66,8 @@ class LevelPatches(Patches):
         # Of several levels the one that divides a patch most evenly.
         below, above = (np.mean(s * (gaps[..., None] - self.levels) > self.noise, axis=(1, 2)) for s in (-1, 1))
         best = np.argmax(below * above, axis=1)
-        inside = np.max(below * above, axis=1) > 0
-        return replace(self, level=np.array(self.levels)[best], along=np.where(inside, along, -1))
+        share = np.max(below * above, axis=1)
+        return replace(self, level=np.array(self.levels)[best], along=np.where(share > 0, along, -1), share=share)
 
     def nodes(self, order: int) -> tuple[Array, Array]:
         """Points (n, k, 3) of a rule, and their areas (n, k), on both sides of the level; all of one kind."""
@@ -69,6 +82,10 @@ class LevelPatches(Patches):
         here, length = (part.reshape(n, m, -1) for part in each.parameters(k, t, w))
         at = (here, np.broadcast_to(there[..., None], here.shape))
         return self.points(np.stack(at if k == 0 else at[::-1], axis=-1), length * thickness[..., None])
+
+    def cost(self, order: int) -> int:
+        """Those of the searches for the level on each line of nodes."""
+        return 0 if self.along[0] < 0 else len(self) * PARTS * order * ROOTS * self.other.search
 
     def _across(self, j: int, order: int) -> tuple[Array, Array]:
         """Nodes and weights (n, m) across the direction of the level, cut where it leaves the patch."""
@@ -112,13 +129,21 @@ def with_levels(patches: Patches, other: Surface, levels: Sequence[float], noise
     patches = _at_corners(patches)
     parts = {name: getattr(patches, name) for name in ("surface", "alike", *Patches.arrays)}
     none = np.zeros(len(patches))
-    found = LevelPatches(**parts, other=other, levels=tuple(levels), noise=noise, level=none, along=none.astype(int))
+    found = LevelPatches(
+        **parts, other=other, levels=tuple(levels), noise=noise, level=none, along=none.astype(int), share=none
+    )
     found = found.marked()
     if any(found.alike):
         for _ in levels:
             if np.all(found.along < 0):
                 break
             found = found.divided(found.alike.index(False)).marked()
+        return found
+    for _ in range(HALVINGS):
+        slight = (found.along >= 0) & (found.share < SLIGHT)
+        if not slight.any():
+            break
+        found = found[~slight].joined(found[slight].halved())
     return found
 
 

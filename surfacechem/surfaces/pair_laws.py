@@ -115,6 +115,9 @@ class PairTable(PairEnergy):
             raise InputError("distances and energies must be finite, and the distances positive and increasing.")
         if psi[-1] != 0:
             raise InputError(f"the last energy is {psi[-1]:g} J: let the table go on to where it is zero.")
+        if psi[0] * psi[1] <= 0:
+            text = f"the first two energies, {psi[0]:g} and {psi[1]:g} J, have no sign in common"
+            raise InputError(f"{text}, so that no power of the distance goes on nearer: let the table begin nearer.")
 
     @property
     def cutoff(self) -> float:  # type: ignore[override]
@@ -141,7 +144,7 @@ class PairTable(PairEnergy):
         for low, high, (a, b, c, d) in reversed(list(zip(x, x[1:], self.cubics, strict=False))):
             z = r - low
             result = where(r < high, d + z * (c + z * (b + z * a)), result)
-        power = math.log(psi[0] / psi[1]) / math.log(x[0] / x[1]) if psi[0] * psi[1] > 0 else 0.0
+        power = math.log(psi[0] / psi[1]) / math.log(x[0] / x[1])
         return where(r < x[0], psi[0] * (r / x[0]) ** power, result)
 
 

@@ -109,7 +109,7 @@ def interaction(lower: Surface, upper: Surface, laws: Sequence[PairEnergy], rtol
     left = max(rtol, 2 * rounded) - rounded
     # Next to the end of a law the energy is its force times the distance to that.
     arms = np.array([min(gap, law.cutoff - gap) if law.cutoff > gap else gap for law in laws])[:, None]
-    found, error, pairs = integral(patches, integrand, lambda found: _sizes(found, gap, arms), left)
+    found, error, pairs = integral(patches, integrand, lambda found: _sizes(found, gap, arms), rtol, left=left)
     energy, on_outer, on_inner, moment, opposite = np.split(found, [1, 4, 7, 10], axis=-1)
     forces, moments = (on_outer, on_inner), (moment, opposite)
     if swapped:

@@ -24,12 +24,18 @@ from surfacechem.surfaces.nearest_places import NearPlaces, near_places
 from surfacechem.surfaces.nodes import LAST, ORDERS, alike_along, alike_around, gauss, is_round, piece_edges
 from surfacechem.surfaces.projection import FIRST, POLE, Array, Surface
 from surfacechem.surfaces.shapes import Disc, Plane
+from surfacechem.tolerances import NEGLIGIBLE
 
 STUCK, ENOUGH = 4.0, 2
 """A rule of a level above enough gains as much at least, or the patch is divided; enough are those below to tell."""
 
 MOST_POINTS = 100_000_000
 """Pairs of points after which an accuracy is out of reach."""
+
+WORTH = 8
+"""Part of the most points, one over this, after which it is seen whether the error falls fast enough, since there were
+as many times fewer.
+"""
 
 TOGETHER = 400_000
 """Pairs of points that are looked at together."""
@@ -83,6 +89,10 @@ class Patches:
         (u, du), (v, dv) = (self.parameters(k, *self.rule(k, order)) for k in range(2))
         u, v = np.broadcast_arrays(u[:, :, None], v[:, None, :])
         return self.points(np.stack([u, v], axis=-1), du[:, :, None] * dv[:, None, :])
+
+    def cost(self, order: int) -> int:
+        """Pairs of points that take as long as finding those of a rule."""
+        return 0 * order
 
     def points(self, at: Array, lengths: Array) -> tuple[Array, Array]:
         """Points (n, k, 3) at parameters (n, ..., 2), and their areas (n, k) from products of lengths (n, ...)."""
@@ -216,6 +226,12 @@ class Rules:
             found |= dict(zip(where.tolist(), values, strict=True))
         return np.array([found[k] for k in range(len(levels))])
 
+    def refuse_beyond(self, ahead: float) -> None:
+        """InputError where so many pairs of points are too many."""
+        if ahead > MOST_POINTS:
+            text = f"the accuracy {self.rtol:.2g} of an integral over the surfaces is out of reach"
+            raise InputError(f"{text}: it takes {ahead:.1g} pairs of points; ask for less, or smaller surfaces.")
+
     def _of_order(self, patches: Patches, order: int, inside: int) -> Array:
         """The same by one rule."""
         found, begin, batch = [], 0, 1
@@ -223,13 +239,11 @@ class Rules:
             part = patches[begin : begin + batch]
             x, area = part.nodes(order)
             values, points = self.integrand(x.reshape(-1, 3), inside)
+            points += part.cost(order)
             found.append(np.einsum("nk...,nk->n...", values.reshape(*area.shape, *values.shape[1:]), area))
             self.points += points
             begin += batch
-            ahead = self.points + points / len(part) * (len(patches) - begin)
-            if ahead > MOST_POINTS:
-                text = f"the accuracy {self.rtol:.2g} of an integral over the surfaces is out of reach"
-                raise InputError(f"{text}: it takes {ahead:.1g} pairs of points; ask for less, or smaller surfaces.")
+            self.refuse_beyond(self.points + points / len(part) * (len(patches) - begin))
             batch = max(1, TOGETHER * len(part) // points)
         return np.concatenate(found)
 
@@ -259,24 +273,34 @@ class Known:
 
 
 def integral(
-    patches: Patches, integrand: Integrand, sizes: Callable[[Array], Array], rtol: float, nested: bool = True
+    patches: Patches,
+    integrand: Integrand,
+    sizes: Callable[[Array], Array],
+    rtol: float,
+    nested: bool = True,
+    left: float | None = None,
 ) -> tuple[Array, float, int]:
-    """Integral over patches, its error relative to the ``sizes`` of the entries, and how many points it took.
+    """Integral over patches, its error relative to the ``sizes`` of the entries, and how many points it took; of the
+    accuracy asked for so much may be ``left`` to it.
 
     A ``nested`` integrand is a sum itself, with an error of its own. InputError where the accuracy is out of reach.
     """
+    left = rtol if left is None else left
     rules, begin = Rules(integrand, rtol), np.full(len(patches), patches.fewest)
-    known = _started(rules, patches, begin, begin, nested)
+    known, met = _started(rules, patches, begin, begin, nested), list[tuple[int, float]]()
     while True:
         whole = known.value.sum(axis=0)
         size = sizes(whole)
         over, within = _largest(known.over, size), _largest(known.within, size)
         error = float((over + within).sum())
-        if error <= rtol:
+        if error <= left:
             return whole, error, rules.points
+        met.append((rules.points, error))
+        if rules.points > MOST_POINTS / WORTH:
+            rules.refuse_beyond(_expected(met, left))
         rank = np.argsort(over + within)
         worst = np.zeros(len(over), dtype=bool)
-        worst[rank[~(np.cumsum((over + within)[rank]) <= rtol / 2)]] = True
+        worst[rank[~(np.cumsum((over + within)[rank]) <= left / 2)]] = True
         deeper = worst & (within > over)
         halved = worst & ~deeper & (known.stuck | (known.level == LAST))
         raised = worst & ~deeper & ~halved
@@ -292,6 +316,14 @@ def integral(
             times = len(halves) // int(halved.sum())
             start, inside = np.maximum(known.level[halved] - 1, patches.fewest), known.inside[halved]
             known = known.but(halved, _started(rules, halves, np.tile(start, times), np.tile(inside, times), nested))
+
+
+def _expected(met: Sequence[tuple[int, float]], rtol: float) -> float:
+    """Points at which the error is that asked for, if it goes on to fall with the power of them with which it did."""
+    points, error = met[-1]
+    fewer, before = next(item for item in met[::-1] if item[0] <= points / WORTH or item is met[0])
+    gain, more = math.log(max(before / error, 1.0)), math.log(points / fewer) if points > fewer else 1.0
+    return points * (error / rtol) ** (more / gain) if gain > NEGLIGIBLE else float(points)
 
 
 def _started(rules: Rules, patches: Patches, level: Levels, inside: Levels, nested: bool) -> Known:

@@ -24,6 +24,9 @@ ROUND = (-math.pi, math.pi)
 STEEPEST = 1.57
 """Slope of a cone at most; a needle has no height."""
 
+OVERSHOOT = 0.1
+"""Part of the range of heights by which a spline through them may be above the highest, as summits lie between."""
+
 
 def _half(extent: float | None) -> tuple[float, float]:
     """From minus to plus half of an extent, which may be infinite."""
@@ -351,6 +354,10 @@ class Heights(Shape):
             raise InputError(f"the heights have holes: {len(self.z)} of them on {grid}.")
         if not np.all(np.isfinite(self.z)):
             raise InputError("the heights have holes: one of them is not a finite number.")
+        between = self.spline(*((np.array(p[1:]) + p[:-1]) / 2 for p in (self.x, self.y)))
+        if between.max() > OVERSHOOT * np.ptp(self.z):
+            text = f"between the places a spline is {between.max():.3g} m above the highest of the heights"
+            raise InputError(f"{text}: they change too much from place to place; smooth them, or give more of them.")
 
     @cached_property
     def spline(self) -> Any:

@@ -232,6 +232,7 @@ def test_a_table_and_a_penalty_of_pairs_end_where_they_say():
         (lambda: density(BondedContact(E_n=1.0)), "reads bonded; .* the gap g_n alone"),
         (lambda: PairTable(n_1=1, n_2=1, distances=[1, 2, 3], energies=[1, 2, 3]), "the last energy is 3 J"),
         (lambda: PairTable(n_1=1, n_2=1, distances=[1, 2], energies=[1, 0]), "at least 3"),
+        (lambda: PairTable(n_1=1, n_2=1, distances=[1, 2, 3], energies=[1, -1, 0]), "first two energies"),
         (lambda: InversePower(n_1=1, n_2=1, psi_0=1, r_0=1, m=2), "m = 2 is outside its range: > 2"),
         (
             lambda: pair(Paraboloid(R=1.0), Sphere(R=1.0), 0.1, [power(6)], 1e-17),

@@ -137,6 +137,7 @@ def test_a_body_bulges_or_is_hollow_by_its_curvature():
         (lambda: Torus(hole=0.0, r=1.0), "hole = 0 is outside its range"),
         (lambda: Heights(x=range(6), y=range(6), z=[0.0] * 35), "have holes: 35 of them on 6 x 6"),
         (lambda: Heights(x=range(6), y=range(6), z=[math.nan] * 36), "not a finite number"),
+        (lambda: Heights(x=range(6), y=range(6), z=[0, 0, 1, 1, 0, 0] * 6), "above the highest of the heights"),
         (lambda: Heights(x=[0.0] * 6, y=range(6), z=[0.0] * 36), "increasing places along x"),
         (lambda: Sphere(R=-1.0), "R = -1 is outside its range"),
         (lambda: find(Shape, "spere"), "Did you mean 'sphere'"),
