@@ -144,7 +144,7 @@ def exact_outputs(
         return None
     from surfacechem.results.matching import exact_values
 
-    side = max(SIDE, found.variables.get(EVENTS, 0.0))
+    side = max(SIDE, found.error)
     return partial(exact_values, *exact, scene, to_the_end=True, side=side)
 
 

@@ -18,7 +18,7 @@ from surfacechem.tolerances import LONGEST_STEP
 
 EVENT_ROWS = 64
 STEP_ROWS = 512
-INSIDE_ROWS = 1024
+INSIDE_ROWS = 4096
 Room: TypeAlias = tuple[int, int, int]
 """So many steps, events, and states inside steps of a run."""
 CHUNK = 256
