@@ -69,6 +69,9 @@ layer that none of its three stages lies in.
 PICTURE = 1e-3
 """Part of its range by which a straight line between two outputs may miss a quantity: a pixel of a large figure."""
 
+FINER = 16
+"""The stepper follows the states so many times closer, as quantities that depend on them may bend more."""
+
 MOMENT = 1e-12
 """Part of the time that has passed that no run resolves, in which nothing that stops is followed any more: ROUNDING of
 what is summed along it, to the next power of ten.

@@ -117,6 +117,8 @@ class Problem:
     picture: float = 0.0
     """Part of its range by which a straight line may miss a state between two that are known; 0 where none are added
     to the outputs and the ends of steps."""
+    before: float = 0.0
+    """Time [s] that the run has lasted before; its logarithm is part of the picture."""
     extremes: Array | None = None
     """Least and largest states of what the problem continues, shape (2, states)."""
     goes_on: bool = False

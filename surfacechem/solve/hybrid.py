@@ -194,6 +194,7 @@ class Hybrid:
             seen=instant.rebounds.seen(start.t, instant.sizes(start)),
             in_play=self.system.in_play(local),
             extremes=self.extremes,
+            before=start.t,
         )
         result = yield from without_stall(problem, self.system.sliding)
         reached, status = min(start.t + result.t, end), result.status

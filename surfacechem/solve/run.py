@@ -29,12 +29,9 @@ from surfacechem.solve.jumps import Jump, Jumper
 from surfacechem.solve.radau.solver import output_rates
 from surfacechem.solve.segments import Passing
 from surfacechem.solve.start import stable_start
-from surfacechem.tolerances import DEFAULT_RTOL, EPS, NONE_OF_SCALE, PICTURE
+from surfacechem.tolerances import DEFAULT_RTOL, EPS, FINER, NONE_OF_SCALE, PICTURE
 
 Array = NDArray[np.float64]
-
-FINER = 16
-"""The stepper follows the states so many times closer, as quantities that depend on them may bend more."""
 
 GROUPS = {"energy supply": 0, "dissipation": 0, "heat": 0, "entropy supply": 1, "entropy production": 1, "bonds": 2}
 """Accounts whose quadratures are measured together."""
@@ -136,13 +133,15 @@ class Trajectory:
         result = replace(self.result, times=t, outputs=y, ledger_outputs=ledger, segment=segment)
         return replace(self, result=result)
 
+    def at_rows(self, rows: NDArray[np.int64] | NDArray[np.bool_]) -> Trajectory:
+        """The trajectory with some of its outputs alone."""
+        result = self.result
+        segment = result.segments_at(result.times, result.segment)
+        return self.at(States(result.times[rows], result.outputs[rows], result.ledger_outputs[rows], segment[rows]))
+
     def at_times(self, times: Sequence[float] | Array) -> Trajectory:
         """The trajectory with those of its outputs alone that are at these times."""
-        result = self.result
-        kept = np.isin(result.times, times)
-        segment = result.segments_at(result.times, result.segment)
-        found = self.at(States(result.times[kept], result.outputs[kept], result.ledger_outputs[kept], segment[kept]))
-        return replace(found, run=replace(self.run, times=tuple(times)))
+        return replace(self.at_rows(np.isin(self.result.times, times)), run=replace(self.run, times=tuple(times)))
 
     @cached_property
     def looked(self) -> Trajectory:

@@ -14,6 +14,9 @@ from surfacechem.tolerances import PICTURE
 FOLLOWED = ("exothermic", "stick-slip", "press-hold-pull", "rate-and-state-stick-slip", "dna-adhesive", "debonding")
 """Smooth, with many jumps, with stages, with slips that are brief, with two time scales, with one jump."""
 
+LINED = (*FOLLOWED, "compliant-debonding")
+"""And one with a traction that rises by a ramp in the first part of many, while no state changes."""
+
 each = pytest.mark.parametrize("name", FOLLOWED)
 
 
@@ -30,19 +33,24 @@ def test_no_step_depends_on_the_outputs(name):
             assert getattr(other.result.steps, column).tobytes() == getattr(first.result.steps, column).tobytes()
 
 
-@each
+@pytest.mark.parametrize("name", LINED)
 def test_lines_between_outputs_show_the_run(name):
-    """Against a run with many outputs, beside the events and the breakpoints."""
+    """Over time and over its logarithm, against a run with many outputs, beside the events and the breakpoints."""
     case, solution = load(name), solved(name)
     run, data = solution.trajectory.run, solution.dataset
-    times = tuple(np.linspace(0.0, run.times[-1], 1234).tolist())
+    end, first = run.times[-1], data.time.values[1]
+    times = tuple(np.union1d(np.linspace(0.0, end, 1234), np.geomspace(first, end, 600)[:-1]).tolist())
     dense = case.run(run=replace(run, times=times, picture=None), error="balances").dataset
     beside = [*case.system.breakpoints, *(data.event_time.values if "event_time" in data else ())]
     smooth = np.all(np.abs(np.subtract.outer(dense.time.values, beside)) > 1e-9 * run.times[-1], axis=1)
-    for state in case.system.states:
-        found, known = dense[state.name].values[smooth], data[state.name]
-        missed = np.abs(np.interp(dense.time.values[smooth], data.time.values, known.values) - found)
-        assert missed.max() <= 1.05 * PICTURE * np.ptp(known.values)
+    tractions = [name for name in ("t_n", "t_t") if name in data]
+    for shown in (*(state.name for state in case.system.states), *tractions):
+        found, known = dense[shown].values[smooth], data[shown].values
+        for begun, over in ((0, np.abs), (1, np.log)):  # a logarithm of the time has no start
+            later = dense.time.values[smooth] >= data.time.values[begun]
+            at, known_at = dense.time.values[smooth][later], data.time.values[begun:]
+            missed = np.interp(over(at), over(known_at), known[begun:]) - found[later]
+            assert np.abs(missed).max() <= 1.05 * PICTURE * np.ptp(known), shown
 
 
 def test_both_sides_of_every_event_and_the_extremes_of_the_steps_are_outputs():

@@ -24,12 +24,14 @@ from surfacechem.solve.radau.roundoff import find_noise
 from surfacechem.solve.radau.step import MAGNIFIED, defect_inside, store_polynomial
 from surfacechem.solve.radau.tables import PROBE, PROBE_RATE, PROBE_SHAPE, SCANNED
 from surfacechem.solve.radau.work import compiled, copy
+from surfacechem.tolerances import FINER
 
 ALLOWED = 2.0
 """Error of the polynomial between its stages, in units of the tolerance."""
 
 MOST_PARTS = 64
-"""Parts of a step between which states are added for a picture: a polynomial of order 7 needs no more."""
+"""Parts of a step, equal in time or in its logarithm, between which states are added for a picture at most: a
+polynomial of order 7 needs no more."""
 
 UNSEEN = 1e3
 """A range of so many tolerances of a state is no picture but its error."""
@@ -158,31 +160,51 @@ def write_outputs(w: Any, times: Any, outputs: Any, first: int, h: float, end: f
 
 
 @compiled
-def _parts(w: Any) -> int:
-    """Parts of the step in each of which a straight line misses no state by more than the picture allows."""
+def _parts(w: Any, h: float, growth: float) -> Any:
+    """Parts of the step in each of which a straight line misses no state by more than the picture allows: equal ones
+    of its time, and of the logarithm of the time of the run, which becomes 1 + ``growth`` times as long.
+    """
     scan_step(w)
-    last, worst = 4 * w.member + 8, 0.0
+    last, by_time, by_ratio = 4 * w.member + 8, 0.0, 0.0
+    for i in range(last + 1):
+        x = SCANNED[w.member, i]
+        w.decades[i] = np.log1p(growth * x) / np.log1p(growth) if growth > 0.0 else x
+        # What is given may be a ramp since the segment began, which bends over the logarithm alone.
+        by_ratio = max(by_ratio, abs(x - w.decades[i]) * h / ((w.tau + h) * FINER))
     for m in range(w.n):
-        low, high, missed = min(w.least[m], w.y[m]), max(w.largest[m], w.y[m]), 0.0
+        low, high, missed, beside = min(w.least[m], w.y[m]), max(w.largest[m], w.y[m]), 0.0, 0.0
+        total = w.scanned[last, m]
         for i in range(last + 1):
             change = w.scanned[i, m]
             low, high = min(low, w.y[m] + change), max(high, w.y[m] + change)
-            missed = max(missed, abs(change - SCANNED[w.member, i] * w.scanned[last, m]))
+            missed = max(missed, abs(change - SCANNED[w.member, i] * total))
+            beside = max(beside, abs(change - w.decades[i] * total))
         w.least[m], w.largest[m] = low, high
-        worst = max(worst, missed / (high - low + UNSEEN * w.weight[m]))
+        size = high - low + UNSEEN * w.weight[m]
+        by_time, by_ratio = max(by_time, missed / size), max(by_ratio, beside / size)
     # What a line misses goes with the square of its length.
-    return min(int(np.ceil(np.sqrt(worst / w.picture))), MOST_PARTS)
+    return (
+        min(int(np.ceil(np.sqrt(by_time / w.picture))), MOST_PARTS),
+        min(int(np.ceil(np.sqrt(by_ratio / w.picture))), MOST_PARTS),
+    )
 
 
 @compiled
 def write_picture(w: Any, times: Any, states: Any, first: int, h: float) -> int:
-    """States inside the step without which its picture would not be true; returns how many the run has now, those
-    among them for which there was no room.
+    """States inside the step without which its picture would not be true, over time and over its logarithm; returns
+    how many the run has now, those among them for which there was no room.
     """
-    parts = _parts(w)
-    last = max(first + parts - 1, first)
+    start = w.before + (w.base + w.tau)
+    growth = h / start if start > 0.0 else 0.0
+    parts, ratios = _parts(w, h, growth)
+    if ratios > 0 and growth <= parts * np.expm1(np.log1p(growth) / ratios):
+        ratios = 0  # equal parts of the time are short enough where its logarithm is the longest
+    middle = first + max(parts - 1, 0)
+    last = middle + max(ratios - 1, 0)
     if first < last <= times.shape[0]:
-        for i in range(first, last):
+        for i in range(first, middle):
             times[i] = w.base + (w.tau + h * (i + 1 - first) / parts)
+        for i in range(middle, last):
+            times[i] = w.base + (w.tau + start * np.expm1(np.log1p(growth) * (i + 1 - middle) / ratios))
         _write_inside(w, times, states, first, last, h)
     return last

@@ -77,6 +77,7 @@ def _batch(problem: Problem, runs: Sequence[Array], room: Room | None = None) ->
         _kinds(problem.margins, problem.in_play),
         int(problem.goes_on),
         problem.picture,
+        problem.before,
         *runs,
         np.empty((count, 1 + 2 * n + q + m)),
         np.zeros((count, COLUMNS), np.int64),
@@ -135,7 +136,8 @@ class Radau(Solver):
         for i, problem in enumerate(problems):
             # What problems of one batch have in common, beside the model and its margins.
             shape = len(problem.segments), problem.atol.tobytes(), problem.rtol
-            alike.setdefault((*shape, problem.in_play, problem.goes_on, problem.picture), []).append(i)
+            picture = problem.picture and (problem.picture, problem.before)
+            alike.setdefault((*shape, problem.in_play, problem.goes_on, picture), []).append(i)
         most = min(CHUNK, -(-len(problems) // threads))
         chunks = [group[k : k + most] for group in alike.values() for k in range(0, len(group), most)]
         with ThreadPoolExecutor(threads) as pool:
@@ -315,7 +317,7 @@ def search_batch(program: Program, ends: Array, table: Array, counts: NDArray[np
     rows, nothing = np.zeros((1, 0)), _no_rows(len(ends))
     return Batch(
         *program.tables,
-        1.0, np.ones(program.n), 0, _kinds(()), 0, 0.0,
+        1.0, np.ones(program.n), 0, _kinds(()), 0, 0.0, 0.0,
         ends, table, np.zeros(0), np.empty(0, np.int64), rows, rows, rows, ends, counts, *(nothing,) * 4, rows,
     )  # fmt: skip
 

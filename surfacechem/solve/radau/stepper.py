@@ -33,6 +33,8 @@ BATCH: dict[str, tuple[Any, int]] = {
     "goes_on": (int, 0),
     # part of its range by which a straight line between known states may miss another one; 0 where none are added
     "picture": (float, 0),
+    # time that the run has lasted before
+    "before": (float, 0),
     # the runs; all but the first two have one row for all where these are alike
     "y0": (float, 2),
     "parameters": (float, 3),
@@ -135,6 +137,8 @@ MEMORY = {
     **_arrays("q_polynomial", "n_ledger", 9),
     # change of the state and its rate at the points where guards are examined
     **_arrays("scanned scanned_rates", SCAN_POINTS + WIDTH - 1, "n"),
+    # shares of the logarithm of the time at these points
+    **_arrays("decades", SCAN_POINTS),
     # least and largest values of the states so far
     **_arrays("least largest", "n"),
     # ledger: now, as a trial, correction of its polynomial, a probe; errors, what they are held against, the largest so
