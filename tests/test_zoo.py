@@ -183,7 +183,7 @@ def test_explicit_steps_serve_a_case_as_well(name):
     simulation = load(name)
     solution = simulation.run(run=replace(simulation.case.run, solver="dop853", accuracy=None))
     assert solution.status == ("stopped" if name in STOPPED else "finished")
-    assert solution.accuracy.error < (1e-8 if simulation.case.reference else 1e-7)
+    assert solution.accuracy.error < FOLDS.get(name, 1e-8 if simulation.case.reference else 1e-7)
     assert solution.audit.energy_error < 1e-9
     assert solution.audit.violations == ()
 

@@ -84,7 +84,7 @@ def _batch(problem: Problem, runs: Sequence[Array], room: Room | None = None) ->
         np.empty((count, times.shape[1], n + q)),
         np.empty((count, step_rows, 1 + 2 * n + q)) if step_rows else _no_rows(count),
         np.empty((count, event_rows, 2 + 2 * n + q)) if event_rows else _no_rows(count),
-        np.empty((count, rows, n + q)) if rows else _no_rows(count),
+        np.empty((count, rows, n + q)) if problem.picture else _no_rows(count),
         np.empty((count, rows)),
     )
 
