@@ -314,9 +314,9 @@ def computed(trajectory: Trajectory) -> dict[str, Array]:
 
 def sizes(trajectory: Trajectory, named: Collection[str] = ()) -> dict[str, Array]:
     """What errors of states are relative to, at each output: their value and what it changes by within the time that
-    has passed, at most their largest value, but where it changes by itself in a moment; at the end, unless it is that of
-    physics, their value alone. Of profiles the least that counts, of what is ``named`` beside the states the largest
-    value.
+    that has passed, at most their largest value, but where it changes by itself in a moment; at the end, unless it is
+    that of physics, their value alone. Of profiles the least that counts, of what is ``named`` beside the states the
+    largest value.
 
     The error of a run is then such that every state is, to this part of itself, the value of a time that is right to
     this part of itself, which is all that can be said near a zero; and that it is right to this part of its largest
