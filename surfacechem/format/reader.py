@@ -256,6 +256,9 @@ def _surface(case: Document) -> CurvedSurfaces | None:
         raise section.error(f"{missing[0]} has no shape: give one to both bodies.", "bodies")
     if not (section.pair or section.laws):
         raise section.error("nothing acts between the surfaces: give a law under `pair` or `laws`.")
+    if section.laws and "J_c" in (case.loading or {}):
+        text = "`laws` are those of the area as it is; a stretch `J_c` thins out the points of `pair` alone"
+        raise section.error(f"{text}: leave one of the two out.", "laws")
     low, high = section.approach.low, section.approach.high
     if not low < high:
         raise section.approach.error(f"the least approach {low:g} m must be below the largest, {high:g} m.", "from")

@@ -315,7 +315,9 @@ class Build:
 
     @property
     def stretch(self) -> Expression:
-        """Area stretch J_c, or one."""
+        """Area stretch J_c, or one; shapes are those of surfaces as they are, and what is integrated over them too."""
+        if self.scene.surface is not None:
+            return symengine.Integer(1)
         return self.variables.get("J_c", "the balance") if self.variables.has("J_c") else symengine.Integer(1)
 
     def initial(self, name: str) -> float:
@@ -329,7 +331,7 @@ class Build:
 
     def areal(self, quantity: Quantity, nominal: Expression) -> Expression:
         """A quantity per current area, and per reference area too where the two differ; returns the nominal one."""
-        if not self.variables.has("J_c"):
+        if self.stretch == 1:
             return self.name(quantity, nominal)
         per_reference = Quantity(
             f"{quantity.name}_nominal", quantity.unit, f"{quantity.long_name} per reference area", tag=quantity.tag

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -25,6 +26,8 @@ ALONG, AROUND, ACROSS = 81, 16, 33
 
 AT = "surface_time"
 
+log = logging.getLogger(__name__)
+
 
 def surface_columns(trajectory: Trajectory, surface: CurvedSurfaces) -> tuple[list[Column], float]:
     """Columns over their own times and over the surface of body 1, and the time that they took [s]."""
@@ -42,18 +45,21 @@ def _columns(trajectory: Trajectory, surface: CurvedSurfaces) -> list[Column]:
     gaps = trajectory.everywhere["g_n"][: len(times)][chosen]
     # A run may end a rounding beyond the approaches that are known.
     approaches = np.clip(gaps, *surface.approach)
+    stretches = np.ones_like(gaps)
+    if "J_c" in trajectory.everywhere:
+        stretches = trajectory.everywhere["J_c"][: len(times)][chosen]
     return [
         Column(AT, (AT,), times[chosen], "s", "times at which the surfaces are looked at"),
-        *_totals(surface, approaches),
-        *_fields(surface, approaches),
+        *_totals(surface, approaches, stretches),
+        *_fields(surface, approaches, stretches),
     ]
 
 
-def _totals(surface: CurvedSurfaces, approaches: Array) -> list[Column]:
+def _totals(surface: CurvedSurfaces, approaches: Array, stretches: Array) -> list[Column]:
     """Moment, area of contact, conductance, and how far off the local law is."""
     from surfacechem.surfaces.nodes import alike_around
 
-    force, moment_x, moment_y, local, least, places, area, across = surface.totals(approaches)
+    force, moment_x, moment_y, local, least, places, area, across = surface.totals(approaches, stretches)
     columns = []
     if not alike_around(*surface.surfaces(0.0)):
         columns = [
@@ -76,7 +82,7 @@ def _totals(surface: CurvedSurfaces, approaches: Array) -> list[Column]:
     return columns
 
 
-def _fields(surface: CurvedSurfaces, approaches: Array) -> Sequence[Column]:
+def _fields(surface: CurvedSurfaces, approaches: Array, stretches: Array) -> Sequence[Column]:
     """Gap and traction over points of body 1, which gather where body 2 is nearest."""
     from surfacechem.surfaces.pairwise import length
     from surfacechem.surfaces.patches import outer_patches
@@ -97,9 +103,11 @@ def _fields(surface: CurvedSurfaces, approaches: Array) -> Sequence[Column]:
     gap, traction = np.empty((2, len(approaches), *x.shape[:-1]))
     opposite = np.empty((len(approaches), *x.shape))
     for k, d in enumerate(approaches):
+        log.info("fields at output times", extra={"done": k, "total": len(approaches)})
         near = surface.surfaces(float(d))[1].nearest(x)
         gap[k], opposite[k] = near.gap, near.point
-        felt = surface.traction(x[:, some].reshape(-1, 3), normals[:, some].reshape(-1, 3), float(d))
+        own = surface.thinned(float(stretches[k]))
+        felt = own.traction(x[:, some].reshape(-1, 3), normals[:, some].reshape(-1, 3), float(d))
         traction[k] = felt.reshape(len(x), -1)
     over = ("u", "v")
     places = [

@@ -5,6 +5,7 @@ Between two approaches the slope is a polynomial through Chebyshev's points, ref
 
 from __future__ import annotations
 
+import logging
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import astuple, dataclass, replace
@@ -15,6 +16,7 @@ import numpy as np
 
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, decay, log, where
+from surfacechem.surfaces.patches import FIRST_FEW
 from surfacechem.surfaces.projection import Array
 from surfacechem.tolerances import TINY
 
@@ -28,6 +30,11 @@ SHORTEST = 2.0**-26
 """Part of the range of approaches below which no piece is divided; at a kink of the force its error does not count."""
 
 MOST_PIECES = 200
+
+BETWEEN = (-0.52, 0.14, 0.71)
+"""Places on a piece at which it is seen what a polynomial misses, beside its ends."""
+
+logger = logging.getLogger(__name__)
 
 Samples = Callable[[float], tuple[float, float, float]]
 """Energy [J] and force [N], tension positive, at an approach [m], and the relative error of both."""
@@ -100,6 +107,22 @@ class ApproachEnergy:
         return self.factor * where(d < first.low, wall, result)
 
 
+class Sampled:
+    """A function of the approach, computed once at each: that is logged, with how many are known to be needed."""
+
+    def __init__(self, samples: Samples) -> None:
+        self.samples, self.needed = samples, FIRST_FEW
+        self.at: dict[float, tuple[float, float, float]] = {}
+
+    def __call__(self, d: float) -> tuple[float, float, float]:
+        """What it is there."""
+        if d not in self.at:
+            amount = {"done": len(self.at), "total": max(self.needed, len(self.at) + 1)}
+            logger.info("integral over the surfaces at the approach %.3g m", d, extra=amount)
+            self.at[d] = self.samples(d)
+        return self.at[d]
+
+
 def straight(low: float, high: float) -> ApproachEnergy:
     """An energy that grows along a line, for one that is not known yet."""
     return ApproachEnergy((ApproachPiece(low, high, (1.0,), 0.0, powers=False),), 0.0)
@@ -120,13 +143,7 @@ def fitted(
 
     An energy of one sign at positive approaches is fitted by its logarithm, in which a power is a straight line.
     """
-    at: dict[float, tuple[float, float, float]] = {}
-
-    def sample(d: float) -> tuple[float, float, float]:
-        if d not in at:
-            at[d] = samples(d)
-        return at[d]
-
+    sample = Sampled(samples)
     first = sample(low)  # what has no force there is refused before anything else is computed
     inside = [cut for cut in cuts if low < cut < high]
     powers = low > 0 and not inside and one_sign([sample(d)[0] for d in (low, math.sqrt(low * high), high)], floor[0])
@@ -135,7 +152,7 @@ def fitted(
     for aim in (rtol, rtol / CLOSER):
         curve = joined(divided(sample, [low, *inside, high], powers, aim, least), *first[:2], powers)
         # Between the places that are looked at it may miss more, hardly twice as much.
-        error = float(2 * missed(curve, at, least) + max(error for _, _, error in at.values()))
+        error = float(2 * missed(curve, sample.at, least) + max(error for _, _, error in sample.at.values()))
         if error <= rtol:
             break
     return replace(curve, error=error)
@@ -165,12 +182,13 @@ def one_sign(energies: Sequence[float], floor: float) -> bool:
 
 
 def divided(
-    sample: Samples, ends: Sequence[float], powers: bool, rtol: float, least: float
+    sample: Sampled, ends: Sequence[float], powers: bool, rtol: float, least: float
 ) -> list[tuple[float, float, Array]]:
     """Pieces that are halved until a polynomial is the force on each; at a kink until they are too short to count."""
     found: list[tuple[float, float, Array]] = []
     waiting = list(pairwise(ends))[::-1]
     while waiting:
+        sample.needed = len(sample.at) + len(waiting) * (degree_for(rtol) + 1 + len(BETWEEN) + 1)
         a, b = waiting.pop()
         if len(found) + len(waiting) > MOST_PIECES:
             raise InputError(f"the accuracy {rtol:g} over the approach is out of reach near {a:.4g} m.")
@@ -208,17 +226,28 @@ def polynomial(sample: Samples, a: float, b: float, powers: bool, rtol: float, l
     def value(x: float) -> float:
         return value_at(sample, approach_at(x, a, b, powers), powers)
 
-    degree = min(DEGREE, LEAST_DEGREE + round(-math.log10(rtol)))
+    degree = degree_for(rtol)
     nodes = np.cos(np.pi * (np.arange(degree + 1) + 0.5) / (degree + 1))
     values = np.array([value(x) for x in nodes])
     fit = np.polynomial.chebyshev.Chebyshev.fit(nodes, values, degree, domain=[-1, 1])
     size = max(float(np.max(np.abs(values))), least)
     # Between the nodes, and at the ends, where an interpolation errs most and which the next piece needs, too.
-    seen = {x: value(x) for x in (-0.52, 0.14, 0.71)}
+    seen = {x: value(x) for x in BETWEEN}
     seen |= {x: value_at(sample, end, powers) for x, end in ((-1.0, a), (1.0, b))}
     if any(abs(fit(x) - true) > rtol * size for x, true in seen.items()):
         return None
     return np.asarray(fit.convert(kind=np.polynomial.Polynomial, domain=[-1, 1], window=[-1, 1]).coef)
+
+
+def degree_for(rtol: float) -> int:
+    """Degree of the polynomials for an accuracy."""
+    return min(DEGREE, LEAST_DEGREE + round(-math.log10(rtol)))
+
+
+def fewest_samples(low: float, high: float, rtol: float, cuts: Sequence[float] = ()) -> int:
+    """At how many approaches a function is looked at, at least."""
+    pieces = 1 + sum(low < cut < high for cut in cuts)
+    return pieces * (degree_for(rtol) + 1 + len(BETWEEN)) + pieces + 1
 
 
 def joined(found: list[tuple[float, float, Array]], energy: float, force: float, powers: bool) -> ApproachEnergy:

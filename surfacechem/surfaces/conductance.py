@@ -9,8 +9,9 @@ from typing import Self
 from surfacechem.contracts.terms import HeatTransfer, option
 from surfacechem.documents.cache_folder import Fingerprint, fingerprint, kept
 from surfacechem.expressions import Expression
-from surfacechem.surfaces.approach import ApproachEnergy, fitted, straight
+from surfacechem.surfaces.approach import ApproachEnergy, fewest_samples, fitted, straight
 from surfacechem.surfaces.curved_gap import bends, density, over_gap
+from surfacechem.surfaces.patches import Budget
 from surfacechem.surfaces.potential import CODE, CurvedSurfaces, integrating
 from surfacechem.tolerances import ROUNDING
 
@@ -58,10 +59,11 @@ class CurvedConductance(HeatTransfer):
         pair, law, levels = self.pair, density(self.law), bends([self.law])
         mark = fingerprint(pair.shapes, self.law, pair.approach, pair.accuracy)
 
+        budget = Budget(pair.accuracy, fewest_samples(*pair.approach, pair.accuracy, levels))
+
         def sample(d: float) -> tuple[float, float, float]:
-            found = pair.at_approach(
-                d, lambda: over_gap(*pair.surfaces(d), [], levels, [law], max(pair.accuracy / 64, ROUNDING))
-            )
+            finer = max(pair.accuracy / 64, ROUNDING)
+            found = pair.at_approach(d, lambda: over_gap(*pair.surfaces(d), [], levels, [law], finer, budget=budget))
             return found.conductance, found.conductance_slope, found.error
 
         # A conductance and its slope are fitted like an energy and its force.

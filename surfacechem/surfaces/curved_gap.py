@@ -16,7 +16,7 @@ from surfacechem.contracts.terms import HeatTransfer, PairEnergy, Potential, Var
 from surfacechem.errors import InputError
 from surfacechem.surfaces.level_cuts import with_levels
 from surfacechem.surfaces.pairwise import check_finite, kernel, length
-from surfacechem.surfaces.patches import Integrand, Patches, Rules, integral, outer_patches
+from surfacechem.surfaces.patches import Budget, Integrand, Patches, Rules, integral, outer_patches
 from surfacechem.surfaces.projection import Array, Projection, Surface
 from surfacechem.tolerances import EPS, NEGLIGIBLE, NOISE, PRECISE, TINY
 
@@ -114,11 +114,12 @@ def over_gap(
     heat: Sequence[Callable[[Array], Array]] = (),
     rtol: float = PRECISE,
     floor: tuple[float, float] = (0.0, 0.0),
+    budget: Budget | None = None,
 ) -> Contact:
     """Integral of laws of the gap over body 1; ``levels`` are gaps [m] at which the laws bend.
 
     Errors are relative to the energy and the force, or to a ``floor`` [J, N] where that is larger. InputError where an
-    accuracy is out of reach.
+    accuracy is out of reach, or takes more than a ``budget`` that is that of other integrals, too.
     """
     check_finite(lower, upper)
     size = length(lower, upper)
@@ -140,15 +141,16 @@ def over_gap(
         flow = max(abs(found[14]), TINY)
         return np.array([*parts, area, flow, max(abs(found[15]), flow / size)])
 
-    whole, error, _ = integral(patches, integrand, sizes, rtol, nested=False)
-    _check_end(patches, integrand, sizes(whole))
+    budget = budget or Budget(rtol)
+    whole, error, _ = integral(patches, integrand, sizes, rtol, budget, nested=False)
+    _check_end(patches, integrand, sizes(whole), budget)
     force_1, force_2, moment_1, moment_2 = np.split(whole[1:13], 4)
     energy, area, conductance, slope = map(float, whole[[0, 13, 14, 15]])
     gap = float(near.gap[0])
     return Contact(energy, force_1, force_2, moment_1, moment_2, area, conductance, slope, gap, near.count, error)
 
 
-def _check_end(patches: Patches, integrand: Integrand, sizes: Array) -> None:
+def _check_end(patches: Patches, integrand: Integrand, sizes: Array, budget: Budget) -> None:
     """InputError where what is integrated over an endless surface does not fall off on the way to its far end."""
     low, high = np.isinf(np.transpose(patches.surface.shape.span))
     last = (high & (patches.high == patches.high.max(axis=0))) | (low & (patches.low == patches.low.min(axis=0)))
@@ -156,7 +158,7 @@ def _check_end(patches: Patches, integrand: Integrand, sizes: Array) -> None:
         return
     ends = patches[last.any(axis=1)]
     none = np.zeros(len(ends), dtype=int)
-    share = np.abs(Rules(integrand, 1.0)(ends, none, none).sum(axis=0) / sizes)
+    share = np.abs(Rules(integrand, budget)(ends, none, none).sum(axis=0) / sizes)
     # Energies may count from anywhere; a force or a conductance that has no end is none.
     for name, part in (("force", share[1:7]), ("conductance", share[14:15])):
         if part.max() > NEGLIGIBLE:

@@ -23,7 +23,7 @@ from surfacechem.surfaces.inner_sums import LEFT_OUT, extents, inner_sums
 from surfacechem.surfaces.level_cuts import with_levels
 from surfacechem.surfaces.nearest_places import NearPlaces
 from surfacechem.surfaces.nodes import LAST, Extent, Kernel, is_round
-from surfacechem.surfaces.patches import Patches, integral, outer_patches
+from surfacechem.surfaces.patches import Budget, Patches, integral, outer_patches
 from surfacechem.surfaces.projection import FIRST, Array, Surface
 from surfacechem.surfaces.shapes import Plane
 from surfacechem.tolerances import ATOM, NEGLIGIBLE, NOISE, PRECISE, TINY, ULPS
@@ -81,8 +81,15 @@ def kernel(law: PairEnergy) -> Kernel:
     return values
 
 
-def interaction(lower: Surface, upper: Surface, laws: Sequence[PairEnergy], rtol: float = PRECISE) -> PairForces:
-    """The double integrals of some laws over two surfaces; InputError where an accuracy is out of reach.
+def interaction(
+    lower: Surface,
+    upper: Surface,
+    laws: Sequence[PairEnergy],
+    rtol: float = PRECISE,
+    budget: Budget | None = None,
+) -> PairForces:
+    """The double integrals of some laws over two surfaces; InputError where an accuracy is out of reach, or takes more
+    than a ``budget`` that is that of other integrals, too.
 
     Densities count as they are in each law.
     """
@@ -109,7 +116,9 @@ def interaction(lower: Surface, upper: Surface, laws: Sequence[PairEnergy], rtol
     left = max(rtol, 2 * rounded) - rounded
     # Next to the end of a law the energy is its force times the distance to that.
     arms = np.array([min(gap, law.cutoff - gap) if law.cutoff > gap else gap for law in laws])[:, None]
-    found, error, pairs = integral(patches, integrand, lambda found: _sizes(found, gap, arms), rtol, left=left)
+    found, error, pairs = integral(
+        patches, integrand, lambda found: _sizes(found, gap, arms), left, budget or Budget(rtol)
+    )
     energy, on_outer, on_inner, moment, opposite = np.split(found, [1, 4, 7, 10], axis=-1)
     forces, moments = (on_outer, on_inner), (moment, opposite)
     if swapped:

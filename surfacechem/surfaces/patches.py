@@ -29,13 +29,19 @@ from surfacechem.tolerances import NEGLIGIBLE
 STUCK, ENOUGH = 4.0, 2
 """A rule of a level above enough gains as much at least, or the patch is divided; enough are those below to tell."""
 
-MOST_POINTS = 100_000_000
-"""Pairs of points after which an accuracy is out of reach."""
+MOST_POINTS = 200_000_000
+"""Pairs of points, of one integral or of all over an approach, after which an accuracy is out of reach: minutes."""
+
+AT_ONCE = 10_000
+"""Pairs of points that take as long as any use of a rule, however few its points are."""
 
 WORTH = 8
 """Part of the most points, one over this, after which it is seen whether the error falls fast enough, since there were
 as many times fewer.
 """
+
+FIRST_FEW = 3
+"""Integrals of an approach that tell what all of them take: the nearest, and others that are farther."""
 
 TOGETHER = 400_000
 """Pairs of points that are looked at together."""
@@ -209,12 +215,33 @@ def _patches(
     return Patches(outer, np.tile(at, (len(low), 1)), np.tile(scale, (len(low), 1)), low, high, alike)
 
 
+class Budget:
+    """What integrals take together, at least so many of them, in pairs of points; InputError before it is too much."""
+
+    def __init__(self, rtol: float, integrals: int = 1) -> None:
+        """For an accuracy that messages name."""
+        self.rtol, self.integrals, self.done, self.spent = rtol, integrals, 0, 0.0
+
+    def whole(self, ahead: float) -> float:
+        """What all integrals take at least, where those that are done and the next one take so much."""
+        return ahead * max(1.0, self.integrals / max(self.done + 1, FIRST_FEW))
+
+    def refuse_beyond(self, ahead: float) -> None:
+        """InputError where that is too much."""
+        if self.whole(ahead) > MOST_POINTS:
+            text = f"the accuracy {self.rtol:.2g} of an integral over the surfaces is out of reach"
+            what = f"{self.integrals} of them take" if self.integrals > 1 else "it takes"
+            raise InputError(
+                f"{text}: {what} {self.whole(ahead):.1g} pairs of points; ask for less, or smaller surfaces."
+            )
+
+
 class Rules:
     """Values of an integrand over patches by rules of some orders; InputError before they take too long."""
 
-    def __init__(self, integrand: Integrand, rtol: float) -> None:
-        """For an accuracy that messages name."""
-        self.integrand, self.rtol, self.points = integrand, rtol, 0
+    def __init__(self, integrand: Integrand, budget: Budget) -> None:
+        """With what they may take."""
+        self.integrand, self.budget, self.points = integrand, budget, 0
 
     def __call__(self, patches: Patches, levels: Levels, inside: Levels) -> Array:
         """Integrals (n, ...) over each patch, with the order of its level, and with that of another one inside."""
@@ -226,12 +253,6 @@ class Rules:
             found |= dict(zip(where.tolist(), values, strict=True))
         return np.array([found[k] for k in range(len(levels))])
 
-    def refuse_beyond(self, ahead: float) -> None:
-        """InputError where so many pairs of points are too many."""
-        if ahead > MOST_POINTS:
-            text = f"the accuracy {self.rtol:.2g} of an integral over the surfaces is out of reach"
-            raise InputError(f"{text}: it takes {ahead:.1g} pairs of points; ask for less, or smaller surfaces.")
-
     def _of_order(self, patches: Patches, order: int, inside: int) -> Array:
         """The same by one rule."""
         found, begin, batch = [], 0, 1
@@ -242,8 +263,9 @@ class Rules:
             points += part.cost(order)
             found.append(np.einsum("nk...,nk->n...", values.reshape(*area.shape, *values.shape[1:]), area))
             self.points += points
+            self.budget.spent += points + AT_ONCE
             begin += batch
-            self.refuse_beyond(self.points + points / len(part) * (len(patches) - begin))
+            self.budget.refuse_beyond(self.budget.spent + points / len(part) * max(len(patches) - begin, 0))
             batch = max(1, TOGETHER * len(part) // points)
         return np.concatenate(found)
 
@@ -276,28 +298,28 @@ def integral(
     patches: Patches,
     integrand: Integrand,
     sizes: Callable[[Array], Array],
-    rtol: float,
+    left: float,
+    budget: Budget,
     nested: bool = True,
-    left: float | None = None,
 ) -> tuple[Array, float, int]:
-    """Integral over patches, its error relative to the ``sizes`` of the entries, and how many points it took; of the
-    accuracy asked for so much may be ``left`` to it.
+    """Integral over patches, its error relative to the ``sizes`` of the entries, no larger than what is ``left`` to it,
+    and how many points it took.
 
-    A ``nested`` integrand is a sum itself, with an error of its own. InputError where the accuracy is out of reach.
+    A ``nested`` integrand is a sum itself, with an error of its own. InputError where it takes more than its budget.
     """
-    left = rtol if left is None else left
-    rules, begin = Rules(integrand, rtol), np.full(len(patches), patches.fewest)
-    known, met = _started(rules, patches, begin, begin, nested), list[tuple[int, float]]()
+    rules, begin, before = Rules(integrand, budget), np.full(len(patches), patches.fewest), budget.spent
+    known, met = _started(rules, patches, begin, begin, nested), list[tuple[float, float]]()
     while True:
         whole = known.value.sum(axis=0)
         size = sizes(whole)
         over, within = _largest(known.over, size), _largest(known.within, size)
         error = float((over + within).sum())
         if error <= left:
+            budget.done += 1
             return whole, error, rules.points
-        met.append((rules.points, error))
-        if rules.points > MOST_POINTS / WORTH:
-            rules.refuse_beyond(_expected(met, left))
+        met.append((budget.spent - before, error))
+        if budget.whole(budget.spent) > MOST_POINTS / WORTH:
+            budget.refuse_beyond(before + _expected(met, left))
         rank = np.argsort(over + within)
         worst = np.zeros(len(over), dtype=bool)
         worst[rank[~(np.cumsum((over + within)[rank]) <= left / 2)]] = True
@@ -318,12 +340,12 @@ def integral(
             known = known.but(halved, _started(rules, halves, np.tile(start, times), np.tile(inside, times), nested))
 
 
-def _expected(met: Sequence[tuple[int, float]], rtol: float) -> float:
+def _expected(met: Sequence[tuple[float, float]], rtol: float) -> float:
     """Points at which the error is that asked for, if it goes on to fall with the power of them with which it did."""
     points, error = met[-1]
     fewer, before = next(item for item in met[::-1] if item[0] <= points / WORTH or item is met[0])
     gain, more = math.log(max(before / error, 1.0)), math.log(points / fewer) if points > fewer else 1.0
-    return points * (error / rtol) ** (more / gain) if gain > NEGLIGIBLE else float(points)
+    return points * (error / rtol) ** (more / gain) if gain > NEGLIGIBLE else points
 
 
 def _started(rules: Rules, patches: Patches, level: Levels, inside: Levels, nested: bool) -> Known:

@@ -6,6 +6,7 @@ that is per area elsewhere is that of the whole pair: N for Pa, J for J/m^2, kg 
 
 from __future__ import annotations
 
+import logging
 import math
 import threading
 import time
@@ -22,14 +23,17 @@ from surfacechem.contracts.terms import HeatTransfer, Law, PairEnergy, Potential
 from surfacechem.documents.cache_folder import Fingerprint, fingerprint, kept
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, derivative
-from surfacechem.surfaces.approach import ApproachEnergy, fitted, straight
+from surfacechem.surfaces.approach import ApproachEnergy, fewest_samples, fitted, straight
 from surfacechem.surfaces.curved_gap import GAP, Contact, bends, between_flats, density, over_gap
 from surfacechem.surfaces.pairwise import PairForces, interaction, kernel, length, pair_traction
+from surfacechem.surfaces.patches import Budget
 from surfacechem.surfaces.projection import Array, Surface
 from surfacechem.tolerances import ATOM, FLOOR, NEGLIGIBLE, NOISE, ROUNDING, SQRT_EPS
 
 KNOWN: dict[Fingerprint, tuple[tuple[ApproachEnergy, ...], ApproachEnergy | None]] = {}
 """Curves that have been integrated, by what they are the curves of."""
+
+log = logging.getLogger(__name__)
 
 PACKAGE = Path(__file__).parents[1]
 CODE = [*(path for room in ("surfaces", "laws", "contracts") for path in sorted((PACKAGE / room).glob("*.py")))]
@@ -108,6 +112,13 @@ class CurvedSurfaces(Potential):
         own = [{name: values[path] for name, path in each.items() if path in values} for each in paths]
         return replace(self, pairs=tuple(law.given(each) for law, each in zip(self.pairs, own, strict=True)))
 
+    def thinned(self, stretch: float) -> Self:
+        """The same where the area has grown by a stretch since densities were what is given; shapes are as given."""
+        if stretch == 1:
+            return self
+        own = [{name: getattr(law, name) / stretch for name in ("n_1", "n_2")} for law in self.pairs]
+        return replace(self, pairs=tuple(law.given(each) for law, each in zip(self.pairs, own, strict=True)))
+
     def surfaces(self, d: float) -> tuple[Surface, Surface]:
         """The two surfaces at an approach [m]."""
         return Surface(self.shapes[0]), Surface(self.shapes[1], True, d)
@@ -172,6 +183,7 @@ class CurvedSurfaces(Potential):
         if mark not in KNOWN:
             with integrating():
                 found = kept(mark, CODE, lambda: [curve.numbers for curve in self.integrated(parts)])
+            log.info("running")
             curves = tuple(map(ApproachEnergy.of, found))
             KNOWN[mark] = curves[: len(parts)], next(iter(curves[len(parts) :]), None)
         return KNOWN[mark]
@@ -183,10 +195,11 @@ class CurvedSurfaces(Potential):
         rtol, finer = self.accuracy, max(self.accuracy / 64, ROUNDING)
 
         met: dict[float, PairForces] = {}
+        budget = Budget(rtol, fewest_samples(*self.approach, rtol))
 
         def of_pairs(k: int, d: float) -> tuple[float, float, float]:
             if d not in met:
-                met[d] = self.at_approach(d, lambda: interaction(*self.surfaces(d), parts, finer))
+                met[d] = self.at_approach(d, lambda: interaction(*self.surfaces(d), parts, finer, budget))
             return float(met[d].energy[k]), float(met[d].force_1[k, 2]), met[d].error
 
         ends = [law.cutoff for law in parts if math.isfinite(law.cutoff)]
@@ -200,10 +213,11 @@ class CurvedSurfaces(Potential):
             return found
         laws, levels = [density(law) for law in self.gap_laws], bends(self.gap_laws)
 
-        floor = 0.0, 0.0
+        floor, spent = (0.0, 0.0), Budget(rtol, fewest_samples(*self.approach, rtol, levels))
 
         def of_gap(d: float) -> tuple[float, float, float]:
-            contact = self.at_approach(d, lambda: over_gap(*self.surfaces(d), laws, levels, rtol=finer, floor=floor))
+            pair = self.surfaces(d)
+            contact = self.at_approach(d, lambda: over_gap(*pair, laws, levels, (), finer, floor, spent))
             return contact.energy, float(contact.force_1[2]), contact.error
 
         # Where bodies just touch, or a law has faded, the force is that of rounding; what counts is that in the range.
@@ -253,8 +267,8 @@ class CurvedSurfaces(Potential):
         levels = bends((*self.gap_laws, *self.heat_laws))
         return over_gap(*self.surfaces(d), self._local(pairs), levels, heat, self.accuracy, self._floor)
 
-    def totals(self, approaches: Array) -> Array:
-        """What is told of each approach, shape (8, n).
+    def totals(self, approaches: Array, stretches: Array) -> Array:
+        """What is told of each approach at its stretch of the area, shape (8, n).
 
         Force on body 1 [N], its moments about x and y [N m], force of the local law [N], least gap [m], number of
         places that are as near, area of contact [m^2], conductance [W/K].
@@ -262,15 +276,17 @@ class CurvedSurfaces(Potential):
 
         def found() -> list[list[float]]:
             rows = []
-            for d in map(float, approaches):
-                (force, moment), local = self.forces(d), self.contact(d)
+            for number, (d, stretch) in enumerate(zip(approaches.tolist(), stretches.tolist(), strict=True)):
+                log.info("forces at output times", extra={"done": number, "total": len(approaches)})
+                own = self.thinned(stretch)
+                (force, moment), local = own.forces(d), own.contact(d)
                 ours = [force[2], *moment[:2], local.force_1[2], local.gap, local.places, local.area, local.conductance]
                 rows.append([float(x) for x in ours])
             return rows
 
         laws = self.pairs, self.gap_laws, self.heat_laws
         return np.transpose(
-            kept(fingerprint(self.shapes, *laws, self.accuracy, self.approach, approaches), CODE, found)
+            kept(fingerprint(self.shapes, *laws, self.accuracy, self.approach, approaches, stretches), CODE, found)
         )
 
     @cached_property

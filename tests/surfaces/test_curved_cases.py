@@ -1,6 +1,7 @@
 """Cases with surfaces: every gap model against an independent integration, units of a pair of bodies, bad input."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -19,7 +20,7 @@ from surfacechem.model.system import STAND_IN
 from surfacechem.references.scene_view import SceneView
 from surfacechem.results.matching import match
 from surfacechem.runs.summaries import run_summary
-from surfacechem.surfaces import potential
+from surfacechem.surfaces import patches, potential
 from surfacechem.surfaces.approach import fitted
 from surfacechem.surfaces.pair_laws import InversePower
 from surfacechem.surfaces.pairwise import interaction
@@ -59,6 +60,7 @@ def data(tmp_path, text):
     return surfacechem.run(path).dataset
 
 
+RAMP = "loading: {F_n: {ramp: {start: -1 nN, rate: 1.5 mN/s}}}\n"
 MOVED = "loading: {g_n: {ramp: {start: 5 nm, rate: -4 mm/s}}}\n"
 
 
@@ -118,6 +120,54 @@ def test_a_mass_or_a_damper_moves_as_integrated_by_itself(tmp_path, m, c):
     exact = solve_ivp(scaled, (0, 1), start, "DOP853", found.time.values * 1e6, rtol=1e-13, atol=1e-13).y[0]
     assert found.g_n.values == pytest.approx(exact * 1e-9, rel=1e-8)
     assert found.attrs["energy_error"] < 1e-9
+
+
+WALL = SCENE.replace("from: 0.4 nm", "from: 0.12 nm")
+
+
+def test_a_dead_load_holds_a_sphere_where_the_force_is_its_own(tmp_path, monkeypatch):
+    monkeypatch.setitem(globals(), "SCENE", WALL)
+    found = data(tmp_path, f"{RAMP}initial: {{T: 300 K, g_n: 0.15 nm}}\n" + RUN)
+    for pull, g in zip(found.F_n.values[::5], found.g_n.values[::5], strict=True):
+        exact = brentq(lambda x, pull=pull: pull - force(x), 1.2e-10, 2e-10, xtol=1e-22, rtol=1e-14)
+        assert g == pytest.approx(exact, rel=1e-8)
+
+
+@pytest.mark.parametrize(("m", "c"), [(2e-15, 0.0), (0.0, 1e-6)])
+def test_a_dead_load_moves_a_sphere_as_integrated_by_itself(tmp_path, monkeypatch, m, c):
+    monkeypatch.setitem(globals(), "SCENE", WALL)
+    holds = "m: 2e-15 kg" if m else "c_g: 1e-6 N s/m"
+    text = f"mechanics: {{normal: {{{holds}}}}}\nloading: {{F_n: 1 nN}}\ninitial: {{T: 300 K, g_n: 0.25 nm}}\n"
+    found = data(tmp_path, text + RUN)
+
+    # In nm and us.
+    def scaled(t, y):
+        pull = 1e-9 - force(y[0] * 1e-9)
+        return [y[1], pull / m * 1e-3] if m else [pull / c * 1e3]
+
+    start = [0.25, 0.0] if m else [0.25]
+    exact = solve_ivp(scaled, (0, 1), start, "DOP853", found.time.values * 1e6, rtol=1e-13, atol=1e-13).y[0]
+    assert found.g_n.values == pytest.approx(exact * 1e-9, rel=1e-8)
+    assert found.attrs["energy_error"] < 1e-9
+
+
+def test_densities_thin_out_as_the_area_grows(tmp_path):
+    """What is given is per reference area: of both bodies, so that the force falls with the square of the stretch."""
+    table = "J_c: {table: {times: [0 s, 1 us], values: [1, 1.5]}}"
+    found = data(tmp_path, f"loading: {{g_n: 1 nm, {table}}}\n" + START + RUN)
+    stretch = np.linspace(1, 1.5, 41)
+    assert found.t_n.values == pytest.approx(force(1e-9) / stretch**2, rel=1e-8)
+    assert found.force.values == pytest.approx(found.t_n.values[::5], rel=1e-8)
+    assert found.traction[-1].values * 1.5**2 == pytest.approx(found.traction[0].values, rel=1e-8)
+    assert found.energy_residual.values == pytest.approx(0, abs=1e-9 * abs(LAW.energy(1e-9)))
+
+
+def test_a_stretch_of_the_area_is_refused_where_laws_of_the_gap_have_no_densities_to_thin_out(tmp_path):
+    path = tmp_path / "case.yaml"
+    text = SCENE.replace("  pair:", "  laws: [penalty: {E_n: 1 Pa/m}]\n  pair:")
+    path.write_text(text + "loading: {g_n: 1 nm, J_c: 1.2}\n" + START + RUN)
+    with pytest.raises(InputError, match=r"case.yaml:\d+: .*`laws` are those of the area as it is"):
+        surfacechem.run(path)
 
 
 def test_other_numbers_of_the_pair_can_be_swept_and_change_the_force(tmp_path):
@@ -284,6 +334,23 @@ def test_powers_that_change_are_followed_near_the_least_approach():
     assert curve.error < 1e-6
     for d in (1.5e-12, 1e-11, 1e-6, 1e-3):
         assert curve.energy(d) == pytest.approx(samples(d)[0], rel=1e-7)
+
+
+def test_an_accuracy_is_refused_by_what_all_integrals_of_the_approach_take_and_each_is_told(monkeypatch, caplog):
+    """By far enough for one of them; the first few say how many times more all will take."""
+    law = InversePower(n_1=1.0, n_2=1.0, psi_0=-1.0, r_0=1.0, m=6)
+    pair = CurvedSurfaces(shapes=(Sphere(R=1.0), Plane()), pairs=[law], approach=(0.1, 1.0), accuracy=1e-6)
+    pair = replace(pair, place=Place(path="surface"))
+    with caplog.at_level("INFO", logger="surfacechem"):
+        assert pair.integrated([law])[0].error <= 1e-6
+    told = [record for record in caplog.records if "integral over the surfaces" in record.message]
+    assert [record.done for record in told] == list(range(len(told)))
+    assert all(record.done < record.total for record in told)
+    budget = patches.Budget(1e-6)
+    interaction(*pair.surfaces(0.1), [law], 1e-6 / 64, budget)
+    monkeypatch.setattr(patches, "MOST_POINTS", 2 * budget.spent)
+    with pytest.raises(InputError, match=r"accuracy 1e-06 of an integral .* out of reach: \d+ of them take"):
+        pair.integrated([law])
 
 
 class FourAndSix(InversePower):

@@ -18,8 +18,9 @@ from surfacechem.laws.longrange import LennardJonesSpherePlane
 from surfacechem.quantities import BOLTZMANN
 from surfacechem.surfaces import nodes, patches
 from surfacechem.surfaces.curved_gap import between_flats, density, over_gap
+from surfacechem.surfaces.inner_sums import inner_sums
 from surfacechem.surfaces.pair_laws import InversePower, LennardJonesPair, PairTable, PenaltyPair
-from surfacechem.surfaces.pairwise import interaction
+from surfacechem.surfaces.pairwise import interaction, kernel
 from surfacechem.surfaces.projection import Surface
 from surfacechem.surfaces.shapes import Cap, Cavity, Cone, Cylinder, Disc, Paraboloid, Plane, Sphere, Torus
 
@@ -85,6 +86,25 @@ def test_a_sphere_in_a_cavity_is_a_closed_form_whichever_is_the_first(m):
     exact = float(spheres(hollow - R - d, R, hollow, m))
     for bodies in ((Sphere(R=R), Cavity(R=hollow)), (Cavity(R=hollow), Sphere(R=R))):
         assert pair(*bodies, d, [power(m)]).energy[0] == pytest.approx(exact, rel=1e-10)
+
+
+@pytest.mark.parametrize(("lower", "upper"), [(Sphere(R=1.0), Sphere(R=2.0)), (Sphere(R=1.0), Torus(hole=1.0, r=0.5))])
+def test_both_half_passes_have_one_energy_and_opposite_forces_where_densities_differ(lower, upper):
+    """Each sums over its own surface what it feels of the other, by a rule that is no part of the program."""
+    law, bodies = power(6), (Surface(lower), Surface(upper, True, 0.5))
+    whole, halves = pair(lower, upper, 0.5, [law]), []
+    x, w = np.polynomial.legendre.leggauss(60)
+    for own, other in (bodies, bodies[::-1]):
+        (low, high), _ = own.shape.span
+        u = (low + high) / 2 + (high - low) / 2 * x
+        points, vectors = own.elements(np.stack([u, np.zeros_like(u)], axis=-1))
+        area = math.pi * (high - low) * w * np.linalg.norm(vectors, axis=-1)
+        ((energy, push, _),), _ = inner_sums(other, points, [law], [kernel(law)], nodes.LAST, 1e-12)
+        halves.append((law.n_1 * law.n_2 * area @ energy, law.n_1 * law.n_2 * area @ push[:, 2]))
+    (energy, force), (same, opposite) = halves
+    assert energy == pytest.approx(same, rel=1e-10)
+    assert force == pytest.approx(-opposite, rel=1e-10)
+    assert (energy, force) == pytest.approx((whole.energy[0], whole.force_1[0, 2]), rel=1e-9)
 
 
 def test_a_sphere_over_a_plane_is_the_law_that_is_there():
