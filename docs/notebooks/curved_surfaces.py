@@ -83,7 +83,7 @@ for name, (shapes, radius) in pairs.items():
     right.loglog(gaps, off[:, 1], ":", color=line.get_color())
     print(f"{name:20s} at {gaps[0]:g} R: local law off by {off[0, 0]:.1e}, Derjaguin by {off[0, 1]:.1e}, slopes", slope)
     assert off[0, 1] < 0.01
-right.loglog(gaps, gaps, color="0.7", linewidth=0.8)
+right.loglog(gaps, gaps, color="0.7", linewidth=0.8, label="gap / radius")
 right.set(xlabel="gap / radius", ylabel="difference to the integral", title="Local law, and Derjaguin dotted")
 right.legend()
 figure
