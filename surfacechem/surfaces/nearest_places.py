@@ -66,6 +66,9 @@ def near_places(
     gaps = _near_grid(lambda nodes: _gaps(outer, inner, parameters(nodes)), steps, halvings, extents, wide)
     chosen = _lowest(gaps, outer.shape.closed, NOISE * size)
     chosen = chosen[gaps[tuple(chosen.T)] <= gaps.min() + wide]
+    if outer.shape.about_axis and low[0] == 0 and not alike[1] and np.any(chosen[:, 0] == 0):
+        # At a pole no direction leads anywhere: the search begins beside it, where the gap is least.
+        chosen = np.concatenate([chosen, [[1, int(np.argmin(gaps[1]))]]])
     at = _settled(
         outer, inner, parameters(chosen), np.where(alike, 0.0, (high - low) / steps), extents.max(), NOISE * size
     )

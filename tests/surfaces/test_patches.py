@@ -103,3 +103,12 @@ def test_where_nothing_is_symmetric_the_area_of_contact_is_exact_too():
     assert found.gap == pytest.approx(-depth, rel=1e-13)
     assert found.area == pytest.approx(2 * math.pi * R * depth, rel=1e-6)
     assert -found.force_1[2] == pytest.approx(math.pi * R * depth**2, rel=1e-6)
+
+
+def test_a_place_beside_the_pole_of_a_sphere_is_found():
+    """A plane tilted by less than a step of the grid is nearest where its normal points, not at the pole."""
+    overlap, R, tilt = 1e-6, 1.0, -0.02
+    upper = Surface(Plane(tilt=tilt), True, (R - overlap) / math.cos(tilt) - R)
+    found = over_gap(Surface(Sphere(R=R)), upper, STIFF, rtol=1e-6)
+    assert found.gap == pytest.approx(-overlap, rel=1e-8)
+    assert np.linalg.norm(found.force_1) == pytest.approx(math.pi * R * overlap**2, rel=1e-6)
