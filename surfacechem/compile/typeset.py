@@ -55,6 +55,9 @@ COMBINATIONS = 12
 LONG = 300
 """Letters of LaTeX that do not fit into a line."""
 
+WIDE = 220
+"""Letters of LaTeX of a term that do not fit into the line of a phone."""
+
 SIMPLE = 40
 """Operations of an expression up to which SymPy looks for a shorter form of it."""
 
@@ -102,8 +105,21 @@ def equations(system: System) -> tuple[list[Equation], dict[str, str]]:
 def lines(system: System) -> list[Statement]:
     """Every equation of a scene that a reader needs: the balances, then what they read."""
     levels = _levels(system)
-    named = [Named(item.quantity, _plain(item)) for item in system.named if item.expression not in levels]
-    rows = [line for name, row in system.rows.items() for line in _balance(system, name, row)]
+    loads = {role.variable for role in system.roles if role.role == "prescribed"}
+    # What is given stands by its name wherever another quantity holds its formula.
+    given = {
+        item.expression: symengine.Symbol(item.name)
+        for item in system.named
+        if item.name in loads and isinstance(item.expression, symengine.Add)
+    }
+    named = [
+        Named(
+            item.quantity, _plain(Named(item.quantity, item.expression.xreplace({} if item.name in loads else given)))
+        )
+        for item in system.named
+        if item.expression not in levels
+    ]
+    rows = [line for name, row in system.rows.items() for line in _balance(system, name, row.xreplace(given))]
     read = needed(named, [line.right for line in rows])
     return [*rows, *(line for item in reversed(read) for line in _definition(system, item))]
 
@@ -310,9 +326,35 @@ class Paper(Latex):
         # A minus before a sum, and a product that is too long for a line, are those of each term.
         if right.as_coeff_Mul()[1].is_Add or len(self.text(right)) > LONG:
             right = sympy.expand_mul(right, deep=False)
-        terms = [self.text(term) for term in self._as_ordered_terms(right)]
-        signed = [term if term.startswith("-") else f"+ {term}" for term in terms[1:]]
-        return Equation(self.text(line.left), [f"= {terms[0]}", *signed], line.text, line.when)
+        left, pieces = self._broken_product(sympy_form(line.left)), self._broken_sum(right)
+        return Equation(left[0], [*left[1:], f"= {pieces[0]}", *pieces[1:]], line.text, line.when)
+
+    def _broken_sum(self, expression: Any) -> list[str]:
+        """A sum in pieces that begin with the signs of its terms."""
+        pieces: list[str] = []
+        for term in self._as_ordered_terms(expression):
+            first, *rest = self._broken_product(term)
+            pieces += [first if first.startswith("-") or not pieces else f"+ {first}", *rest]
+        return pieces
+
+    def _broken_product(self, term: Any) -> list[str]:
+        """A term in one piece; one that is long in its factors, and those of them that are sums in their terms."""
+        if len(self.text(term)) <= WIDE or not term.is_Mul:
+            return [self.text(term)]
+        factors = term.as_ordered_factors()
+        large = [factor for factor in factors if len(self.text(factor)) > WIDE / 4]
+        rest = sympy.Mul(*(factor for factor in factors if factor not in large))
+        # What is divided by stands last.
+        large.sort(key=lambda factor: bool((1 / factor).is_Add))
+        pieces = ["-" if rest == -1 else self.text(rest)]
+        for factor in large:
+            pieces += self._bracketed(1 / factor, "/ (") if (1 / factor).is_Add else self._bracketed(factor, "(")
+        return pieces[rest == 1 and not (1 / large[0]).is_Add :]
+
+    def _bracketed(self, factor: Any, opened: str) -> list[str]:
+        """A factor; one that is a sum in its terms, between brackets."""
+        first, *more = self._broken_sum(factor) if factor.is_Add else [self.text(factor)]
+        return [f"{opened}{first}", *more[:-1], f"{more[-1]})"] if more else [first]
 
     def _as_ordered_terms(self, expr: Any, order: Any = None) -> list[Any]:
         terms = super()._as_ordered_terms(expr, order)

@@ -9,8 +9,9 @@ import pytest
 from sampling import every
 
 import surfacechem
+from surfacechem.compile.typeset import equations
 from surfacechem.errors import InputError
-from surfacechem.studies import run_report
+from surfacechem.studies import mathml, run_report
 
 BROWSER = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 PHONE = 390
@@ -66,6 +67,17 @@ def test_nothing_overflows_on_a_phone_or_in_print(report, tmp_path):
         subprocess.run([*waiting, option, str(report)], capture_output=True, check=True, timeout=120)
     assert shot.read_bytes().startswith(b"\x89PNG")
     assert print_out.read_bytes().startswith(b"%PDF")
+
+
+@pytest.mark.parametrize("name", ["compliant-debonding", "snap-in"])
+def test_long_equations_fit_into_the_lines_of_a_phone(name):
+    """In its smallest letters, of 8 px, a piece between which a line may break has 44 em."""
+    lines = equations(surfacechem.load(name).case.system())[0]
+    for line in lines:
+        widths = re.findall(r"--w:(\d+)", mathml.equation(line))
+        assert max(map(int, widths)) <= 44, line.text
+        text = " ".join([line.left, *line.pieces])
+        assert text.count("(") == text.count(")")
 
 
 def test_a_report_of_events_lists_them_with_verdicts(tmp_path):
