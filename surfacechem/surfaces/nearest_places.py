@@ -27,6 +27,10 @@ TOGETHER = 100_000
 """Places that are looked at together."""
 
 
+STEEPEST = math.atan(1e3)
+"""Turn [rad] beyond which nearest places of surfaces without end are not sought farther out: a choice."""
+
+
 @dataclass(frozen=True)
 class NearPlaces:
     """Parameters (k, 2) of the places of a surface that are nearest to the other, and the gaps there [m]; the nearest
@@ -47,10 +51,12 @@ def near_places(
 ) -> NearPlaces:
     """Places of one surface that are nearer to the other than those around them.
 
-    They are sought near the origin within ``size`` [m] where a surface has no end. Those that are farther than the
+    Where a surface has no end they are sought near the origin, within ``size`` [m] and as much farther as one that is
+    turned is nearest to what rises like a square. Those that are farther than the
     nearest by more than a grain count for nothing of their own. InputError where there are too many to look at.
     """
-    low, high = np.nan_to_num(np.transpose(outer.shape.span), posinf=size, neginf=-size)
+    sought = size * (1 + math.tan(min(abs(outer.shape.tilt) + abs(inner.shape.tilt), STEEPEST)))
+    low, high = np.nan_to_num(np.transpose(outer.shape.span), posinf=sought, neginf=-sought)
     extents = _extents(outer, low, high)
     wide = min(grain, extents.max() / COARSE * PER_GRAIN)
     halvings = max(0, math.ceil(math.log2(PER_GRAIN * extents.max() / grain / COARSE))) if grain < math.inf else 0

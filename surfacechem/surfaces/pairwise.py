@@ -202,6 +202,8 @@ def _reach(lower: Surface, upper: Surface, extent: Extent, rtol: float) -> float
         return float(size * (rtol * LEFT_OUT) ** (-1 / power))
     # At the distance u two without end are u^p apart, and flats there have u^(p (2 - m)) of a power m, on u du.
     drop = max(-surface.shape.point(size, 0.0)[2] for surface in (lower, upper) if surface.shape.rises == rises)
+    if rises == 1:  # to the side to which they are turned, two that rise alike stay closer
+        drop = max(drop - size * math.tan(sum(abs(shape.tilt) for shape in shapes)), TINY)
     return float(size * max(1.0, size / drop) ** (1 / rises) * (rtol * LEFT_OUT) ** (-1 / (rises * power - 2)))
 
 

@@ -163,10 +163,15 @@ def outer_patches(outer: Surface, inner: Surface, size: float, reach: float) -> 
     tangents = outer.derivatives(near.at, FIRST)[1:]
     lengths = np.maximum(np.linalg.norm(tangents, axis=-1).T, POLE)
     first, low, high = near.at[0], *np.transpose(outer.shape.span)
-    # Bodies that are far apart see each other from as far.
-    far = reach * max(1.0, float(near.gap[0]) / size) / lengths[0]
+    # Bodies that are far apart see each other from as far. A parameter without end is a distance from the axis or along
+    # it, and where a surface is steep it is as much flatter: the root of its radius grows like the length of a step.
+    endless = np.isinf(low) | np.isinf(high)
+    far = reach * max(1.0, float(near.gap[0]) / size) * np.where(endless, lengths[0], 1 / lengths[0])
     closed = np.array(outer.shape.closed)
-    low, high = (np.where(closed, first + s * math.pi, np.clip(e, -far, far)) for s, e in ((-1, low), (1, high)))
+    low, high = (
+        np.where(closed, first + s * math.pi, np.clip(e, np.minimum(first, 0.0) - far, np.maximum(first, 0.0) + far))
+        for s, e in ((-1, low), (1, high))
+    )
     at = np.where(closed, first + np.remainder(near.at - first + math.pi, 2 * math.pi) - math.pi, near.at)
     at = np.clip(at, low, high)
     scales = np.maximum(np.abs(near.gap), size * SHALLOWEST)[:, None] / lengths

@@ -169,8 +169,11 @@ class Surface:
             rival = self.derivatives(places, FIRST)[0]
             near = np.linalg.norm(x - rival, axis=-1) <= size * (1 + SAME)
             tied |= near & (np.linalg.norm(rival - D[0], axis=-1) > np.sqrt(SAME) * size)
-        gap = np.where(side < 0, -size, size)
-        off = (self._at_edge(at) & (size > 0))[..., None]
+        # Behind an edge and beyond it is beside the body, not in it.
+        beyond = np.linalg.norm(away - side[..., None] * normal, axis=-1) > np.sqrt(SAME) * size
+        at_edge = self._at_edge(at) & (size > 0)
+        gap = np.where((side < 0) & ~(at_edge & beyond), -size, size)
+        off = at_edge[..., None]
         direction = np.where(off, np.divide(away, gap[..., None], out=np.zeros_like(away), where=off), normal)
         return Projection(at, D[0], normal, direction, gap, tied)
 

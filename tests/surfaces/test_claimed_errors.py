@@ -13,10 +13,12 @@ import pytest
 from sampling import every
 from scipy.interpolate import PchipInterpolator
 
+from surfacechem.laws.contact import Penalty
+from surfacechem.surfaces.curved_gap import density, over_gap
 from surfacechem.surfaces.pair_laws import InversePower, LennardJonesPair, PairTable, PenaltyPair
 from surfacechem.surfaces.pairwise import interaction
 from surfacechem.surfaces.projection import Surface
-from surfacechem.surfaces.shapes import Cavity, Cylinder, Disc, Plane, Sphere
+from surfacechem.surfaces.shapes import Cap, Cavity, Cone, Cylinder, Disc, Paraboloid, Plane, Sphere
 
 DENSITIES = {"n_1": 1.0, "n_2": 1.0}
 R, PSI = [0.1, 0.4, 0.5, 0.9, 1.2], [8.0, 1.0, -1.0, -0.5, 0.0]
@@ -145,3 +147,28 @@ def test_no_error_is_larger_than_claimed_where_the_inner_surface_is_cut_too(lowe
         assert abs(found.energy[0] - energy) <= found.error * size
         assert found.error <= rtol
         assert np.abs(found.force_1 + found.force_2).max() <= 1e-13 * abs(found.force_1[0, 2])
+
+
+@pytest.mark.parametrize(
+    ("lower", "tilt", "d", "gap"),
+    [
+        *((Paraboloid(R=1.0), tilt, math.tan(tilt) ** 2 / 2 + 0.1 / math.cos(tilt), 0.1) for tilt in (1.3, 1.45)),
+        (Cone(slope=0.3), 0.29, 0.1, 0.1 * math.cos(0.29)),
+    ],
+)
+def test_surfaces_without_end_that_are_turned_are_nearest_and_end_farther_out(lower, tilt, d, gap):
+    law = InversePower(n_1=1.0, n_2=1.0, psi_0=-1.0, r_0=1.0, m=6.0)
+    rough, fine = (
+        interaction(Surface(lower), Surface(Plane(tilt=tilt), True, d), [law], rtol) for rtol in (1e-3, 1e-7)
+    )
+    assert fine.gap == pytest.approx(gap, rel=1e-9)
+    assert rough.energy == pytest.approx(fine.energy, rel=rough.error)
+
+
+def test_what_is_behind_a_surface_and_beyond_its_edge_is_not_in_the_body():
+    """A cap in a wide cavity touches nothing; a plate pressed into a plane is borne by its area."""
+    penalty = [density(Penalty(E_n=1.0))]
+    clear = over_gap(Surface(Cavity(R=10.0)), Surface(Cap(R=2.0, angle=0.5), True, 1.0), penalty, rtol=1e-3)
+    assert (clear.energy, clear.area, clear.gap) == (0.0, 0.0, pytest.approx(1.0))
+    pressed = over_gap(Surface(Plane()), Surface(Disc(radius=1.0), True, -0.01), penalty, rtol=1e-4)
+    assert pressed.force_1[2] == pytest.approx(-0.01 * math.pi, rel=1e-4)
