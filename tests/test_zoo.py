@@ -183,7 +183,9 @@ def test_explicit_steps_serve_a_case_as_well(name):
     simulation = load(name)
     solution = simulation.run(run=replace(simulation.case.run, solver="dop853", accuracy=None))
     assert solution.status == ("stopped" if name in STOPPED else "finished")
-    assert solution.accuracy.error < FOLDS.get(name, 1e-8 if simulation.case.reference else 1e-7)
+    # A force that grows without end shows a millionth of the run before it what its time errs by, 1e-13, as 1e-7.
+    known = simulation.case.reference and name not in STOPPED
+    assert solution.accuracy.error < FOLDS.get(name, 1e-8 if known else 1e-7)
     assert solution.audit.energy_error < 1e-9
     assert solution.audit.violations == ()
 
