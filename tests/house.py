@@ -11,11 +11,9 @@ figure is a hint where to look; moving lines about to satisfy it helps nobody.
 """
 
 import ast
-import io
 import re
 import statistics
 import sys
-import tokenize
 import tomllib
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator
@@ -44,7 +42,7 @@ TABLES = {"tolerances", "tables", "radau_tables", "quantities", "units"}
 
 PROSE = re.compile(r"#\s*(?!type:|noqa|pragma|fmt:)")
 
-UNCOUNTED = (tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT, tokenize.ENDMARKER)
+STRING = re.compile(r"""'(?:[^'\\]|\\.)*'|"(?:[^"\\]|\\.)*\"""")
 
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 
@@ -92,25 +90,32 @@ class Module:
         return f"{self.place}:{node.lineno} {name}".rstrip()
 
     @cached_property
-    def tokens(self) -> list[tokenize.TokenInfo]:
-        return list(tokenize.generate_tokens(io.StringIO(self.text).readline))
+    def lines(self) -> dict[int, str]:
+        """Lines by their numbers, without those of strings that go over several lines."""
+        return {n: line for n, line in enumerate(self.text.splitlines(), 1) if n not in self.long_strings}
 
     @cached_property
     def code(self) -> set[int]:
         """Lines with code; docstrings are none."""
-        counted = (t for t in self.tokens if t.type not in (*UNCOUNTED, tokenize.COMMENT))
-        return {line for t in counted for line in range(t.start[0], t.end[0] + 1)} - self.docstrings
+        told = {n for n, line in self.lines.items() if line.strip() and not line.lstrip().startswith("#")}
+        return (told | self.long_strings) - self.docstrings
+
+    @cached_property
+    def long_strings(self) -> set[int]:
+        strings = (n for n in self.nodes if isinstance(n, ast.JoinedStr) or _is_text(n))
+        return {line for n in strings if n.end_lineno != n.lineno for line in _lines(n)}
 
     @cached_property
     def docstrings(self) -> set[int]:
         """Lines of strings that stand by themselves."""
-        alone = (node for node in self.nodes if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant))
-        strings = (node for node in alone if isinstance(node.value.value, str))
-        return {line for node in strings for line in range(node.lineno, (node.end_lineno or 0) + 1)}
+        alone = (n.value for n in self.nodes if isinstance(n, ast.Expr) and _is_text(n.value))
+        return {line for node in alone for line in _lines(node)}
 
     @property
     def comments(self) -> int:
-        return sum(t.type == tokenize.COMMENT and bool(PROSE.match(t.string)) for t in self.tokens)
+        """Comments; what is within the quotation marks of a line is none."""
+        rests = (STRING.sub("", line) for line in self.lines.values() if "#" in line)
+        return sum(bool(PROSE.search(rest)) for rest in rests)
 
     @cached_property
     def functions(self) -> list[Function]:
@@ -126,6 +131,14 @@ class Module:
             return []
         numbers = (n for n in self.nodes if isinstance(n, ast.Constant) and isinstance(n.value, float))
         return [node for node in numbers if 0 < abs(node.value) < SMALL]
+
+
+def _is_text(node: ast.AST) -> bool:
+    return isinstance(node, ast.Constant) and isinstance(node.value, str)
+
+
+def _lines(node: ast.AST) -> range:
+    return range(node.lineno, node.end_lineno + 1)
 
 
 def modules(folder: Path) -> list[Module]:

@@ -193,30 +193,36 @@ PLACES = {
 }
 
 
-@pytest.mark.parametrize("name", PLACES)
-def test_places(name, tmp_path):
-    place = PLACES[name]
-    assert len(place.added) == 1
+TOGETHER = (("a law", "a rate type", "an exact solution", "an output", "a solver"), ("a component", "a constraint"))
+"""Additions that do not meet in a case share a copy of the package."""
+
+
+@pytest.mark.parametrize("names", TOGETHER)
+def test_places(names, tmp_path):
     for folder in ("surfacechem", "mechanisms"):
-        shutil.copytree(ROOT / folder, tmp_path / folder, ignore=shutil.ignore_patterns("*.pyc.*"))
-    for file, (anchor, text) in place.added.items():
+        shutil.copytree(ROOT / folder, tmp_path / folder, ignore=shutil.ignore_patterns("__pycache__"))
+    (tmp_path / "bond.yaml").write_text(BOND, encoding="utf-8")
+    for place in map(PLACES.get, names):
+        ((file, (anchor, text)),) = place.added.items()
         path = tmp_path / "surfacechem" / file
         before = path.read_text(encoding="utf-8") if path.exists() else ""
         assert anchor in before
         path.write_text(before.replace(anchor, anchor + text, 1) if anchor else before + text, encoding="utf-8")
-    case = CASE
-    for old, new in place.case.items():
-        assert old in case
-        case = case.replace(old, new)
-    (tmp_path / "case.yaml").write_text(case, encoding="utf-8")
-    (tmp_path / "bond.yaml").write_text(BOND, encoding="utf-8")
-    environment = os.environ | {"PYTHONPATH": str(tmp_path)}
-    process = [sys.executable, "-c", place.script]
+    script = ""
+    for number, place in enumerate(map(PLACES.get, names)):
+        case = CASE
+        for old, new in place.case.items():
+            assert old in case
+            case = case.replace(old, new)
+        (tmp_path / f"case{number}.yaml").write_text(case, encoding="utf-8")
+        script += place.script.replace("case.yaml", f"case{number}.yaml")
+    process, environment = [sys.executable, "-c", script], os.environ | {"PYTHONPATH": str(tmp_path)}
     done = subprocess.run(process, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    found = json.loads(done.stdout)
-    for key, expected in place.expected.items():
-        if isinstance(expected, str):
-            assert expected in found[key]
-        else:
-            assert found[key] == pytest.approx(expected, rel=1e-6), found
+    for name, line in zip(names, done.stdout.splitlines(), strict=True):
+        found = json.loads(line)
+        for key, expected in PLACES[name].expected.items():
+            if isinstance(expected, str):
+                assert expected in found[key], name
+            else:
+                assert found[key] == pytest.approx(expected, rel=1e-6), (name, found)

@@ -10,7 +10,6 @@ from types import SimpleNamespace
 import netCDF4
 import numpy as np
 import pytest
-from sampling import every
 from typer.testing import CliRunner
 
 from surfacechem.cli import commands
@@ -285,9 +284,8 @@ def test_shells_complete_cases_laws_and_paths(call):
 
 
 class TestRerun:
-    @pytest.mark.parametrize("options", [[], ["--solver", "lsoda", "--rtol", "1e-7"], ["--set", "initial.T=310 K"]])
-    def test_is_the_same_to_the_last_bit(self, call, options):
-        call("run", "bonding.yaml", *options)
+    def test_is_the_same_to_the_last_bit(self, call):
+        call("run", "bonding.yaml", "--solver", "lsoda", "--rtol", "1e-7", "--set", "initial.T=310 K")
         done = call("rerun", "bonding.nc", "-o", "again.nc")
         assert done.exit_code == 0, done.output
         assert "bit for bit the same" in done.stdout
@@ -298,7 +296,6 @@ class TestRerun:
 
     def test_every_difference_is_told(self, call):
         call("run", "cooling.yaml")
-        assert call("rerun", "cooling.nc").exit_code == 0
         with netCDF4.Dataset("cooling.nc", "a") as file:
             file["T"][3] = np.nextafter(float(file["T"][3]), 1.0)
         done = call("rerun", "cooling.nc")
@@ -316,19 +313,17 @@ class TestRerun:
 
 
 class TestPlot:
-    @pytest.mark.parametrize("kind", every(3, ["png", "svg", "pdf"]))
-    def test_of_a_dataset(self, call, tmp_path, kind):
+    def test_of_a_dataset(self, call, tmp_path):
         call("run", "bonding.yaml")
-        done = call("plot", "bonding.nc", "-o", f"x.{kind}")
-        assert (done.exit_code, done.stdout) == (0, f"x.{kind}\n")
-        content = (tmp_path / f"x.{kind}").read_bytes()
-        assert content.startswith({"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}[kind])
+        done = call("plot", "bonding.nc", "-o", "x.png")
+        assert (done.exit_code, done.stdout) == (0, "x.png\n")
+        content = (tmp_path / "x.png").read_bytes()
+        assert content.startswith(b"\x89PNG")
         assert len(content) > 10_000
 
     def test_of_a_case_ends_like_the_run(self, call, tmp_path):
-        assert call("plot", "bonding.yaml", "--set", "run.outputs=9", "--variables", "T, phi").exit_code == 0
-        assert call("plot", "cooling.yaml").exit_code == 3
-        assert files(tmp_path) == {"bonding.png", "cooling.png"}
+        assert call("plot", "cooling.yaml", "--set", "run.outputs=9", "--variables", "T").exit_code == 3
+        assert files(tmp_path) == {"cooling.png"}
 
 
 class TestVerbosity:
@@ -339,13 +334,13 @@ class TestVerbosity:
             assert f"\n{heading}" in told.stdout
         swept = call("sweep", "bonding.yaml", "--over", "initial.T=[300, 310]", "-v", "-o", "s.nc")
         assert "Runs\n  initial_T = 300  finished  error " in swept.stdout
-        assert call("plot", "bonding.nc", "-q").output == ""
 
 
 class TestSweep:
     def test_has_phase_portraits_and_is_not_mixed_with_runs(self, call, tmp_path):
         assert call("sweep", "bonding.yaml", "--over", "initial.T=[300, 310]", "-o", "s.nc", "-q").exit_code == 0
-        assert call("plot", "s.nc", "--against", "phi").exit_code == 0
+        drawn = call("plot", "s.nc", "--against", "phi", "-q")
+        assert (drawn.exit_code, drawn.output) == (0, "")
         assert "no variable 'phy' along the runs" in call("plot", "s.nc", "--against", "phy").stderr
         assert "only runs with runs" in call("plot", "s.nc", "bonding.yaml").stderr
         assert files(tmp_path) == {"s.nc", "s.png"}

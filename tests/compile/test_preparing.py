@@ -32,7 +32,7 @@ run: {until: 1 s}
 """
 
 
-@pytest.mark.parametrize("name", ["debonding", "bouncing-plate", "at rest"])
+@pytest.mark.parametrize("name", ["bouncing-plate", "at rest"])
 def test_the_code_of_jumps_and_of_gaps_at_rest_is_compiled_once_and_counts_as_compiled(name, monkeypatch):
     program._machine_code.cache_clear()
     case = load_text(RESTING) if name == "at rest" else surfacechem.load(name).case

@@ -3,21 +3,18 @@
 import numpy as np
 import pytest
 import symengine
+from case_runs import load
 
-import surfacechem
 from surfacechem.compile.typeset import CONSTANTS, equations, lines, readable
 from surfacechem.expressions import where
 
 pytestmark = pytest.mark.around
 
-SHOWN = [
-    *("stick-slip", "endothermic", "elastic-bonds-at-a-gap", "vinculin-catch-bond", "cohesive-cycles", "thermal-press"),
-    "dna-adhesive",
-]
+SHOWN = ["stick-slip", "elastic-bonds-at-a-gap", "vinculin-catch-bond", "cohesive-cycles", "thermal-press"]
 
 
 def assembled(name):
-    return surfacechem.load(name).case.system()
+    return load(name).system
 
 
 def a_state(system):

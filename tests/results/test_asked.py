@@ -40,7 +40,7 @@ def test_accuracy_is_achieved_everywhere(name, accuracy):
     assert_achieved(name, accuracy)
 
 
-SLIPS = [{"outputs": 4}, {"outputs": 600}, {"first": "1 ms", "spacing": "logarithmic", "outputs": 50}, {}]
+SLIPS = [{"outputs": 4}, {"first": "1 ms", "spacing": "logarithmic", "outputs": 50}, {}]
 """Outputs of which the first ones see no slip at all."""
 
 
@@ -56,12 +56,16 @@ def test_a_run_that_misses_is_run_again_whatever_its_outputs(outputs):
     assert solution.dataset.sizes["time"] == outputs.get("outputs", solution.dataset.sizes["time"])
 
 
+@pytest.fixture(scope="module")
+def fine():
+    return surfacechem.run("stick-slip", {"run": {"until": 3, "rtol": 1e-5, "outputs": 6000}}).dataset
+
+
 @pytest.mark.parametrize("outputs", SLIPS)
 @pytest.mark.parametrize("reference", [{}, {"reference": ""}])
-def test_the_error_is_that_of_every_moment_whatever_the_outputs(outputs, reference):
+def test_the_error_is_that_of_every_moment_whatever_the_outputs(outputs, reference, fine):
     """A slip lasts a thousandth of the run."""
     data = surfacechem.run("stick-slip", {"run": {"until": 3, "rtol": 1e-5, **outputs}, **reference}).dataset
-    fine = surfacechem.run("stick-slip", {"run": {"until": 3, "rtol": 1e-5, "outputs": 6000}}).dataset
     missed = float(abs(fine.v - fine.v_exact).max() / fine.v.max())
     assert missed / 2 < data.error < 4 * missed
     if not reference:
@@ -69,17 +73,17 @@ def test_the_error_is_that_of_every_moment_whatever_the_outputs(outputs, referen
 
 
 def test_cells_are_as_accurate_as_the_run_is_asked_to_be():
-    solution = surfacechem.run("sudden-contact", ["run={until: 60 s, outputs: 20, accuracy: 1e-5}"])
-    assert solution.accuracy.error < 1e-5
+    solution = surfacechem.run("sudden-contact", ["run={until: 60 s, outputs: 20, accuracy: 1e-4}"])
+    assert solution.accuracy.error < 1e-4
     assert not solution.notes
 
 
 def test_a_given_number_of_cells_that_is_too_small_is_named():
-    cells = [f"bodies.{name}.conduction.cells=80" for name in ("epoxy", "glass")]
-    solution = surfacechem.run("sudden-contact", [*cells, "run={until: 60 s, outputs: 20, accuracy: 1e-7}"])
-    assert solution.accuracy.error > 1e-6
+    cells = [f"bodies.{name}.conduction.cells=20" for name in ("epoxy", "glass")]
+    solution = surfacechem.run("sudden-contact", [*cells, "run={until: 60 s, outputs: 20, accuracy: 1e-6}"])
+    assert solution.accuracy.error > 1e-5
     (note,) = solution.notes
-    assert "number is given for epoxy and glass: let `cells: {accuracy: 1e-07}` choose it" in note
+    assert "number is given for epoxy and glass: let `cells: {accuracy: 1e-06}` choose it" in note
 
 
 def test_what_rounding_forbids_is_said():

@@ -29,7 +29,7 @@ def burst(K_0=0.8, C_r=1e38, C=1e3) -> Simulation:
     return Simulation(load_text(BURST.format(K_0=K_0, C_r=C_r, C=C)))
 
 
-@pytest.mark.parametrize(("K_0", "peak"), [(0.8, 4e38), (2.4, 1e123), (2.76, 1e129)])
+@pytest.mark.parametrize(("K_0", "peak"), [(0.8, 4e38), (2.76, 1e129)])
 def test_the_first_instant_of_one_law_hides_no_other(K_0, peak):
     simulation = burst(K_0)
     solution = simulation.run()
@@ -62,8 +62,8 @@ def test_what_is_destroyed_is_the_part_of_what_the_law_turns_over():
     assert solution.audit.destroyed_together == pytest.approx(0.5, abs=0.01)
 
 
-@pytest.mark.parametrize("name", ["exothermic", "two-way-linear", "dna-adhesive", "three-temperatures", "stick-slip"])
-@pytest.mark.parametrize("rtol", [1e-4, 1e-8, 1e-12])
+@pytest.mark.parametrize("name", ["exothermic", "dna-adhesive", "stick-slip"])
+@pytest.mark.parametrize("rtol", [1e-4, 1e-12])
 def test_laws_that_dissipate_are_not_accused(name, rtol):
     solution = surfacechem.run(name, [f"run.rtol={rtol}"])
     assert solution.audit.violations == ()

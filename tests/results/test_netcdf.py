@@ -29,7 +29,7 @@ NAMES = ("x", "time2", "T", "phi", "status", "x_mode", "profile_1", "event_time"
 def files(tmp_path_factory):
     """A run with events, a sweep and a study."""
     folder = tmp_path_factory.mktemp("datasets")
-    study = surfacechem.precision(["exothermic"], solvers=["radau", "lsoda"], tolerances=[1e-4], repeat=1)
+    study = surfacechem.precision(["exothermic"], solvers=["radau"], tolerances=[1e-4], repeat=1)
     study.write(folder / "study.nc")
     return {
         "run": surfacechem.run("debonding").write(folder / "run.nc"),
@@ -89,14 +89,13 @@ for name in sys.argv[1:]:
 """Damaged files used one after the other, each with its name, until HDF5 does not come back from one."""
 
 
-@pytest.mark.parametrize("which", ["run", "sweep", "study"])
-@pytest.mark.parametrize("count", [4, pytest.param(1000, marks=pytest.mark.slow)])
-def test_damaged_bytes(files, which, count, tmp_path, monkeypatch):
+@pytest.mark.parametrize("count", [3, pytest.param(1000, marks=pytest.mark.slow)])
+def test_damaged_bytes(files, count, tmp_path, monkeypatch):
     monkeypatch.setattr(netcdf, "PATIENCE", 5.0)
-    data, random = files[which].read_bytes(), Random(count)
-    names = [str(tmp_path / f"{i}.nc") for i in range(count)]
-    for name in names:
-        Path(name).write_bytes(damaged(data, random))
+    random = Random(count)
+    names = [str(tmp_path / f"{which}{i}.nc") for which in files for i in range(count)]
+    for name, file in zip(names, np.repeat([*files.values()], count), strict=True):
+        Path(name).write_bytes(damaged(file.read_bytes(), random))
     while names:
         done = subprocess.run([sys.executable, "-c", EACH, *names], capture_output=True, text=True, check=False)
         used = done.stdout.split()
@@ -112,31 +111,24 @@ import sys
 from surfacechem.errors import InputError
 from surfacechem.results import netcdf
 from surfacechem.runs import rerun
-netcdf.PATIENCE, netcdf.TRIAL = 1.0, sys.argv[2]
-try:
-    rerun.read(sys.argv[1])
-except InputError as error:
-    sys.exit(f"refused: {error}")
+netcdf.PATIENCE = 1.0
+for netcdf.TRIAL in ("while True: pass", "import os; os.abort()", "raise OSError"):
+    try:
+        rerun.read(sys.argv[1])
+    except InputError as error:
+        print(error)
 """
 
 
-@pytest.mark.parametrize(
-    ("trial", "words"),
-    [
-        ("while True: pass", "no answer in 1"),
-        ("import os; os.abort()", "crashes"),
-        ("raise OSError", "NetCDF"),
-    ],
-)
-def test_a_process_outlives_what_reading_a_file_does_not(tmp_path, trial, words):
+def test_a_process_outlives_what_reading_a_file_does_not(tmp_path):
     (tmp_path / "x.nc").write_bytes(b"nothing that netCDF knows")
-    command = [sys.executable, "-c", LEAVING, str(tmp_path / "x.nc"), trial]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stderr.count("refused: ")) == (1, 1), done.stderr
-    assert words in done.stderr
+    command = [sys.executable, "-c", LEAVING, str(tmp_path / "x.nc")]
+    lines = subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines()
+    for line, words in zip(lines, ("no answer in 1", "crashes", "NetCDF"), strict=True):
+        assert words in line
 
 
-@pytest.mark.parametrize("departures", ['{"atol": -1.0}', '{"atol": NaN}', '{"times": [1, 0]}'])
+@pytest.mark.parametrize("departures", ['{"atol": NaN}', '{"times": [1, 0]}'])
 def test_settings_that_no_run_has_are_refused_with_the_file(files, tmp_path: Path, departures: str) -> None:
     with xarray.open_dataset(files["run"]) as dataset:
         dataset.assign_attrs(departures=departures).to_netcdf(tmp_path / "run.nc")

@@ -35,8 +35,7 @@ def test_the_error_of_cells_chosen_by_an_accuracy_is_that_against_many():
 
 
 def test_a_stage_that_does_not_end_is_reported():
-    press = load("press-hold-pull")
-    assert press.run().warnings == ()
+    assert solved("press-hold-pull").warnings == ()
     early = surfacechem.run("press-hold-pull", ["run.until=22 s"])
     assert early.warnings == ("the stage pull did not end: it goes on until theta_bond_s falls to 1e-06",)
     held = surfacechem.run("press-hold-pull", ["run.until=10 s"])

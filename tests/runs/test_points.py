@@ -37,9 +37,7 @@ POINTS = {
     "element": {"g_n": -2e-9, "phi": 0.3, "v": 2e-3},
     "three-temperatures-no-capacity": {},
     "dna-adhesive": {"theta_bond_s": 0.4, "theta_free_s": 0.5, "T_1": 305.0, "T_2": 330.0},
-    "rate-and-state-velocity-steps": {"theta": 3.0},
     "generalised-bonding-sliding": {"phi": 0.4, "T": 310.0},
-    "viscous-heating": {},
 }
 
 

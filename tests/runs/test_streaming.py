@@ -66,8 +66,6 @@ SWEPT = {
     "exothermic": {K_0: [100.0, 300.0], "initial.phi": [0.0, 0.2, 0.4]},
     "shared-load-rupture": {"loading.t_n": [200.0, 517.743, 1000.0]},
     "debonding": {"interface.limits.tensile-strength.t_max": ["20 MPa", "1 GPa"]},
-    "force-spectroscopy": {"loading.f.ramp.rate": [1e-12, 1e-9]},
-    "epoxy-cure-adiabatic": {"initial.T": [400.0, 420.0]},
 }
 
 

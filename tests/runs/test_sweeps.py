@@ -114,21 +114,6 @@ def test_biotin_breaks_near_the_forces_that_were_measured():
     assert (slow, fast) == (pytest.approx(200e-12, rel=0.02), pytest.approx(230e-12, rel=0.1))
 
 
-def test_a_run_of_a_sweep_is_the_run_by_itself(bonding):
-    solution = bonding.sweep({K_0: [100.0, "0.3 kJ/m^2"], "initial.phi": [0.0, 0.2, 0.4]})
-    data = solution.dataset
-    assert data["T"].dims == ("K_0", "initial_phi", "time")
-    single = bonding.run({K_0: 300.0, "initial.phi": 0.2}, replace(bonding.case.run, picture=None)).dataset
-    one = data.sel(K_0=300.0, initial_phi=0.2)
-    for name in ("phi", "T", "q_1", "U_1", "E_total", "S_total"):
-        assert one[name].values.tobytes() == single[name].values.tobytes()
-    for name in ("energy_error", "entropy_error", "site_error"):
-        assert one[name].item() == pytest.approx(single.attrs[name], abs=1e-13)
-        assert data.attrs[name] == data[name].values.max() < 1e-8
-    assert not data["destroys_entropy"].any()
-    assert one["time_reached"] == single.attrs["time_reached"]
-
-
 def test_extremes_are_those_of_the_runs_whatever_lies_between_the_times_that_all_share():
     data = surfacechem.sweep("stick-slip", {"loading.w_t.ramp.rate": ["1 mm/s", "2 mm/s"]}).dataset
     for at, speed in enumerate(("1 mm/s", "2 mm/s")):
@@ -136,11 +121,6 @@ def test_extremes_are_those_of_the_runs_whatever_lies_between_the_times_that_all
         assert data.v_max[at] == pytest.approx(single.v.max().item(), rel=0.01)
         assert data.v_max[at] > 5 * data.v[at].max()
         assert data.t_t_min[at] == pytest.approx(single.t_t.min().item(), rel=0.01)
-
-
-def test_the_number_of_threads_changes_nothing(bonding):
-    one, two = (bonding.sweep({K_0: np.linspace(1, 300, 600)}, threads=n).dataset for n in (1, 2))
-    assert one["T"].values.tobytes() == two["T"].values.tobytes()
 
 
 def test_a_sweep_compiles_nothing_once_it_has_run(spectrum, monkeypatch):
@@ -153,9 +133,12 @@ def test_a_sweep_compiles_nothing_once_it_has_run(spectrum, monkeypatch):
 
 
 def test_errors_against_an_exact_solution_of_each_run(bonding):
-    data = bonding.sweep({K_0: [100.0, 300.0]}).dataset
+    data = bonding.sweep({K_0: [100.0, "0.3 kJ/m^2"], "bodies.lower.C": [1.0, 2.0, 3.0]}).dataset
+    assert data["T"].dims == ("K_0", "C", "time")
+    assert data["K_0"].values.tolist() == [100.0, 300.0]
     assert data.attrs["error_source"].startswith("exact solution exothermic-bonding")
-    assert np.all(data["error"] < 1e-8)
+    for name in ("error", "energy_error", "entropy_error", "site_error"):
+        assert data.attrs[name] == data[name].values.max() < 1e-8
 
 
 def test_a_sweep_can_be_run_again_from_its_file(spectrum, tmp_path):
@@ -176,7 +159,7 @@ def test_ruptures_are_statuses_with_their_time():
     assert data.attrs["reason"] == "1 finished, 2 stopped"
 
 
-@pytest.mark.parametrize("excess", [1e-1, 1e-2, 1e-4])
+@pytest.mark.parametrize("excess", [1e-1, 1e-4])
 def test_lifetime_above_the_critical_load(excess):
     kind = get("rebinding-cluster")
     given = {"k_off": 0.5, "k_on": 0.5, "x_off": 4e-10, "T": 300.0, "n_c": 1e14}
@@ -195,7 +178,7 @@ def test_survival_down_to_1e_282():
     np.testing.assert_allclose(np.log(phi), exact["ln_phi"], rtol=1e-8, atol=1e-10)
 
 
-@pytest.mark.parametrize("exponent", [0.0, 1.0, 10.0, 100.0, 300.0, 700.0, 1000.0, 1e4, 1e6])
+@pytest.mark.parametrize("exponent", [0.0, 10.0, 700.0, 1e6])
 def test_forces_that_overflow(exponent):
     """Half of the bonds are gone within the lifetime, or at once where no run can resolve it; nothing is infinite."""
     force = exponent * get("bell-constant-force")(k_off=0.1, x_off=4e-10, T=300.0, f=0.0).force_scale
@@ -337,14 +320,6 @@ def test_a_case_without_a_sweep(bonding):
         cases.load("exothermic", {"sweep": {"ovr": {}}})
 
 
-def test_figure_of_a_spectrum(spectrum):
-    plot = plots.figure(spectrum.dataset)
-    ax = plot.axes[0]
-    assert [text.get_text() for text in ax.get_legend().get_texts()] == ["most probable", "median", "mean", "exact"]
-    assert (ax.get_xscale(), ax.get_xlabel()) == ("log", "Loading rate of $f$ [pN s$^{-1}$]")
-    assert ax.get_ylabel() == "$f$ at rupture [pN]"
-
-
 def test_figure_of_final_values(bonding):
     plot = plots.figure(bonding.sweep({"initial.T": [280.0, 300.0], K_0: [100.0, 200.0, 300.0]}).dataset)
     assert [ax.get_ylabel() for ax in plot.axes] == ["final [K]", "final [1]"]
@@ -357,31 +332,19 @@ def test_figure_of_final_values(bonding):
 
 def test_command_line(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    arguments = [
-        "sweep",
-        "force-spectroscopy",
-        "--over",
-        f"{RATE}=[1 pN/s, 1 nN/s]",
-        "--until",
-        "f=150 pN",
-        "-o",
-        "s.nc",
-    ]
-    done = CliRunner().invoke(app, arguments)
+    options = ["--over", f"{RATE}=[1 pN/s, 1 nN/s]", "--until", "f=150 pN", "-o", "s.nc"]
+    done = CliRunner().invoke(app, ["sweep", "force-spectroscopy", *options])
     assert done.exit_code == 0, done.output
     labels = ["swept", "solved", "ended", "error", "time", "balances", "written"]
     assert [line.split()[0] for line in done.stdout.splitlines()[1:]] == labels
     assert "rate (1e-12 to 1e-09, 2 values)" in done.stdout
     with xarray.open_dataset("s.nc") as data:
         assert data["phi"].dims == ("rate", "f")
-    assert CliRunner().invoke(app, ["plot", "s.nc", "-o", "s.svg"]).exit_code == 0
-    again = CliRunner().invoke(app, ["rerun", "s.nc"])
-    assert again.exit_code == 0, again.output
 
 
-def test_an_exact_solution_is_that_of_every_run_or_of_none(tmp_path):
+def test_an_exact_solution_is_that_of_every_run_or_of_none():
     """Between two runs that it fits lies one that it does not: no number there is held against another scene's."""
-    case = surfacechem.load("stick-slip")
+    case = surfacechem.load("stick-slip", ["run.until=1.5 s"])
     swept = case.sweep({"interface.friction.coulomb.mu": [0.2, 0.6, 0.3]})
     alone = case.run({"interface.friction.coulomb.mu": 0.6})
     assert "exact solution stick-slip is not of this scene" in alone.accuracy.source
