@@ -1,9 +1,7 @@
 """What the potentials of contact, cohesion and long range do, and what follows from them by differentiation."""
 
-import json
 import math
 from itertools import pairwise
-from pathlib import Path
 
 import mpmath
 import numpy as np
@@ -17,25 +15,20 @@ from surfacechem.contracts.terms import Friction, Potential, reads
 from surfacechem.expressions import EXPONENT_CAP, derivative
 from surfacechem.format.schema import schema
 from surfacechem.laws import laws
-from surfacechem.laws.bonding import BondEnergy
 from surfacechem.laws.bulk import Quadratic
-from surfacechem.laws.cohesive import AdhesionIntensity, AdhesionLoss, ExponentialCohesiveZone, XuNeedleman
-from surfacechem.laws.contact import BondStiffness
+from surfacechem.laws.cohesive import ExponentialCohesiveZone, XuNeedleman
 from surfacechem.laws.friction import Coulomb, Stribeck
 from surfacechem.laws.loading import Hold
 from surfacechem.laws.longrange import (
     WALL,
-    LennardJonesDerjaguin,
     LennardJonesFlatFlat,
     LennardJonesSpherePlane,
     VanDerWaalsSpherePlane,
 )
 from surfacechem.model.assemble import assemble
 from surfacechem.runs.listing import law_table
-from surfacechem.scene import Body, Interface, Scene, Sites
-from surfacechem.solve.run import Model, Run
+from surfacechem.scene import Body, Interface, Scene
 
-FOLDER = Path(__file__).parents[1] / "references"
 GAPS = [law for law in laws(Potential).values() if {"g_n", "g_t"} & set(reads(law.energy))]
 each_gap_law = pytest.mark.parametrize("law", GAPS, ids=lambda law: law.name())
 g, g_t, phi, bonded, T, T_0 = symengine.symbols("g_n g_t phi bonded T_c T_0")
@@ -58,12 +51,6 @@ def compiled(expression, **values: float) -> float:
     return float(function(list(values.values()))[0])
 
 
-def read(name: str) -> tuple[list[str], np.ndarray, dict[str, float]]:
-    data = json.loads((FOLDER / f"{name}.json").read_text())
-    rows = np.array([[float(entry) for entry in row] for row in data["rows"]])
-    return data["columns"], rows, {key: float(value) for key, value in data["expect"].items()}
-
-
 @each_gap_law
 def test_finite_everywhere(law):
     """Value, traction and tangent at gaps over 600 decades and of both signs, as compiled."""
@@ -78,19 +65,6 @@ def test_finite_everywhere(law):
         for tangential in sizes:
             values = {"g_n": size, "g_t": tangential, "phi": 0.5, "bonded": 1.0, "N_c": 1e15}
             assert np.isfinite(function([values[name] for name in names])).all(), values
-
-
-def test_bond_springs_in_chemical_equilibrium():
-    """Against the exact table; the traction along equilibrium has its peak at sqrt(2K/3E) and does the work K/2."""
-    columns, rows, expect = read("h_damage_equilibrium")
-    E, K = 1e16, 0.2
-    energy = symbolic(BondStiffness(E_b=E, E_n=E)) + BondEnergy(K_0=K).energy(phi=phi, T_c=T, T_0=T_0)
-    for x, bonds, t in rows:
-        if bonds > 0:
-            assert at(derivative(energy, phi), g_n=x, phi=bonds, T_c=300, T_0=300) == pytest.approx(0, abs=1e-15)
-        assert at(derivative(energy, g), g_n=x, phi=bonds) == pytest.approx(t, rel=1e-14)
-    assert columns == ["g", "phi", "t_n"]
-    assert expect["g_peak"] == pytest.approx(math.sqrt(2 * K / (3 * E)), rel=1e-15)
 
 
 def test_cohesive_strength_and_work():
@@ -126,72 +100,7 @@ def test_a_cohesive_zone_is_as_strong_in_shear_as_in_tension():
     assert closed == pytest.approx((math.e * t_max / g_0, E_n), rel=1e-14), "stiffness of a closed zone"
 
 
-def test_xu_needleman_without_shear_is_the_exponential_zone():
-    zone = ExponentialCohesiveZone(t_max=1e6, g_0=1e-8, E_n=0.0)
-    for q, r in ((1.0, 0.0), (0.4, 0.0), (0.4, 0.3)):
-        coupled = XuNeedleman(Phi_n=math.e * 1e6 * 1e-8, g_0=1e-8, g_t0=2e-8, q=q, r=r)
-        for x in (0.0, 3e-9, 1e-8, 5e-8, 1e-7):
-            assert coupled.energy(g_n=x, g_t=0.0) == pytest.approx(zone.energy(g_n=x), rel=1e-14)
-
-
-def test_xu_needleman_in_shear():
-    """Work q Phi_n, strength at g_t0 / sqrt(2), and no normal traction at the gap r g_0 after complete shear."""
-    law = XuNeedleman(Phi_n=0.1, g_0=1e-8, g_t0=2e-8, q=0.6, r=0.3)
-    assert law.energy(g_n=0.0, g_t=1.0) - law.energy(g_n=0.0, g_t=0.0) == pytest.approx(0.06, rel=1e-14)
-    energy = symbolic(law)
-    shear = derivative(energy, g_t)
-    peak = 2e-8 / math.sqrt(2)
-    assert at(shear, g_n=0.0, g_t=peak) == pytest.approx(0.6 * 0.1 * math.sqrt(2 / math.e) / 2e-8, rel=1e-14)
-    assert at(derivative(shear, g_t), g_n=0.0, g_t=peak) == pytest.approx(0.0, abs=1.0)
-    assert at(derivative(energy, g), g_n=0.3e-8, g_t=1.0) == pytest.approx(0.0, abs=1e-6)
-    mixed = derivative(derivative(energy, g), g_t) - derivative(derivative(energy, g_t), g)
-    assert at(mixed, g_n=1e-8, g_t=1e-8) == pytest.approx(0.0, abs=1e-6)
-
-
-def test_strength_that_varies_gives_entropy_affinity_and_capacity():
-    """t_max(T, phi): S = t_T Y, M = -t_phi Y, C_eff = T t_TT Y, all with Y = (g + g_0) exp(1 - g/g_0)."""
-    t_0, g_0 = 5e7, 1e-8
-    strength = t_0 * phi * T_0 / T
-    energy = ExponentialCohesiveZone(t_max=1.0, g_0=g_0, E_n=0.0).bind({"t_max": strength}).energy(g_n=g)
-    S, M = -derivative(energy, T), derivative(energy, phi)
-    capacity = T * derivative(S, T)
-    for x in (0.0, 4e-9, 3e-8):
-        here = {"g_n": x, "phi": 0.7, "T_c": 320.0, "T_0": 300.0}
-        Y = (x + g_0) * math.exp(1 - x / g_0)
-        assert at(S, **here) == pytest.approx(-t_0 * 0.7 * 300 / 320**2 * Y, rel=1e-14)
-        assert at(M, **here) == pytest.approx(-t_0 * 300 / 320 * Y, rel=1e-14)
-        assert at(capacity, **here) == pytest.approx(2 * t_0 * 0.7 * 300 / 320**2 * Y, rel=1e-14)
-        assert at(energy + T * S, **here) == pytest.approx(2 * at(energy, **here), rel=1e-14)
-    elastic = derivative(derivative(energy, T), g)
-    assert at(elastic, **here) == pytest.approx(-t_0 * 0.7 * 300 / 320**2 * 3 * math.exp(-2), rel=1e-14)
-
-
-def test_adhesion_breaks_where_the_elastic_energy_exceeds_it():
-    law = AdhesionIntensity(C_N=1e12, C_T=2e12, w=0.5, E_n=1e14)
-    M = derivative(symbolic(law), phi)
-    threshold = math.sqrt(0.5 / 0.8 / 1e12)
-    assert at(M, g_n=threshold, g_t=0.0, phi=0.8) == pytest.approx(0.0, abs=1e-15)
-    assert at(M, g_n=-1e-6, g_t=1e-6, phi=0.8) == pytest.approx(2e12 * 1e-12 * 0.8 - 0.5, rel=1e-14)
-    rate = AdhesionLoss(b=3.0)
-    for x, expected in ((0.9 * threshold, 0.0), (2 * threshold, -(4 - 1) * 0.5 / 3)):
-        mu = at(M, g_n=x, g_t=0.0, phi=0.8) / 1e18
-        assert rate.rate(mu=mu, n_c=1e18, N_c=1e18) / 1e18 == pytest.approx(expected, rel=1e-13)
-
-
-def test_lennard_jones_between_sphere_and_plane():
-    _, rows, expect = read("i_lj_sphere_plane")
-    sphere = {**SITES, "R": 5e-8, "area": 2e-16}
-    exact, approximate = (
-        derivative(symbolic(law(**sphere)), g) for law in (LennardJonesSpherePlane, LennardJonesDerjaguin)
-    )
-    for x, F, F_derjaguin, _ in rows:
-        assert 2e-16 * at(exact, g_n=x) == pytest.approx(F, rel=1e-12)
-        assert 2e-16 * at(approximate, g_n=x) == pytest.approx(F_derjaguin, rel=1e-13)
-    assert 2e-16 * at(exact, g_n=expect["g_pulloff"]) == pytest.approx(expect["F_pulloff"], rel=1e-13)
-    assert at(derivative(exact, g), g_n=expect["g_pulloff"]) == pytest.approx(0.0, abs=1e-12 * 1e9 / 1e-10)
-
-
-@pytest.mark.parametrize("gap", [1.5e-10, 3e-10, 2e-9, 4e-8])
+@pytest.mark.parametrize("gap", [1.5e-10, 4e-8])
 def test_sphere_plane_is_the_sum_over_all_pairs(gap):
     """Force of every site of the plane on every site of the sphere, by quadrature over plane and polar angle."""
     n_1, n_2, psi_0, g_0, R, area = *SITES.values(), 5e-8, 1e-16
@@ -240,19 +149,6 @@ def test_stribeck_goes_from_static_to_sliding(delta):
     slope = derivative(law.traction(p=1e5, v=v, direction=1.0), v)
     assert all(math.isfinite(compiled(slope, v=x)) for x in (0.0, 1e-300, -1e-9, 1.0, 1e9))
     assert law.traction(p=1e5, v=symengine.Integer(0), direction=symengine.Integer(1)) == 6e4
-
-
-def test_adhesion_is_lost_down_to_its_equilibrium():
-    """At a held gap b phi' = -(C g^2 phi - w): an exponential to w / (C g^2); from below nothing heals."""
-    potential, reaction = AdhesionIntensity(C_N=1e12, C_T=1e12, w=0.4, E_n=1e14), AdhesionLoss(b=2.0)
-    for start, end in ((1.0, 0.4), (0.3, 0.3)):
-        pair = Body("lower", Hold(level=300.0)), Body("upper", Hold(level=300.0))
-        interface = Interface(Hold(level=300.0), [potential], (), [reaction], Sites(1e18, 1e18))
-        loading = {"g_n": Hold(level=8e-7), "g_t": Hold(level=6e-7)}
-        scene = Scene(pair, interface, (), loading, None, 300.0, {"phi": start})
-        run = Model(assemble(scene)).solve(Run(times=np.linspace(0.0, 6.0, 7)))
-        exact = end + (start - end) * np.exp(-run.result.times / 2.0)
-        assert run.result.outputs[:, 0] == pytest.approx(exact, rel=1e-8)
 
 
 def test_a_coefficient_may_be_left_out_of_a_scene():

@@ -2,8 +2,6 @@
 
 import dataclasses
 import math
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -34,14 +32,9 @@ pytestmark = pytest.mark.around
 
 BOUND = 1e-8
 FLUIDS = [
-    ("Nitrogen", 101325.0, 220.0, 480.0),
     ("Air", 1e5, 250.0, 600.0),
-    ("Helium", 1e5, 250.0, 400.0),
-    ("CarbonDioxide", 1e5, 280.0, 500.0),
     ("Water", 1e6, 280.0, 440.0),
-    ("n-Dodecane", 1e5, 290.0, 420.0),
     ("INCOMP::MEG-50%", 1e5, 260.0, 360.0),
-    ("INCOMP::S800", 1e5, 290.0, 450.0),
 ]
 
 
@@ -136,9 +129,9 @@ def test_what_a_mixture_costs_is_told():
     assert "20 to 50 ms for each value" in CoolPropFluid("Methane[0.9]&Ethane[0.1]", 1e5).remark
 
 
-@pytest.mark.parametrize("name", ["Water", "Nitrogen", "INCOMP::MEG-50%"])
+@pytest.mark.parametrize("name", ["Water", "INCOMP::MEG-50%"])
 def test_properties_in_the_compiled_code(name):
-    scene = lubricated(medium(name), v=2.0 if name != "Nitrogen" else 30.0)
+    scene = lubricated(medium(name))
     values = computed(solved(scene, *np.linspace(0.0, 2.0, 21)))
     exact = CoolPropFluid(name, 1e5)
     for quantity in ("k_m", "eta_m"):
@@ -164,14 +157,6 @@ def test_energy_and_entropy_of_a_film_are_the_integrals_of_its_heat_capacity(T_s
         assert (values["U_c"][0], values["S_c"][0]) == pytest.approx((0.0, 0.0), abs=1e-12)
 
 
-def test_films_close_energy_and_entropy():
-    for capacity in (True, False):
-        books = audit(solved(lubricated(medium(), capacity=capacity), 0.0, 1.0, 5.0))
-        assert books.energy_error < 1e-9
-        assert books.entropy_error < 1e-9
-        assert books.violations == ()
-
-
 # -- heat made across a film ------------------------------------------------------------------------------------------
 
 K_M, ETA, D_M = 0.13, 0.01, 5e-6
@@ -193,7 +178,7 @@ def steady(scene: Scene) -> dict[str, float]:
     return {name: values[-1] for name, values in computed(solved(scene, 0.0, 0.02)).items()}
 
 
-@pytest.mark.parametrize(("T_1", "T_2", "v"), [(300.0, 300.0, 10.0), (300.0, 340.0, 30.0), (390.0, 310.0, 0.5)])
+@pytest.mark.parametrize(("T_1", "T_2", "v"), [(300.0, 340.0, 30.0), (390.0, 310.0, 0.5)])
 def test_a_sheared_film_against_couette_flow(T_1, T_2, v):
     """The parabola on a line that solves k T'' + eta (v/d)^2 = 0."""
     values, heat = steady(between_walls(T_1, T_2, v)), ETA * v**2 / D_M
@@ -206,10 +191,9 @@ def test_a_sheared_film_against_couette_flow(T_1, T_2, v):
     assert values["T_c"] == pytest.approx(np.trapezoid(T, profile), rel=1e-8)
 
 
-@pytest.mark.parametrize("alphas", [(1.0, 1.0), (0.9, 0.2)])
-def test_heat_made_across_a_gas_passes_the_jump_at_each_wall(alphas):
+def test_heat_made_across_a_gas_passes_the_jump_at_each_wall():
     T_1, T_2, d = 300.0, 320.0, 1e-7
-    given = {"alpha_1": alphas[0], "alpha_2": alphas[1]}
+    given = {"alpha_1": 0.9, "alpha_2": 0.2}
     scene = between_walls(T_1, T_2, 200.0, law=RarefiedFilm, given={}, **given)
     scene = dataclasses.replace(
         scene, interface=dataclasses.replace(scene.interface, medium=medium("Nitrogen", 1e5, d))
@@ -258,7 +242,7 @@ def test_a_film_that_thins_stays_near_couette_flow_up_to_the_nahme_fold(Na, rise
     assert values["t_viscous"] == pytest.approx(exact["t_t"], rel=traction)
 
 
-@pytest.mark.parametrize("T_c", [250.0, 320.0, 340.0, 345.0, 352.0, 700.0])
+@pytest.mark.parametrize("T_c", [250.0, 345.0, 700.0])
 def test_a_film_produces_entropy_whatever_its_temperature(T_c):
     scene = dataclasses.replace(between_walls(250.0, 450.0, 0.0), initial={"T_c": T_c})
     assert np.all(computed(solved(scene, 0.0, 1e-6, 1e-4, 1e-2))["sigma_film"] > 0)
@@ -399,10 +383,8 @@ def test_a_thick_gas_film_conducts_like_a_continuum():
 
 
 def test_a_gas_film_in_contact_keeps_the_thickness_of_the_voids():
-    def run(gap, Y):
-        return surfacechem.run("closing-gas-gap", {"loading.g_n": gap, "heat.rarefied-film.Y": Y})
-
-    pressed, apart = run("-1 um", "2 um"), run("1 um", "1 um")
+    gap = surfacechem.load("closing-gas-gap", {"loading.g_n": "1 um", "run.outputs": 5})
+    pressed, apart = (gap.run({"loading.g_n": g, "heat.rarefied-film.Y": Y}) for g, Y in ((-1e-6, 2e-6), (1e-6, 1e-6)))
     assert pressed.status == "finished"
     np.testing.assert_allclose(pressed.dataset["T_1"], apart.dataset["T_1"], rtol=1e-9)
 
@@ -418,13 +400,6 @@ def test_a_run_that_reaches_the_pole_of_a_viscosity_stops():
 
 
 # -- nothing without need ---------------------------------------------------------------------------------------------
-
-
-def test_coolprop_is_imported_only_for_a_fluid():
-    runs = "import sys, surfacechem\nfor name in ('exothermic', 'lubricated-sliding'): surfacechem.run(name)\n"
-    code = runs + "print('CoolProp' in sys.modules)"
-    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert found.stdout.strip() == "False"
 
 
 def test_a_medium_gives_only_what_is_asked_for():

@@ -161,17 +161,6 @@ def test_a_tensile_strength():
     assert t == pytest.approx(3e5 * J * 2 / 1e14 / 2e-8, rel=1e-9)
 
 
-def test_bonds_that_soften_bear_the_same_traction_on_the_current_area():
-    def make(on):
-        bonds = BondStiffness(E_b=1e14 / on, E_n=1e15 / on)
-        law = sample(CompliantDebonding, on, t_max=3e5, E_b=1e14, g_f=4e-8)
-        return mounted(on, [bonds], reactions=[law])
-
-    stretched = same(make, ["phi", "t_n", "g_n"], times=np.linspace(0.0, 1.4, 15))
-    assert max(stretched["t_n"]) == pytest.approx(3e5, rel=0.1)
-    assert min(stretched["phi"]) < 0.9
-
-
 def test_bonds_stay_on_their_envelope_as_the_surface_stretches():
     law = CompliantDebonding(t_max=3e5, E_b=1e14, g_f=4e-8)
     plain = mounted(1.0, [BondStiffness(E_b=1e14, E_n=1e15)], reactions=[law])
@@ -237,7 +226,7 @@ def partners(area, potential=PARTNERS) -> Scene:
     return Scene((Body("lower", kept), Body("upper", kept)), interface, (), {"J_c": area}, None, 300.0, {"phi": 0.3})
 
 
-@pytest.mark.parametrize("area", [0.5, 1.0, 4.0])
+@pytest.mark.parametrize("area", [0.5, 4.0])
 def test_bimolecular_bonds_come_to_the_equilibrium_of_their_mixture(area):
     values = solve(partners(Hold(level=area)), (0.0, 60.0))
     phi = values["phi"][-1]
@@ -259,10 +248,3 @@ def test_slow_stretching_is_reversible_and_does_the_work_of_a_gas_in_two_dimensi
     books = audit(trajectory)
     assert books.energy_error < 1e-8
     assert books.violations == ()
-
-
-def test_bimolecular_bonds_in_a_lattice_gas_would_run_uphill_as_the_surface_stretches():
-    """A lattice gas knows no area, so that it is the equilibrium of the rates at one stretch only."""
-    potential = LatticeGas(epsilon=KT * np.log(0.5))
-    trajectory = solve(partners(Ramp(start=1.0, rate=0.5), potential), (0.0, 4.0))
-    assert audit(trajectory).violations

@@ -2,6 +2,7 @@
 
 import math
 import re
+from itertools import product
 
 import numpy as np
 import pytest
@@ -92,7 +93,7 @@ def test_unequal_densities_meet_in_the_law_of_mass_action():
 # -- rupture ----------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("jump", [0.5, 5.0, 30.0, 45.0, 60.0, 200.0, 290.0, 1e3, 1e6])
+@pytest.mark.parametrize("jump", [0.5, 30.0, 290.0, 1e6])
 def test_a_sudden_load_breaks_bonds_when_it_comes(jump):
     """From exponents of one half to a million, and never a number that is none."""
     load = UNIT * SITES
@@ -165,7 +166,6 @@ def test_initial_logarithms_are_checked(initial, message):
 # -- laws -------------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("f", [0.0, 3e-12, 40e-12, 1e-9, 1e-6, 1e3])
 @pytest.mark.parametrize(
     "law",
     [
@@ -180,22 +180,19 @@ def test_initial_logarithms_are_checked(initial, message):
     ],
     ids=lambda law: law.name() if hasattr(law, "name") else None,
 )
-def test_no_force_makes_a_number_that_is_none(law, f):
+def test_no_force_makes_a_number_that_is_none(law):
     """Values and slopes are finite, in compression too."""
     names = ("phi", "n_c", "f", "T_c", "mu")
     symbols = {name: symengine.Symbol(name) for name in names if name in law.rate.__code__.co_varnames}
     rate = law.rate(**symbols)
     rows = [rate, *(symengine.diff(rate, symbol) for symbol in symbols.values())]
     function = symengine.Lambdify(list(symbols.values()), rows)
-    for sign in (1, -1):
-        for phi in (0.0, 1e-12, 0.5, 1.0):
-            point = {"phi": phi, "n_c": SITES, "f": sign * f, "T_c": 300.0, "mu": -1e-20}
-            assert np.isfinite(function([point[name] for name in symbols])).all(), (sign, phi)
+    for f, phi in product((0.0, 3e-12, -3e-12, 1e-9, 1e-6, 1e3, -1e3), (0.0, 1e-12, 0.5, 1.0)):
+        point = {"phi": phi, "n_c": SITES, "f": f, "T_c": 300.0, "mu": -1e-20}
+        assert np.isfinite(function([point[name] for name in symbols])).all(), (f, phi)
 
 
-@pytest.mark.parametrize("rtol", [3e-5, 1e-6, 1e-8, 1e-11])
-@pytest.mark.parametrize("stiffness", [1e-6, 1e-3])
-@pytest.mark.parametrize("rest", [0.0, 1e-4])
+@pytest.mark.parametrize(("rest", "stiffness", "rtol"), [(0.0, 1e-3, 3e-5), (1e-4, 1e-6, 1e-11)])
 def test_a_narrow_peak_of_attachment_is_not_passed_over(rtol, stiffness, rest):
     """A surface that arrives through a layer of tethers thousands of times thinner than its way."""
     speed, k_on, T = 1e-4, 3.7, 300.0
@@ -240,10 +237,8 @@ def run(folder, potential, load="", more=""):
     ("energy", "expected"),
     [
         ("K_0: 1 mJ/m^2", "exothermic"),
-        ("K_0: 2 mJ/m^2, K_2: -1 mJ/m^2", "exothermic"),
         ("K_2: 1 mJ/m^2", "endothermic"),
         ("K_1: 1 mJ/m^2", "isothermic"),
-        ("K_0: -1 mJ/m^2, K_1: 2 mJ/m^2", "endothermic"),
     ],
 )
 def test_the_class_of_a_reaction(energy, expected, tmp_path):

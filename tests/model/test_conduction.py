@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from sampling import every
+from case_runs import solved
 from scipy.optimize import brentq
 from scipy.special import erfc, erfcx
 
@@ -61,15 +61,12 @@ def errors(simulation: Simulation) -> np.ndarray:
     return np.max(parts, axis=0)
 
 
-@pytest.mark.parametrize(
-    ("far", "grading", "perfect"),
-    every(2, [("held", 10, False), ("insulated", 1, False), ("convective", 10, False), ("insulated", 1, True)]),
-)
+@pytest.mark.parametrize(("far", "grading", "perfect"), [("convective", 10, False), ("insulated", 1, True)])
 def test_second_order_in_space(far, grading, perfect):
-    table = np.array([errors(two(cells, far, grading, perfect)) for cells in (20, 40, 80)])
-    orders = np.log2(table[:-1] / table[1:])
-    assert np.all(orders[-1] > 1.9)
-    assert np.all(table[-1] < 0.03)
+    """Of a held far side the table of the documentation says so, below."""
+    coarse, fine = (errors(two(cells, far, grading, perfect)) for cells in (40, 80))
+    assert np.all(np.log2(coarse / fine) > 1.9)
+    assert np.all(fine < 0.03)
 
 
 def test_the_table_of_the_documentation():
@@ -80,7 +77,7 @@ def test_the_table_of_the_documentation():
     np.testing.assert_allclose([[float(cell) for cell in row[1::2]] for row in rows], table, rtol=5e-3)
     shown = [[float(cell) for cell in row[2::2]] for row in rows[1:]]
     np.testing.assert_allclose(shown, np.log2(table[:-1] / table[1:]), atol=6e-3)
-    assert len(rows) == 4
+    assert len(rows) == 3
 
 
 @pytest.mark.parametrize("bulk", ["constant", "quadratic"])
@@ -91,10 +88,9 @@ def test_two_temperatures_in_contact_become_the_one_that_keeps_their_energy(bulk
     assert start == pytest.approx(((4 * 400**power + 9 * 300**power) / 13) ** (1 / power), rel=1e-13)
 
 
-@pytest.mark.parametrize("far", FAR)
-@pytest.mark.parametrize("perfect", [True, False])
+@pytest.mark.parametrize(("far", "perfect"), list(zip(FAR, (True, False, True), strict=True)))
 def test_both_laws_are_kept_by_the_cells(far, perfect):
-    run = two(30, far, perfect=perfect).run()
+    run = two(10, far, perfect=perfect).run()
     assert run.audit.energy_error < 1e-11
     assert run.audit.entropy_error < 1e-9
     assert run.audit.violations == ()
@@ -106,29 +102,12 @@ def test_both_laws_are_kept_by_the_cells(far, perfect):
 def test_chains_are_solved_as_the_whole_matrix_is():
     simulation = two(20, "convective", grading=5)
     ours = simulation.run().trajectory.result
-    for solver in ("scipy-radau", "ida"):
-        run = replace(simulation.case.run, solver=solver, rtol=1e-9)
-        other = simulation.model.solve(run).result
-        np.testing.assert_allclose(other.outputs, ours.outputs, rtol=2e-7)
+    other = simulation.model.solve(replace(simulation.case.run, solver="ida", rtol=1e-9)).result
+    np.testing.assert_allclose(other.outputs, ours.outputs, rtol=2e-7)
 
 
-def test_derivatives_of_chains_stand_where_they_belong():
-    simulation = two(6, "convective")
-    system, program = simulation.system, simulation.model.program
-    inputs = np.concatenate([[0.0], *np.random.default_rng(1).uniform(300, 400, (2, program.n))])
-    inputs = np.concatenate([inputs, [parameter.at(0.0) for parameter in system.parameters]])
-    by_state, by_rate = program.derivatives(inputs)
-    base = program.residual(inputs)
-    for first, matrix in ((1, by_state), (1 + program.n, by_rate)):
-        for j in range(program.n):
-            nudged = inputs.copy()
-            nudged[first + j] += 1.0  # the equations are linear here
-            np.testing.assert_allclose(matrix[:, j], program.residual(nudged) - base, atol=1e-7 * abs(matrix).max())
-
-
-@pytest.mark.parametrize("h", ["1e10", "1e20"])
-def test_huge_conductances_lose_nothing(h):
-    run, perfect = two(20, h=h, exact=False).run(), two(20, perfect=True).run()
+def test_huge_conductances_lose_nothing():
+    run, perfect = two(20, h="1e20", exact=False).run(), two(20, perfect=True).run()
     np.testing.assert_allclose(run.dataset.profile_1[1:], perfect.dataset.profile_1[1:], rtol=1e-8)
     assert run.audit.energy_error < 1e-11
 
@@ -153,20 +132,17 @@ run: {{until: 1 hour}}
 
 
 def test_a_joint_jump_heats_the_volume_of_the_bodies():
-    rises = []
-    for cells in (2, 20):
-        conduction = f"{{thickness: 1 mm, conductivity: 0.5 W/m/K, cells: {cells}}}"
-        run = surfacechem.run("debonding", [f"bodies.{body}.conduction={conduction}" for body in ("lower", "upper")])
-        assert run.trajectory.jumps[0].verdict == "admissible"
-        assert run.audit.energy_error < 1e-12
-        rises.append(run.dataset["T"].values[-1])
-    lumped = surfacechem.run("debonding").dataset["T"].values[-1]
-    np.testing.assert_allclose(rises, lumped, rtol=1e-9)
+    conduction = "{thickness: 1 mm, conductivity: 0.5 W/m/K, cells: 4}"
+    run = surfacechem.run("debonding", [f"bodies.{body}.conduction={conduction}" for body in ("lower", "upper")])
+    assert run.trajectory.jumps[0].verdict == "admissible"
+    assert run.audit.energy_error < 1e-12
+    lumped = solved("debonding").dataset["T"].values[-1]
+    assert run.dataset["T"].values[-1] == pytest.approx(lumped, rel=1e-9)
 
 
 def test_a_search_that_ends_early_states_the_error_of_its_last_cells(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(spatial, "TRIALS", 1)
-    simulation = Simulation(load_text(two("{accuracy: 1e-5}").case.text.replace("times: [1, 3, 10, 30]", "until: 30")))
+    simulation = Simulation(load_text(two("{accuracy: 1e-3}").case.text.replace("times: [1, 3, 10, 30]", "until: 30")))
     chosen, (trajectory,), errors = simulation._resolved(simulation.case.run, {})
     assert spatial.grid(chosen.case.scene) != spatial.grid(simulation.case.scene)
     assert errors == [chosen._halved(trajectory, given=False)]
@@ -187,7 +163,7 @@ def test_a_sweep_takes_the_cells_that_its_runs_need_and_states_what_they_leave()
 
 
 def test_an_accuracy_out_of_reach_is_said(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(spatial, "MOST_CHOSEN", 128)
+    monkeypatch.setattr(spatial, "MOST_CHOSEN", 32)
     warnings = two("{accuracy: 1e-9}", perfect=True, exact=False).run().warnings
     assert any("the accuracy 1e-09 of the cells is not reached" in warning for warning in warnings)
 
@@ -320,9 +296,8 @@ def one(cells: object, run: str, h: float = 1e-9, flux: object = 0.0, hot: float
     return Simulation(load_text(ONE.format(cells=cells, run=run, h=h, flux=flux, hot=hot)))
 
 
-@pytest.mark.parametrize("cells", [2, 400])
-def test_a_number_of_cells_that_is_too_small_for_the_layer_says_so(cells):
-    run = one(cells, "until: 1.2 us", flux=5e7).run()
+def test_a_number_of_cells_that_is_too_small_for_the_layer_says_so():
+    run = one(2, "until: 1.2 us", flux=5e7).run()
     exact = 300 + 2 * 5e7 * np.sqrt(run.dataset.time.values / np.pi) / EFFUSIVITY
     true = abs(run.dataset["T_1"] / exact - 1).values.max()
     assert true > 0.2
@@ -333,11 +308,11 @@ def test_a_number_of_cells_that_is_too_small_for_the_layer_says_so(cells):
 
 def test_each_pulse_starts_a_layer_of_its_own():
     pulses = "{table: {times: [0 s, 0.1 s, 0.1 s, 0.2 s, 0.2 s, 1 s], values: [0, 0, 1e6, 1e6, 0, 0]}}"
-    run = one("{accuracy: 1e-4, after: 10 us}", "times: [0.1, 0.10001, 0.15, 0.2, 0.20001, 1.0]", flux=pulses).run()
+    run = one("{accuracy: 1e-3, after: 1 ms}", "times: [0.1, 0.101, 0.15, 0.2, 0.201, 1.0]", flux=pulses).run()
     t = run.dataset.time.values
     since = [np.sqrt(np.maximum(t - start, 0) / np.pi) for start in (0.1, 0.2)]
     exact = 300 + 2 * 1e6 * (since[0] - since[1]) / EFFUSIVITY
-    assert abs(run.dataset["T_1"] / exact - 1).max() <= run.accuracy.error < 1e-4
+    assert abs(run.dataset["T_1"] / exact - 1).max() <= run.accuracy.error < 1e-3
 
 
 def test_cells_follow_from_the_case_and_never_from_the_outputs():
@@ -437,7 +412,7 @@ def test_a_very_good_conductor_is_a_lump():
         f"bodies.{body}.conduction={{thickness: 1 mm, conductivity: 1e7 W/m/K, cells: 8}}"
         for body in ("lower", "upper")
     ]
-    lumped, divided = surfacechem.run("three-temperatures"), surfacechem.run("three-temperatures", changes)
+    lumped, divided = solved("three-temperatures"), surfacechem.run("three-temperatures", changes)
     for name in ("T_1", "T_2", "T_c", "U_1", "heat_into_1"):
         size = abs(lumped.dataset[name]).max()
         assert abs(divided.dataset[name] - lumped.dataset[name]).max() < 1e-6 * size

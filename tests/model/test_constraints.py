@@ -57,7 +57,7 @@ run: {{until: 3 s, outputs: 31}}
 
 simulation = cache(lambda text: Simulation(load_text(text)))
 
-few = settings(max_examples=15, derandomize=True)
+few = settings(max_examples=6, derandomize=True)
 
 
 def decades(low, high):

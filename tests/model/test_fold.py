@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 import solved
 from mpmath import mp, mpf
-from sampling import every
 from scenes import perfect_contact, together, varying
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, fsolve
@@ -16,7 +15,7 @@ from solved import closed
 from surfacechem.format import load_text
 from surfacechem.laws.cohesive import ExponentialCohesiveZone, XuNeedleman
 from surfacechem.laws.factors import Power
-from surfacechem.laws.friction import Coulomb, MohrCoulomb
+from surfacechem.laws.friction import MohrCoulomb
 from surfacechem.laws.loading import Hold, Ramp, Table
 from surfacechem.runs.simulation import Simulation
 from surfacechem.scene import Mounting
@@ -38,23 +37,22 @@ def shear(x):
     return STIFF * G_T * x * math.exp(-(x**2))
 
 
-@pytest.mark.parametrize("ratio", [1e-3, 0.05, 0.3, 0.44])
+@pytest.mark.parametrize("ratio", [1e-3, 0.3])
 def test_a_soft_spring_on_a_zone_in_shear_snaps_where_the_tangent_is_lost(ratio):
     """(2 x^2 - 1) exp(-x^2) = k / stiffness, with Lambert's function."""
     k, rate = ratio * STIFF, 1e-8
     x = math.sqrt(0.5 - lambertw(-ratio * math.sqrt(math.e) / 2).real)
     w = x * G_T + shear(x) / k
-    top = brentq(lambda y: k * (w - y * G_T) - shear(y), 1.01 * x, w / G_T) if ratio < 0.4 else None
+    top = brentq(lambda y: k * (w - y * G_T) - shear(y), 1.01 * x, w / G_T)
     trajectory = solve({"g_n": Hold(level=0.0), "w_t": Ramp(rate=rate)}, 1.2 * w / rate, tangential=Mounting(k=k))
     (snap,) = trajectory.of("snap")
     assert snap.t == pytest.approx(w / rate, rel=1e-10)
     assert snap.verdict == "admissible"
     gaps = [trajectory.state(snap, name) for name in ("g_t", "u_t")]
     assert gaps[0] == pytest.approx(gaps[1], rel=np.finfo(float).eps)  # two states, each rounded
-    if top is not None:
-        energy = [0.5 * k * (w - y * G_T) ** 2 - PHI * math.exp(-(y**2)) for y in (x, top)]
-        assert trajectory.state(snap, "g_t") == pytest.approx(top * G_T, rel=1e-8)
-        assert snap.released == pytest.approx(energy[0] - energy[1], rel=1e-7)
+    energy = [0.5 * k * (w - y * G_T) ** 2 - PHI * math.exp(-(y**2)) for y in (x, top)]
+    assert trajectory.state(snap, "g_t") == pytest.approx(top * G_T, rel=1e-8)
+    assert snap.released == pytest.approx(energy[0] - energy[1], rel=1e-7)
 
 
 def test_a_stiff_spring_follows_the_whole_zone_in_shear():
@@ -97,7 +95,7 @@ def opened(k, C):
     return [float(value) for value in (w, x * g_0, warm(x), y * g_0, u * T_0)]
 
 
-@pytest.mark.parametrize(("k", "C"), [(1e12, 2.0), (1e12, 0.02), (2.5e12, 0.01)])
+@pytest.mark.parametrize(("k", "C"), [(1e12, 2.0), (2.5e12, 0.01)])
 def test_moment_and_state_of_a_fold_are_those_of_the_fold_itself(k, C):
     """The zone cools as it opens; a run ends a little before the fold, by the root of what time resolves."""
     with mp.workdps(40):
@@ -122,10 +120,9 @@ def gradient(z, w_n, w_t, k_t):
     return r, nn * tt - nt**2
 
 
-@pytest.mark.parametrize("ratio", [0.05, 0.3])
-def test_a_fold_of_both_gaps_is_where_the_determinant_vanishes(ratio):
+def test_a_fold_of_both_gaps_is_where_the_determinant_vanishes():
     """Each tangent by itself would be lost later."""
-    k, v_n, v_t = ratio * STIFF, 3e-9, 1e-8
+    k, v_n, v_t = 0.3 * STIFF, 3e-9, 1e-8
 
     def system(q):
         r, det = gradient(q[:2], v_n * q[2], v_t * q[2], k)
@@ -151,8 +148,7 @@ def test_a_dead_load_in_shear_beyond_the_strength_has_no_equilibrium():
     assert trajectory.result.t == pytest.approx(10.0, rel=1e-9)
 
 
-@pytest.mark.parametrize("rtol", [1e-13, 1e-11, 1e-6])
-@pytest.mark.parametrize("k", [1e10, 3e12])
+@pytest.mark.parametrize(("k", "rtol"), [(1e10, 1e-13), (3e12, 1e-6)])
 def test_a_pull_off_snaps_at_any_tolerance(k, rtol):
     """At the tightest the run reaches the fold itself, where the push is rounding."""
     zone = ExponentialCohesiveZone(t_max=1e6, g_0=1e-8, E_n=1e15)
@@ -229,16 +225,12 @@ def damped(k, w, begin, forces, scale=1e-6):
 
 SCENES = {
     "closed by a spring": (5e10, 1e11, (-20e-6, 0.0), (0.0, 2e-6), {}),
-    "opened": (1e11, 5e10, (0.0, 1e-6), (1e-6, 0.0), {}),
-    "opened and sheared": (8e10, 1.5e11, (0.0, 1e-6), (0.0, 2e-6), {}),
-    "less work in shear": (6e10, 8e10, (-6e-6, 0.0), (0.0, 2e-6), {"q": 0.7}),
     "more opening after shear": (6e10, 8e10, (-4e-6, 0.0), (0.0, 2e-6), {"q": 0.8, "r": 0.3}),
-    "narrow in shear": (3e11, 2e10, (-0.2e-6, 0.0), (0.0, 2e-5), {"g_t0": 0.5e-6}),
     "wide in shear": (2e10, 2e11, (0.0, 2e-6), (2e-6, 0.0), {"g_t0": 5e-6, "q": 1.2}),
 }
 
 
-@pytest.mark.parametrize("scene", every(2, SCENES))
+@pytest.mark.parametrize("scene", SCENES)
 def test_gaps_end_where_damped_motion_does(scene):
     k_n, k_t, w_n, w_t, zone = SCENES[scene]
     data = run(k_n, k_t, w_n, w_t, **zone)
@@ -268,18 +260,17 @@ def test_a_zone_without_an_equilibrium_still_stops():
     assert "no gap follows" in data.attrs["reason"]
 
 
-@pytest.mark.parametrize("rate", [2e-6, -2e-6])
-def test_a_symmetric_balance_is_left_as_the_loads_go_on(rate):
+def test_a_symmetric_balance_is_left_as_the_loads_go_on():
     """Shear of a zone that is pressed shut is unstable from the start; nothing pushes it before the drive begins."""
     k_n, k_t = 1e12, 6e10
-    data = run(k_n, k_t, (-6e-6, 0.0), (0.0, rate))
+    data = run(k_n, k_t, (-6e-6, 0.0), (0.0, -2e-6))
     assert [str(name) for name in data.event_name.values[:1]] == ["snap"]
     assert data.event_time[0] == 0.0
     assert data.u_t_before[0] == 0.0
     begin = np.array([float(data.g_n_before[0]), 0.0])
     expected = damped(np.array([k_n, k_t]), np.array([-6e-6, 0.0]), begin, tractions)
     assert data.g_n_after[0] == pytest.approx(expected[0], rel=1e-8)
-    assert data.u_t_after[0] == pytest.approx(np.sign(rate) * abs(expected[1]), rel=1e-8)
+    assert data.u_t_after[0] == pytest.approx(-abs(expected[1]), rel=1e-8)
 
 
 def test_motion_that_nothing_bears_is_given_up_soon():
@@ -295,9 +286,8 @@ def test_motion_that_nothing_bears_is_given_up_soon():
     assert 0 < seen < 10_000
 
 
-@pytest.mark.parametrize("friction", [Coulomb(mu=0.3), MohrCoulomb(mu=0.3, c=1e7)])
-def test_a_zone_in_shear_beside_friction(friction):
+def test_a_zone_in_shear_beside_friction():
     loading = {"w_n": Hold(level=-1e-9), "w_t": Ramp(rate=1e-8)}
     mounts = {"normal": Mounting(k=1e15), "tangential": Mounting(k=0.05 * STIFF)}
-    trajectory = solve(loading, frictions=[friction], **mounts)
+    trajectory = solve(loading, frictions=[MohrCoulomb(mu=0.3, c=1e7)], **mounts)
     assert trajectory.status == "finished", trajectory.reason

@@ -118,7 +118,7 @@ def heat(model, t, y):
     return (1 - phi) * MU * P * v
 
 
-@pytest.mark.parametrize("stiffness", [1e12, 1e14, 1e16])
+@pytest.mark.parametrize("stiffness", [1e12, 1e16])
 def test_elastic_contact_beside_adhesion(stiffness):
     """The unbonded part sticks elastically, then slides; rigid friction is the limit of a stiff contact."""
     made = scene([ADHESION, TangentialStiffness(E_t=stiffness)], loading={"u_t": Ramp(rate=RATE)}, mount=None)
@@ -156,9 +156,10 @@ def shear_of_coupled(u):
 
 
 @pytest.mark.parametrize(
-    "given", [{"loading": {"g_t": Ramp(rate=RATE)}, "mount": None}, {}], ids=["prescribed", "on a stiff spring"]
+    ("zone", "shear", "given"),
+    [(ZONE, shear_of_zone, {"loading": {"g_t": Ramp(rate=RATE)}, "mount": None}), (COUPLED, shear_of_coupled, {})],
+    ids=["prescribed", "on a stiff spring"],
 )
-@pytest.mark.parametrize(("zone", "shear"), [(ZONE, shear_of_zone), (COUPLED, shear_of_coupled)])
 def test_a_zone_and_friction_add_up(zone, shear, given):
     """The traction is that of the zone at the displacement plus friction; the work both, the heat friction's alone."""
     found = solve(scene([zone], **given))
@@ -226,8 +227,7 @@ def at_an_angle(potentials, frictions, mount, angle=ANGLE):
     return scene(potentials, frictions, {"w_t": Ramp(rate=RATE * math.cos(angle))} | across, mount)
 
 
-@pytest.mark.parametrize("mount", [HEAVY, Mounting(k=1e13, c_b=1e9)], ids=["mass", "damper"])
-@pytest.mark.parametrize("potential", [ADHESION, ZONE, COUPLED], ids=lambda law: law.name())
+@pytest.mark.parametrize(("potential", "mount"), [(ADHESION, HEAVY), (COUPLED, Mounting(k=1e13, c_b=1e9))])
 def test_adhesion_is_the_same_in_all_directions(potential, mount):
     """Pulled at an angle the interface moves along the pull, as it does along an axis."""
     straight = solve(scene([potential], mount=mount))
@@ -242,11 +242,3 @@ def test_what_two_directions_do_not_know_is_refused():
         assemble(at_an_angle([ZONE], (Coulomb(mu=MU),), STIFF))
     with pytest.raises(InputError, match="elastic gap g_t of its potential has one"):
         assemble(at_an_angle([Penalty(E_n=E_N), TangentialStiffness(E_t=1e12)], (Coulomb(mu=MU),), HEAVY))
-
-
-def test_two_adhesions_of_the_same_bonds_are_one_of_their_sums():
-    """What the bonds leave is left once, however many energies the bonds have."""
-    parts = [AdhesionIntensity(C_N=x * C, C_T=x * C, w=x * W, E_n=x * E_N) for x in (0.25, 0.75)]
-    one, two = solve(scene([ADHESION])), solve(scene(parts))
-    for name in ("phi", "t_t", "D_coulomb", "T"):
-        np.testing.assert_allclose(two[name], one[name], rtol=1e-9, atol=1e-12)

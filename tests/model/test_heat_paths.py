@@ -81,23 +81,18 @@ def ledger() -> Scene:
     return replace(scene, heat=heat, loading=loading, interface=interface, surroundings=Hold(level=280.0))
 
 
-def test_fluxes_by_channel_sum_to_the_total():
-    values = solved(ledger(), 0.0, 0.5, 2.0)
+def test_fluxes_by_channel_sum_lost_heat_is_booked_and_both_laws_hold():
+    values = trajectory = solved(ledger(), 0.0, 0.5, 2.0)
     channels = ("spots", "gas", "radiation", "friction", "reaction", "external")
     for k in "12":
         parts = [values[f"q_{k}_{channel}"] for channel in channels]
         assert sum(parts) == pytest.approx(values[f"q_{k}"], rel=1e-13)
     across = [values[f"q_12_{channel}"] for channel in channels[:3]]
     assert sum(across) == pytest.approx(values["q_12"], rel=1e-13)
-
-
-def test_lost_heat_is_booked_and_both_laws_hold():
-    trajectory = solved(ledger(), 0.0, 0.5, 2.0)
     books = audit(trajectory)
     assert books.energy_error < 1e-10
     assert books.entropy_error < 1e-10
     assert books.violations == ()
-    values = trajectory
     for channel, heat in (("friction", values["D_coulomb"]), ("reaction", values["D_linear_affinity"])):
         for k, share in (("1", 0.3), ("2", 0.6)):
             assert values[f"q_{k}_{channel}"] == pytest.approx(share * heat, rel=1e-13)
@@ -165,15 +160,11 @@ def test_mean_influx_is_of_two_bodies_with_temperatures_of_their_own():
 PRESSURES = {"pressures": [0.0, 1e6, 3e6], "conductances": [500.0, 1500.0, 3000.0]}
 
 
-@pytest.mark.parametrize("extrapolation", ["hold", "linear"])
-def test_tables_beyond_their_ends(extrapolation):
-    law = PressureTable(between=ENDS, extrapolation=extrapolation, **PRESSURES)
-    assert law.conductance(p=1e6) == 1500.0
-    value = law.conductance(p=6e6)
-    step = 10.0
-    slope = (law.conductance(p=3e6) - law.conductance(p=3e6 - step)) / step
-    expected = 0.0 if extrapolation == "hold" else slope
-    assert (value - 3000.0) / 3e6 == pytest.approx(expected, rel=1e-4, abs=1e-12)
+def test_tables_beyond_their_ends():
+    held, straight = (PressureTable(between=ENDS, extrapolation=way, **PRESSURES) for way in ("hold", "linear"))
+    assert held.conductance(p=6e6) == held.conductance(p=3e6) == 3000.0
+    slope = (straight.conductance(p=3e6) - straight.conductance(p=3e6 - 10.0)) / 10.0
+    assert (straight.conductance(p=6e6) - 3000.0) / 3e6 == pytest.approx(slope, rel=1e-4)
 
 
 def test_a_table_that_refuses_to_be_extrapolated_ends_the_run():
@@ -200,17 +191,9 @@ def test_a_correlation_outside_its_range_says_so():
     assert outside.warnings[0].startswith("cooper mikic yovanovich is an extrapolation: p ran from 1e+09 to 1e+09")
 
 
-@pytest.mark.parametrize(
-    ("at", "values", "message"),
-    [
-        ([0.0, 1.0], [1.0], "as many gaps"),
-        ([0.0, 0.0], [1.0, 2.0], "must increase"),
-        ([0.0, 1.0], [1.0, -2.0], "not negative"),
-    ],
-)
-def test_tables_that_are_none(at, values, message):
-    with pytest.raises(InputError, match=message):
-        GapTable(between=ENDS, gaps=at, conductances=values)
+def test_a_table_that_is_none_is_refused():
+    with pytest.raises(InputError, match="must increase"):
+        GapTable(between=ENDS, gaps=[0.0, 0.0], conductances=[1.0, 2.0])
 
 
 # -- touch ------------------------------------------------------------------------------------------------------------
@@ -315,9 +298,8 @@ def exchange(h, temperatures=("T_1", "T_c", "T_2"), C_c=4.0):
     return Scene(bodies(first, second, Constant, 10.0, 30.0), interface, heat, {}, None, 300.0, initial | {"phi": 0.0})
 
 
-@pytest.mark.parametrize("h", [1e10, 1e15, 1e20])
-def test_infinite_conductance_is_one_temperature(h):
-    stiff, shared = closed(exchange(h), 2.0), closed(exchange(1.0, ("T", "T", "T")), 2.0)
+def test_infinite_conductance_is_one_temperature():
+    stiff, shared = closed(exchange(1e20), 2.0), closed(exchange(1.0, ("T", "T", "T")), 2.0)
     for name in ("T_1", "T_2", "T_c"):
         assert stiff[name][-1] == pytest.approx(shared["T"][-1], rel=1e-9)
     assert stiff["heat_into_2"][-1] == pytest.approx(shared["heat_into_2"][-1], rel=1e-8)
@@ -329,18 +311,12 @@ def test_an_interface_temperature_that_nothing_determines_is_refused():
         assemble(Scene(bodies(), Interface("T_c"), (), {}, None, 300.0, {"T_1": 300.0, "T_2": 300.0}))
 
 
-@pytest.mark.parametrize(("h", "lost"), [(1e3, False), (1e9, False), (1e20, True)])
+@pytest.mark.parametrize(("h", "lost"), [(1e9, False), (1e20, True)])
 def test_fluxes_that_are_rounding_are_called_out(h, lost):
     """The states and the heat received stay right at any conductance; h times a difference of rounding does not."""
     trajectory = closed(exchange(h), 2.0)
     warnings = [text for text in Solution(trajectory.trajectory).warnings if "lost to rounding" in text]
     assert bool(warnings) is lost
-
-
-def test_the_order_of_the_bodies_does_not_matter():
-    scene = exchange(50.0)
-    swapped = replace(scene, bodies=scene.bodies[::-1])
-    assert closed(swapped, 2.0)["T_c"][-1] == pytest.approx(closed(scene, 2.0)["T_c"][-1], rel=1e-10)
 
 
 def test_a_pressure_from_a_potential_and_from_loading_is_two_roles():

@@ -78,7 +78,7 @@ def test_a_consistent_pair_is_the_reversible_reaction(pair, tmp_path):
     assert both.attributes["detailed_balance"].startswith("free(s) <=> bond(s) (pair): k_f/k_r is K(g, T) to within")
 
 
-@pytest.mark.parametrize("free", [1.0, 0.4, 0.0])
+@pytest.mark.parametrize("free", [1.0, 0.0])
 def test_the_departure_is_what_the_parameters_lack(pair, free):
     """Also where a coverage has vanished, whose logarithm is infinite."""
     solution = pair(math.exp(2.3), free=free).run()
@@ -170,7 +170,7 @@ def with_springs(folder, law, phi=0.5):
     return surfacechem.load(folder / "springs.yaml").run()
 
 
-@pytest.mark.parametrize("phi", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize("phi", [0.0, 1.0])
 def test_a_law_with_both_rates_is_held_against_the_potential(phi, tmp_path):
     solution = with_springs(tmp_path, BELL, phi)
     f = solution.dataset.f

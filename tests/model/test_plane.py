@@ -1,11 +1,9 @@
 """Sliding with two components that moves: exact solutions, rotated axes, and independent integrations of the plane."""
 
 import math
-from itertools import product
 
 import numpy as np
 import pytest
-from sampling import every
 from scenes import bodies, together, varying
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
@@ -64,7 +62,7 @@ def circling(t):
 # -- stops of a free mass -------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("kappa", [1.1, 2.5, 8.0])
+@pytest.mark.parametrize("kappa", [1.1, 8.0])
 def test_a_slide_across_a_dead_load_curves_into_it(kappa):
     """Across a load F, with kappa = mu p / F, v_2 tan(alpha/2)^-kappa is constant; it is the block on an incline."""
     m, v, F, p, mu = 5.0, 2.0, 3e3, 3e4, kappa / 10
@@ -85,20 +83,17 @@ def test_a_slide_across_a_dead_load_curves_into_it(kappa):
 FRICTIONS = [
     [Coulomb(mu=0.4, mu_s=0.6)],
     [MohrCoulomb(mu=0.3, t_n_max=2e4, c=5e3, mu_s=0.5)],
-    [Stribeck(mu_s=0.6, mu_k=0.4, v_s=1e-3, c_v=1e3)],
-    [Coulomb(mu=0.2, mu_s=0.5), Coulomb(mu=0.1)],
+    [Stribeck(mu_s=0.6, mu_k=0.4, v_s=1e-3, c_v=1e3), Coulomb(mu=0.1)],
 ]
 
 
-MOUNTS = [SPRING, Mounting(k=1e8, m=10.0, c_b=100.0, c_g=100.0)]
-
-
-@pytest.mark.parametrize(("frictions", "mount"), every(3, product(FRICTIONS, MOUNTS)))
-def test_stick_slip_along_a_line_is_that_of_one_component(frictions, mount):
+@pytest.mark.parametrize("frictions", FRICTIONS)
+def test_stick_slip_along_a_line_is_that_of_one_component(frictions):
+    mount = Mounting(k=1e8, m=10.0, c_b=100.0, c_g=100.0)
     times = np.linspace(0, 1.1, 21)
     one = closed(scene(frictions, mount, p=1e5, w_t=Ramp(rate=1e-3)), times)
     assert len(one.jumps) > 1
-    for angle in (0.0, 0.7, math.pi):
+    for angle in (0.7, math.pi):
         c, s = math.cos(angle), math.sin(angle)
         both = closed(scene(frictions, mount, p=1e5, w_t=Ramp(rate=1e-3 * c), w_t2=Ramp(rate=1e-3 * s)), times)
         # A slip begins within the tolerance of its time, in which what slides goes on by its velocity.
@@ -110,7 +105,7 @@ def test_stick_slip_along_a_line_is_that_of_one_component(frictions, mount):
         assert moments(both) == pytest.approx(moments(one), rel=1e-9)
 
 
-@pytest.mark.parametrize("mount", [SPRING, Mounting(k=1e8, m=10.0, c_b=1e4), Mounting(k=1e8, c_b=1e6)])
+@pytest.mark.parametrize("mount", [SPRING, Mounting(k=1e8, c_b=1e6)])
 def test_isotropic_sliding_does_not_know_the_axes(mount):
     a = 0.4
     c, s = math.cos(a), math.sin(a)
@@ -162,25 +157,17 @@ def cartesian(mu, m, k, c, far, p=1e5):
     return rates
 
 
-@pytest.mark.parametrize(
-    ("law", "mu"),
-    [
-        (Coulomb(mu=0.4), (0.4, 0.4)),
-        (AnisotropicCoulomb(mu_1=0.2, mu_2=0.5), (0.2, 0.5)),
-        (AnisotropicCoulomb(mu_1=0.4, mu_2=0.1), (0.4, 0.1)),
-    ],
-    ids=["isotropic", "rough across", "smooth across"],
-)
-def test_dragging_in_a_circle(law, mu):
+def test_dragging_in_a_circle():
+    law, mu = AnisotropicCoulomb(mu_1=0.2, mu_2=0.5), (0.2, 0.5)
     n, (w_i, w_dot) = np.array([0.9, 0.4]) / math.hypot(0.9, 0.4), circling(0.0)
     u, v = w_i - 1e5 * np.asarray(mu) * n / 1e8, n * np.linalg.norm(w_dot)
     mount, start = Mounting(k=1e8, m=10.0, c_b=1e4), {"u_t": u[0], "u_t2": u[1], "v": v[0], "v_2": v[1]}
-    times = np.linspace(0, 0.2, 21)
+    times = np.linspace(0, 0.1, 21)
     solved = closed(scene([law], mount, start, p=1e5, **CIRCLE), times)
     assert not solved.events
     state = [*u, *v]
     rates = cartesian(mu, 10.0, 1e8, 1e4, circling)
-    found = solve_ivp(rates, (0, 0.2), state, "Radau", t_eval=times, rtol=1e-12, atol=1e-15).y
+    found = solve_ivp(rates, (0, 0.1), state, "Radau", t_eval=times, rtol=1e-12, atol=1e-15).y
     for name, value in zip(("u_t", "u_t2", "v", "v_2"), found, strict=True):
         close(solved[name], value, 2e-8)
 
@@ -286,9 +273,7 @@ def test_initial_velocities_can_be_changed():
 @pytest.mark.parametrize(
     ("law", "along", "across"),
     [
-        (Coulomb(mu=0.3), 0.3 * 1e2 * 0.6, 0.3 * 1e2 * 0.8),
         (AnisotropicCoulomb(mu_1=0.3, mu_2=0.6), 0.3 * 1e2 * 0.6, 0.6 * 1e2 * 0.8),
-        (Viscous(eta=0.5), 50 * 3.0, 50 * 4.0),
         (AnisotropicViscous(eta_1=0.5, eta_2=0.2), 50 * 3.0, 20 * 4.0),
     ],
 )
@@ -299,12 +284,11 @@ def test_friction_opposes_a_prescribed_velocity(law, along, across):
     assert found[f"D_{name}"][-1] == pytest.approx(3.0 * along + 4.0 * across, rel=1e-14)
 
 
-@pytest.mark.parametrize(("c", "c_2"), every(3, [(1e5, 1e6), (1e6, 1e6), (3e3, 1e3)]))
-def test_dampers_beside_friction_that_knows_directions(c, c_2):
+def test_dampers_beside_friction_that_knows_directions():
     """What pulls is resisted by friction and damper, (L + c s) n, which leaves one speed."""
-    k, L, damping = np.array([K, 3 * K]), np.array([0.2, 0.5]) * P, np.array([c, c_2])
-    times = np.linspace(0, 1, 21)
-    mounts = Mounting(k=K, c_g=c), Mounting(k=3 * K, c_g=c_2)
+    k, L, damping = np.array([K, 3 * K]), np.array([0.2, 0.5]) * P, np.array([1e5, 1e6])
+    times = np.linspace(0, 0.4, 21)
+    mounts = Mounting(k=K, c_g=1e5), Mounting(k=3 * K, c_g=1e6)
     u = circling(0.0)[0] - 0.999 * L * np.array([0.6, 0.8]) / k
     rough = [AnisotropicCoulomb(mu_1=0.2, mu_2=0.5)]
     solved = closed(scene(rough, mounts[0], {"u_t": u[0], "u_t2": u[1]}, mounts[1], p=P, **CIRCLE), times)
@@ -323,7 +307,7 @@ def test_dampers_beside_friction_that_knows_directions(c, c_2):
     begun = solved.jumps[0].t
     assert solved.events[0] == "slip"
     sliding = times > begun
-    found = solve_ivp(rates, (begun, 1), u, "Radau", t_eval=times[sliding], rtol=1e-10, atol=1e-16).y
+    found = solve_ivp(rates, (begun, 0.4), u, "Radau", t_eval=times[sliding], rtol=1e-10, atol=1e-16).y
     close(solved["u_t"][sliding], found[0], 1e-7)
     close(solved["u_t2"][sliding], found[1], 1e-7)
     assert np.all(solved["D_anisotropic_coulomb"] >= 0)

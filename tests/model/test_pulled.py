@@ -2,11 +2,9 @@
 
 import math
 from dataclasses import replace
-from itertools import product
 
 import numpy as np
 import pytest
-from sampling import every
 
 import surfacechem
 from surfacechem.contracts.terms import RateLaw
@@ -56,7 +54,7 @@ def both(a, b, x_f, x_r, k_f=1.0, k_r=1.0):
     return (a, b, k_f, x_f), (b, a, k_r, x_r)
 
 
-@pytest.mark.parametrize("force", ["0 pN", "8 pN", "30 pN"])
+@pytest.mark.parametrize("force", ["0 pN", "30 pN"])
 def test_vinculin_keeps_detailed_balance_under_any_force(force):
     solution = surfacechem.load("vinculin-catch-bond", {"loading.f": force}).run()
     data = solution.dataset
@@ -132,11 +130,11 @@ def test_every_law_that_says_a_length_is_tried_below():
 LOADS = ["loading: {{f: {0} pN}}", "loading: {{t_n: {0} kPa}}", PROGRAMME]
 
 
-@pytest.mark.parametrize(("law", "load"), every(4, product([BELL, REVERSIBLE, BESIDE], LOADS)))
+@pytest.mark.parametrize(("law", "load"), list(zip([BELL, REVERSIBLE, BESIDE], LOADS, strict=True)))
 def test_the_equilibrium_feels_the_work_of_the_force(law, load, tmp_path):
     """d ln(phi / (1 - phi)) / df = l / k_B T, with the force or the share of a traction that each bond bears."""
     found = []
-    for level in (0, 4, 10):
+    for level in (0, 10):
         solution = held(tmp_path, law, load.format(level), "90 s").run()
         last = solution.dataset.isel(time=-1)
         force = float(last["f"])
@@ -145,7 +143,7 @@ def test_the_equilibrium_feels_the_work_of_the_force(law, load, tmp_path):
         assert solution.audit.energy_error < 1e-9
     for force, log_ratio in found:
         assert log_ratio == pytest.approx((EPSILON + force * ELL) / (BOLTZMANN * 300.0), abs=1e-7)
-    assert found[2][0] > found[1][0] > 0
+    assert found[1][0] > 0
 
 
 def test_bells_rates_depart_from_no_equilibrium_under_a_force(tmp_path):

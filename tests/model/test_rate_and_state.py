@@ -5,7 +5,6 @@ At a reversal the velocity passes within no time through all decades down to its
 
 import numpy as np
 import pytest
-from sampling import every
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from solved import solve
@@ -122,18 +121,15 @@ def reversals(trajectory):
     return int(np.sum(np.diff(np.sign(v[v != 0])) != 0))
 
 
-@pytest.mark.parametrize(
-    ("law", "V", "reference"), every(4, [
-        (LAWS[0], 1e-9, forward), (LAWS[0], 1e-3, plain), (LAWS[1], 1e-8, forward), (LAWS[1], 1e-6, plain)]),
-)  # fmt: skip
-def test_stick_slip_is_that_of_the_plain_equations(law, V, reference):
-    """Below the critical stiffness (b - a) p / L the block sticks and slips, whatever the velocity of the drive."""
+def test_stick_slip_is_that_of_the_plain_equations():
+    """Below the critical stiffness (b - a) p / L the block sticks and slips."""
+    law, V = RateAndStateSlip, 1e-3
     k = 0.5 * 0.004 * P / 5e-5
     start, theta = 0.6 * P / k, 0.8 * 5e-5 / V
     loading = {"w_t": Ramp(start=start, rate=V)}
-    trajectory = solved(scene(law, Mounting(k=k, m=M), loading, WEAKENING, {"theta": theta, "v": V}), 4e-3 / V)
+    trajectory = solved(scene(law, Mounting(k=k, m=M), loading, WEAKENING, {"theta": theta, "v": V}), 2e-3 / V)
     times = trajectory.result.times
-    u, v, ln_theta = reference(law, lambda t, u: k * (start + V * t - u), M, times, [0.0, V, np.log(theta)])
+    u, v, ln_theta = forward(law, lambda t, u: k * (start + V * t - u), M, times, [0.0, V, np.log(theta)])
     found = trajectory.everywhere["v"]
     assert found.max() > 20 * V
     assert found.min() < 0.1 * V
@@ -143,23 +139,21 @@ def test_stick_slip_is_that_of_the_plain_equations(law, V, reference):
     assert trajectory.result.counters.steps < 1000
 
 
-@pytest.mark.parametrize("law", every(2, LAWS))
-def test_a_block_swings_through_its_turning_points(law):
+def test_a_block_swings_through_its_turning_point():
     """Friction is a tenth of the pull of the spring: at a turn the velocity passes all decades in no time."""
-    item = scene(law, Mounting(k=K, m=1e6), {"w_t": Hold(level=0.0)}, WEAKENING, {"v": 1.0})
-    trajectory = solved(item, 0.3, outputs=31)
-    assert np.sum(np.diff(np.sign(velocity(trajectory))) != 0) >= 3
-    u, v, _ = plain(law, lambda t, u: -K * u, 1e6, trajectory.result.times, [0.0, 1.0, 0.0], turn=1e-10)
+    item = scene(RateAndStateAging, Mounting(k=K, m=1e6), {"w_t": Hold(level=0.0)}, WEAKENING, {"v": 1.0})
+    trajectory = solved(item, 0.06, outputs=13)
+    assert np.sum(np.diff(np.sign(velocity(trajectory))) != 0) == 1
+    u, v, _ = plain(RateAndStateAging, lambda t, u: -K * u, 1e6, trajectory.result.times, [0.0, 1.0, 0.0], turn=1e-10)
     np.testing.assert_allclose(trajectory["u_t"], u, rtol=0, atol=1e-8 * np.max(u))
     np.testing.assert_allclose(velocity(trajectory), v, rtol=0, atol=1e-8)
     assert trajectory.events == []
 
 
-@pytest.mark.parametrize("law", LAWS)
-def test_pressure_that_vanishes_frees_what_creeps(law):
+def test_pressure_that_vanishes_frees_what_creeps():
     """Pressed again it comes to rest, where the spring has swung to."""
     fall = {"times": [0.0, 1.0, 1.001, 1.002, 3.0], "values": [P, 0.0, 0.0, P, P]}
-    item = scene(law, Mounting(k=K, m=1e4), {"w_t": Hold(level=1e-3)}, WEAKENING, p=Table(**fall))
+    item = scene(RateAndStateSlip, Mounting(k=K, m=1e4), {"w_t": Hold(level=1e-3)}, WEAKENING, p=Table(**fall))
     trajectory = solved(item, 3.0)
     assert np.max(np.abs(trajectory.everywhere["v"])) > 1e-3
     assert abs(velocity(trajectory)[-1]) < 1e-20
@@ -217,18 +211,18 @@ def test_sliding_follows_a_load_that_swings(law, mount):
 
 
 @pytest.mark.parametrize(
-    ("mount", "elastic"), [(Mounting(k=K, c_b=5e6), 0.0), (Mounting(k=K, c_g=5e6), 0.0), (Mounting(k=K, c_b=5e6), 1e13)]
+    ("law", "mount", "elastic"),
+    [(LAWS[0], Mounting(k=K, c_b=5e6), 1e13), (LAWS[1], Mounting(k=K, c_g=5e6), 0.0)],
 )
-@pytest.mark.parametrize("law", LAWS)
-def test_creep_reverses_a_hundred_times(law, mount, elastic):
+def test_creep_reverses_twenty_times(law, mount, elastic):
     """Below what it takes to slide: velocities from 1e-17 m/s through zero and back, in a few steps each."""
     load, potentials = (
         {"w_t": Harmonic(amplitude=1e-3, frequency=0.05)},
         [TangentialStiffness(E_t=elastic)] * bool(elastic),
     )
-    trajectory = solved(scene(law, mount, load, WEAKENING | {"a": 0.008}, potentials=potentials), 1000.0)
-    assert reversals(trajectory) >= 99
-    assert trajectory.result.counters.steps < 100 * 60
+    trajectory = solved(scene(law, mount, load, WEAKENING | {"a": 0.008}, potentials=potentials), 200.0)
+    assert reversals(trajectory) >= 19
+    assert trajectory.result.counters.steps < 20 * 60
 
 
 def test_the_age_at_the_start_is_changed_in_seconds():
@@ -248,7 +242,7 @@ def test_the_age_at_the_start_is_changed_in_seconds():
         simulation.run({"initial.ln_theta": 1.0})
 
 
-@pytest.mark.parametrize("ratio", [0.9, 1.0, 1.1])
+@pytest.mark.parametrize("ratio", [0.9, 1.1])
 def test_growth_rates_are_those_of_linear_stability(ratio):
     """About steady sliding B x'' + (k - k_c) x' + k V x / L = 0, B = a p / V + c_b, k_c = [(b - a) p - c_b V] / L."""
     p, V, c_b, L = 5e6, 1e-6, 5e6, 1e-5

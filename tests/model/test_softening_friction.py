@@ -39,7 +39,6 @@ PERFECT = {
     "until": 30,
     "outputs": 31,
 }
-SLIPS = ("slip forward", "slip backward", "slip")
 
 
 def run(changes=None, **parts):
@@ -51,11 +50,6 @@ def run(changes=None, **parts):
     assert data.attrs["entropy_error"] < 1e-9
     assert data.attrs["entropy_violations"] == "none"
     return data
-
-
-def slips(data, *names):
-    """Times at which the interface begins to slide."""
-    return data.event_time.values[[str(name) in (names or SLIPS) for name in data.event_name.values]]
 
 
 def after_slip(k, stretched, friction):
@@ -125,12 +119,11 @@ REGIMES = {
 }
 
 
-@pytest.mark.parametrize("way", [1, -1])
-@pytest.mark.parametrize("regime", REGIMES)
+@pytest.mark.parametrize(("regime", "way"), [(regime, (-1) ** i) for i, regime in enumerate(REGIMES)])
 def test_a_slip_ends_where_its_own_heat_lets_friction_hold_the_spring(regime, way):
     """Spring and elastic interface in series are one spring of 100 MPa/m."""
     parts, coefficient = REGIMES[regime]
-    data = run(**parts, loading=f"p: 2e6, w_t: {{ramp: {{rate: {way * 1e-3}}}}}", until=20, outputs=21)
+    data = run(**parts, loading=f"p: 2e6, w_t: {{ramp: {{rate: {way * 1e-3}}}}}", until=16, outputs=5)
     k, p, V = 1e8, 2e6, 1e-3
     stretched = 0.7 * p / k
     left = after_slip(k, stretched, lambda energy: p * coefficient(energy))

@@ -5,7 +5,6 @@ from itertools import pairwise
 import cantera as ct
 import numpy as np
 import pytest
-from sampling import every
 
 import surfacechem
 from surfacechem.errors import InputError
@@ -15,14 +14,7 @@ pytestmark = pytest.mark.around
 
 CASES = {
     "debonding": 1e-12,
-    "debonding-cooling": 1e-12,
-    "coulomb-stop": 1e-8,
-    "anisotropic-slide": 1e-7,
     "stick-slip": 1e-7,
-    "stick-slip-debonding": 1e-7,
-    "stick-slip-rebonding": 1e-7,
-    "dynamic-pull-off": 1e-8,
-    "compliant-debonding": 3e-6,
 }
 """How closely Cantera's integrator meets events and states at its tolerance, relative to their largest."""
 
@@ -44,17 +36,17 @@ def compare(interface, solution, within):
         assert interface[state] == pytest.approx(column[-1], abs=within * np.abs(column).max(), rel=0)
 
 
-@pytest.mark.parametrize("name", every(4, CASES))
+@pytest.mark.parametrize("name", CASES)
 def test_events_and_states_of_the_compiled_path(name):
-    solution = surfacechem.load(name, ["run.outputs=201"]).run(error="balances")
+    solution = surfacechem.load(name, ["run.outputs=33"]).run(error="balances")
     interface, net = network(name)
     for t in solution.dataset["time"].values[1:]:
         net.advance(float(t))
     compare(interface, solution, CASES[name])
 
 
-@pytest.mark.parametrize("name", every(3, ["debonding", "stick-slip-debonding", "compliant-debonding"]))
-def test_the_books_hold_what_jumps_release(name):
+def test_the_books_hold_what_jumps_release():
+    name = "debonding"
     solution = surfacechem.load(name).run(error="balances")
     interface, net = network(name)
     net.advance(solution.trajectory.run.times[-1])
@@ -69,11 +61,12 @@ def test_the_books_hold_what_jumps_release(name):
 
 def test_endless_rebounds_end_in_a_network_too():
     """It does not follow as many of them as the compiled path."""
-    interface, net = network("bouncing-plate")
-    net.advance(3.0)
+    interface, net = network("bouncing-plate", overrides=["mechanics.normal.e=0.3"])
+    net.advance(1.0)
     jumps = interface.scene.moments.jumps
     assert [jump.edge.name for jump in jumps] == (len(jumps) - 1) * ["impact"] + ["rest"]
-    assert jumps[-1].t == pytest.approx(2.55863396, rel=1e-6)
+    fall = (2 * 1.0 / 9.81) ** 0.5
+    assert jumps[-1].t == pytest.approx(fall * (1 + 2 * 0.3 / (1 - 0.3)), rel=1e-6)
     assert (interface["g_n"], interface["v_n"]) == (0.0, 0.0)
 
 

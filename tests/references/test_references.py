@@ -187,20 +187,6 @@ def test_every_table_is_used():
     assert {name for name in kept - used - set(tables.makers()) if f'"{name}"' not in tests} == set()
 
 
-@pytest.mark.parametrize("name", [*EXOTHERMIC, *ENDOTHERMIC, "S62x_generalised"])
-def test_mean_and_difference_of_the_fluxes(name):
-    data = table(name)
-    exact = build("bonding", data.parameters).solution(data.columns["t"])
-    assert_exact((exact["q_1"] + exact["q_2"]) / 2, data.columns["q_m"])
-    assert_exact((exact["q_1"] - exact["q_2"]) / 2, data.columns["q_t"])
-
-
-def test_rise_over_twelve_decades_of_time_scales():
-    data = table("x12_wide_scales")
-    _, rise, _ = build("bonding", data.parameters).heated(data.columns["t"])
-    assert_exact(rise, data.columns["T_minus_T0"])
-
-
 @pytest.mark.parametrize("row", range(20))
 def test_stiff_exchange(row):
     data = table("x06_stiff_exchange")
@@ -232,12 +218,6 @@ def test_time_at_a_temperature():
     p = runaway.parameters
     reaction = build("adiabatic-arrhenius", {}, A=p["k0"], E_a=p["Ea"], T_i=p["T_i"], delta_T=p["dT_ad"])
     assert_exact(reaction.time(runaway.columns["phi"]), runaway.columns["t"])
-
-
-def test_steady_states():
-    data = table("f_dry_friction_with_loss")
-    more = friction(data.parameters)
-    assert_exact(build("weakening-friction-with-loss", data.parameters, **more).steady_temperature, data.expect["T_ss"])
 
 
 def test_final_temperatures():

@@ -1,19 +1,13 @@
 """Where two exact solutions must agree, and extreme parameters; every case tests the equations that one solves."""
 
 import math
-from fractions import Fraction
 
 import mpmath
 import numpy as np
 import pytest
 
-import surfacechem
-from surfacechem import references
 from surfacechem.errors import InputError
-from surfacechem.references import Reference
-from surfacechem.references._bodies import ConstantCapacity
-from surfacechem.references.base import Array
-from surfacechem.references.bonding import Bonding
+from surfacechem.references import Reference, get
 
 TIMES = np.array([0.0, 1e-17, 1e-9, 1e-3, 0.1, 0.7, 3.0, 20.0, 1e3, 1e6])
 BODIES = {"C_1": 1.5, "C_2": 0.7, "C_c": 0.3, "T_0": 300.0}
@@ -48,41 +42,6 @@ COLD, RUBBED = {"T_i": 300.0, "tau": 2.0}, {"T_i": 310.0, "D": 40.0}
 LOSS, HOT = {"T_i": 310.0, "T_a": 300.0}, {"C": 900.0, "T_0": 300.0, "T_i": 500.0, "T_a": 290.0}
 
 
-class BondingConstantCapacity(Bonding):
-    r"""Bonding with a constant relaxation time and friction power, perfect thermal contact, constant capacities.
-
-    As Bonding, but bodies and interface have constant capacities. The energy
-    integral :math:`CT-\frac{K_2x}{2T_0^2}T^2+\frac{K_0x}2=\text{const}+Dt` is then a quadratic equation for the rise
-
-    .. math::
-        T-T_i=\frac{2e}{b+\sqrt{b^2-2ke}},\quad k=\frac{K_2x}{T_0^2},\quad b=C-kT_i,\quad
-        e=\frac{x_0-x}2\Big(K_0-K_2\frac{T_i^2}{T_0^2}\Big)+Dt
-
-    in which the root is the total capacity :math:`C-kT`. Valid while that is positive.
-
-    """
-
-    model = ConstantCapacity()
-
-    @property
-    def free_capacity(self) -> float:
-        taken = Fraction(self.K_2) * (1 - Fraction(self.phi_i)) ** 2
-        return float(1 - taken * Fraction(self.T_i) / (self.exact_capacity * Fraction(self.T_0) ** 2))
-
-    def heated(self, t: Array) -> tuple[Array, Array, Array]:
-        x, gone = self.unbonded_squared(t)
-        curvature, lost = self.K_2 * x / self.T_0**2, self.K_2 * gone / self.T_0**2
-        released = 0.5 * gone * (self.K_0 - self.K_2 * (self.T_i / self.T_0) ** 2) + self.D * t
-        at_start = self.C * self.free_capacity + lost * self.T_i
-        rise = 2.0 * released / (at_start + np.sqrt(at_start**2 - 2.0 * curvature * released))
-        T = np.where(self.T_i + rise > 0.0, self.T_i + rise, np.nan)
-        return T, rise, at_start - curvature * (T - self.T_i)
-
-
-def get(name: str) -> type[Reference]:
-    return BondingConstantCapacity if name == BondingConstantCapacity.name else references.get(name)
-
-
 def assert_same(one: Reference, other: Reference, *, relative=1e-13, t=TIMES, absolute=0.0):
     """Both give the same values of every quantity they share."""
     first, second = one.solution(t), other.solution(t)
@@ -101,10 +60,7 @@ class TestLimits:
                 ("bonding", {**BODIES, **COLD, "K_2": K_2}, "endothermic-bonding", {**BODIES, "K_2": K_2, "tau": 2.0})
                 for K_2 in (1.0, 500.0, 749.999999)
             ),
-            *(
-                (f"bonding{capacity}", {**BODIES, **RUBBED, "tau": 1.0}, f"sliding{capacity}", {**BODIES, **RUBBED})
-                for capacity in ("", "-constant-capacity")
-            ),
+            ("bonding", {**BODIES, **RUBBED, "tau": 1.0}, "sliding", {**BODIES, **RUBBED}),
             *(
                 ("thinning-film", {**FILM, "T_i": 310.0, "beta": beta}, "sliding", {**SLID, "T_i": 310.0})
                 for beta in (0.0, 1e-18)
@@ -148,22 +104,9 @@ class TestLimits:
             )
 
 
-def test_a_run_of_bonding_with_constant_capacities():
-    """What a case is compared with by hand."""
-    capacities = ["bodies.lower.capacity=constant", "bodies.upper.capacity=constant"]
-    film = "interface.potential=[bond-energy: {K_0: 120, K_1: 60, K_2: 240}, constant-interface-capacity: {C_c: 0.3}]"
-    run = surfacechem.load("generalised-bonding-sliding", [*capacities, film]).run(error="balances").dataset
-    exact = get("bonding-constant-capacity")(
-        C_1=1.5, C_2=0.7, C_c=0.3, T_0=300.0, T_i=320.0, phi_i=0.1, K_0=120.0, K_1=60.0, K_2=240.0, tau=2.0, D=5.0
-    ).solution(run["time"].values)
-    for name in ("phi", "T", "q_1", "q_2", "U_c"):
-        scale = np.max(np.abs(exact[name]))
-        np.testing.assert_allclose(run[name], exact[name], rtol=0, atol=1e-9 * scale, err_msg=name)
-
-
 class TestExtremes:
-    @pytest.mark.parametrize("t", [0.0, 1e-17, 1e-12, 1e-3, 1.0, 40.0])
-    @pytest.mark.parametrize("power", [10, 40, 52])
+    @pytest.mark.parametrize("t", [0.0, 1e-17, 1.0, 40.0])
+    @pytest.mark.parametrize("power", [10, 52])
     def test_kappa_next_to_one(self, power, t):
         """Digits that double precision holds of 1 - kappa are all kept."""
         with mpmath.workdps(60):
@@ -173,8 +116,8 @@ class TestExtremes:
         for reference in (get("endothermic-bonding")(**given), get("bonding")(**given, T_i=256.0)):
             assert float(reference.solution(t)["T"] / exact - 1) == pytest.approx(0.0, abs=1e-15)
 
-    @pytest.mark.parametrize("t", [1e-9, 1e-3, 10.0, 1e4, 1e9])
-    @pytest.mark.parametrize("C_c", [1e3, 1.0, 1e-15])
+    @pytest.mark.parametrize("t", [1e-9, 10.0, 1e9])
+    @pytest.mark.parametrize("C_c", [1e3, 1e-15])
     @pytest.mark.parametrize("h", [(1e-12, 1e20), (1e20, 1e-12), (3.0, 3.0), (1e20, 1e20), (700.0, 2500.0)])
     def test_three_temperatures_with_many_digits(self, h, C_c, t):
         given = {**MEDIUM, "h_1": h[0], "h_2": h[1], "C_c": C_c, "T_c": 300.0, **SOURCE}
@@ -220,7 +163,7 @@ class TestExtremes:
         """Parameters over many decades, times over 35."""
         random = np.random.default_rng(7)
         t = np.concatenate([[0.0], np.logspace(-20, 15, 36)])
-        for _ in range(40):
+        for _ in range(10):
             given = {key: float(10 ** random.uniform(*span)) for key, span in EXPONENTS[name].items()}
             if name == "semenov-fold":
                 given["D_0"] *= given["H"] / (math.e * given["beta"])
@@ -233,8 +176,6 @@ class TestExtremes:
             get("endothermic-bonding")(**BODIES, K_2=750.0, tau=1.0)
         with pytest.raises(InputError, match="T has no real value at t = "):
             get("bonding")(**BODIES, K_0=-2000.0, T_i=300.0, tau=1.0).solution([0.0, 9.0])
-        with pytest.raises(InputError, match="T has no real value at t = "):
-            get("bonding-constant-capacity")(**BODIES, K_0=-2000.0, T_i=300.0, tau=1.0).solution([0.0, 9.0])
 
 
 @mpmath.workdps(120)
@@ -253,15 +194,3 @@ def by_many_digits(p: dict[str, float], t: float) -> list[mpmath.mpf]:
         amplitude = mpmath.exp(e * t) * start[i] + source[i] * (p["D_0"] * steady + p["D_1"] * decaying)
         result += vectors[:, i] * amplitude
     return [mpmath.re(value) for value in result]
-
-
-@pytest.mark.parametrize("seed", range(20))
-def test_three_temperatures_of_capacities_over_24_decades(seed):
-    random = np.random.default_rng(seed)
-    powers = {name: 10 ** random.uniform(-12, 12) for name in ("C_1", "C_2", "C_c")}
-    powers |= {name: 10 ** random.uniform(-3, 6) for name in ("h_1", "h_2")}
-    given = powers | {"T_1": 290.0, "T_2": 350.0, "T_c": 400.0, "D_0": 900.0, "D_1": 4e3}
-    given["gamma"], t = 10 ** random.uniform(-3, 3), 10 ** random.uniform(-8, 4)
-    exact = [float(value) for value in by_many_digits(given, t)]
-    found = get("three-temperatures")(**given).solution(t)
-    assert [found[name] for name in ("T_1", "T_2", "T_c")] == pytest.approx(exact, rel=1e-11)

@@ -79,27 +79,6 @@ class TestDebonding:
 
 
 class TestFriction:
-    def test_stick_slip_motion(self):
-        """A thousand cycles: the time of a slip is known to 1e-10 of a cycle, its velocity accordingly."""
-        exact = columns("g_stickslip_motion")
-        times, first = np.unique(exact["t"], return_index=True)
-        solved = solve(scenes.slider(), times)
-        rest = len(solved["v"]) - len(times)
-        assert_close(solved["u_t"][rest:], exact["x"][first], 1e-9)
-        assert_close(solved["heat_coulomb"][rest:], exact["heat"][first], 1e-9)
-        assert_close(solved["v"][rest:], exact["xdot"][first], EVENTS)
-        spring = parameters("g_stickslip_motion")["k"] * (solved["w_t"] - solved["u_t"])
-        assert_close(spring[rest:], exact["spring_traction"][first], EVENTS)
-        assert np.all(solved["v"][rest:][exact["phase"][first] == "stick"] == 0.0)
-        assert_closed(solved)
-
-    @pytest.mark.parametrize("row", [row for row in rows("g_stickslip_period_vs_V") if row["V"] >= 1e-3])
-    def test_largest_velocity(self, row):
-        p = parameters("g_stickslip_period_vs_V")
-        middle = p["mu_s"] * p["p"] / (p["k"] * row["V"]) + row["slip_time"] / 2
-        solved = solve(scenes.slider(), (0.0, middle), {"loading.w_t.rate": row["V"]})
-        assert_each(solved["v"][-1], row["v_max"], SMOOTH)
-
     @each_row("g_stickslip_rebonding_steady", "V_over_Vc")
     def test_bonds_that_form_again_in_the_steady_cycle(self, row):
         p = parameters("g_stickslip_rebonding_steady")
@@ -159,17 +138,6 @@ class TestLongRange:
 
 
 class TestExtremes:
-    def test_closing_film(self):
-        """Heat grows like a logarithm until the film closes, which ends the run at its time."""
-        exact, p = columns("x05_closing_film"), parameters("x05_closing_film")
-        solved = solve(scenes.film(), (0.0, *exact["t"][1:8], 20.0))
-        assert_each(solved["T"][:8], exact["T"][:8], 1e-10)
-        assert (solved.status, solved.reason) == (
-            "stopped",
-            "g_n reached zero, where the law viscous ends near t = 10 s",
-        )
-        assert solved.trajectory.result.t == pytest.approx(p["g_i"] / p["a"], rel=1e-12)
-
     def test_closing_film_over_nineteen_decades(self):
         exact, p = columns("x05_closing_film"), parameters("x05_closing_film")
         gaps = p["g_i"] * exact["one_minus_t_over_tc"]

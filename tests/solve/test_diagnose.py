@@ -9,18 +9,17 @@ from surfacechem.errors import InputError
 from surfacechem.laws.bonding import LatticeGas, LinearEnthalpy
 from surfacechem.laws.bonds import DudkoHummerSzabo
 from surfacechem.laws.bulk import Constant
-from surfacechem.laws.cohesive import AdhesionIntensity, ExponentialCohesiveZone
-from surfacechem.laws.contact import NormalStiffness, Penalty
+from surfacechem.laws.cohesive import AdhesionIntensity
+from surfacechem.laws.contact import Penalty
 from surfacechem.laws.contact_conductance import PressureConductance
 from surfacechem.laws.factors import Linear
 from surfacechem.laws.films import FilmCapacity
 from surfacechem.laws.friction import Coulomb
 from surfacechem.laws.heat import GasGap
 from surfacechem.laws.kinetics import LinearAffinity, Relaxation
-from surfacechem.laws.loading import Harmonic, Hold, Ramp
+from surfacechem.laws.loading import Hold, Ramp
 from surfacechem.laws.longrange import VanDerWaalsFlatFlat
 from surfacechem.model.assemble import assemble
-from surfacechem.results.audit import audit
 from surfacechem.results.solution import Solution
 from surfacechem.scene import Interface, Medium, Mounting, Scene
 
@@ -46,14 +45,6 @@ def test_a_parameter_called_C_T_is_not_the_capacity_of_a_node_T():
     scene = perfect_contact([adhesion], loading=loading)
     trajectory = run(scene, 1.0)
     assert trajectory["t_e"][0] == pytest.approx(0.25 * 1e12 * 1e-6, rel=1e-12)
-
-
-def test_work_on_a_state_at_rest_is_followed_without_transitions():
-    loading = {"g_n": Harmonic(mean=2e-8, amplitude=1.8e-8, frequency=0.1, phase=1.0)}
-    interface = Interface(None, [NormalStiffness(E_n=6e13)])
-    heat = [path("lower", "upper", 100.0)]
-    trajectory = run(Scene(bodies(energy=Constant), interface, heat, loading, None, 300.0, APART), 200.0)
-    assert audit(trajectory).energy_error < 1e-9
 
 
 def test_relaxation_needs_a_potential_that_curves():
@@ -94,15 +85,6 @@ def test_an_overdamped_slider_starts_from_rest():
     # The limit of sticking is at least what sliding resists with: 3.6e5 Pa at t = 2.9 s; then c v + k u = F - 3.6e5 Pa.
     tau, since = 1.8 / 1.4, 7.1
     assert trajectory["u_t"][-1] == pytest.approx(1e5 / 1.4e12 * (since - tau * -np.expm1(-since / tau)), rel=1e-8)
-
-
-def test_an_impossible_jump_says_what_is_in_the_way():
-    interface = Interface("T", [ExponentialCohesiveZone(t_max=1e6, g_0=1e-8, E_n=1e14)])
-    loading = {"F_n": Ramp(start=0.0, rate=1e5)}
-    trajectory = run(together(interface=interface, loading=loading), 20.0)
-    assert trajectory.status == "stopped"
-    assert "is impossible: no gap follows at which the tractions are in equilibrium" in trajectory.reason
-    assert trajectory.result.t == pytest.approx(10.0, rel=1e-6)
 
 
 def test_the_search_for_equilibrium_does_not_pass_through_the_pole_of_the_open_side():

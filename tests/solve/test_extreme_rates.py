@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 import scipy.integrate
 import scipy.linalg
-from sampling import every
 
 import surfacechem
 from surfacechem.expressions import EXPONENT_CAP
@@ -91,7 +90,6 @@ def dudko(f, barrier=1e-18):
 
 LOADED = {
     "bell: {k_off: 1e-239, x_off: 0.3 nm}": lambda f: mpmath.exp(work(f)),
-    "two-pathway: {k_slip: 1e-239, x_slip: 0.3 nm, k_catch: 1e-200, x_catch: 1 nm}": lambda f: mpmath.exp(work(f)),
     "dudko-hummer-szabo: {k_off: 1e-239, x_off: 0.3 nm, barrier: 1e-18, nu: 0.5}": dudko,
     "dembo-spring: {k_off: 1e-239, stiffness: 2 N/m, transition_stiffness: 1.3 N/m}": (
         lambda f: mpmath.exp(mpmath.mpf("0.7") * mpmath.mpf(f) ** 2 / (8 * BOLTZMANN * COLD))
@@ -126,8 +124,7 @@ def test_the_warning_is_of_the_rate_and_not_of_its_exponent(tmp_path):
         assert all(f"reached {reached:.4g}" in text for text in texts)
 
 
-@pytest.mark.parametrize("law", ["mass-action: {k_on: 0 1/s,", "bell: {"])
-@pytest.mark.parametrize("energies", [(20,), (12, 8), (30, -10)])
+@pytest.mark.parametrize(("law", "energies"), [("mass-action: {k_on: 0 1/s,", (12, 8)), ("bell: {", (30, -10))])
 def test_factors_of_a_rate_are_one_exponential(tmp_path, law, energies):
     """A rate known at 4 K, taken to 300 K: e^593 times 1e-257."""
     factors = ", ".join(f"activated: {{E_a: {energy} kJ/mol}}" for energy in energies)
@@ -148,8 +145,8 @@ def test_factors_of_a_rate_are_one_exponential(tmp_path, law, energies):
 
 
 def test_a_long_chain_of_reversible_steps_warms_its_bodies(tmp_path):
-    """Coverages of 1e-150 behind the front: mixing entropy has an infinite slope there, the energy has none."""
-    length = 60
+    """Coverages of 1e-100 behind the front: mixing entropy has an infinite slope there, the energy has none."""
+    length = 25
     names = [f"s{i}" for i in range(length + 1)]
     enthalpies = {name: float(i % 3) for i, name in enumerate(names)}
     A = [1.0 + 0.1 * (i % 5) for i in range(length)]
@@ -198,8 +195,7 @@ def coverages(folder, enthalpies, reactions, start, times, more=""):
     return np.array([solution.dataset[f"theta_{name}"].values for name in enthalpies])
 
 
-@pytest.mark.parametrize("n", [0.05, 0.3, 0.6, 0.9])
-@pytest.mark.parametrize("h", [-100.0, -20.0])
+@pytest.mark.parametrize(("n", "h"), [(0.05, -20.0), (0.9, -100.0)])
 def test_a_cure_of_an_order_below_one_is_complete_and_goes_on(tmp_path, n, h):
     """It ends after the integral of da / ((1 + (1 - a)^0.5) a^n) from 0 to 0.99."""
     reaction = "equation: a => b, type: Kamal-Sourour, rate-constant: {A: 1, b: 0, Ea: 0}, A-2: 1, E-2: 0, m: 0.5, n: "
@@ -215,7 +211,7 @@ def test_a_cure_of_an_order_below_one_is_complete_and_goes_on(tmp_path, n, h):
     np.testing.assert_allclose(a + b, 1.0, rtol=0, atol=1e-12)
 
 
-@pytest.mark.parametrize("n", [0.0, 0.1, 0.5, 0.8])
+@pytest.mark.parametrize("n", [0.0, 0.5])
 def test_what_is_used_up_stays_so_and_lives_of_what_comes(tmp_path, n):
     """a => b of order n while c => a: at first a is used up, then it follows its supply."""
     start, supply = 0.1, 0.3
@@ -232,8 +228,7 @@ def test_what_is_used_up_stays_so_and_lives_of_what_comes(tmp_path, n):
     np.testing.assert_allclose(a + b + c, 1.0, rtol=0, atol=1e-12)
 
 
-@pytest.mark.parametrize("k", [0.5, 1e-3, 1e-6, 1e-10])
-@pytest.mark.parametrize("back", [0.5, 1.0])
+@pytest.mark.parametrize(("k", "back"), [(0.5, 0.5), (1e-10, 1.0)])
 def test_orders_below_one_both_ways_end_in_their_balance(tmp_path, k, back):
     """a^0.5 = k b^back."""
     reactions = [
@@ -306,13 +301,13 @@ def random_network(draw, decades):
 
 def test_random_networks_with_rates_of_twenty_decades(tmp_path):
     draw = np.random.default_rng(8)
-    for _ in range(6):
+    for _ in range(3):
         names, steps, loaded = random_network(draw, 20)
         found, exact = network(tmp_path, names, steps, [0.0, 1e-3, 1.0, 1e3], loaded)
         np.testing.assert_allclose(found, exact, rtol=0, atol=1e-9)
 
 
-@pytest.mark.parametrize("seed", every(4, [3, 7, 9, 10]))
+@pytest.mark.parametrize("seed", [3, 9])
 def test_networks_with_rates_of_sixty_decades_are_right_or_fail(tmp_path, seed):
     """Nothing but rounding leads a coverage beyond its bounds: that is no end of the scene."""
     names, steps, loaded = random_network(np.random.default_rng([60, seed]), 60)

@@ -18,11 +18,12 @@ from surfacechem.solve import solver
 from surfacechem.solve.contract import Margin, Status
 from surfacechem.solve.radau.solver import Radau
 
-RTOLS = [1e-6, 1e-9, 1e-11, 1e-13]
+RTOLS = [1e-6, 1e-13]
 
 
-@pytest.mark.parametrize("rtol", RTOLS)
-@pytest.mark.parametrize(("amplitude", "mean", "frequency"), [(30.0, 0.0, 3.0), (15.0, 15.0, 7.0)])
+@pytest.mark.parametrize(
+    ("amplitude", "mean", "frequency", "rtol"), [(30.0, 0.0, 3.0, RTOLS[0]), (15.0, 15.0, 7.0, RTOLS[1])]
+)
 def test_a_traction_that_touches_the_limit_moves_nothing(amplitude, mean, frequency, rtol):
     """A mass that rubs, with a limit of 30 Pa, under a traction that swings."""
     loading = {"p": Hold(level=100.0), "F_t": Harmonic(amplitude=amplitude, frequency=frequency, mean=mean)}
@@ -39,8 +40,7 @@ def elastic(amplitude, rtol):
     return solve(together(sticking, [Coulomb(mu=0.3)], loading, tangential=mount), 3.0, outputs=101, rtol=rtol)
 
 
-@pytest.mark.parametrize("rtol", RTOLS)
-@pytest.mark.parametrize("amplitude", [60e-6, 59.999999999999e-6])
+@pytest.mark.parametrize(("amplitude", "rtol"), [(60e-6, RTOLS[1]), (59.999999999999e-6, RTOLS[0])])
 def test_elastic_sticking_that_touches_its_limit_sticks(amplitude, rtol):
     trajectory = elastic(amplitude, rtol)
     assert (trajectory.status, trajectory.events) == ("finished", [])
@@ -48,7 +48,7 @@ def test_elastic_sticking_that_touches_its_limit_sticks(amplitude, rtol):
     np.testing.assert_allclose(trajectory["g_t"], gap, rtol=0, atol=max(10 * rtol, 1e-10) * amplitude)
 
 
-@pytest.mark.parametrize(("rtol", "amplitude"), [(1e-9, 60.001e-6), (1e-11, 60.1e-6), (1e-13, 66e-6)])
+@pytest.mark.parametrize(("rtol", "amplitude"), [(1e-9, 60.001e-6), (1e-13, 66e-6)])
 def test_a_limit_that_is_just_passed_slides_from_there_to_the_peak(amplitude, rtol):
     """From a peak the gap has to swing by twice the limit: it slides in each half of a period, for a moment."""
     trajectory = elastic(amplitude, rtol)
@@ -63,7 +63,7 @@ def test_a_limit_that_is_just_passed_slides_from_there_to_the_peak(amplitude, rt
     np.testing.assert_allclose(found[1::2], ends, rtol=0, atol=max(10 * rtol, 1e-9))
 
 
-@pytest.mark.parametrize("rtol", [1e-9, 1e-11, 1e-13])
+@pytest.mark.parametrize("rtol", [1e-9, 1e-13])
 def test_a_damper_of_the_bodies_does_not_delay_the_slip(rtol):
     """Before the first slip the bodies push with k w + c_b w': at rest that has to be what the static limit bears."""
     k, m, c, V, p_0, rise = 3e7, 25.0, 900.0, 3e-3, 1e5, 5e3
@@ -126,7 +126,7 @@ def run(program, y0, end, rtol=1e-10, kinds=STOP, start=0.0):
     return radau.solve(problem(program, y0, [start, end], rtol, margins=kinds))
 
 
-@pytest.mark.parametrize("rtol", [1e-3, 1e-6, 1e-9, 1e-12])
+@pytest.mark.parametrize("rtol", [1e-3, 1e-12])
 def test_every_crossing_of_a_fast_margin_is_found_in_order(rtol):
     """22 zeros of sin(22 pi t), many of them within one step of x = t."""
     result = run(clock(se.sin(22 * se.pi * X + 0.5)), [0.0], 1.0, rtol, (Margin.restart(),))
@@ -142,20 +142,21 @@ def dip(centre, width):
 
 FIRST = [
     (0.3 - X**3, 0.3 ** (1 / 3), 4e-16),
-    *((dip(centre, width), centre - 1e-3 * width, 1e-13) for centre in (3.01, 4.97, 6.5) for width in (1.0, 0.3, 0.1)),
-    *(((X - centre) ** 2, centre, 1e-6) for centre in (0.77, 3.01, 9.99)),  # a limit that is touched is reached
+    *((dip(centre, width), centre - 1e-3 * width, 1e-13) for centre, width in ((3.01, 1.0), (6.5, 0.1))),
+    *(((X - centre) ** 2, centre, 1e-6) for centre in (0.77, 9.99)),  # a limit that is touched is reached
     # A pulse of the margin shorter than the step: steps of x = t would take the run in a few.
-    *((0.5 - se.exp(-(((X - 0.33) / w) ** 2)), 0.33 - w * np.sqrt(np.log(2)), 1e-13) for w in (0.3, 0.1, 0.03)),
+    *((0.5 - se.exp(-(((X - 0.33) / w) ** 2)), 0.33 - w * np.sqrt(np.log(2)), 1e-13) for w in (0.3, 0.03)),
     (X * (3 - X) - 0.5, (3 + np.sqrt(7)) / 2, 1e-14),  # passed at the start it recovers, and is passed again later
 ]
 
 
-@pytest.mark.parametrize("rtol", [1e-6, 1e-12])
 @pytest.mark.parametrize(("margin", "t", "exact"), FIRST)
-def test_the_first_passage_of_a_limit_is_located(margin, t, exact, rtol):
-    result = run(clock(margin), [0.0], 10.0, rtol)
-    assert result.status == Status.EVENT
-    assert result.t == pytest.approx(t, rel=exact)
+def test_the_first_passage_of_a_limit_is_located(margin, t, exact):
+    program = clock(margin)
+    for rtol in (1e-6, 1e-12):
+        result = run(program, [0.0], 10.0, rtol)
+        assert result.status == Status.EVENT
+        assert result.t == pytest.approx(t, rel=exact)
 
 
 def test_a_kink_that_is_touched_is_none():
@@ -169,10 +170,11 @@ def test_the_earlier_of_a_dip_and_a_crossing_comes_first():
     assert result.t == pytest.approx(3.01 - 1e-4, rel=1e-13)
 
 
-@pytest.mark.parametrize("rtol", [1e-6, 1e-10])
-def test_coincident_events_have_one_time(rtol):
+def test_coincident_events_have_one_time():
     program = oscillator(X, 3 * X, X * V**2 - 0.0 * T, X - 0.1)
-    result = run(program, [1.0, 0.0], 10.0, rtol, (Margin.restart(), Margin.stop(), Margin.restart(), Margin.restart()))
+    result = run(
+        program, [1.0, 0.0], 10.0, 1e-10, (Margin.restart(), Margin.stop(), Margin.restart(), Margin.restart())
+    )
     assert list(result.events.index) == [3, 0, 1, 2]
     assert len(set(result.events.t)) == 2
 
@@ -187,7 +189,7 @@ def test_what_is_not_in_play_is_not_looked_at(name):
     assert list(result.events.index) == [3]
 
 
-@pytest.mark.parametrize("start", [0.0, 1e-18, -1e-18])
+@pytest.mark.parametrize("start", [0.0, -1e-18])
 def test_a_limit_at_zero_that_falls_fires_at_once(start):
     result = run(clock(1.0 - (1.0 + X)), [start], 1.0)
     assert result.status == Status.EVENT

@@ -26,7 +26,7 @@ from surfacechem.solve.equilibria import Point
 from surfacechem.solve.jumps import ADMISSIBLE, IMPOSSIBLE, VIOLATES, Slack
 from surfacechem.solve.run import Model
 
-TOLERANCES = [10.0**-k for k in range(5, 14)]
+TOLERANCES = [1e-5, 1e-9, 1e-13]
 COLD = Body("lower", Hold(level=300.0)), Body("upper", Hold(level=300.0))
 
 
@@ -97,7 +97,7 @@ class Reluctant(Friction):
         return self.c * (v - self.v_1)
 
 
-@pytest.mark.parametrize(("v_1", "rtol"), [(0.5, 1e-4), (0.5, 1e-12), (0.1, 1e-6), (0.01, 1e-9), (0.01, 1e-12)])
+@pytest.mark.parametrize(("v_1", "rtol"), [(0.5, 1e-4), (0.01, 1e-12)])
 def test_a_law_that_destroys_entropy_is_named_at_any_tolerance(v_1, rtol):
     """Accelerated from rest to 1 m/s it destroys v_1^3 / 6 of what it produces, 1/3 - v_1 / 2 but for that."""
     loading = {"v": Ramp(rate=1.0)}

@@ -1,11 +1,9 @@
 """The heat of a jump goes where that of the same process goes if it takes some time, in every temperature."""
 
 from dataclasses import replace
-from itertools import product
 
 import numpy as np
 import pytest
-from sampling import every
 from scipy.integrate import quad, solve_ivp
 
 from surfacechem.format import load_text
@@ -45,7 +43,6 @@ CELLS = ", conduction: {thickness: 1 mm, conductivity: 1 W/m/K, cells: 4}"
 STORING = "temperature: T_c\n  potential: [constant-interface-capacity: {C_c: 20}]"
 THERMAL = {
     "slider": apart("partition: {slider: 1, base: 0}"),
-    "base": apart("partition: {slider: 0, base: 1}"),
     "surroundings": apart("partition: {slider: 0.2, base: 0.5, surroundings: 0.3}", AROUND),
     "paths": apart("temperature: T_c", paths(slider=9, base=1)),
     "paths outward": apart("temperature: T_c", OUTWARD),
@@ -131,8 +128,8 @@ SLIDER = {
 }
 
 
-SCENES = [(thermal, "rigid") for thermal in THERMAL]
-SCENES += [(thermal, slider) for thermal in ("slider", "paths", "stores") for slider in list(SLIDER)[1:]]
+SCENES = [(thermal, "rigid") for thermal in ("surroundings", "paths outward", "mean", "held", "cells")]
+SCENES += [("stores", "elastic")]
 
 
 def pressure_falls(thermal, slider, jump):
@@ -143,7 +140,7 @@ def pressure_falls(thermal, slider, jump):
     return text(thermal, f"{normal}, w_t: {{ramp: {{rate: 0.4 mm/s}}}}", mechanics, potential)
 
 
-@pytest.mark.parametrize(("thermal", "slider"), every(2, SCENES))
+@pytest.mark.parametrize(("thermal", "slider"), SCENES)
 def test_a_pressure_that_jumps_is_one_that_falls_fast(thermal, slider):
     jumped, swift = (solved(pressure_falls(thermal, slider, jump)) for jump in (0, 1e-6))
     assert max(jump.released for jump in jumped.trajectory.jumps) > 100
@@ -154,9 +151,8 @@ def test_libraries_and_sweeps_heat_the_same():
     case = load_text(pressure_falls("paths outward", "rigid", 0).replace("outputs: 5", "outputs: 5, rtol: 1e-9"))
     simulation = Simulation(case)
     run = simulation.run(error="balances").dataset
-    for method in ("lsoda", "bdf"):
-        other = Simulation(replace(case, own_run=replace(case.run, solver=method))).run(error="balances").dataset
-        np.testing.assert_allclose(other["T_1"], run["T_1"], atol=1e-6)
+    other = Simulation(replace(case, own_run=replace(case.run, solver="lsoda"))).run(error="balances").dataset
+    np.testing.assert_allclose(other["T_1"], run["T_1"], atol=1e-6)
     partition = Simulation(load_text(pressure_falls("slider", "rigid", 0)))
     swept = partition.sweep({"interface.partition": [1.0, 0.75, 0.0]}).dataset
     rise, other = (swept[name].isel(time=-1).values - 300 for name in ("T_1", "T_2"))
@@ -164,7 +160,7 @@ def test_libraries_and_sweeps_heat_the_same():
     np.testing.assert_allclose(1000 * rise + 700 * other, 1000 * rise[0], rtol=1e-12)
 
 
-@pytest.mark.parametrize("thermal", ["surroundings", "paths", "stores", "spots"])
+@pytest.mark.parametrize("thermal", ["stores", "spots"])
 def test_a_network_heats_the_same(thermal):
     case = load_text(pressure_falls(thermal, "rigid", 0))
     solution = solved(pressure_falls(thermal, "rigid", 0))
@@ -184,11 +180,13 @@ PRESSING = {
     "F_n": lambda jump, low: "w_n: -2 um, " + table("F_n", [0, 0, 2 - low, 2 - low], "MPa", jump),
     "w_n": lambda jump, low: table("w_n", [-2, -2, -low, -low], "um", jump),
 }
-VARIED = [(thermal, "rigid", "p", 0.4, "") for thermal in CHANGING]
-VARIED += [("spots", "rigid", "p", rate, static) for rate, static in ((0.7, ""), (-0.4, ""), (0.4, ", mu_s: 0.6"))]
-VARIED += [("spots", "elastic", "p", rate, "") for rate in (0.4, 0.7)]
-VARIED += [("spots", slider, load, 0.7, "") for slider in ("pressed", "both") for load in ("F_n", "w_n")]
-VARIED += [("outward", "pressed", "w_n", 0.4, ", mu_s: 0.6")]
+VARIED = [
+    ("both", "elastic", "p", -0.4, ""),
+    ("spots over cells", "rigid", "p", 0.4, ""),
+    ("spots of an area", "rigid", "p", 0.4, ", mu_s: 0.6"),
+    ("spots", "both", "F_n", 0.7, ""),
+    ("spots", "pressed", "w_n", 0.7, ""),
+]
 
 
 def limit_of_ramps(case, durations=(1e-4, 1e-5)):
@@ -203,7 +201,7 @@ def pressing(thermal, slider, load, rate, static, jump, low=0.2):
     return text(thermal, loads, *SLIDER[slider], static)
 
 
-@pytest.mark.parametrize(("thermal", "slider", "load", "rate", "static"), every(4, VARIED))
+@pytest.mark.parametrize(("thermal", "slider", "load", "rate", "static"), VARIED)
 def test_friction_heats_by_the_conductances_of_each_moment_of_a_jump(thermal, slider, load, rate, static):
     """The normal gap, where there is one, follows a jump by more work than a ramp: its heat of 2 mJ is known."""
     jumped = solved(pressing(thermal, slider, load, rate, static, 0))
@@ -215,14 +213,13 @@ def test_friction_heats_by_the_conductances_of_each_moment_of_a_jump(thermal, sl
     same(found, limit, 1e-7 if load != "p" else 1e-9)
 
 
-@pytest.mark.parametrize("stiffness", ["", "tangential-stiffness: {E_t: 4e9}"])
-def test_the_heat_of_a_jump_by_hand(stiffness):
+def test_the_heat_of_a_jump_by_hand():
     """By quadrature: the slider has the traction mu p, and takes h / (h + 20) of the heat, at each pressure p."""
     mechanics = SLIDER["rigid"][0]
     loads = f"{table('p', [2, 2, 0.2, 0.2], 'MPa', 0)}, w_t: {{ramp: {{rate: 0.4 mm/s}}}}"
-    trajectory = solved(text("spots", loads, mechanics, stiffness)).trajectory
+    trajectory = solved(text("spots", loads, mechanics)).trajectory
     (jump,) = trajectory.jumps
-    k = 1 / (1e-9 + (0.25e-9 if stiffness else 0))
+    k = 1e9
     first = min(2e6, k * 0.8e-3 / 0.5)
 
     def heat(p):
@@ -282,7 +279,7 @@ def test_heat_is_shared_along_a_way_within_the_tolerance(feeds_back):
 # -- what gives way by itself
 
 
-@pytest.mark.parametrize("thermal", every(2, THERMAL))
+@pytest.mark.parametrize("thermal", ["perfect", "area", "held"])
 def test_slips_without_a_mass_are_heat_of_friction(thermal):
     """Each joule of a slip from a static limit goes where one of a slip under a falling pressure goes."""
     falls = f"{table('p', [2, 2, 0.2, 0.2], 'MPa', 0)}, w_t: {{ramp: {{rate: 0.4 mm/s}}}}"
@@ -300,10 +297,9 @@ FRICTION = "  friction: [coulomb: {mu: 0.5}]"
 ZONE = "exponential-cohesive-zone: {t_max: 10 MPa, g_0: 1 um, E_n: 1e15 Pa/m}"
 SOFTENING = "bond-stiffness: {E_b: 1e13, E_n: 1e15}, linear-enthalpy: {H_r: 1}"
 TEARING = "  sites: 1e18\n  bonding: [compliant-debonding: {t_max: 10 MPa, E_b: 1e13, g_f: 4 um}]"
-TOUCHED = ("slider", "paths", "stores", "perfect", "held", "cells")
 
 
-@pytest.mark.parametrize(("thermal", "law"), every(3, product(TOUCHED, ["snap", "tear"])))
+@pytest.mark.parametrize(("thermal", "law"), [("paths", "snap"), ("held", "tear")])
 def test_a_snap_heats_as_the_interface_would_in_a_little_time(thermal, law):
     """A faint damper in parallel with the interface turns the same energy into heat there."""
     potential, laws = (ZONE, "") if law == "snap" else (SOFTENING, TEARING)
@@ -322,7 +318,7 @@ def test_a_snap_heats_as_the_interface_would_in_a_little_time(thermal, law):
 # -- what the supports dissipate
 
 
-@pytest.mark.parametrize(("thermal", "axis"), every(3, product(TOUCHED, ["n", "t"])))
+@pytest.mark.parametrize(("thermal", "axis"), [("paths", "n"), ("stores", "t")])
 def test_what_follows_a_traction_that_jumps_is_damped_by_its_own_support(thermal, axis):
     potential, support = "penalty: {E_n: 1e15}, tangential-stiffness: {E_t: 3e9}", "k: 1e9, beta_1: 0.25"
     loads = table(f"F_{axis}", [0, 0, 3, 3], "MPa", 0) + f", w_{axis}: 0, "
@@ -362,15 +358,13 @@ def test_where_a_way_has_no_numbers_nothing_is_shared():
     assert np.all(np.isnan(found))
 
 
-@pytest.mark.parametrize("method", ["radau", "lsoda"])
-def test_what_a_pressure_stops_does_not_cool_the_interface_first(method):
+def test_what_a_pressure_stops_does_not_cool_the_interface_first():
     """The limit rises faster than the spring pulls: sliding stops, as if the pressure had jumped."""
     runs = []
     for rise in (0, 1e-3):
         loads = f"p: {{table: {{times: [0, 3, {3 + rise}, 4], values: [0.5e6, 0.5e6, 2e6, 2e6]}}}}"
         given = text("paths", f"{loads}, w_t: {{ramp: {{rate: 0.25 mm/s}}}}", "tangential: {k: 1e9 Pa/m}")
-        case = load_text(given)
-        runs.append(Simulation(replace(case, own_run=replace(case.run, solver=method))).run(error="balances"))
+        runs.append(Simulation(load_text(given)).run(error="balances"))
     assert [run.status for run in runs] == ["finished", "finished"]
     assert runs[1].dataset.event_name.values.tolist() == ["slip forward", "stop"]
     for name in ("u_t", "T_1", "T_2", "T_c"):

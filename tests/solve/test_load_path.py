@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from sampling import every
 from scenes import bodies, together
 from solved import closed, solve
 
@@ -97,8 +96,7 @@ def released(solution, name="load"):
 # -- normal gap
 
 
-@pytest.mark.parametrize("solver", [OWN, LIBRARY])
-@pytest.mark.parametrize("k", [1e12, 0.0])
+@pytest.mark.parametrize(("k", "solver"), [(1e12, LIBRARY), (0.0, OWN)])
 def test_a_traction_that_jumps_moves_an_elastic_gap(k, solver):
     text = normal_text(f"w_n: 0, {STEP}" if k else STEP, mount=f"k: {k:g}", solver=solver)
     solution = solved(text if k else text.replace("mechanics: {normal: {k: 0}}\n", ""))
@@ -123,8 +121,7 @@ def test_a_traction_beyond_the_strength_ends_the_run_where_it_jumps():
 JUMPS = "w_n: {table: {times: [0, 1, 1, 4], values: [0, 1 um, 5 um, 5 um]}}"
 
 
-@pytest.mark.parametrize("solver", [OWN, LIBRARY])
-@pytest.mark.parametrize("F", [0.0, 1e6])
+@pytest.mark.parametrize(("F", "solver"), [(0.0, LIBRARY), (1e6, OWN)])
 def test_a_displacement_that_jumps_works_on_the_spring_before_the_gap_moves(F, solver):
     both = f"{JUMPS}, F_n: {{table: {{times: [0, 1, 1, 2], values: [0, 0, {F}, {F}]}}}}"
     solution = normal(both if F else JUMPS, solver=solver)
@@ -147,7 +144,7 @@ def test_a_displacement_that_jumps_sets_a_mass_in_motion():
     assert released(solution) == [0.0]
 
 
-@pytest.mark.parametrize("F", [0.0, 1e6, -9e6])
+@pytest.mark.parametrize("F", [1e6, -9e6])
 def test_an_open_rigid_gap_follows_a_jump_or_closes(F):
     """It has no traction, so that all the work is heat but what bends the spring."""
     loading = f"{JUMPS}, F_n: {{table: {{times: [0, 1, 1, 2], values: [0, 0, {F}, {F}]}}}}"
@@ -170,8 +167,9 @@ def test_a_damper_bears_no_jump_of_the_displacement():
 RISES, FALLS = pressure([0, 3, 3, 10], [1, 1, 2, 2]), pressure([0, 5, 5, 10], [2, 2, 1, 1])
 
 
-@pytest.mark.parametrize("solver", [OWN, LIBRARY])
-@pytest.mark.parametrize(("static", "start", "again"), [("", 2.0, 5.0), (", mu_s: 0.6", 2.4, 5.8)])
+@pytest.mark.parametrize(
+    ("static", "start", "again", "solver"), [("", 2.0, 5.0, OWN), (", mu_s: 0.6", 2.4, 5.8, LIBRARY)]
+)
 def test_what_slides_sticks_where_the_pressure_jumps_up(static, start, again, solver):
     """k = 1 GPa/m at 0.25 mm/s: the traction grows by 0.25 MPa/s, the limit jumps from 0.5 to 1 MPa."""
     solution = slider(f"{RISES}, {PULLED}", static=static, solver=solver)
@@ -182,19 +180,17 @@ def test_what_slides_sticks_where_the_pressure_jumps_up(static, start, again, so
         assert at(solution, "t_t", t) == pytest.approx(1e9 * (0.25e-3 * t - u), rel=1e-9)
 
 
-@pytest.mark.parametrize("solver", [OWN, LIBRARY])
-def test_what_slides_jumps_on_where_the_pressure_jumps_down(solver):
-    solution = slider(f"{FALLS}, {PULLED}", solver=solver)
+def test_what_slides_jumps_on_where_the_pressure_jumps_down():
+    solution = slider(f"{FALLS}, {PULLED}", solver=LIBRARY)
     assert events(solution) == [("slip forward", pytest.approx(4.0)), ("load", 5.0)]
     assert released(solution) == pytest.approx([(1e6**2 - 0.5e6**2) / 2e9], rel=1e-9)
     for t, u in ((4.5, 0.125e-3), (5.25, 0.8125e-3), (6.0, 1e-3)):
         assert at(solution, "u_t", t) == pytest.approx(u, rel=1e-9)
 
 
-@pytest.mark.parametrize("solver", [OWN, LIBRARY])
-def test_a_shear_traction_that_jumps_moves_what_sticks_elastically(solver):
+def test_a_shear_traction_that_jumps_moves_what_sticks_elastically():
     shear = "p: 1 MPa, w_t: 0, F_t: {table: {times: [0, 3, 3, 10], values: [0, 0.1 MPa, 0.6 MPa, 0.6 MPa]}}"
-    solution = slider(shear, SPRING % "1e9", outputs=7, solver=solver)
+    solution = slider(shear, SPRING % "1e9", outputs=7)
     assert at(solution, "u_t", 4.0) == pytest.approx(300e-6, rel=1e-11)
     assert at(solution, "t_t", 4.0) == pytest.approx(0.3e6, rel=1e-11)
     assert released(solution) == pytest.approx([62.5], rel=1e-11)
@@ -230,11 +226,11 @@ run: {until: 2 s}
     assert at(solution, "u_t", 2.0) == pytest.approx(0.5e-6, rel=1e-11)
 
 
-@pytest.mark.parametrize("seed", every(3, range(12)))
+@pytest.mark.parametrize("seed", range(2))
 def test_random_steps_of_the_loads(seed):
     """Rate-independent friction against its own rule: the traction is brought back to the limit, and no further."""
     draw = np.random.default_rng(seed)
-    k, E = 1e9, draw.choice([0.0, 2e9])
+    k, E = 1e9, 2e9 * seed
     p, w, F = draw.uniform(0.5, 2, 6), draw.uniform(-2, 2, 6), draw.uniform(-1, 1, 6)
 
     def steps(values, unit):
@@ -257,11 +253,10 @@ def test_random_steps_of_the_loads(seed):
     assert all(jump.entropy >= -1e-12 for jump in solution.trajectory.jumps)
 
 
-@pytest.mark.parametrize("high", [1, 3])
-def test_an_elastic_gap_on_a_given_displacement_slips_where_the_pressure_falls(high):
+def test_an_elastic_gap_on_a_given_displacement_slips_where_the_pressure_falls():
     """The displacement is held at 0.5 mm from 2 s on; the limit falls to 0.25 MPa at 3 s and rises again at 4 s."""
     text = SLIDER.format(
-        loading=f"{pressure([0, 3, 3, 4, 4, 6], [high, high, 0.5, 0.5, 2, 2])}, "
+        loading=f"{pressure([0, 3, 3, 4, 4, 6], [3, 3, 0.5, 0.5, 2, 2])}, "
         "u_t: {table: {times: [0, 2, 6], values: [0, 0.5 mm, 0.5 mm]}}",
         potential=SPRING % "4e9",
         static="",
@@ -269,7 +264,7 @@ def test_an_elastic_gap_on_a_given_displacement_slips_where_the_pressure_falls(h
         solver=OWN,
     )
     solution = solved(text.replace("mechanics: {tangential: {k: 1e9 Pa/m}}\n", ""))
-    held = min(2.0, 0.5 * high) / 4 * 1e-3
+    held = 1.5 / 4 * 1e-3
     for t, g in ((2.5, held), (3.5, 0.0625e-3), (6.0, 0.0625e-3)):
         assert at(solution, "g_t", t) == pytest.approx(g, rel=1e-9)
     heat = 4e9 / 2 * (held**2 - 0.0625e-3**2)
@@ -310,7 +305,7 @@ def test_what_creeps_is_carried_along():
     np.testing.assert_allclose(v, 2e-6 * np.sinh(t_t / 8e3) * np.exp(-strength), rtol=1e-11)
 
 
-@pytest.mark.parametrize("begin", [0.0, 14.584101652239939, 36.0])
+@pytest.mark.parametrize("begin", [0.0, 14.584101652239939])
 def test_a_late_pulse_is_as_sharp_as_an_early_one(begin):
     """One digit of the time is up to a millionth of the pulse; in a time of its own nothing is lost in it."""
     pulse = Table(times=(begin + np.array([0.0, 1e-9, 2e-9])).tolist(), values=[0.0, -1e9, 0.0])

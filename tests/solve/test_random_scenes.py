@@ -4,8 +4,6 @@ from collections import Counter
 
 import numpy as np
 import pytest
-from hypothesis import given, reject, settings
-from hypothesis import strategies as st
 from random_scenes import random_scene
 from sampling import every
 
@@ -116,21 +114,14 @@ def entropy_is_produced(solution: Solution, scene: Scene) -> None:
         assert any("destroys entropy" in warning for warning in solution.warnings)
 
 
-@settings(max_examples=6, deadline=None, derandomize=True)
-@given(st.integers(0, 10**6))
-def test_random_scenes(seed):
-    if check(seed).startswith(REFUSED):
-        reject()
-
-
 UNTRUE = [
     *(1019, 1021, 1029, 2011, 2015, 4016, 7012, 10000, 14017, 14019, 18006, 18030, 20005, 20037, 22010, 22021, 22030),
     *(25001, 26030, 27003, 32022, 34015, 38031),
 ]
-LONG = [4032, 8028, 11002, 11028, 25022, 29005]
+UNTRUE += [4032, 8028, 11002, 11028, 25022, 29005]
 
 
-@pytest.mark.parametrize("seed", every(8, [*UNTRUE, *LONG]))
+@pytest.mark.parametrize("seed", every(10, UNTRUE))
 def test_scenes_that_once_ended_untruly(seed):
     check(seed)
 
@@ -148,6 +139,7 @@ def test_a_thousand_random_scenes(block):
     assert not failures
 
 
+@pytest.mark.slow
 def test_every_law_is_drawn():
     """What is new in the registry is drawn by itself; single parts of laws stand for no scene."""
     drawn: Counter[str] = Counter()

@@ -58,8 +58,7 @@ def test_a_weight_that_comes_to_nothing_rests_in_contact(solved, history):
     np.testing.assert_allclose(data.g_n, data.F_n / 1e12, rtol=1e-11, atol=1e-16)
 
 
-@pytest.mark.parametrize("size", [1.0, 1e3, 1e6, 1e9])
-@pytest.mark.parametrize("phase", [0.0, 1.0])
+@pytest.mark.parametrize(("size", "phase"), [(1.0, 0.0), (1e9, 1.0)])
 def test_a_pressure_that_touches_nothing_goes_on(solved, size, phase):
     wave = f"{{mean: {size}, amplitude: {size}, frequency: 1 Hz, phase: {phase} rad}}"
     data = solved(COULOMB + f"loading: {{v: 1 mm/s, p: {{harmonic: {wave}}}}}\n" + END)
@@ -69,9 +68,8 @@ def test_a_pressure_that_touches_nothing_goes_on(solved, size, phase):
     assert float(data.dataset["T"][-1]) == pytest.approx(np.sqrt(300.0**2 + heat * 600.0 / 2000.0), rel=1e-12)
 
 
-@pytest.mark.parametrize("size", [1.0, 1e6])
-def test_a_pressure_that_passes_nothing_ends_the_run(solved, size):
-    wave = f"{{mean: {size}, amplitude: {size * 1.0001!r}, frequency: 1 Hz}}"
+def test_a_pressure_that_passes_nothing_ends_the_run(solved):
+    wave = "{mean: 1e6, amplitude: 1.0001e6, frequency: 1 Hz}"
     solution = solved(COULOMB + f"loading: {{v: 1 mm/s, p: {{harmonic: {wave}}}}}\n" + END)
     assert solution.status == "stopped"
     assert solution.trajectory.result.t == pytest.approx(0.75 - np.arccos(1 / 1.0001) / (2 * np.pi), abs=1e-7)
@@ -146,8 +144,7 @@ def reversals(trajectory, name="v"):
     return columns["event_time"][columns["event_name"] == name]
 
 
-@pytest.mark.parametrize("solver", ["radau", "lsoda"])
-@pytest.mark.parametrize("breaks", [[], [1.0], [0.7, 2.0, 3.0]])
+@pytest.mark.parametrize(("breaks", "solver"), [([], "lsoda"), ([1.0], "radau"), ([0.7, 2.0, 3.0], "lsoda")])
 def test_a_velocity_reverses_at_breakpoints_of_another_load(breaks, solver):
     pressure = Table(times=[0.0, *breaks, 4.0], values=[1e5 * (1 + k % 2) for k in range(2 + len(breaks))])
     trajectory = solve(together((), RUBBING, {"p": pressure, **SWINGS}), 4.0, solver=solver)
@@ -194,7 +191,7 @@ def test_a_run_ends_where_tension_reaches_the_strength():
 # -- sliding that begins and ends where large loads cancel: rounding of the loads is no error of the step -------------
 
 
-@pytest.mark.parametrize("rtol", [1e-5, 1e-8, 1e-11, 1e-13])
+@pytest.mark.parametrize("rtol", [1e-5, 1e-13])
 def test_a_damped_slider_that_turns_six_times(rtol):
     """It starts with velocities of 1e-17 m/s, from tractions of 4e4 Pa that cancel."""
     mount, drive = Mounting(k=1e8, c_b=1e6, c_g=1e5), Harmonic(amplitude=2e-3, frequency=1.0)

@@ -1,6 +1,7 @@
 """A body at rest exactly at touch that a load sets in motion slowly: what drives it decides to which side it goes."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -25,10 +26,11 @@ LOADS = {
 }
 """Far-field displacements whose value is zero at first, and of the smooth ones also the change of the force or more."""
 
-TOLERANCES = (1e-4, 1e-7, 1e-10, 1e-12)
+TOLERANCES = (1e-4, 1e-12)
 
 
-def run(load: str, way: str, rtol: float, potential: str):
+def runs(load: str, way: str, potential: str):
+    """Runs at all tolerances, with these."""
     text = f"""
 bodies: {{lower: {{temperature: 300 K}}, upper: {{temperature: 300 K}}}}
 interface:
@@ -37,29 +39,28 @@ interface:
 mechanics: {{normal: {{k: 5e11, c_g: 4e10, m: 7e7}}}}
 loading: {{w_n: {{{LOADS[load].format(way=way, phase=-math.pi / 2)}}}}}
 initial: {{g_n: 0}}
-run: {{until: 1 s, outputs: 11, rtol: {rtol}}}
+run: {{until: 1 s, outputs: 11}}
 """
-    return Simulation(load_text(text)).run()
+    simulation = Simulation(load_text(text))
+    return [(rtol, simulation.run(run=replace(simulation.case.run, rtol=rtol))) for rtol in TOLERANCES]
 
 
-@pytest.mark.parametrize("rtol", TOLERANCES)
 @pytest.mark.parametrize("load", LOADS)
-def test_a_body_pulled_off_from_rest_at_touch_does_not_touch(load, rtol):
-    solution = run(load, "", rtol, "exponential-cohesive-zone: {t_max: 1e5, g_0: 200 nm, E_n: 3e11}")
-    assert solution.status == "finished", solution.reason
-    assert not solution.trajectory.jumps
-    assert solution.accuracy.error < 100 * rtol, solution.accuracy.source
+def test_a_body_pulled_off_from_rest_at_touch_does_not_touch(load):
+    for rtol, solution in runs(load, "", "exponential-cohesive-zone: {t_max: 1e5, g_0: 200 nm, E_n: 3e11}"):
+        assert solution.status == "finished", solution.reason
+        assert not solution.trajectory.jumps
+        assert solution.accuracy.error < 100 * rtol, solution.accuracy.source
 
 
-@pytest.mark.parametrize("rtol", TOLERANCES)
 @pytest.mark.parametrize("load", LOADS)
-def test_a_body_pressed_from_rest_at_touch_touches_once_and_stays(load, rtol):
-    solution = run(load, "-", rtol, "exponential-cohesive-zone: {t_max: 1e5, g_0: 200 nm, E_n: 3e12}")
+def test_a_body_pressed_from_rest_at_touch_touches_once_and_stays(load):
     begins = 0.2 if load == "rest-and-ramp" else 0.0
-    assert solution.status == "finished", solution.reason
-    assert [jump.edge.name for jump in solution.trajectory.jumps] == ["touch"]
-    assert solution.trajectory.jumps[0].t == pytest.approx(begins, rel=1e-9)
-    assert solution.accuracy.error < 100 * rtol, solution.accuracy.source
+    for rtol, solution in runs(load, "-", "exponential-cohesive-zone: {t_max: 1e5, g_0: 200 nm, E_n: 3e12}"):
+        assert solution.status == "finished", solution.reason
+        assert [jump.edge.name for jump in solution.trajectory.jumps] == ["touch"]
+        assert solution.trajectory.jumps[0].t == pytest.approx(begins, rel=1e-9)
+        assert solution.accuracy.error < 100 * rtol, solution.accuracy.source
 
 
 # -- motions far faster than the run: what cannot be followed says so, and what begins and ends at once is held -------
@@ -81,23 +82,21 @@ def test_a_slider_that_swings_too_often_says_its_period():
     assert "the period of the tangential displacement, 6.28e-19 s, is too short for a run of 20 s" in trajectory.reason
 
 
-@pytest.mark.parametrize("c_g", [1e-5])
-def test_a_damper_too_light_for_the_passage_of_a_fold_says_so(c_g):
-    initial, mount = {"g_n": 0.0}, Mounting(k=1e13, c_g=c_g)
+def test_a_damper_too_light_for_the_passage_of_a_fold_says_so():
+    initial, mount = {"g_n": 0.0}, Mounting(k=1e13, c_g=1e-5)
     trajectory = solve(20.0, [ZONE], initial=initial, loading={"w_n": Ramp(rate=1e-8)}, normal=mount)
     assert trajectory.status == "failed"
     assert "leave out the damper" in trajectory.reason
 
 
-@pytest.mark.parametrize("c_g", [1e-3, 1e-4])
-def test_a_light_damper_passes_a_fold(c_g):
-    initial, mount = {"g_n": 0.0}, Mounting(k=1e13, c_g=c_g)
+def test_a_light_damper_passes_a_fold():
+    initial, mount = {"g_n": 0.0}, Mounting(k=1e13, c_g=1e-4)
     trajectory = solve(20.0, [ZONE], initial=initial, loading={"w_n": Ramp(rate=1e-8)}, normal=mount)
     assert trajectory.status == "finished", trajectory.reason
     assert audit(trajectory).energy_error < 1e-9
 
 
-@pytest.mark.parametrize(("c_b", "c_g"), [(3e2, 5e2), (4e2, 4e2), (8e2, 0.0), (0.0, 8e2)])
+@pytest.mark.parametrize(("c_b", "c_g"), [(3e2, 5e2), (0.0, 8e2)])
 def test_dampers_of_the_bodies_and_of_the_gap_relax_together(c_b, c_g):
     mount = Mounting(k=1e13, c_b=c_b, c_g=c_g)
     scene = together([ZONE], (), {"w_n": Ramp(rate=1e-8)}, {"g_n": 0.0}, normal=mount)
