@@ -141,7 +141,7 @@ def test_an_evaluated_rate_is_no_parameter(case):
 
 
 def test_an_evaluated_mechanism_is_swept_run_by_run(case):
-    simulation = surfacechem.load(case(FOREIGN))
+    simulation = surfacechem.load(case(FOREIGN), {"run.until": "3 ms"})
     data = simulation.sweep({"initial.T_2": [330.0, 345.0]}).dataset
     assert data["T_2"].values[1].tobytes() == simulation.run().dataset["T_2"].values.tobytes()
 

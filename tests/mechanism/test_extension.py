@@ -93,7 +93,7 @@ def test_every_type_has_an_example_here():
     g_n=st.floats(0.0, 20e-9),
     weights=st.lists(st.floats(0.01, 1.0), min_size=3, max_size=3),
 )
-@settings(max_examples=20)
+@settings(max_examples=10)
 def test_same_rates_as_in_a_scene(both, T, f, g_n, weights):
     mechanism, surface = both
     surface.f, surface.g_n = f, g_n
@@ -146,7 +146,7 @@ reactions:
 ELEMENTARY_CHARGE = 1.602176634e-19
 
 
-@pytest.mark.parametrize("f", [0.0, 5e-12, -20e-12, 60e-12])
+@pytest.mark.parametrize("f", [0.0, -20e-12, 60e-12])
 @pytest.mark.parametrize("T", [290.0, 330.0])
 def test_against_the_work_of_an_electric_potential(f, T):
     """Force times length as charge times potential: beta of the length belongs to rupture, the rest to formation."""

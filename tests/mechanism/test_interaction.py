@@ -113,7 +113,7 @@ def file(tmp_path_factory):
 
 
 @given(text=interacting(), data=st.data())
-@settings(max_examples=20)
+@settings(max_examples=10)
 def test_random_mechanisms_agree_with_cantera(file, text, data):
     file.write_text(text)
     mechanism = load_mechanism(file)

@@ -1,6 +1,7 @@
 """The surface mechanisms that come with Cantera: those between surface species agree, others are refused."""
 
 import json
+from functools import cache
 from pathlib import Path
 
 import cantera as ct
@@ -38,9 +39,14 @@ LOWERED = [("example_data/covdepsurf.yaml", f"covdep_{model}") for model in ("li
 """Phases that are taken as they are."""
 
 
+read = cache(load_mechanism)
+
+
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    return tmp_path_factory.mktemp("cantera")
+def alone(tmp_path_factory):
+    """Each of these phases once."""
+    folder = tmp_path_factory.mktemp("cantera")
+    return cache(lambda file, phase: surface_alone(file, phase, folder))
 
 
 def surface_alone(file: str, phase: str, folder: Path) -> tuple[Path, int]:
@@ -67,10 +73,10 @@ def surface_alone(file: str, phase: str, folder: Path) -> tuple[Path, int]:
 @pytest.mark.parametrize(("file", "phase"), every(3, [surface for surface, count in SURFACES.items() if count]))
 @given(data=st.data())
 @settings(max_examples=10)
-def test_reactions_between_surface_species_agree(folder, file, phase, data):
-    path, count = surface_alone(file, phase, folder)
+def test_reactions_between_surface_species_agree(alone, file, phase, data):
+    path, count = alone(file, phase)
     assert count == SURFACES[file, phase]
-    mechanism = load_mechanism(path)
+    mechanism = read(path)
     assert len(mechanism.reactions) == 2 * count
     compare(mechanism, *data.draw(states(len(mechanism.variables))))
 
@@ -91,7 +97,7 @@ def test_other_phases_are_refused_by_name(file, phase):
 @given(data=st.data())
 @settings(max_examples=10)
 def test_coverage_dependent_thermo_agrees(file, phase, data):
-    mechanism = load_mechanism(FOLDER / file, phase)
+    mechanism = read(FOLDER / file, phase)
     compare(mechanism, *data.draw(states(len(mechanism.variables))))
 
 

@@ -134,13 +134,16 @@ def file(tmp_path_factory):
     return tmp_path_factory.mktemp("mechanisms") / "fuzzed.yaml"
 
 
-@pytest.mark.parametrize("name", TEXTS)
+WHOLE = ("every key", "every rate type")
+
+
+@pytest.mark.parametrize("name", WHOLE)
 def test_the_file_itself_is_read(name, file):
     file.write_text(TEXTS[name], encoding="utf-8")
     assert load_mechanism(file).reactions
 
 
-@pytest.mark.parametrize("name", TEXTS)
+@pytest.mark.parametrize("name", WHOLE)
 @given(data=st.data())
 @settings(max_examples=15)
 def test_a_misspelt_key_is_named(name, file, data):
@@ -234,7 +237,7 @@ def refusal(case, folder):
     return None
 
 
-@pytest.mark.parametrize("examples", [40, pytest.param(3000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("examples", [25, pytest.param(3000, marks=pytest.mark.slow)])
 def test_mutated_documents(examples, file):
     @given(name=st.sampled_from(list(TEXTS)), data=st.data())
     @settings(max_examples=examples, derandomize=True, suppress_health_check=list(HealthCheck))
@@ -247,7 +250,7 @@ def test_mutated_documents(examples, file):
     run()
 
 
-@pytest.mark.parametrize("examples", [40, pytest.param(3000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("examples", [25, pytest.param(3000, marks=pytest.mark.slow)])
 def test_mutated_texts(examples, file):
     @given(name=st.sampled_from(list(TEXTS)), data=st.data())
     @settings(max_examples=examples, derandomize=True, suppress_health_check=list(HealthCheck))

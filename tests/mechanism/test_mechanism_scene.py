@@ -114,7 +114,7 @@ def file(tmp_path_factory):
 
 
 @given(data=st.data())
-@settings(max_examples=10)
+@settings(max_examples=5)
 def test_random_mechanisms_in_a_scene(file, data):
     ct.suppress_thermo_warnings(True)
     file.write_text(data.draw(mechanism_texts()), encoding="utf-8")
@@ -124,7 +124,7 @@ def test_random_mechanisms_in_a_scene(file, data):
     compare(mechanism, assemble(scene(mechanism, initial, capacity=1e6)), T, coverages)
 
 
-@pytest.mark.parametrize("name", SHIPPED)
+@pytest.mark.parametrize("name", every(3, SHIPPED))
 def test_a_run_ends_where_nothing_reacts(name):
     """At its end affinities are zero or reactants used up, and the sites and one temperature are left."""
     mechanism, built = shipped(name, capacity=42.0)
@@ -203,7 +203,7 @@ STARTS = [
 
 
 @pytest.mark.parametrize(("file", "bond", "coverages"), STARTS)
-@pytest.mark.parametrize("rtol", [1e-7, 1e-9])
+@pytest.mark.parametrize("rtol", [1e-9])
 def test_the_books_close_from_empty_and_full_coverages(file, bond, coverages, rtol, tmp_path):
     """Chemical potentials are infinite there, the books are not."""
     path = tmp_path / "case.yaml"

@@ -138,7 +138,7 @@ LOADS += [("Dudko-Hummer-Szabo", DUDKO), ("gap-attachment", TETHER)]
 
 
 @given(data=st.data(), f=st.floats(-40e-12, 40e-12), g_n=st.floats(0.0, 4e-8))
-@settings(max_examples=20, phases=[Phase.explicit, Phase.generate])
+@settings(max_examples=10, phases=[Phase.explicit, Phase.generate])
 def test_loads_multiply_the_rates_of_random_mechanisms(tmp_path_factory, data, f, g_n):
     """Whatever the thermo, orders and coverage dependencies: Cantera's rates times what the load does."""
     ct.suppress_thermo_warnings(True)

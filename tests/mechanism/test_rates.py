@@ -91,7 +91,7 @@ def compare_thermo(mechanism, surface, point):
 
 @pytest.mark.parametrize("name", SHIPPED)
 @given(data=st.data(), under=loads)
-@settings(max_examples=20)
+@settings(max_examples=5)
 def test_shipped_mechanisms_agree_with_cantera(name, data, under):
     mechanism = load(name)
     compare(mechanism, *data.draw(states(len(mechanism.variables))), **under)
@@ -103,7 +103,7 @@ def file(tmp_path_factory):
 
 
 @given(data=st.data())
-@settings(max_examples=40)
+@settings(max_examples=20)
 def test_random_mechanisms_agree_with_cantera(file, data):
     file.write_text(data.draw(mechanism_texts()), encoding="utf-8")
     mechanism = load_mechanism(file)

@@ -14,7 +14,6 @@ from surfacechem.results.error_estimates import (
     EVENTS,
     against_tighter,
     apart,
-    difference,
     estimated,
     event_errors,
     floors,
@@ -99,17 +98,6 @@ def test_a_second_run_that_fails_later_than_the_first_did_not_end_earlier():
     first, second = (simulation.model.solve(replace(simulation.case.run, times=(0.0, 1.0, 2.0)[:n])) for n in (2, 3))
     first, second = (replace(each, status="failed") for each in (first, second))
     assert estimated(first, second).source.startswith("unknown: a second run at rtol 1e-11 failed later")
-
-
-def test_the_end_of_a_stopped_run_is_an_event():
-    solution = surfacechem.load("cooling-to-zero").run()
-    assert solution.status == "stopped"
-    assert event_times(solution.trajectory)["end"] == [solution.trajectory.result.t]
-
-
-def test_differences_between_events_in_words():
-    assert difference({"slip": np.array([0.1])}, {"slip": np.array([0.2])}) == ""
-    assert difference({}, {"slip": np.array([0.2])}) == "other events: 1 slip instead of 0"
 
 
 @pytest.mark.parametrize("strength", [20, 55])

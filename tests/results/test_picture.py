@@ -11,16 +11,14 @@ from surfacechem.results.event_table import events_of
 from surfacechem.results.picture import needed
 from surfacechem.tolerances import PICTURE
 
-FOLLOWED = ("exothermic", "stick-slip", "press-hold-pull", "rate-and-state-stick-slip", "dna-adhesive", "debonding")
-"""Smooth, with many jumps, with stages, with slips that are brief, with two time scales, with one jump."""
+FOLLOWED = ("stick-slip", "press-hold-pull", "dna-adhesive", "debonding")
+"""With many jumps, with stages, with two time scales, with one jump."""
 
 LINED = (*FOLLOWED, "compliant-debonding")
 """And one with a traction that rises by a ramp in the first part of many, while no state changes."""
 
-each = pytest.mark.parametrize("name", FOLLOWED)
 
-
-@each
+@pytest.mark.parametrize("name", FOLLOWED)
 def test_no_step_depends_on_the_outputs(name):
     case = load(name)
     run, trajectory = case.case.run, solved(name).trajectory

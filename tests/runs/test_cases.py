@@ -14,7 +14,7 @@ from surfacechem.errors import InputError
 from surfacechem.format import load_text, names
 from surfacechem.quantities import BOLTZMANN
 from surfacechem.results.accuracy import largest_errors
-from surfacechem.results.error_estimates import against_exact, against_tighter, computed, floors
+from surfacechem.results.error_estimates import against_exact, computed, floors
 from surfacechem.runs.simulation import Simulation
 
 CELLS = ("sudden-contact", "epoxy-cure-thick")
@@ -61,25 +61,6 @@ def test_a_run_with_changed_parameters_compiles_nothing(monkeypatch):
     assert hotter.dataset["T"][-1] > 400
 
 
-def test_changed_parameters_give_what_the_changed_case_gives():
-    path = "bodies.lower.C"
-    changed = load("exothermic").run({path: "2 J/m^2/K"})
-    overridden = surfacechem.run("exothermic", {path: "2 J/m^2/K"})
-    assert changed.accuracy.error < 1e-8
-    for a, b in zip(changed.columns, overridden.columns, strict=True):
-        assert np.array_equal(a.values, b.values)
-
-
-def test_an_exact_solution_of_another_scene_is_not_used():
-    accuracy = load("exothermic").run({"initial.T": 350.0}).accuracy
-    assert accuracy.source.startswith("estimate: a second run")
-    assert "it starts from T = 300, the scene from 350" in accuracy.source
-    other = surfacechem.run("exothermic", ["bodies.upper.capacity=constant"]).accuracy
-    assert "it misses the equation of T by" in other.source
-    third = surfacechem.run("exothermic", ["reference=sliding"]).accuracy
-    assert "it says nothing of phi" in third.source
-
-
 HELD_FILM = """
 T_0: 300 K
 bodies: {lower: {temperature: 300 K}, upper: {temperature: 300 K}}
@@ -105,6 +86,9 @@ def test_an_exact_solution_is_held_against_balances_without_rates():
 @pytest.mark.parametrize(
     ("name", "change", "reason"),
     [
+        ("exothermic", "initial.T=350 K", "it starts from T = 300, the scene from 350"),
+        ("exothermic", "bodies.upper.capacity=constant", "it misses the equation of T by"),
+        ("exothermic", "reference=sliding", "it says nothing of phi"),
         ("stick-slip", "mechanics.tangential.c_g=1 kPa s/m", "it misses the equation of"),
         ("stick-slip", "initial.v=1 mm/s", "it starts from v = 0"),
         ("stick-slip", "loading.w_t={harmonic: {amplitude: 1 mm, frequency: 1 Hz}}", "it needs V"),
@@ -122,8 +106,8 @@ def test_an_exact_solution_is_held_against_balances_without_rates():
         ("stick-slip-rebonding", "initial.phi=1e-9", "it starts from phi = 0, the scene from 1e-09"),
     ],
 )
-def test_an_exact_solution_of_mechanics_of_another_scene_is_not_used(name, change, reason):
-    changes = [change, "initial.g_n=0"] if "normal" in change else [change]
+def test_an_exact_solution_of_another_scene_is_not_used(name, change, reason):
+    changes = [change, "initial.g_n=0", "run.until=1 ms"] if "normal" in change else [change]
     source = surfacechem.run(name, changes).accuracy.source
     assert "is not of this scene" in source
     assert reason in source
@@ -133,7 +117,7 @@ TOLD = ("compliant-debonding", "debonding-cooling", "endothermic-kappa-0p1", "st
 """Cases whose exact solutions were once compared with other scenes."""
 
 
-def assert_no_false_error(name):
+def assert_no_false_error(name, factors=(1.1, 1.001), instead_of_zero=(1e-2, 1e-4, 1e-6, 1e-8, 1e-10)):
     """Whatever is changed, the exact solution follows it, or says that it is of another scene."""
     simulation = load(name)
     model, reference = simulation.model, simulation.case.reference
@@ -141,7 +125,7 @@ def assert_no_false_error(name):
         return
     run, values = replace(simulation.case.run, solver="radau", rtol=1e-11), model.values()
     for path in model.system.changeable:
-        for value in [1.1 * values[path], 1.001 * values[path]] if values[path] else [1e-2, 1e-4, 1e-6, 1e-8, 1e-10]:
+        for value in [factor * values[path] for factor in factors] if values[path] else instead_of_zero:
             with suppress(InputError):
                 trajectory = model.solve(run, {path: value})
                 found = against_exact(trajectory, simulation.case.scene, reference.name, reference.options)
@@ -150,29 +134,13 @@ def assert_no_false_error(name):
 
 @pytest.mark.parametrize("name", TOLD)
 def test_no_error_against_another_scene(name):
-    assert_no_false_error(name)
+    assert_no_false_error(name, (1.001,), (1e-4, 1e-9))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in names() if name not in CELLS])
 def test_no_error_against_another_scene_in_any_case(name):
     assert_no_false_error(name)
-
-
-def test_an_exact_solution_is_used_far_beyond_its_time_scale():
-    assert surfacechem.run("exothermic", ["run.until=50 s"]).accuracy.source == "exact solution exothermic-bonding"
-
-
-def test_the_error_estimate_is_true():
-    """Without its exact solution a case estimates its error; the estimate is within a factor of ten of the error."""
-    simulation = load("exothermic")
-    trajectory = simulation.model.solve(simulation.case.run)
-    exact, estimate = (
-        against_exact(trajectory, simulation.case.scene, simulation.case.reference.name, {}),
-        against_tighter(trajectory),
-    )
-    for name in estimate.variables:
-        assert 0.1 < estimate.variables[name] / exact.variables[name] < 10
 
 
 def test_a_single_bond_needs_a_bond_a_force_and_a_temperature():

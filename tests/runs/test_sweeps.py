@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray
-from test_references import bell, build, table
+from test_references import build
 from typer.testing import CliRunner
 
 import surfacechem
@@ -49,15 +49,6 @@ def test_six_decades_of_loading_rates_meet_the_exact_formulas(spectrum):
     assert data.attrs["error_source"] == "exact solution bell-ramp"
     assert set(data["status"].values) == {"stopped"}
     assert "all bonds broke" in data["reason"].values[0]
-
-
-def test_spectrum_meets_the_table():
-    data = table("c_bell_ramp")
-    p, rates = bell(data.parameters), data.columns["r"]
-    assert (p["k_off"], p["x_off"], data.parameters["T"]) == (0.1, 4e-10, 300.0)
-    found = surfacechem.sweep("force-spectroscopy", {RATE: rates}, {"f": "250 pN"}).dataset
-    for which, column in (("mode", "F_mode"), ("median", "F_median"), ("mean", "F_mean")):
-        np.testing.assert_allclose(found[f"f_{which}"], data.columns[column], rtol=1e-10, atol=1e-24)
 
 
 def test_outputs_of_a_spectrum_are_at_equal_forces(spectrum):
@@ -268,12 +259,6 @@ def test_paths_of_a_sweep_are_those_of_the_case(case, path, value, written):
 def test_what_makes_a_gap_move_as_it_does_cannot_vanish(case, path):
     with pytest.raises(InputError, match=f"{path} = 0 is outside its range: > 0"):
         surfacechem.sweep(case, {path: [1.0, 0.0]})
-
-
-def test_an_output_at_a_jump_is_compared_on_its_side():
-    """The first two debond at a multiple of the spacing of the outputs."""
-    path = "interface.limits.tensile-strength.t_max"
-    assert surfacechem.sweep("debonding", {path: ["20 MPa", "55 MPa", "80.01 MPa"]}).dataset.error.max() < 1e-12
 
 
 def test_a_run_that_ends_at_its_start_leaves_the_others_alone(tmp_path):

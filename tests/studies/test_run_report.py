@@ -51,22 +51,17 @@ def test_a_report_is_one_file_without_scripts_or_network(report):
 
 
 @pytest.mark.skipif(BROWSER is None, reason="needs Chromium")
-def test_nothing_overflows_on_a_phone_or_in_print(report, tmp_path):
+def test_nothing_overflows_on_a_phone(report, tmp_path):
     page = tmp_path / "measure.html"
     source = json.dumps(report.read_text(encoding="utf-8")).replace("</", "<\\/")
     page.write_text(MEASURE % (PHONE, PHONE, source), encoding="utf-8")
     browser = [BROWSER, "--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={tmp_path / 'profile'}"]
-    shot, print_out = tmp_path / "shot.png", tmp_path / "print.pdf"
-    waiting = [*browser, "--virtual-time-budget=5000"]
-    done = subprocess.run([*waiting, "--dump-dom", str(page)], capture_output=True, text=True, check=True, timeout=120)
+    waiting = [*browser, "--virtual-time-budget=5000", "--dump-dom", str(page)]
+    done = subprocess.run(waiting, capture_output=True, text=True, check=True, timeout=120)
     width, height, beyond = json.loads(re.search(r'<pre id="o">(.*?)</pre>', done.stdout)[1])
     assert width <= PHONE
     assert height > 900
     assert beyond == []
-    for option in (f"--screenshot={shot}", f"--print-to-pdf={print_out}"):
-        subprocess.run([*waiting, option, str(report)], capture_output=True, check=True, timeout=120)
-    assert shot.read_bytes().startswith(b"\x89PNG")
-    assert print_out.read_bytes().startswith(b"%PDF")
 
 
 @pytest.mark.parametrize("name", ["compliant-debonding", "snap-in"])
