@@ -28,7 +28,7 @@ FILE = "kernel.numba"
 """File of what Numba loads; others of the folder that begin with `kernel.` hold the same code in other forms."""
 
 
-def _processor() -> str:
+def processor() -> str:
     """Name of the processor; where it is not told, the instruction sets Numba finds still guard the machine code."""
     try:
         with open("/proc/cpuinfo", encoding="utf-8") as lines:
@@ -40,7 +40,7 @@ def _processor() -> str:
 def kernel_folder(sources: Sequence[Path]) -> Path:
     """Where code compiled from these sources, here, is kept."""
     digest = hashlib.sha256()
-    for text in (version("numba"), version("llvmlite"), sys.version, platform.machine(), _processor()):
+    for text in (version("numba"), version("llvmlite"), sys.version, platform.machine(), processor()):
         digest.update(text.encode())
     # These files decide in which form code is kept.
     for source in (Path(cache_folder.__file__), Path(__file__), Path(__file__).with_name("objectcode.py"), *sources):

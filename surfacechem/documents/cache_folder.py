@@ -1,8 +1,8 @@
-"""The user's cache folder, and numbers in it that take long to find: fits of properties, integrals over surfaces.
+"""The user's cache folder, and what takes long to find: fits of properties, integrals over surfaces, machine code.
 
-A file is named by a digest of all that its numbers follow from, the code that finds them included, so that they are
-never used where they do not hold. It holds numbers and texts, no code, behind their SHA-256. What cannot be written,
-read or trusted costs time, never a result.
+A file is named by a digest of all that it follows from, so that it is never used where it does not hold, and is read
+where its SHA-256 is right and no other user could have written it. What cannot be written, read or trusted costs time,
+never a result.
 """
 
 from __future__ import annotations
@@ -29,6 +29,9 @@ PACKAGE = Path(__file__).parents[1]
 
 OTHERS = stat.S_IWGRP | stat.S_IWOTH
 """Permission of others to write."""
+
+MOST = 4096
+"""Files of one kind that are kept; at 5 to 100 kB some 100 MB."""
 
 
 def cache_root() -> Path:
@@ -176,13 +179,28 @@ def kept(mark: Fingerprint, code: Iterable[Path], find: Callable[[], Any]) -> An
         return find()
     sources = sorted(_source(str(path)) for path in code)
     libraries = [version(name) for name in ("numpy", "scipy", "symengine")]
-    folder = cache_root() / "numbers"
-    path = folder / f"{fingerprint(mark.digest, sources, libraries).digest[:32]}.json"
+    name = fingerprint(mark.digest, sources, libraries).digest[:32]
+    return from_file(cache_root() / "numbers" / f"{name}.json", find, json.loads, lambda x: json.dumps(x).encode())
+
+
+def from_file(path: Path, find: Callable[[], Any], read: Callable[[bytes], Any], write: Callable[[Any], bytes]) -> Any:
+    """What ``find`` gives, read from its file in the cache where that is, else written there."""
+    folder = path.parent
     with suppress(OSError, ValueError):
         if untrusted((folder, path)) is None and (content := unsealed(path.read_bytes())) is not None:
-            return json.loads(content)
+            return read(content)
     found = find()
     with suppress(OSError):
         make_folder(folder)
-        keep_file(path, sealed(json.dumps(found).encode()))
+        keep_file(path, sealed(write(found)))
+        _forget(folder)
     return found
+
+
+def _forget(folder: Path) -> None:
+    """Of more than MOST files in a folder the older half goes."""
+    with os.scandir(folder) as entries:
+        files = [entry.path for entry in entries]
+    if len(files) > MOST:
+        for path in sorted(files, key=os.path.getmtime)[: len(files) // 2]:
+            Path(path).unlink(missing_ok=True)

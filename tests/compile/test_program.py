@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import symengine as se
 
+from surfacechem.compile import program
 from surfacechem.compile.program import compile_function, compile_program, expanded, jacobian
 
 
@@ -23,6 +24,27 @@ def test_derivatives_and_layout() -> None:
     assert program.margins is not None
     assert program.ledger([inputs, inputs]).shape == (2, 1)
     np.testing.assert_array_equal(program.margins(inputs), [2.0])
+
+
+def test_machine_code_is_loaded_where_it_is_of_the_same_expressions(tmp_path, monkeypatch) -> None:
+    monkeypatch.setenv("SURFACECHEM_CACHE", str(tmp_path))
+    x, y = se.symbols("x y")
+    tenth = 0.1 * se.exp(x) / (y + 3 * x)
+
+    def made(*expressions: se.Basic) -> np.ndarray:
+        program._machine_code.cache_clear()  # as in another process
+        return compile_function([x, y], expressions)([0.3, 0.7])
+
+    first = made(tenth, x + y)
+    assert len(list((tmp_path / "code").iterdir())) == 1
+    with monkeypatch.context() as patch:
+        patch.setattr(se, "Lambdify", lambda *_, **__: pytest.fail("made again"))
+        np.testing.assert_array_equal(made(tenth, x + y), first)
+    assert made(tenth * (1 + np.finfo(float).eps), x + y)[0] != first[0]  # another last digit, which is not printed
+    assert made(x + y, tenth).tolist() == first[::-1].tolist()
+    for file in (tmp_path / "code").iterdir():
+        file.write_bytes(file.read_bytes()[:-1])
+    np.testing.assert_array_equal(made(tenth, x + y), first)
 
 
 def test_unused_inputs_and_constants() -> None:

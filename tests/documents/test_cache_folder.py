@@ -1,5 +1,6 @@
 """Numbers that are kept between processes are used only where they hold, and are those that were found."""
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -81,6 +82,16 @@ def test_what_is_damaged_or_not_ours_is_found_again(folder, harm):
     harm(path)
     assert kept(fingerprint("x"), [], lambda: 2.0) == 2.0
     assert kept(fingerprint("x"), [], never) == 2.0
+
+
+def test_of_too_many_files_the_older_half_goes(folder, monkeypatch):
+    monkeypatch.setattr(cache_folder, "MOST", 3)
+    for age, x in enumerate("abcd"):
+        kept(fingerprint(x), [], lambda x=x: x)
+        for path in folder.iterdir():
+            os.utime(path, (path.stat().st_mtime - 60,) * 2)
+        assert len(list(folder.iterdir())) == (2 if age == 3 else age + 1)
+    assert [kept(fingerprint(x), [], lambda: "anew") for x in "dcb"] == ["d", "c", "anew"]
 
 
 def test_a_folder_that_cannot_be_made_costs_nothing_but_time(tmp_path, monkeypatch):
