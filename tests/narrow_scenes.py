@@ -212,16 +212,6 @@ def tapping(rng: np.random.Generator) -> NarrowScene:
     return plates("gap-conductance", law, f"g_n: {gap.text}", exponent, end, f"{width:.1e} of the travel")
 
 
-def gas_gap(rng: np.random.Generator) -> NarrowScene:
-    """Gas that is thin near touch only."""
-    end, width = duration(rng), narrow(rng)
-    gap, M = history(rng, 0.0, 1e-3, end), 1e-3 * width
-    marks = around(gap, [0.0], end)
-    factor, exponent = scaled(rng, lambda t: 1 / (np.maximum(gap.value(t), 0.0) + M), end, marks)
-    law = f"gas-gap: {{between: [lower, upper], k: {EXPOSURE * factor!r}, M: {M!r}}}"
-    return plates("gas-gap", law, f"g_n: {gap.text}", exponent, end, f"{width:.1e} of the travel")
-
-
 ONE = """T_0: 300 K
 bodies:
   lower: {temperature: T, C: 1 kJ/m^2/K, capacity: constant}
@@ -350,19 +340,6 @@ def zone(rng: np.random.Generator) -> NarrowScene:
     return worked("cohesive-zone", law, gap, energy, end, f"{width:.1e} of the travel")
 
 
-def lennard_jones(rng: np.random.Generator) -> NarrowScene:
-    """The same through a well of Lennard-Jones type."""
-    end, width = duration(rng), narrow(rng)
-    g_0, n, psi = 1e-3 * width, 1e19, 4e-21
-    gap = history(rng, float(rng.uniform(0.55, 1.5)) * g_0, 1e-3, end)
-
-    def energy(g: float) -> float:
-        return 2 * math.pi * n * n * psi * g_0**2 * ((g_0 / g) ** 8 / 360 - (g_0 / g) ** 2 / 6)
-
-    law = f"lennard-jones-flat-flat: {{n_1: {n!r}, n_2: {n!r}, psi_0: {psi!r}, g_0: {g_0!r}}}"
-    return worked("lennard-jones", law, gap, energy, end, f"{width:.1e} of the travel")
-
-
 def _swing(rng: np.random.Generator, end: float, nearest: float) -> tuple[History, str, str]:
     """A mass on a spring that starts at its highest: its motion, its loading, and the rest of the case."""
     cycles, swing = float(rng.uniform(0.3, 8)), 4e-4
@@ -388,8 +365,8 @@ def swinging_mass(rng: np.random.Generator) -> NarrowScene:
 
 
 FAMILIES = [
-    *(gap_table, elastic_pressure_table, tapping, gas_gap, stribeck, film),
-    *(attachment, bell, zone, lennard_jones, activated, swinging_mass),
+    *(gap_table, elastic_pressure_table, tapping, stribeck, film),
+    *(attachment, bell, zone, activated, swinging_mass),
 ]
 
 

@@ -376,12 +376,6 @@ def test_a_property_that_is_given_goes_before_that_of_the_fluid():
     assert values["k_m"] == pytest.approx(CoolPropFluid("Water", 1e5).values("k_m", values["T_c"]), rel=BOUND)
 
 
-def test_a_thick_gas_film_conducts_like_a_continuum():
-    gas = {"k_m": 0.0259, "eta_m": 1.79e-5, "rho_m": 1.138, "cp_m": 1041.0, "gamma_m": 1.401, "p_m": 101325.0}
-    rarefied, film = (law(between=("lower", "upper")) for law in (RarefiedFilm, Film))
-    assert rarefied.conductance(d_m=1.0, **gas) == pytest.approx(film.conductance(k_m=gas["k_m"], d_m=1.0), rel=1e-6)
-
-
 def test_a_gas_film_in_contact_keeps_the_thickness_of_the_voids():
     gap = surfacechem.load("closing-gas-gap", {"loading.g_n": "1 um", "run.outputs": 5})
     pressed, apart = (gap.run({"loading.g_n": g, "heat.rarefied-film.Y": Y}) for g, Y in ((-1e-6, 2e-6), (1e-6, 1e-6)))

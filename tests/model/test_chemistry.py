@@ -15,7 +15,6 @@ from surfacechem.errors import InputError
 from surfacechem.laws.bonding import BondSprings, LatticeGas, LinearEnthalpy
 from surfacechem.laws.bonds import Bell, DemboSpring, DudkoHummerSzabo, GapAttachment, ReversibleBell, TwoPathway
 from surfacechem.laws.contact import NormalStiffness
-from surfacechem.laws.kinetics import Bimolecular
 from surfacechem.laws.loading import Harmonic, Hold, Ramp, Table
 from surfacechem.model.assemble import assemble
 from surfacechem.quantities import BOLTZMANN
@@ -34,10 +33,6 @@ def solved(scene, *times, **settings):
     return solve(scene, times, **settings)
 
 
-def role_of(scene, name):
-    return next((role.by for role in assemble(scene).roles if role.variable == name), None)
-
-
 # -- who carries the load ---------------------------------------------------------------------------------------------
 
 
@@ -50,14 +45,6 @@ def test_bonds_share_the_tension_and_feel_no_compression():
     assert audit(trajectory).site_error < 1e-10
     restarts = trajectory.result.events.t
     assert np.allclose(restarts, [2.0], atol=1e-9) or np.allclose(restarts, [2.0, 4.0], atol=1e-9)
-
-
-def test_elastic_bonds_carry_what_stretches_them_and_the_contact_the_rest():
-    potentials = [LatticeGas(epsilon=5e-20), BondSprings(k_b=1e-3, l_0=1e-9), NormalStiffness(E_n=1e13)]
-    scene = isothermal(ReversibleBell(k_off=1.0, x_off=X), {"g_n": Ramp(rate=1e-9)}, 0.5, potentials=potentials)
-    values = solved(scene, 1.0, 5.0)
-    np.testing.assert_allclose(values["f"], 1e-3 * (values["g_n"] - 1e-9), rtol=1e-12, atol=1e-24)
-    assert role_of(scene, "f") == "bond elasticity"
 
 
 @pytest.mark.parametrize(
@@ -74,20 +61,6 @@ def test_a_load_has_one_role(loading, potentials, message):
     with pytest.raises(InputError) as error:
         assemble(isothermal(SLIP, histories, potentials=potentials))
     assert message in str(error.value)
-
-
-def test_unequal_densities_meet_in_the_law_of_mass_action():
-    """d phi/dt = a (1 - phi)(r - phi) - b phi with r = n_2 / n_c, in closed form."""
-    kept = Hold(level=300.0)
-    ratio, k_f, k_r = 0.6, 2e-16, 0.3
-    interface = Interface(kept, reactions=[Bimolecular(k_f=k_f, k_r=k_r)], sites=Sites(SITES, ratio * SITES))
-    scene = Scene((Body("a", kept), Body("b", kept)), interface, initial={"phi": 0.0})
-    t = np.array([0.1, 0.5, 2.0])
-    phi = solved(scene, *t).result.outputs[1:, 0]
-    a = k_f * SITES
-    high, low = sorted(np.roots([a, -(a * (1 + ratio) + k_r), a * ratio]).real, reverse=True)
-    decay = np.exp(-a * (high - low) * t) * low / high
-    np.testing.assert_allclose(phi, (low - high * decay) / (1 - decay), rtol=1e-9)
 
 
 # -- rupture ----------------------------------------------------------------------------------------------------------
@@ -109,13 +82,6 @@ def test_a_sudden_load_breaks_bonds_when_it_comes(jump):
 def test_a_load_beyond_reason_is_refused_at_the_start():
     with pytest.raises(InputError, match=r"at the start the bonds ruptured .*lower `t_n`, or let it grow from zero"):
         solved(isothermal(SLIP, {"t_n": Hold(level=1e5 * UNIT * SITES)}), 1.0)
-
-
-def test_rupture_does_not_depend_on_the_form_of_the_state():
-    scene = isothermal(SLIP, {"t_n": Hold(level=0.5 * UNIT * SITES)})
-    plain, logarithmic = (solved(form, 1.0) for form in (scene, in_logarithms(scene)))
-    assert logarithmic.result.t == pytest.approx(plain.result.t, rel=1e-12)
-    assert logarithmic.result.t == pytest.approx(0.559773594776160811746795939315, rel=1e-12)
 
 
 # -- survival in logarithms -------------------------------------------------------------------------------------------
@@ -278,10 +244,3 @@ def test_at_constant_traction_the_fall_of_the_enthalpy_is_the_heat_that_leaves(a
     t_n = data["t_n_nominal"] if area == 2 else data["t_n"]
     np.testing.assert_allclose(1e16 * data["e_c"], data["U_c"] - t_n * data["g_n"], rtol=1e-12)
     np.testing.assert_allclose(t_n, 2e4, rtol=1e-9)
-
-
-def test_the_length_of_a_reversible_bond_is_how_its_equilibrium_answers_force():
-    """Detailed balance: ln(phi / (1 - phi)) rises with the force by (x_on - x_off) / kT, ruptures over formations."""
-    law = ReversibleBell(k_off=1.0, x_off=X, x_on=X / 4)
-    assert law.length == pytest.approx(X / 4 - X, rel=1e-15)
-    assert ReversibleBell(k_off=1.0, x_off=X).length is None

@@ -276,19 +276,6 @@ def test_heat_into_a_body_that_is_kept_warm_is_all_that_the_interface_gives():
 # -- loads that are easy to miss, and limits in which two models must agree --------------------------------------------
 
 
-def heated(load):
-    return scenes.perfect_contact([], energy=Constant, C_1=2.0, C_2=3.0, loading={"Q_1": load})
-
-
-def test_a_brief_pulse_is_not_stepped_over():
-    end, heat = 3.0 + 1e-9, 50.0
-    width = end - 3.0  # as doubles have it
-    pulse = Table(times=[0.0, 3.0, 3.0, end, end, 9.0], values=[0, 0, heat / width, heat / width, 0, 0])
-    trajectory = closed(heated(pulse), 10.0)
-    assert trajectory["T"][-1] == pytest.approx(300 + heat / 5.0, rel=1e-9)
-    assert trajectory["H_1"][-1] == pytest.approx(heat, rel=1e-12)
-
-
 def exchange(h, temperatures=("T_1", "T_c", "T_2"), C_c=4.0):
     first, middle, second = temperatures
     potentials = [BondEnergy(K_0=300.0)] + ([ConstantInterfaceCapacity(C_c=C_c)] if C_c else [])
@@ -324,16 +311,6 @@ def test_a_pressure_from_a_potential_and_from_loading_is_two_roles():
     loading = {name: Hold(level=1.0) for name in ("g_n", "v", "p")}
     with pytest.raises(InputError, match="p has two roles"):
         assemble(Scene(bodies("T", "T"), interface, (), loading, None, 300.0, {"T": 300.0}))
-
-
-def test_fluxes_between_unequal_bodies_follow_the_exact_identity():
-    """q_t = h (T_2 - T_1) + (h_1 - h_2) / (h_1 + h_2) q_m with 1/h = 1/h_1 + 1/h_2."""
-    h_1, h_2 = 900.0, 300.0
-    scene = replace(exchange(0.0), heat=[path("interface", "lower", h_1), path("interface", "upper", h_2)])
-    trajectory = closed(replace(scene, initial=scene.initial | {"T_2": 350.0}), 1.0)
-    T_1, T_2, q_m, q_t = (trajectory[name][-1] for name in ("T_1", "T_2", "q_m", "q_t"))
-    h = 1 / (1 / h_1 + 1 / h_2)
-    assert q_t == pytest.approx(h * (T_2 - T_1) + (h_1 - h_2) / (h_1 + h_2) * q_m, rel=1e-9)
 
 
 def test_a_pressure_may_grow_from_nothing():

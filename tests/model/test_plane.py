@@ -105,30 +105,6 @@ def test_stick_slip_along_a_line_is_that_of_one_component(frictions):
         assert moments(both) == pytest.approx(moments(one), rel=1e-9)
 
 
-@pytest.mark.parametrize("mount", [SPRING, Mounting(k=1e8, c_b=1e6)])
-def test_isotropic_sliding_does_not_know_the_axes(mount):
-    a = 0.4
-    c, s = math.cos(a), math.sin(a)
-    times = np.linspace(0, 1, 21)
-
-    def pulled(along: tuple[float, float], across: tuple[float, float]) -> Solved:
-        """Each component of the far field is a sum of two harmonics: the second comes as a traction."""
-        loads = {}
-        for axis, (x, y) in (("t", along), ("t2", across)):
-            loads[f"w_{axis}"] = Harmonic(amplitude=2e-3 * x, frequency=1.0)
-            loads[f"F_{axis}"] = Harmonic(amplitude=1.5e5 * y, frequency=1.3)
-        return closed(scene([Coulomb(mu=0.4, mu_s=0.6)], mount, p=1e5, **loads), times)
-
-    straight, turned = pulled((1, 0), (0, 1)), pulled((c, -s), (s, c))
-    assert len(straight.jumps) > 1
-    for x, y in (("u_t", "u_t2"), ("v", "v_2"), ("t_t", "t_t2")):
-        size = np.hypot(straight[x], straight[y]).max()
-        tolerance = 1e-8 if x == "u_t" else 1e-6
-        assert np.max(np.abs(straight[x] - (c * turned[x] + s * turned[y]))) <= tolerance * size
-        assert np.max(np.abs(straight[y] - (c * turned[y] - s * turned[x]))) <= tolerance * size
-    assert [j.t for j in straight.jumps] == pytest.approx([j.t for j in turned.jumps], rel=1e-8)
-
-
 # -- beginning on the ellipse, and independent integrations ---------------------------------------------------------
 
 
@@ -200,21 +176,6 @@ def test_a_block_on_a_conveyor_comes_to_rest_on_it():
     after = (times > stop) & (times < solved.jumps[1].t)
     assert np.all(solved["v"][after] == 0)
     assert np.all(solved["v_2"][after] == 0)
-
-
-def test_creep_in_a_circle_follows_the_pull():
-    k, c, mu, p = 1e8, 1e6, 0.3, 1e5
-    times = np.linspace(0, 1, 21)
-    solved = closed(scene([Coulomb(mu=mu)], Mounting(k=k, c_g=c), p=p, **CIRCLE), times)
-
-    def rates(t, u):
-        pull = k * (circling(t)[0] - u)
-        size = np.linalg.norm(pull)
-        return pull / c * max(1 - mu * p / size, 0)
-
-    found = solve_ivp(rates, (0, 1), [0.0, 0.0], "DOP853", t_eval=times, rtol=1e-12, atol=1e-16).y
-    close(solved["u_t"], found[0], 1e-8)
-    close(solved["u_t2"], found[1], 1e-8)
 
 
 def test_what_bears_nothing_across_slides_there():

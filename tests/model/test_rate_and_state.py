@@ -6,7 +6,6 @@ At a reversal the velocity passes within no time through all decades down to its
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from scipy.optimize import brentq
 from solved import solve
 
 import surfacechem
@@ -92,30 +91,6 @@ def forward(law, pull, m, times, y, mu_0=0.6, a=0.01, b=0.014, L=5e-5, v_0=1e-6)
     return found.y[0], np.exp(found.y[1]), found.y[2]
 
 
-@np.errstate(over="ignore", invalid="ignore")
-def massless(law, pull, resistance, times, mu_0=0.6, a=0.014, b=0.008, L=5e-5, v_0=1e-6):
-    """Displacement, logarithm of the age and velocity where pull(t, u) = a p s + resistance v, by SciPy."""
-
-    def velocity(t, u, ln_theta):
-        strength = (mu_0 + b * (np.log(v_0 / L) + ln_theta)) / a
-
-        def of(s):
-            return np.sign(s) * v_0 * -np.expm1(-2 * abs(s)) * np.exp(abs(s) - strength)
-
-        s = pull(t, u) / (a * P)
-        if resistance and s:
-            s = brentq(lambda x: a * P * (x - s) + resistance * of(x), 0.0, s, xtol=1e-15 * abs(s), rtol=1e-15)
-        return of(s)
-
-    def rates(t, y):
-        v = velocity(t, *y)
-        x = abs(v) / L * np.exp(y[1])
-        return [v, np.exp(-y[1]) * (1 - x if law is RateAndStateAging else -x * np.log(x) if x else 0.0)]
-
-    found = solve_ivp(rates, (0.0, times[-1]), [0.0, 0.0], "Radau", times, rtol=1e-11, atol=[1e-16, 1e-11]).y
-    return found, np.array([velocity(t, *y) for t, y in zip(times, found.T, strict=True)])
-
-
 def reversals(trajectory):
     v = trajectory.everywhere["v"][len(trajectory.result.times) :]
     return int(np.sum(np.diff(np.sign(v[v != 0])) != 0))
@@ -192,22 +167,6 @@ def test_parameters_that_vary_with_temperature():
         item = Scene(warm, interface, (), load, None, 300.0, {"theta": 1.0}, tangential=Mounting(k=K, m=m))
         found.append(solved(item, 40.0)["u_t"])
     np.testing.assert_allclose(found[1], found[0], rtol=0, atol=1e-10)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("law", "mount"), [(LAWS[0], Mounting(k=K, c_g=1e9)), (LAWS[1], Mounting(k=K))])
-def test_sliding_follows_a_load_that_swings(law, mount):
-    trajectory = solved(scene(law, mount, {"w_t": Harmonic(amplitude=5e-3, frequency=0.05)}), 40.0)
-    assert reversals(trajectory) == 4
-    assert trajectory.result.counters.steps < 4000
-
-    def pull(t, u):
-        return mount.k * (5e-3 * np.sin(0.1 * np.pi * t) - u)
-
-    (u, ln_theta), v = massless(law, pull, mount.c_g, trajectory.result.times)
-    np.testing.assert_allclose(trajectory["u_t"], u, rtol=0, atol=5e-11)
-    np.testing.assert_allclose(trajectory["ln_theta"], ln_theta, rtol=0, atol=1e-6)
-    np.testing.assert_allclose(velocity(trajectory)[1:], v[1:], rtol=1e-5, atol=1e-60)
 
 
 @pytest.mark.parametrize(

@@ -1,8 +1,7 @@
 """What random scenes brought to light: each cause by itself, in the smallest scene that shows it."""
 
-import numpy as np
 import pytest
-from scenes import SITES, bodies, path, perfect_contact, together, varying
+from scenes import SITES, bodies, path, perfect_contact, varying
 from solved import solve
 
 from surfacechem.errors import InputError
@@ -10,18 +9,15 @@ from surfacechem.laws.bonding import LatticeGas, LinearEnthalpy
 from surfacechem.laws.bonds import DudkoHummerSzabo
 from surfacechem.laws.bulk import Constant
 from surfacechem.laws.cohesive import AdhesionIntensity
-from surfacechem.laws.contact import Penalty
 from surfacechem.laws.contact_conductance import PressureConductance
 from surfacechem.laws.factors import Linear
 from surfacechem.laws.films import FilmCapacity
-from surfacechem.laws.friction import Coulomb
 from surfacechem.laws.heat import GasGap
 from surfacechem.laws.kinetics import LinearAffinity, Relaxation
 from surfacechem.laws.loading import Hold, Ramp
-from surfacechem.laws.longrange import VanDerWaalsFlatFlat
 from surfacechem.model.assemble import assemble
 from surfacechem.results.solution import Solution
-from surfacechem.scene import Interface, Medium, Mounting, Scene
+from surfacechem.scene import Interface, Medium, Scene
 
 APART = {"T_1": 300.0, "T_2": 310.0}
 
@@ -73,26 +69,3 @@ def test_a_parameter_that_varies_out_of_its_range_stops_the_run():
     trajectory = run(scene, 1.5)
     assert trajectory.status == "stopped"
     assert trajectory.reason.startswith("pressure conductance: H left its range (> 0) as it varies near t = 1.13333")
-
-
-def test_an_overdamped_slider_starts_from_rest():
-    mount = Mounting(k=1.4e12, c_g=1.8e12)
-    loading = {"F_t": Ramp(start=7e4, rate=1e5), "w_t": Hold(level=0.0), "p": Hold(level=4e5)}
-    interface = Interface("T", frictions=[Coulomb(mu=0.9, mu_s=0.04)])
-    scene = together(interface=interface, loading=loading, tangential=mount)
-    trajectory = run(scene, 10.0)
-    assert trajectory.status == "finished"
-    # The limit of sticking is at least what sliding resists with: 3.6e5 Pa at t = 2.9 s; then c v + k u = F - 3.6e5 Pa.
-    tau, since = 1.8 / 1.4, 7.1
-    assert trajectory["u_t"][-1] == pytest.approx(1e5 / 1.4e12 * (since - tau * -np.expm1(-since / tau)), rel=1e-8)
-
-
-def test_the_search_for_equilibrium_does_not_pass_through_the_pole_of_the_open_side():
-    interface = Interface("T", [VanDerWaalsFlatFlat(A_H=1e-19), Penalty(E_n=1e13)])
-    loading = {"w_n": Ramp(start=5e-9, rate=-1e-9)}
-    initial = {"g_n": 5e-9}
-    scene = together(interface=interface, loading=loading, initial=initial, normal=Mounting(k=1e13))
-    trajectory = run(scene, 10.0)
-    # In contact the attraction is what it is at touch: A_H / (6 pi D_0^3).
-    pull = 1e-19 / (6 * np.pi * 1.65e-10**3)
-    assert trajectory["g_n"][0] == pytest.approx((5e-9 - pull / 1e13) / 2, rel=1e-9)

@@ -279,20 +279,6 @@ def test_heat_is_shared_along_a_way_within_the_tolerance(feeds_back):
 # -- what gives way by itself
 
 
-@pytest.mark.parametrize("thermal", ["perfect", "area", "held"])
-def test_slips_without_a_mass_are_heat_of_friction(thermal):
-    """Each joule of a slip from a static limit goes where one of a slip under a falling pressure goes."""
-    falls = f"{table('p', [2, 2, 0.2, 0.2], 'MPa', 0)}, w_t: {{ramp: {{rate: 0.4 mm/s}}}}"
-    rises = []
-    for loads, static in (("p: 1 MPa, w_t: {ramp: {rate: 0.4 mm/s}}", ", mu_s: 0.6"), (falls, "")):
-        trajectory = solved(text(thermal, loads, "tangential: {k: 1e9, beta_1: 0.9}", static=static)).trajectory
-        jump = trajectory.jumps[0]
-        assert jump.released > 50
-        change = (jump.after.y - jump.before.y) / jump.released
-        rises.append([x for x, s in zip(change, trajectory.model.system.states, strict=True) if s.quantity.unit == "K"])
-    np.testing.assert_allclose(*rises, atol=1e-9 * max(rises[0]))
-
-
 FRICTION = "  friction: [coulomb: {mu: 0.5}]"
 ZONE = "exponential-cohesive-zone: {t_max: 10 MPa, g_0: 1 um, E_n: 1e15 Pa/m}"
 SOFTENING = "bond-stiffness: {E_b: 1e13, E_n: 1e15}, linear-enthalpy: {H_r: 1}"

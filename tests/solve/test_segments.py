@@ -151,14 +151,6 @@ def test_a_velocity_reverses_at_breakpoints_of_another_load(breaks, solver):
     np.testing.assert_allclose(reversals(trajectory), [1.0, 2.0, 3.0], rtol=0, atol=1e-13)
 
 
-def test_so_it_does_in_a_scene_with_transitions():
-    """The stretches of such a run end at the breakpoints, too."""
-    push = Table(times=[0.0, 1.0, 4.0], values=[-1e-6, -2e-6, -1e-6])
-    trajectory = solve(together((), RUBBING, {"w_n": push, **SWINGS}, normal=Mounting(k=1e11)), 4.0)
-    assert trajectory.system.edges
-    np.testing.assert_allclose(reversals(trajectory), [1.0, 2.0, 3.0], rtol=0, atol=1e-13)
-
-
 def test_a_step_ends_where_a_given_gap_closes():
     """The traction bends at touch; the work on the gap is the change of the energy, whatever felt the gap."""
     law = VanDerWaalsFlatFlat(A_H=1e-12, D_0=4e-8)

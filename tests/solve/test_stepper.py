@@ -56,11 +56,6 @@ def test_order_conditions(k: int) -> None:
     for q in range(1, 2 * s):
         assert a[-1] @ c ** (q - 1) == pytest.approx(1 / q, rel=1e-14)
     np.testing.assert_allclose(a @ INVERSE[k, :s, :s], np.eye(s), atol=1e-13)
-    pairs = PAIR_VALUES[k, : (s - 1) // 2]
-    values = np.concatenate(([GAMMA[k]], pairs, pairs.conj()))
-    np.testing.assert_allclose(
-        np.sort_complex(values), np.sort_complex(np.linalg.eigvals(INVERSE[k, :s, :s])), rtol=1e-10
-    )
 
 
 def test_order_conditions_of_the_explicit_steps() -> None:
@@ -296,7 +291,7 @@ def product(table, rows, terms, values, states, out):
     combine(table.ctypes.data, table.shape[1], rows, terms, values.ctypes.data, states, out.ctypes.data)
 
 
-@pytest.mark.parametrize("states", [1, 2, 3, 4, 5, 7, 8, 30])
+@pytest.mark.parametrize("states", [1, 2, 3, 7, 30])
 @pytest.mark.parametrize("stages", STAGES)
 def test_any_number_of_states(stages, states):
     """What runs over the end of a row is written over, or lies behind the last stage."""
