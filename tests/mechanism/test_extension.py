@@ -113,58 +113,6 @@ def test_same_rates_as_in_a_scene(both, T, f, g_n, weights):
             assert back[i] == pytest.approx(call(law.reverse, point), rel=1e-12)
 
 
-EMULATION = """
-units: {length: m, quantity: mol, activation-energy: kJ/mol}
-phases:
-- {name: work, thermo: electron-cloud, elements: [E], species: [electron], density: 1 kg/m^3}
-- name: contact
-  thermo: ideal-surface
-  kinetics: surface
-  adjacent-phases: [work]
-  species: [A(s), AB(s)]
-  reactions: all
-  site-density: 1e-6 mol/m^2
-species:
-- {name: electron, composition: {E: 1}, thermo: {model: constant-cp, h0: 0 kJ/mol, s0: 0 J/mol/K}}
-- {name: A(s), composition: {H: 1}, thermo: {model: constant-cp, h0: 0 kJ/mol, s0: 0 J/mol/K}}
-- {name: AB(s), composition: {H: 1, E: 1}, thermo: {model: constant-cp, h0: -30 kJ/mol, s0: -60 J/mol/K}}
-reactions:
-- {equation: AB(s) <=> A(s) + electron, rate-constant: {A: 1e5, b: 0, Ea: 20}, beta: 0.3}
-"""
-PAIR = """
-units: {length: m, quantity: mol, activation-energy: kJ/mol}
-extensions: [{type: python, name: surfacechem.extension}]
-phases:
-- {name: contact, thermo: ideal-surface, kinetics: surface, species: all, reactions: all, site-density: 1e-6 mol/m^2}
-species:
-- {name: A(s), composition: {H: 1}, thermo: {model: constant-cp, h0: 0 kJ/mol, s0: 0 J/mol/K}}
-- {name: AB(s), composition: {H: 1}, thermo: {model: constant-cp, h0: -30 kJ/mol, s0: -60 J/mol/K}}
-reactions:
-- {equation: AB(s) => A(s), type: Bell, rate-constant: {A: 1e5, b: 0, Ea: 20}, x-beta: 0.15 nm}
-- {equation: A(s) => AB(s), type: Bell, rate-constant: {A: REVERSE, b: 0, Ea: -10}, x-beta: -0.35 nm}
-"""
-ELEMENTARY_CHARGE = 1.602176634e-19
-
-
-@pytest.mark.parametrize("f", [0.0, -20e-12, 60e-12])
-@pytest.mark.parametrize("T", [290.0, 330.0])
-def test_against_the_work_of_an_electric_potential(f, T):
-    """Force times length as charge times potential: beta of the length belongs to rupture, the rest to formation."""
-    x = 0.5e-9
-    cloud = ct.Solution(yaml=EMULATION, name="work")
-    emulated = ct.Interface(yaml=EMULATION, name="contact", adjacent=[cloud])
-    prefactor = 1e5 * math.exp(-60.0 / (ct.gas_constant / 1000))
-    pair = LoadedInterface(yaml=PAIR.replace("REVERSE", repr(prefactor)), name="contact")
-    pair.f = f
-    for surface in (emulated, pair):
-        surface.TP = T, ct.one_atm
-        surface.coverages = "A(s): 0.4, AB(s): 0.6"
-    cloud.TP = T, ct.one_atm
-    cloud.electric_potential = f * x / ELEMENTARY_CHARGE
-    rates = [emulated.forward_rates_of_progress[0], emulated.reverse_rates_of_progress[0]]
-    np.testing.assert_allclose(pair.forward_rates_of_progress, rates, rtol=1e-12)
-
-
 @pytest.mark.parametrize(
     "chosen", [None, {"length": "nm", "quantity": "molec", "activation-energy": "K", "time": "min"}]
 )

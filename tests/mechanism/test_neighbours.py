@@ -388,14 +388,6 @@ def test_what_a_reversible_reaction_may_give_back_is_told(tmp_path):
     assert any("the neighbours hold no O2, which reactions make" in text for text in system.warnings)
 
 
-def test_what_neighbours_do_not_hold_is_told(tmp_path):
-    neighbours = "{gas: {pressure: 1 atm, composition: {CH4: 0.095, O2: 0.21, AR: 0.695}}}"
-    simulation = surfacechem.load(written(tmp_path, ("methane_pox_on_pt.yaml", "Pt_surf"), neighbours=neighbours))
-    assert any(
-        "the neighbours hold no H2, H2O, CO, CO2, which reactions make" in text for text in simulation.system.warnings
-    )
-
-
 def test_species_in_another_case_than_declared_are_told(tmp_path):
     case = written(tmp_path, ("ptcombust.yaml", "Pt_surf"))
     file = tmp_path / "ptcombust.yaml"

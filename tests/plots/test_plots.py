@@ -192,10 +192,10 @@ def test_modes_and_stages_are_bands():
 @pytest.mark.parametrize("kind", ["svg", "png", "pdf"])
 def test_files_are_the_same_every_time(kind):
     first, second = BytesIO(), BytesIO()
-    save(figure(dataset()), first, kind)
-    save(figure(dataset()), second, kind)
+    for file in (first, second):
+        save(figure(dataset(), ["phi"]), file, kind)
     assert first.getvalue() == second.getvalue()
-    assert len(first.getvalue()) > 10_000
+    assert len(first.getvalue()) > 5_000
 
 
 def test_notebooks_show_it_and_settings_stay_as_they_were():
@@ -220,7 +220,7 @@ def test_runs_that_ended_at_once_and_values_that_are_not_finite():
         figure(dataset(np.zeros(0)))
     values = np.linspace(300.0, 400.0, 21)
     values[3] = np.nan  # leaves a gap
-    save(figure(dataset(T_3=("K", values))), BytesIO(), "png")
+    save(figure(dataset(T_3=("K", values)), ["T_3"]), BytesIO(), "png")
 
 
 def test_symbols():

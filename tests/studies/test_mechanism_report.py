@@ -98,7 +98,7 @@ def file(tmp_path_factory):
 
 
 @given(text=mechanism_texts(), temperature=st.floats(300.0, 1200.0))
-@settings(max_examples=10)
+@settings(max_examples=5)
 def test_numbers_of_random_mechanisms_are_cantera_s(file, text, temperature):
     ct.suppress_thermo_warnings(True)
     file.write_text(text, encoding="utf-8")

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray
+from matplotlib.figure import Figure
 from typer.testing import CliRunner
 
 import surfacechem
@@ -16,7 +17,7 @@ from surfacechem.results.accuracy import relative_errors
 from surfacechem.solve.adapters import sundials
 from surfacechem.studies import precision
 from surfacechem.studies import truth as truths
-from surfacechem.studies.report import LIBRARIES
+from surfacechem.studies.report import LIBRARIES, Study
 from surfacechem.studies.truth import KINDS, Subject, establish, numerical
 
 pytestmark = pytest.mark.around
@@ -30,6 +31,12 @@ def quick_methods(monkeypatch, request):
     """References of the two quicker methods, but in slow tests of all."""
     if "slow" not in request.keywords:
         monkeypatch.setattr(truths, "METHODS", ("radau", "lsoda"))
+
+
+@pytest.fixture
+def blank(monkeypatch):
+    """Figures without anything, where they are not what is tested."""
+    monkeypatch.setattr(Study, "figure", lambda _: Figure())
 
 
 def run(*arguments, **more):
@@ -144,6 +151,7 @@ def test_a_case_without_an_exact_solution_says_what_it_is_held_against(rtol, ove
     assert 0 < float(data["uncertainty_max"][0]) < limit
 
 
+@pytest.mark.usefixtures("blank")
 def test_methods_that_do_not_agree_give_no_reference(monkeypatch, tmp_path):
     limit = truths._limit
     shifts = iter(np.linspace(0.0, 1.0, 1000))
@@ -176,6 +184,7 @@ def test_a_method_that_fails_is_no_reference(monkeypatch):
 # -- what failed and what was left out ---------------------------------------------------------------------------------
 
 
+@pytest.mark.usefixtures("blank")
 def test_a_failing_solver_is_shown_as_failed():
     few = run("exothermic", ["radau", "bdf"], [1e-10], overrides=["run.max-steps=40"])
     data = few.dataset.isel(case=0, tolerance=0)
@@ -302,6 +311,7 @@ def again(study, folder, monkeypatch):
         return data.load()
 
 
+@pytest.mark.usefixtures("blank")
 def test_the_command_holds_whatever_was_given_from_python(tmp_path, monkeypatch):
     """A case by its path, a tolerance of many digits, nothing instead of a reference, a nested value."""
     path = tmp_path / "a case.yaml"
