@@ -18,7 +18,7 @@ from surfacechem.laws.kinetics import Arrhenius, LinearAffinity
 from surfacechem.laws.loading import Hold, Ramp, Table
 from surfacechem.laws.longrange import LennardJonesDerjaguin, LennardJonesFlatFlat, LennardJonesSpherePlane
 from surfacechem.model.assemble import assemble
-from surfacechem.scene import Body, Interface, Mounting, Scene, Stage
+from surfacechem.scene import Body, Interface, Mounting, Scene
 from surfacechem.solve.run import Model
 
 FOLDER = Path(__file__).parent / "references"
@@ -119,13 +119,6 @@ def dynamic() -> Solved:
     p = parameters("h_pulloff_dynamic")
     model = zone(Mounting(k=p["k_eff"], m=p["m"], c_b=p["c_b"]), Hold(level=p["w"]), C=p["C_tot"] / 2)
     return solve(model, columns("h_pulloff_dynamic")["t"])
-
-
-@cache
-def overdamped() -> Model:
-    p = parameters("h_overdamped_bottleneck")
-    opens = Stage("open", variable="g_n", value=4 * p["g0"])
-    return zone(Mounting(k=p["k_eff"], c_g=p["c"]), Hold(level=1.0), C=10.0, programme=(opens,))
 
 
 def isentropic() -> Solved:

@@ -9,11 +9,9 @@ import pytest
 import surfacechem
 from surfacechem import format as case
 from surfacechem.contracts import fits
-from surfacechem.contracts.terms import Varying
 from surfacechem.errors import InputError
 from surfacechem.laws.bulk import Constant
 from surfacechem.laws.contact import ConstantInterfaceCapacity
-from surfacechem.laws.factors import Exponential
 from surfacechem.laws.films import Film, FilmCapacity, FilmShear, FilmWear, RarefiedFilm
 from surfacechem.laws.friction import Viscous
 from surfacechem.laws.loading import Hold
@@ -210,36 +208,6 @@ def test_heat_made_across_a_gas_passes_the_jump_at_each_wall():
     assert T_c == pytest.approx(level + slope / 2 - heat * r / 6, rel=1e-8)
     assert values["q_1"] == pytest.approx(slope / r, rel=1e-6)
     assert values["q_2"] == pytest.approx(heat - slope / r, rel=1e-6)
-
-
-def couette_flow(beta: float, v: float) -> dict[str, float]:
-    """Steady values of a film of viscosity ETA exp(-beta (T - T_w)) between two walls at T_w = 300 K, across the film.
-
-    T = T_w + 2/beta ln(cosh(lam) / cosh(lam s)), sinh(lam)^2 = Na / 8, Na = beta ETA v^2 / k, with s from -1 to 1;
-    traction ETA v / d 2 lam / sinh(2 lam). T_c is the mean of T, T_max its largest value. Source: Nahme (1940),
-    Ing.-Arch. 11, 191; Gavis & Laurence (1968), doi 10.1021/i160025a032.
-    """
-    lam = np.arcsinh(np.sqrt(beta * ETA * v**2 / K_M / 8))
-    nodes, weights = np.polynomial.legendre.leggauss(80)
-
-    def temperature(s):
-        hotter = 2 * np.sinh(lam * (1 + s) / 2) * np.sinh(lam * (1 - s) / 2) / np.cosh(lam * s)
-        return 300.0 + 2 / beta * np.log1p(hotter)
-
-    mean, top = float(weights @ temperature((nodes + 1) / 2)) / 2, float(temperature(0.0))
-    return {"T_c": mean, "T_max": top, "t_t": float(ETA * v / D_M * 2 * lam / np.sinh(2 * lam))}
-
-
-@pytest.mark.parametrize(("Na", "rise", "traction"), [(1e-3, 2e-5, 1e-8), (1.0, 0.014, 0.0017), (18.2, 0.043, 0.097)])
-def test_a_film_that_thins_stays_near_couette_flow_up_to_the_nahme_fold(Na, rise, traction):
-    """The film has one temperature, and its viscosity; the solution across it has both everywhere."""
-    beta = 0.04
-    v = np.sqrt(Na * K_M / (beta * ETA))
-    thinning = Varying(ETA, (Exponential(beta=beta),))
-    values = steady(between_walls(300.0, 300.0, v, thinning))
-    exact = couette_flow(beta, v)
-    assert values["T_c"] - 300.0 == pytest.approx(exact["T_c"] - 300.0, rel=rise)
-    assert values["t_viscous"] == pytest.approx(exact["t_t"], rel=traction)
 
 
 @pytest.mark.parametrize("T_c", [250.0, 345.0, 700.0])

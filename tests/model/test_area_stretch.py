@@ -233,18 +233,3 @@ def test_bimolecular_bonds_come_to_the_equilibrium_of_their_mixture(area):
     n_b, n_1, n_2 = phi * N_1 / area, (1 - phi) * N_1 / area, (N_2 - phi * N_1) / area
     assert n_b / (n_1 * n_2) == pytest.approx(K_F / K_R, rel=1e-9)
     assert values["mu"][-1] == pytest.approx(0.0, abs=1e-9 * KT)
-
-
-def test_slow_stretching_is_reversible_and_does_the_work_of_a_gas_in_two_dimensions():
-    """W_J = -int kT (n_b + n_1' + n_2') dA along the equilibrium, where the surface is stretched slowly."""
-    trajectory = solve(partners(Ramp(start=1.0, rate=1e-5)), np.linspace(0.0, 1e5, 4001))
-    values = trajectory
-    area = 1.0 + 1e-5 * np.linspace(0.0, 1e5, 4001)
-    particles = values["phi"] * N_1 + (1 - values["phi"]) * N_1 + N_2 - values["phi"] * N_1
-    work = -np.concatenate([[0.0], np.cumsum(np.diff(area) * (KT * particles / area)[1:])])
-    assert trajectory["W_J"][-1] == pytest.approx(work[-1], rel=1e-3)
-    produced = trajectory["entropy_bimolecular"][[10, -1]]  # after the start has relaxed
-    assert 0 < np.diff(produced)[0] < 1e-4 * abs(work[-1]) / 300.0
-    books = audit(trajectory)
-    assert books.energy_error < 1e-8
-    assert books.violations == ()

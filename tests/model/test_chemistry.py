@@ -12,15 +12,14 @@ from tables_bonds import SITES, isothermal
 
 import surfacechem
 from surfacechem.errors import InputError
-from surfacechem.laws.bonding import BondSprings, LatticeGas, LinearEnthalpy
-from surfacechem.laws.bonds import Bell, DemboSpring, DudkoHummerSzabo, GapAttachment, ReversibleBell, TwoPathway
+from surfacechem.laws.bonding import BondSprings, LatticeGas
+from surfacechem.laws.bonds import Bell, DemboSpring, DudkoHummerSzabo, ReversibleBell, TwoPathway
 from surfacechem.laws.contact import NormalStiffness
 from surfacechem.laws.loading import Harmonic, Hold, Ramp, Table
 from surfacechem.model.assemble import assemble
 from surfacechem.quantities import BOLTZMANN
 from surfacechem.results.audit import audit
-from surfacechem.scene import Body, Interface, Scene, Sites
-from surfacechem.solve.run import Model, Run
+from surfacechem.scene import Scene
 
 THERMAL = BOLTZMANN * 300.0
 X = 4e-10
@@ -156,23 +155,6 @@ def test_no_force_makes_a_number_that_is_none(law):
     for f, phi in product((0.0, 3e-12, -3e-12, 1e-9, 1e-6, 1e3, -1e3), (0.0, 1e-12, 0.5, 1.0)):
         point = {"phi": phi, "n_c": SITES, "f": f, "T_c": 300.0, "mu": -1e-20}
         assert np.isfinite(function([point[name] for name in symbols])).all(), (f, phi)
-
-
-@pytest.mark.parametrize(("rest", "stiffness", "rtol"), [(0.0, 1e-3, 3e-5), (1e-4, 1e-6, 1e-11)])
-def test_a_narrow_peak_of_attachment_is_not_passed_over(rtol, stiffness, rest):
-    """A surface that arrives through a layer of tethers thousands of times thinner than its way."""
-    speed, k_on, T = 1e-4, 3.7, 300.0
-    law = GapAttachment(k_on=k_on, stiffness=stiffness, rest_length=rest)
-    pair = Body("lower", Hold(level=T)), Body("upper", Hold(level=T))
-    interface = Interface(Hold(level=T), [LinearEnthalpy(H_r=20.0)], (), [law], Sites(1e18, 1e18))
-    loading = {"g_n": Ramp(start=rest + 3e-4, rate=-speed)}
-    scene = Scene(pair, interface, [], loading, T_0=T, initial={"phi": 0.0})
-    trajectory = Model(assemble(scene)).solve(Run(times=(0.0, 3.0, 6.0), rtol=rtol))
-    half = k_on / speed * math.sqrt(math.pi * BOLTZMANN * T / (2 * stiffness))
-    exact = [0.0, -math.expm1(-half), -math.expm1(-2 * half)]
-    # The tolerance of phi is a part of its scale, one; half of the peak is far more than that.
-    assert exact[1] > 3 * rtol
-    assert trajectory.result.outputs[:, 0] == pytest.approx(exact, rel=max(1e-9, 2 * rtol), abs=2 * rtol)
 
 
 # -- contact enthalpy per bonding site, and the class of a reaction by its heat ---------------------------------------

@@ -148,7 +148,7 @@ def caught_up(scenes, steps):
 def differing(seeds):
     """The random scenes that differ from the truth, with what differs."""
     scenes = [drawn(seed) for seed in seeds]
-    coarse, fine = caught_up(scenes, 5_000), caught_up(scenes, 10_000)
+    coarse, fine = caught_up(scenes, 4_000), caught_up(scenes, 8_000)
     found = {}
     for j, seed in enumerate(seeds):
         solution = Simulation(load_text(case(scenes[j]))).run(error="balances")
@@ -260,12 +260,3 @@ def test_bonds_yield_where_a_slip_heats_what_they_bear():
     softened = found.result.times > found.jumps[-1].t
     np.testing.assert_allclose(phi[softened], left[softened], atol=2e-9)
     np.testing.assert_allclose(1e12 * (0.5e-6 * found.result.times - g), phi * 1e12 * g, atol=1e-8 * 5e6)
-
-
-def test_a_soft_mounting_tears_the_interface_open():
-    laws = [BondStiffness(E_b=1e14, E_n=1e14)], [CompliantDebonding(t_max=1e6, E_b=1e14, g_f=5e-8)]
-    pull = {"loading": {"w_n": Ramp(rate=2e-7)}, "normal": Mounting(k=1e13), "initial": {"phi": 1.0}}
-    trajectory = solve(together(laws[0], reactions=laws[1], pair=bodies("T", "T", C_1=0.1, C_2=0.1), **pull), 1.0)
-    soften, tear = trajectory.jumps[-2:]
-    assert (soften.edge.name, tear.edge.name, tear.verdict) == ("soften", "tear", "admissible")
-    assert tear.released == pytest.approx(0.5 * 1e6**2 * (1 / 1e13 + 1 / 1e14), rel=1e-9)

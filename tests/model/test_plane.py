@@ -148,36 +148,6 @@ def test_dragging_in_a_circle():
         close(solved[name], value, 2e-8)
 
 
-def test_a_block_on_a_conveyor_comes_to_rest_on_it():
-    """Held by a spring to the ground, thrown sideways onto a belt: relative to the belt the ground moves."""
-    m, k, mu, p, belt = 2.0, 1e4, 0.3, 1e3, 0.5
-    times = np.linspace(0, 0.15, 151)
-    far = {"w_t": Ramp(rate=-belt), "w_t2": 0.0}
-    solved = closed(scene([Coulomb(mu=mu)], Mounting(k=k, m=m), {"v": -belt, "v_2": 0.4}, p=p, **far), times)
-
-    def ground(t):
-        return np.array([-belt * t, 0.0]), np.array([-belt, 0.0])
-
-    rates = cartesian((mu, mu), m, k, 0.0, ground, p)
-
-    def slow(t, state):
-        return np.linalg.norm(state[2:]) - 1e-7
-
-    slow.terminal = True
-    start = [0.0, 0.0, -belt, 0.4]
-    found = solve_ivp(rates, (0, 0.15), start, "DOP853", rtol=1e-12, atol=1e-14, events=slow, dense_output=True)
-    stop = solved.jumps[0].t
-    assert solved.events[0] == "stop"
-    pull = np.linalg.norm(k * (ground(stop)[0] - found.y[:2, -1]))
-    assert stop == pytest.approx(found.t[-1] + 1e-7 * m / (mu * p - pull), rel=1e-6)
-    sliding = times < 0.98 * stop
-    for name, value in zip(("u_t", "u_t2", "v", "v_2"), found.sol(times[sliding]), strict=True):
-        close(solved[name][sliding], value, 1e-8)
-    after = (times > stop) & (times < solved.jumps[1].t)
-    assert np.all(solved["v"][after] == 0)
-    assert np.all(solved["v_2"][after] == 0)
-
-
 def test_what_bears_nothing_across_slides_there():
     """A block on rails: friction along, none across, where the spring swings it for good."""
     law = AnisotropicCoulomb(mu_1=0.3, mu_2=0.0)

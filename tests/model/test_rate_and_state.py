@@ -43,36 +43,6 @@ def velocity(trajectory):
     return trajectory.everywhere["v"][: len(trajectory.result.times)]
 
 
-def plain(law, pull, m, times, y, p=lambda t: P, mu_0=0.6, a=0.01, b=0.014, L=5e-5, v_0=1e-6, turn=0.0):
-    """Displacement, velocity and logarithm of the age, by SciPy, in the equations as they stand in the books.
-
-    What has no more than the velocity ``turn`` comes back at once, as fast as it was.
-    """
-
-    def rates(t, y):
-        u, v, ln_theta = y
-        friction = a * p(t) * np.arcsinh(v / (2 * v_0) * np.exp((mu_0 + b * (np.log(v_0 / L) + ln_theta)) / a))
-        x = abs(v) / L * np.exp(ln_theta)
-        ages = 1 - x if law is RateAndStateAging else -x * np.log(x) if x else 0.0
-        return [v, (pull(t, u) - friction) / m, np.exp(-ln_theta) * ages]
-
-    def turns(t, y):
-        return abs(y[1]) - turn
-
-    turns.terminal, turns.direction = True, -1
-    t, arcs = times[0], []
-    while t < times[-1]:
-        ahead = times[times >= t]
-        arc = solve_ivp(rates, (t, times[-1]), y, "Radau", ahead, events=turns, rtol=1e-10, atol=[1e-17, 1e-24, 1e-11])
-        assert arc.success
-        arcs.append(arc.y)
-        if arc.status == 1:
-            t, y = arc.t_events[0][0], arc.y_events[0][0] * [1, -1, 1]
-        else:
-            t = times[-1]
-    return np.hstack(arcs)
-
-
 def forward(law, pull, m, times, y, mu_0=0.6, a=0.01, b=0.014, L=5e-5, v_0=1e-6):
     """The same for sliding that never reverses, by the logarithm of its velocity."""
 
@@ -112,17 +82,6 @@ def test_stick_slip_is_that_of_the_plain_equations():
     np.testing.assert_allclose(trajectory["ln_theta"], ln_theta, rtol=0, atol=1e-7)
     np.testing.assert_allclose(velocity(trajectory), v, rtol=1e-7)
     assert trajectory.result.counters.steps < 1000
-
-
-def test_a_block_swings_through_its_turning_point():
-    """Friction is a tenth of the pull of the spring: at a turn the velocity passes all decades in no time."""
-    item = scene(RateAndStateAging, Mounting(k=K, m=1e6), {"w_t": Hold(level=0.0)}, WEAKENING, {"v": 1.0})
-    trajectory = solved(item, 0.06, outputs=13)
-    assert np.sum(np.diff(np.sign(velocity(trajectory))) != 0) == 1
-    u, v, _ = plain(RateAndStateAging, lambda t, u: -K * u, 1e6, trajectory.result.times, [0.0, 1.0, 0.0], turn=1e-10)
-    np.testing.assert_allclose(trajectory["u_t"], u, rtol=0, atol=1e-8 * np.max(u))
-    np.testing.assert_allclose(velocity(trajectory), v, rtol=0, atol=1e-8)
-    assert trajectory.events == []
 
 
 def test_pressure_that_vanishes_frees_what_creeps():

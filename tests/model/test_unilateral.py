@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import pytest
 from scenes import SITES, bodies, path, together, varying
-from scipy.integrate import solve_ivp
 from solved import closed, solve
 
 import surfacechem
@@ -32,30 +31,6 @@ def scene(mount, loading=PRESSED, initial=None, **more):
 
 
 # -- rebounds ----------------------------------------------------------------------------------------------------------
-
-
-def test_dampers_against_another_integrator():
-    e, m, k, c_b, c_g = 0.6, 4.0, 100.0, 6.0, 1.5
-    drive = Harmonic(mean=-0.3, amplitude=0.4, frequency=0.4)
-    turn = 2 * math.pi * 0.4
-
-    def motion(t, y):
-        w, w_dot = -0.3 + 0.4 * math.sin(turn * t), 0.4 * turn * math.cos(turn * t)
-        return [y[1], (k * (w - y[0]) + c_b * (w_dot - y[1]) - c_g * y[1]) / m]
-
-    def touch(t, y):
-        return y[0]
-
-    touch.terminal, touch.direction = True, -1
-    trajectory = closed(scene(Mounting(m=m, k=k, c_b=c_b, c_g=c_g, e=e), {"w_n": drive}, {"g_n": 0.3}), 3.0)
-    y, t = [0.3, 0.0], 0.0
-    for jump in trajectory.of("impact")[:6]:
-        found = solve_ivp(motion, (t, t + 3.0), y, "DOP853", events=touch, rtol=1e-13, atol=1e-15)
-        t, speed = found.t[-1], found.y[1, -1]
-        assert jump.t == pytest.approx(t, abs=1e-10)
-        assert jump.before.y[1] == pytest.approx(speed, rel=1e-8)
-        y = [0.0, -e * speed]
-    assert trajectory.energy_error < 1e-9
 
 
 def test_a_shaken_body_leaves_and_lands_as_it_has_to():

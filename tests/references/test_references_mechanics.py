@@ -92,26 +92,6 @@ class TestFriction:
             found = [cycle.stick_time, cycle.limit, slip.duration, slip.distance, 4e4 * slip.distance]
             assert found == pytest.approx(exact, rel=1e-13)
 
-    def test_rebonding_in_time(self):
-        """The limit is reached when the stick ends; a sticking contact bonds, a sliding one has no bonds."""
-        slider = get("stick-slip-rebonding")(**REBONDING, V=7.5e-5)
-        first, second = islice(slider.cycles(), 2)
-        end = first.duration + second.stick_time
-        exact = slider.solution([0.5, first.stick_time + 1e-4, end * (1 - 1e-12), end + 1e-4])
-        assert_exact(exact["phi"][[0, 2]], [-math.expm1(-0.25), second.phi], relative=1e-10)
-        assert np.all(exact["phi"][[1, 3]] == 0.0)
-        assert_exact(exact["spring_traction"][[0, 2]], [1e8 * 7.5e-5 * 0.5, second.limit], relative=1e-10)
-        assert np.all(exact["v"] > 0.0) == np.all([False, True, False, True])
-        assert_exact(exact["u_t"][2], first.slip.distance)
-
-    def test_rebonding_without_bonds_is_stick_slip(self):
-        more = {"mu_b": 0.6, "mu_ub": 0.6, "mu_k": 0.4}
-        slider = get("stick-slip-rebonding")(**{**REBONDING, **more}, V=0.01)
-        plain = get("stick-slip")(**FRICTION, V=0.01)
-        t = np.linspace(0.0, 0.3, 50)
-        for name in ("u_t", "t_t", "heat"):
-            assert_exact(slider.solution(t)[name], plain.solution(t)[name], relative=1e-11, absolute=1e-13 * 6e4)
-
     def test_what_slides_without_rest_is_refused(self):
         with pytest.raises(InputError, match="no stick-slip above V"):
             _ = get("stick-slip-rebonding")(**REBONDING, V=3.1e-4).steady

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 import tables_mechanics as scenes
 from asked import MOTION
-from scipy.special import lambertw
 from tables_mechanics import Solved, columns, parameters, rows, solve
 
 from surfacechem.errors import InputError
@@ -78,33 +77,7 @@ class TestDebonding:
             assert_each(solved.state(jump, "T") / T_0, row["T_f_over_T0"], 1e-12)
 
 
-class TestFriction:
-    @each_row("g_stickslip_rebonding_steady", "V_over_Vc")
-    def test_bonds_that_form_again_in_the_steady_cycle(self, row):
-        p = parameters("g_stickslip_rebonding_steady")
-        length = (row["ts_star"] - 2 * p["mu_k"] * p["p"]) / p["k"]
-        changes = {"loading.w_t.rate": row["V"], "initial.u_t": length}
-        solved = solve(scenes.rebonding_slider(), (0.0, 3.5 * (row["stick_time"] + row["slip_time"])), changes)
-        slip, stop = solved.of("slip")[1], solved.of("stop")[1]
-        phi = solved.state(slip, "phi", "before")
-        heat = solved.account("heat_bonded_coulomb", 3) - solved.account("heat_bonded_coulomb", 2)
-        exact = [row[name] for name in ("stick_time", "phi_star", "slip_time", "heat_per_cycle")]
-        assert_each([slip.since, phi, stop.since, heat], exact, EVENTS)
-        assert_closed(solved)
-
-
 class TestCohesion:
-    @each_row("h_overdamped_bottleneck", "w_over_woff_minus_1")
-    def test_overdamped_passage_of_the_fold(self, row):
-        p = parameters("h_overdamped_bottleneck")
-        g = p["g0"] * (1 - lambertw(-p["k_eff"] * p["g0"] / p["t_max"]).real)
-        w = g + p["t_max"] / p["k_eff"] * g / p["g0"] * math.exp(1 - g / p["g0"])
-        level = {"loading.w_n.level": w * (1 + row["w_over_woff_minus_1"])}
-        solved = solve(scenes.overdamped(), (0.0, 2 * row["t"]), level)
-        # The distance from the fold is known to the rounding of w.
-        assert_each(solved.jumps[0].t, row["t"], max(SMOOTH, 1e-15 / row["w_over_woff_minus_1"]))
-        assert_closed(solved)
-
     def test_bonds_in_equilibrium_until_none_is_left(self):
         solved, exact = scenes.damage(), columns("h_damage_equilibrium")
         assert_close(solved["phi"], exact["phi"], SMOOTH)

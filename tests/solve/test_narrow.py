@@ -1,14 +1,11 @@
 """What is brief in a run is seen, whatever makes it so, and by the estimate of the error too."""
 
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import pytest
 import symengine as se
-from narrow_scenes import FAMILIES, Array, integral, scene
-from scipy.integrate import solve_ivp
-from scipy.interpolate import PchipInterpolator
+from narrow_scenes import FAMILIES, scene
 from scipy.special import erf
 from solver_problems import problem
 
@@ -79,40 +76,6 @@ heat:
 loading: {{g_n: {{ramp: {{start: 1 mm, rate: -10 um/s}}}}}}
 run: {{until: 100 s}}
 """
-
-
-def tapped():
-    """Both temperatures after three taps, by an integration that ends and begins at each."""
-
-    def rates(t: float, y: Array) -> list[float]:
-        held = np.exp(-1e8 * 1e-3 * (1 + np.sin(2 * np.pi * t + 1)))
-        black = 5.670374419e-8 * (y[0] ** 2 + y[1] ** 2) * (y[0] + y[1]) / (2 / 0.05 - 1)
-        heat = (3e5 * held + black * (1 - held)) * (y[1] - y[0]) / 1e3
-        return [heat, -heat]
-
-    taps = [(1.5 * np.pi - 1) / (2 * np.pi) + k for k in range(3)]
-    near = [tap + side * d for tap in taps for side in (-1, 1) for d in (0.0, 5e-4, 2e-3, 2e-2)]
-    times, y = sorted({0.0, 3.0, *near}), [300.0, 400.0]
-    for a, b in pairwise(times):
-        y = solve_ivp(rates, (a, b), y, "DOP853", rtol=1e-12, atol=1e-10, max_step=(b - a) / 40).y[:, -1]
-    return y
-
-
-def test_taps_are_felt():
-    """They are where the gap turns; 5 K are missed with one of them."""
-    simulation = Simulation(load_text(TAPPING))
-    found, _ = ends(simulation, replace(simulation.case.run, rtol=1e-9, accuracy=None))
-    np.testing.assert_allclose([found["T_1"], found["T_2"]], tapped(), rtol=1e-10)
-
-
-def test_a_layer_is_felt():
-    """The temperatures of the plates are all but equal then."""
-    simulation = Simulation(load_text(LAYER))
-    found, _ = ends(simulation, replace(simulation.case.run, rtol=1e-9, accuracy=None))
-    table = PchipInterpolator([0, 485, 500, 515, 1000], [0.01, 0.01, 3333, 0.01, 0.01])
-    exposure = integral(lambda t: table(1000 - 10 * t), 100.0, [48.5, 50.0, 51.5])
-    left = 100 * np.exp(-2 * exposure / 1e3)
-    assert found["T_2"] - found["T_1"] == pytest.approx(left, rel=1e-7)
 
 
 class Resonance(HeatTransfer):
