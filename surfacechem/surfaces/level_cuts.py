@@ -1,4 +1,5 @@
-"""Patches that are cut where the gap passes a level at which a law bends, so that rules stay accurate on both sides.
+"""Patches that are cut where the gap passes a level at which a law bends, and where the nearest point comes to an edge
+of the other surface, so that rules stay accurate on both sides.
 
 Source: Saye (2015), doi 10.1137/140966290: along the direction in which the gap changes most its level is found on each
 line of nodes; the other direction is cut where the level leaves the patch.
@@ -11,10 +12,11 @@ from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from surfacechem.surfaces.nodes import gauss
 from surfacechem.surfaces.patches import ENOUGH, Levels, Patches
-from surfacechem.surfaces.projection import FIRST, Array, Surface
+from surfacechem.surfaces.projection import FIRST, Array, Projection, Surface
 
 SAMPLES = 5
 """Points along each side of a patch at which it is seen whether it has a level."""
@@ -22,25 +24,33 @@ SAMPLES = 5
 SLIGHT, HALVINGS = 0.1, 30
 """A patch of which a level cuts off less, as part times rest, is halved at first, so many times at most."""
 
+CORNERS = 256
+"""Patches that an edge crosses beside their level are halved, too, while they are no more: where lines meet, not where
+they run along each other.
+"""
+
 PARTS, ROOTS = 3, 30
 """Parts of a side on each of which there are lines of nodes, and gaps that are looked at to find a level on a line."""
 
 
 @dataclass(frozen=True)
 class LevelPatches(Patches):
-    """Patches with the level (n,) [m] of the gap to another surface that each has, and the direction (n,) along which
-    it is found; minus one where there is none. Gaps that differ by less than the ``noise`` [m] are the same.
+    """Patches with the level (n,) that each has, the number of one of the gap to another surface or of an edge of
+    that, and the direction (n,) along which it is found; minus one where there is none. Heights over a level that are
+    less than the ``noise`` [m] are none.
     """
 
-    arrays: ClassVar[Sequence[str]] = (*Patches.arrays, "level", "along", "share")
+    arrays: ClassVar[Sequence[str]] = (*Patches.arrays, "level", "along", "share", "crossed")
 
     other: Surface
     levels: tuple[float, ...]
     noise: float
-    level: Array
+    level: Levels
     along: Levels
     share: Array
     """Part of each below the level times that above."""
+    crossed: NDArray[np.bool_]
+    """Whether an edge divides each in another way."""
 
     @property
     def fewest(self) -> int:
@@ -57,17 +67,24 @@ class LevelPatches(Patches):
         return super().halved().marked()
 
     def marked(self) -> Self:
-        """With the level and its direction as the gap now has them."""
+        """With the level and its direction as they now are."""
         share = np.linspace(0, 1, SAMPLES)
         u, v = (self.low[:, k, None] + (self.high - self.low)[:, k, None] * share for k in range(2))
-        gaps = self.gaps(*np.broadcast_arrays(u[:, :, None], v[:, None, :]))
-        steepness = np.stack([np.abs(np.diff(gaps, axis=k + 1)).mean(axis=(1, 2)) for k in range(2)])
-        along = np.argmax(np.where(np.array(self.alike)[:, None], -1.0, steepness), axis=0)
+        x, near = self.seen(*np.broadcast_arrays(u[:, :, None], v[:, None, :]))
+        heights = self.heights(near)
         # Of several levels the one that divides a patch most evenly.
-        below, above = (np.mean(s * (gaps[..., None] - self.levels) > self.noise, axis=(1, 2)) for s in (-1, 1))
-        best = np.argmax(below * above, axis=1)
-        share = np.max(below * above, axis=1)
-        return replace(self, level=np.array(self.levels)[best], along=np.where(share > 0, along, -1), share=share)
+        below, above = (np.mean(s * heights > self.noise, axis=(1, 2)) for s in (-1, 1))
+        best, share = np.argmax(below * above, axis=1), np.max(below * above, axis=1)
+        over = np.take_along_axis(heights, best[:, None, None, None], axis=-1)
+        steepness = np.stack([np.abs(np.diff(over, axis=k + 1)).mean(axis=(1, 2, 3)) for k in range(2)])
+        along = np.argmax(np.where(np.array(self.alike)[:, None], -1.0, steepness), axis=0)
+        # Two edges are never one line; where a gap jumps its level is on the edge. Far from the body no edge counts.
+        edges = np.arange(heights.shape[-1]) < len(self.other.edges)
+        alike = np.mean((heights > 0) == (over > 0), axis=(1, 2))
+        apart = np.where(edges & edges[best, None], np.arange(len(edges)) != best[:, None], (alike > 0) & (alike < 1))
+        crossed = np.any((below * above > 0) & apart & (edges | edges[best, None]), axis=1)
+        crossed &= near.gap.min(axis=(1, 2)) < np.linalg.norm(x[:, -1, -1] - x[:, 0, 0], axis=-1)
+        return replace(self, level=best, along=np.where(share > 0, along, -1), share=share, crossed=crossed)
 
     def nodes(self, order: int) -> tuple[Array, Array]:
         """Points (n, k, 3) of a rule, and their areas (n, k), on both sides of the level; all of one kind."""
@@ -111,36 +128,52 @@ class LevelPatches(Patches):
         from scipy.optimize.elementwise import find_root
 
         def above(t: Array, across: Array, which: Array) -> Array:
-            gaps = self[which].gaps(*((t, across) if k == 0 else (across, t)))
-            return np.asarray(gaps - self.level[which])
+            _, near = self[which].seen(*((t, across) if k == 0 else (across, t)))
+            return np.asarray(self.heights(near)[np.arange(len(which)), self.level[which]])
 
         ends = self.low[:, k], self.high[:, k]
         found: Any = find_root(above, ends, args=(across, np.arange(len(self))))
         return np.asarray(np.where(found.success, found.x, ends[1]))
 
-    def gaps(self, u: Array, v: Array) -> Array:
-        """Gaps at substituted parameters (n, ...)."""
+    def seen(self, u: Array, v: Array) -> tuple[Array, Projection]:
+        """Points (n, ..., 3) at substituted parameters (n, ...), and what they see of the other surface."""
         at = np.stack([self.parameters(k, t)[0] for k, t in enumerate((u, v))], axis=-1)
-        return np.asarray(self.other.nearest(self.surface.derivatives(at, FIRST)[0]).gap)
+        x = self.surface.derivatives(at, FIRST)[0]
+        return x, self.other.nearest(x)
+
+    def heights(self, near: Projection) -> Array:
+        """How far (n, ..., levels) [m] points are beyond edges, along which a gap may jump, and over levels of it."""
+        return np.concatenate([near.beyond, near.gap[..., None] - self.levels], axis=-1)
 
 
 def with_levels(patches: Patches, other: Surface, levels: Sequence[float], noise: float) -> LevelPatches:
-    """Patches of a surface, each with the level of the gap to the other that passes through it, if one does."""
+    """Patches of a surface, each with the level of the gap to the other, or the edge of that, which passes through it,
+    if one does.
+    """
     patches = _at_corners(patches)
     parts = {name: getattr(patches, name) for name in ("surface", "alike", *Patches.arrays)}
-    none = np.zeros(len(patches))
+    none = np.zeros(len(patches), dtype=int)
     found = LevelPatches(
-        **parts, other=other, levels=tuple(levels), noise=noise, level=none, along=none.astype(int), share=none
+        **parts,
+        other=other,
+        levels=tuple(levels),
+        noise=noise,
+        level=none,
+        along=none,
+        share=0.0 * none,
+        crossed=none > 0,
     )
     found = found.marked()
     if any(found.alike):
-        for _ in levels:
+        for _ in range(len(levels) + len(other.edges)):
             if np.all(found.along < 0):
                 break
             found = found.divided(found.alike.index(False)).marked()
         return found
     for _ in range(HALVINGS):
         slight = (found.along >= 0) & (found.share < SLIGHT)
+        if found.crossed.sum() <= CORNERS:
+            slight |= found.crossed
         if not slight.any():
             break
         found = found[~slight].joined(found[slight].halved())

@@ -9,6 +9,7 @@ Contact Mechanics, doi 10.1007/978-3-642-31531-2, for rates and for where a proj
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -19,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from surfacechem.contracts.terms import Shape
 from surfacechem.errors import InputError
+from surfacechem.surfaces.shapes import Sphere
 from surfacechem.tolerances import DIGITS, GONE, SAME, TINY, ULPS
 
 Array = NDArray[np.float64]
@@ -63,8 +65,8 @@ class Projection:
     """Nearest points of a surface; arrays over the points that were projected.
 
     ``at`` holds the parameters (..., 2), ``gap`` the distance along ``direction``, negative inside the body [m],
-    ``tied`` where another point is as near. The direction is the normal, but at an edge and a tip that from the nearest
-    point.
+    ``beyond`` how far the points are beyond each edge along the surface (..., edges) [m], ``tied`` where another point
+    is as near. The direction is the normal, but at an edge and a tip that from the nearest point.
     """
 
     at: Array
@@ -72,6 +74,7 @@ class Projection:
     normal: Array
     direction: Array
     gap: Array
+    beyond: Array
     tied: NDArray[np.bool_]
 
 
@@ -170,12 +173,33 @@ class Surface:
             near = np.linalg.norm(x - rival, axis=-1) <= size * (1 + SAME)
             tied |= near & (np.linalg.norm(rival - D[0], axis=-1) > np.sqrt(SAME) * size)
         # Behind an edge and beyond it is beside the body, not in it.
-        beyond = np.linalg.norm(away - side[..., None] * normal, axis=-1) > np.sqrt(SAME) * size
-        at_edge = self._at_edge(at) & (size > 0)
-        gap = np.where((side < 0) & ~(at_edge & beyond), -size, size)
+        beyond, at_edge = self._beyond(at, away, D[1:3]), self._at_edge(at) & (size > 0)
+        gap = np.where((side < 0) & ~np.any(beyond > 0, axis=-1), -size, size)
         off = at_edge[..., None]
         direction = np.where(off, np.divide(away, gap[..., None], out=np.zeros_like(away), where=off), normal)
-        return Projection(at, D[0], normal, direction, gap, tied)
+        return Projection(at, D[0], normal, direction, gap, beyond, tied)
+
+    @cached_property
+    def edges(self) -> list[tuple[int, int, float]]:
+        """Where the surface ends: along which parameter, below minus one or above plus one, and at which value of it;
+        a tip is an edge, a pole none.
+        """
+        found = []
+        for k, ends in enumerate(self.shape.span):
+            for side, end in zip((-1, 1), ends, strict=True):
+                smooth = self.shape.rises != 1 if side < 0 else isinstance(self.shape, Sphere) and end == math.pi
+                pole = self.shape.about_axis and smooth
+                if not (pole or self.shape.closed[k] or math.isinf(end)):
+                    found.append((k, side, end))
+        return found
+
+    def _beyond(self, at: Array, away: Array, tangents: Array) -> Array:
+        """How far points that are ``away`` from their feet are beyond each edge [m], (..., edges)."""
+        found = np.empty((*at.shape[:-1], len(self.edges)))
+        for j, (k, side, end) in enumerate(self.edges):
+            left, size = side * (end - at[..., k]), np.linalg.norm(tangents[k], axis=-1)
+            found[..., j] = np.where(left > POLE, -left * size, side * _dot(away, tangents[k]) / size)
+        return found
 
     def _at_edge(self, at: Array) -> NDArray[np.bool_]:
         """Whether parameters are those of an edge or a tip."""

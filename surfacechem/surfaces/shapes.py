@@ -253,6 +253,12 @@ class Cone(Turned):
         """Point at the distance u from the axis and the angle v about it."""
         return u * cos(v), u * sin(v), -u * math.tan(self.slope)
 
+    def foot(self, x: Array) -> Array:
+        """On the line of its side that is below the point, or on the tip or the edge."""
+        along = np.hypot(x[..., 0], x[..., 1]) * math.cos(self.slope) - x[..., 2] * math.sin(self.slope)
+        at = np.stack([along * math.cos(self.slope), np.arctan2(x[..., 1], x[..., 0])], axis=-1)
+        return np.asarray(np.clip(at, *np.transpose(self.span)))
+
 
 class Torus(Shape):
     r"""Torus lying flat.

@@ -33,6 +33,7 @@ LAWS = {
     "penalty": (PenaltyPair(**DENSITIES, k=1.0, r_0=1.2), lambda r: (1.2 - r) ** 2 / 2, ENDED),
     "table": (PairTable(**DENSITIES, distances=R, energies=PSI), PchipInterpolator(R, PSI), ENDED),
 }
+PENALTY = [density(Penalty(E_n=1.0))]
 GAPS = 0.15, 1.0633, 1.1999, 1.3
 """Near, where the end of a law lies between nodes, barely in reach, and beyond."""
 X, W = np.polynomial.legendre.leggauss(20)
@@ -166,9 +167,41 @@ def test_surfaces_without_end_that_are_turned_are_nearest_and_end_farther_out(lo
 
 
 def test_what_is_behind_a_surface_and_beyond_its_edge_is_not_in_the_body():
-    """A cap in a wide cavity touches nothing; a plate pressed into a plane is borne by its area."""
-    penalty = [density(Penalty(E_n=1.0))]
-    clear = over_gap(Surface(Cavity(R=10.0)), Surface(Cap(R=2.0, angle=0.5), True, 1.0), penalty, rtol=1e-3)
+    """A cap in a wide cavity touches nothing."""
+    clear = over_gap(Surface(Cavity(R=10.0)), Surface(Cap(R=2.0, angle=0.5), True, 1.0), PENALTY, rtol=1e-3)
     assert (clear.energy, clear.area, clear.gap) == (0.0, 0.0, pytest.approx(1.0))
-    pressed = over_gap(Surface(Plane()), Surface(Disc(radius=1.0), True, -0.01), penalty, rtol=1e-4)
-    assert pressed.force_1[2] == pytest.approx(-0.01 * math.pi, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("lower", "upper", "area"),
+    [
+        (Plane(), Disc(radius=1.0), math.pi),
+        (Plane(length=3.0, width=3.0), Plane(length=0.05, width=1.3, turn=0.4), 0.065),
+    ],
+)
+def test_a_plate_pressed_into_a_plane_is_borne_by_its_area_up_to_its_edges(lower, upper, area):
+    """Where the gap ends at once, patches of the other body are cut: even a loose accuracy has the exact force."""
+    pressed = over_gap(Surface(lower), Surface(upper, True, -0.01), PENALTY, rtol=1e-2)
+    assert pressed.force_1[2] == pytest.approx(-0.01 * area, rel=1e-9)
+    assert pressed.area == pytest.approx(area, rel=1e-9)
+    assert np.abs(pressed.moment_1).max() < 1e-12
+
+
+def test_a_tilted_plate_over_a_plane_has_moments_and_heat_as_summed_over_the_plane():
+    """Nearest points of the plate are clipped to it, and the plane is cut into small cells."""
+    half, tilt, d, s = np.array([0.65, 0.35]), 0.2, 0.2, 0.3
+    upper = Plane(length=1.3, width=0.7, tilt=tilt)
+    smooth = [lambda g: np.stack([np.exp(-((g / s) ** 2)), -2 * g / s**2 * np.exp(-((g / s) ** 2))], axis=-1)]
+    found = over_gap(Surface(Plane(length=4.0, width=4.0)), Surface(upper, True, d), smooth, (), smooth, 1e-4)
+    x = np.stack(np.meshgrid(*[np.linspace(-2, 2, 401)[:-1] + 0.005] * 2, [0.0], indexing="ij"), axis=-1)[:, :, 0]
+    along = np.array([[math.cos(tilt), 0.0, math.sin(tilt)], [0.0, 1.0, 0.0]])
+    foot = np.clip((x - [0, 0, d]) @ along.T, -half, half) @ along + [0, 0, d]
+    away = foot - x
+    psi, traction = np.moveaxis(smooth[0](np.linalg.norm(away, axis=-1)), -1, 0)
+    pull = (traction / np.linalg.norm(away, axis=-1))[..., None] * away * 0.01**2
+    off = found.error * np.linalg.norm(found.force_1)
+    assert found.energy == pytest.approx(psi.sum() * 0.01**2, rel=1e-4)
+    assert found.conductance == pytest.approx(found.energy, rel=1e-12)
+    assert found.force_1 == pytest.approx(pull.sum(axis=(0, 1)), abs=off)
+    assert found.moment_1 == pytest.approx(np.cross(x, pull).sum(axis=(0, 1)), abs=off * 4)
+    assert found.moment_2 == pytest.approx(-np.cross(foot, pull).sum(axis=(0, 1)), abs=off * 4)
