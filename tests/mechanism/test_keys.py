@@ -15,11 +15,6 @@ BARE = TEXT.replace("units: {length: m, quantity: mol, activation-energy: kJ/mol
 
 # What to replace in the file by what, the line of the error ("+n" after the replaced one) and its words.
 REFUSED = {
-    "a key of the phase": ("site-density: 1.0e-4", "site-densty: 1.0e-4", "Did you mean 'site-density'?"),
-    "a key of the rate": ("b: 0, Ea: 0", "b: 0, E: 0", "unknown key 'E'"),
-    "a key of the species": ("  sites: 2", "  site: 2", "Did you mean 'sites'?"),
-    "a key of the thermo": ("s0: -515", "S: -515", "unknown key 'S'"),
-    "a key of the state": ("state: {T: 298.15 K, cov", "state: {T: 298.15 K, Cov", "Did you mean 'coverages'?"),
     "a key of the reaction": ("  rate-constant:", "  rate-constants:", "Did you mean 'rate-constant'?"),
     "a key of the file": ("units: {length: m", "unit: {length: m", "Did you mean 'units'?"),
     "a thermo model": ("model: constant-cp, T0: 298.15 K, h0: -", "model: constant_cp, T0: 298.15 K, h0: -", "Did you"),

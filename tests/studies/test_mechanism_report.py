@@ -137,7 +137,6 @@ def test_prints_the_measured_rates(call):
 @pytest.mark.parametrize(
     ("arguments", "file", "phase"),
     [
-        (("ptcombust", "-T", "900 K"), "ptcombust.yaml", "Pt_surf"),
         (("diamond.yaml", "-T", "1200 K"), "diamond.yaml", "diamond_100"),
         (("SiF4_NH3_mec", "-T", "1600 K"), "SiF4_NH3_mec.yaml", "SI3N4"),
         (("sofc", "--phase", "oxide_surface"), "sofc.yaml", "oxide_surface"),
