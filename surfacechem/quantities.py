@@ -9,6 +9,7 @@ Source of tags: the equation labels of Sauer, Duong & Mandadapu (2021), doi 10.1
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 BOLTZMANN = 1.380649e-23
@@ -115,3 +116,14 @@ VELOCITIES = frozenset(("v_n", "v_t", "v", "v_2", "speed"))
 
 INTERNAL = frozenset(("t", "T_from", "T_to", "ln_theta", "gamma_m", "f_m", "dmu_dphi"))
 """What laws read of each other, and no case names."""
+
+SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def raised(text: str) -> str:
+    """Text with its powers raised.
+
+    >>> raised("J/(m^2 K)"), raised("m^-1")
+    ('J/(m² K)', 'm⁻¹')
+    """
+    return re.sub(r"\^(-?\d+)", lambda m: m[1].translate(SUPERSCRIPTS), text)

@@ -18,8 +18,8 @@ import surfacechem
 folder = Path(tempfile.mkdtemp())
 study = surfacechem.precision(
     ["exothermic", "sliding-dry"],
-    solvers=["radau", "lsoda", "cvode"],
-    tolerances=[1e-4, 1e-6, 1e-8, 1e-10],
+    solvers=["radau", "lsoda"],
+    tolerances=[1e-4, 1e-7, 1e-10],
     repeat=1,
 )
 for path in study.write(folder / "study"):

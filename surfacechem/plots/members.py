@@ -144,9 +144,9 @@ def maps(dataset: xarray.Dataset, plan: Plan, axes: Sequence[str], names: Sequen
             plot.colorbar(image, ax=ax, label=quantity_label(dataset[name]))
             ax.set_ylabel(axis_label(y))
             if plan.axes[0].logarithmic:
-                ax.set_xscale("log")
+                style.logarithmic(ax.xaxis)
             if plan.axes[1].logarithmic:
-                ax.set_yscale("log")
+                style.logarithmic(ax.yaxis)
         grid[-1, 0].set_xlabel(axis_label(x))
         style.headings(plot, grid[0, 0], dataset)
     return plot
@@ -272,4 +272,4 @@ def effect(ax: Axes, over: Array, values: Array, logarithmic: bool) -> None:
     ax.fill_between(places, low, high, color=COLOURS[1], alpha=0.25, linewidth=0)
     ax.plot(places, middle, color=COLOURS[1], marker="o", markersize=2.5)
     if logarithmic:
-        ax.set_xscale("log")
+        style.logarithmic(ax.xaxis)

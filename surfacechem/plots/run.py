@@ -339,7 +339,7 @@ def _draw_balances(ax: Axes, dataset: xarray.Dataset) -> None:
         worst = float(np.max(relative, initial=0.0))
         relative = relative / worst * largest if worst > 0 and largest is not None else relative
         ax.plot(dataset["time"].values, np.maximum(relative, LEAST), label=name.partition("_")[0], linewidth=1.2)
-    ax.set_yscale("log")
+    style.logarithmic(ax.yaxis)
     low, high = ax.get_ylim()
     ax.set(ylim=(min(low, LEAST), max(high, ROUNDING)), ylabel="Balance residual [1]")
     style.legend(ax)
@@ -369,7 +369,8 @@ def show_decades(ax: Axes, first: float, last: float) -> None:
     if ax.get_yscale() == "linear" and varies(seen):
         margin = 0.05 * np.ptp(seen)
         ax.set_ylim(seen.min() - margin, seen.max() + margin)
-    ax.set(xscale="log", xlim=(first, last))
+    style.logarithmic(ax.xaxis)
+    ax.set_xlim(first, last)
 
 
 def _moments(dataset: xarray.Dataset) -> dict[float, str]:

@@ -85,7 +85,8 @@ def _draw_density(ax: Axes, dataset: xarray.Dataset, load: str) -> None:
 
 def _draw_lifetime(ax: Axes, dataset: xarray.Dataset, load: str) -> None:
     _draw_over(ax, dataset, load, dataset["lifetime"].values, below=0.7)
-    ax.set(ylabel=rf"Lifetime $\tau$({symbol(load)}) [s]", yscale="log")
+    ax.set(ylabel=rf"Lifetime $\tau$({symbol(load)}) [s]")
+    style.logarithmic(ax.yaxis)
 
 
 def _draw_series(ax: Axes, dataset: xarray.Dataset, load: str, name: str) -> None:
@@ -117,7 +118,7 @@ def _draw_told(ax: Axes, dataset: xarray.Dataset, told: Mapping[str, str], size:
     words, scale = style.parameter_unit(parameter) if decades else style.prefixed(unit(parameter), parameter.values)
     x = parameter.values / scale
     if decades:
-        ax.set_xscale("log")
+        style.logarithmic(ax.xaxis)
     ax.set_xlabel(f"{style.parameter_words(parameter)} [{words}]")
     for (name, word), colour, marker in zip(told.items(), COLOURS, "osD", strict=False):
         for j, (values, label) in enumerate(style.by_second(dataset, dataset[name].values)):
@@ -134,7 +135,8 @@ def lifetimes(dataset: xarray.Dataset) -> Figure:
     with style.panels(6.4, 5.3, 2) as (plot, grid):
         above, below = grid[:, 0]
         _draw_told(above, dataset, {"lifetime": "runs"}, 1.0)
-        above.set(ylabel=r"Lifetime $\tau$ [s]", yscale="log")
+        above.set_ylabel(r"Lifetime $\tau$ [s]")
+        style.logarithmic(above.yaxis)
         _draw_survival(below, dataset)
         for ax in (above, below):
             style.legend(ax)
@@ -152,7 +154,8 @@ def _draw_survival(ax: Axes, dataset: xarray.Dataset) -> None:
         values = np.nan_to_num(survival[tuple(place)])
         ax.plot(times, values, color=colour, label=style.member_name(dataset, place))
     if logarithmic(times):
-        ax.set(xscale="log", xlim=(times[times > 0][0], dataset["time_reached"].values.max()))
+        style.logarithmic(ax.xaxis)
+        ax.set_xlim(times[times > 0][0], dataset["time_reached"].values.max())
     else:
         ax.set(xlim=(0, dataset["time_reached"].values.max()))
     ax.set(xlabel="Time [s]", ylabel="Survival $S$ [1]")

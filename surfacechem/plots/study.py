@@ -66,7 +66,7 @@ def precision(dataset: xarray.Dataset) -> Figure:
         for i in range(rows):
             case = dataset.isel(case=i)
             for ax, name in zip(grid[i], drawn, strict=True):
-                ax.set(xscale="log", yscale="log")
+                style.logarithmic(ax.xaxis, ax.yaxis)
                 for axis in (ax.xaxis, ax.yaxis):
                     axis.set_minor_formatter(NullFormatter())  # labels within a decade would overlap
                 limit = float(case[name.replace("error_", "uncertainty_")]) if name.startswith("error_") else np.nan

@@ -20,10 +20,11 @@ from matplotlib.axis import XAxis, YAxis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.rcsetup import cycler
+from matplotlib.ticker import LogFormatterSciNotation, LogLocator
 from numpy.typing import NDArray
 
 from surfacechem.errors import InputError, Place
-from surfacechem.quantities import VARIABLES
+from surfacechem.quantities import SUPERSCRIPTS, VARIABLES, raised
 from surfacechem.results.netcdf import reading, replacing
 from surfacechem.tolerances import ROUNDING
 
@@ -67,6 +68,9 @@ GREEK = ("alpha", "beta", "epsilon", "eta", "kappa", "lambda", "mu", "phi", "rho
 
 LETTERS, TITLE_LETTERS = 16, 9.5
 """Of a line of facts above the panels, and of the title, in an inch."""
+
+MOST_DECADES = 1e5
+"""Largest over smallest value of a logarithmic axis that has ticks inside its decades."""
 
 MOST_CURVES = 7
 """Values of a parameter that are drawn as curves of their own: as many as there are colours."""
@@ -249,16 +253,16 @@ def unit_text(unit: str) -> str:
     """A CF unit with its powers raised.
 
     >>> unit_text("W m-2 K-1")
-    'W m$^{-2}$ K$^{-1}$'
+    'W m⁻² K⁻¹'
     """
-    return re.sub(r"([A-Za-z])(-?\d+)", r"\1$^{\2}$", unit).replace("degC", "°C")
+    return re.sub(r"(?<=[A-Za-z])-?\d+", lambda m: m[0].translate(SUPERSCRIPTS), unit).replace("degC", "°C")
 
 
 def prefixed(unit: str, values: Array) -> tuple[str, float]:
     """The unit with the prefix that suits the largest of the values, as text, and how large it is.
 
     >>> prefixed("Pa", np.array([0.0, 3e6])), prefixed("m s-1", np.array([-2e-8])), prefixed("K", np.array([3e4]))
-    (('MPa', 1000000.0), ('nm s$^{-1}$', 1e-09), ('K', 1.0))
+    (('MPa', 1000000.0), ('nm s⁻¹', 1e-09), ('K', 1.0))
     """
     size = largest(values)
     if unit.partition(" ")[0] not in TAKES_PREFIX or size == 0 or PLAIN[0] <= size < PLAIN[1]:
@@ -291,8 +295,8 @@ def draw_parameter(ax: Axes, values: xarray.DataArray) -> None:
     text, size = parameter_unit(values) if decades else prefixed(unit(values), values.values)
     ax.set_xlabel(f"{parameter_words(values)} [{text}]")
     if decades:
-        ax.set_xscale("log")
-        ax.xaxis.set_major_formatter(lambda value, _: f"$10^{{{round(math.log10(value / size))}}}$")
+        logarithmic(ax.xaxis)
+        ax.xaxis.set_major_formatter(lambda value, _: raised(f"10^{round(math.log10(value / size))}"))
     else:
         label_ticks(ax.xaxis, size)
 
@@ -337,7 +341,7 @@ def valued(values: xarray.DataArray, place: int) -> str:
     """A value of a swept parameter with its name and unit.
 
     >>> valued(xarray.DataArray([1e-10, 1e-9], name="rate", attrs={"units": "N s-1"}), 0)
-    'rate = 100 pN s$^{-1}$'
+    'rate = 100 pN s⁻¹'
     """
     value = values.values[place]
     text, size = prefixed(unit(values), values.values[place : place + 1])
@@ -357,6 +361,30 @@ def by_second(dataset: xarray.Dataset, values: Array) -> list[tuple[Array, str]]
     chosen = np.unique(np.linspace(0, values.shape[1] - 1, MOST_CURVES).round().astype(int)).tolist()
     left = f" ({len(chosen)} of {values.shape[1]})" if len(chosen) < values.shape[1] else ""
     return [(values[:, j], valued(second, j) + (left if j == chosen[-1] else "")) for j in chosen]
+
+
+class _Powers(LogFormatterSciNotation):
+    """Powers of ten as plain text, which is set in a tenth of the time of mathematics."""
+
+    def __call__(self, x: float, pos: Any = None) -> str:
+        text = super().__call__(x, pos).removeprefix(r"$\mathdefault{").removesuffix("}$")
+        return raised(text.replace(r"\times", "×").replace("{", "").replace("}", ""))
+
+
+class _FewDecades(LogLocator):
+    """Ticks inside decades, where these are few; each tick takes as long to draw as a curve."""
+
+    def tick_values(self, vmin: float, vmax: float) -> Any:
+        return super().tick_values(vmin, vmax) if vmax <= MOST_DECADES * vmin else np.empty(0)
+
+
+def logarithmic(*axes: XAxis | YAxis) -> None:
+    """Make axes logarithmic."""
+    for axis in axes:
+        axis.axes.set(**{f"{axis.axis_name}scale": "log"})
+        axis.set_major_formatter(_Powers())
+        axis.set_minor_formatter(_Powers(minor_thresholds=(1, 0.4)))
+        axis.set_minor_locator(_FewDecades(subs="auto"))
 
 
 def label_ticks(axis: XAxis | YAxis, size: float) -> None:

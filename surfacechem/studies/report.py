@@ -34,6 +34,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from surfacechem.quantities import raised
 from surfacechem.results.netcdf import CONVENTIONS, Column, replacing, save
 from surfacechem.runs.listing import plain
 from surfacechem.runs.sheet import columns
@@ -50,9 +51,6 @@ LIBRARIES = ("surfacechem", "numpy", "scipy", "numba", "symengine", "cantera", "
 
 # The files of a study, in the order in which they are written.
 SUFFIXES = (".nc", ".svg", ".png", ".html")
-
-
-SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 class PageTable(NamedTuple):
@@ -121,15 +119,6 @@ class Page:
         ]
         font = mathml.font() if any(section.equations for section in self.sections) else ""
         return template.render(page=self, figure=figure, drawn=drawn, machine=machine(), font=font)
-
-
-def raised(text: str) -> str:
-    """Text with its powers raised.
-
-    >>> raised("J/(m^2 K)"), raised("m^-1")
-    ('J/(m² K)', 'm⁻¹')
-    """
-    return re.sub(r"\^(-?\d+)", lambda m: m[1].translate(SUPERSCRIPTS), text)
 
 
 def inline_svg(figure: Figure, prefix: str = "f0-") -> str:
@@ -277,6 +266,7 @@ class Study:
         save(files[".nc"], self.columns, self.attributes)
         for suffix in (".svg", ".png"):
             plots.write(figure, files[suffix])
+            figure.set_layout_engine("none")  # both have the same, which takes as long to find as to draw
         with replacing(files[".html"]) as temporary:
             temporary.write_text(self.page.html(), encoding="utf-8")
         return list(files.values())

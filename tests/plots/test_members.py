@@ -39,7 +39,7 @@ def test_a_map_over_two_parameters(tmp_path):
     ax = plot.axes[0]
     assert np.array_equal(ax.collections[0].get_array(), opened(path)["T_last"].values.T)
     assert (ax.get_xscale(), ax.get_yscale()) == ("log", "linear")
-    assert (ax.get_xlabel(), ax.get_ylabel()) == ("$K_{0}$ of potential bond-energy [J m$^{-2}$]", "initial T [K]")
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("$K_{0}$ of potential bond-energy [J m⁻²]", "initial T [K]")
 
 
 @pytest.fixture(scope="module")
@@ -61,7 +61,7 @@ def test_curves_over_two_parameters_have_the_colours_of_the_first(grid):
     assert [len({line.get_color() for line in curves.lines[k : k + 8]}) for k in (0, 8)] == [1, 1]
     assert curves.lines[0].get_color() != curves.lines[8].get_color()
     assert curves.get_title("left").endswith("curves of one colour differ in initial T")
-    assert bar.get_ylabel() == "$K_{0}$ of potential bond-energy [J m$^{-2}$]"
+    assert bar.get_ylabel() == "$K_{0}$ of potential bond-energy [J m⁻²]"
 
 
 def test_distributions_and_effects_of_a_sample(drawn):
@@ -73,8 +73,8 @@ def test_distributions_and_effects_of_a_sample(drawn):
     middle = rows[1, 0].lines[1].get_ydata()[0]
     assert middle == np.median(data["T_last"].values)
     assert {ax.get_xlabel() for ax in rows[1, 1:]} == {
-        "$K_{0}$\nof potential bond-energy\n[J m$^{-2}$]",
-        "$c_{r}$\nof bonding linear-affinity\n[J$^{-1}$ s$^{-1}$]",
+        "$K_{0}$\nof potential bond-energy\n[J m⁻²]",
+        "$c_{r}$\nof bonding linear-affinity\n[J⁻¹ s⁻¹]",
     }
     (effect,) = (ax for ax in rows[1] if ax.get_xlabel().startswith("$K"))
     assert np.all(np.diff(effect.lines[0].get_ydata()) > 0)
@@ -91,7 +91,7 @@ def test_each_run_of_a_sweep_over_a_variable_or_time():
     (ax,) = plots.figure(sweep, ["T"], "phi").axes
     assert (ax.get_xlabel(), ax.get_ylabel()) == (r"$\phi$ [1]", "$T$ [K]")
     assert np.array_equal(ax.lines[1].get_data(), [sweep["phi"].values[1], sweep["T"].values[1]])
-    assert [text.get_text() for text in ax.get_legend().get_texts()] == ["K 0 = 200 J m$^{-2}$", "K 0 = 300 J m$^{-2}$"]
+    assert [text.get_text() for text in ax.get_legend().get_texts()] == ["K 0 = 200 J m⁻²", "K 0 = 300 J m⁻²"]
     assert plots.figure(sweep, against="time").axes[-1].get_xlabel() == "Time [s]"
     with pytest.raises(InputError, match="no variable 'T_last' along the runs"):
         plots.figure(sweep, ["T_last"], "phi")

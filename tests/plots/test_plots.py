@@ -69,7 +69,7 @@ def with_events(times, names, mode="", text=""):
 
 def test_panels_of_the_usual_figure():
     plot = figure(dataset())
-    assert titles(plot) == ["Temperature [K]", "Bonding [1]", "Heat flux [W m$^{-2}$]", "Balance residual [1]"]
+    assert titles(plot) == ["Temperature [K]", "Bonding [1]", "Heat flux [W m⁻²]", "Balance residual [1]"]
     assert labels(plot) == [["$T_{1}$", "$T_{2}$", "exact"], [r"$\phi$"], ["$q_{1}$ = $q_{2}$"], ["energy"]]
     assert [line.get_linestyle() for line in plot.axes[0].get_lines()] == ["-", "-", "--"]  # exact: where there is one
     assert plot.axes[-1].get_xlabel() == "Time [s]"
@@ -172,7 +172,7 @@ def test_a_flux_that_is_a_spike_at_the_start_is_shown_behind_it():
     spike = np.where(np.linspace(0.0, 2.0, 2001) < 0.001, 1e6, 50 * np.exp(-np.linspace(0.0, 2.0, 2001)))
     (ax,) = figure(dataset(np.linspace(0.0, 2.0, 2001), q_1=("W m-2", spike)), ["q_1"]).axes
     assert 50 < ax.get_ylim()[1] < 60
-    assert texts(ax) == ["1 MW m$^{-2}$ at the start"]
+    assert texts(ax) == ["1 MW m⁻² at the start"]
 
 
 def test_the_force_on_a_bond_has_a_panel_and_balances_that_close_have_none():

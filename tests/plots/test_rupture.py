@@ -26,12 +26,12 @@ def test_lifetimes_are_those_under_a_constant_force_at_every_rate(spectrum):
 
 def test_the_figure_has_spectrum_distributions_and_lifetimes(spectrum):
     forces, density, lifetime = plots.figure(spectrum).axes
-    assert (forces.get_xlabel(), forces.get_xscale()) == ("Loading rate of $f$ [pN s$^{-1}$]", "log")
+    assert (forces.get_xlabel(), forces.get_xscale()) == ("Loading rate of $f$ [pN s⁻¹]", "log")
     assert [text.get_text() for text in forces.get_legend().get_texts()] == ["most probable", "median", "mean", "exact"]
     assert forces.get_ylabel() == "$f$ at rupture [pN]"
     assert [text.get_text() for text in density.get_legend().get_texts()] == [
-        "rate = 100 pN s$^{-1}$",
-        "rate = 1 nN s$^{-1}$",
+        "rate = 100 pN s⁻¹",
+        "rate = 1 nN s⁻¹",
     ]  # at 1 pN/s most bonds break before there is a force
     assert (density.get_title("right"), lifetime.get_yscale()) == ("2 of 3 runs", "log")
     for line in density.get_lines():
