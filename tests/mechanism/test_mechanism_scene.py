@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from sampling import every
 
 import surfacechem
-from mechanisms import KMOL, SHIPPED, load, loading_read, loads, mechanism_texts, pulled, species_of, states
+from mechanisms import KMOL, SHIPPED, load, loading_read, loads, mechanism_texts, pulled, states
 from surfacechem.documents.shipped import mechanisms
 from surfacechem.laws.bulk import Constant
 from surfacechem.laws.contact import ConstantInterfaceCapacity
@@ -22,7 +22,6 @@ from surfacechem.mechanism.mixture import IdealMixture
 from surfacechem.model.assemble import assemble
 from surfacechem.runs.simulation import Simulation
 from surfacechem.scene import Body, Interface, Scene
-from surfacechem.solve.run import Model, Run
 
 UNDER = {"gap": 2e-9, "force": 10e-12}
 """A load that single bonds bear."""
@@ -122,27 +121,6 @@ def test_random_mechanisms_in_a_scene(file, data):
     T, coverages = data.draw(states(len(mechanism.variables)))
     initial = {variable.name: theta for variable, theta in zip(mechanism.variables, coverages, strict=True)}
     compare(mechanism, assemble(scene(mechanism, initial, capacity=1e6)), T, coverages)
-
-
-@pytest.mark.parametrize("name", every(3, SHIPPED))
-def test_a_run_ends_where_nothing_reacts(name):
-    """At its end affinities are zero or reactants used up, and the sites and one temperature are left."""
-    mechanism, built = shipped(name, capacity=42.0)
-    model = Model(assemble(built))
-    trajectory = model.solve(Run(times=[0.0, 3e3], rtol=1e-10))
-    assert trajectory.status == "finished", trajectory.reason
-    names = [state.name for state in model.system.states]
-    end = dict(zip(names, trajectory.result.outputs[-1], strict=True))
-    surface = pulled(mechanism, end["T_c"], **UNDER)
-    surface.set_unnormalized_coverages([end[variable.name] for variable in mechanism.variables])
-    affinities = surface.delta_gibbs / (ct.gas_constant * end["T_c"])
-    for law, affinity in zip(mechanism.reactions, affinities, strict=True):
-        assert abs(affinity) < 1e-7 if law.reversible else min(abs(end[name]) for name in law.orders) < 1e-10
-    sizes = np.array([species.sites for species in species_of(mechanism)])
-    amounts = np.array([end[v.name] * v.density for v in mechanism.variables])
-    assert sizes @ amounts == pytest.approx(mechanism.variables[0].density * sizes[0], rel=1e-9)
-    temperatures = [end[name] for name in ("T_1", "T_2", "T_c")]
-    assert max(temperatures) - min(temperatures) < 1e-6
 
 
 def test_phi_counts_bonds_and_is_in_the_dataset():

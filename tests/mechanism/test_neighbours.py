@@ -17,7 +17,6 @@ import surfacechem
 from surfacechem.documents.shipped import mechanisms
 from surfacechem.errors import InputError
 from surfacechem.mechanism.mixture import word
-from surfacechem.quantities import BOLTZMANN
 from surfacechem.reactor import InterfaceReactor, ReactorNet
 from surfacechem.runs import rerun
 
@@ -217,31 +216,6 @@ def test_heat_of_reaction_warms_the_bodies(tmp_path):
     change = float(data["E_total"][-1] - data["E_total"][0])
     assert change == pytest.approx(float(data["H_neighbours"][-1]), rel=BOOKS)
     assert solution.audit.violations == ()
-
-
-def test_a_reversible_surface_comes_to_rest_in_equilibrium_with_its_gas(tmp_path):
-    which = "sofc.yaml", "metal_surface"
-    solution = surfacechem.load(written(tmp_path, which, until=1.0)).run(error="balances")
-    assert solution.audit.violations == ()
-    surface = alone(which)
-    surface.set_unnormalized_coverages(coverages(solution.dataset, surface)[-1])
-    rates, _, g = reactions(surface)
-    held = [i for i, reaction in enumerate(surface.reactions()) if "O2" not in reaction.reactants]  # none is there
-    assert len(held) == len(g) - 1
-    assert np.all(np.abs(g[held]) < 1e-7 * BOLTZMANN * CASES[which].T)
-    assert -np.sum(rates * g) < 1e-12 * np.sum(surface.forward_rates_of_progress * 1e3 * AVOGADRO * np.abs(g).max())
-
-
-def test_an_electrode_turns_overpotential_into_heat(tmp_path):
-    """What current times overpotential gives is dissipated; the rest of the heat is that of the entropy."""
-    which = "lithium_ion_battery.yaml", "edge_anode_electrolyte"
-    solution = surfacechem.load(written(tmp_path, which)).run(error="balances")
-    data, surface = solution.dataset.isel(time=-1), alone(which)
-    (rate,), (h,), (g,) = reactions(surface)
-    assert abs(g) > 1e-3 * ct.electron_charge
-    assert float(data["D_R1"]) == pytest.approx(-rate * g, rel=1e-9)
-    assert float(data["Q_T_c"]) == pytest.approx(rate * h, rel=1e-9)
-    assert float(data["q_n"]) == pytest.approx(-rate * h, rel=1e-9)
 
 
 def test_a_run_again_from_its_file(tmp_path):
