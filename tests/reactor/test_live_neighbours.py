@@ -172,50 +172,6 @@ def test_a_gas_that_is_not_in_the_network(tmp_path):
         InterfaceReactor("exothermic", neighbours={"gas": fuel()})
 
 
-BED = """
-bodies: {wall: {temperature: 1073.15 K}, core: {temperature: 1073.15 K}}
-interface:
-  temperature: 1073.15 K
-  mechanism:
-    file: methane_pox_on_pt.yaml
-    phase: Pt_surf
-    neighbours: {gas: {pressure: 1 atm, composition: {CH4: 0.4, O2: 0.55}, rest: AR}}
-initial: {coverages: {PT(S): 1}}
-run: {until: 1 s, solver: cantera}
-"""
-
-
-def test_a_bed_is_cantera_s_chain_of_reactors_point_by_point(tmp_path):
-    """Its example surf_pfr_chain, coarser: partial oxidation of methane, each reactor fed by the one before."""
-
-    def chain(ours):
-        surface = ct.Interface("methane_pox_on_pt.yaml", "Pt_surf")
-        inlet = surface.adjacent["gas"]
-        surface.TP, inlet.TPX = (1073.15, ct.one_atm), (1073.15, ct.one_atm, "CH4:1, O2:1.5, AR:0.1")
-        kind = ReactingGas if ours else ct.IdealGasReactor
-        gas = kind(inlet, clone=True, volume=3e-8, energy="off")
-        upstream, downstream = ct.Reservoir(inlet, clone=True), ct.Reservoir(inlet, clone=True)
-        feed = ct.MassFlowController(upstream, gas, mdot=0.4 / 60 * inlet.density * 1e-4 * 0.3)
-        ct.PressureController(gas, downstream, primary=feed, K=1e-6)
-        if ours:
-            catalyst = interface_of(tmp_path, BED, gas, area=3e-3)
-            net = network(gas, catalyst)
-        else:
-            catalyst = ct.ReactorSurface(surface, gas, A=3e-3, clone=True)
-            net = ct.ReactorNet([gas])
-        net.rtol, net.atol = 1e-9, 1e-16
-        for n in range(1, 3):
-            upstream.phase.TDY = gas.phase.TDY
-            upstream.syncState()
-            net.reinitialize()
-            net.advance(3.0 * n)
-            coverages = [catalyst[name] for name in catalyst.scene.states] if ours else catalyst.coverages
-            yield np.concatenate((gas.phase.X, coverages))
-
-    for ours, theirs in zip(chain(True), chain(False), strict=True):
-        np.testing.assert_allclose(ours, theirs, atol=1e-8, rtol=0)
-
-
 ELECTRODE = """
 bodies: {particle: {temperature: 300 K}, cell: {temperature: 300 K}}
 interface:

@@ -87,7 +87,7 @@ def test_what_is_booked_is_as_accurate_as_the_state(name: str) -> None:
     np.testing.assert_allclose(found, np.stack([1 - exact, 1 - exact**2], axis=1), atol=1e-6)
 
 
-@pytest.mark.parametrize("name", every(3, names))
+@pytest.mark.parametrize("name", every(7, names))
 def test_a_peak_before_an_event_is_seen(name: str) -> None:
     """Attachment peaks at touch, in the last hundredths of a long approach: a step may go on to where it is over."""
     simulation = load("press-hold-pull")
