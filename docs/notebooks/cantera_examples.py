@@ -25,7 +25,7 @@ folder = Path(tempfile.mkdtemp())
 # `ReactorSurface`, or a case beside a `ReactingGas`.
 
 # %%
-T, LENGTH, COUNT = 1073.15, 3e-3, 13
+T, LENGTH, COUNT = 1073.15, 3e-3, 7
 VOLUME, CATALYST = 1e-4 * 0.3 * LENGTH / (COUNT - 1), 1e5 * 1e-4 * 0.3 * LENGTH / (COUNT - 1)
 
 BED = """

@@ -6,6 +6,7 @@ import inspect
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain, count
 from typing import Self
 
 from surfacechem.contracts.terms import Law, Potential, option, parameter
@@ -182,8 +183,9 @@ def identifiers(names: Iterable[str], prefix: str = "theta_") -> dict[str, str]:
     {'free(s)': 'theta_free_s', 'bond(s)': 'theta_bond_s', 'free-s': 'theta_free_s_2'}
     """
     result: dict[str, str] = {}
+    taken: set[str] = set()
     for name in names:
         base = f"{prefix}{word(name)}"
-        taken = set(result.values())
-        result[name] = next(n for n in (base, *(f"{base}_{i}" for i in range(2, 10000))) if n not in taken)
+        result[name] = next(n for n in chain((base,), (f"{base}_{i}" for i in count(2))) if n not in taken)
+        taken.add(result[name])
     return result
