@@ -42,13 +42,6 @@ def ramp_survival(name: str) -> Table:
     return Table(name, isothermal(bell(p), {"f": Ramp(rate=p["r"])}), columns["F"] / p["r"], exact)
 
 
-def ramp(row: int) -> tuple[Scene, dict[str, float]]:
-    """A ramp and what is known of the force at which the bond breaks."""
-    p, columns = read("c_bell_ramp")
-    known = {key: values[row] for key, values in columns.items()}
-    return isothermal(bell(p), {"f": Ramp(rate=known["r"])}), known
-
-
 def cluster(per_bond: float, rebinding: float = 0.0, phi: float = 1.0) -> Scene:
     """Bonds that share a constant load of ``per_bond``, in k_B T / x, if all are closed; times are in 1/k_off."""
     x, T = 4e-10, 300.0

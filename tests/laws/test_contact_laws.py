@@ -1,7 +1,6 @@
 """What the potentials of contact, cohesion and long range do, and what follows from them by differentiation."""
 
 import math
-from itertools import pairwise
 
 import mpmath
 import numpy as np
@@ -22,7 +21,6 @@ from surfacechem.laws.loading import Hold
 from surfacechem.laws.longrange import (
     WALL,
     LennardJonesFlatFlat,
-    LennardJonesSpherePlane,
     VanDerWaalsSpherePlane,
 )
 from surfacechem.model.assemble import assemble
@@ -32,7 +30,6 @@ from surfacechem.scene import Body, Interface, Scene
 GAPS = [law for law in laws(Potential).values() if {"g_n", "g_t"} & set(reads(law.energy))]
 each_gap_law = pytest.mark.parametrize("law", GAPS, ids=lambda law: law.name())
 g, g_t, phi, bonded, T, T_0 = symengine.symbols("g_n g_t phi bonded T_c T_0")
-SITES = {"n_1": 2e19, "n_2": 3e19, "psi_0": 4e-21, "g_0": 3e-10}
 
 
 def symbolic(law: Potential):
@@ -98,30 +95,6 @@ def test_a_cohesive_zone_is_as_strong_in_shear_as_in_tension():
         assert pressed == pytest.approx((-E_n * 1e-9, t), rel=1e-14)
     closed = compiled(derivative(shear, g_t), g_n=0.0, g_t=0.0), compiled(derivative(normal, g), g_n=0.0, g_t=1e-30)
     assert closed == pytest.approx((math.e * t_max / g_0, E_n), rel=1e-14), "stiffness of a closed zone"
-
-
-@pytest.mark.parametrize("gap", [1.5e-10, 4e-8])
-def test_sphere_plane_is_the_sum_over_all_pairs(gap):
-    """Force of every site of the plane on every site of the sphere, by quadrature over plane and polar angle."""
-    n_1, n_2, psi_0, g_0, R, area = *SITES.values(), 5e-8, 1e-16
-    force = -derivative(psi_0 * ((g_0 / g) ** 10 / 45 - (g_0 / g) ** 4 / 3), g)
-    pair = symengine.Lambdify([g], [force])
-
-    def of_plane(z: float) -> float:
-        """On one site at height z: distance r, normal component z/r; s = (r - z) / z."""
-        value, _ = quad(
-            lambda s: float(pair([z * (1 + s)])[0]) * z * z, 0.0, np.inf, epsabs=0.0, epsrel=1e-11, limit=400
-        )
-        return 2 * math.pi * n_1 * value
-
-    def of_ring(angle: float) -> float:
-        height = gap + 2 * R * math.sin(angle / 2) ** 2
-        return 2 * math.pi * R**2 * n_2 * math.sin(angle) * of_plane(height)
-
-    edges = [0.0, *np.geomspace(1e-3, math.pi, 12)]
-    repulsion = sum(quad(of_ring, a, b, epsabs=0.0, epsrel=1e-10)[0] for a, b in pairwise(edges))
-    law = LennardJonesSpherePlane(**SITES, R=R, area=area)
-    assert area * at(derivative(symbolic(law), g), g_n=gap) == pytest.approx(-repulsion, rel=1e-8)
 
 
 def test_van_der_waals_sphere_is_the_sum_of_its_shells():

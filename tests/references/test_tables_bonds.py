@@ -30,26 +30,6 @@ def test_exact_values_are_met(name):
 
 
 @pytest.mark.parametrize("row", ROWS)
-def test_distribution_of_the_rupture_force(row):
-    """Median, mode, mean and spread of the force at which bonds break under a ramp."""
-    scene, known = tables.ramp(row)
-    nodes, weights = np.polynomial.legendre.leggauss(80)
-    last = known["F_mode"] + 6 * known["F_std"] if known["F_mode"] > 2 * known["F_std"] else 40 * known["F_mean"]
-    forces = last * (nodes + 1) / 2
-    marks = [known["F_median"], *([known["F_mode"]] if known["F_mode"] else [])]
-    every = np.unique([0.0, *forces, *marks])
-    trajectory = Model(assemble(scene)).solve(Run(times=every / known["r"]))
-    survival = dict(zip(every, trajectory.result.outputs[:, 0], strict=True))
-    assert survival[known["F_median"]] == pytest.approx(0.5, rel=1e-8)
-    if known["F_mode"]:
-        assert survival[known["F_mode"]] == pytest.approx(known["S_at_mode"], rel=1e-8)
-    S = np.array([survival[force] for force in forces])
-    mean, square = (last / 2 * weights @ (factor * S) for factor in (1, 2 * forces))
-    assert mean == pytest.approx(known["F_mean"], rel=1e-8)
-    assert math.sqrt(square - mean**2) == pytest.approx(known["F_std"], rel=1e-8)
-
-
-@pytest.mark.parametrize("row", ROWS)
 def test_lifetime_of_a_cluster(row):
     p, columns = read("d_cluster_lifetimes")
     life = columns["tau_star"][row]
