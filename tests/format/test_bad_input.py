@@ -35,7 +35,6 @@ reference: bonding
 
 SCHEMA = Draft202012Validator(schema())
 BODY_KEYS = "Known: C, E, H, capacity, conduction, stiffness, temperature."
-RUN_KEYS = "Known: accuracy, atol, first, max-seconds, max-steps, outputs, rtol, solver, spacing, times, until."
 
 MISTAKES = [
     # what to replace, by what, the message
@@ -44,7 +43,6 @@ MISTAKES = [
         "{temperature: T, Cc:",
         f"3: bodies.lower: unknown key 'Cc'. Did you mean 'C'? {BODY_KEYS}",
     ),
-    ("lower: {temperature: T,", "lower: {temperatur: T,", "3: bodies.lower: unknown key 'temperatur'. Did you mean 't"),
     ("1 kJ/m^2/K}\n  up", "1 kJ/m^2}\n  up", "3: bodies.lower.C: 1 kJ/m^2 is an energy per area; C needs a heat"),
     ("C: 1 kJ/m^2/K}\n  up", "C: -1}\n  up", "3: bodies.lower.C: C = -1 is outside its range: > 0."),
     ("C: 1 kJ/m^2/K}\n  up", "C: .nan}\n  up", "3: bodies.lower.C: C must be finite, got 'nan'."),
@@ -59,14 +57,9 @@ MISTAKES = [
     ("upper: {temperature: T,", "upper: {temperature: mu,", "4: bodies.upper.temperature: 'mu' cannot name a temper"),
     ("upper: {temperature: T,", "upper: {temperature: T_1,", "4: bodies.upper.temperature: 'T_1' is temperature of"),
     ("bodies:", "bodys:", "2: unknown key 'bodys'. Did you mean 'bodies'? Known: T_0, bodies,"),
-    ("T_0: 300 K", "T_0: 3 s", "1: T_0: 3 s is a time; T_0 needs a temperature [K]."),
-    ("T_0: 300 K", "T_0: 0", "1: T_0: T_0 = 0 is outside its range: > 0."),
-    ("potential:", "potentials:", "8: interface: unknown key 'potentials'. Did you mean 'potential'? Known: bondin"),
     ("- bond-energy: {K_0", "- bond-enrgy: {K_0", "9: interface.potential.bond-enrgy: no potential law 'bond-enrgy'. "),
-    ("- bond-energy: {K_0", "- bond-energy: {k_0", "9: interface.potential.bond-energy: unknown key 'k_0'. Did you"),
     ("- bond-energy: {K_0: 300 J/m^2}", "- []", "9: interface.potential[1]: a law is `name: {parameters}`, not a list"),
     ("- bond-energy: {K_0", "bond-energy: {K_0", "8: interface.potential: this must be a list"),
-    ("{tau: 0.5 s}", "{tau: 0 s}", "13: interface.bonding.relaxation.tau: tau = 0 is outside its range: > 0."),
     ("{tau: 0.5 s}", "{}", "13: interface.bonding.relaxation: relaxation needs `tau`: relaxation time [s]."),
     ("relaxation: {tau: 0.5 s}", "relaxation", "13: interface.bonding.relaxation: relaxation needs `tau`"),
     ("times: [power", "times: [powr", "11: interface.friction.coulomb.mu.times.powr: no factor law 'powr'. Did you"),
@@ -74,7 +67,6 @@ MISTAKES = [
     ("[power: {exponent: -2}]", "[power: {exponent: -2, of: w}]", "11: interface.friction.coulomb.mu.times.power.of:"),
     ("exponent: -2", "exponent: {value: 1}", "power.exponent: exponent cannot vary; give it a value."),
     ("sites: 1e18 1/m^2", "sites: {lower: 1e18}", "7: interface.sites: the sites of upper are missing"),
-    ("sites: 1e18 1/m^2", "sites: -1", "7: interface.sites: sites = -1 is outside its range: > 0."),
     ("  sites:", "  partition: 0.5\n  sites:", "7: interface.partition: an interface with a temperature divides it"),
     ("[lower, surroundings]", "[lowr, surroundings]", "15: heat.conductance.between: no end 'lowr'. Did you mean 'l"),
     ("[lower, surroundings]", "[lower, lower]", "15: heat.conductance.between: a heat path needs two different ends"),
@@ -83,7 +75,6 @@ MISTAKES = [
     ("surroundings: {temperature: 300 K}\n", "", "15: heat.conductance.between: the surroundings have no temperature."),
     ("{temperature: 300 K}", "{temperature: 0 K}", "16: surroundings.temperature: 0 K is not an absolute temperature"),
     ("loading: {v:", "loading: {w:", "17: loading: unknown key 'w'. Did you mean 'w_n'? Known: F_n, F_t, F_t2, J_c"),
-    ("v: 0.1 m/s", "v: 0.1 m", "17: loading.v: 0.1 m is a length; v needs a velocity [m/s]."),
     ("v: 0.1 m/s", "g_n: 5 nm/s", "g_n needs a length [m]. To change it in time, write `{ramp: {rate: 5 nm/s}}`."),
     ("v: 0.1 m/s", "v: {rampe: {rate: 1}}", "17: loading.v: no loading law 'rampe'. Did you mean 'ramp'?"),
     ("v: 0.1 m/s", "v: {ramp: {rate: 1 m/s}}", "17: loading.v.ramp.rate: 1 m/s is a velocity; rate needs an accele"),
@@ -117,13 +108,8 @@ MISTAKES = [
         "reference: bonding\nsweep: {over: {}}",
         "example `over: {loading.f.ramp.rate: {from: 1 pN/s, to: 1 nN/s, points: 31}}`; none is given.",
     ),
-    ("T: 300 K}\nrun", "T: -1 K}\nrun", "18: initial.T: T = -1 is outside its range: > 0."),
-    ("{until: 5 s}", "{until: -5 s}", "19: run.until: until = -5 is outside its range: > 0."),
-    ("{until: 5 s}", "{untill: 5 s}", f"19: run: unknown key 'untill'. Did you mean 'until'? {RUN_KEYS}"),
     ("{until: 5 s}", "{outputs: 5}", "19: run: the run needs an end. Add `until: 1 s`, or a list of `times`."),
-    ("{until: 5 s}", "{until: 5 s, outputs: 1}", "19: run.outputs: outputs = 1 is outside its range: >= 2"),
     ("{until: 5 s}", "{until: 5 s, outputs: [1 s]}", "19: run.outputs: outputs are a number, `outputs: 201`; a list"),
-    ("{until: 5 s}", "{until: 5 s, outputs: log}", "19: run.outputs: outputs are a number, `outputs: 201`; a list"),
     ("{until: 5 s}", "{until: 5 s, outputs: 2.5}", "19: run.outputs: outputs must be a whole number, got 2.5."),
     ("{until: 5 s}", "{until: 5 s, outputs: 1e99}", "19: run.outputs: outputs = 1e+99 is outside its range: >= 2 an"),
     ("{until: 5 s}", "{until: 5 s, spacing: log}", "19: run.spacing: no spacing 'log'. Did you mean 'logarithmic'?"),
