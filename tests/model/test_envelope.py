@@ -148,7 +148,7 @@ def caught_up(scenes, steps):
 def differing(seeds):
     """The random scenes that differ from the truth, with what differs."""
     scenes = [drawn(seed) for seed in seeds]
-    coarse, fine = caught_up(scenes, 4_000), caught_up(scenes, 8_000)
+    coarse, fine = caught_up(scenes, 2_000), caught_up(scenes, 4_000)
     found = {}
     for j, seed in enumerate(seeds):
         solution = Simulation(load_text(case(scenes[j]))).run(error="balances")
