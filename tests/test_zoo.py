@@ -152,7 +152,7 @@ def test_a_case_runs_to_a_true_status_with_closed_balances(name):
     assert STOPPED.get(name, "reached the end") in solution.reason
     assert solution.audit.energy_error < 1e-9
     assert solution.audit.violations == ()
-    assert ("destroys entropy" in solution.dataset.attrs["warnings"]) is (name in FLAGGED)
+    assert ("destroys entropy" in solution.attributes["warnings"]) is (name in FLAGGED)
     assert all(np.isfinite(column.values).all() for column in solution.columns if column.values.dtype == float)
 
 
