@@ -1,6 +1,8 @@
 """A function of the approach from its values and slopes at a few approaches: an energy with its force, for instance.
 
-Between two approaches the slope is a polynomial through Chebyshev's points, refined until it is one to the accuracy.
+Between two approaches the slope is a polynomial through Chebyshev's points, of which twice as many hold those before;
+where more of them do not help the piece is halved. Source: Trefethen (2013), Approximation Theory and Approximation
+Practice, chapters 2 and 8.
 """
 
 from __future__ import annotations
@@ -18,13 +20,16 @@ from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, decay, log, where
 from surfacechem.surfaces.patches import FIRST_FEW
 from surfacechem.surfaces.projection import Array
-from surfacechem.tolerances import TINY
+from surfacechem.tolerances import NEGLIGIBLE, TINY
 
-DEGREE, LEAST_DEGREE = 14, 5
-"""Largest degree of the polynomials in the approach, and that to which each digit asked for adds one."""
+DEGREES = (2, 4, 8, 16, 32)
+"""Degrees of the polynomials in the approach that are tried one after the other."""
 
 CLOSER = 8
 """How much closer a second fit is held, which the errors of the integrals leave room for."""
+
+ENOUGH, FEWEST = 8, 7
+"""Degree from which it is told whether a higher one is worth it, and the places that a piece takes beside its end."""
 
 SHORTEST = 2.0**-26
 """Part of the range of approaches below which no piece is divided; at a kink of the force its error does not count."""
@@ -80,7 +85,9 @@ class ApproachEnergy:
     """Slope of the first piece at the least approach [N]."""
     factor: float = 1.0
     error: float = 0.0
-    """Largest error of the force relative to it, or where it changes its sign to its largest value in the piece."""
+    """Largest error of the force relative to it, or to a thousandth of its largest value in a piece; to all of that
+    where it changes its sign.
+    """
 
     @property
     def numbers(self) -> list[Any]:
@@ -166,13 +173,11 @@ def missed(curve: ApproachEnergy, at: Mapping[float, tuple[float, float, float]]
     for piece in curve.pieces:
         if len(piece.coefficients) == 1:  # a kink, too short to count
             continue
-        size, off = max(least, TINY), 0.0
-        for d, (energy, force, _) in at.items():
-            if piece.low <= d <= piece.high:
-                unit = abs(energy) / d if piece.powers else 1.0
-                size = max(size, abs(force) / unit)
-                off = max(off, abs(curve.factor * piece.force(d) - force) / unit)
-        worst = max(worst, off / size)
+        inside = {d: sample for d, sample in at.items() if piece.low <= d <= piece.high}
+        units = [abs(energy) / d if piece.powers else 1.0 for d, (energy, _, _) in inside.items()]
+        forces = np.array([force for _, force, _ in inside.values()])
+        off = np.abs([curve.factor * piece.force(d) for d in inside] - forces) / units
+        worst = max(worst, float(off.max()) / size_of(forces / units, least))
     return worst
 
 
@@ -188,7 +193,7 @@ def divided(
     found: list[tuple[float, float, Array]] = []
     waiting = list(pairwise(ends))[::-1]
     while waiting:
-        sample.needed = len(sample.at) + len(waiting) * (degree_for(rtol) + 1 + len(BETWEEN) + 1)
+        sample.needed = len(sample.at) + len(waiting) * FEWEST
         a, b = waiting.pop()
         if len(found) + len(waiting) > MOST_PIECES:
             raise InputError(f"the accuracy {rtol:g} over the approach is out of reach near {a:.4g} m.")
@@ -215,39 +220,48 @@ def value_at(sample: Samples, d: float, powers: bool) -> float:
     return force * d / energy if powers else force
 
 
-def approach_at(x: float, a: float, b: float, powers: bool) -> float:
-    """The approach at -1 <= x <= 1."""
-    return math.sqrt(a * b) * (b / a) ** (x / 2) if powers else (a + b) / 2 + x * (b - a) / 2
-
-
-def polynomial(sample: Samples, a: float, b: float, powers: bool, rtol: float, least: float) -> Array | None:
-    """Coefficients of what is fitted between two approaches; None where they miss what is between the nodes."""
+def polynomial(sample: Sampled, a: float, b: float, powers: bool, rtol: float, least: float) -> Array | None:
+    """Coefficients of what is fitted between two approaches; None where a higher degree gains too little."""
 
     def value(x: float) -> float:
         return value_at(sample, approach_at(x, a, b, powers), powers)
 
-    degree = degree_for(rtol)
-    nodes = np.cos(np.pi * (np.arange(degree + 1) + 0.5) / (degree + 1))
-    values = np.array([value(x) for x in nodes])
-    fit = np.polynomial.chebyshev.Chebyshev.fit(nodes, values, degree, domain=[-1, 1])
-    size = max(float(np.max(np.abs(values))), least)
-    # Between the nodes, and at the ends, where an interpolation errs most and which the next piece needs, too.
-    seen = {x: value(x) for x in BETWEEN}
-    seen |= {x: value_at(sample, end, powers) for x, end in ((-1.0, a), (1.0, b))}
-    if any(abs(fit(x) - true) > rtol * size for x, true in seen.items()):
-        return None
-    return np.asarray(fit.convert(kind=np.polynomial.Polynomial, domain=[-1, 1], window=[-1, 1]).coef)
+    fit = None
+    for degree in DEGREES:
+        nodes = np.cos(np.pi * np.arange(degree + 1) / degree)
+        values = np.array([value(x) for x in nodes])
+        size, before = size_of(values, least), fit
+        fit = np.polynomial.chebyshev.Chebyshev.fit(nodes, values, degree, domain=[-1, 1])
+        if before is None:
+            continue
+        # What one of half the degree misses is the root of what this one does, as errors fall like a power of it.
+        largest = max(float(np.max(np.abs(values))), size)
+        off, goal = float(np.max(np.abs(before(nodes) - values))) / largest, rtol * size / largest
+        if off**2 <= goal and all(abs(fit(x) - value(x)) <= rtol * size for x in BETWEEN):
+            found = fit.trim(NEGLIGIBLE * rtol * size).convert(kind=np.polynomial.Polynomial, domain=[-1, 1])
+            return np.asarray(found.coef)
+        if degree >= ENOUGH and off ** (2 * DEGREES[-1] / degree) > goal:
+            return None
+    return None
 
 
-def degree_for(rtol: float) -> int:
-    """Degree of the polynomials for an accuracy."""
-    return min(DEGREE, LEAST_DEGREE + round(-math.log10(rtol)))
+def size_of(values: Array, least: float) -> float:
+    """What errors of values in a piece are relative to: the smallest of one sign, or a small part of the largest."""
+    sizes = np.abs(values)
+    one_sided = values.min() > 0 or values.max() < 0
+    return float(max(sizes.min(), NEGLIGIBLE * sizes.max(), least) if one_sided else max(sizes.max(), least, TINY))
 
 
-def fewest_samples(low: float, high: float, rtol: float, cuts: Sequence[float] = ()) -> int:
+def approach_at(x: float, a: float, b: float, powers: bool) -> float:
+    """The approach at -1 <= x <= 1, the ends as they are."""
+    if abs(x) == 1:
+        return b if x > 0 else a
+    return math.sqrt(a * b) * (b / a) ** (x / 2) if powers else (a + b) / 2 + x * (b - a) / 2
+
+
+def fewest_samples(low: float, high: float, cuts: Sequence[float] = ()) -> int:
     """At how many approaches a function is looked at, at least."""
-    pieces = 1 + sum(low < cut < high for cut in cuts)
-    return pieces * (degree_for(rtol) + 1 + len(BETWEEN)) + pieces + 1
+    return (1 + sum(low < cut < high for cut in cuts)) * FEWEST + 1
 
 
 def joined(found: list[tuple[float, float, Array]], energy: float, force: float, powers: bool) -> ApproachEnergy:

@@ -59,7 +59,7 @@ class CurvedConductance(HeatTransfer):
         pair, law, levels = self.pair, density(self.law), bends([self.law])
         mark = fingerprint(pair.shapes, self.law, pair.approach, pair.accuracy)
 
-        budget = Budget(pair.accuracy, fewest_samples(*pair.approach, pair.accuracy, levels))
+        budget = Budget(pair.accuracy, fewest_samples(*pair.approach, levels))
 
         def sample(d: float) -> tuple[float, float, float]:
             finer = max(pair.accuracy / 64, ROUNDING)

@@ -14,10 +14,11 @@ import numpy as np
 
 from surfacechem.contracts.terms import HeatTransfer, PairEnergy, Potential, Varying, optional, reads
 from surfacechem.errors import InputError
+from surfacechem.surfaces.inner_sums import kernel
 from surfacechem.surfaces.level_cuts import with_levels
-from surfacechem.surfaces.pairwise import check_finite, kernel, length
+from surfacechem.surfaces.pairwise import check_finite, length
 from surfacechem.surfaces.patches import Budget, Integrand, Patches, Rules, integral, outer_patches
-from surfacechem.surfaces.projection import Array, Projection, Surface
+from surfacechem.surfaces.projection import Array, Projection, Surface, cross
 from surfacechem.tolerances import EPS, NEGLIGIBLE, NOISE, PRECISE, TINY
 
 GAP = "g_n"
@@ -175,7 +176,7 @@ def counts_at(x: Array, near: Projection, laws: Sequence[Density], heat: Sequenc
         pull = -traction[..., None] * near.direction
         count[..., 0] += psi
         count[..., 1:7] += np.concatenate([pull, -pull], axis=-1)
-        count[..., 7:13] += np.concatenate([np.cross(x, pull), -np.cross(near.point, pull)], axis=-1)
+        count[..., 7:13] += np.concatenate([cross(x, pull), -cross(near.point, pull)], axis=-1)
     count[..., 13] = near.gap <= 0
     for path in heat:
         h, slope = np.moveaxis(path(near.gap), -1, 0)

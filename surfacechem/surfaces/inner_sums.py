@@ -7,10 +7,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
-from surfacechem.contracts.terms import PairEnergy
+from surfacechem.contracts.terms import PairEnergy, Shape
 from surfacechem.errors import InputError
 from surfacechem.surfaces.nodes import Extent, Kernel, Sums, divided, gauss, is_round, order_of, tensor_grid
 from surfacechem.surfaces.projection import Array, Projection, Surface
@@ -26,6 +27,12 @@ SOUGHT = 4
 
 CHEBYSHEV, BETWEEN = np.cos(np.pi * (np.arange(24) + 0.5) / 24), np.array([-0.97, -0.52, 0.14, 0.71])
 """Gaps for a polynomial of their logarithm, and places between them at which it is tried."""
+
+PART = 0.5
+"""Length of these pieces: over one a sum of r^-10 falls to a fiftieth."""
+
+FEW = 56
+"""Points up to which sums are made one by one where no table is good enough or used again: twice what that takes."""
 
 
 @dataclass(frozen=True)
@@ -48,6 +55,23 @@ class Circles:
         return np.stack([(psi * self.area).sum(-1), strength.sum(-1), (strength * self.down).sum(-1)], axis=-1)
 
 
+@lru_cache(maxsize=64)
+def kernel(law: PairEnergy) -> Kernel:
+    """Energy of a pair and its slope as machine code, (n, 2) for n distances."""
+    import symengine
+
+    r = symengine.Symbol("r")
+    psi = symengine.sympify(law.energy(r))
+    compiled: Kernel = symengine.Lambdify([r], [psi, psi.diff(r)], backend="llvm")
+
+    def values(distances: Array) -> Array:
+        # The machine code takes no empty array.
+        flat = compiled(distances.reshape(-1, 1)) if distances.size else np.empty(0)
+        return np.asarray(flat).reshape(*distances.shape, 2)
+
+    return values
+
+
 def extents(laws: Sequence[PairEnergy]) -> dict[Extent, list[int]]:
     """Which laws have nodes of their own: those that bend or end at distances of their own, all others together."""
     found: dict[tuple[float, ...], list[int]] = {}
@@ -64,9 +88,9 @@ def extents(laws: Sequence[PairEnergy]) -> dict[Extent, list[int]]:
 
 
 def inner_sums(
-    surface: Surface, x: Array, laws: Sequence[PairEnergy], kernels: Sequence[Kernel], level: int, rtol: float
+    surface: Surface, x: Array, laws: Sequence[PairEnergy], level: int, rtol: float
 ) -> tuple[list[Sums], int]:
-    """Sums over the inner surface for points (n, 3), of each law with its kernel, and the number of pairs of points.
+    """Sums over the inner surface for points (n, 3), of each law, and the number of pairs of points.
 
     InputError where a point is in the body.
     """
@@ -76,77 +100,108 @@ def inner_sums(
     found: dict[int, Sums] = {}
     pairs = surface.search * len(x)
     for extent, which in extents(laws).items():
-        sums, more = _sums_of(surface, x, near, [kernels[k] for k in which], extent, level, rtol)
+        sums, more = _sums_of(surface, x, near, [laws[k] for k in which], extent, level, rtol)
         found |= dict(zip(which, sums, strict=True))
         pairs += more
     return [found[k] for k in range(len(laws))], pairs
 
 
 def _sums_of(
-    surface: Surface, x: Array, near: Projection, kernels: Sequence[Kernel], extent: Extent, level: int, rtol: float
+    surface: Surface, x: Array, near: Projection, laws: Sequence[PairEnergy], extent: Extent, level: int, rtol: float
 ) -> tuple[list[Sums], int]:
     """The same for laws of one extent."""
     # Of what lies beyond, a part of size (h / reach)^(decay - 2) of all is missed.
     farther = (rtol * LEFT_OUT) ** (-1 / (extent.decay - 2))
-    if not is_round(surface):
+    if not is_round(surface.shape):
         reach = np.minimum(near.gap * farther, extent.cutoff)
         if extent.bends:
             nodes = ray_grid(surface, x, near, reach, extent, level)
-            return [nodes.sums(one) for one in kernels], SOUGHT * nodes.area.size
+            return [nodes.sums(kernel(law)) for law in laws], SOUGHT * nodes.area.size
         nodes = tensor_grid(surface, x, near, reach, level)
-        return [nodes.sums(one) for one in kernels], nodes.area.size
-    pairs = 0
-
-    def profiles(gaps: Array) -> Array:
-        nonlocal pairs
-        circles = _around(surface, gaps, farther, extent, level)
-        pairs += circles.area.size
-        return np.concatenate([circles.profile(one) for one in kernels], axis=-1)
-
-    found, sums = tabulated(profiles, near.gap, rtol, extent.levels(surface)), []
-    for energy, whole, lower in np.split(found.T, len(kernels)):
+        return [nodes.sums(kernel(law)) for law in laws], nodes.area.size
+    found, pairs = tabulated(RoundSums(surface.shape, tuple(laws), extent, farther, level, rtol), near.gap)
+    sums = []
+    for energy, whole, lower in np.split(found.T, len(laws)):
         push = (whole * near.gap + lower)[:, None] * near.normal
         sums.append((energy, push, whole[:, None] * near.point - lower[:, None] * near.normal))
     return sums, pairs
 
 
-def tabulated(function: Callable[[Array], Array], gaps: Array, rtol: float, levels: Sequence[float] = ()) -> Array:
-    """A function (n, k) of many gaps by polynomials of their logarithm, on pieces that are short enough; it bends at
-    some ``levels``.
+@dataclass(frozen=True)
+class RoundSums:
+    """Sums (n, 3 laws) around the feet of points at gaps (n,) on a shape whose points are all alike, which do not
+    depend on where that is: circles up to where laws end or, where they do not, so many times farther than the gap.
     """
-    at, x = np.log(gaps), np.concatenate([CHEBYSHEV, BETWEEN])
-    pieces = max(1, math.ceil(np.ptp(at)))
-    inside = [math.log(gap) for gap in levels if at.min() < math.log(gap) < at.max()]
-    edges = np.sort([*np.linspace(at.min(), at.max(), pieces + 1), *inside])
-    home = np.clip(np.searchsorted(edges, at, side="right") - 1, 0, len(edges) - 2)
-    waiting = [(np.flatnonzero(home == k), edges[k], edges[k + 1]) for k in range(len(edges) - 1)]
-    parts = []
+
+    shape: Shape
+    laws: tuple[PairEnergy, ...]
+    extent: Extent
+    farther: float
+    level: int
+    rtol: float
+
+    def at(self, gaps: Array) -> tuple[Array, int]:
+        """The sums, and the number of pairs of points that they take."""
+        circles = _around(self.shape, gaps, self.farther, self.extent, self.level)
+        return np.concatenate([circles.profile(kernel(law)) for law in self.laws], axis=-1), circles.area.size
+
+
+@lru_cache(maxsize=4096)
+def table(profile: RoundSums, low: float, high: float) -> tuple[Array | None, int]:
+    """Coefficients of Chebyshev's polynomials (24, 3 laws) of a logarithm of the gap between two of them, none where
+    they miss what is between, and the number of pairs that they take.
+    """
+    at = (low + high) / 2 + (high - low) / 2 * np.concatenate([CHEBYSHEV, BETWEEN])
+    known, pairs = profile.at(np.exp(at))
+    fit = np.polynomial.chebyshev.chebfit(CHEBYSHEV, known[: len(CHEBYSHEV)], len(CHEBYSHEV) - 1)
+    missed = np.polynomial.chebyshev.chebval(BETWEEN, fit).T - known[len(CHEBYSHEV) :]
+    good = np.all(np.abs(missed) <= profile.rtol * NEGLIGIBLE * np.abs(known).max(axis=0))
+    return np.asarray(fit) if good else None, pairs
+
+
+def tabulated(profile: RoundSums, gaps: Array) -> tuple[Array, int]:
+    """A profile (n, k) of many gaps, and the number of pairs that it takes; from tables over pieces of the logarithm of
+    the gap, which are the same for all points and approaches, unless it bends.
+    """
+    at, parts = np.log(gaps), []
+    low, high = float(at.min()), float(at.max())
+    if profile.extent.bends:
+        # Next to the end of a law there is next to nothing, of which a table over more would miss a lot.
+        levels = [math.log(gap) for gap in profile.extent.levels(profile.shape)]
+        inside = [level for level in levels if low < level < high]
+        edges = np.unique([*np.linspace(low, high, math.ceil(high - low) + 1), *inside])
+    else:
+        edges = PART * np.arange(math.floor(low / PART), math.floor(high / PART) + 2)
+    home = np.clip(np.searchsorted(edges, at, side="right") - 1, 0, max(len(edges) - 2, 0))
+    waiting = [(np.flatnonzero(home == k), edges[k], edges[min(k + 1, len(edges) - 1)]) for k in np.unique(home)]
+    pairs, single = 0, [np.empty(0, dtype=int)]
     while waiting:
         which, low, high = waiting.pop()
-        if len(which) < 2 * len(x):
-            parts += [(which, function(gaps[which]))] if len(which) else []
-            continue
+        few = len(which) < FEW
+        fit, more = table(profile, float(low), float(high)) if not (few and profile.extent.bends) else (None, 0)
+        pairs += more
         middle, half = (low + high) / 2, max((high - low) / 2, TINY)
-        known = function(np.exp(middle + half * x))
-        fit = np.polynomial.chebyshev.chebfit(CHEBYSHEV, known[: len(CHEBYSHEV)], len(CHEBYSHEV) - 1)
-        missed = np.polynomial.chebyshev.chebval(BETWEEN, fit).T - known[len(CHEBYSHEV) :]
-        if np.all(np.abs(missed) <= rtol * NEGLIGIBLE * np.abs(known).max(axis=0)):
-            z = np.clip((at[which] - middle) / half, -1, 1)
-            parts.append((which, np.polynomial.chebyshev.chebval(z, fit).T))
+        if fit is not None:
+            parts.append((which, np.polynomial.chebyshev.chebval((at[which] - middle) / half, fit).T))
+        elif few:
+            single.append(which)
         else:
             below = at[which] < middle
-            waiting += [(which[below], low, middle), (which[~below], middle, high)]
+            waiting += [(part, *ends) for part, *ends in ((which[below], low, middle), (which[~below], middle, high))]
+    which = np.concatenate(single)
+    if len(which):
+        values, more = profile.at(gaps[which])
+        parts, pairs = [*parts, (which, values)], pairs + more
     found = np.empty((len(gaps), parts[0][1].shape[-1]))
     for which, values in parts:
         found[which] = values
-    return found
+    return found, pairs
 
 
-def _around(surface: Surface, gap: Array, farther: float, extent: Extent, level: int) -> Circles:
+def _around(shape: Shape, gap: Array, farther: float, extent: Extent, level: int) -> Circles:
     """Circles around the feet on a plane, a sphere or a cavity of points at gaps (n,), up to where laws end or, where
     they do not, so many times ``farther`` than the gap.
     """
-    shape = surface.shape
     bent = 0.0 if isinstance(shape, Plane) else getattr(shape, "bulge") / getattr(shape, "R")  # noqa: B009
     last = math.pi / abs(bent) if bent else math.inf
     ends = [np.zeros_like(gap)]

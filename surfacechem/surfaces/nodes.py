@@ -17,6 +17,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from surfacechem.contracts.terms import Shape
 from surfacechem.surfaces.projection import FIRST, POLE, Array, Indices, Projection, Surface
 from surfacechem.surfaces.shapes import Cavity, Cylinder, Plane, Sphere
 
@@ -61,9 +62,8 @@ class Grid:
         return np.asarray(np.bincount(self.owner, values, len(self.outer)), dtype=float)
 
 
-def is_round(surface: Surface) -> bool:
-    """Whether all points of a surface are alike: a plane without end, a whole sphere or cavity."""
-    shape = surface.shape
+def is_round(shape: Shape) -> bool:
+    """Whether all points of a shape are alike: a plane without end, a whole sphere or cavity."""
     if type(shape) is Plane:
         return shape.length is None and shape.width is None
     return type(shape) is Sphere or (type(shape) is Cavity and shape.angle == math.pi)
@@ -79,10 +79,10 @@ class Extent:
     cutoff: float
     bends: tuple[float, ...]
 
-    def levels(self, surface: Surface) -> list[float]:
-        """Gaps to a surface [m] at which sums over it bend: there its nearest or its farthest point is at a bend."""
-        shape, found = surface.shape, set(self.bends)
-        if is_round(surface) and not isinstance(shape, Plane):
+    def levels(self, shape: Shape) -> list[float]:
+        """Gaps to a shape [m] at which sums over it bend: there its nearest or its farthest point is at a bend."""
+        found = set(self.bends)
+        if is_round(shape) and not isinstance(shape, Plane):
             bulge, R = getattr(shape, "bulge"), getattr(shape, "R")  # noqa: B009
             found |= {bulge * (bend - 2 * R) for bend in self.bends}
         return sorted(gap for gap in found if gap > 0)
@@ -170,7 +170,7 @@ def _within(surface: Surface, k: int, tangent: Array, distance: Array) -> Array:
 def alike_around(outer: Surface, inner: Surface) -> bool:
     """Whether nothing changes around a common axis."""
     axial = all(s.shape.tilt == 0 for s in (outer, inner)) and outer.shape.about_axis
-    return axial and (inner.shape.about_axis or is_round(inner))
+    return axial and (inner.shape.about_axis or is_round(inner.shape))
 
 
 def alike_along(outer: Surface, inner: Surface) -> bool:
@@ -179,4 +179,4 @@ def alike_along(outer: Surface, inner: Surface) -> bool:
     if not isinstance(shapes[0], Cylinder) or any(shape.tilt for shape in shapes):
         return False
     same = shapes[0].turn == shapes[1].turn and isinstance(shapes[1], Cylinder) and shapes[1].length is None
-    return same or (is_round(inner) and isinstance(shapes[1], Plane))
+    return same or (is_round(inner.shape) and isinstance(shapes[1], Plane))

@@ -13,18 +13,17 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 
 from surfacechem.contracts.terms import PairEnergy
 from surfacechem.errors import InputError
-from surfacechem.surfaces.inner_sums import LEFT_OUT, extents, inner_sums
+from surfacechem.surfaces.inner_sums import LEFT_OUT, extents, inner_sums, kernel
 from surfacechem.surfaces.level_cuts import with_levels
 from surfacechem.surfaces.nearest_places import NearPlaces
-from surfacechem.surfaces.nodes import LAST, Extent, Kernel, is_round
+from surfacechem.surfaces.nodes import LAST, Extent, is_round
 from surfacechem.surfaces.patches import Budget, Patches, integral, outer_patches
-from surfacechem.surfaces.projection import FIRST, Array, Surface
+from surfacechem.surfaces.projection import FIRST, Array, Surface, cross
 from surfacechem.surfaces.shapes import Plane
 from surfacechem.tolerances import ATOM, NEGLIGIBLE, NOISE, PRECISE, TINY, ULPS
 
@@ -64,23 +63,6 @@ class PairForces:
     """Pairs of points that were looked at."""
 
 
-@lru_cache(maxsize=64)
-def kernel(law: PairEnergy) -> Kernel:
-    """Energy of a pair and its slope as machine code, (n, 2) for n distances."""
-    import symengine
-
-    r = symengine.Symbol("r")
-    psi = symengine.sympify(law.energy(r))
-    compiled: Kernel = symengine.Lambdify([r], [psi, psi.diff(r)], backend="llvm")
-
-    def values(distances: Array) -> Array:
-        # The machine code takes no empty array.
-        flat = compiled(distances.reshape(-1, 1)) if distances.size else np.empty(0)
-        return np.asarray(flat).reshape(*distances.shape, 2)
-
-    return values
-
-
 def interaction(
     lower: Surface,
     upper: Surface,
@@ -98,17 +80,17 @@ def interaction(
         _check_decay(law, length(lower, upper), rtol)
         _check_energy(lower, upper, law)
     # The inner surface is the simpler one, if any.
-    swapped = is_round(lower) and (not is_round(upper) or isinstance(lower.shape, Plane))
-    swapped |= not is_round(upper) and lower.shape.grain > upper.shape.grain
+    swapped = is_round(lower.shape) and (not is_round(upper.shape) or isinstance(lower.shape, Plane))
+    swapped |= not is_round(upper.shape) and lower.shape.grain > upper.shape.grain
     outer, inner = (upper, lower) if swapped else (lower, upper)
-    kernels, found_extents = [kernel(law) for law in laws], list(extents(laws))
+    found_extents = list(extents(laws))
     patches, near = _cut_patches(outer, inner, found_extents, rtol)
     gap = float(near.gap[0])
     rounded = _rounded(outer.derivatives(near.at[0], FIRST)[0], gap, found_extents, rtol)
     amounts = np.array([law.n_1 * law.n_2 for law in laws])[:, None]
 
     def integrand(x: Array, level: int) -> tuple[Array, int]:
-        found, pairs = _sums(x, inner, laws, kernels, level, rtol)
+        found, pairs = _sums(x, inner, laws, level, rtol)
         return found * amounts, pairs
 
     # What is left out is a hundredth of the accuracy, but for factors of order one.
@@ -137,7 +119,7 @@ def _cut_patches(outer: Surface, inner: Surface, found: Sequence[Extent], rtol: 
         if gap > ATOM:
             text = f"a gap of {gap:.3g} m is lost in the rounding of bodies of {size:.3g} m; give smaller ones"
         raise InputError(f"{text}.")
-    levels = sorted({level for extent in found for level in extent.levels(inner)})
+    levels = sorted({level for extent in found for level in extent.levels(inner.shape)})
     return (with_levels(patches, inner, levels, NOISE * size) if levels else patches), near
 
 
@@ -154,11 +136,10 @@ def _rounded(x: Array, gap: float, found: Sequence[Extent], rtol: float) -> floa
 
 def pair_traction(x: Array, normals: Array, inner: Surface, laws: Sequence[PairEnergy], rtol: float) -> Array:
     """Normal tractions (n,) [Pa], tension positive, at points (n, 3) of a surface from all points of another."""
-    kernels = [kernel(law) for law in laws]
-    found, together = np.zeros(len(x)), len(x) if is_round(inner) else POINTS
+    found, together = np.zeros(len(x)), len(x) if is_round(inner.shape) else POINTS
     for begin in range(0, len(x), together):
         part = slice(begin, begin + together)
-        sums, _ = inner_sums(inner, x[part], laws, kernels, LAST, rtol)
+        sums, _ = inner_sums(inner, x[part], laws, LAST, rtol)
         for law, (_, push, _) in zip(laws, sums, strict=True):
             found[part] += law.n_1 * law.n_2 * np.einsum("nc,nc->n", push, normals[part])
     return found
@@ -228,16 +209,14 @@ def length(lower: Surface, upper: Surface) -> float:
     return float(max([*shapes[0].lengths, *shapes[1].lengths, *spans], default=1.0))
 
 
-def _sums(
-    x: Array, inner: Surface, laws: Sequence[PairEnergy], kernels: Sequence[Kernel], level: int, rtol: float
-) -> tuple[Array, int]:
+def _sums(x: Array, inner: Surface, laws: Sequence[PairEnergy], level: int, rtol: float) -> tuple[Array, int]:
     """Integrals (n, laws, 13) over the inner surface for points (n, 3), and the number of pairs."""
-    sums, pairs = inner_sums(inner, x, laws, kernels, level, rtol)
-    found = np.empty((len(x), len(kernels), COUNT))
+    sums, pairs = inner_sums(inner, x, laws, level, rtol)
+    found = np.empty((len(x), len(laws), COUNT))
     for j, (energy, push, theirs) in enumerate(sums):
         found[:, j, 0], found[:, j, 1:4], found[:, j, 4:7] = energy, push, -push
         # The moment of -strength * away at the other end is x2 x away = x2 x x1, the same for all but the arm.
-        found[:, j, 7:10], found[:, j, 10:13] = np.cross(x, push), np.cross(x, theirs)
+        found[:, j, 7:10], found[:, j, 10:13] = cross(x, push), cross(x, theirs)
     return found, pairs
 
 

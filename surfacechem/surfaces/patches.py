@@ -29,6 +29,9 @@ from surfacechem.tolerances import NEGLIGIBLE
 STUCK, ENOUGH = 4.0, 2
 """A rule of a level above enough gains as much at least, or the patch is divided; enough are those below to tell."""
 
+SOONER = NEGLIGIBLE, NEGLIGIBLE**3
+"""Accuracies from which on patches in one direction begin with a rule of one more level: their points cost little."""
+
 MOST_POINTS = 200_000_000
 """Pairs of points, of one integral or of all over an approach, after which an accuracy is out of reach: minutes."""
 
@@ -153,7 +156,7 @@ class Patches:
 
 def outer_patches(outer: Surface, inner: Surface, size: float, reach: float) -> tuple[Patches, NearPlaces]:
     """The patches of a surface, graded towards the other up to a ``reach`` [m], and where that is nearest."""
-    if type(outer.shape) is Plane and is_round(outer) and outer.shape.tilt == 0:
+    if type(outer.shape) is Plane and is_round(outer.shape) and outer.shape.tilt == 0:
         # Polar coordinates, in which nothing may change around an axis.
         polar = Surface(Disc(), outer.upper, outer.approach)
         outer = polar if alike_around(polar, inner) else outer
@@ -312,7 +315,8 @@ def integral(
 
     A ``nested`` integrand is a sum itself, with an error of its own. InputError where it takes more than its budget.
     """
-    rules, begin, before = Rules(integrand, budget), np.full(len(patches), patches.fewest), budget.spent
+    first = patches.fewest if not any(patches.alike) else ENOUGH + sum(left < goal for goal in SOONER)
+    rules, begin, before = Rules(integrand, budget), np.full(len(patches), first), budget.spent
     known, met = _started(rules, patches, begin, begin, nested), list[tuple[float, float]]()
     while True:
         whole = known.value.sum(axis=0)

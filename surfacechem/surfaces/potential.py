@@ -25,7 +25,8 @@ from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, derivative
 from surfacechem.surfaces.approach import ApproachEnergy, fewest_samples, fitted, straight
 from surfacechem.surfaces.curved_gap import GAP, Contact, bends, between_flats, density, over_gap
-from surfacechem.surfaces.pairwise import PairForces, interaction, kernel, length, pair_traction
+from surfacechem.surfaces.inner_sums import kernel
+from surfacechem.surfaces.pairwise import PairForces, interaction, length, pair_traction
 from surfacechem.surfaces.patches import Budget
 from surfacechem.surfaces.projection import Array, Surface
 from surfacechem.tolerances import ATOM, FLOOR, NEGLIGIBLE, NOISE, ROUNDING, SQRT_EPS
@@ -195,7 +196,7 @@ class CurvedSurfaces(Potential):
         rtol, finer = self.accuracy, max(self.accuracy / 64, ROUNDING)
 
         met: dict[float, PairForces] = {}
-        budget = Budget(rtol, fewest_samples(*self.approach, rtol))
+        budget = Budget(rtol, fewest_samples(*self.approach))
 
         def of_pairs(k: int, d: float) -> tuple[float, float, float]:
             if d not in met:
@@ -213,7 +214,7 @@ class CurvedSurfaces(Potential):
             return found
         laws, levels = [density(law) for law in self.gap_laws], bends(self.gap_laws)
 
-        floor, spent = (0.0, 0.0), Budget(rtol, fewest_samples(*self.approach, rtol, levels))
+        floor, spent = (0.0, 0.0), Budget(rtol, fewest_samples(*self.approach, levels))
 
         def of_gap(d: float) -> tuple[float, float, float]:
             pair = self.surfaces(d)

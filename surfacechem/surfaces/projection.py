@@ -10,7 +10,7 @@ Contact Mechanics, doi 10.1007/978-3-642-31531-2, for rates and for where a proj
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any
@@ -65,17 +65,36 @@ class Projection:
     """Nearest points of a surface; arrays over the points that were projected.
 
     ``at`` holds the parameters (..., 2), ``gap`` the distance along ``direction``, negative inside the body [m],
-    ``beyond`` how far the points are beyond each edge along the surface (..., edges) [m], ``tied`` where another point
-    is as near. The direction is the normal, but at an edge and a tip that from the nearest point.
+    ``beyond`` how far the points are beyond each edge along the surface (..., edges) [m]. The direction is the normal,
+    but at an edge and a tip that from the nearest point. Where it was searched for, ``rivals`` are what searches from
+    other starts have found.
     """
 
+    surface: Surface
     at: Array
     point: Array
     normal: Array
     direction: Array
     gap: Array
     beyond: Array
-    tied: NDArray[np.bool_]
+    rivals: Sequence[Array]
+
+    @cached_property
+    def tied(self) -> NDArray[np.bool_]:
+        """Where another point is as near."""
+        shape, size = self.surface.shape, np.abs(self.gap)
+        x = self.point + self.gap[..., None] * self.direction
+        D = self.surface.derivatives(self.at, SECOND)
+        found = _degenerate(D, self.normal * _dot(x - self.point, self.normal)[..., None])
+        if shape.about_axis:
+            # For a point on the axis all around is alike.
+            own, around = (x - [0.0, 0.0, self.surface.approach]) @ self.surface.axes, np.linalg.norm(D[2], axis=-1)
+            found |= (np.hypot(own[..., 0], own[..., 1]) < SAME * around) & (around > SAME * size)
+        for places in self.rivals:
+            rival = self.surface.derivatives(places, FIRST)[0]
+            near = np.linalg.norm(x - rival, axis=-1) <= size * (1 + SAME)
+            found |= near & (np.linalg.norm(rival - self.point, axis=-1) > np.sqrt(SAME) * size)
+        return found
 
 
 @dataclass(frozen=True)
@@ -135,49 +154,39 @@ class Surface:
     def elements(self, at: Array) -> tuple[Array, Array]:
         """Points (..., 3) and vectors of the area per parameters (..., 3), which point out of the body."""
         x, x_u, x_v = self.derivatives(at, FIRST)
-        outward = np.cross(x_u, x_v)
+        outward = cross(x_u, x_v)
         return x, -outward if self.upper else outward
 
     def normals(self, derivatives: Array) -> Array:
         """Unit normals (..., 3) out of the body."""
-        outward = np.cross(derivatives[1], derivatives[2]) * (-1 if self.upper else 1)
+        outward = cross(derivatives[1], derivatives[2]) * (-1 if self.upper else 1)
         return np.asarray(outward / np.linalg.norm(outward, axis=-1, keepdims=True))
 
     def nearest(self, x: ArrayLike) -> Projection:
         """Projection of points (..., 3)."""
         x = np.asarray(x, dtype=float)
-        own, other = (x - [0.0, 0.0, self.approach]) @ self.axes, None
+        own = (x - [0.0, 0.0, self.approach]) @ self.axes
+        rivals: list[Array] = []
         if self.shape.foot is not None:
             at = self.shape.foot(own)
         else:
-            found = [self._search(x, start) for start in self.shape.starts(own)]
-            distances = np.array([np.linalg.norm(x - self.derivatives(at, FIRST)[0], axis=-1) for at in found])
-            ranked = np.take_along_axis(np.array(found), np.argsort(distances, axis=0)[..., None], axis=0)
-            at, other = ranked[0], ranked[1:]
+            found = np.array([self._search(x, start) for start in self.shape.starts(own)])
+            distances = np.linalg.norm(x - self.derivatives(found, FIRST)[0], axis=-1)
+            at, *rivals = np.take_along_axis(found, np.argsort(distances, axis=0)[..., None], axis=0)
         # At the pole itself no direction along the surface has a length.
         if self.shape.about_axis and self.shape.span[0][0] == 0:
             at = np.maximum(at, [POLE, -np.inf])
-        D = self.derivatives(at, SECOND)
+        D = self.derivatives(at, FIRST)
         normal, away = self.normals(D), x - D[0]
         # Beyond an edge the distance is not along the normal, which then tells the side only.
         size = np.linalg.norm(away, axis=-1)
-        side = np.einsum("...i,...i", away, normal)
-        tied = self._degenerate(D, normal * side[..., None])
-        if self.shape.about_axis:
-            # For a point on the axis all around is alike.
-            around = np.linalg.norm(D[2], axis=-1)
-            tied |= (np.hypot(own[..., 0], own[..., 1]) < SAME * around) & (around > SAME * size)
-        # Searches from other starts may have ended elsewhere, as near.
-        for places in () if other is None else other:
-            rival = self.derivatives(places, FIRST)[0]
-            near = np.linalg.norm(x - rival, axis=-1) <= size * (1 + SAME)
-            tied |= near & (np.linalg.norm(rival - D[0], axis=-1) > np.sqrt(SAME) * size)
+        side = _dot(away, normal)
         # Behind an edge and beyond it is beside the body, not in it.
         beyond, at_edge = self._beyond(at, away, D[1:3]), self._at_edge(at) & (size > 0)
         gap = np.where((side < 0) & ~np.any(beyond > 0, axis=-1), -size, size)
         off = at_edge[..., None]
         direction = np.where(off, np.divide(away, gap[..., None], out=np.zeros_like(away), where=off), normal)
-        return Projection(at, D[0], normal, direction, gap, beyond, tied)
+        return Projection(self, at, D[0], normal, direction, gap, beyond, rivals)
 
     @cached_property
     def edges(self) -> list[tuple[int, int, float]]:
@@ -207,14 +216,6 @@ class Surface:
         ends = (at <= low + (POLE if self.shape.about_axis else 0.0)) | (at >= high)
         return np.asarray(np.any(ends & ~np.array(self.shape.closed), axis=-1))
 
-    def _degenerate(self, D: Array, away: Array) -> NDArray[np.bool_]:
-        """Whether points are where normals meet, so that not one point is nearest but many."""
-        metric, hessian = _forms(D, away)
-        # Eigenvalues of the second in terms of the first, 1 - distance * curvature, vanish there.
-        ratio = _determinant(hessian) / _determinant(metric)
-        trace = (metric[0] * hessian[2] + metric[2] * hessian[0] - 2 * metric[1] * hessian[1]) / _determinant(metric)
-        return np.asarray((ratio <= SAME) & (np.abs(ratio) <= SAME * np.maximum(np.abs(trace), 1)))
-
     def _search(self, x: Array, start: Array) -> Array:
         """Parameters of a nearest point by Newton's method; a step that does not come nearer is halved."""
         low, high = np.transpose(self.shape.span)
@@ -240,13 +241,13 @@ class Surface:
         """Curvature at parameters (..., 2), and its rate where they move at a rate."""
         D = self.derivatives(at)
         E, F, G = _metric(D)
-        outward = np.cross(D[1], D[2]) * (-1 if self.upper else 1)
+        outward = cross(D[1], D[2]) * (-1 if self.upper else 1)
         size = np.linalg.norm(outward, axis=-1)
         n = outward / size[..., None]
         # What follows is the product rule, with rates of the derivatives along the path of the parameters.
         p, q = np.moveaxis(np.zeros_like(at) if rate is None else rate, -1, 0)[..., None]
         turned = [p * D[k] + q * D[k + 1] for k in (3, 4, 6, 7, 8)]  # rates of x_u, x_v, x_uu, x_uv, x_vv
-        swing = (np.cross(turned[0], D[2]) + np.cross(D[1], turned[1])) * (-1 if self.upper else 1)
+        swing = (cross(turned[0], D[2]) + cross(D[1], turned[1])) * (-1 if self.upper else 1)
         n_dot = (swing - n * _dot(n, swing)[..., None]) / size[..., None]
         L, M, N = (-_dot(n, D[k]) for k in (3, 4, 5))
         L_dot, M_dot, N_dot = (-_dot(n_dot, D[k]) - _dot(n, turned[k - 1]) for k in (3, 4, 5))
@@ -267,10 +268,10 @@ class Surface:
         if np.any(found.tied):
             raise InputError("two points of the surface are equally near, so that their distance has no rate.")
         D = self.derivatives(found.at, SECOND)
-        relative = moves - np.asarray(shift, dtype=float) - np.cross(spin, x)
+        relative = moves - np.asarray(shift, dtype=float) - cross(spin, x)
         at = self._moved(found.at, D, x - D[0], relative)
         glide = at[..., :1] * D[1] + at[..., 1:] * D[2]
-        vector = relative - glide + np.cross(spin, x - D[0])
+        vector = relative - glide + cross(spin, x - D[0])
         # Weingarten: the normal turns with the second form.
         slopes = np.stack([_dot(D[3], found.normal), _dot(D[4], found.normal), _dot(D[5], found.normal)])
         E, F, G = _metric(D)
@@ -278,7 +279,7 @@ class Surface:
         second = slopes[1] * at[..., 0] + slopes[2] * at[..., 1]
         area = (E * G - F**2)[..., None]
         turned = (G * first - F * second)[..., None] * D[1] + (E * second - F * first)[..., None] * D[2]
-        normal = -turned / area + np.cross(spin, found.normal)
+        normal = -turned / area + cross(spin, found.normal)
         return Rates(at, _dot(relative, found.direction), vector, normal, self.curvature(found.at, at))
 
     def _moved(self, at: Array, D: Array, away: Array, relative: Array) -> Array:
@@ -302,12 +303,27 @@ def _dot(a: Array, b: Array) -> Array:
     return np.asarray(np.einsum("...i,...i", a, b))
 
 
+def cross(a: Array, b: Array) -> Array:
+    """Products (..., 3) of vectors, of few of them in a tenth of the time that NumPy takes."""
+    (a0, a1, a2), (b0, b1, b2) = ((v[..., 0], v[..., 1], v[..., 2]) for v in (a, b))
+    return np.stack([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0], axis=-1)
+
+
 def _metric(D: Array) -> tuple[Array, Array, Array]:
     return _dot(D[1], D[1]), _dot(D[1], D[2]), _dot(D[2], D[2])
 
 
 def _determinant(form: tuple[Array, Array, Array]) -> Array:
     return form[0] * form[2] - form[1] ** 2
+
+
+def _degenerate(D: Array, away: Array) -> NDArray[np.bool_]:
+    """Whether points are where normals meet, so that not one point is nearest but many."""
+    metric, hessian = _forms(D, away)
+    # Eigenvalues of the second in terms of the first, 1 - distance * curvature, vanish there.
+    ratio = _determinant(hessian) / _determinant(metric)
+    trace = (metric[0] * hessian[2] + metric[2] * hessian[0] - 2 * metric[1] * hessian[1]) / _determinant(metric)
+    return np.asarray((ratio <= SAME) & (np.abs(ratio) <= SAME * np.maximum(np.abs(trace), 1)))
 
 
 def _forms(D: Array, away: Array) -> tuple[tuple[Array, Array, Array], tuple[Array, Array, Array]]:
