@@ -12,7 +12,7 @@ import numpy as np
 
 from surfacechem.errors import InputError
 from surfacechem.reactor.interface import InterfaceReactor
-from surfacechem.reactor.watch import Watch
+from surfacechem.reactor.watch import AHEAD, Watch
 from surfacechem.solve.adapters.cantera_network import last_step
 from surfacechem.solve.adapters.dense_step import Guards, first_crossing
 from surfacechem.solve.contract import Array, Counters, Margin
@@ -44,6 +44,7 @@ class ReactorNet(cantera.ReactorNet):
         self._last_step = 0.0
         self._steps = 0
         self._fresh = True
+        self._started = -np.inf
         # What others take of an interface has to be evaluated with the multipliers that Cantera gives it in its turn.
         super().__init__(sorted(reactors, key=lambda reactor: not isinstance(reactor, InterfaceReactor)))
         self.interfaces += [reactor for reactor in reactors if isinstance(reactor, InterfaceReactor)]
@@ -77,7 +78,7 @@ class ReactorNet(cantera.ReactorNet):
             with self._guarded():
                 if self._watch.interfaces:
                     self._reach(goal, apply_limit)
-                else:
+                elif not self._there(goal):
                     super().advance(goal, apply_limit)
             self._arrive(float(self.time))
             if self.time >= t or self.time < goal:
@@ -89,7 +90,7 @@ class ReactorNet(cantera.ReactorNet):
         for interface in watch.interfaces:
             interface.scene.moments.until(goal, self.rtol)  # type: ignore[union-attr]
         start = np.array(self.get_state()) if apply_limit and np.any(self.advance_limits >= 0) else None
-        while self.time < goal:
+        while not self._there(goal):
             if self.time >= watch.known:
                 self._look(goal)
             event, now = watch.event, float(self.time)
@@ -102,6 +103,14 @@ class ReactorNet(cantera.ReactorNet):
             if event is not None and self.time >= event.t:
                 event.interface.jump(self.time, event.index)
                 self._anew(f"the event at t = {self.time:g} s")
+
+    def _there(self, goal: float) -> bool:
+        """Whether a time is reached: where the integration has just started within rounding of it, the clock alone goes
+        there, since CVODE takes no step as short.
+        """
+        if self.time == self._started and 0 < goal - self.time <= AHEAD * np.spacing(goal):
+            self.initial_time = self._started = goal
+        return bool(self.time >= goal)
 
     def _limited(self, now: float, end: float, start: Array) -> float:
         """The time in a step at which a variable has first changed by its advance limit; the end where none has.
@@ -137,7 +146,7 @@ class ReactorNet(cantera.ReactorNet):
             self._record(interface, self.time)
         self.reinitialize()
         self._watch.restart()
-        self._steps = 0
+        self._steps, self._started = 0, self.time
 
     def step(self) -> float:
         """Take one step of the integrator, or go to the next breakpoint where a step could pass it.
@@ -222,6 +231,8 @@ class ReactorNet(cantera.ReactorNet):
     def _watched_step(self, following: Sequence[float]) -> float:
         """To the end of the integrator's next step, or the event or breakpoint in it."""
         watch, ahead = self._watch, min(following, default=np.inf)
+        if self._there(ahead):
+            return self.advance(ahead)
         if self.time >= watch.known:
             with self._guarded():
                 self._look(min(ahead, self.time + LONGEST))
@@ -235,7 +246,7 @@ class ReactorNet(cantera.ReactorNet):
         return sorted({b for interface in self.interfaces for b in interface.scene.breakpoints if b > self.time})
 
     def _begin(self) -> None:
-        self._fresh = False
+        self._fresh, self._started = False, self.time
         self._refuse_strangers()
         for interface in self.interfaces:
             interface.begin_piece(self.time, self.rtol)

@@ -86,6 +86,7 @@ def test_no_breakpoint_is_stepped_over(pulse, stepwise):
         while net.time < 2:
             net.step()
     else:
+        net.advance(np.nextafter(1.0, 2.0))  # CVODE starts no step as short
         net.advance(2)
     assert {0.0, 1.0, 1.001} <= set(interface.dataset.time.values)
     assert interface["T"] == pytest.approx(300.5, rel=1e-10)

@@ -38,7 +38,7 @@ def compare(interface, solution, within):
 
 @pytest.mark.parametrize("name", CASES)
 def test_events_and_states_of_the_compiled_path(name):
-    solution = surfacechem.load(name, ["run.outputs=33"]).run(error="balances")
+    solution = surfacechem.load(name, ["run.outputs=41"]).run(error="balances")
     interface, net = network(name)
     for t in solution.dataset["time"].values[1:]:
         net.advance(float(t))
