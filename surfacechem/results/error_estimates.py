@@ -314,7 +314,7 @@ def computed(trajectory: Trajectory) -> dict[str, Array]:
 
 def sizes(trajectory: Trajectory, named: Collection[str] = ()) -> dict[str, Array]:
     """What errors of states are relative to, at each output: their value and what it changes by within the time that
-    that has passed, at most their largest value, but where it changes by itself in a moment; at the end, unless it is
+    has passed, at most their largest value, but where it changes by itself in a moment; at the end, unless it is
     that of physics, their value alone. Of profiles the least that counts, of what is ``named`` beside the states the
     largest value.
 

@@ -139,7 +139,7 @@ class ArrayRuns:
         if self.ramp is not None:
             segments = np.column_stack([np.zeros(len(own)), ends[own]])
         # Looks at the equations follow the length of a run; outputs are for what is kept of its course.
-        problem = self.problem.changed(times=times[0], record_steps=self.keeps_steps)
+        problem = self.problem.changed(times=times[0], record_steps=self.keeps_steps, picture=0.0)
         spacing = segments[:, -1] / self.run.samples
         batch = solve_arrays(problem, y0[own], table[own], spacing, peaks, segments, times)
         clear, columns = self._columns(Ends(batch, table[own], segments, times))

@@ -208,7 +208,7 @@ def _result(problem: Problem, batch: Any, i: int) -> Result:
     events, steps = batch.events[i, : counts[EVENTS]], batch.records[i, : counts[RECORDS]]
     inside, moments = batch.inside[i, : counts[INSIDE]], batch.inside_times[i, : counts[INSIDE]]
     if len(batch.counts) > 1:  # the room for the steps of many runs is not kept for those that they took
-        events, steps = events.copy(), steps.copy()
+        events, steps, inside, moments = events.copy(), steps.copy(), inside.copy(), moments.copy()
     return Result(
         problem=problem,
         status=_STATUSES[counts[END]],
