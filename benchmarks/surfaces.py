@@ -17,6 +17,7 @@ from surfacechem.contracts.terms import Shape
 from surfacechem.errors import InputError
 from surfacechem.laws.bonding import EquilibriumBonds
 from surfacechem.surfaces import nodes, patches
+from surfacechem.surfaces.inner_sums import table
 from surfacechem.surfaces.pair_laws import InversePower, LennardJonesPair
 from surfacechem.surfaces.pairwise import PairForces, interaction
 from surfacechem.surfaces.potential import CurvedSurfaces
@@ -41,6 +42,7 @@ def measured(shapes: Sequence[Shape], d: float, rtol: float) -> tuple[PairForces
     """The forces at a gap, and the least processor time of a few evaluations [ms]."""
     times = []
     for _ in range(REPEAT):
+        table.cache_clear()
         begin = time.process_time()
         found = interaction(Surface(shapes[0]), Surface(shapes[1], True, d), [LAW], rtol)
         times.append(time.process_time() - begin)
@@ -73,11 +75,13 @@ def rules() -> Iterator[tuple[str, float, str, float, int, float]]:
     usual = nodes.ORDERS
     for order in usual:
         # A rule that is asked for twice agrees with itself.
-        nodes.ORDERS = patches.ORDERS = (order, order)
+        nodes.ORDERS = patches.ORDERS = (order,) * len(usual)
+        table.cache_clear()
         found, cost = measured(ROUND["sphere, plane"], 0.01, 1e-15)
         error = abs(float(found.energy[0]) / sphere_over_plane(0.01) - 1)
         yield "sphere, plane", 0.01, f"{order} points", error, found.pairs, cost
     nodes.ORDERS = patches.ORDERS = usual
+    table.cache_clear()
 
 
 CURVES: dict[str, tuple[tuple[Shape, Shape], str, tuple[float, ...]]] = {
@@ -104,6 +108,7 @@ def curves() -> Iterator[tuple[str, str, str, float]]:
         for accuracy in accuracies:
             both = CurvedSurfaces(shapes=shapes, approach=(1e-9, 2e-8), accuracy=accuracy, **laws)
             parts = [part for law in both.pairs for _, part in both.parts(law)]
+            table.cache_clear()
             begin = time.process_time()
             found = both.integrated(parts)  # not what the cache keeps
             yield name, f"{accuracy:.0e}", f"{max(curve.error for curve in found):.1e}", time.process_time() - begin

@@ -47,12 +47,10 @@ class Circles:
     area: Array
 
     def profile(self, law: Callable[[Array], Array]) -> Array:
-        """Sums (n, 3) over the circles: energy, strength of what acts along the arms, and that times how low they are;
-        what points across the normal cancels.
-        """
+        """Sums (n, 2) over the circles: energy and force along the normal; what points across that cancels."""
         psi, slope = np.moveaxis(law(self.r), -1, 0)
-        strength = -slope * self.area / self.r
-        return np.stack([(psi * self.area).sum(-1), strength.sum(-1), (strength * self.down).sum(-1)], axis=-1)
+        push = -slope * self.area / self.r * (self.gap[:, None] + self.down)
+        return np.stack([(psi * self.area).sum(-1), push.sum(-1)], axis=-1)
 
 
 @lru_cache(maxsize=64)
@@ -120,16 +118,12 @@ def _sums_of(
         nodes = tensor_grid(surface, x, near, reach, level)
         return [nodes.sums(kernel(law)) for law in laws], nodes.area.size
     found, pairs = tabulated(RoundSums(surface.shape, tuple(laws), extent, farther, level, rtol), near.gap)
-    sums = []
-    for energy, whole, lower in np.split(found.T, len(laws)):
-        push = (whole * near.gap + lower)[:, None] * near.normal
-        sums.append((energy, push, whole[:, None] * near.point - lower[:, None] * near.normal))
-    return sums, pairs
+    return [(energy, push[:, None] * near.normal) for energy, push in np.split(found.T, len(laws))], pairs
 
 
 @dataclass(frozen=True)
 class RoundSums:
-    """Sums (n, 3 laws) around the feet of points at gaps (n,) on a shape whose points are all alike, which do not
+    """Sums (n, 2 laws) around the feet of points at gaps (n,) on a shape whose points are all alike, which do not
     depend on where that is: circles up to where laws end or, where they do not, so many times farther than the gap.
     """
 
@@ -148,7 +142,7 @@ class RoundSums:
 
 @lru_cache(maxsize=4096)
 def table(profile: RoundSums, low: float, high: float) -> tuple[Array | None, int]:
-    """Coefficients of Chebyshev's polynomials (24, 3 laws) of a logarithm of the gap between two of them, none where
+    """Coefficients of Chebyshev's polynomials (24, 2 laws) of a logarithm of the gap between two of them, none where
     they miss what is between, and the number of pairs that they take.
     """
     at = (low + high) / 2 + (high - low) / 2 * np.concatenate([CHEBYSHEV, BETWEEN])

@@ -33,33 +33,33 @@ PIECE = 2.0
 Kernel = Callable[[Array], Array]
 """Energy of a law and its slope (n, 2) at n distances."""
 
-Sums = tuple[Array, Array, Array]
-"""For n outer points: energy (n,), force on them (n, 3), and inner points weighted by what acts on each (n, 3)."""
+Sums = tuple[Array, Array]
+"""For n outer points: energy (n,), and force on them (n, 3)."""
 
 
 @dataclass(frozen=True)
 class Grid:
     """Points (k, 3) of the inner surface with their areas (k,), and for which of the n points (n, 3) of the outer one
-    each is.
+    each is; where they are as many for each, (n, k / n, 3) and (n, k / n).
     """
 
     outer: Array
-    owner: Indices
+    owner: Indices | None
     x: Array
     area: Array
 
     def sums(self, law: Kernel) -> Sums:
         """Sums over the inner points of a law of the distance."""
-        away = self.outer[self.owner] - self.x
-        r = np.sqrt(np.einsum("kc,kc->k", away, away))
+        owner = self.owner
+        away = (self.outer[:, None] if owner is None else self.outer[owner]) - self.x
+        r = np.sqrt(np.einsum("...c,...c", away, away))
         psi, slope = np.moveaxis(law(r), -1, 0)
         strength = -slope * self.area / r
-        push, theirs = (np.stack([self.total(strength * arms[:, c]) for c in range(3)], -1) for arms in (away, self.x))
-        return self.total(psi * self.area), push, theirs
-
-    def total(self, values: Array) -> Array:
-        """Sums (n,) of values (k,) for each outer point."""
-        return np.asarray(np.bincount(self.owner, values, len(self.outer)), dtype=float)
+        if owner is None:
+            return np.einsum("nk,nk->n", psi, self.area), np.einsum("nk,nkc->nc", strength, away)
+        parts = np.concatenate([(psi * self.area)[:, None], strength[:, None] * away], axis=-1)
+        energy, *push = (np.asarray(np.bincount(owner, part, len(self.outer)), np.float64) for part in parts.T)
+        return energy, np.stack(push, axis=-1)
 
 
 def is_round(shape: Shape) -> bool:
@@ -152,10 +152,8 @@ def tensor_grid(surface: Surface, x: Array, found: Projection, reach: Array, lev
         axes.append((at[:, None] + scale[:, None] * np.sinh(t), w * scale[:, None] * np.cosh(t)))
     (u, du), (v, dv) = axes
     u, v = np.broadcast_arrays(u[:, :, None], v[:, None, :])
-    points, x_u, x_v = surface.derivatives(np.stack([u, v], axis=-1).reshape(len(x), -1, 2), FIRST)
-    E, F, G = (np.einsum("nkc,nkc->nk", *pair) for pair in ((x_u, x_u), (x_u, x_v), (x_v, x_v)))
-    areas = np.sqrt(E * G - F**2) * (du[:, :, None] * dv[:, None, :]).reshape(len(x), -1)
-    return Grid(x, np.repeat(np.arange(len(x)), areas.shape[1]), points.reshape(-1, 3), areas.ravel())
+    points, areas = surface.elements(np.stack([u, v], axis=-1).reshape(len(x), -1, 2))
+    return Grid(x, None, points, areas * (du[:, :, None] * dv[:, None, :]).reshape(len(x), -1))
 
 
 def _within(surface: Surface, k: int, tangent: Array, distance: Array) -> Array:

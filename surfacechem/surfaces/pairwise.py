@@ -39,8 +39,8 @@ FAR = 1e6
 POINTS = 8
 """Points at which tractions are summed together where the other surface has no circles."""
 
-COUNT = 13
-"""Energy, and three components of two forces and two moments."""
+COUNT = 7
+"""Energy, and three components of force and moment."""
 
 
 @dataclass(frozen=True)
@@ -101,11 +101,9 @@ def interaction(
     found, error, pairs = integral(
         patches, integrand, lambda found: _sizes(found, gap, arms), left, budget or Budget(rtol)
     )
-    energy, on_outer, on_inner, moment, opposite = np.split(found, [1, 4, 7, 10], axis=-1)
-    forces, moments = (on_outer, on_inner), (moment, opposite)
-    if swapped:
-        forces, moments = forces[::-1], moments[::-1]
-    return PairForces(energy[:, 0], *forces, *moments, error + rounded, gap, near.count, pairs)
+    # Each pair of points has opposite forces on the line through both, and no moment.
+    _, force, moment = np.split(-found if swapped else found, [1, 4], axis=-1)
+    return PairForces(found[:, 0], force, -force, moment, -moment, error + rounded, gap, near.count, pairs)
 
 
 def _cut_patches(outer: Surface, inner: Surface, found: Sequence[Extent], rtol: float) -> tuple[Patches, NearPlaces]:
@@ -140,7 +138,7 @@ def pair_traction(x: Array, normals: Array, inner: Surface, laws: Sequence[PairE
     for begin in range(0, len(x), together):
         part = slice(begin, begin + together)
         sums, _ = inner_sums(inner, x[part], laws, LAST, rtol)
-        for law, (_, push, _) in zip(laws, sums, strict=True):
+        for law, (_, push) in zip(laws, sums, strict=True):
             found[part] += law.n_1 * law.n_2 * np.einsum("nc,nc->n", push, normals[part])
     return found
 
@@ -210,13 +208,11 @@ def length(lower: Surface, upper: Surface) -> float:
 
 
 def _sums(x: Array, inner: Surface, laws: Sequence[PairEnergy], level: int, rtol: float) -> tuple[Array, int]:
-    """Integrals (n, laws, 13) over the inner surface for points (n, 3), and the number of pairs."""
+    """Integrals (n, laws, 7) over the inner surface for points (n, 3), and the number of pairs."""
     sums, pairs = inner_sums(inner, x, laws, level, rtol)
     found = np.empty((len(x), len(laws), COUNT))
-    for j, (energy, push, theirs) in enumerate(sums):
-        found[:, j, 0], found[:, j, 1:4], found[:, j, 4:7] = energy, push, -push
-        # The moment of -strength * away at the other end is x2 x away = x2 x x1, the same for all but the arm.
-        found[:, j, 7:10], found[:, j, 10:13] = cross(x, push), cross(x, theirs)
+    for j, (energy, push) in enumerate(sums):
+        found[:, j, 0], found[:, j, 1:4], found[:, j, 4:] = energy, push, cross(x, push)
     return found, pairs
 
 
@@ -226,7 +222,7 @@ def _sizes(found: Array, gap: float, reach: Array) -> Array:
     """
     force = np.maximum(np.linalg.norm(found[:, 1:4], axis=-1, keepdims=True), TINY)
     # What is nowhere anything has the size of the smallest number.
-    turning = np.linalg.norm(found[:, 7:10], axis=-1, keepdims=True)
+    turning = np.linalg.norm(found[:, 4:], axis=-1, keepdims=True)
     moment = np.maximum(turning, force * gap)
     energy = np.maximum(np.abs(found[:, :1]), force * reach)
-    return np.concatenate([energy, np.repeat(force, 6, axis=-1), np.repeat(moment, 6, axis=-1)], axis=-1)
+    return np.concatenate([energy, np.repeat(force, 3, axis=-1), np.repeat(moment, 3, axis=-1)], axis=-1)

@@ -105,8 +105,8 @@ class Patches:
 
     def points(self, at: Array, lengths: Array) -> tuple[Array, Array]:
         """Points (n, k, 3) at parameters (n, ..., 2), and their areas (n, k) from products of lengths (n, ...)."""
-        x, vectors = self.surface.elements(at.reshape(len(at), -1, 2))
-        return x, np.linalg.norm(vectors, axis=-1) * lengths.reshape(len(at), -1)
+        x, areas = self.surface.elements(at.reshape(len(at), -1, 2))
+        return x, areas * lengths.reshape(len(at), -1)
 
     def rule(self, k: int, order: int) -> tuple[Array, Array]:
         """Nodes and weights (n, m) along a direction."""

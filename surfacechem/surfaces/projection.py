@@ -42,20 +42,26 @@ POLE = GONE
 FIRST, SECOND, THIRD = 3, 6, 10
 """Numbers of derivatives up to an order: x; x_u, x_v; x_uu, x_uv, x_vv; and four of third order."""
 
+AREA = 0
+"""Asks for points and areas per parameters alone."""
+
 
 @lru_cache(maxsize=64)
 def _compiled(shape: Shape, count: int) -> Callable[[Array], Array]:
-    """The point of a shape and its derivatives as machine code."""
+    """The point of a shape and its derivatives, or its area per parameters, as machine code."""
     import symengine
 
     u, v = symengine.symbols("u v")
-    orders = [(i - j, j) for i in range(4) for j in range(i + 1)][:count]
-    formulas = []
+    orders = [(i - j, j) for i in range(4) for j in range(i + 1)][: count or FIRST]
+    formulas: list[Any] = []
     for i, j in orders:
         for part in map(symengine.sympify, shape.point(u, v)):
             for symbol in (*[u] * i, *[v] * j):
                 part = symengine.diff(part, symbol)
             formulas.append(part)
+    if count == AREA:
+        across = cross(*np.array(formulas[3:]).reshape(2, 3))
+        formulas = [*formulas[:3], symengine.sqrt(sum(part**2 for part in across))]
     compiled: Callable[[Array], Array] = symengine.Lambdify([u, v], formulas, cse=True, backend="llvm")
     return compiled
 
@@ -152,10 +158,12 @@ class Surface:
         return 1 if self.shape.foot is not None else SEARCH
 
     def elements(self, at: Array) -> tuple[Array, Array]:
-        """Points (..., 3) and vectors of the area per parameters (..., 3), which point out of the body."""
-        x, x_u, x_v = self.derivatives(at, FIRST)
-        outward = cross(x_u, x_v)
-        return x, -outward if self.upper else outward
+        """Points (..., 3) and areas per parameters (...)."""
+        if self.shape.derivatives is not None:
+            x, x_u, x_v = self.derivatives(at, FIRST)
+            return x, np.linalg.norm(cross(x_u, x_v), axis=-1)
+        table = _compiled(self.shape, AREA)(np.ascontiguousarray(at)).reshape(*at.shape[:-1], 4)
+        return table[..., :3] @ self.axes.T + [0.0, 0.0, self.approach], table[..., 3]
 
     def normals(self, derivatives: Array) -> Array:
         """Unit normals (..., 3) out of the body."""

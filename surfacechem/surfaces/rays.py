@@ -67,11 +67,10 @@ def has_pole(surface: Surface) -> bool:
 def pole_free(surface: Surface, w: Array) -> tuple[Array, Array]:
     """Points (..., 3) at coordinates (..., 2), and areas per area of these (...)."""
     if not has_pole(surface):
-        x, vectors = surface.elements(w)
-        return x, np.linalg.norm(vectors, axis=-1)
+        return surface.elements(w)
     u = np.maximum(np.hypot(w[..., 0], w[..., 1]), POLE)
-    x, vectors = surface.elements(np.stack([u, np.arctan2(w[..., 1], w[..., 0])], axis=-1))
-    return x, np.linalg.norm(vectors, axis=-1) / u
+    x, areas = surface.elements(np.stack([u, np.arctan2(w[..., 1], w[..., 0])], axis=-1))
+    return x, areas / u
 
 
 def ray_grid(surface: Surface, x: Array, near: Projection, reach: Array, extent: Extent, level: int) -> Grid:
