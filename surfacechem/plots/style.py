@@ -136,7 +136,8 @@ def opened(data: xarray.Dataset | str | Path) -> xarray.Dataset:
         return store.opened(path)
 
     def load() -> xarray.Dataset:
-        with xarray.open_dataset(path, engine="netcdf4") as file:
+        # Indexes, by which nothing is looked for here, would import Dask and Pint.
+        with xarray.open_dataset(path, engine="netcdf4", create_default_indexes=False) as file:
             return file.load()
 
     return reading(path, load)
