@@ -77,7 +77,7 @@ def rules() -> Iterator[tuple[str, float, str, float, int, float]]:
         # A rule that is asked for twice agrees with itself.
         nodes.ORDERS = patches.ORDERS = (order,) * len(usual)
         table.cache_clear()
-        found, cost = measured(ROUND["sphere, plane"], 0.01, 1e-15)
+        found, cost = measured(ROUND["sphere, plane"], 0.01, 1e-12)
         error = abs(float(found.energy[0]) / sphere_over_plane(0.01) - 1)
         yield "sphere, plane", 0.01, f"{order} points", error, found.pairs, cost
     nodes.ORDERS = patches.ORDERS = usual

@@ -83,6 +83,9 @@ class LevelPatches(Patches):
         alike = np.mean((heights > 0) == (over > 0), axis=(1, 2))
         apart = np.where(edges & edges[best, None], np.arange(len(edges)) != best[:, None], (alike > 0) & (alike < 1))
         crossed = np.any((below * above > 0) & apart & (edges | edges[best, None]), axis=1)
+        # Along its direction a line of nodes passes a level once.
+        steps = np.where(along[:, None, None] == 0, np.diff(over[..., 0], axis=1).mT, np.diff(over[..., 0], axis=2))
+        crossed |= (share > 0) & np.any((steps.min(axis=2) < -self.noise) & (steps.max(axis=2) > self.noise), axis=1)
         crossed &= near.gap.min(axis=(1, 2)) < np.linalg.norm(x[:, -1, -1] - x[:, 0, 0], axis=-1)
         return replace(self, level=best, along=np.where(share > 0, along, -1), share=share, crossed=crossed)
 
