@@ -192,6 +192,9 @@ class CurvedSurfaces(Potential):
     def integrated(self, parts: Sequence[PairEnergy]) -> list[ApproachEnergy]:
         """Those energies from their integrals."""
         self._refuse_jumps()
+        if self.heat_laws:
+            # A conductance that has no end is refused before any force is integrated.
+            self.at_approach(self.approach[0], self._conducts)
         # Errors of the samples must not look like what a polynomial misses.
         rtol, finer = self.accuracy, max(self.accuracy / 64, ROUNDING)
 
@@ -226,6 +229,11 @@ class CurvedSurfaces(Potential):
             energy, force, _ = of_gap(d)
             floor = max(floor[0], NEGLIGIBLE * abs(energy)), max(floor[1], NEGLIGIBLE * abs(force))
         return [*found, fitted(of_gap, *self.approach, rtol, levels, floor)]
+
+    def _conducts(self) -> Contact:
+        """What the conductances give at the least approach, by and large."""
+        heat = [density(law) for law in self.heat_laws]
+        return over_gap(*self.surfaces(self.approach[0]), [], bends(self.heat_laws), heat, NEGLIGIBLE)
 
     def _refuse_jumps(self) -> None:
         """InputError where the energy of a law jumps, so that no force is its slope."""
