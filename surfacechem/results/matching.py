@@ -7,7 +7,8 @@ satisfy the assembled equations.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from functools import lru_cache, partial
 
 import numpy as np
@@ -51,6 +52,16 @@ order, 2e-16, and rounding 1e-12.
 """
 
 
+@contextmanager
+def _in_range() -> Iterator[None]:
+    """What overflows belongs to another scene."""
+    try:
+        yield
+    except ArithmeticError:
+        raise InputError("its formulas leave the range of numbers") from None
+
+
+@_in_range()
 def exact_values(
     name: str,
     options: Mapping[str, float],

@@ -66,7 +66,7 @@ class Folds:
         Equilibrium is lost like a square root in time, so that a run ends a little before the fold. Where the stiffness
         rises as the interface slides on, only time leads to the fold, and nothing pushes the interface there.
         """
-        if index not in self.items:
+        if index not in self.items or not len(self.equilibria.free(point)):
             return None
         falls, warming, way = self._shape(index, point)
         direction, onward = float(np.sign(falls @ way.pulls)), self.equilibria.onward_along(point, way)

@@ -225,6 +225,13 @@ def test_an_exact_solution_with_parameters_of_its_own_is_of_the_scene_as_written
         assert same.accuracy.source == "exact solution overdamped-pull-off"
 
 
+def test_an_exact_solution_that_overflows_gives_way_to_a_second_run():
+    changes = {"interface.bonding.bell.k_off": 1e12}
+    accuracy = surfacechem.load("adhesion-cluster").run(changes).accuracy
+    assert accuracy.source.startswith("estimate")
+    assert accuracy.source.endswith("its formulas leave the range of numbers")
+
+
 def test_a_sweep_of_which_no_error_is_known_says_so(tmp_path):
     """Runs that end before their second output have the error of their end; without it that of a sweep is unknown."""
     swept = surfacechem.load("cooling-to-zero", {"run": {"until": "1e5 s", "outputs": 3}, "reference": ""}).sweep(

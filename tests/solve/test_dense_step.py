@@ -76,6 +76,21 @@ def test_what_has_just_fired_has_to_leave_zero_first():
     assert t == pytest.approx(1.0, rel=1e-14)
 
 
+def test_a_guard_too_small_for_a_parabola_has_no_zero():
+    guards = Guards.of([Margin.stop()], lambda t, _: np.array([5e-324 * (1.0 + abs(t - 0.5) * 100.0)]))
+    guards.start(np.array([5e-324 * 51.0]))
+    assert first_crossing(DenseStep(0.0, 1.0, lambda _: np.zeros(0)), guards, np.ones(1, bool), 0.0) == (1.0, [])
+
+
+def test_a_guard_that_jumps_right_after_no_time_is_found_there():
+    jump, nothing = 1e-300, np.zeros(0)
+    guards = Guards.of([Margin.stop()], lambda t, _: np.array([1.0 if t < jump else -1e-57]))
+    guards.start(np.array([1.0]))
+    t, fired = first_crossing(DenseStep(0.0, 1e-15, lambda _: nothing), guards, np.ones(1, bool), 0.0)
+    assert fired == [0]
+    assert t == pytest.approx(jump, rel=1e-14)
+
+
 @pytest.mark.parametrize(
     ("values", "far"),
     [

@@ -14,6 +14,9 @@ from surfacechem.tolerances import DIGITS, NOISE, SQRT_EPS, TINY
 POINTS = 16
 """Points of a step at which guards are looked at; zeros in pairs between two of them show in a lowest point."""
 
+HALVINGS = 10_000
+"""Most steps to a zero: a guard that jumps beside the start of a step at no time takes a thousand halvings."""
+
 
 @dataclass(frozen=True)
 class DenseStep:
@@ -145,7 +148,7 @@ def _zero(value: Callable[[float], float], low: float, high: float) -> float:
     at_low, at_high = value(low), value(high)
     if not at_low > 0.0 > at_high:
         return high if at_high == 0.0 else float(np.nextafter(low, high))
-    return float(brentq(value, low, high, xtol=TINY, rtol=DIGITS))
+    return float(brentq(value, low, high, xtol=TINY, rtol=DIGITS, maxiter=HALVINGS))
 
 
 def _may_dip(guards: Guards, points: Sequence[tuple[float, Array]]) -> NDArray[np.intp]:
@@ -165,7 +168,8 @@ def _bottom(value: Callable[[float], float], a: float, b: float, c: float) -> fl
     at_a, at_b, at_c = value(a), value(b), value(c)
     while at_b > 0.0 and c - a > SQRT_EPS * (abs(b) + (c - a)):
         left, right = (b - a) * (at_b - at_c), (b - c) * (at_b - at_a)
-        x = b - 0.5 * ((b - a) * left - (b - c) * right) / (left - right)
+        bend = left - right  # none where the values are too small for one
+        x = b - 0.5 * ((b - a) * left - (b - c) * right) / bend if bend else b
         if not (a < x < c and abs(x - b) > 0.01 * (c - a)):  # no progress: into the larger part
             x = b + 0.1 * (c - b) if c - b > b - a else b - 0.1 * (b - a)
         at_x = value(x)
