@@ -364,9 +364,20 @@ def swinging_mass(rng: np.random.Generator) -> NarrowScene:
     return _swinging(plates("swinging mass", law, loading, exponent, end, scale, rest), motion)
 
 
+def swinging_spots(rng: np.random.Generator) -> NarrowScene:
+    """A mass that swings close to touch, where contact spots hold for little."""
+    end, width = duration(rng), narrow(rng) ** 2
+    motion, loading, rest = _swing(rng, end, 1e-4 * width * rng.random())
+    decay = 1e3 / width
+    factor, exponent = scaled(rng, lambda t: np.exp(-decay * motion.value(t)), end, around(motion, [], end))
+    law = spots(EXPOSURE * factor, decay)
+    scene = plates("swinging spots", law, loading, exponent, end, f"{width:.1e} of the travel", rest)
+    return _swinging(scene, motion)
+
+
 FAMILIES = [
     *(gap_table, elastic_pressure_table, tapping, stribeck, film),
-    *(attachment, bell, zone, activated, swinging_mass),
+    *(attachment, bell, zone, activated, swinging_mass, swinging_spots),
 ]
 
 

@@ -138,11 +138,6 @@ class GasGap(HeatTransfer):
     Y: float = parameter("m", "mean gap at touch, left by the roughness", default=0.0, at_least=0)
 
     @property
-    def peaks(self) -> Mapping[str, float]:
-        """Touch, where the gas is thinnest."""
-        return {"g_n": 0.0}
-
-    @property
     def positive(self) -> tuple[str, ...]:  # type: ignore[override]
         """A gap without roughness and jumps conducts without bound as it closes."""
         return () if self.M or self.Y else ("g_n",)

@@ -244,6 +244,14 @@ def test_dampers_beside_friction_that_knows_directions():
     assert np.all(solved["D_anisotropic_coulomb"] >= 0)
 
 
+def test_dampers_relax_each_on_its_own_where_nothing_presses():
+    times, k, c = np.linspace(0, 1, 5), (K, 3 * K), (1e7, 1e8)
+    mounts = [Mounting(k=stiff, c_g=damped) for stiff, damped in zip(k, c, strict=True)]
+    solved = closed(scene([Coulomb(mu=0.3)], mounts[0], None, mounts[1], p=0.0, w_t=1e-3, w_t2=-2e-3), times)
+    close(solved["u_t"], 1e-3 * (1 - np.exp(-k[0] / c[0] * times)))
+    close(solved["u_t2"], -2e-3 * (1 - np.exp(-k[1] / c[1] * times)))
+
+
 def test_rails_need_a_mass():
     mount, pull = Mounting(k=K, c_b=1e5), {"w_t": Ramp(rate=1e-3), "w_t2": Ramp(rate=1e-3)}
     model = Model(assemble(scene([AnisotropicCoulomb(mu_1=0.2, mu_2=0.0)], mount, p=P, **pull)))
