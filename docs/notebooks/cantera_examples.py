@@ -21,8 +21,8 @@ folder = Path(tempfile.mkdtemp())
 # ## A packed bed: `surf_pfr_chain`
 #
 # Partial oxidation of methane on platinum at 800 °C. The bed is a chain of stirred reactors, each fed by the one
-# before; since nothing runs upstream, one after the other is integrated to its steady state. The catalyst is Cantera's
-# `ReactorSurface`, or a case beside a `ReactingGas`.
+# before; since nothing runs upstream, one after the other is integrated for three seconds, to its steady state. The
+# catalyst is Cantera's `ReactorSurface`, or a case beside a `ReactingGas`.
 
 # %%
 T, LENGTH, COUNT = 1073.15, 3e-3, 7
@@ -64,7 +64,7 @@ def bed(ours):
         upstream.phase.TDY = gas.phase.TDY
         upstream.syncState()
         net.reinitialize()
-        net.advance(n + 1.0)
+        net.advance(3.0 * (n + 1))
         found.append(gas.phase["CH4", "H2", "CO"].X)
     return np.array(found)
 
