@@ -33,6 +33,15 @@ def test_a_traction_that_touches_the_limit_moves_nothing(amplitude, mean, freque
     assert np.all(trajectory.everywhere["u_t"] == 0)
 
 
+@pytest.mark.parametrize("name", ["lsoda", "ida"])
+def test_what_nothing_holds_slides_at_once(name):
+    """The limit is zero at the start, and every traction beyond it."""
+    loading = {"p": Hold(level=0.0), "F_t": Ramp(rate=2.0)}
+    trajectory = solve(together([], [Coulomb(mu=0.3)], loading, tangential=Mounting(m=5.0)), 3.0, solver=name)
+    assert trajectory.events == ["slip forward"]
+    np.testing.assert_allclose(trajectory["v"], 2.0 / 5.0 * trajectory.result.times**2 / 2, rtol=1e-6)
+
+
 def elastic(amplitude, rtol):
     """Elastic sticking in series with a spring as stiff: the elastic gap is half of what is imposed."""
     loading = {"p": Hold(level=100.0), "w_t": Harmonic(amplitude=amplitude, frequency=3.0)}

@@ -49,14 +49,17 @@ class Guards:
 
     A side is 1 or -1; it is 0 for a guard that starts at zero or has just fired, until it has left zero. ``largest`` is
     the largest size of each so far, in proportion to which it is zero; ``now`` are the values that were met last.
+    ``due`` are limits that started at zero or beyond and have not left there: they act where they fall.
     """
 
     values: Callable[[float, Array], Array]
     directions: Array
     strict: NDArray[np.bool_]
+    limits: NDArray[np.bool_]
     largest: Array
     sides: Array = field(init=False)
     now: Array = field(init=False)
+    due: NDArray[np.bool_] = field(init=False)
 
     @classmethod
     def of(
@@ -65,7 +68,8 @@ class Guards:
         """Those of a problem, which may have been ``seen`` as large as this before."""
         directions = np.array([float(kind.direction) for kind in kinds])
         strict = np.array([kind.strict for kind in kinds], dtype=bool)
-        return cls(values, directions, strict, np.zeros(len(kinds)) if seen is None else seen.copy())
+        limits = np.array([kind.terminal and kind.direction <= 0 for kind in kinds], dtype=bool)
+        return cls(values, directions, strict, limits, np.zeros(len(kinds)) if seen is None else seen.copy())
 
     def start(self, now: Array, fired: Iterable[int] = ()) -> None:
         """Begin on the sides of these values, but for what has just fired."""
@@ -73,18 +77,28 @@ class Guards:
         self.sides = np.sign(now)
         self.sides[list(fired)] = 0.0
         self.now = now
+        self.due = self.limits & np.isfinite(now) & (now <= NOISE * self.largest)
+        self.due[list(fired)] = False
 
     def follow(self, now: Array) -> None:
         """Go on to these values, across none of which a guard has fired."""
         self.largest = np.fmax(self.largest, np.abs(now))
         left = np.abs(now) > np.where((self.sides != 0.0) & ~self.strict, 0.0, NOISE * self.largest)
         self.sides = np.where(left, np.sign(now), self.sides)
+        self.due &= np.abs(self._change_of_due(now)) <= NOISE * self.largest
         self.now = now
 
+    def _change_of_due(self, now: Array) -> Array:
+        """By how much these values differ from the last where a guard is due; others may be infinite."""
+        return np.subtract(now, self.now, out=np.zeros_like(now), where=self.due)
+
     def crossed(self, now: Array) -> NDArray[np.bool_]:
-        """Which of these values lie across zero in a direction that counts; strict ones by more than their rounding."""
+        """Which of these values lie across zero in a direction that counts, strict ones by more than their rounding, or
+        fall where they are due.
+        """
         across = np.where(self.strict, now < -NOISE * self.largest, now * self.sides <= 0.0)
-        return across & (self.sides != 0.0) & (self.sides * self.directions <= 0.0)
+        across &= (self.sides != 0.0) & (self.sides * self.directions <= 0.0)
+        return np.asarray(across | (self.due & (self._change_of_due(now) < -NOISE * self.largest)))
 
     def far(self, values: Array, active: NDArray[np.bool_]) -> int:
         """Number of first steps in which no guard changes as much as it is away from zero; all have then followed them.
@@ -97,7 +111,7 @@ class Guards:
         values = np.concatenate((starts[:, None], values), axis=1)
         heights = values * self.sides
         lowest, highest = heights.min(axis=1), heights.max(axis=1)
-        clear = (lowest > highest - lowest) | ~np.any(values, axis=1)
+        clear = ((lowest > highest - lowest) & ~self.due) | ~np.any(values, axis=1)
         near = np.flatnonzero(~clear.all(axis=1))
         count = int(near[0]) if len(near) else len(values)
         if count:
@@ -131,7 +145,8 @@ def first_crossing(
         points.append((t, at(t)))
         before, now = points[-2][0], points[-1][1]
         zeros = dips(points[-3:]) if len(points) > 2 else {}
-        zeros |= {i: _zero(one(i), before, t) for i in np.flatnonzero(guards.crossed(now) & active).tolist()}
+        across = np.flatnonzero(guards.crossed(now) & active).tolist()
+        zeros |= {i: before if guards.due[i] else _zero(one(i), before, t) for i in across}
         if zeros:
             # Another guard may have crossed and come back in the same interval: it is still rising at its end.
             near = t - SQRT_EPS * (step.end - step.start)

@@ -217,9 +217,10 @@ class _Run:
         fired: list[int] = []
         while self.t < end:
             start = self.t
-            self.y, self.ydot = self.view.complete(start, self.y[self.view.differential])
-            if not np.all(np.isfinite(self.y)):
+            y, ydot = self.view.complete(start, self.y[self.view.differential])
+            if not np.all(np.isfinite(y)):
                 raise NoStateError
+            self.y, self.ydot = y, ydot
             self.margins = self.view.margins(start, self.y, self.ydot)
             self.ledger_rates = self.view.ledger_rates(start, self.y, self.ydot)
             self.guards.start(self.margins, fired)
