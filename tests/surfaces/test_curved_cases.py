@@ -80,7 +80,7 @@ def test_a_prescribed_gap_bears_the_force_in_newtons(tmp_path, monkeypatch, evol
     assert STAND_IN not in found
 
 
-@pytest.mark.parametrize("rtol", [1e-2, 1e-6])
+@pytest.mark.parametrize("rtol", every(2, [1e-2, 1e-6]))
 def test_the_error_of_a_run_holds_that_of_its_integrals(tmp_path, rtol):
     held = "mechanics: {normal: {k: 5 N/m}}\nloading: {w_n: {ramp: {start: 6 nm, rate: -4 mm/s}}}\n"
     path = tmp_path / "case.yaml"
@@ -104,7 +104,7 @@ def test_a_quasi_static_gap_is_where_spring_and_force_balance(tmp_path):
         assert g == pytest.approx(exact, rel=1e-8)
 
 
-@pytest.mark.parametrize(("m", "c"), every(2, [(2e-15, 0.0), (2e-15, 1e-9), (0.0, 1e-9)]))
+@pytest.mark.parametrize(("m", "c"), every(3, [(2e-15, 1e-9), (2e-15, 0.0), (0.0, 1e-9)]))
 def test_a_mass_or_a_damper_moves_as_integrated_by_itself(tmp_path, m, c):
     holds = ", ".join(f"{name}: {value} {unit}" for name, value, unit in (("m", m, "kg"), ("c_g", c, "N s/m")) if value)
     text = f"mechanics: {{normal: {{k: 0.5 N/m, {holds}}}}}\nloading: {{w_n: 5 nm}}\ninitial: {{T: 300 K, g_n: 4 nm}}\n"
@@ -134,7 +134,7 @@ def test_a_dead_load_holds_a_sphere_where_the_force_is_its_own(tmp_path, monkeyp
         assert g == pytest.approx(exact, rel=1e-8)
 
 
-@pytest.mark.parametrize(("m", "c"), [(2e-15, 0.0), (0.0, 1e-6)])
+@pytest.mark.parametrize(("m", "c"), every(2, [(0.0, 1e-6), (2e-15, 0.0)]))
 def test_a_dead_load_moves_a_sphere_as_integrated_by_itself(tmp_path, monkeypatch, m, c):
     monkeypatch.setitem(globals(), "SCENE", WALL)
     holds = "m: 2e-15 kg" if m else "c_g: 1e-6 N s/m"
@@ -312,14 +312,14 @@ def test_bonds_that_fade_are_integrated_where_they_still_count():
     """Over a sphere the force is 2 pi R times the energy between flats; far out that is rounding, and no jump."""
     R, law = 1e-6, EquilibriumBonds(N=1e16, K=50.0, k_b=1e-3, T=300.0)
     pair = CurvedSurfaces(
-        shapes=(Sphere(R=R), Plane()), gap_laws=[law], approach=(1e-9, 6e-8), accuracy=1e-4, place=Place(path="surface")
+        shapes=(Sphere(R=R), Plane()), gap_laws=[law], approach=(1e-9, 6e-8), accuracy=1e-3, place=Place(path="surface")
     )
     found = symengine.Lambdify([G], [derivative(pair.energy(G), G)])
     flats = symengine.Lambdify([G], [law.energy(G)])
     gaps = np.geomspace(1e-9, 6e-8, 500)
     exact = 2 * np.pi * R * (flats(gaps + 2 * R) - flats(gaps))
     off = np.abs(found(gaps[:, None])[:, 0] - exact).max() / exact.max()
-    assert off < pair.error < 1e-4
+    assert off < pair.error < 1e-3
     assert pair.strongest == pytest.approx(gaps[np.argmax(exact)], rel=0.01)
 
 
