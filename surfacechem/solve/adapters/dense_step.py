@@ -93,12 +93,13 @@ class Guards:
         return np.subtract(now, self.now, out=np.zeros_like(now), where=self.due)
 
     def crossed(self, now: Array) -> NDArray[np.bool_]:
-        """Which of these values lie across zero in a direction that counts, strict ones by more than their rounding, or
-        fall where they are due.
-        """
+        """Which of these values lie across zero in a direction that counts; strict ones by more than their rounding."""
         across = np.where(self.strict, now < -NOISE * self.largest, now * self.sides <= 0.0)
-        across &= (self.sides != 0.0) & (self.sides * self.directions <= 0.0)
-        return np.asarray(across | (self.due & (self._change_of_due(now) < -NOISE * self.largest)))
+        return across & (self.sides != 0.0) & (self.sides * self.directions <= 0.0)
+
+    def fallen(self, now: Array) -> NDArray[np.bool_]:
+        """Which guards are due and have fallen to these values."""
+        return self.due & (self._change_of_due(now) < -NOISE * self.largest)
 
     def far(self, values: Array, active: NDArray[np.bool_]) -> int:
         """Number of first steps in which no guard changes as much as it is away from zero; all have then followed them.
@@ -140,13 +141,17 @@ def first_crossing(
         return {i: _zero(one(i), points[0][0], x) for i, x in bottoms.items() if guards.crossed(at(x))[i]}
 
     times = np.unique(np.linspace(step.start, step.end, POINTS + 1)).tolist()  # fewer in a step of few roundings
+    if guards.due.any():
+        # What begins at zero as a power of time may go either way inside a step, whose end is right.
+        soon, late = guards.fallen(at(times[1])), guards.fallen(at(times[-1]))
+        if np.any(fallen := np.where(guards.sides != 0.0, soon, late) & active):
+            return step.start, np.flatnonzero(fallen).tolist()
     points = [(times[0], np.where(active, guards.now, 1.0))]
     for t in times[1:]:
         points.append((t, at(t)))
         before, now = points[-2][0], points[-1][1]
         zeros = dips(points[-3:]) if len(points) > 2 else {}
-        across = np.flatnonzero(guards.crossed(now) & active).tolist()
-        zeros |= {i: before if guards.due[i] else _zero(one(i), before, t) for i in across}
+        zeros |= {i: _zero(one(i), before, t) for i in np.flatnonzero(guards.crossed(now) & active).tolist()}
         if zeros:
             # Another guard may have crossed and come back in the same interval: it is still rising at its end.
             near = t - SQRT_EPS * (step.end - step.start)
