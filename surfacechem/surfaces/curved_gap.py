@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from surfacechem.contracts.terms import HeatTransfer, PairEnergy, Potential, Varying, optional, reads
 from surfacechem.errors import InputError
@@ -18,7 +19,8 @@ from surfacechem.surfaces.inner_sums import kernel
 from surfacechem.surfaces.level_cuts import with_levels
 from surfacechem.surfaces.pairwise import check_finite, length
 from surfacechem.surfaces.patches import Budget, Integrand, Patches, Rules, integral, outer_patches
-from surfacechem.surfaces.projection import Array, Projection, Surface, cross
+from surfacechem.surfaces.projection import FIRST, Array, Projection, Surface, cross
+from surfacechem.surfaces.shapes import Plane
 from surfacechem.tolerances import EPS, NEGLIGIBLE, NOISE, PRECISE, TINY
 
 GAP = "g_n"
@@ -28,6 +30,8 @@ Density = Callable[[Array], Array]
 
 OF_AREA = NEGLIGIBLE**2
 """Relative accuracy of the area of contact, which no force follows from, unless less is asked for."""
+
+UP = np.array([0.0, 0.0, 1.0])
 
 FAR = 1e6
 """Extent of an endless surface over the largest length of the two."""
@@ -105,6 +109,43 @@ def bends(laws: Iterable[Potential | HeatTransfer]) -> list[float]:
         for places in (law.kinks.get(GAP, ()), law.peaks.get(GAP, ())):
             found |= {float(x) for x in (places if isinstance(places, Sequence) else (places,))}
     return sorted(found)
+
+
+def passages(lower: Surface, upper: Surface, levels: Sequence[float]) -> list[float]:
+    """Approaches at which levels of the gap pass what is nearest; for two plates a corner of one of them, or where
+    edges of both cross, in closed form: there the force over the approach bends. The ``upper`` body is at zero.
+    """
+    if not all(type(body.shape) is Plane for body in (lower, upper)):
+        return list(levels)
+    size = length(lower, upper)
+    below, above = (_outline(body, size * FAR) for body in (lower, upper))
+    n, m = upper.axes[:, 2], lower.axes[:, 2]
+    found = []
+    for moved in (above + level * n for level in levels):
+        # A corner of one plate over the other, which is an offset of the upper one by the level.
+        over, under = (below - moved[0]) @ n / n[2], -moved @ m / m[2]
+        found += over[_within(upper, below - over[:, None] * UP)].tolist()
+        found += under[_within(lower, moved + under[:, None] * UP)].tolist()
+        for a, b in zip(below, np.roll(below, 1, axis=0), strict=True):
+            for c, e in zip(moved, np.roll(moved, 1, axis=0), strict=True):
+                across = np.cross(b - a, e - c)
+                if abs(across[2]) > NOISE * np.linalg.norm(b - a) * np.linalg.norm(e - c):
+                    d = (a - c) @ across / across[2]
+                    s, t = (np.cross(c - a, way)[2] / across[2] for way in (b - a, e - c))
+                    found += [float(d)] if 0 <= s <= 1 and 0 <= t <= 1 else []
+    distinct = np.unique(found)
+    return list(map(float, distinct[np.diff(distinct, prepend=-np.inf) > NOISE * size]))
+
+
+def _outline(plate: Surface, far: float) -> Array:
+    """Corners (4, 3), one after the other."""
+    (a, b), (c, e) = np.nan_to_num(plate.shape.span, posinf=far, neginf=-far)
+    return np.asarray(plate.derivatives(np.array([(a, c), (b, c), (b, e), (a, e)]), FIRST)[0])
+
+
+def _within(plate: Surface, x: Array) -> NDArray[np.bool_]:
+    """Which points (n, 3) in the plane of a plate are on it."""
+    return np.asarray(np.all(np.abs((x @ plate.axes)[:, :2]) <= np.max(plate.shape.span, axis=1) * (1 + NOISE), axis=1))
 
 
 def over_gap(

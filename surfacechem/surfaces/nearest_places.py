@@ -144,7 +144,7 @@ def _settled(outer: Surface, inner: Surface, at: Array, steps: Array, long: floa
         along = found.normal
         # Beyond an edge the gap grows along the line to it.
         beyond = np.abs(np.einsum("nc,nc->n", x - found.point, along)) < np.abs(found.gap) * (1 - SAME)
-        along[beyond] = ((x - found.point) / found.gap[:, None])[beyond]
+        along[beyond] = (x - found.point)[beyond] / found.gap[beyond, None]
         return np.einsum("nc,knc->nk", along, tangents), tangents
 
     def step(at: Array, _: Indices) -> Array:

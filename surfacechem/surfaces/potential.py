@@ -24,7 +24,7 @@ from surfacechem.documents.cache_folder import Fingerprint, fingerprint, kept
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, derivative
 from surfacechem.surfaces.approach import ApproachEnergy, fewest_samples, fitted, straight
-from surfacechem.surfaces.curved_gap import GAP, Contact, bends, between_flats, density, over_gap
+from surfacechem.surfaces.curved_gap import GAP, Contact, bends, between_flats, density, over_gap, passages
 from surfacechem.surfaces.inner_sums import kernel
 from surfacechem.surfaces.pairwise import PairForces, interaction, length, pair_traction
 from surfacechem.surfaces.patches import Budget
@@ -216,8 +216,8 @@ class CurvedSurfaces(Potential):
         if not self.gap_laws:
             return found
         laws, levels = [density(law) for law in self.gap_laws], bends(self.gap_laws)
-
-        floor, spent = (0.0, 0.0), Budget(rtol, fewest_samples(*self.approach, levels))
+        cuts = passages(*self.surfaces(0.0), levels)
+        floor, spent = (0.0, 0.0), Budget(rtol, fewest_samples(*self.approach, cuts))
 
         def of_gap(d: float) -> tuple[float, float, float]:
             pair = self.surfaces(d)
@@ -228,7 +228,7 @@ class CurvedSurfaces(Potential):
         for d in self.approach:
             energy, force, _ = of_gap(d)
             floor = max(floor[0], NEGLIGIBLE * abs(energy)), max(floor[1], NEGLIGIBLE * abs(force))
-        return [*found, fitted(of_gap, *self.approach, rtol, levels, floor)]
+        return [*found, fitted(of_gap, *self.approach, rtol, cuts, floor)]
 
     def _conducts(self) -> Contact:
         """What the conductances give at the least approach, by and large."""

@@ -9,13 +9,14 @@ import symengine
 from case_runs import load, solved
 from sampling import every
 from scipy.integrate import solve_ivp
-from scipy.optimize import brentq
+from scipy.optimize import brentq, linprog
 
 import surfacechem
 from surfacechem import references
 from surfacechem.errors import InputError, Place
 from surfacechem.expressions import derivative
 from surfacechem.laws.bonding import EquilibriumBonds
+from surfacechem.laws.contact import Penalty
 from surfacechem.laws.longrange import LennardJonesSpherePlane
 from surfacechem.model.system import STAND_IN
 from surfacechem.references.scene_view import SceneView
@@ -23,6 +24,7 @@ from surfacechem.results.matching import match
 from surfacechem.runs.summaries import run_summary
 from surfacechem.surfaces import patches, potential
 from surfacechem.surfaces.approach import fitted
+from surfacechem.surfaces.curved_gap import passages
 from surfacechem.surfaces.pair_laws import InversePower
 from surfacechem.surfaces.pairwise import interaction
 from surfacechem.surfaces.potential import CurvedSurfaces
@@ -321,6 +323,35 @@ def test_bonds_that_fade_are_integrated_where_they_still_count():
     off = np.abs(found(gaps[:, None])[:, 0] - exact).max() / exact.max()
     assert off < pair.error < 1e-3
     assert pair.strongest == pytest.approx(gaps[np.argmax(exact)], rel=0.01)
+
+
+def test_the_force_of_a_tilted_plate_bends_where_its_edge_comes_into_contact():
+    """Pressed in by u sin t - d along it, a plate bears a force that is a square from its edge on."""
+    shapes, law = (Plane(length=4.0, width=3.0, tilt=0.02), Plane(length=6.0, width=5.0)), Penalty(E_n=1.0)
+    pair = CurvedSurfaces(
+        shapes=shapes, gap_laws=[law], approach=(-0.03, 0.2), accuracy=1e-3, place=Place(path="surface")
+    )
+    curve = pair.curves[1]
+    assert len(curve.pieces) == 2
+    rise = 2 * math.sin(0.02)
+    for d in (-0.02, 0.0, 0.03, 0.0399, 0.1):
+        exact = -3 * max(rise - d, 0.0) ** 2 / (2 * math.sin(0.02))
+        assert curve.pieces[d > rise].force(d) == pytest.approx(exact, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("lower", "upper"),
+    [
+        (Plane(length=6.0, width=5.0), Plane(length=4.0, width=3.0, tilt=0.02, turn=0.3)),
+        (Plane(length=4.0, width=1.0), Plane(length=1.0, width=5.0, tilt=0.1, turn=0.2)),
+    ],
+)
+def test_contact_of_plates_begins_where_a_corner_or_edges_that_cross_come_into_contact(lower, upper):
+    """As linear programming has it: the largest height of one plate over the other where their plans overlap."""
+    bodies = Surface(lower), Surface(upper, True)
+    axes = np.hstack([bodies[0].axes[:, :2], -bodies[1].axes[:, :2]])
+    best = linprog(-axes[2], A_eq=axes[:2], b_eq=[0, 0], bounds=[*lower.span, *upper.span])
+    assert passages(*bodies, [0.0])[-1] == pytest.approx(-best.fun, rel=1e-9)
 
 
 def test_powers_that_change_are_followed_near_the_least_approach():
