@@ -238,7 +238,7 @@ def _destroyed(trajectory: Trajectory, laws: list[str], stored: float) -> float:
     rates = np.array([trajectory.within_bounds[f"sigma_{law}"][-len(points.t) :] for law in laws]).sum(axis=0)
     if trajectory.status == "stopped":  # a law that ends there may have no value
         rates[-1:] = np.nan_to_num(rates[-1:], posinf=0.0, neginf=0.0)
-        ledger[-1:] = np.where(np.isfinite(ledger[-1:]), ledger[-1:], ledger[-2:-1])
+        ledger[-1:] = np.where(np.isfinite(ledger[-1:]), ledger[-1:], ledger[-2:][:1])
     columns = [j for j, a in enumerate(accounts) if a.kind == "entropy production" and a.law in laws]
     booked, lengths = np.diff(ledger[:, columns].sum(axis=1)), np.diff(points.t)
     # The end of a step tells of it, but for the first of an arc: between arcs production may jump.
