@@ -108,8 +108,9 @@ class Audit:
         if self.destroys and not found:
             found = ["the laws together destroy entropy"]
         # What is exchanged may be less than the rounding of a body's heat content.
-        known = _relative(np.maximum(np.abs(self.energy) - self.energy_rounding, 0), self.energy_scale)
-        open_balances = (("energy", known), ("sites", self.site_error))
+        energy = _relative(np.maximum(np.abs(self.energy) - self.energy_rounding, 0), self.energy_scale)
+        entropy = _relative(np.maximum(np.abs(self.entropy) - self.entropy_rounding, 0), self.entropy_scale)
+        open_balances = (("energy", energy), ("entropy", entropy), ("sites", self.site_error))
         limit = OPEN * max(self.rtol, FINEST)
         found += [
             f"the balance of {name} is open by {error:.1e}" for name, error in open_balances if not error <= limit

@@ -1,6 +1,9 @@
 """What the audit says of laws that destroy entropy: judged by what each turns over, in runs and in sweeps alike."""
 
+from dataclasses import replace
+
 import pytest
+from case_runs import solved
 
 import surfacechem
 from surfacechem.format import load_text
@@ -68,3 +71,11 @@ def test_laws_that_dissipate_are_not_accused(name, rtol):
     solution = surfacechem.run(name, [f"run.rtol={rtol}"])
     assert solution.audit.violations == ()
     assert solution.audit.destroyed_together == 0.0
+
+
+@pytest.mark.parametrize(("name", "scale"), [("energy", "energy_scale"), ("entropy", "entropy_scale")])
+def test_a_balance_that_is_open_is_told(name, scale):
+    audit = solved("exothermic").audit
+    assert audit.findings == ()
+    off = getattr(audit, name) + 1e-3 * getattr(audit, scale)
+    assert replace(audit, **{name: off}).findings == (f"the balance of {name} is open by 1.0e-03",)
