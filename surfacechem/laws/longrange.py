@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
+from collections.abc import Mapping
 from typing import ClassVar
 
 from surfacechem.contracts.terms import Potential, parameter
@@ -34,6 +35,8 @@ class LennardJones(Potential):
     """Divisor and power of the repulsion."""
     attracting: ClassVar[tuple[int, int]]
     """Divisor and power of the attraction."""
+    strongest: ClassVar[float]
+    """Gap over g_0 at the largest tension."""
 
     n_1: float = parameter("1/m^2", "density of interacting sites on body 1", at_least=0, stretch=-1)
     n_2: float = parameter("1/m^2", "density of interacting sites on body 2", at_least=0, stretch=-1)
@@ -44,6 +47,11 @@ class LennardJones(Potential):
     def stiffness(self) -> Expression:
         """A = 2 pi n_1 n_2 psi_0 [Pa/m]."""
         return 2 * math.pi * self.n_1 * self.n_2 * self.psi_0
+
+    @property
+    def peaks(self) -> Mapping[str, Expression]:
+        """The gap at which the attraction is strongest."""
+        return {"g_n": self.g_0 * self.strongest}
 
     def energy(self, g_n: Expression) -> Expression:
         """Free energy [J/m^2]."""
@@ -77,7 +85,7 @@ class LennardJonesFlatFlat(LennardJones):
     """
 
     per = "current"
-    repelling, attracting = (360, 8), (-6, 2)
+    repelling, attracting, strongest = (360, 8), (-6, 2), 5 ** (-1 / 6)
 
     def _sum(self, g_n: Expression, *terms: tuple[int, int]) -> Expression:
         return self.stiffness * self.g_0**2 * _repelling(g_n / self.g_0, *terms)
@@ -100,7 +108,7 @@ class LennardJonesSpherePlane(LennardJones):
     '-0.0206974228'
     """
 
-    repelling, attracting = (2520, 7), (-6, 1)
+    repelling, attracting, strongest = (2520, 7), (-6, 1), 15 ** (-1 / 6)
 
     R: float = parameter("m", "radius of the sphere", above=0)
     area: float = parameter("m^2", "reference area", above=0)
@@ -128,7 +136,7 @@ class LennardJonesDerjaguin(LennardJones):
     '-0.0213183455'
     """
 
-    repelling, attracting = (2520, 7), (-6, 1)
+    repelling, attracting, strongest = (2520, 7), (-6, 1), 15 ** (-1 / 6)
 
     R: float = parameter("m", "radius of the sphere", above=0)
     area: float = parameter("m^2", "reference area", above=0)

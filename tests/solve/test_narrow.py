@@ -184,3 +184,18 @@ def test_passages_are_found_in_any_number():
     expected = np.sort([(x - 1) / (2000 * np.pi) for x in (*turns, *touches)])
     expected = expected[(expected > 0) & (expected < 3)]
     np.testing.assert_allclose(pieces[1:-1], expected, rtol=1e-13)
+
+
+@pytest.mark.parametrize("far", ["10 nm", "1 mm"])
+def test_the_strongest_attraction_on_a_way_is_in_the_dataset(far):
+    path = f"{{table: {{times: [0 s, 0.4321 s, 1 s], values: [{far}, 0.22 nm, {far}]}}}}"
+    text = f"""{PLATES}
+interface:
+  temperature: 300 K
+  potential: [lennard-jones-flat-flat: {{n_1: 2e19 1/m^2, n_2: 3e19 1/m^2, psi_0: 4e-21 J, g_0: 0.3 nm}}]
+loading: {{g_n: {path}}}
+run: {{until: 1 s, rtol: 1e-8}}
+"""
+    run = Simulation(load_text(text)).run().dataset
+    strongest = 5 ** (-1 / 6) * 3e-10  # where the slope of the tension is zero
+    assert run["g_n"].values[run["t_n"].values.argmax()] == pytest.approx(strongest, rel=1e-7)
