@@ -18,8 +18,10 @@ from surfacechem.surfaces.nodes import gauss
 from surfacechem.surfaces.patches import ENOUGH, Levels, Patches
 from surfacechem.surfaces.projection import FIRST, Array, Projection, Surface
 
-SAMPLES = 5
-"""Points along each side of a patch at which it is seen whether it has a level."""
+SAMPLES = np.array([0, 1 / 128, 1 / 4, 1 / 2, 3 / 4, 127 / 128, 1])
+"""Places along each side of a patch at which it is seen whether it has a level. Two at either end tell the slope there:
+a height that turns round between two others has passed it with another sign.
+"""
 
 SLIGHT, HALVINGS = 0.1, 30
 """A patch of which a level cuts off less, as part times rest, is halved at first, so many times at most."""
@@ -68,24 +70,29 @@ class LevelPatches(Patches):
 
     def marked(self) -> Self:
         """With the level and its direction as they now are."""
-        share = np.linspace(0, 1, SAMPLES)
-        u, v = (self.low[:, k, None] + (self.high - self.low)[:, k, None] * share for k in range(2))
+        u, v = (self.low[:, k, None] + (self.high - self.low)[:, k, None] * SAMPLES for k in range(2))
         x, near = self.seen(*np.broadcast_arrays(u[:, :, None], v[:, None, :]))
         heights = self.heights(near)
         # Of several levels the one that divides a patch most evenly.
         below, above = (np.mean(s * heights > self.noise, axis=(1, 2)) for s in (-1, 1))
         best, share = np.argmax(below * above, axis=1), np.max(below * above, axis=1)
         over = np.take_along_axis(heights, best[:, None, None, None], axis=-1)
-        steepness = np.stack([np.abs(np.diff(over, axis=k + 1)).mean(axis=(1, 2, 3)) for k in range(2)])
-        along = np.argmax(np.where(np.array(self.alike)[:, None], -1.0, steepness), axis=0)
+        # Along its direction a line of nodes passes a level once.
+        steps = [np.diff(over[..., 0], axis=k + 1) for k in range(2)]
+        turns = np.stack(
+            [
+                np.any((step.min(axis=k + 1) < -self.noise) & (step.max(axis=k + 1) > self.noise), axis=1)
+                for k, step in enumerate(steps)
+            ]
+        )
+        steepness = np.stack([np.abs(step).mean(axis=(1, 2)) for step in steps])
+        along = np.argmax(np.where(np.array(self.alike)[:, None], -1.0, np.where(turns, 0.0, steepness)), axis=0)
         # Two edges are never one line; where a gap jumps its level is on the edge. Far from the body no edge counts.
         edges = np.arange(heights.shape[-1]) < len(self.other.edges)
         alike = np.mean((heights > 0) == (over > 0), axis=(1, 2))
         apart = np.where(edges & edges[best, None], np.arange(len(edges)) != best[:, None], (alike > 0) & (alike < 1))
         crossed = np.any((below * above > 0) & apart & (edges | edges[best, None]), axis=1)
-        # Along its direction a line of nodes passes a level once.
-        steps = np.where(along[:, None, None] == 0, np.diff(over[..., 0], axis=1).mT, np.diff(over[..., 0], axis=2))
-        crossed |= (share > 0) & np.any((steps.min(axis=2) < -self.noise) & (steps.max(axis=2) > self.noise), axis=1)
+        crossed |= (share > 0) & turns[along, np.arange(len(along))]
         crossed &= near.gap.min(axis=(1, 2)) < np.linalg.norm(x[:, -1, -1] - x[:, 0, 0], axis=-1)
         return replace(self, level=best, along=np.where(share > 0, along, -1), share=share, crossed=crossed)
 

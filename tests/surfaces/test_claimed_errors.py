@@ -187,6 +187,14 @@ def test_a_plate_pressed_into_a_plane_is_borne_by_its_area_up_to_its_edges(lower
     assert np.abs(pressed.moment_1).max() < 1e-12
 
 
+@pytest.mark.parametrize(("turn", "rtol"), [(0.4, 1e-4), (0.3, 1e-5)])
+def test_an_edge_that_turns_round_between_the_points_of_a_patch_is_followed(turn, rtol):
+    """In polar coordinates the straight edges of a plate come nearest somewhere along them."""
+    plate = Surface(Plane(length=0.13, width=0.7, turn=turn), True, -0.01)
+    pressed = over_gap(Surface(Disc(radius=2.0)), plate, PENALTY, rtol=rtol)
+    assert abs(pressed.force_1[2] / (-0.01 * 0.13 * 0.7) - 1) <= pressed.error <= rtol
+
+
 def test_a_tilted_plate_over_a_plane_has_moments_and_heat_as_summed_over_the_plane():
     """Nearest points of the plate are clipped to it, and the plane is cut into small cells."""
     half, tilt, d, s = np.array([0.65, 0.35]), 0.2, 0.2, 0.3
