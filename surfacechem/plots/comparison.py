@@ -158,9 +158,8 @@ def _draw(
                 drawn.append(values if begin is None else values[dataset[over].values >= begin])
                 marker = "o" if len(values) < 3 else ""
                 ax.plot(dataset[over].values, values, color=colour, linestyle=dash, linewidth=1.3, marker=marker)
-    text, size = style.prefixed(panel.unit, np.concatenate(drawn))
-    ax.set_ylabel(f"{panel.title or ', '.join(map(symbol, panel.names[:2]))} [{text}]")
-    style.label_ticks(ax.yaxis, size)
+    words = panel.title or ", ".join(map(symbol, panel.names[:2]))
+    style.label(ax.yaxis, words, panel.unit, np.concatenate(drawn))
     several = panel.names if len(panel.names) > 1 else ()
     for name, dash in zip(several, cycle(DASHES), strict=False):
         ax.plot([], [], color="black", linestyle=dash, linewidth=1.3, label=symbol(name))
@@ -178,6 +177,5 @@ def _label_axis(axes: Sequence[Axes], datasets: Sequence[xarray.Dataset], over: 
         for ax in axes:
             run.show_decades(ax, begin, float(values.max()))
         return
-    text, size = style.prefixed(unit(first), values)
-    axes[-1].set_xlabel(f"Time [{text}]" if over == "time" else f"{style.meaning(first)} {symbol(over)} [{text}]")
-    style.label_ticks(axes[-1].xaxis, size)
+    words = "Time" if over == "time" else f"{style.meaning(first)} {symbol(over)}"
+    style.label(axes[-1].xaxis, words, unit(first), values)

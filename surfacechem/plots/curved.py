@@ -105,7 +105,7 @@ def _chosen(dataset: xarray.Dataset) -> Iterator[tuple[int, Any, str]]:
     approach = dataset["approach"].values
     # Runs linger where little changes: approaches are spread by their rank, not by time.
     order = np.argsort(approach)
-    for k in dict.fromkeys(order[np.linspace(0, len(order) - 1, 4).round().astype(int)].tolist()):
+    for k in order[style.spread(len(order), 4)].tolist():
         share = float(np.mean(approach < approach[k]))
         text, size = style.prefixed("m", approach)
         yield k, matplotlib.colormaps["viridis"](share * 0.9), f"$g_n$ = {approach[k] / size:.3g} {text}"
@@ -115,7 +115,6 @@ def _draw_profiles(ax: Axes, dataset: xarray.Dataset, even: bool) -> None:
     """Section through both bodies; the upper one at several approaches."""
     along, at = _section(dataset)
     reach = _reach(dataset, along, at)
-    text, size = style.prefixed("m", np.array([reach]))
     signs = (1, -1) if even else (1,)
     for sign in signs:
         ax.plot(sign * along, dataset["surface_z"].values[at], color="black", label="body 1" if sign > 0 else "_")
@@ -130,10 +129,8 @@ def _draw_profiles(ax: Axes, dataset: xarray.Dataset, even: bool) -> None:
     margin = 0.05 * max(float(np.ptp(drawn)), float(np.abs(drawn).max()))
     ends = (-reach, reach) if even else (max(-reach, float(along.min())), min(reach, float(along.max())))
     ax.set(xlim=ends, ylim=(drawn.min() - margin, drawn.max() + margin))
-    ax.set_ylabel(f"Height [{style.prefixed('m', drawn)[0]}]")
-    ax.set_xlabel(f"Distance {'from the axis' if even else 'along a section'} [{text}]")
-    style.label_ticks(ax.xaxis, size)
-    style.label_ticks(ax.yaxis, style.prefixed("m", drawn)[1])
+    style.label(ax.yaxis, "Height", "m", drawn)
+    style.label(ax.xaxis, f"Distance {'from the axis' if even else 'along a section'}", "m", np.array([reach]))
     style.legend(ax)
 
 
@@ -146,12 +143,9 @@ def _draw_tractions(ax: Axes, dataset: xarray.Dataset) -> None:
     for k, colour, _ in _chosen(dataset):
         ax.plot(along[shown], values[k][shown], color=colour)
         ax.plot(-along[shown], values[k][shown], color=colour)
-    text, size = style.prefixed("Pa", values[:, shown])
-    ax.set(xlim=(-reach, reach), ylabel=f"Traction [{text}]")
-    style.label_ticks(ax.yaxis, size)
-    text, size = style.prefixed("m", np.array([reach]))
-    ax.set_xlabel(f"Distance from the axis [{text}]")
-    style.label_ticks(ax.xaxis, size)
+    ax.set_xlim(-reach, reach)
+    style.label(ax.yaxis, "Traction", "Pa", values[:, shown])
+    style.label(ax.xaxis, "Distance from the axis", "m", np.array([reach]))
 
 
 def _draw_field(ax: Axes, dataset: xarray.Dataset) -> None:
@@ -168,10 +162,9 @@ def _draw_field(ax: Axes, dataset: xarray.Dataset) -> None:
     # As an image, since a page would hold each triangle.
     mesh = ax.pcolormesh(x, y, values[k] / size, shading="gouraud", rasterized=True, **colours)
     ax.figure.colorbar(mesh, cax=ax.inset_axes((1.05, 0, 0.05, 1)), label=f"Traction [{text}]")
-    text, size = style.prefixed("m", np.concatenate([x.ravel(), y.ravel()]))
-    ax.set(xlabel=f"x [{text}]", ylabel=f"y [{text}]", aspect="equal")
-    for axis in (ax.xaxis, ax.yaxis):
-        style.label_ticks(axis, size)
+    ax.set_aspect("equal")
+    for axis, name in ((ax.xaxis, "x"), (ax.yaxis, "y")):
+        style.label(axis, name, "m", np.concatenate([x.ravel(), y.ravel()]))
 
 
 def _draw_force(ax: Axes, dataset: xarray.Dataset) -> None:
@@ -187,8 +180,6 @@ def _draw_force(ax: Axes, dataset: xarray.Dataset) -> None:
     if "local_difference" in dataset:
         local = dataset["force"].values + dataset["local_difference"].values
         ax.plot(dataset["approach"].values, local, "o", color="black", markersize=4, label="local law")
-    for axis, values, unit, words in ((ax.xaxis, approach, "m", "Approach"), (ax.yaxis, force, "N", "Force")):
-        text, size = style.prefixed(unit, values)
-        axis.set_label_text(f"{words} [{text}]")
-        style.label_ticks(axis, size)
+    style.label(ax.xaxis, "Approach", "m", approach)
+    style.label(ax.yaxis, "Force", "N", force)
     style.legend(ax)

@@ -13,7 +13,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 
-from surfacechem.errors import InputError, suggestion
+from surfacechem.errors import InputError
 from surfacechem.format.plans import RUN, Plan
 from surfacechem.plots import style
 from surfacechem.plots.run import KINDS, of_kind
@@ -63,9 +63,7 @@ def figure(dataset: xarray.Dataset, plan: Plan, variables: Sequence[str] | None 
 def chosen(dataset: xarray.Dataset, axes: Sequence[str], variables: Sequence[str] | None) -> list[str]:
     """The variables that are drawn: those asked for, else those of the ends that differ from run to run."""
     known = [str(n) for n, x in dataset.data_vars.items() if x.dtype.kind == "f" and x.dims[: len(axes)] == tuple(axes)]
-    for name in variables or ():
-        if name not in known:
-            raise InputError(f"no variable '{name}' in the sweep.{suggestion(name, known)}")
+    style.refuse_unknown(variables or (), known, "in the sweep")
     return list(dict.fromkeys(variables)) if variables else differing(dataset, axes, known)
 
 
@@ -157,9 +155,7 @@ def portraits(dataset: xarray.Dataset, axes: Sequence[str], variables: Sequence[
     series = along(dataset, axes)
     # Along the runs there is time, or where a load ends them, the load.
     inner = [str(dim) for name in series for dim in dataset[name].dims if dim not in axes]
-    for name in (*(variables or ()), against):
-        if name not in (*series, *inner):
-            raise InputError(f"no variable '{name}' along the runs of the sweep.{suggestion(name, series)}")
+    style.refuse_unknown((*(variables or ()), against), [*series, *dict.fromkeys(inner)], "along the runs of the sweep")
     usual = [name for _, *kind in KINDS[:2] for name in of_kind(dataset, series, *kind)]
     moving = [name for name in usual if name != against and varies(fair(dataset, name))]
     if not (names := list(dict.fromkeys(variables or moving[:MOST_PANELS]))):
@@ -176,26 +172,22 @@ def along(dataset: xarray.Dataset, axes: Sequence[str]) -> list[str]:
 def curves(dataset: xarray.Dataset, axes: Sequence[str], names: Sequence[str], against: str | None = None) -> Figure:
     """Series of all runs, or of a fair part of them, which the figure says; over ``against`` instead of time."""
     count = int(np.prod([dataset.sizes[name] for name in axes]))
-    members = np.unique(np.linspace(0, count - 1, min(count, MOST_MEMBERS)).round().astype(np.int64))
+    members = style.spread(count, MOST_MEMBERS)
     over = dataset[against or str(dataset[names[0]].dims[-1])]
     x = np.broadcast_to(over.values, dataset[names[0]].shape).reshape(count, -1)[members]
-    text, size = style.prefixed(unit(over), x)
     with style.panels(6.4, 0.9 + 2.2 * len(names), len(names), sharex=True) as (plot, grid):
         for ax, name in zip(grid[:, 0], names, strict=True):
             values = dataset[name].values.reshape(count, -1)[members]
-            for line, run, k in zip(values, x, members.tolist(), strict=True):
-                ax.plot(run / size, line, **looks(dataset, axes, k))
-            words, high = style.prefixed(unit(dataset[name]), values)
-            ax.set_ylabel(f"{symbol(name)} [{words}]")
-            style.label_ticks(ax.yaxis, high)
+            for line, run, k in zip(values, x, members, strict=True):
+                ax.plot(run, line, **looks(dataset, axes, k))
+            style.label(ax.yaxis, symbol(name), unit(dataset[name]), values)
             style.legend(ax)
-        grid[-1, 0].set_xlabel(f"{'Time' if against in (None, 'time') else symbol(against)} [{text}]")
+        style.label(grid[-1, 0].xaxis, "Time" if against in (None, "time") else symbol(against), unit(over), x)
         many = RUN not in axes and count > style.MOST_CURVES
         if many:
             bar = plot.colorbar(colours(dataset, axes), ax=grid[:, 0].tolist())
-            words, size = style.prefixed(unit(dataset[axes[0]]), dataset[axes[0]].values)
-            bar.set_label(f"{axis_words(dataset[axes[0]])} [{words}]")
-            style.label_ticks(bar.ax.yaxis, size)
+            parameter = dataset[axes[0]]
+            style.label(bar.ax.yaxis, axis_words(parameter), unit(parameter), parameter.values)
         others = ", ".join(axis_words(dataset[name]) for name in axes[1:]) if many else ""
         style.headings(plot, grid[0, 0], dataset, more=f"curves of one colour differ in {others}" if others else "")
         if len(members) < count:

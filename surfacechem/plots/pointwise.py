@@ -6,10 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 import xarray
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from surfacechem.errors import InputError, suggestion
+from surfacechem.errors import InputError
 from surfacechem.plots import style
 
 POINT = "point"
@@ -26,34 +25,24 @@ def figure(dataset: xarray.Dataset, variables: Sequence[str] | None = None, agai
     """
     known = [str(n) for n, x in dataset.data_vars.items() if x.dims == (POINT,) and x.dtype.kind == "f"]
     asked = [*(variables or ()), *filter(None, [against])]
-    if unknown := next((name for name in asked if name not in known), None):
-        raise InputError(f"no variable '{unknown}' at the states.{suggestion(unknown, known)}")
-    differing = _differing(dataset, known)
+    style.refuse_unknown(asked, known, "at the states")
+    # Quantities, no derivatives, that are not the same at all states.
+    differing = [name for name in known if len(np.unique(dataset[name].values)) > 1 and "_by_" not in name]
     if not differing:
         raise InputError("one state, or states that are all alike, make no figure.", style.place(dataset))
     over = against or differing[0]
     names = variables or _usual(dataset, [name for name in differing if name != over])
     with style.panels(6.4, 0.7 + 1.9 * len(names), len(names), sharex=True) as (plot, grid):
         for ax, name in zip(grid[:, 0], names, strict=True):
-            _draw(ax, dataset[over], dataset[name])
-        text, _ = style.prefixed(style.unit(dataset[over]), dataset[over].values)
-        grid[-1, 0].set_xlabel(f"{style.meaning(dataset[over])} {style.symbol(over)} [{text}]")
+            order = np.argsort(dataset[over].values, kind="stable")
+            ax.plot(dataset[over].values[order], dataset[name].values[order], "o-", markersize=3)
+            style.label(ax.yaxis, style.symbol(name), style.unit(dataset[name]), dataset[name].values)
+        words = f"{style.meaning(dataset[over])} {style.symbol(over)}"
+        style.label(grid[-1, 0].xaxis, words, style.unit(dataset[over]), dataset[over].values)
         style.headings(plot, grid[0, 0], dataset)
     return plot
-
-
-def _differing(dataset: xarray.Dataset, names: Sequence[str]) -> list[str]:
-    """Quantities, no derivatives, that are not the same at all states."""
-    return [name for name in names if len(np.unique(dataset[name].values)) > 1 and "_by_" not in name]
 
 
 def _usual(dataset: xarray.Dataset, names: Sequence[str]) -> Sequence[str]:
     """Tractions and heat fluxes among these, or where there are none the first."""
     return ([name for name in names if style.unit(dataset[name]) in SHOWN] or names)[:MOST]
-
-
-def _draw(ax: Axes, x: xarray.DataArray, y: xarray.DataArray) -> None:
-    (_, across), (text, up) = (style.prefixed(style.unit(values), values.values) for values in (x, y))
-    order = np.argsort(x.values, kind="stable")
-    ax.plot(x.values[order] / across, y.values[order] / up, "o-", markersize=3)
-    ax.set_ylabel(f"{style.symbol(str(y.name))} [{text}]")

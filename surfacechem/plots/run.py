@@ -18,7 +18,7 @@ import xarray
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from surfacechem.errors import InputError, suggestion
+from surfacechem.errors import InputError
 from surfacechem.plots import curved, style
 from surfacechem.plots.style import Array, meaning, symbol, unit, varies
 from surfacechem.tolerances import EPS, ROUNDING
@@ -159,9 +159,8 @@ def draw_axis(
     """
     if against is None:
         return _draw_time(axes, dataset, first)
-    text, size = style.prefixed(unit(dataset[against]), dataset[against].values)
-    axes[-1].set_xlabel(f"{meaning(dataset[against])} {symbol(against)} [{text}]")
-    style.label_ticks(axes[-1].xaxis, size)
+    words = f"{meaning(dataset[against])} {symbol(against)}"
+    style.label(axes[-1].xaxis, words, unit(dataset[against]), dataset[against].values)
     return 0.0, _counted([name for _, name in _named(_moments(dataset))], {})
 
 
@@ -197,9 +196,7 @@ def of_kind(dataset: xarray.Dataset, names: Sequence[str], units: str, pattern: 
 def panels(dataset: xarray.Dataset, variables: Sequence[str] | None, against: str | None) -> list[Panel]:
     """Panels of the variables by unit, or of all that vary by kind, without the variable that is their axis."""
     known = curves(dataset)
-    for name in (*(variables or ()), *([against] if against else ())):
-        if name not in known:
-            raise InputError(f"no variable '{name}' over time in the dataset.{suggestion(name, known)}")
+    style.refuse_unknown((*(variables or ()), *filter(None, [against])), known, "over time in the dataset")
     found = _by_unit(dataset, list(dict.fromkeys(variables))) if variables else _by_kind(dataset, known)
     found = [replace(panel, names=[name for name in panel.names if name != against]) for panel in found]
     return [panel for panel in found if panel.names]
@@ -235,10 +232,10 @@ def _across(dataset: xarray.Dataset, names: Sequence[str]) -> Figure:
     for name in names:
         if not PROFILE.fullmatch(name) or name not in dataset:
             raise InputError(f"{name} goes over time, a profile over places; show them in figures of their own.")
-    shown = np.unique(np.linspace(0, dataset.sizes["time"] - 1, PROFILE_TIMES).round().astype(int))
+    shown = style.spread(dataset.sizes["time"], PROFILE_TIMES)
     shown_unit = style.unit_text(unit(dataset[names[0]]))
     with style.panels(6.4, 3.4) as (plot, ((ax,),)):
-        for j, i in enumerate(shown.tolist()):
+        for j, i in enumerate(shown):
             colour = matplotlib.colormaps["viridis"](j / max(len(shown) - 1, 1) * 0.9)
             for name in names:
                 side = -1e3 if name == "profile_1" else 1e3  # [mm]
@@ -260,11 +257,8 @@ def _draw(ax: Axes, dataset: xarray.Dataset, panel: Panel, over: str, first: flo
         start = EARLY * t[-1]
         _show_behind_spike(ax, dataset, panel, start)
     drawn = _drawn(dataset, panel, t >= start if start else slice(None))
-    text, size = style.prefixed(panel.unit, drawn)
     words = panel.title or ", ".join(map(symbol, panel.names[:MOST_NAMES]))
-    between = " " if len(panel.title) < ONE_LINE else "\n"
-    ax.set_ylabel(f"{words}{between}[{text}]")
-    style.label_ticks(ax.yaxis, size)
+    style.label(ax.yaxis, words, panel.unit, drawn, between=" " if len(panel.title) < ONE_LINE else "\n")
     if len(drawn) and not varies(drawn):  # a line, not rounding blown up to the panel's height
         middle = float(drawn.mean())
         ax.set_ylim(middle - 0.05 * abs(middle or 1.0), middle + 0.05 * abs(middle or 1.0))
@@ -348,12 +342,12 @@ def _draw_balances(ax: Axes, dataset: xarray.Dataset) -> None:
 def _draw_time(axes: Sequence[Axes], dataset: xarray.Dataset, first: float | None) -> tuple[float, str]:
     """The axis of time, with bands of modes and lines at events; returns what :func:`draw_axis` does."""
     times = dataset["time"].values
-    text, size = style.prefixed("s", times) if first is None else ("s", 1.0)
-    axes[-1].set_xlabel(f"Time [{text}]")
     if first is None:
-        style.label_ticks(axes[-1].xaxis, size)
-    for ax in axes if first is not None else ():
-        show_decades(ax, first or 0.0, times[-1])
+        style.label(axes[-1].xaxis, "Time", "s", times)
+    else:
+        axes[-1].set_xlabel("Time [s]")
+        for ax in axes:
+            show_decades(ax, first, times[-1])
     stages = _draw_bands(axes, dataset) if len(times) > 1 else []
     moments = _moments(dataset)
     width = float(axes[0].figure.bbox.width / axes[0].figure.dpi)

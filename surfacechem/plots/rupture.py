@@ -59,19 +59,19 @@ def _members(dataset: xarray.Dataset, load: str) -> list[tuple[tuple[int, ...], 
     # At slow loads most bonds break before there is any load, and their peak at zero would dwarf all others.
     inside = np.argwhere(modes > dataset[load].values[0])
     places = inside if len(inside) else np.argwhere(np.isfinite(modes))
-    chosen = places[np.unique(np.linspace(0, len(places) - 1, MOST_CURVES).round().astype(int))] if len(places) else []
-    return [(tuple(at), style.member_name(dataset, at)) for at in np.asarray(chosen, dtype=int).tolist()]
+    chosen = places[style.spread(len(places), MOST_CURVES)]
+    return [(tuple(at), style.member_name(dataset, at)) for at in chosen.tolist()]
 
 
 def _draw_over(ax: Axes, dataset: xarray.Dataset, load: str, values: Array, below: float = 0.0) -> None:
     """Values of some runs over the load."""
-    text, size = style.prefixed(unit(dataset[load]), dataset[load].values)
     members = _members(dataset, load)
     for k, ((place, label), colour) in enumerate(zip(members, COLOURS, strict=False)):
         # Curves that coincide, as lifetimes do, are seen below each other.
         width = 1.2 + below * (len(members) - 1 - k)
-        ax.plot(dataset[load].values / size, values[place], color=colour, linewidth=width, label=label)
-    ax.set_xlabel(f"{style.meaning(dataset[load])} {symbol(load)} [{text}]")
+        ax.plot(dataset[load].values, values[place], color=colour, linewidth=width, label=label)
+    words = f"{style.meaning(dataset[load])} {symbol(load)}"
+    style.label(ax.xaxis, words, unit(dataset[load]), dataset[load].values)
     if len(members) < dataset["status"].size:
         ax.set_title(f"{len(members)} of {dataset['status'].size} runs", loc="right", fontsize=8, color="#555555")
 
@@ -97,9 +97,7 @@ def _draw_series(ax: Axes, dataset: xarray.Dataset, load: str, name: str) -> Non
         return _draw_lifetime(ax, dataset, load)
     values = dataset[name].values
     _draw_over(ax, dataset, load, values)
-    text, size = style.prefixed(unit(dataset[name]), values)
-    ax.set_ylabel(f"{symbol(name)} [{text}]")
-    style.label_ticks(ax.yaxis, size)
+    style.label(ax.yaxis, symbol(name), unit(dataset[name]), values)
     return None
 
 
@@ -114,12 +112,8 @@ def _draw_spectrum(ax: Axes, dataset: xarray.Dataset, load: str) -> None:
 def _draw_told(ax: Axes, dataset: xarray.Dataset, told: Mapping[str, str], size: float) -> None:
     """What each run tells over what is swept, by name with its label in the legend; exact values as lines."""
     parameter = dataset[str(dataset["status"].dims[0])]
-    decades = style.over_decades(parameter.values)
-    words, scale = style.parameter_unit(parameter) if decades else style.prefixed(unit(parameter), parameter.values)
-    x = parameter.values / scale
-    if decades:
-        style.logarithmic(ax.xaxis)
-    ax.set_xlabel(f"{style.parameter_words(parameter)} [{words}]")
+    style.draw_parameter(ax, parameter)
+    x = parameter.values
     for (name, word), colour, marker in zip(told.items(), COLOURS, "osD", strict=False):
         for j, (values, label) in enumerate(style.by_second(dataset, dataset[name].values)):
             (points,) = ax.plot(x, values / size, marker, color=colour, markersize=3.5 if len(x) < DENSE else 2.0)
@@ -147,7 +141,7 @@ def lifetimes(dataset: xarray.Dataset) -> Figure:
 def _draw_survival(ax: Axes, dataset: xarray.Dataset) -> None:
     """Bonds that are left over time, of runs evenly spread over those whose lifetime is known."""
     known = np.argwhere(np.isfinite(dataset["lifetime"].values))
-    chosen = np.unique(np.linspace(0, len(known) - 1, min(MOST_CURVES, len(known))).round().astype(int))
+    chosen = style.spread(len(known), MOST_CURVES)
     times, survival = dataset["time"].values, dataset["survival"].values
     for place, colour in zip(known[chosen], COLOURS, strict=False):
         # Where all have broken a run has ended.

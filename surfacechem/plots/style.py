@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from io import BytesIO
@@ -23,7 +23,7 @@ from matplotlib.rcsetup import cycler
 from matplotlib.ticker import LogFormatterSciNotation, LogLocator
 from numpy.typing import NDArray
 
-from surfacechem.errors import InputError, Place
+from surfacechem.errors import InputError, Place, suggestion
 from surfacechem.quantities import SUPERSCRIPTS, VARIABLES, raised
 from surfacechem.results.netcdf import reading, replacing
 from surfacechem.tolerances import ROUNDING
@@ -167,6 +167,23 @@ def check(
             raise InputError(f"{name} does not hold numbers in double precision.", place(dataset))
 
 
+def refuse_unknown(names: Iterable[str], known: Sequence[str], where: str) -> None:
+    """InputError for the name of a variable that is none of the known ones."""
+    for name in names:
+        if name not in known:
+            raise InputError(f"no variable '{name}' {where}.{suggestion(name, known)}")
+
+
+def spread(count: int, most: int) -> list[int]:
+    """Of the numbers below a count at most so many, evenly spread over all of them.
+
+    >>> spread(100, 4), spread(3, 7)
+    ([0, 33, 66, 99], [0, 1, 2])
+    """
+    chosen: list[int] = np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(int)).tolist()
+    return chosen
+
+
 def number(dataset: xarray.Dataset, name: str) -> float | None:
     """The value of a global attribute; None where there is none."""
     value = dataset.attrs.get(name)
@@ -292,20 +309,14 @@ def over_decades(values: Array) -> bool:
 
 def draw_parameter(ax: Axes, values: xarray.DataArray) -> None:
     """The axis of a swept parameter: its meaning, or its name where that tells more, and unit."""
-    decades = over_decades(values.values)
-    text, size = parameter_unit(values) if decades else prefixed(unit(values), values.values)
+    if not over_decades(values.values):
+        label(ax.xaxis, parameter_words(values), unit(values), values.values)
+        return
+    # The prefix suits the middle of the decades: at their upper end, nobody reads 100 pN/s from an axis in nN/s.
+    text, size = prefixed(unit(values), np.sqrt(np.abs(values.values[:1] * values.values[-1:])))
     ax.set_xlabel(f"{parameter_words(values)} [{text}]")
-    if decades:
-        logarithmic(ax.xaxis)
-        ax.xaxis.set_major_formatter(lambda value, _: raised(f"10^{round(math.log10(value / size))}"))
-    else:
-        label_ticks(ax.xaxis, size)
-
-
-def parameter_unit(values: xarray.DataArray) -> tuple[str, float]:
-    """The unit of a parameter over decades, with the prefix that suits the middle of them, and how large it is."""
-    # At their upper end, nobody reads 100 pN/s from an axis in nN/s.
-    return prefixed(unit(values), np.sqrt(np.abs(values.values[:1] * values.values[-1:])))
+    logarithmic(ax.xaxis)
+    ax.xaxis.set_major_formatter(lambda value, _: raised(f"10^{round(math.log10(value / size))}"))
 
 
 def parameter_words(values: xarray.DataArray) -> str:
@@ -359,7 +370,7 @@ def by_second(dataset: xarray.Dataset, values: Array) -> list[tuple[Array, str]]
     if values.ndim == 1:
         return [(values, "")]
     second = dataset[str(dataset["status"].dims[1])]
-    chosen = np.unique(np.linspace(0, values.shape[1] - 1, MOST_CURVES).round().astype(int)).tolist()
+    chosen = spread(values.shape[1], MOST_CURVES)
     left = f" ({len(chosen)} of {values.shape[1]})" if len(chosen) < values.shape[1] else ""
     return [(values[:, j], valued(second, j) + (left if j == chosen[-1] else "")) for j in chosen]
 
@@ -388,8 +399,10 @@ def logarithmic(*axes: XAxis | YAxis) -> None:
         axis.set_minor_locator(_FewDecades(subs="auto"))
 
 
-def label_ticks(axis: XAxis | YAxis, size: float) -> None:
-    """Labels of a linear axis in units of this size."""
+def label(axis: XAxis | YAxis, words: str, unit: str, values: Array, between: str = " ") -> None:
+    """What lies along a linear axis, with its unit and labels of ticks in the prefix that suits these values."""
+    text, size = prefixed(unit, values)
+    axis.set_label_text(f"{words}{between}[{text}]")
     if size == 1.0:
         axis.axes.ticklabel_format(axis="x" if isinstance(axis, XAxis) else "y", useOffset=False, scilimits=(-4, 5))
     else:

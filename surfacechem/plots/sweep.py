@@ -9,7 +9,7 @@ import xarray
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from surfacechem.errors import InputError, suggestion
+from surfacechem.errors import InputError
 from surfacechem.format.plans import RUN, Plan, recorded_plan
 from surfacechem.plots import members, rupture, style
 from surfacechem.plots.run import KINDS, Panel, of_kind
@@ -80,9 +80,7 @@ def _numbers(dataset: xarray.Dataset) -> list[str]:
 def groups(dataset: xarray.Dataset, variables: Sequence[str] | None) -> list[Panel]:
     """Panels of the variables, else of the most probable load at rupture, else of what depends on the sweep."""
     known, load = _numbers(dataset), rupture.load_of(dataset)
-    for name in variables or ():
-        if name not in known:
-            raise InputError(f"no variable '{name}' in the sweep.{suggestion(name, known)}")
+    style.refuse_unknown(variables or (), known, "in the sweep")
     names = [[name] for name in dict.fromkeys(variables or ())] or ([[f"{load}_mode"]] if load else _dependent(dataset))
     return [Panel("", unit(dataset[group[0]]), group) for group in names or [["time_reached"]]]
 
@@ -105,6 +103,4 @@ def _draw_final(ax: Axes, dataset: xarray.Dataset, names: Sequence[str]) -> None
         for values, label in style.by_second(dataset, end):
             marker = "o" if len(x) < 3 else ""
             ax.plot(x, values, marker=marker, label=f"{symbol(name)} {label}".strip())
-    text, size = style.prefixed(unit(dataset[names[0]]), np.stack(list(ends.values())))
-    ax.set_ylabel(f"final [{text}]")
-    style.label_ticks(ax.yaxis, size)
+    style.label(ax.yaxis, "final", unit(dataset[names[0]]), np.stack(list(ends.values())))

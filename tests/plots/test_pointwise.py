@@ -23,8 +23,8 @@ def test_tractions_are_drawn_over_what_the_states_differ_in():
     labels = [ax.get_ylabel() for ax in figure.axes]
     assert labels[0] == "$t_{n}$ [kPa]"
     (line,) = figure.axes[0].get_lines()
-    assert line.get_xdata() == pytest.approx([-4, -2, 2])
-    assert line.get_ydata() == pytest.approx([-200, -100, 0])
+    assert line.get_xdata() == pytest.approx([-4e-9, -2e-9, 2e-9])
+    assert line.get_ydata() == pytest.approx([-200e3, -100e3, 0])
     assert "[nm]" in figure.axes[-1].get_xlabel()
     (slope,) = plots.figure(data, ["t_n_by_g_n"], "t_n").axes
     assert np.all(np.diff(slope.get_lines()[0].get_xdata()) >= 0)
