@@ -14,12 +14,12 @@ import symengine as se
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from sksundae.cvode import CVODE
-from solver_problems import problem
+from solver_problems import problem, solved_as_arrays
 
 from surfacechem.compile.program import Program, compile_program
 from surfacechem.solve import solver
-from surfacechem.solve.contract import Margin, Problem
-from surfacechem.solve.radau.solver import solve_many
+from surfacechem.solve.contract import Margin, Problem, Status
+from surfacechem.solve.radau.stepper import END
 
 RUPTURE = np.array([0.2, 1.0, 4000.0, 1e-9])
 """Force ramp per second in units of kT/x, rebinding rate, activation temperature, capacity of the interface."""
@@ -223,7 +223,5 @@ def rupture_batch(rtol: float, runs: int, threads: int) -> np.ndarray:
     """Times of rupture of randomised clusters, NaN where none was found."""
     parameters = RUPTURE * np.random.default_rng(0).uniform(0.85, 1.15, (runs, 1, 4))
     y0 = np.tile(RUPTURE_START, (runs, 1))
-    atol = 0.01 * rtol
-    stop = [Margin.stop()]
-    batch = solve_many(rupture(), y0, parameters, [0.0, 100.0], rtol, atol, margins=stop, threads=threads)
-    return np.where(batch.status == 1, batch.t, np.nan)
+    ends, counts, _ = solved_as_arrays(rupture_problem(rtol), y0, parameters, threads)
+    return np.where(counts[:, END] == Status.EVENT, ends[:, 0], np.nan)

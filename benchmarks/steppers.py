@@ -45,11 +45,18 @@ from events import (
     slide_ours,
 )
 from matplotlib import pyplot as plt
-from solver_problems import PARAMETERS, exothermic, exothermic_exact, exothermic_problem, problem, robertson_sums
+from solver_problems import (
+    PARAMETERS,
+    exothermic,
+    exothermic_exact,
+    exothermic_problem,
+    problem,
+    robertson_sums,
+    solved_as_arrays,
+)
 
 from surfacechem.solve import names, solver
 from surfacechem.solve.contract import Problem, Result
-from surfacechem.solve.radau.solver import solve_many
 
 REPEATS = 3
 CASES = ("P1", "P2", "P3", "P4")
@@ -194,15 +201,15 @@ def sweep(rtol: float, threads: int = 2, runs: int = 10_000) -> tuple[float, flo
     rng = np.random.default_rng(0)
     parameters = PARAMETERS * rng.uniform(0.5, 1.5, (runs, 1, 5))
     y0 = np.stack([parameters[:, 0, 2], np.zeros(runs)], axis=1)
+    atol = np.array([300.0, 1.0]) * rtol
+    shared = problem(exothermic(), y0[0], [0.0, 2.5], rtol, atol=atol, parameters=PARAMETERS)
     rates = []
     for _ in range(REPEATS):
         start = time.perf_counter()
-        batch = solve_many(
-            exothermic(), y0, parameters, [0.0, 2.5], rtol, np.array([300.0, 1.0]) * rtol, threads=threads
-        )
+        ends, *_ = solved_as_arrays(shared, y0, parameters, threads)
         rates.append(runs / (time.perf_counter() - start))
     exact = np.array([exothermic_exact(2.5, p) for p in parameters[:, 0]])
-    return max(rates), float(np.max(np.abs(batch.y / exact - 1)))
+    return max(rates), float(np.max(np.abs(ends[:, 1:3] / exact - 1)))
 
 
 def sweep_ruptures(rtol: float, threads: int = 2, runs: int = 10_000) -> tuple[float, float, float]:

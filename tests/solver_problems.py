@@ -1,5 +1,6 @@
 """Small systems with known solutions, shared by the solver tests."""
 
+from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 
 import numpy as np
@@ -7,6 +8,7 @@ import symengine as se
 
 from surfacechem.compile.program import Program, compile_program
 from surfacechem.solve.contract import Margin, Problem
+from surfacechem.solve.radau.solver import solve_arrays
 
 CONDUCTANCE = (1e3, 1e12, 1e20)
 PARAMETERS = np.array([2.0, 300.0, 300.0, 1.0, 0.5])
@@ -37,6 +39,20 @@ def problem(
         margins,
         **options,
     )
+
+
+def solved_as_arrays(shared: Problem, y0, parameters, threads: int = 1):
+    """Ends, counts and outputs of runs that share all with a problem but y0 and parameters, on so many threads."""
+    peaks = np.zeros((1, shared.program.n_ledger + shared.program.n_margins))
+    alike = np.array([shared.spacing]), peaks, shared.segments[None], shared.times[None]
+
+    def part(rows):
+        batch = solve_arrays(shared, y0[rows], parameters[rows], *alike)
+        return batch.ends, batch.counts, batch.outputs
+
+    with ThreadPoolExecutor(threads) as pool:
+        parts = list(pool.map(part, np.array_split(np.arange(len(y0)), threads)))
+    return [np.concatenate(columns) for columns in zip(*parts, strict=True)]
 
 
 @cache

@@ -7,7 +7,7 @@ that could not go on) is left to runs that are looked at one by one.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -80,7 +80,7 @@ class ArrayRuns:
     def __init__(self, model: Model, plan: Plan, run: Run, changes: Mapping[str, float], keep: Keep) -> None:
         self.model, self.plan, self.run, self.keep = model, plan, run, keep
         self.values = model.values(changes)
-        self.problem = self._first_problem(changes).changed(explicit=run.solver == EXPLICIT)
+        self.problem = replace(self._first_problem(changes), explicit=run.solver == EXPLICIT)
         system = model.system
         self.n = len(system.states)
         paths = [parameter.path for parameter in system.parameters]
@@ -139,7 +139,7 @@ class ArrayRuns:
         if self.ramp is not None:
             segments = np.column_stack([np.zeros(len(own)), ends[own]])
         # Looks at the equations follow the length of a run; outputs are for what is kept of its course.
-        problem = self.problem.changed(times=times[0], record_steps=self.keeps_steps, picture=0.0)
+        problem = replace(self.problem, times=times[0], record_steps=self.keeps_steps, picture=0.0)
         spacing = segments[:, -1] / self.run.samples
         batch = solve_arrays(problem, y0[own], table[own], spacing, peaks, segments, times)
         clear, columns = self._columns(Ends(batch, table[own], segments, times))

@@ -5,12 +5,11 @@ parameters. Time breakpoints end a step; margins that cross zero stop the run or
 is integrated beside the state, outside the error norm. A result always carries a status and its reason in words.
 """
 
-import copy
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -127,45 +126,16 @@ class Problem:
     """Whether steps may be explicit where the equations give their rates and are not stiff."""
 
     def __post_init__(self) -> None:
-        n, segments = self.program.n, len(self.segments) - 1
-        require = self._require
-        require(self.y0.shape == (n,), "y0 has shape {0.y0.shape}; the program has {0.program.n} states.")
-        require(
-            self.atol.shape == (n,),
-            "atol has shape {0.atol.shape}; it needs one entry for each of {0.program.n} states.",
-        )
-        require(segments >= 1 and _increase(self.segments), "segments must be increasing breakpoints, at least two.")
-        require(
-            self.parameters.shape == (segments, self.program.n_parameters),
-            "parameters have shape {0.parameters.shape}; one vector of {0.program.n_parameters} a segment is needed.",
-        )
-        require(_increase(self.times), "output times must increase strictly.")
-        inside = len(self.times) == 0 or (self.times[0] >= self.segments[0] and self.times[-1] <= self.segments[-1])
-        require(inside, "output times must lie within the segments.")
-        require(len(self.margins) == self.program.n_margins, "{0.program.n_margins} margins need as many kinds.")
-        require(
-            0.0 < self.rtol < 1.0 and bool((self.atol >= 0.0).all()),
-            "rtol must lie in (0, 1) and atol must not be negative.",
-        )
+        """Compiled code takes these sizes on trust."""
+        n, counts = self.program.n, (self.program.n_parameters, self.program.n_margins)
+        given = self.y0.shape, self.atol.shape, self.parameters.shape, len(self.margins)
+        if given != ((n,), (n,), (len(self.segments) - 1, counts[0]), counts[1]):
+            message = f"y0, atol, parameters and margins have the sizes {given}"
+            raise ValueError(f"{message}; the program has {n} states, {counts[0]} parameters and {counts[1]} margins.")
 
-    def changed(self, **changes: object) -> "Problem":
-        """The problem with other fields, over an arc of it or as a pickle needs it; what was checked is not checked
-        again.
-        """
-        other = copy.copy(self)
-        for name, value in changes.items():
-            object.__setattr__(other, name, value)
-        return other
-
-    def _require(self, condition: bool, message: str) -> None:
-        """Raise ValueError; the message is made up only then, as a run may be brief."""
-        if not condition:
-            raise ValueError(message.format(self))
-
-
-def _increase(times: Array) -> bool:
-    """Whether each is beyond the one before."""
-    return len(times) < 2 or bool((times[1:] > times[:-1]).all())
+    def __getstate__(self) -> dict[str, Any]:
+        """All but machine code, which a model makes again."""
+        return {**vars(self), "program": None}
 
 
 class Counters(NamedTuple):

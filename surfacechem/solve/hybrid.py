@@ -69,7 +69,7 @@ def without_stall(problem: Problem, velocities: NDArray[np.bool_]) -> Flow[Resul
         atol = np.where(velocities, np.maximum(problem.atol, SEEN * rounding(result)), problem.atol)
         if not np.all(np.isfinite(atol)) or np.all(atol == problem.atol):
             break
-        problem = problem.changed(atol=atol)
+        problem = replace(problem, atol=atol)
         result = yield problem
     return result
 
@@ -182,7 +182,8 @@ class Hybrid:
         local[next(j for j, p in enumerate(self.system.parameters) if p.path == START)] = start.t
         local[self.system.origins] -= start.t
         segments = instant.rebounds.pieces(start.t, end)
-        problem = problem.changed(
+        problem = replace(
+            problem,
             y0=start.y,
             times=np.clip(times - start.t, 0.0, end - start.t),
             segments=segments,
@@ -233,7 +234,8 @@ def merged(problem: Problem, arcs: Sequence[Arc], status: Status, end: float, le
     last = results[-1]
     events = _rows([(arc, arc.result.events, slice(None)) for arc in arcs])
     return Result(
-        problem=problem.changed(
+        problem=replace(
+            problem,
             segments=np.array([*(arc.start.t for arc in arcs), problem.segments[-1]]),
             parameters=np.array([arc.start.parameters for arc in arcs]),
         ),

@@ -118,13 +118,9 @@ class Trajectory:
     seconds: float
     jumps: tuple[Jump, ...] = ()
 
-    def __getstate__(self) -> dict[str, Any]:
-        """All but machine code, which is made again from the system."""
-        return {**vars(self), "result": replace(self.result, problem=self.result.problem.changed(program=None))}
-
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Give the problem the machine code that the model has made anew."""
-        problem = state["result"].problem.changed(program=state["model"].program)
+        problem = replace(state["result"].problem, program=state["model"].program)
         vars(self).update(state, result=replace(state["result"], problem=problem))
 
     def at(self, rows: States) -> Trajectory:

@@ -52,8 +52,8 @@ def test_outputs_right_after_the_start(name: str) -> None:
 def test_problem_is_checked() -> None:
     t, y, dy = se.symbols("t y dy")
     program = compile_program(t, [y], [dy], [], [dy + y])
-    with pytest.raises(ValueError, match="output times must lie within"):
-        Problem(program, np.ones(1), np.array([3.0]), np.array([0.0, 1.0]), np.zeros((1, 0)), 1e-6, np.ones(1))
+    with pytest.raises(ValueError, match="the program has 1 states, 0 parameters and 0 margins"):
+        Problem(program, np.ones(1), np.zeros(0), np.array([0.0, 1.0]), np.zeros((1, 2)), 1e-6, np.ones(1))
 
 
 @pytest.mark.parametrize("name", ["bdf", "scipy-radau"])

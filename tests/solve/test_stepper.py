@@ -15,13 +15,14 @@ from solver_problems import (
     linear_decay,
     problem,
     robertson_sums,
+    solved_as_arrays,
 )
 
 from surfacechem.compile.program import compile_program
 from surfacechem.solve import names, solver
 from surfacechem.solve.contract import Margin, Problem, Status
-from surfacechem.solve.radau.solver import Dop853, Radau, consistent, output_rates, solve_many
-from surfacechem.solve.radau.stepper import ROWS
+from surfacechem.solve.radau.solver import Dop853, Radau, consistent, output_rates
+from surfacechem.solve.radau.stepper import END, ROWS
 from surfacechem.solve.radau.tables import (
     COLLOCATION,
     DEFECT,
@@ -216,19 +217,15 @@ def test_batch_is_deterministic_and_equals_single_runs() -> None:
     rng = np.random.default_rng(1)
     parameters = np.array([2.0, 300.0, 300.0, 1.0, 0.5]) * rng.uniform(0.5, 1.5, (600, 1, 5))
     y0 = np.stack([parameters[:, 0, 2], np.zeros(600)], axis=1)
-    one, two = (
-        solve_many(exothermic(), y0, parameters, [0.0, 2.5], 1e-8, [1e-8, 1e-10], times=[1.0, 2.5], threads=threads)
-        for threads in (1, 2)
-    )
-    assert one.y.tobytes() == two.y.tobytes()
-    assert one.outputs.tobytes() == two.outputs.tobytes()
-    assert np.all(one.status == Status.FINISHED)
     atol = np.array([1e-8, 1e-10])
     alone = problem(exothermic(), y0[7], [0.0, 2.5], 1e-8, atol=atol, times=[1.0, 2.5], parameters=parameters[7])
-    single = radau.solve(alone)
-    assert single.y.tobytes() == one.y[7].tobytes()
+    one, two = (solved_as_arrays(alone, y0, parameters, threads) for threads in (1, 2))
+    assert [each.tobytes() for each in one] == [each.tobytes() for each in two]
+    ends, counts, _ = one
+    assert np.all(counts[:, END] == Status.FINISHED)
+    assert radau.solve(alone).y.tobytes() == ends[7, 1:3].tobytes()
     for i in (0, 599):
-        np.testing.assert_allclose(one.y[i], exothermic_exact(2.5, parameters[i, 0]), rtol=1e-7)
+        np.testing.assert_allclose(ends[i, 1:3], exothermic_exact(2.5, parameters[i, 0]), rtol=1e-7)
 
 
 def test_consistent_states_in_rows() -> None:
@@ -261,11 +258,6 @@ def test_batch_with_times_of_their_own_and_events() -> None:
     np.testing.assert_allclose([result.events.t[0] for result in results], np.log(2.0) / rates, rtol=1e-10)
     for result, each in zip(results, problems, strict=True):
         assert result.steps.y.tobytes() == radau.solve(each).steps.y.tobytes()
-
-
-def test_a_batch_needs_parameters_for_each_run() -> None:
-    with pytest.raises(ValueError, match="3 initial values but 2 parameter tables"):
-        solve_many(exothermic(), np.ones((3, 2)), np.ones((2, 1, 5)), [0.0, 1.0], 1e-8, 1e-8)
 
 
 def test_a_return_code_without_words_ends_the_step():

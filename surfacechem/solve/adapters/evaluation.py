@@ -8,7 +8,6 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from surfacechem.compile.program import CODE, Function, Program
 from surfacechem.solve.contract import Array
@@ -89,52 +88,26 @@ class Evaluation:
         return self._margins().copy()
 
 
-class StateRows:
-    """A program at so many states at once, with the same parameters.
-
-    ``y`` and ``ydot``, a row for each state, are views of its buffer.
+def at_rows(program: Program, parameters: Array, times: Array, y: Array) -> tuple[Array, Array, Array, Array]:
+    """The equations at many states with the same parameters: states with the algebraic variables found, which are not a
+    number where there are none, their derivatives, rates of the ledger and values of the margins, a row for each.
     """
-
-    def __init__(self, program: Program, parameters: Array, count: int) -> None:
-        n = program.n
-        self.program = program
-        self.inputs = np.zeros((count, program.n_inputs))
-        self.inputs[:, 1 + 2 * n :] = parameters
-        self.y, self.ydot = self.inputs[:, 1 : 1 + n], self.inputs[:, 1 + n : 1 + 2 * n]
-
-    def hold(self, times: Array, y: Array) -> None:
-        """Go to states whose derivatives are not known."""
-        self.inputs[:, 0] = times
-        self.y[:] = y
-        self.ydot[:] = 0.0
-
-    def put(self, times: Array, y: Array) -> None:
-        """Go to states, and find derivatives and algebraic variables of each; not a number where there are none."""
-        self.hold(times, y)
-        self.program.filled(self.inputs)
-        if self.program.rates is not None:
-            self.ydot[:] = self.program.rates(self.inputs)
-            found = np.isfinite(self.ydot).all(axis=1)
-        else:
-            found = self._search()
-        self.inputs[~found, 1 : 1 + 2 * self.program.n] = np.nan
-
-    def _search(self) -> NDArray[np.bool_]:
-        """Find derivatives and algebraic variables; where they were found."""
-        n, count = self.program.n, len(self.inputs)
-        ends, counts = self.inputs[:, : 1 + 2 * n].copy(), np.zeros((count, COLUMNS), np.int64)
-        table = np.ascontiguousarray(self.inputs[:, None, 1 + 2 * n :])
-        stepper.run(search_batch(self.program, ends, table, counts), 0, count)
-        self.inputs[:, : 1 + 2 * n] = ends
-        return np.asarray(counts[:, END] == 0)
-
-    def values(self) -> tuple[Array, Array]:
-        """Rates of the ledger and values of the margins, a row for each state."""
-        ledger, margins = (
-            function(self.inputs) if function else np.zeros((len(self.inputs), 0))
-            for function in (self.program.ledger, self.program.margins)
-        )
-        return ledger, margins
+    n, count = program.n, len(times)
+    rows = np.concatenate((times[:, None], y, np.zeros_like(y), np.tile(parameters, (count, 1))), axis=1)
+    program.filled(rows)
+    if program.rates is not None:
+        rows[:, 1 + n : 1 + 2 * n] = program.rates(rows)
+        found = np.isfinite(rows[:, 1 + n : 1 + 2 * n]).all(axis=1)
+    else:
+        ends, counts = rows[:, : 1 + 2 * n].copy(), np.zeros((count, COLUMNS), np.int64)
+        table = np.ascontiguousarray(rows[:, None, 1 + 2 * n :])
+        stepper.run(search_batch(program, ends, table, counts), 0, count)
+        rows[:, : 1 + 2 * n], found = ends, counts[:, END] == 0
+    rows[~found, 1 : 1 + 2 * n] = np.nan
+    ledger, margins = (
+        function(rows) if function else np.zeros((count, 0)) for function in (program.ledger, program.margins)
+    )
+    return rows[:, 1 : 1 + n], rows[:, 1 + n : 1 + 2 * n], ledger, margins
 
 
 class _Code:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem.solve.adapters.dense_step import NODES, WEIGHTS, DenseStep, Guards, StepLedger, first_crossing
-from surfacechem.solve.adapters.evaluation import Evaluation, StateRows
+from surfacechem.solve.adapters.evaluation import Evaluation, at_rows
 from surfacechem.solve.contract import Array, Counters, Events, Points, Problem, Result, Solver, Status
 from surfacechem.solve.radau import stepper
 from surfacechem.tolerances import NEGLIGIBLE, SQRT_EPS, ULPS
@@ -342,10 +342,8 @@ class _Run:
         if not self.solver.keeps_algebraic:
             y = np.empty((len(x), len(self.y)))
             y[:, view.evaluation.free], y[:, view.evaluation.algebraic] = x, view.evaluation.guess
-        rows = StateRows(self.problem.program, view.parameters, len(y))
-        rows.put(times[:, 1:].ravel(), y)
-        starts = self.y, self.ydot, self.ledger_rates, self.margins
-        return _Inside.of(times, zip(starts, (rows.y, rows.ydot, *rows.values()), strict=True))
+        rows = at_rows(self.problem.program, view.parameters, times[:, 1:].ravel(), y)
+        return _Inside.of(times, zip((self.y, self.ydot, self.ledger_rates, self.margins), rows, strict=True))
 
     def _state(self, step: DenseStep, t: float) -> tuple[Array, Array]:
         """State and derivative inside the last step."""

@@ -11,15 +11,7 @@ import numpy as np
 
 from surfacechem.solve.radau.linear import factor, fold_chains, solve_real
 from surfacechem.solve.radau.roundoff import spread_noise
-from surfacechem.solve.radau.work import (
-    JACOBIAN,
-    RESIDUAL,
-    any_true,
-    compiled,
-    evaluate,
-    finite,
-    set_inputs,
-)
+from surfacechem.solve.radau.work import JACOBIAN, RESIDUAL, any_true, compiled, evaluate, finite, set_inputs
 from surfacechem.tolerances import DIGITS, NEGLIGIBLE, SQRT_EPS, TINY
 
 CONSISTENT, NO_STATE, SINGULAR_STATE, NOT_FINITE_STATE = range(4)

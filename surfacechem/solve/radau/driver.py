@@ -6,11 +6,10 @@ import numpy as np
 
 from surfacechem.solve.contract import Status
 from surfacechem.solve.radau.consistency import find_consistent
-from surfacechem.solve.radau.dense import finish_step, hold_rates
+from surfacechem.solve.radau.dense import finish_step, hold_rates, ledger_norm
 from surfacechem.solve.radau.guards import AT_START, find_event, keep_sides, mark_at_end, restore_sides, start_margins
 from surfacechem.solve.radau.newton import stage_count
 from surfacechem.solve.radau.outputs import write_outputs, write_picture
-from surfacechem.solve.radau.quadrature import ledger_norm
 from surfacechem.solve.radau.step import (
     BRIEF,
     GOOD,

@@ -23,16 +23,7 @@ from surfacechem.solve.radau.tables import (
     PAIR_VALUES,
     TO_PARTS,
 )
-from surfacechem.solve.radau.work import (
-    JACOBIAN,
-    RESIDUAL,
-    clear,
-    combine,
-    compiled,
-    evaluate,
-    finite,
-    put,
-)
+from surfacechem.solve.radau.work import JACOBIAN, RESIDUAL, clear, combine, compiled, evaluate, finite, put
 from surfacechem.tolerances import EPS, NEGLIGIBLE, TINY
 
 CONVERGED, DIVERGED, NOT_FINITE = range(3)

@@ -11,13 +11,7 @@ import numpy as np
 
 from surfacechem.solve.radau.linear import solve_real
 from surfacechem.solve.radau.tables import GAMMA
-from surfacechem.solve.radau.work import (
-    RESIDUAL,
-    clear,
-    compiled,
-    evaluate,
-    set_inputs,
-)
+from surfacechem.solve.radau.work import RESIDUAL, clear, compiled, evaluate, set_inputs
 from surfacechem.tolerances import NEGLIGIBLE, ULPS
 
 DIFFERENCE = np.array([1.0, -5.0, 10.0, -10.0, 5.0, -1.0]) / np.sqrt(252.0)

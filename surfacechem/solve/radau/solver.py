@@ -3,7 +3,7 @@
 import threading
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, lru_cache
 from typing import Any, TypeAlias
 
@@ -161,10 +161,10 @@ class Dop853(Radau):
     name = "dop853"
 
     def solve(self, problem: Problem) -> Result:
-        return super().solve(problem.changed(explicit=True))
+        return super().solve(replace(problem, explicit=True))
 
     def solve_all(self, problems: Sequence[Problem], threads: int = 1) -> list[Result]:
-        return super().solve_all([problem.changed(explicit=True) for problem in problems], threads)
+        return super().solve_all([replace(problem, explicit=True) for problem in problems], threads)
 
 
 def _solved(problems: Sequence[Problem]) -> list[Result]:
@@ -234,58 +234,6 @@ def _result(problem: Problem, batch: Any, i: int) -> Result:
 @cache
 def _no_events(n: int, q: int) -> Events:
     return Events(*_points(np.empty((0, 1 + 2 * n + q)), n), index=np.empty(0, np.int64))
-
-
-@dataclass(frozen=True)
-class BatchResult:
-    """Ends of many runs as arrays; ``outputs[i, :counts[i]]`` are the outputs run i reached, the rest is not set."""
-
-    status: NDArray[np.int64]
-    t: Array
-    y: Array
-    outputs: Array
-    ledger_outputs: Array
-    counts: NDArray[np.int64]
-
-
-def solve_many(
-    program: Program,
-    y0: ArrayLike,
-    parameters: ArrayLike,
-    segments: ArrayLike,
-    rtol: float,
-    atol: ArrayLike,
-    *,
-    times: ArrayLike = (),
-    margins: Sequence[Margin] = (),
-    max_steps: int = 100_000,
-    threads: int = 1,
-) -> BatchResult:
-    """Run arrays of initial values [run, state] and parameters [run, segment, parameter] that share segments and output
-    times, without anything of the way but the outputs; independent of the number of threads.
-    """
-    states, table, breaks, outputs = map(_contiguous, (y0, parameters, segments, times))
-    if len(states) != len(table):
-        raise ValueError(
-            f"{len(states)} initial values but {len(table)} parameter tables; one of each a run is needed."
-        )
-    n = program.n
-    weights, kinds = np.array(np.broadcast_to(np.asarray(atol, dtype=float), (n,))), tuple(margins)
-    first = states[0] if len(states) else np.zeros(n)
-    fixed = table[0] if len(table) else np.zeros((len(breaks) - 1, program.n_parameters))
-    shared = Problem(program, first, outputs, breaks, fixed, rtol, weights, kinds, max_steps)
-    limits = np.array((np.inf,)), np.array((max_steps,)), _peaks(shared)[None]
-    batch = _batch(shared, (states, table, *limits, breaks[None], outputs[None]), (0, 0, 0))
-    with ThreadPoolExecutor(threads) as pool:
-        list(pool.map(lambda i: stepper.run(batch, i, min(i + CHUNK, len(states))), range(0, len(states), CHUNK)))
-    return BatchResult(
-        status=batch.counts[:, END],
-        t=batch.ends[:, 0],
-        y=batch.ends[:, 1 : 1 + n],
-        outputs=batch.outputs[:, :, :n],
-        ledger_outputs=batch.outputs[:, :, n:],
-        counts=batch.counts[:, OUTPUTS],
-    )
 
 
 def solve_arrays(

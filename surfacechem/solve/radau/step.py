@@ -18,15 +18,15 @@ import numpy as np
 
 from surfacechem.solve.contract import Status
 from surfacechem.solve.radau.consistency import CONSISTENT, NO_STATE, SINGULAR_STATE, find_consistent
-from surfacechem.solve.radau.dense import change_and_slope, keep_polynomial, probe_ledger, put_inside
-from surfacechem.solve.radau.explicit import (
-    DENSEST,
-    defect_of_rates,
-    is_stiff,
-    mark_noise,
-    put_rates,
-    step_explicitly,
+from surfacechem.solve.radau.dense import (
+    change_and_slope,
+    defect_norm,
+    excused_norm,
+    keep_polynomial,
+    probe_ledger,
+    put_inside,
 )
+from surfacechem.solve.radau.explicit import DENSEST, defect_of_rates, is_stiff, mark_noise, put_rates, step_explicitly
 from surfacechem.solve.radau.linear import solve_real
 from surfacechem.solve.radau.newton import (
     CONVERGED,
@@ -39,7 +39,6 @@ from surfacechem.solve.radau.newton import (
     solve_stages,
     stage_count,
 )
-from surfacechem.solve.radau.quadrature import defect_norm, excused_norm
 from surfacechem.solve.radau.roundoff import find_noise
 from surfacechem.solve.radau.stepper import STOP
 from surfacechem.solve.radau.tables import FINEST, START_SLOPE

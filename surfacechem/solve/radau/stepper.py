@@ -180,7 +180,6 @@ _SOURCES = (
     "step",
     "consistency",
     "dense",
-    "quadrature",
     "guards",
     "outputs",
     "driver",
