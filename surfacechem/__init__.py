@@ -14,6 +14,7 @@ Theory: Sauer, Duong & Mandadapu (2021), doi 10.1177/10812865211032723.
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -25,21 +26,11 @@ if TYPE_CHECKING:
 __all__ = ["Simulation", "load", "precision", "register", "run", "steady", "sweep"]
 
 
+# Modules of those names that are not of simulations; each is imported when it is asked for.
+_ELSEWHERE = {"precision": "studies.precision", "register": "laws", "steady": "studies.steady"}
+
+
 def __getattr__(name: str) -> Any:
-    if name == "precision":
-        from surfacechem.studies import precision
-
-        return precision.precision
-    if name == "steady":
-        from surfacechem.studies import steady
-
-        return steady.steady
-    if name == "register":
-        from surfacechem import laws
-
-        return laws.register
-    if name in __all__:
-        from surfacechem.runs import simulation
-
-        return getattr(simulation, name)
-    raise AttributeError(f"module 'surfacechem' has no attribute {name!r}")
+    if name not in __all__:
+        raise AttributeError(f"module 'surfacechem' has no attribute {name!r}")
+    return getattr(import_module(f"surfacechem.{_ELSEWHERE.get(name, 'runs.simulation')}"), name)

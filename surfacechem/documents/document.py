@@ -168,6 +168,15 @@ def beside(folder: Path, name: str, place: Place) -> Path | None:
     return path
 
 
+def named(tree: Tree, base: str | Path, what: str) -> Path:
+    """The file in a folder that a value names; InputError, which says ``what`` it should be, where there is none."""
+    name = tree.text(what)
+    path = beside(Path(base), name, tree.place)
+    if path is None:
+        raise tree.error(f"no file {name} beside the case.")
+    return path
+
+
 def parse(text: str, file: str = "") -> Tree:
     """The tree of a YAML document.
 

@@ -7,7 +7,6 @@ import re
 from dataclasses import replace
 from hashlib import sha256
 from itertools import pairwise
-from pathlib import Path
 
 from surfacechem.contracts.units import parse
 from surfacechem.documents import document
@@ -37,11 +36,7 @@ def embedded(tree: Tree, base: str) -> Tree:
         fields = table.mapping(KEYS)
         if "csv" in fields:
             raise fields["csv"].error("the table has two roles: give `file` or `csv`.")
-        file = fields.pop("file")
-        name = file.text("the file of a table")
-        path = document.beside(Path(base), name, file.place)
-        if path is None:
-            raise file.error(f"no file {name} beside the case.")
+        path = document.named(fields.pop("file"), base, "the file of a table")
         values["table"] = replace(table, value={"csv": Tree(document.read(path), Place(str(path))), **fields})
     return replace(tree, value=values)
 

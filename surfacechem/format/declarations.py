@@ -92,14 +92,23 @@ class Content(ABC):
 
 @dataclass(frozen=True)
 class Number(Content):
-    """A number with a unit, in a range; one that varies is its value times factors."""
+    """A number with a unit, in a range, or the one word that may stand in its place; one that varies is its value
+    times factors.
+    """
 
     spec: Spec
     difference: bool = False
-    words: str = "quantity"
+    word: str = ""
 
-    def read(self, tree: Tree, name: str, context: Context) -> float | Varying:
-        """The value in SI."""
+    @property
+    def words(self) -> str:  # type: ignore[override]
+        """The word beside a quantity."""
+        return f"quantity or `{self.word}`" if self.word else "quantity"
+
+    def read(self, tree: Tree, name: str, context: Context) -> float | Varying | str:
+        """The value in SI, or the word."""
+        if self.word and tree.value == self.word:
+            return self.word
         spec = self.spec.resolved(context.x)
         if context.whole:
             spec = replace(spec, unit=WHOLE.get(spec.unit, spec.unit))
@@ -113,14 +122,15 @@ class Number(Content):
         return value if factors is None else Varying(value, factors)
 
     def schema(self) -> Schema:
-        """A number in its range, or a text with a unit; else the value and its factors."""
+        """A number in its range, or a text with a unit; else the value and its factors, or the word."""
         spec = self.spec
         bare = _bounded({"type": "number"}, exclusiveMinimum=spec.above, minimum=spec.at_least, maximum=spec.at_most)
         kinds: list[Schema] = [bare, {"type": "string", "pattern": QUANTITY}]
         if spec.varies:
             factors = {"type": "array", "items": reference(Factor.contract)}
             kinds.append(closed({"value": reference("quantity"), "times": factors}, required=("value",)))
-        return {"anyOf": kinds} if len(bare) > 1 or spec.varies else reference("quantity")
+        kinds += [{"const": self.word}] if self.word else []
+        return {"anyOf": kinds} if len(bare) > 1 or len(kinds) > 2 else reference("quantity")
 
 
 def number(tree: Tree, spec: Spec, name: str, *, difference: bool = False) -> float:
@@ -131,25 +141,6 @@ def number(tree: Tree, spec: Spec, name: str, *, difference: bool = False) -> fl
     except InputError as error:
         raise error.at(tree.place) from None
     return value
-
-
-@dataclass(frozen=True)
-class OrWord(Number):
-    """A number with a unit, or the one word that may stand in its place."""
-
-    word: str = ""
-
-    def __post_init__(self) -> None:
-        """Both are told."""
-        object.__setattr__(self, "words", f"quantity or `{self.word}`")
-
-    def read(self, tree: Tree, name: str, context: Context) -> Any:
-        """The value in SI, or the word."""
-        return self.word if tree.value == self.word else super().read(tree, name, context)
-
-    def schema(self) -> Schema:
-        """Either."""
-        return {"anyOf": [super().schema(), {"const": self.word}]}
 
 
 @dataclass(frozen=True)

@@ -36,11 +36,7 @@ def _numbers(tree: Tree, base: str) -> Tree:
     """The parameters of heights, from their file if they name one."""
     if not (isinstance(tree.value, dict) and "file" in tree.value):
         return tree
-    file = tree.mapping(("file",))["file"]
-    name = file.text("the file of heights")
-    path = document.beside(Path(base), name, file.place)
-    if path is None:
-        raise file.error(f"no file {name} beside the case.")
+    path = document.named(tree.mapping(("file",))["file"], base, "the file of heights")
     place = Place(str(path))
     numbers = from_netcdf(path) if path.suffix == NETCDF else from_csv(Tree(document.read(path), place))
     # Errors of the numbers, as of places that do not increase, are errors of the file.
@@ -51,7 +47,9 @@ def _numbers(tree: Tree, base: str) -> Tree:
 def from_csv(content: Tree) -> Numbers:
     """Heights of a table with a row for each place, in any order."""
     table = CSVText(content)
-    _refuse_holes(table)
+    for line, row in table.rows:
+        if any(cell.lower() in HOLES for cell in row):
+            raise table.error(line, "the heights have a hole: z is no finite number there.")
     x, y, z = (table.column(axis, "m", axis) for axis in AXES)
     heights: dict[tuple[float, float], float] = {}
     for (line, _), place, height in zip(table.rows, zip(x, y, strict=True), z, strict=True):
@@ -67,13 +65,6 @@ def from_csv(content: Tree) -> Numbers:
             )
             raise InputError(f"the heights have holes: {grid}.", content.place)
     return {"x": along[0], "y": along[1], "z": [heights[place] for place in product(*along)]}
-
-
-def _refuse_holes(table: CSVText) -> None:
-    """InputError where a table says itself that a height is missing."""
-    for line, row in table.rows:
-        if any(cell.lower() in HOLES for cell in row):
-            raise table.error(line, "the heights have a hole: z is no finite number there.")
 
 
 def from_netcdf(path: Path) -> Numbers:

@@ -56,10 +56,7 @@ def embedded(tree: Tree, base: Path, allow_code: bool = False) -> tuple[Tree, li
 def _source(fields: dict[str, Tree], name: str, base: Path, allow_code: bool) -> str:
     """The source of an entry: in the entry itself, or in the file that it names."""
     if "python" not in fields:
-        path = document.beside(base, name, fields["file"].place)
-        if path is None:
-            raise fields["file"].error(f"there is no file {name} beside the case.")
-        return document.read(path)
+        return document.read(document.named(fields["file"], base, "a file of laws"))
     source = str(fields["python"].value)
     if not allow_code and hashlib.sha256(source.encode()).hexdigest() not in _run:
         raise fields["python"].error(

@@ -5,37 +5,13 @@ from __future__ import annotations
 import json
 
 from surfacechem import laws
-from surfacechem.contracts.terms import (
-    Factor,
-    FilmGrowth,
-    Friction,
-    HeatTransfer,
-    Law,
-    Limit,
-    Load,
-    PairEnergy,
-    Potential,
-    Property,
-    RateLaw,
-    Shape,
-)
+from surfacechem.contracts.terms import BodyEnergy, Law, Load, Shape
 from surfacechem.format.csvtable import TEXTS
 from surfacechem.format.declarations import NODE, QUANTITY, Schema, closed, law_keys, reference, schema_of
 from surfacechem.format.sections import Document
 
-CONTRACTS: tuple[type[Law], ...] = (
-    Potential,
-    RateLaw,
-    Friction,
-    HeatTransfer,
-    Limit,
-    Property,
-    Load,
-    Factor,
-    Shape,
-    PairEnergy,
-    FilmGrowth,
-)
+# The parameters of a body's energy stand beside its other keys.
+CONTRACTS = [contract for contract in laws.FAMILIES if contract is not BodyEnergy]
 
 
 def schema() -> Schema:

@@ -44,7 +44,6 @@ from surfacechem.format.declarations import (
     Number,
     OneLaw,
     OneOf,
-    OrWord,
     PerArea,
     Prescribed,
     Section,
@@ -378,7 +377,7 @@ class RunSection(Section):
     """times, accuracy, solver, for example `run: {until: 5 s}`"""
 
     until: float | str | None = key(
-        OrWord(Spec("s", "end of the run", varies=False, above=0), word=STEADY),
+        Number(Spec("s", "end of the run", varies=False, above=0), word=STEADY),
         "end of the run [s], or where nothing changes any more",
     )
     outputs: int | None = key(

@@ -56,10 +56,6 @@ def module(family: str) -> ModuleType:
     return importlib.import_module(ELSEWHERE.get(family, f"{__name__}.{family}"))
 
 
-def _in_module(contract: type[Law], family: str) -> Iterator[type[Law]]:
-    return _stated_in(module(family), contract)
-
-
 def _stated_in(found: ModuleType, contract: type[Law]) -> Iterator[type[Law]]:
     for value in vars(found).values():
         own = inspect.isclass(value) and value.__module__ == found.__name__
@@ -74,7 +70,7 @@ def laws(contract: type[Law]) -> dict[str, type[Law]]:
 
 
 def _shipped(contract: type[Law]) -> dict[str, type[Law]]:
-    return {law.name(): law for family in FAMILIES[contract] for law in _in_module(contract, family)}
+    return {law.name(): law for family in FAMILIES[contract] for law in _stated_in(module(family), contract)}
 
 
 def knows(contract: type[Law], name: str) -> bool:
@@ -93,7 +89,7 @@ def find(contract: type[Law], name: str) -> type[Law]:
 def _found(contract: type[Law], name: str) -> type[Law] | None:
     # One family after the other, so that a case imports no more than those before its own.
     for family in FAMILIES[contract]:
-        for law in _in_module(contract, family):
+        for law in _stated_in(module(family), contract):
             if law.name() == name:
                 return law
     return laws(contract).get(name)
