@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -427,7 +428,7 @@ def plot(
 
 
 def _run(case: str, changes: Changes, talk: bool | None) -> Solution:
-    """A case that is run to be plotted; a dataset is plotted without what runs cases being imported."""
+    """A case that is run to be shown; a dataset is shown without what runs cases being imported."""
     from surfacechem.runs.simulation import load
 
     return solved(load(case, changes or ()).run, talk, brief=True)
@@ -472,7 +473,6 @@ def report(
     Scene, equations, figures, events, balances, error against run time. It needs no network.
     """
     from surfacechem.results.netcdf import WRITTEN
-    from surfacechem.runs.simulation import load
     from surfacechem.studies import run_report
 
     is_file = source.endswith(WRITTEN)
@@ -480,7 +480,7 @@ def report(
         raise InputError("a dataset is reported as it is; give a case to change values of.", Place(path="--set"))
     target = run_report.report_path(output or f"{Path(source).stem}.html")
     refuse_unwritable(target)
-    solution = None if is_file else solved(load(source, changes or ()).run, talk, brief=True)
+    solution = None if is_file else _run(source, changes, talk)
     solved(lambda: run_report.write(solution.dataset if solution else source, target), talk)
     if talk is not False:
         typer.echo(str(target))
@@ -548,10 +548,7 @@ def precision(
         "repeat": repeat,
     }
     given = {name: value for name, value in settings.items() if value is not None}
-
-    def study() -> Study:
-        return studies.precision(cases, overrides=changes or (), **given)  # type: ignore[arg-type]
-
+    study = partial(studies.precision, cases, overrides=changes or (), **given)  # type: ignore[arg-type]
     _conduct(study, output or Path("precision"), talk)
 
 
@@ -580,10 +577,7 @@ def stability(
 
     settings = {"solvers": None if solvers is None else listed(solvers), "rtol": rtol, "rounds": search}
     given = {name: value for name, value in settings.items() if value is not None}
-
-    def study() -> Study:
-        return studies.stability(*(regimes or ()), quick=quick, **given)  # type: ignore[arg-type]
-
+    study = partial(studies.stability, *(regimes or ()), quick=quick, **given)  # type: ignore[arg-type]
     _conduct(study, output or Path("stability"), talk)
 
 
