@@ -145,7 +145,7 @@ def runaway(states: Sequence[State], result: Result) -> str | None:
     with np.errstate(over="ignore", invalid="ignore"):
         speed = np.nan_to_num(np.abs(result.ydot) / (np.abs(result.y) + NONE_OF_SCALE * scales))
     j = int(np.argmax(speed))
-    if not speed[j] * result.t > 1 / SOON:
+    if not (speed[j] * result.t > 1 / SOON and _is_faster(result, j)):
         return None
     if states[j].given is not None:
         # A velocity without inertia takes the age of the contact with it.
@@ -153,3 +153,12 @@ def runaway(states: Sequence[State], result: Result) -> str | None:
         return f"{names[0]} runs away, faster and faster"
     unit = states[j].quantity.unit
     return f"{states[j].name} runs away: it changes by {result.ydot[j]:.3g} {unit}/s, faster and faster"
+
+
+def _is_faster(result: Result, j: int) -> bool:
+    """Whether the rate of a state has doubled since a breakpoint or an event, where a steep load may begin."""
+    if result.steps is None:
+        return False
+    places = np.concatenate((result.problem.segments, result.events.t))
+    since = result.steps.t > np.max(places[places <= result.t])
+    return bool(np.any(2 * np.abs(result.steps.ydot[since, j]) < abs(result.ydot[j])))

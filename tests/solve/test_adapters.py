@@ -10,9 +10,12 @@ from solver_problems import problem
 
 from surfacechem import load
 from surfacechem.compile.program import compile_program
+from surfacechem.model.system import State
+from surfacechem.quantities import VARIABLES
 from surfacechem.results.event_table import event_times
 from surfacechem.solve import names, solver
-from surfacechem.solve.contract import Problem
+from surfacechem.solve.contract import Problem, Status
+from surfacechem.solve.diagnose import runaway
 
 pytestmark = pytest.mark.around
 
@@ -39,6 +42,31 @@ def test_what_cannot_go_on_is_no_success(name, rows, last):
     assert not result.success
     assert result.t <= last
     assert last == 0.0 or np.isfinite(result.y).all()
+
+
+def steep(name: str, row, start: float, end: float):
+    """A run of y from 1 on, of which a library keeps the steps."""
+    program = compile_program(T, [Y], [DY], [], [row], [2 * Y * DY])
+    return solver(name).solve(problem(program, [1.0], [start, end], 1e-8, times=[start, end], record_steps=True))
+
+
+LAYER = Y * DY - 1e17
+"""y = sqrt(1 + 2e17 (t - 1)), which doubles within 2e-17."""
+
+
+@pytest.mark.parametrize("name", [name for name in names if name != "cantera"])
+def test_a_layer_within_the_last_digit_of_the_clock(name: str) -> None:
+    result = steep(name, LAYER, 1.0, 2.0)
+    assert result.success
+    np.testing.assert_allclose(result.outputs[1], np.sqrt([2e17]), rtol=1e-6)
+    np.testing.assert_allclose(result.ledger_outputs[1], [2e17], rtol=1e-6)
+
+
+@pytest.mark.parametrize(("row", "start", "reason"), [(DY + 0.5 / Y, 0.0, "phi runs away"), (LAYER, 1.0, "None")])
+def test_only_what_gets_faster_runs_away(row, start, reason):
+    result = steep("cantera", row, start, 2.0)
+    assert result.status is Status.STEP_UNDERFLOW
+    assert str(runaway([State(VARIABLES["phi"], Y, DY, 1.0, 1.0, False)], result)).startswith(reason)
 
 
 @pytest.mark.parametrize("name", names)

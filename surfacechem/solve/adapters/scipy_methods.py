@@ -18,19 +18,33 @@ SMALLEST_RTOL = 100 * EPS
 
 
 class _Stretch(Method):
+    """Steps that count time from their start: what begins there may be over before the run's own clock ticks."""
+
     def __init__(self, kind: type[OdeSolver], view: View, t: float, end: float, y: Array) -> None:
+        self.start, self.t, self.end = t, t, end
         options: dict[str, Any] = {
             "rtol": max(view.problem.rtol, SMALLEST_RTOL),
             "atol": view.atol,
-            "jac": view.reduced_jacobian,
+            "jac": lambda since, x: view.reduced_jacobian(t + since, x),
             "max_step": view.problem.spacing,
         }
         try:
-            self.solver = kind(view.reduced_rates, t, y[view.differential], end, **options)
+            self.solver = kind(
+                lambda since, x: view.reduced_rates(t + since, x), 0.0, y[view.differential], end - t, **options
+            )
         except (ValueError, ArithmeticError) as error:
             raise StepError(str(error)) from error
 
     def advance(self) -> DenseStep:
+        before = self.t
+        while self.t == before:
+            self._step()
+            self.t = self.end if self.solver.status == "finished" else self.start + float(self.solver.t)
+        inside, start, end, last = self.solver.dense_output(), self.start, self.t, self.solver.y
+        # The clock of the run may tick before the library's last step.
+        return DenseStep(before, end, lambda t: np.asarray(last if t == end else inside(max(t - start, inside.t_old))))
+
+    def _step(self) -> None:
         with warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore")
             try:
@@ -39,8 +53,6 @@ class _Stretch(Method):
                 raise StepError(str(error)) from error
         if self.solver.status == "failed":
             raise StepError(str(message))
-        inside, end, last = self.solver.dense_output(), float(self.solver.t), self.solver.y
-        return DenseStep(float(self.solver.t_old), end, lambda t: np.asarray(last if t == end else inside(t)))
 
     @property
     def factorizations(self) -> int:

@@ -20,14 +20,16 @@ os.environ.setdefault("SUNLOGGER_WARNING_FILENAME", os.devnull)
 
 
 class _Stretch(Method):
-    """Single steps of either library; interpolation inside the last step is a step back to it."""
+    """Single steps of either library, which counts time from their start; interpolation inside the last step is a step
+    back to it.
+    """
 
     def __init__(self, library: Any, t: float, end: float, *start: Array) -> None:
         self.integrator = library
-        self.end = end
-        self.t = t
+        self.start, self.t, self.end = t, t, end
+        self.before, self.passed, self.length = 0.0, 0.0, end - t
         self.x = start[0]
-        self._call(lambda: library.init_step(t, *start))
+        self._call(lambda: library.init_step(0.0, *start))
 
     def _call(self, action: Any) -> Any:
         # The wrapper prints what it also raises.
@@ -44,20 +46,28 @@ class _Stretch(Method):
 
     def advance(self) -> DenseStep:
         before = self.t
-        # After an interpolation the library first returns to where it was.
-        for _attempt in range(2):
-            answer = self._call(lambda: self.integrator.step(self.end, method="onestep", tstop=self.end))
-            self.t, self.x = float(answer.t), np.array(answer.y)
-            if self.t > before:
-                break
+        while self.t == before:
+            self._step()
+            self.t = self.end if self.passed >= self.length else self.start + self.passed
         return DenseStep(before, self.t, self._at)
 
+    def _step(self) -> None:
+        self.before = self.passed
+        # After an interpolation the library first returns to where it was.
+        for _attempt in range(2):
+            answer = self._call(lambda: self.integrator.step(self.length, method="onestep", tstop=self.length))
+            self.passed, self.x = float(answer.t), np.array(answer.y)
+            if self.passed > self.before:
+                return
+        raise StepError("the step size fell to zero")
+
     def _at(self, t: float) -> Array:
-        if t >= self.t:  # by rounding: asked for what is beyond, the library would step on
+        since = max(t - self.start, self.before)  # the clock of the run may tick before this step
+        if t >= self.t or since >= self.passed:  # by rounding: asked for what is beyond, the library would step on
             return self.x
-        answer = self._call(lambda: self.integrator.step(t, method="normal", tstop=self.end))
-        if not abs(answer.t - t) <= ROUNDING * abs(t):
-            raise StepError(f"asked for t = {t}, given t = {answer.t}")
+        answer = self._call(lambda: self.integrator.step(since, method="normal", tstop=self.length))
+        if not abs(answer.t - since) <= ROUNDING * since:
+            raise StepError(f"asked for t = {t}, given t = {self.start + answer.t}")
         return np.array(answer.y)
 
 
@@ -73,11 +83,11 @@ class CVODESolver(SteppingSolver):
 
     def begin(self, view: View, t: float, end: float, y: Array, ydot: Array) -> Method:
 
-        def rates(t: float, x: Array, out: Array) -> None:
-            out[:] = view.reduced_rates(t, x)
+        def rates(since: float, x: Array, out: Array) -> None:
+            out[:] = view.reduced_rates(t + since, x)
 
-        def jacobian(t: float, x: Array, _rates: Array, out: Array) -> None:
-            out[:] = view.reduced_jacobian(t, x)
+        def jacobian(since: float, x: Array, _rates: Array, out: Array) -> None:
+            out[:] = view.reduced_jacobian(t + since, x)
 
         library = CVODE(
             rates,
@@ -99,12 +109,12 @@ class IDASolver(SteppingSolver):
     def begin(self, view: View, t: float, end: float, y: Array, ydot: Array) -> Method:
         program = view.problem.program
 
-        def residual(t: float, x: Array, rate: Array, out: Array) -> None:
+        def residual(since: float, x: Array, rate: Array, out: Array) -> None:
             view.residuals += 1
-            out[:] = program.residual(view.inputs(t, x, rate))
+            out[:] = program.residual(view.inputs(t + since, x, rate))
 
-        def jacobian(t: float, x: Array, rate: Array, _residual: Array, shift: float, out: Array) -> None:
-            by_state, by_rate = view.matrices(t, x, rate)
+        def jacobian(since: float, x: Array, rate: Array, _residual: Array, shift: float, out: Array) -> None:
+            by_state, by_rate = view.matrices(t + since, x, rate)
             out[:] = by_state + shift * by_rate
 
         library = IDA(
