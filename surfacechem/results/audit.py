@@ -156,14 +156,14 @@ def residuals(system: System, named: Array, ledger: Array) -> Residuals:
         found = named[..., [column[name] for name in names if name in column]]
         return found - found[..., :1, :]
 
-    def largest(*tables: Array) -> Any:
+    def most(*tables: Array) -> Any:
         return np.max([np.max(np.abs(table), axis=(-2, -1), initial=0.0) for table in tables], axis=0)
 
     return Residuals(
         changes("E_total")[..., 0] - booked("energy supply").sum(axis=-1),
         changes("S_total")[..., 0] - booked("entropy supply").sum(axis=-1) - booked("entropy production").sum(axis=-1),
-        largest(changes("U_1", "U_2", "U_c"), booked("energy supply", "dissipation")),
-        largest(changes("S_1", "S_2", "S_c"), booked("entropy supply", "entropy production")),
+        most(changes("U_1", "U_2", "U_c"), booked("energy supply", "dissipation")),
+        most(changes("S_1", "S_2", "S_c"), booked("entropy supply", "entropy production")),
     )
 
 
@@ -180,16 +180,16 @@ def audit(trajectory: Trajectory) -> Audit:
     open_ones = residuals(system, outputs, result.ledger_outputs)
     energy_scale, turned = float(open_ones.energy_scale), float(open_ones.entropy_scale)
     if steps:  # a brief load may come and go between outputs; the ends of the steps have seen it
-        energy_scale = max(energy_scale, _largest(accounts(system, steps.ledger, "energy supply", "dissipation")))
+        energy_scale = max(energy_scale, largest(accounts(system, steps.ledger, "energy supply", "dissipation")))
     E, S = (outputs[:, column[name]] for name in ("E_total", "S_total"))
-    energy_stored = max(trajectory.roundings["E_total"] / EPS, _largest(E))
-    entropy_stored = max(trajectory.roundings["S_total"] / EPS, turned, _largest(S))
+    energy_stored = max(trajectory.roundings["E_total"] / EPS, largest(E))
+    entropy_stored = max(trajectory.roundings["S_total"] / EPS, turned, largest(S))
     roundings, untimed = ROUNDINGS, 0.0
     if steps and len(steps.t):
         roundings += len(steps.t)
         if system.energy_has_histories:  # of one that is steep no more is known than within the last digits of time
             later = model.evaluate(result, steps.t * (1 + EPS), steps.y, steps.ydot, steps.segment)
-            untimed = _largest(later[:, column["E_total"]] - trajectory.everywhere["E_total"][len(result.times) :])
+            untimed = largest(later[:, column["E_total"]] - trajectory.everywhere["E_total"][len(result.times) :])
     sites = np.zeros(len(ledger))
     for j in system.account_columns.get("bonds", ()):
         bonds = trajectory.everywhere[system.ledger[j].law][: len(ledger)]
@@ -301,5 +301,6 @@ def lost(booked: Array, seen: Array, rounded: Array | float = 0.0) -> tuple[Any,
     return np.maximum(*amounts), np.maximum(*wholes)
 
 
-def _largest(*columns: Array) -> float:
-    return max(max(float(c.max(initial=0.0)), -float(c.min(initial=0.0))) for c in columns)
+def largest(values: Any) -> float:
+    """The largest absolute value of what may be empty."""
+    return float(np.max(np.abs(values), initial=0.0))

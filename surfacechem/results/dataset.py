@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 from surfacechem.errors import InputError, suggestion
 from surfacechem.model.system import Profile, System
 from surfacechem.quantities import Quantity
-from surfacechem.results import exports
-from surfacechem.results.netcdf import CONVENTIONS, TABLES, Column, dataset_path, package_version, save
+from surfacechem.results.netcdf import CONVENTIONS, TABLES, Column, dataset_path, package_version, save, save_table
 from surfacechem.solve.run import Run, Trajectory
 
 if TYPE_CHECKING:
@@ -224,7 +223,7 @@ class Results(ABC):
         """
         target = dataset_path(path)
         if target.suffix.lower() in TABLES:
-            exports.save_table(target, self.dataset)
+            save_table(target, self.dataset)
         else:
             save(target, self.columns, self.attributes)
         return target

@@ -18,14 +18,7 @@ from numpy.typing import NDArray
 
 from surfacechem.contracts.terms import Law
 from surfacechem.errors import InputError, Place, suggestion
-from surfacechem.results.accuracy import (
-    MARGIN,
-    UNKNOWN,
-    Accuracy,
-    CellErrors,
-    largest_errors,
-    second_tolerance,
-)
+from surfacechem.results.accuracy import MARGIN, UNKNOWN, Accuracy, CellErrors, largest_errors, second_tolerance
 from surfacechem.results.audit import audit
 from surfacechem.results.dataset import profile_values
 from surfacechem.results.event_table import KINK, SIDE, event_times
@@ -85,7 +78,7 @@ def accuracy(
             return replace(against_exact(trajectory, scene, *exact), asked=estimate.asked if estimate else None)
         except InputError as error:
             unused = f"; the exact solution {exact[0]} is not of this scene: {error.message}"
-    estimate = with_cells(estimate, cells()) if estimate else against_tighter(trajectory, cells())
+    estimate = with_cells(estimate or against_tighter(trajectory), cells())
     return replace(estimate, source=f"{estimate.source}{unused}")
 
 
@@ -184,9 +177,9 @@ def _second(trajectory: Trajectory, known: bool = False) -> Trajectory:
     return trajectory.model.solve_values(closer(trajectory, known), trajectory.values, nudged=True)
 
 
-def against_tighter(trajectory: Trajectory, cells: CellErrors | None = None) -> Accuracy:
-    """Errors estimated from a second run, those of the cells across bodies added."""
-    return with_cells(estimated(trajectory, _second(trajectory)), cells or CellErrors())
+def against_tighter(trajectory: Trajectory) -> Accuracy:
+    """Errors estimated from a second run."""
+    return estimated(trajectory, _second(trajectory))
 
 
 def estimated(trajectory: Trajectory, second: Trajectory) -> Accuracy:

@@ -105,8 +105,9 @@ def event_columns(runs: Sequence[Trajectory], axes: Mapping[str, int] | None = N
     for k, state in enumerate(system.states):
         if state.name not in system.inside:
             q = state.quantity
-            columns.append(column(f"{q.name}_before", q.unit, f"{q.long_name} before", partial(_state, "before", k)))
-            columns.append(column(f"{q.name}_after", q.unit, f"{q.long_name} after", partial(_state, "after", k)))
+            for side in ("before", "after"):
+                text = f"{q.long_name} {side}"
+                columns.append(column(f"{q.name}_{side}", q.unit, text, partial(_state, side, k)))
     return columns
 
 

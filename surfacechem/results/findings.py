@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import symengine
@@ -23,7 +22,7 @@ from numpy.typing import NDArray
 from surfacechem.expressions import EXPONENT_CAP
 from surfacechem.model.system import System
 from surfacechem.results.accuracy import Accuracy
-from surfacechem.results.audit import Audit
+from surfacechem.results.audit import Audit, largest
 from surfacechem.solve.run import Trajectory
 from surfacechem.tolerances import EPS, FLOOR, NEGLIGIBLE, ROUNDING
 
@@ -147,11 +146,11 @@ def _lost_fluxes(trajectory: Trajectory) -> list[str]:
     """Fluxes through conductances so large that the temperature difference is rounding."""
     fluxes = {name: size for name, size in trajectory.roundings.items() if name.startswith("q_")}
     everywhere, duration = trajectory.everywhere, trajectory.result.t
-    largest = max((_largest(everywhere[name]) for name in fluxes), default=0.0)
+    most = max((largest(everywhere[name]) for name in fluxes), default=0.0)
     # What rounding alone carries over the whole run counts against the heat that there is, wherever its zero lies.
     content = trajectory.roundings.get("E_total", 0.0) / EPS
-    felt = FLOOR * max(_largest(everywhere["E_total"]), content)
-    lost = [name for name, size in fluxes.items() if size > LOST * largest and size * duration > felt]
+    felt = FLOOR * max(largest(everywhere["E_total"]), content)
+    lost = [name for name, size in fluxes.items() if size > LOST * most and size * duration > felt]
     advice = "let the two share one temperature, or use the heat_into variables, which are exact"
     return [f"{', '.join(lost)}: lost to rounding, as the conductance is very large; {advice}"] if lost else []
 
@@ -167,7 +166,3 @@ def _extrapolations(trajectory: Trajectory) -> list[str]:
             span = f"{limit.variable} ran from {low:.6g} to {high:.6g}"
             found.append(f"{limit.law} is an extrapolation: {span}, its range is {limit.low:g} to {limit.high:g}")
     return found
-
-
-def _largest(values: Any) -> float:
-    return float(np.max(np.abs(values), initial=0.0))

@@ -1,4 +1,6 @@
-"""Columns of data and netCDF files of them, with CF conventions: a file takes its place only when it is whole."""
+"""Columns of data, and files of them: netCDF with CF conventions, and tables. A file takes its place only when it is
+whole.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +11,7 @@ import stat
 import subprocess
 import sys
 import tempfile
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -16,11 +19,14 @@ from functools import cache
 from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
 from surfacechem.errors import InputError, OutputError, Place, SurfacechemError, nearest
+
+if TYPE_CHECKING:
+    import xarray
 
 R = TypeVar("R")
 
@@ -201,6 +207,31 @@ def write_netcdf(path: Path, columns: Sequence[Column], attributes: Mapping[str,
             file.setncatts(attributes)
     except RuntimeError as error:  # the library's for all that HDF5 meets
         raise OSError(str(error)) from error
+
+
+def save_table(target: Path, dataset: xarray.Dataset) -> None:
+    """A row for each output, whole or not at all; each column is headed by its name and unit, ``v [m s-1]``.
+
+    What has other dimensions than the first variable, events and profiles for instance, is in netCDF only.
+    """
+    frame = table(dataset)
+    with replacing(target) as temporary:
+        if target.suffix.lower() == CSV:
+            frame.to_csv(temporary, index=False, lineterminator="\n")
+        else:
+            frame.to_parquet(temporary, index=False)
+
+
+def table(dataset: xarray.Dataset) -> Any:
+    """The pandas data frame of a dataset."""
+    along = set(next(iter(dataset.data_vars.values())).dims)
+    names = [name for name, item in dataset.data_vars.items() if item.dims and set(item.dims) <= along]
+    with warnings.catch_warnings():
+        # Of a table with more than a hundred columns pandas says that it is made of many parts.
+        warnings.simplefilter("ignore")
+        frame = dataset[names].to_dataframe().reset_index()
+    units = {name: dataset[name].attrs.get("units", "1") for name in frame}
+    return frame.rename(columns={name: f"{name} [{unit}]" for name, unit in units.items()})
 
 
 def reading(path: Path, read: Callable[[], R]) -> R:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from surfacechem.results.spatial import begun, unresolved
 from surfacechem.solve.contract import Array, States
-from surfacechem.solve.run import Run, Trajectory
+from surfacechem.solve.run import Trajectory
 
 Flags = NDArray[np.bool_]
 Rows = NDArray[np.int64]
@@ -93,17 +93,6 @@ def _edges(values: Array) -> Flags:
     return found
 
 
-def _kept(run: Run, t: Array, quantities: Array, noise: Array, part: float, sides: Flags, early: Flags) -> Flags:
-    """Rows that the picture of these quantities needs, ``sides`` of events among them; ``noise`` is not pictured, and
-    what is ``early`` counts for no range.
-    """
-    values = np.where(np.isfinite(quantities), quantities, 0.0)
-    known = values if early.all() else values[~early]
-    allowed = part * np.ptp(known, axis=0) + UNRESOLVED * run.rtol * np.abs(values).max(axis=0) + noise
-    seen = np.ptp(values, axis=0) > allowed
-    return needed(t, values[:, seen], allowed[seen], sides | _edges(quantities[:, seen]))
-
-
 def _chosen(rows: States, which: Flags) -> States:
     """Some of the rows."""
     assert rows.segment is not None
@@ -121,16 +110,16 @@ def followed(trajectory: Trajectory) -> Trajectory:
     early = unresolved(system, end, t)
     sides &= ~early | np.isin(t, begun(system, end))
     rows, early = _chosen(rows._replace(t=t), sides), early[sides]
-    values, noise = _quantities(trajectory, rows)
-    beside = _beside_events(trajectory, rows.t)
-    kept = _kept(trajectory.run, rows.t, values, noise, part, beside, early)
-    return trajectory.at(_chosen(rows, kept))
-
-
-def _beside_events(trajectory: Trajectory, t: Array) -> Flags:
-    """Which of the times are those of events, or just before them."""
+    quantities, noise = _quantities(trajectory, rows)
+    # Both sides of events are kept; rounding is not pictured, and what is early counts for no range.
     moments = np.array([*trajectory.result.events.t, *(jump.t for jump in trajectory.jumps)])
-    return np.isin(t, moments) | np.isin(np.nextafter(t, np.inf), moments)
+    beside = np.isin(rows.t, moments) | np.isin(np.nextafter(rows.t, np.inf), moments)
+    values = np.where(np.isfinite(quantities), quantities, 0.0)
+    known, rtol = values if early.all() else values[~early], trajectory.run.rtol
+    allowed = part * np.ptp(known, axis=0) + UNRESOLVED * rtol * np.abs(values).max(axis=0) + noise
+    seen = np.ptp(values, axis=0) > allowed
+    kept = needed(rows.t, values[:, seen], allowed[seen], beside | _edges(quantities[:, seen]))
+    return trajectory.at(_chosen(rows, kept))
 
 
 def _quantities(trajectory: Trajectory, rows: States) -> tuple[Array, Array]:

@@ -18,7 +18,6 @@ from surfacechem.compile.program import Function, compile_function
 from surfacechem.errors import InputError
 from surfacechem.expressions import derivative, magnitude
 from surfacechem.format.plans import Plan
-from surfacechem.model.system import System
 from surfacechem.quantities import VELOCITIES
 from surfacechem.results.audit import ROUNDINGS, residuals, resolved
 from surfacechem.runs import spectrum
@@ -62,16 +61,11 @@ def solvable(model: Model, plan: Plan, run: Run, problem: Problem) -> bool:
     one_arc = model.jumper is None or len(problem.segments) == 2
     own = run.solver in (IMPLICIT, EXPLICIT) and run.max_seconds is None and model.program.filler is None
     shared = model.passing.is_empty and not set(plan.paths) & set(system.cycles)
-    return own and shared and one_arc and not system.equilibria and _starts_as_given(system, set(plan.paths))
-
-
-def _starts_as_given(system: System, swept: set[str]) -> bool:
-    """Whether states and modes start with what is given, or with its logarithm, and none of them is searched for."""
-    searched = [state for state in system.states if state.algebraic]
-    made = [state for state in system.states if state.given is not None and state.given.state and state.path in swept]
-    modes = [mode for mode in system.modes if mode.start is not None]
-    memory = [item for item in system.memory if item.given is not None]
-    return not (searched or made or modes or memory)
+    # States and modes start with what is given, or with its logarithm, and none of them is searched for.
+    searched = any(state.algebraic for state in system.states) or bool(system.equilibria)
+    made = any(state.given and state.given.state and state.path in plan.paths for state in system.states)
+    derived = any(mode.start is not None for mode in system.modes) or any(item.given for item in system.memory)
+    return own and shared and one_arc and not (searched or made or derived)
 
 
 class ArrayRuns:
@@ -354,7 +348,6 @@ class ArrayRuns:
 
     def _event_columns(self, found: Ends) -> Columns:
         """First times of events after which a run goes on, and of values that are reached."""
-        # The first row of a run that fits; a row of another run's kind is masked out afterwards.
         batch, margins, keep = found.batch, self.model.margins, self.keep
         columns: Columns = {}
         names = [*((name, f"time_{variable(name)}") for name in keep.events)]
@@ -362,15 +355,11 @@ class ArrayRuns:
         happened = np.arange(batch.events.shape[1]) < batch.counts[:, EVENTS, None]
         for name, column in names:
             wanted = [j for j, margin in enumerate(margins) if margin.name == name]
-            fits = happened & np.isin(batch.events[..., 0], wanted)
-            first = fits.argmax(axis=1) if fits.shape[1] else np.zeros(len(fits), np.int64)
-            any_of = fits.any(axis=1)
-            rows = (
-                batch.events[np.arange(len(fits)), first] if fits.shape[1] else np.full((len(fits), 2 + self.n), np.nan)
-            )
-            columns[column] = np.where(any_of, rows[:, 1], np.nan)
-            if name in keep.events:
-                for state in keep.at_events:
-                    j = self.model.system.state_columns[state]
-                    columns[f"{state}_at_{variable(name)}"] = np.where(any_of, rows[:, 2 + j], np.nan)
+            owner, row = np.nonzero(happened & np.isin(batch.events[..., 0], wanted))
+            owner, first = np.unique(owner, return_index=True)
+            rows = np.full((len(happened), 2 + self.n), np.nan)
+            rows[owner] = batch.events[owner, row[first], : 2 + self.n]
+            columns[column] = rows[:, 1]
+            for state in keep.at_events if name in keep.events else ():
+                columns[f"{state}_at_{variable(name)}"] = rows[:, 2 + self.model.system.state_columns[state]]
         return columns

@@ -48,23 +48,19 @@ def to_rest(model: Model, run: Run, values: Mapping[str, float]) -> Run:
     if far.status == "stopped":
         return replace(run, times=_until(run, min(2 * far.result.t, LONGEST) or LONGEST))
     name = _rest_of(far)[1]
+    scales = np.array([state.scale for state in model.system.states])
     for end in (LONGEST, *(SHORTER if audit(far).site_error > run.rtol else ())):
         near = far if end == LONGEST else _looked(model, run, values, end)
-        last = _rest_of(near)[0]
-        if near.status == "finished" and last * AFTER <= end and _alike(near, far):
+        last, change = _rest_of(near)[0], np.abs(near.result.y - far.result.y)
+        # Both end in states that differ slightly, or by a trace of something.
+        alike = np.all(change <= NEGLIGIBLE * np.maximum(np.abs(near.result.y), scales))
+        if near.status == "finished" and last * AFTER <= end and alike:
             return replace(run, times=_until(run, last), rest=last)
     raise InputError(f"the case has come to no rest in {LONGEST:.3g} s: {name} still changes.", path=PATH)
 
 
 def _looked(model: Model, run: Run, values: Mapping[str, float], end: float) -> Trajectory:
     return model.solve_values(replace(run, times=(0.0, end), picture=PICTURE, accuracy=None), values)
-
-
-def _alike(near: Trajectory, far: Trajectory) -> bool:
-    """Whether two runs end in states that differ slightly, or by a trace of something."""
-    scales = np.array([state.scale for state in near.model.system.states])
-    change = np.abs(near.result.y - far.result.y)
-    return bool(np.all(change <= NEGLIGIBLE * np.maximum(np.abs(near.result.y), scales)))
 
 
 def all_to_rest(model: Model, run: Run, points: Iterable[Mapping[str, float]]) -> list[Run]:

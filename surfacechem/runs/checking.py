@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 
 from surfacechem.errors import InputError
 from surfacechem.format.draws import permuted
-from surfacechem.results.event_table import entropy_destroyed
 from surfacechem.results.store import StoredArray
-from surfacechem.runs.keeping import STATUSES
+from surfacechem.runs.keeping import ENDS, STATUSES
 
 if TYPE_CHECKING:
     from surfacechem.runs.streaming import Stream
@@ -27,13 +26,12 @@ HARDEST = 100
 AT_ONCE = 200
 """Runs that are checked together, with all of their steps in memory."""
 
+TOLD = ("energy_error", "entropy_error", "site_error", "destroys_entropy")
+
 KEYS = {
     "run": ("int64", "number of the run in the plan, the last dimension fastest; -1 for none"),
     "error": ("float64", "largest relative error of the run"),
-    "energy_error": ("float64", "largest energy residual relative to the energy exchanged"),
-    "entropy_error": ("float64", "largest entropy residual relative to what was exchanged"),
-    "site_error": ("float64", "largest residual of the site balances"),
-    "destroys_entropy": ("float64", "1 where a law or a jump does, else 0"),
+    **{name: ("float64", ENDS[name]) for name in TOLD},
 }
 """What is stored of a run that is checked: type and meaning."""
 
@@ -129,11 +127,5 @@ def _errors(stream: Stream, index: Index, threads: int | None) -> Iterator[tuple
                         yield first + k, single, errors, source
             continue
         assert done.accuracy is not None
-        values: dict[str, Any] = {"error": done.accuracy.errors}
-        for balance in ("energy", "entropy", "site"):
-            values[f"{balance}_error"] = [getattr(books, f"{balance}_error") for books in done.audits]
-        values["destroys_entropy"] = [
-            books.destroys or entropy_destroyed(run.jumps) > 0
-            for books, run in zip(done.audits, done.runs, strict=True)
-        ]
-        yield first, part, values, done.accuracy.source
+        values = {name: [end[name] for end in done.run_ends] for name in TOLD}
+        yield first, part, {"error": done.accuracy.errors, **values}, done.accuracy.source

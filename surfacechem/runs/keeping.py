@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -14,10 +14,9 @@ from numpy.typing import NDArray
 from surfacechem.errors import suggestion
 from surfacechem.format.sections import ALL, KeepSection
 from surfacechem.model.system import Margin, System
-from surfacechem.quantities import Quantity
-from surfacechem.results.audit import audit
+from surfacechem.results.audit import Audit, audit
 from surfacechem.results.dataset import quantities
-from surfacechem.results.event_table import events_of
+from surfacechem.results.event_table import entropy_destroyed, events_of
 from surfacechem.solve.contract import REASONS, Status
 from surfacechem.solve.run import Model, Trajectory
 
@@ -29,6 +28,18 @@ STATUSES = ("finished", "stopped", "failed", "refused")
 """How a run ends, in the order of its codes; refused is one whose values are not admissible at its start."""
 
 REFUSED, OTHER = "the values are not admissible at the start", "another reason"
+
+ENDS = {
+    "status": "how the run ended",
+    "reason": "why the run ended",
+    "time_reached": "time that the run reached",
+    "steps": "steps of the run",
+    "energy_error": "largest energy residual relative to the energy exchanged",
+    "entropy_error": "largest entropy residual relative to what was exchanged",
+    "site_error": "largest residual of the site balances",
+    "destroys_entropy": "1 where a law or a jump does, else 0",
+}
+"""What is told of the end of every run, in words; only the time has a unit, seconds."""
 
 EXTREMES = {"max": (np.fmax, "at most, over outputs and steps"), "min": (np.fmin, "at least, over the same")}
 """Extremes of a run: what the names of their columns end with, what finds them, and words."""
@@ -49,22 +60,24 @@ class Keep:
     at_events: tuple[str, ...] = ()
     reach: Mapping[str, float] | None = None
 
-    @property
-    def names(self) -> list[str]:
-        """All quantities of which a value is kept."""
-        return list(dict.fromkeys((*self.last, *self.max, *self.min, *self.series)))
-
-    @property
-    def record(self) -> dict[str, Any]:
-        """What a store says of it."""
-        return asdict(self)
-
 
 def recorded_keep(record: str) -> Keep:
     """What is kept, as a store says it."""
     content = json.loads(record)
     reach = content.pop("reach")
     return Keep(**{name: tuple(names) for name, names in content.items()}, reach=reach)
+
+
+def end_of(run: Trajectory, books: Audit) -> dict[str, Any]:
+    """What ENDS tells of a run and its balances."""
+    return {
+        "status": run.status,
+        "reason": run.reason,
+        "time_reached": run.result.t,
+        "steps": run.result.counters.steps,
+        **{f"{kind}_error": getattr(books, f"{kind}_error") for kind in ("energy", "entropy", "site")},
+        "destroys_entropy": books.destroys or entropy_destroyed(run.jumps) > 0,
+    }
 
 
 def keep_of(section: KeepSection | None, system: System) -> Keep:
@@ -128,14 +141,11 @@ def variable(name: str) -> str:
 def described(system: System, keep: Keep) -> dict[str, tuple[str, str, str]]:
     """Type, unit and meaning of every column but the series, by name."""
     q = quantities(system)
+    codes = {"status": "int8", "reason": "int16", "steps": "int32"}
     found = {
-        "status": ("int8", "1", "how the run ended"),
-        "reason": ("int16", "1", "why the run ended"),
-        "time_reached": ("float64", "s", "time that the run reached"),
-        "steps": ("int32", "1", "steps of the run"),
-        "energy_error": ("float64", "1", "largest energy residual relative to the energy exchanged"),
-        "entropy_error": ("float64", "1", "largest entropy residual relative to what was exchanged"),
-        "site_error": ("float64", "1", "largest residual of the site balances"),
+        name: (codes.get(name, "float64"), "s" if name == "time_reached" else "1", text)
+        for name, text in ENDS.items()
+        if name != "destroys_entropy"  # of the runs that are checked alone
     }
     words = {"last": "at the end of the run", **{which: word for which, (_, word) in EXTREMES.items()}}
     for which, word in words.items():
@@ -149,12 +159,6 @@ def described(system: System, keep: Keep) -> dict[str, tuple[str, str, str]]:
     for name, value in (keep.reach or {}).items():
         found[f"time_to_{name}"] = ("float64", "s", f"time at which {name} first reaches {value:g} {q[name].unit}")
     return found
-
-
-def series(system: System, keep: Keep) -> dict[str, Quantity]:
-    """The quantities that are kept at every output time."""
-    q = quantities(system)
-    return {name: q[name] for name in keep.series}
 
 
 def extreme(run: Trajectory, name: str, which: str) -> float:
@@ -172,7 +176,8 @@ class RunByRun:
 
     def columns(self, runs: Sequence[Trajectory | None], times: int) -> Columns:
         """What is kept of runs, None for one that was refused, with so many output times."""
-        rows = [self._refused() if run is None else self._kept(run, times) for run in runs]
+        refused = {"status": STATUSES.index("refused"), "reason": self.reasons.index(REFUSED), "steps": 0}
+        rows = [refused if run is None else self._kept(run, times) for run in runs]
         kinds = {name: kind for name, (kind, _, _) in described(self.model.system, self.keep).items()}
         found: Columns = {name: np.array([row.get(name, np.nan) for row in rows], kind) for name, kind in kinds.items()}
         for name in self.keep.series:
@@ -180,18 +185,9 @@ class RunByRun:
             found[name] = np.array([row.get(name, nothing) for row in rows])
         return found
 
-    def _refused(self) -> dict[str, Any]:
-        return {"status": STATUSES.index("refused"), "reason": self.reasons.index(REFUSED), "steps": 0}
-
     def _kept(self, run: Trajectory, times: int) -> dict[str, Any]:
-        result, books, keep = run.result, audit(run), self.keep
-        row: dict[str, Any] = {
-            "status": STATUSES.index(run.status),
-            "reason": self._code(run.reason),
-            "time_reached": result.t,
-            "steps": result.counters.steps,
-            **{f"{kind}_error": getattr(books, f"{kind}_error") for kind in ("energy", "entropy", "site")},
-        }
+        result, keep = run.result, self.keep
+        row = end_of(run, audit(run)) | {"status": STATUSES.index(run.status), "reason": self._code(run.reason)}
         names = [state.name for state in self.model.system.states] + [*self.model.system.output_columns]
         end = np.array([result.t]), result.y[None], result.ydot[None]
         last = dict(zip(names, [*result.y, *self.model.evaluate(result, *end)[0]], strict=True)) if keep.last else {}

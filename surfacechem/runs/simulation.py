@@ -348,7 +348,11 @@ class Simulation:
         """The run with these values, or the runs over a plan: a run is a batch of one."""
         try:
             if plan is None:
-                return [self._solved_alone(settings, values)]
+                if settings.steady:
+                    from surfacechem.runs.at_rest import to_rest
+
+                    settings = to_rest(self.model, settings, self.model.values(values))
+                return [self.model.solve(settings, values)]
             from surfacechem.runs import sweeps
 
             # Statistics of rupture are part of what is compiled.
@@ -358,13 +362,6 @@ class Simulation:
             return sweeps.solve(self._sweep_models[key], plan, settings, values, threads)
         except InputError as error:
             raise self.case.located(error) from None
-
-    def _solved_alone(self, settings: Run, values: Mapping[str, float]) -> Trajectory:
-        if settings.steady:
-            from surfacechem.runs.at_rest import to_rest
-
-            settings = to_rest(self.model, settings, self.model.values(values))
-        return self.model.solve(settings, values)
 
     def _layers(self, *runs: Trajectory) -> dict[str, float]:
         """By body, the least layer that heat has reached when runs, or events in them, are first looked at."""

@@ -19,6 +19,7 @@ from surfacechem import format as cases
 from surfacechem.errors import InputError, Place, suggestion
 from surfacechem.format.plans import Plan, recorded_plan
 from surfacechem.format.sections import ALL, SweepSection
+from surfacechem.results.dataset import quantities
 from surfacechem.results.netcdf import CONVENTIONS, Column, cf_unit, versions
 from surfacechem.results.store import MOST_BYTES, Layout, Store, StoredArray, begin, opened, store_path
 from surfacechem.runs import keeping, sweeps
@@ -259,7 +260,7 @@ def stream(
         case.text,
         case.mechanism_text,
         plan.record,
-        json.dumps(keep.record),
+        json.dumps(asdict(keep)),
         json.dumps(dict(changes)),
         chunks.run,
     )
@@ -281,7 +282,8 @@ def _layout(chunks: ChunkRuns, job: Job) -> Layout:
     if keep.series:
         sizes["time"] = len(chunks.run.times)
         coordinates.append(Column("time", ("time",), np.asarray(chunks.run.times), "s", "time since the start"))
-    for name, q in keeping.series(system, keep).items():
+    for name in keep.series:
+        q = quantities(system)[name]
         attributes = Column(name, (), None, q.unit, q.long_name).attributes
         variables[name] = StoredArray("float64", (*runs, "time"), attributes)
     more, beside = checked_arrays(plan.size, chunks.checked)

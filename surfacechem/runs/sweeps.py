@@ -28,18 +28,10 @@ from surfacechem.results.event_table import entropy_destroyed, event_columns, ev
 from surfacechem.results.matching import exact_values, match
 from surfacechem.results.netcdf import Column, versions
 from surfacechem.runs import spectrum
-from surfacechem.runs.keeping import EXTREMES, extreme
+from surfacechem.runs.keeping import ENDS, EXTREMES, end_of, extreme
 from surfacechem.runs.spectrum import Lifetime, Statistics
 from surfacechem.solve.run import Model, Run, Trajectory
 from surfacechem.tolerances import EPS
-
-BALANCES = {
-    "energy": "largest energy residual relative to the energy exchanged",
-    "entropy": "largest entropy residual relative to what was exchanged",
-    "site": "largest residual of the site balances",
-}
-"""Balances of a run, and what their errors are in words."""
-
 
 Rupture = Statistics | Lifetime
 
@@ -267,6 +259,11 @@ class SweepSolution(Results):
         """The balances of each run."""
         return [audit(run) for run in self.runs]
 
+    @cached_property
+    def run_ends(self) -> list[dict[str, Any]]:
+        """What ENDS tells of each run."""
+        return [end_of(run, books) for run, books in zip(self.runs, self.audits, strict=True)]
+
     def worst(self, balance: str) -> float:
         """Largest error over all runs of the balance of energy, entropy or site."""
         return float(np.max([getattr(books, f"{balance}_error") for books in self.audits]))
@@ -378,20 +375,12 @@ class SweepSolution(Results):
 
     def _of_runs(self) -> list[Column]:
         """How each run ended, and what its balances, jumps and error are."""
-        runs, audits = self.runs, self.audits
-        destroyed = [entropy_destroyed(run.jumps) for run in runs]
-        destroys = [books.destroys or most > 0 for books, most in zip(audits, destroyed, strict=True)]
         columns = [
-            self._of_each("status", [run.status for run in runs], "1", "how the run ended"),
-            self._of_each("reason", [run.reason for run in runs], "1", "why the run ended"),
-            self._of_each("time_reached", [run.result.t for run in runs], "s", "time that the run reached"),
-            self._of_each("steps", [run.result.counters.steps for run in runs], "1", "steps of the run"),
+            self._of_each(name, [end[name] for end in self.run_ends], "s" if name == "time_reached" else "1", text)
+            for name, text in ENDS.items()
         ]
-        for balance, text in BALANCES.items():
-            errors = [getattr(books, f"{balance}_error") for books in audits]
-            columns.append(self._of_each(f"{balance}_error", errors, "1", text))
-        columns.append(self._of_each("destroys_entropy", destroys, "1", "1 where a law or a jump does, else 0"))
         if self.system.edges:
+            destroyed = [entropy_destroyed(run.jumps) for run in self.runs]
             text = "most entropy that a jump has destroyed"
             columns.append(self._of_each("entropy_destroyed", destroyed, "J/(m^2 K)", text))
         if self.accuracy:
@@ -426,6 +415,6 @@ class SweepSolution(Results):
             "compile_seconds": float(self.model.compile_seconds),
             **({"integrals_seconds": self.before_seconds} if self.system.whole else {}),
             **error,
-            **{f"{balance}_error": self.worst(balance) for balance in BALANCES},
+            **{f"{balance}_error": self.worst(balance) for balance in ("energy", "entropy", "site")},
             "versions": versions(),
         }
