@@ -108,7 +108,14 @@ def python(system: System, title: str = "") -> str:
     functions += [_jacobian(system, printer)] if system.rows else []
     lines = [f"    {float(p.at(0.0))!r},  # {p.symbol} {_parameter_text(p)}" for p in system.parameters]
     parameters = "\n".join(["PARAMETERS = (", *lines, ")\n"])
-    return "\n\n".join([_head(system, title), parameters, *_pieces(system), *functions])
+    states = "\n".join(
+        f"    {state.name} [{state.quantity.unit}] {state.quantity.long_name}"
+        f" ({'algebraic' if state.algebraic else 'evolved'})"
+        for state in system.states
+    )
+    heading = f"{title}: {system.regime}" if title else system.regime
+    text = f"{_safe(heading)}.\n\nt is time [s]. y holds\n\n{states}\n\nand ydot their time derivatives."
+    return "\n\n".join([f'"""{text}\n"""\n\nimport math\n', parameters, *_pieces(system), *functions])
 
 
 def executable(system: System) -> ModuleType:
@@ -138,17 +145,6 @@ def _functions(system: System) -> dict[str, tuple[str, list[Row]]]:
         "margins": ("What must stay positive.", margins),
     }
     return {name: (text, rows) for name, (text, rows) in functions.items() if rows}
-
-
-def _head(system: System, title: str) -> str:
-    states = "\n".join(
-        f"    {state.name} [{state.quantity.unit}] {state.quantity.long_name}"
-        f" ({'algebraic' if state.algebraic else 'evolved'})"
-        for state in system.states
-    )
-    heading = f"{title}: {system.regime}" if title else system.regime
-    text = f"{_safe(heading)}.\n\nt is time [s]. y holds\n\n{states}\n\nand ydot their time derivatives."
-    return f'"""{text}\n"""\n\nimport math\n'
 
 
 def pieces(system: System) -> list[tuple[float, tuple[float, ...]]]:

@@ -33,26 +33,17 @@ def surface_columns(trajectory: Trajectory, surface: CurvedSurfaces) -> tuple[li
     """Columns over their own times and over the surface of body 1, and the time that they took [s]."""
     from surfacechem.surfaces.potential import SPENT, integrating
 
-    before = SPENT.seconds
-    with integrating():
-        columns = _columns(trajectory, surface.of_run(trajectory.values))
-    return columns, SPENT.seconds - before
-
-
-def _columns(trajectory: Trajectory, surface: CurvedSurfaces) -> list[Column]:
-    times = trajectory.result.times
+    before, times = SPENT.seconds, trajectory.result.times
     chosen = np.unique(np.linspace(0, len(times) - 1, TIMES).round().astype(int))
-    gaps = trajectory.everywhere["g_n"][: len(times)][chosen]
-    # A run may end a rounding beyond the approaches that are known.
-    approaches = np.clip(gaps, *surface.approach)
-    stretches = np.ones_like(gaps)
-    if "J_c" in trajectory.everywhere:
-        stretches = trajectory.everywhere["J_c"][: len(times)][chosen]
-    return [
-        Column(AT, (AT,), times[chosen], "s", "times at which the surfaces are looked at"),
-        *_totals(surface, approaches, stretches),
-        *_fields(surface, approaches, stretches),
-    ]
+    columns = [Column(AT, (AT,), times[chosen], "s", "times at which the surfaces are looked at")]
+    with integrating():
+        surface, gaps = surface.of_run(trajectory.values), trajectory.everywhere["g_n"][: len(times)][chosen]
+        # A run may end a rounding beyond the approaches that are known.
+        approaches, stretches = np.clip(gaps, *surface.approach), np.ones_like(gaps)
+        if "J_c" in trajectory.everywhere:
+            stretches = trajectory.everywhere["J_c"][: len(times)][chosen]
+        columns += [*_totals(surface, approaches, stretches), *_fields(surface, approaches, stretches)]
+    return columns, SPENT.seconds - before
 
 
 def _totals(surface: CurvedSurfaces, approaches: Array, stretches: Array) -> list[Column]:

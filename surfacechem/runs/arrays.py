@@ -18,6 +18,7 @@ from surfacechem.compile.program import Function, compile_function
 from surfacechem.errors import InputError
 from surfacechem.expressions import derivative, magnitude
 from surfacechem.format.plans import Plan
+from surfacechem.model.system import System
 from surfacechem.quantities import VELOCITIES
 from surfacechem.results.audit import ROUNDINGS, residuals, resolved
 from surfacechem.runs import spectrum
@@ -61,11 +62,16 @@ def solvable(model: Model, plan: Plan, run: Run, problem: Problem) -> bool:
     one_arc = model.jumper is None or len(problem.segments) == 2
     own = run.solver in (IMPLICIT, EXPLICIT) and run.max_seconds is None and model.program.filler is None
     shared = model.passing.is_empty and not set(plan.paths) & set(system.cycles)
-    # States and modes start with what is given, or with its logarithm, and none of them is searched for.
-    searched = any(state.algebraic for state in system.states) or bool(system.equilibria)
-    made = any(state.given and state.given.state and state.path in plan.paths for state in system.states)
-    derived = any(mode.start is not None for mode in system.modes) or any(item.given for item in system.memory)
-    return own and shared and one_arc and not (searched or made or derived)
+    return own and shared and one_arc and not system.equilibria and _starts_as_given(system, set(plan.paths))
+
+
+def _starts_as_given(system: System, swept: set[str]) -> bool:
+    """Whether states and modes start with what is given, or with its logarithm, and none of them is searched for."""
+    searched = [state for state in system.states if state.algebraic]
+    made = [state for state in system.states if state.given is not None and state.given.state and state.path in swept]
+    modes = [mode for mode in system.modes if mode.start is not None]
+    memory = [item for item in system.memory if item.given is not None]
+    return not (searched or made or modes or memory)
 
 
 class ArrayRuns:

@@ -21,16 +21,11 @@ ASKING = ("cantera",)
 """Solvers that call Python for their right-hand sides, and so can ask something outside for rates."""
 
 
-def _adapters() -> dict[str, str]:
-    """Files of adapters by the names of their solvers, which are read without importing a library."""
-    found: dict[str, str] = {}
-    for file in sorted(Path(__file__).with_name("adapters").glob("*.py")):
-        declared = re.search(r"^NAMES = (\(.*\))$", file.read_text(encoding="utf-8"), re.MULTILINE)
-        found.update(dict.fromkeys(ast.literal_eval(declared[1]) if declared else (), file.stem))
-    return found
-
-
-_ADAPTERS = _adapters()
+_ADAPTERS: dict[str, str] = {}
+"""Files of adapters by the names of their solvers, which are read without importing a library."""
+for _file in sorted(Path(__file__).with_name("adapters").glob("*.py")):
+    _declared = re.search(r"^NAMES = (\(.*\))$", _file.read_text(encoding="utf-8"), re.MULTILINE)
+    _ADAPTERS.update(dict.fromkeys(ast.literal_eval(_declared[1]) if _declared else (), _file.stem))
 
 _OWN = {"radau": "Radau", "dop853": "Dop853"}
 """The methods of this package, and their classes."""

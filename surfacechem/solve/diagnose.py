@@ -77,16 +77,12 @@ def cause(
     return "failed", f"{REASONS[result.status]} at {where}{too_fast(system, result, values)}"
 
 
-def is_led_back(system: System, program: Program, margin: Margin, result: Result) -> bool:
-    """Whether the rates at the bound of a bonding variable lead back, so that rounding has carried it beyond."""
-    parameters = result.problem.parameters[result.segments_at(np.array([result.t]))[0]]
-    return bool(are_led_back(system, program, margin, np.array([result.t]), result.y[None], parameters[None])[0])
-
-
 def are_led_back(
     system: System, program: Program, margin: Margin, t: Array, y: Array, parameters: Array
 ) -> NDArray[np.bool_]:
-    """The same of many runs, whose ends are the rows."""
+    """Whether the rates at the bound of a bonding variable lead back, so that rounding has carried it beyond: of runs
+    whose ends are the rows.
+    """
     names, bonds = [state.name for state in system.states], {a.law for a in system.ledger if a.kind == "bonds"}
     if margin.bound is None or margin.bound[0] not in names:
         return np.zeros(len(t), dtype=bool)

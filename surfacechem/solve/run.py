@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem.compile.preparing import PREPARING
-from surfacechem.compile.program import PIECE, Chain, Filler, Function, compile_function, compile_program
+from surfacechem.compile.program import PIECE, Chain, Filler, Function, Program, compile_function, compile_program
 from surfacechem.contracts.terms import Spec
 from surfacechem.errors import PATHS, InputError, suggestion
 from surfacechem.model.checks import check_start
@@ -22,13 +22,12 @@ from surfacechem.solve import ASKING, AUTO, solver
 from surfacechem.solve import segments as pieces
 from surfacechem.solve.choice import EXPLICIT, method
 from surfacechem.solve.contract import Margin, Problem, Result, Solver, States, Status
-from surfacechem.solve.diagnose import ROUNDED, cause, is_led_back
+from surfacechem.solve.diagnose import ROUNDED, are_led_back, cause
 from surfacechem.solve.equilibria import Equilibria, Point
 from surfacechem.solve.hybrid import Flow, Hybrid, solve_together, without_stall
 from surfacechem.solve.jumps import Jump, Jumper
-from surfacechem.solve.radau.solver import output_rates
+from surfacechem.solve.radau.solver import consistent, output_rates
 from surfacechem.solve.segments import Passing
-from surfacechem.solve.start import stable_start
 from surfacechem.tolerances import DEFAULT_RTOL, EPS, FINER, NONE_OF_SCALE, PICTURE
 
 Array = NDArray[np.float64]
@@ -47,6 +46,9 @@ AT_ONCE = 10_000
 
 OWN = "radau"
 """The method of this package."""
+
+COLDER = 0.95 ** np.arange(1, 40)
+"""Parts of the first guess of a temperature that are tried where that leads to an unstable one."""
 
 STATE, POSITIVE = Spec("", "initial value"), Spec("", "initial value", above=0)
 """Initial values need only be finite here, and have a logarithm where that is the state; margins say the rest."""
@@ -129,15 +131,12 @@ class Trajectory:
         result = replace(self.result, times=t, outputs=y, ledger_outputs=ledger, segment=segment)
         return replace(self, result=result)
 
-    def at_rows(self, rows: NDArray[np.int64] | NDArray[np.bool_]) -> Trajectory:
-        """The trajectory with some of its outputs alone."""
-        result = self.result
-        segment = result.segments_at(result.times, result.segment)
-        return self.at(States(result.times[rows], result.outputs[rows], result.ledger_outputs[rows], segment[rows]))
-
     def at_times(self, times: Sequence[float] | Array) -> Trajectory:
         """The trajectory with those of its outputs alone that are at these times."""
-        return replace(self.at_rows(np.isin(self.result.times, times)), run=replace(self.run, times=tuple(times)))
+        result, rows = self.result, np.isin(self.result.times, times)
+        segment = result.segments_at(result.times, result.segment)
+        kept = States(result.times[rows], result.outputs[rows], result.ledger_outputs[rows], segment[rows])
+        return replace(self.at(kept), run=replace(self.run, times=tuple(times)))
 
     @cached_property
     def looked(self) -> Trajectory:
@@ -231,6 +230,40 @@ def refuse_nothing(system: System, case: str = "CASE") -> None:
         raise InputError(f"there is nothing to solve: everything is prescribed. {remedy}", path="bodies")
 
 
+def stable_start(system: System, program: Program, y: Array, parameters: Array) -> Array:
+    """First guesses that lead to a stable state; those given, where they do or where none does.
+
+    Heat that grows with temperature meets what leaves twice: in a stable state, and above it in one that any
+    disturbance ignites or cools down.
+    """
+    guessed = np.array([state.algebraic and state.is_temperature for state in system.states])
+    if not guessed.any():
+        return y
+    if not _are_stable(system, program, y[None], parameters)[0]:
+        tried = np.array([np.where(guessed, part * y, y) for part in COLDER])
+        stable = _are_stable(system, program, tried, parameters)
+        y = tried[int(stable.argmax())] if stable.any() else y
+    found = consistent(program, 0.0, y, np.zeros_like(y), parameters)
+    if found.valid and np.any(found.y[guessed] <= 0):
+        names = " and ".join(state.name for state, is_one in zip(system.states, guessed, strict=True) if is_one)
+        raise InputError(
+            f"at the start the interface takes up more heat than any temperature {names} above zero brings it.",
+            path="interface",
+        )
+    return y
+
+
+def _are_stable(system: System, program: Program, y: Array, parameters: Array) -> NDArray[np.bool_]:
+    """Which first guesses lead to states in which all limits of stability are open."""
+    playing = system.in_play(parameters)
+    checks = [i for i, m in enumerate(system.moving_margins()) if m.stability and playing[i]]
+    if not checks or program.margins is None:
+        return np.ones(len(y), dtype=bool)
+    found = consistent(program, 0.0, y, np.zeros_like(y), parameters)
+    rows = np.concatenate([np.zeros((len(y), 1)), found.y, found.ydot, np.tile(parameters, (len(y), 1))], axis=1)
+    return np.asarray(found.valid & np.all(np.atleast_2d(program.margins(rows))[:, checks] > 0, axis=1))
+
+
 class Model:
     """A system with its machine code, made when it is built."""
 
@@ -291,9 +324,6 @@ class Model:
         """
         return values_of(self.system, changes)
 
-    def _segments(self, end: float, values: Mapping[str, float]) -> Array:
-        return pieces.segments(self.system, end, values)
-
     @cached_property
     def equilibria(self) -> Equilibria:
         """The quasi-static gaps, with the code that finds them; one a model."""
@@ -311,7 +341,7 @@ class Model:
         digit.
         """
         system, end = self.system, run.times[-1]
-        segments = self._segments(end, values)
+        segments = pieces.segments(system, end, values)
         scales = np.array([state.finest or state.scale for state in system.states])
         parameters = pieces.segment_parameters(system, segments[:-1], run.rtol, values)
         if passing:
@@ -453,12 +483,11 @@ class Model:
                 else f"reached the end at {where}",
             )
         if result.status is Status.EVENT:
-            margin = self.margins[int(result.events.index[-1])]
-            if is_led_back(self.system, self.program, margin, result):
+            margin, at, y = self.margins[int(result.events.index[-1])], np.array([result.t]), result.y[None]
+            inputs = self.inputs(result, at, y, result.ydot[None])
+            if are_led_back(self.system, self.program, margin, at, y, inputs[:, 1 + 2 * len(result.y) :])[0]:
                 return "failed", f"{margin.reason} at {where}: {ROUNDED}"
-            at = np.array([result.t])
-            why = self.system.reason(margin, self.inputs(result, at, result.y[None], result.ydot[None])[0])
-            return "stopped", f"{why} at {where}"
+            return "stopped", f"{self.system.reason(margin, inputs[0])} at {where}"
         return cause(self.system, self.program, self.margins, result, values)
 
     def evaluate(

@@ -1,6 +1,7 @@
 """Random scenes end with a status that is true: finished with closed balances, or a reason that names its cause."""
 
 from collections import Counter
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from surfacechem.laws import FAMILIES, laws
 from surfacechem.model.assemble import assemble
 from surfacechem.results.solution import Solution
 from surfacechem.scene import Scene
+from surfacechem.solve import segments
 from surfacechem.solve.contract import REASONS, Status
 from surfacechem.solve.run import Model, Run, Trajectory
 
@@ -22,6 +24,7 @@ CLOSED = 1e-9
 """Energy that may be missing, relative to what was exchanged."""
 
 STEPS, SECONDS, PIECES = 20_000, 60.0, 2001
+WHOLE = segments.segments
 BUDGETS = (REASONS[Status.MAX_STEPS], REASONS[Status.STOPPED])
 GENERIC = tuple(reason for status, reason in REASONS.items() if reason not in BUDGETS and not status.success)
 
@@ -81,11 +84,9 @@ def missing(solution: Solution) -> float:
     return float(known / books.energy_scale) if books.energy_scale else float(known)
 
 
-class Fine(Model):
-    """Runs in many short pieces: what the steps need for the states is not always enough for the work."""
-
-    def _segments(self, end, values):
-        return np.union1d(super()._segments(end, values), np.linspace(0.0, end, PIECES))
+def fine(system, end, values):
+    """Many short pieces: what the steps need for the states is not always enough for the work."""
+    return np.union1d(WHOLE(system, end, values), np.linspace(0.0, end, PIECES))
 
 
 def energy_is_closed(solution: Solution) -> None:
@@ -98,9 +99,9 @@ def energy_is_closed(solution: Solution) -> None:
     if gap <= CLOSED:
         return
     assert gap <= 1e-6 or any("balance of energy is open" in warning for warning in solution.warnings)
-    finer = Fine(solution.trajectory.model.system)
-    times = solution.trajectory.run.times
-    better = [finer.solve(Run(times, rtol, max_steps=20 * STEPS)) for rtol in (1e-11, 1e-13)]
+    model, times = solution.trajectory.model, solution.trajectory.run.times
+    with patch.object(segments, "segments", fine):
+        better = [model.solve(Run(times, rtol, max_steps=20 * STEPS)) for rtol in (1e-11, 1e-13)]
     known = [missing(Solution(item)) for item in better if item.status != "failed"]
     assert not known or min(known) < max(CLOSED, gap / 3)
 

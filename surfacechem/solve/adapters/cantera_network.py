@@ -139,9 +139,9 @@ class _SystemReactor(HeldReactor):
     def __init__(self, surface: Any, view: View, x: Array) -> None:
         super().__init__(surface)
         self.view = view
-        self.evaluation = Evaluation(view.problem.program, view.evaluation.y, view.parameters)
+        self.evaluation = Evaluation(view.program, view.y, view.parameters)
         self.count = len(x)
-        lines = view.problem.program.n_ledger if view.problem.program.filler else 0
+        lines = view.program.n_ledger if view.program.filler else 0
         self.counts = lines > 0
         self.unit = np.concatenate((np.maximum(view.atol, TINY), np.full(lines, LEDGER_UNIT)))
         self.scaled = np.concatenate((x, np.zeros(lines))) / self.unit
@@ -199,7 +199,12 @@ class _Stretch(Method):
                 self.net.max_time_step = max(self.end - self.t, NOISE * self.end)
             try:
                 self.t = self.net.step()
-                ends += self._present()
+                state, rate = self.net.get_derivative(0), self.net.get_derivative(1)
+                try:
+                    bend = self.net.get_derivative(2)
+                except cantera.CanteraError:  # the first polynomial is a straight line
+                    bend = np.zeros_like(rate)
+                ends += [state, rate, bend]
                 times.append(self.t)
             except (cantera.CanteraError, ArithmeticError) as error:
                 self.failure = error  # an event may lie before it
@@ -212,14 +217,6 @@ class _Stretch(Method):
         return self._steps(
             np.array(times), hermite(np.diff(times), np.concatenate(ends).reshape(-1, 3, len(unit)) * unit)
         )
-
-    def _present(self) -> list[Array]:
-        """State, its rate and second derivative by the integrator's polynomial, a straight line at first."""
-        state, rate = self.net.get_derivative(0), self.net.get_derivative(1)
-        try:
-            return [state, rate, self.net.get_derivative(2)]
-        except cantera.CanteraError:
-            return [state, rate, np.zeros_like(rate)]
 
     def _steps(self, times: Array, rows: Array) -> list[DenseStep]:
         """Steps from and to these times by the coefficients of their polynomials, and their ledger if it is there."""

@@ -241,18 +241,10 @@ WEIGHTS = 1 / (30 * np.polynomial.Legendre.basis(5)(2 * NODES - 1) ** 2)
 """Of the values at the nodes in that integral over the whole step."""
 
 
-class StepLedger:
-    """The ledger along a step, from its rates at the nodes.
+def gained_at(part: float, rates: Array) -> Array:
+    """What the ledger gains up to a part of a step, over the length of the step, from its rates at the nodes.
 
     Quadratures stay outside the library: it would have to count them in its error norm to integrate them well, and a
     state at rest, which needs no steps, may do work all the same.
     """
-
-    def __init__(self, start: float, size: float, ledger: Array, rates: Array) -> None:
-        self.start, self.size, self.ledger = start, size, ledger
-        self.coefficients = TO_POWERS @ rates * size
-
-    def at(self, t: float) -> Array:
-        """The ledger at a time within the step."""
-        part = (t - self.start) / self.size if self.size else 0.0
-        return np.asarray(self.ledger + part ** np.arange(1.0, len(NODES) + 1) @ self.coefficients)
+    return np.asarray(part ** np.arange(1.0, len(NODES) + 1) @ (TO_POWERS @ rates))

@@ -5,12 +5,12 @@ contract.
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from surfacechem.solve.adapters.dense_step import NODES, WEIGHTS, DenseStep, Guards, StepLedger, first_crossing
+from surfacechem.solve.adapters.dense_step import NODES, WEIGHTS, DenseStep, Guards, first_crossing, gained_at
 from surfacechem.solve.adapters.evaluation import Evaluation, at_rows
 from surfacechem.solve.contract import Array, Counters, Events, Points, Problem, Result, Solver, Status
 from surfacechem.solve.radau import stepper
@@ -37,49 +37,35 @@ class NoStateError(Exception):
     """No consistent state exists at a point the run needs."""
 
 
-@dataclass
-class View:
+class View(Evaluation):
     """The problem as a library sees it in one segment: x = differential or all variables.
 
-    For libraries that know no algebraic variables it is reduced to x' = f(t, x) of the differential ones.
+    For libraries that know no algebraic variables it is reduced to x' = f(t, x) of the differential ones. Algebraic
+    variables are first searched from the state at the start.
     """
 
-    problem: Problem
-    parameters: Array
-    start: Array
-    """The state from which algebraic variables are first searched; later from where they were last."""
-    residuals: int = 0
-    """Right-hand sides that the library has asked for; those for outputs and events are not counted."""
-    jacobians: int = 0
-    evaluation: Evaluation = field(init=False)
+    def __init__(self, problem: Problem, parameters: Array, start: Array) -> None:
+        super().__init__(problem.program, start, parameters)
+        self.problem = problem
+        self.differential = ~problem.program.algebraic_mask
+        self.atol = problem.atol[self.differential]
+        self.residuals = self.jacobians = 0
+        """Right-hand sides and Jacobians that the library has asked for; those for outputs and events do not count."""
 
-    def __post_init__(self) -> None:
-        """Its buffer serves all states of the segment."""
-        self.evaluation = Evaluation(self.problem.program, self.start, self.parameters)
-        self.differential = ~self.problem.program.algebraic_mask
-        self.atol = self.problem.atol[self.differential]
-
-    def inputs(self, t: float, y: Array, ydot: Array) -> Array:
-        return self.problem.program.filled(np.concatenate(([t], y, ydot, self.parameters)))
+    def row(self, t: float, y: Array, ydot: Array) -> Array:
+        """Arguments of compiled functions at a state."""
+        return self.program.filled(np.concatenate(([t], y, ydot, self.parameters)))
 
     def complete(self, t: float, x: Array) -> tuple[Array, Array]:
         """State and derivative from the differential variables, the algebraic ones found from the equations."""
-        if not self.evaluation.put(t, x):
-            return np.full_like(self.start, np.nan), np.full_like(self.start, np.nan)
-        return self.evaluation.y.copy(), self.evaluation.ydot.copy()
-
-    def ledger_rates(self, t: float, y: Array, ydot: Array) -> Array:
-        self.evaluation.hold(t, y, ydot)
-        return self.evaluation.ledger()
-
-    def margins(self, t: float, y: Array, ydot: Array) -> Array:
-        self.evaluation.hold(t, y, ydot, whole=not self.problem.program.plain_margins)
-        return self.evaluation.margins()
+        if not self.put(t, x):
+            return np.full_like(self.y, np.nan), np.full_like(self.y, np.nan)
+        return self.y.copy(), self.ydot.copy()
 
     def matrices(self, t: float, y: Array, ydot: Array) -> tuple[Array, Array]:
         """G_y and G_ydot."""
         self.jacobians += 1
-        return self.problem.program.derivatives(self.inputs(t, y, ydot))
+        return self.program.derivatives(self.row(t, y, ydot))
 
     def reduced_rates(self, t: float, x: Array) -> Array:
         """The right-hand side f of the reduced system."""
@@ -221,8 +207,8 @@ class _Run:
             if not np.all(np.isfinite(y)):
                 raise NoStateError
             self.y, self.ydot = y, ydot
-            self.margins = self.view.margins(start, self.y, self.ydot)
-            self.ledger_rates = self.view.ledger_rates(start, self.y, self.ydot)
+            self.view.hold(start, y, ydot)
+            self.margins, self.ledger_rates = self.view.margins(), self.view.ledger()
             self.guards.start(self.margins, fired)
             if not self.outputs and len(self.problem.times) and self.problem.times[0] <= start:
                 self.outputs.append(np.concatenate((self.y, self.ledger)))
@@ -261,7 +247,7 @@ class _Run:
             if self.t == start:
                 self._check_first(steps[0], min(steps[0].end, end))
             # Where algebraic variables are searched from the state before, that is to be close.
-            most = 1 if len(self.view.evaluation.algebraic) else min(4 * most, SEVERAL)
+            most = 1 if len(self.view.algebraic) else min(4 * most, SEVERAL)
             inside = self._inside(steps, min(steps[-1].end, end))
             while steps:
                 far = self.guards.far(inside.margins[:, 1:], self.in_play) if self.problem.margins else len(steps)
@@ -301,7 +287,7 @@ class _Run:
             self.aim = None
         self.t, self.y, self.ydot, self.ledger = float(times[-1]), y[-1], ydot[-1], ledgers[-1]
         self.ledger_rates, self.margins = inside.ledger[-1, -1], inside.margins[-1, -1]
-        self.view.evaluation.guess = self.y[self.view.evaluation.algebraic]
+        self.view.guess = self.y[self.view.algebraic]
         self.count += len(steps)
         if self.problem.record_steps:
             self.steps.extend(zip(times.tolist(), y, ydot, ledgers[1:], strict=True))
@@ -318,7 +304,7 @@ class _Run:
             k = int(np.searchsorted(ends, t))
             start, ledger = float(inside.times[k, 0]), ledgers[k + 1]
             if t < ends[k]:
-                gain = StepLedger(start, ends[k] - start, np.zeros_like(ledger), inside.ledger[k]).at(t)
+                gain = gained_at((t - start) / (ends[k] - start), inside.ledger[k]) * (ends[k] - start)
                 ledger = ledgers[k] + (gain if relied[k] else self._gained(steps[k], start, t, gain))
             row = np.concatenate((self._state(steps[k], t)[0], ledger))
             if not np.all(np.isfinite(row)):
@@ -341,7 +327,7 @@ class _Run:
         x = y = np.concatenate([step.at_nodes(row[1:]) for step, row in zip(steps, times, strict=True)])
         if not self.solver.keeps_algebraic:
             y = np.empty((len(x), len(self.y)))
-            y[:, view.evaluation.free], y[:, view.evaluation.algebraic] = x, view.evaluation.guess
+            y[:, view.free], y[:, view.algebraic] = x, view.guess
         rows = at_rows(self.problem.program, view.parameters, times[:, 1:].ravel(), y)
         return _Inside.of(times, zip((self.y, self.ydot, self.ledger_rates, self.margins), rows, strict=True))
 
@@ -350,15 +336,16 @@ class _Run:
         x = step.y(t)
         if not self.solver.keeps_algebraic:
             return self.view.complete(t, x)
-        self.view.evaluation.guess = x[self.view.evaluation.algebraic]
+        self.view.guess = x[self.view.algebraic]
         return self.view.complete(t, x[self.view.differential])
 
     def _guards(self, t: float, x: Array) -> Array:
         """Margins from the library's variables; without a search for the rest where nothing of it is read."""
-        program = self.problem.program
-        if program.plain_margins and not program.algebraic_mask.any():
-            return self.view.margins(t, x, np.zeros_like(x))
-        return self.view.margins(t, *self._state(DenseStep(t, t, lambda _: x), t))
+        plain = self.problem.program.plain_margins
+        alone = plain and not len(self.view.algebraic)
+        state = (x, np.zeros_like(x)) if alone else self._state(DenseStep(t, t, lambda _: x), t)
+        self.view.hold(t, *state, whole=not plain)
+        return self.view.margins()
 
     def _check_first(self, step: DenseStep, reached: float) -> None:
         """A first step far longer than the layer it starts in may end in another solution, unseen by its own test."""

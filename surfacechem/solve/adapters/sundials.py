@@ -107,11 +107,9 @@ class IDASolver(SteppingSolver):
     keeps_algebraic = True
 
     def begin(self, view: View, t: float, end: float, y: Array, ydot: Array) -> Method:
-        program = view.problem.program
-
         def residual(since: float, x: Array, rate: Array, out: Array) -> None:
             view.residuals += 1
-            out[:] = program.residual(view.inputs(t + since, x, rate))
+            out[:] = view.program.residual(view.row(t + since, x, rate))
 
         def jacobian(since: float, x: Array, rate: Array, _residual: Array, shift: float, out: Array) -> None:
             by_state, by_rate = view.matrices(t + since, x, rate)
@@ -124,7 +122,7 @@ class IDASolver(SteppingSolver):
             jacfn=jacobian,
             max_num_steps=100_000,
             max_step=_longest(view.problem),
-            algebraic_idx=list(np.flatnonzero(program.algebraic_mask)) or None,
+            algebraic_idx=list(view.algebraic) or None,
         )
         return _Stretch(library, t, end, y, ydot)
 
