@@ -216,6 +216,21 @@ class Law(ABC):
             if "option" in item.metadata:
                 yield item.name, item.metadata["option"]
 
+    @property
+    def varying(self) -> dict[str, Varying]:
+        """Its parameters that depend on variables, by name."""
+        values = {name: getattr(self, name) for name, _ in self.specs()}
+        return {name: value for name, value in values.items() if isinstance(value, Varying)}
+
+    @property
+    def factors(self) -> list[Factor]:
+        """The factors by which they do."""
+        return [factor for value in self.varying.values() for factor in value.factors]
+
+    def at_reference(self) -> Self:
+        """The same with what varies as it is at the reference state."""
+        return self.bind({name: value.value for name, value in self.varying.items()})
+
     def refine(self, name: str, spec: Spec) -> Spec:
         """Specification of a parameter of this very law, where its unit depends on the other fields."""
         return spec

@@ -10,9 +10,9 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from collections.abc import Callable, Mapping
-from typing import Any, ClassVar
+from typing import ClassVar
 
-from surfacechem.contracts.terms import RateLaw, RateType, Varying, parameter
+from surfacechem.contracts.terms import RateLaw, RateType, parameter
 from surfacechem.expressions import (
     Expression,
     is_symbolic,
@@ -277,8 +277,7 @@ class DudkoHummerSzabo(StatedBothWays):
     @property
     def ranges(self) -> Mapping[str, tuple[float, float]]:
         """Forces below that at which the barrier vanishes."""
-        numbers: tuple[Any, ...] = (self.barrier, self.x_off, self.nu)
-        if any(isinstance(number, Varying) for number in numbers):
+        if self.varying.keys() & {"barrier", "x_off", "nu"}:
             return {}
         return {"f": (-math.inf, self.barrier / (self.nu * self.x_off))}
 

@@ -5,13 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from surfacechem.contracts.terms import HeatTransfer, UnderPressure, Varying, option, parameter
+from surfacechem.contracts.terms import HeatTransfer, UnderPressure, option, parameter
 from surfacechem.expressions import Expression, power
 from surfacechem.laws.tabulated import ConductanceTable
-
-
-def _value(number: float | Varying) -> float:
-    return number.value if isinstance(number, Varying) else number
 
 
 class PressureConductance(UnderPressure, HeatTransfer):
@@ -37,7 +33,7 @@ class PressureConductance(UnderPressure, HeatTransfer):
     @property
     def ranges(self) -> Mapping[str, tuple[float, float]]:
         """At p = H the contact is complete."""
-        return {"p": (0.0, _value(self.H))}
+        return {"p": (0.0, self.at_reference().H)}
 
     def conductance(self, p: Expression) -> Expression:
         """Conductance [W/(m^2 K)]."""
@@ -70,7 +66,7 @@ class BondedPressureConductance(UnderPressure, HeatTransfer):
     @property
     def ranges(self) -> Mapping[str, tuple[float, float]]:
         """At p = H the contact is complete."""
-        return {"p": (0.0, _value(self.H))}
+        return {"p": (0.0, self.at_reference().H)}
 
     def conductance(self, p: Expression, phi: Expression) -> Expression:
         """Conductance [W/(m^2 K)]."""
@@ -103,7 +99,8 @@ class CooperMikicYovanovich(UnderPressure, HeatTransfer):
     def ranges(self) -> Mapping[str, tuple[float, float]]:
         """Where the correlation was fitted."""
         # A hardness that varies is taken at its reference value: a range is a hint, no law.
-        return {"p": (1e-6 * _value(self.H), 2.3e-2 * _value(self.H))}
+        hardness = self.at_reference().H
+        return {"p": (1e-6 * hardness, 2.3e-2 * hardness)}
 
     def conductance(self, p: Expression) -> Expression:
         """Conductance [W/(m^2 K)]."""
@@ -133,7 +130,8 @@ class MikicElastic(UnderPressure, HeatTransfer):
     @property
     def ranges(self) -> Mapping[str, tuple[float, float]]:
         """Where the correlation was fitted."""
-        hardness = _value(self.E) * _value(self.m) / math.sqrt(2)
+        law = self.at_reference()
+        hardness = law.E * law.m / math.sqrt(2)
         return {"p": (1e-5 * hardness, 2e-2 * hardness)}
 
     def conductance(self, p: Expression) -> Expression:
@@ -170,7 +168,7 @@ class SongYovanovich(UnderPressure, HeatTransfer):
     @property
     def ranges(self) -> Mapping[str, tuple[float, float]]:
         """Where the correlation was fitted."""
-        law = self.bind({name: _value(getattr(self, name)) for name, _ in self.specs()})
+        law = self.at_reference()
         size = law.c_1 * law.indent**law.c_2
         exponent = 1 + 0.071 * law.c_2
         return {"p": (size * 1e-6**exponent, size * 2.3e-2**exponent)}

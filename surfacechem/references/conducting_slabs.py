@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from surfacechem.contracts.terms import Load, Varying, parameter
+from surfacechem.contracts.terms import Load, parameter
 from surfacechem.errors import InputError
 from surfacechem.references.base import Array, Parameters, Quantities, Reference, SceneView, read
 
@@ -178,8 +178,7 @@ def _beside_conduction(scene: Scene) -> Iterator[str]:
     if interface.temperature not in (None, *(body.temperature for body in scene.bodies)):
         yield "the interface has a temperature of its own"
     for path in scene.heat:
-        constant = not any(isinstance(getattr(path, name), Varying) for name, _ in path.specs())
-        if path.name() != "conductance" or set(path.between) != bodies or not constant:
+        if path.name() != "conductance" or set(path.between) != bodies or path.varying:
             yield f"the heat path {path.name()} is no constant one between the bodies"
     for body in scene.bodies:
         yield from _varying(body)
@@ -188,9 +187,9 @@ def _beside_conduction(scene: Scene) -> Iterator[str]:
 def _varying(body: Body) -> Iterator[str]:
     """The contents of a body that are not constant, in words."""
     energy, conduction = body.energy, body.conduction
-    if energy is not None and (energy.name() != "constant" or isinstance(getattr(energy, "C", None), Varying)):
+    if energy is not None and (energy.name() != "constant" or energy.varying):
         yield f"the heat capacity of {body.name} varies"
-    if conduction is not None and isinstance(conduction.conductivity, Varying):
+    if conduction is not None and conduction.varying:
         yield f"the conductivity of {body.name} varies"
     loads = [body.temperature, conduction.far if conduction else None]
     if any(isinstance(load, Load) and load.name() != "hold" for load in loads):

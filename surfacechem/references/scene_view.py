@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from surfacechem.contracts.terms import Law, Varying
-
 if TYPE_CHECKING:
+    from surfacechem.contracts.terms import Law
     from surfacechem.scene import Scene
     from surfacechem.solve.run import Trajectory
 
@@ -60,8 +59,7 @@ class SceneView:
         """A constant of one law, as its own or as that of a factor of one of its parameters."""
         paths = []
         for law in laws:
-            varying = [value for field, _ in law.specs() if isinstance(value := getattr(law, field), Varying)]
-            paths += [law.path, *(factor.path for value in varying for factor in value.factors)]
+            paths += [law.path, *(factor.path for factor in law.factors)]
         found = [self.run.values[f"{path}.{name}"] for path in paths if f"{path}.{name}" in self.run.values]
         return found[0] if len(found) == 1 else None
 

@@ -34,9 +34,7 @@ def variables(build: Build) -> Iterator[Power | Thermal]:
             continue
         _check(build, body, law)
         # At the reference state; along the body each place has the factors of its own temperature.
-        reference = law.conductivity.value if isinstance(law.conductivity, Varying) else law.conductivity
-        path = f"bodies.{body.name}.conduction"
-        bound = build.variables.bind(replace(law, conductivity=reference), path, f"_{number}")
+        bound = build.variables.bind(law.at_reference(), f"bodies.{body.name}.conduction", f"_{number}")
         resistances = {**thermal.resistances, body.name: bound.thickness / bound.conductivity}
         thermal = replace(thermal, resistances=resistances)
         if law.cells:

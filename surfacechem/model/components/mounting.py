@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import symengine
 
-from surfacechem.contracts.terms import Law, Varying, reads
+from surfacechem.contracts.terms import Law, reads
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, absolute, derivative, sqrt
 from surfacechem.model.automaton import Equilibrium
@@ -115,9 +115,7 @@ def driven(build: Build, name: str) -> bool:
 
 def law_reads(law: Law, name: str) -> bool:
     """Whether a law depends on a variable, by itself or by a factor."""
-    values = (getattr(law, parameter) for parameter, _ in law.specs())
-    factors = (factor for value in values if isinstance(value, Varying) for factor in value.factors)
-    return name in reads(law.statement) or any(factor.of == name for factor in factors)
+    return name in reads(law.statement) or any(factor.of == name for factor in law.factors)
 
 
 @dataclass(frozen=True)

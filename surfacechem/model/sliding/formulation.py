@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import symengine
 
-from surfacechem.contracts.terms import Friction, Potential, TangentialPotential, Varying, reads
+from surfacechem.contracts.terms import Friction, Potential, TangentialPotential, reads
 from surfacechem.errors import InputError, Place
 from surfacechem.expressions import Expression, depends, derivative, sqrt, where
 from surfacechem.model.build import Build
@@ -234,9 +234,8 @@ def _refuse_one_component(law: Friction) -> None:
     """A law of one component of the velocity would know the axes."""
     if law.internal:
         raise InputError(f"{law.name()} remembers sliding along one direction, and this scene has two.", law.place)
-    for name, _ in law.specs():
-        value = getattr(law, name)
-        if isinstance(value, Varying) and any(factor.of in REST for factor in value.factors):
+    for name, value in law.varying.items():
+        if any(factor.of in REST for factor in value.factors):
             raise InputError(f"{name} varies with one component of the velocity, and this scene has two.", law.place)
 
 

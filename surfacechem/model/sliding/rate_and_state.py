@@ -15,7 +15,7 @@ from collections.abc import Mapping
 
 import symengine
 
-from surfacechem.contracts.terms import Friction, Varying, reads
+from surfacechem.contracts.terms import Friction, reads
 from surfacechem.expressions import Expression
 from surfacechem.model.build import Build
 from surfacechem.model.sliding.formulation import evolve
@@ -40,10 +40,11 @@ def evolve_drive(build: Build, *, inertial: bool) -> Expression | None:
     A mass feels the rate of the velocity, for which parameters that vary count as they are without their factors.
     Without one the balance may need the velocity itself, where they vary with it.
     """
-    law = _law(build, inertial)
+    laws = (law for law in build.interface.frictions if law.velocity is not None)
+    law = next((law for law in laws if inertial or not _varies_with_velocity(law)), None)
     if law is None:
         return None
-    bound, varying = build.bound(law), _varying(law)
+    bound, varying = build.bound(law), law.varying
     if inertial and varying:
         symbols = {parameter.path: parameter.symbol for parameter in build.parameters.items}
         bound = bound.bind({name: symbols[f"{bound.path}.{name}"] for name in varying})
@@ -68,11 +69,6 @@ def evolve_drive(build: Build, *, inertial: bool) -> Expression | None:
     return symbol
 
 
-def _law(build: Build, inertial: bool) -> Friction | None:
-    laws = (law for law in build.interface.frictions if law.velocity is not None)
-    return next((law for law in laws if inertial or not _varies_with_velocity(law)), None)
-
-
 def _number_at_start(build: Build, expression: Expression, values: Mapping[str, float]) -> float:
     numbers = {parameter.symbol: values[parameter.path] for parameter in build.parameters.items}
     numbers |= {state.symbol: state.from_given(values) for state in build.states if state.name != DRIVE}
@@ -82,14 +78,8 @@ def _number_at_start(build: Build, expression: Expression, values: Mapping[str, 
         return 0.0
 
 
-def _varying(law: Friction) -> dict[str, Varying]:
-    values = {name: getattr(law, name) for name, _ in law.specs()}
-    return {name: value for name, value in values.items() if isinstance(value, Varying)}
-
-
 def _varies_with_velocity(law: Friction) -> bool:
-    factors = (factor for value in _varying(law).values() for factor in value.factors)
-    return any("v" in (factor.of, *reads(factor.factor)) for factor in factors)
+    return any("v" in (factor.of, *reads(factor.factor)) for factor in law.factors)
 
 
 def stands_for_velocity(build: Build) -> bool:
