@@ -10,6 +10,8 @@ import symengine
 
 from surfacechem.expressions import Expression, where
 
+NONE, ONE = symengine.Integer(0), symengine.Integer(1)
+
 SIDE = "mode.side"
 """Path of the mode that says on which side of touch the gap is."""
 

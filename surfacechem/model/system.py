@@ -74,11 +74,9 @@ class State:
     """A variable that the run solves for: evolved by a balance, or algebraic where that has no capacity."""
 
     quantity: Quantity
-    symbol: Any
-    dot: Any
     initial: float
     scale: float
-    algebraic: bool
+    algebraic: bool = False
     start: str = ""
     """Whose initial value it takes, where not its own."""
     finest: float | None = None
@@ -86,6 +84,16 @@ class State:
     given: Given | None = None
     """What is given in its place, where it stands for that."""
     is_temperature: bool = False
+
+    @cached_property
+    def symbol(self) -> Any:
+        """Its symbol in the equations."""
+        return symengine.Symbol(self.name)
+
+    @cached_property
+    def dot(self) -> Any:
+        """The symbol of its time derivative."""
+        return symengine.Symbol(f"d{self.name}_dt")
 
     @property
     def name(self) -> str:
@@ -376,9 +384,28 @@ class System:
         """The same with a state that stands for none where it has none."""
         if self.states:
             return self
-        symbol, dot = symengine.symbols(f"{STAND_IN} d{STAND_IN}_dt")
-        state = State(Quantity(STAND_IN, "1", "stands for states"), symbol, dot, 0.0, 1.0, algebraic=False)
-        return replace(self, states=(state,), rows={STAND_IN: dot})
+        state = State(Quantity(STAND_IN, "1", "stands for states"), 0.0, 1.0)
+        return replace(self, states=(state,), rows={STAND_IN: state.dot})
+
+    @property
+    def reactions(self) -> tuple[str, ...]:
+        """Labels of the reactions in the order of the scene."""
+        return tuple(item.name.removeprefix("R_") for item in self.named if item.quantity.tag == "e:R")
+
+    def with_multipliers(self) -> System:
+        """The same with a factor on each reaction rate, ``multiplier.LABEL``, one unless it is changed."""
+        factors = {
+            f"R_{label}": Parameter(
+                symengine.Symbol(f"multiplier_{label}"), f"multiplier.{label}", Spec("1", "factor on a rate"), 1.0
+            )
+            for label in self.reactions
+        }
+        named = tuple(
+            replace(item, expression=factors[item.name].symbol * item.expression) if item.name in factors else item
+            for item in self.named
+        )
+        parameters = (*self.parameters, *factors.values())
+        return replace(self, named=named, parameters=parameters, origin=partial(System.with_multipliers, self))
 
     @property
     def chains(self) -> list[tuple[int, int, int]]:

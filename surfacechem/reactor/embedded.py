@@ -16,7 +16,6 @@ from surfacechem.expressions import depends
 from surfacechem.format import Case
 from surfacechem.mechanism.evaluated import HeldPhase
 from surfacechem.model.assemble import assemble
-from surfacechem.model.multipliers import with_multipliers
 from surfacechem.model.system import System
 from surfacechem.quantities import MOLECULAR
 from surfacechem.reactor import coupling
@@ -100,8 +99,9 @@ class EmbeddedScene:
             scene = coupling.with_heat(coupling.with_reactors(case.scene, reactors), heated)
             scene = coupling.with_loads(scene, {name: float(function(0.0)) for name, function in loads.items()})
             scene = coupling.with_neighbours(scene, neighbours or {})
-            system, self.reactions = with_multipliers(assemble(scene))
+            system = assemble(scene).with_multipliers()
             _refuse_folds(system)
+            self.reactions = system.reactions
             self.model = Model(system)
             self.values = self.model.values()
             self.problem = self.model.problem(Run(times=(0.0, FOREVER)), self.values, passing=False)

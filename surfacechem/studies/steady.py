@@ -13,7 +13,6 @@ import numpy as np
 
 from surfacechem.errors import InputError, suggestion
 from surfacechem.format import Overrides, Source
-from surfacechem.model.multipliers import with_multipliers
 from surfacechem.model.system import System
 from surfacechem.quantities import GAS_CONSTANT
 from surfacechem.runs.at_rest import refuse_histories
@@ -91,7 +90,8 @@ def steady(source: Source, of: Sequence[str] = (), overrides: Overrides = ()) ->
         Where the case has a history, jumps, or comes to no rest.
     """
     simulation = load(source, overrides)
-    system, labels = with_multipliers(simulation.system)
+    system = simulation.system.with_multipliers()
+    labels = system.reactions
     refuse_histories(system)
     if system.in_stretches:
         raise InputError("the scene jumps, so that its steady states are none of one set of equations.")

@@ -165,7 +165,7 @@ def _profile(build: Build, slab: Slab) -> Iterator[State | Profile]:
     for i, node in enumerate(slab.inner, start=1):
         build.rows.balance(node.name, build.energy_row(node))
         quantity = Quantity(node.name, "K", f"temperature of {slab.body.name}, point {i} from the contact")
-        yield State(quantity, node.T, node.T_dot, value, value, algebraic=False, start=start, is_temperature=True)
+        yield State(quantity, value, value, start=start, is_temperature=True)
     last = slab.behind[-1]
     yield Profile(
         number=slab.number,

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
+from functools import partial
 
 import symengine
 
@@ -79,15 +80,14 @@ def pressed(build: Build, law: Friction) -> dict[str, Expression]:
 def memory(build: Build, law: Friction, bound: Friction) -> Iterator[State]:
     """States of the law and their rates; the initial value is that of the quantity, not of its logarithm."""
     for name, of in law.internal.items():
-        symbol, dot = symengine.symbols(f"{name} d{name}_dt")
         start = build.initial(of)
         if not start > 0:
             raise InputError(f"initial {of} = {start:g} is outside its range: > 0.", path=f"initial.{of}")
-        build.variables.define(name, lambda symbol=symbol: symbol, "evolved", law.path)  # type: ignore[misc]
+        build.variables.define(name, partial(symengine.Symbol, name), "evolved", law.path)
         given = Given(VARIABLES[of], start)
         # As a logarithm it stays positive, and twenty decades of age are as well resolved as one.
-        yield State(VARIABLES[name], symbol, dot, math.log(start), 1.0, algebraic=False, given=given)
-        build.name(VARIABLES[of], exp(symbol))
+        yield State(VARIABLES[name], math.log(start), 1.0, given=given)
+        build.name(VARIABLES[of], exp(symengine.Symbol(name)))
     if law.internal:
         for name, rate in build.variables.call(bound, bound.evolution).items():
             build.rows.kinematics(name, rate)

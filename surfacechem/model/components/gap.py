@@ -10,7 +10,7 @@ import symengine
 from surfacechem.contracts.terms import Spec
 from surfacechem.errors import InputError, Place
 from surfacechem.expressions import Expression, derivative
-from surfacechem.model.automaton import Constraint
+from surfacechem.model.automaton import NONE, Constraint
 from surfacechem.model.build import Build, Record
 from surfacechem.model.components.mounting import LENGTH, Held, far_field, held, law_reads
 from surfacechem.model.constraints.threshold import bonds_left
@@ -18,7 +18,6 @@ from surfacechem.model.constraints.unilateral import TOUCHING, closing, contact,
 from surfacechem.model.system import Margin, State
 from surfacechem.quantities import VARIABLES, Quantity
 
-NONE = symengine.Integer(0)
 G, V = symengine.symbols("g_n v_n")
 
 SOFT = "Give a potential that lets them, such as `penalty`, or a gap that is not negative."
@@ -76,12 +75,11 @@ def _moving(build: Build, mount: Held) -> Iterator[State]:
     initial = build.scene.initial.get("g_n", 0.0) if mount.quasi_static else build.initial("g_n")
     build.variables.define("g_n", G, "evolved", mount.by)
     build.variables.get("g_n", "the mechanics")
-    yield State(VARIABLES["g_n"], G, dot, initial, LENGTH, algebraic=False)
+    yield State(VARIABLES["g_n"], initial, LENGTH)
     rates["g_n"] = dot if mount.quasi_static else V
     if mount.inertial:
-        start, change = build.scene.initial.get("v_n", 0.0), symengine.Symbol("dv_n_dt")
         build.variables.define("v_n", V, "evolved", mount.by)
-        yield State(VARIABLES["v_n"], V, change, start, LENGTH, algebraic=False)
+        yield State(VARIABLES["v_n"], build.scene.initial.get("v_n", 0.0), LENGTH)
     elif mount.damped:
 
         def yielding() -> Expression:

@@ -116,16 +116,16 @@ def _per_current_area(build: Build, amount: Expression) -> Expression:
 
 def _bonding_state(build: Build, quantity: Quantity, density: Expression, limit: float) -> Bond:
     name = quantity.name
-    symbol, dot = symengine.Symbol(name), symengine.Symbol(f"d{name}_dt")
     initial = initial_bonding(build, name)
     if not 0 <= initial <= limit:
         raise InputError(f"initial {name} = {initial:g} is outside its range: 0 to {limit:g}.", path=f"initial.{name}")
-    build.variables.define(name, symbol, "evolved", "bonding")
+    state = State(quantity, initial, 1.0)
+    build.variables.define(name, state.symbol, "evolved", "bonding")
     start, fixed = Spec("1", f"initial {name}"), name not in build.scene.initial
     first = build.constant(f"{name}_i", f"initial.{name}", start, initial, internal=fixed)
-    build.add(State(quantity, symbol, dot, initial, 1.0, algebraic=False))
-    _bounds(build, name, symbol, limit)
-    return Bond(symbol, dot, density, first)
+    build.add(state)
+    _bounds(build, name, state.symbol, limit)
+    return Bond(state.symbol, state.dot, density, first)
 
 
 def _bounds(build: Build, name: str, symbol: Any, limit: float) -> None:

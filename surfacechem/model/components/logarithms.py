@@ -37,10 +37,8 @@ def outputs(build: Build) -> None:
     if any(bond.symbol in edge.reset for edge in build.edges):
         message = f"bonds that break at once have no {LOGARITHM}. Give `phi` instead."
         raise InputError(message, path=f"initial.{LOGARITHM}")
-    symbol, dot = symengine.symbols(f"{LOGARITHM} d{LOGARITHM}_dt")
-    phi = Named(VARIABLES["phi"], symengine.exp(symbol))
-    change = Named(Quantity(str(bond.dot), "1/s", "rate of change of the bonding state"), bond.symbol * dot, False)
-    build.named[:0] = [phi, change]
-    build.rows.logarithm("phi", symbol, LOGARITHM, build.expanded(build.rows["phi"]))
-    state = State(VARIABLES[LOGARITHM], symbol, dot, build.scene.initial[LOGARITHM], 1.0, algebraic=False)
+    state = State(VARIABLES[LOGARITHM], build.scene.initial[LOGARITHM], 1.0)
+    phi, rate = Named(VARIABLES["phi"], symengine.exp(state.symbol)), bond.symbol * state.dot
+    build.named[:0] = [phi, Named(Quantity(str(bond.dot), "1/s", "rate of change of the bonding state"), rate, False)]
+    build.rows.logarithm("phi", state.symbol, LOGARITHM, build.expanded(build.rows["phi"]))
     build.states[:] = [state if item.symbol == bond.symbol else item for item in build.states]

@@ -40,8 +40,7 @@ def variables(build: Build) -> Iterator[State]:
     assert found is not None
     _film(build, found)
     if found.growth:
-        symbol, dot = symengine.symbols("d_m dd_m_dt")
-        yield State(VARIABLES["d_m"], symbol, dot, build.initial("d_m"), NANOMETRE, algebraic=False)
+        yield State(VARIABLES["d_m"], build.initial("d_m"), NANOMETRE)
     for name, value in found.properties.items():
         build.variables.define(name, partial(_given, build, name, value), "derived", f"{PATH}.{KEYS[name]}")
     fluid = None if found.fluid is None else cache(partial(FluidFit, build, found.fluid))

@@ -52,7 +52,6 @@ def _awaited(stage: Stage) -> str:
 
 def _driven(build: Build, name: str) -> Expression:
     """A state that moves at the rate of the present stage."""
-    symbol, dot = symengine.Symbol(name), symengine.Symbol(f"d{name}_dt")
     quantity = VARIABLES[name]
     rate: Expression = symengine.Integer(0)
     for i, item in enumerate(build.scene.programme):
@@ -61,10 +60,10 @@ def _driven(build: Build, name: str) -> Expression:
             value = build.parameters.add(f"{name}_rate", f"programme.{item.name}.{name}", spec, item.rates[name])
             rate = rate + where(_during(i), value, 0)
     start = build.scene.initial.get(name, 0.0)
-    build.add(State(quantity, symbol, dot, start, SCALES.get(quantity.unit, 1.0), algebraic=False))
+    build.add(State(quantity, start, SCALES.get(quantity.unit, 1.0)))
     build.rows.kinematics(name, rate)
     build.motion.drives[name] = rate
-    return symbol
+    return symengine.Symbol(name)
 
 
 def _during(i: int) -> Expression:

@@ -137,7 +137,7 @@ def _temperature_state(build: Build, node: Node) -> State:
     quantity = VARIABLES.get(
         node.name, Quantity(node.name, "K", f"temperature of {build.thermal.owners(node)}", node.name)
     )
-    return State(quantity, node.T, node.T_dot, initial, initial, algebraic, is_temperature=True)
+    return State(quantity, initial, initial, algebraic, is_temperature=True)
 
 
 def _initial(build: Build, node: Node) -> float:

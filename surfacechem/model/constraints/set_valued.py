@@ -25,12 +25,10 @@ import symengine
 from surfacechem.contracts.terms import Friction
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, absolute, depends, derivative, sign, where
-from surfacechem.model.automaton import Constraint, Edge, Register
+from surfacechem.model.automaton import NONE, ONE, Constraint, Edge, Register
 from surfacechem.model.build import Build
 from surfacechem.model.components.mounting import far_field, law_reads
 from surfacechem.model.constraints.threshold import broken
-
-NONE, ONE = symengine.Integer(0), symengine.Integer(1)
 
 SLIP = symengine.Symbol("slip")
 P = symengine.Symbol("p of an impact")

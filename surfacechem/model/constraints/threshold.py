@@ -20,13 +20,11 @@ import symengine
 from surfacechem.contracts.terms import Law, Limit
 from surfacechem.errors import InputError, suggestion
 from surfacechem.expressions import Expression, depends, derivative, where
-from surfacechem.model.automaton import Constraint, Edge, Mode, Register
+from surfacechem.model.automaton import NONE, ONE, Constraint, Edge, Mode, Register
 from surfacechem.model.build import Build
 from surfacechem.model.components.mounting import held, law_reads
 
 Stoichiometry = Mapping[str, int | float]
-
-NONE, ONE = symengine.Integer(0), symengine.Integer(1)
 
 BONDED = Mode("bonded", 1.0, {0.0: "debonded", 1.0: "bonded"})
 LOOSE = Register("loose", "whether the gaps have yet to follow a local jump")

@@ -23,14 +23,13 @@ import symengine
 
 from surfacechem.contracts.terms import Spec
 from surfacechem.expressions import Expression, absolute, derivative, where
-from surfacechem.model.automaton import RESTS, Constraint, Edge, Mode, Register
+from surfacechem.model.automaton import NONE, ONE, RESTS, Constraint, Edge, Mode, Register
 from surfacechem.model.build import Build
 from surfacechem.model.components.mounting import FarField, far_field, held, law_reads
 from surfacechem.model.constraints.set_valued import PRESSURES, friction_impulse
 from surfacechem.model.system import TOLERANCE, Margin
 from surfacechem.tolerances import PICOMETRE, SOLVED
 
-NONE, ONE = symengine.Integer(0), symengine.Integer(1)
 G, V = symengine.symbols("g_n v_n")
 LANDED = Register("landed", "whether the bodies have met and do not rebound")
 FASTEST = Register("fastest", "speed of the fastest impact [m/s]")

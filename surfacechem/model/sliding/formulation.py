@@ -15,6 +15,7 @@ import symengine
 from surfacechem.contracts.terms import Friction, Potential, TangentialPotential, reads
 from surfacechem.errors import InputError, Place
 from surfacechem.expressions import Expression, depends, derivative, sqrt, where
+from surfacechem.model.automaton import NONE, ONE
 from surfacechem.model.build import Build
 from surfacechem.model.components.mounting import (
     ACROSS,
@@ -31,7 +32,6 @@ from surfacechem.model.system import Caution, Given, State
 from surfacechem.quantities import VARIABLES, Quantity
 from surfacechem.tolerances import CREEP
 
-NONE, ONE = symengine.Integer(0), symengine.Integer(1)
 REST = {"v": NONE, "v_2": NONE, "direction": ONE, "direction_2": ONE}
 
 UNSTABLE = (
@@ -178,13 +178,13 @@ def evolve(
     scale: float = LENGTH,
 ) -> Expression:
     """A new state of the motion, and the variable of its name where something says what it is determined by."""
-    symbol, dot = symengine.symbols(f"{name} d{name}_dt")
     initial = build.scene.initial.get(name, 0.0) if start is None else start
     finest = CREEP if name == "v" and any(law.internal for law in build.interface.frictions) else None
-    build.add(State(VARIABLES[name], symbol, dot, initial, scale, algebraic, finest=finest, given=given))
+    state = State(VARIABLES[name], initial, scale, algebraic, finest=finest, given=given)
+    build.add(state)
     if by:
-        build.variables.define(name, symbol, "algebraic" if algebraic else "evolved", by)
-    return symbol
+        build.variables.define(name, state.symbol, "algebraic" if algebraic else "evolved", by)
+    return state.symbol
 
 
 def name_traction(build: Build, d: Direction, slides: Expression, carried: Expression, needed: Expression) -> None:

@@ -29,11 +29,11 @@ import symengine
 
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, cos, depends, derivative, norm, sin, sqrt, where
-from surfacechem.model.automaton import Constraint, Mode, Register
+from surfacechem.model.automaton import NONE, Constraint, Mode, Register
 from surfacechem.model.build import Build, Record
 from surfacechem.model.components.mounting import ACROSS, LENGTH, Direction, FarField, far_field
 from surfacechem.model.constraints.set_valued import SLIP, breaks_bonds, set_valued
-from surfacechem.model.sliding.formulation import NONE, PLACE, UNSTABLE, Formulation, evolve, name_traction
+from surfacechem.model.sliding.formulation import PLACE, UNSTABLE, Formulation, evolve, name_traction
 from surfacechem.model.system import STABLE, Given, Margin
 from surfacechem.quantities import VARIABLES
 from surfacechem.tolerances import MOMENT, PICOMETRE, ROUNDING, SQRT_EPS, STILL

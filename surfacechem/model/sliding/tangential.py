@@ -17,15 +17,13 @@ import symengine
 
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, absolute, depends, derivative, norm, sign, where
-from surfacechem.model.automaton import Constraint, Equilibrium, Mode, When
+from surfacechem.model.automaton import NONE, ONE, Constraint, Equilibrium, Mode, When
 from surfacechem.model.balances import MECHANICS, OUTSIDE, WORK, Power
 from surfacechem.model.build import Build, Record
 from surfacechem.model.components.mounting import ACROSS, ALONG, KEYS, FarField, far_field
 from surfacechem.model.constraints.set_valued import SLIP, breaks_bonds, set_valued
 from surfacechem.model.sliding import plane, rate_and_state
 from surfacechem.model.sliding.formulation import (
-    NONE,
-    ONE,
     PLACE,
     UNSTABLE,
     Formulation,
