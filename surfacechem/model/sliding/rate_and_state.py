@@ -40,8 +40,7 @@ def evolve_drive(build: Build, *, inertial: bool) -> Expression | None:
     A mass feels the rate of the velocity, for which parameters that vary count as they are without their factors.
     Without one the balance may need the velocity itself, where they vary with it.
     """
-    laws = (law for law in build.interface.frictions if law.velocity is not None)
-    law = next((law for law in laws if inertial or not _varies_with_velocity(law)), None)
+    law = _law(build, inertial)
     if law is None:
         return None
     bound, varying = build.bound(law), law.varying
@@ -78,8 +77,13 @@ def _number_at_start(build: Build, expression: Expression, values: Mapping[str, 
         return 0.0
 
 
-def _varies_with_velocity(law: Friction) -> bool:
-    return any("v" in (factor.of, *reads(factor.factor)) for factor in law.factors)
+def _law(build: Build, inertial: bool) -> Friction | None:
+    """The first law whose traction can stand for the velocity."""
+    for law in build.interface.frictions:
+        varies_with_velocity = any("v" in (factor.of, *reads(factor.factor)) for factor in law.factors)
+        if law.velocity is not None and (inertial or not varies_with_velocity):
+            return law
+    return None
 
 
 def stands_for_velocity(build: Build) -> bool:
