@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field
 from typing import Self
 
@@ -95,6 +95,21 @@ def suggestion(name: str, known: Iterable[str], listed_by: str = "") -> str:
     like = sorted(names, key=lambda other: likeness(name, other), reverse=True)[:NEAR]
     more = f" {listed_by} lists all." if listed_by else ""
     return f"{nearest(name, names)} Nearest of {len(names)}: {', '.join(like)}.{more}"
+
+
+def refuse_unknown(
+    names: Iterable[str], known: Collection[str], message: str, place: Place | None = None, listed_by: str = ""
+) -> None:
+    """InputError for the first name that is none of the known ones; it stands where the message has {}.
+
+    >>> refuse_unknown(["k", "mu_s"], ["k", "mu"], "no parameter '{}'")
+    Traceback (most recent call last):
+        ...
+    surfacechem.errors.InputError: no parameter 'mu_s'. Did you mean 'mu'? Known: k, mu.
+    """
+    for name in names:
+        if name not in known:
+            raise InputError(f"{message.replace('{}', str(name))}.{suggestion(str(name), known, listed_by)}", place)
 
 
 def nearest(name: str, known: Iterable[str]) -> str:

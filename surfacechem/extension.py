@@ -20,7 +20,7 @@ import cantera
 import symengine
 
 from surfacechem.compile.program import CODE, compile_function
-from surfacechem.errors import InputError, suggestion
+from surfacechem.errors import InputError, refuse_unknown, suggestion
 from surfacechem.expressions import EXPONENT_CAP
 from surfacechem.mechanism.rate_types import AffinityReaction, kinds
 from surfacechem.mechanism.rates import CoverageTerm, InterfaceArrhenius
@@ -128,7 +128,7 @@ class LoadedRate(cantera.ExtensibleRate):
     def _read(self, node: Any, units: Any) -> InterfaceArrhenius:
         equation = str(node.get("equation", ""))
         own = self.law.own_keys()
-        _check_keys(node, {*REACTION, *self.law.keys, *own}, f"a rate of type {self.kind}")
+        refuse_unknown(node, {*REACTION, *self.law.keys, *own}, f"a rate of type {self.kind}: unknown key '{{}}'")
         constant = node.get("rate-constant")
         _check_all(constant, self.law.keys["rate-constant"], "rate-constant")
         coverage = []
@@ -276,17 +276,11 @@ class AffinityRate(LoadedRate):
         return float(super().eval(data) * ratio)
 
 
-def _check_keys(node: Any, known: Any, title: str) -> None:
-    for key in node:
-        if key not in known:
-            raise InputError(f"{title}: unknown key '{key}'.{suggestion(str(key), known)}")
-
-
 def _check_all(node: Any, keys: Collection[str], title: str) -> None:
     """Raise InputError unless a mapping has these keys and no other, as Cantera's own rates have."""
     if not isinstance(node, Mapping):
         raise InputError(f"{title} must be a mapping with {', '.join(sorted(keys))}.")
-    _check_keys(node, keys, title)
+    refuse_unknown(node, keys, f"{title}: unknown key '{{}}'")
     for key in sorted(set(keys) - set(node)):
         raise InputError(f"{title}: {key} is missing.")
 

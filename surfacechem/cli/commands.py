@@ -16,7 +16,7 @@ import typer
 from typer import Argument, Option
 from typer.core import TyperGroup
 
-from surfacechem.errors import InputError, OutputError, Place, SurfacechemError, suggestion
+from surfacechem.errors import InputError, OutputError, Place, SurfacechemError, refuse_unknown
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
@@ -218,8 +218,7 @@ def chosen(simulation: Simulation, solver: str | None, rtol: float | None, accur
     from surfacechem.solve import AUTO, names
     from surfacechem.solve.run import OWN
 
-    if solver is not None and solver not in (AUTO, *names):
-        raise InputError(f"no solver '{solver}'.{suggestion(solver, (AUTO, *names))}", Place(path="--solver"))
+    refuse_unknown([] if solver is None else [solver], (AUTO, *names), "no solver '{}'", Place(path="--solver"))
     for option, value, most in (("--rtol", rtol, 0.1), ("--accuracy", accuracy, 1.0)):
         if value is not None and not 0 < value <= most:
             raise InputError(f"{value:g} is outside its range: > 0 and <= {most:g}.", Place(path=option))
@@ -284,8 +283,7 @@ def refuse_unwritable(*targets: Path) -> None:
 def check_picture(target: Path) -> None:
     """InputError where a file name asks for no kind of picture, or the file could not be written."""
     kind = target.suffix.lower().removeprefix(".")
-    if kind not in ("png", "svg", "pdf"):
-        raise InputError(f"no format '{kind}'.{suggestion(kind, ('png', 'svg', 'pdf'))}", Place(path=str(target)))
+    refuse_unknown([kind], ("png", "svg", "pdf"), "no format '{}'", Place(path=str(target)))
     refuse_unwritable(target)
 
 

@@ -37,7 +37,7 @@ from surfacechem.cli.commands import (
     written_to,
 )
 from surfacechem.cli.terminal import show, show_page
-from surfacechem.errors import InputError, Place, suggestion
+from surfacechem.errors import InputError, Place, refuse_unknown
 
 if TYPE_CHECKING:
     from surfacechem.results.solution import Solution
@@ -247,8 +247,7 @@ def equations(
     changes: Changes = None,
 ) -> None:
     """Print the equations of a case, as Python that runs, as LaTeX, or as text."""
-    if form not in ("python", "latex", "text"):
-        raise InputError(f"no format '{form}'.{suggestion(form, ('python', 'latex', 'text'))}", Place(path="--format"))
+    refuse_unknown([form], ("python", "latex", "text"), "no format '{}'", Place(path="--format"))
     from surfacechem import format as cases
     from surfacechem.compile import printing
     from surfacechem.results import spatial

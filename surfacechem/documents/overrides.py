@@ -7,7 +7,7 @@ from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from surfacechem.documents.document import ORIGIN, Tree, from_plain, labels, parse, with_paths
-from surfacechem.errors import InputError, Place, suggestion
+from surfacechem.errors import InputError, Place, refuse_unknown, suggestion
 
 # Keys of a value that may also stand by itself.
 WRITTEN_OUT = ("level", "value", "rises-to")
@@ -99,8 +99,7 @@ def _set(tree: Tree, keys: Sequence[str], new: Tree, place: Place) -> Tree:
     known = _entries(tree, place)
     if not removes:
         return replace(tree, value={**known, first: _set(known.get(first, Tree(None, place)), rest, new, place)})
-    if first not in known:
-        raise InputError(f"there is no '{first}' to remove.{suggestion(first, known)}", place)
+    refuse_unknown([first], known, "there is no '{}' to remove", place)
     kept = dict(known)
     del kept[first]
     return replace(tree, value=kept)

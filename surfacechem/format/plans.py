@@ -18,7 +18,7 @@ import numpy as np
 
 from surfacechem.documents.document import Tree
 from surfacechem.documents.overrides import parameter_path
-from surfacechem.errors import PATHS, InputError, suggestion
+from surfacechem.errors import PATHS, InputError, refuse_unknown
 from surfacechem.format import csvtable
 from surfacechem.format.declarations import Context, keys, read
 from surfacechem.format.draws import Array, Distribution, Drawn, Index, Lognormal, Normal, Sample, Uniform
@@ -261,8 +261,7 @@ def _known(path: str, tree: Tree, units: Mapping[str, str]) -> str:
     if path.startswith(INTEGRATED):
         text = "shapes and laws of the gap are in integrals that are made once; give each value a run, by --set."
         raise InputError(f"{path} cannot be swept: {text}", tree.place)
-    if path not in units:
-        raise InputError(f"no parameter '{path}' to sweep.{suggestion(path, units, PATHS)}", tree.place)
+    refuse_unknown([path], units, "no parameter '{}' to sweep", tree.place, PATHS)
     return path
 
 

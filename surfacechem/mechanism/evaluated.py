@@ -18,7 +18,7 @@ import symengine
 from numpy.typing import NDArray
 
 from surfacechem.contracts.terms import Load, RateLaw, option, parameter
-from surfacechem.errors import InputError, Place, suggestion
+from surfacechem.errors import InputError, Place, refuse_unknown, suggestion
 from surfacechem.expressions import Expression, absolute
 from surfacechem.mechanism.mixture import Formula, Species, identifiers, word
 from surfacechem.mechanism.rates import MechanismReaction
@@ -61,9 +61,7 @@ def hold(surface: Any, given: Mapping[str, Neighbour] | None, place: Place | Non
     if given is None:
         return ()
     for name, state in given.items():
-        if name not in surface.adjacent:
-            message = f"the surface {surface.name} has no neighbour '{name}'.{suggestion(name, surface.adjacent)}"
-            raise InputError(message, state.place)
+        refuse_unknown([name], surface.adjacent, f"the surface {surface.name} has no neighbour '{{}}'", state.place)
     for name, phase in surface.adjacent.items():
         state = given.get(name, Neighbour(place=place))
         if problem := _problem(phase, state):
@@ -272,10 +270,8 @@ class SurfaceEngine:
     def beside(self, neighbours: Mapping[str, Neighbour]) -> SurfaceEngine:
         """The same with other pressures and compositions of neighbours; InputError where no reaction has such a one."""
         known = {held.phase.name: held for held in self.held}
+        refuse_unknown(neighbours, known, f"no reaction of the surface {self.surface.name} has a neighbour '{{}}'")
         for name, state in neighbours.items():
-            if name not in known:
-                found = suggestion(name, known)
-                raise InputError(f"no reaction of the surface {self.surface.name} has a neighbour '{name}'.{found}")
             own = known[name].phase.species_names
             if state.composition and list(state.composition) != own:
                 raise InputError(

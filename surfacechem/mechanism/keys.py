@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Mapping
 from typing import Any
 
-from surfacechem.errors import InputError, Place, suggestion
+from surfacechem.errors import InputError, Place, refuse_unknown, suggestion
 from surfacechem.mechanism.interaction import CAPACITY, COEFFICIENTS, CURVES, KEY, TOGETHER
 from surfacechem.mechanism.rate_types import kind_of, kinds, names
 from surfacechem.mechanism.rates import InterfaceArrhenius
@@ -199,10 +199,8 @@ class Check:
         for entry in entries:
             if not self.beside or "name" not in entry or entry in own:
                 self._species(entry)
-        for name in self.names:
-            if name not in there:
-                message = f"species: no species '{name}'.{suggestion(name, there)}"
-                raise self.source.error(message, self.phase, "species")
+        place = self.source.place(self.phase, "species")
+        refuse_unknown(self.names, there, "species: no species '{}'", place)
         self._composition(own if self.beside else entries)
         for entry in own:
             self._dependence(entry)
@@ -258,8 +256,7 @@ class Check:
     def _curve(self, entry: Any, node: Any, title: str) -> None:
         """How thermo depends on one coverage: the keys of its model, those that need each other, and their units."""
         error, model = self.source.error, str(node.get("model"))
-        if model not in CURVES:
-            raise error(f"{title}: no model '{model}'.{suggestion(model, CURVES)}", node, "model")
+        refuse_unknown([model], CURVES, f"{title}: no model '{{}}'", self.source.place(node, "model"))
         self._keys(node, ("model", "units", *CURVES[model], *CAPACITY), title)
         given = {**self.source.defaults(entry), **(node.get("units") or {})}
         for key, value in node.items():

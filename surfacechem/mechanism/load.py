@@ -15,7 +15,7 @@ from typing import Any
 from surfacechem.contracts.terms import Potential, RateLaw
 from surfacechem.documents import document
 from surfacechem.documents import shipped as data
-from surfacechem.errors import InputError, Place, suggestion
+from surfacechem.errors import InputError, Place, refuse_unknown, suggestion
 from surfacechem.mechanism.evaluated import (
     EvaluatedReaction,
     Neighbour,
@@ -65,9 +65,7 @@ class Mechanism:
 
     def coverages(self, given: Mapping[str, float], place: Place | None = None) -> dict[str, float]:
         """Initial values from coverages by species; those not given are zero, and all must sum to one."""
-        for name in given:
-            if name not in self.species:
-                raise InputError(f"coverages: no species '{name}'.{suggestion(name, self.species)}", place)
+        refuse_unknown(given, self.species, "coverages: no species '{}'", place)
         total = sum(given.values())
         if abs(total - 1) > SUM_TOLERANCE:
             raise InputError(f"coverages sum to {total:.12g}, not to 1.", place)
@@ -101,9 +99,7 @@ def load_mechanism(
     kept = _kept(source, entry, surface)
     species = _species(surface, source, entry, any(outside for _, _, outside in kept))
     by_name = {item.name: item for item in species}
-    for bond in bonds:
-        if bond not in by_name:
-            raise InputError(f"bonds: no species '{bond}' in the mechanism.{suggestion(bond, by_name)}", place)
+    refuse_unknown(bonds, by_name, "bonds: no species '{}' in the mechanism", place)
     chosen = [by_name[bond] for bond in dict.fromkeys(bonds)]
     density = surface.site_density * MOLECULAR
     # A bond that takes two sites can form half as often, so that phi is the coverage of bonds in either case.
@@ -264,14 +260,9 @@ def _reaction(
         message = f"{title}: {elastic[0]} is elastic, which Cantera's equilibrium constant does not know. "
         raise InputError(f"{message}Write two one-way reactions.", place)
     given |= {"whole": whole, "value": 0.0}
-    if beside := _outside(whole, variables):
+    if beside := {name: nu for name, nu in whole.items() if name not in variables}:
         return NeighbourReaction(enthalpy=0.0, gibbs=0.0, beside=beside, **given)
     return EvaluatedReaction(**given)
-
-
-def _outside(whole: Mapping[str, float], own: Mapping[str, str]) -> dict[str, float]:
-    """What of a change belongs to no species of the surface."""
-    return {name: nu for name, nu in whole.items() if name not in own}
 
 
 def _lowered(

@@ -15,7 +15,7 @@ from typing import Any
 from surfacechem.contracts.terms import Law, Spec
 from surfacechem.documents import document
 from surfacechem.documents.document import Limits, Tree
-from surfacechem.errors import InputError, Place, suggestion
+from surfacechem.errors import InputError, Place, refuse_unknown, suggestion
 from surfacechem.quantities import AVOGADRO, KILO
 
 LIMITS = Limits(largest=10_000_000, most=200_000)
@@ -218,8 +218,7 @@ class Source:
         if name is None and len(surfaces) > 1:
             raise InputError(f"the mechanism has several phases, name one.{suggestion('', surfaces)}", place)
         name = surfaces[0] if name is None else name
-        if name not in phases:
-            raise InputError(f"{self.file} has no phase '{name}'.{suggestion(name, phases)}", place)
+        refuse_unknown([name], phases, f"{self.file} has no phase '{{}}'", place)
         return phases[name]
 
     def species(self, phase: Any) -> Iterator[Any]:

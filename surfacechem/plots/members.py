@@ -13,7 +13,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 
-from surfacechem.errors import InputError
+from surfacechem.errors import InputError, refuse_unknown
 from surfacechem.format.plans import RUN, Plan
 from surfacechem.plots import style
 from surfacechem.plots.run import KINDS, of_kind
@@ -63,7 +63,7 @@ def figure(dataset: xarray.Dataset, plan: Plan, variables: Sequence[str] | None 
 def chosen(dataset: xarray.Dataset, axes: Sequence[str], variables: Sequence[str] | None) -> list[str]:
     """The variables that are drawn: those asked for, else those of the ends that differ from run to run."""
     known = [str(n) for n, x in dataset.data_vars.items() if x.dtype.kind == "f" and x.dims[: len(axes)] == tuple(axes)]
-    style.refuse_unknown(variables or (), known, "in the sweep")
+    refuse_unknown(variables or (), known, "no variable '{}' in the sweep")
     return list(dict.fromkeys(variables)) if variables else differing(dataset, axes, known)
 
 
@@ -155,7 +155,8 @@ def portraits(dataset: xarray.Dataset, axes: Sequence[str], variables: Sequence[
     series = along(dataset, axes)
     # Along the runs there is time, or where a load ends them, the load.
     inner = [str(dim) for name in series for dim in dataset[name].dims if dim not in axes]
-    style.refuse_unknown((*(variables or ()), against), [*series, *dict.fromkeys(inner)], "along the runs of the sweep")
+    known = [*series, *dict.fromkeys(inner)]
+    refuse_unknown((*(variables or ()), against), known, "no variable '{}' along the runs of the sweep")
     usual = [name for _, *kind in KINDS[:2] for name in of_kind(dataset, series, *kind)]
     moving = [name for name in usual if name != against and varies(fair(dataset, name))]
     if not (names := list(dict.fromkeys(variables or moving[:MOST_PANELS]))):

@@ -18,7 +18,7 @@ import xarray
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from surfacechem.errors import InputError
+from surfacechem.errors import InputError, refuse_unknown
 from surfacechem.plots import curved, style
 from surfacechem.plots.style import Array, meaning, symbol, unit, varies
 from surfacechem.tolerances import EPS, ROUNDING
@@ -196,7 +196,8 @@ def of_kind(dataset: xarray.Dataset, names: Sequence[str], units: str, pattern: 
 def panels(dataset: xarray.Dataset, variables: Sequence[str] | None, against: str | None) -> list[Panel]:
     """Panels of the variables by unit, or of all that vary by kind, without the variable that is their axis."""
     known = curves(dataset)
-    style.refuse_unknown((*(variables or ()), *filter(None, [against])), known, "over time in the dataset")
+    asked = (*(variables or ()), *filter(None, [against]))
+    refuse_unknown(asked, known, "no variable '{}' over time in the dataset")
     found = _by_unit(dataset, list(dict.fromkeys(variables))) if variables else _by_kind(dataset, known)
     found = [replace(panel, names=[name for name in panel.names if name != against]) for panel in found]
     return [panel for panel in found if panel.names]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from io import BytesIO
@@ -23,7 +23,7 @@ from matplotlib.rcsetup import cycler
 from matplotlib.ticker import LogFormatterSciNotation, LogLocator
 from numpy.typing import NDArray
 
-from surfacechem.errors import InputError, Place, suggestion
+from surfacechem.errors import InputError, Place
 from surfacechem.quantities import SUPERSCRIPTS, VARIABLES, raised
 from surfacechem.results.netcdf import reading, replacing
 from surfacechem.tolerances import ROUNDING
@@ -165,13 +165,6 @@ def check(
             raise InputError(f"{name} does not go over {' and '.join(dimensions)}.", place(dataset))
         if name in numbers and dataset[name].dtype.kind != "f":
             raise InputError(f"{name} does not hold numbers in double precision.", place(dataset))
-
-
-def refuse_unknown(names: Iterable[str], known: Sequence[str], where: str) -> None:
-    """InputError for the name of a variable that is none of the known ones."""
-    for name in names:
-        if name not in known:
-            raise InputError(f"no variable '{name}' {where}.{suggestion(name, known)}")
 
 
 def spread(count: int, most: int) -> list[int]:

@@ -9,7 +9,7 @@ import xarray
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from surfacechem.errors import InputError
+from surfacechem.errors import InputError, refuse_unknown
 from surfacechem.format.plans import RUN, Plan, recorded_plan
 from surfacechem.plots import members, rupture, style
 from surfacechem.plots.run import KINDS, Panel, of_kind
@@ -80,7 +80,7 @@ def _numbers(dataset: xarray.Dataset) -> list[str]:
 def groups(dataset: xarray.Dataset, variables: Sequence[str] | None) -> list[Panel]:
     """Panels of the variables, else of the most probable load at rupture, else of what depends on the sweep."""
     known, load = _numbers(dataset), rupture.load_of(dataset)
-    style.refuse_unknown(variables or (), known, "in the sweep")
+    refuse_unknown(variables or (), known, "no variable '{}' in the sweep")
     names = [[name] for name in dict.fromkeys(variables or ())] or ([[f"{load}_mode"]] if load else _dependent(dataset))
     return [Panel("", unit(dataset[group[0]]), group) for group in names or [["time_reached"]]]
 

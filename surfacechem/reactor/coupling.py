@@ -14,7 +14,7 @@ from typing import Any, NoReturn
 import cantera
 
 from surfacechem.contracts.terms import Load
-from surfacechem.errors import InputError, suggestion
+from surfacechem.errors import InputError, refuse_unknown, suggestion
 from surfacechem.laws.loading import Hold
 from surfacechem.mechanism.evaluated import Neighbour, SurfaceEngine
 from surfacechem.model.components.interface import LOADABLE
@@ -37,8 +37,7 @@ species:
 def suffix_of(scene: Scene, name: str) -> str:
     """Suffix of a body, or of 'interface', in the names of variables; InputError where there is none of that name."""
     names = {body.name: str(k) for k, body in enumerate(scene.bodies, start=1)} | {"interface": "c"}
-    if name not in names:
-        raise InputError(f"the scene has no body '{name}'.{suggestion(name, names)}")
+    refuse_unknown([name], names, "the scene has no body '{}'")
     return names[name]
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from surfacechem.errors import InputError, suggestion
+from surfacechem.errors import InputError, refuse_unknown
 from surfacechem.expressions import depends
 from surfacechem.format import Case
 from surfacechem.mechanism.evaluated import HeldPhase
@@ -211,8 +211,7 @@ class EmbeddedScene:
         if name in found:
             return float(found[name])
         names = self.output_names
-        if name not in names:
-            raise InputError(f"the scene has no quantity '{name}'.{suggestion(name, [*found, *names])}")
+        refuse_unknown([name], [*names, *found], "the scene has no quantity '{}'")
         return float(self.model.output_function(evaluation.inputs)[names.index(name)])
 
     @cached_property

@@ -9,7 +9,7 @@ import symengine
 
 from surfacechem.contracts.terms import Spec
 from surfacechem.contracts.units import quotient
-from surfacechem.errors import InputError, suggestion
+from surfacechem.errors import InputError, refuse_unknown, suggestion
 from surfacechem.expressions import Expression, where
 from surfacechem.model.automaton import Constraint, Edge, Mode, Register
 from surfacechem.model.build import Build
@@ -34,10 +34,9 @@ def variables(build: Build) -> Iterator[Constraint]:
             raise InputError(f"two stages are called '{item.name}'. Give each a name of its own.", item.place)
     waits = {float(i): _awaited(stage) for i, stage in enumerate(stages) if _awaited(stage)}
     yield Constraint((Mode("stage", 0.0, words, waits=waits),))
-    for name in dict.fromkeys(name for item in stages for name in item.rates):
-        if name not in LOADABLE:
-            message = f"a programme cannot move '{name}'.{suggestion(name, LOADABLE)}"
-            raise InputError(message, stages[0].place)
+    moved = dict.fromkeys(name for item in stages for name in item.rates)
+    refuse_unknown(moved, LOADABLE, "a programme cannot move '{}'", stages[0].place)
+    for name in moved:
         build.variables.define(name, partial(_driven, build, name), "driven", "programme")
 
 
