@@ -355,24 +355,18 @@ class Nested(Content):
     """A section inside another, or the parameters of a law of a known class."""
 
     cls: type[Section] | type[Law]
+    per_area: bool = False
+    """Whether what is per area in it is so in every scene."""
     words: str = "mapping"
 
     def read(self, tree: Tree, name: str, context: Context) -> Any:
         """The section or the law."""
+        context = replace(context, whole=False) if self.per_area else context
         return read(self.cls, tree, context) if issubclass(self.cls, Section) else read_law(self.cls, tree, context)
 
     def schema(self) -> Schema:
         """Its keys."""
         return schema_of(self.cls)
-
-
-@dataclass(frozen=True)
-class PerArea(Nested):
-    """A section in which what is per area is so in every scene."""
-
-    def read(self, tree: Tree, name: str, context: Context) -> Any:
-        """The section."""
-        return super().read(tree, name, replace(context, whole=False))
 
 
 @dataclass(frozen=True)

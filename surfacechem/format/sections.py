@@ -44,7 +44,6 @@ from surfacechem.format.declarations import (
     Number,
     OneLaw,
     OneOf,
-    PerArea,
     Prescribed,
     Section,
     Shapes,
@@ -640,7 +639,7 @@ class Document(Section):
         MappingProxyType({}),
     )
     interface: InterfaceSection = key(Nested(InterfaceSection), default=InterfaceSection())
-    surface: SurfaceSection | None = key(PerArea(SurfaceSection))
+    surface: SurfaceSection | None = key(Nested(SurfaceSection, per_area=True))
     heat: Sequence[HeatTransfer] = key(ListOf(OneLaw(HeatTransfer)), "heat paths", ())
     surroundings: SurroundingsSection | None = key(Nested(SurroundingsSection))
     mechanics: MechanicsSection = key(Nested(MechanicsSection), default=MechanicsSection())

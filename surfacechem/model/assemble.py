@@ -61,7 +61,7 @@ ORDER = (
     "medium",
     "heat",
     "fold",
-    "load_steps",
+    "mounting",
     "envelope",
 )
 """Components that build on those before them, or are printed behind them; all others follow by name."""

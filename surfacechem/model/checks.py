@@ -82,18 +82,17 @@ def refuse_idle_initial_values(build: Build) -> None:
             continue
         if name in build.scene.loading:
             message = f"{name} is prescribed under `loading`, so it has no initial value; remove one of them."
-            raise InputError(message, path=f"initial.{name}")
-        if build.variables.has(name):
+        elif build.variables.has(name):
             symbol = build.variables.get(name, "the initial value")
             same = next((state.name for state in build.states if state.symbol == symbol), None)
             message = f"{name} has two roles: an initial value, and prescribed or constant elsewhere."
             message = f"{name} is {same} in this case; give `{same}` instead." if same else message
-            raise InputError(message, path=f"initial.{name}")
-        if name in ("phi", "ln_phi"):
+        elif name in ("phi", "ln_phi"):
             message = f"nothing evolves {name}. Give a law under `bonding`, or remove it."
-            raise InputError(message, path=f"initial.{name}")
-        known = {*states, *(slab.profile for slab in build.thermal.slabs.values())}
-        raise InputError(f"nothing that evolves is called '{name}'.{suggestion(name, known)}", path=f"initial.{name}")
+        else:
+            known = {*states, *(slab.profile for slab in build.thermal.slabs.values())}
+            message = f"nothing that evolves is called '{name}'.{suggestion(name, known)}"
+        raise InputError(message, path=f"initial.{name}")
 
 
 def check_start(system: System, values: Mapping[str, float], initial: Mapping[str, float]) -> None:

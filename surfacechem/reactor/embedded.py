@@ -110,9 +110,10 @@ class EmbeddedScene:
         self.evaluation = Evaluation(self.problem.program, self.problem.y0, self.problem.parameters[0])
         self.moments: Moments | None = None
         self.begin_piece(0.0, DIFFERENCE)
-        self.moments = Moments.of(self.model, self.problem, self.evaluation)
+        self.moments = Moments(self.model, self.problem, self.evaluation) if self.model.jumper else None
         self._terminal = np.array([margin.terminal for margin in self.model.margins], dtype=bool)
-        self._position = {parameter.path: j for j, parameter in enumerate(system.parameters)}
+        self.places = {parameter.path: j for j, parameter in enumerate(system.parameters)}
+        """Places of the parameters, by path."""
         self.states = tuple(system.states[j].name for j in self.evaluation.free)
         self.beside = [self._beside(scene.interface.engine, *item) for item in (neighbours or {}).items()]
         """The reactors beside the surface."""
@@ -123,7 +124,7 @@ class EmbeddedScene:
         return Beside(
             reactor=reactor,
             held=held,
-            places=np.array([self._position[f"loading.{quantity.name}.level"] for quantity, _ in held.taken_over]),
+            places=np.array([self.places[f"loading.{quantity.name}.level"] for quantity, _ in held.taken_over]),
             species=np.array([held.phase.species_index(species) for species in made]),
             accounts=np.array([len(self.states) + self.accounts.index(account) for account in made.values()]),
         )
@@ -158,13 +159,9 @@ class EmbeddedScene:
             raise InputError(message)
         return len(self.states) + self.accounts.index(wanted)
 
-    def place(self, path: str) -> int:
-        """Place of a parameter."""
-        return self._position[path]
-
     def give(self, path: str, value: float) -> None:
         """Set a parameter of the present piece of time."""
-        self.evaluation.parameters[self._position[path]] = value
+        self.evaluation.parameters[self.places[path]] = value
 
     def edges_that_read(self, name: str) -> list[str]:
         """Names of the edges whose guards depend on a load."""

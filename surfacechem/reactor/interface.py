@@ -337,7 +337,7 @@ class InterfaceReactor(HeldReactor):
         names += [port.heat_name for port in self.ports.values()]
         paths = [f"loading.{name}.level" for name in names]
         paths += [f"multiplier.{label}" for label in self.scene.reactions]
-        yield from map(self.scene.place, paths)
+        yield from (self.scene.places[path] for path in paths)
         for item in self.scene.beside:
             yield from item.places
 

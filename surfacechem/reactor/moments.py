@@ -29,11 +29,6 @@ class Moments:
         self.loads: Array | None = None
         """Parameters of the piece of time that has just ended."""
 
-    @classmethod
-    def of(cls, model: Model, problem: Problem, evaluation: Evaluation) -> Moments | None:
-        """Those of a model, None where it has none; ``evaluation`` holds the present state and parameters."""
-        return None if model.jumper is None else cls(model, problem, evaluation)
-
     @property
     def jumps(self) -> list[Jump]:
         """What has happened so far."""

@@ -31,7 +31,6 @@ class PullOffFold:
     w: float
     t: float
     g_after: float
-    t_after: float
     release: float
     """Energy [J/m^2] that the jump turns into heat."""
 
@@ -93,7 +92,7 @@ class SpringAndZone(Reference):
         w = g + t / self.k
         after = float(self.gap(np.array([w]), self.g_0 * (1.0 + low), self.g_0 * (1.0 + high))[0])
         release = self.energy(g, w) - self.energy(after, w)
-        return PullOffFold(g, w, t, after, float(self.traction(np.array(after))), release)
+        return PullOffFold(g, w, t, after, release)
 
 
 class CohesivePullOff(SpringAndZone):

@@ -1,7 +1,11 @@
-"""The state of the interface: prescribed variables, bonding states with their bounds, and the free energy."""
+"""The state of the interface: prescribed variables, bonding states with their bounds, and the free energy.
+
+Where a case gives ``ln_phi`` its initial value the bonding state is solved for as that: survival far below 1e-16.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from functools import partial
@@ -15,14 +19,15 @@ from surfacechem.expressions import Expression, depends, derivative, positive, w
 from surfacechem.model.automaton import Constraint, Edge, Mode
 from surfacechem.model.balances import INTERFACE
 from surfacechem.model.build import Build
-from surfacechem.model.components.logarithms import initial_bonding
 from surfacechem.model.components.mounting import held, law_reads
 from surfacechem.model.parts import Bond, Energy, Thermal
 from surfacechem.model.sliding.formulation import arrangement, displacement, in_parallel, in_series
-from surfacechem.model.system import Margin, State
+from surfacechem.model.system import Margin, Named, State
 from surfacechem.quantities import VARIABLES, Quantity
 from surfacechem.scene import Sites
 from surfacechem.tolerances import NOTHING, SLACK
+
+LOGARITHM = "ln_phi"
 
 LOADABLE = (
     *("phi", "g_n", "g_t", "v", "v_2", "p", "t_n", "f", "J_c", "Q_1", "Q_2", "Q_c"),
@@ -116,7 +121,7 @@ def _per_current_area(build: Build, amount: Expression) -> Expression:
 
 def _bonding_state(build: Build, quantity: Quantity, density: Expression, limit: float) -> Bond:
     name = quantity.name
-    initial = initial_bonding(build, name)
+    initial = _initial_bonding(build, name)
     if not 0 <= initial <= limit:
         raise InputError(f"initial {name} = {initial:g} is outside its range: 0 to {limit:g}.", path=f"initial.{name}")
     state = State(quantity, initial, 1.0)
@@ -126,6 +131,21 @@ def _bonding_state(build: Build, quantity: Quantity, density: Expression, limit:
     build.add(state)
     _bounds(build, name, state.symbol, limit)
     return Bond(state.symbol, state.dot, density, first)
+
+
+def _initial_bonding(build: Build, name: str) -> float:
+    """Initial value of a bonding variable, from its logarithm where that is given."""
+    initial = build.scene.initial
+    if name != "phi" or LOGARITHM not in initial:
+        return build.initial(name)
+    if "phi" in initial:
+        raise InputError(
+            f"phi has two roles: given by itself and by {LOGARITHM}. Remove one of them.", path="initial.phi"
+        )
+    if initial[LOGARITHM] < math.log(math.ulp(0.0)):
+        message = f"{LOGARITHM} = {initial[LOGARITHM]:g} is no bonding state that a number can hold."
+        raise InputError(message, path=f"initial.{LOGARITHM}")
+    return math.exp(initial[LOGARITHM])
 
 
 def _bounds(build: Build, name: str, symbol: Any, limit: float) -> None:
@@ -289,3 +309,18 @@ def _tractions(build: Build, psi: Expression) -> None:
     if depends(psi, GAP):
         pressure = partial(build.name, VARIABLES["p"], -symengine.Symbol("t_n"))
         build.variables.define("p", pressure, "derived", "the potential gives the normal traction")
+
+
+def outputs(build: Build) -> None:
+    """Replace the state phi by ln phi: d ln phi / dt is the balance of the bonds per bond."""
+    if "phi" not in build.bonding or LOGARITHM not in build.scene.initial:
+        return
+    bond = build.bonding["phi"]
+    if any(bond.symbol in edge.reset for edge in build.edges):
+        message = f"bonds that break at once have no {LOGARITHM}. Give `phi` instead."
+        raise InputError(message, path=f"initial.{LOGARITHM}")
+    state = State(VARIABLES[LOGARITHM], build.scene.initial[LOGARITHM], 1.0)
+    phi, rate = Named(VARIABLES["phi"], symengine.exp(state.symbol)), bond.symbol * state.dot
+    build.named[:0] = [phi, Named(Quantity(str(bond.dot), "1/s", "rate of change of the bonding state"), rate, False)]
+    build.rows.logarithm("phi", state.symbol, LOGARITHM, build.expanded(build.rows["phi"]))
+    build.states[:] = [state if item.symbol == bond.symbol else item for item in build.states]

@@ -1,4 +1,9 @@
-"""How the far field holds a direction of the gap: springs, masses, dampers and their energies."""
+"""How the far field holds a direction of the gap: springs, masses, dampers and their energies; loads that jump.
+
+A gap without inertia or damper moves at once to where the tractions balance again as a load jumps. A far-field
+displacement that jumps does its work on the spring before the gap moves, a far-field traction does it on the way. What
+is not stored of it is heat.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +16,7 @@ import symengine
 from surfacechem.contracts.terms import Law, reads
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, absolute, derivative, sqrt
-from surfacechem.model.automaton import Equilibrium
+from surfacechem.model.automaton import ONE, Constraint, Edge, Equilibrium
 from surfacechem.model.balances import DISSIPATION, INTERFACE, MECHANICS, OUTSIDE, WORK, Power, elastic_energy
 from surfacechem.model.build import Build
 from surfacechem.model.system import Pace
@@ -291,3 +296,18 @@ def _bound(build: Build, mount: Held) -> Mounting | FarField:
         return first
     law = build.variables.bind(mount.law, f"mechanics.{KEYS[mount.axis]}", f"_{mount.axis}")
     return replace(first, k=law.k, c_b=law.c_b, c_g=law.c_g, beta_1=law.beta_1)
+
+
+def jumps(build: Build) -> Iterator[Constraint]:
+    """The edge at the times at which loads jump, where a gap in equilibrium or a spring feels them."""
+    springs = [far.stored(far.gap) for far in build.motion.far_fields.values() if far.works]
+    felt = set().union(*(build.expanded(x).free_symbols for x in [*(e.residual for e in build.equilibria), *springs]))
+    paths = {item.path for item in build.parameters.items if item.symbol in felt}
+    steps = {
+        name: load
+        for name, load in build.loads.items()
+        if load.jumps() and any(path.startswith(f"loading.{name}.") for path in paths)
+    }
+    if steps:
+        times = tuple(sorted({t for load in steps.values() for t in load.jumps()}))
+        yield Constraint(edges=(Edge("load", ONE, f"{' or '.join(steps)} jumps", equilibrates=True, times=times),))

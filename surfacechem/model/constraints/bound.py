@@ -21,7 +21,7 @@ from surfacechem.contracts.terms import reads
 from surfacechem.expressions import Expression, where
 from surfacechem.model.automaton import Constraint, Edge, Mode
 from surfacechem.model.build import Build
-from surfacechem.model.components.logarithms import LOGARITHM
+from surfacechem.model.components.interface import LOGARITHM
 from surfacechem.quantities import Quantity
 from surfacechem.tolerances import INSIDE
 
