@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping
 from functools import reduce
 from typing import Any, TypeAlias
 
-from surfacechem.tolerances import FRACTION_FLOOR
+from surfacechem.tolerances import FRACTION_FLOOR, NOISE
 
 Expression: TypeAlias = Any
 """A float or a SymEngine expression."""
@@ -128,6 +128,8 @@ def magnitude(expression: Expression, sizes: Mapping[Any, Expression] | None = N
     >>> x, y = symengine.symbols("x y")
     >>> magnitude(x * (y - 3)).subs({x: -2.0, y: 4.0})
     16.0
+    >>> magnitude(positive(y - 1)).subs({y: 1.0})
+    2.0
     """
     import symengine
 
@@ -142,7 +144,13 @@ def magnitude(expression: Expression, sizes: Mapping[Any, Expression] | None = N
         if not e.args:
             return symengine.Abs(e)
         if isinstance(e, symengine.Piecewise):
-            return symengine.Piecewise(*zip(map(bound, e.args[::2]), e.args[1::2], strict=True))
+            sides, conditions = [bound(side) for side in e.args[::2]], list(e.args[1::2])
+            first = conditions[0]
+            if len(sides) == 2 and isinstance(first, symengine.StrictLessThan | symengine.LessThan):
+                apart = first.args[0] - first.args[1]  # within its rounding that decides on the side
+                sides.insert(0, sides[0] + sides[1])
+                conditions.insert(0, symengine.Le(symengine.Abs(apart), NOISE * bound(apart)))
+            return symengine.Piecewise(*zip(sides, conditions, strict=True))
         if e.is_Add:
             return symengine.Add(*map(bound, e.args))
         if e.is_Mul:  # each factor errs while the others stand
