@@ -87,6 +87,14 @@ def test_a_damper_of_the_bodies_does_not_delay_the_slip(rtol):
         assert jump.t == pytest.approx(onset, rel=1e-13)
 
 
+def test_friction_that_rises_steeply_lets_slip_begin_in_its_own_direction():
+    """Without a direction the speed has a slope without bound at rest, and drives on rounding of either sign."""
+    loading = {"p": Hold(level=0.05), "w_t": Ramp(rate=-1.5e-10)}
+    friction = Stribeck(mu_s=0.14, mu_k=0.74, v_s=5.7e-8, delta=0.4)
+    trajectory = solve(together((), [friction], loading, tangential=Mounting(k=7.8e7, m=7.9e7)), 6.4, rtol=1e-6)
+    assert trajectory.events == ["slip backward"]
+
+
 def test_what_lies_in_the_air_moves_with_the_least_push():
     """A traction that begins while nothing presses begins to move it at once, and to and fro."""
     push = Table(times=[0.0, 1e-3, 1e-3, 2e-2], values=[0.0, 0.0, 50.0, 50.0])

@@ -14,7 +14,7 @@ import symengine
 
 from surfacechem.contracts.terms import Friction, Potential, TangentialPotential, reads
 from surfacechem.errors import InputError, Place
-from surfacechem.expressions import Expression, depends, derivative, sqrt, where
+from surfacechem.expressions import Expression, absolute, depends, derivative, sqrt, where
 from surfacechem.model.automaton import NONE, ONE
 from surfacechem.model.build import Build
 from surfacechem.model.components.mounting import (
@@ -28,6 +28,7 @@ from surfacechem.model.components.mounting import (
     held_across,
     law_reads,
 )
+from surfacechem.model.constraints.set_valued import SLIP
 from surfacechem.model.system import Caution, Given, State
 from surfacechem.quantities import VARIABLES, Quantity
 from surfacechem.tolerances import CREEP
@@ -208,7 +209,12 @@ def resistance(
     both = directions(build)
     if len(both) == 1:
         formula = bound.driven if law is build.motion.creeping else bound.statement
-        return {ALONG: build.variables.call(bound, formula, own)}
+        traction = build.variables.call(bound, formula, own)
+        if any(slip.sticks for slip in build.motion.slips):
+            # A speed without a direction would drive on what rounding moves the wrong way as sliding begins.
+            v = symengine.Symbol(ALONG.velocity)
+            traction = symengine.sympify(traction).subs({absolute(v): SLIP * v})
+        return {ALONG: traction}
     _refuse_one_component(law)
     if law.transverse is not None:
         formulas = {ALONG: bound.traction, ACROSS: bound.transverse}
