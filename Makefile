@@ -7,7 +7,9 @@ BIN := $(abspath $(VENV))/bin
 export PYTHONDONTWRITEBYTECODE :=
 PACKAGE := $(VENV)/.installed
 RUNTIME := $(VENV)/.compiled
+IMPORTED := $(VENV)/.imported
 TOOLS := $(VENV)/.installed-tools
+DOCTOOLS := $(VENV)/.installed-doctools
 # Tests that share what they assemble, compile and run stay with one worker (tests/conftest.py).
 PYTEST := $(BIN)/pytest -n 2 --dist loadfile
 
@@ -36,7 +38,7 @@ core: $(RUNTIME) $(TOOLS)  ## of these the tests of assembly, laws, mechanisms, 
 slow: $(RUNTIME) $(TOOLS)  ## the slow tests
 	$(PYTEST) -m slow
 
-docs: $(RUNTIME) $(TOOLS)  ## the documentation, notebooks executed, warnings are errors
+docs: $(RUNTIME) $(DOCTOOLS)  ## the documentation, notebooks executed, warnings are errors
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 
 # A case that physics stops, by design, ends with status 3.
@@ -57,7 +59,7 @@ coverage: $(TOOLS)  ## the lines that the tests reach; fails under 95 %
 	$(BIN)/coverage report
 
 mutation: $(TOOLS)  ## each sign of balances, assembly and laws is changed, and a test has to fail
-	$(BIN)/pip install --quiet --editable '.[mutation]'
+	$(BIN)/pip install --quiet --group mutation
 	$(BIN)/python tests/mutation.py
 
 bench: $(TOOLS)  ## time against error of every solver beside what was kept in benchmarks/results, and where time goes
@@ -72,10 +74,10 @@ clean:  ## all that make has made
 $(VENV)/bin/python:
 	$(or $(PYTHON),$(error No Python >= 3.11 found. Name one: make PYTHON=/path/to/python3.11)) -m venv $(VENV)
 
-# Every module is imported with nothing but what the package declares to need.
+# An old pip takes three times as long to find which versions go together.
 $(PACKAGE): pyproject.toml | $(VENV)/bin/python
+	$(BIN)/pip install --quiet --no-compile --upgrade pip
 	$(BIN)/pip install --quiet --no-compile --editable .
-	$(BIN)/python -c "from pkgutil import walk_packages as w; [__import__(m.name) for m in w(['surfacechem'], 'surfacechem.') if '__main__' not in m.name]"
 	touch $@
 
 $(RUNTIME): $(PACKAGE)
@@ -83,6 +85,16 @@ $(RUNTIME): $(PACKAGE)
 	$(BIN)/surfacechem run exothermic -q -o $(VENV)/exothermic.nc
 	touch $@
 
-$(TOOLS): $(PACKAGE)
-	$(BIN)/pip install --quiet --no-compile --editable '.[test,docs]'
+# Every module is imported with nothing but what the package declares to need.
+$(IMPORTED): $(PACKAGE)
+	$(BIN)/python -c "from pkgutil import walk_packages as w; [__import__(m.name) for m in w(['surfacechem'], 'surfacechem.') if '__main__' not in m.name]"
+	touch $@
+
+$(TOOLS): $(IMPORTED)
+	$(BIN)/pip install --quiet --no-compile --group test
+	touch $@
+
+# After the other tools, since tests begin as soon as those are there.
+$(DOCTOOLS): $(TOOLS)
+	$(BIN)/pip install --quiet --no-compile --group docs
 	touch $@
