@@ -23,7 +23,7 @@ from sympy.printing.latex import LatexPrinter  # type: ignore[import-untyped]
 from sympy.printing.printer import Printer  # type: ignore[import-untyped]
 from sympy.printing.pycode import PythonCodePrinter  # type: ignore[import-untyped]
 
-from surfacechem.compile.program import jacobian
+from surfacechem.compile.program import jacobian, needed
 from surfacechem.expressions import Expression
 from surfacechem.model.system import Named, Parameter, System
 from surfacechem.quantities import VARIABLES, Quantity
@@ -227,7 +227,7 @@ def _function(system: System, printer: _Python, name: str, text: str, rows: Sequ
     ):
         if names:
             lines += _unpacked([printer.name(n) for n in names], source)
-    for item in needed(system.named, [row.expression for row in rows]):
+    for item in quantities_read(system.named, [row.expression for row in rows]):
         lines += _assignment(printer, item.name, item.expression, _described(item.quantity))
     for row in rows:
         if str(row.expression) != row.name:
@@ -235,19 +235,10 @@ def _function(system: System, printer: _Python, name: str, text: str, rows: Sequ
     return "\n".join([*lines, *_broken("    return [", returned, "]"), ""])
 
 
-def needed(named: Sequence[Named], expressions: Iterable[Expression]) -> list[Named]:
+def quantities_read(named: Sequence[Named], expressions: Iterable[Expression]) -> list[Named]:
     """Those named quantities that the expressions read, directly or through others, in their order."""
-    wanted = _symbols(expressions)
-    kept: list[Named] = []
-    for item in reversed(named):
-        if item.name in wanted:
-            kept.append(item)
-            wanted |= _symbols([item.expression])
-    return kept[::-1]
-
-
-def _symbols(expressions: Iterable[Expression]) -> set[str]:
-    return {str(symbol) for e in expressions for symbol in symengine.sympify(e).free_symbols}
+    items = {symengine.Symbol(item.name): item for item in named}
+    return [items[symbol] for symbol, _ in needed([(x, item.expression) for x, item in items.items()], [*expressions])]
 
 
 def _described(quantity: Quantity) -> str:
@@ -365,7 +356,7 @@ def latex(system: System, title: str = "") -> str:
     for start, numbers in pieces(system)[1:]:
         then = ", ".join(f"{name} = {number!r}" for name, number in zip(names, numbers, strict=True))
         values.append(f"%   from {start!r} s on: {then}")
-    wanted = needed(system.named, system.rows.values())
+    wanted = quantities_read(system.named, system.rows.values())
     others = [item for item in system.outputs if item not in wanted]
     lines = [_latex_row(printer, symbol(i.name), i.expression, i.quantity.long_name, i.quantity.unit) for i in wanted]
     lines += [_latex_row(printer, "0", row, f"balance of {name}", "") for name, row in system.rows.items()]

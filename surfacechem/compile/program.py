@@ -304,7 +304,7 @@ def _entries(
 ) -> list[Any]:
     """Derivatives of the residual by states, then by rates: of the core, then of its border, then along the chains."""
     core = chains[0].first if chains else len(states)
-    slopes, names = jacobian(residual, [*states, *rates], _read(named, residual))
+    slopes, names = jacobian(residual, [*states, *rates], needed(named, residual))
     linked = list(_linked(core, chains))
     border = core * len(chains)
     parts = ([(i, j) for i in range(core) for j in range(core)], linked[:border], linked[border:])
@@ -388,8 +388,13 @@ def solved_rates(residual: Sequence[Any], rates: Sequence[Any]) -> list[Any] | N
     return expanded(named, rates)
 
 
-def _read(named: Named, expressions: Sequence[Any]) -> Named:
-    """Of what is named that which the expressions contain, or what they contain in turn."""
+def needed(named: Named, expressions: Sequence[Any]) -> Named:
+    """Of what is named that which the expressions contain, or what they contain in turn.
+
+    >>> a, b, c, x = symengine.symbols("a b c x")
+    >>> needed([(a, 2 * x), (b, a**2), (c, b)], [b])
+    [(a, 2*x), (b, a**2)]
+    """
     read = {symbol for expression in expressions for symbol in symengine.sympify(expression).free_symbols}
     found = []
     for symbol, expression in reversed(named):

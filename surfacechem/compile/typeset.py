@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 import symengine
 import sympy  # type: ignore[import-untyped]
 
-from surfacechem.compile.printing import RELATIONS, SPECIAL, Latex, needed, symbol, sympy_form
+from surfacechem.compile.printing import RELATIONS, SPECIAL, Latex, quantities_read, symbol, sympy_form
 from surfacechem.expressions import EXPONENT_CAP, LARGE_EXPONENT, LITERAL, Expression, derivative
 from surfacechem.model.system import Named, Parameter, System
 from surfacechem.quantities import AVOGADRO, BOLTZMANN, GAPS, GAS_CONSTANT, STEFAN_BOLTZMANN
@@ -120,7 +120,7 @@ def lines(system: System) -> list[Statement]:
         if item.expression not in levels
     ]
     rows = [line for name, row in system.rows.items() for line in _balance(system, name, row.xreplace(given))]
-    read = needed(named, [line.right for line in rows])
+    read = quantities_read(named, [line.right for line in rows])
     return [*rows, *(line for item in reversed(read) for line in _definition(system, item))]
 
 

@@ -7,11 +7,11 @@ ValueError: no solver 'radua'. Did you mean 'radau'? Known: bdf, cantera, cvode,
 """
 
 import ast
-import difflib
 import re
 from importlib import import_module
 from pathlib import Path
 
+from surfacechem.errors import suggestion
 from surfacechem.solve.contract import Solver
 
 AUTO = "auto"
@@ -36,9 +36,7 @@ names = (*_OWN, *sorted(_ADAPTERS, key=lambda name: name in ASKING))
 def solver(name: str) -> Solver:
     """The solver of this name; 'radau' is our own and the default."""
     if name not in names:
-        near = difflib.get_close_matches(name, names, n=1)
-        guess = f" Did you mean '{near[0]}'?" if near else ""
-        raise ValueError(f"no solver '{name}'.{guess} Known: {', '.join(sorted(names))}.")
+        raise ValueError(f"no solver '{name}'.{suggestion(name, names)}")
     if name in _OWN:
         made = getattr(import_module("surfacechem.solve.radau.solver"), _OWN[name])()
     else:

@@ -17,8 +17,8 @@ from surfacechem.model.system import System
 from surfacechem.quantities import VELOCITIES
 from surfacechem.solve.contract import Problem, Result, Status
 from surfacechem.solve.equilibria import BALANCED, DRIFT, Point
+from surfacechem.solve.jump_heat import LoadStep
 from surfacechem.solve.jumps import Jump, Jumper, Slack, booked
-from surfacechem.solve.load_path import LoadStep
 from surfacechem.solve.radau.solver import consistent
 from surfacechem.tolerances import BRIEF, CROSSED, MICROMETRE, NEGLIGIBLE, PICOMETRE, SOLVED, SOON
 

@@ -19,10 +19,8 @@ from surfacechem.expressions import derivative, magnitude
 from surfacechem.model.automaton import INTERFACE, RESTS, Edge
 from surfacechem.model.balances import elastic_energy
 from surfacechem.model.system import Account, System
-from surfacechem.solve.equilibria import BALANCED, Equilibria, Lost, Point, compiled
-from surfacechem.solve.folds import Folds
-from surfacechem.solve.jump_heat import JumpHeat
-from surfacechem.solve.load_path import LoadPath, LoadStep
+from surfacechem.solve.equilibria import BALANCED, Equilibria, Folds, Lost, Point, compiled
+from surfacechem.solve.jump_heat import JumpHeat, LoadPath, LoadStep
 from surfacechem.tolerances import ATOM, DIGITS, ROUNDING
 
 Array = NDArray[np.float64]

@@ -10,13 +10,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 import symengine
 from numpy.typing import NDArray
 
-from surfacechem.compile.program import Function, compile_function
+from surfacechem.compile.program import Function, compile_function, needed
 from surfacechem.expressions import Expression, derivative
 from surfacechem.model.system import TOLERANCE, System
 from surfacechem.tolerances import CROSSED, EPS, NEGLIGIBLE
@@ -175,8 +174,7 @@ def _narrow(system: System) -> tuple[list[Expression], list[Expression]]:
         curved += [x for x in member.atoms(symengine.Pow) if not (x.args[1].is_Integer and x.args[1] > 0)]
         bent |= {symbol for item in curved for symbol in item.free_symbols}
         compared |= _compared(member)
-    bent = _made_of(system, bent)
-    bends = [item.expression for item in system.named if symengine.Symbol(item.name) in bent]
+    bends = [expression for _, expression in needed(_definitions(system), [*bent])]
     turns = [derivative(system.expand(x), t) for x in bends if t in symengine.sympify(x).free_symbols]
     peaks = [margin.expression for margin in system.margins if margin.peak]
     places = [system.expand(item) for item in (*sorted(compared, key=str), *peaks)]
@@ -192,8 +190,7 @@ def _of_time(system: System, expressions: Sequence[Expression]) -> list[Expressi
 def _members(system: System) -> list[Expression]:
     """What is integrated, and the named quantities that it is made of."""
     integrated = [symengine.sympify(row) for row in (*system.rows.values(), *(item.rate for item in system.ledger))]
-    read = _made_of(system, {symbol for item in integrated for symbol in item.free_symbols})
-    named = [symengine.sympify(item.expression) for item in system.named if symengine.Symbol(item.name) in read]
+    named = [symengine.sympify(expression) for _, expression in needed(_definitions(system), integrated)]
     return integrated + named
 
 
@@ -204,10 +201,6 @@ def _compared(expression: Expression) -> set[Expression]:
     return {item.args[0] - item.args[1] for item in single if isinstance(item, COMPARISONS)}
 
 
-def _made_of(system: System, symbols: set[Any]) -> set[Any]:
-    """The symbols, with all that the named quantities among them are made of; each is made of earlier ones."""
-    found = set(symbols)
-    for item in reversed(system.named):
-        if symengine.Symbol(item.name) in found:
-            found |= symengine.sympify(item.expression).free_symbols
-    return found
+def _definitions(system: System) -> list[tuple[Expression, Expression]]:
+    """Named quantities with what they are made of."""
+    return [(symengine.Symbol(item.name), item.expression) for item in system.named]

@@ -10,7 +10,7 @@ from surfacechem.format import load_text
 from surfacechem.reactor import InterfaceReactor, ReactorNet
 from surfacechem.runs.check import warnings
 from surfacechem.runs.simulation import Simulation
-from surfacechem.solve.load_path import shared
+from surfacechem.solve.jump_heat import shared
 
 CASE = """
 T_0: 300 K

@@ -12,7 +12,6 @@ from surfacechem.cli.main import app
 from surfacechem.runs.simulation import Simulation
 from surfacechem.runs.summaries import run_summary
 from surfacechem.solve import names
-from surfacechem.studies.condition import condition
 from surfacechem.studies.regimes import Exact, Refused, Stops, Trial, regimes
 from surfacechem.studies.stability import (
     FAILED,
@@ -21,6 +20,7 @@ from surfacechem.studies.stability import (
     SENSITIVE,
     SOLVED,
     WRONG,
+    condition,
     digits_left,
     few,
     prepared,
