@@ -17,11 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem.model.system import System
-from surfacechem.solve.contract import Points
+from surfacechem.solve.contract import Array, Points
 from surfacechem.solve.run import Trajectory
 from surfacechem.tolerances import EPS, SQRT_EPS
-
-Array = NDArray[np.float64]
 
 OPEN, FINEST = 1000.0, SQRT_EPS / 16
 """Relative residual, in tolerances of the run, above which a balance counts as open: errors of smooth runs stay below a

@@ -11,19 +11,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from surfacechem.errors import InputError, suggestion
 from surfacechem.model.system import Profile, System
 from surfacechem.quantities import Quantity
 from surfacechem.results.netcdf import CONVENTIONS, TABLES, Column, dataset_path, package_version, save, save_table
+from surfacechem.solve.contract import Array
 from surfacechem.solve.run import Run, Trajectory
 
 if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 
 DATASET_NAMES = {
     "Q_1": "Q_ext_1",

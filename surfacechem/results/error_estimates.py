@@ -24,11 +24,9 @@ from surfacechem.results.dataset import profile_values
 from surfacechem.results.event_table import KINK, SIDE, event_times
 from surfacechem.scene import Scene
 from surfacechem.solve.choice import method
-from surfacechem.solve.contract import Problem
+from surfacechem.solve.contract import Array, Problem
 from surfacechem.solve.run import Run, Trajectory
 from surfacechem.tolerances import BRIEF, EPS, FLOOR, TIGHTEST
-
-Array = NDArray[np.float64]
 
 EARLIER = "ended earlier"
 """What is said of a second run that did not come as far."""

@@ -9,14 +9,12 @@ from operator import attrgetter
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from surfacechem.results.netcdf import Column
+from surfacechem.solve.contract import Array
 from surfacechem.solve.jumps import ADMISSIBLE, VIOLATES, Jump
 from surfacechem.solve.run import Trajectory
 from surfacechem.tolerances import NEGLIGIBLE, ROUNDING
-
-Array = NDArray[np.float64]
 
 SIDE = ROUNDING / 8
 """Relative distance from a jump at which a time is that of the jump, 1.1e-13: times are summed, too, over some 1e5

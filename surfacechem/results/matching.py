@@ -20,10 +20,10 @@ from surfacechem.references._bodies import ConstantCapacity, QuadraticEnergy
 from surfacechem.references.base import Reference, SceneView
 from surfacechem.results.event_table import SIDE
 from surfacechem.scene import Scene
+from surfacechem.solve.contract import Array
 from surfacechem.solve.run import Trajectory
 from surfacechem.tolerances import DIGITS, MISMATCH, QUARTER_EPS, ROUNDING, SAME, SQRT_EPS
 
-Array = NDArray[np.float64]
 Solution = Callable[[Array], dict[str, Array]]
 """Exact values under the names of the scene, at any times."""
 

@@ -12,20 +12,13 @@ import numpy as np
 
 from surfacechem.results.accuracy import Accuracy
 from surfacechem.results.audit import Audit, audit
-from surfacechem.results.dataset import (
-    DATASET_NAMES,
-    Array,
-    Results,
-    coverage_columns,
-    profile_columns,
-    quantity_columns,
-)
+from surfacechem.results.dataset import DATASET_NAMES, Results, coverage_columns, profile_columns, quantity_columns
 from surfacechem.results.event_table import event_columns, event_findings, event_violations, event_waits
 from surfacechem.results.findings import Verdict, findings, verdicts
 from surfacechem.results.netcdf import Column, versions
 from surfacechem.results.picture import followed
 from surfacechem.solve import solver
-from surfacechem.solve.contract import Status
+from surfacechem.solve.contract import Array, Status
 from surfacechem.solve.run import Run, Trajectory
 
 RECORDED = ("times", "picture", "atol", "max_steps")

@@ -26,10 +26,9 @@ from surfacechem.results.accuracy import MARGIN, UNKNOWN, Accuracy, CellErrors
 from surfacechem.results.error_estimates import EVENTS, apart
 from surfacechem.results.findings import WITHIN
 from surfacechem.scene import Body, Conduction, Scene
+from surfacechem.solve.contract import Array
 from surfacechem.solve.run import Run, Trajectory
 from surfacechem.tolerances import ROUNDING
-
-Array = NDArray[np.float64]
 
 FEW = 4
 

@@ -8,15 +8,14 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from surfacechem.results.netcdf import Column
+from surfacechem.solve.contract import Array
 from surfacechem.solve.run import Trajectory
 
 if TYPE_CHECKING:
     from surfacechem.surfaces.potential import CurvedSurfaces
 
-Array = NDArray[np.float64]
 
 TIMES = 9
 """Output times, evenly spread, at which the surfaces are looked at."""

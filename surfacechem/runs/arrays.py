@@ -24,14 +24,13 @@ from surfacechem.results.audit import ROUNDINGS, residuals, resolved
 from surfacechem.runs import spectrum
 from surfacechem.runs.keeping import REACHED, STATUSES, Columns, Keep, reason_table, variable
 from surfacechem.solve.choice import EXPLICIT, IMPLICIT
-from surfacechem.solve.contract import Problem, Status
+from surfacechem.solve.contract import Array, Problem, Status
 from surfacechem.solve.diagnose import are_led_back
 from surfacechem.solve.radau.solver import consistent, solve_arrays
 from surfacechem.solve.radau.stepper import END, EVENTS, FIRST_COUNTER, OUTPUTS, RECORDS
 from surfacechem.solve.run import Model, Run
 from surfacechem.tolerances import CROSSED, EPS, MICROMETRE, PICOMETRE
 
-Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Index = NDArray[np.int64]
 

@@ -18,12 +18,10 @@ from surfacechem.model.system import System
 from surfacechem.quantities import BOLTZMANN, GAS_CONSTANT
 from surfacechem.results.findings import cautioned
 from surfacechem.scene import Scene
-from surfacechem.solve.contract import Problem
+from surfacechem.solve.contract import Array, Problem
 from surfacechem.solve.diagnose import paces
 from surfacechem.solve.run import Model
 from surfacechem.tolerances import CONSERVED, DIGITS, ROUNDING, TINY
-
-Array = NDArray[np.float64]
 
 SMALL = 0.1
 """Biot number up to which a lump is taken for good: it errs by 3 % then."""

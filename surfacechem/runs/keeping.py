@@ -20,7 +20,6 @@ from surfacechem.results.event_table import entropy_destroyed, events_of
 from surfacechem.solve.contract import REASONS, Status
 from surfacechem.solve.run import Model, Trajectory
 
-Array = NDArray[np.float64]
 Columns = dict[str, NDArray[Any]]
 """What is kept by name, the run as first axis."""
 

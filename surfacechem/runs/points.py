@@ -32,10 +32,10 @@ from surfacechem.quantities import Quantity
 from surfacechem.results.dataset import DATASET_NAMES, Results
 from surfacechem.results.netcdf import CONVENTIONS, Column, package_version, versions
 from surfacechem.scene import Scene
+from surfacechem.solve.contract import Array
 from surfacechem.solve.run import values_of
 from surfacechem.tolerances import ROUNDING, TINY
 
-Array = NDArray[np.float64]
 Points = Mapping[str, ArrayLike]
 
 TRIALS = 50

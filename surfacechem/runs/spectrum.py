@@ -15,16 +15,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import symengine
-from numpy.typing import NDArray
 
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, derivative
 from surfacechem.model.system import Account, Margin, Named, System
 from surfacechem.quantities import Quantity
+from surfacechem.solve.contract import Array
 from surfacechem.solve.run import Trajectory
 from surfacechem.tolerances import FEWEST
-
-Array = NDArray[np.float64]
 
 INTACT = FEWEST**0.5
 """With more survivors at the end, 1e-6, the mean is not known: what is left then is less than half of the decades to

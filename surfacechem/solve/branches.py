@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem.compile.preparing import PREPARING
+from surfacechem.solve.contract import Array
 from surfacechem.tolerances import CBRT_EPS, DIGITS, NEGLIGIBLE, NOTHING, PICOMETRE, TINY
 
-Array = NDArray[np.float64]
 Curve = Callable[[Sequence[float] | Array], Array]
 
 CLOSEST: dict[str, Any] = {"xtol": TINY, "rtol": (1 + NEGLIGIBLE) * DIGITS, "maxiter": 300, "disp": False}

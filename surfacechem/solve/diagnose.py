@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from surfacechem.compile.program import Program
 from surfacechem.model.system import Margin, Pace, State, System
-from surfacechem.solve.contract import REASONS, Points, Result, Status
+from surfacechem.solve.contract import REASONS, Array, Points, Result, Status
 from surfacechem.solve.radau.solver import consistent
 from surfacechem.tolerances import GONE, NEGLIGIBLE, NONE_OF_SCALE, ROUNDING, SOLVED, SOON
 
@@ -34,8 +34,6 @@ def too_fast(system: System, result: Result, values: Mapping[str, float]) -> str
             return f": the {pace.text}, {time:.3g} s, is too short for a run of {end:.3g} s; {pace.remedy}"
     return ""
 
-
-Array = NDArray[np.float64]
 
 STALLED = NEGLIGIBLE
 """A margin that has shrunk to this part of its largest value, and has less than this part of the time that has passed

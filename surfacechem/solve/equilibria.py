@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from surfacechem.compile.program import Function, Program, compile_function
 from surfacechem.expressions import Expression, derivative
@@ -28,9 +27,9 @@ from surfacechem.solve.branches import (
     unstable_way,
     zero_ahead,
 )
+from surfacechem.solve.contract import Array
 from surfacechem.tolerances import ATOM, NANOMETRE, NEGLIGIBLE, ROUNDING, SOLVED, SOON
 
-Array = NDArray[np.float64]
 Heat = Callable[[Array], Array]
 """Inputs with the temperatures that a jump to them gives."""
 

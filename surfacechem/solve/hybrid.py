@@ -19,13 +19,12 @@ from numpy.typing import NDArray
 
 from surfacechem.model.system import START, System
 from surfacechem.quantities import GAPS
-from surfacechem.solve.contract import Counters, Events, Points, Problem, Result, Solver, States, Status
+from surfacechem.solve.contract import Array, Counters, Events, Points, Problem, Result, Solver, States, Status
 from surfacechem.solve.equilibria import Point
 from surfacechem.solve.instant import ENDLESS, MANY, MISSED, REACHED, Instant
 from surfacechem.solve.jumps import Jumper
 from surfacechem.tolerances import ATOM, BRIEF, ULPS
 
-Array = NDArray[np.float64]
 Found = TypeVar("Found")
 Flow = Generator[Problem, Result, Found]
 """What asks for the solution of one problem after another."""

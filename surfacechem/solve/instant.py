@@ -15,14 +15,13 @@ from numpy.typing import NDArray
 from surfacechem.model.automaton import RESTS
 from surfacechem.model.system import System
 from surfacechem.quantities import VELOCITIES
-from surfacechem.solve.contract import Problem, Result, Status
+from surfacechem.solve.contract import Array, Problem, Result, Status
 from surfacechem.solve.equilibria import BALANCED, DRIFT, Point
 from surfacechem.solve.jump_heat import LoadStep
 from surfacechem.solve.jumps import Jump, Jumper, Slack, booked
 from surfacechem.solve.radau.solver import consistent
 from surfacechem.tolerances import BRIEF, CROSSED, MICROMETRE, NEGLIGIBLE, PICOMETRE, SOLVED, SOON
 
-Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 REACHED = SOLVED

@@ -18,7 +18,6 @@ from functools import cache, cached_property
 import numpy as np
 import symengine
 from numpy.polynomial import chebyshev
-from numpy.typing import NDArray
 
 from surfacechem.compile.preparing import PREPARING
 from surfacechem.compile.program import Function
@@ -26,10 +25,10 @@ from surfacechem.expressions import derivative
 from surfacechem.model.automaton import INTERFACE, Sink
 from surfacechem.model.system import System
 from surfacechem.solve.branches import CLOSEST
+from surfacechem.solve.contract import Array
 from surfacechem.solve.equilibria import Equilibria, Heat, Point, Way, compiled
 from surfacechem.tolerances import ULPS
 
-Array = NDArray[np.float64]
 Moments = Callable[[Array, Array], tuple[Array, Array]]
 """From ways and what each taker has taken up to there, shape (ways, takers): the heat made up to each way, shape
 (ways,), and the shares at these moments, shape (ways, takers)."""

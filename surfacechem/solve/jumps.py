@@ -12,18 +12,16 @@ from functools import cached_property
 
 import numpy as np
 import symengine
-from numpy.typing import NDArray
 
 from surfacechem.compile.program import Function, Program, compile_function
 from surfacechem.expressions import derivative, magnitude
 from surfacechem.model.automaton import INTERFACE, RESTS, Edge
 from surfacechem.model.balances import elastic_energy
 from surfacechem.model.system import Account, System
+from surfacechem.solve.contract import Array
 from surfacechem.solve.equilibria import BALANCED, Equilibria, Folds, Lost, Point, compiled
 from surfacechem.solve.jump_heat import JumpHeat, LoadPath, LoadStep
 from surfacechem.tolerances import ATOM, DIGITS, ROUNDING
-
-Array = NDArray[np.float64]
 
 ADMISSIBLE, VIOLATES, IMPOSSIBLE = "admissible", "destroys entropy", "impossible"
 

@@ -21,7 +21,7 @@ from surfacechem.model.system import System
 from surfacechem.solve import ASKING, AUTO, solver
 from surfacechem.solve import segments as pieces
 from surfacechem.solve.choice import EXPLICIT, method
-from surfacechem.solve.contract import Margin, Problem, Result, Solver, States, Status
+from surfacechem.solve.contract import Array, Margin, Problem, Result, Solver, States, Status
 from surfacechem.solve.diagnose import ROUNDED, are_led_back, cause
 from surfacechem.solve.equilibria import Equilibria, Point
 from surfacechem.solve.hybrid import Flow, Hybrid, solve_together, without_stall
@@ -29,8 +29,6 @@ from surfacechem.solve.jumps import Jump, Jumper
 from surfacechem.solve.radau.solver import consistent, output_rates
 from surfacechem.solve.segments import Passing
 from surfacechem.tolerances import DEFAULT_RTOL, EPS, FINER, NONE_OF_SCALE, PICTURE
-
-Array = NDArray[np.float64]
 
 GROUPS = {"energy supply": 0, "dissipation": 0, "heat": 0, "entropy supply": 1, "entropy production": 1, "bonds": 2}
 """Accounts whose quadratures are measured together."""

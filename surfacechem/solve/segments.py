@@ -13,14 +13,12 @@ from functools import lru_cache
 
 import numpy as np
 import symengine
-from numpy.typing import NDArray
 
 from surfacechem.compile.program import Function, compile_function, needed
 from surfacechem.expressions import Expression, derivative
 from surfacechem.model.system import TOLERANCE, System
+from surfacechem.solve.contract import Array
 from surfacechem.tolerances import CROSSED, EPS, NEGLIGIBLE
-
-Array = NDArray[np.float64]
 
 PARTS_OF_A_PERIOD, MOST_PARTS = 8.17, 20_000
 """Parts into which the period of a load is cut, so many that no cut falls on a reversal, and the number of them above

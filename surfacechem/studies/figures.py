@@ -38,13 +38,13 @@ from surfacechem.format.declarations import (
 )
 from surfacechem.format.sections import SWEPT
 from surfacechem.runs.simulation import load
+from surfacechem.solve.contract import Array
 
 if TYPE_CHECKING:
     import xarray
 
     from surfacechem.plots.style import Plot
 
-Array = NDArray[np.float64]
 
 log = logging.getLogger(__name__)
 

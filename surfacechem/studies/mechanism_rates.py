@@ -19,7 +19,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import symengine
-from numpy.typing import NDArray
 
 from surfacechem.contracts.terms import reads
 from surfacechem.expressions import Expression, depends, derivative, log, log_sum
@@ -30,8 +29,7 @@ from surfacechem.mechanism.rates import InterfaceArrhenius
 from surfacechem.model.components.pairs import Opposed, lengths, opposed
 from surfacechem.quantities import BOLTZMANN, GAS_CONSTANT
 from surfacechem.results.findings import ROUNDED
-
-Array = NDArray[np.float64]
+from surfacechem.solve.contract import Array
 
 # A reaction, by its label, or a pair of one-way reactions.
 Step = str | Opposed

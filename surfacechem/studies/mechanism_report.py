@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from surfacechem.contracts.units import parse
 from surfacechem.errors import InputError, Place
@@ -18,13 +17,13 @@ from surfacechem.mechanism.source import Source
 from surfacechem.results.findings import said
 from surfacechem.runs.listing import WIDTH, source
 from surfacechem.runs.sheet import columns
+from surfacechem.solve.contract import Array
 from surfacechem.studies.mechanism_rates import Curves, cycle_verdict, cycles
 from surfacechem.tolerances import ROUNDING
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 
 # Temperature [K] at which the thermo of the species is shown, where it is in range.
 STANDARD = 298.15

@@ -31,6 +31,7 @@ from surfacechem.plots.study import MARKS, NO_ANSWER
 from surfacechem.results.accuracy import largest_errors, relative_errors
 from surfacechem.results.error_estimates import computed
 from surfacechem.solve import names as known_solvers
+from surfacechem.solve.contract import Array
 from surfacechem.solve.run import OWN, Model, Run, Trajectory
 from surfacechem.studies.grid import Cell, attempt, check_options, filled
 from surfacechem.studies.regimes import Exact, Expectation, Refused, Regime, Stops, Trial, chosen
@@ -63,7 +64,6 @@ POPULATION, WEIGHT, CROSSOVER = 8, 0.7, 0.8
 # A failure counts as worse than any error, a wrong answer as worse than a failure.
 BADNESS = {FAILED: MOST, WRONG: 2 * MOST}
 
-Array = NDArray[np.float64]
 Answer = Mapping[str, Array]
 Data = Mapping[str, float]
 

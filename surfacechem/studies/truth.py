@@ -25,11 +25,11 @@ from surfacechem.results.error_estimates import computed, difference, event_erro
 from surfacechem.results.event_table import SIDE, event_times
 from surfacechem.results.matching import exact_values
 from surfacechem.solve import ASKING, solver
+from surfacechem.solve.contract import Array
 from surfacechem.solve.run import Model, Trajectory
 from surfacechem.studies.grid import FAULTS
 from surfacechem.tolerances import EPS, TIGHTEST
 
-Array = NDArray[np.float64]
 Values = Mapping[str, Array]
 
 # Different families: collocation twice, by different authors, and multistep. A bug of one is not one of the other.

@@ -16,13 +16,9 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
 
-import numpy as np
-from numpy.typing import NDArray
-
 from surfacechem.errors import InputError, suggestion
 from surfacechem.references.base import Reference
-
-Array: TypeAlias = NDArray[np.float64]
+from surfacechem.solve.contract import Array
 
 Values: TypeAlias = Mapping[str, Array | float]
 

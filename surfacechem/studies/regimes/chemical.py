@@ -15,7 +15,8 @@ from surfacechem.references.bonding import Bonding, EndothermicBonding, Exotherm
 from surfacechem.references.cluster import SharedLoadCluster
 from surfacechem.references.cooling_to_zero import CoolingToZero
 from surfacechem.references.debonding import SuddenDebonding
-from surfacechem.studies.regimes import Array, Exact, Refused, Stops, Trial, regime
+from surfacechem.solve.contract import Array
+from surfacechem.studies.regimes import Exact, Refused, Stops, Trial, regime
 
 LOST = "heat capacity at T was lost"
 N_C = 1e18

@@ -12,7 +12,8 @@ from surfacechem.references.elastic_contact import ElasticContact
 from surfacechem.references.film import ClosingFilm
 from surfacechem.references.pull_off import OverdampedPullOff
 from surfacechem.references.stick_slip import StickSlip
-from surfacechem.studies.regimes import FOLDER, Array, Exact, Stops, Trial, regime
+from surfacechem.solve.contract import Array
+from surfacechem.studies.regimes import FOLDER, Exact, Stops, Trial, regime
 
 # Least stick over slip that is told from steady sliding, whose events are as close. Also the part of the width of a
 # bottleneck over which its speed is taken: enough for a condition number, which is told to a digit.
