@@ -1,10 +1,9 @@
-"""Measured numbers as smooth curves, and the conductances that are given so."""
+"""Conductances that are measured, as smooth curves of one variable."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import ClassVar, Literal
 
@@ -13,47 +12,13 @@ from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, positive, where
 
 
-@dataclass(frozen=True)
-class Curve:
-    """Points joined by cubics that keep their order: no overshoot, continuous slope; never below zero.
+class ConductanceTable(HeatTransfer):
+    """Conductances measured at points of one variable; subclasses have the points as a field, and state the law.
+
+    Points are joined by cubics that keep their order: no overshoot, continuous slope; never below zero.
 
     Source: Fritsch & Butland (1984), doi 10.1137/0905021.
-
-    >>> curve = Curve([0.0, 1.0, 3.0], [1.0, 2.0, 2.5])
-    >>> curve.value(1.0, linear=False), curve.value(-7.0, linear=False)
-    (2.0, 1.0)
     """
-
-    at: Sequence[float]
-    values: Sequence[float]
-
-    @staticmethod
-    def check(at: Sequence[float], values: Sequence[float], of: str, what: str) -> None:
-        """Raise InputError unless the points are finite, increasing, not negative and at least two."""
-        if len(at) != len(values) or len(at) < 2:
-            raise InputError(f"a table needs as many {of} ({len(at)}) as {what} ({len(values)}), at least 2.")
-        if not all(math.isfinite(x) for x in (*at, *values)) or min(values) < 0:
-            raise InputError(f"{of} and {what} of a table must be finite, and the {what} not negative.")
-        if any(b <= a for a, b in pairwise(at)):
-            raise InputError(f"{of} of a table must increase from each to the next.")
-
-    def value(self, x: Expression, *, linear: bool) -> Expression:
-        """Value at x; beyond the ends constant, or continued by the end slopes."""
-        from scipy.interpolate import PchipInterpolator
-
-        interpolation = PchipInterpolator(self.at, self.values)
-        cubics = interpolation.c.T.tolist()
-        slopes = interpolation((self.at[0], self.at[-1]), 1).tolist() if linear else (0.0, 0.0)
-        result = self.values[-1] + slopes[1] * (x - self.at[-1])
-        for (low, high), (a, b, c, d) in reversed(list(zip(pairwise(self.at), cubics, strict=True))):
-            z = x - low
-            result = where(x < high, d + z * (c + z * (b + z * a)), result)
-        result = where(x < self.at[0], self.values[0] + slopes[0] * (x - self.at[0]), result)
-        return positive(result) if linear else result
-
-
-class ConductanceTable(HeatTransfer):
-    """Conductances measured at points of one variable; subclasses have the points as a field, and state the law."""
 
     over: ClassVar[str]
     """The variable."""
@@ -64,9 +29,15 @@ class ConductanceTable(HeatTransfer):
     extrapolation: Literal["hold", "linear", "refuse"] = option("beyond the ends of the table", default="hold")
 
     def __post_init__(self) -> None:
-        """Check that the table is one."""
+        """The points are finite, increasing, not negative and at least two."""
         super().__post_init__()
-        Curve.check(self._at, self.conductances, self.points, "conductances")
+        at, values, of = self._at, self.conductances, self.points
+        if len(at) != len(values) or len(at) < 2:
+            raise InputError(f"a table needs as many {of} ({len(at)}) as conductances ({len(values)}), at least 2.")
+        if not all(math.isfinite(x) for x in (*at, *values)) or min(values) < 0:
+            raise InputError(f"{of} and conductances of a table must be finite, and the conductances not negative.")
+        if any(b <= a for a, b in pairwise(at)):
+            raise InputError(f"{of} of a table must increase from each to the next.")
 
     @property
     def _at(self) -> Sequence[float]:
@@ -89,5 +60,16 @@ class ConductanceTable(HeatTransfer):
         return self.ranges if self.extrapolation == "refuse" else {}
 
     def _interpolated(self, x: Expression) -> Expression:
-        """The conductance at a value of the variable [W/(m^2 K)]."""
-        return Curve(self._at, self.conductances).value(x, linear=self.extrapolation == "linear")
+        """The conductance [W/(m^2 K)] at a value of the variable; beyond the ends constant, or by the end slopes."""
+        from scipy.interpolate import PchipInterpolator
+
+        at, values, linear = self._at, self.conductances, self.extrapolation == "linear"
+        interpolation = PchipInterpolator(at, values)
+        cubics = interpolation.c.T.tolist()
+        slopes = interpolation((at[0], at[-1]), 1).tolist() if linear else (0.0, 0.0)
+        result = values[-1] + slopes[1] * (x - at[-1])
+        for (low, high), (a, b, c, d) in reversed(list(zip(pairwise(at), cubics, strict=True))):
+            z = x - low
+            result = where(x < high, d + z * (c + z * (b + z * a)), result)
+        result = where(x < at[0], values[0] + slopes[0] * (x - at[0]), result)
+        return positive(result) if linear else result
