@@ -12,9 +12,10 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from decimal import Decimal
 from functools import lru_cache
+from itertools import chain, repeat
 
 ZERO_CELSIUS = Decimal("273.15")
 """0 degC in K."""
@@ -22,7 +23,8 @@ ZERO_CELSIUS = Decimal("273.15")
 TOWER = re.compile(r"[\d²³⁰-⁹]\s*\)*\s*(?:\^|\*\*)|(?:\^|\*\*)\s*(?![-+(\d])")
 """Powers of powers, such as 9^9^9, which would never end, and of numbers."""
 
-_TOKEN = re.compile(r"[^\W\d_]+|%|1(?![\d.])|\*\*|[-+]?\d+|[()*/^]|\s+")
+_FACTOR = re.compile(r"([^\W\d_]+|%|1)(?:(?:\^|\*\*)([-+]?\d+))?")
+_PRODUCT = re.compile(rf"{_FACTOR.pattern}((\s*\*\s*|\s+){_FACTOR.pattern})*")
 
 _BASES: Mapping[str, Mapping[str, int]] = {
     "1": {},
@@ -93,51 +95,33 @@ def factor(given: str, target: str) -> Decimal | None:
 
 def _read(text: str) -> tuple[Decimal, dict[str, int]]:
     """Factor and powers of the base units of a text."""
-    tokens = _TOKEN.findall(text)
-    if "".join(tokens) != text or not text or text[0] in "*/^" or TOWER.search(text):
-        raise _UnusualError
-    stream = iter([token.strip() or " " for token in tokens] + [""])
-    value, powers, last = _product(stream)
-    if last:
-        raise _UnusualError
+    value, powers = Decimal(1), Counter[str]()
+    for name, power in factors(text):
+        if name not in TABLE:
+            raise _UnusualError
+        number, own = TABLE[name]
+        value = value * number**power if power > 0 else value / number**-power
+        for base, n in own.items():
+            powers[base] += n * power
     return value, {base: power for base, power in powers.items() if power}
 
 
-def _product(stream: Iterator[str]) -> tuple[Decimal, Counter[str], str]:
-    """Factors with `*`, a space or `/` between, as far as a closing parenthesis or the end, which is given, too."""
-    value, powers, sign, divided = Decimal(1), Counter[str](), 1, False
-    while True:
-        number, own, token = _factor(stream)
-        value = value * number if sign > 0 else value / number
-        for base, power in own.items():
-            powers[base] += sign * power
-        if token in (")", ""):
-            return value, powers, token
-        # In "J/m^2 K" the eye reads another unit than the rules.
-        if token not in ("*", " ", "/") or (divided and token != "/"):
-            raise _UnusualError
-        sign = -1 if token == "/" else 1
-        divided = token == "/"
+def factors(text: str) -> list[tuple[str, int]]:
+    """The names in a product or a quotient of units, each with its power.
 
-
-def _factor(stream: Iterator[str]) -> tuple[Decimal, Mapping[str, int], str]:
-    """A name or a product in parentheses, with its power, and the token that follows."""
-    token = next(stream)
-    number: Decimal
-    powers: Mapping[str, int]
-    if token == "(":
-        number, powers, last = _product(stream)
-        if last != ")":
-            raise _UnusualError
-    elif token in TABLE:
-        number, powers = TABLE[token]
-    else:
+    >>> factors("W/(m^2 K)")
+    [('W', 1), ('m', -2), ('K', -1)]
+    """
+    if TOWER.search(text):
         raise _UnusualError
-    token = next(stream)
-    if token not in ("^", "**"):
-        return number, powers, token
-    try:
-        power = int(next(stream))
-    except ValueError:
-        raise _UnusualError from None
-    return number**power, {base: n * power for base, n in powers.items()}, next(stream)
+    found = []
+    for sign, side in zip(chain([1], repeat(-1)), text.split("/"), strict=False):
+        inside = side.strip()
+        if inside[:1] + inside[-1:] == "()":
+            inside = inside[1:-1]
+        elif sign < 0 and _FACTOR.fullmatch(inside) is None:  # in "J/m^2 K" the eye reads another unit than the rules
+            raise _UnusualError
+        if _PRODUCT.fullmatch(inside) is None:
+            raise _UnusualError
+        found += [(name, sign * int(power or 1)) for name, power in _FACTOR.findall(inside)]
+    return found

@@ -221,9 +221,8 @@ def quotient(unit: str, per: str) -> str:
     """
     powers: dict[str, int] = {}
     for text, sign in ((unit, 1), (per, -1)):
-        for side, factors in zip((sign, -sign), text.split("/"), strict=False):
-            for base, _, power in (factor.partition("^") for factor in factors.strip("()").split()):
-                powers[base] = powers.get(base, 0) + side * int(power or 1)
+        for base, power in si_units.factors(text or "1"):
+            powers[base] = powers.get(base, 0) + sign * power
     powers.pop("1", None)
     written = {base: base if abs(power) == 1 else f"{base}^{abs(power)}" for base, power in powers.items()}
     top, bottom = ([written[base] for base, power in powers.items() if power * sign > 0] for sign in (1, -1))
