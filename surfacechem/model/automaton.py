@@ -49,8 +49,6 @@ class Mode:
     """What each value means."""
     start: Expression | None = None
     """The value at the start as it follows from the initial state, where it does."""
-    given: Callable[[Mapping[str, float]], float] | None = None
-    """The value at the start as it follows from what a case gives, by path, where it does."""
     waits: Mapping[float, str] = field(default_factory=dict)
     """Until when a value holds, in words, where it is meant to be left."""
 

@@ -69,8 +69,8 @@ def _starts_as_given(system: System, swept: set[str]) -> bool:
     searched = [state for state in system.states if state.algebraic]
     made = [state for state in system.states if state.given is not None and state.given.state and state.path in swept]
     modes = [mode for mode in system.modes if mode.start is not None]
-    memory = [item for item in system.memory if item.given is not None]
-    return not (searched or made or modes or memory)
+    registers = [register for register in system.registers if register.given is not None]
+    return not (searched or made or modes or registers)
 
 
 class ArrayRuns:

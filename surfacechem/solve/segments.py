@@ -68,9 +68,9 @@ def start_modes(system: System, parameters: Array, values: Mapping[str, float]) 
         if mode.start is not None:
             start = float(system.expand(mode.start).subs(initial))
             parameters[:, symbols.index(mode.symbol)] = start
-    for item in system.memory:
-        if item.given is not None:
-            parameters[:, symbols.index(item.symbol)] = item.given(values)
+    for register in system.registers:
+        if register.given is not None:
+            parameters[:, symbols.index(register.symbol)] = register.given(values)
 
 
 COMPARISONS = (symengine.StrictLessThan, symengine.LessThan)
