@@ -18,7 +18,7 @@ import numpy as np
 
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, decay, log, where
-from surfacechem.surfaces.patches import FIRST_FEW
+from surfacechem.surfaces.patches import Budget
 from surfacechem.surfaces.projection import Array
 from surfacechem.tolerances import NEGLIGIBLE, TINY
 
@@ -115,16 +115,18 @@ class ApproachEnergy:
 
 
 class Sampled:
-    """A function of the approach, computed once at each: that is logged, with how many are known to be needed."""
+    """A function of the approach, computed once at each: that is logged, with how many are known to be needed, which
+    the ``budget`` is for.
+    """
 
-    def __init__(self, samples: Samples) -> None:
-        self.samples, self.needed = samples, FIRST_FEW
+    def __init__(self, samples: Samples, budget: Budget) -> None:
+        self.samples, self.budget = samples, budget
         self.at: dict[float, tuple[float, float, float]] = {}
 
     def __call__(self, d: float) -> tuple[float, float, float]:
         """What it is there."""
         if d not in self.at:
-            amount = {"done": len(self.at), "total": max(self.needed, len(self.at) + 1)}
+            amount = {"done": len(self.at), "total": max(self.budget.integrals, len(self.at) + 1)}
             logger.info("integral over the surfaces at the approach %.3g m", d, extra=amount)
             self.at[d] = self.samples(d)
         return self.at[d]
@@ -142,17 +144,18 @@ def fitted(
     rtol: float,
     cuts: Sequence[float] = (),
     floor: tuple[float, float] = (0.0, 0.0),
+    budget: Budget | None = None,
 ) -> ApproachEnergy:
     """The energy between two approaches, so that its slope is the force within a relative error.
 
-    It bends at the approaches ``cuts``; energies [J] and forces [N] below a ``floor`` count as that. InputError where
-    it is not smooth elsewhere.
+    It bends at the approaches ``cuts``; energies [J] and forces [N] below a ``floor`` count as that; a ``budget``
+    learns how many of the samples are needed. InputError where it is not smooth elsewhere.
 
     An energy of one sign at positive approaches is fitted by its logarithm, in which a power is a straight line.
     """
-    sample = Sampled(samples)
+    sample, inside = Sampled(samples, budget or Budget(rtol)), [cut for cut in cuts if low < cut < high]
+    sample.budget.integrals = (1 + len(inside)) * FEWEST + 1
     first = sample(low)  # what has no force there is refused before anything else is computed
-    inside = [cut for cut in cuts if low < cut < high]
     powers = low > 0 and not inside and one_sign([sample(d)[0] for d in (low, math.sqrt(low * high), high)], floor[0])
     least = 0.0 if powers else floor[1]
     # What pieces miss of a slope of ln E adds up along them: then they are made once more, closer.
@@ -193,7 +196,7 @@ def divided(
     found: list[tuple[float, float, Array]] = []
     waiting = list(pairwise(ends))[::-1]
     while waiting:
-        sample.needed = len(sample.at) + len(waiting) * FEWEST
+        sample.budget.integrals = len(sample.at) + len(waiting) * FEWEST
         a, b = waiting.pop()
         if len(found) + len(waiting) > MOST_PIECES:
             raise InputError(f"the accuracy {rtol:g} over the approach is out of reach near {a:.4g} m.")
@@ -257,11 +260,6 @@ def approach_at(x: float, a: float, b: float, powers: bool) -> float:
     if abs(x) == 1:
         return b if x > 0 else a
     return math.sqrt(a * b) * (b / a) ** (x / 2) if powers else (a + b) / 2 + x * (b - a) / 2
-
-
-def fewest_samples(low: float, high: float, cuts: Sequence[float] = ()) -> int:
-    """At how many approaches a function is looked at, at least."""
-    return (1 + sum(low < cut < high for cut in cuts)) * FEWEST + 1
 
 
 def joined(found: list[tuple[float, float, Array]], energy: float, force: float, powers: bool) -> ApproachEnergy:

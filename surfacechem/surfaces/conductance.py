@@ -9,7 +9,7 @@ from typing import Self
 from surfacechem.contracts.terms import HeatTransfer, option
 from surfacechem.documents.cache_folder import Fingerprint, fingerprint, kept
 from surfacechem.expressions import Expression
-from surfacechem.surfaces.approach import ApproachEnergy, fewest_samples, fitted, straight
+from surfacechem.surfaces.approach import ApproachEnergy, fitted, straight
 from surfacechem.surfaces.curved_gap import bends, density, over_gap, passages
 from surfacechem.surfaces.patches import Budget
 from surfacechem.surfaces.potential import CODE, CurvedSurfaces, integrating
@@ -60,7 +60,7 @@ class CurvedConductance(HeatTransfer):
         mark = fingerprint(pair.shapes, self.law, pair.approach, pair.accuracy)
 
         cuts = passages(*pair.surfaces(0.0), levels)
-        budget = Budget(pair.accuracy, fewest_samples(*pair.approach, cuts))
+        budget = Budget(pair.accuracy)
 
         def sample(d: float) -> tuple[float, float, float]:
             finer = max(pair.accuracy / 64, ROUNDING)
@@ -70,7 +70,9 @@ class CurvedConductance(HeatTransfer):
         # A conductance and its slope are fitted like an energy and its force.
         if mark not in KNOWN:
             with integrating():
-                found = kept(mark, CODE, lambda: fitted(sample, *pair.approach, pair.accuracy, cuts).numbers)
+                found = kept(
+                    mark, CODE, lambda: fitted(sample, *pair.approach, pair.accuracy, cuts, budget=budget).numbers
+                )
             KNOWN[mark] = ApproachEnergy.of(found)
         return KNOWN[mark]
 

@@ -166,7 +166,7 @@ def over_gap(
     check_finite(lower, upper)
     size = length(lower, upper)
     patches, near = outer_patches(lower, upper, size, size * FAR)
-    patches = with_levels(patches, upper, levels, NOISE * size)
+    patches = with_levels(patches, upper, levels, NOISE * size, rtol)
 
     def integrand(x: Array, level: int) -> tuple[Array, int]:
         return counts_at(x, upper.nearest(x), laws, heat), len(x) * upper.search

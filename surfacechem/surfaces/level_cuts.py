@@ -7,6 +7,7 @@ line of nodes; the other direction is cut where the level leaves the patch.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Self
@@ -23,15 +24,17 @@ SAMPLES = np.array([0, 1 / 128, 1 / 4, 1 / 2, 3 / 4, 127 / 128, 1])
 a height that turns round between two others has passed it with another sign.
 """
 
-SLIGHT, HALVINGS = 0.1, 30
-"""A patch of which a level cuts off less, as part times rest, is halved at first, so many times at most."""
+SLIGHT, HALVINGS = 0.1, 8
+"""A patch of which a level cuts off less, as part times rest, is halved at first, at most so many times more than it
+takes until its area is the accuracy.
+"""
 
 CORNERS = 256
 """Patches that an edge crosses beside their level are halved, too, while they are no more: where lines meet, not where
 they run along each other.
 """
 
-PARTS, ROOTS = 3, 30
+PARTS, ROOTS = 3, 10
 """Parts of a side on each of which there are lines of nodes, and gaps that are looked at to find a level on a line."""
 
 
@@ -142,7 +145,8 @@ class LevelPatches(Patches):
             return np.asarray(self.heights(near)[np.arange(len(which)), self.level[which]])
 
         ends = self.low[:, k], self.high[:, k]
-        found: Any = find_root(above, ends, args=(across, np.arange(len(self))))
+        reached: Any = {"fatol": self.noise}
+        found: Any = find_root(above, ends, args=(across, np.arange(len(self))), tolerances=reached)
         return np.asarray(np.where(found.success, found.x, ends[1]))
 
     def seen(self, u: Array, v: Array) -> tuple[Array, Projection]:
@@ -156,7 +160,7 @@ class LevelPatches(Patches):
         return np.concatenate([near.beyond, near.gap[..., None] - self.levels], axis=-1)
 
 
-def with_levels(patches: Patches, other: Surface, levels: Sequence[float], noise: float) -> LevelPatches:
+def with_levels(patches: Patches, other: Surface, levels: Sequence[float], noise: float, rtol: float) -> LevelPatches:
     """Patches of a surface, each with the level of the gap to the other, or the edge of that, which passes through it,
     if one does.
     """
@@ -180,7 +184,7 @@ def with_levels(patches: Patches, other: Surface, levels: Sequence[float], noise
                 break
             found = found.divided(found.alike.index(False)).marked()
         return found
-    for _ in range(HALVINGS):
+    for _ in range(HALVINGS - math.floor(math.log2(rtol) / 2)):
         slight = (found.along >= 0) & (found.share < SLIGHT)
         if found.crossed.sum() <= CORNERS:
             slight |= found.crossed

@@ -161,7 +161,27 @@ def _settled(outer: Surface, inner: Surface, at: Array, steps: Array, long: floa
         hessian = long * uu, long * (uv + vu) / 2, long * vv
         return np.clip(newton_step(long * first, hessian, (E, F, G), at <= low, at >= high), -steps, steps)
 
-    return descended(at, low, high, lambda at, _: _gaps(outer, inner, at), step, noise)
+    found = descended(at, low, high, lambda at, _: _gaps(outer, inner, at), step, noise)
+    nearest = [np.argmin(_gaps(outer, inner, found))]
+    first, here = slope(found[nearest])[0], found[nearest]
+    first[((here <= low) & (first > 0)) | ((here >= high) & (first < 0))] = 0.0
+    # Along an edge of the other surface, where the gap bends or jumps, there may be no rest for Newton's method.
+    if np.abs(first * steps).max() > SQRT_EPS * long:
+        found[nearest] = _rolled(outer, inner, here[0], steps, np.array([low, high]), noise)
+    return found
+
+
+def _rolled(outer: Surface, inner: Surface, at: Array, steps: Array, bounds: Array, noise: float) -> Array:
+    """The place (2,) of least gap near one by the method of Nelder and Mead, which needs no slope."""
+    from scipy.optimize import minimize
+
+    def gap(at: Array) -> float:
+        return float(_gaps(outer, inner, at[None])[0])
+
+    corners = at + np.diag(np.where(at + steps > bounds[1], -steps, steps))
+    options: Any = {"initial_simplex": [at, *corners], "xatol": SQRT_EPS * steps.max(), "fatol": SAME * steps.max()}
+    found = minimize(gap, list(at), method="Nelder-Mead", bounds=list(bounds.T), options=options)
+    return np.asarray(found.x)
 
 
 def _distinct(outer: Surface, at: Array, gap: Array, near: float) -> NearPlaces:

@@ -118,7 +118,7 @@ def _cut_patches(outer: Surface, inner: Surface, found: Sequence[Extent], rtol: 
             text = f"a gap of {gap:.3g} m is lost in the rounding of bodies of {size:.3g} m; give smaller ones"
         raise InputError(f"{text}.")
     levels = sorted({level for extent in found for level in extent.levels(inner.shape)})
-    return (with_levels(patches, inner, levels, NOISE * size) if levels else patches), near
+    return (with_levels(patches, inner, levels, NOISE * size, rtol) if levels else patches), near
 
 
 def _rounded(x: Array, gap: float, found: Sequence[Extent], rtol: float) -> float:

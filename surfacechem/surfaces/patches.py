@@ -226,9 +226,9 @@ def _patches(
 class Budget:
     """What integrals take together, at least so many of them, in pairs of points; InputError before it is too much."""
 
-    def __init__(self, rtol: float, integrals: int = 1) -> None:
+    def __init__(self, rtol: float) -> None:
         """For an accuracy that messages name."""
-        self.rtol, self.integrals, self.done, self.spent = rtol, integrals, 0, 0.0
+        self.rtol, self.integrals, self.done, self.spent = rtol, 1, 0, 0.0
 
     def whole(self, ahead: float) -> float:
         """What all integrals take at least, where those that are done and the next one take so much."""

@@ -23,7 +23,7 @@ from surfacechem.contracts.terms import HeatTransfer, Law, PairEnergy, Potential
 from surfacechem.documents.cache_folder import Fingerprint, fingerprint, kept
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, derivative
-from surfacechem.surfaces.approach import ApproachEnergy, fewest_samples, fitted, straight
+from surfacechem.surfaces.approach import ApproachEnergy, fitted, straight
 from surfacechem.surfaces.curved_gap import GAP, Contact, bends, between_flats, density, over_gap, passages
 from surfacechem.surfaces.inner_sums import kernel
 from surfacechem.surfaces.pairwise import PairForces, interaction, length, pair_traction
@@ -199,7 +199,7 @@ class CurvedSurfaces(Potential):
         rtol, finer = self.accuracy, max(self.accuracy / 64, ROUNDING)
 
         met: dict[float, PairForces] = {}
-        budget = Budget(rtol, fewest_samples(*self.approach))
+        budget = Budget(rtol)
 
         def of_pairs(k: int, d: float) -> tuple[float, float, float]:
             if d not in met:
@@ -212,12 +212,12 @@ class CurvedSurfaces(Potential):
             of_pairs(0, self.approach[0])
             behind = self.approach[0] - met[self.approach[0]].gap
             ends = sorted({end + behind for end in ends})
-        found = [fitted(partial(of_pairs, k), *self.approach, rtol, ends) for k in range(len(parts))]
+        found = [fitted(partial(of_pairs, k), *self.approach, rtol, ends, budget=budget) for k in range(len(parts))]
         if not self.gap_laws:
             return found
         laws, levels = [density(law) for law in self.gap_laws], bends(self.gap_laws)
         cuts = passages(*self.surfaces(0.0), levels)
-        floor, spent = (0.0, 0.0), Budget(rtol, fewest_samples(*self.approach, cuts))
+        floor, spent = (0.0, 0.0), Budget(rtol)
 
         def of_gap(d: float) -> tuple[float, float, float]:
             pair = self.surfaces(d)
@@ -228,7 +228,7 @@ class CurvedSurfaces(Potential):
         for d in self.approach:
             energy, force, _ = of_gap(d)
             floor = max(floor[0], NEGLIGIBLE * abs(energy)), max(floor[1], NEGLIGIBLE * abs(force))
-        return [*found, fitted(of_gap, *self.approach, rtol, cuts, floor)]
+        return [*found, fitted(of_gap, *self.approach, rtol, cuts, floor, spent)]
 
     def _conducts(self) -> Contact:
         """What the conductances give at the least approach, by and large."""

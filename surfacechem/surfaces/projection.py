@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 NEWTONS = 100
 """Steps after which a search ends; some ten are the rule."""
 
-HALVINGS = 40
+HALVINGS = 16
 """Times that a step is halved at most."""
 
 SEARCH = 500

@@ -25,6 +25,7 @@ from surfacechem.runs.summaries import run_summary
 from surfacechem.surfaces import patches, potential
 from surfacechem.surfaces.approach import fitted
 from surfacechem.surfaces.curved_gap import passages
+from surfacechem.surfaces.nearest_places import near_places
 from surfacechem.surfaces.pair_laws import InversePower
 from surfacechem.surfaces.pairwise import interaction
 from surfacechem.surfaces.potential import CurvedSurfaces
@@ -352,6 +353,8 @@ def test_contact_of_plates_begins_where_a_corner_or_edges_that_cross_come_into_c
     axes = np.hstack([bodies[0].axes[:, :2], -bodies[1].axes[:, :2]])
     best = linprog(-axes[2], A_eq=axes[:2], b_eq=[0, 0], bounds=[*lower.span, *upper.span])
     assert passages(*bodies, [0.0])[-1] == pytest.approx(-best.fun, rel=1e-9)
+    touching = near_places(bodies[0], Surface(upper, True, -best.fun), 6.0, (False, False))
+    assert touching.gap[0] == pytest.approx(0, abs=2e-6)
 
 
 def test_powers_that_change_are_followed_near_the_least_approach():
