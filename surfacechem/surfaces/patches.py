@@ -39,8 +39,8 @@ AT_ONCE = 10_000
 """Pairs of points that take as long as any use of a rule, however few its points are."""
 
 WORTH = 8
-"""Part of the most points, one over this, after which it is seen whether the error falls fast enough, since there were
-as many times fewer.
+"""Part of the most points, one over this, after which it is seen whether the error of an integral falls fast enough,
+since there were as many times fewer.
 """
 
 FIRST_FEW = 3
@@ -327,7 +327,7 @@ def integral(
             budget.done += 1
             return whole, error, rules.points
         met.append((budget.spent - before, error))
-        if budget.whole(budget.spent) > MOST_POINTS / WORTH:
+        if budget.whole(budget.spent) > MOST_POINTS / WORTH and met[-1][0] > WORTH * met[0][0]:
             budget.refuse_beyond(before + _expected(met, left))
         rank = np.argsort(over + within)
         worst = np.zeros(len(over), dtype=bool)
