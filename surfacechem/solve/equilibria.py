@@ -28,7 +28,7 @@ from surfacechem.solve.branches import (
     zero_ahead,
 )
 from surfacechem.solve.contract import Array
-from surfacechem.tolerances import ATOM, NANOMETRE, NEGLIGIBLE, ROUNDING, SOLVED, SOON
+from surfacechem.tolerances import ATOM, NANOMETRE, NEGLIGIBLE, PICOMETRE, ROUNDING, SOLVED, SOON
 
 Heat = Callable[[Array], Array]
 """Inputs with the temperatures that a jump to them gives."""
@@ -334,7 +334,7 @@ class Equilibria:
             y = point.y.copy()
             for way, residual, slope in zip(self.ways(point), values[::3], values[1::3], strict=True):
                 change = -residual / slope if slope < 0 else 0.0
-                if abs(change) <= NEGLIGIBLE * abs(point.y[way.column]):  # else it is no drift
+                if abs(change) <= NEGLIGIBLE * max(abs(point.y[way.column]), PICOMETRE):  # else it is no drift
                     y += change * way.moves
             point = replace(point, y=y)
         return point

@@ -23,7 +23,7 @@ from surfacechem.solve.contract import Array, Counters, Events, Points, Problem,
 from surfacechem.solve.equilibria import Point
 from surfacechem.solve.instant import ENDLESS, MANY, MISSED, REACHED, Instant
 from surfacechem.solve.jumps import Jumper
-from surfacechem.tolerances import ATOM, BRIEF, ULPS
+from surfacechem.tolerances import ATOM, BRIEF, DIGITS, ULPS
 
 Found = TypeVar("Found")
 Flow = Generator[Problem, Result, Found]
@@ -169,6 +169,14 @@ class Hybrid:
         self.instant.status = arc.status
         return None
 
+    def _last_of(self, start: float, end: float) -> float:
+        """The end of an arc: before a breakpoint that no load has, at which a formula is that of what follows."""
+        row = int(np.searchsorted(self.problem.segments, end))
+        parameters = self.problem.parameters
+        if row >= len(parameters) or not np.array_equal(parameters[row - 1], parameters[row]):
+            return end
+        return max(end - DIGITS * end, 0.5 * (start + end))
+
     def _flow(self, start: Point, end: float) -> Flow[Arc | None]:
         """Integrate until an edge, a limit or the end of the segment; None where the run ends before or without it."""
         problem, instant = self.problem, self.instant
@@ -180,11 +188,11 @@ class Hybrid:
         local = start.parameters.copy()
         local[next(j for j, p in enumerate(self.system.parameters) if p.path == START)] = start.t
         local[self.system.origins] -= start.t
-        segments = instant.rebounds.pieces(start.t, end)
+        segments = instant.rebounds.pieces(start.t, self._last_of(start.t, end))
         problem = replace(
             problem,
             y0=start.y,
-            times=np.clip(times - start.t, 0.0, end - start.t),
+            times=np.clip(times - start.t, 0.0, segments[-1]),
             segments=segments,
             parameters=np.repeat(local[None], len(segments) - 1, axis=0),
             max_steps=problem.max_steps - self._steps,

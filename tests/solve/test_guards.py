@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import symengine as se
 from scenes import together
-from solved import solve
+from solved import closed, solve
 from solver_problems import problem
 
 from surfacechem.compile.program import compile_program
@@ -93,6 +93,22 @@ def test_friction_that_rises_steeply_lets_slip_begin_in_its_own_direction():
     friction = Stribeck(mu_s=0.14, mu_k=0.74, v_s=5.7e-8, delta=0.4)
     trajectory = solve(together((), [friction], loading, tangential=Mounting(k=7.8e7, m=7.9e7)), 6.4, rtol=1e-6)
     assert trajectory.events == ["slip backward"]
+
+
+@pytest.mark.parametrize("touch", [0.7, 1.1])
+def test_what_friction_stretches_follows_a_gap_that_closes_and_opens(touch):
+    """The pressure, and the rate at which friction stretches the springs of its asperities, begin and end at once."""
+    gap = Table(times=[0.0, 2 * touch, 2 * touch + 1.3], values=[1e-8, -1e-8, 0.7e-8])
+    springs, mount = [Penalty(E_n=1.6e15), TangentialStiffness(E_t=2.2e14)], Mounting(k=1e13, m=1e12)
+    made = together(springs, [Coulomb(mu=0.5)], {"g_n": gap, "w_t": Ramp(rate=1e-10)}, tangential=mount)
+    opens = 2 * touch + 1.3 / 1.7
+    trajectory = closed(made, (0.0, opens, opens + 0.05), rtol=1e-8)
+    assert trajectory.events[:5] == ["slip forward", "stop", "slip forward", "stop", "slip backward"]
+    assert [jump.t for jump in trajectory.jumps[1:4:2]] == pytest.approx([touch, opens], rel=1e-14)
+    u, v, rate, wave = trajectory["u_t"], trajectory["v_t"], 1e-10, np.sqrt(10.0)
+    # Open it swings about what pulls it.
+    swung = (u[1] - rate * opens) * np.cos(0.05 * wave) + (v[1] - rate) / wave * np.sin(0.05 * wave)
+    assert u[2] == pytest.approx(rate * (opens + 0.05) + swung, rel=1e-7)
 
 
 def test_what_lies_in_the_air_moves_with_the_least_push():
