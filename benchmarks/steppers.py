@@ -82,7 +82,7 @@ class Curve:
 
 def finished(result: Result) -> Result:
     """The result, its numbers void where the run failed."""
-    if not result.success:
+    if not result.status.success:
         result.y[:] = np.nan
         result.outputs[:] = np.nan
     return result

@@ -8,14 +8,10 @@ outputs, over time as over its logarithm, miss no quantity by more than a part o
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from surfacechem.results.spatial import begun, unresolved
-from surfacechem.solve.contract import Array, States
+from surfacechem.solve.contract import Array, Index, Mask, States
 from surfacechem.solve.run import Trajectory
-
-Flags = NDArray[np.bool_]
-Rows = NDArray[np.int64]
 
 SAMPLED = 100
 """Rows that tell how large rounding is."""
@@ -27,7 +23,7 @@ UNRESOLVED = 100.0
 """Tolerances of a value below which a change may be an error of the run."""
 
 
-def _two_sided(t: Array) -> tuple[Array, Flags]:
+def _two_sided(t: Array) -> tuple[Array, Mask]:
     """Times that increase, and which rows to keep: where several have one time, the first, moved to just before it, and
     the last.
     """
@@ -41,7 +37,7 @@ def _two_sided(t: Array) -> tuple[Array, Flags]:
     return moved, kept
 
 
-def needed(t: Array, values: Array, allowed: Array, kept: Flags) -> Flags:
+def needed(t: Array, values: Array, allowed: Array, kept: Mask) -> Mask:
     """Rows between which straight lines over time, and over its logarithm, miss no value by more than is allowed.
 
     ``values`` has shape (times, quantities), ``allowed`` is for each quantity; rows that are ``kept`` are among them.
@@ -68,7 +64,7 @@ def needed(t: Array, values: Array, allowed: Array, kept: Flags) -> Flags:
     return kept
 
 
-def _missed(t: Array, values: Array, left: Rows, rows: Rows, right: Rows) -> Array:
+def _missed(t: Array, values: Array, left: Index, rows: Index, right: Index) -> Array:
     """By how much lines from one row to another miss rows between them, over time or its logarithm, at worst."""
     missed = np.zeros(len(rows))
     for over in (t, np.log(np.maximum(t, t[t > 0].min(initial=1.0)))):
@@ -79,7 +75,7 @@ def _missed(t: Array, values: Array, left: Rows, rows: Rows, right: Rows) -> Arr
     return missed
 
 
-def _edges(values: Array) -> Flags:
+def _edges(values: Array) -> Mask:
     """Rows with an extreme of a quantity, and those beside which one begins or ceases to be a number."""
     number = np.isfinite(values)
     found = np.zeros(len(values), bool)
@@ -93,7 +89,7 @@ def _edges(values: Array) -> Flags:
     return found
 
 
-def _chosen(rows: States, which: Flags) -> States:
+def _chosen(rows: States, which: Mask) -> States:
     """Some of the rows."""
     assert rows.segment is not None
     return States(rows.t[which], rows.y[which], rows.ledger[which], rows.segment[which])

@@ -12,7 +12,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from surfacechem.compile.program import Function, compile_function
 from surfacechem.errors import InputError
@@ -24,15 +23,12 @@ from surfacechem.results.audit import ROUNDINGS, residuals, resolved
 from surfacechem.runs import spectrum
 from surfacechem.runs.keeping import REACHED, STATUSES, Columns, Keep, reason_table, variable
 from surfacechem.solve.choice import EXPLICIT, IMPLICIT
-from surfacechem.solve.contract import Array, Problem, Status
+from surfacechem.solve.contract import Array, Index, Mask, Problem, Status
 from surfacechem.solve.diagnose import are_led_back
 from surfacechem.solve.radau.solver import consistent, solve_arrays
 from surfacechem.solve.radau.stepper import END, EVENTS, FIRST_COUNTER, OUTPUTS, RECORDS
 from surfacechem.solve.run import Model, Run
 from surfacechem.tolerances import CROSSED, EPS, MICROMETRE, PICOMETRE
-
-Mask = NDArray[np.bool_]
-Index = NDArray[np.int64]
 
 TRIED = 100
 """Runs of a plan that are tried for one that is admissible, whose problem the others share."""

@@ -13,11 +13,11 @@ from surfacechem.errors import InputError
 from surfacechem.format.draws import permuted
 from surfacechem.results.store import StoredArray
 from surfacechem.runs.keeping import ENDS, STATUSES
+from surfacechem.solve.contract import Index
 
 if TYPE_CHECKING:
     from surfacechem.runs.streaming import Stream
 
-Index = NDArray[np.int64]
 Array = NDArray[Any]
 
 HARDEST = 100

@@ -258,10 +258,9 @@ class Simulation:
         settings = run or self.case.run
         if self.case.scene.surface is not None:
             self.case.refuse_nothing()
-        values = self._values(changes or {})
-        if (freed := self._with_freed(values)) is not self:
+        freed, values = self._ready(changes or {})
+        if freed is not self:
             return freed.run(values, settings, error)
-        values = {path: value for path, value in values.items() if path not in self.system.constants}
         chosen, (trajectory,), errors = self._resolved(settings, values)
         estimate: Accuracy | None = None
         if settings.solver == AUTO:
@@ -464,9 +463,9 @@ class Simulation:
                 f"a sweep of {plan.size} runs is too large; {MOST_RUNS} at most. A store, -o NAME.zarr, takes more."
             )
             raise InputError(message, path="sweep")
-        if (freed := self._freed_for(plan, values := self._values(changes or {}))) is not self:
+        freed, values = self._ready(changes or {}, plan)
+        if freed is not self:
             return freed.sweep_plan(plan, values, threads)
-        values = {path: value for path, value in values.items() if path not in self.system.constants}
         chosen, done, errors = self._resolved(self.case.run, values, plan, threads)
         model = done[0].model
         run = model.chosen(self.case.run, done[0].values)
@@ -515,7 +514,8 @@ class Simulation:
         """
         from surfacechem.runs import streaming
 
-        if (freed := self._freed_for(plan, values := self._values(changes or {}))) is not self:
+        freed, values = self._ready(changes or {}, plan)
+        if freed is not self:
             return freed.stream(plan, path, values, resume=resume, part=part)
         if spatial.wanted(self.case.scene) is not None:
             message = "cells that follow from an accuracy need all runs at once; give a number of cells for a store."
@@ -525,25 +525,10 @@ class Simulation:
         if self.case.run.steady:
             message = "a store keeps runs of a given length, not `steady`. Write the sweep to a file, -o NAME.nc."
             raise InputError(message, path="run.until")
-        values = {path: value for path, value in values.items() if path not in self.system.constants}
         try:
             return streaming.stream(self, plan, path, changes=values, resume=resume, part=part)
         except InputError as error:
             raise self.case.located(error) from None
-
-    def _freed_for(self, plan: Plan, values: Mapping[str, float]) -> Simulation:
-        """The simulation in whose equations stand symbols for the defaults that are swept or changed."""
-        constants = self.system.constants
-        ends = plan.at(np.array([0, plan.size - 1]))
-        # A default that is swept needs a symbol, so that the equations are assembled for any other value of it.
-        others = {
-            path: next(
-                (x for x in xs.tolist() if x != constants[path][1]), math.nextafter(constants[path][1], math.inf)
-            )
-            for path, xs in ends.items()
-            if path in constants
-        }
-        return self._with_freed({**values, **others})
 
     def plan(
         self,
@@ -590,14 +575,20 @@ class Simulation:
         system = self.system
         return {**{path: spec.unit for path, (spec, _) in system.constants.items()}, **system.changeable}
 
-    def _with_freed(self, values: Mapping[str, float]) -> Simulation:
-        """The simulation in whose equations stand symbols for the defaults that values depart from: the case with these
-        values, assembled anew; itself where no default is departed from.
+    def _ready(
+        self, changes: Mapping[str, float | str], plan: Plan | None = None
+    ) -> tuple[Simulation, dict[str, float]]:
+        """The simulation in whose equations stand symbols for the defaults that are swept, or that changes depart from,
+        and the changes that it takes: the case with these values, assembled anew; itself where no default is.
         """
-        constants = self.system.constants
+        constants, values = self.system.constants, self._values(changes)
         departing = {path: x for path, x in values.items() if path in constants and x != constants[path][1]}
+        for path, ends in plan.at(np.array([0, plan.size - 1])).items() if plan else ():
+            if path in constants:  # any other value does for what needs a symbol
+                usual = constants[path][1]
+                departing[path] = next((x for x in ends.tolist() if x != usual), math.nextafter(usual, math.inf))
         if not departing:
-            return self
+            return self, {path: value for path, value in values.items() if path not in constants}
         if not self.case.text:
             path = next(iter(departing))
             raise InputError(f"{path} is at its default; a scene in Python gives another value to its law itself.")
@@ -606,7 +597,7 @@ class Simulation:
             case = self.case
             freed = cases.load_text(case.text, case.name, mechanism_text=case.mechanism_text, overrides=departing)
             self._freed[paths] = Simulation(replace(freed, own_run=case.own_run, file=case.file))
-        return self._freed[paths]
+        return self._freed[paths], values
 
     def _values(self, changes: Mapping[str, float | str]) -> dict[str, float]:
         units = self._units

@@ -26,12 +26,12 @@ from surfacechem.runs import keeping, sweeps
 from surfacechem.runs.arrays import ArrayRuns, solvable
 from surfacechem.runs.checking import checked_arrays
 from surfacechem.runs.keeping import STATUSES, Columns, Keep, RunByRun, keep_of, variable
+from surfacechem.solve.contract import Index
 from surfacechem.solve.run import Model, Run, Trajectory
 
 if TYPE_CHECKING:
     from surfacechem.runs.simulation import Simulation
 
-Index = NDArray[np.int64]
 
 RUNS_OF_A_CHUNK, OF_A_SLOW_ONE = 2**14, 2**9
 """Runs of a chunk at most: a second or two of the compiled loop. Of runs that are looked at one by one fewer."""

@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 from surfacechem.compile.program import Program
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Index = NDArray[np.int64]
 
 
 class Status(IntEnum):
@@ -155,7 +157,7 @@ class States(NamedTuple):
     t: Array
     y: Array
     ledger: Array
-    segment: NDArray[np.int64] | None = None
+    segment: Index | None = None
 
 
 @dataclass(frozen=True)
@@ -166,7 +168,7 @@ class Points:
     y: Array
     ydot: Array
     ledger: Array
-    segment: NDArray[np.int64] | None = field(default=None, kw_only=True)
+    segment: Index | None = field(default=None, kw_only=True)
     """Segment of each, where several lie so close that their times do not tell."""
 
 
@@ -174,7 +176,7 @@ class Points:
 class Events(Points):
     """Events in order of time; ``index`` is the margin that crossed zero. Coincident ones have a row each."""
 
-    index: NDArray[np.int64] = field(kw_only=True)
+    index: Index = field(kw_only=True)
 
 
 @dataclass(slots=True)
@@ -196,18 +198,16 @@ class Result:
     events: Events
     counters: Counters
     steps: Points | None = None
-    note: str = ""
-    """What a library said of its failure."""
     stepping: float = float("nan")
     """Time inside a library's own steps [s], without outputs and events; NaN for a method that does them itself."""
-    segment: NDArray[np.int64] | None = None
+    segment: Index | None = None
     """Segment of each output, where their times do not tell."""
     inside: States | None = None
     """What a picture needs inside steps and at the start of segments."""
     known: States | None = None
     """All states that are known, where the result is of several arcs and a picture is wanted."""
 
-    def segments_at(self, t: Array, known: NDArray[np.int64] | None = None) -> NDArray[np.int64]:
+    def segments_at(self, t: Array, known: Index | None = None) -> Index:
         """Segment of each time; a breakpoint belongs to the one that it ends."""
         return np.searchsorted(self.problem.segments[1:-1], t, side="left") if known is None else known
 
@@ -226,27 +226,6 @@ class Result:
         t, segment = t[order], segment[order]
         new = (np.diff(t, prepend=-1.0) > 0) | (np.diff(segment, prepend=-1) > 0)
         return States(t[new], y[order[new]], ledger[order[new]], segment[new])
-
-    @property
-    def success(self) -> bool:
-        return self.status.success
-
-    @property
-    def message(self) -> str:
-        """The status in words, with the time and the margin concerned; an adapter adds what its library says."""
-        text = f"{REASONS[self.status]} (t = {self.t:.9g})"
-        if self.note:
-            return f"{text}: {self.note}"
-        if self.status is Status.EVENT:
-            margins = self.problem.margins
-            return f"{text}: margin {next(int(i) for i in reversed(self.events.index) if margins[i].terminal)}"
-        left = np.abs(self.margins)
-        if self.problem.in_play is not None:
-            left = np.where(self.problem.in_play, left, np.inf)
-        if not self.success and np.isfinite(left).any():
-            nearest = int(np.argmin(left))
-            return f"{text}; nearest margin: {nearest} = {self.margins[nearest]:.3g}"
-        return text
 
 
 class Solver(ABC):

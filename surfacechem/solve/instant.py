@@ -10,19 +10,16 @@ from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from surfacechem.model.automaton import RESTS
 from surfacechem.model.system import System
 from surfacechem.quantities import VELOCITIES
-from surfacechem.solve.contract import Array, Problem, Result, Status
+from surfacechem.solve.contract import Array, Mask, Problem, Result, Status
 from surfacechem.solve.equilibria import BALANCED, DRIFT, Point
 from surfacechem.solve.jump_heat import LoadStep
 from surfacechem.solve.jumps import Jump, Jumper, Slack, booked
 from surfacechem.solve.radau.solver import consistent
 from surfacechem.tolerances import BRIEF, CROSSED, MICROMETRE, NEGLIGIBLE, PICOMETRE, SOLVED, SOON
-
-Mask = NDArray[np.bool_]
 
 REACHED = SOLVED
 """Part of the time within which two moments are one: a step onto an event solves for its time."""

@@ -39,7 +39,7 @@ def test_what_cannot_go_on_is_no_success(name, rows, last):
     n = len(rows)
     program = compile_program(T, [Y, Z][:n], [DY, DZ][:n], [], rows)
     result = solver(name).solve(problem(program, [1.0] * n, [0.0, 5.0], 1e-6, max_steps=5_000))
-    assert not result.success
+    assert not result.status.success
     assert result.t <= last
     assert last == 0.0 or np.isfinite(result.y).all()
 
@@ -57,7 +57,7 @@ LAYER = Y * DY - 1e17
 @pytest.mark.parametrize("name", [name for name in names if name != "cantera"])
 def test_a_layer_within_the_last_digit_of_the_clock(name: str) -> None:
     result = steep(name, LAYER, 1.0, 2.0)
-    assert result.success
+    assert result.status.success
     np.testing.assert_allclose(result.outputs[1], np.sqrt([2e17]), rtol=1e-6)
     np.testing.assert_allclose(result.ledger_outputs[1], [2e17], rtol=1e-6)
 

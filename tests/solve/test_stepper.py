@@ -75,7 +75,7 @@ def test_explicit_steps_go_on_implicitly_from_where_a_problem_is_stiff() -> None
     steps, smooth = Dop853(), exothermic_problem(1e-10)
     long = problem(robertson_sums(), [1.0, 0.0, 0.0], [0.0, 1e11], 1e-10, atol=1e-20)
     stiff, mild = steps.solve(long), steps.solve(smooth)
-    assert stiff.success
+    assert stiff.status.success
     assert stiff.counters.jacobians > 0 == mild.counters.jacobians
     np.testing.assert_allclose(stiff.y, radau.solve(long).y, rtol=1e-7)
     np.testing.assert_allclose(mild.outputs, exothermic_exact(smooth.times), rtol=1e-10)
@@ -177,7 +177,6 @@ def test_terminal_event(name: str) -> None:
     assert result.t == pytest.approx(np.log(2), rel=1e-6 if name != "radau" else 1e-11)
     assert list(result.times) == [0.0]
     assert list(result.events.index) == [0]
-    assert "margin 0" in result.message
 
 
 def oscillator(*margins):
@@ -377,4 +376,3 @@ def test_singular_capacity() -> None:
     program = compile_program(t, [x, y], [dx, dy], [], [dx + dy - 1, 2 * dx + 2 * dy - 1])
     result = radau.solve(problem(program, [0.0, 0.0], [0.0, 1.0], 1e-6))
     assert result.status == Status.SINGULAR
-    assert "singular" in result.message
