@@ -53,13 +53,6 @@ class Record:
             raise self.error(f"the attribute '{name}' is no {'text' if kind is str else 'number'}.")
         return value
 
-    def content(self, name: str) -> Any:
-        """What an attribute says in JSON."""
-        try:
-            return json.loads(self.attribute(name, str))
-        except (ValueError, RecursionError):
-            raise self.error(f"the attribute '{name}' is no JSON.") from None
-
     @property
     def place(self) -> Place:
         """Where the record is from, for messages."""
@@ -123,7 +116,10 @@ def _departures(record: Record) -> Mapping[str, Any]:
     """In which way the run was not that of its case."""
     if "departures" not in record.attributes:
         return {}
-    found = record.content("departures")
+    try:
+        found = json.loads(record.attribute("departures", str))
+    except (ValueError, RecursionError):
+        raise record.error("the attribute 'departures' is no JSON.") from None
     if not isinstance(found, dict) or any(not isinstance(found[k], DEPARTURES.get(k, ())) for k in found):
         raise record.error(f"the attribute 'departures' may hold {', '.join(DEPARTURES)}, each of its kind.")
     numbers = [*found.get("times", []), *found.get("changes", {}).values(), found.get("max_steps", 1)]

@@ -163,10 +163,7 @@ def statistics(trajectory: Trajectory, variable: str) -> Statistics:
     reasons = np.array(told)[result.events.index]
     at = model.evaluate(result, result.events.t, result.events.y, result.events.ydot)
     halves, peaks = at[reasons == MEDIAN], np.concatenate([trajectory.outputs[:1], at[reasons == MODE]])
-    end = model.evaluate(result, np.array([result.t]), result.y[None], result.ydot[None])[0]
-    survivors = end[columns["survival"]]
-    accounts = [account.quantity.name for account in model.system.ledger]
-    integral = result.ledger[accounts.index(f"mean_{variable}")]
+    survivors, integral = _at_end(trajectory, f"mean_{variable}")
     return Statistics(
         mode=float(peaks[np.argmax(peaks[:, density]), column]),
         median=float(halves[0, column]) if len(halves) else math.nan,
@@ -176,8 +173,13 @@ def statistics(trajectory: Trajectory, variable: str) -> Statistics:
 
 def lifetime(trajectory: Trajectory) -> Lifetime:
     """Mean lifetime of a run of a system :func:`with_lifetime`; not a number where too many bonds are left."""
-    system, result = trajectory.model.system, trajectory.result
+    survivors, integral = _at_end(trajectory, "lifetime")
+    return Lifetime(integral if survivors <= 1.01 * INTACT else math.nan)
+
+
+def _at_end(trajectory: Trajectory, account: str) -> tuple[float, float]:
+    """The survival at the end of a run, and an account of its ledger."""
+    result, system = trajectory.result, trajectory.model.system
     end = trajectory.model.evaluate(result, np.array([result.t]), result.y[None], result.ydot[None])[0]
-    survivors = end[system.output_columns["survival"]]
-    accounts = [account.quantity.name for account in system.ledger]
-    return Lifetime(float(result.ledger[accounts.index("lifetime")]) if survivors <= 1.01 * INTACT else math.nan)
+    accounts = [item.quantity.name for item in system.ledger]
+    return float(end[system.output_columns["survival"]]), float(result.ledger[accounts.index(account)])

@@ -268,14 +268,11 @@ def _known(arcs: Sequence[Arc]) -> States | None:
     """What is known of the arcs, in the time and ledger of the run, where a picture is wanted."""
     if not arcs[0].result.problem.picture:
         return None
-    parts = [arc.result.states() for arc in arcs]
-    pairs = list(zip(arcs, parts, strict=True))
-    return States(
-        np.concatenate([np.minimum(arc.start.t + part.t, arc.end) for arc, part in pairs]),
-        np.concatenate([part.y for part in parts]),
-        np.concatenate([arc.booked + part.ledger for arc, part in pairs]),
-        np.repeat(np.arange(len(arcs)), [len(part.t) for part in parts]),
-    )
+    rows = []
+    for number, arc in enumerate(arcs):
+        t, y, ledger, _ = arc.result.states()
+        rows.append((np.minimum(arc.start.t + t, arc.end), y, arc.booked + ledger, np.full(len(t), number)))
+    return States(*map(np.concatenate, zip(*rows, strict=True)))
 
 
 def _steps(arcs: Sequence[Arc]) -> Points:
@@ -289,9 +286,9 @@ def _steps(arcs: Sequence[Arc]) -> Points:
 
 def _rows(found: Sequence[tuple[Arc, Points, slice | NDArray[np.bool_]]]) -> tuple[Array, Array, Array, Array]:
     """Times, states, rates and ledgers of the points that are kept of each arc, in the time and ledger of the run."""
-    return (
-        np.concatenate([arc.start.t + points.t[keep] for arc, points, keep in found]),
-        np.concatenate([points.y[keep] for _, points, keep in found]),
-        np.concatenate([points.ydot[keep] for _, points, keep in found]),
-        np.concatenate([arc.booked + points.ledger[keep] for arc, points, keep in found]),
-    )
+    rows = [
+        (arc.start.t + points.t[keep], points.y[keep], points.ydot[keep], arc.booked + points.ledger[keep])
+        for arc, points, keep in found
+    ]
+    t, y, ydot, ledger = map(np.concatenate, zip(*rows, strict=True))
+    return t, y, ydot, ledger
