@@ -106,7 +106,12 @@ def followed(trajectory: Trajectory) -> Trajectory:
     early = unresolved(system, end, t)
     sides &= ~early | np.isin(t, begun(system, end))
     rows, early = _chosen(rows._replace(t=t), sides), early[sides]
-    quantities, noise = _quantities(trajectory, rows)
+    # What is shown over time, shape (times, quantities), and how much of it may be rounding.
+    quantities = np.hstack([rows.y, rows.ledger, trajectory.at(rows).outputs])
+    sampled = np.arange(len(rows.t)) % max(len(rows.t) // SAMPLED, 1) == 0
+    roundings = trajectory.at(_chosen(rows, sampled)).roundings
+    unknown = [UNRESOLVED * roundings[name] for name in system.output_columns]
+    noise = np.pad(unknown, (quantities.shape[1] - len(unknown), 0))
     # Both sides of events are kept; rounding is not pictured, and what is early counts for no range.
     moments = np.array([*trajectory.result.events.t, *(jump.t for jump in trajectory.jumps)])
     beside = np.isin(rows.t, moments) | np.isin(np.nextafter(rows.t, np.inf), moments)
@@ -116,13 +121,3 @@ def followed(trajectory: Trajectory) -> Trajectory:
     seen = np.ptp(values, axis=0) > allowed
     kept = needed(rows.t, values[:, seen], allowed[seen], beside | _edges(quantities[:, seen]))
     return trajectory.at(_chosen(rows, kept))
-
-
-def _quantities(trajectory: Trajectory, rows: States) -> tuple[Array, Array]:
-    """What is shown over time, shape (times, quantities), and how much of it may be rounding."""
-    system = trajectory.model.system
-    states = np.hstack([rows.y, rows.ledger])
-    sampled = np.arange(len(rows.t)) % max(len(rows.t) // SAMPLED, 1) == 0
-    noise = trajectory.at(_chosen(rows, sampled)).roundings
-    unknown = [0.0] * states.shape[1] + [UNRESOLVED * noise[name] for name in system.output_columns]
-    return np.hstack([states, trajectory.at(rows).outputs]), np.array(unknown)

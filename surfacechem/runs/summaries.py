@@ -135,28 +135,29 @@ def sweep_summary(solution: SweepSolution, written: Path | None, details: bool =
     """What was swept, how the runs ended, how accurate and how fast they were, and where they are; with ``details`` how
     each run ended.
     """
-    facts = []
-    facts.append(("swept", swept_in_words(solution.plan, solution.parameters)))
-    facts.append(("solved", _solved(solution.system, solution.run)))
-    facts.append(("ended", f"{len(solution.runs)} runs: {solution.ends}"))
+    error = ""
     if accuracy := solution.accuracy:
         known = accuracy.known
         missing = len(accuracy.errors) - len(known)
         unknown = f"; unknown in {missing} runs" if missing else ""
         error = f"{known.max():.2g} ({accuracy.source}){unknown}" if len(known) else f"unknown ({accuracy.source})"
-        facts.append(("error", error))
     speed = f"run {duration(solution.seconds)}, compile {duration(solution.model.compile_seconds)}"
     if solution.system.whole:
         speed = f"surfaces {duration(solution.before_seconds)}, {speed}"
-    facts.append(("time", f"{speed}; {solution.steps} steps"))
-    if events := _sweep_events(solution):
-        facts.append(("events", events))
     energy, entropy, sites = (f"{solution.worst(balance):.1e}" for balance in ("energy", "entropy", "site"))
     count = sum(books.destroys for books in solution.audits)
     verdict = f"ENTROPY DESTROYED in {count} runs" if count else "no law destroys entropy"
-    facts.append(("balances", f"energy {energy}, entropy {entropy}, sites {sites}; {verdict}"))
-    if written:
-        facts.append(("written", str(written)))
+    every = [
+        ("swept", swept_in_words(solution.plan, solution.parameters)),
+        ("solved", _solved(solution.system, solution.run)),
+        ("ended", f"{len(solution.runs)} runs: {solution.ends}"),
+        ("error", error),
+        ("time", f"{speed}; {solution.steps} steps"),
+        ("events", _sweep_events(solution)),
+        ("balances", f"energy {energy}, entropy {entropy}, sites {sites}; {verdict}"),
+        ("written", str(written or "")),
+    ]
+    facts = [(label, text) for label, text in every if text]
     return Sheet(solution.title or "untitled", facts, sweep_details(solution) if details else {})
 
 
@@ -321,16 +322,19 @@ def store_summary(stream: Stream, store: Store, checked: Checked | None, file: P
         worst = np.fmax(worst, np.fmax.reduce(store.read("energy_error", number), initial=0.0))
     names = parameter_names(chunks.model.system, chunks.plan)
     counted = ", ".join(f"{count} {word}" for count, word in zip(ends.tolist(), STATUSES, strict=True) if count)
-    facts = []
-    facts.append(("swept", swept_in_words(chunks.plan, names)))
-    facts.append(("solved", _solved(chunks.model.system, chunks.run)))
-    facts.append(("ended", f"{ends.sum()} of {chunks.plan.size} runs: {counted}"))
+    error = destroyed = ""
     if checked is not None:
         unknown = f"; unknown in {checked.unknown}" if checked.unknown else ""
-        facts.append(("error", f"{checked.error:.2g} of {checked.count} runs ({checked.source}){unknown}"))
-    destroyed = f"; ENTROPY DESTROYED in {checked.destroys} runs" if checked and checked.destroys else ""
-    facts.append(("balances", f"energy {worst:.1e} at worst{destroyed}"))
-    facts.append(("written", str(file) if file else f"{store.path}, {len(done)} of {layout.chunks} chunks"))
+        error = f"{checked.error:.2g} of {checked.count} runs ({checked.source}){unknown}"
+        destroyed = f"; ENTROPY DESTROYED in {checked.destroys} runs" if checked.destroys else ""
+    facts = [
+        ("swept", swept_in_words(chunks.plan, names)),
+        ("solved", _solved(chunks.model.system, chunks.run)),
+        ("ended", f"{ends.sum()} of {chunks.plan.size} runs: {counted}"),
+        *([("error", error)] if error else []),
+        ("balances", f"energy {worst:.1e} at worst{destroyed}"),
+        ("written", str(file) if file else f"{store.path}, {len(done)} of {layout.chunks} chunks"),
+    ]
     stopped = ends[STATUSES.index("stopped")] == ends.sum()
     status = "failed" if ends[STATUSES.index("failed")] else "stopped" if stopped else "finished"
     return status, Sheet(chunks.simulation.case.title or "untitled", facts)

@@ -202,11 +202,6 @@ def _first(curve: Callable[[float], float], reached: float) -> float:
     return float(brentq(curve, reached, 1.0, **CLOSEST)) if curve(1.0) < 0 else 1.0
 
 
-def _as_it_is(rows: Array) -> Array:
-    """Inputs with the temperatures that they have."""
-    return rows
-
-
 class LoadPath:
     """The way of what slides as loads jump."""
 
@@ -311,7 +306,7 @@ class LoadPath:
         whole = float(np.sum(taken))
         return taken / whole if whole > 0 else None
 
-    def _held(self, point: Point, span: Array, warm: Heat = _as_it_is) -> Point:
+    def _held(self, point: Point, span: Array, warm: Heat = lambda rows: rows) -> Point:
         """The point with all in equilibrium while friction holds; where there is none, as it is."""
         stuck = self.equilibria.with_slip(point, 0.0)
         return self.equilibria.settle_near(stuck, warm, span) or stuck

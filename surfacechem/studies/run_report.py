@@ -59,7 +59,9 @@ def page(data: xarray.Dataset | str | Path) -> Page:
         raise InputError("this is no dataset of a run or of a sweep.", place)
     command = f"surfacechem rerun {Path(data).name}" if isinstance(data, str | Path) else "surfacechem rerun RUN.nc"
     attributes, omissions = dataset.attrs, []
-    sections = [PageSection("What happened", [_ending(attributes), *_warnings(attributes)], figure=True)]
+    told = attributes.get("warnings", "none")
+    warnings = [] if told == "none" else [f"Warning: {text}." for text in told.split("; ")]
+    sections = [PageSection("What happened", [_ending(attributes), *warnings], figure=True)]
     try:
         if not attributes["case"]:
             raise InputError("the scene was built in Python, and the dataset holds no case.")
@@ -119,11 +121,6 @@ def _ending(attributes: Any) -> str:
     if "integrals_seconds" in attributes:
         text += f" Integrals over the surfaces took {duration(attributes['integrals_seconds'])}."
     return text
-
-
-def _warnings(attributes: Any) -> list[str]:
-    warnings = attributes.get("warnings", "none")
-    return [] if warnings == "none" else [f"Warning: {text}." for text in warnings.split("; ")]
 
 
 def _scene(case: cases.Case) -> Iterator[PageSection]:

@@ -114,7 +114,7 @@ def steady(source: Source, of: Sequence[str] = (), overrides: Overrides = ()) ->
             for name, column in zip(rest.wanted, changes.T.tolist(), strict=True)
         },
         dict(zip(rest.wanted, barriers.tolist(), strict=False)),
-        dict(zip(labels, _equations(system, labels), strict=True)),
+        {label: system.find(f"R_{label}").quantity.long_name.removeprefix("net rate of ") for label in labels},
         {name: system.outputs[j].quantity.unit for name, j in rest.wanted.items()},
     )
 
@@ -129,12 +129,6 @@ def _wanted(system: System, of: Sequence[str]) -> dict[str, int]:
     if not wanted:
         raise InputError("nothing is made in a neighbour: name the rates that matter, `--of R_R1` for instance.")
     return {name: names.index(name) for name in wanted}
-
-
-def _equations(system: System, labels: Sequence[str]) -> list[str]:
-    """Equations of the reactions."""
-    titles = {item.name: item.quantity.long_name.removeprefix("net rate of ") for item in system.named}
-    return [titles[f"R_{label}"] for label in labels]
 
 
 HELD = re.compile(r"(bodies\..+|interface)\.temperature\.level|loading\.T\w*\.level")
