@@ -59,12 +59,16 @@ def test_the_stepper_finds_the_same(clock, seed):
     def values(_t: float, x: np.ndarray) -> np.ndarray:
         return np.array([np.polyval(row[::-1], x[0]) for row in rows])
 
-    guards = Guards.of(kinds, values)
-    guards.start(values(0.0, np.zeros(1)))
+    guards, at_once = Guards.of(kinds, values), Guards.of(kinds, values)
+    at_once.rows = lambda _, x: np.array([values(0.0, row) for row in x])
     step = DenseStep(0.0, 1.0, lambda t: np.array([t]))
-    t, fired = first_crossing(step, guards, np.array(in_play), 1e-10)
-    assert fired == found.index.tolist()
-    assert t == pytest.approx(found.t[0] if fired else 1.0, rel=1e-9)
+    for each in (guards, at_once):
+        each.start(values(0.0, np.zeros(1)))
+        t, fired = first_crossing(step, each, np.array(in_play), 1e-10)
+        assert fired == found.index.tolist()
+        assert t == pytest.approx(found.t[0] if fired else 1.0, rel=1e-9)
+    state = [[vars(each)[name].tolist() for name in ("sides", "largest", "now", "due")] for each in (guards, at_once)]
+    assert state[0] == state[1]
 
 
 def test_what_has_just_fired_has_to_leave_zero_first():

@@ -49,7 +49,8 @@ class Guards:
 
     A side is 1 or -1; it is 0 for a guard that starts at zero or has just fired, until it has left zero. ``largest`` is
     the largest size of each so far, in proportion to which it is zero; ``now`` are the values that were met last.
-    ``due`` are limits that started at zero or beyond and have not left there: they act where they fall.
+    ``due`` are limits that started at zero or beyond and have not left there: they act where they fall. ``rows`` gives
+    the values at several times at once, a row each, where that is possible.
     """
 
     values: Callable[[float, Array], Array]
@@ -57,6 +58,7 @@ class Guards:
     strict: NDArray[np.bool_]
     limits: NDArray[np.bool_]
     largest: Array
+    rows: Callable[[Array, Array], Array] | None = None
     sides: Array = field(init=False)
     now: Array = field(init=False)
     due: NDArray[np.bool_] = field(init=False)
@@ -120,6 +122,23 @@ class Guards:
             self.now = values[count - 1, -1]
         return count
 
+    def untouched(self, times: Array, step: DenseStep, active: NDArray[np.bool_]) -> bool:
+        """Whether all active ones are seen to stay on their sides at these times of a step, its start first, with no
+        dip between; all have then followed it.
+        """
+        if self.rows is None:
+            return False
+        rows = np.vstack((self.now, self.rows(times[1:], step.rows(times[1:]))))
+        values = np.where(active, rows, 1.0)
+        heights = values * self.sides
+        quiet = bool(np.all(heights > 0.0)) and not np.any(_may_dip(self, times, values))
+        if quiet:
+            largest = np.fmax.accumulate(np.fmax(self.largest, np.abs(values)))
+            changes = np.diff(np.where(self.due, values, 0.0), axis=0)
+            self.due &= np.all(np.abs(changes) <= NOISE * largest[1:], axis=0)
+            self.largest, self.now = largest[-1], values[-1]
+        return quiet
+
 
 def first_crossing(
     step: DenseStep, guards: Guards, active: NDArray[np.bool_], resolution: float
@@ -137,25 +156,29 @@ def first_crossing(
         return lambda t: float(guards.sides[i] * at(t)[i])
 
     def dips(points: Sequence[tuple[float, Array]]) -> dict[int, float]:
-        bottoms = {i: _bottom(one(i), *(t for t, _ in points)) for i in _may_dip(guards, points).tolist()}
+        at_times, values = map(np.array, zip(*points, strict=True))
+        low = np.flatnonzero(_may_dip(guards, at_times, values)).tolist()
+        bottoms = {i: _bottom(one(i), *at_times.tolist()) for i in low}
         return {i: _zero(one(i), points[0][0], x) for i, x in bottoms.items() if guards.crossed(at(x))[i]}
 
-    times = np.unique(np.linspace(step.start, step.end, POINTS + 1)).tolist()  # fewer in a step of few roundings
+    times = np.unique(np.linspace(step.start, step.end, POINTS + 1))  # fewer in a step of few roundings
     if guards.due.any():
         # What begins at zero as a power of time may go either way inside a step, whose end is right.
         soon, late = guards.fallen(at(times[1])), guards.fallen(at(times[-1]))
         if np.any(fallen := np.where(guards.sides != 0.0, soon, late) & active):
             return step.start, np.flatnonzero(fallen).tolist()
-    points = [(times[0], np.where(active, guards.now, 1.0))]
-    for t in times[1:]:
+    if guards.untouched(times, step, active):
+        return step.end, []
+    points = [(step.start, np.where(active, guards.now, 1.0))]
+    for t in times[1:].tolist():
         points.append((t, at(t)))
-        before, now = points[-2][0], points[-1][1]
+        last, now = points[-2][0], points[-1][1]
         zeros = dips(points[-3:]) if len(points) > 2 else {}
-        zeros |= {i: _zero(one(i), before, t) for i in np.flatnonzero(guards.crossed(now) & active).tolist()}
+        zeros |= {i: _zero(one(i), last, t) for i in np.flatnonzero(guards.crossed(now) & active).tolist()}
         if zeros:
             # Another guard may have crossed and come back in the same interval: it is still rising at its end.
             near = t - SQRT_EPS * (step.end - step.start)
-            if before < near < t:
+            if last < near < t:
                 zeros = dips([points[-2], (near, at(near)), points[-1]]) | zeros
             first = min(zeros.values())
             return first, [i for i, zero in sorted(zeros.items()) if zero <= first + resolution]
@@ -171,12 +194,16 @@ def _zero(value: Callable[[float], float], low: float, high: float) -> float:
     return float(brentq(value, low, high, xtol=TINY, rtol=DIGITS, maxiter=HALVINGS))
 
 
-def _may_dip(guards: Guards, points: Sequence[tuple[float, Array]]) -> NDArray[np.intp]:
-    """Guards whose middle value of three is the lowest, by so little above zero that a smooth one may reach it."""
-    (a, at_a), (b, at_b), (c, at_c) = ((t, guards.sides * values) for t, values in points)
-    steepest = np.maximum((at_a - at_b) / (b - a), (at_c - at_b) / (c - b))
+def _may_dip(guards: Guards, times: Array, values: Array) -> NDArray[np.bool_]:
+    """Where the middle one of three values [time, guard] in a row is the lowest, by so little above zero that a smooth
+    guard may reach it: a row for each three.
+    """
+    heights, steps = guards.sides * values, np.diff(times)[:, None]
+    before, middle, after = heights[:-2], heights[1:-1], heights[2:]
+    steepest = np.maximum((before - middle) / steps[:-1], (after - middle) / steps[1:])
     counts = (guards.sides != 0.0) & (guards.sides * guards.directions <= 0.0)
-    return np.flatnonzero(counts & (at_b > 0.0) & (at_b < at_a) & (at_b < at_c) & (at_b <= steepest * (c - a)))
+    lowest = (middle > 0.0) & (middle < before) & (middle < after)
+    return np.asarray(counts & lowest & (middle <= steepest * (steps[:-1] + steps[1:])))
 
 
 def _bottom(value: Callable[[float], float], a: float, b: float, c: float) -> float:

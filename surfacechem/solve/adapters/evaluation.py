@@ -93,8 +93,7 @@ def at_rows(program: Program, parameters: Array, times: Array, y: Array) -> tupl
     number where there are none, their derivatives, rates of the ledger and values of the margins, a row for each.
     """
     n, count = program.n, len(times)
-    rows = np.concatenate((times[:, None], y, np.zeros_like(y), np.tile(parameters, (count, 1))), axis=1)
-    program.filled(rows)
+    rows = program.filled(_inputs(parameters, times, y))
     if program.rates is not None:
         rows[:, 1 + n : 1 + 2 * n] = program.rates(rows)
         found = np.isfinite(rows[:, 1 + n : 1 + 2 * n]).all(axis=1)
@@ -108,6 +107,16 @@ def at_rows(program: Program, parameters: Array, times: Array, y: Array) -> tupl
         function(rows) if function else np.zeros((count, 0)) for function in (program.ledger, program.margins)
     )
     return rows[:, 1 : 1 + n], rows[:, 1 + n : 1 + 2 * n], ledger, margins
+
+
+def margins_at_rows(program: Program, parameters: Array, times: Array, y: Array) -> Array:
+    """Values of margins that read nothing but the state, at many states with the same parameters, a row for each."""
+    assert program.margins is not None
+    return program.margins(_inputs(parameters, times, y))
+
+
+def _inputs(parameters: Array, times: Array, y: Array) -> Array:
+    return np.concatenate((times[:, None], y, np.zeros_like(y), np.tile(parameters, (len(times), 1))), axis=1)
 
 
 class _Code:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem.solve.adapters.dense_step import NODES, WEIGHTS, DenseStep, Guards, first_crossing, gained_at
-from surfacechem.solve.adapters.evaluation import Evaluation, at_rows
+from surfacechem.solve.adapters.evaluation import Evaluation, at_rows, margins_at_rows
 from surfacechem.solve.contract import Array, Counters, Events, Points, Problem, Result, Solver, Status
 from surfacechem.solve.radau import stepper
 from surfacechem.tolerances import NEGLIGIBLE, SQRT_EPS, ULPS
@@ -184,6 +184,10 @@ class _Run:
         self.margins = np.zeros(0)
         self.entropic = np.array(program.groups) == ENTROPY
         self.guards = Guards.of(problem.margins, self._guards, problem.seen)
+        self.plain = program.plain_margins and not program.algebraic_mask.any()
+        """Whether margins read nothing but what a library integrates."""
+        if self.plain:
+            self.guards.rows = lambda times, x: margins_at_rows(program, self.view.parameters, times, x)
         self.in_play = np.array((True,) * program.n_margins if problem.in_play is None else problem.in_play, bool)
         self.outputs: list[Array] = []
         self.events: list[tuple[int, float, Array, Array, Array]] = []
@@ -341,10 +345,8 @@ class _Run:
 
     def _guards(self, t: float, x: Array) -> Array:
         """Margins from the library's variables; without a search for the rest where nothing of it is read."""
-        plain = self.problem.program.plain_margins
-        alone = plain and not len(self.view.algebraic)
-        state = (x, np.zeros_like(x)) if alone else self._state(DenseStep(t, t, lambda _: x), t)
-        self.view.hold(t, *state, whole=not plain)
+        state = (x, np.zeros_like(x)) if self.plain else self._state(DenseStep(t, t, lambda _: x), t)
+        self.view.hold(t, *state, whole=not self.problem.program.plain_margins)
         return self.view.margins()
 
     def _check_first(self, step: DenseStep, reached: float) -> None:
