@@ -20,18 +20,7 @@ from surfacechem.model import components, constraints, ledger, sliding
 from surfacechem.model.build import Build
 from surfacechem.model.checks import refuse_idle_initial_values
 from surfacechem.model.sliding.rate_and_state import stands_for_velocity
-from surfacechem.model.system import (
-    START,
-    Capped,
-    Caution,
-    Conductor,
-    Outside,
-    Pace,
-    Pair,
-    Profile,
-    Range,
-    System,
-)
+from surfacechem.model.system import START, Outside, System
 from surfacechem.quantities import Quantity
 from surfacechem.scene import Scene
 
@@ -176,13 +165,7 @@ def _system(build: Build) -> System:
         ledger=tuple(build.ledger),
         margins=tuple(build.margins),
         roles=build.roles,
-        ranges=build.noted(Range),
-        capped=build.noted(Capped),
-        pairs=build.noted(Pair),
-        paces=build.noted(Pace),
-        cautions=build.noted(Caution),
-        profiles=build.noted(Profile),
-        conductors=build.noted(Conductor),
+        notes=tuple(build.notes),
         conductances=build.conductances,
         regime=ledger.regime(build),
         breakpoints=build.breakpoints,

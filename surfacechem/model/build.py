@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, TypeVar
+from typing import Any
 
 import symengine
 
@@ -18,14 +18,9 @@ from surfacechem.model.balances import Node, Power, Rows
 from surfacechem.model.parts import NO_ENERGY, NO_NODES, Bond, Energy, HeatPath, Thermal
 from surfacechem.model.system import (
     Account,
-    Capped,
-    Caution,
-    Conductor,
     Margin,
     Named,
-    Pace,
-    Pair,
-    Profile,
+    Note,
     Range,
     Role,
     State,
@@ -35,8 +30,6 @@ from surfacechem.quantities import Quantity
 from surfacechem.scene import Interface, Scene
 from surfacechem.tolerances import NOTHING
 from surfacechem.tolerances import ROUNDING as DIGITS
-
-N = TypeVar("N")
 
 MANY = range(2, 1000)
 
@@ -74,7 +67,6 @@ class Motion:
     """Rates of the gaps that move by a balance."""
 
 
-Note = Range | Capped | Pair | Pace | Caution | Profile | Conductor
 Record = Thermal | Bond | Energy | HeatPath | State | Account | Margin | Constraint | Equilibrium | Power | Note | str
 """What components state; a string is a warning."""
 
@@ -113,7 +105,6 @@ class Build:
     """What has its equilibrium at all times, as it was stated."""
     motion: Motion = field(default_factory=Motion)
     notes: list[Note] = field(default_factory=list)
-    """What is watched along a run, and told where it matters; no equation depends on it."""
     warnings: list[str] = field(default_factory=list)
     used_names: set[str] = field(default_factory=set)
 
@@ -183,10 +174,6 @@ class Build:
     def constant(self, name: str, path: str, spec: Spec, value: float, *, internal: bool = False) -> Expression:
         """A scene-level number as a run-time parameter."""
         return self.parameters.constant(name, path, spec, value, internal)
-
-    def noted(self, kind: type[N]) -> tuple[N, ...]:
-        """The notes of one kind."""
-        return tuple(note for note in self.notes if isinstance(note, kind))
 
     def bound(self, law: Friction) -> Friction:
         """A friction law with its parameters as symbols, made once."""

@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from pickle import PicklingError
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import symengine
@@ -282,6 +282,11 @@ class Conductor:
     """Of all paths at the contact [W/(m^2 K)]; None in perfect contact."""
 
 
+Note = Range | Capped | Pair | Pace | Caution | Profile | Conductor
+
+N = TypeVar("N", bound=Note)
+
+
 @dataclass(frozen=True)
 class System:
     """States, equations and everything that is read off them.
@@ -298,8 +303,6 @@ class System:
     ledger: tuple[Account, ...]
     margins: tuple[Margin, ...]
     roles: tuple[Role, ...]
-    ranges: tuple[Range, ...]
-    capped: tuple[Capped, ...]
     regime: str
     breakpoints: tuple[float, ...]
     warnings: tuple[str, ...] = ()
@@ -318,12 +321,8 @@ class System:
     pulls: Mapping[str, tuple[Expression, ...]] = field(default_factory=dict)
     """Stiffness [Pa/m], displacement [m] and traction [Pa] of the far field, and the gap [m], by the account of the
     work."""
-    pairs: tuple[Pair, ...] = ()
-    paces: tuple[Pace, ...] = ()
-    cautions: tuple[Caution, ...] = ()
-    profiles: tuple[Profile, ...] = ()
-    """Temperatures across bodies; their states stand behind all others, profile after profile."""
-    conductors: tuple[Conductor, ...] = ()
+    notes: tuple[Note, ...] = ()
+    """What is watched along a run, and told where it matters; no equation depends on it."""
     conductances: Mapping[tuple[str, str], Sequence[Expression]] = field(default_factory=dict)
     """Conductances in parallel between two ends [W/(m^2 K)]."""
     outside: Outside | None = None
@@ -352,6 +351,15 @@ class System:
     def expand(self, expression: Expression) -> Expression:
         """The expression in t, states, derivatives and parameters only."""
         return without(expression, self.definitions)
+
+    def noted(self, kind: type[N]) -> tuple[N, ...]:
+        """The notes of one kind."""
+        return tuple(note for note in self.notes if isinstance(note, kind))
+
+    @cached_property
+    def profiles(self) -> tuple[Profile, ...]:
+        """Temperatures across bodies; their states stand behind all others, profile after profile."""
+        return self.noted(Profile)
 
     def unit(self, unit: str) -> str:
         """A unit per area, or that of the same for a pair of bodies."""

@@ -20,7 +20,7 @@ import symengine
 from numpy.typing import NDArray
 
 from surfacechem.expressions import EXPONENT_CAP
-from surfacechem.model.system import System
+from surfacechem.model.system import Capped, Caution, Pair, Range, System
 from surfacechem.results.accuracy import Accuracy
 from surfacechem.results.audit import Audit, largest
 from surfacechem.solve.run import Trajectory
@@ -80,7 +80,7 @@ def said(low: float, high: float) -> str:
 def verdicts(trajectory: Trajectory, audit: Audit) -> tuple[Verdict, ...]:
     """The verdict on each pair of rates, over all outputs and steps."""
     found = []
-    for pair in trajectory.model.system.pairs:
+    for pair in trajectory.model.system.noted(Pair):
         values = trajectory.everywhere[pair.departure]
         if len(values):  # a run that ends at its start has none
             low, high = float(np.min(values)), float(np.max(values))
@@ -91,7 +91,7 @@ def verdicts(trajectory: Trajectory, audit: Audit) -> tuple[Verdict, ...]:
 def findings(trajectory: Trajectory, accuracy: Accuracy | None) -> list[str]:
     """Everything but the verdicts, in words."""
     system, rows = trajectory.model.system, np.empty((0, 0))
-    if system.capped or system.cautions:  # arguments of compiled functions at the outputs and steps
+    if [*system.noted(Capped), *system.noted(Caution)]:  # arguments of compiled functions at the outputs and steps
         model, result, steps = trajectory.model, trajectory.result, trajectory.result.steps
         rows = model.inputs(result, result.times, result.outputs, trajectory.rates, result.segment)
         if steps is not None:
@@ -108,7 +108,7 @@ def findings(trajectory: Trajectory, accuracy: Accuracy | None) -> list[str]:
 def _capped_rates(system: System, rows: NDArray[np.float64]) -> list[str]:
     """Laws whose rate was beyond exp(EXPONENT_CAP) at one of several states."""
     found = []
-    for law in system.capped if len(rows) else ():
+    for law in system.noted(Capped) if len(rows) else ():
         # Interpreted, since they are needed once.
         exponents = [system.expand(expression) for expression in law.exponents]
         values = symengine.Lambdify(system.inputs, exponents, backend="lambda")(rows)
@@ -123,12 +123,13 @@ def _capped_rates(system: System, rows: NDArray[np.float64]) -> list[str]:
 
 def cautioned(system: System, rows: NDArray[np.float64]) -> list[str]:
     """The cautions that apply at one of several states, which are the arguments of compiled functions."""
-    if not (system.cautions and len(rows)):
+    cautions = system.noted(Caution)
+    if not (cautions and len(rows)):
         return []
-    expressions = [system.expand(item.expression) for item in system.cautions]
+    expressions = [system.expand(item.expression) for item in cautions]
     values = symengine.Lambdify(system.inputs, expressions, backend="lambda")(rows).reshape(len(rows), -1)
     least, size = np.nanmin(values, axis=0), np.nanmax(np.abs(values), axis=0)
-    return [item.text for item, x in zip(system.cautions, least < -ROUNDING * size, strict=True) if x]
+    return [item.text for item, x in zip(cautions, least < -ROUNDING * size, strict=True) if x]
 
 
 def _inaccurate(trajectory: Trajectory, found: Accuracy | None) -> list[str]:
@@ -158,7 +159,7 @@ def _lost_fluxes(trajectory: Trajectory) -> list[str]:
 def _extrapolations(trajectory: Trajectory) -> list[str]:
     """Laws that the run has used outside their range."""
     found = []
-    for limit in trajectory.model.system.ranges:
+    for limit in trajectory.model.system.noted(Range):
         values = trajectory.everywhere[limit.variable]
         low, high = float(np.min(values, initial=math.inf)), float(np.max(values, initial=-math.inf))
         rounding = ROUNDING * max(abs(low), abs(high))

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from surfacechem.compile.program import compile_function
 from surfacechem.contracts import grids
-from surfacechem.model.system import System
+from surfacechem.model.system import Conductor, System
 from surfacechem.results.accuracy import MARGIN, UNKNOWN, Accuracy, CellErrors
 from surfacechem.results.error_estimates import EVENTS, apart
 from surfacechem.results.findings import WITHIN
@@ -169,7 +169,7 @@ def layers(system: System, points: Sequence[Mapping[str, float]], times: Sequenc
     """
     paths = {p.symbol: p.path for p in system.parameters} | {s.symbol: s.path for s in system.states}
     found = {}
-    for conductor in system.conductors:
+    for conductor in system.noted(Conductor):
         slow = system.expand(conductor.resistance * conductor.capacity).subs({system.t: 0.0})
         symbols = [symbol for symbol in slow.free_symbols if symbol in paths]
         table = np.array([[point[paths[symbol]] for symbol in symbols] for point in points]).reshape(len(points), -1)

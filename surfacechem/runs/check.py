@@ -14,7 +14,7 @@ from surfacechem.contracts.terms import Law, Varying
 from surfacechem.expressions import Expression
 from surfacechem.model.automaton import INTERFACE
 from surfacechem.model.checks import conductance_warnings
-from surfacechem.model.system import System
+from surfacechem.model.system import Conductor, System
 from surfacechem.quantities import BOLTZMANN, GAS_CONSTANT
 from surfacechem.results.findings import cautioned
 from surfacechem.scene import Scene
@@ -207,7 +207,7 @@ def warnings(system: System) -> list[str]:
 def _evaluated(system: System) -> list[Expression]:
     """What a run evaluates beside the equations."""
     formulas = [*[a.rate for a in system.ledger], *[m.masked for m in system.margins]]
-    formulas += [*[i.expression for i in system.outputs], *[c.resistance for c in system.conductors]]
+    formulas += [*[i.expression for i in system.outputs], *[c.resistance for c in system.noted(Conductor)]]
     formulas += [x for item in system.edges for x in (item.masked, *item.modes.values(), *item.reset.values())]
     return [*formulas, *_heat_shares(system)]
 
@@ -309,7 +309,7 @@ def slowest(biot: float) -> float:
 def lumpings(system: System, start: Start, end: float) -> list[Lumping]:
     """The numbers of the bodies that say how they conduct, at the start."""
     found = []
-    for c in system.conductors:
+    for c in system.noted(Conductor):
         expressions = [system.expand(item) for item in (c.resistance, c.capacity, c.conductance or 0)]
         resistance, capacity, h = compile_function(system.inputs, expressions)(start.inputs).tolist()
         biot = h * resistance if c.conductance is not None else math.inf

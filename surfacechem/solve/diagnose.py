@@ -21,7 +21,7 @@ FEW, SHARP = 100.0, ROUNDING
 def paces(system: System, values: Mapping[str, float]) -> list[tuple[Pace, float]]:
     """Times in which the gaps move by themselves [s], the shortest first."""
     point = {parameter.symbol: values[parameter.path] for parameter in system.parameters}
-    found = [(pace, float(system.expand(pace.time).subs(point))) for pace in system.paces]
+    found = [(pace, float(system.expand(pace.time).subs(point))) for pace in system.noted(Pace)]
     return sorted(found, key=lambda item: item[1])
 
 
