@@ -141,10 +141,6 @@ class Edge:
         return masked(self.guard, self.when)
 
 
-def _nothing(edge: Edge) -> Mapping[Any, Expression]:
-    return {}
-
-
 @dataclass(frozen=True)
 class Constraint:
     """An inclusion as automaton and balances see it; stated in parts, a mode before the edges that change it."""
@@ -159,7 +155,7 @@ class Constraint:
     """What it bears while it holds [Pa]."""
     at_once: bool = False
     """Whether its edges come before those of others that are due at the same moment."""
-    beside: Callable[[Edge], Mapping[Any, Expression]] = _nothing
+    beside: Callable[[Edge], Mapping[Any, Expression]] = lambda edge: {}
     """New values of its modes and registers along an edge of another constraint."""
 
 
