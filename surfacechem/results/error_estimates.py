@@ -73,7 +73,9 @@ def accuracy(
     unused = ""
     if exact is not None and way != "estimate":
         try:
-            return replace(against_exact(trajectory, scene, *exact), asked=estimate.asked if estimate else None)
+            known = {EVENTS: estimate.variables[EVENTS]} if estimate and EVENTS in estimate.variables else None
+            found = against_exact(trajectory, scene, *exact, late=known)
+            return replace(found, asked=estimate.asked if estimate else None)
         except InputError as error:
             unused = f"; the exact solution {exact[0]} is not of this scene: {error.message}"
     estimate = with_cells(estimate or against_tighter(trajectory), cells())
@@ -101,9 +103,10 @@ def against_exact(
     name: str,
     options: Mapping[str, float],
     second: Trajectory | None = None,
+    late: Mapping[str, float] | None = None,
 ) -> Accuracy:
     """Largest errors where the run is looked at, and those of the times of events, which a second run tells; it is
-    made where it is needed and none is given.
+    made where it is needed, none is given, and it is not known how ``late`` events are.
 
     InputError where the exact solution is another scene's.
     """
@@ -111,12 +114,11 @@ def against_exact(
 
     # How well cells resolve what has just begun is told at the times that are asked for.
     seen = trajectory if trajectory.model.system.profiles else fewer(trajectory.looked)
-    late: dict[str, float] = {}
     # Exact solutions have no events to compare with: the times of these come from a second run.
-    if found := event_times(trajectory):
-        second = second or _second(trajectory)
-        if not difference(found, event_times(second)):
-            late = event_errors(found, event_times(second), trajectory.run.times[-1])
+    if late is None and (found := event_times(trajectory)):
+        expected = event_times(second or _second(trajectory))
+        late = {} if difference(found, expected) else event_errors(found, expected, trajectory.run.times[-1])
+    late = dict(late or {})
     exact = exact_values(name, options, scene, seen, to_the_end=True, side=max([SIDE, *late.values()]))
     alike = _off_events(seen, max(late.values(), default=0.0))
     for values in exact.values():  # where a solution ends with an infinite slope its last moment has none
