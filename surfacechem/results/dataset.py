@@ -17,7 +17,7 @@ from surfacechem.model.system import Profile, System
 from surfacechem.quantities import Quantity
 from surfacechem.results.netcdf import CONVENTIONS, TABLES, Column, dataset_path, package_version, save, save_table
 from surfacechem.solve.contract import Array
-from surfacechem.solve.run import Run, Trajectory
+from surfacechem.solve.run import Trajectory
 
 if TYPE_CHECKING:
     import xarray
@@ -125,13 +125,13 @@ class Results(ABC):
     def attributes(self) -> Mapping[str, str | float | int]:
         """Global attributes: scalars and strings only."""
 
-    def _origin(self, run: Run) -> dict[str, str | float | int]:
-        """Attributes that say where the dataset is from."""
+    def _origin(self, made: str, how: str) -> dict[str, str | float | int]:
+        """Attributes that say where the dataset is from; it is ``made``, or evaluated."""
         return {
             "Conventions": CONVENTIONS,
             "title": self.title,
             "source": self.source or "surfacechem",
-            "history": f"made by surfacechem {package_version('surfacechem')} with {run.solver} at rtol {run.rtol:g}",
+            "history": f"{made} by surfacechem {package_version('surfacechem')} {how}",
             "case": self.case,
             **({"mechanism": self.mechanism} if self.mechanism else {}),
         }

@@ -14,7 +14,6 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from surfacechem.contracts.terms import Law
 from surfacechem.errors import InputError, Place, suggestion
@@ -24,7 +23,7 @@ from surfacechem.results.dataset import profile_values
 from surfacechem.results.event_table import KINK, SIDE, event_times
 from surfacechem.scene import Scene
 from surfacechem.solve.choice import method
-from surfacechem.solve.contract import Array, Problem
+from surfacechem.solve.contract import Array, Mask, Problem
 from surfacechem.solve.run import Run, Trajectory
 from surfacechem.tolerances import BRIEF, EPS, FLOOR, TIGHTEST
 
@@ -141,7 +140,7 @@ def exact_outputs(
     return partial(exact_values, *exact, scene, to_the_end=True, side=side)
 
 
-def _off_events(trajectory: Trajectory, late: float) -> NDArray[np.bool_]:
+def _off_events(trajectory: Trajectory, late: float) -> Mask:
     """Which outputs are no moments beside a jump or the end of what physics stopped, whose times may err by this part
     of them: there the side on which an exact solution is, and its slope, are those of a time.
     """
@@ -261,14 +260,18 @@ def _at_same_places(a: Array, b: Array, x_a: Sequence[float], x_b: Sequence[floa
     return (CubicSpline(x_a, a, axis=1)(x_b), b) if len(x_a) > len(x_b) else (a, CubicSpline(x_b, b, axis=1)(x_a))
 
 
-def beside_jumps(times: Array, first: Trajectory, second: Trajectory) -> NDArray[np.bool_]:
+def beside_jumps(times: Array, first: Trajectory, second: Trajectory) -> Mask:
     """At which times two runs with the same events have made the same jumps; those of the events are compared apart.
 
     One of them may have made another at the end, where rounding decides whether it still happens.
     """
     both = min(len(first.jumps), len(second.jumps))
     pairs = [(one.t, other.t) for one, other in zip(first.jumps[:both], second.jumps[:both], strict=True)]
-    pairs += [(jump.t, jump.t) for jump in (*first.jumps[both:], *second.jumps[both:])]
+    return clear_of(times, pairs + [(jump.t, jump.t) for jump in (*first.jumps[both:], *second.jumps[both:])])
+
+
+def clear_of(times: Array, pairs: Sequence[tuple[float, float]]) -> Mask:
+    """Which times lie between none of these pairs, the times at which two runs have the same event."""
     ways = np.array(pairs).reshape(-1, 2)
     early, late = ways.min(axis=1) * (1 - SIDE), ways.max(axis=1) * (1 + SIDE)
     return np.asarray(np.all((times[:, None] < early) | (times[:, None] > late), axis=1))

@@ -147,7 +147,7 @@ class Solution(Results):
             error = {"error": float(found.error), "error_source": found.source}
             error |= {} if found.asked is None else {"error_asked": float(found.asked)}
         return {
-            **self._origin(run),
+            **self._origin("made", f"with {run.solver} at rtol {run.rtol:g}"),
             **self._departures(),
             "status": self.status,
             "reason": self.reason,

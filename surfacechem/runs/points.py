@@ -30,7 +30,7 @@ from surfacechem.model.assemble import assemble
 from surfacechem.model.system import Named, System
 from surfacechem.quantities import Quantity
 from surfacechem.results.dataset import DATASET_NAMES, Results
-from surfacechem.results.netcdf import CONVENTIONS, Column, package_version, versions
+from surfacechem.results.netcdf import Column, versions
 from surfacechem.scene import Scene
 from surfacechem.solve.contract import Array
 from surfacechem.solve.run import values_of
@@ -76,10 +76,7 @@ class PointResults(Results):
     @property
     def attributes(self) -> Mapping[str, str | float | int]:
         """Where the dataset is from."""
-        history = f"evaluated by surfacechem {package_version('surfacechem')} at {len(self.refused)} points"
-        mechanism = {"mechanism": self.mechanism} if self.mechanism else {}
-        origin = {"Conventions": CONVENTIONS, "title": self.title, "source": self.source or "surfacechem"}
-        return {**origin, "history": history, "case": self.case, **mechanism, "versions": versions()}
+        return {**self._origin("evaluated", f"at {len(self.refused)} points"), "versions": versions()}
 
 
 def held(scene: Scene) -> Scene:

@@ -401,7 +401,7 @@ class SweepSolution(Results):
             error = {"error": worst, "error_source": self.accuracy.source}
         departures = {"departures": json.dumps({"changes": dict(self.changes)})} if self.changes else {}
         return {
-            **self._origin(self.run),
+            **self._origin("made", f"with {self.run.solver} at rtol {self.run.rtol:g}"),
             "sweep": self.plan.record,
             **departures,
             "status": self.status,

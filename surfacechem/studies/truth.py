@@ -16,13 +16,12 @@ from dataclasses import dataclass, field, replace
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from surfacechem.errors import InputError
 from surfacechem.format import Case
 from surfacechem.results.accuracy import errors_over_time
-from surfacechem.results.error_estimates import computed, difference, event_errors, fewer, floors, sizes
-from surfacechem.results.event_table import SIDE, event_times
+from surfacechem.results.error_estimates import clear_of, computed, difference, event_errors, fewer, floors, sizes
+from surfacechem.results.event_table import event_times
 from surfacechem.results.matching import exact_values
 from surfacechem.solve import ASKING, solver
 from surfacechem.solve.contract import Array
@@ -165,7 +164,10 @@ class Truth:
 
     def errors(self, values: Values, events: Values) -> Errors:
         """Errors of values and of times of events, over the output times that both have reached."""
-        alike = self._beside_events(events)
+        # Where a run has not had the same events as this its error is that of a time.
+        both = [(events.get(name, ()), times) for name, times in self.events.items()]
+        pairs = [pair for found, times in both if len(found) == len(times) for pair in zip(found, times, strict=True)]
+        alike = clear_of(self.times, pairs)
         found = {
             name: np.where(alike[: len(error)], error, 0.0)
             for name, error in errors_over_time(values, self.values, self.floors).items()
@@ -178,15 +180,6 @@ class Truth:
                 "event": dict(zip([""], event_errors(events, self.events, self.end).values(), strict=False)),
             }
         )
-
-    def _beside_events(self, events: Values) -> NDArray[np.bool_]:
-        """At which times a run with these events has had the same as this: where it has not, its error is of a time."""
-        both = [(events.get(name, ()), times) for name, times in self.events.items()]
-        ways = np.concatenate(
-            [np.array(pair) for pair in both if len(pair[0]) == len(pair[1])] or [np.empty((2, 0))], 1
-        )
-        early, late = ways.min(axis=0) * (1 - SIDE), ways.max(axis=0) * (1 + SIDE)
-        return np.asarray(np.all((self.times[:, None] < early) | (self.times[:, None] > late), axis=1))
 
     def objection(self, trajectory: Trajectory) -> str:
         """The reason for which a run has no errors: it failed, or came to another end; empty where it has."""
