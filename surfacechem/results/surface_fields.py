@@ -75,12 +75,12 @@ def _totals(surface: CurvedSurfaces, approaches: Array, stretches: Array) -> lis
 def _fields(surface: CurvedSurfaces, approaches: Array, stretches: Array) -> Sequence[Column]:
     """Gap and traction over points of body 1, which gather where body 2 is nearest."""
     from surfacechem.surfaces.pairwise import length
-    from surfacechem.surfaces.patches import outer_patches
+    from surfacechem.surfaces.patches import Budget, outer_patches
     from surfacechem.surfaces.projection import FIRST, POLE
 
     lower, upper = surface.surfaces(float(approaches.min()))
     size = length(lower, upper)
-    patches, _ = outer_patches(lower, upper, size, size)
+    patches, _ = outer_patches(lower, upper, size, size, Budget(surface.accuracy))
     lower = patches.surface
     counts = [ALONG, AROUND] if patches.alike[1] else [ACROSS, ACROSS]
     at = np.stack(np.meshgrid(*map(patches.line, (0, 1), counts), indexing="ij"), axis=-1)

@@ -18,7 +18,7 @@ from surfacechem.errors import InputError
 from surfacechem.surfaces.inner_sums import kernel
 from surfacechem.surfaces.level_cuts import with_levels
 from surfacechem.surfaces.pairwise import check_finite, length
-from surfacechem.surfaces.patches import Budget, Integrand, Patches, Rules, integral, outer_patches
+from surfacechem.surfaces.patches import Budget, Patches, Rules, integral, outer_patches
 from surfacechem.surfaces.projection import FIRST, Array, Projection, Surface, cross
 from surfacechem.surfaces.shapes import Plane
 from surfacechem.tolerances import EPS, NEGLIGIBLE, NOISE, PRECISE, TINY
@@ -164,12 +164,12 @@ def over_gap(
     accuracy is out of reach, or takes more than a ``budget`` that is that of other integrals, too.
     """
     check_finite(lower, upper)
-    size = length(lower, upper)
-    patches, near = outer_patches(lower, upper, size, size * FAR)
+    size, budget = length(lower, upper), budget or Budget(rtol)
+    patches, near = outer_patches(lower, upper, size, size * FAR, budget)
     patches = with_levels(patches, upper, levels, NOISE * size, rtol)
 
     def integrand(x: Array, level: int) -> tuple[Array, int]:
-        return counts_at(x, upper.nearest(x), laws, heat), len(x) * upper.search
+        return counts_at(x, upper.nearest(x), laws, heat), len(x)
 
     def sizes(found: Array) -> Array:
         force, moment = (float(np.linalg.norm(found[k])) for k in (slice(1, 4), slice(7, 10)))
@@ -183,16 +183,15 @@ def over_gap(
         flow = max(abs(found[14]), TINY)
         return np.array([*parts, area, flow, max(abs(found[15]), flow / size)])
 
-    budget = budget or Budget(rtol)
-    whole, error, _ = integral(patches, integrand, sizes, rtol, budget, nested=False)
-    _check_end(patches, integrand, sizes(whole), budget)
+    whole, error, _ = integral(patches, integrand, upper.search, sizes, rtol, budget, nested=False)
+    _check_end(patches, Rules(integrand, upper.search, budget), sizes(whole))
     force_1, force_2, moment_1, moment_2 = np.split(whole[1:13], 4)
     energy, area, conductance, slope = map(float, whole[[0, 13, 14, 15]])
     gap = float(near.gap[0])
     return Contact(energy, force_1, force_2, moment_1, moment_2, area, conductance, slope, gap, near.count, error)
 
 
-def _check_end(patches: Patches, integrand: Integrand, sizes: Array, budget: Budget) -> None:
+def _check_end(patches: Patches, rules: Rules, sizes: Array) -> None:
     """InputError where what is integrated over an endless surface does not fall off on the way to its far end."""
     low, high = np.isinf(np.transpose(patches.surface.shape.span))
     last = (high & (patches.high == patches.high.max(axis=0))) | (low & (patches.low == patches.low.min(axis=0)))
@@ -200,7 +199,7 @@ def _check_end(patches: Patches, integrand: Integrand, sizes: Array, budget: Bud
         return
     ends = patches[last.any(axis=1)]
     none = np.zeros(len(ends), dtype=int)
-    share = np.abs(Rules(integrand, budget)(ends, none, none).sum(axis=0) / sizes)
+    share = np.abs(rules(ends, none, none).sum(axis=0) / sizes)
     # Energies may count from anywhere; a force or a conductance that has no end is none.
     for name, part in (("force", share[1:7]), ("conductance", share[14:15])):
         if part.max() > NEGLIGIBLE:

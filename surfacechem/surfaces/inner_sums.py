@@ -96,7 +96,7 @@ def inner_sums(
     if not np.all(near.gap > 0):
         raise InputError("the surfaces overlap; a law of pairs of points holds outside only.")
     found: dict[int, Sums] = {}
-    pairs = surface.search * len(x)
+    pairs = len(x)
     for extent, which in extents(laws).items():
         sums, more = _sums_of(surface, x, near, [laws[k] for k in which], extent, level, rtol)
         found |= dict(zip(which, sums, strict=True))

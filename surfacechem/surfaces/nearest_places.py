@@ -23,8 +23,8 @@ COARSE, PER_GRAIN = 32, 4
 MOST_PLACES = 5_000_000
 """Places of the finest grid, at most."""
 
-TOGETHER = 100_000
-"""Places that are looked at together."""
+TOGETHER, ANY = 100_000, 200
+"""Places that are looked at together, and those that take as long as any, however few they are."""
 
 
 STEEPEST = math.atan(1e3)
@@ -47,13 +47,19 @@ class NearPlaces:
 
 
 def near_places(
-    outer: Surface, inner: Surface, size: float, alike: tuple[bool, bool], grain: float = math.inf
+    outer: Surface,
+    inner: Surface,
+    size: float,
+    alike: tuple[bool, bool],
+    grain: float = math.inf,
+    take: Callable[[int], None] = lambda _: None,
 ) -> NearPlaces:
     """Places of one surface that are nearer to the other than those around them.
 
     Where a surface has no end they are sought near the origin, within ``size`` [m] and as much farther as one that is
-    turned is nearest to what rises like a square. Those that are farther than the
-    nearest by more than a grain count for nothing of their own. InputError where there are too many to look at.
+    turned is nearest to what rises like a square. Those that are farther than the nearest by more than a grain count
+    for nothing of their own. InputError where there are too many to look at; ``take`` is told before how many points
+    take as long as what is looked at.
     """
     sought = size * (1 + math.tan(min(abs(outer.shape.tilt) + abs(inner.shape.tilt), STEEPEST)))
     low, high = np.nan_to_num(np.transpose(outer.shape.span), posinf=sought, neginf=-sought)
@@ -69,16 +75,20 @@ def near_places(
         at = low + (high - low) * np.where(alike, 0.5, nodes / steps)
         return np.asarray(np.maximum(at, [POLE, -np.inf]) if outer.shape.about_axis and low[0] == 0 else at)
 
-    gaps = _near_grid(lambda nodes: _gaps(outer, inner, parameters(nodes)), steps, halvings, extents, wide)
+    def gap(at: Array) -> Array:
+        take((len(at) + ANY) * inner.search)
+        parts = np.array_split(at, math.ceil(len(at) / TOGETHER))
+        return np.concatenate([inner.nearest(outer.derivatives(part, FIRST)[0]).gap for part in parts])
+
+    gaps = _near_grid(lambda nodes: gap(parameters(nodes)), steps, halvings, extents, wide)
     chosen = _lowest(gaps, outer.shape.closed, NOISE * size)
     chosen = chosen[gaps[tuple(chosen.T)] <= gaps.min() + wide]
     if outer.shape.about_axis and low[0] == 0 and not alike[1] and np.any(chosen[:, 0] == 0):
         # At a pole no direction leads anywhere: the search begins beside it, where the gap is least.
         chosen = np.concatenate([chosen, [[1, int(np.argmin(gaps[1]))]]])
-    at = _settled(
-        outer, inner, parameters(chosen), np.where(alike, 0.0, (high - low) / steps), extents.max(), NOISE * size
-    )
-    return _distinct(outer, at, _gaps(outer, inner, at), SQRT_EPS * extents.max())
+    apart = np.where(alike, 0.0, (high - low) / steps)
+    at = _settled(outer, inner, gap, parameters(chosen), apart, extents.max(), NOISE * size)
+    return _distinct(outer, at, gap(at), SQRT_EPS * extents.max())
 
 
 def _near_grid(gap: Callable[[Indices], Array], steps: Indices, halvings: int, extents: Array, wide: float) -> Array:
@@ -113,12 +123,6 @@ def _extents(outer: Surface, low: Array, high: Array) -> Array:
     return np.asarray(np.linalg.norm(tangents, axis=-1).max(axis=(1, 2)) * (high - low))
 
 
-def _gaps(outer: Surface, inner: Surface, at: Array) -> Array:
-    """Gaps at parameters (n, 2)."""
-    parts = np.array_split(at, math.ceil(len(at) / TOGETHER))
-    return np.concatenate([inner.nearest(outer.derivatives(part, FIRST)[0]).gap for part in parts])
-
-
 def _lowest(gaps: Array, closed: tuple[bool, bool], noise: float) -> Indices:
     """Indices (n, 2) of places of a grid that no neighbour is nearer than; one of those alike and side by side."""
     from scipy.ndimage import label, minimum_filter, minimum_position
@@ -131,7 +135,9 @@ def _lowest(gaps: Array, closed: tuple[bool, bool], noise: float) -> Indices:
     return np.array(found, dtype=int)
 
 
-def _settled(outer: Surface, inner: Surface, at: Array, steps: Array, long: float, noise: float) -> Array:
+def _settled(
+    outer: Surface, inner: Surface, gap: Callable[[Array], Array], at: Array, steps: Array, long: float, noise: float
+) -> Array:
     """The places of least gap near some, no step longer than that of the grid, over a ``long`` surface [m]."""
     low, high = np.transpose(outer.shape.span)
     low = np.where(outer.shape.closed, -np.inf, low) + (POLE if outer.shape.about_axis else 0.0)
@@ -161,26 +167,26 @@ def _settled(outer: Surface, inner: Surface, at: Array, steps: Array, long: floa
         hessian = long * uu, long * (uv + vu) / 2, long * vv
         return np.clip(newton_step(long * first, hessian, (E, F, G), at <= low, at >= high), -steps, steps)
 
-    found = descended(at, low, high, lambda at, _: _gaps(outer, inner, at), step, noise)
-    nearest = [np.argmin(_gaps(outer, inner, found))]
+    found = descended(at, low, high, lambda at, _: gap(at), step, noise, SAME)
+    nearest = [np.argmin(gap(found))]
     first, here = slope(found[nearest])[0], found[nearest]
     first[((here <= low) & (first > 0)) | ((here >= high) & (first < 0))] = 0.0
     # Along an edge of the other surface, where the gap bends or jumps, there may be no rest for Newton's method.
     if np.abs(first * steps).max() > SQRT_EPS * long:
-        found[nearest] = _rolled(outer, inner, here[0], steps, np.array([low, high]), noise)
+        found[nearest] = _rolled(gap, here[0], steps, np.array([low, high]))
     return found
 
 
-def _rolled(outer: Surface, inner: Surface, at: Array, steps: Array, bounds: Array, noise: float) -> Array:
+def _rolled(gap: Callable[[Array], Array], at: Array, steps: Array, bounds: Array) -> Array:
     """The place (2,) of least gap near one by the method of Nelder and Mead, which needs no slope."""
     from scipy.optimize import minimize
 
-    def gap(at: Array) -> float:
-        return float(_gaps(outer, inner, at[None])[0])
+    def value(at: Array) -> float:
+        return float(gap(at[None])[0])
 
     corners = at + np.diag(np.where(at + steps > bounds[1], -steps, steps))
     options: Any = {"initial_simplex": [at, *corners], "xatol": SQRT_EPS * steps.max(), "fatol": SAME * steps.max()}
-    found = minimize(gap, list(at), method="Nelder-Mead", bounds=list(bounds.T), options=options)
+    found = minimize(value, list(at), method="Nelder-Mead", bounds=list(bounds.T), options=options)
     return np.asarray(found.x)
 
 

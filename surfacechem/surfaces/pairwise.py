@@ -83,8 +83,8 @@ def interaction(
     swapped = is_round(lower.shape) and (not is_round(upper.shape) or isinstance(lower.shape, Plane))
     swapped |= not is_round(upper.shape) and lower.shape.grain > upper.shape.grain
     outer, inner = (upper, lower) if swapped else (lower, upper)
-    found_extents = list(extents(laws))
-    patches, near = _cut_patches(outer, inner, found_extents, rtol)
+    found_extents, budget = list(extents(laws)), budget or Budget(rtol)
+    patches, near = _cut_patches(outer, inner, found_extents, rtol, budget)
     gap = float(near.gap[0])
     rounded = _rounded(outer.derivatives(near.at[0], FIRST)[0], gap, found_extents, rtol)
     amounts = np.array([law.n_1 * law.n_2 for law in laws])[:, None]
@@ -99,18 +99,20 @@ def interaction(
     # Next to the end of a law the energy is its force times the distance to that.
     arms = np.array([min(gap, law.cutoff - gap) if law.cutoff > gap else gap for law in laws])[:, None]
     found, error, pairs = integral(
-        patches, integrand, lambda found: _sizes(found, gap, arms), left, budget or Budget(rtol)
+        patches, integrand, inner.search, lambda found: _sizes(found, gap, arms), left, budget
     )
     # Each pair of points has opposite forces on the line through both, and no moment.
     _, force, moment = np.split(-found if swapped else found, [1, 4], axis=-1)
     return PairForces(found[:, 0], force, -force, moment, -moment, error + rounded, gap, near.count, pairs)
 
 
-def _cut_patches(outer: Surface, inner: Surface, found: Sequence[Extent], rtol: float) -> tuple[Patches, NearPlaces]:
+def _cut_patches(
+    outer: Surface, inner: Surface, found: Sequence[Extent], rtol: float, budget: Budget
+) -> tuple[Patches, NearPlaces]:
     """Patches of the outer surface, cut where sums over the inner one bend, and where the surfaces are nearest."""
     size = length(outer, inner)
     reach = max(_reach(outer, inner, extent, rtol) for extent in found)
-    patches, near = outer_patches(outer, inner, size, reach)
+    patches, near = outer_patches(outer, inner, size, reach, budget)
     gap = float(near.gap[0])
     if not gap > NOISE * size:
         text = f"the surfaces overlap or touch, their gap is {gap:.3g} m; a law of pairs of points holds outside only"

@@ -43,8 +43,8 @@ WORTH = 8
 since there were as many times fewer.
 """
 
-FIRST_FEW = 3
-"""Integrals of an approach that tell what all of them take: the nearest, and others that are farther."""
+FIRST_FEW = 2
+"""Integrals of an approach that tell what all of them take: the nearest, and one that is farther."""
 
 TOGETHER = 400_000
 """Pairs of points that are looked at together."""
@@ -56,7 +56,7 @@ Levels = NDArray[np.int_]
 """Which of the orders each patch has."""
 
 Integrand = Callable[[Array, int], tuple[Array, int]]
-"""Values (n, ...) per area at points (n, 3), with rules of a level inside, and how many points these took."""
+"""Values (n, ...) per area at points (n, 3), with rules of a level inside, and how many were looked at together."""
 
 
 @dataclass(frozen=True)
@@ -154,15 +154,19 @@ class Patches:
         return replace(self, **parts)
 
 
-def outer_patches(outer: Surface, inner: Surface, size: float, reach: float) -> tuple[Patches, NearPlaces]:
-    """The patches of a surface, graded towards the other up to a ``reach`` [m], and where that is nearest."""
+def outer_patches(
+    outer: Surface, inner: Surface, size: float, reach: float, budget: Budget
+) -> tuple[Patches, NearPlaces]:
+    """The patches of a surface, graded towards the other up to a ``reach`` [m], and where that is nearest; the search
+    for that is part of the ``budget``.
+    """
     if type(outer.shape) is Plane and is_round(outer.shape) and outer.shape.tilt == 0:
         # Polar coordinates, in which nothing may change around an axis.
         polar = Surface(Disc(), outer.upper, outer.approach)
         outer = polar if alike_around(polar, inner) else outer
     alike = alike_along(outer, inner), alike_around(outer, inner)
     grain = min(outer.shape.grain, inner.shape.grain)
-    near = near_places(outer, inner, size, alike, grain)
+    near = near_places(outer, inner, size, alike, grain, budget.take)
     tangents = outer.derivatives(near.at, FIRST)[1:]
     lengths = np.maximum(np.linalg.norm(tangents, axis=-1).T, POLE)
     first, low, high = near.at[0], *np.transpose(outer.shape.span)
@@ -234,6 +238,11 @@ class Budget:
         """What all integrals take at least, where those that are done and the next one take so much."""
         return ahead * max(1.0, self.integrals / max(self.done + 1, FIRST_FEW))
 
+    def take(self, points: int) -> None:
+        """So many pairs of points are next; InputError where they are too many."""
+        self.spent += points
+        self.refuse_beyond(self.spent)
+
     def refuse_beyond(self, ahead: float) -> None:
         """InputError where that is too much."""
         if self.whole(ahead) > MOST_POINTS:
@@ -247,9 +256,9 @@ class Budget:
 class Rules:
     """Values of an integrand over patches by rules of some orders; InputError before they take too long."""
 
-    def __init__(self, integrand: Integrand, budget: Budget) -> None:
-        """With what they may take."""
-        self.integrand, self.budget, self.points = integrand, budget, 0
+    def __init__(self, integrand: Integrand, search: int, budget: Budget) -> None:
+        """With the points that a projection to the other surface costs, and what they may take."""
+        self.integrand, self.search, self.budget, self.points = integrand, search, budget, 0
 
     def __call__(self, patches: Patches, levels: Levels, inside: Levels) -> Array:
         """Integrals (n, ...) over each patch, with the order of its level, and with that of another one inside."""
@@ -267,14 +276,14 @@ class Rules:
         while begin < len(patches):
             part = patches[begin : begin + batch]
             x, area = part.nodes(order)
-            values, points = self.integrand(x.reshape(-1, 3), inside)
-            points += part.cost(order)
+            values, together = self.integrand(x.reshape(-1, 3), inside)
+            points = together + area.size * self.search + part.cost(order)
             found.append(np.einsum("nk...,nk->n...", values.reshape(*area.shape, *values.shape[1:]), area))
             self.points += points
             self.budget.spent += points + AT_ONCE
             begin += batch
             self.budget.refuse_beyond(self.budget.spent + points / len(part) * max(len(patches) - begin, 0))
-            batch = max(1, TOGETHER * len(part) // points)
+            batch = max(1, TOGETHER * len(part) // together)
         return np.concatenate(found)
 
 
@@ -305,6 +314,7 @@ class Known:
 def integral(
     patches: Patches,
     integrand: Integrand,
+    search: int,
     sizes: Callable[[Array], Array],
     left: float,
     budget: Budget,
@@ -313,10 +323,11 @@ def integral(
     """Integral over patches, its error relative to the ``sizes`` of the entries, no larger than what is ``left`` to it,
     and how many points it took.
 
-    A ``nested`` integrand is a sum itself, with an error of its own. InputError where it takes more than its budget.
+    A ``nested`` integrand is a sum itself, with an error of its own; each of its points has a projection to the other
+    surface that costs as much as ``search`` points. InputError where it takes more than its budget.
     """
     first = patches.fewest if not any(patches.alike) else ENOUGH + sum(left < goal for goal in SOONER)
-    rules, begin, before = Rules(integrand, budget), np.full(len(patches), first), budget.spent
+    rules, begin, before = Rules(integrand, search, budget), np.full(len(patches), first), budget.spent
     known, met = _started(rules, patches, begin, begin, nested), list[tuple[float, float]]()
     while True:
         whole = known.value.sum(axis=0)

@@ -347,9 +347,11 @@ def descended(
     value: Callable[[Array, Indices], Array],
     step: Callable[[Array, Indices], Array],
     noise: float = 0.0,
+    gain: float = 0.0,
 ) -> Array:
     """Parameters (n, 2) between bounds at which values are least, from steps that are halved where they do not lower
-    them by more than their ``noise``; values and steps are asked for where the search has not ended.
+    them by more than their ``noise``, and end where one that was halved gains no more than a part ``gain``; values and
+    steps are asked for where the search has not ended.
     """
     found, which = at.copy(), np.arange(len(at))
     for _ in range(NEWTONS):
@@ -358,15 +360,18 @@ def descended(
         # Close to the end values agree to rounding, while steps still get shorter.
         most = now + np.maximum(noise, DIGITS * np.abs(now))
         tried = np.clip(here + move, low, high)
-        worse = value(tried, which) > most
+        after = value(tried, which)
         for _ in range(HALVINGS):
+            worse = after > most
             if not worse.any():
                 break
             length[worse] /= 2
             tried[worse] = np.clip(here + length[:, None] * move, low, high)[worse]
-            worse[worse] = value(tried[worse], which[worse]) > most[worse]
-        found[which] = np.where(worse[:, None], here, tried)
+            after[worse] = value(tried[worse], which[worse])
+        found[which] = np.where((after > most)[:, None], here, tried)
         moving = np.any(np.abs(found[which] - here) > ULPS * np.abs(here), axis=1)
+        # Where values have a kink steps are cut short for ever.
+        moving &= (length == 1) | (now - after > gain * np.abs(now))
         which = which[moving]
         if len(which) == 0:
             break
