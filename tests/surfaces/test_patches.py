@@ -102,7 +102,7 @@ def test_where_nothing_is_symmetric_the_area_of_contact_is_exact_too():
     found = over_gap(Surface(Sphere(R=R, tilt=tilt)), Surface(Plane(), True, approach), STIFF, rtol=1e-5)
     assert found.gap == pytest.approx(-depth, rel=1e-13)
     assert found.area == pytest.approx(2 * math.pi * R * depth, rel=1e-5)
-    assert -found.force_1[2] == pytest.approx(math.pi * R * depth**2, rel=1e-5)
+    assert -found.force_1[2] == pytest.approx(math.pi * R * depth**2, rel=1e-7)
 
 
 def test_a_place_beside_the_pole_of_a_sphere_is_found():
@@ -111,4 +111,4 @@ def test_a_place_beside_the_pole_of_a_sphere_is_found():
     upper = Surface(Plane(tilt=tilt), True, (R - overlap) / math.cos(tilt) - R)
     found = over_gap(Surface(Sphere(R=R)), upper, STIFF, rtol=1e-5)
     assert found.gap == pytest.approx(-overlap, rel=1e-8)
-    assert np.linalg.norm(found.force_1) == pytest.approx(math.pi * R * overlap**2, rel=1e-5)
+    assert np.linalg.norm(found.force_1) == pytest.approx(math.pi * R * overlap**2, rel=1e-7)
