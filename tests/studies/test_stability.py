@@ -126,6 +126,9 @@ def test_budgets_and_libraries_fail_without_an_exception():
     cell = prepared(regimes()["runaway"].problem(200.0))("cvode")
     assert (cell.outcome, cell.digits) == (FAILED, 0.0)
     assert "the number of steps allowed was used up" in cell.reason
+    cell = prepared(regimes()["cold"].problem(1e-4), 1e-6)("lsoda")  # which would step on where it stands
+    assert (cell.outcome, cell.digits) == (FAILED, 0.0)
+    assert "the temperature T reached zero" in cell.reason
 
 
 def test_the_condition_number_is_that_of_the_exact_solution():

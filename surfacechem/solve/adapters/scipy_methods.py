@@ -38,7 +38,10 @@ class _Stretch(Method):
     def advance(self) -> DenseStep:
         before = self.t
         while self.t == before:
+            passed = self.solver.t
             self._step()
+            if not self.solver.t > passed:  # some go on like this for ever
+                raise StepError("the step size fell to zero")
             self.t = self.end if self.solver.status == "finished" else self.start + float(self.solver.t)
         inside, start, end, last = self.solver.dense_output(), self.start, self.t, self.solver.y
         # The clock of the run may tick before the library's last step.
