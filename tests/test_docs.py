@@ -143,7 +143,6 @@ def test_a_law_is_known_once_its_class_is_in_the_file(tmp_path):
     (tmp_path / "eyring.yaml").write_text(shown["eyring.yaml"])
     for command, expected in (
         ("laws eyring", "stress scale"),
-        ("schema", "friction.eyring"),
         ("equations eyring.yaml", "t_eyring = "),
     ):
         process = [sys.executable, "-m", "surfacechem", *command.split()]

@@ -93,6 +93,7 @@ def finish(process: subprocess.Popen[str], warning: str = "") -> str:
     return out.strip()
 
 
+@pytest.mark.slow
 def test_two_processes_at_once(start) -> None:
     both = [start(), start()]
     assert all(finish(process).endswith("filled True") for process in both)

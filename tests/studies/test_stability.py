@@ -211,7 +211,7 @@ def test_the_report_says_what_every_solver_keeps_and_what_was_left_out(study, mo
     assert "the solvers dop853, lsoda, bdf, scipy-radau, cvode, cantera, which were not asked for" in text
     assert "the search for worst corners, which was not asked for" in text
     assert "steps of a run" not in text
-    monkeypatch.setitem(regimes(), "seconds", replace(regimes()["seconds"], values=(1.0,)))
+    monkeypatch.setitem(regimes(), "seconds", replace(regimes()["seconds"], values=(1.0,), space={}))
     everything = stability("seconds", solvers=names, rounds=1)
     assert everything.page.omissions == []
     assert "<p>Nothing.</p>" in everything.page.html()
