@@ -72,6 +72,9 @@ PICTURE = 1e-3
 FINER = 16
 """The stepper follows the states so many times closer, as quantities that depend on them may bend more."""
 
+UNRESOLVED = 100.0
+"""Tolerances of a value, or roundings, below which a change may be an error of the run: smooth runs err by less."""
+
 MOMENT = 1e-12
 """Part of the time that has passed that no run resolves, in which nothing that stops is followed any more: ROUNDING of
 what is summed along it, to the next power of ten.

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -96,6 +97,13 @@ class Accuracy:
     """Exact values at the output times, by variable, where an exact solution was named."""
     asked: float | None = None
     """What was asked for, where the tolerance was chosen from it."""
+    named: Callable[[], Mapping[str, float]] = dict
+    """The errors of what follows from the compared variables, by variable, where they are known."""
+
+    @cached_property
+    def everywhere(self) -> dict[str, float]:
+        """The errors of all variables of which one is known, by variable."""
+        return {**self.named(), **self.variables}
 
 
 @dataclass(frozen=True)

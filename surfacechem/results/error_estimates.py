@@ -23,9 +23,9 @@ from surfacechem.results.dataset import profile_values
 from surfacechem.results.event_table import KINK, SIDE, event_times
 from surfacechem.scene import Scene
 from surfacechem.solve.choice import method
-from surfacechem.solve.contract import Array, Mask, Problem
+from surfacechem.solve.contract import Array, Mask, Problem, States
 from surfacechem.solve.run import Run, Trajectory
-from surfacechem.tolerances import BRIEF, EPS, FLOOR, TIGHTEST
+from surfacechem.tolerances import BRIEF, EPS, FLOOR, SQRT_EPS, TIGHTEST, UNRESOLVED
 
 EARLIER = "ended earlier"
 """What is said of a second run that did not come as far."""
@@ -197,7 +197,7 @@ def estimated(trajectory: Trajectory, second: Trajectory) -> Accuracy:
         return unknown("the run ended at its start")
     if note:  # one of the two went another way
         return unknown(f"a second run at rtol {other:.0e}, which had {note}")
-    return Accuracy(stated(errors), second_run(second.run), errors)
+    return Accuracy(stated(errors), second_run(second.run), errors, named=partial(of_named, trajectory.looked, second))
 
 
 def unknown(why: str) -> Accuracy:
@@ -245,6 +245,38 @@ def apart(
     return errors, note
 
 
+def of_named(ours: Trajectory, theirs: Trajectory) -> dict[str, float]:
+    """Largest differences of two runs in each named quantity; empty where they differ in events.
+
+    What may be rounding is no difference, and beside events and breakpoints a time is compared, not a value.
+    """
+    found, expected = event_times(ours), event_times(theirs)
+    if difference(found, expected):
+        return {}
+    times, *rows = np.intersect1d(ours.result.times, theirs.result.times, assume_unique=True, return_indices=True)
+    pairs = [pair for name, each in found.items() for pair in zip(each, expected.get(name, ()), strict=False)]
+    pairs += [(t, t) for t in ours.result.problem.segments]
+    alike = beside_jumps(times, ours, theirs) & clear_of(times, pairs)
+    first, second = (run.picked(own[alike]) for run, own in zip((ours, theirs), rows, strict=True))
+    names, true = second.model.system.output_columns, second.outputs
+    rounded = UNRESOLVED * np.array(list(second.some.roundings.values()))
+    size = np.transpose(list(map(sizes(second, named=names).__getitem__, names)))
+    with np.errstate(invalid="ignore"):  # what is infinite in both is the same
+        missed = np.fmax(np.abs(first.outputs - true) - rounded, 0.0)
+    errors = np.fmax.reduce(np.divide(missed, size, out=np.zeros_like(missed), where=size > 0), initial=0.0)
+    return dict(zip(names, errors.tolist(), strict=True))
+
+
+def _changes(trajectory: Trajectory) -> Array:
+    """What named quantities change by within the time that has passed, at the rates of the outputs."""
+    result = trajectory.result
+    passed = SQRT_EPS * result.times
+    y, segment = result.outputs + passed[:, None] * trajectory.rates, result.segments_at(result.times, result.segment)
+    later = trajectory.at(States(result.times + passed, y, result.ledger_outputs, segment))
+    with np.errstate(invalid="ignore"):
+        return np.asarray(np.abs(later.outputs - trajectory.outputs) / SQRT_EPS)
+
+
 def _compared(trajectory: Trajectory, also: Collection[str]) -> dict[str, Array]:
     """States at the output times, and some named quantities; of a scene without states what is exchanged."""
     own = states(trajectory) or exchanged(trajectory)
@@ -282,12 +314,13 @@ def with_cells(estimate: Accuracy, cells: CellErrors) -> Accuracy:
     if not cells.variables:
         return estimate
     if not cells.converged:
-        return replace(estimate, error=math.nan, source=f"unknown: {UNKNOWN}", variables={})
+        return replace(estimate, error=math.nan, source=f"unknown: {UNKNOWN}", variables={}, named=dict)
     errors = dict(estimate.variables)
     for name, error in cells.variables.items():
         errors[name] = errors.get(name, 0.0) + error
     worst = max(estimate.error, stated(errors))
-    return replace(estimate, error=worst, variables=errors, source=f"{estimate.source}, {cells.source}")
+    source = f"{estimate.source}, {cells.source}"
+    return replace(estimate, error=worst, variables=errors, source=source, named=dict)
 
 
 def states(trajectory: Trajectory) -> dict[str, Array]:
@@ -312,7 +345,7 @@ def sizes(trajectory: Trajectory, named: Collection[str] = ()) -> dict[str, Arra
     """What errors of states are relative to, at each output: their value and what it changes by within the time that
     has passed, at most their largest value, but where it changes by itself in a moment; at the end, unless it is
     that of physics, their value alone. Of profiles the least that counts, of what is ``named`` beside the states the
-    largest value.
+    largest value, or what it changes by within the time that has passed if that is more.
 
     The error of a run is then such that every state is, to this part of itself, the value of a time that is right to
     this part of itself, which is all that can be said near a zero; and that it is right to this part of its largest
@@ -324,7 +357,9 @@ def sizes(trajectory: Trajectory, named: Collection[str] = ()) -> dict[str, Arra
         for profile in system.profiles
     }
     if named:
-        found |= {name: np.full(len(result.times), size) for name, size in floors(trajectory).items() if name in named}
+        changes = dict(zip(system.output_columns, _changes(trajectory).T, strict=True))
+        largest = {name: np.full(len(result.times), size) for name, size in floors(trajectory).items() if name in named}
+        found |= {name: np.fmax(size, changes.get(name, 0.0)) for name, size in largest.items()}
     end, speeds = trajectory.run.times[-1], np.abs(trajectory.rates)
     for name, j in system.state_columns.items():
         size, speed = np.maximum(np.abs(result.outputs[:, j]), least[name]), speeds[:, j]
@@ -422,7 +457,7 @@ def compared(first: Trajectory, second: Trajectory) -> Accuracy:
         return Accuracy(math.inf, f"{source}, which had {others}")
     if not errors:
         return unknown("the run ended at its start")
-    return Accuracy(stated(errors), source, errors)
+    return Accuracy(stated(errors), source, errors, named=partial(of_named, first.looked, second))
 
 
 def rounding_of_time(trajectory: Trajectory) -> float:

@@ -74,12 +74,15 @@ class Column:
     unit: str
     long_name: str
     tag: str = ""
+    error: float | None = None
+    """Largest relative error, where it is known."""
 
     @property
-    def attributes(self) -> dict[str, str]:
-        """CF attributes."""
+    def attributes(self) -> dict[str, str | float]:
+        """CF attributes, the number of the equation, and the error."""
         result = {"units": cf_unit(self.unit), "long_name": self.long_name}
-        return result | ({"equation": self.tag} if self.tag else {})
+        told = {} if self.error is None else {"error": self.error}
+        return result | ({"equation": self.tag} if self.tag else {}) | told
 
 
 def cf_unit(unit: str) -> str:

@@ -12,15 +12,10 @@ import numpy as np
 from surfacechem.results.spatial import begun, unresolved
 from surfacechem.solve.contract import Array, Index, Mask, States
 from surfacechem.solve.run import Trajectory
-
-SAMPLED = 100
-"""Rows that tell how large rounding is."""
+from surfacechem.tolerances import UNRESOLVED
 
 LONG = 64
 """Rows between two that are kept of which one in the middle is kept, too, where the line between the two misses any."""
-
-UNRESOLVED = 100.0
-"""Tolerances of a value below which a change may be an error of the run."""
 
 
 def _two_sided(t: Array) -> tuple[Array, Mask]:
@@ -107,9 +102,9 @@ def followed(trajectory: Trajectory) -> Trajectory:
     sides &= ~early | np.isin(t, begun(system, end))
     rows, early = _chosen(rows._replace(t=t), sides), early[sides]
     # What is shown over time, shape (times, quantities), and how much of it may be rounding.
-    quantities = np.hstack([rows.y, rows.ledger, trajectory.at(rows).outputs])
-    sampled = np.arange(len(rows.t)) % max(len(rows.t) // SAMPLED, 1) == 0
-    roundings = trajectory.at(_chosen(rows, sampled)).roundings
+    whole = trajectory.at(rows)
+    quantities = np.hstack([rows.y, rows.ledger, whole.outputs])
+    roundings = whole.some.roundings
     unknown = [UNRESOLVED * roundings[name] for name in system.output_columns]
     noise = np.pad(unknown, (quantities.shape[1] - len(unknown), 0))
     # Both sides of events are kept; rounding is not pictured, and what is early counts for no range.
@@ -120,4 +115,4 @@ def followed(trajectory: Trajectory) -> Trajectory:
     allowed = part * np.ptp(known, axis=0) + UNRESOLVED * rtol * np.abs(values).max(axis=0) + noise
     seen = np.ptp(values, axis=0) > allowed
     kept = needed(rows.t, values[:, seen], allowed[seen], beside | _edges(quantities[:, seen]))
-    return trajectory.at(_chosen(rows, kept))
+    return whole.picked(kept)

@@ -116,6 +116,9 @@ class Solution(Results):
         for name, values in (self.exact(trajectory) if self.exact else {}).items():
             c = computed[name]
             columns.append(Column(f"{name}_exact", c.dimensions, values, c.unit, f"exact {c.long_name}"))
+        errors = self.accuracy.everywhere if self.accuracy else {}
+        known = {DATASET_NAMES.get(name, name): error for name, error in errors.items()}
+        columns = [replace(column, error=known.get(column.name)) for column in columns]
         columns += event_columns([trajectory])
         if not trajectory.model.system.whole:
             return tuple(columns)

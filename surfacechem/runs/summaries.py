@@ -96,7 +96,7 @@ def run_summary(solution: Solution, written: Path | None, details: bool = False)
 def run_details(solution: Solution) -> dict[str, Rows]:
     """The error of each variable, every count, and the events of a run."""
     found = {name: value for name, value in solution.attributes.items() if name.startswith("count_")}
-    errors = solution.accuracy.variables if solution.accuracy else {}
+    errors = solution.accuracy.everywhere if solution.accuracy else {}
     jumps = solution.trajectory.jumps
     more = [("...", f"{len(jumps) - MOST_EVENTS} more", "")] if len(jumps) > MOST_EVENTS else []
     return {
@@ -113,6 +113,10 @@ def _solved(system: System, run: Run) -> str:
 def _accuracy(accuracy: Accuracy) -> str:
     worst = max(accuracy.variables, key=lambda name: accuracy.variables[name], default="")
     where = f" in {worst}" if worst else ""
+    known = accuracy.everywhere
+    most = max(known, key=known.__getitem__, default="")
+    if most and known[most] > 10 * accuracy.error:
+        where += f"; of what follows from the states up to {known[most]:.2g}, in {most}"
     asked = "" if accuracy.asked is None else f"; {accuracy.asked:.0e} was asked"
     return accuracy.source if math.isnan(accuracy.error) else f"{accuracy.error:.2g}{where}{asked} ({accuracy.source})"
 

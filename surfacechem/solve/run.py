@@ -21,7 +21,7 @@ from surfacechem.model.system import System
 from surfacechem.solve import ASKING, AUTO, solver
 from surfacechem.solve import segments as pieces
 from surfacechem.solve.choice import EXPLICIT, method
-from surfacechem.solve.contract import Array, Margin, Problem, Result, Solver, States, Status
+from surfacechem.solve.contract import Array, Index, Margin, Mask, Problem, Result, Solver, States, Status
 from surfacechem.solve.diagnose import ROUNDED, are_led_back, cause
 from surfacechem.solve.equilibria import Equilibria, Point
 from surfacechem.solve.hybrid import Flow, Hybrid, solve_together, without_stall
@@ -41,6 +41,9 @@ What both miss lasts less than 1/438 of the run, which every estimate says.
 
 AT_ONCE = 10_000
 """Rows in which named quantities are evaluated together, so that they take some MB."""
+
+SAMPLED = 100
+"""Outputs, about, that tell how large rounding is."""
 
 OWN = "radau"
 """The method of this package."""
@@ -131,10 +134,20 @@ class Trajectory:
 
     def at_times(self, times: Sequence[float] | Array) -> Trajectory:
         """The trajectory with those of its outputs alone that are at these times."""
-        result, rows = self.result, np.isin(self.result.times, times)
+        kept = self.picked(np.isin(self.result.times, times))
+        return replace(kept, run=replace(self.run, times=tuple(times)))
+
+    def picked(self, rows: Index | Mask) -> Trajectory:
+        """The trajectory with some of its outputs alone."""
+        result = self.result
         segment = result.segments_at(result.times, result.segment)
-        kept = States(result.times[rows], result.outputs[rows], result.ledger_outputs[rows], segment[rows])
-        return replace(self.at(kept), run=replace(self.run, times=tuple(times)))
+        return self.at(States(result.times[rows], result.outputs[rows], result.ledger_outputs[rows], segment[rows]))
+
+    @property
+    def some(self) -> Trajectory:
+        """The trajectory with so many of its outputs as tell how large rounding is."""
+        count = len(self.result.times)
+        return self.picked(np.arange(0, count, max(count // SAMPLED, 1)))
 
     @cached_property
     def looked(self) -> Trajectory:

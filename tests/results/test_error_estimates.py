@@ -241,3 +241,22 @@ def test_a_sweep_of_which_no_error_is_known_says_so(tmp_path):
     nothing = replace(swept, accuracy=replace(swept.accuracy, errors=np.full(2, np.nan)))
     assert "error      unknown (estimate: a second sweep at rtol 1e-13 that" in str(sweep_summary(nothing, None))
     assert np.isnan(nothing.attributes["error"])
+
+
+@pytest.mark.parametrize("name", ["adhesion-cluster", "stick-slip-rebonding", "three-temperatures"])
+def test_the_error_of_what_follows_from_states_is_that_against_an_exact_solution(name):
+    case = surfacechem.load(name)
+    loose = replace(case.case.run, rtol=1e-5)
+    exact, solution = case.run(run=loose).accuracy.variables, case.run(run=loose, error="estimate")
+    named = exact.keys() & solution.trajectory.model.system.output_columns.keys()
+    assert named
+    for each in named:
+        assert exact[each] / 2 < solution[each].attrs["error"] < 2 * exact[each]
+
+
+def test_a_variable_says_its_error_and_the_summary_the_worst():
+    """Beside a jump of a load a time is compared; a chemical potential of next to no bonds is known to no digit."""
+    assert max(surfacechem.run("area-stretch").accuracy.everywhere.values()) < 1e-8
+    solution = surfacechem.run("press-hold-pull")
+    assert solution["M_theta_bond_s"].attrs["error"] > 0.01 > solution["t_n"].attrs["error"]
+    assert "of what follows from the states up to 0." in str(run_summary(solution, None))
