@@ -6,6 +6,7 @@ import math
 from abc import abstractmethod
 from collections.abc import Sequence
 from functools import cached_property
+from itertools import product
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -23,6 +24,11 @@ Point = tuple[Expression, Expression, Expression]
 ROUND = (-math.pi, math.pi)
 STEEPEST = 1.57
 """Slope of a cone at most; a needle has no height."""
+
+NODES, PER_CELL, MOST_NODES = 128, 8, 1_000_000
+"""Places along half a wave, and along each cell of measured heights, among which a search for the nearest point begins,
+and those of all cells at most.
+"""
 
 OVERSHOOT = 0.1
 """Part of the range of heights by which a spline through them may be above the highest, as summits lie between."""
@@ -324,12 +330,35 @@ class Wavy(Plane):
         """A quarter of a wave."""
         return min(self.wavelength, self.wavelength_2 or math.inf) / 4
 
+    @property
+    def waves(self) -> Array:
+        """Wavelengths along x and, if there is one, along y."""
+        return np.array([wave for wave in (self.wavelength, self.wavelength_2) if wave is not None])
+
+    @cached_property
+    def nodes(self) -> Any:
+        """Places (along each wave, and height) from a crest to half a wave away."""
+        from scipy.spatial import KDTree
+
+        axes = [np.linspace(0, wave / 2, NODES) for wave in self.waves]
+        places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(axes))
+        heights = self.amplitude * (np.prod(np.cos(2 * math.pi / self.waves * places), axis=-1) - 1)
+        return KDTree(np.column_stack([places, heights]))
+
     def starts(self, x: Array) -> Sequence[Array]:
-        """Below the point, and on the crests and flanks around it."""
-        steps = (-0.25, 0.0, 0.25)
-        across = (0.0,) if self.wavelength_2 is None else steps
-        shifts = [(a * self.wavelength, b * (self.wavelength_2 or 0.0)) for a in steps for b in across]
-        return [np.clip(x[..., :2] + shift, *np.transpose(self.span)) for shift in shifts]
+        """The nearest of some places of the half wave that the points are in, and its mirror images in the crest or
+        trough that is nearer: a place beyond these has an image that is nearer than itself.
+        """
+        waves, ends = self.waves, np.transpose(self.span)
+        at = np.clip(x[..., :2], *ends)
+        along, rest = np.split(at, [len(waves)], axis=-1)
+        crest = waves * np.round(along / waves)
+        side = np.where(along < crest, -1.0, 1.0)
+        own = side * (x[..., : len(waves)] - crest)
+        near = self.nodes.data[self.nodes.query(np.concatenate([own, x[..., 2:]], axis=-1))[1]][..., :-1]
+        image = np.where(own < waves / 4, -near, waves - near)
+        found = [crest + side * np.where(chosen, image, near) for chosen in product((False, True), repeat=len(waves))]
+        return [np.clip(np.concatenate([place, rest], axis=-1), *ends) for place in found]
 
 
 class Heights(Shape):
@@ -387,14 +416,22 @@ class Heights(Shape):
         """The smallest cell of the grid, in which heights are a polynomial."""
         return float(min(np.diff(self.x).min(), np.diff(self.y).min()))
 
-    def starts(self, x: Array) -> Sequence[Array]:
-        """Below the point, and the nearest of the places that were measured."""
+    @cached_property
+    def nodes(self) -> Any:
+        """Places of the surface, some in each cell of the grid unless these are many."""
         from scipy.spatial import KDTree
 
-        u, v = np.meshgrid(self.x, self.y, indexing="ij")
-        grid = np.stack([u.ravel(), v.ravel(), self.spline(self.x, self.y).ravel()], axis=-1)
-        below = np.clip(x[..., :2], *np.transpose(self.span))
-        return below, grid[KDTree(grid).query(x)[1]][..., :2]
+        parts = min(PER_CELL, max(1, math.isqrt(MOST_NODES // len(self.z))))
+        at = [np.arange(0, len(p) - 1 + 0.5 / parts, 1 / parts) for p in (self.x, self.y)]
+        x, y = (np.interp(t, range(len(p)), p) for t, p in zip(at, (self.x, self.y), strict=True))
+        u, v = np.meshgrid(x, y, indexing="ij")
+        return KDTree(np.stack([u, v, self.spline(x, y)], axis=-1).reshape(-1, 3))
+
+    def starts(self, x: Array) -> Sequence[Array]:
+        """The nearest of some places, and one on the other side."""
+        near = self.nodes.data[self.nodes.query(x)[1]]
+        across = np.concatenate([2 * x[..., :2] - near[..., :2], near[..., 2:]], axis=-1)
+        return near[..., :2], self.nodes.data[self.nodes.query(across)[1]][..., :2]
 
     def derivatives(self, u: Array, v: Array, count: int) -> Array:
         """Those of the spline."""

@@ -74,6 +74,24 @@ def test_no_other_point_is_nearer_and_the_distance_is_along_the_normal(surface):
 
 
 @pytest.mark.parametrize(
+    ("shape", "x"),
+    [
+        (Wavy(amplitude=0.2, wavelength=0.05), [(0.00699116, 0.0, -0.25786422), (0.01764846, 0.0, -0.12473847)]),
+        (Wavy(amplitude=0.5, wavelength=1.0, wavelength_2=0.1), [(-0.05968653, 0.00529196, -2.15254208)]),
+        (Wavy(amplitude=0.5, wavelength=1.0, wavelength_2=0.1), [(0.30351270, 0.00617443, 2.25969664)]),
+    ],
+)
+def test_the_nearest_point_of_short_waves_is_not_that_of_another_wave(shape, x):
+    """Newton's method leaps over waves that are steep; one wave all around is searched."""
+    grid = np.stack(np.meshgrid(*(np.linspace(-0.6, 0.6, n) for n in (1201, 401)), indexing="ij"), axis=-1)
+    waves = grid * [shape.wavelength, shape.wavelength_2 or 0.0] * 2
+    all_points = Surface(shape).derivatives(waves, 3)[0].reshape(-1, 3)
+    for point, gap in zip(x, Surface(shape).nearest(x).gap, strict=True):
+        nearest = np.linalg.norm(all_points - point, axis=-1).min()
+        assert nearest * 0.99 < abs(gap) <= nearest
+
+
+@pytest.mark.parametrize(
     ("surface", "x"),
     [*((surface, None) for surface in SURFACES), *((Surface(shape), place) for shape, place in BEYOND)],
     ids=lambda item: f"{item.shape.name()} {item.upper}" if isinstance(item, Surface) else "",
