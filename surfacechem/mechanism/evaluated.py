@@ -105,7 +105,7 @@ class HeldPhase:
 
     def __init__(self, phase: Any, state: Neighbour) -> None:
         self.phase, self.pressure = phase, float(phase.P)
-        self.species = [phase.species_index(name) for name in state.composition]
+        self.species = np.array([phase.species_index(name) for name in state.composition], dtype=np.int64)
         self.rest = phase.species_index(state.rest) if state.rest else None
         self.potential = state.electric_potential
         self.charges = FARADAY * np.asarray(phase.charges)
@@ -122,7 +122,8 @@ class HeldPhase:
         self._fractions = [*names.values()]
         self.enthalpies = np.zeros(phase.n_species)
         """Of its species where it was put last [J/kmol]."""
-        self._parts, self._all = [math.nan], np.empty(0)
+        self._parts: Sequence[float] = [math.nan]
+        self._all = np.zeros(phase.n_species)
         self._pressed, self._charged = state.pressure is not None, state.electric_potential is not None
 
     @property
@@ -132,19 +133,17 @@ class HeldPhase:
 
     def put(self, T: float, values: Sequence[float]) -> None:
         """Go to a temperature [K] and to values of the histories."""
-        given = iter(values)
-        pressure = next(given) if self._pressed else self.pressure
+        pressure = values[0] if self._pressed else self.pressure
         if self._charged:
-            self.phase.electric_potential = next(given)
-        if not self.species and self.rest is None:
+            self.phase.electric_potential = values[self._pressed]
+        if not len(self.species) and self.rest is None:
             self.phase.TP = T, pressure
             return
-        parts = list(given)
+        parts = values[self._pressed + self._charged :]
         if parts != self._parts:
-            self._parts, self._all = parts, np.zeros(self.phase.n_species)
-            self._all[self.species] = parts
+            self._parts, self._all[self.species] = parts, parts
             if self.rest is not None:
-                self._all[self.rest] = max(1.0 - self._all.sum(), 0.0)
+                self._all[self.rest] = max(1.0 - sum(parts), 0.0)
         self.phase.TPX = T, pressure, self._all
 
     def limits(self, values: Mapping[str, Expression]) -> Iterator[tuple[str, Expression, str]]:
@@ -166,11 +165,12 @@ class HeldPhase:
         charges = dict(zip(self.phase.species_names, self.phase.charges.tolist(), strict=True))
         return {name: CHARGE * charges[name] for name in names if charges.get(name)}
 
-    def energies(self) -> Any:
-        """Partial molar enthalpies and Gibbs energies of its species [J/kmol], with those of their charges."""
-        self.enthalpies = self.phase.partial_molar_enthalpies
-        both = np.array((self.enthalpies, self.phase.chemical_potentials))
-        return both + self.charges * self.phase.electric_potential if self._charged else both
+    def energies(self, both: Array) -> None:
+        """Set partial molar enthalpies and Gibbs energies of its species [J/kmol], with those of their charges."""
+        both[0] = self.enthalpies = self.phase.partial_molar_enthalpies
+        both[1] = self.phase.chemical_potentials
+        if self._charged:
+            both += self.charges * self.phase.electric_potential
 
 
 def lacking(surface: Any) -> tuple[str, ...]:
@@ -251,7 +251,7 @@ class SurfaceEngine:
         neighbours: Mapping[str, Neighbour],
     ) -> None:
         self.surface = surface
-        self.positions = [i for i, law in enumerate(reactions) if isinstance(law, EvaluatedReaction)]
+        self.positions = np.array([i for i, law in enumerate(reactions) if isinstance(law, EvaluatedReaction)])
         open_ones = [i for i, law in enumerate(reactions) if isinstance(law, NeighbourReaction)]
         energies = [f"{reactions[i].path}.{name}" for name in ("enthalpy", "gibbs") for i in open_ones]
         self.gives = (*(f"{reactions[i].path}.value" for i in self.positions), *energies)
@@ -264,7 +264,7 @@ class SurfaceEngine:
         self._taken = taken(surface, [held.phase for held in self.held])[open_ones].T / MOLECULAR
         self._last: tuple[Sequence[float], Array] = (), np.empty(0)
         self._energies = np.empty(0)
-        self._brought: list[tuple[int, Sequence[float]]] = [(0, ())]
+        self._brought: list[tuple[int, float, Sequence[float]]] = [(0, math.nan, ())]
         """Who has brought the surface where, as several may share it."""
 
     def beside(self, neighbours: Mapping[str, Neighbour]) -> SurfaceEngine:
@@ -313,7 +313,7 @@ class SurfaceEngine:
             return self._last[1]
         T, amount, end = values[0], values[1], 2 + self._count
         if T > 0 and amount > 0:
-            around = id(self), [T, *values[end:]]
+            around = id(self), T, values[end:]
             if around != self._brought[0]:
                 self._bring(T, values[end:])
                 self._brought[0] = around
@@ -330,8 +330,11 @@ class SurfaceEngine:
     def _bring(self, T: float, states: Sequence[float]) -> None:
         """Bring the surface and its neighbours to a temperature [K], and these to their states."""
         self.surface.TP = T, None
-        given = iter(states)
+        both, species, first = np.empty((2, len(self._taken))), 0, 0
         for held in self.held:
-            held.put(T, [next(given) for _ in held.histories])
+            last, end = first + len(held.histories), species + len(held.charges)
+            held.put(T, states[first:last])
+            held.energies(both[:, species:end])
+            first, species = last, end
         if self.held:
-            self._energies = (np.concatenate([held.energies() for held in self.held], axis=1) @ self._taken).ravel()
+            self._energies = (both @ self._taken).ravel()

@@ -51,17 +51,20 @@ class Beside:
     accounts: NDArray[np.int64]
     """Where the variables say how much of each."""
 
-    def state(self) -> list[float]:
+    def state(self) -> Array:
         """Its present pressure and mole fractions."""
-        phase = self.reactor.phase
-        return [phase.P, *(phase.X.tolist() if len(self.places) > 1 else ())]
+        phase, found = self.reactor.phase, np.empty(len(self.places))
+        found[0] = phase.P
+        if len(found) > 1:
+            found[1:] = phase.X
+        return found
 
-    def given(self, rates: Array) -> tuple[Array, float]:
-        """Amounts of all species [kmol/(m^2 s)] that reactions give, and their enthalpy [W/m^2], from the rates of the
+    def given(self, rates: Array, area: float) -> tuple[Array, float]:
+        """Amounts of all species [kmol/s] that reactions on an area give, and their enthalpy [W], from the rates of the
         variables.
         """
         amounts = np.zeros(len(self.held.enthalpies))
-        amounts[self.species] = rates[self.accounts] / MOLECULAR
+        amounts[self.species] = rates[self.accounts] * (area / MOLECULAR)
         return amounts, float(amounts @ self.held.enthalpies)
 
 
@@ -180,12 +183,17 @@ class EmbeddedScene:
         evaluation = self.evaluation
         if not self.put(t, x):
             raise EndError("no state satisfies the equations")
-        closed = self._terminal & ~(evaluation.margins()[: len(self._terminal)] >= 0)
+        self._refuse_ended(evaluation.margins()[: len(self._terminal)])
+        return evaluation.rates()
+
+    def _refuse_ended(self, margins: Array) -> None:
+        if not len(margins) or margins[margins.argmin()] >= 0:  # which is what is not a number, if any is
+            return
+        closed = self._terminal & ~(margins >= 0)
         if closed.any():
-            closed &= self.model.system.in_play(evaluation.parameters)[: len(closed)]
+            closed &= self.model.system.in_play(self.evaluation.parameters)[: len(closed)]
         if closed.any():
             raise EndError(self.model.margins[int(closed.argmax())].reason)
-        return evaluation.rates()
 
     def closest(self, t: float, x: Array) -> str:
         """Why the scene ends where the integrator goes on no more: the limit that has come closest."""

@@ -33,21 +33,21 @@ class Gas(Receiver):
         super().__init__(*arguments, **options)
         self.weights = self.phase.molecular_weights  # type: ignore[attr-defined]
 
-    def energies(self) -> Array:
+    def energies(self, phase: Any) -> Array:
         """What a species holds of the quantity in whose balance the temperature is [J/kmol]."""
         raise NotImplementedError
 
     def after_eval(self, t: float, _lhs: Any, rhs: Any) -> None:
         """Called by Cantera after its own balances of mass, energy and species, which this adds to."""
+        rates, first, phase = np.asarray(rhs), self.temperature + 1, self.phase  # type: ignore[attr-defined]
         for source in self.sources:
             amounts, enthalpy = source(t)
             masses = amounts * self.weights
-            total = masses.sum()
-            rhs[0] += total
+            total = float(amounts @ self.weights)
+            rates[0] += total
             if self.energy_enabled:  # type: ignore[attr-defined]  # its left side is the heat capacity
-                rhs[self.temperature] += enthalpy - amounts @ self.energies()
-            own = np.asarray(rhs)[self.temperature + 1 : self.temperature + 1 + len(masses)]
-            own += masses - total * self.phase.Y  # type: ignore[attr-defined]
+                rates[self.temperature] += enthalpy - float(amounts @ self.energies(phase))
+            rates[first : first + len(masses)] += masses - total * phase.Y
 
 
 class ReactingGas(Gas, cantera.ExtensibleIdealGasReactor):
@@ -60,8 +60,8 @@ class ReactingGas(Gas, cantera.ExtensibleIdealGasReactor):
 
     temperature = 2
 
-    def energies(self) -> Array:
-        return np.asarray(self.phase.partial_molar_int_energies)
+    def energies(self, phase: Any) -> Array:
+        return np.asarray(phase.partial_molar_int_energies)
 
 
 class ReactingGasAtPressure(Gas, cantera.ExtensibleIdealGasConstPressureReactor):
@@ -72,8 +72,8 @@ class ReactingGasAtPressure(Gas, cantera.ExtensibleIdealGasConstPressureReactor)
 
     temperature = 1
 
-    def energies(self) -> Array:
-        return np.asarray(self.phase.partial_molar_enthalpies)
+    def energies(self, phase: Any) -> Array:
+        return np.asarray(phase.partial_molar_enthalpies)
 
 
 class ReactingSolid(Receiver, HeldReactor):

@@ -107,9 +107,9 @@ class InterfaceReactor(HeldReactor):
         self._take_up(self.scene)
         for body, reactor in self.bodies.items():
             self._connect(reactor, self.scene.account(body))
-        for gas in self.neighbours.values():
-            if isinstance(gas, Receiver):
-                gas.sources.append(partial(self._given, gas))
+        for k, neighbour in enumerate(self.neighbours.values()):
+            if isinstance(neighbour, Receiver):
+                neighbour.sources.append(partial(self._given, k))
 
     def __repr__(self) -> str:
         """Title and states in a line."""
@@ -138,11 +138,9 @@ class InterfaceReactor(HeldReactor):
         cantera.Wall(self, reactor, A=self.area, Q=lambda t: -float(self.attempt(self._rates, t)[account]))
         self._connecting = False
 
-    def _given(self, gas: Receiver, t: float) -> tuple[Array, float]:
+    def _given(self, k: int, t: float) -> tuple[Array, float]:
         """Amounts of species [kmol/s] that reactions give to a neighbour at a time [s], and their enthalpy [W]."""
-        rates = self.attempt(self._rates, t)
-        amounts, enthalpy = next(item for item in self.scene.beside if item.reactor is gas).given(rates)
-        return amounts * self.area, enthalpy * self.area
+        return self.scene.beside[k].given(self.attempt(self._rates, t), self.area)
 
     def _add_wall(self, wall: Any) -> None:
         """Called by Cantera where a wall is made on this reactor itself, which is two bodies and what is between."""
@@ -285,9 +283,11 @@ class InterfaceReactor(HeldReactor):
 
     def rates(self, t: float) -> Array:
         began = time.perf_counter()
-        self._check_piece(t)
+        if not self.passes_breakpoints:
+            self._check_piece(t)
         rates = np.asarray(self._rates(t) / self.unit)
-        self._refuse_passed()
+        if not self.passes_breakpoints:
+            self._refuse_passed()
         self.evaluations += 1
         self.seconds += time.perf_counter() - began
         return rates
@@ -323,13 +323,13 @@ class InterfaceReactor(HeldReactor):
 
     def _listen(self) -> bytes:
         """Take over temperatures, heats, multipliers and compositions from the network, and tell them as bytes."""
-        values = [reactor.T for reactor in self.bodies.values()]
-        values += [port.heat() / self.area for port in self.ports.values()]
-        values += self.surface.forward_rate_constants[: len(self.scene.reactions)].tolist()
-        for item in self.scene.beside:
-            values += item.state()
-        self.scene.evaluation.parameters[self._heard] = values
-        return np.array(values).tobytes()
+        around = [reactor.T for reactor in self.bodies.values()]
+        around += [port.heat() / self.area for port in self.ports.values()]
+        multipliers = self.surface.forward_rate_constants[: len(self.scene.reactions)]
+        beside = [item.state() for item in self.scene.beside]
+        heard = np.concatenate([around, multipliers, *beside] if around else [multipliers, *beside])
+        self.scene.evaluation.parameters[self._heard] = heard
+        return heard.tobytes()
 
     def _paths(self) -> Iterator[int]:
         """Places among the scene's parameters of what the network gives, in the order of ``_listen``."""
@@ -344,7 +344,7 @@ class InterfaceReactor(HeldReactor):
     def _check_piece(self, t: float) -> None:
         breakpoints = self.scene.breakpoints
         following = bisect_right(breakpoints, self.t)
-        if not self.passes_breakpoints and following < len(breakpoints) and t > breakpoints[following]:
+        if following < len(breakpoints) and t > breakpoints[following]:
             raise InputError(
                 f"the loading has a breakpoint at t = {breakpoints[following]:g} s, which an ordinary ReactorNet steps "
                 "over. Use surfacechem.reactor.ReactorNet."
@@ -352,7 +352,7 @@ class InterfaceReactor(HeldReactor):
 
     def _refuse_passed(self) -> None:
         """Refuse a state beyond an edge that no network has carried out."""
-        if self.scene.moments is None or self.passes_breakpoints:
+        if self.scene.moments is None:
             return
         edges = self.scene.model.system.edges
         passed = [edges[i].reason for i in np.flatnonzero(self.scene.moments.margins() < 0)]

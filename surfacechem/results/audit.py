@@ -8,9 +8,9 @@ Source: Sauer, Duong & Mandadapu (2021), sections 3.3, 3.4 and 4.3.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -63,11 +63,24 @@ class Audit:
     """Entropy that the last digits of the states stand for over all steps [J/(m^2 K)]."""
     least: Mapping[str, float]
     """Least entropy production of each dissipative law over all steps and outputs [W/(m^2 K)]."""
-    destroyed: Mapping[str, float]
-    """Part of what each dissipative law turns over that it destroys, beyond rounding; nothing where that is less than
-    the last digit of the total."""
-    destroyed_together: float
-    """The same of all laws together."""
+    losses: Callable[[], tuple[Mapping[str, float], float]]
+    """Finds what is destroyed, which takes time where surroundings are asked for rates."""
+
+    @cached_property
+    def _lost(self) -> tuple[Mapping[str, float], float]:
+        return self.losses()
+
+    @property
+    def destroyed(self) -> Mapping[str, float]:
+        """Part of what each dissipative law turns over that it destroys, beyond rounding; nothing where that is less
+        than the last digit of the total.
+        """
+        return self._lost[0]
+
+    @property
+    def destroyed_together(self) -> float:
+        """The same of all laws together."""
+        return self._lost[1]
 
     @property
     def energy_error(self) -> float:
@@ -192,7 +205,7 @@ def audit(trajectory: Trajectory) -> Audit:
     for j in system.account_columns.get("bonds", ()):
         bonds = trajectory.everywhere[system.ledger[j].law][: len(ledger)]
         sites = np.maximum(sites, np.abs(bonds - bonds[:1] - ledger[:, j]))
-    least, destroyed, together = _production(trajectory, entropy_stored)
+    least = _least(trajectory)
     return Audit(
         energy=open_ones.energy,
         entropy=open_ones.entropy,
@@ -205,13 +218,12 @@ def audit(trajectory: Trajectory) -> Audit:
         energy_rounding=EPS * energy_stored * roundings + untimed,
         entropy_rounding=EPS * entropy_stored * roundings,
         least=least,
-        destroyed=destroyed,
-        destroyed_together=together,
+        losses=partial(_losses, trajectory, least, entropy_stored),
     )
 
 
-def _production(trajectory: Trajectory, stored: float) -> tuple[dict[str, float], dict[str, float], float]:
-    """Least entropy production of each law over outputs and steps, and the part that it destroys, and all do."""
+def _least(trajectory: Trajectory) -> dict[str, float]:
+    """Least entropy production of each law over outputs and steps."""
     values, least, system = trajectory.within_bounds, {}, trajectory.model.system
     for j in system.account_columns.get("entropy production", ()):
         rates = values.get(f"sigma_{system.ledger[j].law}", np.empty(0))
@@ -219,9 +231,14 @@ def _production(trajectory: Trajectory, stored: float) -> tuple[dict[str, float]
             # A law that ends the run may have no value there.
             ended = trajectory.status == "stopped" and len(rates) > 1 and not np.isfinite(rates[-1])
             least[system.ledger[j].law] = float((rates[:-1] if ended else rates).min())
+    return least
+
+
+def _losses(trajectory: Trajectory, least: Mapping[str, float], stored: float) -> tuple[Mapping[str, float], float]:
+    """The part that each law destroys, and all together."""
     destroyed = {law: 0.0 if low >= 0 else _destroyed(trajectory, [law], stored) for law, low in least.items()}
     together = _destroyed(trajectory, list(least), stored) if any(destroyed.values()) else 0.0
-    return least, destroyed, together
+    return destroyed, together
 
 
 def _destroyed(trajectory: Trajectory, laws: list[str], stored: float) -> float:

@@ -120,7 +120,7 @@ class HeldReactor(cantera.ExtensibleReactor):
 
     def replace_eval(self, t: float, _lhs: Any, rhs: Any) -> None:  # its left side is one
         self.asked = t
-        rhs[:] = self.attempt(self.rates, t)
+        np.asarray(rhs)[:] = self.attempt(self.rates, t)
 
     def replace_component_name(self, i: int) -> str:
         return self.names[i]

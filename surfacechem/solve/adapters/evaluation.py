@@ -77,7 +77,7 @@ class Evaluation:
 
     def rates(self) -> Array:
         """Derivatives of the differential variables and of the ledger."""
-        return np.concatenate((self.ydot[self.free], self.ledger()))
+        return np.concatenate((self.ydot[self.free], self._ledger()))
 
     def ledger(self) -> Array:
         """Rates of the ledger."""
