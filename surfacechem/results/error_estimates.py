@@ -194,7 +194,8 @@ def estimated(trajectory: Trajectory, second: Trajectory) -> Accuracy:
         return unknown(f"a second run at rtol {other:.0e} {fate}: {second.reason}")
     errors, note = apart(trajectory.looked, second)
     if not errors:
-        return unknown("the run ended at its start")
+        still = "nothing evolves, and no work is done"
+        return unknown(still if len(trajectory.result.times) > 1 else "the run ended at its start")
     if note:  # one of the two went another way
         return unknown(f"a second run at rtol {other:.0e}, which had {note}")
     return Accuracy(stated(errors), second_run(second.run), errors, named=partial(of_named, trajectory.looked, second))

@@ -220,9 +220,10 @@ class Surface:
 
     def _at_edge(self, at: Array) -> NDArray[np.bool_]:
         """Whether parameters are those of an edge or a tip."""
-        low, high = np.transpose(self.shape.span)
-        ends = (at <= low + (POLE if self.shape.about_axis else 0.0)) | (at >= high)
-        return np.asarray(np.any(ends & ~np.array(self.shape.closed), axis=-1))
+        found = np.zeros(at.shape[:-1], dtype=bool)
+        for k, side, end in self.edges:
+            found |= side * (end - at[..., k]) <= (POLE if self.shape.about_axis and side < 0 else 0.0)
+        return found
 
     def _search(self, x: Array, start: Array) -> Array:
         """Parameters of a nearest point by Newton's method; a step that does not come nearer is halved."""
@@ -277,7 +278,8 @@ class Surface:
             raise InputError("two points of the surface are equally near, so that their distance has no rate.")
         D = self.derivatives(found.at, SECOND)
         relative = moves - np.asarray(shift, dtype=float) - cross(spin, x)
-        at = self._moved(found.at, D, x - D[0], relative)
+        # At a pole, which is next to it alone, what is on the axis is on its normal.
+        at = self._moved(found.at, D, found.gap[..., None] * found.direction, relative)
         glide = at[..., :1] * D[1] + at[..., 1:] * D[2]
         vector = relative - glide + cross(spin, x - D[0])
         # Weingarten: the normal turns with the second form.
@@ -299,6 +301,9 @@ class Surface:
         # Beyond an edge, and at a tip, a point stays there.
         held = ((at <= low) & (slopes < -SAME * sizes)) | ((at >= high) & (slopes > SAME * sizes))
         held &= ~np.array(self.shape.closed)
+        if self.shape.about_axis:
+            # Around a tip there is no way.
+            held[..., 1] |= held[..., 0] & (at[..., 0] <= POLE)
         _, (a, b, c) = _forms(D, away)
         a, c = np.where(held[..., 0], 1.0, a), np.where(held[..., 1], 1.0, c)
         b = np.where(held.any(axis=-1), 0.0, b)

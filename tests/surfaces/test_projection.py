@@ -39,6 +39,8 @@ SHAPES = [
 ]
 SURFACES = [Surface(shape, upper, 0.2 * upper) for shape in SHAPES for upper in (False, True)]
 BEYOND = [
+    (Sphere(R=1.0), [0.0, 0.0, 0.5]),
+    (Cavity(R=2.0), [0.0, 0.0, 0.3]),
     (Plane(length=1.0, width=1.0), [1.0, 0.2, 0.3]),
     (Plane(length=1.0, width=1.0), [1.0, 0.9, 0.3]),
     (Cap(R=1.0, angle=0.5), [1.0, 0.3, 0.4]),
@@ -97,7 +99,7 @@ def test_the_nearest_point_of_short_waves_is_not_that_of_another_wave(shape, x):
     ids=lambda item: f"{item.shape.name()} {item.upper}" if isinstance(item, Surface) else "",
 )
 def test_rates_are_slopes_of_what_they_are_rates_of(surface, x):
-    """Beyond an edge, too, where the nearest point stays there."""
+    """At a pole, too, and beyond an edge, where the nearest point stays there."""
     x, h = points(surface) if x is None else np.array([x]), 1e-5
     draw = np.random.default_rng(2)
     moves, shift, spin = (draw.normal(size=3) for _ in range(3))
