@@ -154,5 +154,8 @@ def _is_faster(result: Result, j: int) -> bool:
     if result.steps is None:
         return False
     places = np.concatenate((result.problem.segments, result.events.t))
-    since = result.steps.t > np.max(places[places <= result.t])
-    return bool(np.any(2 * np.abs(result.steps.ydot[since, j]) < abs(result.ydot[j])))
+    begun = np.max(places[places <= result.t])
+    # The first step that ends there has come from before; what runs away at once ends further ones at the same time.
+    since = np.searchsorted(result.steps.t, begun)
+    since += bool(result.steps.t[since:].size) and result.steps.t[since] == begun
+    return bool(np.any(2 * np.abs(result.steps.ydot[since:, j]) < abs(result.ydot[j])))
