@@ -162,7 +162,6 @@ def pull_off(row: dict) -> tuple[mechanics.Solved, float]:
 def isentropic() -> tuple[mechanics.Solved, float]:
     solved, exact = mechanics.isentropic(), columns("h_isentropic_cohesive_cooling")
     pairs = {"T": "T", "t_n": "t_n", "W_g_n": "work"}
-    assert np.ptp(solved["S_total"]) < 1e-12
     return solved, max(of_largest(solved[name], exact[column]) for name, column in pairs.items())
 
 
