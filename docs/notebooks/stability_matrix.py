@@ -15,7 +15,7 @@ import xarray
 from surfacechem.studies.stability import stability
 
 folder = Path(tempfile.mkdtemp())
-study = stability("capacity", "rupture", solvers=["radau", "cvode"], rtol=1e-6, rounds=0)
+study = stability("capacity", "rupture", solvers=["radau", "cvode"], rtol=1e-6, quick=True, rounds=0)
 for path in study.write(folder / "matrix"):
     print(path.name)
 

@@ -167,19 +167,31 @@ def test_an_answer_without_digits_to_a_problem_that_leaves_some_is_wrong():
 
 
 @pytest.fixture(scope="module")
-def study():
-    return stability("seconds", "ignition", solvers=("radau", "ida"), quick=True, rounds=0)
+def made(tmp_path_factory):
+    """The study that the command makes, and the folder of what it writes."""
+    studies, folder = [], tmp_path_factory.mktemp("stability")
 
+    def kept(*regimes, **options):
+        studies.append(stability(*regimes, **options))
+        return studies[-1]
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    """What the command writes."""
-    folder = tmp_path_factory.mktemp("stability")
     options = ["--solvers", "radau,ida", "--search", "0", "--quick", "-o", str(folder / "study")]
-    done = CliRunner().invoke(app, ["stability", "seconds", "ignition", *options])
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("surfacechem.studies.stability.stability", kept)
+        done = CliRunner().invoke(app, ["stability", "seconds", "ignition", *options])
     assert done.exit_code == 0, done.output
     assert "study.nc, " in done.output
-    return folder
+    return studies[0], folder
+
+
+@pytest.fixture
+def study(made):
+    return made[0]
+
+
+@pytest.fixture
+def folder(made):
+    return made[1]
 
 
 def test_the_dataset_holds_every_cell(folder):
