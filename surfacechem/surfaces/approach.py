@@ -28,7 +28,7 @@ DEGREES = (2, 4, 8, 16, 32)
 CLOSER = 8
 """How much closer a second fit is held, which the errors of the integrals leave room for."""
 
-ENOUGH, FEWEST = 8, 7
+ENOUGH, FEWEST = 8, 9
 """Degree from which it is told whether a higher one is worth it, and the places that a piece takes beside its end."""
 
 SHORTEST = 2.0**-26
@@ -36,7 +36,7 @@ SHORTEST = 2.0**-26
 
 MOST_PIECES = 200
 
-BETWEEN = (-0.52, 0.14, 0.71)
+BETWEEN = (-0.97, -0.52, 0.14, 0.71, 0.97)
 """Places on a piece at which it is seen what a polynomial misses, beside its ends."""
 
 logger = logging.getLogger(__name__)
@@ -60,7 +60,8 @@ class ApproachPiece:
         """Where an approach is from -1 to 1, and half of the length of that."""
         ends = (math.log(self.low), math.log(self.high)) if self.powers else (self.low, self.high)
         half = (ends[1] - ends[0]) / 2
-        return ((log(d) if self.powers else d) - (ends[0] + half)) / half, half
+        # A product with 1 / half would be a factor of its own in a high power, too large for a number.
+        return (log(d) if self.powers else d) / half - (ends[0] / half + 1), half
 
     def force(self, d: float) -> float:
         """Slope of the energy at an approach [N]."""
@@ -251,7 +252,7 @@ def polynomial(sample: Sampled, a: float, b: float, powers: bool, rtol: float, l
 def size_of(values: Array, least: float) -> float:
     """What errors of values in a piece are relative to: the smallest of one sign, or a small part of the largest."""
     sizes = np.abs(values)
-    one_sided = values.min() > 0 or values.max() < 0
+    one_sided = values.min() >= 0 or values.max() <= 0
     return float(max(sizes.min(), NEGLIGIBLE * sizes.max(), least) if one_sided else max(sizes.max(), least, TINY))
 
 

@@ -7,8 +7,9 @@ approximation. Source: Sauer, Duong & Mandadapu (2021), eqs. e:bt_sr and e:psi_c
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +20,7 @@ from surfacechem.surfaces.inner_sums import kernel
 from surfacechem.surfaces.level_cuts import with_levels
 from surfacechem.surfaces.pairwise import check_finite, length
 from surfacechem.surfaces.patches import Budget, Patches, Rules, integral, outer_patches
-from surfacechem.surfaces.projection import FIRST, Array, Projection, Surface, cross
+from surfacechem.surfaces.projection import FIRST, NEWTONS, Array, Projection, Surface, cross
 from surfacechem.surfaces.shapes import Plane
 from surfacechem.tolerances import EPS, NEGLIGIBLE, NOISE, PRECISE, TINY
 
@@ -112,11 +113,11 @@ def bends(laws: Iterable[Potential | HeatTransfer]) -> list[float]:
 
 
 def passages(lower: Surface, upper: Surface, levels: Sequence[float]) -> list[float]:
-    """Approaches at which levels of the gap pass what is nearest; for two plates a corner of one of them, or where
+    """Approaches at which the least gap passes levels; for two plates where a corner of one of them does, or where
     edges of both cross, in closed form: there the force over the approach bends. The ``upper`` body is at zero.
     """
     if not all(type(body.shape) is Plane for body in (lower, upper)):
-        return list(levels)
+        return [_met(lower, upper, level) for level in levels]
     size = length(lower, upper)
     below, above = (_outline(body, size * FAR) for body in (lower, upper))
     n, m = upper.axes[:, 2], lower.axes[:, 2]
@@ -135,6 +136,23 @@ def passages(lower: Surface, upper: Surface, levels: Sequence[float]) -> list[fl
                     found += [float(d)] if 0 <= s <= 1 and 0 <= t <= 1 else []
     distinct = np.unique(found)
     return list(map(float, distinct[np.diff(distinct, prepend=-np.inf) > NOISE * size]))
+
+
+def _met(lower: Surface, upper: Surface, level: float) -> float:
+    """The approach at which the least gap is a level, which it is itself where no body is tilted about its highest
+    point.
+    """
+    size = length(lower, upper)
+    d, before, step = level, math.nan, math.nan
+    for _ in range(NEWTONS):
+        _, near = outer_patches(lower, replace(upper, approach=d), size, size * FAR, Budget(PRECISE))
+        left = level - float(near.gap[0])
+        if abs(left) <= NOISE * size:
+            break
+        # The secant; at first as if the gap grew as much as the approach, more than which it cannot.
+        step = left * (step / (before - left) if before - left else 1.0) if math.isfinite(before) else left
+        d, before = d + step, left
+    return d
 
 
 def _outline(plate: Surface, far: float) -> Array:

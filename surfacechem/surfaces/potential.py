@@ -206,12 +206,7 @@ class CurvedSurfaces(Potential):
                 met[d] = self.at_approach(d, lambda: interaction(*self.surfaces(d), parts, finer, budget))
             return float(met[d].energy[k]), float(met[d].force_1[k, 2]), met[d].error
 
-        ends = [law.cutoff for law in parts if math.isfinite(law.cutoff)]
-        if ends:
-            # The gap grows with the approach, from that at the least one.
-            of_pairs(0, self.approach[0])
-            behind = self.approach[0] - met[self.approach[0]].gap
-            ends = sorted({end + behind for end in ends})
+        ends = passages(*self.surfaces(0.0), sorted({law.cutoff for law in parts if math.isfinite(law.cutoff)}))
         found = [fitted(partial(of_pairs, k), *self.approach, rtol, ends, budget=budget) for k in range(len(parts))]
         if not self.gap_laws:
             return found

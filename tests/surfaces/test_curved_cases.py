@@ -30,7 +30,7 @@ from surfacechem.surfaces.pair_laws import InversePower
 from surfacechem.surfaces.pairwise import interaction
 from surfacechem.surfaces.potential import CurvedSurfaces
 from surfacechem.surfaces.projection import Surface
-from surfacechem.surfaces.shapes import Plane, Sphere
+from surfacechem.surfaces.shapes import Plane, Sphere, Torus
 
 pytestmark = pytest.mark.around
 
@@ -369,6 +369,29 @@ def test_powers_that_change_are_followed_near_the_least_approach():
     assert curve.error < 1e-6
     for d in (1.5e-12, 1e-11, 1e-6, 1e-3):
         assert curve.energy(d) == pytest.approx(samples(d)[0], rel=1e-7)
+
+
+def test_a_force_that_begins_like_a_root_is_held_where_it_is_small():
+    """As of lines that come into contact, in a range of approaches that is short as a number."""
+
+    def samples(d):
+        depth = max(-d, 0.0) / 1e-10
+        return depth**2.5, -2.5e10 * depth**1.5, 0.0
+
+    curve = fitted(samples, -1e-10, 1e-9, 1e-4, [0.0], (1e-3, 2.5e7))
+    force = symengine.Lambdify([G], [derivative(curve.energy(G), G)])
+    depths = np.geomspace(1e-12, 1e-10, 200)
+    exact = np.array([samples(-depth)[1] for depth in depths])
+    assert np.abs(force(-depths[:, None]).ravel() / exact - 1).max() <= curve.error <= 1e-4
+
+
+@pytest.mark.parametrize(
+    ("upper", "least"),
+    [(Torus(hole=1.0, r=0.5, tilt=0.17), 1.5 * math.sin(0.17) + 0.5 * (1 - math.cos(0.17))), (Sphere(R=1.0), 0.0)],
+)
+def test_contact_begins_where_the_least_gap_vanishes(upper, least):
+    found = passages(Surface(Plane()), Surface(upper, True), [0.0, 0.1])
+    assert found == pytest.approx([least, least + 0.1], abs=1e-12)
 
 
 def test_an_accuracy_is_refused_by_what_all_integrals_of_the_approach_take_and_each_is_told(monkeypatch, caplog):
