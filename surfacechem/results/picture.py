@@ -2,10 +2,13 @@
 
 Known are the ends of steps, both sides of events and breakpoints, the times at which runs are compared, and what the
 stepper adds inside steps that are too long for a straight line. The picture is true where straight lines between
-outputs, over time as over its logarithm, miss no quantity by more than a part of its range.
+outputs, over time as over its logarithm, miss no quantity by more than a part of its range. Where quantities bend
+between states that are known, the run is made again with outputs there.
 """
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 
@@ -16,6 +19,9 @@ from surfacechem.tolerances import UNRESOLVED
 
 LONG = 64
 """Rows between two that are kept of which one in the middle is kept, too, where the line between the two misses any."""
+
+BENDS, CLOSER, ROUNDS = 100, 16, 2
+"""Between how many known states a run is known closer at most, in how many parts of it, and how often in turn."""
 
 
 def _two_sided(t: Array) -> tuple[Array, Mask]:
@@ -90,7 +96,29 @@ def _chosen(rows: States, which: Mask) -> States:
     return States(rows.t[which], rows.y[which], rows.ledger[which], rows.segment[which])
 
 
-def followed(trajectory: Trajectory) -> Trajectory:
+def _bends(trajectory: Trajectory, allowed: Array) -> Array:
+    """Times between outputs at which named quantities, in whose middle lines from one to the next miss them by more
+    than is allowed, are to be known: they may bend where states do not.
+    """
+    result, y, rates = trajectory.result, trajectory.result.outputs, trajectory.rates
+    t, segment = result.times, result.segments_at(result.times, result.segment)
+    left = np.flatnonzero((np.diff(t) > 0) & (np.diff(segment) == 0) & (t[:-1] > 0))
+    right, length = left + 1, np.diff(t)[left]
+    middle = t[left] + length / 2
+    states = (y[left] + y[right]) / 2 + length[:, None] / 8 * (rates[left] - rates[right])
+    between = trajectory.at(States(middle, states, result.ledger_outputs[left], segment[left]))
+    lines = (trajectory.outputs[left] + trajectory.outputs[right]) / 2
+    with np.errstate(invalid="ignore"):  # quantities may be infinite
+        apart = np.abs(between.outputs - lines)
+    missed = np.divide(apart, allowed, out=np.zeros_like(apart), where=allowed > 0).max(axis=1, initial=0.0)
+    rows = np.sort(np.argsort(-missed, kind="stable")[:BENDS])
+    rows = rows[missed[rows] > 1]
+    parts = np.minimum(np.ceil(missed[rows]), CLOSER).astype(int)
+    inside = [np.linspace(t[left[i]], t[right[i]], n, endpoint=False)[1:] for i, n in zip(rows, parts, strict=True)]
+    return np.concatenate([[], *inside])
+
+
+def followed(trajectory: Trajectory, rounds: int = ROUNDS) -> Trajectory:
     """The trajectory with the outputs that its picture needs, instead of those at which runs are compared."""
     part, rows = trajectory.run.picture, trajectory.result.known or trajectory.result.states()
     if part is None or len(rows.t) < 2:
@@ -113,6 +141,14 @@ def followed(trajectory: Trajectory) -> Trajectory:
     values = np.where(np.isfinite(quantities), quantities, 0.0)
     known, rtol = values if early.all() else values[~early], trajectory.run.rtol
     allowed = part * np.ptp(known, axis=0) + UNRESOLVED * rtol * np.abs(values).max(axis=0) + noise
+    bends = (
+        _bends(whole, allowed[len(allowed) - whole.outputs.shape[1] :])
+        if rounds and trajectory.run.max_seconds is None
+        else ()
+    )
+    if len(bends):
+        run = replace(trajectory.run, times=tuple(np.union1d(trajectory.run.times, bends).tolist()))
+        return followed(trajectory.model.solve_values(run, trajectory.values), rounds - 1)
     seen = np.ptp(values, axis=0) > allowed
     kept = needed(rows.t, values[:, seen], allowed[seen], beside | _edges(quantities[:, seen]))
     return whole.picked(kept)

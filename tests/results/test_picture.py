@@ -85,3 +85,14 @@ def test_rows_are_needed_where_a_line_over_time_or_its_logarithm_would_miss():
     kept = needed(t, t[:, None], np.array([0.1]), np.zeros(len(t), bool))
     assert np.abs(np.interp(np.log(t[1:]), np.log(t[1:][kept[1:]]), t[1:][kept[1:]]) - t[1:]).max() <= 0.1
     assert 3 < kept.sum() < 12
+
+
+def test_what_bends_where_no_state_does_is_shown():
+    """Heat through a gas that contact spots replace within the last nanometres of an even approach."""
+    case = surfacechem.load("thermal-press", {"heat.gap-conductance.C_trans": "1e7 1/m", "run.until": "3 s"})
+    solution = case.run(error="balances")
+    times = np.append(np.linspace(0.0, 1.99, 200), 2 - np.geomspace(1e-2, 1e-8, 900)[1:])
+    dense = case.run(run=replace(case.case.run, times=tuple(times), picture=None), error="balances")["q_12_gas"]
+    shown = solution["q_12_gas"]
+    missed = np.interp(times, shown.time, shown) - dense.values
+    assert np.abs(missed).max() < 2 * PICTURE * np.ptp(dense.values)
