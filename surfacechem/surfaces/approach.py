@@ -253,7 +253,7 @@ def size_of(values: Array, least: float) -> float:
     """What errors of values in a piece are relative to: the smallest of one sign, or a small part of the largest."""
     sizes = np.abs(values)
     one_sided = values.min() >= 0 or values.max() <= 0
-    return float(max(sizes.min(), NEGLIGIBLE * sizes.max(), least) if one_sided else max(sizes.max(), least, TINY))
+    return float(max(sizes.min() if one_sided else sizes.max(), NEGLIGIBLE * sizes.max(), least, TINY))
 
 
 def approach_at(x: float, a: float, b: float, powers: bool) -> float:

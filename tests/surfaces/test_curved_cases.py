@@ -383,6 +383,7 @@ def test_a_force_that_begins_like_a_root_is_held_where_it_is_small():
     depths = np.geomspace(1e-12, 1e-10, 200)
     exact = np.array([samples(-depth)[1] for depth in depths])
     assert np.abs(force(-depths[:, None]).ravel() / exact - 1).max() <= curve.error <= 1e-4
+    assert fitted(samples, 1e-10, 1e-9, 1e-4).energy(5e-10) == 0.0  # out of reach there is none
 
 
 @pytest.mark.parametrize(
