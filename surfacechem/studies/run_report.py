@@ -9,8 +9,9 @@ import html
 import inspect
 import logging
 import re
+import shlex
 from base64 import b64encode
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
@@ -57,8 +58,8 @@ def page(data: xarray.Dataset | str | Path) -> Page:
     if "case" not in dataset.attrs or "status" not in dataset.attrs:
         place = Place(str(data)) if isinstance(data, str | Path) else None
         raise InputError("this is no dataset of a run or of a sweep.", place)
-    command = f"surfacechem rerun {Path(data).name}" if isinstance(data, str | Path) else "surfacechem rerun RUN.nc"
     attributes, omissions = dataset.attrs, []
+    command, again = _again(data, attributes)
     told = attributes.get("warnings", "none")
     warnings = [] if told == "none" else [f"Warning: {text}." for text in told.split("; ")]
     sections = [PageSection("What happened", [_ending(attributes), *warnings], figure=True)]
@@ -70,9 +71,21 @@ def page(data: xarray.Dataset | str | Path) -> Page:
     except InputError as error:  # code that the dataset carries is not run to draw it
         sections += [*_events(dataset), _balances(attributes)]
         omissions.append(f"The scene and its equations: {error.message}")
-    again = "The dataset holds the case, the mechanism and the settings of the run."
-    sections.append(PageSection("How to run it again", [again, f"$ {command}"], code=attributes["case"], details=True))
+    told_again = [again, *([f"$ {command}"] if command else [])]
+    sections.append(PageSection("How to run it again", told_again, code=attributes["case"], details=True))
     return Page(attributes.get("title", "untitled"), command, sections, omissions, lambda: _narrow(dataset))
+
+
+def _again(data: xarray.Dataset | str | Path, attributes: Mapping[str, Any]) -> tuple[str, str]:
+    """The command that runs a dataset again, empty where there is none, and what it needs."""
+    if not attributes["case"]:
+        return "", "The scene was built in Python; its script runs it again."
+    if isinstance(data, str | Path):
+        command = f"surfacechem rerun {shlex.quote(Path(data).name)}"
+        return command, "The dataset holds the case, the mechanism and the settings of the run."
+    needed = "The command needs the case below as case.yaml, and beside it the files that it names"
+    beyond = " What was changed in Python, a written dataset has alone." if "departures" in attributes else ""
+    return f"surfacechem {'sweep' if 'sweep' in attributes else 'run'} case.yaml", f"{needed}.{beyond}"
 
 
 def _narrow(dataset: xarray.Dataset) -> Figure:

@@ -80,6 +80,8 @@ def test_a_report_of_events_lists_them_with_verdicts(tmp_path):
     text = run_report.page(dataset).text()
     assert text.count("slip forward") == 6
     assert "Error against run time" in text
+    assert run_report.page(dataset).command == "surfacechem run case.yaml"
+    assert not run_report.page(dataset.assign_attrs(case="")).command
     with pytest.raises(InputError, match="this is no dataset of a run or of a sweep"):
         run_report.page(dataset.drop_attrs())
     dataset[["time"]].drop_attrs().to_netcdf(tmp_path / "bare.nc")
