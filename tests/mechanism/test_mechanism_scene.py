@@ -9,6 +9,7 @@ import symengine
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from sampling import every
+from scipy.linalg import expm
 
 import surfacechem
 from mechanisms import KMOL, SHIPPED, load, loading_read, loads, mechanism_texts, pulled, states
@@ -190,3 +191,30 @@ def test_the_books_close_from_empty_and_full_coverages(file, bond, coverages, rt
     assert books.entropy_error < 100 * rtol
     assert books.energy_error < 100 * rtol
     assert books.violations == ()
+
+
+def test_forty_species_follow_the_exponential_of_their_matrix(tmp_path):
+    # From thirty variables on the stepper exchanges columns and passes over zeros.
+    n, draw = 40, np.random.default_rng(3)
+    pairs = [(i, (i + 1) % n) for i in range(n)] + [(i, (i + draw.integers(2, n)) % n) for i in range(n)]
+    rates = 10 ** draw.uniform(-2, 4, len(pairs))
+    entries = [
+        f"- {{equation: A{i} => A{j}, rate-constant: {{A: {k:.17g}, b: 0, Ea: 0}}}}"
+        for (i, j), k in zip(pairs, rates, strict=True)
+    ]
+    species = [f"- {{name: A{i}, composition: {{H: 1}}, thermo: {{model: constant-cp}}}}" for i in range(n)]
+    phase = "{name: s, thermo: ideal-surface, kinetics: surface, reactions: all, site-density: 1e-5 mol/m^2, species: [%s]}"
+    names = ", ".join(f"A{i}" for i in range(n))
+    text = ["phases:", "- " + phase % names, "species:", *species, "reactions:", *entries]
+    (tmp_path / "many.yaml").write_text("\n".join(text))
+    (tmp_path / "case.yaml").write_text(
+        "bodies: {a: {temperature: 300 K}, b: {temperature: 300 K}}\n"
+        "interface: {temperature: 300 K, mechanism: {file: many.yaml}}\n"
+        "initial: {coverages: {A0: 1}}\nrun: {until: 0.1 s, outputs: 2, rtol: 1e-10}\n"
+    )
+    matrix = np.zeros((n, n))
+    for (i, j), k in zip(pairs, rates, strict=True):
+        matrix[i, i] -= k
+        matrix[j, i] += k
+    end = surfacechem.load(tmp_path / "case.yaml").run(error="balances").trajectory.result.y
+    np.testing.assert_allclose(end[:n], expm(0.1 * matrix)[:, 0], rtol=1e-9, atol=1e-14)

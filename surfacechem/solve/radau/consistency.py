@@ -58,17 +58,18 @@ def _factor(w: Any) -> bool:
         for j in range(n):
             w.real[i, j] = w.jacobian[0 if w.algebraic[j] else 1, i, j]
     # Unknowns may differ by forty decades, as may equations: only entries beside those of their row can be compared.
+    for i in range(n):
+        w.delta[i] = 0.0
+        for j in range(n):
+            w.delta[i] = max(w.delta[i], abs(w.real[i, j]))
     for j in range(n):
         largest = 0.0
         for i in range(n):
-            row = 0.0
-            for m in range(n):
-                row = max(row, abs(w.real[i, m]))
-            largest = max(largest, abs(w.real[i, j]) / row if row > 0.0 else 0.0)
+            largest = max(largest, abs(w.real[i, j]) / w.delta[i] if w.delta[i] > 0.0 else 0.0)
         w.columns[j] = 1.0 / largest if largest > 0.0 else 1.0
     if w.links > 0 and not _fold(w):
         return False
-    return bool(factor(w.real, w.order[0], w.columns, w.delta, SMALLEST_PIVOT))
+    return bool(factor(w.real, w.order[0], w.places[0], w.columns, w.delta, w.entries, SMALLEST_PIVOT))
 
 
 @compiled

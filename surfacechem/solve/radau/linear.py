@@ -11,6 +11,10 @@ is eliminated from its far end, which leaves a correction of one column of the c
 length. Nothing is exchanged within a chain: where heat is conducted between capacities its matrix is diagonally
 dominant.
 
+The core of a large mechanism is sparse, as most species do not take part in each other's reactions. From LARGE rows on
+the column with the fewest entries left is eliminated next, by the row with the fewest among those whose pivot is not
+small, after Markowitz (1957) with the threshold of Duff, Erisman & Reid (1986).
+
 A chain is a row (first, end, anchor) of a table, the anchor -1 where the chain hangs on nothing; its equations are rows
 (inwards, own, outwards) of the bands; the border holds how the core reads the first variable of each chain.
 """
@@ -20,6 +24,12 @@ from typing import Any
 import numpy as np
 
 from surfacechem.solve.radau.work import compiled
+
+LARGE = 30
+"""Rows from which on columns are exchanged, too, and zeros passed over."""
+
+NOT_SMALL = 0.1
+"""Part of the largest scaled entry of its column that a pivot may be where that keeps the factors sparse."""
 
 
 @compiled
@@ -51,7 +61,6 @@ def _eliminate(a: Any, k: int) -> None:
     a[k, k] = inverse
     pivot = a[k, k + 1 :]
     for i in range(k + 1, a.shape[0]):
-        # In a large mechanism most species do not take part in each other's reactions.
         if a[i, k] == 0.0:
             continue
         multiple = a[i, k] * inverse
@@ -62,13 +71,126 @@ def _eliminate(a: Any, k: int) -> None:
 
 
 @compiled
-def factor(a: Any, order: Any, columns: Any, rows: Any, threshold: float) -> bool:
+def _count_entries(a: Any, counts: Any) -> None:
+    """Count the entries of each row and column; columns stand where they were."""
+    n = a.shape[0]
+    for i in range(n):
+        counts[0, i] = counts[1, i] = 0
+        counts[2, i] = i
+    for i in range(n):
+        for j in range(n):
+            if a[i, j] != 0.0:
+                counts[0, i] += 1
+                counts[1, j] += 1
+
+
+@compiled
+def _emptiest(a: Any, k: int, columns: Any, rows: Any, counts: Any, threshold: float) -> tuple[int, int, int]:
+    """Row and column of the next pivot, and the number of entries in it; the row is -1 where no scaled pivot of that
+    column is above the threshold.
+    """
+    n, q, best, p, found = a.shape[0], k, 0.0, -1, 0
+    for j in range(k + 1, n):
+        if counts[1, j] < counts[1, q]:
+            q = j
+    for i in range(k, n):
+        if a[i, q] != 0.0:
+            counts[4, found] = i
+            found += 1
+            best = max(best, size_of(a[i, q]) * rows[i])
+    if best * columns[counts[2, q]] > threshold:
+        for m in range(found):
+            i = counts[4, m]
+            if size_of(a[i, q]) * rows[i] >= NOT_SMALL * best and (p < 0 or counts[0, i] < counts[0, p]):
+                p = i
+    return p, q, found
+
+
+@compiled
+def _exchange(a: Any, k: int, p: int, q: int, rows: Any, counts: Any) -> None:
+    """Exchange rows k and p, and columns k and q."""
+    n = a.shape[0]
+    if p != k:
+        for j in range(n):
+            a[k, j], a[p, j] = a[p, j], a[k, j]
+        rows[k], rows[p] = rows[p], rows[k]
+        counts[0, k], counts[0, p] = counts[0, p], counts[0, k]
+    if q != k:
+        for i in range(n):
+            a[i, k], a[i, q] = a[i, q], a[i, k]
+        for m in range(1, 3):
+            counts[m, k], counts[m, q] = counts[m, q], counts[m, k]
+
+
+@compiled
+def _eliminate_entries(a: Any, k: int, p: int, below: int, counts: Any) -> None:
+    """What _eliminate does, entry by entry, and count those that are left; rows k and p have been exchanged."""
+    n, found = a.shape[0], 0
+    inverse = 1.0 / a[k, k]
+    a[k, k] = inverse
+    for j in range(k + 1, n):
+        if a[k, j] != 0.0:
+            counts[1, j] -= 1
+            counts[3, found] = j
+            found += 1
+    for listed in range(below):
+        i = counts[4, listed]
+        if i == p:
+            continue
+        i = p if i == k else i
+        multiple = a[i, k] * inverse
+        a[i, k] = multiple
+        counts[0, i] -= 1
+        for m in range(found):
+            j = counts[3, m]
+            if a[i, j] == 0.0:
+                counts[0, i] += 1
+                counts[1, j] += 1
+            a[i, j] -= multiple * a[k, j]
+
+
+@compiled
+def _list_entries(a: Any, order: Any, places: Any) -> None:
+    """List where in each row of the factors there are entries: first those before the diagonal, then those behind."""
+    n = a.shape[0]
+    for i in range(n):
+        found = 0
+        for j in range(n):
+            if j == i:
+                order[2, i] = found
+            elif a[i, j] != 0.0:
+                places[i, found] = j
+                found += 1
+        order[3, i] = found
+
+
+@compiled
+def _factor_large(a: Any, order: Any, places: Any, columns: Any, rows: Any, counts: Any, threshold: float) -> bool:
+    _count_entries(a, counts)
+    for k in range(a.shape[0]):
+        p, q, below = _emptiest(a, k, columns, rows, counts, threshold)
+        if p < 0:
+            return False
+        order[0, k], order[1, k] = p, q
+        _exchange(a, k, p, q, rows, counts)
+        _eliminate_entries(a, k, p, below, counts)
+    _list_entries(a, order, places)
+    return True
+
+
+@compiled
+def factor(a: Any, order: Any, places: Any, columns: Any, rows: Any, counts: Any, threshold: float) -> bool:
     """Replace a by its factors, the inverse pivots on the diagonal; False if a scaled pivot is not above the
     threshold.
+
+    The order is what rows were exchanged with, and columns, and how many entries of a row come before its diagonal, and
+    in all; the places are where these are. Five rows of counts are room to work in.
     """
     n = a.shape[0]
     if not _scale_rows(a, columns, rows[:n]):
         return False
+    if n >= LARGE:
+        return bool(_factor_large(a, order, places, columns, rows, counts, threshold))
     for k in range(n):
         p, best = k, -1.0
         for i in range(k, n):
@@ -77,7 +199,7 @@ def factor(a: Any, order: Any, columns: Any, rows: Any, threshold: float) -> boo
                 p, best = i, size
         if not size_of(a[p, k]) * rows[p] * columns[k] > threshold:
             return False
-        order[k] = p
+        order[0, k] = p
         if p != k:
             for j in range(n):
                 a[k, j], a[p, j] = a[p, j], a[k, j]
@@ -87,12 +209,37 @@ def factor(a: Any, order: Any, columns: Any, rows: Any, threshold: float) -> boo
 
 
 @compiled
-def solve(a: Any, order: Any, x: Any) -> None:
+def _solve_large(a: Any, order: Any, places: Any, x: Any) -> None:
+    n = a.shape[0]
+    for k in range(n):
+        p = order[0, k]
+        total = x[p]
+        x[p] = x[k]
+        for m in range(order[2, k]):
+            j = places[k, m]
+            total -= a[k, j] * x[j]
+        x[k] = total
+    for k in range(n - 1, -1, -1):
+        total = x[k]
+        for m in range(order[2, k], order[3, k]):
+            j = places[k, m]
+            total -= a[k, j] * x[j]
+        x[k] = total * a[k, k]
+    for k in range(n - 1, -1, -1):
+        q = order[1, k]
+        x[k], x[q] = x[q], x[k]
+
+
+@compiled
+def solve(a: Any, order: Any, places: Any, x: Any) -> None:
     """Overwrite the right-hand side by the solution; entries of x beyond the matrix are left alone."""
     n = a.shape[0]
+    if n >= LARGE:
+        _solve_large(a, order, places, x)
+        return
     # Sums in a local name: in x each term would wait until the one before it is stored.
     for k in range(n):
-        p = order[k]
+        p = order[0, k]
         total = x[p]
         x[p] = x[k]
         for j in range(k):
@@ -146,7 +293,7 @@ def fold_shifted(w: Any, shift: Any, core: Any, border: Any, bands: Any) -> bool
 
 
 @compiled
-def _solve_chained(chains: Any, core: Any, border: Any, bands: Any, order: Any, x: Any) -> None:
+def _solve_chained(chains: Any, core: Any, border: Any, bands: Any, order: Any, places: Any, x: Any) -> None:
     """Overwrite the right-hand side by the solution with a matrix whose chains are folded into its core."""
     n = core.shape[0]
     # The right-hand side of the core with the chains eliminated, from their far ends.
@@ -156,7 +303,7 @@ def _solve_chained(chains: Any, core: Any, border: Any, bands: Any, order: Any, 
             x[i] -= bands[i - n, 2] * x[i + 1]
         for i in range(n):
             x[i] -= border[i, c] * x[first]
-    solve(core, order, x)
+    solve(core, order, places, x)
     # The solution along the chains, from that of the core outwards.
     for c in range(chains.shape[0]):
         first, anchor = chains[c, 0], chains[c, 2]
@@ -171,9 +318,9 @@ def _solve_chained(chains: Any, core: Any, border: Any, bands: Any, order: Any, 
 def solve_real(w: Any, x: Any) -> None:
     """Overwrite the right-hand side by the solution with the real matrix."""
     if w.links > 0:
-        _solve_chained(w.chains, w.real, w.real_border, w.real_bands, w.order[0], x)
+        _solve_chained(w.chains, w.real, w.real_border, w.real_bands, w.order[0], w.places[0], x)
     else:
-        solve(w.real, w.order[0], x)
+        solve(w.real, w.order[0], w.places[0], x)
 
 
 @compiled
@@ -181,6 +328,6 @@ def solve_complex(w: Any, pair: int, x: Any) -> None:
     """Overwrite the right-hand side by the solution with the complex matrix of a pair of eigenvalues."""
     if w.links > 0:
         border, bands = w.complex_border[pair], w.complex_bands[pair]
-        _solve_chained(w.chains, w.complex[pair], border, bands, w.order[1 + pair], x)
+        _solve_chained(w.chains, w.complex[pair], border, bands, w.order[1 + pair], w.places[1 + pair], x)
     else:
-        solve(w.complex[pair], w.order[1 + pair], x)
+        solve(w.complex[pair], w.order[1 + pair], w.places[1 + pair], x)

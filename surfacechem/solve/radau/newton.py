@@ -147,14 +147,14 @@ def factor_newton(w: Any, h: float) -> bool:
     shifted(w.jacobian, shift, real)
     if chained and not fold_shifted(w, shift, real, w.real_border, w.real_bands):
         return False
-    if not factor(real, w.order[0], w.pivot, w.delta, 0.0):
+    if not factor(real, w.order[0], w.places[0], w.pivot, w.delta, w.entries, 0.0):
         return False
     for pair in range(k + 1):
         complex_shift, matrix = PAIR_VALUES[k, pair] / h, w.complex[pair]
         shifted(w.jacobian, complex_shift, matrix)
         if chained and not fold_shifted(w, complex_shift, matrix, w.complex_border[pair], w.complex_bands[pair]):
             return False
-        if not factor(matrix, w.order[1 + pair], w.pivot, w.delta, 0.0):
+        if not factor(matrix, w.order[1 + pair], w.places[1 + pair], w.pivot, w.delta, w.entries, 0.0):
             return False
     return True
 

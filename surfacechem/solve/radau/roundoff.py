@@ -102,16 +102,26 @@ def find_noise(w: Any) -> None:
         return
     spread_noise(w, w.y, w.ydot)
     for j in range(w.n):
-        most = max(LARGEST * w.scale[j], w.atol[j] / w.rtol)
-        w.noise[j] = min(w.noise[j], most)
+        w.noise[j] = min(w.noise[j], _most_noise(w, j))
+
+
+@compiled
+def _most_noise(w: Any, j: int) -> float:
+    return float(max(LARGEST * w.scale[j], w.atol[j] / w.rtol))
 
 
 @compiled
 def correction_is_noise(w: Any, stages: int) -> bool:
     """Whether Newton's last correction, kept in g, is no larger than the noise, magnified by the method."""
+    magnified = 2.0 * GAMMA[w.member]
+    # As a rule it is larger than noise can be, whose search takes as many solutions as there are variables.
+    for i in range(stages):
+        for j in range(w.n):
+            if w.explicit == 0 and not abs(w.g[i, j]) <= magnified * _most_noise(w, j):
+                return False
     find_noise(w)
     for i in range(stages):
         for j in range(w.n):
-            if not abs(w.g[i, j]) <= 2.0 * GAMMA[w.member] * w.noise[j]:
+            if not abs(w.g[i, j]) <= magnified * w.noise[j]:
                 return False
     return True
