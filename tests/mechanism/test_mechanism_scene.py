@@ -203,9 +203,9 @@ def test_forty_species_follow_the_exponential_of_their_matrix(tmp_path):
         for (i, j), k in zip(pairs, rates, strict=True)
     ]
     species = [f"- {{name: A{i}, composition: {{H: 1}}, thermo: {{model: constant-cp}}}}" for i in range(n)]
-    phase = "{name: s, thermo: ideal-surface, kinetics: surface, reactions: all, site-density: 1e-5 mol/m^2, species: [%s]}"
     names = ", ".join(f"A{i}" for i in range(n))
-    text = ["phases:", "- " + phase % names, "species:", *species, "reactions:", *entries]
+    phase = f"- {{name: s, thermo: ideal-surface, site-density: 1e-5 mol/m^2, kinetics: surface, species: [{names}]}}"
+    text = ["phases:", phase, "species:", *species, "reactions:", *entries]
     (tmp_path / "many.yaml").write_text("\n".join(text))
     (tmp_path / "case.yaml").write_text(
         "bodies: {a: {temperature: 300 K}, b: {temperature: 300 K}}\n"
