@@ -44,10 +44,11 @@ def test_what_cannot_go_on_is_no_success(name, rows, last):
     assert last == 0.0 or np.isfinite(result.y).all()
 
 
-def steep(name: str, row, start: float, end: float):
+def steep(name: str, row, start: float, end: float, **more):
     """A run of y from 1 on, of which a library keeps the steps."""
     program = compile_program(T, [Y], [DY], [], [row], [2 * Y * DY])
-    return solver(name).solve(problem(program, [1.0], [start, end], 1e-8, times=[start, end], record_steps=True))
+    more |= {"times": [start, end], "record_steps": True}
+    return solver(name).solve(problem(program, [1.0], [start, end], 1e-8, **more))
 
 
 LAYER = Y * DY - 1e17
@@ -60,6 +61,11 @@ def test_a_layer_within_the_last_digit_of_the_clock(name: str) -> None:
     assert result.status.success
     np.testing.assert_allclose(result.outputs[1], np.sqrt([2e17]), rtol=1e-6)
     np.testing.assert_allclose(result.ledger_outputs[1], [2e17], rtol=1e-6)
+
+
+@pytest.mark.parametrize("name", ["lsoda", "bdf", "scipy-radau", "cvode", "ida"])
+def test_steps_are_counted_while_the_clock_stands(name: str) -> None:
+    assert steep(name, LAYER, 1.0, 2.0, max_steps=5).status is Status.STEP_UNDERFLOW
 
 
 @pytest.mark.parametrize(("row", "start", "reason"), [(DY + 0.5 / Y, 0.0, "phi runs away"), (LAYER, 1.0, "None")])

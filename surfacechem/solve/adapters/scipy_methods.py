@@ -21,7 +21,7 @@ class _Stretch(Method):
     """Steps that count time from their start: what begins there may be over before the run's own clock ticks."""
 
     def __init__(self, kind: type[OdeSolver], view: View, t: float, end: float, y: Array) -> None:
-        self.start, self.t, self.end = t, t, end
+        self.start, self.t, self.end, self.most = t, t, end, view.problem.max_steps
         options: dict[str, Any] = {
             "rtol": max(view.problem.rtol, SMALLEST_RTOL),
             "atol": view.atol,
@@ -36,9 +36,9 @@ class _Stretch(Method):
             raise StepError(str(error)) from error
 
     def advance(self) -> DenseStep:
-        before = self.t
+        before, taken = self.t, 0
         while self.t == before:
-            passed = self.solver.t
+            passed, taken = self.solver.t, self.counted(taken)
             self._step()
             if not self.solver.t > passed:  # some go on like this for ever
                 raise StepError("the step size fell to zero")

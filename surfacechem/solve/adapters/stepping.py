@@ -86,6 +86,15 @@ class View(Evaluation):
 class Method(ABC):
     """One library method running over one stretch without breakpoints."""
 
+    most: int
+    """Steps that it may take before the clock of the run ticks."""
+
+    def counted(self, taken: int) -> int:
+        """One step more since the clock ticked; StepError where there are too many."""
+        if taken >= self.most:
+            raise StepError(f"more than {self.most} steps without a change of the time in its last digit")
+        return taken + 1
+
     @abstractmethod
     def advance(self) -> DenseStep:
         """Take one step of the library's choice."""

@@ -24,8 +24,8 @@ class _Stretch(Method):
     back to it.
     """
 
-    def __init__(self, library: Any, t: float, end: float, *start: Array) -> None:
-        self.integrator = library
+    def __init__(self, library: Any, most: int, t: float, end: float, *start: Array) -> None:
+        self.integrator, self.most = library, most
         self.start, self.t, self.end = t, t, end
         self.before, self.passed, self.length = 0.0, 0.0, end - t
         self.x = start[0]
@@ -45,8 +45,9 @@ class _Stretch(Method):
         return answer
 
     def advance(self) -> DenseStep:
-        before = self.t
+        before, taken = self.t, 0
         while self.t == before:
+            taken = self.counted(taken)
             self._step()
             self.t = self.end if self.passed >= self.length else self.start + self.passed
         return DenseStep(before, self.t, self._at)
@@ -97,7 +98,7 @@ class CVODESolver(SteppingSolver):
             max_num_steps=100_000,
             max_step=_longest(view.problem),
         )
-        return _Stretch(library, t, end, y[view.differential])
+        return _Stretch(library, view.problem.max_steps, t, end, y[view.differential])
 
 
 class IDASolver(SteppingSolver):
@@ -124,7 +125,7 @@ class IDASolver(SteppingSolver):
             max_step=_longest(view.problem),
             algebraic_idx=list(view.algebraic) or None,
         )
-        return _Stretch(library, t, end, y, ydot)
+        return _Stretch(library, view.problem.max_steps, t, end, y, ydot)
 
 
 def make(name: str) -> SteppingSolver:
