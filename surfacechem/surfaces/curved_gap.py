@@ -22,7 +22,7 @@ from surfacechem.surfaces.pairwise import check_finite, length
 from surfacechem.surfaces.patches import Budget, Patches, Rules, integral, outer_patches
 from surfacechem.surfaces.projection import FIRST, NEWTONS, Array, Projection, Surface, cross
 from surfacechem.surfaces.shapes import Plane
-from surfacechem.tolerances import EPS, NEGLIGIBLE, NOISE, PRECISE, TINY
+from surfacechem.tolerances import NEGLIGIBLE, NOISE, PRECISE, SQRT_EPS, TINY
 
 GAP = "g_n"
 
@@ -197,7 +197,8 @@ def over_gap(
             *[force] * 6,
             *[max(moment, force * size)] * 6,
         ]
-        area = max(abs(found[13]), EPS * size**2) * max(1.0, OF_AREA / rtol)
+        # Where bodies just touch rounding decides what overlaps.
+        area = max(abs(found[13]), SQRT_EPS * size**2) * max(1.0, OF_AREA / rtol)
         flow = max(abs(found[14]), TINY)
         return np.array([*parts, area, flow, max(abs(found[15]), flow / size)])
 

@@ -24,13 +24,13 @@ from surfacechem.results.matching import match
 from surfacechem.runs.summaries import run_summary
 from surfacechem.surfaces import patches, potential
 from surfacechem.surfaces.approach import fitted
-from surfacechem.surfaces.curved_gap import passages
+from surfacechem.surfaces.curved_gap import density, over_gap, passages
 from surfacechem.surfaces.nearest_places import near_places
 from surfacechem.surfaces.pair_laws import InversePower
 from surfacechem.surfaces.pairwise import interaction
 from surfacechem.surfaces.potential import CurvedSurfaces
 from surfacechem.surfaces.projection import Surface
-from surfacechem.surfaces.shapes import Plane, Sphere, Torus
+from surfacechem.surfaces.shapes import Cone, Plane, Sphere, Torus
 
 pytestmark = pytest.mark.around
 
@@ -393,6 +393,16 @@ def test_a_force_that_begins_like_a_root_is_held_where_it_is_small():
 def test_contact_begins_where_the_least_gap_vanishes(upper, least):
     found = passages(Surface(Plane()), Surface(upper, True), [0.0, 0.1])
     assert found == pytest.approx([least, least + 0.1], abs=1e-12)
+
+
+def test_bodies_that_just_touch_have_no_area_of_contact():
+    """Rounding decides which points of a rim overlap, and takes no patches."""
+    lower, upper = Surface(Plane()), Surface(Cone(slope=0.3, radius=1.0, tilt=0.4), True)
+    touching = replace(upper, approach=passages(lower, upper, [0.0])[0])
+    budget = patches.Budget(1e-5)
+    found = over_gap(lower, touching, [density(Penalty(E_n=1.0))], rtol=1e-5, floor=(1e-6, 1e-6), budget=budget)
+    assert found.area < 1e-12
+    assert budget.spent < 1e7
 
 
 def test_an_accuracy_is_refused_by_what_all_integrals_of_the_approach_take_and_each_is_told(monkeypatch, caplog):
