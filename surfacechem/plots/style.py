@@ -67,7 +67,7 @@ GREEK = ("alpha", "beta", "epsilon", "eta", "kappa", "lambda", "mu", "phi", "rho
 
 
 LETTERS, TITLE_LETTERS = 16, 9.5
-"""Of a line of facts above the panels, and of the title, in an inch."""
+"""Of a line of facts above the panels, and of the title and the words below an axis, in an inch."""
 
 MOST_DECADES = 1e5
 """Largest over smallest value of a logarithmic axis that has ticks inside its decades."""
@@ -302,12 +302,15 @@ def over_decades(values: Array) -> bool:
 
 def draw_parameter(ax: Axes, values: xarray.DataArray) -> None:
     """The axis of a swept parameter: its meaning, or its name where that tells more, and unit."""
+    whole = ax.get_figure(root=True)
+    assert whole is not None
+    words = "\n".join(wrap(parameter_words(values), int(TITLE_LETTERS * whole.get_figwidth())))
     if not over_decades(values.values):
-        label(ax.xaxis, parameter_words(values), unit(values), values.values)
+        label(ax.xaxis, words, unit(values), values.values)
         return
     # The prefix suits the middle of the decades: at their upper end, nobody reads 100 pN/s from an axis in nN/s.
     text, size = prefixed(unit(values), np.sqrt(np.abs(values.values[:1] * values.values[-1:])))
-    ax.set_xlabel(f"{parameter_words(values)} [{text}]")
+    ax.set_xlabel(f"{words} [{text}]")
     logarithmic(ax.xaxis)
     ax.xaxis.set_major_formatter(lambda value, _: raised(f"10^{round(math.log10(value / size))}"))
 

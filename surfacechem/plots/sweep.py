@@ -101,6 +101,7 @@ def _draw_final(ax: Axes, dataset: xarray.Dataset, names: Sequence[str]) -> None
     ends = {name: members.final(dataset, name) for name in names}
     for name, end in ends.items():
         for values, label in style.by_second(dataset, end):
-            marker = "o" if len(x) < 3 else ""
-            ax.plot(x, values, marker=marker, label=f"{symbol(name)} {label}".strip())
-    style.label(ax.yaxis, "final", unit(dataset[names[0]]), np.stack(list(ends.values())))
+            words = label or symbol(name) if len(names) == 1 else f"{symbol(name)} {label}".strip()
+            ax.plot(x, values, marker="o" if len(x) < 3 else "", label=words)
+    said = f"Final {symbol(names[0])}" if len(names) == 1 else "Final value"
+    style.label(ax.yaxis, said, unit(dataset[names[0]]), np.stack(list(ends.values())))

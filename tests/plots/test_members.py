@@ -111,3 +111,12 @@ def test_what_cannot_be_drawn_is_refused(drawn, tmp_path):
         plots.figure(drawn, ["T_lst"])
     with pytest.raises(InputError, match="is no readable store"):
         plots.figure(tmp_path / "missing.zarr")
+
+
+def test_the_words_of_a_parameter_stay_inside_the_figure():
+    plot = plots.figure(surfacechem.load("exothermic").sweep({K_0: [200.0, 300.0]}).dataset)
+    plot.draw_without_rendering()
+    words = plot.axes[-1].xaxis.label
+    assert words.get_text().startswith("Temperature-independent part")
+    assert plot.bbox.x0 <= words.get_window_extent().x0 < words.get_window_extent().x1 <= plot.bbox.x1
+    assert [ax.get_ylabel() for ax in plot.axes] == ["Final $T$ [K]", "Final $\\phi$ [1]"]
