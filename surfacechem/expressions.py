@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from functools import reduce
+from functools import lru_cache, reduce
 from typing import Any, TypeAlias
 
 from surfacechem.tolerances import FRACTION_FLOOR, NOISE
@@ -31,7 +31,13 @@ def is_symbolic(*values: Expression) -> bool:
 
 def depends(expression: Expression, symbol: Expression) -> bool:
     """Whether the expression contains the symbol."""
-    return is_symbolic(expression) and symbol in expression.free_symbols
+    return is_symbolic(expression) and symbol in _symbols(expression)
+
+
+@lru_cache(maxsize=8)
+def _symbols(expression: Expression) -> Any:
+    """Symbols of an expression: a potential of many species is asked for each of them in turn."""
+    return expression.free_symbols
 
 
 def without(expression: Expression, known: Mapping[Any, Expression]) -> Expression:

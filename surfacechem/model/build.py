@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import chain, count
 from typing import Any
 
 import symengine
@@ -30,8 +31,6 @@ from surfacechem.quantities import Quantity
 from surfacechem.scene import Interface, Scene
 from surfacechem.tolerances import NOTHING
 from surfacechem.tolerances import ROUNDING as DIGITS
-
-MANY = range(2, 1000)
 
 BOTH = "interface", "each body"
 """Ends of the paths that bring heat into both bodies alike."""
@@ -181,7 +180,7 @@ class Build:
 
     def unique(self, base: str) -> str:
         """The name, with a number where it is taken."""
-        name = next(n for n in (base, *(f"{base}_{i}" for i in MANY)) if n not in self.used_names)
+        name = next(n for n in chain((base,), (f"{base}_{i}" for i in count(2))) if n not in self.used_names)
         self.used_names.add(name)
         return name
 

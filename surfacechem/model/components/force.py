@@ -35,7 +35,7 @@ def energies(build: Build) -> None:
     g_n = symengine.Symbol("g_n")
     if depends(build.psi, g_n):
         build.variables.define("t_n", symengine.Symbol("t_n"), "derived", "the interface's potential")
-    for name, bond in build.bonding.items():
+    for name, bond in build.bonding.items() if depends(build.psi, g_n) else ():
         if depends(derivative(build.psi, bond.symbol), g_n):
             quantity = VARIABLES["f"] if name == "phi" else Quantity(f"f_{name}", "N", f"force per bond of {name}")
             stretching = derivative(derivative(build.psi, bond.symbol), g_n) / bond.density
