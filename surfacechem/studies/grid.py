@@ -26,7 +26,7 @@ from surfacechem.solve.run import Trajectory
 BRIEF, LEAST_REPEATS, MOST_REPEATS = 0.05, 3, 20
 
 # A solver at one value is not timed again once it has taken this long [s].
-BUDGET = 10.0
+BUDGET = 1.0
 
 # Relative tolerance above which no solver is asked.
 LOOSEST = 0.1

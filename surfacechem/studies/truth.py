@@ -27,13 +27,13 @@ from surfacechem.solve import ASKING, solver
 from surfacechem.solve.contract import Array
 from surfacechem.solve.run import Model, Trajectory
 from surfacechem.studies.grid import FAULTS
-from surfacechem.tolerances import EPS, TIGHTEST
+from surfacechem.tolerances import EPS, SQRT_EPS, TIGHTEST
 
 Values = Mapping[str, Array]
 
 # Different families: collocation twice, by different authors, and multistep. A bug of one is not one of the other.
-# Methods that a reference may be made of; the last only where it is needed.
-METHODS = ("radau", "scipy-radau", "lsoda", "cantera")
+# Methods that a reference may be made of, the quicker first; the last only where it is needed.
+METHODS = ("radau", "lsoda", "scipy-radau", "cantera")
 
 # Closer tolerances would differ by little more than rounding, others would leave the range where errors follow them.
 # Ratio of the two tolerances from which a method is extrapolated.
@@ -48,6 +48,9 @@ TOLERANCES = tuple(10.0**-k for k in (4, 6, 8, 10, 12))
 
 # Methods that differ by more do not agree: a reference must still tell the errors of the loosest tolerance.
 AGREE = TOLERANCES[0] / 100
+
+# Two that differ by no more than this need no third.
+CLOSE = DECADE * TOLERANCES[-1]
 
 KINDS = ("final", "max", "l2")
 # The kinds of errors; the last is not of variables.
@@ -198,8 +201,11 @@ def looked_at(subject: Subject) -> Subject:
         found = subject.tight(subject.methods()[0], TIGHTEST)
     except InputError:
         return subject
-    run = subject.case.run
-    times = np.union1d(fewer(found.looked).result.times, [0.0, run.times[-1]])
+    run, times = subject.case.run, fewer(found.looked).result.times
+    # Towards an event states may change like a root, so that next to it the rounding of time decides.
+    moments = np.concatenate([[0.0], *event_times(found).values()])
+    times = times[np.all(np.abs(times[:, None] - moments) > SQRT_EPS * moments, axis=1)]
+    times = np.union1d(times, [0.0, run.times[-1]])
     return replace(subject, case=replace(subject.case, own_run=replace(run, times=tuple(times.tolist()), picture=None)))
 
 
@@ -222,14 +228,15 @@ def establish(subject: Subject, variables: Sequence[str]) -> Truth:
         return replace(found, source=f"{found.source}; {unused}")
     # Variables and times of events that the exact solution does not state are those of two methods.
     known = {name: exact[name] for name in variables if name in exact}
-    alone = len(known) == len(variables) and not event_times(trajectory)
-    beside = Truth.of(trajectory, "", variables) if alone else numerical(subject, variables)
+    whole, others = Truth.of(trajectory, "", variables), [name for name in variables if name not in known]
+    beside = numerical(subject, others) if others or event_times(trajectory) else whole
+    beside = replace(beside, floors=whole.floors)
     noise = replace(beside, times=result.times, values=known, events={}).errors(moved, {}).by_kind
     uncertain = {
         kind: {**errors, **{name: error + EPS for name, error in noise[kind].items()}}
         for kind, errors in beside.uncertainty.by_kind.items()
     }
-    others = [*(name for name in beside.values if name not in known), *(["events"] if beside.events else [])]
+    others += ["events"] if beside.events else []
     source = f"exact solution {reference.name}" + (f"; {', '.join(others)}: {beside.source}" if others else "")
     values = {**beside.values, **known}
     return replace(beside, source=source, times=result.times, values=values, uncertainty=Errors(uncertain))
@@ -238,8 +245,11 @@ def establish(subject: Subject, variables: Sequence[str]) -> Truth:
 def numerical(subject: Subject, variables: Sequence[str]) -> Truth:
     """The truth from the two methods that agree best; InputError where no two agree."""
     name = subject.case.name
-    found, failures = [], []
+    found: list[Truth] = []
+    failures = []
     for method in subject.methods():
+        if len(found) == 2 and _apart(*found) <= CLOSE:
+            break
         try:
             found.append(_extrapolated(subject, method, variables))
         except InputError as error:
@@ -248,19 +258,22 @@ def numerical(subject: Subject, variables: Sequence[str]) -> Truth:
         raise InputError("; ".join(failures))
     if len(found) == 1:
         return replace(found[0], source=f"{found[0].source} alone, which no second method confirms")
-    pairs = [
-        (a, b, a.errors(b.values, b.events))
-        for a, b in combinations(found, 2)
-        if a.status == b.status and not difference(a.events, b.events) and len(a.times) == len(b.times)
-    ]
-    if not pairs:
+    first, second = min(combinations(found, 2), key=lambda pair: _apart(*pair))
+    methods, largest = f"{first.source} and {second.source}", _apart(first, second)
+    if math.isinf(largest):
         raise InputError(f"{name} has no reference: its methods come to different ends or events.")
-    first, second, apart = min(pairs, key=lambda pair: np.nan_to_num(pair[2].worst("max", "event"), nan=math.inf))
-    methods, largest = f"{first.source} and {second.source}", apart.worst("max", "event")
     if not largest <= AGREE:
         raise InputError(f"{name} has no reference: the methods that agree best, {methods}, differ by {largest:.1e}.")
     source = f"{methods}, extrapolated from rtol {TIGHTEST * DECADE:.0e} and {TIGHTEST:.0e}"
+    apart = first.errors(second.values, second.events)
     return replace(first, source=source, uncertainty=apart.larger(first.uncertainty))
+
+
+def _apart(a: Truth, b: Truth) -> float:
+    """By how much two methods differ at most; infinite where they come to other ends or events."""
+    if a.status != b.status or difference(a.events, b.events) or len(a.times) != len(b.times):
+        return math.inf
+    return float(np.nan_to_num(a.errors(b.values, b.events).worst("max", "event"), nan=math.inf))
 
 
 def _extrapolated(subject: Subject, method: str, variables: Sequence[str]) -> Truth:
