@@ -129,7 +129,9 @@ def _size(build: Build, gap: Equilibrium, own: Expression) -> Expression:
     # Of what holds the gap itself: friction beside it has no stiffness.
     t = build.expanded(derivative(build.psi, g))
     t = t if t != 0 else far.F - build.expanded(gap.residual)
-    secant = t * g
+    # From a closed gap on, where attraction is not zero; what is infinite there is looked at from zero.
+    closed = t.subs(g, 0)
+    secant = (t if closed.has(symengine.nan, symengine.zoo, symengine.oo) else t - closed) * g
     return where(secant > 0, secant / absolute(g) ** 2, where(absolute(own) > 0, absolute(own), 1))
 
 
