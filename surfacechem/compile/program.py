@@ -36,6 +36,8 @@ class Function:
     >>> compile_function([x, y], [x * y, x + y])([[2.0, 3.0], [4.0, 5.0]])
     array([[ 6.,  5.],
            [20.,  9.]])
+    >>> compile_function([x, y], [])([2.0, 3.0])
+    array([], dtype=float64)
     """
 
     address: int
@@ -48,6 +50,8 @@ class Function:
 
     def __call__(self, inputs: ArrayLike) -> NDArray[np.float64]:
         values = np.ascontiguousarray(inputs, dtype=float)
+        if not self.n_out:  # machine code of nothing cannot be called
+            return np.empty((*values.shape[:-1], 0))
         if not self.rest:
             return np.asarray(self.keep(values))
         return np.concatenate([np.asarray(self.keep(values)), *(part(values) for part in self.rest)], axis=-1)

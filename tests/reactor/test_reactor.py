@@ -259,6 +259,7 @@ def test_heat_through_a_wall(tmp_path):
         ("exothermic", {"uper": None}, "no body 'uper'. Did you mean 'upper'"),
         ("exothermic", {"interface": None}, "not of the interface"),
         ("exothermic", {"upper": None}, "must not give it a heat capacity"),
+        ("rate-and-state-stick-slip", {}, "sliding that rate-and-state friction lets evolve"),
     ],
 )
 def test_bodies_that_no_reactor_can_replace(case, bodies, message):
