@@ -84,7 +84,7 @@ def _section(dataset: xarray.Dataset) -> tuple[Array, Any]:
     if _around(dataset):
         return np.hypot(x, y)[rows, column], (rows, column)
     columns, last = np.full(len(rows), column), x.shape[1] - 1
-    if np.ptp(x[:, [0, -1]], axis=1).max() <= SQRT_EPS * np.ptp(x):
+    if max(np.ptp(ends[:, [0, -1]], axis=1).max() for ends in (x, y)) <= SQRT_EPS * np.ptp(x):
         # About an axis a section goes on where the opposite column begins.
         rows, columns = np.append(rows[::-1], rows), np.append(np.full(len(rows), (column + last // 2) % last), columns)
     at = rows, columns

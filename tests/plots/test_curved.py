@@ -44,3 +44,14 @@ def test_the_far_side_of_a_closed_body_does_not_cover_the_near_one(dataset):
     assert z.min() == pytest.approx(-1e-8, rel=0.05)
     assert -x.min() == pytest.approx(x.max(), rel=0.1)  # with sixteen points around the opposite one is beside
     assert field.collections[0].get_array().shape[0] == pytest.approx(dataset.sizes["u"] / 2, abs=1)
+
+
+def test_a_section_through_a_plate_is_one_line(dataset):
+    """Its columns lie beside each other and meet nowhere, unlike those around an axis."""
+    plate = dataset.copy(deep=True)
+    u, v = np.meshgrid(np.linspace(0, 2e-8, dataset.sizes["u"]), np.linspace(-1e-8, 1e-8, dataset.sizes["v"]))
+    for axis, value in zip("xyz", (u, v, -(u**2) - v**2), strict=True):
+        plate[f"surface_{axis}"].values[:] = value.T
+    plate["gap"] = dataset.gap * (1 + 1e-3 * plate.surface_x / 1e-8 + plate.surface_y / 1e-7)
+    x, _ = figure(plate, ["traction"]).axes[0].lines[0].get_data()
+    assert x == pytest.approx(u[0])
