@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from surfacechem.errors import InputError
-from surfacechem.surfaces.projection import FIRST, POLE, Array, Indices, Surface, descended, newton_step
+from surfacechem.surfaces.projection import FIRST, NEWTONS, POLE, Array, Indices, Surface, descended, newton_step
 from surfacechem.tolerances import CBRT_EPS, NOISE, SAME, SQRT_EPS
 
 COARSE, PER_GRAIN = 32, 4
@@ -26,6 +26,9 @@ MOST_PLACES = 5_000_000
 TOGETHER, ANY = 100_000, 200
 """Places that are looked at together, and those that take as long as any, however few they are."""
 
+
+ACROSS, SHRINK = 9, 0.6
+"""Places along each side of a grid around one of least gap, and how much smaller the next is."""
 
 STEEPEST = math.atan(1e3)
 """Turn [rad] beyond which nearest places of surfaces without end are not sought farther out: a choice."""
@@ -178,7 +181,9 @@ def _settled(
 
 
 def _rolled(gap: Callable[[Array], Array], at: Array, steps: Array, bounds: Array) -> Array:
-    """The place (2,) of least gap near one by the method of Nelder and Mead, which needs no slope."""
+    """The place (2,) of least gap near one by the method of Nelder and Mead, which needs no slope, and on grids that
+    shrink around the best so far, as that may come to rest where the gap jumps.
+    """
     from scipy.optimize import minimize
 
     def value(at: Array) -> float:
@@ -186,8 +191,16 @@ def _rolled(gap: Callable[[Array], Array], at: Array, steps: Array, bounds: Arra
 
     corners = at + np.diag(np.where(at + steps > bounds[1], -steps, steps))
     options: Any = {"initial_simplex": [at, *corners], "xatol": SQRT_EPS * steps.max(), "fatol": SAME * steps.max()}
-    found = minimize(value, list(at), method="Nelder-Mead", bounds=list(bounds.T), options=options)
-    return np.asarray(found.x)
+    at = np.asarray(minimize(value, list(at), method="Nelder-Mead", bounds=list(bounds.T), options=options).x)
+    around = np.stack(np.meshgrid(*[np.linspace(-1, 1, ACROSS)] * 2, indexing="ij"), axis=-1).reshape(-1, 2)
+    size = 1.0
+    for _ in range(NEWTONS):
+        places = np.clip(np.concatenate([at[None], at + size * steps * around]), *bounds)
+        best = places[np.argmin(gap(places))]
+        # While the best is moving the grid stays as wide.
+        size *= 1.0 if np.max(np.abs(best - at) / np.maximum(steps, POLE)) > size / 2 else SHRINK
+        at = best
+    return at
 
 
 def _distinct(outer: Surface, at: Array, gap: Array, near: float) -> NearPlaces:
