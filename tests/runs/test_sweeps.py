@@ -284,10 +284,10 @@ def test_a_case_without_a_sweep(bonding):
 
 def test_figure_of_final_values(bonding):
     plot = plots.figure(bonding.sweep({"initial.T": [280.0, 300.0], K_0: [100.0, 200.0, 300.0]}).dataset)
-    assert [ax.get_ylabel() for ax in plot.axes] == ["final [K]", "final [1]"]
+    assert [ax.get_ylabel() for ax in plot.axes] == ["Final $T$ [K]", "Final $\\phi$ [1]"]
     ax = plot.axes[0]
     assert len(ax.get_lines()) == 3
-    assert ax.get_legend().get_texts()[0].get_text() == "$T$ K 0 = 100 J m⁻²"
+    assert ax.get_legend().get_texts()[0].get_text() == "K 0 = 100 J m⁻²"
     with pytest.raises(InputError, match="no variable 'x' in the sweep"):
         plots.figure(bonding.sweep({K_0: [1.0]}).dataset, ["x"])
 

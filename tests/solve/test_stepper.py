@@ -269,7 +269,7 @@ def test_a_return_code_without_words_ends_the_step():
             raise KeyError(-60)
 
     with pytest.raises(StepError, match="return code -60"):
-        _Stretch(Library(), 0.0, 1.0, np.zeros(1))
+        _Stretch(Library(), 5, 0.0, 1.0, np.zeros(1))
 
 
 # -- tables of the Radau family, and their products with the stages ---------------------------------------------------
