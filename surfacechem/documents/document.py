@@ -139,7 +139,7 @@ def decoded(data: bytes, place: Place) -> str:
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError:
-        message = "no text in UTF-8; a case is a YAML file, a dataset is read by `plot` and `rerun`."
+        message = "no text in UTF-8; cases are YAML files, tables CSV; a dataset is read by `plot` and `rerun`."
         raise InputError(message, place) from None
 
 

@@ -50,7 +50,7 @@ def table(tree: Tree, unit: str) -> Table | None:
     if given is None or not isinstance(given.value, dict) or "csv" not in given.value:
         return None
     fields = given.mapping(KEYS[1:])
-    content, variable = CSVText(fields["csv"]), tree.place.path.rpartition(".")[2]
+    content, variable = CSVText(fields["csv"], renamed=True), tree.place.path.rpartition(".")[2]
     name = fields["column"].text("column") if "column" in fields else variable
     times, values = content.column("t", "s", "t"), content.column(name, unit, variable)
     for (line, _), (earlier, later) in zip(content.rows[1:], pairwise(times), strict=True):
@@ -71,11 +71,12 @@ class CSVText:
     """A table as text: a heading of names and units, and rows; lines that are empty or comments do not count.
 
     A name without a unit is that of a dimensionless quantity. Messages quote a heading only where the user has named
-    the file, since a case may come from anywhere.
+    the file, since a case may come from anywhere. Where another column may be named in place of one (``renamed``),
+    they say so.
     """
 
-    def __init__(self, content: Tree, quoted: bool = False) -> None:
-        self.place = content.place
+    def __init__(self, content: Tree, quoted: bool = False, renamed: bool = False) -> None:
+        self.place, self.renamed = content.place, renamed
         given = content.value if isinstance(content.value, str) else content.text("the table")
         lines = enumerate(given.splitlines(), start=1)
         kept = [(line, text) for line, text in lines if text.strip() and not text.lstrip().startswith("#")]
@@ -132,6 +133,10 @@ class CSVText:
             others = [other for other in names if other != "t"]
             other = others[0] if len(others) == 1 else "NAME"
             # A column of another name is never meant by itself.
-            remedy = f" To take one of another name, write `column: {other}`." if others and name != "t" else ""
+            remedy = (
+                f" To take one of another name, write `column: {other}`."
+                if self.renamed and others and name != "t"
+                else ""
+            )
             raise self.error(self.heading[0], f"no column '{name}'.{suggestion(name, names)}{remedy}")
         return names.index(name)

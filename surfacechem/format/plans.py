@@ -305,7 +305,7 @@ def _column(table: TableSection, path: str, unit: str) -> Drawn:
     if not table.csv:
         raise table.error("the table needs a `file`.")
     variable = path.rpartition(".")[2]
-    content = csvtable.CSVText(table.tree.value["csv"])
+    content = csvtable.CSVText(table.tree.value["csv"], renamed=True)
     values = content.column(table.column or variable, unit, variable)
     if not values:
         raise table.error("the table has no rows.")

@@ -193,7 +193,7 @@ BOMB = "a: &a [1, 1, 1, 1, 1, 1, 1, 1, 1]\n" + "".join(
         (b"# only a comment\n", "{}: the file is empty."),
         (b"- 1\n- 2\n", "{}:1: this must be a mapping with the keys title, source,"),
         (b"just text", "{}:1: this must be a mapping with the keys title, source,"),
-        (b"\x89PNG\r\n\x1a\n\x00\x00", "{}: no text in UTF-8; a case is a YAML file"),
+        (b"\x89PNG\r\n\x1a\n\x00\x00", "{}: no text in UTF-8; cases are YAML files"),
         (b"title: a\x00b\n", "{}:1: a control character, which YAML does not allow."),
         (b"x" * (document.CASE.largest + 1), "{}: larger than 1000000 bytes."),
         (b"[" * 100_000, "{}:1: nested deeper than 24 levels."),

@@ -57,11 +57,15 @@ def test_both_kinds_of_files_give_the_surface_that_was_measured(tmp_path):
         ("scan.csv", [*ROWS[:3], (0.0, 60.0, "nan"), *ROWS[4:]], r"scan.csv:5: the heights have a hole"),
         ("scan.csv", [*ROWS, ROWS[0]], "scan.csv:44: a second height at x = 0 m, y = 0 m"),
         ("scan.nc", None, r"scan.nc: the heights have holes: 1 of them, the first at x = 3e-08 m, y = 4e-08 m"),
+        ("scan.npy", ROWS, r"scan.npy: no text in UTF-8; cases are YAML files, tables CSV"),
+        ("other names.csv", ROWS, r"names.csv:1: no column 'z'. Known: h, x, y\.$"),
         ("other.csv", ROWS, r"case.yaml:1: .*no file other.csv beside the case"),
     ],
 )
 def test_holes_are_told_with_their_place(tmp_path, name, rows, message):
     (tmp_path / "scan.csv").write_text(table(rows or ROWS))
+    (tmp_path / "other names.csv").write_text("x [nm],y [nm],h [nm]\n0,0,1\n")
+    np.save(tmp_path / "scan.npy", Z)
     holed = Z.copy()
     holed[3, 2] = np.nan
     netcdf(tmp_path, holed)
