@@ -212,6 +212,27 @@ def write_netcdf(path: Path, columns: Sequence[Column], attributes: Mapping[str,
         raise OSError(str(error)) from error
 
 
+def read_netcdf(path: Path) -> xarray.Dataset:
+    """The dataset of a file, all of it, as it is written; OSError where that cannot be read."""
+    import netCDF4
+    import xarray
+
+    def attributes(item: Any) -> dict[str, Any]:
+        return {name: item.getncattr(name) for name in item.ncattrs()}
+
+    # xarray.open_dataset, indexes and checks of arrays import Dask and Pint where they are installed, for a second.
+    with netCDF4.Dataset(path) as file:
+        file.set_auto_maskandscale(False)
+        found = {
+            name: xarray.Variable(item.dimensions, np.asarray(item[...]), attributes(item), fastpath=True)
+            for name, item in file.variables.items()
+        }
+        coordinates = {name: found.pop(name) for name in list(found) if found[name].dims == (name,)}
+        dataset = xarray.Dataset(found, xarray.Coordinates(coordinates, indexes={}), attributes(file))
+    dataset.encoding["source"] = str(path)
+    return dataset
+
+
 def save_table(target: Path, dataset: xarray.Dataset) -> None:
     """A row for each output, whole or not at all; each column is headed by its name and unit, ``v [m s-1]``.
 
