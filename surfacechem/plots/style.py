@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from surfacechem.errors import InputError, Place
 from surfacechem.quantities import SUPERSCRIPTS, VARIABLES, raised
-from surfacechem.results.netcdf import reading, replacing
+from surfacechem.results.netcdf import read_netcdf, reading, replacing
 from surfacechem.tolerances import ROUNDING
 
 Array = NDArray[np.float64]
@@ -135,12 +135,7 @@ def opened(data: xarray.Dataset | str | Path) -> xarray.Dataset:
 
         return store.opened(path)
 
-    def load() -> xarray.Dataset:
-        # Indexes, by which nothing is looked for here, would import Dask and Pint.
-        with xarray.open_dataset(path, engine="netcdf4", create_default_indexes=False) as file:
-            return file.load()
-
-    return reading(path, load)
+    return reading(path, lambda: read_netcdf(path))
 
 
 def in_celsius(dataset: xarray.Dataset) -> xarray.Dataset:
@@ -345,6 +340,15 @@ def owner(values: xarray.DataArray) -> str:
     return f" of {' '.join(path[1:-1])}" if len(path) > 2 and path[-1] == values.name else ""
 
 
+def parameter_name(name: str) -> str:
+    """The name of a swept parameter: a symbol with its subscript, or words.
+
+    >>> parameter_name("K_0"), parameter_name("bond_energy")
+    ('$K_{0}$', 'bond energy')
+    """
+    return symbol(name) if "_" in name and len(name.partition("_")[0]) == 1 else name.replace("_", " ")
+
+
 def valued(values: xarray.DataArray, place: int) -> str:
     """A value of a swept parameter with its name and unit.
 
@@ -353,7 +357,7 @@ def valued(values: xarray.DataArray, place: int) -> str:
     """
     value = values.values[place]
     text, size = prefixed(unit(values), values.values[place : place + 1])
-    return f"{str(values.name).replace('_', ' ')} = {value / size:.4g} {'' if text == '1' else text}".rstrip()
+    return f"{parameter_name(str(values.name))} = {value / size:.4g} {'' if text == '1' else text}".rstrip()
 
 
 def member_name(dataset: xarray.Dataset, place: Sequence[int]) -> str:

@@ -91,7 +91,7 @@ def test_each_run_of_a_sweep_over_a_variable_or_time():
     (ax,) = plots.figure(sweep, ["T"], "phi").axes
     assert (ax.get_xlabel(), ax.get_ylabel()) == (r"$\phi$ [1]", "$T$ [K]")
     assert np.array_equal(ax.lines[1].get_data(), [sweep["phi"].values[1], sweep["T"].values[1]])
-    assert [text.get_text() for text in ax.get_legend().get_texts()] == ["K 0 = 200 J m⁻²", "K 0 = 300 J m⁻²"]
+    assert [text.get_text() for text in ax.get_legend().get_texts()] == [f"$K_{{0}}$ = {K} J m⁻²" for K in (200, 300)]
     assert plots.figure(sweep, against="time").axes[-1].get_xlabel() == "Time [s]"
     with pytest.raises(InputError, match="no variable 'T_last' along the runs"):
         plots.figure(sweep, ["T_last"], "phi")

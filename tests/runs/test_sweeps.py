@@ -287,7 +287,7 @@ def test_figure_of_final_values(bonding):
     assert [ax.get_ylabel() for ax in plot.axes] == ["Final $T$ [K]", "Final $\\phi$ [1]"]
     ax = plot.axes[0]
     assert len(ax.get_lines()) == 3
-    assert ax.get_legend().get_texts()[0].get_text() == "K 0 = 100 J m⁻²"
+    assert ax.get_legend().get_texts()[0].get_text() == "$K_{0}$ = 100 J m⁻²"
     with pytest.raises(InputError, match="no variable 'x' in the sweep"):
         plots.figure(bonding.sweep({K_0: [1.0]}).dataset, ["x"])
 
