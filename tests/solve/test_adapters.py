@@ -14,6 +14,7 @@ from surfacechem.model.system import State
 from surfacechem.quantities import VARIABLES
 from surfacechem.results.event_table import event_times
 from surfacechem.solve import names, solver
+from surfacechem.solve.adapters import stepping
 from surfacechem.solve.contract import Problem, Status
 from surfacechem.solve.diagnose import runaway
 
@@ -130,3 +131,14 @@ def test_a_peak_before_an_event_is_seen(name: str) -> None:
     times = event_times(trajectory)
     np.testing.assert_allclose(times["touch"], [0.5], rtol=1e-8)
     np.testing.assert_allclose(times["release"], [21.15942147473261], rtol=1e-5)
+
+
+@pytest.mark.parametrize("solver", ["lsoda", "bdf", "scipy-radau"])
+def test_steps_looked_at_together_are_those_looked_at_one_by_one(solver, monkeypatch):
+    """Events lie before what a library has stepped through already."""
+    case = load("debonding", {"run.solver": solver})
+    together = case.run().dataset
+    monkeypatch.setattr(stepping, "SEVERAL", 1)
+    alone = case.run().dataset
+    for name in ("event_time", "time", "phi"):
+        np.testing.assert_array_equal(together[name], alone[name])

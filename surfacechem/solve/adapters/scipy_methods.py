@@ -7,7 +7,7 @@ import numpy as np
 from scipy.integrate import BDF, LSODA, OdeSolver, Radau
 
 from surfacechem.solve.adapters.dense_step import DenseStep
-from surfacechem.solve.adapters.stepping import Method, StepError, SteppingSolver, View
+from surfacechem.solve.adapters.stepping import Method, NoStateError, StepError, SteppingSolver, View
 from surfacechem.solve.contract import Array
 from surfacechem.tolerances import EPS
 
@@ -22,6 +22,7 @@ class _Stretch(Method):
 
     def __init__(self, kind: type[OdeSolver], view: View, t: float, end: float, y: Array) -> None:
         self.start, self.t, self.end, self.most = t, t, end, view.problem.max_steps
+        self.failure: Exception | None = None
         options: dict[str, Any] = {
             "rtol": max(view.problem.rtol, SMALLEST_RTOL),
             "atol": view.atol,
@@ -35,6 +36,17 @@ class _Stretch(Method):
         except (ValueError, ArithmeticError) as error:
             raise StepError(str(error)) from error
 
+    def several(self, most: int) -> list[DenseStep]:
+        steps: list[DenseStep] = []
+        while self.failure is None and len(steps) < most and not (steps and self.t == self.end):
+            try:
+                steps.append(self.advance())
+            except (StepError, NoStateError) as error:
+                self.failure = error  # an event may lie before it
+        if not steps and self.failure is not None:
+            raise self.failure
+        return steps
+
     def advance(self) -> DenseStep:
         before, taken = self.t, 0
         while self.t == before:
@@ -43,7 +55,7 @@ class _Stretch(Method):
             if not self.solver.t > passed:  # some go on like this for ever
                 raise StepError("the step size fell to zero")
             self.t = self.end if self.solver.status == "finished" else self.start + float(self.solver.t)
-        inside, start, end, last = self.solver.dense_output(), self.start, self.t, self.solver.y
+        inside, start, end, last = self.solver.dense_output(), self.start, self.t, self.solver.y.copy()
         # The clock of the run may tick before the library's last step.
         return DenseStep(before, end, lambda t: np.asarray(last if t == end else inside(max(t - start, inside.t_old))))
 
