@@ -102,7 +102,8 @@ from surfacechem.cli import app
 def slow(path, columns, attributes):
     path.write_bytes(b"half")
     print("writing", flush=True)
-    time.sleep(60)
+    while True:
+        time.sleep(0.01)  # a signal that comes before one long sleep would wait for its end
 
 netcdf.write_netcdf = slow
 app(["run", "exothermic", "-q"], prog_name="surfacechem")
@@ -117,16 +118,16 @@ def ended_by(number, script, told, folder, pause=0.0):
     """
     own = signal.signal(number, signal.SIG_DFL)
     command = [sys.executable, "-c", script]
-    process = subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    signal.signal(number, own)
-    try:
-        assert process.stdout.readline() == told, process.communicate()
-        time.sleep(pause)
-        assert process.poll() is None, process.communicate()
-        process.send_signal(number)
-        return process.communicate(timeout=30), process.returncode
-    finally:
-        process.kill()
+    with subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        signal.signal(number, own)
+        try:
+            assert process.stdout.readline() == told, process.communicate()
+            time.sleep(pause)
+            assert process.poll() is None, process.communicate()
+            process.send_signal(number)
+            return process.communicate(timeout=30), process.returncode
+        finally:
+            process.kill()
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no signals to one process")
