@@ -46,7 +46,7 @@ def interface_of(tmp_path, text, gas, **options):
 
 def network(*reactors):
     net = ReactorNet(reactors)
-    net.rtol, net.atol = 1e-10, 1e-18
+    net.rtol, net.atol = 1e-11, 1e-18
     return net
 
 
