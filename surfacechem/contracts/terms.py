@@ -640,8 +640,9 @@ class Shape(Law):
 
     foot: ClassVar[Callable[..., Any] | None] = None
     """Parameters (..., 2) of the nearest point of each of the points (..., 3), where there is a closed form."""
-    starts: ClassVar[Callable[..., Sequence[Any]]]
-    """Parameters from which a search for the nearest point begins where there is none, two or more for each point."""
+    starts: ClassVar[Callable[..., tuple[Any, Any]]]
+    """Where there is none, which of the points (n, 3) searches for the nearest point are for (m,), in their order and
+    one or more for each, and the parameters (m, 2) from which they begin."""
     derivatives: ClassVar[Callable[..., Any] | None] = None
     """So many derivatives (count, ..., 3) where they are no formulas: 1, u, v, uu, uv, vv, uuu, uuv, uvv, vvv."""
 

@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 
 from surfacechem.errors import InputError
-from surfacechem.surfaces.projection import FIRST, NEWTONS, POLE, Array, Indices, Surface, descended, newton_step
+from surfacechem.surfaces.projection import FIRST, NEWTONS, POLE, Array, Surface, descended, newton_step
+from surfacechem.surfaces.shapes import Indices
 from surfacechem.tolerances import CBRT_EPS, NOISE, SAME, SQRT_EPS
 
 COARSE, PER_GRAIN = 32, 4

@@ -18,8 +18,8 @@ from itertools import pairwise
 import numpy as np
 
 from surfacechem.contracts.terms import Shape
-from surfacechem.surfaces.projection import FIRST, POLE, Array, Indices, Projection, Surface
-from surfacechem.surfaces.shapes import Cavity, Cylinder, Plane, Sphere
+from surfacechem.surfaces.projection import FIRST, POLE, Array, Projection, Surface
+from surfacechem.surfaces.shapes import Cavity, Cylinder, Indices, Plane, Sphere
 
 ORDERS = (4, 6, 9, 13, 18, 25)
 """Points of Gauss's rule on each piece, more and more of them until two in a row agree."""

@@ -10,7 +10,7 @@ Contact Mechanics, doi 10.1007/978-3-642-31531-2, for rates and for where a proj
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any
@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from surfacechem.contracts.terms import Shape
 from surfacechem.errors import InputError
-from surfacechem.surfaces.shapes import Sphere
+from surfacechem.surfaces.shapes import Indices, Sphere
 from surfacechem.tolerances import DIGITS, GONE, SAME, TINY, ULPS
 
 Array = NDArray[np.float64]
@@ -33,8 +33,6 @@ HALVINGS = 16
 
 SEARCH = 500
 """Pairs of points that take as long as a projection without a closed form."""
-
-Indices = NDArray[np.int_]
 
 POLE = GONE
 """Parameter at the pole of a surface of revolution, where directions along it have no length."""
@@ -72,8 +70,8 @@ class Projection:
 
     ``at`` holds the parameters (..., 2), ``gap`` the distance along ``direction``, negative inside the body [m],
     ``beyond`` how far the points are beyond each edge along the surface (..., edges) [m]. The direction is the normal,
-    but at an edge and a tip that from the nearest point. Where it was searched for, ``rivals`` are what searches from
-    other starts have found.
+    but at an edge and a tip that from the nearest point. Where it was searched for, ``rivals`` are the points (m,) that
+    searches were for, counted along all of them, and the parameters (m, 2) that these have found.
     """
 
     surface: Surface
@@ -83,7 +81,7 @@ class Projection:
     direction: Array
     gap: Array
     beyond: Array
-    rivals: Sequence[Array]
+    rivals: tuple[Indices, Array] | None
 
     @cached_property
     def tied(self) -> NDArray[np.bool_]:
@@ -96,10 +94,13 @@ class Projection:
             # For a point on the axis all around is alike.
             own, around = (x - [0.0, 0.0, self.surface.approach]) @ self.surface.axes, np.linalg.norm(D[2], axis=-1)
             found |= (np.hypot(own[..., 0], own[..., 1]) < SAME * around) & (around > SAME * size)
-        for places in self.rivals:
-            rival = self.surface.derivatives(places, FIRST)[0]
+        if self.rivals is not None:
+            which, places = self.rivals
+            rival, size = self.surface.derivatives(places, FIRST)[0], size.reshape(-1)[which]
+            x, nearest = (points.reshape(-1, 3)[which] for points in (x, self.point))
             near = np.linalg.norm(x - rival, axis=-1) <= size * (1 + SAME)
-            found |= near & (np.linalg.norm(rival - self.point, axis=-1) > np.sqrt(SAME) * size)
+            near &= np.linalg.norm(rival - nearest, axis=-1) > np.sqrt(SAME) * size
+            found.reshape(-1)[which[near]] = True
         return found
 
 
@@ -174,13 +175,16 @@ class Surface:
         """Projection of points (..., 3)."""
         x = np.asarray(x, dtype=float)
         own = (x - [0.0, 0.0, self.approach]) @ self.axes
-        rivals: list[Array] = []
+        rivals = None
         if self.shape.foot is not None:
             at = self.shape.foot(own)
         else:
-            found = np.array([self._search(x, start) for start in self.shape.starts(own)])
-            distances = np.linalg.norm(x - self.derivatives(found, FIRST)[0], axis=-1)
-            at, *rivals = np.take_along_axis(found, np.argsort(distances, axis=0)[..., None], axis=0)
+            which, starts = self.shape.starts(own.reshape(-1, 3))
+            places = x.reshape(-1, 3)[which]
+            found = self._search(places, starts)
+            distances = np.linalg.norm(places - self.derivatives(found, FIRST)[0], axis=-1)
+            order, rivals = np.lexsort((distances, which)), (which, found)
+            at = found[order[np.unique(which[order], return_index=True)[1]]].reshape(*x.shape[:-1], 2)
         # At the pole itself no direction along the surface has a length.
         if self.shape.about_axis and self.shape.span[0][0] == 0:
             at = np.maximum(at, [POLE, -np.inf])
@@ -225,13 +229,14 @@ class Surface:
             found |= side * (end - at[..., k]) <= (POLE if self.shape.about_axis and side < 0 else 0.0)
         return found
 
-    def _search(self, x: Array, start: Array) -> Array:
-        """Parameters of a nearest point by Newton's method; a step that does not come nearer is halved."""
+    def _search(self, places: Array, starts: Array) -> Array:
+        """Parameters (n, 2) of nearest points of some (n, 3) by Newton's method; a step that does not come nearer is
+        halved.
+        """
         low, high = np.transpose(self.shape.span)
         # What comes round has no edge that a step could leave.
         low = np.where(self.shape.closed, -np.inf, low) + (POLE if self.shape.about_axis else 0.0)
         high = np.where(self.shape.closed, np.inf, high)
-        places = x.reshape(-1, 3)
 
         def value(at: Array, which: Indices) -> Array:
             return np.asarray(np.linalg.norm(places[which] - self.derivatives(at, FIRST)[0], axis=-1))
@@ -243,8 +248,7 @@ class Surface:
                 move[..., 1] = 0.0  # the angle about the axis is that of the start
             return move
 
-        found = descended(np.clip(start, low, high).reshape(-1, 2), low, high, value, step)
-        return found.reshape(start.shape)
+        return descended(np.clip(starts, low, high), low, high, value, step)
 
     def curvature(self, at: Array, rate: Array | None = None) -> Curvature:
         """Curvature at parameters (..., 2), and its rate where they move at a rate."""
@@ -396,13 +400,17 @@ def newton_step(
     """Newton's step (..., 2) from a slope (..., 2) and second derivatives uu, uv, vv, or with the metric for these
     where they are not convex; none across an edge.
     """
-    convex = (_determinant(hessian) > SAME * _determinant(metric)) & (hessian[0] > 0)
-    a, b, c = (np.where(convex, mine, usual) for mine, usual in zip(hessian, metric, strict=True))
     held = (lowest & (slope > 0)) | (highest & (slope < 0))
-    b = np.where(held.any(axis=-1), 0.0, b)
     slope = np.where(held, 0.0, slope)
-    # With the mixed derivative gone each of the others has to be positive by itself.
-    a, c = (np.where(x > 0, x, usual) for x, usual in ((a, metric[0]), (c, metric[2])))
+    # Along an edge only what is along it counts.
+    E, F, G = metric[0], np.where(held.any(axis=-1), 0.0, metric[1]), metric[2]
+    a, b, c = (
+        np.where(held[..., 0], E, hessian[0]),
+        np.where(held.any(axis=-1), 0.0, hessian[1]),
+        np.where(held[..., 1], G, hessian[2]),
+    )
+    convex = (a * c - b**2 > SAME * (E * G - F**2)) & (a > 0)
+    a, b, c = (np.where(convex, mine, usual) for mine, usual in ((a, E), (b, F), (c, G)))
     det = np.maximum(a * c - b**2, TINY)
     raised = np.stack([b * slope[..., 1] - c * slope[..., 0], b * slope[..., 0] - a * slope[..., 1]], axis=-1)
     return np.asarray(raised / det[..., None])

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from surfacechem.surfaces.nodes import Extent, Grid, divided, gauss, order_of
-from surfacechem.surfaces.projection import POLE, Array, Indices, Projection, Surface
-from surfacechem.surfaces.shapes import Sphere
+from surfacechem.surfaces.projection import POLE, Array, Projection, Surface
+from surfacechem.surfaces.shapes import Indices, Sphere
 from surfacechem.tolerances import TINY
 
 LOOKS = 4

@@ -10,6 +10,7 @@ from itertools import product
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from surfacechem.contracts.terms import Shape, option, parameter
 from surfacechem.errors import InputError
@@ -18,6 +19,7 @@ from surfacechem.expressions import Expression, cos, sin
 if TYPE_CHECKING:
     from surfacechem.contracts.fits import Array
 
+Indices = NDArray[np.int_]
 Span = tuple[tuple[float, float], tuple[float, float]]
 Point = tuple[Expression, Expression, Expression]
 
@@ -32,6 +34,11 @@ and those of all cells at most.
 
 OVERSHOOT = 0.1
 """Part of the range of heights by which a spline through them may be above the highest, as summits lie between."""
+
+
+def _each(starts: Sequence[Array]) -> tuple[Indices, Array]:
+    """As many starts for each point, those of one after those of another."""
+    return np.repeat(np.arange(len(starts[0])), len(starts)), np.stack(starts, axis=1).reshape(-1, 2)
 
 
 def _half(extent: float | None) -> tuple[float, float]:
@@ -186,10 +193,10 @@ class Turned(Shape):
         """Up to the edge."""
         return (0.0, math.inf if self.radius is None else self.radius), ROUND
 
-    def starts(self, x: Array) -> Sequence[Array]:
+    def starts(self, x: Array) -> tuple[Indices, Array]:
         """At the angle of the points about the axis and at the opposite one."""
-        angle, radius = np.arctan2(x[..., 1], x[..., 0]), np.hypot(x[..., 0], x[..., 1])
-        return [np.stack([radius, angle + shift], axis=-1) for shift in (0.0, math.pi)]
+        angle, radius = np.arctan2(x[:, 1], x[:, 0]), np.hypot(x[:, 0], x[:, 1])
+        return _each([np.stack([radius, angle + shift], axis=-1) for shift in (0.0, math.pi)])
 
     @abstractmethod
     def point(self, u: Expression, v: Expression) -> Point:
@@ -345,7 +352,7 @@ class Wavy(Plane):
         heights = self.amplitude * (np.prod(np.cos(2 * math.pi / self.waves * places), axis=-1) - 1)
         return KDTree(np.column_stack([places, heights]))
 
-    def starts(self, x: Array) -> Sequence[Array]:
+    def starts(self, x: Array) -> tuple[Indices, Array]:
         """The nearest of some places of the half wave that the points are in, and its mirror images in the crest or
         trough that is nearer: a place beyond these has an image that is nearer than itself.
         """
@@ -358,7 +365,7 @@ class Wavy(Plane):
         near = self.nodes.data[self.nodes.query(np.concatenate([own, x[..., 2:]], axis=-1))[1]][..., :-1]
         image = np.where(own < waves / 4, -near, waves - near)
         found = [crest + side * np.where(chosen, image, near) for chosen in product((False, True), repeat=len(waves))]
-        return [np.clip(np.concatenate([place, rest], axis=-1), *ends) for place in found]
+        return _each([np.clip(np.concatenate([place, rest], axis=-1), *ends) for place in found])
 
 
 class Heights(Shape):
@@ -418,20 +425,41 @@ class Heights(Shape):
 
     @cached_property
     def nodes(self) -> Any:
-        """Places of the surface, some in each cell of the grid unless these are many."""
+        """Places of the surface (x, y, z), some in each cell of the grid unless these are many, in order and for
+        searches; and how much the square of a distance d is above that of the nearest point at the place beside it, at
+        most: a + b d.
+        """
         from scipy.spatial import KDTree
 
         parts = min(PER_CELL, max(1, math.isqrt(MOST_NODES // len(self.z))))
         at = [np.arange(0, len(p) - 1 + 0.5 / parts, 1 / parts) for p in (self.x, self.y)]
         x, y = (np.interp(t, range(len(p)), p) for t, p in zip(at, (self.x, self.y), strict=True))
-        u, v = np.meshgrid(x, y, indexing="ij")
-        return KDTree(np.stack([u, v, self.spline(x, y)], axis=-1).reshape(-1, 3))
+        places = np.stack([*np.meshgrid(x, y, indexing="ij"), self.spline(x, y)], axis=-1)
+        # Where a point is nearest the square of its distance has no slope: beside it it grows with the second
+        # derivative, 2 (|x_u|^2 - d n . x_uu).
+        first = math.sqrt(1 + sum(self.spline(x, y, *order) ** 2 for order in ((1, 0), (0, 1))).max())
+        bent = (self.spline(x, y, *order) ** 2 for order in ((2, 0), (1, 1), (1, 1), (0, 2)))
+        second, beside = math.sqrt(sum(bent).max()), math.hypot(np.diff(x).max(), np.diff(y).max()) / 2
+        growth = ((first * beside) ** 2 + second * first * beside**3, second * beside**2)
+        return places, KDTree(places.reshape(-1, 3)), growth
 
-    def starts(self, x: Array) -> Sequence[Array]:
-        """The nearest of some places, and one on the other side."""
-        near = self.nodes.data[self.nodes.query(x)[1]]
-        across = np.concatenate([2 * x[..., :2] - near[..., :2], near[..., 2:]], axis=-1)
-        return near[..., :2], self.nodes.data[self.nodes.query(across)[1]][..., :2]
+    def starts(self, x: Array) -> tuple[Indices, Array]:
+        """Of the places beside which the nearest point may be, those that no neighbour is nearer than."""
+        places, tree, (a, b) = self.nodes
+        d = tree.query(x)[0]
+        near = tree.query_ball_point(x, np.sqrt(d**2 + a + b * d))
+        which = np.repeat(np.arange(len(x)), [len(some) for some in near])
+        i, j = np.unravel_index(np.concatenate(near).astype(int), places.shape[:2])
+        distance = np.linalg.norm(x[which] - places[i, j], axis=-1)
+        least = np.ones(len(which), dtype=bool)
+        for offsets in product((-1, 0, 1), repeat=2):
+            # At an edge the nearest point may be one that is so along it alone.
+            beside = (
+                np.where((k == 0) | (k == count - 1), k, k + offset)
+                for k, count, offset in zip((i, j), places.shape, offsets, strict=False)
+            )
+            least &= distance <= np.linalg.norm(x[which] - places[tuple(beside)], axis=-1)
+        return which[least], places[i, j, :2][least]
 
     def derivatives(self, u: Array, v: Array, count: int) -> Array:
         """Those of the spline."""

@@ -4,6 +4,8 @@ import math
 
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter
+from scipy.spatial import KDTree
 
 from surfacechem.errors import InputError
 from surfacechem.laws import find
@@ -91,6 +93,18 @@ def test_the_nearest_point_of_short_waves_is_not_that_of_another_wave(shape, x):
     for point, gap in zip(x, Surface(shape).nearest(x).gap, strict=True):
         nearest = np.linalg.norm(all_points - point, axis=-1).min()
         assert nearest * 0.99 < abs(gap) <= nearest
+
+
+@pytest.mark.parametrize("seed", [3, 19, 26, 34, 45])
+def test_the_nearest_point_of_rough_heights_is_found(seed):
+    """Of places that are about as near, in cells beside each other and along an edge, the nearest."""
+    draw = np.random.default_rng(seed)
+    heights = gaussian_filter(draw.normal(size=(9, 12)), 0.5)
+    shape = Heights(x=range(9), y=range(12), z=heights.ravel())
+    x = draw.uniform([-1, -1, -2], [9, 12, 3], (1000, 3))
+    u, v = (np.linspace(0, count - 1, 40 * count) for count in heights.shape)
+    all_points = np.stack([*np.meshgrid(u, v, indexing="ij"), shape.spline(u, v)], axis=-1).reshape(-1, 3)
+    assert np.all(np.abs(Surface(shape).nearest(x).gap) <= KDTree(all_points).query(x)[0] * (1 + 1e-12))
 
 
 @pytest.mark.parametrize(
