@@ -91,8 +91,8 @@ def near_places(
         # At a pole no direction leads anywhere: the search begins beside it, where the gap is least.
         chosen = np.concatenate([chosen, [[1, int(np.argmin(gaps[1]))]]])
     apart = np.where(alike, 0.0, (high - low) / steps)
-    at = _settled(outer, inner, gap, parameters(chosen), apart, extents.max(), NOISE * size)
-    return _distinct(outer, at, gap(at), SQRT_EPS * extents.max())
+    at, gaps = _settled(outer, inner, gap, parameters(chosen), apart, extents.max(), NOISE * size)
+    return _distinct(outer, at, gaps, SQRT_EPS * extents.max())
 
 
 def _near_grid(gap: Callable[[Indices], Array], steps: Indices, halvings: int, extents: Array, wide: float) -> Array:
@@ -141,8 +141,10 @@ def _lowest(gaps: Array, closed: tuple[bool, bool], noise: float) -> Indices:
 
 def _settled(
     outer: Surface, inner: Surface, gap: Callable[[Array], Array], at: Array, steps: Array, long: float, noise: float
-) -> Array:
-    """The places of least gap near some, no step longer than that of the grid, over a ``long`` surface [m]."""
+) -> tuple[Array, Array]:
+    """The places (n, 2) of least gap near some, no step longer than that of the grid, over a ``long`` surface [m], and
+    the gaps there.
+    """
     low, high = np.transpose(outer.shape.span)
     low = np.where(outer.shape.closed, -np.inf, low) + (POLE if outer.shape.about_axis else 0.0)
     high = np.where(outer.shape.closed, np.inf, high)
@@ -172,18 +174,20 @@ def _settled(
         return np.clip(newton_step(long * first, hessian, (E, F, G), at <= low, at >= high), -steps, steps)
 
     found = descended(at, low, high, lambda at, _: gap(at), step, noise, SAME)
-    nearest = [np.argmin(gap(found))]
+    gaps = gap(found)
+    nearest = np.array([np.argmin(gaps)])
     first, here = slope(found[nearest])[0], found[nearest]
     first[((here <= low) & (first > 0)) | ((here >= high) & (first < 0))] = 0.0
     # Along an edge of the other surface, where the gap bends or jumps, there may be no rest for Newton's method.
     if np.abs(first * steps).max() > SQRT_EPS * long:
-        found[nearest] = _rolled(gap, here[0], steps, np.array([low, high]))
-    return found
+        found[nearest], gaps[nearest] = _rolled(gap, here[0], steps, np.array([low, high]))
+    return found, gaps
 
 
-def _rolled(gap: Callable[[Array], Array], at: Array, steps: Array, bounds: Array) -> Array:
+def _rolled(gap: Callable[[Array], Array], at: Array, steps: Array, bounds: Array) -> tuple[Array, float]:
     """The place (2,) of least gap near one by the method of Nelder and Mead, which needs no slope, and on grids that
-    shrink around the best so far, as that may come to rest where the gap jumps.
+    shrink around the best so far, as that may come to rest where the gap jumps; and the gap there, which looked at
+    again may be that beyond the jump by rounding.
     """
     from scipy.optimize import minimize
 
@@ -192,16 +196,19 @@ def _rolled(gap: Callable[[Array], Array], at: Array, steps: Array, bounds: Arra
 
     corners = at + np.diag(np.where(at + steps > bounds[1], -steps, steps))
     options: Any = {"initial_simplex": [at, *corners], "xatol": SQRT_EPS * steps.max(), "fatol": SAME * steps.max()}
-    at = np.asarray(minimize(value, list(at), method="Nelder-Mead", bounds=list(bounds.T), options=options).x)
+    rest = minimize(value, list(at), method="Nelder-Mead", bounds=list(bounds.T), options=options)
+    at, least = np.asarray(rest.x), float(rest.fun)
     around = np.stack(np.meshgrid(*[np.linspace(-1, 1, ACROSS)] * 2, indexing="ij"), axis=-1).reshape(-1, 2)
     size = 1.0
     for _ in range(NEWTONS):
-        places = np.clip(np.concatenate([at[None], at + size * steps * around]), *bounds)
-        best = places[np.argmin(gap(places))]
+        places = np.clip(at + size * steps * around, *bounds)
+        gaps = gap(places)
+        k = np.argmin(gaps)
+        best, least = (places[k], float(gaps[k])) if gaps[k] < least else (at, least)
         # While the best is moving the grid stays as wide.
         size *= 1.0 if np.max(np.abs(best - at) / np.maximum(steps, POLE)) > size / 2 else SHRINK
         at = best
-    return at
+    return at, least
 
 
 def _distinct(outer: Surface, at: Array, gap: Array, near: float) -> NearPlaces:

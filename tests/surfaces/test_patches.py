@@ -124,3 +124,18 @@ def test_the_least_gap_of_plates_that_are_turned_and_pressed_in_is_that_of_a_cor
     seen = upper.nearest(lower.derivatives(at, 3)[0]).gap.min()
     found = near_places(lower, upper, 2.0, (False, False)).gap[0]
     assert seen - 2e-4 < found <= seen
+
+
+@pytest.mark.parametrize("seed", [85, 147])
+def test_the_least_gap_of_plates_through_each_other_is_not_that_beyond_an_edge(seed):
+    """Where the gap jumps rounding decides on which side a place is when it is looked at again."""
+    draw = np.random.default_rng(seed)
+
+    def plate():
+        length, width = draw.uniform(0.5, 2, 2)
+        turn, tilt = (draw.uniform(-most, most) * (draw.random() < 0.7) for most in (3, 0.6))
+        return Plane(length=length, width=width, turn=turn, tilt=tilt)
+
+    lower, upper = Surface(plate()), Surface(plate(), True, draw.uniform(0, 1.5))
+    at = np.stack(np.meshgrid(*(np.linspace(*ends, 161) for ends in lower.shape.span), indexing="ij"), axis=-1)
+    assert near_places(lower, upper, 4.0, (False, False)).gap[0] <= upper.nearest(lower.derivatives(at, 3)[0]).gap.min()
