@@ -3,7 +3,7 @@
 Known are the ends of steps, both sides of events and breakpoints, the times at which runs are compared, and what the
 stepper adds inside steps that are too long for a straight line. The picture is true where straight lines between
 outputs, over time as over its logarithm, miss no quantity by more than a part of its range. Where quantities bend
-between states that are known, the run is made again with outputs there.
+between two states that are known, the run is made again from one to the other.
 """
 
 from __future__ import annotations
@@ -13,9 +13,11 @@ from dataclasses import replace
 import numpy as np
 
 from surfacechem.results.spatial import begun, unresolved
+from surfacechem.solve import solver
 from surfacechem.solve.contract import Array, Index, Mask, States
+from surfacechem.solve.radau.solver import consistent
 from surfacechem.solve.run import Trajectory
-from surfacechem.tolerances import UNRESOLVED
+from surfacechem.tolerances import EPS, UNRESOLVED
 
 LONG = 64
 """Rows between two that are kept of which one in the middle is kept, too, where the line between the two misses any."""
@@ -90,35 +92,46 @@ def _edges(values: Array) -> Mask:
     return found
 
 
-def _chosen(rows: States, which: Mask) -> States:
+def _chosen(rows: States, which: Mask | Index) -> States:
     """Some of the rows."""
     assert rows.segment is not None
     return States(rows.t[which], rows.y[which], rows.ledger[which], rows.segment[which])
 
 
-def _bends(trajectory: Trajectory, allowed: Array) -> Array:
-    """Times between outputs at which named quantities, in whose middle lines from one to the next miss them by more
-    than is allowed, are to be known: they may bend where states do not.
+def _bends(trajectory: Trajectory, allowed: Array, seen: Mask) -> list[States]:
+    """States between outputs, where lines from one output to the next miss named quantities that are ``seen`` by more
+    than is allowed: they may bend where states do not. The run is made again there alone, from the output before.
     """
     result, y, rates = trajectory.result, trajectory.result.outputs, trajectory.rates
-    t, segment = result.times, result.segments_at(result.times, result.segment)
+    t, segment, problem = result.times, result.segments_at(result.times, result.segment), result.problem
     left = np.flatnonzero((np.diff(t) > 0) & (np.diff(segment) == 0) & (t[:-1] > 0))
-    right, length = left + 1, np.diff(t)[left]
+    right, length, parameters = left + 1, np.diff(t)[left], problem.parameters[segment[left]]
     middle = t[left] + length / 2
     states = (y[left] + y[right]) / 2 + length[:, None] / 8 * (rates[left] - rates[right])
+    # Small differences of algebraic states are quantities, too.
+    states = consistent(problem.program, middle, states, rates[left], parameters).y
     between = trajectory.at(States(middle, states, result.ledger_outputs[left], segment[left]))
     lines = (trajectory.outputs[left] + trajectory.outputs[right]) / 2
     with np.errstate(invalid="ignore"):  # quantities may be infinite
         apart = np.abs(between.outputs - lines)
-    missed = np.divide(apart, allowed, out=np.zeros_like(apart), where=allowed > 0).max(axis=1, initial=0.0)
+    missed = np.divide(apart, allowed, out=np.zeros_like(apart), where=seen).max(axis=1, initial=0.0)
     rows = np.sort(np.argsort(-missed, kind="stable")[:BENDS])
     rows = rows[missed[rows] > 1]
-    parts = np.minimum(np.ceil(missed[rows]), CLOSER).astype(int)
-    inside = [np.linspace(t[left[i]], t[right[i]], n, endpoint=False)[1:] for i, n in zip(rows, parts, strict=True)]
-    return np.concatenate([[], *inside])
+    bent, parts = left[rows], np.minimum(np.ceil(missed[rows]), CLOSER).astype(int)
+    # No event lies between two outputs.
+    calm = replace(problem, record_steps=False, picture=0.0, max_seconds=None, in_play=(False,) * len(problem.margins))
+    problems = [
+        replace(calm, y0=y[i], times=np.linspace(*ends, n + 1)[1:-1], segments=np.array(ends), parameters=p[None])
+        for i, n, p, ends in zip(bent, parts, parameters[rows], zip(t[bent], t[bent + 1], strict=True), strict=True)
+    ]
+    found = solver(trajectory.run.solver).solve_all(problems) if problems else []
+    return [
+        States(each.times, each.outputs, result.ledger_outputs[i] + each.ledger_outputs, segment[[i] * len(each.times)])
+        for i, each in zip(bent, found, strict=True)
+    ]
 
 
-def followed(trajectory: Trajectory, rounds: int = ROUNDS) -> Trajectory:
+def followed(trajectory: Trajectory) -> Trajectory:
     """The trajectory with the outputs that its picture needs, instead of those at which runs are compared."""
     part, rows = trajectory.run.picture, trajectory.result.known or trajectory.result.states()
     if part is None or len(rows.t) < 2:
@@ -126,29 +139,30 @@ def followed(trajectory: Trajectory, rounds: int = ROUNDS) -> Trajectory:
     t, sides = _two_sided(rows.t)
     # What cells do not resolve yet is no part of the picture, but for how it begins.
     system, end = trajectory.model.system, trajectory.run.times[-1]
-    early = unresolved(system, end, t)
-    sides &= ~early | np.isin(t, begun(system, end))
-    rows, early = _chosen(rows._replace(t=t), sides), early[sides]
-    # What is shown over time, shape (times, quantities), and how much of it may be rounding.
+    sides &= ~unresolved(system, end, t) | np.isin(t, begun(system, end))
+    return _pictured(trajectory, part, _chosen(rows._replace(t=t), sides), ROUNDS)
+
+
+def _pictured(trajectory: Trajectory, part: float, rows: States, rounds: int) -> Trajectory:
+    """The trajectory with those of the rows that its picture needs, and others where it bends between them."""
     whole = trajectory.at(rows)
-    quantities = np.hstack([rows.y, rows.ledger, whole.outputs])
-    roundings = whole.some.roundings
-    unknown = [UNRESOLVED * roundings[name] for name in system.output_columns]
-    noise = np.pad(unknown, (quantities.shape[1] - len(unknown), 0))
-    # Both sides of events are kept; rounding is not pictured, and what is early counts for no range.
-    moments = np.array([*trajectory.result.events.t, *(jump.t for jump in trajectory.jumps)])
-    beside = np.isin(rows.t, moments) | np.isin(np.nextafter(rows.t, np.inf), moments)
+    result = whole.result
+    early = unresolved(whole.model.system, whole.run.times[-1], result.times)
+    # What is shown over time, shape (times, quantities), and what a last bit or the absolute tolerance of a
+    # state makes of it.
+    quantities = np.hstack([result.outputs, result.ledger_outputs, whole.outputs])
+    some, first = whole.some, quantities.shape[1] - whole.outputs.shape[1]
+    unknown = some.felt(EPS * np.abs(some.result.outputs) + result.problem.atol)
+    noise = np.pad(UNRESOLVED * np.array([*unknown.values()]), (first, 0))
+    # What may be an error is not pictured, and what is early counts for no range.
     values = np.where(np.isfinite(quantities), quantities, 0.0)
-    known, rtol = values if early.all() else values[~early], trajectory.run.rtol
+    known, rtol = values if early.all() else values[~early], whole.run.rtol
     allowed = part * np.ptp(known, axis=0) + UNRESOLVED * rtol * np.abs(values).max(axis=0) + noise
-    bends = (
-        _bends(whole, allowed[len(allowed) - whole.outputs.shape[1] :])
-        if rounds and trajectory.run.max_seconds is None
-        else ()
-    )
-    if len(bends):
-        run = replace(trajectory.run, times=tuple(np.union1d(trajectory.run.times, bends).tolist()))
-        return followed(trajectory.model.solve_values(run, trajectory.values), rounds - 1)
     seen = np.ptp(values, axis=0) > allowed
-    kept = needed(rows.t, values[:, seen], allowed[seen], beside | _edges(quantities[:, seen]))
-    return whole.picked(kept)
+    if rounds and (bends := _bends(whole, allowed[first:], seen[first:])):
+        more = States(*map(np.concatenate, zip(rows, *bends, strict=True)))
+        return _pictured(trajectory, part, _chosen(more, np.argsort(more.t, kind="stable")), rounds - 1)
+    # Both sides of events are kept.
+    t, moments = result.times, np.array([*result.events.t, *(jump.t for jump in whole.jumps)])
+    beside = np.isin(t, moments) | np.isin(np.nextafter(t, np.inf), moments)
+    return whole.picked(needed(t, values[:, seen], allowed[seen], beside | _edges(quantities[:, seen])))

@@ -171,6 +171,10 @@ class Trajectory:
     @cached_property
     def roundings(self) -> dict[str, float]:
         """By how much the last bit of a state changes each named quantity at most."""
+        return self.felt(EPS * self.result.outputs)
+
+    def felt(self, changes: Array) -> dict[str, float]:
+        """By how much changes of one state at a time, shape (times, states), change each named quantity at most."""
         result, system, times = self.result, self.model.system, self.result.times
         # No flux reads one of the states inside bodies alone but the first, and those are not named.
         own = [j for j, state in enumerate(system.states) if state.name not in system.inside]
@@ -178,13 +182,13 @@ class Trajectory:
         worst = np.zeros(self.outputs.shape[1])
         for some in (own[first : first + together] for first in range(0, len(own), together)):
             nudged = np.array([result.outputs] * len(some))
-            nudged[range(len(some)), :, some] *= 1 + EPS
+            nudged[range(len(some)), :, some] += changes.T[some]
             rows = nudged.reshape(-1, len(system.states)), np.concatenate([self.rates] * len(some))
             segment = None if result.segment is None else np.tile(result.segment, len(some))
             values = self.model.evaluate(result, np.tile(times, len(some)), *rows, segment)
             with np.errstate(invalid="ignore"):  # quantities may be infinite, whatever the last bit is
-                changes = np.abs(values.reshape(len(some), *self.outputs.shape) - self.outputs)
-                worst = np.fmax(worst, np.fmax.reduce(changes.max(axis=1, initial=0.0)))
+                apart = np.abs(values.reshape(len(some), *self.outputs.shape) - self.outputs)
+                worst = np.fmax(worst, np.fmax.reduce(apart.max(axis=1, initial=0.0)))
         return dict(zip(system.output_columns, worst, strict=True))
 
     @cached_property

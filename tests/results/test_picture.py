@@ -96,3 +96,7 @@ def test_what_bends_where_no_state_does_is_shown():
     shown = solution["q_12_gas"]
     missed = np.interp(times, shown.time, shown) - dense.values
     assert np.abs(missed).max() < 2 * PICTURE * np.ptp(dense.values)
+
+
+def test_the_potential_of_hardly_any_sites_which_is_their_error_needs_no_outputs():
+    assert len(solved("press-hold-pull").dataset.time) < 300
