@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import html
 import inspect
+import json
 import logging
 import re
 import shlex
@@ -83,9 +84,13 @@ def _again(data: xarray.Dataset | str | Path, attributes: Mapping[str, Any]) -> 
     if isinstance(data, str | Path):
         command = f"surfacechem rerun {shlex.quote(Path(data).name)}"
         return command, "The dataset holds the case, the mechanism and the settings of the run."
+    if "sweep" in attributes:
+        changes = json.loads(attributes.get("departures", "{}")).get("changes", {})
+        again = f'load("case.yaml").sweep_plan(recorded_plan({attributes["sweep"]!r}), {changes})'
+        return "", f"In Python, with the case below: {again}; recorded_plan is in surfacechem.format.plans."
     needed = "The command needs the case below as case.yaml, and beside it the files that it names"
     beyond = " What was changed in Python, a written dataset has alone." if "departures" in attributes else ""
-    return f"surfacechem {'sweep' if 'sweep' in attributes else 'run'} case.yaml", f"{needed}.{beyond}"
+    return "surfacechem run case.yaml", f"{needed}.{beyond}"
 
 
 def _narrow(dataset: xarray.Dataset) -> Figure:

@@ -1,9 +1,11 @@
 """The page about a run: all in one file, within a phone's width in a real browser, and without code that it carries."""
 
+import html
 import json
 import re
 import shutil
 import subprocess
+from pathlib import Path
 
 import pytest
 from sampling import every
@@ -11,6 +13,7 @@ from sampling import every
 import surfacechem
 from surfacechem.compile.typeset import equations
 from surfacechem.errors import InputError
+from surfacechem.format.plans import recorded_plan
 from surfacechem.studies import mathml, run_report
 
 BROWSER = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
@@ -87,3 +90,12 @@ def test_a_report_of_events_lists_them_with_verdicts(tmp_path):
     dataset[["time"]].drop_attrs().to_netcdf(tmp_path / "bare.nc")
     with pytest.raises(InputError, match=r"bare.nc: this is no dataset of a run or of a sweep"):
         run_report.page(tmp_path / "bare.nc")
+
+
+def test_the_report_of_a_sweep_made_in_python_says_how_python_makes_it_again(tmp_path, monkeypatch):
+    names = {"load": surfacechem.load, "recorded_plan": recorded_plan}
+    dataset = surfacechem.load("exothermic").sweep({"initial.phi": [0.1, 0.2]}, changes={"initial.T": 290.0}).dataset
+    monkeypatch.chdir(tmp_path)
+    Path("case.yaml").write_text(dataset.attrs["case"], encoding="utf-8")
+    (told,) = re.findall(r"case below: (.*); recorded_plan", html.unescape(run_report.page(dataset).html()))
+    assert eval(told, names).dataset.phi.equals(dataset.phi)
