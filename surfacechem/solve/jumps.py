@@ -286,12 +286,19 @@ class Jumper:
         if last is None or not (edge.times or edge.fold):
             return self._books(before.inputs()), {}
         books = self._books((last if edge.times else before).inputs())
+        # What the jump makes is counted from where the integration ended. Free nodes are at the fold already, with the
+        # heat of the last of the way in their temperatures; reservoirs have still to pass it.
+        unseen = edge.fold and not self._heat.free
+        if unseen:
+            books[:2] = self._books(last.inputs())[:2]
         if not self.system.pulls:
             return books, {}
         (k, w, F, g), (_, w_new, F_new, g_new) = self._far_field(last), self._far_field(before)
         if edge.fold:
             middle = (g_new + g) / 2
-            way = elastic_energy(k, w_new, middle) - elastic_energy(k, w, middle) + (F_new + F) / 2 * (g_new - g)
+            lift = elastic_energy(k, w_new, middle) - elastic_energy(k, w, middle)
+            books[0] += unseen * np.sum(lift + (F - F_new) * middle)
+            way = lift + (F_new + F) / 2 * (g_new - g)
             return books, dict(zip(self.system.pulls, way.tolist(), strict=True))
         lift = elastic_energy(k, w_new, g) - elastic_energy(k, w, g)
         books[0] += np.sum(lift) + np.sum((F - F_new) * g)
