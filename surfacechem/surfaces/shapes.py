@@ -32,6 +32,11 @@ NODES, PER_CELL, MOST_NODES = 128, 8, 1_000_000
 and those of all cells at most.
 """
 
+OWN = 0.6
+"""Part of the way from one of these places to the next within which it is the one beside the nearest point: half, and
+what Newton's step may be wrong by.
+"""
+
 OVERSHOOT = 0.1
 """Part of the range of heights by which a spline through them may be above the highest, as summits lie between."""
 
@@ -39,6 +44,23 @@ OVERSHOOT = 0.1
 def _each(starts: Sequence[Array]) -> tuple[Indices, Array]:
     """As many starts for each point, those of one after those of another."""
     return np.repeat(np.arange(len(starts[0])), len(starts)), np.stack(starts, axis=1).reshape(-1, 2)
+
+
+def _leads_nowhere_else(
+    away: Array, slopes: Array, ends: Sequence[NDArray[np.bool_]], widths: Sequence[float]
+) -> Array:
+    """Whether Newton's step, from places (n, 3) that points are ``away`` from, stays beside them; at an edge along it.
+
+    ``slopes`` (n, 5) are derivatives of the heights: u, v, uu, uv, vv; ``ends`` tell where u and v have none.
+    """
+    (h_u, h_v, h_uu, h_uv, h_vv), (x_u, x_v, up) = slopes.T, away.T
+    E = np.where(ends[0], 1.0, 1 + h_u**2 - up * h_uu)
+    F = np.where(ends[0] | ends[1], 0.0, h_u * h_v - up * h_uv)
+    G = np.where(ends[1], 1.0, 1 + h_v**2 - up * h_vv)
+    along, across = np.where(ends[0], 0.0, x_u + up * h_u), np.where(ends[1], 0.0, x_v + up * h_v)
+    det = E * G - F**2
+    stays = np.abs(G * along - F * across) <= OWN * widths[0] * det
+    return np.asarray(stays & (np.abs(E * across - F * along) <= OWN * widths[1] * det) & (E > 0) & (det > 0))
 
 
 def _half(extent: float | None) -> tuple[float, float]:
@@ -435,30 +457,34 @@ class Heights(Shape):
         at = [np.arange(0, len(p) - 1 + 0.5 / parts, 1 / parts) for p in (self.x, self.y)]
         x, y = (np.interp(t, range(len(p)), p) for t, p in zip(at, (self.x, self.y), strict=True))
         places = np.stack([*np.meshgrid(x, y, indexing="ij"), self.spline(x, y)], axis=-1)
+        slopes = [self.spline(x, y, *order) for order in ((1, 0), (0, 1), (2, 0), (1, 1), (0, 2))]
         # Where a point is nearest the square of its distance has no slope: beside it it grows with the second
         # derivative, 2 (|x_u|^2 - d n . x_uu).
-        first = math.sqrt(1 + sum(self.spline(x, y, *order) ** 2 for order in ((1, 0), (0, 1))).max())
-        bent = (self.spline(x, y, *order) ** 2 for order in ((2, 0), (1, 1), (1, 1), (0, 2)))
-        second, beside = math.sqrt(sum(bent).max()), math.hypot(np.diff(x).max(), np.diff(y).max()) / 2
+        h_u, h_v, h_uu, h_uv, h_vv = slopes
+        first = math.sqrt(1 + (h_u**2 + h_v**2).max())
+        second = math.sqrt((h_uu**2 + 2 * h_uv**2 + h_vv**2).max())
+        beside = math.hypot(np.diff(x).max(), np.diff(y).max()) / 2
         growth = ((first * beside) ** 2 + second * first * beside**3, second * beside**2)
-        return places, KDTree(places.reshape(-1, 3)), growth
+        return places, np.stack(slopes, axis=-1), KDTree(places.reshape(-1, 3)), growth
 
     def starts(self, x: Array) -> tuple[Indices, Array]:
-        """Of the places beside which the nearest point may be, those that no neighbour is nearer than."""
-        places, tree, (a, b) = self.nodes
+        """Of the places beside which the nearest point may be, those that no neighbour is nearer than, and those from
+        which Newton's method leads to none of them.
+        """
+        places, slopes, tree, (a, b) = self.nodes
         d = tree.query(x)[0]
         near = tree.query_ball_point(x, np.sqrt(d**2 + a + b * d))
         which = np.repeat(np.arange(len(x)), [len(some) for some in near])
         i, j = np.unravel_index(np.concatenate(near).astype(int), places.shape[:2])
-        distance = np.linalg.norm(x[which] - places[i, j], axis=-1)
-        least = np.ones(len(which), dtype=bool)
+        widths = [np.diff(line).max() for line in (places[:, 0, 0], places[0, :, 1])]
+        away, least = x[which] - places[i, j], np.ones(len(which), dtype=bool)
+        distance = np.linalg.norm(away, axis=-1)
+        ends = [(k == 0) | (k == count - 1) for k, count in zip((i, j), places.shape, strict=False)]
         for offsets in product((-1, 0, 1), repeat=2):
             # At an edge the nearest point may be one that is so along it alone.
-            beside = (
-                np.where((k == 0) | (k == count - 1), k, k + offset)
-                for k, count, offset in zip((i, j), places.shape, offsets, strict=False)
-            )
+            beside = (np.where(end, k, k + offset) for end, k, offset in zip(ends, (i, j), offsets, strict=True))
             least &= distance <= np.linalg.norm(x[which] - places[tuple(beside)], axis=-1)
+        least |= _leads_nowhere_else(away, slopes[i, j], ends, widths)
         return which[least], places[i, j, :2][least]
 
     def derivatives(self, u: Array, v: Array, count: int) -> Array:
