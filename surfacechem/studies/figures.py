@@ -80,7 +80,9 @@ class DataSection(Section):
 
     called = "published data"
 
-    file: str = key(Text(), "CSV file beside the list; its first line names columns and units", REQUIRED)
+    file: str = key(
+        Text(), "CSV file beside the list; its first line names columns and units; none: numbers of the axis", REQUIRED
+    )
     x: str = key(Text(), "column along the axis", REQUIRED)
     y: str = key(Text(), "column of the values", REQUIRED)
 
@@ -208,6 +210,7 @@ class Picture:
         x, y = self.section.x, self.section.y
         ax.set(xlabel=x.name, ylabel=y.name, xscale=x.scale, yscale=y.scale)
         beside = [ax.plot([], [], label="exact", **EXACT)] if self._any("exact") else []
+        beside += [ax.plot([], [], "o", color="0.4", markersize=4, label="measured")] if self._any("data") else []
         beside += [ax.plot([], [], ":", color="0.4", label="breaks the second law")] if self._any("refused") else []
         if beside or any(curve.label for curve in self.curves):
             ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
@@ -313,9 +316,10 @@ def _data(
     if path is None:
         raise given.error(f"no file {given.file} beside the list.", "file")
     table = CSVText(Tree(document.read(path), Place(str(path))))
-    names = {"x": (figure.x, given.x), "y": (figure.y, given.y)}
-    x, y = (
-        np.array(table.column(column, _own_unit(dataset[axis.variable]), column)) / per[name]
-        for name, (axis, column) in names.items()
-    )
-    return x, y
+    found = []
+    for name, axis, column in (("x", figure.x, given.x), ("y", figure.y, given.y)):
+        # A column without a unit holds the numbers of the axis itself.
+        shown = (column, "") in table.columns
+        unit, scale = ("1", 1.0) if shown else (_own_unit(dataset[axis.variable]), per[name])
+        found.append(np.array(table.column(column, unit, column)) / scale)
+    return found[0], found[1]
