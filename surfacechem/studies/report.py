@@ -112,13 +112,23 @@ class Page:
         environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined)
         environment.filters |= {"equation": mathml.equation, "raised": raised}
         template = environment.get_template("page.html")
-        figure = inline_svg(self.draw()) if self.draw else ""
         drawn = [
             [inline_svg(draw(), f"s{i}f{k}-") for k, draw in enumerate(section.drawings)]
             for i, section in enumerate(self.sections)
         ]
         font = mathml.font() if any(section.equations for section in self.sections) else ""
-        return template.render(page=self, figure=figure, drawn=drawn, machine=machine(), font=font)
+        return template.render(page=self, figures=self._figures(), drawn=drawn, machine=machine(), font=font)
+
+    def _figures(self) -> list[str]:
+        """The figure as SVG, and the one that a phone shows in its place if it is narrower."""
+        if self.draw is None:
+            return []
+        from surfacechem.plots.style import narrow
+
+        with narrow():
+            slim = self.draw()
+        wide = self.draw()
+        return [inline_svg(wide), *([inline_svg(slim, "n0-")] if slim.get_figwidth() < wide.get_figwidth() else [])]
 
 
 def inline_svg(figure: Figure, prefix: str = "f0-") -> str:

@@ -24,7 +24,6 @@ from surfacechem.contracts.terms import Law
 from surfacechem.errors import InputError, Place
 from surfacechem.model.system import System
 from surfacechem.plots import drawing, figure, opened, save
-from surfacechem.plots.style import narrow
 from surfacechem.results import spatial
 from surfacechem.results.dataset import Results
 from surfacechem.results.netcdf import replacing
@@ -40,7 +39,6 @@ from surfacechem.studies.report import Page, PageSection, PageTable
 
 if TYPE_CHECKING:
     import xarray
-    from matplotlib.figure import Figure
 
 log = logging.getLogger(__name__)
 
@@ -72,9 +70,10 @@ def page(data: xarray.Dataset | str | Path) -> Page:
     except InputError as error:  # code that the dataset carries is not run to draw it
         sections += [*_events(dataset), _balances(attributes)]
         omissions.append(f"The scene and its equations: {error.message}")
+    untitled = dataset.assign_attrs(title="")  # the page has the title above
     told_again = [again, *([f"$ {command}"] if command else [])]
     sections.append(PageSection("How to run it again", told_again, code=attributes["case"], details=True))
-    return Page(attributes.get("title", "untitled"), command, sections, omissions, lambda: _narrow(dataset))
+    return Page(attributes.get("title", "untitled"), command, sections, omissions, lambda: figure(untitled))
 
 
 def _again(data: xarray.Dataset | str | Path, attributes: Mapping[str, Any]) -> tuple[str, str]:
@@ -91,12 +90,6 @@ def _again(data: xarray.Dataset | str | Path, attributes: Mapping[str, Any]) -> 
     needed = "The command needs the case below as case.yaml, and beside it the files that it names"
     beyond = " What was changed in Python, a written dataset has alone." if "departures" in attributes else ""
     return "surfacechem run case.yaml", f"{needed}.{beyond}"
-
-
-def _narrow(dataset: xarray.Dataset) -> Figure:
-    """The figure of a dataset, legible on a phone."""
-    with narrow():
-        return figure(dataset)
 
 
 def report_path(path: str | Path) -> Path:

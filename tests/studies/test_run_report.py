@@ -48,7 +48,8 @@ def test_a_report_is_one_file_without_scripts_or_network(report):
     assert len(text.encode()) < LARGEST
     assert not re.search(r"<script|<link|@import|src=|href=[\"']http", text)
     assert [part for part in PARTS if f"<h2>{part}</h2>" not in text] == []
-    assert text.count("<svg") == 2
+    assert text.count("<svg") == 3
+    assert text.count('<figure class="wide">') == text.count('<figure class="slim">') == 1  # the second for phones
     names = re.findall(r'\bid="([^"]+)"', text)
     assert len(names) == len(set(names))
 
