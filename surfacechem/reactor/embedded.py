@@ -16,7 +16,6 @@ from surfacechem.expressions import depends
 from surfacechem.format import Case
 from surfacechem.mechanism.evaluated import HeldPhase
 from surfacechem.model.assemble import assemble
-from surfacechem.model.sliding.rate_and_state import DRIVE
 from surfacechem.model.system import System
 from surfacechem.quantities import MOLECULAR
 from surfacechem.reactor import coupling
@@ -82,17 +81,6 @@ def _refuse_folds(system: System) -> None:
         )
 
 
-def _refuse_drives(system: System) -> None:
-    """In a network the displacement follows the velocity of the start: CVODE accepts steps as if it were constant,
-    whatever its tolerances.
-    """
-    if any(state.name == DRIVE for state in system.states):
-        raise InputError(
-            "sliding that rate-and-state friction lets evolve is not integrated well enough in a network. Prescribe "
-            "`v`, or run the case alone."
-        )
-
-
 class EmbeddedScene:
     """The scene of a case with what the network gives it: temperatures of reactors, heat, factors on its rates.
 
@@ -116,7 +104,6 @@ class EmbeddedScene:
             scene = coupling.with_neighbours(scene, neighbours or {})
             system = assemble(scene).with_multipliers()
             _refuse_folds(system)
-            _refuse_drives(system)
             self.reactions = system.reactions
             self.model = Model(system)
             self.values = self.model.values()

@@ -20,7 +20,7 @@ class Evaluation:
     """State, derivatives and parameters of a program in one buffer, made consistent by :meth:`put`.
 
     ``y``, ``ydot`` and ``parameters`` are views of it; algebraic variables are searched from ``guess``, where they were
-    last. ``ledger()`` are the rates of the ledger there, ``margins()`` the values of the margins.
+    at the time before. ``ledger()`` are the rates of the ledger there, ``margins()`` the values of the margins.
     """
 
     def __init__(self, program: Program, y: Array, parameters: Array) -> None:
@@ -29,7 +29,7 @@ class Evaluation:
         self.inputs = np.concatenate(([0.0], y, np.zeros(n), parameters))
         self.y, self.ydot, self.parameters = np.split(self.inputs[1:], [n, 2 * n])
         self.free, self.algebraic = map(np.flatnonzero, (~program.algebraic_mask, program.algebraic_mask))
-        self.guess = y[self.algebraic]
+        self.guess = self._found = y[self.algebraic]
         self._counts = np.zeros((1, COLUMNS), np.int64)
         ends, table = self.inputs[: 2 * n + 1][None], self.parameters[None, None]
         self._rates = _Code(program.rates, self.inputs) if program.rates else None
@@ -40,6 +40,10 @@ class Evaluation:
 
     def put(self, t: float, differential: Array) -> bool:
         """Go to a state; whether derivatives and algebraic variables were found there."""
+        # At the same time the search begins at the same place: an integrator that differentiates by 1e-27 m would
+        # else divide by it what rounding makes of two searches, and take a step that it does not correct for right.
+        if t != self.inputs[0]:
+            self.guess = self._found
         self.inputs[0] = t
         if self._rates is not None:
             self.y[:] = differential
@@ -54,7 +58,7 @@ class Evaluation:
         self._search()
         found = bool(self._counts[0, END] == 0)
         if found:
-            self.guess = self.y[self.algebraic]
+            self._found = self.y[self.algebraic]
         return found
 
     def hold(self, t: float, y: Array, ydot: Array, whole: bool = True) -> None:
@@ -73,7 +77,7 @@ class Evaluation:
     def restart(self, y: Array) -> None:
         """Take over a state after a jump; algebraic variables are searched from there."""
         self.y[:] = y
-        self.guess = y[self.algebraic]
+        self.guess = self._found = y[self.algebraic]
 
     def rates(self) -> Array:
         """Derivatives of the differential variables and of the ledger."""
