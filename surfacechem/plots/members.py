@@ -233,7 +233,7 @@ def effects(
                 effect(ax, over[:: -(-over.size // MOST_POINTS)], values, ratios)
         for ax, parameter in zip(grid[-1, 1:], parameters, strict=True):
             # Beside a short first line there is room for the power of ten of the axis.
-            ax.set_xlabel(axis_label(dataset[parameter]).replace(" of ", "\nof ").replace(" [", "\n["), fontsize=8)
+            ax.set_xlabel(axis_label(dataset[parameter]).replace(" (", "\n(").replace(" [", "\n["), fontsize=8)
         grid[-1, 0].set_xlabel("runs")
         style.headings(plot, grid[0, 0], dataset)
         grid[0, 0].set_title("5, 50 and 95 % of the runs", loc="left", fontsize=8, color="#555555")

@@ -26,7 +26,8 @@ from surfacechem.tolerances import EPS, ROUNDING
 # Panels of the usual figure: title, and patterns of the unit and of the names.
 KINDS: tuple[tuple[str, str, str], ...] = (
     ("Temperature", "K|degC", r".*"),
-    ("Bonding", "1", r"(?!formed_|departure_|.*_residual$|J_c$|n_c$|gamma_m$|ln_theta$|drive$).*"),
+    ("Bonding", "1", r"(?!formed_|departure_|x_|.*_residual$|J_c$|n_c$|gamma_m$|ln_theta$|drive$).*"),
+    ("Mole fraction", "1", r"x_\w+"),
     ("Film", "m", "d_m"),
     ("Growth", "m s-1", r"growth_\w+"),
     ("Gap", "m", r"g_\w*"),
@@ -218,6 +219,8 @@ def _by_kind(dataset: xarray.Dataset, known: Sequence[str]) -> list[Panel]:
         names = of_kind(dataset, known, units, pattern)
         if title == "Heat flux" and {"q_1", "q_2"} & set(names):
             names = [name for name in names if name in ("q_1", "q_2")]
+        elif title == "Bonding" and any(name.startswith("theta_") for name in names):
+            title = "Coverage"
         # What is nothing beside another quantity of its unit is rounding of what both are made of.
         sizes = {
             name: style.largest(dataset[name].values) for name in known if re.fullmatch(units, unit(dataset[name]))

@@ -334,10 +334,10 @@ def owner(values: xarray.DataArray) -> str:
     """Whose a swept parameter is, by the path that its long name ends with; '' where its own name tells that.
 
     >>> owner(xarray.DataArray(1.0, name="C", attrs={"long_name": "heat capacity per area (bodies.upper.C)"}))
-    ' of upper'
+    ' (upper)'
     """
     path = str(values.attrs.get("long_name", "")).rpartition("(")[2].removesuffix(")").split(".")
-    return f" of {' '.join(path[1:-1])}" if len(path) > 2 and path[-1] == values.name else ""
+    return f" ({path[-2]})" if len(path) > 2 and path[-1] == values.name else ""
 
 
 def parameter_name(name: str) -> str:

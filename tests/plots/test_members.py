@@ -39,7 +39,7 @@ def test_a_map_over_two_parameters(tmp_path):
     ax = plot.axes[0]
     assert np.array_equal(ax.collections[0].get_array(), opened(path)["T_last"].values.T)
     assert (ax.get_xscale(), ax.get_yscale()) == ("log", "linear")
-    assert (ax.get_xlabel(), ax.get_ylabel()) == ("$K_{0}$ of potential bond-energy [J m⁻²]", "initial T [K]")
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("$K_{0}$ (bond-energy) [J m⁻²]", "initial T [K]")
 
 
 @pytest.fixture(scope="module")
@@ -61,7 +61,7 @@ def test_curves_over_two_parameters_have_the_colours_of_the_first(grid):
     assert [len({line.get_color() for line in curves.lines[k : k + 8]}) for k in (0, 8)] == [1, 1]
     assert curves.lines[0].get_color() != curves.lines[8].get_color()
     assert curves.get_title("left").endswith("curves of one colour differ in initial T")
-    assert bar.get_ylabel() == "$K_{0}$ of potential bond-energy [J m⁻²]"
+    assert bar.get_ylabel() == "$K_{0}$ (bond-energy) [J m⁻²]"
 
 
 def test_distributions_and_effects_of_a_sample(drawn):
@@ -73,8 +73,8 @@ def test_distributions_and_effects_of_a_sample(drawn):
     middle = rows[1, 0].lines[1].get_ydata()[0]
     assert middle == np.median(data["T_last"].values)
     assert {ax.get_xlabel() for ax in rows[1, 1:]} == {
-        "$K_{0}$\nof potential bond-energy\n[J m⁻²]",
-        "$c_{r}$\nof bonding linear-affinity\n[J⁻¹ s⁻¹]",
+        "$K_{0}$\n(bond-energy)\n[J m⁻²]",
+        "$c_{r}$\n(linear-affinity)\n[J⁻¹ s⁻¹]",
     }
     (effect,) = (ax for ax in rows[1] if ax.get_xlabel().startswith("$K"))
     assert np.all(np.diff(effect.lines[0].get_ydata()) > 0)

@@ -87,6 +87,12 @@ def test_sliding_is_no_gap_and_logarithms_are_no_bonds():
     assert labels(plot)[1:4] == [[r"$\phi$"], ["$g_{n}$"], ["$u_{t}$"]]
 
 
+def test_coverages_and_mole_fractions_have_panels_of_their_own():
+    t = np.linspace(0.0, 2.0, 21)
+    plot = figure(dataset(theta_free_s=("1", 1 - t / 2), x_gas_H=("1", t / 100)))
+    assert titles(plot)[1:3] == ["Coverage [1]", "Mole fraction [1]"]
+
+
 def test_chosen_variables_are_grouped_by_unit():
     assert labels(figure(dataset(), ["q_12", "phi", "q_1"])) == [["$q_{12}$", "$q_{1}$"], [r"$\phi$"]]
     (constant,) = figure(dataset(), ["v"]).axes
