@@ -515,6 +515,14 @@ class System:
         """Which guards are in play in the modes among the parameters: the moving margins, then the edges."""
         return tuple(all(parameters[j] in values for j, values in when) for when in self._when)
 
+    def playing(self, table: Array) -> NDArray[np.bool_]:
+        """The same for many rows of parameters, shape (runs, guards)."""
+        found = np.ones((len(table), len(self._when)), dtype=bool)
+        for k, when in enumerate(self._when):
+            for j, values in when:
+                found[:, k] &= np.any([table[:, j] == value for value in values], axis=0)
+        return found
+
     @property
     def moves(self) -> bool:
         """Whether a gap moves by a balance."""

@@ -28,6 +28,7 @@ from surfacechem.solve.diagnose import are_led_back
 from surfacechem.solve.radau.solver import consistent, solve_arrays
 from surfacechem.solve.radau.stepper import END, EVENTS, FIRST_COUNTER, OUTPUTS, RECORDS
 from surfacechem.solve.run import Model, Run
+from surfacechem.solve.stretches import Stretches
 from surfacechem.tolerances import CROSSED, EPS, MICROMETRE, PICOMETRE
 
 TRIED = 100
@@ -60,13 +61,17 @@ def solvable(model: Model, plan: Plan, run: Run, problem: Problem) -> bool:
     return own and shared and one_arc and not system.equilibria and _starts_as_given(system, set(plan.paths))
 
 
+def quiet(model: Model) -> bool:
+    """Whether the modes at the start of a run are the same whatever its values are."""
+    return all(mode.start is None for mode in model.system.modes)
+
+
 def _starts_as_given(system: System, swept: set[str]) -> bool:
-    """Whether states and modes start with what is given, or with its logarithm, and none of them is searched for."""
+    """Whether states start with what is given, or with its logarithm, and neither they nor registers are searched."""
     searched = [state for state in system.states if state.algebraic]
     made = [state for state in system.states if state.given is not None and state.given.state and state.path in swept]
-    modes = [mode for mode in system.modes if mode.start is not None]
     registers = [register for register in system.registers if register.given is not None]
-    return not (searched or made or modes or registers)
+    return not (searched or made or registers)
 
 
 class ArrayRuns:
@@ -117,6 +122,15 @@ class ArrayRuns:
         line = spectrum.history(system, self.plan.load)
         return compile_function(system.inputs, [line, derivative(line, system.t)])
 
+    @cached_property
+    def modes(self) -> tuple[list[int], Function]:
+        """Columns of the modes that follow from the start, and what they are there."""
+        system = self.model.system
+        found = {mode.symbol: system.expand(mode.start) for mode in system.modes if mode.start is not None}
+        columns = [j for j, parameter in enumerate(system.parameters) if parameter.symbol in found]
+        starts = [found[system.parameters[j].symbol] for j in columns]
+        return columns, compile_function(system.inputs, starts)
+
     # -- from values to arrays ----------------------------------------------------------------------------------------
 
     def solve(self, values: Mapping[str, Array]) -> tuple[Mask, Columns]:
@@ -151,6 +165,10 @@ class ArrayRuns:
         with np.errstate(invalid="ignore", divide="ignore"):
             for column, state in self.state_columns:
                 y0[:, column] = values[state.path] if state.given is None else np.log(values[state.path])
+        columns, started = self.modes
+        if columns:
+            rows = np.concatenate([np.zeros((count, 1)), y0, np.zeros_like(y0), table[:, 0]], axis=1)
+            table[:, :, columns] = started(rows)[:, None]
         return table, y0
 
     def _admissible(self, values: Mapping[str, Array], rows: Array) -> Mask:
@@ -349,13 +367,14 @@ class ArrayRuns:
 
     def _event_columns(self, found: Ends) -> Columns:
         """First times of events after which a run goes on, and of values that are reached."""
-        batch, margins, keep = found.batch, self.model.margins, self.keep
+        batch, keep = found.batch, self.keep
+        named = [margin.name for margin in self.model.margins] + [edge.name for edge in self.model.system.edges]
         columns: Columns = {}
         names = [*((name, f"time_{variable(name)}") for name in keep.events)]
         names += [(f"{REACHED}{name}", f"time_to_{name}") for name in keep.reach or {}]
         happened = np.arange(batch.events.shape[1]) < batch.counts[:, EVENTS, None]
         for name, column in names:
-            wanted = [j for j, margin in enumerate(margins) if margin.name == name]
+            wanted = [j for j, each in enumerate(named) if each == name]
             owner, row = np.nonzero(happened & np.isin(batch.events[..., 0], wanted))
             owner, first = np.unique(owner, return_index=True)
             rows = np.full((len(happened), 2 + self.n), np.nan)
@@ -364,3 +383,30 @@ class ArrayRuns:
             for state in keep.at_events if name in keep.events else ():
                 columns[f"{state}_at_{variable(name)}"] = rows[:, 2 + self.model.system.state_columns[state]]
         return columns
+
+
+class JumpingRuns(ArrayRuns):
+    """Runs of a plan that arrays tell with their jumps."""
+
+    @cached_property
+    def stretches(self) -> Stretches:
+        """What carries them from stretch to stretch."""
+        model = self.model
+        assert model.jumper is not None
+        return Stretches(model.system, model.jumper, replace(self.problem, record_steps=self.keeps_steps))
+
+    def solve(self, values: Mapping[str, Array]) -> tuple[Mask, Columns]:
+        """Which runs with these values the arrays tell, and what is kept of those."""
+        table, y0 = self.starts(values)
+        rows = np.concatenate([np.zeros((len(y0), 1)), y0, np.zeros_like(y0), table[:, 0]], axis=1)
+        ends, times = self.ends(rows)
+        told = self._admissible(values, rows) & np.isfinite(ends) & (ends > 0)
+        own = np.flatnonzero(told)
+        if not len(own):
+            return told, {}
+        times = times if len(times) == 1 else times[own]
+        course = self.stretches.run(y0[own], table[own, 0], ends[own], times, ends[own] / self.run.samples)
+        clear, columns = self._columns(Ends(course, course.table, course.segments, times))
+        clear &= course.told
+        told[own[~clear]] = False
+        return told, {name: column[clear] for name, column in columns.items()}

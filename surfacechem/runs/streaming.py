@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from surfacechem import format as cases
 from surfacechem.errors import InputError, Place, suggestion
@@ -23,7 +22,7 @@ from surfacechem.results.dataset import quantities
 from surfacechem.results.netcdf import CONVENTIONS, Column, cf_unit, versions
 from surfacechem.results.store import MOST_BYTES, Layout, Store, StoredArray, begin, opened, store_path
 from surfacechem.runs import keeping, sweeps
-from surfacechem.runs.arrays import ArrayRuns, solvable
+from surfacechem.runs.arrays import ArrayRuns, JumpingRuns, quiet, solvable
 from surfacechem.runs.checking import checked_arrays
 from surfacechem.runs.keeping import STATUSES, Columns, Keep, RunByRun, keep_of, variable
 from surfacechem.solve.contract import Index
@@ -60,7 +59,13 @@ class ChunkRuns:
         self.run = self.model.chosen(simulation.case.run, self.model.values(changes))
         self.one_by_one = RunByRun(self.model, keep)
         arrays = ArrayRuns(self.model, plan, self.run, changes, keep)
-        self.arrays = arrays if solvable(self.model, plan, self.run, arrays.problem) else None
+        told = solvable(self.model, plan, self.run, arrays.problem)
+        self.arrays = arrays if told else None
+        ways = [arrays] if told and quiet(self.model) else []
+        if told and self.model.jumper is not None:
+            ways.append(JumpingRuns(self.model, plan, self.run, changes, keep))
+        self.ways = ways
+        """How runs become arrays, in the order in which they are tried; the rest is looked at one by one."""
 
     @cached_property
     def piece(self) -> int:
@@ -83,16 +88,17 @@ class ChunkRuns:
         """What is kept of the runs of these numbers."""
         values = self.plan.at(index)
         times = len(self.run.times)
-        if self.arrays is None:
-            return self.one_by_one.columns(self._solved(values, np.arange(len(index))), times)
-        told, found = self.arrays.solve(values)
-        left = np.flatnonzero(~told)  # what arrays do not tell is run by run, and the same in any company
-        if not len(left):
-            return found
-        others = self.one_by_one.columns(self._solved(values, left), times)
-        if not found:
-            return others
-        return {name: _merged(told, found[name], others[name]) for name in others}
+        columns: Columns = {}
+        left = np.arange(len(index))
+        for way in self.ways:
+            told, found = way.solve({path: column[left] for path, column in values.items()})
+            _put(columns, left[told], found, len(index))
+            left = left[~told]
+            if not len(left):
+                return columns
+        # What arrays do not tell is run by run, and the same in any company.
+        _put(columns, left, self.one_by_one.columns(self._solved(values, left), times), len(index))
+        return columns
 
     def _solved(self, values: Mapping[str, Any], chosen: Index) -> list[Trajectory | None]:
         """Some runs by themselves, None for one whose values are not admissible."""
@@ -107,11 +113,11 @@ class ChunkRuns:
         return [run for i in chosen.tolist() for run in self._solved(values, np.array([i]))]
 
 
-def _merged(told: NDArray[np.bool_], these: NDArray[Any], others: NDArray[Any]) -> NDArray[Any]:
-    """A column of runs of which some are told by the one, the rest by the other."""
-    whole = np.empty((len(told), *these.shape[1:]), dtype=these.dtype)
-    whole[told], whole[~told] = these, others
-    return whole
+def _put(columns: Columns, own: Index, found: Columns, count: int) -> None:
+    """Put what is kept of some of so many runs into the columns of all."""
+    for name, column in found.items():
+        whole = columns.setdefault(name, np.empty((count, *column.shape[1:]), dtype=column.dtype))
+        whole[own] = column
 
 
 # -- a sweep into a store ---------------------------------------------------------------------------------------------

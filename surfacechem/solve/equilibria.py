@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -45,12 +46,18 @@ POLISH = 3
 
 @dataclass(frozen=True)
 class Point:
-    """A state with the parameters that hold there."""
+    """A state with the parameters that hold there, or many of them."""
 
-    t: float
+    t: Any
     y: Array
     ydot: Array
     parameters: Array
+
+    @classmethod
+    def of(cls, inputs: Array, n: int) -> Point:
+        """The point, or many at once, at arguments of compiled functions with so many states."""
+        t, y, ydot, parameters = np.split(inputs, [1, 1 + n, 1 + 2 * n], axis=-1)
+        return cls(t[..., 0], y, ydot, parameters)
 
     def inputs(self) -> Array:
         """Arguments of compiled functions."""

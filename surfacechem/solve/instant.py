@@ -44,6 +44,11 @@ ENDLESS = (
 MISSED = "the method has not seen the gap close; radau does, or a tighter tolerance"
 
 
+def velocity_scales(system: System) -> Array:
+    """Scales of the velocities among the states, zero for the others."""
+    return np.array([(state.finest or state.scale) * (state.name in VELOCITIES) for state in system.states])
+
+
 class Rebounds:
     """Edges whose guard leaves an exact zero and may soon be back, ever lower and sooner.
 
@@ -103,7 +108,7 @@ class Instant:
         """Times [s] between which the run goes; what is brief is so against them."""
         self.strict = np.array([kind.strict for kind in problem.margins], dtype=bool)
         self.terminal = np.array([kind.terminal for kind in problem.margins], dtype=bool)
-        self.scales = np.array([(state.finest or state.scale) * (state.name in VELOCITIES) for state in system.states])
+        self.scales = velocity_scales(system)
         self.peaks = self.scales.copy()
         """Largest states seen; what is left of them is rounding. A velocity adds up what forces have given and taken,
         and is rounding where it is small against its scale; a gap may be exactly zero, at touch.

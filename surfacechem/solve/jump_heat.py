@@ -25,7 +25,7 @@ from surfacechem.expressions import derivative
 from surfacechem.model.automaton import INTERFACE, Sink
 from surfacechem.model.system import System
 from surfacechem.solve.branches import CLOSEST
-from surfacechem.solve.contract import Array
+from surfacechem.solve.contract import Array, Mask
 from surfacechem.solve.equilibria import Equilibria, Heat, Point, Way, compiled
 from surfacechem.tolerances import ULPS
 
@@ -81,38 +81,45 @@ class JumpHeat:
         values = self._columns(rows).reshape(len(rows), len(self.nodes), -1)
         return values[:, :, 0], values[:, :, 1], values[:, :, 2], values[:, :, 3:]
 
-    def taken(self, rows: Array, made: Array, shares: Array | None) -> tuple[Array, Array, Array, Array]:
-        """Temperature, energy and capacity of each node, and the heat that it takes, each of shape (rows, nodes).
+    @cached_property
+    def passed(self) -> Mask:
+        """Which nodes pass on what they take."""
+        return np.array([node.prescribed for node in self.nodes.values()], dtype=bool)
+
+    def taken(self, rows: Array, made: Array, shares: Array | None) -> tuple[Array, Array]:
+        """Temperature of each node, and the heat that it takes, each of shape (rows, nodes).
 
         ``made`` has a column for each maker, and friction last: its heat goes by the ``shares`` along its way, where
         these are known, else as the interface shares it at the end.
         """
-        T, U, C, parts = self.at(rows)
+        T, _, _, parts = self.at(rows)
         rubbed = parts[:, :, self.interface] if shares is None else shares
-        return T, U, C, np.einsum("ijk,ik->ij", parts, made[:, :-1]) + rubbed * made[:, -1:]
+        return T, np.einsum("ijk,ik->ij", parts, made[:, :-1]) + rubbed * made[:, -1:]
 
     def warmed(self, rows: Array, made: Array, shares: Array | None) -> Array:
         """Inputs with the temperatures of the nodes after they have taken the heat that is made."""
-        return self.with_heat(rows, self.taken(rows, made, shares)[3])
+        return self.with_heat(rows, self.taken(rows, made, shares)[1])
 
     def with_heat(self, rows: Array, taken: Array) -> Array:
         """Inputs with the temperatures of the nodes after each has taken its heat, shape (rows, nodes)."""
         free = list(zip([j for j, s in enumerate(self.nodes.values()) if not s.prescribed], self.free, strict=True))
         _, U, C, _ = self.at(rows)
-        target, rows = U + taken, rows.copy()
+        target, rows, left = U + taken, rows.copy(), np.arange(len(rows))
+        # Each row ends where it has converged: what it becomes does not depend on the others.
         for _ in range(NEWTON if free else 0):
-            done = True
+            moves = np.zeros(len(left), dtype=bool)
             for j, column in free:
-                T = rows[:, column]
+                T = rows[left, column]
                 with np.errstate(over="ignore", invalid="ignore"):  # far away a search may see no number
-                    change = (target[:, j] - U[:, j]) / C[:, j]
+                    change = (target[left, j] - U[:, j]) / C[:, j]
                 moved = T + change
-                done = done and not np.any(np.abs(change) > ULPS * np.abs(T))
+                moves |= np.abs(change) > ULPS * np.abs(T)
                 # A body without a minimum of energy above T = 0 lets Newton's method run out below it.
-                rows[:, column] = np.where(moved > 0, moved, np.nan)
-            if done:
+                rows[left, column] = np.where(moved > 0, moved, np.nan)
+            left = left[moves]
+            if not len(left):
                 break
-            _, U, C, _ = self.at(rows)
+            _, U, C, _ = self.at(rows[left])
         return rows
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import symengine
@@ -18,7 +19,7 @@ from surfacechem.expressions import derivative, magnitude
 from surfacechem.model.automaton import INTERFACE, RESTS, Edge
 from surfacechem.model.balances import elastic_energy
 from surfacechem.model.system import Account, System
-from surfacechem.solve.contract import Array
+from surfacechem.solve.contract import Array, Mask
 from surfacechem.solve.equilibria import BALANCED, Equilibria, Folds, Lost, Point, compiled
 from surfacechem.solve.jump_heat import JumpHeat, LoadPath, LoadStep
 from surfacechem.tolerances import ATOM, DIGITS, ROUNDING
@@ -79,11 +80,26 @@ class Jump:
         return self.verdict == IMPOSSIBLE or (self.verdict == VIOLATES and self.edge.violation == "refuse")
 
 
-def booked(jump: Jump, account: Account, states: Sequence[str]) -> float:
-    """What a jump adds to an account of the ledger; ``states`` are the names of the states in order."""
+@dataclass(frozen=True)
+class Jumps:
+    """Jumps of many runs along one edge, the run as first axis of all."""
+
+    before: Point
+    after: Point
+    released: Array
+    entropy: Array
+    work: Mapping[str, Array]
+    heat_out: Array
+    entropy_out: Array
+    goes_on: Mask
+    """Which of the runs may go on."""
+
+
+def booked(jump: Jump | Jumps, account: Account, states: Sequence[str]) -> Any:
+    """What a jump, or each of many, adds to an account of the ledger; ``states`` are the names of the states."""
     if account.kind == "bonds":
         j = states.index(account.law)
-        return float(jump.after.y[j] - jump.before.y[j])
+        return jump.after.y[..., j] - jump.before.y[..., j]
     if account.law != "events":
         return jump.work.get(account.quantity.name, 0.0)
     amounts = {
@@ -379,15 +395,10 @@ class Jumper:
         the normal gap is where it goes to.
         """
         edge, start = release.edge, release.start
-        makers = list(self.system.sinks)
-        made = np.zeros((len(rows), len(makers) + 1))
-
-        def maker(axis: str) -> int:
-            return makers.index(axis if axis in makers and edge.heat != "snap" else INTERFACE)
+        made = np.zeros((len(rows), len(self.system.sinks) + 1))
 
         level = self._energy(start.inputs())[0]
-        first = -1 if edge.heat == "local" else maker("n" if edge.heat == "joint" else INTERFACE)
-        made[:, first] += release.energy - level
+        made[:, self._first_maker(edge)] += release.energy - level
         parameters = 1 + 2 * len(start.y)
         here = np.repeat(start.inputs()[None], len(rows), axis=0)
         here[:, parameters:] = rows[:, parameters:]
@@ -401,41 +412,92 @@ class Jumper:
                 gives = rows[:, parameters + slip] != 0 if slip is not None else np.zeros(len(rows), dtype=bool)
             with np.errstate(invalid="ignore"):  # far away from where it begins a search may see no number
                 fall = level - now
-            made[~gives, maker(axis)] += fall[~gives]
-            made[gives, maker(INTERFACE) if axis == "n" else -1] += fall[gives]
+            made[~gives, self._maker(edge, axis)] += fall[~gives]
+            made[gives, self._maker(edge, INTERFACE) if axis == "n" else -1] += fall[gives]
             level = now
         return made
+
+    def _maker(self, edge: Edge, axis: str) -> int:
+        """The column of who makes the heat along an axis."""
+        makers = list(self.system.sinks)
+        return makers.index(axis if axis in makers and edge.heat != "snap" else INTERFACE)
+
+    def _first_maker(self, edge: Edge) -> int:
+        """The column of who makes the heat of what is released before gaps move."""
+        return -1 if edge.heat == "local" else self._maker(edge, "n" if edge.heat == "joint" else INTERFACE)
 
     def _heated(self, point: Point, release: Release, shares: Array | None) -> tuple[Point, float, float, float]:
         """The point with the heat made in its nodes; energy released, heat and entropy passed to reservoirs."""
         rows = point.inputs()[None]
-        made = self._made(rows, release)
-        made[np.abs(made) <= self._rounding(point, release.energy)] = 0.0
-        if not np.any(made):
-            return point, 0.0, 0.0, 0.0
-        heated = self._heat.warmed(rows, made, shares)
+        heated, *amounts = self._warmed(rows, self._made(rows, release), np.array([release.energy]), shares)
         if not np.all(np.isfinite(heated)):
             raise ImpossibleError(NO_HEAT)
-        T, _, _, taken = self._heat.taken(rows, made, shares)
-        passed = np.array([node.prescribed for node in self._heat.nodes.values()])
-        heat, entropy = float(np.sum(taken[0, passed])), float(np.sum((taken / T)[0, passed]))
-        return replace(point, y=heated[0, 1 : 1 + len(point.y)]), float(np.sum(made)), heat, entropy
+        released, heat, entropy = (float(amount[0]) for amount in amounts)
+        return replace(point, y=heated[0, 1 : 1 + len(point.y)]), released, heat, entropy
+
+    def _warmed(
+        self, rows: Array, made: Array, energy: Array, shares: Array | None = None
+    ) -> tuple[Array, Array, Array, Array]:
+        """Inputs with the heat made in their nodes, not a number where they cannot take it; energy released, heat and
+        entropy passed to reservoirs. What does not count beside the ``energy`` before is not made.
+        """
+        small = DIGITS * np.maximum(self._magnitudes(rows)[:, 0], np.abs(energy))
+        made = np.where(np.abs(made) <= small[:, None], 0.0, made)
+        released, warmed = made.sum(axis=1), rows.copy()
+        heat, entropy = np.zeros(len(rows)), np.zeros(len(rows))
+        hot = made.any(axis=1)
+        if hot.any():
+            T, taken = self._heat.taken(rows[hot], made[hot], shares)
+            warmed[hot] = self._heat.with_heat(rows[hot], taken)
+            passed = self._heat.passed
+            heat[hot], entropy[hot] = taken[:, passed].sum(axis=1), (taken / T)[:, passed].sum(axis=1)
+        return warmed, released, heat, entropy
 
     def _judged(self, jump: Jump, books: Array, noise: float) -> Jump:
         """The jump with the entropy it produces, what the second law says of that, and the work done in it."""
-        now = self._books(jump.after.inputs())
-        before, after = float(books[1]), float(now[1])
-        gain = after - before + jump.entropy_out
-        # What does not count: rounding, and what the noise of the state that a guard measures makes.
-        rows = np.repeat(jump.before.inputs()[None], 2, axis=0)
-        if jump.edge.measure:
-            rows[1, 1 + self.states.index(jump.edge.measure)] += noise
-        still, moved = self._books(rows)[:, 1]
-        small = ROUNDING * max(abs(before), abs(after), abs(jump.entropy_out))
-        small += DIGITS * self._magnitudes(rows[0])[1] + abs(moved - still)
-        done = zip(self.system.given, (now[2:] - books[2:]).tolist(), strict=True)
-        work = {**jump.work, **{name: jump.work.get(name, 0.0) + moved for name, moved in done}}
-        return replace(jump, entropy=gain, verdict=ADMISSIBLE if gain >= -small else VIOLATES, work=work)
+        before, after = jump.before.inputs()[None], jump.after.inputs()[None]
+        gain, admissible, work = self._judge(jump.edge, before, after, books[None], np.array([noise]), jump.entropy_out)
+        total = {**jump.work, **{name: jump.work.get(name, 0.0) + float(done[0]) for name, done in work.items()}}
+        verdict = ADMISSIBLE if admissible[0] else VIOLATES
+        return replace(jump, entropy=float(gain[0]), verdict=verdict, work=total)
+
+    def _judge(
+        self, edge: Edge, before: Array, after: Array, books: Array, noise: Array, entropy_out: Array | float
+    ) -> tuple[Array, Mask, dict[str, Array]]:
+        """Entropy that jumps between these rows produce, whether the second law admits it, and the work done in them.
+
+        What does not count: rounding, and what the ``noise`` of the state that a guard measures makes.
+        """
+        now, nudged = self._books(after), before.copy()
+        if edge.measure:
+            nudged[:, 1 + self.states.index(edge.measure)] += noise
+        made = np.abs(self._books(nudged)[:, 1] - self._books(before)[:, 1])
+        gain = now[:, 1] - books[:, 1] + entropy_out
+        small = ROUNDING * np.maximum(np.maximum(np.abs(books[:, 1]), np.abs(now[:, 1])), np.abs(entropy_out))
+        small += DIGITS * self._magnitudes(before)[:, 1] + made
+        return gain, gain >= -small, dict(zip(self.system.given, (now[:, 2:] - books[:, 2:]).T, strict=True))
+
+    # -- many jumps at once ---------------------------------------------------------------------------------------
+
+    def make_all(self, index: int, rows: Array, noise: Array) -> tuple[Jumps, Array]:
+        """Carry out an edge at many points, as :meth:`make` does each where no gap has to find its equilibrium; the
+        arguments of compiled functions after it.
+
+        ``rows`` are these arguments before it, ``noise`` is the rounding of the guard at each.
+        """
+        edge, n = self.system.edges[index], len(self.states)
+        values, start = self._resets[index](rows), rows.copy()
+        start[:, 1 : 1 + n], start[:, 1 + n : 1 + 2 * n] = values[:, :n], 0.0
+        start[:, [1 + 2 * n + j for j in self.mode_columns]] = values[:, n:]
+        books, level = self._books(rows), self._books(start)[:, 0]
+        made = np.zeros((len(rows), len(self.system.sinks) + 1))
+        made[:, self._first_maker(edge)] = books[:, 0] - level
+        after, released, heat, entropy = self._warmed(start, made, books[:, 0])
+        gain, admissible, work = self._judge(edge, rows, after, books, noise, entropy)
+        goes_on = np.isfinite(level) & np.all(np.isfinite(after), axis=1)
+        goes_on &= admissible | (edge.violation != "refuse")
+        jumps = Jumps(Point.of(rows, n), Point.of(after, n), released, gain, work, heat, entropy, goes_on)
+        return jumps, after
 
     @cached_property
     def _magnitudes(self) -> Function:

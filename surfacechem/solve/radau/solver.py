@@ -236,14 +236,13 @@ def _no_events(n: int, q: int) -> Events:
     return Events(*_points(np.empty((0, 1 + 2 * n + q)), n), index=np.empty(0, np.int64))
 
 
-def solve_arrays(
-    problem: Problem, y0: Array, parameters: Array, spacing: Array, peaks: Array, segments: Array, times: Array
-) -> Any:
-    """The batch of runs that share with a problem all but what is given, each with the run as first axis, or of length
-    one where it is the same for all; its rows as the stepper writes them.
+def solve_arrays(problem: Problem, *columns: Array, room: Room | None = None) -> Any:
+    """The batch of runs that share with a problem all but y0, parameters, spacing, peaks, segments and times, which are
+    given in this order with the run as first axis, or of length one where it is the same for all; its rows as the
+    stepper writes them, with this room for each or as much as is usual.
     """
-    columns = y0, parameters, spacing, np.array((problem.max_steps,)), peaks, segments, times
-    batch = _batch(problem, tuple(map(np.ascontiguousarray, columns)))
+    y0, parameters, spacing, *others = map(np.ascontiguousarray, columns)
+    batch = _batch(problem, (y0, parameters, spacing, np.array((problem.max_steps,)), *others), room)
     stepper.run(batch, 0, len(y0))
     return batch
 
