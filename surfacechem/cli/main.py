@@ -341,7 +341,9 @@ def new(
     text = case_text(like)
     with replacing(file) as temporary:
         temporary.write_text(text, encoding="utf-8")
-    typer.echo(f"{file}, from {like}. Next: `surfacechem check {file}`, then `surfacechem run {file}`.")
+    starts = ["run", "sweep"] if "\nsweep:" in text else ["run"]
+    commands = " or ".join(f"`surfacechem {start} {file}`" for start in starts)
+    typer.echo(f"{file}, from {like}. Next: `surfacechem check {file}`, then {commands}.")
 
 
 @app.command(epilog=EXIT_CODES)

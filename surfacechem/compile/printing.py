@@ -114,7 +114,12 @@ def python(system: System, title: str = "") -> str:
         for state in system.states
     )
     heading = f"{title}: {system.regime}" if title else system.regime
-    text = f"{_safe(heading)}.\n\nt is time [s]. y holds\n\n{states}\n\nand ydot their time derivatives."
+    held = (
+        f"y holds\n\n{states}\n\nand ydot their time derivatives."
+        if states
+        else "Nothing evolves: y and ydot are empty."
+    )
+    text = f"{_safe(heading)}.\n\nt is time [s]. {held}"
     return "\n\n".join([f'"""{text}\n"""\n\nimport math\n', parameters, *_pieces(system), *functions])
 
 

@@ -249,7 +249,9 @@ WHOLE = {
 def needed(unit: str) -> str:
     """What a unit measures, in words: ``a length [m]``."""
     exact = next((words for words, known in WORDS.items() if known == unit), None)
-    return f"{exact or _described(_unit(unit))} [{unit}]" if unit != "1" else "a pure number"
+    words = exact or _words().get(_unit(unit).dimensionality)
+    measured = f"{words} [{unit}]" if words else f"a quantity in {unit}"
+    return measured if unit != "1" else "a pure number"
 
 
 def _described(unit: Any) -> str:

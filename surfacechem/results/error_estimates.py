@@ -213,7 +213,7 @@ def stated(errors: Mapping[str, float]) -> float:
 
 def second_run(run: Run, kind: str = "run") -> str:
     """What an estimate is from, in words: what is briefer, and that no law tells of, may be missed by both runs."""
-    return f"estimate: a second {kind} at rtol {run.rtol:.0e} that sees what lasts 1/{run.samples:.0f} of it"
+    return f"estimate: a second {kind} at rtol {run.rtol:.0e} that resolves 1/{run.samples:.0f} of the time"
 
 
 def apart(

@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     from surfacechem.solve.run import Run
 
 REGIMES = {
-    "isothermal": "bodies and interface are kept at one temperature; heat is what has to be supplied for it.",
-    "prescribed temperatures": "bodies and interface follow given temperatures; heat is what that takes.",
+    "isothermal": "bodies and interface are held at one temperature; the heat that this takes is an output.",
+    "prescribed temperatures": "bodies and interface follow given temperatures; the heat that this takes is an output.",
     "perfect contact": "both bodies and the interface share one temperature; the heat fluxes follow from the balances.",
     "one-sided perfect contact": "the interface shares the temperature of one body; heat passes to the other by laws.",
     "separate interface temperature": "the interface has its own temperature; heat passes to the bodies by laws.",
@@ -152,7 +152,7 @@ def sweep_summary(solution: SweepSolution, written: Path | None, details: bool =
     count = sum(books.destroys for books in solution.audits)
     verdict = f"ENTROPY DESTROYED in {count} runs" if count else "no law destroys entropy"
     every = [
-        ("swept", swept_in_words(solution.plan, solution.parameters)),
+        ("swept", swept_in_words(solution.plan, solution.parameters, solution.system.changeable)),
         ("solved", _solved(solution.system, solution.run)),
         ("ended", f"{len(solution.runs)} runs: {solution.ends}"),
         ("error", error),
@@ -183,13 +183,13 @@ def sweep_details(solution: SweepSolution) -> dict[str, Rows]:
     return {"Runs": [*rows, *([("...", f"{more} more", "", "")] if more else [])]}
 
 
-def swept_in_words(plan: Plan, names: Mapping[str, str]) -> str:
+def swept_in_words(plan: Plan, names: Mapping[str, str], units: Mapping[str, str]) -> str:
     """The parameters of a plan, with how many values of each and between which, and the draws of a sample."""
-    ends = [axis.at(np.array([0, -1]) % len(axis)) for axis in plan.axes]
-    axes = [
-        f"{name} ({first:g}{f' to {last:g}' if len(axis) > 1 else ''}, {len(axis)} values)"
-        for name, axis, (first, last) in zip(names, plan.axes, ends, strict=False)
-    ]
+    axes = []
+    for (name, path), axis in zip(names.items(), plan.axes, strict=False):
+        first, last = axis.at(np.array([0, -1]) % len(axis))
+        span = f"{first:g} to {last:g}" if len(axis) > 1 else f"{first:g}"
+        axes.append(f"{name} ({f'{span} {units[path]}'.removesuffix(' 1')}, {len(axis)} values)")
     text = (" with " if plan.zipped else " by ").join(axes)
     if plan.sample is None:
         return text
@@ -199,11 +199,14 @@ def swept_in_words(plan: Plan, names: Mapping[str, str]) -> str:
 
 
 def points_summary(found: PointResults, written: Path | None) -> Sheet:
-    """Every quantity of a single point; of many, what there is of them and where it is."""
+    """Quantities and non-zero derivatives of a single point; of many, how many there are and where."""
     refused = [(i, why) for i, why in enumerate(found.refused) if why]
     facts, rows, count = [], [], len(found.refused)
     if count == 1:
-        rows = [(c.name, f"{c.values[0]:.12g}", c.unit, c.long_name) for c in (*found.values, *found.slopes)]
+        shown = [*found.values, *(slope for slope in found.slopes if slope.values[0])]
+        rows = [(c.name, f"{c.values[0]:.12g}", c.unit, c.long_name) for c in shown]
+        zero = len(found.values) + len(found.slopes) - len(shown)
+        facts += [("zero", f"{zero} derivatives, which are not listed")] if zero else []
     else:
         text = f"{count}, with {len(found.values)} quantities and {len(found.slopes)} derivatives each"
         facts.append(("points", text))
@@ -332,7 +335,7 @@ def store_summary(stream: Stream, store: Store, checked: Checked | None, file: P
         error = f"{checked.error:.2g} of {checked.count} runs ({checked.source}){unknown}"
         destroyed = f"; ENTROPY DESTROYED in {checked.destroys} runs" if checked.destroys else ""
     facts = [
-        ("swept", swept_in_words(chunks.plan, names)),
+        ("swept", swept_in_words(chunks.plan, names, chunks.model.system.changeable)),
         ("solved", _solved(chunks.model.system, chunks.run)),
         ("ended", f"{ends.sum()} of {chunks.plan.size} runs: {counted}"),
         *([("error", error)] if error else []),

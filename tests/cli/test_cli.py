@@ -269,6 +269,8 @@ def test_a_case_of_ones_own_begins_with_a_shipped_one(call, tmp_path):
         "no case 'stik-slip' comes with the package. Did you mean 'stick-slip'?"
         in call("new", "other.yaml", "--from", "stik-slip").stderr
     )
+    swept = call("new", "bond.yaml", "--from", "catch-bond").stdout
+    assert swept.endswith("`surfacechem run bond.yaml` or `surfacechem sweep bond.yaml`.\n")
     assert "a case is YAML: give other.yaml" in call("new", "other.txt").stderr
 
 
@@ -334,6 +336,7 @@ class TestVerbosity:
             assert f"\n{heading}" in told.stdout
         swept = call("sweep", "bonding.yaml", "--over", "initial.T=[300, 310]", "-v", "-o", "s.nc")
         assert "Runs\n  initial_T = 300  finished  error " in swept.stdout
+        assert "  swept      initial_T (300 to 310 K, 2 values)\n" in swept.stdout
 
 
 class TestSweep:

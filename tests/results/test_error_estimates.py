@@ -159,7 +159,7 @@ def test_the_error_of_the_tightest_run_is_not_that_of_a_looser_one():
     settings = {"run": {"until": "2.5 s", "rtol": 1e-13}}
     exact = surfacechem.run("exothermic", settings).accuracy
     estimate = surfacechem.run("exothermic", {**settings, "reference": ""}).accuracy
-    assert estimate.source == "estimate: a second run at rtol 3e-14 that sees what lasts 1/438 of it"
+    assert estimate.source == "estimate: a second run at rtol 3e-14 that resolves 1/438 of the time"
     assert exact.error / 3 < estimate.error < 3 * exact.error
 
 

@@ -121,5 +121,5 @@ def test_what_is_known_is_told_once_and_can_be_written(end, message, monkeypatch
 def test_rates_are_told_in_a_unit_without_brackets():
     with pytest.raises(InputError, match=r"programme\.press\.w_n: 3 nm is a length; w_n needs a velocity \[m/s\]\."):
         load_text(HEATS.replace("-1 nm/s", "3 nm"))
-    with pytest.raises(InputError, match=r"3 m is a length; rate needs a quantity in .* \[W/\(m\^2 s\)\]\."):
+    with pytest.raises(InputError, match=r"3 m is a length; rate needs a quantity in W/\(m\^2 s\)\."):
         load_text(HEATS.replace("4 W/m^2", "{ramp: {rate: 3 m}}"))

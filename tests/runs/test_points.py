@@ -113,6 +113,10 @@ def test_a_point_is_the_scene_with_these_values(element, tmp_path):
     one = element.evaluate({"g_n": "3 nm", "interface.friction.coulomb.mu": 0.5})
     other = moved.evaluate()
     assert all(one[name].values == other[name].values for name in other)
+    told = CliRunner().invoke(app, ["evaluate", str(tmp_path / "element.yaml")]).stdout
+    assert "\n  t_n_by_g_n " in told
+    assert "t_n_by_v" not in told  # a zero is counted, not listed
+    assert "derivatives, which are not listed" in told
 
 
 def test_points_where_a_law_does_not_hold_say_so(tmp_path):
