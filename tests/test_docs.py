@@ -163,6 +163,10 @@ SHOWN = re.compile(r"^::: (?P<path>[\w.]+)(?:\n    options: {(?:members: \[(?P<m
 
 NEVER_RAISE = {"Simulation.of", "Study.figure", "Model.evaluate", "InterfaceReactor.record", "Run.second"}
 
+NUMBERS = re.compile(r"\b(float|Array|NDArray)\b")
+"""Annotations of what has a unit, which its description tells in brackets or words."""
+UNIT = re.compile(r"\[[^\]]+\]|\bSI\b|[Rr]elative|\bunit\b|\bm\^2\b|^Number of ")
+
 
 def shown_functions():
     """Every function and method that the pages document, by name."""
@@ -192,5 +196,8 @@ def test_what_the_pages_show_names_parameters_returns_and_errors(name, function)
     wanted = [f"*{x.name}" if x.kind is x.VAR_POSITIONAL else x.name for x in signature.parameters.values()]
     assert described.keys() == set(wanted) - {"self", "cls"}
     assert all(described.values())
+    parameters = {name: signature.parameters[name.lstrip("*")] for name in described}
+    numbers = [name for name in described if NUMBERS.search(str(parameters[name].annotation))]
+    assert [name for name in numbers if not UNIT.search(described[name])] == []
     assert ("returns" in told) is (signature.return_annotation not in ("None", None))
     assert ("raises" in told) is (name not in NEVER_RAISE)

@@ -431,7 +431,7 @@ class Simulation:
         until
             A prescribed ramp, and the value of it at which each run ends.
         changes
-            Other values that differ from the case, by path, the same for all runs.
+            Values that differ from the case, by path, in SI or with a unit, the same for all runs.
         threads
             How many runs are solved at a time; as many as there are processors if not given.
         sample
@@ -496,7 +496,7 @@ class Simulation:
         path
             The store, a folder whose name ends with .zarr.
         changes
-            Other values that differ from the case, by path, the same for all runs.
+            Values that differ from the case, by path, in SI or with a unit, the same for all runs.
         resume
             Whether an unfinished store of the same plan goes on.
         part
