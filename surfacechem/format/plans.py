@@ -140,7 +140,7 @@ class Plan:
             raise InputError(message, path="sweep")
         if self.zipped and len({len(axis) for axis in self.axes}) > 1:
             counts = ", ".join(f"{len(axis)} of {axis.path}" for axis in self.axes)
-            raise InputError(f"values that are combined by zip are as many of each, not {counts}.", path="sweep")
+            raise InputError(f"`combine: zip` needs as many values of each parameter, not {counts}.", path="sweep")
         if self.zipped and self.sample:
             raise InputError("a sample goes with a grid of values, not with `combine: zip`.", path="sweep")
         for axis in () if self.zipped else self.axes:

@@ -80,7 +80,7 @@ class ExactSolution:
         if not self.options:
             return ""
         own = f"it is given with {', '.join(self.options)}, and the scene was changed"
-        return f"the exact solution {self.name} is not of this scene: {own}"
+        return f"the exact solution {self.name} does not apply to this scene: {own}"
 
 
 def read_document(tree: Tree, base: str = ".", mechanism_text: str | None = None) -> tuple[Document, Mechanism | None]:

@@ -66,12 +66,12 @@ def _content(
     """What lies along the axis, and the panels."""
     sweeps = ["sweep" in dataset.attrs for dataset in datasets]
     if any("study" in dataset.attrs for dataset in datasets) or any(sweeps) != all(sweeps):
-        raise InputError("only runs with runs, and sweeps with sweeps, go into one figure.")
+        raise InputError("a figure takes runs or sweeps, not both.")
     if not any(sweeps):
         return against or "time", _united([run.panels(each, variables, against) for each in datasets])
     axes = {tuple(sweep.axes_of(each)) for each in datasets}
     if len(axes) > 1 or len(min(axes)) > 1:
-        raise InputError("sweeps go into one figure where all are over one and the same parameter.")
+        raise InputError("sweeps share a figure only if they are over the same parameter.")
     return min(axes)[0], _united([sweep.groups(each, variables) for each in datasets])
 
 

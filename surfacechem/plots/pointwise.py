@@ -29,7 +29,7 @@ def figure(dataset: xarray.Dataset, variables: Sequence[str] | None = None, agai
     # Quantities, no derivatives, that are not the same at all states.
     differing = [name for name in known if len(np.unique(dataset[name].values)) > 1 and "_by_" not in name]
     if not differing:
-        raise InputError("one state, or states that are all alike, make no figure.", style.place(dataset))
+        raise InputError("a figure needs states that differ.", style.place(dataset))
     over = against or differing[0]
     names = variables or _usual(dataset, [name for name in differing if name != over])
     with style.panels(6.4, 0.7 + 1.9 * len(names), len(names), sharex=True) as (plot, grid):

@@ -120,7 +120,7 @@ class ConductingSlabs(Reference):
     @classmethod
     def from_scene(cls, scene: SceneView) -> Parameters:
         for reason in _beside_conduction(scene.scene):
-            raise InputError(f"it knows conduction between two bodies alone, and {reason}.")
+            raise InputError(f"it holds for conduction between two bodies alone, and {reason}.")
         told, h = dict(super().from_scene(scene)), scene.total_conductance
         told["R"] = 1.0 / h if h else None
         for k in "12":  # what starts from a profile has no temperature at the contact of its own

@@ -33,7 +33,7 @@ def pair_of(scene: SceneView) -> CurvedSurfaces:
     from surfacechem.surfaces.potential import CurvedSurfaces
 
     if not isinstance(scene.scene.surface, CurvedSurfaces):
-        raise InputError("it is of two bodies with shapes; the scene has no `surface`.")
+        raise InputError("it needs two bodies with shapes; the scene has no `surface`.")
     return scene.scene.surface
 
 
@@ -73,7 +73,7 @@ class SphereOnSpring(Reference):
         load = scene.scene.loading.get("w_n")
         times, values = (list(getattr(load, name, ())) for name in ("times", "values"))
         if len(times) != 3 or values[0] != values[2] or times[2] != 2 * times[1]:
-            raise InputError("it is of a table of `w_n` that goes to one displacement and back at one speed.")
+            raise InputError("it needs a table of `w_n` that goes to one displacement and back at one speed.")
         speed = (values[0] - values[1]) / times[1]
         drive = {"w_i": values[0], "w_turn": values[1], "speed": speed}
         return {**super().from_scene(scene), **drive, **surface_values(scene, "R", "g_0")}
@@ -299,7 +299,7 @@ class AttractingSphereInCavity(Reference):
         own = surface_values(scene, "n_1", "n_2", "psi_0", "g_0")
         radii = [shape.R for shape in pair_of(scene).shapes if isinstance(shape, Sphere)]
         if len(radii) != 2:
-            raise InputError("it is of a sphere in a cavity.")
+            raise InputError("it needs a sphere in a cavity.")
         return {**super().from_scene(scene), **own, "R": min(radii), "H": max(radii)}
 
     def quantities(self, t: Array) -> Quantities:

@@ -76,7 +76,7 @@ def accuracy(
             found = against_exact(trajectory, scene, *exact, late=known)
             return replace(found, asked=estimate.asked if estimate else None)
         except InputError as error:
-            unused = f"; the exact solution {exact[0]} is not of this scene: {error.message}"
+            unused = f"; the exact solution {exact[0]} does not apply to this scene: {error.message}"
     estimate = with_cells(estimate or against_tighter(trajectory), cells())
     return replace(estimate, source=f"{estimate.source}{unused}")
 

@@ -277,7 +277,7 @@ def begin(path: Path, layout: Layout, resume: bool) -> Store:
     ours = json.loads(json.dumps(dict(layout.attributes)))
     different = [word for name, word in WORDS.items() if there.get(name) != ours.get(name)]
     if different:
-        raise InputError(f"is of another sweep: {', '.join(different)} differ.", place)
+        raise InputError(f"belongs to another sweep: {', '.join(different)} differ.", place)
     return Store(path, layout)
 
 

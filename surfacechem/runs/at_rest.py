@@ -56,7 +56,7 @@ def to_rest(model: Model, run: Run, values: Mapping[str, float]) -> Run:
         alike = np.all(change <= NEGLIGIBLE * np.maximum(np.abs(near.result.y), scales))
         if near.status == "finished" and last * AFTER <= end and alike:
             return replace(run, times=_until(run, last), rest=last)
-    raise InputError(f"the case has come to no rest in {LONGEST:.3g} s: {name} still changes.", path=PATH)
+    raise InputError(f"the case did not reach a steady state within {LONGEST:.3g} s: {name} still changes.", path=PATH)
 
 
 def _looked(model: Model, run: Run, values: Mapping[str, float], end: float) -> Trajectory:

@@ -132,7 +132,7 @@ def accuracy(
         try:
             return _against_exact(case, done, named.name, second)
         except InputError as error:
-            unused = f"the exact solution {named.name} is not of this scene: {error.message}"
+            unused = f"the exact solution {named.name} does not apply to this scene: {error.message}"
     elif named is not None:
         unused = named.fixed
     left = cells()

@@ -94,7 +94,7 @@ def steady(source: Source, of: Sequence[str] = (), overrides: Overrides = ()) ->
     labels = system.reactions
     refuse_histories(system)
     if system.in_stretches:
-        raise InputError("the scene jumps, so that its steady states are none of one set of equations.")
+        raise InputError("the scene has jumps, so that a steady state is not the root of one set of equations.")
     rest = _Rest(Model(system), simulation.case.run, _wanted(system, of))
     if not of:
         rest.drop_small()
@@ -153,7 +153,7 @@ class _Rest:
         for _ in range(ATTEMPTS):
             reached = model.solve(replace(run, times=(0.0, self.time), picture=None))
             if reached.status != "finished":
-                raise InputError(f"the case comes to no rest: {reached.reason}.")
+                raise InputError(f"the case reaches no steady state: {reached.reason}.")
             problem = reached.result.problem
             self.evaluation = Evaluation(problem.program, reached.result.y, problem.parameters[-1])
             states = [model.system.states[j] for j in self.evaluation.free]
@@ -164,7 +164,7 @@ class _Rest:
                 self.x, self.largest = found, np.abs(reached.outputs).max(axis=0)
                 return
             self.time *= LONGER
-        raise InputError(f"the case has come to no rest in {self.time / LONGER:.3g} s.")
+        raise InputError(f"the case did not reach a steady state within {self.time / LONGER:.3g} s.")
 
     def rates(self, x: Array) -> Array:
         """Time derivatives of the states."""

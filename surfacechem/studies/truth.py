@@ -224,7 +224,7 @@ def establish(subject: Subject, variables: Sequence[str]) -> Truth:
         )
     except InputError as error:
         found = numerical(subject, variables)
-        unused = f"the exact solution {reference.name} is not of this scene: {error.message}"
+        unused = f"the exact solution {reference.name} does not apply to this scene: {error.message}"
         return replace(found, source=f"{found.source}; {unused}")
     # Variables and times of events that the exact solution does not state are those of two methods.
     known = {name: exact[name] for name in variables if name in exact}

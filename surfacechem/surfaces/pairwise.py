@@ -152,7 +152,7 @@ def check_finite(lower: Surface, upper: Surface) -> None:
     # What has no end in both directions shares one with anything that has none in one.
     parallel = all(endless[0]) or all(endless[1]) or abs(math.sin(shapes[0].turn - shapes[1].turn)) < NOISE
     if any(endless[0]) and any(endless[1]) and parallel:
-        raise InputError("both surfaces have no end: give one of them a length, so that the force has one.")
+        raise InputError("both surfaces are endless: give one of them a length, so that the force is finite.")
 
 
 def _check_decay(law: PairEnergy, size: float, rtol: float) -> None:
@@ -167,7 +167,7 @@ def _check_decay(law: PairEnergy, size: float, rtol: float) -> None:
         raise InputError(f"{text} as its `decay` says; state a `decay` that it has, above 2.", law.place)
     if -math.log10(rtol) > MOST_DECADES * (law.decay - 2):
         text = f"{law.name()} falls off like r^-{law.decay:g}, too slowly for the accuracy {rtol:.2g}"
-        raise InputError(f"{text}; a plane takes no end of energy where it is r^-2.", law.place)
+        raise InputError(f"{text}; a plane has an infinite energy where it is r^-2.", law.place)
 
 
 def _reach(lower: Surface, upper: Surface, extent: Extent, rtol: float) -> float:
@@ -196,7 +196,7 @@ def _check_energy(lower: Surface, upper: Surface, law: PairEnergy) -> None:
     # At the distance u their gap is u^p, and what flats have of a power m of it is 2 pi u du u^(p (2 - m)).
     separation = max(shape.rises for shape in shapes)
     if endless and math.isinf(law.cutoff) and separation * (law.decay - 2) <= 2:
-        text = f"two surfaces without end have no end of energy where points interact like r^-{law.decay:g}"
+        text = f"two endless surfaces have an infinite energy where points interact like r^-{law.decay:g}"
         raise InputError(f"{text}: give the {' and the '.join(shape.name() for shape in turned)} a radius.")
 
 

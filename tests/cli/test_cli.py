@@ -345,7 +345,7 @@ class TestSweep:
         drawn = call("plot", "s.nc", "--against", "phi", "-q")
         assert (drawn.exit_code, drawn.output) == (0, "")
         assert "no variable 'phy' along the runs" in call("plot", "s.nc", "--against", "phy").stderr
-        assert "only runs with runs" in call("plot", "s.nc", "bonding.yaml").stderr
+        assert "takes runs or sweeps, not both" in call("plot", "s.nc", "bonding.yaml").stderr
         assert files(tmp_path) == {"s.nc", "s.png"}
 
     def test_all_of_whose_runs_stop_is_stopped(self, call):

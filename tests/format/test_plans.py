@@ -116,7 +116,7 @@ REFUSED = [
     ({}, {"of": {K_0: {"normal": {"mean": 1, "std": 1}}}}, "a sample needs `runs`"),
     ({}, {"of": {"x.y": {"normal": {"mean": 1, "std": 1}}}, "runs": 1}, "no parameter 'x.y' to sweep"),
     ({K_0: [1.0]}, {"of": {K_0: {"normal": {"mean": 1, "std": 1}}}, "runs": 3}, "different parameters"),
-    ({K_0: [1.0, 2.0], C_R: [1.0]}, None, "as many of each, not 2 of interface.potential"),
+    ({K_0: [1.0, 2.0], C_R: [1.0]}, None, "as many values of each parameter, not 2 of interface.potential"),
 ]
 
 

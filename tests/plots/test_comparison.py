@@ -47,7 +47,7 @@ def test_sweeps_over_the_same_parameter_are_compared(sweeps, runs):
     (ax,) = figure(sweeps, ["T_1"]).axes
     assert [line.get_ydata()[1] for line in ax.get_lines()] == [each["T_1"].values[1, -1] for each in sweeps]
     assert labels(sweeps) == ["until = 200 s", "until = 10 s"]
-    with pytest.raises(InputError, match="only runs with runs"):
+    with pytest.raises(InputError, match="takes runs or sweeps, not both"):
         figure([sweeps[0], runs[0]])
 
 

@@ -30,5 +30,5 @@ def test_tractions_are_drawn_over_what_the_states_differ_in():
     assert np.all(np.diff(slope.get_lines()[0].get_xdata()) >= 0)
     with pytest.raises(InputError, match="no variable 't' at the states"):
         plots.figure(data, ["t"])
-    with pytest.raises(InputError, match="all alike, make no figure"):
+    with pytest.raises(InputError, match="needs states that differ"):
         plots.figure(case.evaluate())

@@ -128,5 +128,5 @@ def test_an_exact_solution_is_added_by_its_file_alone(added):
 )
 def test_an_added_solution_is_of_its_own_scene_only(added, change, reason):
     source = surfacechem.run("reservoir-exchange", [*CHANGES, change]).accuracy.source
-    assert "the exact solution newton-cooling is not of this scene" in source
+    assert "the exact solution newton-cooling does not apply to this scene" in source
     assert reason in source

@@ -212,7 +212,7 @@ def test_an_exact_solution_with_parameters_of_its_own_is_of_the_scene_as_written
     """A separation that differs by 1e-15 of itself leaves the equations as they are, not the time of the passage."""
     w_n = 1.1063772254722603e-07
     simulation = surfacechem.load("slow-passage")
-    why = "is not of this scene: it is given with delta_w, and the scene was changed"
+    why = "does not apply to this scene: it is given with delta_w, and the scene was changed"
     changed = simulation.run({"loading.w_n": w_n * (1 + 1e-9)})
     for accuracy in (
         changed.accuracy,

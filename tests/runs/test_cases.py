@@ -109,7 +109,7 @@ def test_an_exact_solution_is_held_against_balances_without_rates():
 def test_an_exact_solution_of_another_scene_is_not_used(name, change, reason):
     changes = [change, "initial.g_n=0", "run.until=1 ms"] if "normal" in change else [change]
     source = surfacechem.run(name, changes).accuracy.source
-    assert "is not of this scene" in source
+    assert "does not apply to this scene" in source
     assert reason in source
 
 

@@ -220,9 +220,9 @@ def test_a_damaged_chunk_is_computed_again(whole, tmp_path):
 def test_another_sweep_or_what_is_no_store_is_refused(whole, tmp_path):
     with pytest.raises(InputError, match="is there already: --resume goes on with it"):
         stored(whole)
-    with pytest.raises(InputError, match="is of another sweep: the case, what is kept differ"):
+    with pytest.raises(InputError, match="belongs to another sweep: the case, what is kept differ"):
         stored(whole, case(keep={"last": ["T"]}), resume=True)
-    with pytest.raises(InputError, match="is of another sweep: the case, the plan differ"):
+    with pytest.raises(InputError, match="belongs to another sweep: the case, the plan differ"):
         stored(whole, case(keep=ENDS, over={K_0: [1.0, 2.0]}), resume=True)
     (tmp_path / "foreign.zarr").mkdir()
     (tmp_path / "foreign.zarr" / "zarr.json").write_text("{}")

@@ -299,7 +299,7 @@ def test_command_line(tmp_path, monkeypatch):
     assert done.exit_code == 0, done.output
     labels = ["swept", "solved", "ended", "error", "time", "balances", "written"]
     assert [line.split()[0] for line in done.stdout.splitlines()[1:]] == labels
-    assert "rate (1e-12 to 1e-09, 2 values)" in done.stdout
+    assert "rate (1e-12 to 1e-09 N/s, 2 values)" in done.stdout
     with xarray.open_dataset("s.nc") as data:
         assert data["phi"].dims == ("rate", "f")
 
@@ -309,8 +309,8 @@ def test_an_exact_solution_is_that_of_every_run_or_of_none():
     case = surfacechem.load("stick-slip", ["run.until=1.5 s"])
     swept = case.sweep({"interface.friction.coulomb.mu": [0.2, 0.6, 0.3]})
     alone = case.run({"interface.friction.coulomb.mu": 0.6})
-    assert "exact solution stick-slip is not of this scene" in alone.accuracy.source
-    assert "exact solution stick-slip is not of this scene" in swept.accuracy.source
+    assert "exact solution stick-slip does not apply to this scene" in alone.accuracy.source
+    assert "exact solution stick-slip does not apply to this scene" in swept.accuracy.source
     assert swept.accuracy.errors[1] == pytest.approx(alone.accuracy.error, rel=1e-9, nan_ok=True)
 
 

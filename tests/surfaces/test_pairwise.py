@@ -344,5 +344,5 @@ def test_bodies_that_are_far_apart_see_all_of_each_other():
 
 @pytest.mark.parametrize(("lower", "upper"), [(Plane(), Plane(turn=0.3)), (Plane(), Cylinder(R=1.0, turn=0.3))])
 def test_bodies_without_end_along_each_other_are_refused(lower, upper):
-    with pytest.raises(InputError, match="both surfaces have no end"):
+    with pytest.raises(InputError, match="both surfaces are endless"):
         pair(lower, upper, 1.0, [power(6)])
