@@ -494,6 +494,7 @@ class System:
         """Modes and registers, which change along edges only."""
         return (*self.modes, *self.registers)
 
+    @cached_property
     def moving_margins(self) -> tuple[Margin, ...]:
         """The margins that change in the course of a run; when time alone leads to a peak is known before."""
         evolved = {x for state in self.states for x in (state.symbol, state.dot)} | {x.symbol for x in self.memory}
@@ -508,7 +509,7 @@ class System:
     @cached_property
     def _when(self) -> list[list[tuple[int, Collection[int]]]]:
         columns = {parameter.symbol: j for j, parameter in enumerate(self.parameters)}
-        items: tuple[Margin | Edge, ...] = (*self.moving_margins(), *self.edges)
+        items: tuple[Margin | Edge, ...] = (*self.moving_margins, *self.edges)
         return [[(columns[mode], values) for mode, values in item.when.items()] for item in items]
 
     def in_play(self, parameters: Array) -> tuple[bool, ...]:

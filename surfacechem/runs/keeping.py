@@ -102,7 +102,7 @@ def keep_of(section: KeepSection | None, system: System) -> Keep:
 
 def event_names(system: System) -> list[str]:
     """Events after which a run goes on: kinks and edges. One that ends it is its reason."""
-    kinks = [margin.name for margin in system.moving_margins() if not (margin.terminal or margin.peak)]
+    kinks = [margin.name for margin in system.moving_margins if not (margin.terminal or margin.peak)]
     return list(dict.fromkeys([*kinks, *(edge.name for edge in system.edges)]))
 
 
@@ -118,7 +118,7 @@ def reaching(system: System, keep: Keep) -> System:
 
 def reason_table(system: System) -> list[str]:
     """Why runs end, in the order of the codes."""
-    margins = system.moving_margins()
+    margins = system.moving_margins
     ends = [text for margin in margins for text in (margin.reason, *(margin.below or ("", ""))[1:]) if text]
     failures = [text for status, text in REASONS.items() if not status.success]
     return list(

@@ -213,19 +213,32 @@ class Result:
 
     def states(self) -> States:
         """All states that are known, in order of time, each once on each side of a breakpoint."""
+        t, y, ledger, segment = self.scattered()
+        kept = in_order(t, segment)
+        return States(t[kept], y[kept], ledger[kept], segment[kept])
+
+    def scattered(self) -> tuple[Array, Array, Array, Index]:
+        """Times, states, ledgers and segments of all that is known, in the order in which it is kept."""
         parts = [States(self.times, self.outputs, self.ledger_outputs)]
         if self.steps is not None:
             parts.append(States(self.steps.t, self.steps.y, self.steps.ledger))
         if self.inside is not None:
             parts.append(self.inside)
         t, y, ledger = (np.concatenate(columns) for columns in zip(*(part[:3] for part in parts), strict=True))
+        if len(self.problem.segments) == 2:
+            return t, y, ledger, np.zeros(len(t), np.int64)
         segment = self.segments_at(t)
         if self.inside is not None:  # what is added at a breakpoint is its other side
             segment[len(t) - len(self.inside.t) :] += np.isin(self.inside.t, self.problem.segments[1:-1])
-        order = np.lexsort((segment, t))
-        t, segment = t[order], segment[order]
-        new = (np.diff(t, prepend=-1.0) > 0) | (np.diff(segment, prepend=-1) > 0)
-        return States(t[new], y[order[new]], ledger[order[new]], segment[new])
+        return t, y, ledger, segment
+
+
+def in_order(t: Array, *segments: Index) -> Index:
+    """Places of what is known at these times, in order of the segments, the last of them first, then each time once."""
+    order = np.lexsort((segments[0], t, *segments[1:]))
+    new = np.ones(len(order), dtype=bool)
+    new[1:] = np.any([np.diff(column[order]) != 0 for column in (t, *segments)], axis=0)
+    return order[new]
 
 
 class Solver(ABC):

@@ -19,7 +19,18 @@ from numpy.typing import NDArray
 
 from surfacechem.model.system import START, System
 from surfacechem.quantities import GAPS
-from surfacechem.solve.contract import Array, Counters, Events, Points, Problem, Result, Solver, States, Status
+from surfacechem.solve.contract import (
+    Array,
+    Counters,
+    Events,
+    Points,
+    Problem,
+    Result,
+    Solver,
+    States,
+    Status,
+    in_order,
+)
 from surfacechem.solve.equilibria import Point
 from surfacechem.solve.instant import ENDLESS, MANY, MISSED, REACHED, Instant
 from surfacechem.solve.jumps import Jumper
@@ -116,6 +127,8 @@ class Hybrid:
         """Steps taken and outputs written."""
         self._gaps = np.array([state.name in GAPS for state in system.states])
         """Which of the states are gaps."""
+        self._start = next(j for j, p in enumerate(system.parameters) if p.path == START)
+        """Column of the time at which a stretch starts."""
         self._renewed = 0
         """Number of brief arcs in a row that time could not resolve."""
 
@@ -186,13 +199,13 @@ class Hybrid:
             return None
         times = problem.times[self._written : int(np.searchsorted(problem.times, end, side="right"))]
         local = start.parameters.copy()
-        local[next(j for j, p in enumerate(self.system.parameters) if p.path == START)] = start.t
+        local[self._start] = start.t
         local[self.system.origins] -= start.t
         segments = instant.rebounds.pieces(start.t, self._last_of(start.t, end))
         problem = replace(
             problem,
             y0=start.y,
-            times=np.clip(times - start.t, 0.0, segments[-1]),
+            times=np.minimum(np.maximum(times - start.t, 0.0), segments[-1]),
             segments=segments,
             parameters=np.repeat(local[None], len(segments) - 1, axis=0),
             max_steps=problem.max_steps - self._steps,
@@ -268,11 +281,14 @@ def _known(arcs: Sequence[Arc]) -> States | None:
     """What is known of the arcs, in the time and ledger of the run, where a picture is wanted."""
     if not arcs[0].result.problem.picture:
         return None
-    rows = []
-    for number, arc in enumerate(arcs):
-        t, y, ledger, _ = arc.result.states()
-        rows.append((np.minimum(arc.start.t + t, arc.end), y, arc.booked + ledger, np.full(len(t), number)))
-    return States(*map(np.concatenate, zip(*rows, strict=True)))
+    found = [arc.result.scattered() for arc in arcs]
+    t, y, ledger, segment = map(np.concatenate, zip(*found, strict=True))
+    number = np.repeat(np.arange(len(arcs)), [len(rows[0]) for rows in found])
+    kept = in_order(t, segment, number)
+    number = number[kept]
+    start, end = np.array([(arc.start.t, arc.end) for arc in arcs]).T
+    booked = np.array([arc.booked for arc in arcs])
+    return States(np.minimum(start[number] + t[kept], end[number]), y[kept], booked[number] + ledger[kept], number)
 
 
 def _steps(arcs: Sequence[Arc]) -> Points:

@@ -123,6 +123,8 @@ class Instant:
         """The last loads that have jumped."""
         self.flowed = (np.nan, 0.0, np.nan)
         """Start of the last flow, its length, and its end [s]; the length is sharper than the difference of the two."""
+        self._sized: tuple[Point | None, Array, Array] = None, self.peaks, self.peaks
+        """A point, the peaks with which it was looked at, and the sizes of the guards there."""
         self._resolved = 0
         """Number of edges before the last chatter that was resolved."""
         self._sharpened = -np.inf
@@ -148,8 +150,11 @@ class Instant:
         """
         if self.program.margins is None:
             return np.zeros(0)
+        if self._sized[0] is point and self._sized[1] is self.peaks:
+            return self._sized[2]
         found = self.jumper.magnitudes(np.concatenate((point.inputs(), np.maximum(self.peaks, np.abs(point.y)))))
-        return np.where(np.isfinite(found), found, 0.0)
+        self._sized = point, self.peaks, np.where(np.isfinite(found), found, 0.0)
+        return self._sized[2]
 
     def consistent(self, point: Point) -> Point:
         """The point with the rates and algebraic variables that belong to it."""
@@ -179,7 +184,7 @@ class Instant:
             due = self._due(now[self.first :], playing[self.first :], sizes[self.first :], point)
             closed = self._closed(now, playing, sizes, due is not None) if self.jumps else []
             if closed:
-                margin = self.system.moving_margins()[closed[0]]
+                margin = self.system.moving_margins[closed[0]]
                 self.status, self.reason = Status.EVENT, self.system.reason(margin, self.jumps[-1].after.inputs())
                 return None
             if due is None:
@@ -234,7 +239,7 @@ class Instant:
     def _closed(self, now: Array, playing: Mask, sizes: Array, due: bool) -> list[int]:
         """Limits beyond which a jump has carried the state; not what modes say that are left at this moment."""
         # Beyond the end of a law, be it by rounding, what it says has no meaning.
-        margins = self.system.moving_margins()[: self.first]
+        margins = self.system.moving_margins[: self.first]
         least = [0.0 if m.domain else -CROSSED * size for m, size in zip(margins, sizes, strict=False)]
         closed = [i for i in range(self.first) if self.terminal[i] and playing[i] and now[i] < least[i]]
         closed += [i for i in self.limits if playing[i] and now[i] <= CROSSED * sizes[i]]
@@ -246,7 +251,7 @@ class Instant:
     def _found_anew(self) -> set[int]:
         """Limits that read states without a past, which are found anew as modes change."""
         found = {state.symbol for state in self.system.states if state.algebraic}
-        read = [self.system.expand(m.expression).free_symbols for m in self.system.moving_margins()[: self.first]]
+        read = [self.system.expand(m.expression).free_symbols for m in self.system.moving_margins[: self.first]]
         return {i for i, symbols in enumerate(read) if symbols & found}
 
     def apply(self, index: int, point: Point, last: Point | None = None) -> Point | None:

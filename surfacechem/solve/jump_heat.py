@@ -86,25 +86,33 @@ class JumpHeat:
         """Which nodes pass on what they take."""
         return np.array([node.prescribed for node in self.nodes.values()], dtype=bool)
 
-    def taken(self, rows: Array, made: Array, shares: Array | None) -> tuple[Array, Array]:
-        """Temperature of each node, and the heat that it takes, each of shape (rows, nodes).
+    def given(self, rows: Array, made: Array, shares: Array | None) -> tuple[Array, Array, Array]:
+        """Inputs with the temperatures of the nodes after they have taken the heat that is made; the heat that each
+        takes, and its temperature before, each of shape (rows, nodes).
 
         ``made`` has a column for each maker, and friction last: its heat goes by the ``shares`` along its way, where
         these are known, else as the interface shares it at the end.
         """
-        T, _, _, parts = self.at(rows)
+        T, U, C, parts = self.at(rows)
         rubbed = parts[:, :, self.interface] if shares is None else shares
-        return T, np.einsum("ijk,ik->ij", parts, made[:, :-1]) + rubbed * made[:, -1:]
+        taken = np.einsum("ijk,ik->ij", parts, made[:, :-1]) + rubbed * made[:, -1:]
+        return self._with_energy(rows, U + taken, U, C), taken, T
 
     def warmed(self, rows: Array, made: Array, shares: Array | None) -> Array:
         """Inputs with the temperatures of the nodes after they have taken the heat that is made."""
-        return self.with_heat(rows, self.taken(rows, made, shares)[1])
+        return self.given(rows, made, shares)[0]
 
     def with_heat(self, rows: Array, taken: Array) -> Array:
         """Inputs with the temperatures of the nodes after each has taken its heat, shape (rows, nodes)."""
-        free = list(zip([j for j, s in enumerate(self.nodes.values()) if not s.prescribed], self.free, strict=True))
         _, U, C, _ = self.at(rows)
-        target, rows, left = U + taken, rows.copy(), np.arange(len(rows))
+        return self._with_energy(rows, U + taken, U, C)
+
+    def _with_energy(self, rows: Array, target: Array, U: Array, C: Array) -> Array:
+        """Inputs with the temperatures at which nodes of these energies and capacities have the energies of a target,
+        each of shape (rows, nodes).
+        """
+        free = list(zip([j for j, s in enumerate(self.nodes.values()) if not s.prescribed], self.free, strict=True))
+        rows, left = rows.copy(), np.arange(len(rows))
         # Each row ends where it has converged: what it becomes does not depend on the others.
         for _ in range(NEWTON if free else 0):
             moves = np.zeros(len(left), dtype=bool)

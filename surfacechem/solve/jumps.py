@@ -123,7 +123,8 @@ class Release:
     edge: Edge
     start: Point
     energy: float
-    """What the jump conserves, before it [J/m^2]."""
+    """What the jump conserves, before it and at its start [J/m^2]."""
+    level: float
     fold: Lost | None
     slack: Slack
     step: LoadStep | None
@@ -149,7 +150,7 @@ class Jumper:
         """Running error bounds of limits and edges, of the inputs and the peaks of the states; one a model."""
         system = self.system
         peaks = {state.symbol: symengine.Symbol(f"peak of {state.name}") for state in system.states}
-        guards = [m.expression for m in system.moving_margins()] + [edge.guard for edge in system.edges]
+        guards = [m.expression for m in system.moving_margins] + [edge.guard for edge in system.edges]
         bounds = [magnitude(system.expand(guard), peaks) for guard in guards]
         return compile_function([*system.inputs, *peaks.values()], bounds)
 
@@ -186,9 +187,12 @@ class Jumper:
 
     @cached_property
     def _books(self) -> Function:
-        """What a jump conserves, the total entropy, and the potentials of the far-field tractions."""
+        """What a jump conserves, the total entropy, and the potentials of the far-field tractions; then the magnitudes
+        of the first two. It takes longer to call than to compute.
+        """
         system = self.system
-        return compiled(system, [system.jump_energy, system.find("S_total").expression, *system.given.values()])
+        totals = [system.jump_energy, system.find("S_total").expression]
+        return compiled(system, [*totals, *system.given.values(), *(magnitude(system.expand(x)) for x in totals)])
 
     @cached_property
     def _energy(self) -> Function:
@@ -264,10 +268,11 @@ class Jumper:
         edge, fold = self.system.edges[index], self.folds.at(index, before)
         before, start = self._reset(index, before if fold is None else fold.point, fold)
         jump = Jump(before.t, edge, before, start, 0.0, 0.0, IMPOSSIBLE, since)
-        if not np.isfinite(self._books(start.inputs())[0]):
+        level = float(self._books(start.inputs())[0])
+        if not np.isfinite(level):
             return replace(jump, obstacle=NO_ENERGY)
         books, lift = self._opened(edge, before, last)
-        release = Release(index, edge, start, float(books[0]), fold, slack, step)
+        release = Release(index, edge, start, float(books[0]), level, fold, slack, step)
         if step is not None:
             self._load_path.reach(index, step, before)
         try:
@@ -277,8 +282,12 @@ class Jumper:
             return replace(jump, obstacle=str(obstacle))
         if edge.equilibrates and self.equilibria.is_pushed_back(after, slack.balanced):  # friction pulls nothing back
             after = self.equilibria.with_slip(after, 0.0)
-        jump = replace(jump, after=after, released=released, work=lift, heat_out=heat_out, entropy_out=entropy_out)
-        return self._judged(jump, books, slack.noise)
+        gain, admissible, done = self._judged(
+            edge, before.inputs()[None], after.inputs()[None], books[None], np.array([slack.noise]), entropy_out
+        )
+        verdict, gained = ADMISSIBLE if admissible[0] else VIOLATES, float(gain[0])
+        work = lift | {name: lift.get(name, 0.0) + float(more[0]) for name, more in done.items()}
+        return Jump(before.t, edge, before, after, released, gained, verdict, since, work, "", heat_out, entropy_out)
 
     def _reset(self, index: int, before: Point, fold: Lost | None) -> tuple[Point, Point]:
         """The point before a jump, and with the modes and states that the edge resets."""
@@ -384,7 +393,7 @@ class Jumper:
         made, small = float(self._made(after.inputs()[None], release)[0, -1]), self._rounding(after, release.energy)
         if not made > small:
             return None
-        broken = release.energy - float(self._energy(release.start.inputs())[0]) if edge.heat == "local" else 0.0
+        broken = release.energy - release.level if edge.heat == "local" else 0.0
         return path.shares(step, release.start, after, broken, release.slack.rtol * made + small)
 
     def _made(self, rows: Array, release: Release) -> Array:
@@ -397,12 +406,12 @@ class Jumper:
         edge, start = release.edge, release.start
         made = np.zeros((len(rows), len(self.system.sinks) + 1))
 
-        level = self._energy(start.inputs())[0]
-        made[:, self._first_maker(edge)] += release.energy - level
+        made[:, self._first_maker(edge)] += release.energy - release.level
         parameters = 1 + 2 * len(start.y)
         here = np.repeat(start.inputs()[None], len(rows), axis=0)
         here[:, parameters:] = rows[:, parameters:]
         slip, lost = self.equilibria.slip, self.equilibria.followers
+        level = np.full(len(rows), release.level)
         for axis, columns in self._stages:
             here[:, columns] = rows[:, columns]
             now = self._energy(here)[:, 0]
@@ -441,41 +450,32 @@ class Jumper:
         """Inputs with the heat made in their nodes, not a number where they cannot take it; energy released, heat and
         entropy passed to reservoirs. What does not count beside the ``energy`` before is not made.
         """
-        small = DIGITS * np.maximum(self._magnitudes(rows)[:, 0], np.abs(energy))
+        small = DIGITS * np.maximum(self._books(rows)[:, -2], np.abs(energy))
         made = np.where(np.abs(made) <= small[:, None], 0.0, made)
         released, warmed = made.sum(axis=1), rows.copy()
         heat, entropy = np.zeros(len(rows)), np.zeros(len(rows))
         hot = made.any(axis=1)
         if hot.any():
-            T, taken = self._heat.taken(rows[hot], made[hot], shares)
-            warmed[hot] = self._heat.with_heat(rows[hot], taken)
+            warmed[hot], taken, T = self._heat.given(rows[hot], made[hot], shares)
             passed = self._heat.passed
             heat[hot], entropy[hot] = taken[:, passed].sum(axis=1), (taken / T)[:, passed].sum(axis=1)
         return warmed, released, heat, entropy
 
-    def _judged(self, jump: Jump, books: Array, noise: float) -> Jump:
-        """The jump with the entropy it produces, what the second law says of that, and the work done in it."""
-        before, after = jump.before.inputs()[None], jump.after.inputs()[None]
-        gain, admissible, work = self._judge(jump.edge, before, after, books[None], np.array([noise]), jump.entropy_out)
-        total = {**jump.work, **{name: jump.work.get(name, 0.0) + float(done[0]) for name, done in work.items()}}
-        verdict = ADMISSIBLE if admissible[0] else VIOLATES
-        return replace(jump, entropy=float(gain[0]), verdict=verdict, work=total)
-
-    def _judge(
+    def _judged(
         self, edge: Edge, before: Array, after: Array, books: Array, noise: Array, entropy_out: Array | float
     ) -> tuple[Array, Mask, dict[str, Array]]:
         """Entropy that jumps between these rows produce, whether the second law admits it, and the work done in them.
 
         What does not count: rounding, and what the ``noise`` of the state that a guard measures makes.
         """
-        now, nudged = self._books(after), before.copy()
+        nudged = before.copy()
         if edge.measure:
             nudged[:, 1 + self.states.index(edge.measure)] += noise
-        made = np.abs(self._books(nudged)[:, 1] - self._books(before)[:, 1])
+        now, still, moved = self._books(np.concatenate([after, before, nudged])).reshape(3, len(before), -1)
         gain = now[:, 1] - books[:, 1] + entropy_out
         small = ROUNDING * np.maximum(np.maximum(np.abs(books[:, 1]), np.abs(now[:, 1])), np.abs(entropy_out))
-        small += DIGITS * self._magnitudes(before)[:, 1] + made
-        return gain, gain >= -small, dict(zip(self.system.given, (now[:, 2:] - books[:, 2:]).T, strict=True))
+        small += DIGITS * still[:, -1] + np.abs(moved[:, 1] - still[:, 1])
+        return gain, gain >= -small, dict(zip(self.system.given, (now[:, 2:-2] - books[:, 2:-2]).T, strict=True))
 
     # -- many jumps at once ---------------------------------------------------------------------------------------
 
@@ -493,18 +493,12 @@ class Jumper:
         made = np.zeros((len(rows), len(self.system.sinks) + 1))
         made[:, self._first_maker(edge)] = books[:, 0] - level
         after, released, heat, entropy = self._warmed(start, made, books[:, 0])
-        gain, admissible, work = self._judge(edge, rows, after, books, noise, entropy)
+        gain, admissible, work = self._judged(edge, rows, after, books, noise, entropy)
         goes_on = np.isfinite(level) & np.all(np.isfinite(after), axis=1)
         goes_on &= admissible | (edge.violation != "refuse")
         jumps = Jumps(Point.of(rows, n), Point.of(after, n), released, gain, work, heat, entropy, goes_on)
         return jumps, after
 
-    @cached_property
-    def _magnitudes(self) -> Function:
-        """Magnitudes of what a jump conserves and of the total entropy."""
-        books = [self.system.jump_energy, self.system.find("S_total").expression]
-        return compiled(self.system, (magnitude(self.system.expand(item)) for item in books))
-
     def _rounding(self, point: Point, energy: float) -> float:
         """Energy that does not count at a point, beside what it was before [J/m^2]."""
-        return DIGITS * max(float(self._magnitudes(point.inputs())[0]), abs(energy))
+        return DIGITS * max(float(self._books(point.inputs())[-2]), abs(energy))

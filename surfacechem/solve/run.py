@@ -271,7 +271,7 @@ def stable_start(system: System, program: Program, y: Array, parameters: Array) 
 def _are_stable(system: System, program: Program, y: Array, parameters: Array) -> NDArray[np.bool_]:
     """Which first guesses lead to states in which all limits of stability are open."""
     playing = system.in_play(parameters)
-    checks = [i for i, m in enumerate(system.moving_margins()) if m.stability and playing[i]]
+    checks = [i for i, m in enumerate(system.moving_margins) if m.stability and playing[i]]
     if not checks or program.margins is None:
         return np.ones(len(y), dtype=bool)
     found = consistent(program, 0.0, y, np.zeros_like(y), parameters)
@@ -294,7 +294,7 @@ class Model:
             reads = compile_function(inputs, [system.expand(expression) for expression in outside.reads])
             filler = Filler(reads, positions, outside.engine)
         self.system = system
-        self.margins = system.moving_margins()
+        self.margins = system.moving_margins
         """The margins that can close on the way; the rest is checked at the start only."""
         program = compile_program(
             system.t,

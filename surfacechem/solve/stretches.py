@@ -90,7 +90,7 @@ class Stretches:
         """Index of the first edge among the guards; limits come before."""
         self.terminal = np.array([kind.terminal for kind in problem.margins[: self.first]], dtype=bool)
         self.strict = np.array([kind.strict for kind in problem.margins[self.first :]], dtype=bool)
-        limits = system.moving_margins()[: self.first]
+        limits = system.moving_margins[: self.first]
         self.slack = np.array([0.0 if margin.domain else CROSSED for margin in limits])
         self.returns = [self.first + j for j, edge in enumerate(system.edges) if edge.returns is not None]
         self.given = 1 + 2 * self.n

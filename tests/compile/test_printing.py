@@ -39,7 +39,7 @@ def functions_of(model):
         "residual": (program.residual, list(system.rows.values())),
         "outputs": (model.output_function, [item.expression for item in system.outputs]),
         "ledger": (program.ledger, [account.rate for account in system.ledger]),
-        "margins": (program.margins, [each.masked for each in (*system.moving_margins(), *system.edges)]),
+        "margins": (program.margins, [each.masked for each in (*system.moving_margins, *system.edges)]),
     }
     return {name: (f, [system.expand(e) for e in rows]) for name, (f, rows) in functions.items() if f is not None}
 
