@@ -199,7 +199,7 @@ class _Stretch(Method):
                 self.net.max_time_step = max(self.end - self.t, NOISE * self.end)
             try:
                 self.t = self.net.step()
-                state, rate = self.net.get_derivative(0), self.net.get_derivative(1)
+                state, rate = self.reactor.scaled, self.net.get_derivative(1)
                 try:
                     bend = self.net.get_derivative(2)
                 except cantera.CanteraError:  # the first polynomial is a straight line

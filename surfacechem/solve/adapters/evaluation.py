@@ -5,7 +5,8 @@ twice.
 from __future__ import annotations
 
 import math
-from typing import Any
+from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -32,7 +33,7 @@ class Evaluation:
         self.guess = self._found = y[self.algebraic]
         self._counts = np.zeros((1, COLUMNS), np.int64)
         ends, table = self.inputs[: 2 * n + 1][None], self.parameters[None, None]
-        self._rates = _Code(program.rates, self.inputs) if program.rates else None
+        self._rates = _Code(program.rates, self.inputs, self.ydot) if program.rates else None
         self._search = stepper.Repeated(search_batch(program, ends, table, self._counts))
         self._reads = _Code(program.filler.reads if program.filler else None, self.inputs)
         self._ledger = _Code(program.ledger, self.inputs)
@@ -48,8 +49,7 @@ class Evaluation:
         if self._rates is not None:
             self.y[:] = differential
             self._fill()
-            self.ydot[:] = self._rates()
-            return all(map(math.isfinite, self.ydot.tolist()))
+            return all(map(math.isfinite, self._rates().tolist()))
         self.y[self.free] = differential
         self.y[self.algebraic] = self.guess
         self.ydot[:] = 0.0
@@ -126,16 +126,16 @@ def _inputs(parameters: Array, times: Array, y: Array) -> Array:
 class _Code:
     """A compiled function of a buffer of inputs, each of its pieces: a call from NumPy takes five times as long."""
 
-    def __init__(self, function: Function | None, inputs: Array) -> None:
-        self.out = np.zeros(function.size if function else 0)
-        self._calls: list[tuple[Any, int, int, int]] = []
+    def __init__(self, function: Function | None, inputs: Array, out: Array | None = None) -> None:
+        self.out = np.zeros(function.size if function else 0) if out is None else out
+        self._calls: list[Callable[[], object]] = []
         place = self.out.ctypes.data
         for part in (function, *function.rest) if function else ():
-            self._calls.append((CODE(part.address), place, inputs.ctypes.data, part.user))
+            self._calls.append(partial(CODE(part.address), place, inputs.ctypes.data, part.user))
             place += part.n_out * self.out.itemsize
         self._keep = function
 
     def __call__(self) -> Array:
-        for code, *arguments in self._calls:
-            code(*arguments)
+        for call in self._calls:
+            call()
         return self.out

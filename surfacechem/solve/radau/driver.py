@@ -8,6 +8,7 @@ from surfacechem.solve.contract import Status
 from surfacechem.solve.radau.consistency import find_consistent
 from surfacechem.solve.radau.dense import finish_step, hold_rates, ledger_norm
 from surfacechem.solve.radau.guards import AT_START, find_event, keep_sides, mark_at_end, restore_sides, start_margins
+from surfacechem.solve.radau.linear import LARGE
 from surfacechem.solve.radau.newton import stage_count
 from surfacechem.solve.radau.outputs import write_outputs, write_picture
 from surfacechem.solve.radau.step import (
@@ -248,6 +249,9 @@ def _run(w: Any, i: int) -> None:
     clear(w.fired)
     w.steps = w.rejected = w.residuals = w.jacobians = w.factorizations = w.iterations = 0
     w.member = w.last_member = w.tries = w.calm = w.fresh = w.refused = 0
+    if w.core >= LARGE:
+        for m in range(w.order.shape[0]):
+            w.order[m, 3, 0] = -1  # that of another run counts for nothing
     clear(w.q)
     peaks = w.peaks[row_of(w.peaks, i)]
     copy(peaks[: w.n_ledger], w.q_largest)

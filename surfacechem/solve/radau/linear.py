@@ -31,6 +31,9 @@ LARGE = 30
 NOT_SMALL = 0.1
 """Part of the largest scaled entry of its column that a pivot may be where that keeps the factors sparse."""
 
+SHRUNK = NOT_SMALL**2
+"""The same of a matrix that is factored in the order of one before it."""
+
 
 @compiled
 def size_of(value: Any) -> float:
@@ -150,18 +153,37 @@ def _eliminate_entries(a: Any, k: int, p: int, below: int, counts: Any) -> None:
 
 
 @compiled
-def _list_entries(a: Any, order: Any, places: Any) -> None:
-    """List where in each row of the factors there are entries: first those before the diagonal, then those behind."""
+def _list_entries(a: Any, order: Any, places: Any, marks: Any) -> None:
+    """List where in each row of the factors there are entries, or would be with other numbers in their places: first
+    those before the diagonal, then those behind.
+    """
     n = a.shape[0]
     for i in range(n):
         found = 0
         for j in range(n):
+            marks[j] = a[i, j] != 0.0
+        for j in range(n):
             if j == i:
                 order[2, i] = found
-            elif a[i, j] != 0.0:
+            elif marks[j] != 0:
                 places[i, found] = j
                 found += 1
+                if j < i:
+                    for m in range(order[2, j], order[3, j]):
+                        marks[places[j, m]] = 1
         order[3, i] = found
+
+
+@compiled
+def _list_origins(order: Any) -> None:
+    """List where rows and columns of the factors have been, from what they were exchanged with."""
+    n = order.shape[1]
+    for k in range(n):
+        order[4, k] = order[5, k] = k
+    for k in range(n):
+        for part in range(2):
+            p, origins = order[part, k], order[4 + part]
+            origins[k], origins[p] = origins[p], origins[k]
 
 
 @compiled
@@ -174,7 +196,53 @@ def _factor_large(a: Any, order: Any, places: Any, columns: Any, rows: Any, coun
         order[0, k], order[1, k] = p, q
         _exchange(a, k, p, q, rows, counts)
         _eliminate_entries(a, k, p, below, counts)
-    _list_entries(a, order, places)
+    _list_entries(a, order, places, counts[4])
+    _list_origins(order)
+    return True
+
+
+@compiled
+def count_entries_of_rows(derivatives: Any, counts: Any) -> None:
+    """Count what is not zero in each row of G_y and G_ydot together."""
+    for i in range(len(counts)):
+        found = 0
+        for j in range(len(counts)):
+            found += derivatives[0, i, j] != 0.0 or derivatives[1, i, j] != 0.0
+        counts[i] = found
+
+
+@compiled
+def factor_again(
+    derivatives: Any, entries: Any, shift: Any, a: Any, order: Any, places: Any, columns: Any, rows: Any
+) -> bool:
+    """Factor G_y + shift G_ydot in the order in which a large matrix was, row by row and nothing but where its factors
+    have entries; False where this matrix has others, so many of which are in each row, or where a pivot has become
+    small.
+    """
+    for i in range(a.shape[0]):
+        row, known, found, largest = a[i], order[3, i], 0, 0.0
+        for m in range(known + 1):
+            j = places[i, m] if m < known else i
+            g, r = derivatives[0, order[4, i], order[5, j]], derivatives[1, order[4, i], order[5, j]]
+            found += g != 0.0 or r != 0.0
+            row[j] = shift * r + g
+            largest = max(largest, size_of(row[j]) * columns[order[5, j]])
+        if found != entries[order[4, i]] or not 0.0 < largest < np.inf:
+            return False
+        rows[i] = 1.0 / largest
+        for m in range(order[2, i]):
+            k = places[i, m]
+            multiple = row[k] * a[k, k]
+            if not size_of(multiple) * rows[i] * SHRUNK <= rows[k]:
+                return False
+            row[k] = multiple
+            pivot = a[k]
+            for later in range(order[2, k], order[3, k]):
+                j = places[k, later]
+                row[j] -= multiple * pivot[j]
+        if not 0.0 < size_of(row[i]) < np.inf:
+            return False
+        row[i] = 1.0 / row[i]
     return True
 
 
@@ -184,7 +252,8 @@ def factor(a: Any, order: Any, places: Any, columns: Any, rows: Any, counts: Any
     threshold.
 
     The order is what rows were exchanged with, and columns, and how many entries of a row come before its diagonal, and
-    in all; the places are where these are. Five rows of counts are room to work in.
+    in all, and where rows and columns have been; the places are where the entries are. Five rows of counts are room to
+    work in.
     """
     n = a.shape[0]
     if not _scale_rows(a, columns, rows[:n]):

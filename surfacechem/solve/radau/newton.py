@@ -10,7 +10,16 @@ from typing import Any
 import numpy as np
 
 from surfacechem.solve.radau.explicit import put_rates
-from surfacechem.solve.radau.linear import factor, fold_shifted, shifted, solve_complex, solve_real
+from surfacechem.solve.radau.linear import (
+    LARGE,
+    count_entries_of_rows,
+    factor,
+    factor_again,
+    fold_shifted,
+    shifted,
+    solve_complex,
+    solve_real,
+)
 from surfacechem.solve.radau.roundoff import correction_is_noise
 from surfacechem.solve.radau.tables import (
     COARSE,
@@ -134,27 +143,36 @@ def differentiate_system(w: Any, h: float, foresee: bool) -> bool:
         for i in range(w.core):
             if not finite(w.jacobian[part, i]):
                 return False
+    if w.core >= LARGE:
+        count_entries_of_rows(w.jacobian, w.entries[5])
     # Chains that are not finite show in their pivots.
     return True
 
 
 @compiled
+def _factor_shifted(w: Any, m: int, shift: Any, matrix: Any, border: Any, bands: Any) -> bool:
+    """Factor matrix m, the core of G_y + shift G_ydot, with the chains folded into it."""
+    order, places = w.order[m], w.places[m]
+    chained = w.links > 0
+    known = w.core >= LARGE and not chained and order[3, 0] >= 0
+    if known and factor_again(w.jacobian, w.entries[5], shift, matrix, order, places, w.pivot, w.delta):
+        return True
+    shifted(w.jacobian, shift, matrix)
+    if chained and not fold_shifted(w, shift, matrix, border, bands):
+        return False
+    return bool(factor(matrix, order, places, w.pivot, w.delta, w.entries, 0.0))
+
+
+@compiled
 def factor_newton(w: Any, h: float) -> bool:
     """Factor the real and the complex Newton matrices for this step size."""
-    k, real, chained = w.member, w.real, w.links > 0
+    k = w.member
     w.factorizations += 1
-    shift = GAMMA[k] / h
-    shifted(w.jacobian, shift, real)
-    if chained and not fold_shifted(w, shift, real, w.real_border, w.real_bands):
-        return False
-    if not factor(real, w.order[0], w.places[0], w.pivot, w.delta, w.entries, 0.0):
+    if not _factor_shifted(w, 0, GAMMA[k] / h, w.real, w.real_border, w.real_bands):
         return False
     for pair in range(k + 1):
-        complex_shift, matrix = PAIR_VALUES[k, pair] / h, w.complex[pair]
-        shifted(w.jacobian, complex_shift, matrix)
-        if chained and not fold_shifted(w, complex_shift, matrix, w.complex_border[pair], w.complex_bands[pair]):
-            return False
-        if not factor(matrix, w.order[1 + pair], w.places[1 + pair], w.pivot, w.delta, w.entries, 0.0):
+        border, bands = w.complex_border[pair], w.complex_bands[pair]
+        if not _factor_shifted(w, 1 + pair, PAIR_VALUES[k, pair] / h, w.complex[pair], border, bands):
             return False
     return True
 

@@ -123,16 +123,16 @@ MEMORY = {
     **_arrays("border_derivatives", 2, "core", "links"),
     **_arrays("band_derivatives", 2, "cells", 3),
     # Newton matrices, then their factors, what rows and columns of these were exchanged with, where the entries
-    # of large ones are, and these counted
+    # of large ones are, and these counted; in the last row those of the derivatives
     **_arrays("real", "core", "core"),
     **_arrays("real_border", "core", "links"),
     **_arrays("real_bands", "cells", 3),
     **_arrays("complex", 3, "core", "core", kind=complex),
     **_arrays("complex_border", 3, "core", "links", kind=complex),
     **_arrays("complex_bands", 3, "cells", 3, kind=complex),
-    **_arrays("order", 4, 4, "core", kind=int),
+    **_arrays("order", 4, 6, "core", kind=int),
     **_arrays("places", 4, "core", "core", kind=int),
-    **_arrays("entries", 5, "core", kind=int),
+    **_arrays("entries", 6, "core", kind=int),
     # polynomials in Newton's form: the stored one, and those of state and ledger over the step
     **_arrays("z_polynomial polynomial", "n", 9),
     # fractions of the step of four outputs

@@ -1,0 +1,54 @@
+"""LU of large matrices: again in the order of the one before, and never where that would be wrong."""
+
+from typing import Any
+
+import numba
+import numpy as np
+import pytest
+
+from surfacechem.solve.radau import linear
+
+N = 40
+
+
+@numba.njit
+def factored(derivatives: Any, shift: Any, a: Any, order: Any, places: Any, again: bool, x: Any) -> bool:
+    """G_y + shift G_ydot factored, from nothing or in the order known, and a right-hand side solved for."""
+    counts, scales = np.zeros((6, len(x)), np.int64), np.ones(len(x))
+    linear.count_entries_of_rows(derivatives, counts[5])
+    if again:
+        known = linear.factor_again(derivatives, counts[5], shift, a, order, places, scales, np.empty(len(x)))
+    else:
+        linear.shifted(derivatives, shift, a)
+        known = linear.factor(a, order, places, scales, np.empty(len(x)), counts, 0.0)
+    linear.solve(a, order, places, x)
+    return known
+
+
+@pytest.mark.parametrize("kind", [float, complex])
+@pytest.mark.parametrize("seed", range(5))
+def test_again_in_the_order_known(kind: type, seed: int) -> None:
+    draw = np.random.default_rng(seed)
+    derivatives = np.zeros((2, N, N))
+    derivatives[0] = np.where(draw.random((N, N)) < 0.06, draw.integers(-2, 3, (N, N)), 0)
+    derivatives[1] = np.eye(N)[draw.permutation(N)]
+    order, places = np.zeros((6, N), np.int64), np.zeros((N, N), np.int64)
+    # Whole numbers: entries of the factors cancel exactly, which they do not the next time.
+    assert factored(derivatives, kind(3.0), np.zeros((N, N), kind), order, places, False, np.ones(N, kind))
+    derivatives[0] *= 1.0 + 0.1 * draw.random((N, N))
+    x, shift = np.ones(N, kind), kind(4.0 if kind is float else 4.0 + 1.0j)
+    assert factored(derivatives, shift, np.full((N, N), np.nan, kind), order, places, True, x)
+    np.testing.assert_allclose((derivatives[0] + shift * derivatives[1]) @ x, 1.0, rtol=1e-11)
+    # An entry where none was nor has come, and a pivot that has become small beside what is below it.
+    entries = np.eye(N, dtype=bool)
+    for i in range(N):
+        entries[i, places[i, : order[3, i]]] = True
+    i, j = np.argwhere(~entries)[seed]
+    more, small = derivatives.copy(), derivatives.copy()
+    more[0, order[4, i], order[5, j]] = 1.0
+    # A pivot that is an entry of the matrix as it is, and not the only one of its column.
+    eliminated = {place for i in range(N) for place in places[i, : order[2, i]]}
+    k = next(k for k in sorted(eliminated) if order[2, k] == 0)
+    small[:, order[4, k], order[5, k]] *= 1e-12
+    for other in (more, small):
+        assert not factored(other, shift, np.zeros((N, N), kind), order, places, True, np.ones(N, kind))
