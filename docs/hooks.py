@@ -298,7 +298,7 @@ LINKS = {
     "surface mechanism": "mechanisms.md",
     "exact solution": "exact-solutions.md",
     "what fills the space": "heat-paths.md#media",
-    "temperatures across the body": "heat-paths.md#bodies-that-are-no-lump",
+    "temperatures across the body": "heat-paths.md#bodies-with-conduction",
     "stages": "#programme",
     "mounted": "#mechanics",
     "an event": "events.md",

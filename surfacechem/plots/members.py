@@ -46,6 +46,9 @@ BINS, PARTS = 40, 12
 BAND = (5.0, 50.0, 95.0)
 """Percentiles of a distribution that are drawn."""
 
+SEEN = 0.99
+"""Part of the largest value of a variable that an output has to come to; less is told."""
+
 
 def figure(dataset: xarray.Dataset, plan: Plan, variables: Sequence[str] | None = None) -> Figure:
     """The figure of a grid of two parameters, of a sample, or of more parameters."""
@@ -190,10 +193,22 @@ def curves(dataset: xarray.Dataset, axes: Sequence[str], names: Sequence[str], a
             parameter = dataset[axes[0]]
             style.label(bar.ax.yaxis, axis_words(parameter), unit(parameter), parameter.values)
         others = ", ".join(axis_words(dataset[name]) for name in axes[1:]) if many else ""
-        style.headings(plot, grid[0, 0], dataset, more=f"curves of one colour differ in {others}" if others else "")
+        told = [f"curves of one colour differ in {others}"] if others else []
+        told += filter(None, (_between_outputs(dataset, name) for name in names))
+        style.headings(plot, grid[0, 0], dataset, more="   ".join(told))
         if len(members) < count:
             grid[0, 0].set_title(f"{len(members)} of {count} runs", loc="left", fontsize=8, color="#555555")
     return plot
+
+
+def _between_outputs(dataset: xarray.Dataset, name: str) -> str:
+    """The largest magnitude of a variable where no output of any run comes near it, as of a slip that is brief."""
+    ends = [dataset[key].values for key in (f"{name}_max", f"{name}_min") if key in dataset]
+    reached, shown = max(map(style.largest, ends), default=0.0), style.largest(dataset[name].values)
+    if shown > SEEN * reached:
+        return ""
+    text, size = style.prefixed(unit(dataset[name]), np.array([reached]))
+    return f"between outputs, {symbol(name)} reaches {reached / size:.3g} {text}"
 
 
 def colours(dataset: xarray.Dataset, axes: Sequence[str]) -> ScalarMappable:

@@ -97,6 +97,13 @@ def test_each_run_of_a_sweep_over_a_variable_or_time():
         plots.figure(sweep, ["T_last"], "phi")
 
 
+def test_what_is_briefer_than_the_outputs_of_a_sweep_is_told():
+    swept = surfacechem.load("stick-slip").sweep({"mechanics.tangential.k": ["60 MPa/m", "90 MPa/m"]})
+    facts = [ax.get_title(loc="left") for ax in swept.plot(variables=["v", "u_t"], against="time").axes]
+    assert "between outputs, $v$ reaches" in facts[0]
+    assert "u_{t}" not in facts[0]
+
+
 def test_effects_of_three_parameters_of_a_grid(tmp_path):
     over = {K_0: [100.0, 200.0, 300.0], "initial.T": [290.0, 310.0], C_R: [5e15, 7e15]}
     path = stored(tmp_path, over=over, keep={"last": ["T"]})
