@@ -34,3 +34,7 @@ def __getattr__(name: str) -> Any:
     if name not in __all__:
         raise AttributeError(f"module 'surfacechem' has no attribute {name!r}")
     return getattr(import_module(f"surfacechem.{_ELSEWHERE.get(name, 'runs.simulation')}"), name)
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})  # so that a shell completes what is imported when it is asked for

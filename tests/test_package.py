@@ -13,6 +13,8 @@ from pathlib import Path
 import pytest
 from ruamel.yaml import YAML
 
+import surfacechem
+
 pytestmark = pytest.mark.around
 
 ROOT = Path(__file__).parents[1]
@@ -75,3 +77,7 @@ def test_sdist_holds_what_a_rebuild_and_the_tests_need(dist):
 
 def test_citation_has_the_version():
     assert YAML(typ="safe").load(ROOT / "CITATION.cff")["version"] == version("surfacechem")
+
+
+def test_a_shell_completes_what_is_imported_when_it_is_asked_for():
+    assert set(surfacechem.__all__) <= set(dir(surfacechem))
