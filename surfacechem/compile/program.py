@@ -42,6 +42,7 @@ class Function:
 
     address: int
     user: int
+    n_in: int
     n_out: int
     keep: Any
     """Owns the machine code: the address is valid as long as this object lives."""
@@ -53,8 +54,20 @@ class Function:
         if not self.n_out:  # machine code of nothing cannot be called
             return np.empty((*values.shape[:-1], 0))
         if not self.rest:
-            return np.asarray(self.keep(values))
+            return self._of_one(values) if values.shape == (self.n_in,) else np.asarray(self.keep(values))
         return np.concatenate([np.asarray(self.keep(values)), *(part(values) for part in self.rest)], axis=-1)
+
+    @cached_property
+    def _called(self) -> tuple[Any, Any, Any]:
+        """The code as Python calls it by itself, and the types of its inputs and results."""
+        return CODE(self.address), ctypes.c_double * self.n_in, ctypes.c_double * self.n_out
+
+    def _of_one(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Results of a single row, in half of the time that the library takes to look at what it is given."""
+        code, inputs, results = self._called
+        found = results()
+        code(found, inputs.from_buffer(values), self.user)
+        return np.frombuffer(found)
 
     @property
     def size(self) -> int:
@@ -217,7 +230,7 @@ def _machine_code(inputs: tuple[Any, ...], expressions: tuple[Any, ...], opt_lev
     code = from_file(cache_root() / "code" / mark.hexdigest()[:32], make, pickle.loads, pickle.dumps)
     function, user = code.as_ctypes()
     address = ctypes.cast(function, ctypes.c_void_p).value
-    return Function(int(address or 0), int(user.value), len(expressions), code)
+    return Function(int(address or 0), int(user.value), len(inputs), len(expressions), code)
 
 
 @cache

@@ -52,6 +52,17 @@ def test_unused_inputs_and_constants() -> None:
     np.testing.assert_array_equal(compile_function([x, y], [x, 3])([1.0, np.nan]), [1.0, 3.0])
 
 
+def test_one_row_gives_the_bits_that_it_gives_among_others() -> None:
+    x, y = se.symbols("x y")
+    function = compile_function([x, y], [se.sin(x) ** 3.3, x / y])
+    rows = np.random.default_rng(0).uniform(0.1, 1.0, (5, 2))
+    together = function(rows)
+    for row in (rows[2], rows[2].tolist()):
+        np.testing.assert_array_equal(function(row), together[2])
+    with pytest.raises(ValueError, match="size mismatch"):
+        function(rows[2, :1])
+
+
 def test_counts_must_agree() -> None:
     t, x, dx = se.symbols("t x dx")
     with pytest.raises(ValueError, match="as many equations as states"):
