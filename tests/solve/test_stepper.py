@@ -6,6 +6,7 @@ import numba
 import numpy as np
 import pytest
 import symengine as se
+from scipy.special import spence
 from solver_problems import (
     CONDUCTANCE,
     coupled_nodes,
@@ -362,6 +363,14 @@ def test_logarithm_of_a_coverage_that_starts_at_zero():
     entropy, _ = booked(lambda t, x, dx: dx * se.log(se.Max(x, 1e-300)), 1.0)
     x = 1 - np.exp(-1.0)
     assert entropy == pytest.approx(x * np.log(x) - x, abs=1e-8)
+
+
+def test_rates_that_are_all_but_singular_at_the_start():
+    """Steps come to where they resolve them in a few trials: more would use up the patience with the ledger."""
+    logarithm, _ = booked(lambda t, x, dx: se.log(x + 1e-25), 1.0)
+    assert logarithm == pytest.approx(spence(1 - np.exp(-1.0)) - np.pi**2 / 6, abs=1e-8)
+    _, counters = booked(lambda t, x, dx: se.log(t + 1e-25), 1.0)
+    assert counters.rejected < 20
 
 
 def test_a_rate_that_is_noise_does_not_hold_up_a_run():

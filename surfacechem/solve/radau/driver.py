@@ -125,16 +125,22 @@ def _is_brief(w: Any, h: float) -> bool:
 @compiled
 def _ledger_limit(w: Any, h: float, remaining: float) -> float:
     """Longest next step that serves the ledger; shorter than this one where this one does not."""
-    norm = 0.0 if _is_brief(w, h) else ledger_norm(w, h, remaining)
+    norm = 0.0 if _is_brief(w, h) else min(ledger_norm(w, h, remaining), 1e30)
+    h_refused, w.h_refused = w.h_refused, 0.0
     if norm == 0.0:
         return np.inf
-    # The local error of a quadrature of order 2s - 1 goes with h^(2s).
-    limit = h * max(0.1, 0.9 * max(norm, NEGLIGIBLE) ** (-0.5 / stage_count(w.member)))
+    # The local error of a quadrature of order 2s - 1 goes with h^(2s), slower where a rate is singular at the start.
+    power, least = 2.0 * stage_count(w.member), 0.1
+    if h < h_refused:
+        found = np.log(w.norm_refused / norm) / np.log(h_refused / h)
+        power, least = min(power, max(found, SQRT_EPS)), 0.01
+    limit = h * max(least, 0.9 * max(norm, NEGLIGIBLE) ** (-1.0 / power))
     if norm <= 1.0:
         return max(limit, h)
     if w.refused > PATIENCE + w.steps // 2:
         return np.inf
     w.refused += 1
+    w.h_refused, w.norm_refused = h, norm
     return limit
 
 

@@ -79,6 +79,8 @@ NUMBERS: dict[str, type] = {
     # stages was and how large rounding is in units of the tolerance. How much larger than the tolerance the estimate
     # of low order may be.
     **dict.fromkeys(("theta", "contraction", "guessed", "roundoff", "loose"), float),
+    # Of the trial before, if the ledger has refused it: its step, and what it missed in units of what is allowed.
+    **dict.fromkeys(("h_refused", "norm_refused"), float),
     # Counters of a run.
     **dict.fromkeys(("steps", "rejected", "residuals", "jacobians", "factorizations", "iterations"), int),
     # Member of the Radau family now, and that of the stored polynomial. Newton iterations of this step; easy steps in a
