@@ -54,13 +54,13 @@ assert abs(forces[:, 0] / exact - 1).max() < 1e-9
 # over the sphere, is exact. Derjaguin leaves out the far side of the sphere.
 
 # %%
-figure, (left, right) = plt.subplots(1, 2, figsize=(8.4, 3.4), layout="constrained")
-left.semilogx(gaps, forces[:, 0] / forces[:, 2], label="integral")
-left.semilogx(gaps, forces[:, 1] / forces[:, 2], "--", label="local law")
-left.axhline(1.0, linestyle=":", color="black", label="Derjaguin")
-left.set(xlabel="gap / radius", ylabel="force / that after Derjaguin", title="Sphere over a plane")
-left.legend()
-left.grid(alpha=0.3)
+figure, ax = plt.subplots(figsize=(5.6, 3.6), layout="constrained")
+ax.semilogx(gaps, forces[:, 0] / forces[:, 2], label="integral")
+ax.semilogx(gaps, forces[:, 1] / forces[:, 2], "--", label="local law")
+ax.axhline(1.0, linestyle=":", color="black", label="Derjaguin")
+ax.set(xlabel="gap / radius", ylabel="force / that after Derjaguin", title="Sphere over a plane")
+ax.legend()
+ax.grid(alpha=0.3)
 
 # %% [markdown]
 # ## Other pairs
@@ -75,18 +75,21 @@ pairs = {
     "sphere in a cavity": ((Sphere(R=1.0), Cavity(R=3.0)), 1.5),
     "paraboloid, sphere": ((Paraboloid(R=1.0), Sphere(R=1.0)), 0.5),
 }
-for name, (shapes, radius) in pairs.items():
+figure, ax = plt.subplots(figsize=(5.6, 3.6), layout="constrained")
+print("difference at a gap of a thousandth of the radius, and its power of the gap")
+print(f"{'':20s}{'local law':18s}Derjaguin")
+for (name, (shapes, radius)), width in zip(pairs.items(), (3.5, 1.5, 1.5), strict=True):
     found = np.array([three(shapes, radius, gap) for gap in gaps])
     off = abs(found[:, 1:] / found[:, :1] - 1)
-    slope = np.log(off[4] / off[0]) / np.log(gaps[4] / gaps[0])
-    (line,) = right.loglog(gaps, off[:, 0], label=name)
-    right.loglog(gaps, off[:, 1], ":", color=line.get_color())
-    print(f"{name:20s} at {gaps[0]:g} R: local law off by {off[0, 0]:.1e}, Derjaguin by {off[0, 1]:.1e}, slopes", slope)
+    powers = np.log(off[4] / off[0]) / np.log(gaps[4] / gaps[0])
+    (line,) = ax.loglog(gaps, off[:, 0], linewidth=width, label=name)
+    ax.loglog(gaps, off[:, 1], ":", color=line.get_color())
+    print(f"{name:20s}" + "    ".join(f"{a:.1e} ({n:.3f})" for a, n in zip(off[0], powers, strict=True)))
     assert off[0, 1] < 0.01
-right.loglog(gaps, gaps, color="0.7", linewidth=0.8, label="gap / radius")
-right.set(xlabel="gap / radius", ylabel="difference to the integral", title="Local law, and Derjaguin dotted")
-right.legend()
-figure
+ax.loglog(gaps, gaps, "--", color="0.4", linewidth=0.8, label="gap / radius")
+ax.set(xlabel="gap / radius", ylabel="difference to the integral", title="Local law, and Derjaguin dotted")
+ax.legend()
+ax.grid(alpha=0.3)
 
 # %% [markdown]
 # ## In a run
@@ -98,5 +101,6 @@ figure
 import surfacechem
 
 run = surfacechem.run("ball-in-a-socket").dataset
-for approach, force, difference in zip(run.approach.values, run.force.values, run.local_difference.values, strict=True):
-    print(f"{approach * 1e9:6.3f} nm  {force * 1e9:9.5f} nN  local law {difference / force:+.1%}")
+rows = zip(run.approach.values * 1e9, run.force.values * 1e9, run.local_difference / run.force, strict=True)
+for approach, force, off in rows:
+    print(f"{approach:6.3f} nm  {force:9.5f} nN  local law {off:+.1%}")

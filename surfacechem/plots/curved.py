@@ -22,6 +22,9 @@ FIELDS = ("gap", "traction")
 ROWS, HEIGHT = 3, 2.3
 """Panels, and the height of each [inch]."""
 
+APART = 0.08
+"""Space above and below each [inch]: twice the usual."""
+
 BEYOND = 1.5
 """So much farther than the traction is felt the surfaces are drawn."""
 
@@ -49,6 +52,9 @@ def draw_below(axes: Sequence[Axes], dataset: xarray.Dataset) -> None:
 
 def draw(axes: Sequence[Axes], dataset: xarray.Dataset) -> None:
     """The same on axes of a figure, one below the other."""
+    # Each has an axis of its own, whose words stand apart from the panel below.
+    engine: Any = axes[0].figure.get_layout_engine()
+    engine.set(h_pad=APART)
     even = _around(dataset)
     _draw_profiles(axes[0], dataset, even)
     if even:
@@ -163,8 +169,17 @@ def _draw_field(ax: Axes, dataset: xarray.Dataset) -> None:
     mesh = ax.pcolormesh(x, y, values[k] / size, shading="gouraud", rasterized=True, **colours)
     ax.figure.colorbar(mesh, cax=ax.inset_axes((1.05, 0, 0.05, 1)), label=f"Traction [{text}]")
     ax.set_aspect("equal")
-    for axis, name in ((ax.xaxis, "x"), (ax.yaxis, "y")):
-        style.label(axis, name, "m", np.concatenate([x.ravel(), y.ravel()]))
+    # What is drawn is the square around all that is felt, or what there is of the surface in it.
+    felt = np.abs(values[k]) >= NEGLIGIBLE * np.abs(values[k]).max()
+    ends = [(float(part[felt].min()), float(part[felt].max())) for part in (x, y)]
+    half = BEYOND / 2 * max(b - a for a, b in ends)
+    shown = [
+        np.clip([(a + b) / 2 - half, (a + b) / 2 + half], part.min(), part.max())
+        for part, (a, b) in zip((x, y), ends, strict=True)
+    ]
+    ax.set(xlim=shown[0], ylim=shown[1])
+    style.label(ax.xaxis, "x", "m", shown[0])
+    style.label(ax.yaxis, "y", "m", shown[1])
 
 
 def _draw_force(ax: Axes, dataset: xarray.Dataset) -> None:

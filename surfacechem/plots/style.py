@@ -20,7 +20,7 @@ from matplotlib.axis import XAxis, YAxis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.rcsetup import cycler
-from matplotlib.ticker import LogFormatterSciNotation, LogLocator
+from matplotlib.ticker import Formatter, LogFormatterSciNotation, LogLocator
 from numpy.typing import NDArray
 
 from surfacechem.errors import InputError, Place
@@ -406,7 +406,7 @@ def label(axis: XAxis | YAxis, words: str, unit: str, values: Array, between: st
     if size == 1.0:
         axis.axes.ticklabel_format(axis="x" if isinstance(axis, XAxis) else "y", useOffset=False, scilimits=(-4, 5))
     else:
-        axis.set_major_formatter(lambda value, _: f"{value / size:.10g}")
+        axis.set_major_formatter(lambda value, _: Formatter.fix_minus(f"{value / size:.10g}"))
 
 
 def varies(values: Array) -> bool:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import logging
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,8 +24,6 @@ ALONG, AROUND, ACROSS = 81, 16, 33
 """Points of the fields from an axis on and around it; both ways where there is none."""
 
 AT = "surface_time"
-
-log = logging.getLogger(__name__)
 
 
 def surface_columns(trajectory: Trajectory, surface: CurvedSurfaces) -> tuple[list[Column], float]:
@@ -88,17 +86,14 @@ def _fields(surface: CurvedSurfaces, approaches: Array, stretches: Array) -> Seq
         at = np.maximum(at, [POLE, -np.inf])
     D = lower.derivatives(at, FIRST)
     x, normals = D[0], lower.normals(D)
+    near = [replace(upper, approach=d).nearest(x) for d in approaches.tolist()]
+    gap, opposite = np.array([one.gap for one in near]), np.array([one.point for one in near])
     # Around an axis all columns are alike.
     some = slice(0, 1 if patches.alike[1] else None)
-    gap, traction = np.empty((2, len(approaches), *x.shape[:-1]))
-    opposite = np.empty((len(approaches), *x.shape))
-    for k, d in enumerate(approaches):
-        log.info("fields at output times", extra={"done": k, "total": len(approaches)})
-        near = surface.surfaces(float(d))[1].nearest(x)
-        gap[k], opposite[k] = near.gap, near.point
-        own = surface.thinned(float(stretches[k]))
-        felt = own.traction(x[:, some].reshape(-1, 3), normals[:, some].reshape(-1, 3), float(d))
-        traction[k] = felt.reshape(len(x), -1)
+    points, directions = (part[:, some].reshape(-1, 3) for part in (x, normals))
+    gaps = gap[:, :, some].reshape(len(gap), -1)
+    felt, summed = surface.tractions(points, directions, gaps, approaches, stretches)
+    traction = np.broadcast_to(felt.reshape(len(gap), len(x), -1), gap.shape)
     over = ("u", "v")
     places = [
         Column(f"surface_{axis}", over, x[..., k], "m", f"{axis} of points of body 1") for k, axis in enumerate("xyz")
@@ -107,7 +102,7 @@ def _fields(surface: CurvedSurfaces, approaches: Array, stretches: Array) -> Seq
         Column(f"opposite_{axis}", (AT, *over), opposite[..., k], "m", f"{axis} of the nearest point of body 2")
         for k, axis in enumerate("xyz")
     ]
-    by = "" if surface.sums_tractions or not surface.pairs else " by the local law"
+    by = "" if summed or not surface.pairs else " by the local law"
     text = f"normal traction on body 1{by}, tension positive"
     return [
         *places,

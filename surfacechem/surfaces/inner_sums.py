@@ -31,6 +31,11 @@ CHEBYSHEV, BETWEEN = np.cos(np.pi * (np.arange(24) + 0.5) / 24), np.array([-0.97
 PART = 0.5
 """Length of these pieces: over one a sum of r^-10 falls to a fiftieth."""
 
+FALL, NEAR_END = 100.0, 6
+"""How much smaller a sum may be at one end of a table than at the other, so that what the table misses of the larger is
+a tenth of the accuracy of the smaller; and how many of the gaps tell what it is there, as it may change its sign.
+"""
+
 FEW = 56
 """Points up to which sums are made one by one where no table is good enough or used again: twice what that takes."""
 
@@ -149,7 +154,10 @@ def table(profile: RoundSums, low: float, high: float) -> tuple[Array | None, in
     known, pairs = profile.at(np.exp(at))
     fit = np.polynomial.chebyshev.chebfit(CHEBYSHEV, known[: len(CHEBYSHEV)], len(CHEBYSHEV) - 1)
     missed = np.polynomial.chebyshev.chebval(BETWEEN, fit).T - known[len(CHEBYSHEV) :]
-    good = np.all(np.abs(missed) <= profile.rtol * NEGLIGIBLE * np.abs(known).max(axis=0))
+    sizes = np.abs(known)
+    ends = [sizes[: len(CHEBYSHEV)][side].max(axis=0) for side in (slice(NEAR_END), slice(-NEAR_END, None))]
+    good = np.all(np.abs(missed) <= profile.rtol * NEGLIGIBLE * sizes.max(axis=0))
+    good &= np.all(sizes.max(axis=0) <= FALL * np.minimum(*ends))
     return np.asarray(fit) if good else None, pairs
 
 

@@ -45,7 +45,7 @@ class LevelPatches(Patches):
     less than the ``noise`` [m] are none.
     """
 
-    arrays: ClassVar[Sequence[str]] = (*Patches.arrays, "level", "along", "share", "crossed")
+    arrays: ClassVar[Sequence[str]] = (*Patches.arrays, "level", "along", "share", "crossed", "leaves")
 
     other: Surface
     levels: tuple[float, ...]
@@ -56,6 +56,8 @@ class LevelPatches(Patches):
     """Part of each below the level times that above."""
     crossed: NDArray[np.bool_]
     """Whether an edge divides each in another way."""
+    leaves: Array
+    """Where across that direction the level leaves each at its low and its high end (n, 2), unless not sought yet."""
 
     @property
     def fewest(self) -> int:
@@ -69,7 +71,7 @@ class LevelPatches(Patches):
 
     def halved(self) -> Self:
         """Their halves, each with the level it has itself."""
-        return super().halved().marked()
+        return super().halved().marked().left()
 
     def marked(self) -> Self:
         """With the level and its direction as they now are."""
@@ -97,7 +99,8 @@ class LevelPatches(Patches):
         crossed = np.any((below * above > 0) & apart & (edges | edges[best, None]), axis=1)
         crossed |= (share > 0) & turns[along, np.arange(len(along))]
         crossed &= near.gap.min(axis=(1, 2)) < np.linalg.norm(x[:, -1, -1] - x[:, 0, 0], axis=-1)
-        return replace(self, level=best, along=np.where(share > 0, along, -1), share=share, crossed=crossed)
+        along, none = np.where(share > 0, along, -1), np.full((len(self), 2), math.nan)
+        return replace(self, level=best, along=along, share=share, crossed=crossed, leaves=none)
 
     def nodes(self, order: int) -> tuple[Array, Array]:
         """Points (n, k, 3) of a rule, and their areas (n, k), on both sides of the level; all of one kind."""
@@ -113,6 +116,10 @@ class LevelPatches(Patches):
         at = (here, np.broadcast_to(there[..., None], here.shape))
         return self.points(np.stack(at if k == 0 else at[::-1], axis=-1), length * thickness[..., None])
 
+    def most(self, order: int) -> int:
+        """Two sides of the level on each line, and parts across them."""
+        return super().most(order) * (2 * PARTS if self.along[0] >= 0 else 1)
+
     def cost(self, order: int) -> int:
         """Those of the searches for the level on each line of nodes."""
         return 0 if self.along[0] < 0 else len(self) * PARTS * order * ROOTS * self.other.search
@@ -121,12 +128,20 @@ class LevelPatches(Patches):
         """Nodes and weights (n, m) across the direction of the level, cut where it leaves the patch."""
         if self.alike[j]:
             return self.rule(j, order)
-        k, leaves = 1 - j, []
-        for side in (self.low, self.high):
-            edge = replace(self, low=np.where(np.arange(2) == k, side, self.low))
-            leaves.append(edge.crossing(j, side[:, k]))
-        edges = np.stack([self.low[:, j], *leaves, self.high[:, j]], axis=1)
+        edges = np.column_stack([self.low[:, j], self.leaves, self.high[:, j]])
         return gauss(np.sort(edges, axis=1), order)
+
+    def left(self) -> Self:
+        """With the places where their levels leave them."""
+        leaves = self.leaves.copy()
+        for k in range(2):
+            chosen = self.along == k
+            if self.alike[1 - k] or not chosen.any():
+                continue
+            passed = self[chosen]
+            ends = np.concatenate([passed.low[:, k], passed.high[:, k]])
+            leaves[chosen] = passed.joined(passed).crossing(1 - k, ends).reshape(2, -1).T
+        return replace(self, leaves=leaves)
 
     def divided(self, k: int) -> Self:
         """The same where nothing changes across a direction: divided at the levels once for all."""
@@ -176,6 +191,7 @@ def with_levels(patches: Patches, other: Surface, levels: Sequence[float], noise
         along=none,
         share=0.0 * none,
         crossed=none > 0,
+        leaves=np.zeros((len(patches), 2)),
     )
     found = found.marked()
     if any(found.alike):
@@ -190,8 +206,8 @@ def with_levels(patches: Patches, other: Surface, levels: Sequence[float], noise
             slight |= found.crossed
         if not slight.any():
             break
-        found = found[~slight].joined(found[slight].halved())
-    return found
+        found = found[~slight].joined(Patches.halved(found[slight]).marked())
+    return found.left()
 
 
 def _at_corners(patches: Patches) -> Patches:

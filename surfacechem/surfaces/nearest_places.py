@@ -7,11 +7,13 @@ Newton's method leads to the least gap.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from surfacechem.errors import InputError
 from surfacechem.surfaces.projection import FIRST, NEWTONS, POLE, Array, Surface, descended, newton_step
@@ -69,7 +71,8 @@ def near_places(
     low, high = np.nan_to_num(np.transpose(outer.shape.span), posinf=sought, neginf=-sought)
     extents = _extents(outer, low, high)
     wide = min(grain, extents.max() / COARSE * PER_GRAIN)
-    halvings = max(0, math.ceil(math.log2(PER_GRAIN * extents.max() / grain / COARSE))) if grain < math.inf else 0
+    # A surface without a grain needs no more than the coarsest places.
+    halvings = np.ceil(np.log2(np.maximum(PER_GRAIN * extents / grain / COARSE, 1))).astype(int)
     steps = np.where(alike, 1, COARSE * 2**halvings)
     if math.prod(int(n) for n in steps) > MOST_PLACES:
         text = f"the {outer.shape.name()} has details of {grain:.3g} m on {extents[0]:.3g} by {extents[1]:.3g} m"
@@ -87,37 +90,47 @@ def near_places(
     gaps = _near_grid(lambda nodes: gap(parameters(nodes)), steps, halvings, extents, wide)
     chosen = _lowest(gaps, outer.shape.closed, NOISE * size)
     chosen = chosen[gaps[tuple(chosen.T)] <= gaps.min() + wide]
-    if outer.shape.about_axis and low[0] == 0 and not alike[1] and np.any(chosen[:, 0] == 0):
+    poles = (
+        chosen[:, 0] == 0 if outer.shape.about_axis and low[0] == 0 and not alike[1] else np.zeros(len(chosen), bool)
+    )
+    if poles.any():
         # At a pole no direction leads anywhere: the search begins beside it, where the gap is least.
-        chosen = np.concatenate([chosen, [[1, int(np.argmin(gaps[1]))]]])
-    apart = np.where(alike, 0.0, (high - low) / steps)
-    at, gaps = _settled(outer, inner, gap, parameters(chosen), apart, extents.max(), NOISE * size)
+        chosen, poles = np.concatenate([chosen, [[1, int(np.argmin(gaps[1]))]]]), np.append(poles, False)
+    apart, noise = np.where(alike, 0.0, (high - low) / steps), NOISE * size
+    at, gaps = _settled(outer, inner, gap, parameters(chosen), apart, extents.max(), noise)
+    # A pole that is not nearer than where this leads is no place of its own.
+    kept = ~poles | (gaps < gaps[-1] - noise)
+    at, gaps = at[kept], gaps[kept]
     return _distinct(outer, at, gaps, SQRT_EPS * extents.max())
 
 
-def _near_grid(gap: Callable[[Indices], Array], steps: Indices, halvings: int, extents: Array, wide: float) -> Array:
+def _near_grid(
+    gap: Callable[[Indices], Array], steps: Indices, halvings: Indices, extents: Array, wide: float
+) -> Array:
     """Gaps on a grid of so many steps, infinite where they cannot be within a width of the least.
 
     From one place to another a gap changes by no more than their distance, so that the grid is made finer only where a
     place between those of a coarser one may be near.
     """
     found = np.full(steps + 1, np.inf)
-    stride = 2**halvings
-    axes = [np.arange(0, n + 1, stride) if n > 1 else np.zeros(1, dtype=int) for n in steps]
-    new = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
-    while True:
-        found[tuple(new.T)] = gap(new)
-        if stride == 1:
-            return found
-        reach = float(np.linalg.norm(extents * stride / np.maximum(steps, stride)))
+    strides = [np.minimum(2**halvings, 2**k) for k in range(halvings.max(), -1, -1)]
+    new = _mesh(np.arange(0, n + 1, stride) if n > 1 else [0] for n, stride in zip(steps, strides[0], strict=True))
+    found[tuple(new.T)] = gap(new)
+    for before, stride in pairwise(strides):
+        reach = float(np.linalg.norm(extents * before / np.maximum(steps, before)))
         near = np.argwhere(found <= found.min() + wide + reach)
-        stride //= 2
-        around = np.stack(
-            np.meshgrid(*[(-stride, 0, stride) if n > 1 else (0,) for n in steps], indexing="ij"), axis=-1
-        )
-        new = np.unique((near[:, None] + around.reshape(-1, 2)).reshape(-1, 2), axis=0)
+        halved = (stride < before) & (steps > 1)
+        around = _mesh((-s, 0, s) if finer else (0,) for s, finer in zip(stride, halved, strict=True))
+        new = np.unique((near[:, None] + around).reshape(-1, 2), axis=0)
         new = new[np.all((new >= 0) & (new <= steps), axis=1)]
         new = new[np.isinf(found[tuple(new.T)])]
+        found[tuple(new.T)] = gap(new)
+    return found
+
+
+def _mesh(axes: Iterable[ArrayLike]) -> Indices:
+    """All pairs (n, 2) of places along two axes."""
+    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
 
 
 def _extents(outer: Surface, low: Array, high: Array) -> Array:

@@ -134,15 +134,39 @@ def _rounded(x: Array, gap: float, found: Sequence[Extent], rtol: float) -> floa
     return least + NOISE * gap / left
 
 
-def pair_traction(x: Array, normals: Array, inner: Surface, laws: Sequence[PairEnergy], rtol: float) -> Array:
-    """Normal tractions (n,) [Pa], tension positive, at points (n, 3) of a surface from all points of another."""
-    found, together = np.zeros(len(x)), len(x) if is_round(inner.shape) else POINTS
-    for begin in range(0, len(x), together):
-        part = slice(begin, begin + together)
-        sums, _ = inner_sums(inner, x[part], laws, LAST, rtol)
-        for law, (_, push) in zip(laws, sums, strict=True):
-            found[part] += law.n_1 * law.n_2 * np.einsum("nc,nc->n", push, normals[part])
+def pair_traction(
+    x: Array, normals: Array, inner: Surface, laws: Sequence[PairEnergy], rtol: float, budget: Budget
+) -> Array:
+    """Normal tractions (n,) [Pa], tension positive, at points (n, 3) of a surface from all points of another.
+
+    InputError where the sums over the other surface take more than a ``budget``, of which each lot of points is an
+    integral.
+    """
+    found = np.zeros(len(x))
+    for part in lots(len(x), inner):
+        pushes = _pushes(x[part], inner, laws, rtol, budget)
+        found[part] = np.einsum("nc,nc->n", pushes, normals[part])
+        budget.done += 1
     return found
+
+
+def lots(count: int, inner: Surface) -> list[slice]:
+    """Parts of so many points that are summed together."""
+    together = count if is_round(inner.shape) else POINTS
+    return [slice(begin, begin + together) for begin in range(0, count, together)]
+
+
+def _pushes(x: Array, inner: Surface, laws: Sequence[PairEnergy], rtol: float, budget: Budget) -> Array:
+    """Forces per area (n, 3) on points (n, 3), by rules of higher and higher level until two in a row agree."""
+    before = None
+    for level in range(1, LAST + 1):
+        sums, pairs = inner_sums(inner, x, laws, level, rtol)
+        budget.take(pairs)
+        pushes = np.array([law.n_1 * law.n_2 * push for law, (_, push) in zip(laws, sums, strict=True)])
+        if before is not None and np.all(np.abs(pushes - before) <= rtol * np.linalg.norm(pushes, axis=-1)[..., None]):
+            break
+        before = pushes
+    return np.asarray(pushes.sum(axis=0))
 
 
 def check_finite(lower: Surface, upper: Surface) -> None:

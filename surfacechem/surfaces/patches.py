@@ -99,6 +99,10 @@ class Patches:
         u, v = np.broadcast_arrays(u[:, :, None], v[:, None, :])
         return self.points(np.stack([u, v], axis=-1), du[:, :, None] * dv[:, None, :])
 
+    def most(self, order: int) -> int:
+        """Points of a rule on each, at most; all patches are of one kind."""
+        return order**2
+
     def cost(self, order: int) -> int:
         """Pairs of points that take as long as finding those of a rule."""
         return 0 * order
@@ -227,8 +231,12 @@ def _patches(
     return Patches(outer, np.tile(at, (len(low), 1)), np.tile(scale, (len(low), 1)), low, high, alike)
 
 
+class OutOfReachError(InputError):
+    """An accuracy takes too many pairs of points."""
+
+
 class Budget:
-    """What integrals take together, at least so many of them, in pairs of points; InputError before it is too much."""
+    """What integrals take together, at least so many, in pairs of points; OutOfReachError before it is too much."""
 
     def __init__(self, rtol: float) -> None:
         """For an accuracy that messages name."""
@@ -239,16 +247,16 @@ class Budget:
         return ahead * max(1.0, self.integrals / max(self.done + 1, FIRST_FEW))
 
     def take(self, points: int) -> None:
-        """So many pairs of points are next; InputError where they are too many."""
+        """So many pairs of points are next; OutOfReachError where they are too many."""
         self.spent += points
         self.refuse_beyond(self.spent)
 
     def refuse_beyond(self, ahead: float) -> None:
-        """InputError where that is too much."""
+        """OutOfReachError where that is too much."""
         if self.whole(ahead) > MOST_POINTS:
             text = f"the accuracy {self.rtol:.2g} of an integral over the surfaces is out of reach"
             what = f"{self.integrals} of them take" if self.integrals > 1 else "it takes"
-            raise InputError(
+            raise OutOfReachError(
                 f"{text}: {what} {self.whole(ahead):.1g} pairs of points; ask for less, or smaller surfaces."
             )
 
@@ -259,6 +267,7 @@ class Rules:
     def __init__(self, integrand: Integrand, search: int, budget: Budget) -> None:
         """With the points that a projection to the other surface costs, and what they may take."""
         self.integrand, self.search, self.budget, self.points = integrand, search, budget, 0
+        self.each: dict[int, float] = {}  # pairs of points of one outer point, by the level inside
 
     def __call__(self, patches: Patches, levels: Levels, inside: Levels) -> Array:
         """Integrals (n, ...) over each patch, with the order of its level, and with that of another one inside."""
@@ -272,18 +281,20 @@ class Rules:
 
     def _of_order(self, patches: Patches, order: int, inside: int) -> Array:
         """The same by one rule."""
-        found, begin, batch = [], 0, 1
+        found, begin = [], 0
         while begin < len(patches):
-            part = patches[begin : begin + batch]
+            # One patch at first, as nobody knows yet how many pairs its points have.
+            each = self.each.get(inside, TOGETHER) * patches.most(order)
+            part = patches[begin : begin + max(1, int(TOGETHER / each))]
             x, area = part.nodes(order)
             values, together = self.integrand(x.reshape(-1, 3), inside)
             points = together + area.size * self.search + part.cost(order)
             found.append(np.einsum("nk...,nk->n...", values.reshape(*area.shape, *values.shape[1:]), area))
             self.points += points
             self.budget.spent += points + AT_ONCE
-            begin += batch
-            self.budget.refuse_beyond(self.budget.spent + points / len(part) * max(len(patches) - begin, 0))
-            batch = max(1, TOGETHER * len(part) // together)
+            begin += len(part)
+            self.budget.refuse_beyond(self.budget.spent + points / len(part) * (len(patches) - begin))
+            self.each[inside] = together / area.size
         return np.concatenate(found)
 
 

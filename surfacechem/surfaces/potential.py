@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from functools import cached_property, partial
+from functools import cache, cached_property, partial
 from pathlib import Path
 from typing import Any, Self
 
@@ -26,8 +26,8 @@ from surfacechem.expressions import Expression, derivative
 from surfacechem.surfaces.approach import ApproachEnergy, fitted, straight
 from surfacechem.surfaces.curved_gap import GAP, Contact, bends, between_flats, density, over_gap, passages
 from surfacechem.surfaces.inner_sums import kernel
-from surfacechem.surfaces.pairwise import PairForces, interaction, length, pair_traction
-from surfacechem.surfaces.patches import Budget
+from surfacechem.surfaces.pairwise import PairForces, interaction, length, lots, pair_traction
+from surfacechem.surfaces.patches import Budget, OutOfReachError
 from surfacechem.surfaces.projection import Array, Surface
 from surfacechem.tolerances import ATOM, FLOOR, NEGLIGIBLE, NOISE, ROUNDING, SQRT_EPS
 
@@ -214,6 +214,7 @@ class CurvedSurfaces(Potential):
         cuts = passages(*self.surfaces(0.0), levels)
         floor, spent = (0.0, 0.0), Budget(rtol)
 
+        @cache
         def of_gap(d: float) -> tuple[float, float, float]:
             pair = self.surfaces(d)
             contact = self.at_approach(d, lambda: over_gap(*pair, laws, levels, (), finer, floor, spent))
@@ -303,19 +304,31 @@ class CurvedSurfaces(Potential):
             floor = max(floor[0], NEGLIGIBLE * abs(found.energy)), max(floor[1], NEGLIGIBLE * force)
         return floor
 
-    @property
-    def sums_tractions(self) -> bool:
-        """Whether tractions of pairs are sums over body 2; over a rough one they are those of the local law."""
-        return bool(self.pairs) and math.isinf(self.shapes[1].grain)
+    def tractions(
+        self, x: Array, normals: Array, gaps: Array, approaches: Array, stretches: Array
+    ) -> tuple[Array, bool]:
+        """Normal tractions (k, n) on body 1 [Pa], tension positive, at points (n, 3) with normals and gaps (k, n) at
+        approaches (k,) with their stretches of the area; and whether those of pairs are sums over body 2: over a rough
+        one, or where they take more than their budget, they are those of the local law.
+        """
+        own, upper = [self.thinned(stretch) for stretch in stretches.tolist()], self.surfaces(0.0)[1]
 
-    def traction(self, x: Array, normals: Array, d: float) -> Array:
-        """Normal tractions (n,) on body 1 [Pa], tension positive, at points (n, 3) with normals at an approach."""
-        upper = self.surfaces(d)[1]
-        gap = upper.nearest(x).gap
-        found = np.zeros(len(x)) + sum(law(gap)[..., 1] for law in self._local(not self.sums_tractions))
-        if self.sums_tractions:
-            found += pair_traction(x, normals, upper, self.pairs, max(self.accuracy, FLOOR))
-        return np.asarray(found)
+        def local(pairs: bool) -> Array:
+            laws = [one._local(pairs) for one in own]
+            found = [sum((law(gap)[..., 1] for law in each), 0 * gap) for each, gap in zip(laws, gaps, strict=True)]
+            return np.array(found)
+
+        if not self.pairs or math.isfinite(self.shapes[1].grain):
+            return local(pairs=True), False
+        budget, summed, rtol = Budget(self.accuracy), [], max(self.accuracy, FLOOR)
+        budget.integrals = len(own) * len(lots(len(x), upper))
+        try:
+            for k, (one, d) in enumerate(zip(own, approaches.tolist(), strict=True)):
+                log.info("fields at output times", extra={"done": k, "total": len(own)})
+                summed.append(pair_traction(x, normals, replace(upper, approach=d), one.pairs, rtol, budget))
+        except OutOfReachError:
+            return local(pairs=True), False
+        return np.array(summed) + local(pairs=False), True
 
     def _local(self, pairs: bool) -> list[Callable[[Array], Array]]:
         return [*map(density, self.gap_laws), *(map(between_flats, self.pairs) if pairs else ())]

@@ -33,6 +33,15 @@ def test_without_an_axis_of_symmetry_the_traction_is_a_field(dataset):
     assert np.abs(drawn).max() == pytest.approx(np.abs(dataset.traction.values).max() / 1e6, rel=1e-12)
 
 
+def test_of_a_field_no_more_is_drawn_than_a_half_beyond_what_is_felt(dataset):
+    x, y = dataset.surface_x, dataset.surface_y
+    tilted = dataset.assign(gap=dataset.gap * (1 + 1e-3 * x / 1e-8), traction=1e6 * (x**2 + y**2 < 4e-9**2))
+    tilted["traction"] = tilted.traction.expand_dims(surface_time=dataset.surface_time)
+    ax = figure(tilted, ["traction"]).axes[1]
+    felt = float(x.where(tilted.traction[0] > 0).max())
+    assert [*ax.get_xlim(), *ax.get_ylim()] == pytest.approx([s * 1.5 * felt for s in (-1, 1, -1, 1)], rel=0.05)
+
+
 def test_the_far_side_of_a_closed_body_does_not_cover_the_near_one(dataset):
     whole = dataset.copy(deep=True)
     u, v = np.meshgrid(np.linspace(0, np.pi, dataset.sizes["u"]), np.linspace(0, 2 * np.pi, dataset.sizes["v"]))

@@ -14,7 +14,7 @@ from scipy.optimize import brentq, linprog
 import surfacechem
 from surfacechem import references
 from surfacechem.errors import InputError, Place
-from surfacechem.expressions import derivative
+from surfacechem.expressions import derivative, exp
 from surfacechem.laws.bonding import EquilibriumBonds
 from surfacechem.laws.contact import Penalty
 from surfacechem.laws.longrange import LennardJonesSpherePlane
@@ -433,9 +433,47 @@ class FourAndSix(InversePower):
         return self.psi_0 * ((self.r_0 / r) ** 6 - (self.r_0 / r) ** 4)
 
 
+class Screened(FourAndSix):
+    """A law of one's own that falls by decades over the gap."""
+
+    def energy(self, r):
+        """Energy of a pair [J]."""
+        return self.psi_0 * exp(-r / self.r_0)
+
+
+@pytest.mark.parametrize("gap", [0.099, 0.13])
+def test_a_law_that_falls_by_decades_within_a_table_is_integrated(gap):
+    """Over a sphere the force is that between the energies of flats at its near and its far end."""
+    law = Screened(n_1=1.0, n_2=1.0, psi_0=-1.0, r_0=1 / 400, m=4)
+    found = interaction(Surface(Sphere(R=1.0)), Surface(Plane(), True, gap), [law], 1e-10)
+    exact = 4 * math.pi**2 * math.exp(-400 * gap) * (gap / 400 + 1 / 400**2)
+    assert found.force_1[0, 2] == pytest.approx(exact, rel=1e-10)
+
+
 def test_a_law_that_falls_off_as_it_says_beside_a_steeper_part_is_integrated():
     numbers = {"n_1": 1.0, "n_2": 1.0, "r_0": 0.1}
     bodies = Surface(Sphere(R=1.0)), Surface(Plane(), True, 0.2)
     parts = [InversePower(psi_0=sign, m=m, **numbers) for sign, m in ((1.0, 6), (-1.0, 4))]
     (whole,) = interaction(*bodies, [FourAndSix(psi_0=1.0, m=4, **numbers)], 1e-8).force_1
     assert whole == pytest.approx(interaction(*bodies, parts, 1e-8).force_1.sum(axis=0), rel=1e-7, abs=1e-9)
+
+
+def test_fields_are_sums_to_the_accuracy_and_those_of_the_local_law_where_these_take_too_much(monkeypatch):
+    shapes = Sphere(R=1.0), Torus(hole=1.0, r=0.5, tilt=0.1)
+    law = InversePower(n_1=2.0, n_2=1.5, psi_0=-1.0, r_0=1.0, m=6)
+    pair = CurvedSurfaces(shapes=shapes, pairs=[law], approach=(0.5, 1.0), accuracy=1e-4)
+    u, v = np.linspace(0.1, 1.0, 20), np.linspace(0.0, 6.0, 20)
+    normals = np.stack([np.sin(u) * np.cos(v), np.sin(u) * np.sin(v), np.cos(u)], axis=-1)
+    x = normals - np.array([0.0, 0.0, 1.0])
+    approaches, stretches = np.array([0.5, 0.7]), np.array([1.0, 1.2])
+    gaps = np.array([pair.surfaces(d)[1].nearest(x).gap for d in approaches])
+    asked = x, normals, gaps, approaches, stretches
+    found, summed = pair.tractions(*asked)
+    fine, _ = replace(pair, accuracy=1e-9).tractions(*asked)
+    assert summed
+    assert 0 < np.abs(found / fine - 1).max() < 1e-4
+    flat = -2 * np.pi * 3.0 * gaps * -(gaps**-6) / stretches[:, None] ** 2
+    monkeypatch.setattr(patches, "MOST_POINTS", 20_000)
+    local, summed = pair.tractions(*asked)
+    assert not summed
+    assert local == pytest.approx(flat, rel=1e-12)

@@ -39,6 +39,15 @@ def test_a_second_place_that_is_as_near_counts_at_any_accuracy():
         assert found.force_1[0, 2] == pytest.approx(exact.force_1[0, 2], rel=rtol)
 
 
+def test_a_pole_beside_the_nearest_place_is_no_place_itself():
+    """At it no direction of the parameters leads anywhere, but the surface does."""
+    for tilt in (0.01, 0.0873, 0.3):
+        upper = Surface(Plane(length=3.0, width=2.0, tilt=tilt), True, 0.1)
+        found = near_places(Surface(Sphere(R=1.0)), upper, 3.0, (False, False))
+        assert found.gap == pytest.approx([1.1 * math.cos(tilt) - 1], rel=1e-12)
+        assert [found.at[0, 0], math.cos(found.at[0, 1])] == pytest.approx([tilt, -1], rel=1e-6)
+
+
 def test_every_summit_that_is_near_is_found_with_its_exact_gap():
     draw = np.random.default_rng(3)
     places = draw.uniform(1e-7, 9e-7, (5, 2))
