@@ -155,7 +155,7 @@ def _scene(case: cases.Case) -> Iterator[PageSection]:
     numbers = [
         (Typeset(symbols[p.path]), f"{p.at(0.0):.6g}", p.spec.unit, f"{p.spec.text} ({p.path})")
         for p in system.parameters
-        if p.changeable and p.path in symbols
+        if p.path in system.changeable and p.path in symbols
     ]
     table = PageTable(("symbol", "value", "unit", "meaning"), numbers, "Numbers")
     yield PageSection("Equations", tables=[table], equations=lines, details=True)

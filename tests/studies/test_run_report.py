@@ -93,6 +93,13 @@ def test_a_report_of_events_lists_them_with_verdicts(tmp_path):
         run_report.page(tmp_path / "bare.nc")
 
 
+def test_rates_that_cantera_gives_are_no_numbers_of_the_scene():
+    page = run_report.page(surfacechem.run("temperature-programmed-desorption").dataset)
+    (numbers,) = (table.rows for part in page.sections for table in part.tables if table.caption == "Numbers")
+    assert numbers
+    assert not [row for row in numbers if row[3].startswith("net rate, evaluated by Cantera")]
+
+
 def test_the_report_of_a_sweep_made_in_python_says_how_python_makes_it_again(tmp_path, monkeypatch):
     names = {"load": surfacechem.load, "recorded_plan": recorded_plan}
     dataset = surfacechem.load("exothermic").sweep({"initial.phi": [0.1, 0.2]}, changes={"initial.T": 290.0}).dataset
