@@ -51,8 +51,8 @@ class Function:
 
     def __call__(self, inputs: ArrayLike) -> NDArray[np.float64]:
         values = np.ascontiguousarray(inputs, dtype=float)
-        if not self.n_out:  # machine code of nothing cannot be called
-            return np.empty((*values.shape[:-1], 0))
+        if not (self.n_out and values.size):  # machine code of nothing cannot be called, nor on nothing
+            return np.empty((*values.shape[:-1], self.size))
         if not self.rest:
             return self._of_one(values) if values.shape == (self.n_in,) else np.asarray(self.keep(values))
         return np.concatenate([np.asarray(self.keep(values)), *(part(values) for part in self.rest)], axis=-1)

@@ -55,15 +55,18 @@ class Ends:
 def solvable(model: Model, plan: Plan, run: Run, problem: Problem) -> bool:
     """Whether runs of a plan differ in nothing but values of states and parameters: so that arrays tell all."""
     system = model.system
-    one_arc = model.jumper is None or len(problem.segments) == 2
+    # Loads that jump may have to be searched for, and a load that ends the runs is one ramp.
+    jumps = any(edge.times for edge in system.edges) or (plan.load and len(problem.segments) > 2)
     own = run.solver in (IMPLICIT, EXPLICIT) and run.max_seconds is None and model.program.filler is None
-    shared = model.passing.is_empty and not set(plan.paths) & set(system.cycles)
-    return own and shared and one_arc and not system.equilibria and _starts_as_given(system, set(plan.paths))
+    shared = model.passing.is_empty or not (plan.load or model.passing.reads & set(plan.paths))
+    shared = shared and not set(plan.paths) & set(system.cycles)
+    return own and shared and not jumps and not system.equilibria and _starts_as_given(system, set(plan.paths))
 
 
-def quiet(model: Model) -> bool:
-    """Whether the modes at the start of a run are the same whatever its values are."""
-    return all(mode.start is None for mode in model.system.modes)
+def quiet(model: Model, problem: Problem) -> bool:
+    """Whether runs may have no jumps: they are of one arc, and begin in the same modes whatever their values are."""
+    one_arc = model.jumper is None or len(problem.segments) == 2
+    return one_arc and all(mode.start is None for mode in model.system.modes)
 
 
 def _starts_as_given(system: System, swept: set[str]) -> bool:
@@ -76,6 +79,9 @@ def _starts_as_given(system: System, swept: set[str]) -> bool:
 
 class ArrayRuns:
     """Runs of a plan that :func:`solvable` says are arrays."""
+
+    jumps = False
+    """Whether runs go on behind their jumps."""
 
     def __init__(self, model: Model, plan: Plan, run: Run, changes: Mapping[str, float], keep: Keep) -> None:
         self.model, self.plan, self.run, self.keep = model, plan, run, keep
@@ -251,10 +257,11 @@ class ArrayRuns:
         system, outcome = model.system, batch.counts[:, END]
         ended, stopped = outcome == Status.FINISHED, outcome == Status.EVENT
         reason = np.full(len(outcome), self.reasons.index(self.reasons[0]), np.int16)
-        clear = ended | (stopped & (model.jumper is None))
-        if model.jumper is None and stopped.any():
+        whole = model.jumper is None or self.jumps
+        clear = ended | (stopped & whole)
+        if whole and stopped.any():
             self._stops(found, last, stopped, reason, clear)
-        elif model.jumper is not None:  # a gap that has closed unseen
+        elif not whole:  # a gap that has closed unseen
             first, gaps = len(model.margins), batch.ends[:, -model.program.n_margins :]
             returns = [first + j for j, edge in enumerate(system.edges) if edge.returns is not None]
             clear &= ~(gaps[:, returns] < -PICOMETRE).any(axis=1)
@@ -388,6 +395,8 @@ class ArrayRuns:
 class JumpingRuns(ArrayRuns):
     """Runs of a plan that arrays tell with their jumps."""
 
+    jumps = True
+
     @cached_property
     def stretches(self) -> Stretches:
         """What carries them from stretch to stretch."""
@@ -405,7 +414,10 @@ class JumpingRuns(ArrayRuns):
         if not len(own):
             return told, {}
         times = times if len(times) == 1 else times[own]
-        course = self.stretches.run(y0[own], table[own, 0], ends[own], times, ends[own] / self.run.samples)
+        segments = self.problem.segments[None]
+        if self.ramp is not None:
+            segments = np.column_stack([np.zeros(len(own)), ends[own]])
+        course = self.stretches.run(y0[own], table[own], segments, times, ends[own] / self.run.samples)
         clear, columns = self._columns(Ends(course, course.table, course.segments, times))
         clear &= course.told
         told[own[~clear]] = False

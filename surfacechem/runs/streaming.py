@@ -60,12 +60,11 @@ class ChunkRuns:
         self.one_by_one = RunByRun(self.model, keep)
         arrays = ArrayRuns(self.model, plan, self.run, changes, keep)
         told = solvable(self.model, plan, self.run, arrays.problem)
-        self.arrays = arrays if told else None
-        ways = [arrays] if told and quiet(self.model) else []
-        if told and self.model.jumper is not None:
-            ways.append(JumpingRuns(self.model, plan, self.run, changes, keep))
-        self.ways = ways
+        self.ways = [arrays] if told and quiet(self.model, arrays.problem) else []
+        if told and self.model.system.edges:
+            self.ways.append(JumpingRuns(self.model, plan, self.run, changes, keep))
         """How runs become arrays, in the order in which they are tried; the rest is looked at one by one."""
+        self.arrays = arrays if self.ways else None
 
     @cached_property
     def piece(self) -> int:

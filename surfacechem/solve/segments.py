@@ -98,6 +98,8 @@ class Passing:
             [j for j, p in enumerate(system.parameters) if any(p.symbol in x.free_symbols for x in (*turns, *places))],
             dtype=np.int64,
         )
+        self.reads = {system.parameters[j].path for j in self._columns}
+        """Paths of the parameters that they depend on."""
         self._function: Function | None = None
         if turns or places:
             symbols = [system.parameters[j].symbol for j in self._columns]

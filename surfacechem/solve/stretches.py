@@ -1,7 +1,8 @@
 """Many runs of a system with edges as arrays: all flow, all jump, until each has ended.
 
 It is what a hybrid run and its instant do, for all runs of a batch at once, as far as no gap has to be searched for and
-nothing rare happens: a run that is stopped, that chatters or that its method has lost is left to a run by itself.
+nothing rare happens: what chatters, what a jump leads beyond a limit and what its method has lost is left to a run by
+itself.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from surfacechem.solve.instant import ALOFT, AT_ONCE, FITTED, REACHED, velocity_
 from surfacechem.solve.jumps import Jumper, booked
 from surfacechem.solve.radau.solver import consistent, solve_arrays
 from surfacechem.solve.radau.stepper import END, EVENTS, FIRST_COUNTER, OUTPUTS, RECORDS, STOP
-from surfacechem.tolerances import BRIEF, CROSSED, MICROMETRE, PICOMETRE
+from surfacechem.tolerances import BRIEF, CROSSED, DIGITS, MICROMETRE, PICOMETRE
 
 ROOM = 64, 4, 0
 """Steps and events of an arc for which there is room at first: what needs more is solved once more with as much."""
@@ -54,7 +55,11 @@ class _Runs:
 
     inputs: Array
     """Time, states, rates and parameters: arguments of compiled functions, shape (runs, inputs)."""
-    end: Array
+    table: Array
+    """Parameters of each segment, shape (runs, segments, parameters)."""
+    breaks: Array
+    """Starts of the segments and the end of the last one, shape (runs, segments + 1)."""
+    segment: Index
     peaks: Array
     """Largest states seen, shape (runs, states)."""
     exchanged: Array
@@ -73,6 +78,11 @@ class _Runs:
     """Of all arcs that begin together the runs, and the inputs at their starts."""
     events: list[tuple[Index, Array]] = field(default_factory=list)
     records: list[tuple[Index, Array]] = field(default_factory=list)
+
+    @property
+    def end(self) -> Array:
+        """End of the segment that each run is in."""
+        return self.breaks[np.arange(len(self.segment)), self.segment + 1]
 
     def leave(self, own: Index) -> None:
         """Leave these to runs by themselves."""
@@ -98,16 +108,18 @@ class Stretches:
         self.start = self.given + next(j for j, p in enumerate(system.parameters) if p.path == START)
         self.origins = [self.given + j for j in system.origins]
 
-    def run(self, y0: Array, parameters: Array, ends: Array, times: Array, spacing: Array) -> Course:
-        """Runs from their states and parameters at time zero to their ends.
+    def run(self, y0: Array, table: Array, segments: Array, times: Array, spacing: Array) -> Course:
+        """Runs from their states at time zero through their segments, whose parameters are ``table``.
 
-        ``times`` are output times, shape (runs, outputs) or one row for all; ``spacing`` is that of looks at the
+        ``segments`` and output ``times`` have a row for each run, or one for all; ``spacing`` is that of looks at the
         equations, shape (runs,).
         """
         count, outputs = len(y0), times.shape[1]
         runs = _Runs(
-            inputs=np.concatenate([np.zeros((count, 1)), y0, np.zeros_like(y0), parameters], axis=1),
-            end=ends,
+            inputs=np.concatenate([np.zeros((count, 1)), y0, np.zeros_like(y0), table[:, 0]], axis=1),
+            table=table,
+            breaks=np.broadcast_to(segments, (count, segments.shape[1])),
+            segment=np.zeros(count, np.int64),
             peaks=np.repeat(velocity_scales(self.system)[None], count, axis=0),
             exchanged=np.zeros((count, self.accounts)),
             booked=np.zeros((count, self.accounts)),
@@ -151,7 +163,7 @@ class Stretches:
             due = self._due(now, playing, sizes, inputs, runs.jumped[own, -1])
             # Beyond a limit, or where edges follow each other without end, a run is looked at by itself.
             beyond = self.terminal & playing[:, limits] & (now[:, limits] < -self.slack * sizes[:, limits])
-            endless = runs.jumped[own, 0] >= t - REACHED * np.maximum(t, BRIEF * runs.end[own])
+            endless = runs.jumped[own, 0] >= t - REACHED * np.maximum(t, BRIEF * runs.breaks[own, -1])
             has_jumped = runs.jumped[own, -1] >= 0
             runs.leave(own[(has_jumped & beyond.any(axis=1)) | (due == UNKNOWN) | endless])
             jumps = runs.going[own] & (due != NONE)
@@ -194,7 +206,7 @@ class Stretches:
         """The next arc of all runs that go on, those in the same modes together."""
         own = np.flatnonzero(runs.going)
         inputs, t = runs.inputs[own], runs.inputs[own, 0]
-        length = runs.end[own] - t
+        goes_on, length = runs.segment[own] + 1 < runs.table.shape[1], self._length(runs, own)
         # What has just rebounded, and soon may again, has a piece of its own.
         since, back = runs.returning[own].T
         aloft = np.where(since == t, back, 0.0)
@@ -204,26 +216,33 @@ class Stretches:
         runs.arcs.append((own, inputs.copy()))
         inputs[:, self.start] = t
         inputs[:, self.origins] -= t[:, None]
-        kinds = np.column_stack([self.system.playing(inputs[:, self.given :]), soon])
+        kinds = np.column_stack([self.system.playing(inputs[:, self.given :]), goes_on, soon])
         for kind in np.unique(kinds, axis=0):
             alike = (kinds == kind).all(axis=1)
-            some, left = own[alike], self._left(runs, own[alike], times)
+            some, left = own[alike], self._left(runs, own[alike], times, length[alike])
             inside = [ALOFT * aloft[alike]] if kind[-1] else []
             segments = np.column_stack([np.zeros(len(some)), *inside, length[alike]])
             table = np.repeat(inputs[alike, None, self.given :], segments.shape[1] - 1, axis=1)
             peaks = np.concatenate([runs.exchanged[some], seen[alike]], axis=1)
-            problem = replace(self.problem, in_play=tuple(kind[:-1].tolist()), times=left[0])
+            problem = replace(self.problem, in_play=tuple(kind[:-2].tolist()), goes_on=bool(kind[-2]), times=left[0])
             y0 = inputs[alike, 1 : 1 + self.n]
             for which, batch in _solved(problem, y0, table, spacing[some], peaks, segments, left):
                 self._take(runs, some[which], batch)
 
-    def _left(self, runs: _Runs, own: Index, times: Array) -> Array:
-        """The outputs that runs have not reached yet, in the time of an arc; infinite where there are none left."""
+    def _length(self, runs: _Runs, own: Index) -> Array:
+        """How long arcs may last: not to a breakpoint that no load has, as a formula there is that of what follows."""
+        t, end, segment = runs.inputs[own, 0], runs.end[own], runs.segment[own]
+        following = np.minimum(segment + 1, runs.table.shape[1] - 1)
+        same = (following > segment) & (runs.table[own, segment] == runs.table[own, following]).all(axis=1)
+        return np.where(same, np.maximum(end - DIGITS * end, 0.5 * (t + end)), end) - t
+
+    def _left(self, runs: _Runs, own: Index, times: Array, length: Array) -> Array:
+        """The outputs of a segment not reached yet, in the time of an arc; infinite where there are none left."""
         written, most = runs.counts[own, OUTPUTS], times.shape[1]
         which = written[:, None] + np.arange(most - int(written.min()))
-        t, end = runs.inputs[own, 0], runs.end[own]
-        local = np.clip(times[own[:, None], np.minimum(which, most - 1)] - t[:, None], 0.0, (end - t)[:, None])
-        return np.where(which < most, local, np.inf)
+        found = times[own[:, None], np.minimum(which, most - 1)]
+        local = np.clip(found - runs.inputs[own, :1], 0.0, length[:, None])
+        return np.where((which < most) & (found <= runs.end[own, None]), local, np.inf)
 
     def _take(self, runs: _Runs, own: Index, batch: Any) -> None:
         """What the stepper has written of an arc, in the time and ledger of the run; then the edge at its end."""
@@ -239,9 +258,22 @@ class Stretches:
         runs.exchanged[own] = np.maximum(runs.exchanged[own], np.abs(runs.booked[own]))
         runs.peaks[own] = np.fmax(runs.peaks[own], np.abs(ends[:, 1 : 1 + self.n]))
         runs.ends[own], runs.inputs[own, : self.given] = ends, ends[:, : self.given]
-        runs.going[own] = event
         runs.leave(own[~(finished | event) | ~enough])
-        self._end(runs, own, batch)
+        self._end(runs, own, batch, event & runs.going[own])
+        self._begin(runs, own[runs.going[own] & (runs.inputs[own, 0] >= runs.end[own])])
+
+    def _begin(self, runs: _Runs, own: Index) -> None:
+        """The next segment of runs at the end of one, with the modes that hold; those without another have ended."""
+        over = runs.segment[own] + 2 == runs.breaks.shape[1]
+        runs.going[own[over]] = False
+        own = own[~over]
+        runs.segment[own] += 1
+        segment, modes = runs.segment[own], [self.given + j for j in self.jumper.mode_columns]
+        inputs = runs.inputs[own]
+        inputs[:, 0], inputs[:, 1 + self.n : self.given] = runs.breaks[own, segment], 0.0
+        inputs[:, self.given :] = runs.table[own, segment]
+        inputs[:, modes] = runs.inputs[own][:, modes]
+        runs.inputs[own] = inputs
 
     def _write(self, runs: _Runs, own: Index, batch: Any, t: Array) -> None:
         """Outputs, kinks and steps of an arc that began at these times."""
@@ -267,9 +299,9 @@ class Stretches:
         if self.keeps_steps:
             runs.records.append((own[i[later]], steps[later]))
 
-    def _end(self, runs: _Runs, own: Index, batch: Any) -> None:
+    def _end(self, runs: _Runs, own: Index, batch: Any, event: Mask) -> None:
         """Carry out the edges at which arcs have ended; of what else they end with a run tells by itself."""
-        index, at, event = batch.events[..., 0], batch.events[..., 1], runs.going[own]
+        index, at = batch.events[..., 0], batch.events[..., 1]
         every, count = np.arange(len(own)), batch.counts[:, EVENTS]
         happened = event[:, None] & (np.arange(index.shape[1]) < count[:, None])
         last = np.maximum(count, 1) - 1
@@ -279,11 +311,12 @@ class Stretches:
         unseen = np.zeros(len(own), dtype=bool)
         for j in self.returns:  # a gap that has closed
             unseen |= playing[:, j] & (margins[:, j] < -PICOMETRE) & ~(happened & (index == j)).any(axis=1)
-        runs.leave(own[unseen | limit.any(axis=1) | (ended < 0)])
-        event &= runs.going[own]
+        stopped = ended < 0
+        runs.leave(own[unseen | (limit.any(axis=1) & ~stopped)])
+        runs.going[own[stopped]], runs.counts[own[stopped], END] = False, Status.EVENT
+        event = event & runs.going[own]
         for edge in np.unique(ended[event]).tolist():
             self._apply(runs, own[event & (ended == edge)], edge)
-        runs.going[own] &= runs.inputs[own, 0] < runs.end[own]
 
     # -- all arcs of a run --------------------------------------------------------------------------------------------
 

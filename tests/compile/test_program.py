@@ -49,7 +49,9 @@ def test_machine_code_is_loaded_where_it_is_of_the_same_expressions(tmp_path, mo
 
 def test_unused_inputs_and_constants() -> None:
     x, y = se.symbols("x y")
-    np.testing.assert_array_equal(compile_function([x, y], [x, 3])([1.0, np.nan]), [1.0, 3.0])
+    function = compile_function([x, y], [x, 3])
+    np.testing.assert_array_equal(function([1.0, np.nan]), [1.0, 3.0])
+    assert function(np.empty((0, 2))).shape == (0, 2)
 
 
 def test_one_row_gives_the_bits_that_it_gives_among_others() -> None:
