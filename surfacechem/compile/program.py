@@ -106,6 +106,9 @@ class Chain:
 PIECE = 400
 """Expressions that are compiled at a time where there are many alike."""
 
+MANY = 50
+"""States of a network beyond which a second function of its rates takes longer to compile than any run gains by it."""
+
 
 @dataclass(frozen=True)
 class Program:

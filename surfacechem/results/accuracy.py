@@ -54,8 +54,9 @@ def relative_errors(values: Array, exact: Array, floor: float | Array) -> Array:
     >>> relative_errors(np.array([1.5, 2.0, 1e-9]), np.array([1.0, 2.0, 0.0]), 1e-6).tolist()
     [0.5, 0.0, 0.001]
     """
-    scale = np.maximum(np.abs(exact), floor)
-    return np.asarray(np.abs(values - exact) / np.where(scale > 0, scale, 1.0))
+    scale = np.asarray(np.maximum(np.abs(exact), floor))
+    scale[scale == 0] = 1.0
+    return np.asarray(np.abs(values - exact) / scale)
 
 
 def errors_over_time(

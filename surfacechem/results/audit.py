@@ -158,24 +158,22 @@ def residuals(system: System, named: Array, ledger: Array) -> Residuals:
     # Transitions at the very start come before the first output.
     ledger = ledger - ledger[..., :1, :]
 
-    def booked(*kinds: str) -> Array:
-        """Columns of the ledger, of accounts of these kinds."""
-        return accounts(system, ledger, *kinds)
+    def balance(total: str, parts: tuple[str, ...], supplies: tuple[str, ...], sinks: tuple[str, ...]) -> Any:
+        """What the supplies do not explain of the change of a total, and the most that its parts and all accounts
+        changed by.
+        """
+        found = named[..., [column[name] for name in (total, *parts) if name in column]]
+        found = found - found[..., :1, :]
+        own = [accounts(system, ledger, kind) for kind in (*supplies, *sinks)]
+        residual = found[..., 0]
+        for booked in own[: len(supplies)]:
+            residual = residual - booked.sum(axis=-1)
+        tables = np.concatenate([found[..., 1:], *own], axis=-1)
+        return residual, np.abs(tables).max(axis=(-2, -1), initial=0.0)
 
-    def changes(*names: str) -> Array:
-        """Changes of named quantities since the start."""
-        found = named[..., [column[name] for name in names if name in column]]
-        return found - found[..., :1, :]
-
-    def most(*tables: Array) -> Any:
-        return np.max([np.max(np.abs(table), axis=(-2, -1), initial=0.0) for table in tables], axis=0)
-
-    return Residuals(
-        changes("E_total")[..., 0] - booked("energy supply").sum(axis=-1),
-        changes("S_total")[..., 0] - booked("entropy supply").sum(axis=-1) - booked("entropy production").sum(axis=-1),
-        most(changes("U_1", "U_2", "U_c"), booked("energy supply", "dissipation")),
-        most(changes("S_1", "S_2", "S_c"), booked("entropy supply", "entropy production")),
-    )
+    energy, most_energy = balance("E_total", ("U_1", "U_2", "U_c"), ("energy supply",), ("dissipation",))
+    entropy, most_entropy = balance("S_total", ("S_1", "S_2", "S_c"), ("entropy supply", "entropy production"), ())
+    return Residuals(energy, entropy, most_energy, most_entropy)
 
 
 def accounts(system: System, ledger: Array, *kinds: str) -> Array:

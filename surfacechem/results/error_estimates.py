@@ -122,8 +122,10 @@ def against_exact(
     alike = _off_events(seen, max(late.values(), default=0.0))
     for values in exact.values():  # where a solution ends with an infinite slope its last moment has none
         alike &= np.isfinite(values.reshape(len(values), -1)).all(axis=1)
-    known = sizes(seen, named=exact.keys() - states(seen).keys())
-    ours, true, known = ({key: x[alike] for key, x in each.items()} for each in (computed(seen), exact, known))
+    ours, known = computed(seen), sizes(seen, named=exact.keys() - states(seen).keys())
+    if not alike.all():
+        ours, known = ({key: each[key][alike] for key in exact} for each in (ours, known))
+    true = exact if alike.all() else {key: values[alike] for key, values in exact.items()}
     errors = largest_errors(ours, true, known) | late
     return Accuracy(stated(errors), f"exact solution {name}", errors, exact)
 
@@ -268,14 +270,14 @@ def of_named(ours: Trajectory, theirs: Trajectory) -> dict[str, float]:
     return dict(zip(names, errors.tolist(), strict=True))
 
 
-def _changes(trajectory: Trajectory) -> Array:
-    """What named quantities change by within the time that has passed, at the rates of the outputs."""
+def _changes(trajectory: Trajectory, columns: list[int]) -> Array:
+    """What some named quantities change by within the time that has passed, at the rates of the outputs."""
     result = trajectory.result
     passed = SQRT_EPS * result.times
     y, segment = result.outputs + passed[:, None] * trajectory.rates, result.segments_at(result.times, result.segment)
     later = trajectory.at(States(result.times + passed, y, result.ledger_outputs, segment))
     with np.errstate(invalid="ignore"):
-        return np.asarray(np.abs(later.outputs - trajectory.outputs) / SQRT_EPS)
+        return np.asarray(np.abs(later.outputs[:, columns] - trajectory.outputs[:, columns]) / SQRT_EPS)
 
 
 def _compared(trajectory: Trajectory, also: Collection[str]) -> dict[str, Array]:
@@ -352,46 +354,49 @@ def sizes(trajectory: Trajectory, named: Collection[str] = ()) -> dict[str, Arra
     this part of itself, which is all that can be said near a zero; and that it is right to this part of its largest
     value at its own time, too, but for moments.
     """
-    system, result, least = trajectory.model.system, trajectory.result, state_floors(trajectory)
-    found: dict[str, Array] = {
-        profile.name: np.full((len(result.times), 1), max((least[state] for state in profile.states), default=0.0))
-        for profile in system.profiles
-    }
-    if named:
-        changes = dict(zip(system.output_columns, _changes(trajectory).T, strict=True))
-        largest = {name: np.full(len(result.times), size) for name, size in floors(trajectory).items() if name in named}
-        found |= {name: np.fmax(size, changes.get(name, 0.0)) for name, size in largest.items()}
-    end, speeds = trajectory.run.times[-1], np.abs(trajectory.rates)
-    for name, j in system.state_columns.items():
-        size, speed = np.maximum(np.abs(result.outputs[:, j]), least[name]), speeds[:, j]
-        most = np.where(size < BRIEF * end * speed, np.inf, size.max(initial=0.0))
-        found[name] = np.fmin(size + result.times * speed, most)
-        if trajectory.status == "finished":
-            found[name][-1:] = size[-1:]
-    return found
+    system, result, least = trajectory.model.system, trajectory.result, _state_floors(trajectory)
+    found: dict[str, Array] = {}
+    for profile in system.profiles:
+        floor = max((float(least[system.state_columns[state]]) for state in profile.states), default=0.0)
+        found[profile.name] = np.full((len(result.times), 1), floor)
+    if own := {name: column for name, column in system.output_columns.items() if name in named}:
+        columns = [*own.values()]
+        largest = np.abs(trajectory.outputs[:, columns]).max(axis=0, initial=0.0)
+        found |= zip(own, np.fmax(largest, _changes(trajectory, columns)).T, strict=True)
+    if len(own) < len(named):
+        found |= {
+            name: np.full(len(result.times), np.abs(values).max(initial=0.0))
+            for name, values in exchanged(trajectory).items()
+            if name in named
+        }
+    end, speed, size = trajectory.run.times[-1], np.abs(trajectory.rates), np.maximum(np.abs(result.outputs), least)
+    most = np.where(size < BRIEF * end * speed, np.inf, size.max(axis=0, initial=0.0))
+    whole = np.fmin(size + result.times[:, None] * speed, most)
+    if trajectory.status == "finished":
+        whole[-1:] = size[-1:]
+    return found | dict(zip(system.state_columns, whole.T, strict=True))
 
 
 def floors(trajectory: Trajectory) -> dict[str, float]:
     """Sizes below which errors are relative to these: of states, and of named quantities and accounts their largest
     value.
     """
-    system, found = trajectory.model.system, state_floors(trajectory)
+    system = trajectory.model.system
+    found = dict(zip(system.state_columns, _state_floors(trajectory).tolist(), strict=True))
     found |= {p.name: max((found[state] for state in p.states), default=0.0) for p in system.profiles}
     others = dict(zip(system.output_columns, trajectory.outputs.T, strict=True)) | exchanged(trajectory)
     largest = {name: float(np.max(np.abs(values), initial=0.0)) for name, values in others.items()}
     return largest | found
 
 
-def state_floors(trajectory: Trajectory) -> dict[str, float]:
+def _state_floors(trajectory: Trajectory) -> Array:
     """Size of each state at which its absolute tolerance is as much as the relative one, and at most its scale."""
-    system = trajectory.model.system
-    scales = np.array([state.scale for state in system.states])
+    scales = trajectory.model.scales
     least = np.minimum(trajectory.result.problem.atol / trajectory.run.rtol, scales)
     # What never exceeds the last digit of its scale is nothing, however tight the absolute tolerance: a species that no
     # reaction makes has a coverage of rounding.
     never = np.abs(trajectory.result.outputs).max(axis=0, initial=0.0) < EPS * scales
-    least = np.where(never, np.maximum(least, EPS * scales), least)
-    return {state.name: size for state, size in zip(system.states, least.tolist(), strict=True)}
+    return np.asarray(np.where(never, np.maximum(least, EPS * scales), least))
 
 
 def difference(found: Mapping[str, Array], expected: Mapping[str, Array]) -> str:

@@ -113,14 +113,15 @@ def _choose_sides(
     whether a run still has it.
     """
     times = run.result.times
-    moments = np.union1d(run.result.problem.segments[1:-1], [jump.t for jump in run.jumps])
-    around = np.pad(moments, 1, constant_values=np.inf)
-    k = np.searchsorted(moments, times)
-    near = np.minimum(np.abs(times - around[k]), np.abs(around[k + 1] - times)) <= SIDE * times
-    for way in (-SIDE, SIDE, -side, side) if near.any() else ():
-        _take_nearer(exact, solution(times[near] * (1 + 2 * way)), run, near)
-    if near[-1]:
-        return
+    moments = np.array([*run.result.problem.segments[1:-1], *(jump.t for jump in run.jumps)])
+    if len(moments):
+        around = np.concatenate([[-np.inf], np.unique(moments), [np.inf]])
+        k = np.searchsorted(around, times)
+        near = np.minimum(times - around[k - 1], around[k] - times) <= SIDE * times
+        for way in (-SIDE, SIDE, -side, side) if near.any() else ():
+            _take_nearer(exact, solution(times[near] * (1 + 2 * way)), run, near)
+        if near[-1]:
+            return
     jumped = {
         name: np.array([close])
         for name, (close, far) in ((name, values.tolist()) for name, values in before_end.items())

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from surfacechem.compile.program import Program
+from surfacechem.compile.program import MANY, Program
 from surfacechem.solve import ASKING
 from surfacechem.solve.contract import Problem
 from surfacechem.tolerances import TIGHTEST
@@ -13,9 +13,6 @@ STIFF = 1e3
 """Length of a run in units of its fastest relaxation above which it is stiff from the start: some two hundred explicit
 steps, at the limit of their stability, cost what the implicit ones of a smooth run do.
 """
-
-MANY = 50
-"""States of a network beyond which a second function of its rates takes longer to compile than any run gains by it."""
 
 
 def method(problem: Problem, moves: bool) -> tuple[str, str]:

@@ -140,6 +140,17 @@ class Problem:
         return {**vars(self), "program": None}
 
 
+def among(t: Array, times: Array) -> Mask:
+    """Which of some times are among others, which are in order.
+
+    >>> among(np.array([3.0, 1.0, 2.5]), np.array([1.0, 2.0, 3.0])).tolist()
+    [True, True, False]
+    """
+    if not len(times):
+        return np.zeros(len(t), bool)
+    return np.asarray(times[np.minimum(np.searchsorted(times, t), len(times) - 1)] == t)
+
+
 class Counters(NamedTuple):
     """What a run cost."""
 
@@ -229,7 +240,7 @@ class Result:
             return t, y, ledger, np.zeros(len(t), np.int64)
         segment = self.segments_at(t)
         if self.inside is not None:  # what is added at a breakpoint is its other side
-            segment[len(t) - len(self.inside.t) :] += np.isin(self.inside.t, self.problem.segments[1:-1])
+            segment[len(t) - len(self.inside.t) :] += among(self.inside.t, self.problem.segments[1:-1])
         return t, y, ledger, segment
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import operator
 import time
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -21,7 +22,7 @@ from surfacechem.model.system import System
 from surfacechem.solve import ASKING, AUTO, solver
 from surfacechem.solve import segments as pieces
 from surfacechem.solve.choice import EXPLICIT, method
-from surfacechem.solve.contract import Array, Index, Margin, Mask, Problem, Result, Solver, States, Status
+from surfacechem.solve.contract import Array, Index, Margin, Mask, Problem, Result, Solver, States, Status, among
 from surfacechem.solve.diagnose import ROUNDED, are_led_back, cause
 from surfacechem.solve.equilibria import Equilibria, Point
 from surfacechem.solve.hybrid import Flow, Hybrid, solve_together, without_stall
@@ -129,7 +130,8 @@ class Trajectory:
     def at(self, rows: States) -> Trajectory:
         """The trajectory with these states at its outputs."""
         t, y, ledger, segment = rows
-        result = replace(self.result, times=t, outputs=y, ledger_outputs=ledger, segment=segment)
+        result = copy(self.result)
+        result.times, result.outputs, result.ledger_outputs, result.segment = t, y, ledger, segment
         return replace(self, result=result)
 
     def at_times(self, times: Sequence[float] | Array) -> Trajectory:
@@ -159,8 +161,10 @@ class Trajectory:
         t = np.minimum(rows.t, self.run.times[-1])  # the last step may end beyond it by rounding
         kept = np.diff(t, prepend=-1.0) > 0  # of two sides of a moment the first, which an output has, too
         if (result.known or result.inside) is not None and result.steps is not None:
-            kept &= np.isin(rows.t, result.steps.t) | ~np.isin(rows.t, result.times)
+            kept &= among(rows.t, result.steps.t) | ~among(rows.t, result.times)
         assert rows.segment is not None
+        if kept.all():
+            return self.at(rows._replace(t=t))
         return self.at(States(t[kept], rows.y[kept], rows.ledger[kept], rows.segment[kept]))
 
     @cached_property
@@ -294,6 +298,8 @@ class Model:
             reads = compile_function(inputs, [system.expand(expression) for expression in outside.reads])
             filler = Filler(reads, positions, outside.engine)
         self.system = system
+        self.scales = np.array([state.scale for state in system.states])
+        """Sizes of the states that count."""
         self.margins = system.moving_margins
         """The margins that can close on the way; the rest is checked at the start only."""
         program = compile_program(
