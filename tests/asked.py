@@ -48,8 +48,8 @@ def settings(times, accuracy: float) -> Run:
 
 def achieved(trajectory: Trajectory, error: float, source: str) -> Achieved:
     steps = trajectory.result.counters.steps
-    known, result = error_estimates.state_floors(trajectory), trajectory.result
-    size = np.maximum(np.abs(result.outputs), [known[name] for name in trajectory.model.system.state_columns])
+    result = trajectory.result
+    size = np.maximum(np.abs(result.outputs), error_estimates.state_floors(trajectory))
     rounding = float(np.max(EPS * np.abs(trajectory.rates) * result.times[:, None] / size))
     return Achieved(error, rounding, steps, trajectory.run.rtol, source)
 

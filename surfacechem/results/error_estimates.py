@@ -354,7 +354,7 @@ def sizes(trajectory: Trajectory, named: Collection[str] = ()) -> dict[str, Arra
     this part of itself, which is all that can be said near a zero; and that it is right to this part of its largest
     value at its own time, too, but for moments.
     """
-    system, result, least = trajectory.model.system, trajectory.result, _state_floors(trajectory)
+    system, result, least = trajectory.model.system, trajectory.result, state_floors(trajectory)
     found: dict[str, Array] = {}
     for profile in system.profiles:
         floor = max((float(least[system.state_columns[state]]) for state in profile.states), default=0.0)
@@ -382,14 +382,14 @@ def floors(trajectory: Trajectory) -> dict[str, float]:
     value.
     """
     system = trajectory.model.system
-    found = dict(zip(system.state_columns, _state_floors(trajectory).tolist(), strict=True))
+    found = dict(zip(system.state_columns, state_floors(trajectory).tolist(), strict=True))
     found |= {p.name: max((found[state] for state in p.states), default=0.0) for p in system.profiles}
     others = dict(zip(system.output_columns, trajectory.outputs.T, strict=True)) | exchanged(trajectory)
     largest = {name: float(np.max(np.abs(values), initial=0.0)) for name, values in others.items()}
     return largest | found
 
 
-def _state_floors(trajectory: Trajectory) -> Array:
+def state_floors(trajectory: Trajectory) -> Array:
     """Size of each state at which its absolute tolerance is as much as the relative one, and at most its scale."""
     scales = trajectory.model.scales
     least = np.minimum(trajectory.result.problem.atol / trajectory.run.rtol, scales)

@@ -8,6 +8,7 @@ between two states that are known, the run is made again from one to the other.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -47,34 +48,36 @@ def needed(t: Array, values: Array, allowed: Array, kept: Mask) -> Mask:
     """
     kept = kept.copy()
     kept[[0, -1]] = True
-    scaled = np.divide(values, allowed, out=np.zeros_like(values), where=allowed > 0)
+    scaled = np.divide(values.T, allowed[:, None], out=np.zeros(values.shape[::-1]), where=allowed[:, None] > 0)
+    ways = t, np.log(np.maximum(t, t[t > 0].min(initial=1.0)))
     rows = np.flatnonzero(~kept)
     while len(rows):
         ends = np.flatnonzero(kept)
         right = np.searchsorted(ends, rows)
-        left = ends[right - 1]
-        missed = _missed(t, scaled, left, rows, ends[right])
+        left, right = ends[right - 1], ends[right]
+        missed = _missed(ways, scaled, left, rows, right)
+        begins = np.flatnonzero(np.diff(left, prepend=-1))
+        most, counts = np.maximum.reduceat(missed, begins), np.diff(begins, append=len(rows))
         # The worst row of each interval that is missed; what lies in the others is not looked at again.
-        order = np.lexsort((missed, left))
-        worst = order[np.append(np.diff(left[order]) > 0, True)]
-        worst = worst[missed[worst] > 1]
-        kept[rows[worst]] = True
-        again = np.isin(left, left[worst])
+        again = np.repeat(most > 1, counts)
+        worst = np.flatnonzero(again & (missed == np.repeat(most, counts)))
+        kept[rows[worst[np.diff(left[worst], append=len(t)) > 0]]] = True
         # Where all swings are alike the worst is next to an end each time: halves come to an end, too.
-        middle = (rows == (left + ends[right]) // 2) & (ends[right] - left > LONG)
+        middle = (rows == (left + right) // 2) & (right - left > LONG)
         kept[rows[again & middle]] = True
         rows = rows[again & ~kept[rows]]
     return kept
 
 
-def _missed(t: Array, values: Array, left: Index, rows: Index, right: Index) -> Array:
-    """By how much lines from one row to another miss rows between them, over time or its logarithm, at worst."""
-    missed = np.zeros(len(rows))
-    for over in (t, np.log(np.maximum(t, t[t > 0].min(initial=1.0)))):
+def _missed(ways: Sequence[Array], values: Array, left: Index, rows: Index, right: Index) -> Array:
+    """By how much lines from one row to another miss rows between them at worst, the one way or the other: over time or
+    its logarithm; ``values`` has shape (quantities, times).
+    """
+    start, rise, missed = values[:, left], values[:, right] - values[:, left], np.zeros(len(rows))
+    for over in ways:
         length = over[right] - over[left]
         part = np.divide(over[rows] - over[left], length, out=np.zeros_like(length), where=length > 0)
-        line = values[left] + part[:, None] * (values[right] - values[left])
-        missed = np.fmax(missed, np.abs(values[rows] - line).max(axis=1, initial=0.0))
+        missed = np.fmax(missed, np.abs(values[:, rows] - (start + part * rise)).max(axis=0, initial=0.0))
     return missed
 
 

@@ -82,6 +82,15 @@ def test_explicit_steps_go_on_implicitly_from_where_a_problem_is_stiff() -> None
     np.testing.assert_allclose(mild.outputs, exothermic_exact(smooth.times), rtol=1e-10)
 
 
+def test_rates_by_their_formula_are_those_of_the_linear_systems(monkeypatch) -> None:
+    result = radau.solve(exothermic_problem(1e-8))
+    program, times, y = result.problem.program, result.times, result.outputs
+    assert program.rates is not None
+    solved = consistent(program, times, y, np.zeros_like(y), result.problem.parameters[0])
+    monkeypatch.delattr("surfacechem.solve.radau.stepper.run")  # nothing is solved
+    np.testing.assert_allclose(output_rates(result), solved.ydot, rtol=4e-15)
+
+
 def test_output_rates_come_from_the_equations() -> None:
     result = radau.solve(exothermic_problem(1e-10))
     np.testing.assert_allclose(output_rates(result)[:, 1], 2.0 * np.exp(-2.0 * result.times), rtol=1e-7)
