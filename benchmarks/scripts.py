@@ -5,9 +5,9 @@
 The script is what a person would write: a Python function of the rates with the numbers of the case in it, one call of
 LSODA for each piece of the loads. It knows neither error, balances nor events, which `run` tells; both are compared at
 the output times of the case, as the largest error of a state relative to its largest value. The loosest tolerance of
-LSODA counts that is as good as ours; where none is, the tightest, which is marked. Kept in benchmarks/results/scripts.csv:
-milliseconds of CPU time, errors, and how many times longer the script takes. Cases that such a script cannot solve are
-listed with the reason.
+LSODA counts that is as good as ours; where none is, the tightest, which is marked. Milliseconds of CPU time, errors,
+and how many times longer the script takes are kept in benchmarks/results/scripts.csv. Cases that such a script cannot
+solve are listed with the reason.
 """
 
 import argparse
@@ -54,6 +54,8 @@ def obstacle(simulation: Simulation, solution: Solution) -> str:
         return "some states are algebraic"
     if program.chains:
         return "heat is conducted in cells"
+    if not system.states:
+        return "nothing evolves"
     if solution.trajectory.jumps:
         return f"{len(solution.trajectory.jumps)} jumps, each to be located and carried out"
     return "" if program.rates is not None else "the equations determine their rates together"
@@ -116,6 +118,7 @@ def measured(name: str) -> list[str]:
 
 
 def main() -> None:
+    """Measure the cases and keep the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", nargs="?", type=Path, default=Path(__file__).parent / "results")
     parser.add_argument("--cases", default=",".join(names()))

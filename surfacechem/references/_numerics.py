@@ -10,7 +10,9 @@ Sources: McCurdy, Ng & Parlett (1984), Math. Comp. 43, 501-528 (differences); Ab
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +37,10 @@ NEAR = 60
 
 Rate = Callable[[Array, Array], Array]
 """Rate at which the distance covered grows, from the distances to the start and to the end; positive between them."""
+
+
+gauss = cache(np.polynomial.legendre.leggauss)
+"""Points and weights of Gauss on [-1, 1], so many; nothing writes to them."""
 
 
 def increasing_root(
@@ -77,7 +83,7 @@ def short_integral(function: Callable[[Array], Array], upper: Array) -> Array:
     >>> f"{float(short_integral(np.exp, np.array(1e-20))):.14e}"
     '1.00000000000000e-20'
     """
-    nodes, weights = np.polynomial.legendre.leggauss(10)
+    nodes, weights = gauss(10)
     return np.asarray(0.5 * upper * (function(0.5 * np.multiply.outer(upper, 1.0 + nodes)) @ weights))
 
 
@@ -91,7 +97,7 @@ class Separable:
 
     def __init__(self, rate: Rate, length: float, hard: Sequence[float] = ()) -> None:
         self.rate, self.length = rate, length
-        self.nodes, self.weights = np.polynomial.legendre.leggauss(POINTS)
+        self.nodes, self.weights = gauss(POINTS)
         half = 0.5 * length
         steps = half * 0.5 ** np.arange(1.0, NEAR)
         edges = []
@@ -137,6 +143,9 @@ class Separable:
         rest = self.length - distance
         return np.where(from_end, rest, distance), np.where(from_end, distance, rest)
 
+
+INVERSE_FACTORIALS = [1.0 / math.factorial(k) for k in range(2, 21)]
+"""1/2!, 1/3!, ...: within [-1, 1] the first of those left out is 1/21! = 2e-20."""
 
 SERIES_TERMS = 22
 """Of the second difference for arguments within [-1, 0]; those left out begin with 23 / 24! = 4e-23."""
@@ -184,13 +193,13 @@ def remainder(q: Array) -> Array:
     >>> float(remainder(np.array(1e-9)))
     4.999999998333333e-19
     """
-    p = np.abs(q)
-    near = np.minimum(p, 1.0)
-    falling = near**2 * second_difference(np.zeros_like(near), -near)
-    rising = near**2 * np.exp(near) * second_difference(-near, -near)
+    near = np.clip(q, -1.0, 1.0)
+    series = np.full(near.shape, INVERSE_FACTORIALS[-1])
+    for coefficient in INVERSE_FACTORIALS[-2::-1]:
+        series = coefficient - near * series
     with np.errstate(over="ignore"):
-        far = np.where(q < -40.0, np.exp(p), np.expm1(-np.maximum(q, -40.0)) + q)
-    return np.where(p < 1.0, np.where(q < 0.0, rising, falling), far)
+        far = np.where(q < -40.0, np.exp(np.abs(q)), np.expm1(-np.maximum(q, -40.0)) + q)
+    return np.where(np.abs(q) < 1.0, near**2 * series, far)
 
 
 def scaled_expint(n: int, x: Array) -> Array:
@@ -201,8 +210,7 @@ def scaled_expint(n: int, x: Array) -> Array:
     """
     from scipy.special import expn
 
-    near, far = np.minimum(x, FAR), np.maximum(x, FAR)
-    return np.where(x < FAR, np.exp(near) * expn(n, near), _asymptotic(n, far))
+    return _pieced(x, FAR, lambda near: np.exp(near) * expn(n, near), lambda far: _asymptotic(n, far))
 
 
 def scaled_Ei(x: Array) -> Array:
@@ -213,8 +221,16 @@ def scaled_Ei(x: Array) -> Array:
     """
     from scipy.special import expi
 
-    near, far = np.minimum(x, FAR_EI), np.maximum(x, FAR_EI)
-    return np.where(x < FAR_EI, np.exp(-near) * expi(near), -_asymptotic(1, -far))  # Ei(x) = -E_1(-x)
+    # Ei(x) = -E_1(-x)
+    return _pieced(x, FAR_EI, lambda near: np.exp(-near) * expi(near), lambda far: -_asymptotic(1, -far))
+
+
+def _pieced(x: Array, edge: float, near: Callable[[Array], Array], far: Callable[[Array], Array]) -> Array:
+    """Two formulas, below an edge and from there on, each evaluated where it holds alone."""
+    x = np.asarray(x)
+    found, below = np.empty(x.shape), x < edge
+    found[below], found[~below] = near(x[below]), far(x[~below])
+    return found
 
 
 def _asymptotic(n: int, x: Array) -> Array:

@@ -33,7 +33,7 @@ HELD = 1e300
 
 
 def inverted(image: Callable[[Complex], Complex], t: Array) -> Array:
-    """The function of times t > 0 whose Laplace transform is ``image``.
+    """The function of times t > 0 whose Laplace transform is ``image``, which may have more axes beside those of t.
 
     >>> bool(abs(inverted(lambda s: 1 / (s + 2), np.array([0.5]))[0] - np.exp(-1)) < 1e-12)
     True
@@ -41,11 +41,11 @@ def inverted(image: Callable[[Complex], Complex], t: Array) -> Array:
     angle = (2 * np.arange(NODES // 2) + 1) * np.pi / NODES
     path = NODES * (0.5017 * angle / np.tan(0.6407 * angle) - 0.6122 + 0.2645j * angle)
     slope = NODES * (0.5017 / np.tan(0.6407 * angle) - 0.5017 * 0.6407 * angle / np.sin(0.6407 * angle) ** 2 + 0.2645j)
-    result = np.zeros(t.shape)
+    result: Any = 0.0
     for z, weight in zip(path, np.exp(path) * slope, strict=True):
         # The other half of the contour is the complex conjugate.
-        result += 2 * np.imag(weight * image(z / t) / t) / NODES
-    return result
+        result = result + 2 * np.imag(weight * image(z / t) / t) / NODES
+    return np.asarray(result)
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ class ConductingSlab:
     h_far: float = 0.0
     T_far: float = 0.0
 
-    def answer(self, s: Complex, x: float = 0.0) -> tuple[Complex, Complex]:
+    def answer(self, s: Complex, x: Array | float = 0.0) -> tuple[Complex, Complex]:
         """Temperature at x per heat flux into the contact, and less the initial one where nothing enters there."""
         if not self.C:
             return np.zeros_like(s), np.zeros_like(s)
@@ -157,13 +157,12 @@ class ConductingSlabs(Reference):
         """Temperatures of a body at distances from the contact [m], shape (times, places)."""
         body, sign = self.bodies[number - 1], 1.0 if number == 2 else -1.0
         values = np.full((t.size, x.size), body.T)
-        for j, place in enumerate(x.tolist()):
 
-            def rise(s: Complex, place: float = place) -> Complex:
-                heated, unheated = body.answer(s, place)
-                return unheated + sign * self._flux(s) * heated
+        def rise(s: Complex) -> Complex:
+            heated, unheated = body.answer(s, x)
+            return unheated + sign * self._flux(s) * heated
 
-            values[t > 0, j] += inverted(rise, t[t > 0])
+        values[t > 0] += inverted(rise, t[t > 0, None])
         return values
 
 

@@ -11,12 +11,9 @@ import numpy as np
 from surfacechem.contracts.terms import parameter
 from surfacechem.errors import InputError
 from surfacechem.references._bodies import UniformBody
-from surfacechem.references._numerics import increasing_root
+from surfacechem.references._numerics import gauss, increasing_root
 from surfacechem.references.base import Array, Parameters, Quantities, Reference, SceneView, read
 from surfacechem.references.semenov_fold import scaled_rise
-
-GRID = 200
-"""Gaps whose times give the first guess of the gap at a time."""
 
 PANEL = 0.25
 """Length of a panel in arsinh of the distance from the fold; the poles of 1 / cosh are pi / 2 away, so that
@@ -224,22 +221,31 @@ class OverdampedPullOff(SpringAndZone):
 
     def quantities(self, t: Array) -> Quantities:
         low, high = np.full_like(t, self.g_i), np.full_like(t, self.end_gap)
-        first, last = np.arcsinh((np.array([self.g_i, self.end_gap]) - self.fold.g) / self.width)
-        grid = self.fold.g + self.width * np.sinh(np.linspace(first, last, GRID))
-        guess = np.where(t > 0, np.interp(t, self._times(grid), grid), low)
+        edges, times = self._panels
+        guess = np.where(t > 0, np.interp(t, times, self.fold.g + self.width * np.sinh(edges)), low)
         g = increasing_root(lambda x: (self._times(x), self.c / self._force(x - self.fold.g)), t, low, high, guess)
         return {"g_n": g, "t_n": self.traction(g), "v_n": self._force(g - self.fold.g) / self.c}
 
     def _times(self, g: Array) -> Array:
-        """Integral of c dg / force over panels in arsinh of the distance from the fold."""
-        start, ends = math.asinh((self.g_i - self.fold.g) / self.width), np.arcsinh((g - self.fold.g) / self.width)
-        panels = max(1, math.ceil(float(np.max(ends) - start) / PANEL))
-        nodes, weights = np.polynomial.legendre.leggauss(16)
-        edges = start + np.multiply.outer(ends - start, np.arange(panels) / panels)
-        step = ((ends - start) / panels)[:, None, None]
-        u = edges[:, :, None] + 0.5 * step * (1.0 + nodes)
-        rates = self.c * self.width * np.cosh(u) / self._force(self.width * np.sinh(u))
-        return np.asarray(np.sum(0.5 * step * weights * rates, axis=(1, 2)))
+        """Integral of c dg / force, over the panels that end before and over a part of the next."""
+        edges, times = self._panels
+        ends = np.arcsinh((g - self.fold.g) / self.width)
+        j = np.clip(np.searchsorted(edges, ends, side="right") - 1, 0, len(edges) - 1)
+        return np.asarray(times[j] + self._elapsed(edges[j], ends))
+
+    @cached_property
+    def _panels(self) -> tuple[Array, Array]:
+        """Edges of panels in arsinh of the distance from the fold, in widths, and the times there [s]."""
+        first, last = np.arcsinh((np.array([self.g_i, self.end_gap]) - self.fold.g) / self.width)
+        edges = np.linspace(first, last, 1 + max(1, math.ceil((last - first) / PANEL)))
+        return edges, np.append(0.0, np.cumsum(self._elapsed(edges[:-1], edges[1:])))
+
+    def _elapsed(self, first: Array, last: Array) -> Array:
+        """Time between two points of a panel."""
+        nodes, weights = gauss(16)
+        half = 0.5 * (last - first)[:, None]
+        u = first[:, None] + half * (1.0 + nodes)
+        return np.asarray(half * self.c * self.width * np.cosh(u) / self._force(self.width * np.sinh(u)) @ weights)
 
     def _force(self, distance: Array) -> Array:
         """Driving traction [Pa] at a distance from the gap of the fold."""
