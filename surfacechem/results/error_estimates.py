@@ -165,9 +165,10 @@ def closer(trajectory: Trajectory, known: bool = False) -> Run:
     """The run that tells the error of another: at another tolerance, looked at elsewhere and more often, with outputs
     also where the two are compared; ``known`` inside its steps, too, where it may be handed out.
     """
-    run = trajectory.run.second(second_tolerance(trajectory.run.rtol))
-    run = replace(run, times=tuple(np.union1d(run.times, trajectory.looked.result.times).tolist()))
-    return run if known else replace(run, picture=None, looks=0.0)
+    run, seen = trajectory.run, trajectory.looked.result.times
+    times = tuple(np.union1d(run.times, seen).tolist())
+    inside = {} if known else {"picture": None, "looks": 0.0}
+    return run.second(second_tolerance(run.rtol), times=times, **inside)
 
 
 def _second(trajectory: Trajectory, known: bool = False) -> Trajectory:

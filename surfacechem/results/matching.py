@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from surfacechem import references
 from surfacechem.errors import InputError
+from surfacechem.model.system import System
 from surfacechem.references._bodies import ConstantCapacity, QuadraticEnergy
 from surfacechem.references.base import Reference, SceneView
 from surfacechem.results.event_table import SIDE
@@ -154,10 +155,13 @@ def match(kind: type[Reference], options: Mapping[str, float], view: SceneView) 
     values, told = dict(options), kind.from_scene(view)
     for item in dataclasses.fields(kind):  # type: ignore[arg-type]
         found, spec = told.get(item.name), item.metadata["spec"]
-        if found is None and item.name not in values and item.default is dataclasses.MISSING:
-            raise InputError(f"it needs {item.name} ({spec.text}), which the scene has not.")
-        if found is not None and not _same(values.setdefault(item.name, found), found, 0.0):
-            ours, theirs = (f"{value:.9g} {spec.unit}" for value in (found, values[item.name]))
+        if found is None:
+            if item.name not in values and item.default is dataclasses.MISSING:
+                raise InputError(f"it needs {item.name} ({spec.text}), which the scene has not.")
+        elif item.name not in options:
+            values[item.name] = found
+        elif not _same(options[item.name], found, 0.0):
+            ours, theirs = (f"{value:.9g} {spec.unit}" for value in (found, options[item.name]))
             raise InputError(f"it is given for {item.name} = {theirs}; the scene has {ours}.")
     return kind(**values)
 
@@ -201,18 +205,22 @@ def _with_profiles(reference: Reference, exact: Mapping[str, Array], scene: Scen
 def renamed(exact: Mapping[str, Array], run: Trajectory) -> dict[str, Array]:
     """Exact values under the names of the scene; those it does not have are left out."""
     system = run.model.system
-    known = system.state_columns | system.output_columns
-    stands_for = {
-        "T": [s.name for s in system.states if s.is_temperature and s.name not in system.inside],
-        "R_c": [name for name in known if name.startswith("R_")],
-        "sigma_chem": [f"sigma_{name[2:]}" for name in known if name.startswith("R_")],
-    }
+    states, outputs = system.state_columns, system.output_columns
     result = {}
     for name, values in exact.items():
-        candidates = [name] if name in known else stands_for.get(name, [])
-        if len(candidates) == 1:
+        if name in states or name in outputs:
+            result[name] = values
+        elif len(candidates := _standing_for(name, system)) == 1:
             result[candidates[0]] = values
     return result
+
+
+def _standing_for(name: str, system: System) -> list[str]:
+    """Names in a scene of what an exact solution calls otherwise."""
+    if name == "T":
+        return [state.name for state in system.states if state.is_temperature and state.name not in system.inside]
+    rates = [own for own in (*system.state_columns, *system.output_columns) if own.startswith("R_")]
+    return {"R_c": rates, "sigma_chem": [f"sigma_{own[2:]}" for own in rates]}.get(name, [])
 
 
 def _check_start(exact: Mapping[str, Array], run: Trajectory) -> None:

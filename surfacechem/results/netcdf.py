@@ -85,6 +85,7 @@ class Column:
         return result | ({"equation": self.tag} if self.tag else {}) | told
 
 
+@cache
 def cf_unit(unit: str) -> str:
     """A unit of this package in the notation of the CF conventions.
 

@@ -90,7 +90,7 @@ class Run:
                 f"rtol must lie in (0, 1), and atol must be finite and not negative: {self.rtol:g}, {self.atol}."
             )
 
-    def second(self, rtol: float) -> Run:
+    def second(self, rtol: float, **others: Any) -> Run:
         """The run that tells the error of this one: at another tolerance, the absolute one in proportion, and with more
         looks at the equations, elsewhere; of explicit steps by implicit ones, which do not share their blindness.
 
@@ -98,15 +98,17 @@ class Run:
         ----------
         rtol
             The other relative tolerance.
+        others
+            What else differs.
 
         Returns
         -------
         Run
-            The same outputs at that tolerance.
+            The same but for that.
         """
         atol = None if self.atol is None else self.atol * rtol / self.rtol
         used = OWN if self.solver == EXPLICIT else self.solver
-        return replace(self, rtol=rtol, atol=atol, solver=used, samples=CLOSER * self.samples)
+        return replace(self, rtol=rtol, atol=atol, solver=used, samples=CLOSER * self.samples, **others)
 
 
 @dataclass(frozen=True)
@@ -168,9 +170,16 @@ class Trajectory:
         return self.at(States(t[kept], rows.y[kept], rows.ledger[kept], rows.segment[kept]))
 
     @cached_property
+    def _inputs(self) -> Array:
+        """Arguments of compiled functions at the output times."""
+        result = self.result
+        return self.model.inputs(result, result.times, result.outputs, output_rates(result), result.segment)
+
+    @property
     def rates(self) -> Array:
         """Time derivatives of the states at the output times, shape (times, states)."""
-        return output_rates(self.result)
+        n = len(self.model.system.states)
+        return self._inputs[:, 1 + n : 1 + 2 * n]
 
     @cached_property
     def roundings(self) -> dict[str, float]:
@@ -179,17 +188,16 @@ class Trajectory:
 
     def felt(self, changes: Array) -> dict[str, float]:
         """By how much changes of one state at a time, shape (times, states), change each named quantity at most."""
-        result, system, times = self.result, self.model.system, self.result.times
+        model, system, times = self.model, self.model.system, self.result.times
         # No flux reads one of the states inside bodies alone but the first, and those are not named.
         own = [j for j, state in enumerate(system.states) if state.name not in system.inside]
         together = max(1, AT_ONCE // max(len(times), 1))
         worst = np.zeros(self.outputs.shape[1])
         for some in (own[first : first + together] for first in range(0, len(own), together)):
-            nudged = np.array([result.outputs] * len(some))
-            nudged[range(len(some)), :, some] += changes.T[some]
-            rows = nudged.reshape(-1, len(system.states)), np.concatenate([self.rates] * len(some))
-            segment = None if result.segment is None else np.tile(result.segment, len(some))
-            values = self.model.evaluate(result, np.tile(times, len(some)), *rows, segment)
+            rows = np.array([self._inputs] * len(some))
+            for nudged, j in zip(rows, some, strict=True):
+                nudged[:, 1 + j] += changes[:, j]
+            values = model.named(rows.reshape(len(some) * len(times), -1))
             with np.errstate(invalid="ignore"):  # quantities may be infinite, whatever the last bit is
                 apart = np.abs(values.reshape(len(some), *self.outputs.shape) - self.outputs)
                 worst = np.fmax(worst, np.fmax.reduce(apart.max(axis=1, initial=0.0)))
@@ -222,8 +230,7 @@ class Trajectory:
     @cached_property
     def outputs(self) -> Array:
         """Named quantities at the output times, shape (times, outputs)."""
-        result = self.result
-        return self.model.evaluate(result, result.times, result.outputs, self.rates, result.segment)
+        return self.model.named(self._inputs.copy() if self.model.program.filler else self._inputs)
 
 
 def values_of(system: System, changes: Mapping[str, float] | None = None) -> dict[str, float]:
@@ -528,10 +535,13 @@ class Model:
         ndarray
             Shape (n, outputs).
         """
-        inputs = self.inputs(result, t, y, ydot, segment)
-        return (
-            self.output_function(self.program.filled(inputs)) if len(t) else np.empty((0, self.output_function.n_out))
-        )
+        return self.named(self.inputs(result, t, y, ydot, segment))
+
+    def named(self, inputs: Array) -> Array:
+        """Named quantities at arguments of compiled functions, which are filled in place."""
+        if not len(inputs):
+            return np.empty((0, self.output_function.n_out))
+        return self.output_function(self.program.filled(inputs))
 
     def inputs(
         self, result: Result, t: Array, y: Array, ydot: Array, segment: NDArray[np.int64] | None = None
