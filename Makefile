@@ -65,6 +65,7 @@ mutation: $(TOOLS)  ## each sign of balances, assembly and laws is changed, and 
 bench: $(TOOLS)  ## time against error of every solver beside what was kept in benchmarks/results, and where time goes
 	$(BIN)/python benchmarks/steppers.py
 	$(BIN)/python benchmarks/startup.py
+	$(BIN)/python benchmarks/scripts.py
 	$(BIN)/python benchmarks/accuracy.py
 	$(BIN)/python benchmarks/surfaces.py
 

@@ -392,7 +392,7 @@ def floors(trajectory: Trajectory) -> dict[str, float]:
 
 def state_floors(trajectory: Trajectory) -> Array:
     """Size of each state at which its absolute tolerance is as much as the relative one, and at most its scale."""
-    scales = trajectory.model.scales
+    scales = np.array([state.scale for state in trajectory.model.system.states])
     least = np.minimum(trajectory.result.problem.atol / trajectory.run.rtol, scales)
     # What never exceeds the last digit of its scale is nothing, however tight the absolute tolerance: a species that no
     # reaction makes has a coverage of rounding.

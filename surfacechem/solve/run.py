@@ -305,8 +305,6 @@ class Model:
             reads = compile_function(inputs, [system.expand(expression) for expression in outside.reads])
             filler = Filler(reads, positions, outside.engine)
         self.system = system
-        self.scales = np.array([state.scale for state in system.states])
-        """Sizes of the states that count."""
         self.margins = system.moving_margins
         """The margins that can close on the way; the rest is checked at the start only."""
         program = compile_program(
