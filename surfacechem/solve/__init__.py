@@ -8,6 +8,7 @@ ValueError: no solver 'radua'. Did you mean 'radau'? Known: bdf, cantera, cvode,
 
 import ast
 import re
+from functools import cache
 from importlib import import_module
 from pathlib import Path
 
@@ -33,6 +34,7 @@ _OWN = {"radau": "Radau", "dop853": "Dop853"}
 names = (*_OWN, *sorted(_ADAPTERS, key=lambda name: name in ASKING))
 
 
+@cache
 def solver(name: str) -> Solver:
     """The solver of this name; 'radau' is our own and the default."""
     if name not in names:

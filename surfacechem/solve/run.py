@@ -394,7 +394,7 @@ class Model:
             parameters=parameters,
             rtol=run.rtol,
             atol=scales * (run.atol if run.atol is not None else NONE_OF_SCALE * run.rtol),
-            margins=self._guards(),
+            margins=self._guards,
             max_steps=run.max_steps,
             max_seconds=run.max_seconds,
             record_steps=True,
@@ -411,6 +411,7 @@ class Model:
             raise InputError(message, path="mechanics")
         return settled.y, np.where(settled.parameters != parameters[0], settled.parameters, parameters)
 
+    @cached_property
     def _guards(self) -> tuple[Margin, ...]:
         """How a solver meets the zeros of limits, and behind them of the guards of edges."""
         limits = (Margin.peak() if m.peak else Margin.stop() if m.terminal else Margin.restart() for m in self.margins)
@@ -465,7 +466,9 @@ class Model:
                 f"`solver: {ASKING[0]}` under `run`.",
                 path="run.solver",
             )
-        pairs = [(replace(each, solver=run.solver), values) for each, values in runs]
+        pairs = [
+            (each if each.solver == run.solver else replace(each, solver=run.solver), values) for each, values in runs
+        ]
         # A limit in seconds is one of each run by itself.
         groups = [[pair] for pair in pairs] if run.max_seconds else [pairs]
         return [done for group in groups for done in self._solve_together(used, group, threads, nudged)]
