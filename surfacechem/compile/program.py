@@ -13,12 +13,14 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property, lru_cache, partial
 from importlib.metadata import version
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import symengine
 from numpy.typing import ArrayLike, NDArray
 
+from surfacechem import expressions as calculus
 from surfacechem.compile.cache import processor
 from surfacechem.compile.preparing import PREPARING
 from surfacechem.documents.cache_folder import cache_root, from_file
@@ -219,21 +221,54 @@ def compile_function(
         starts = range(0, len(expressions), pieces)
         parts = [_machine_code(tuple(inputs), tuple(expressions[start : start + pieces]), 0) for start in starts]
         return replace(parts[0], rest=tuple(parts[1:]))
+    return _machine_code(tuple(inputs), tuple(expressions), _level(len(expressions), steps))
+
+
+def _level(count: int, steps: bool) -> int:
     # Of many expressions LLVM makes little more at its highest level than at its first, in twice the time.
-    level = 0 if not steps else 3 if len(expressions) < PIECE else 1
-    return _machine_code(tuple(inputs), tuple(expressions), level)
+    return 0 if not steps else 3 if count < PIECE else 1
+
+
+@dataclass(frozen=True)
+class _Derivatives:
+    """What a Jacobian without chains is made from: to load its code, what it is differentiated from is enough."""
+
+    residual: tuple[Any, ...]
+    states: tuple[Any, ...]
+    rates: tuple[Any, ...]
+    named: tuple[tuple[Any, Any], ...]
+
+    def __len__(self) -> int:
+        return 2 * len(self.states) * len(self.rates)
+
+    def __iter__(self) -> Iterator[Any]:
+        return iter(_entries(self.residual, self.states, self.rates, (), self.named))
+
+    def origins(self) -> list[str]:
+        """All that the entries follow from, as text."""
+        names = [part for pair in self.named for part in pair]
+        return [*_differentiation(), *written((*self.states, *self.rates, *names, *self.residual))]
 
 
 @lru_cache(maxsize=128)  # a scene that is loaded again, or differs in numbers alone, has the same expressions
 @PREPARING
-def _machine_code(inputs: tuple[Any, ...], expressions: tuple[Any, ...], opt_level: int) -> Function:
-    make = partial(symengine.Lambdify, list(inputs), list(expressions), backend="llvm", cse=True, opt_level=opt_level)
+def _machine_code(inputs: tuple[Any, ...], expressions: tuple[Any, ...] | _Derivatives, opt_level: int) -> Function:
+    def make() -> Any:
+        return symengine.Lambdify(list(inputs), list(expressions), backend="llvm", cse=True, opt_level=opt_level)
+
     # Code is loaded in a tenth of the time that it takes to make.
-    mark = hashlib.sha256("\n".join((*_here(), str(opt_level), *written((*inputs, *expressions)))).encode())
+    origins = expressions.origins() if isinstance(expressions, _Derivatives) else written(expressions)
+    mark = hashlib.sha256("\n".join((*_here(), str(opt_level), *written(inputs), *origins)).encode())
     code = from_file(cache_root() / "code" / mark.hexdigest()[:32], make, pickle.loads, pickle.dumps)
     function, user = code.as_ctypes()
     address = ctypes.cast(function, ctypes.c_void_p).value
     return Function(int(address or 0), int(user.value), len(inputs), len(expressions), code)
+
+
+@cache
+def _differentiation() -> list[str]:
+    """The sources by which is differentiated."""
+    return [hashlib.sha256(Path(file).read_bytes()).hexdigest() for file in (__file__, calculus.__file__)]
 
 
 @cache
@@ -356,10 +391,14 @@ def compile_program(
         raise ValueError(f"{counts}: a system needs as many equations as states, and one derivative a state.")
     inputs = [t, *states, *derivatives, *parameters]
     n, core = len(states), chains[0].first if chains else len(states)
-    entries = _entries(residual, states, derivatives, chains, named)
-    by_rate = entries[core * core : 2 * core * core]
     pieces = PIECE if chains else None
+    if chains:
+        slopes = compile_function(inputs, _entries(residual, states, derivatives, chains, named), pieces, steps=True)
+    else:
+        parts = _Derivatives(tuple(residual), tuple(states), tuple(derivatives), tuple(needed(named, residual)))
+        slopes = _machine_code(tuple(inputs), parts, _level(len(parts), steps=True))
     residual, ledger, margins = (expanded(named, rows) for rows in (residual, ledger, margins))
+    known = {symbol for row in residual[:core] for symbol in row.free_symbols}
     read = {symbol for margin in margins for symbol in margin.free_symbols}
     outside = {inputs[j] for j in filler.positions} if filler else set()
     return Program(
@@ -368,10 +407,10 @@ def compile_program(
         n_ledger=len(ledger),
         n_margins=len(margins),
         residual=compile_function(inputs, residual, pieces, steps=True),
-        jacobian=compile_function(inputs, entries, pieces, steps=True),
+        jacobian=slopes,
         ledger=compile_function(inputs, ledger, pieces, steps=True) if ledger else None,
         margins=compile_function(inputs, margins, pieces, steps=True) if margins else None,
-        algebraic=tuple(all(entry == 0 for entry in by_rate[j::core]) for j in range(core)) + (False,) * (n - core),
+        algebraic=tuple(rate not in known for rate in derivatives[:core]) + (False,) * (n - core),
         filler=filler,
         chains=tuple(chains),
         solved=partial(_compiled_rates, inputs, residual, derivatives, chains),

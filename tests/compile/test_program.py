@@ -47,6 +47,21 @@ def test_machine_code_is_loaded_where_it_is_of_the_same_expressions(tmp_path, mo
     np.testing.assert_array_equal(made(tenth, x + y), first)
 
 
+def test_the_code_of_a_jacobian_is_loaded_without_differentiating(tmp_path, monkeypatch) -> None:
+    monkeypatch.setenv("SURFACECHEM_CACHE", str(tmp_path))
+    t, x, dx, r = se.symbols("t x dx r")
+
+    def made(power: int) -> list[float]:
+        program._machine_code.cache_clear()  # as in another process
+        return compile_program(t, [x], [dx], [], [dx + r], named=[(r, x**power)]).jacobian([0.0, 3.0, 0.0]).tolist()
+
+    assert made(2) == [6.0, 1.0]
+    with monkeypatch.context() as patch:
+        patch.setattr(program, "_entries", lambda *_: pytest.fail("differentiated again"))
+        assert made(2) == [6.0, 1.0]
+    assert made(3) == [27.0, 1.0]
+
+
 def test_unused_inputs_and_constants() -> None:
     x, y = se.symbols("x y")
     function = compile_function([x, y], [x, 3])
