@@ -370,6 +370,21 @@ def _entries(
     return expanded(names, entries)
 
 
+def _slopes(
+    inputs: Sequence[Any],
+    residual: Sequence[Any],
+    states: Sequence[Any],
+    rates: Sequence[Any],
+    chains: Sequence[Chain],
+    named: Named,
+) -> Function:
+    """The code of the Jacobian."""
+    if chains:
+        return compile_function(inputs, _entries(residual, states, rates, chains, named), PIECE, steps=True)
+    parts = _Derivatives(tuple(residual), tuple(states), tuple(rates), tuple(needed(named, residual)))
+    return _machine_code(tuple(inputs), parts, _level(len(parts), steps=True))
+
+
 def compile_program(
     t: Any,
     states: Sequence[Any],
@@ -392,11 +407,7 @@ def compile_program(
     inputs = [t, *states, *derivatives, *parameters]
     n, core = len(states), chains[0].first if chains else len(states)
     pieces = PIECE if chains else None
-    if chains:
-        slopes = compile_function(inputs, _entries(residual, states, derivatives, chains, named), pieces, steps=True)
-    else:
-        parts = _Derivatives(tuple(residual), tuple(states), tuple(derivatives), tuple(needed(named, residual)))
-        slopes = _machine_code(tuple(inputs), parts, _level(len(parts), steps=True))
+    slopes = _slopes(inputs, residual, states, derivatives, chains, named)
     residual, ledger, margins = (expanded(named, rows) for rows in (residual, ledger, margins))
     known = {symbol for row in residual[:core] for symbol in row.free_symbols}
     read = {symbol for margin in margins for symbol in margin.free_symbols}
