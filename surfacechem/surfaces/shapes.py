@@ -376,18 +376,30 @@ class Wavy(Plane):
 
     def starts(self, x: Array) -> tuple[Indices, Array]:
         """The nearest of some places of the half wave that the points are in, and its mirror images in the crest or
-        trough that is nearer: a place beyond these has an image that is nearer than itself.
+        trough that is nearer: a place beyond these has an image that is nearer than itself. That image is none where an
+        edge cuts the half wave off: the one farther in has places, too, and so have its crests and troughs.
         """
-        waves, ends = self.waves, np.transpose(self.span)
-        at = np.clip(x[..., :2], *ends)
-        along, rest = np.split(at, [len(waves)], axis=-1)
+        waves, (low, high) = self.waves, np.transpose(self.span)
+        count = len(waves)
+        along = np.clip(x[:, :count], low[:count], high[:count])
         crest = waves * np.round(along / waves)
         side = np.where(along < crest, -1.0, 1.0)
-        own = side * (x[..., : len(waves)] - crest)
-        near = self.nodes.data[self.nodes.query(np.concatenate([own, x[..., 2:]], axis=-1))[1]][..., :-1]
-        image = np.where(own < waves / 4, -near, waves - near)
-        found = [crest + side * np.where(chosen, image, near) for chosen in product((False, True), repeat=len(waves))]
-        return _each([np.clip(np.concatenate([place, rest], axis=-1), *ends) for place in found])
+        outside, trough = (np.abs(place) > high[:count] for place in (crest, crest + side * waves / 2))
+        which, found = [], []
+        for inner in map(np.array, product((False, True), repeat=count)):
+            asked = np.flatnonzero(np.all(~inner | outside | trough, axis=-1))
+            middle = np.where(inner & outside, crest + side * waves, crest)[asked]
+            turn = np.where(inner, -side, side)[asked]
+            own, rest = turn * (x[asked, :count] - middle), x[asked, count:2]
+            near = self.nodes.data[self.nodes.query(np.column_stack([own, x[asked, 2]]))[1]][:, :-1]
+            image = np.where(own < waves / 4, -near, waves - near)
+            pairs = [(near, image), *([(0.0 * near, waves / 2)] if inner.any() else [])]
+            for (one, other), chosen in product(pairs, product((False, True), repeat=count)):
+                place = middle + turn * np.where(chosen, other, one)
+                found.append(np.clip(np.concatenate([place, rest], axis=-1), low, high))
+                which.append(asked)
+        order = np.argsort(np.concatenate(which), kind="stable")
+        return np.concatenate(which)[order], np.concatenate(found)[order]
 
 
 class Heights(Shape):

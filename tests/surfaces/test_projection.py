@@ -9,7 +9,7 @@ from scipy.spatial import KDTree
 
 from surfacechem.errors import InputError
 from surfacechem.laws import find
-from surfacechem.surfaces.projection import Surface
+from surfacechem.surfaces.projection import FIRST, Surface
 from surfacechem.surfaces.shapes import (
     Cap,
     Cavity,
@@ -180,3 +180,18 @@ def test_a_body_bulges_or_is_hollow_by_its_curvature():
 def test_what_is_no_surface_is_refused(make, message):
     with pytest.raises(InputError, match=message):
         make()
+
+
+@pytest.mark.parametrize(
+    "shape",
+    [
+        Wavy(amplitude=0.1, wavelength=1.0, wavelength_2=0.8, length=4.0, width=3.0),
+        Wavy(amplitude=0.3, wavelength=0.9, wavelength_2=1.2, length=0.7, width=3.9),
+    ],
+)
+def test_no_place_is_nearer_than_the_nearest_where_edges_cut_waves_off(shape):
+    surface, (low, high) = Surface(shape), np.transpose(shape.span)
+    grid = np.stack(np.meshgrid(*np.linspace(low, high, 301).T, indexing="ij"), axis=-1)
+    points = np.random.default_rng(18).uniform([*1.1 * low, -1.5], [*1.1 * high, 1.5], (2000, 3))
+    dense, _ = KDTree(surface.derivatives(grid, FIRST)[0].reshape(-1, 3)).query(points)
+    assert np.all(np.abs(surface.nearest(points).gap) <= dense * (1 + 1e-12))
