@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from functools import cache, cached_property, lru_cache, partial
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import symengine
@@ -24,7 +24,10 @@ from surfacechem import expressions as calculus
 from surfacechem.compile.cache import processor
 from surfacechem.compile.preparing import PREPARING
 from surfacechem.documents.cache_folder import cache_root, from_file
-from surfacechem.expressions import gradient
+from surfacechem.expressions import derivative, gradient
+
+if TYPE_CHECKING:
+    from surfacechem.compile.vectors import LaneFunction
 
 CODE = ctypes.PYFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
 """The C signature of machine code, for calls from Python with addresses."""
@@ -94,6 +97,16 @@ class Filler:
 
 
 @dataclass(frozen=True)
+class Lanes:
+    """The code of a program for eight cases at once: rates of states and accounts, and margins, by time, state and
+    parameters alone.
+    """
+
+    rates: "LaneFunction"
+    margins: "LaneFunction"
+
+
+@dataclass(frozen=True)
 class Chain:
     """States from ``first`` to before ``end``, each coupled to its neighbours only, the first one to ``anchor``.
 
@@ -135,6 +148,8 @@ class Program:
     """Per quadrature: errors of a group are measured by its largest, 0 to 2; -1 for what steps need not serve."""
     solved: Callable[[], Function | None] = lambda: None
     """Makes the code of the rates by themselves; None where the equations do not give them one after another."""
+    laned: Callable[[], Lanes | None] = lambda: None
+    """Makes the code for eight cases at once; None where there is none for it."""
     plain_margins: bool = False
     """Whether margins read neither derivatives nor what comes from outside."""
 
@@ -166,6 +181,22 @@ class Program:
     def rates(self) -> Function | None:
         """The rates by time, state and parameters alone, compiled when they are first asked for."""
         return self.solved()
+
+    @cached_property
+    def lanes(self) -> Lanes | None:
+        """The code for eight cases at once, compiled when it is first asked for."""
+        return self.laned()
+
+    @cached_property
+    def lane_tables(self) -> tuple[NDArray[Any], ...]:
+        """What steps of eight cases at once read of a program: its sizes (states, accounts, margins, inputs, columns
+        that are integrated); else as the other tables.
+        """
+        assert self.lanes is not None
+        sizes = self.n, self.n_ledger, self.n_margins, self.n_inputs, self.n + self.n_ledger
+        functions = None, None, None, self.lanes.margins, self.lanes.rates
+        code = [(f.address if f else 0, 0, which, 0) for which, f in enumerate(functions)]
+        return np.array(sizes, np.int64), np.array(code, np.int64), *self.tables[2:]
 
     @cached_property
     def explicit_tables(self) -> tuple[NDArray[Any], ...]:
@@ -425,6 +456,7 @@ def compile_program(
         filler=filler,
         chains=tuple(chains),
         solved=partial(_compiled_rates, inputs, residual, derivatives, chains),
+        laned=partial(_compiled_lanes, inputs, residual, derivatives, chains, (ledger, margins)),
         plain_margins=not read & {*derivatives, *outside},
     )
 
@@ -436,6 +468,27 @@ def _compiled_rates(
     """The code of the rates; none where there are chains."""
     rates = None if chains else solved_rates(residual, derivatives)
     return compile_function(inputs, rates, steps=True) if rates else None
+
+
+def _compiled_lanes(
+    inputs: Sequence[Any],
+    residual: Sequence[Any],
+    derivatives: Sequence[Any],
+    chains: Sequence[Chain],
+    others: Sequence[Sequence[Any]],
+) -> Lanes | None:
+    """The code for eight cases at once; none where the equations do not give their rates by themselves."""
+    from surfacechem.compile.vectors import compile_lanes
+
+    rates = None if chains else solved_rates(residual, derivatives)
+    if not rates:
+        return None
+    known = list(zip(derivatives, rates, strict=True))
+    ledger, margins = (expanded(known, rows) for rows in others)
+    try:
+        return Lanes(compile_lanes(inputs, [*rates, *ledger]), compile_lanes(inputs, margins))
+    except NotImplementedError:  # a function without vector code
+        return None
 
 
 def solved_rates(residual: Sequence[Any], rates: Sequence[Any]) -> list[Any] | None:
@@ -453,7 +506,7 @@ def solved_rates(residual: Sequence[Any], rates: Sequence[Any]) -> list[Any] | N
         if found is None:
             return None
         rate, row = unknown[found][0], rows.pop(found)
-        named.append((rate, -row.xreplace({rate: 0}) / row.diff(rate)))
+        named.append((rate, -row.xreplace({rate: 0}) / derivative(row, rate)))
         del left[rate]
     return expanded(named, rates)
 

@@ -407,7 +407,7 @@ class RunSection(Section):
     )
     solver: str | None = key(
         OneOf("solver", lambda: (solvers.AUTO, *sorted(solvers.names))),
-        f"integrator; {OWN} if not given, {solvers.AUTO} with `accuracy`",
+        f"integrator; {OWN} if not given, {solvers.AUTO} with `accuracy` and for sweeps into a store",
     )
     max_steps: int = key(Whole(1), "most steps", 100_000, name="max-steps")
     max_seconds: float | None = quantity("s", "longest run time", above=0, name="max-seconds")

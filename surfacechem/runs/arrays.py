@@ -25,7 +25,8 @@ from surfacechem.runs.keeping import REACHED, STATUSES, Columns, Keep, reason_ta
 from surfacechem.solve.choice import EXPLICIT, IMPLICIT
 from surfacechem.solve.contract import Array, Index, Mask, Problem, Status
 from surfacechem.solve.diagnose import are_led_back
-from surfacechem.solve.radau.solver import consistent, solve_arrays
+from surfacechem.solve.lanes.lane_batch import solve_batch
+from surfacechem.solve.radau.solver import consistent, rates_at
 from surfacechem.solve.radau.stepper import END, EVENTS, FIRST_COUNTER, OUTPUTS, RECORDS
 from surfacechem.solve.run import Model, Run
 from surfacechem.solve.stretches import Stretches
@@ -156,7 +157,7 @@ class ArrayRuns:
         # Looks at the equations follow the length of a run; outputs are for what is kept of its course.
         problem = replace(self.problem, times=times[0], record_steps=self.keeps_steps, picture=0.0)
         spacing = segments[:, -1] / self.run.samples
-        batch = solve_arrays(problem, y0[own], table[own], spacing, peaks, segments, times)
+        batch = solve_batch(problem, y0[own], table[own], spacing, peaks, segments, times)
         clear, columns = self._columns(Ends(batch, table[own], segments, times))
         told[own[~clear]] = False
         return told, {name: column[clear] for name, column in columns.items()}
@@ -297,7 +298,7 @@ class ArrayRuns:
         owner, k = np.nonzero(reached)
         t, y = times[np.minimum(owner, len(times) - 1), k], batch.outputs[owner, k, :n]
         rows = found.inputs(owner, t, y, np.zeros_like(y))
-        rows[:, 1 + n : 1 + 2 * n] = consistent(self.model.program, t, y, np.zeros_like(y), rows[:, 1 + 2 * n :]).ydot
+        rows[:, 1 + n : 1 + 2 * n] = rates_at(self.model.program, t, y, rows[:, 1 + 2 * n :])
         values = self._values(rows)
 
         def table(column: Array) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -12,8 +12,10 @@ from numpy.typing import NDArray
 from surfacechem.errors import InputError
 from surfacechem.format.draws import permuted
 from surfacechem.results.store import StoredArray
-from surfacechem.runs.keeping import ENDS, STATUSES
+from surfacechem.runs.keeping import ENDS, STATUSES, Keep, RunByRun
 from surfacechem.solve.contract import Index
+from surfacechem.solve.run import Trajectory
+from surfacechem.tolerances import FLOOR, TINY
 
 if TYPE_CHECKING:
     from surfacechem.runs.streaming import Stream
@@ -128,4 +130,20 @@ def _errors(stream: Stream, index: Index, threads: int | None) -> Iterator[tuple
             continue
         assert done.accuracy is not None
         values = {name: [end[name] for end in done.run_ends] for name in TOLD}
-        yield first, part, {"error": done.accuracy.errors, **values}, done.accuracy.source
+        found = np.fmax(done.accuracy.errors, _apart(stream, part, done.runs))
+        yield first, part, {"error": found, **values}, done.accuracy.source
+
+
+def _apart(stream: Stream, part: Index, runs: Sequence[Trajectory]) -> Array:
+    """How far what is stored of runs is from the same runs by themselves: their ends, relative to these; of one that an
+    event has stopped the time alone, since its state may change there by any amount in the last digit of it.
+    """
+    chunks = stream.chunks
+    ends = RunByRun(chunks.model, Keep(last=chunks.keep.last)).columns(runs, 0)
+    stored, largest = chunks.columns(part), np.zeros(len(part))
+    for name in ("time_reached", *(f"{name}_last" for name in chunks.keep.last)):
+        size = np.maximum(np.abs(ends[name]), FLOOR * np.nanmax(np.abs(ends[name]), initial=TINY))
+        apart = np.abs(stored[name] - ends[name]) / size
+        counts = (name == "time_reached") | (ends["status"] == STATUSES.index("finished"))
+        largest = np.fmax(largest, np.where(counts, apart, 0.0))
+    return largest

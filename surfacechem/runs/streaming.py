@@ -25,6 +25,7 @@ from surfacechem.runs import keeping, sweeps
 from surfacechem.runs.arrays import ArrayRuns, JumpingRuns, quiet, solvable
 from surfacechem.runs.checking import checked_arrays
 from surfacechem.runs.keeping import STATUSES, Columns, Keep, RunByRun, keep_of, variable
+from surfacechem.solve import AUTO
 from surfacechem.solve.contract import Index
 from surfacechem.solve.run import Model, Run, Trajectory
 
@@ -51,12 +52,18 @@ class ChunkRuns:
     """The runs of a plan, in any order and in parts of any size, as columns of what is kept."""
 
     def __init__(
-        self, simulation: Simulation, plan: Plan, keep: Keep, changes: Mapping[str, float], checked: int = 0
+        self,
+        simulation: Simulation,
+        plan: Plan,
+        keep: Keep,
+        changes: Mapping[str, float],
+        checked: int = 0,
+        run: Run | None = None,
     ) -> None:
         self.simulation, self.plan, self.keep = simulation, plan, keep
         self.changes, self.checked = changes, checked
         self.model = Model(keeping.reaching(sweeps.prepared(simulation.system, plan), keep))
-        self.run = self.model.chosen(simulation.case.run, self.model.values(changes))
+        self.run = run or self._chosen()
         self.one_by_one = RunByRun(self.model, keep)
         arrays = ArrayRuns(self.model, plan, self.run, changes, keep)
         told = solvable(self.model, plan, self.run, arrays.problem)
@@ -65,6 +72,12 @@ class ChunkRuns:
             self.ways.append(JumpingRuns(self.model, plan, self.run, changes, keep))
         """How runs become arrays, in the order in which they are tried; the rest is looked at one by one."""
         self.arrays = arrays if self.ways else None
+
+    def _chosen(self) -> Run:
+        """How the runs are solved: where the case names no solver, by the one that suits the scene."""
+        case = self.simulation.case
+        run = case.run if "run.solver" in case.places else replace(case.run, solver=AUTO)
+        return self.model.chosen(run, self.model.values(self.changes))
 
     @cached_property
     def piece(self) -> int:
@@ -140,8 +153,8 @@ def _runs_of(job: Job) -> ChunkRuns:
     from surfacechem.runs.simulation import Simulation
 
     case = cases.load_text(job.case, job.name, mechanism_text=job.mechanism, allow_code=True)
-    simulation = Simulation(replace(case, own_run=job.run))
-    return ChunkRuns(simulation, recorded_plan(job.plan), keeping.recorded_keep(job.keep), json.loads(job.changes))
+    plan, keep, changes = recorded_plan(job.plan), keeping.recorded_keep(job.keep), json.loads(job.changes)
+    return ChunkRuns(Simulation(case), plan, keep, changes, run=job.run)
 
 
 def columns_of(job: Job, index: Index) -> Columns:

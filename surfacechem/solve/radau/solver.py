@@ -60,17 +60,20 @@ def _contiguous(values: ArrayLike) -> Array:
     return np.ascontiguousarray(values, dtype=float)
 
 
-def _batch(problem: Problem, runs: Sequence[Array], room: Room | None = None) -> Any:
+def batch_of(
+    problem: Problem, runs: Sequence[Array], room: Room | None = None, tables: Sequence[NDArray[Any]] | None = None
+) -> Any:
     """Runs that share with a problem all but their y0, parameters, spacing, max_steps, peaks, segments and times,
-    which are given in this order with the run as first axis; with this room for each, or as much as is usual.
+    which are given in this order with the run as first axis; with this room for each, or as much as is usual, and with
+    the tables of its program or others.
     """
     program, times = problem.program, runs[-1]
-    explicit = problem.explicit and program.rates is not None
+    explicit = tables is None and problem.explicit and program.rates is not None
     steps, filled = STEP_ROWS if problem.record_steps else 0, INSIDE_ROWS if problem.picture else 0
     step_rows, event_rows, rows = room or (steps, EVENT_ROWS if problem.margins else 0, filled)
     n, q, m, count = program.n, program.n_ledger, program.n_margins, len(runs[0])
     return Batch(
-        *(program.explicit_tables if explicit else program.tables),
+        *(tables or (program.explicit_tables if explicit else program.tables)),
         min(problem.rtol, LONGEST_STEP),
         _contiguous(problem.atol),
         int(explicit),
@@ -95,7 +98,7 @@ def _run_one(problem: Problem, room: Room | None = None) -> Any:
         _contiguous(values)[None] for values in (problem.y0, problem.parameters, problem.segments, problem.times)
     )
     columns = y0, parameters, np.array((problem.spacing,)), np.array((problem.max_steps,)), _peaks(problem)[None]
-    batch = _batch(problem, (*columns, segments, times), room)
+    batch = batch_of(problem, (*columns, segments, times), room)
     if problem.max_seconds is None:
         stepper.run(batch, 0, 1)
         return batch
@@ -182,7 +185,7 @@ def _solved(problems: Sequence[Problem]) -> list[Result]:
     # Outputs that a run has not are at infinity, which none reaches.
     times = shared([np.pad(each.times, (0, most - len(each.times)), constant_values=np.inf) for each in problems])
     segments = shared([each.segments for each in problems])
-    batch = _batch(problems[0], (y0, parameters, spacing, max_steps, peaks, segments, times))
+    batch = batch_of(problems[0], (y0, parameters, spacing, max_steps, peaks, segments, times))
     stepper.run(batch, 0, len(problems))
     return [_whole(problem, batch, i) for i, problem in enumerate(problems)]
 
@@ -242,7 +245,7 @@ def solve_arrays(problem: Problem, *columns: Array, room: Room | None = None) ->
     stepper writes them, with this room for each or as much as is usual.
     """
     y0, parameters, spacing, *others = map(np.ascontiguousarray, columns)
-    batch = _batch(problem, (y0, parameters, spacing, np.array((problem.max_steps,)), *others), room)
+    batch = batch_of(problem, (y0, parameters, spacing, np.array((problem.max_steps,)), *others), room)
     stepper.run(batch, 0, len(y0))
     return batch
 
@@ -301,9 +304,14 @@ def output_rates(result: Result) -> Array:
     problem = result.problem
     if not len(result.times):
         return np.empty_like(result.outputs)
-    program, y = problem.program, result.outputs
-    parameters, guess = problem.parameters[result.segments_at(result.times, result.segment)], np.zeros_like(y)
+    parameters = problem.parameters[result.segments_at(result.times, result.segment)]
+    return rates_at(problem.program, result.times, result.outputs, parameters)
+
+
+def rates_at(program: Program, t: Array, y: Array, parameters: Array) -> Array:
+    """Derivatives of states, shape (rows, n), at times and with parameters of their own."""
+    guess = np.zeros_like(y)
     # A formula is there much sooner than the solution of a linear system for each row.
     if program.filler is None and program.n <= MANY and program.rates is not None:
-        return program.rates(np.concatenate([result.times[:, None], y, guess, parameters], axis=1))
-    return consistent(program, result.times, y, guess, parameters).ydot
+        return program.rates(np.concatenate([t[:, None], y, guess, parameters], axis=1))
+    return consistent(program, t, y, guess, parameters).ydot

@@ -6,6 +6,7 @@ Importing this module imports neither Numba nor the kernel.
 import math
 import threading
 from collections import namedtuple
+from collections.abc import Mapping
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -161,21 +162,26 @@ MEMORY = {
 """Arrays that a trajectory writes to: type and shape."""
 
 
-@lru_cache(maxsize=64)
-def _bytes_of(sizes: tuple[int, ...]) -> int:
-    """Memory of a trajectory of a program of these sizes."""
-    size_of = dict(zip(SIZES, sizes, strict=True))
+def words_of(size_of: Mapping[str, int], memory: Mapping[str, tuple[type, tuple[str | int, ...]]]) -> int:
+    """Words of eight bytes that these arrays take up for these sizes."""
     total = 0
-    for kind, shape in MEMORY.values():
+    for kind, shape in memory.values():
         lengths = (size_of[length] if isinstance(length, str) else length for length in shape)
-        total += np.dtype(kind).itemsize * math.prod(lengths)
+        total += np.dtype(kind).itemsize // 8 * math.prod(lengths)
     return total
+
+
+@lru_cache(maxsize=64)
+def _words_of(sizes: tuple[int, ...]) -> int:
+    """Memory of a trajectory of a program of these sizes, in words."""
+    return words_of(dict(zip(SIZES, sizes, strict=True)), MEMORY)
 
 
 _SOURCES = (
     "../contract",
     "../../tolerances",
     "stepper",
+    "record",
     "work",
     "linear",
     "roundoff",
@@ -192,9 +198,14 @@ _SOURCES = (
 _LOCK = threading.Lock()
 
 
-def _folder() -> Path:
+def sources() -> list[Path]:
+    """The files that the compiled code depends on."""
     here = Path(__file__).parent
-    return kernel_folder([here / "coefficients.json", *(here / f"{name}.py" for name in _SOURCES)])
+    return [here / "coefficients.json", *(here / f"{name}.py" for name in _SOURCES)]
+
+
+def _folder() -> Path:
+    return kernel_folder(sources())
 
 
 def is_compiled() -> bool:
@@ -202,17 +213,21 @@ def is_compiled() -> bool:
     return _Loaded.kernel is not None or is_filled(_folder())
 
 
-def _compiled() -> Any:
+def signature() -> Any:
+    """Of a compiled loop: the first run and the one behind the last, memory, and the batch."""
     from numba import from_dtype, types
-
-    from surfacechem.solve.radau.driver import run_batch
-    from surfacechem.solve.radau.work import PARTS
 
     numba_types: Any = types
     entries = [(from_dtype(np.dtype(dtype)), axes) for dtype, axes in BATCH.values()]
     batch = numba_types.Tuple([types.Array(entry, axes, "C") if axes else entry for entry, axes in entries])
-    signature = types.void(types.int64, types.int64, types.int64[::1], batch)
-    kernel = compile_kernel(run_batch, signature, _folder(), PARTS)
+    return types.void(types.int64, types.int64, types.int64[::1], batch)
+
+
+def _compiled() -> Any:
+    from surfacechem.solve.radau.driver import run_batch
+    from surfacechem.solve.radau.work import PARTS
+
+    kernel = compile_kernel(run_batch, signature(), _folder(), PARTS)
     # A batch of no runs: Numba looks longer at the types of its first arguments than a brief run takes.
     nothing = (np.zeros((len(SIZES),) * axes, dtype) if axes else dtype(0) for dtype, axes in BATCH.values())
     kernel(0, 0, np.zeros(0, np.int64), tuple(nothing))
@@ -234,7 +249,7 @@ def run_batch() -> Any:
 
 def run(batch: Any, first: int, last: int) -> None:
     """Run some of a batch with a memory of their own: threads may do so with different runs at the same time."""
-    memory = np.zeros(_bytes_of(tuple(batch.sizes.tolist())) // 8, np.int64)
+    memory = np.zeros(_words_of(tuple(batch.sizes.tolist())), np.int64)
     run_batch()(first, last, memory, tuple(batch))
 
 
@@ -242,7 +257,7 @@ class Repeated:
     """Runs the same batch again and again in one memory: each time it takes its rows as they are then."""
 
     def __init__(self, batch: Any) -> None:
-        memory = np.zeros(_bytes_of(tuple(batch.sizes.tolist())) // 8, np.int64)
+        memory = np.zeros(_words_of(tuple(batch.sizes.tolist())), np.int64)
         self._arguments = 0, len(batch.ends), memory, tuple(batch)
         self._kernel = run_batch()
 

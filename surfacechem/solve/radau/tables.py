@@ -69,17 +69,19 @@ EXPLICIT = np.pad(_rows("EXPLICIT", LAST_STAGE + 1), ((1, 0), (0, 0)))
 """Changes of the state at the stages of the explicit method from the rates of those before; row 12 is its step."""
 EXPLICIT_ERRORS = _rows("EXPLICIT_ERRORS", LAST_STAGE + 1)
 """Errors of order 5 and 3 from the rates."""
+_step, _first, _last = EXPLICIT[12], np.eye(LAST_STAGE + 1)[0], np.eye(LAST_STAGE + 1)[12]
+DENSE_FACTORS = np.array(
+    [_step, _first - _step, 2.0 * _step - _last - _first, *_rows("EXPLICIT_DENSE", LAST_STAGE + 1)]
+)
+"""F_0, F_1, ... of the polynomial x (F_0 + (1 - x) (F_1 + x (F_2 + (1 - x) (F_3 + ...)))) of an explicit step from all
+its rates; F_0 to F_2 are from both ends.
+"""
 
 
 def _dense(nodes: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Changes at the nodes of an explicit step's polynomial from all its rates.
-
-    The polynomial is x (F_0 + (1 - x) (F_1 + x (F_2 + (1 - x) (F_3 + ...)))), with F_0 to F_2 from both ends.
-    """
-    step, first, last = EXPLICIT[12], np.eye(LAST_STAGE + 1)[0], np.eye(LAST_STAGE + 1)[12]
-    factors = [step, first - step, 2.0 * step - last - first, *_rows("EXPLICIT_DENSE", LAST_STAGE + 1)]
+    """Changes at the nodes of an explicit step's polynomial from all its rates."""
     table = np.zeros((len(nodes), LAST_STAGE + 1))
-    for i, factor in enumerate(reversed(factors)):
+    for i, factor in enumerate(reversed(DENSE_FACTORS)):
         table = (table + factor) * (nodes if i % 2 == 0 else 1.0 - nodes)[:, None]
     return table
 

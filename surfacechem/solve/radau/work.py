@@ -1,4 +1,4 @@
-"""The memory of one trajectory as a record with named fields, and calls of machine code by its address.
+"""The memory of one trajectory, calls of machine code by its address, and tables times stages.
 
 The address is data, not a function type: code compiled here never depends on the scene it calls and is cached for good.
 
@@ -7,25 +7,17 @@ compiler to make vectors of them; here they are written as vectors, whatever the
 a row runs over into the next row, which is written after it, or into rows that are kept free behind the last stage.
 """
 
-from functools import reduce
-from typing import Any, NamedTuple, cast
+from typing import Any
 
 import numba
 import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
-from numba.core.typing.templates import AttributeTemplate
-from numba.extending import (
-    infer_getattr,
-    intrinsic,
-    lower_getattr_generic,
-    lower_setattr_generic,
-    models,
-    register_model,
-)
+from numba.extending import intrinsic
 
-from surfacechem.solve.radau.stepper import BATCH, MEMORY, NUMBERS, SIZES, WIDTH
+from surfacechem.solve.radau.record import StepperRecord, laying_out
+from surfacechem.solve.radau.stepper import MEMORY, NUMBERS, SIZES, WIDTH
 
 _njit: Any = numba.njit
 _intrinsic: Any = intrinsic
@@ -33,6 +25,8 @@ _Constant: Any = ir.Constant
 _loop: Any = cgutils.for_range
 _strided_loop: Any = cgutils.for_range_slice
 _alloca: Any = cgutils.alloca_once
+_WORD = ir.IntType(64)
+_POINTER = ir.IntType(8).as_pointer()
 
 PARTS: set[str] = set()
 """Names of the functions that only the kernel itself calls."""
@@ -52,155 +46,8 @@ FUNCTIONS = 5
 functions that are compiled in pieces. NumPy's integers, as Numba compiles what takes a Python constant anew for each
 constant."""
 
-# -- The record ----------------------------------------------------------------------------------------------------
-
-_WORD = ir.IntType(64)
-_POINTER = ir.IntType(8).as_pointer()
-_NUMBA: dict[Any, Any] = {float: types.float64, int: types.int64, complex: types.complex128}
-
-
-class _Field(NamedTuple):
-    kind: Any
-    shape: tuple[str | int, ...] | None
-    """Of an array: None where its lengths stand behind its address."""
-    place: int
-    """In words of eight bytes."""
-
-
-def _layout() -> tuple[dict[str, _Field], int]:
-    """The fields of the record and its number of words."""
-    fields: dict[str, _Field] = {}
-    place = 0
-    for name, (dtype, axes) in BATCH.items():
-        entry = _NUMBA.get(dtype) or numba.from_dtype(np.dtype(dtype))
-        fields[name] = _Field(types.Array(entry, axes, "C") if axes else entry, None, place)
-        place += 1 + axes
-    for name, kind in {**dict.fromkeys(SIZES, int), **NUMBERS}.items():
-        fields[name] = _Field(_NUMBA[kind], None, place)
-        place += 1
-    for name, (kind, shape) in MEMORY.items():
-        fields[name] = _Field(types.Array(_NUMBA[kind], len(shape), "C"), shape, place)
-        place += 1
-    return fields, place
-
-
-FIELDS, WORDS = _layout()
-
-
-class WorkType(types.Type):
-    """Pointer to the record. By value its arrays would be hundreds of arguments of every call."""
-
-
-WORK = WorkType(name="Work")
-
-
-@register_model(WorkType)
-class _WorkModel(models.PrimitiveModel):
-    def __init__(self, manager: Any, kind: Any) -> None:
-        super().__init__(manager, kind, _POINTER)  # type: ignore[no-untyped-call]
-
-
-@infer_getattr
-class _WorkFields(AttributeTemplate):
-    key = WorkType
-
-    def generic_resolve(self, _work: Any, name: str) -> Any:  # type: ignore[override]
-        return FIELDS[name].kind
-
-
-def _word(builder: Any, work: Any, place: int, kind: Any) -> Any:
-    """Pointer to a word of the record."""
-    return builder.bitcast(builder.gep(work, [_WORD(8 * place)], inbounds=True), kind.as_pointer())
-
-
-def _fixed(builder: Any, work: Any, place: int, kind: Any) -> Any:
-    """A word that never changes: an address, a size, a number of the batch. Told so, the compiler keeps it in a
-    register instead of looking again after each store.
-    """
-    value = builder.load(_word(builder, work, place, kind))
-    value.set_metadata("invariant.load", builder.module.add_metadata([]))
-    return value
-
-
-@lower_getattr_generic(WorkType)  # type: ignore[no-untyped-call]
-def _load_field(context: Any, builder: Any, _work: Any, work: Any, name: str) -> Any:
-    kind, shape, place = FIELDS[name]
-    if name in NUMBERS:
-        return builder.load(_word(builder, work, place, context.get_value_type(kind)))
-    if not isinstance(kind, types.Array):
-        return _fixed(builder, work, place, context.get_value_type(kind))
-    lengths = []
-    for axis, length in enumerate(shape or (None,) * kind.ndim):
-        at = place + 1 + axis if length is None else FIELDS[length].place if isinstance(length, str) else None
-        lengths.append(_WORD(length) if at is None else _fixed(builder, work, at, _WORD))
-    size = _WORD(context.get_abi_sizeof(context.get_data_type(kind.dtype)))
-    strides, pack = [size], cast(Any, cgutils.pack_array)
-    for length in reversed(lengths):
-        strides.insert(0, builder.mul(strides[0], length))
-    model, value = context.data_model_manager[kind], _Constant(context.get_value_type(kind), ir.Undefined)
-    parts = {
-        "meminfo": _Constant(_POINTER, None),
-        "parent": _Constant(_POINTER, None),
-        "nitems": reduce(builder.mul, lengths),
-        "itemsize": size,
-        "data": _fixed(builder, work, place, context.get_data_type(kind.dtype).as_pointer()),
-        "shape": pack(builder, lengths),
-        "strides": pack(builder, strides[1:]),
-    }
-    for part, entry in parts.items():
-        value = model.set(builder, value, entry, part)
-    return value
-
-
-@lower_setattr_generic(WorkType)  # type: ignore[no-untyped-call]
-def _store_field(_context: Any, builder: Any, _signature: Any, args: Any, name: str) -> None:
-    assert name in NUMBERS, f"{name} does not change"
-    work, value = args
-    builder.store(value, _word(builder, work, FIELDS[name].place, value.type))
-
-
-@_intrinsic
-def lay_out(_context: Any, batch: Any, memory: Any) -> Any:
-    """The record of a batch, on the caller's stack: what it is given, and the addresses of what it works on."""
-
-    def generate(context: Any, builder: Any, _signature: Any, args: Any) -> Any:
-        work = builder.bitcast(_alloca(builder, ir.ArrayType(_WORD, WORDS)), _POINTER)
-
-        def store(place: int, value: Any) -> None:
-            builder.store(value, _word(builder, work, place, value.type))
-
-        for k, (name, kind) in enumerate(zip(BATCH, batch.types, strict=True)):
-            place, value = FIELDS[name].place, builder.extract_value(args[0], k)
-            if isinstance(kind, types.Array):
-                given = context.make_array(kind)(context, builder, value)
-                store(place, given.data)
-                for axis in range(kind.ndim):
-                    store(place + 1 + axis, builder.extract_value(given.shape, axis))
-                if name == "sizes":
-                    for j, size in enumerate(SIZES):
-                        entry = builder.gep(given.data, [_WORD(j)])
-                        store(FIELDS[size].place, builder.load(entry))
-            else:
-                store(place, value)
-        for name, kind in NUMBERS.items():
-            store(FIELDS[name].place, _Constant(context.get_value_type(_NUMBA[kind]), 0))
-        free = builder.ptrtoint(context.make_array(memory)(context, builder, args[1]).data, _WORD)
-        for name, (kind, shape) in MEMORY.items():
-            store(FIELDS[name].place, free)
-            size = _WORD(np.dtype(kind).itemsize)
-            for length in shape:
-                if isinstance(length, str):
-                    count = builder.load(_word(builder, work, FIELDS[length].place, _WORD))
-                else:
-                    count = _WORD(length)
-                size = builder.mul(size, count)
-            free = builder.add(free, size)
-        # What follows is told that these words never change: it must not know that they have just been written.
-        opaque = ir.FunctionType(_POINTER, [_POINTER])
-        return builder.asm(opaque, "", "=r,0,~{memory}", [work], True)
-
-    return WORK(batch, memory), generate
-
+WORK = StepperRecord("Work", SIZES, NUMBERS, MEMORY)
+lay_out = laying_out(WORK)
 
 # -- Calls ---------------------------------------------------------------------------------------------------------
 

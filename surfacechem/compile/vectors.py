@@ -1,0 +1,326 @@
+"""SymEngine expressions to machine code that evaluates eight cases at once: what sweeps run on.
+
+SymEngine's own code is scalar. Here the same graph becomes vectors of LLVM, each of whose places belongs to a case of
+its own: inputs and results have the case as last axis. Exponentials and logarithms are vectors, too, right to one unit
+in the last place; functions that are rare in laws are those of the C library, place by place. A processor without
+vectors of this length is served by several shorter ones.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from decimal import Decimal
+from functools import reduce
+from math import factorial
+from typing import Any
+
+import numpy as np
+import symengine
+from llvmlite import binding, ir
+from numpy.typing import NDArray
+
+from surfacechem.compile.preparing import PREPARING
+
+LANES = 8
+"""Cases of a vector: one of the widest vectors there are, or two of those of most processors, which hide each other's
+latency.
+"""
+
+_binding: Any = binding
+_Constant: Any = ir.Constant
+NUMBER = ir.DoubleType()
+VECTOR: Any = ir.VectorType(NUMBER, LANES)
+MASK: Any = ir.VectorType(ir.IntType(1), LANES)
+WORDS: Any = ir.VectorType(ir.IntType(64), LANES)
+_POINTER = ir.IntType(8).as_pointer()
+
+
+@dataclass(frozen=True)
+class LaneFunction:
+    """Machine code with the C signature ``void f(double *out, const double *inputs, void *user)``, inputs [input, case]
+    and results [result, case].
+
+    >>> x, y = symengine.symbols("x y")
+    >>> compile_lanes([x, y], [x * y, x + y])(np.arange(16.0).reshape(2, 8))[:, :3]
+    array([[ 0.,  9., 20.],
+           [ 8., 10., 12.]])
+    """
+
+    address: int
+    n_out: int
+    keep: Any
+    """Owns the machine code: the address is valid as long as this object lives."""
+
+    def __call__(self, inputs: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The results for eight cases, shape (results, 8), from inputs of the shape (inputs, 8)."""
+        values = np.ascontiguousarray(inputs, dtype=float)
+        found = np.empty((self.n_out, LANES))
+        code = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)(self.address)
+        code(found.ctypes.data, values.ctypes.data, None)
+        return found
+
+
+@PREPARING
+def compile_lanes(inputs: Sequence[Any], expressions: Sequence[Any]) -> LaneFunction:
+    """Compile a vector of expressions of the inputs for eight cases at once.
+
+    NotImplementedError where an expression contains what has no code here.
+    """
+    module = ir.Module(name="lanes")
+    code = _Code(module, inputs, expressions)
+    for number, value in enumerate(code.values):
+        code.store(number, value)
+    code.builder.ret_void()
+    engine = _engine(str(module))
+    return LaneFunction(int(engine.get_function_address("f")), len(expressions), engine)
+
+
+def _engine(text: str) -> Any:
+    """An engine that holds the machine code of a module, made for this processor."""
+    _binding.initialize_native_target()
+    _binding.initialize_native_asmprinter()
+    features = _binding.get_host_cpu_features().flatten()
+    target = _binding.Target.from_default_triple()
+    machine = target.create_target_machine(cpu=_binding.get_host_cpu_name(), features=features, opt=2)
+    module = _binding.parse_assembly(text)
+    builder = _binding.create_pass_builder(machine, _binding.create_pipeline_tuning_options(speed_level=2))
+    builder.getModulePassManager().run(module, builder)
+    engine = _binding.create_mcjit_compiler(module, machine)  # which owns both from here on
+    engine.finalize_object()
+    return engine
+
+
+class _Code:
+    """The body of the function: a value for each expression, each part of the graph once."""
+
+    def __init__(self, module: Any, inputs: Sequence[Any], expressions: Sequence[Any]) -> None:
+        self.module = module
+        function: Any = ir.Function(module, ir.FunctionType(ir.VoidType(), [_POINTER] * 3), name="f")
+        self.builder: Any = ir.IRBuilder(function.append_basic_block())
+        self.arguments = function.args
+        self.places = {symbol: place for place, symbol in enumerate(inputs)}
+        self.known: dict[Any, Any] = {}
+        named, reduced = symengine.cse([symengine.sympify(each) for each in expressions]) if expressions else ([], [])
+        for symbol, expression in named:
+            self.known[symbol] = self.value(expression)
+        self.values = [self.value(expression) for expression in reduced]
+
+    def _entry(self, argument: int, place: int) -> Any:
+        pointer = self.builder.gep(self.arguments[argument], [ir.IntType(64)(8 * LANES * place)])
+        return self.builder.bitcast(pointer, VECTOR.as_pointer())
+
+    def store(self, place: int, value: Any) -> None:
+        """Write a result."""
+        self.builder.store(value, self._entry(0, place), align=8)
+
+    def value(self, expression: Any) -> Any:
+        """The vector of a number, a symbol or a function, or the mask of a condition."""
+        found = self.known.get(expression)
+        if found is None:
+            # Arguments before the whole, so that what is nested deeply needs no stack.
+            left = [expression]
+            while left:
+                part = left[-1]
+                missing = [each for each in part.args if each not in self.known] if part not in self.known else []
+                if missing:
+                    left += missing
+                    continue
+                if part not in self.known:
+                    self.known[part] = self._made(part)
+                left.pop()
+            found = self.known[expression]
+        return found
+
+    def _made(self, part: Any) -> Any:
+        kind = type(part).__name__
+        if part in self.places:
+            return self.builder.load(self._entry(1, self.places[part]), align=8)
+        if part.is_Number or kind in _CONSTANTS:
+            return number(float(part))
+        if kind in _TRUTHS:
+            return _Constant(MASK, [int(kind == "BooleanTrue")] * LANES)
+        values = [self.known[each] for each in part.args]
+        if kind in _OWN:
+            return _OWN[kind](self, part, values)
+        if kind in _LIBRARY:
+            return self._by_library(_LIBRARY[kind], values)
+        raise NotImplementedError(f"no vector code for {kind}: {part}")
+
+    def _piecewise(self, _part: Any, values: Sequence[Any]) -> Any:
+        """The first value whose condition holds."""
+        pairs = list(zip(values[::2], values[1::2], strict=True))
+        return reduce(lambda rest, pair: self.builder.select(pair[1], pair[0], rest), pairs[::-1], number(np.nan))
+
+    def _relation(self, part: Any, values: Sequence[Any]) -> Any:
+        truths = values[0].type == MASK  # a condition that is compared with another one
+        compare = self.builder.icmp_unsigned if truths else self.builder.fcmp_ordered
+        return compare(_RELATIONS[type(part).__name__], *values)
+
+    def _joined(self, part: Any, values: Sequence[Any]) -> Any:
+        return reduce(self.builder.and_ if type(part).__name__ == "And" else self.builder.or_, values)
+
+    def _extreme(self, part: Any, values: Sequence[Any]) -> Any:
+        sign = ">" if type(part).__name__ == "Max" else "<"
+        return reduce(lambda a, b: self.builder.select(self.builder.fcmp_ordered(sign, a, b), a, b), values)
+
+    def _product(self, part: Any, _values: Sequence[Any]) -> Any:
+        """A product, with one division for all its negative powers."""
+        above: list[Any] = []
+        below: list[Any] = []
+        for factor in part.args:
+            inverse = type(factor).__name__ == "Pow" and factor.args[1].is_Integer and int(factor.args[1]) < 0
+            (below if inverse else above).append(factor)
+        top = reduce(self.builder.fmul, [self.known[each] for each in above]) if above else number(1.0)
+        if not below:
+            return top
+        bottom = reduce(self.builder.fmul, [self._whole_power(e.args[0], -int(e.args[1])) for e in below])
+        return self.builder.fdiv(top, bottom)
+
+    def _power(self, part: Any, _values: Sequence[Any]) -> Any:
+        base, exponent = part.args
+        if base == symengine.E:
+            return exp(self.builder, self.known[exponent])
+        if exponent.is_Integer:
+            power = self._whole_power(base, abs(int(exponent)))
+            return power if int(exponent) > 0 else self.builder.fdiv(number(1.0), power)
+        if exponent in (symengine.Rational(1, 2), symengine.Rational(-1, 2)):
+            found = by_vector(self.builder, "sqrt", self.known[base])
+            return found if exponent > 0 else self.builder.fdiv(number(1.0), found)
+        return self._by_library("pow", [self.known[base], self.known[exponent]])
+
+    def _whole_power(self, base: Any, exponent: int) -> Any:
+        """A power by repeated squares."""
+        square, found = self.known[base], None
+        while exponent:
+            if exponent % 2:
+                found = square if found is None else self.builder.fmul(found, square)
+            exponent //= 2
+            square = self.builder.fmul(square, square) if exponent else square
+        return found
+
+    def _by_library(self, name: str, values: Sequence[Any]) -> Any:
+        """A function of the C library at each place."""
+        kind = ir.FunctionType(NUMBER, [NUMBER] * len(values))
+        function = self.module.globals.get(name) or ir.Function(self.module, kind, name=name)
+        found = _Constant(VECTOR, ir.Undefined)
+        for lane in range(LANES):
+            place = ir.IntType(32)(lane)
+            own = [self.builder.extract_element(value, place) for value in values]
+            found = self.builder.insert_element(found, self.builder.call(function, own), place)
+        return found
+
+
+_CONSTANTS = {"Pi", "Exp1"}
+_TRUTHS = {"BooleanTrue", "BooleanFalse"}
+_RELATIONS = {"LessThan": "<=", "StrictLessThan": "<", "Equality": "==", "Unequality": "!="}
+_OWN: dict[str, Callable[[Any, Any, Any], Any]] = {
+    "Add": lambda code, _part, values: reduce(code.builder.fadd, values),
+    "Mul": _Code._product,
+    "Pow": _Code._power,
+    "log": lambda code, _part, values: log(code.builder, *values),
+    "Piecewise": _Code._piecewise,
+    **dict.fromkeys(_RELATIONS, _Code._relation),
+    **dict.fromkeys(("And", "Or"), _Code._joined),
+    **dict.fromkeys(("Max", "Min"), _Code._extreme),
+}
+"""What makes the vectors of a node of the graph, by its kind."""
+_TRIGONOMETRIC = "sin", "cos", "tan", "asin", "acos", "atan"
+_HYPERBOLIC = "sinh", "cosh", "tanh", "asinh", "acosh", "atanh"
+_LIBRARY = {name: name for name in (*_TRIGONOMETRIC, *_HYPERBOLIC, "erf", "erfc")} | {"Abs": "fabs"}
+"""Functions of the C library, by the kind of their node."""
+
+
+def number(value: float) -> Any:
+    """The same number at every place."""
+    return _Constant(VECTOR, [value] * LANES)
+
+
+def _whole(value: int) -> Any:
+    return _Constant(WORDS, [value] * LANES)
+
+
+def by_vector(builder: Any, function: str, value: Any) -> Any:
+    """A function that processors have for vectors, as `sqrt`."""
+    name = f"llvm.{function}.v{LANES}f64"
+    declared = builder.module.globals.get(name)
+    if declared is None:
+        declared = ir.Function(builder.module, ir.FunctionType(VECTOR, [VECTOR]), name=name)
+    return builder.call(declared, [value])
+
+
+def _polynomial(builder: Any, x: Any, coefficients: Sequence[float]) -> Any:
+    """A polynomial by its coefficients, the lowest first: pairs, pairs of pairs, ... (Estrin), since in a chain of
+    products and sums each has to wait for the one before.
+    """
+    terms = [number(c) for c in coefficients]
+    while len(terms) > 1:
+        pairs = [builder.fadd(low, builder.fmul(high, x)) for low, high in zip(terms[::2], terms[1::2], strict=False)]
+        terms = pairs + terms[2 * len(pairs) :]
+        x = builder.fmul(x, x)
+    return terms[0]
+
+
+_LN2_HIGH = 0.693147180369123816490
+_LN2_LOW = float(Decimal(2).ln() - Decimal(_LN2_HIGH))
+"""The logarithm of 2 in two parts, the first with zeros behind, so that its multiples are exact (fdlibm)."""
+_ROUNDER = 1.5 * 2.0**52
+"""Added and taken off again this rounds to a whole number."""
+_LARGEST, _LEAST = 709.782712893384, -745.2
+"""Where exp overflows, and where it is nothing."""
+_EXP = [1.0 / factorial(k) for k in range(2, 14)]
+"""Taylor's series without its first two terms: below half of the logarithm of 2 the next one is 4e-18."""
+
+
+def exp(builder: Any, x: Any) -> Any:
+    """Exponential of a vector: 2^k exp(r) with abs(r) at most half of the logarithm of 2 (Cody & Waite)."""
+    inside = builder.select(builder.fcmp_ordered(">", x, number(_LARGEST)), number(_LARGEST), x)
+    inside = builder.select(builder.fcmp_ordered(">=", inside, number(_LEAST)), inside, number(_LEAST))  # no NaN either
+    whole = builder.fsub(
+        builder.fadd(builder.fmul(inside, number(1.4426950408889634)), number(_ROUNDER)), number(_ROUNDER)
+    )
+    rest = builder.fsub(inside, builder.fmul(whole, number(_LN2_HIGH)))
+    rest = builder.fsub(rest, builder.fmul(whole, number(_LN2_LOW)))
+    series = builder.fmul(builder.fmul(rest, rest), _polynomial(builder, rest, _EXP))
+    found = builder.fadd(number(1.0), builder.fadd(rest, series))
+    # In two factors, as the whole power of 2 may lie beyond the range.
+    power = builder.fptosi(whole, WORDS)
+    half = builder.ashr(power, _whole(1))
+    for part in (half, builder.sub(power, half)):
+        bits = builder.shl(builder.add(part, _whole(1023)), _whole(52))
+        found = builder.fmul(found, builder.bitcast(bits, VECTOR))
+    found = builder.select(builder.fcmp_ordered(">", x, number(_LARGEST)), number(np.inf), found)
+    return builder.select(builder.fcmp_unordered("uno", x, x), x, found)
+
+
+_LOG_EVEN = [6.666666666666735130e-01, 2.857142874366239149e-01, 1.818357216161805012e-01, 1.479819860511658591e-01]
+_LOG_ODD = [3.999999999940941908e-01, 2.222219843214978396e-01, 1.531383769920937332e-01]
+"""Coefficients of the series of log((1 + s) / (1 - s)) / s - 2 in even and odd powers of s^2 (fdlibm, e_log.c)."""
+_ROOT_BITS = 0x3FE6A09E667F3BCD
+"""The bits of the root of one half."""
+
+
+def log(builder: Any, x: Any) -> Any:
+    """Natural logarithm of a vector (fdlibm, e_log.c): x = 2^k (1 + f) with 1 + f between the roots of 1/2 and 2."""
+    tiny = builder.fcmp_ordered("<", x, number(2.0**-1022))
+    scaled = builder.select(tiny, builder.fmul(x, number(2.0**54)), x)
+    bits = builder.sub(builder.bitcast(scaled, WORDS), _whole(_ROOT_BITS))
+    power = builder.sitofp(builder.ashr(bits, _whole(52)), VECTOR)
+    power = builder.fsub(power, builder.select(tiny, number(54.0), number(0.0)))
+    kept = builder.add(builder.and_(bits, _whole(2**52 - 1)), _whole(_ROOT_BITS))
+    f = builder.fsub(builder.bitcast(kept, VECTOR), number(1.0))
+    s = builder.fdiv(f, builder.fadd(number(2.0), f))
+    z = builder.fmul(s, s)
+    w = builder.fmul(z, z)
+    even, odd = builder.fmul(z, _polynomial(builder, w, _LOG_EVEN)), builder.fmul(w, _polynomial(builder, w, _LOG_ODD))
+    half = builder.fmul(number(0.5), builder.fmul(f, f))
+    inner = builder.fadd(
+        builder.fmul(s, builder.fadd(half, builder.fadd(even, odd))), builder.fmul(power, number(_LN2_LOW))
+    )
+    found = builder.fsub(builder.fmul(power, number(_LN2_HIGH)), builder.fsub(builder.fsub(half, inner), f))
+    usual = builder.and_(builder.fcmp_ordered(">", x, number(0.0)), builder.fcmp_ordered("<", x, number(np.inf)))
+    # Infinity, zero, below it, and what is no number.
+    zero = builder.select(builder.fcmp_ordered("==", x, number(0.0)), number(-np.inf), number(np.nan))
+    other = builder.select(builder.fcmp_ordered("==", x, number(np.inf)), x, zero)
+    return builder.select(usual, found, other)

@@ -1,0 +1,240 @@
+"""Guards of eight runs at once: which are met in a step, where, and the steps onto them.
+
+A guard that touches zero, or may, is unclear here: its run is left to steps of its own.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from surfacechem.solve.lanes.lane_step import larger, put_inside, smaller
+from surfacechem.solve.lanes.vector import absolute, any_lane, lanes, put, same, where
+from surfacechem.solve.radau.explicit import DENSEST
+from surfacechem.solve.radau.tables import SCANNED
+from surfacechem.solve.radau.work import MARGINS, compiled, evaluate
+from surfacechem.tolerances import CBRT_EPS, EPS, NOISE, ROUNDING, SOLVED, TINY
+
+POINTS = SCANNED[DENSEST]
+"""Fractions of a step at which guards are examined."""
+TRIALS = 12
+"""Steps onto a guard: secants take four, the rounding of the guard some more."""
+
+
+@compiled
+def _is_limit(w: Any, m: int) -> bool:
+    """Whether the run may not go on where this guard is below zero."""
+    return bool(w.kinds[m, 0] == 1 and w.kinds[m, 1] <= 0)
+
+
+@compiled
+def start_margins(w: Any, fresh: Any) -> None:
+    """Sides of zero of the guards at a start or restart; one that may be zero there is unclear."""
+    unclear = same(0.0)
+    evaluate(w, MARGINS, w.margin)
+    for m in range(w.n_margins):
+        value, largest = lanes(w.margin[m]), lanes(w.margin_largest[m])
+        largest = where(fresh, larger(largest, absolute(value)), largest)
+        put(w.margin_largest[m], largest)
+        put(w.margin_first[m], where(fresh, value, lanes(w.margin_first[m])))
+        clear = (absolute(value) > NOISE * largest) & (lanes(w.fired[m]) < 0.5)
+        side = where(clear, where(value > 0.0, 1.0, -1.0), 0.0)
+        put(w.side[m], where(fresh, side, lanes(w.side[m])))
+        if w.kinds[m, 4] == 0:
+            put(w.side[m], 0.0)
+        elif _is_limit(w, m):
+            unclear = where(side < 0.5, 1.0, unclear)
+        else:
+            unclear = where((side == 0.0) & (lanes(w.fired[m]) < 0.5), 1.0, unclear)
+    put(w.unclear, unclear)
+
+
+@compiled
+def _crosses(w: Any, m: int) -> Any:
+    """Where a guard is across zero from its side, in a direction that counts; a strict one by more than noise."""
+    value, side, direction = lanes(w.margin[m]), lanes(w.side[m]), w.kinds[m, 1]
+    least = NOISE * lanes(w.margin_largest[m]) if w.kinds[m, 3] == 1 else same(0.0)
+    falls = (side > 0.5) & (value <= 0.0 - least)
+    rises = (side < -0.5) & (value >= least)
+    if direction < 0:
+        return falls
+    if direction > 0:
+        return rises
+    return falls | rises
+
+
+@compiled
+def _dips(w: Any, m: int, a: float, b: float, c: float) -> Any:
+    """Where a guard has a lowest point between three points that may be zero though it is not across it at any."""
+    side = lanes(w.side[m])
+    at_a, at_b = side * lanes(w.margin_earlier[m]), side * lanes(w.margin_before[m])
+    at_c = side * lanes(w.margin[m])
+    steepest = larger((at_a - at_b) / (b - a), (at_c - at_b) / (c - b))
+    return (absolute(side) > 0.5) & (at_b < at_a) & (at_b < at_c) & (at_b <= steepest * (c - a))
+
+
+@compiled
+def _put_margins(w: Any, x: float) -> None:
+    """The guards at the fraction x of each step, one behind the other."""
+    for m in range(w.n_margins):
+        put(w.margin_earlier[m], lanes(w.margin_before[m]))
+        put(w.margin_before[m], lanes(w.margin[m]))
+    put_inside(w, same(x))
+    evaluate(w, MARGINS, w.margin)
+
+
+@compiled
+def _may_meet(w: Any, good: Any) -> Any:
+    """Where guards have to be looked at closely: a quarter of the step may bring one to zero from where it is nearest,
+    as they change from each quarter to the next.
+    """
+    for m in range(w.n_margins):
+        put(w.margin[m], lanes(w.margin_first[m]))
+        put(w.nearest[m], lanes(w.side[m]) * lanes(w.margin_first[m]))
+        put(w.farthest[m], 0.0)
+    for quarter in range(1, 5):
+        _put_margins(w, 0.25 * quarter)
+        for m in range(w.n_margins):
+            value = lanes(w.margin[m])
+            put(w.nearest[m], smaller(lanes(w.nearest[m]), lanes(w.side[m]) * value))
+            put(w.farthest[m], larger(lanes(w.farthest[m]), absolute(value - lanes(w.margin_before[m]))))
+    close = same(0.0)
+    for m in range(w.n_margins):
+        if w.kinds[m, 4] != 0:
+            close = where(lanes(w.nearest[m]) > 2.0 * lanes(w.farthest[m]), close, 1.0)
+            largest = lanes(w.margin_largest[m])
+            put(w.margin_largest[m], where(good, larger(largest, absolute(lanes(w.margin[m]))), largest))
+    return good & (close > 0.5)
+
+
+@compiled
+def _scan(w: Any, searched: Any) -> None:
+    """The first interval of each step in which guards are met, and which these are; unclear where one may touch."""
+    for m in range(w.n_margins):
+        put(w.margin[m], lanes(w.margin_first[m]))
+    earlier, before = 0.0, 0.0
+    for i in range(POINTS.shape[0]):
+        x = POINTS[i]
+        _put_margins(w, x)
+        found = same(0.0)
+        for m in range(w.n_margins):
+            if w.kinds[m, 4] == 0:
+                continue
+            crossed = searched & _crosses(w, m)
+            found = where(crossed, 1.0, found)
+            put(w.fired[m], where(searched, where(crossed, 1.0, 0.0), lanes(w.fired[m])))
+            if before > 0.0:
+                put(w.unclear, where(searched & _dips(w, m, earlier, before, x), 1.0, lanes(w.unclear)))
+        put(w.low, where(found > 0.5, before, lanes(w.low)))
+        put(w.high, where(found > 0.5, x, lanes(w.high)))
+        searched = searched & (found < 0.5)
+        if not any_lane(searched):
+            break
+        for m in range(w.n_margins):
+            value, side, largest = lanes(w.margin[m]), lanes(w.side[m]), lanes(w.margin_largest[m])
+            largest = where(searched, larger(largest, absolute(value)), largest)
+            put(w.margin_largest[m], largest)
+            leaves = searched & (side == 0.0) & (absolute(value) > NOISE * largest)
+            if w.kinds[m, 4] != 0:
+                put(w.side[m], where(leaves, where(value > 0.0, 1.0, -1.0), side))
+        earlier, before = before, x
+
+
+@compiled
+def _nearest(w: Any) -> Any:
+    """The least of the guards that are met in a step, each counted from its side."""
+    least = same(np.inf)
+    for m in range(w.n_margins):
+        least = where(lanes(w.fired[m]) > 0.5, smaller(least, lanes(w.side[m]) * lanes(w.margin[m])), least)
+    return least
+
+
+@compiled
+def _nearest_inside(w: Any, x: Any) -> Any:
+    put_inside(w, x)
+    evaluate(w, MARGINS, w.margin)
+    return _nearest(w)
+
+
+@compiled
+def _locate(w: Any, met: Any) -> None:
+    """Where guards are met, on the polynomial, and their slope there (Illinois: Dowell & Jarratt 1971, BIT 11)."""
+    low, high = lanes(w.low), lanes(w.high)
+    at_low, at_high = _nearest_inside(w, low), _nearest_inside(w, high)
+    # At the very start of a step nothing is across zero.
+    at_low = where(at_low > 0.0, at_low, TINY)
+    kept = same(0.0)
+    for iteration in range(60):
+        wide = met & (high - low > SOLVED * high) & (at_high < 0.0)
+        if not any_lane(wide):
+            break
+        x = low + (high - low) * (at_low / (at_low - at_high))
+        # Bisection at times: near a multiple zero the secants creep.
+        x = where((x > low) & (x < high), x, 0.5 * (low + high)) if iteration % 8 != 7 else 0.5 * (low + high)
+        value = _nearest_inside(w, x)
+        across, before = value <= 0.0, kept
+        kept = where(across, 1.0, -1.0)
+        # An end that stays for a second time counts half, so that the secant moves past the zero.
+        half_low, half_high = where(before > 0.5, 0.5, 1.0), where(before < -0.5, 0.5, 1.0)
+        at_low = where(wide, where(across, half_low * at_low, value), at_low)
+        at_high = where(wide, where(across, value, half_high * at_high), at_high)
+        low, high = where(wide & ~across, x, low), where(wide & across, x, high)
+    width = CBRT_EPS * larger(high, ROUNDING)
+    rise = _nearest_inside(w, high + width) - _nearest_inside(w, high - width)
+    put(w.slope, where(met, rise / (2.0 * width * lanes(w.h)), lanes(w.slope)))
+    put(w.met, where(met, high, 1.0))
+
+
+@compiled
+def meet(w: Any, good: Any) -> None:
+    """Guards in the steps that pass: which are met, and where; at the end of a step onto one, how far it is."""
+    landing = good & (lanes(w.onto) > 0.5)
+    close = _may_meet(w, good & (lanes(w.onto) < 0.5))
+    put(w.high, 0.0)
+    if any_lane(close):
+        _scan(w, close)
+    met = good & (lanes(w.onto) < 0.5) & (lanes(w.high) > 0.0)
+    put(w.met, 1.0)
+    put(w.inputs[0], lanes(w.t) + lanes(w.h))
+    for m in range(w.n):
+        put(w.inputs[1 + m], lanes(w.y_new[m]))
+    evaluate(w, MARGINS, w.margin_end)
+    if any_lane(met):
+        _locate(w, met)
+    for m in range(w.n_margins):
+        put(w.margin[m], lanes(w.margin_end[m]))
+    put(w.value, where(landing, _nearest(w), lanes(w.value)))
+
+
+@compiled
+def _kink(w: Any, lane: int) -> bool:
+    """Whether the equations may bend where a guard is met that this lane is about to reach."""
+    found = False
+    for m in range(w.n_margins):
+        found = found or (w.fired[m, lane] > 0.5 and w.kinds[m, 0] == 0 and w.kinds[m, 2] == 0)
+    return found
+
+
+@compiled
+def lands(w: Any, lane: int) -> bool:
+    """Whether a step onto a guard ends there: across zero by no more than time resolves, and just short of a kink, as
+    beyond it the last stage would feel what begins there. Else the next trial is set; none after too many.
+    """
+    h, value, slope = w.h[lane], w.value[lane], w.slope[lane]
+    attempt = w.landing[lane] - 1
+    resolution = 0.5 * EPS * (abs(w.t[lane]) + h)
+    change = -value / slope if slope < 0.0 else 0.0
+    wanted = -1.0 if _kink(w, lane) else 1.0
+    lies = value * wanted <= 0.0
+    if lies and (abs(change) <= resolution * (1 + attempt) or w.nudge[lane] > 0.0 or attempt >= 6):
+        return True
+    if not lies and abs(change) <= resolution * (1 + attempt):
+        # A zero that time does not resolve is passed by the least that crosses it.
+        w.nudge[lane] = max(2.0 * w.nudge[lane], resolution)
+        change = wanted * w.nudge[lane]
+    else:
+        w.nudge[lane] = 0.0
+    w.landing[lane] += 1
+    if w.landing[lane] > TRIALS or slope >= 0.0:
+        w.unclear[lane] = 1.0
+    w.proposed[lane] = min(max(h + change, 0.5 * h), min(2.0 * h, w.longest[lane]))
+    return False

@@ -1,0 +1,366 @@
+"""Whole runs, eight at once, compiled: starts, steps, events, segments and ends.
+
+Runs that are over give their places to the next. What these steps are not made for (stiffness, guards that touch zero
+or start there, rates that are not finite, noise) is left to the steps of one run at a time, and marked as LEFT.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from surfacechem.compile.vectors import LANES
+from surfacechem.solve.contract import Status
+from surfacechem.solve.lanes.lane_guards import lands, meet, start_margins
+from surfacechem.solve.lanes.lane_step import (
+    END_STAGE,
+    ORDER,
+    WORK,
+    eighth_root,
+    find_stiff,
+    interpolate,
+    larger,
+    look,
+    norm_of,
+    propose,
+    put_start,
+    set_weights,
+    smaller,
+    try_step,
+)
+from surfacechem.solve.lanes.layout import LEFT
+from surfacechem.solve.lanes.vector import any_lane, lanes, put, where
+from surfacechem.solve.radau.driver import FEWEST, LEAST_NORM
+from surfacechem.solve.radau.explicit import FALLS, PATIENT
+from surfacechem.solve.radau.record import laying_out
+from surfacechem.solve.radau.step import loosening
+from surfacechem.solve.radau.stepper import END, EVENTS, FIRST_COUNTER, OUTPUTS, RECORDS
+from surfacechem.solve.radau.tables import LAST_STAGE
+from surfacechem.solve.radau.work import MARGINS, RATES, compiled, evaluate, row_of
+from surfacechem.tolerances import NEGLIGIBLE, SQRT_EPS, ULPS
+
+_lay_out = laying_out(WORK)
+
+FINISHED, EVENT = int(Status.FINISHED), int(Status.EVENT)
+HOPELESS = 12
+"""Trials of a step in a row after which it is noise or stiffness that they meet: each is a half of the last or less."""
+TOGETHER = 4
+"""Free lanes for which new runs begin: a choice. Fewer fill the lanes better, more share what starts and ends cost."""
+
+
+@compiled
+def _write_state(w: Any, row: Any, lane: int) -> None:
+    """[t | y | ydot | ledger] at the start of the step of a lane."""
+    n = w.n
+    row[0] = w.t[lane]
+    for m in range(n):
+        row[1 + m] = w.y[m, lane]
+        row[1 + n + m] = w.k[0, m, lane]
+    for m in range(w.n_ledger):
+        row[1 + 2 * n + m] = w.y[n + m, lane]
+
+
+@compiled
+def _record(w: Any, lane: int) -> None:
+    i = w.run[lane]
+    counts, records = w.counts[i], w.records[i]
+    if counts[RECORDS] < records.shape[0]:
+        _write_state(w, records[counts[RECORDS]], lane)
+    counts[RECORDS] += 1
+
+
+@compiled
+def _end(w: Any, lane: int, status: int) -> None:
+    """The end of a run, which leaves its lane free; its guards there are evaluated with those of others that end."""
+    i = w.run[lane]
+    counts = w.counts[i]
+    counts[END] = status
+    _write_state(w, w.ends[i], lane)
+    counters = w.steps[lane], w.rejected[lane], LAST_STAGE * (w.steps[lane] + w.rejected[lane])
+    for k, counter in enumerate(counters):
+        counts[FIRST_COUNTER + k] = counter
+    w.over[lane], w.run[lane] = i, -1
+
+
+@compiled
+def _give_up(w: Any, lane: int) -> None:
+    """Leave the run of a lane to other steps."""
+    w.counts[w.run[lane], END] = LEFT
+    w.run[lane] = -1
+
+
+@compiled
+def _enter(w: Any, lane: int) -> None:
+    """The segment of a lane, with its end and its parameters."""
+    i = w.run[lane]
+    segment, segments, spacing = w.segment[lane], w.segments[row_of(w.segments, i)], w.spacing[row_of(w.spacing, i)]
+    w.t[lane], w.end[lane] = segments[segment], segments[segment + 1]
+    for j in range(w.parameters.shape[2]):
+        w.inputs[1 + 2 * w.n + j, lane] = w.parameters[i, segment, j]
+    w.spacing_of[lane] = min(spacing, (w.end[lane] - w.t[lane]) / FEWEST)
+    w.fresh[lane] = 1.0
+
+
+@compiled
+def _begin(w: Any, lane: int, i: int) -> None:
+    """Run i in this lane, from its start."""
+    w.run[lane] = i
+    w.segment[lane] = w.steps[lane] = w.rejected[lane] = w.failed[lane] = w.stiff_steps[lane] = w.landing[lane] = 0
+    peaks = w.peaks[row_of(w.peaks, i)]
+    for m in range(w.n):
+        w.y[m, lane] = w.y0[i, m]
+    for m in range(w.n_ledger):
+        w.y[w.n + m, lane] = 0.0
+        w.q_largest[m, lane] = peaks[m]
+    for m in range(w.n_margins):
+        w.margin_largest[m, lane] = peaks[w.n_ledger + m]
+        w.fired[m, lane] = 0.0
+    _enter(w, lane)
+
+
+@compiled
+def _first_sizes(w: Any) -> Any:
+    """Steps over which the change of the rate, felt by a small trial step, stays within the tolerance (II.4)."""
+    span, speed, size = lanes(w.end) - lanes(w.t), norm_of(w, w.k[0]) / w.loose, norm_of(w, w.y) / w.loose
+    trial = smaller(larger(size * NEGLIGIBLE**2, 1e-2) / speed, span * NEGLIGIBLE)
+    put(w.inputs[0], lanes(w.t) + trial)
+    for m in range(w.n):
+        put(w.inputs[1 + m], lanes(w.y[m]) + trial * lanes(w.k[0, m]))
+    evaluate(w, RATES, w.rates)
+    for m in range(w.n):
+        put(w.rates[m], lanes(w.rates[m]) - lanes(w.k[0, m]))
+    change = norm_of(w, w.rates) / w.loose / speed
+    scale = trial / change
+    felt = smaller(scale * smaller(1.0 / eighth_root(speed * scale), 1.0), 0.05 * span)
+    felt = where(change * span > SQRT_EPS * trial, felt, 0.05 * span)
+    return where((speed > 0.0) & (speed < np.inf), felt, NEGLIGIBLE * span)
+
+
+@compiled
+def _start(w: Any) -> None:
+    """Rates, sides of guards and sizes of first steps of the lanes that start or restart; others stay as they are."""
+    fresh = lanes(w.fresh) > 0.5
+    put_start(w)
+    evaluate(w, RATES, w.rates)
+    for m in range(w.columns):
+        put(w.k[0, m], where(fresh, lanes(w.rates[m]), lanes(w.k[0, m])))
+    put(w.unclear, 0.0)
+    if w.n_margins > 0:
+        start_margins(w, fresh)
+    set_weights(w)
+    put(w.proposed, where(fresh, _first_sizes(w), lanes(w.proposed)))
+    put(w.aim, where(fresh, np.inf, lanes(w.aim)))
+    put(w.h_last, where(fresh, 0.0, lanes(w.h_last)))
+    for lane in range(LANES):
+        i = w.run[lane]
+        if w.fresh[lane] < 0.5 or i < 0:
+            continue
+        w.fresh[lane], w.begins[lane], w.again[lane], w.failed[lane] = 0.0, 1.0, 0.0, 0
+        for m in range(w.n_margins):
+            w.fired[m, lane] = 0.0
+        if w.unclear[lane] > 0.5:
+            _give_up(w, lane)
+            continue
+        counts, times = w.counts[i], w.times[row_of(w.times, i)]
+        if counts[OUTPUTS] == 0 and times.shape[0] > 0 and times[0] <= w.t[lane]:
+            for m in range(w.columns):
+                w.outputs[i, 0, m] = w.y[m, lane]
+            counts[OUTPUTS] = 1
+        if counts[RECORDS] == 0:
+            _record(w, lane)
+
+
+@compiled
+def _choose_sizes(w: Any) -> None:
+    """The step of each lane: what was proposed, up to the end of its segment or to where a step has to end."""
+    for lane in range(LANES):
+        h = w.proposed[lane]
+        left = w.end[lane] - w.t[lane]
+        remaining = min(left, w.aim[lane] - w.t[lane])
+        if w.landing[lane] == 0:
+            # No tiny last step: two of half the length are better than a whole one and a rest.
+            if h >= remaining * (1.0 - SQRT_EPS):
+                h = remaining
+            elif 2.0 * h > remaining:
+                h = 0.5 * remaining
+        w.h[lane] = h if w.run[lane] >= 0 else 0.0
+        w.last[lane] = 1.0 if h == left else 0.0
+        w.onto[lane] = 1.0 if w.landing[lane] > 0 else 0.0
+
+
+@compiled
+def _write_outputs(w: Any, lane: int, t_new: float) -> None:
+    """The outputs up to the end of the step."""
+    i = w.run[lane]
+    counts, times, outputs = w.counts[i], w.times[row_of(w.times, i)], w.outputs[i]
+    k = counts[OUTPUTS]
+    while k < times.shape[0] and times[k] <= t_new:
+        x = (times[k] - w.t[lane]) / w.h[lane]
+        for m in range(w.columns):
+            total = w.polynomial[ORDER - 1, m, lane]
+            for d in range(ORDER - 2, -1, -1):
+                total = total * x + w.polynomial[d, m, lane]
+            inside = w.y[m, lane] + w.h[lane] * x * total
+            outputs[k, m] = w.y_new[m, lane] if times[k] == t_new else inside
+        k += 1
+    counts[OUTPUTS] = k
+
+
+@compiled
+def _write_events(w: Any, lane: int) -> bool:
+    """A row for each guard that is met at the state of the lane; whether one of them ends the run."""
+    i = w.run[lane]
+    counts, events = w.counts[i], w.events[i]
+    nearest, terminal = np.inf, False
+    for m in range(w.n_margins):
+        if w.fired[m, lane] > 0.5:
+            nearest = min(nearest, w.side[m, lane] * w.margin[m, lane])
+    for m in range(w.n_margins):
+        value = w.side[m, lane] * w.margin[m, lane]
+        if w.fired[m, lane] < 0.5 or value > max(nearest, 0.0):
+            w.fired[m, lane] = 0.0
+            continue
+        if counts[EVENTS] < events.shape[0]:
+            row = events[counts[EVENTS]]
+            row[0] = m
+            _write_state(w, row[1:], lane)
+        counts[EVENTS] += 1
+        terminal = terminal or w.kinds[m, 0] == 1
+    return terminal
+
+
+@compiled
+def _accept(w: Any, lane: int) -> None:
+    """Move on to the end of a step."""
+    t_new = w.end[lane] if w.last[lane] > 0.5 else w.t[lane] + w.h[lane]
+    _write_outputs(w, lane, t_new)
+    for m in range(w.columns):
+        w.y[m, lane] = w.y_new[m, lane]
+        w.k[0, m, lane] = w.k[END_STAGE, m, lane]
+    for m in range(w.n_margins):
+        w.margin_first[m, lane] = w.margin_end[m, lane]
+    for m in range(w.n_ledger):
+        w.q_largest[m, lane] = max(w.q_largest[m, lane], abs(w.y[w.n + m, lane]))
+    w.t[lane] = t_new
+    w.steps[lane] += 1
+    w.begins[lane], w.again[lane], w.failed[lane] = 0.0, 0.0, 0
+    # The controller learns nothing more from what is far below the tolerance.
+    w.h_last[lane], w.norm_last[lane] = w.h[lane], max(w.norm[lane], LEAST_NORM)
+    w.proposed[lane] = w.following[lane]
+    if t_new >= w.aim[lane]:
+        w.aim[lane] = np.inf
+    stiff = w.stiff[lane] > 0.5
+    w.stiff_steps[lane] = w.stiff_steps[lane] + 2 if stiff else max(w.stiff_steps[lane] - 1, 0)
+    _record(w, lane)
+
+
+@compiled
+def _go_on(w: Any, lane: int) -> None:
+    """Behind a step: events, the next segment, the end."""
+    whole = w.t[lane] == w.end[lane]
+    if w.landing[lane] > 0:
+        w.landing[lane], w.fresh[lane] = 0, 1.0
+        if _write_events(w, lane):
+            _end(w, lane, EVENT)
+            return
+    if whole and w.segment[lane] + 2 < w.segments.shape[1]:
+        w.segment[lane] += 1
+        _enter(w, lane)
+    elif whole:
+        _end(w, lane, FINISHED)
+
+
+@compiled
+def _conclude(w: Any, lane: int) -> None:
+    """What becomes of the step of a lane: repeated, shorter or onto a guard; accepted; the last one."""
+    h, i = w.h[lane], w.run[lane]
+    if w.again[lane] > 0.5 and w.norm[lane] > FALLS * w.norm_tried[lane] * (h / w.h_tried[lane]) ** 8:
+        # The error of a step that is repeated has not fallen with its size: it is noise, or stiffness.
+        w.stiff_steps[lane] += PATIENT
+    if not w.norm[lane] < 1.0:
+        w.h_tried[lane], w.norm_tried[lane] = h, min(w.norm[lane], 1e30)
+        w.proposed[lane], w.again[lane] = w.following[lane], 1.0
+        w.failed[lane] += 1
+        w.rejected[lane] += 1
+    elif w.missed[lane] < 1.0:
+        # A step ends there, so that its last stage feels what the others have missed.
+        w.aim[lane], w.proposed[lane] = w.t[lane] + w.missed[lane] * h, w.missed[lane] * h
+        w.failed[lane] += 1
+        w.rejected[lane] += 1
+    elif w.landing[lane] == 0 and w.met[lane] < 1.0:
+        w.landing[lane], w.nudge[lane], w.longest[lane] = 1, 0.0, 1.25 * h
+        w.proposed[lane] = w.met[lane] * h
+        w.rejected[lane] += 1
+    elif w.landing[lane] == 0 or lands(w, lane):
+        _accept(w, lane)
+        _go_on(w, lane)
+    doubtful = w.unclear[lane] + (w.failed[lane] > HOPELESS) + (w.stiff_steps[lane] >= 2 * PATIENT) > 0
+    spent = w.steps[lane] + w.rejected[lane] >= w.max_steps[row_of(w.max_steps, i)]
+    if w.run[lane] >= 0 and (doubtful or spent or not w.proposed[lane] > ULPS * w.t[lane]):
+        _give_up(w, lane)
+
+
+@compiled
+def _write_margins(w: Any) -> None:
+    """Guards where runs have ended."""
+    ended = False
+    for lane in range(LANES):
+        ended = ended or w.over[lane] >= 0
+    if not ended:
+        return
+    if w.n_margins > 0:
+        put_start(w)
+        evaluate(w, MARGINS, w.margin)
+    for lane in range(LANES):
+        if w.over[lane] >= 0:
+            end = w.ends[w.over[lane]]
+            for m in range(w.n_margins):
+                end[end.shape[0] - w.n_margins + m] = w.margin[m, lane]
+            w.over[lane] = -1
+
+
+@compiled
+def _step(w: Any) -> None:
+    """A trial step of every lane, and what becomes of each."""
+    _choose_sizes(w)
+    set_weights(w)
+    try_step(w)
+    propose(w)
+    good = lanes(w.norm) < 1.0
+    put(w.unclear, 0.0)
+    if any_lane(good):
+        find_stiff(w)
+        interpolate(w)
+        look(w, good)
+        if w.n_margins > 0:
+            meet(w, good & (lanes(w.missed) == 1.0))
+    for lane in range(LANES):
+        if w.run[lane] >= 0:
+            _conclude(w, lane)
+    _write_margins(w)
+
+
+def run_lanes(first: int, last: int, memory: Any, batch: Any) -> None:
+    """Runs first to last - 1 of a batch. What becomes of one depends neither on those beside it nor on the threads."""
+    w = _lay_out(batch, memory)
+    w.loose = loosening(w.rtol)
+    following, busy = first, 0
+    for lane in range(LANES):
+        w.run[lane] = w.over[lane] = -1
+    while busy > 0 or following < last:
+        # Runs begin together, so that what is done at their starts and ends is done for several at once.
+        begins = busy <= LANES - TOGETHER
+        starts, busy = False, 0
+        for lane in range(LANES):
+            if begins and w.run[lane] < 0 and following < last:
+                _begin(w, lane, following)
+                following += 1
+            starts = starts or (w.run[lane] >= 0 and w.fresh[lane] > 0.5)
+        if starts:
+            _start(w)
+        for lane in range(LANES):
+            busy += w.run[lane] >= 0
+        if busy > 0:
+            _step(w)
+            busy = 0
+            for lane in range(LANES):
+                busy += w.run[lane] >= 0

@@ -1,0 +1,276 @@
+"""One explicit step of order 8 for eight runs at once, each with its own time and size: stages, error, polynomial, and
+the looks at the equations inside it.
+
+The rules are those of the steps of one run, with the accounts of the ledger integrated beside the states.
+
+Source: Hairer, Norsett & Wanner, Solving Ordinary Differential Equations I, sections II.4, II.5 and II.10 (DOP853).
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.polynomial import Polynomial
+from numpy.typing import NDArray
+
+from surfacechem.compile.vectors import LANES
+from surfacechem.solve.lanes.layout import MEMORY, SIZES
+from surfacechem.solve.lanes.vector import absolute, any_lane, floor, lanes, put, same, square_root, where
+from surfacechem.solve.radau.dense import FORESEEN, GROUPS, LEAST, LOOSER
+from surfacechem.solve.radau.explicit import DENSEST, FELT, FOLLOWED, SHARE, STABLE
+from surfacechem.solve.radau.record import StepperRecord
+from surfacechem.solve.radau.step import BRIEF, DECADES, FAR, GROWTH, SAFETY, SHRINK
+from surfacechem.solve.radau.tables import (
+    DENSE_FACTORS,
+    EXPLICIT,
+    EXPLICIT_ERRORS,
+    EXPLICIT_NODES,
+    GAMMA,
+    LAST_STAGE,
+    STAGES_OF_DENSE,
+)
+from surfacechem.solve.radau.work import RATES, compiled, evaluate, weighted_sums
+from surfacechem.tolerances import ROUNDING, SHALLOW, TINY
+
+WORK = StepperRecord("LaneWork", SIZES, {"loose": float}, MEMORY)
+END_STAGE = STAGES_OF_DENSE - 1
+"""The last stage of a step, at its end."""
+
+
+def _polynomial_table() -> NDArray[np.float64]:
+    """Coefficients of x, x^2, ... in the change over a fraction x of the step, per unit of it, from all its rates."""
+    x = Polynomial([0.0, 1.0])
+    table = np.zeros((len(DENSE_FACTORS) + 1, LAST_STAGE + 1))
+    for stage in range(LAST_STAGE + 1):
+        total = Polynomial([0.0])
+        for i, factor in enumerate(DENSE_FACTORS[::-1, stage]):
+            total = (total + factor) * (x if i % 2 == 0 else 1.0 - x)
+        table[: len(total.coef), stage] = total.coef
+    return table[1:]
+
+
+_change = weighted_sums(EXPLICIT)
+_errors = weighted_sums(EXPLICIT_ERRORS)
+_coefficients = weighted_sums(_polynomial_table())
+ORDER = len(DENSE_FACTORS)
+
+
+_change = weighted_sums(EXPLICIT)
+_errors = weighted_sums(EXPLICIT_ERRORS)
+_coefficients = weighted_sums(_polynomial_table())
+ORDER = len(DENSE_FACTORS)
+
+
+@compiled
+def larger(a: Any, b: Any) -> Any:
+    """The larger at each place; the second where one is no number."""
+    return where(a > b, a, b)
+
+
+@compiled
+def smaller(a: Any, b: Any) -> Any:
+    """The smaller at each place; the second where one is no number."""
+    return where(a < b, a, b)
+
+
+@compiled
+def eighth_root(a: Any) -> Any:
+    """The root of order 8, that of the method."""
+    return square_root(square_root(square_root(a)))
+
+
+@compiled
+def put_start(w: Any) -> None:
+    """Time and state at the start of the step."""
+    put(w.inputs[0], lanes(w.t))
+    for m in range(w.n):
+        put(w.inputs[1 + m], lanes(w.y[m]))
+
+
+@compiled
+def set_weights(w: Any) -> None:
+    """Weights of the error norm at the start of the step."""
+    for m in range(w.n):
+        put(w.weight[m], larger(w.rtol * absolute(lanes(w.y[m])) + w.atol[m], TINY))
+
+
+@compiled
+def norm_of(w: Any, row: Any) -> Any:
+    """The largest of these changes of the states beside their tolerances."""
+    norm = same(0.0)
+    for m in range(w.n):
+        size = absolute(lanes(row[m])) / lanes(w.weight[m])
+        norm = where(size <= norm, norm, size)  # not the larger: what is no number must be seen
+    return norm
+
+
+@compiled
+def _evaluate_stage(w: Any, i: int, change: Any) -> None:
+    """Rates of a stage, by those of the stages before it."""
+    h = lanes(w.h)
+    _change(i, w.k.ctypes.data, LANES * w.columns, change.ctypes.data)
+    put(w.inputs[0], lanes(w.t) + EXPLICIT_NODES[i] * h)
+    for m in range(w.n):
+        put(w.inputs[1 + m], lanes(w.y[m]) + h * lanes(change[m]))
+    evaluate(w, RATES, w.k[i])
+
+
+@compiled
+def _ledger_norms(w: Any) -> Any:
+    """Error of the accounts in units of what is allowed: those of one kind beside the largest of them, which turned
+    over so much or soon will.
+    """
+    h, span = lanes(w.h), lanes(w.end) - lanes(w.t)
+    for m in range(w.n_ledger):
+        rate = same(0.0)
+        for i in range(STAGES_OF_DENSE):
+            rate = larger(rate, absolute(lanes(w.k[i, w.n + m])))
+        put(w.q_rate[m], rate)
+        put(w.q_scale[m], lanes(w.q_largest[m]) + larger(h, FORESEEN * span) * rate)
+    norm = same(0.0)
+    for group in range(GROUPS):
+        miss, second, scale = same(0.0), same(0.0), same(TINY)
+        for m in range(w.n_ledger):
+            if w.groups[m] == group:
+                miss = larger(miss, absolute(lanes(w.coarse[w.n + m])))
+                second = larger(second, absolute(lanes(w.fine[w.n + m])))
+                scale = larger(scale, lanes(w.q_scale[m]))
+        norm = larger(norm, h * miss * miss / (square_root(miss * miss + 0.01 * second * second) + TINY) / scale)
+    return where(h < SHALLOW * lanes(w.t), 0.0, norm / max(LOOSER * w.rtol, LEAST))
+
+
+@compiled
+def try_step(w: Any) -> None:
+    """All stages of a step of each lane, and the norms of their errors."""
+    for i in range(1, STAGES_OF_DENSE):
+        _evaluate_stage(w, i, w.change_before if i == END_STAGE - 1 else w.change)
+    h = lanes(w.h)
+    _errors(0, w.k.ctypes.data, LANES * w.columns, w.coarse.ctypes.data)
+    _errors(1, w.k.ctypes.data, LANES * w.columns, w.fine.ctypes.data)
+    largest, second = same(0.0), same(0.0)
+    for m in range(w.columns):
+        put(w.y_new[m], lanes(w.y[m]) + h * lanes(w.change[m]))
+    for m in range(w.n):
+        size = larger(absolute(lanes(w.y[m])), absolute(lanes(w.y_new[m])))
+        rate = h / larger(w.rtol * size + w.atol[m], TINY)
+        error = absolute(lanes(w.coarse[m])) * rate
+        largest = where(error <= largest, largest, error)
+        second = larger(second, absolute(lanes(w.fine[m])) * rate)
+    # The estimate of fifth order, made one of seventh by that of third.
+    norm = largest * largest / (SHARE * square_root(largest * largest + 0.01 * second * second + TINY))
+    put(w.norm, larger(norm, _ledger_norms(w)) if w.n_ledger > 0 else norm)
+
+
+@compiled
+def propose(w: Any) -> None:
+    """The size of the next step by the error of this one (Gustafsson 1994), or of its repetition where it fails."""
+    h, h_last, given = lanes(w.h), lanes(w.h_last), lanes(w.norm)
+    norm = larger(where(given < 1e30, given, 1e30), ROUNDING)
+    factor = SAFETY / eighth_root(norm)
+    passes = norm < 1.0
+    predicted = factor * h / h_last * eighth_root(lanes(w.norm_last) / norm)
+    factor = where(passes & (h_last > 0.0), smaller(factor, predicted), factor)
+    factor = smaller(larger(factor, SHRINK), GROWTH)
+    put(w.following, h * where(passes & (lanes(w.again) > 0.5), smaller(factor, 1.0), factor))
+
+
+@compiled
+def find_stiff(w: Any) -> None:
+    """Which steps are long beside the fastest rate, as the rates of the last two stages tell."""
+    largest, fastest, speed, change = same(0.0), same(0.0), same(0.0), same(0.0)
+    for m in range(w.n):
+        end, unit = lanes(w.k[END_STAGE, m]), 1.0 / lanes(w.weight[m])
+        apart = absolute(end - lanes(w.k[END_STAGE - 1, m]))
+        # Of the variable that feels the difference of the two most: slower ones differ by their error alone.
+        most = apart * unit > largest
+        largest = where(most, apart * unit, largest)
+        moved = absolute(lanes(w.change[m]) - lanes(w.change_before[m]))
+        fastest = where(most, apart / (moved + TINY), fastest)
+        speed = larger(speed, absolute(end) * unit)
+        change = larger(change, absolute(end - lanes(w.k[0, m])) * unit)
+    outrun = (fastest > FELT) & (change < FOLLOWED * fastest * speed)
+    put(w.stiff, where((fastest > STABLE) | outrun, 1.0, 0.0))
+
+
+@compiled
+def interpolate(w: Any) -> None:
+    """The polynomials of the steps."""
+    for i in range(STAGES_OF_DENSE, LAST_STAGE + 1):
+        _evaluate_stage(w, i, w.rates)
+    for d in range(ORDER):
+        _coefficients(d, w.k.ctypes.data, LANES * w.columns, w.polynomial[d].ctypes.data)
+
+
+@compiled
+def put_inside(w: Any, x: Any) -> None:
+    """Time and state at the fraction x of each step."""
+    h = lanes(w.h)
+    put(w.inputs[0], lanes(w.t) + x * h)
+    for m in range(w.n):
+        total = lanes(w.polynomial[ORDER - 1, m])
+        for d in range(ORDER - 2, -1, -1):
+            total = total * x + lanes(w.polynomial[d, m])
+        put(w.inputs[1 + m], lanes(w.y[m]) + h * x * total)
+
+
+@compiled
+def _differs(w: Any, x: Any) -> Any:
+    """Where the equations at the fraction x of the step, or the rates of the ledger, are far from the polynomials."""
+    put_inside(w, x)
+    evaluate(w, RATES, w.rates)
+    for m in range(w.columns):
+        total = float(ORDER) * lanes(w.polynomial[ORDER - 1, m])
+        for d in range(ORDER - 2, -1, -1):
+            total = total * x + float(d + 1) * lanes(w.polynomial[d, m])
+        put(w.slopes[m], total)
+    h, norm = lanes(w.h), same(0.0)
+    for m in range(w.n):
+        size = larger(absolute(lanes(w.y[m])), absolute(lanes(w.y_new[m])))
+        error = absolute(lanes(w.rates[m]) - lanes(w.slopes[m])) / larger(w.rtol * size + w.atol[m], TINY)
+        norm = where(error <= norm, norm, error)
+    norm = norm * h / (GAMMA[DENSEST] * w.loose)
+    for group in range(GROUPS):
+        miss, scale = same(0.0), same(TINY)
+        for m in range(w.n_ledger):
+            if w.groups[m] == group:
+                defect = absolute(lanes(w.rates[w.n + m]) - lanes(w.slopes[w.n + m]))
+                rate = larger(lanes(w.q_rate[m]), defect)
+                # The quadrature of a smooth rate is better than its polynomial of order 7, by 6/7 of that power; 3/4 is
+                # what roots give.
+                root = square_root(square_root(defect / larger(rate, TINY)))
+                miss = larger(miss, h * defect * root * root * root)
+                scale = larger(scale, lanes(w.q_scale[m]))
+        norm = larger(norm, miss / (scale * max(LOOSER * w.rtol, LEAST)))
+    return norm
+
+
+@compiled
+def _miss(w: Any, x: Any, looks: Any) -> None:
+    """Keep where the lanes that look there have missed something, if they have not before."""
+    missed = lanes(w.missed)
+    put(w.missed, where((looks > 0.5) & (missed == 1.0) & ~(_differs(w, x) <= FAR), x, missed))
+
+
+@compiled
+def look(w: Any, good: Any) -> None:
+    """The fraction of each step at which it has missed something, one where it has not, as far as the points tell.
+
+    Beside the ends of a segment, and of steps that an event has cut short, there may be something narrow.
+    """
+    h, spacing = lanes(w.h), lanes(w.spacing_of)
+    put(w.missed, 1.0)
+    looks = good & (h > BRIEF * spacing)
+    begins, ends = where(looks, lanes(w.begins), 0.0), where(looks, larger(lanes(w.last), lanes(w.onto)), 0.0)
+    if any_lane(begins > 0.5):
+        # From the narrowest outwards: the first that differs says how short the step has to be.
+        for k in range(DECADES, 0, -1):
+            _miss(w, same(10.0**-k), begins)
+    points = where(looks, h / spacing, 0.0)
+    i = 0.0
+    while any_lane(points >= i + 1.0):
+        # Of so many whole spacings each has one in its middle.
+        most = floor(points)
+        _miss(w, (i + 0.5) / larger(most, 1.0), where(most >= i + 1.0, 1.0, 0.0))
+        i += 1.0
+    if any_lane(ends > 0.5):
+        for k in range(1, DECADES + 1):
+            _miss(w, same(1.0 - 10.0**-k), ends)

@@ -1,0 +1,53 @@
+"""What eight runs at once work on: names, types and shapes of the arrays behind the record of the compiled loop.
+
+Nothing of Numba is imported here.
+"""
+
+from surfacechem.compile.vectors import LANES
+
+SIZES = ("n", "n_ledger", "n_margins", "n_inputs", "columns")
+"""Sizes of a program, in the order in which it tells them: the columns are what is integrated, states and accounts."""
+
+LEFT = -1
+"""In place of a status: the run is not for these steps."""
+
+
+def _arrays(names: str, *shape: str | int, kind: type = float) -> dict[str, tuple[type, tuple[str | int, ...]]]:
+    return dict.fromkeys(names.split(), (kind, (*shape, LANES)))
+
+
+MEMORY = {
+    # t, y, ydot, parameters: what every function of the program is given
+    **_arrays("inputs", "n_inputs"),
+    # states and accounts at the start and at the end of the step, their changes per time at its last two stages, the
+    # two estimates of their error, their rates at a point inside and the slopes of their polynomials there
+    **_arrays("y y_new change change_before coarse fine rates slopes", "columns"),
+    # rates at the stages, and the coefficients of the polynomial of the step
+    **_arrays("k", 16, "columns"),
+    **_arrays("polynomial", 7, "columns"),
+    # weights of the error norm; of each account the largest value, and in this step the largest rate and what its error
+    # is held against
+    **_arrays("weight", "n"),
+    **_arrays("q_largest q_rate q_scale", "n_ledger"),
+    # guards: value now and at the two points before, at the start and at the end of the step; over its quarters how
+    # near to zero and how far from each to the next; largest value so far; side of zero, 0 where it is not known yet;
+    # whether each is met in the step
+    **_arrays("margin margin_before margin_earlier margin_first margin_end", "n_margins"),
+    **_arrays("nearest farthest margin_largest side fired", "n_margins"),
+    # the time, the end of the segment, and a time at which a step has to end
+    **_arrays("t end aim"),
+    # this step, the last one and one that failed, the norms of their errors, the next step; how far apart looks at the
+    # equations are
+    **_arrays("h h_last h_tried norm norm_last norm_tried proposed following spacing_of"),
+    # the fraction of the step at which it has missed something, and at which it meets a guard, with the bracket of that
+    **_arrays("missed met low high"),
+    # a step onto a guard: its value at the end, its slope, the longest step to try, the last push across
+    **_arrays("value slope longest nudge"),
+    # flags: a start or restart; the first step of a segment, the last one; a step onto a guard; one that is repeated;
+    # one that is stiff; guards of which it is unclear whether they are met
+    **_arrays("fresh begins last onto again stiff unclear"),
+    # the run of each lane, -1 where there is none, and the run that has just ended there; its segment; steps, rejected
+    # ones, those in a row; twice the stiff ones; trials of a step onto a guard
+    **_arrays("run over segment steps rejected failed stiff_steps landing", kind=int),
+}
+"""Arrays that the loop writes to: type and shape, with a place for each lane."""

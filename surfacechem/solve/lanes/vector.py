@@ -1,0 +1,187 @@
+"""A number for each of eight cases, as a type of compiled code: arithmetic, comparisons and choices place by place.
+
+Code that is written with these reads as that of one case. ``lanes(row)`` reads eight numbers, ``put(row, values)``
+writes them, ``where(mask, a, b)`` chooses, ``any_lane(mask)`` asks whether a condition holds for any of them.
+"""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Callable
+from typing import Any
+
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic, lower_builtin, models, register_model, type_callable
+
+from surfacechem.compile.vectors import LANES, VECTOR, WORDS, by_vector
+
+_Constant: Any = ir.Constant
+_intrinsic: Any = intrinsic
+_lower: Any = lower_builtin
+_typed: Any = type_callable
+
+
+class _Lanes(types.Type):
+    """Eight numbers, or eight truths."""
+
+
+LANE, MASK = _Lanes(name="Lanes"), _Lanes(name="Mask")
+
+
+@register_model(_Lanes)
+class _LanesModel(models.PrimitiveModel):
+    def __init__(self, manager: Any, kind: Any) -> None:
+        super().__init__(manager, kind, VECTOR if kind is LANE else WORDS)  # type: ignore[no-untyped-call]
+
+
+def _spread(builder: Any, value: Any) -> Any:
+    """A number at every place."""
+    nothing, first = _Constant(VECTOR, ir.Undefined), ir.IntType(32)(0)
+    single = builder.insert_element(nothing, value, first)
+    return builder.shuffle_vector(single, nothing, _Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES))
+
+
+def _holds(builder: Any, mask: Any) -> Any:
+    """A mask as bits. Between operations it is eight words of ones or zeros: what processors without registers for bits
+    choose by.
+    """
+    return builder.icmp_signed("<", mask, _Constant(WORDS, [0] * LANES))
+
+
+def _operation(operation: Any, kind: Any, result: Any, emit: Callable[[Any, Any, Any], Any]) -> None:
+    """Let an operator of two work on vectors of a kind, and on one of them and a number."""
+
+    @_typed(operation)
+    def _type(_context: Any) -> Any:
+        def typed(a: Any, b: Any) -> Any:
+            fits = all(each is kind or (kind is LANE and isinstance(each, types.Float)) for each in (a, b))
+            return result if fits and kind in (a, b) else None
+
+        return typed
+
+    def lowered(_context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        given = zip(signature.args, args, strict=True)
+        return emit(builder, *(value if each is kind else _spread(builder, value) for each, value in given))
+
+    for pair in ((kind, kind), *(((kind, types.Float), (types.Float, kind)) if kind is LANE else ())):
+        _lower(operation, *pair)(lowered)
+
+
+def _arithmetic(name: str) -> Callable[[Any, Any, Any], Any]:
+    return lambda builder, a, b: getattr(builder, name)(a, b)
+
+
+def _comparison(sign: str) -> Callable[[Any, Any, Any], Any]:
+    return lambda builder, a, b: builder.sext(builder.fcmp_ordered(sign, a, b), WORDS)
+
+
+for _operator, _name in (("add", "fadd"), ("sub", "fsub"), ("mul", "fmul"), ("truediv", "fdiv")):
+    _operation(getattr(operator, _operator), LANE, LANE, _arithmetic(_name))
+for _operator, _name in (("lt", "<"), ("le", "<="), ("gt", ">"), ("ge", ">="), ("eq", "==")):
+    _operation(getattr(operator, _operator), LANE, MASK, _comparison(_name))
+_operation(operator.and_, MASK, MASK, lambda builder, x, y: builder.and_(x, y))
+_operation(operator.or_, MASK, MASK, lambda builder, x, y: builder.or_(x, y))
+
+
+@_typed(operator.invert)
+def _type_of_not(_context: Any) -> Any:
+    return lambda mask: MASK if mask is MASK else None
+
+
+@_lower(operator.invert, MASK)
+def _not(_context: Any, builder: Any, _signature: Any, args: Any) -> Any:
+    return builder.not_(args[0])
+
+
+def _row(context: Any, builder: Any, kind: Any, row: Any) -> Any:
+    """Pointer to eight numbers of a row."""
+    return builder.bitcast(context.make_array(kind)(context, builder, row).data, VECTOR.as_pointer())
+
+
+@_intrinsic
+def lanes(_context: Any, row: Any) -> Any:
+    """The eight numbers of a row."""
+
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return builder.load(_row(context, builder, signature.args[0], args[0]), align=8)
+
+    return LANE(row), generate
+
+
+@_intrinsic
+def put(_context: Any, row: Any, values: Any) -> Any:
+    """Write eight numbers into a row; one number stands for eight."""
+
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        value = args[1] if signature.args[1] is LANE else _spread(builder, args[1])
+        builder.store(value, _row(context, builder, signature.args[0], args[0]), align=8)
+        return context.get_dummy_value()
+
+    return types.void(row, values), generate
+
+
+@_intrinsic
+def where(_context: Any, mask: Any, a: Any, b: Any) -> Any:
+    """At each place the first value where the mask holds, else the second."""
+
+    def generate(_context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        values = [
+            value if kind is LANE else _spread(builder, value)
+            for kind, value in zip(signature.args[1:], args[1:], strict=True)
+        ]
+        return builder.select(_holds(builder, args[0]), *values)
+
+    return LANE(mask, a, b), generate
+
+
+@_intrinsic
+def same(_context: Any, value: Any) -> Any:
+    """One number eight times."""
+
+    def generate(_context: Any, builder: Any, _signature: Any, args: Any) -> Any:
+        return _spread(builder, args[0])
+
+    return LANE(value), generate
+
+
+@_intrinsic
+def any_lane(_context: Any, mask: Any) -> Any:
+    """Whether the mask holds at any place."""
+
+    def generate(_context: Any, builder: Any, _signature: Any, args: Any) -> Any:
+        bits = ir.IntType(LANES)
+        return builder.icmp_unsigned("!=", builder.bitcast(_holds(builder, args[0]), bits), bits(0))
+
+    return types.boolean(mask), generate
+
+
+@_intrinsic
+def absolute(_context: Any, value: Any) -> Any:
+    """The sizes of eight numbers."""
+
+    def generate(_context: Any, builder: Any, _signature: Any, args: Any) -> Any:
+        sizes = builder.and_(builder.bitcast(args[0], WORDS), _Constant(WORDS, [2**63 - 1] * LANES))
+        return builder.bitcast(sizes, VECTOR)
+
+    return LANE(value), generate
+
+
+@_intrinsic
+def floor(_context: Any, value: Any) -> Any:
+    """The largest whole numbers that are not above."""
+
+    def generate(_context: Any, builder: Any, _signature: Any, args: Any) -> Any:
+        return by_vector(builder, "floor", args[0])
+
+    return LANE(value), generate
+
+
+@_intrinsic
+def square_root(_context: Any, value: Any) -> Any:
+    """The square roots of eight numbers."""
+
+    def generate(_context: Any, builder: Any, _signature: Any, args: Any) -> Any:
+        return by_vector(builder, "sqrt", args[0])
+
+    return LANE(value), generate

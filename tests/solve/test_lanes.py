@@ -1,0 +1,118 @@
+"""Steps of eight runs at once: the results of one run at a time, whatever company a run has."""
+
+from dataclasses import replace
+
+import case_runs
+import narrow_scenes
+import numpy as np
+import pytest
+
+import surfacechem
+from surfacechem.solve.lanes import lane_batch
+from surfacechem.solve.radau.solver import solve_arrays
+from surfacechem.solve.radau.stepper import END, EVENTS, OUTPUTS
+
+RUNS = 11
+"""Not a multiple of eight, so that lanes run empty."""
+
+CASES = (
+    ("exothermic", 0), ("endothermic-kappa-0p99", 0), ("biotin-streptavidin", 0), ("catch-bond", 0),
+    ("closing-film", 0), ("epoxy-cure-adiabatic", 0), ("rate-and-state-velocity-steps", 0),
+    ("press-conductance", 0), ("squeeze-film", 0),
+    ("shared-load-rupture", 0), ("coulomb-stop", 0), ("one-sided-contact", 0), ("snap-in", 0), ("stick-slip", 0),
+    ("three-temperatures", RUNS), ("slow-passage", RUNS), ("cohesive-cycles", RUNS), ("press-hold-pull", RUNS),
+)  # fmt: skip
+"""Cases of smooth runs, breakpoints, kinks, rupture and stops, and how many runs are left to other steps: stiff ones,
+and those with guards that start at zero."""
+LAWS = ".bonding", "potential", "friction"
+
+
+def problem_of(simulation, rtol=1e-9):
+    model = simulation.model
+    run = replace(simulation.case.run, solver="dop853", rtol=rtol)
+    return replace(model.problem(run, model.values({})), explicit=True, picture=0.0, record_steps=True)
+
+
+def columns_of(simulation, problem, runs=RUNS):
+    """Runs whose laws differ by a thousandth."""
+    system, program = simulation.model.system, problem.program
+    held = {item.symbol for item in (*system.modes, *system.registers)}
+    free = [each.symbol not in held and any(part in each.path for part in LAWS) for each in system.parameters]
+    own = np.flatnonzero(free)
+    table = np.repeat(problem.parameters[None], runs, axis=0)
+    table[:, :, own] *= 1 + 1e-3 * np.random.default_rng(0).uniform(-1, 1, (runs, 1, len(own)))
+    y0 = np.repeat(problem.y0[None], runs, axis=0)
+    peaks = np.zeros((1, program.n_ledger + program.n_margins))
+    times = np.linspace(0, problem.segments[-1], 7)[None]
+    return y0, table, np.array([problem.spacing]), peaks, problem.segments[None], times
+
+
+@pytest.fixture
+def left(monkeypatch):
+    """How many runs were left to other steps."""
+    counted = [0]
+
+    def counting(problem, *columns, room=None):
+        counted[0] += len(columns[0])
+        return solve_arrays(problem, *columns, room=room)
+
+    monkeypatch.setattr(lane_batch, "solve_arrays", counting)
+    return counted
+
+
+def assert_alike(found, wanted, n, tolerance):
+    for column in (END, EVENTS, OUTPUTS):
+        assert np.array_equal(found.counts[:, column], wanted.counts[:, column])
+    assert found.ends[:, 0] == pytest.approx(wanted.ends[:, 0], rel=10 * tolerance)
+    states = slice(1, 1 + n)
+    size = np.maximum(np.abs(wanted.ends[:, states]).max(axis=0), 1e-9)
+    # Where bonds rupture, the state changes by much in the last digit of the time.
+    steep = np.abs(wanted.ends[:, 1 + n : 1 + 2 * n]) * wanted.ends[:, :1]
+    assert np.all(np.abs(found.ends - wanted.ends)[:, states] <= tolerance * (size + 1e-5 * steep))
+    for i, reached in enumerate(wanted.counts[:, OUTPUTS]):
+        # The last output of a run that has stopped there is its end.
+        shown = slice(0, reached)
+        assert found.outputs[i, shown, :n] == pytest.approx(wanted.outputs[i, shown, :n], rel=tolerance, abs=tolerance)
+
+
+@pytest.mark.parametrize(("name", "others"), CASES)
+def test_runs_are_those_of_one_at_a_time(name, others, left):
+    simulation = case_runs.load(name)
+    problem = problem_of(simulation)
+    columns = columns_of(simulation, problem)
+    found = lane_batch.solve_batch(problem, *columns)
+    assert left[0] == others
+    wanted = solve_arrays(problem, *columns)
+    assert_alike(found, wanted, problem.program.n, 3e-7)
+    n, q = problem.program.n, problem.program.n_ledger
+    accounts = slice(1 + 2 * n, 1 + 2 * n + q)
+    turned = np.abs(wanted.ends[:, accounts]).max(initial=1e-300)
+    assert np.all(np.abs(found.ends - wanted.ends)[:, accounts] <= 1e-5 * turned)
+
+
+@pytest.mark.parametrize("name", ["exothermic", "shared-load-rupture", "closing-film"])
+def test_company_and_order_change_nothing(name):
+    simulation = case_runs.load(name)
+    problem = problem_of(simulation)
+    y0, table, *others = columns_of(simulation, problem, 21)
+    whole = lane_batch.solve_batch(problem, y0, table, *others)
+    order = np.random.default_rng(1).permutation(21)
+    for some in (order, np.array([7]), np.arange(3)):
+        part = lane_batch.solve_batch(problem, y0[some], table[some], *others)
+        for field in ("ends", "counts"):
+            assert np.array_equal(getattr(part, field), getattr(whole, field)[some])
+        for i, reached in enumerate(part.counts[:, OUTPUTS]):
+            assert np.array_equal(part.outputs[i, :reached], whole.outputs[some[i], :reached])
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_what_is_narrow_is_seen(seed, left):
+    scene = narrow_scenes.scene(seed)
+    simulation = surfacechem.load(scene.text)
+    if simulation.model.program.lanes is None or simulation.model.jumper is not None:
+        pytest.skip("not for these steps")
+    problem = problem_of(simulation)
+    columns = columns_of(simulation, problem, 1)
+    y = lane_batch.solve_batch(problem, *columns).ends[0, 1 : 1 + problem.program.n]
+    wanted = solve_arrays(problem, *columns).ends[0, 1 : 1 + problem.program.n]
+    assert y == pytest.approx(wanted, rel=1e-6, abs=1e-9)
