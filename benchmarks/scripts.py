@@ -32,6 +32,9 @@ TOLERANCES = [10.0**-k for k in range(4, 14)]
 REPEATS, ENOUGH = 5, 1.0
 """Runs of each at least, and seconds after which there are no more."""
 
+MOST = 200_000
+"""Evaluations of the rates after which a script has failed: towards a singular end its steps shrink without end."""
+
 
 def seconds(call: Callable[[], object]) -> float:
     """CPU time of a call, the least of several."""
@@ -74,12 +77,21 @@ def rates_of(model: Model) -> Callable[..., list[float]]:
 def script(rates: Callable[..., list[float]], problem: Problem, times: Array, rtol: float) -> Array | None:
     """States at these times by LSODA; None where it fails."""
     atol, y, rows = rtol * problem.atol / problem.rtol, problem.y0, [problem.y0[None]]
-    for start, end, p in zip(problem.segments, problem.segments[1:], problem.parameters.tolist(), strict=False):
+    left = iter(range(MOST))
+
+    def counted(t: float, y: Array, p: list[float]) -> list[float]:
+        next(left)
+        return rates(t, y, p)
+
+    for start, last, p in zip(problem.segments, problem.segments[1:], problem.parameters.tolist(), strict=False):
+        end = min(last, times[-1])
+        if end <= start:
+            break
         inside = times[(times > start) & (times < end)]
         at = np.append(inside, end)
         try:
-            answer = solve_ivp(rates, (start, end), y, method="LSODA", t_eval=at, rtol=rtol, atol=atol, args=(p,))
-        except (ValueError, OverflowError, ZeroDivisionError):
+            answer = solve_ivp(counted, (start, end), y, method="LSODA", t_eval=at, rtol=rtol, atol=atol, args=(p,))
+        except (ValueError, OverflowError, ZeroDivisionError, StopIteration):
             return None
         if not answer.success or not np.all(np.isfinite(answer.y)):
             return None
