@@ -4,11 +4,11 @@
 
 The script is what a person would write: a Python function of the rates with the numbers of the case in it, one call of
 LSODA for each piece of the loads. Its formulas are ours, with their guards at singular ends, which a person may leave
-out. It knows neither error, balances nor events, which `run` tells; both are compared at
-the output times of the case, as the largest error of a state relative to its largest value. The loosest tolerance of
-LSODA counts that is as good as ours; where none is, the tightest, which is marked. Milliseconds of CPU time, errors,
-and how many times longer the script takes are kept in benchmarks/results/scripts.csv. Cases that such a script cannot
-solve are listed with the reason.
+out. It knows neither error, balances nor events, which `run` tells. Both are compared at the output times of the case,
+as the largest error of a state relative to its largest value. The loosest tolerance of LSODA counts that is as good as
+ours; where none is, the tightest, which is marked. Milliseconds of CPU time, errors, and how many times longer the
+script takes are kept in benchmarks/results/scripts.csv. Cases that such a script cannot solve are listed with the
+reason.
 """
 
 import argparse
