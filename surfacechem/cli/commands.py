@@ -254,16 +254,17 @@ def wait_for(work: Callable[[], R], tick: Callable[[], None] = lambda: None) -> 
         pool.shutdown(wait=False)
 
 
-def solved(run: Callable[[], R], talk: bool | None, brief: bool = False) -> R:
+def solved(run: Callable[[], R], talk: bool | None, brief: bool = False, waits: bool = False) -> R:
     """The solution, its dataset's columns and audit included, so that what follows only writes; ``talk`` as the command
-    line says, ``brief`` where the stepper is called a few times only. A terminal shows a bar after a while.
+    line says, ``brief`` where the stepper is called a few times only, ``waits`` where more than it has to be compiled.
+    A terminal shows a bar after a while.
     """
     from surfacechem.cli.terminal import following
     from surfacechem.solve.radau import stepper
 
     if brief:
         stepper.load_briefly()
-    if not (talk is False or stepper.is_compiled()):
+    if talk is not False and (waits or not stepper.is_compiled()):
         typer.echo("compiling the stepper, once on this machine; this takes a minute or less ...", err=True)
     with following(talk) as bar:
         bar.tell("running")

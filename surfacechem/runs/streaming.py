@@ -27,6 +27,7 @@ from surfacechem.runs.checking import checked_arrays
 from surfacechem.runs.keeping import STATUSES, Columns, Keep, RunByRun, keep_of, variable
 from surfacechem.solve import AUTO
 from surfacechem.solve.contract import Index
+from surfacechem.solve.lanes import lane_batch
 from surfacechem.solve.run import Model, Run, Trajectory
 
 if TYPE_CHECKING:
@@ -78,6 +79,12 @@ class ChunkRuns:
         case = self.simulation.case
         run = case.run if "run.solver" in case.places else replace(case.run, solver=AUTO)
         return self.model.chosen(run, self.model.values(self.changes))
+
+    @property
+    def waits(self) -> bool:
+        """Whether the loop that steps eight runs at once has to be compiled before the first of them."""
+        laned = self.arrays is not None and self.arrays.problem.explicit and self.model.program.lanes is not None
+        return laned and not lane_batch.is_compiled()
 
     @cached_property
     def piece(self) -> int:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from surfacechem.compile.cache import compile_kernel, kernel_folder
+from surfacechem.compile.cache import compile_kernel, is_filled, kernel_folder
 from surfacechem.solve.contract import Array, Problem
 from surfacechem.solve.lanes.layout import LEFT, MEMORY, SIZES
 from surfacechem.solve.radau import stepper
@@ -24,8 +24,7 @@ def solve_batch(problem: Problem, *columns: Array, room: Room | None = None) -> 
     y0, parameters, spacing, *others = map(np.ascontiguousarray, columns)
     runs = y0, parameters, spacing, np.array((problem.max_steps,)), *others
     batch = batch_of(problem, runs, room, problem.program.lane_tables)
-    memory = np.zeros(_words(tuple(batch.sizes.tolist())), np.int64)
-    _kernel()(0, len(y0), memory, tuple(batch))
+    run(batch)
     left = np.flatnonzero(batch.counts[:, END] == LEFT)
     if len(left):
         own = (rows[left] if len(rows) == len(y0) else rows for rows in columns)
@@ -33,6 +32,12 @@ def solve_batch(problem: Problem, *columns: Array, room: Room | None = None) -> 
         for name in ("ends", "counts", "outputs", "records", "events"):
             getattr(batch, name)[left] = getattr(repeated, name)
     return batch
+
+
+def run(batch: Any) -> None:
+    """The runs of a batch, eight at once, with a memory of their own: threads may do so at the same time."""
+    memory = np.zeros(_words(tuple(batch.sizes.tolist())), np.int64)
+    _kernel()(0, len(batch.counts), memory, tuple(batch))
 
 
 @lru_cache(maxsize=64)
@@ -55,11 +60,19 @@ def _kernel() -> Any:
     return _Loaded.kernel
 
 
+def is_compiled() -> bool:
+    """Whether the loop can be loaded instead of compiled (which takes some ten seconds, once)."""
+    return _Loaded.kernel is not None or is_filled(_folder())
+
+
+def _folder() -> Path:
+    here = Path(__file__).parent
+    own = [here / f"{name}.py" for name in _SOURCES]
+    return kernel_folder([*stepper.sources(), here.parent.parent / "compile" / "vectors.py", *own])
+
+
 def _compiled() -> Any:
     from surfacechem.solve.lanes.lane_run import run_lanes
     from surfacechem.solve.radau.work import PARTS
 
-    here = Path(__file__).parent
-    own = [here / f"{name}.py" for name in _SOURCES]
-    folder = kernel_folder([*stepper.sources(), here.parent.parent / "compile" / "vectors.py", *own])
-    return compile_kernel(run_lanes, stepper.signature(), folder, PARTS)
+    return compile_kernel(run_lanes, stepper.signature(), _folder(), PARTS)
