@@ -71,7 +71,7 @@ def all_to_rest(model: Model, run: Run, points: Iterable[Mapping[str, float]]) -
 
 
 def _until(run: Run, end: float) -> tuple[float, ...]:
-    return tuple(end * t / run.times[-1] for t in run.times)
+    return tuple(end * (t / run.times[-1]) for t in run.times)  # the last of them exactly the end
 
 
 def _rest_of(reached: Trajectory) -> tuple[float, str]:

@@ -197,7 +197,7 @@ class Trajectory:
             rows = np.array([self._inputs] * len(some))
             for nudged, j in zip(rows, some, strict=True):
                 nudged[:, 1 + j] += changes[:, j]
-            values = model.named(rows.reshape(len(some) * len(times), -1))
+            values = model.named(rows.reshape(len(some) * len(times), rows.shape[-1]))
             with np.errstate(invalid="ignore"):  # quantities may be infinite, whatever the last bit is
                 apart = np.abs(values.reshape(len(some), *self.outputs.shape) - self.outputs)
                 worst = np.fmax(worst, np.fmax.reduce(apart.max(axis=1, initial=0.0)))

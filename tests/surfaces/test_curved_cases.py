@@ -218,7 +218,7 @@ def test_heat_flows_over_the_curved_gap_as_integrated_over_the_sphere():
         ("from: 0.4 nm", "from: 10 nm", "must be below the largest"),
         ("{sphere: {R: 50 nm}}", "{spere: {R: 50 nm}}", "Did you mean 'sphere'"),
         ("    plane: plane\n", "", "plane has no shape"),
-        ("ball: {sphere: {R: 50 nm}}", "ball: plane", "no end: give one of them a length"),
+        ("ball: {sphere: {R: 50 nm}}", "ball: plane", "endless: give one of them a length"),
         ("ball: {sphere: {R: 50 nm}}", "ball: {sphere: {R: -1 nm}}", "outside its range"),
         ("to: 9 nm}", "to: 9 nm}\n  acuracy: 1e-3", "Did you mean 'accuracy'"),
         ("surface:", "interface: {sites: 1e16 1/m^2}\nsurface:", "`sites` is of flats.* equilibrium-bonds"),

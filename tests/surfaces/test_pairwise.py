@@ -247,7 +247,7 @@ def test_a_table_and_a_penalty_of_pairs_end_where_they_say():
     ("make", "message"),
     [
         (lambda: pair(Sphere(R=1.0), Plane(), -0.1, [power(4)]), "overlap or touch, their gap is -0.1 m"),
-        (lambda: pair(Plane(), Plane(), 0.1, [power(4)]), "no end: give one of them a length"),
+        (lambda: pair(Plane(), Plane(), 0.1, [power(4)]), "endless: give one of them a length"),
         (
             lambda: over_gap(Surface(Paraboloid(R=1.0)), Surface(Plane(), True, 0.1), [], heat=[GAS]),
             "conductance .* no end",

@@ -40,6 +40,10 @@ FEWEST = 4
 """Points of a segment at which its steps are held against the equations, however short it is: a choice. Each costs an
 evaluation in every segment; what lasts less than a fourth of a segment may be missed.
 """
+SINGULAR = 0.5
+"""Power of the step with which the error of an account falls at least where its rate is singular at the start: that of
+a rate that grows like the inverse root, as of ideal diffusion; that of a logarithm falls with the step itself.
+"""
 LEAST_NORM = 1e-2
 """Error norm of the last step below which the controller learns nothing more from it (Hairer & Wanner II, IV.8)."""
 
@@ -131,9 +135,11 @@ def _ledger_limit(w: Any, h: float, remaining: float) -> float:
         return np.inf
     # The local error of a quadrature of order 2s - 1 goes with h^(2s), slower where a rate is singular at the start.
     power, least = 2.0 * stage_count(w.member), 0.1
-    if h < h_refused:
+    if w.tau < h < h_refused:  # farther from the start a rate is as smooth as elsewhere
         found = np.log(w.norm_refused / norm) / np.log(h_refused / h)
-        power, least = min(power, max(found, SQRT_EPS)), 0.01
+        # What falls slower still is noise, which no shorter step is rid of.
+        if found >= SINGULAR:
+            power, least = min(power, found), 0.01
     limit = h * max(least, 0.9 * max(norm, NEGLIGIBLE) ** (-1.0 / power))
     if norm <= 1.0:
         return max(limit, h)
@@ -262,7 +268,7 @@ def _run(w: Any, i: int) -> None:
     peaks = w.peaks[row_of(w.peaks, i)]
     copy(peaks[: w.n_ledger], w.q_largest)
     copy(peaks[w.n_ledger : w.n_ledger + w.n_margins], w.margin_largest)
-    w.explicit, w.stiff_steps = w.explicitly, 0
+    w.explicit, w.stiff_steps, w.h_refused = w.explicitly, 0, 0.0
     copy(w.y0[i], w.y)
     extremes = peaks[w.n_ledger + w.n_margins :]
     for j in range(w.n):
