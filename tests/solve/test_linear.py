@@ -52,3 +52,12 @@ def test_again_in_the_order_known(kind: type, seed: int) -> None:
     small[:, order[4, k], order[5, k]] *= 1e-12
     for other in (more, small):
         assert not factored(other, shift, np.zeros((N, N), kind), order, places, True, np.ones(N, kind))
+
+
+def test_an_order_that_is_not_whole_is_not_used_again() -> None:
+    derivatives, order, places = np.array([np.eye(N), np.zeros((N, N))]), np.zeros((6, N), int), np.zeros((N, N), int)
+    assert factored(derivatives, 1.0, np.zeros((N, N)), order, places, False, np.ones(N))
+    assert order[3, 0] >= 0
+    derivatives[0, :2, :2] = 1.0  # singular
+    assert not factored(derivatives, 1.0, np.zeros((N, N)), order, places, False, np.ones(N))
+    assert order[3, 0] < 0

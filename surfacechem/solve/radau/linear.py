@@ -188,6 +188,7 @@ def _list_origins(order: Any) -> None:
 
 @compiled
 def _factor_large(a: Any, order: Any, places: Any, columns: Any, rows: Any, counts: Any, threshold: float) -> bool:
+    order[3, 0] = -1  # until it is whole, no other matrix is to be factored in this order
     _count_entries(a, counts)
     for k in range(a.shape[0]):
         p, q, below = _emptiest(a, k, columns, rows, counts, threshold)
