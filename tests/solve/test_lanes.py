@@ -6,6 +6,7 @@ import case_runs
 import narrow_scenes
 import numpy as np
 import pytest
+from solver_problems import exothermic_problem
 
 import surfacechem
 from surfacechem.solve.lanes import lane_batch
@@ -88,6 +89,15 @@ def test_runs_are_those_of_one_at_a_time(name, others, left):
     accounts = slice(1 + 2 * n, 1 + 2 * n + q)
     turned = np.abs(wanted.ends[:, accounts]).max(initial=1e-300)
     assert np.all(np.abs(found.ends - wanted.ends)[:, accounts] <= 1e-5 * turned)
+
+
+def test_runs_without_guards(left):
+    problem = replace(exothermic_problem(1e-9), explicit=True)
+    one = problem.y0, problem.parameters, np.array(0.1), np.zeros(0), problem.segments, problem.times
+    columns = [np.repeat(row[None], RUNS, axis=0) for row in one]
+    found = lane_batch.solve_batch(problem, *columns)
+    assert left[0] == 0
+    assert_alike(found, solve_arrays(problem, *columns), 2, 1e-7)
 
 
 @pytest.mark.parametrize("name", ["exothermic", "shared-load-rupture", "closing-film"])

@@ -286,7 +286,7 @@ def _conclude(w: Any, lane: int) -> None:
         w.aim[lane], w.proposed[lane] = w.t[lane] + w.missed[lane] * h, w.missed[lane] * h
         w.failed[lane] += 1
         w.rejected[lane] += 1
-    elif w.landing[lane] == 0 and w.met[lane] < 1.0:
+    elif w.n_margins > 0 and w.landing[lane] == 0 and w.met[lane] < 1.0:
         w.landing[lane], w.nudge[lane], w.longest[lane] = 1, 0.0, 1.25 * h
         w.proposed[lane] = w.met[lane] * h
         w.rejected[lane] += 1

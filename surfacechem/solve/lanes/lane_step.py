@@ -54,12 +54,6 @@ _coefficients = weighted_sums(_polynomial_table())
 ORDER = len(DENSE_FACTORS)
 
 
-_change = weighted_sums(EXPLICIT)
-_errors = weighted_sums(EXPLICIT_ERRORS)
-_coefficients = weighted_sums(_polynomial_table())
-ORDER = len(DENSE_FACTORS)
-
-
 @compiled
 def larger(a: Any, b: Any) -> Any:
     """The larger at each place; the second where one is no number."""
