@@ -9,6 +9,7 @@ import ctypes
 import hashlib
 import pickle
 import platform
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property, lru_cache, partial
@@ -58,21 +59,20 @@ class Function:
         values = np.ascontiguousarray(inputs, dtype=float)
         if not (self.n_out and values.size):  # machine code of nothing cannot be called, nor on nothing
             return np.empty((*values.shape[:-1], self.size))
+        if not self.rest and values.shape == (self.n_in,):
+            # In half of the time that the library takes to look at what it is given.
+            code, row, results = self._called
+            found = results()
+            code(found, row.from_buffer(values), self.user)
+            return np.frombuffer(found)
         if not self.rest:
-            return self._of_one(values) if values.shape == (self.n_in,) else np.asarray(self.keep(values))
+            return np.asarray(self.keep(values))
         return np.concatenate([np.asarray(self.keep(values)), *(part(values) for part in self.rest)], axis=-1)
 
     @cached_property
     def _called(self) -> tuple[Any, Any, Any]:
         """The code as Python calls it by itself, and the types of its inputs and results."""
         return CODE(self.address), ctypes.c_double * self.n_in, ctypes.c_double * self.n_out
-
-    def _of_one(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Results of a single row, in half of the time that the library takes to look at what it is given."""
-        code, inputs, results = self._called
-        found = results()
-        code(found, inputs.from_buffer(values), self.user)
-        return np.frombuffer(found)
 
     @property
     def size(self) -> int:
@@ -120,6 +120,8 @@ class Chain:
 
 PIECE = 400
 """Expressions that are compiled at a time where there are many alike."""
+
+_ONE_THREAD = threading.Lock()
 
 MANY = 50
 """States of a network beyond which a second function of its rates takes longer to compile than any run gains by it."""
@@ -184,8 +186,11 @@ class Program:
 
     @cached_property
     def lanes(self) -> Lanes | None:
-        """The code for eight cases at once, compiled when it is first asked for."""
-        return self.laned()
+        """The code for eight cases at once, compiled when it is first asked for; by one thread, as machine code that
+        another one replaces is gone while tables have its address.
+        """
+        with _ONE_THREAD:
+            return vars(self).get("lanes") or self.laned()
 
     @cached_property
     def lane_tables(self) -> tuple[NDArray[Any], ...]:
