@@ -130,7 +130,7 @@ def _errors(stream: Stream, index: Index, threads: int | None) -> Iterator[tuple
             continue
         assert done.accuracy is not None
         values = {name: [end[name] for end in done.run_ends] for name in TOLD}
-        found = np.fmax(done.accuracy.errors, _apart(stream, part, done.runs))
+        found = np.maximum(done.accuracy.errors, _apart(stream, part, done.runs))  # an unknown error stays unknown
         yield first, part, {"error": found, **values}, done.accuracy.source
 
 
@@ -143,7 +143,8 @@ def _apart(stream: Stream, part: Index, runs: Sequence[Trajectory]) -> Array:
     stored, largest = chunks.columns(part), np.zeros(len(part))
     for name in ("time_reached", *(f"{name}_last" for name in chunks.keep.last)):
         size = np.maximum(np.abs(ends[name]), FLOOR * np.nanmax(np.abs(ends[name]), initial=TINY))
-        apart = np.abs(stored[name] - ends[name]) / size
+        apart = np.nan_to_num(np.abs(stored[name] - ends[name]) / size)
+        apart[np.isnan(stored[name]) != np.isnan(ends[name])] = np.inf
         counts = (name == "time_reached") | (ends["status"] == STATUSES.index("finished"))
-        largest = np.fmax(largest, np.where(counts, apart, 0.0))
+        largest = np.maximum(largest, np.where(counts, apart, 0.0))
     return largest

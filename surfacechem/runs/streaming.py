@@ -64,7 +64,10 @@ class ChunkRuns:
         self.simulation, self.plan, self.keep = simulation, plan, keep
         self.changes, self.checked = changes, checked
         self.model = Model(keeping.reaching(sweeps.prepared(simulation.system, plan), keep))
-        self.run = run or self._chosen()
+        case = simulation.case
+        # Where the case names no solver, the one that suits the scene.
+        asked = case.run if "run.solver" in case.places else replace(case.run, solver=AUTO)
+        self.run = run or self.model.chosen(asked, self.model.values(changes))
         self.one_by_one = RunByRun(self.model, keep)
         arrays = ArrayRuns(self.model, plan, self.run, changes, keep)
         told = solvable(self.model, plan, self.run, arrays.problem)
@@ -74,17 +77,11 @@ class ChunkRuns:
         """How runs become arrays, in the order in which they are tried; the rest is looked at one by one."""
         self.arrays = arrays if self.ways else None
 
-    def _chosen(self) -> Run:
-        """How the runs are solved: where the case names no solver, by the one that suits the scene."""
-        case = self.simulation.case
-        run = case.run if "run.solver" in case.places else replace(case.run, solver=AUTO)
-        return self.model.chosen(run, self.model.values(self.changes))
-
     @property
     def waits(self) -> bool:
         """Whether the loop that steps eight runs at once has to be compiled before the first of them."""
-        laned = self.arrays is not None and self.arrays.problem.explicit and self.model.program.lanes is not None
-        return laned and not lane_batch.is_compiled()
+        laned = any(way.problem.explicit and not way.jumps for way in self.ways)
+        return laned and self.model.program.lanes is not None and not lane_batch.is_compiled()
 
     @cached_property
     def piece(self) -> int:

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -21,7 +22,7 @@ from surfacechem.errors import InputError, OutputError
 from surfacechem.results.store import Layout, StoredArray, opened
 from surfacechem.runs import checking, streaming
 from surfacechem.runs.checking import check
-from surfacechem.runs.keeping import STATUSES
+from surfacechem.runs.keeping import STATUSES, Keep
 
 pytestmark = pytest.mark.around
 
@@ -353,6 +354,24 @@ def test_errors_of_runs_that_are_checked_are_those_of_a_sweep(tmp_path, monkeypa
     monkeypatch.setattr(checking, "HARDEST", 3)
     few = checking._hardest(stream)
     assert sorted(steps[few]) == sorted(np.sort(steps)[-3:])
+
+
+def test_an_error_that_is_unknown_and_an_end_that_is_no_number_count_for_no_small_error(monkeypatch):
+    ends = {"status": np.zeros(4, int), "time_reached": np.ones(4), "T_last": np.array([300.0, np.nan, 300.0, 303.0])}
+    ends["status"][:] = STATUSES.index("finished")
+    kept = ends | {"T_last": np.array([300.0, np.nan, np.nan, 300.0])}
+    monkeypatch.setattr(checking, "RunByRun", lambda *_: SimpleNamespace(columns=lambda *_: ends))
+    done = SimpleNamespace(
+        accuracy=SimpleNamespace(errors=np.array([np.nan, 1e-9, 1e-9, 1e-9]), source=""),
+        run_ends=[dict.fromkeys(checking.TOLD, 0.0)] * 4,
+        runs=[],
+    )
+    simulation, plan = (SimpleNamespace(**{name: lambda *_: done}) for name in ("sweep_plan", "picked"))
+    chunks = SimpleNamespace(
+        model=None, keep=Keep(last=("T",)), columns=lambda _: kept, simulation=simulation, plan=plan, changes={}
+    )
+    ((_, _, found, _),) = checking._errors(SimpleNamespace(chunks=chunks), np.arange(4), None)
+    assert found["error"] == pytest.approx([np.nan, 1e-9, np.inf, 1 / 101], nan_ok=True)
 
 
 def test_runs_that_failed_are_run_again_alone(tmp_path):
