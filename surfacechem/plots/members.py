@@ -205,7 +205,7 @@ def _between_outputs(dataset: xarray.Dataset, name: str) -> str:
     """The largest magnitude of a variable where no output of any run comes near it, as of a slip that is brief."""
     ends = [dataset[key].values for key in (f"{name}_max", f"{name}_min") if key in dataset]
     reached, shown = max(map(style.largest, ends), default=0.0), style.largest(dataset[name].values)
-    if shown > SEEN * reached:
+    if shown >= SEEN * reached:
         return ""
     text, size = style.prefixed(unit(dataset[name]), np.array([reached]))
     return f"between outputs, {symbol(name)} reaches {reached / size:.3g} {text}"

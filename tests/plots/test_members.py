@@ -102,6 +102,8 @@ def test_what_is_briefer_than_the_outputs_of_a_sweep_is_told():
     facts = [ax.get_title(loc="left") for ax in swept.plot(variables=["v", "u_t"], against="time").axes]
     assert "between outputs, $v$ reaches" in facts[0]
     assert "u_{t}" not in facts[0]
+    still = swept.dataset.assign({name: 0 * swept.dataset[name] for name in ("v", "v_max", "v_min")})
+    assert "between outputs" not in plots.figure(still, ["v"], "time").axes[0].get_title(loc="left")
 
 
 def test_effects_of_three_parameters_of_a_grid(tmp_path):
