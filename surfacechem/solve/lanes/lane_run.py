@@ -182,6 +182,7 @@ def _choose_sizes(w: Any) -> None:
                 h = remaining
             elif 2.0 * h > remaining:
                 h = 0.5 * remaining
+        h = min(h, left)  # a step onto a guard may aim a rounding beyond
         w.h[lane] = h if w.run[lane] >= 0 else 0.0
         w.last[lane] = 1.0 if h == left else 0.0
         w.onto[lane] = 1.0 if w.landing[lane] > 0 else 0.0

@@ -141,8 +141,10 @@ def try_step(w: Any) -> None:
     _errors(0, w.k.ctypes.data, LANES * w.columns, w.coarse.ctypes.data)
     _errors(1, w.k.ctypes.data, LANES * w.columns, w.fine.ctypes.data)
     largest, second = same(0.0), same(0.0)
+    blank = same(0.0)
     for m in range(w.columns):
         put(w.y_new[m], lanes(w.y[m]) + h * lanes(w.change[m]))
+        blank = blank + 0.0 * lanes(w.coarse[m])  # no number where an error is none: comparisons lose it
     for m in range(w.n):
         size = larger(absolute(lanes(w.y[m])), absolute(lanes(w.y_new[m])))
         rate = h / larger(w.rtol * size + w.atol[m], TINY)
@@ -151,7 +153,7 @@ def try_step(w: Any) -> None:
         second = larger(second, absolute(lanes(w.fine[m])) * rate)
     # The estimate of fifth order, made one of seventh by that of third.
     norm = largest * largest / (SHARE * square_root(largest * largest + 0.01 * second * second + TINY))
-    put(w.norm, larger(norm, _ledger_norms(w)) if w.n_ledger > 0 else norm)
+    put(w.norm, blank + (larger(norm, _ledger_norms(w)) if w.n_ledger > 0 else norm))
 
 
 @compiled
@@ -216,7 +218,7 @@ def _differs(w: Any, x: Any) -> Any:
         for d in range(ORDER - 2, -1, -1):
             total = total * x + float(d + 1) * lanes(w.polynomial[d, m])
         put(w.slopes[m], total)
-    h, norm = lanes(w.h), same(0.0)
+    h, norm, blank = lanes(w.h), same(0.0), same(0.0)
     for m in range(w.n):
         size = larger(absolute(lanes(w.y[m])), absolute(lanes(w.y_new[m])))
         error = absolute(lanes(w.rates[m]) - lanes(w.slopes[m])) / larger(w.rtol * size + w.atol[m], TINY)
@@ -234,7 +236,9 @@ def _differs(w: Any, x: Any) -> Any:
                 miss = larger(miss, h * defect * root * root * root)
                 scale = larger(scale, lanes(w.q_scale[m]))
         norm = larger(norm, miss / (scale * max(LOOSER * w.rtol, LEAST)))
-    return norm
+    for m in range(w.columns):
+        blank = blank + 0.0 * lanes(w.rates[m])  # as in a step
+    return norm + blank
 
 
 @compiled
