@@ -268,7 +268,13 @@ def solved(run: Callable[[], R], talk: bool | None, brief: bool = False, waits: 
         typer.echo("compiling the stepper, once on this machine; this takes a minute or less ...", err=True)
     with following(talk) as bar:
         bar.tell("running")
-        return wait_for(run, bar.tick)
+        return wait_for(lambda: _with_columns(run()), bar.tick)
+
+
+def _with_columns(found: R) -> R:
+    """The same once the columns of its dataset are computed, if it has any."""
+    getattr(found, "columns", None)
+    return found
 
 
 def refuse_unwritable(*targets: Path) -> None:

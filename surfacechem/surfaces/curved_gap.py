@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 
 from surfacechem.contracts.terms import HeatTransfer, PairEnergy, Potential, Varying, optional, reads
 from surfacechem.errors import InputError
-from surfacechem.surfaces.inner_sums import kernel
+from surfacechem.surfaces.inner_sums import extents, kernel
 from surfacechem.surfaces.level_cuts import with_levels
+from surfacechem.surfaces.nodes import gauss
 from surfacechem.surfaces.pairwise import check_finite, length
 from surfacechem.surfaces.patches import Budget, Patches, Rules, integral, outer_patches
 from surfacechem.surfaces.projection import FIRST, NEWTONS, Array, Projection, Surface, cross
@@ -89,16 +90,21 @@ def between_flats(law: PairEnergy) -> Density:
             return np.stack([whole, -amount * gaps * psi(gaps)[..., 0]], axis=-1)
 
         return summed
-    x, w = np.polynomial.legendre.leggauss(24)
-    t = (np.arange(8)[:, None] + (x + 1) / 2).ravel()  # r = g exp(t), up to exp(8) g
+    ends, last = np.array([bend for extent in extents([law]) for bend in extent.bends]), law.cutoff
 
     def at(gaps: Array) -> Array:
-        r = gaps[..., None] * np.exp(t)
-        whole = np.sum(psi(r)[..., 0] * r**2 * np.tile(w / 2, 8), axis=-1)
-        # What is left of a power of the distance follows from its end.
-        end = r[..., -1:]
-        whole += (psi(end)[..., 0] * end**2)[..., 0] / (law.decay - 2)
-        return np.stack([amount * whole, -amount * gaps * psi(gaps)[..., 0]], axis=-1)
+        # Pieces of r = g exp(t) up to where the law ends or, where it does not, to exp(8) g, cut where it bends.
+        g = gaps.reshape(-1, 1)
+        most = np.log(np.maximum(last / g, 1)) if math.isfinite(last) else np.full_like(g, 8.0)
+        cuts = np.clip(np.log(np.maximum(ends / g, 1)), 0, most)
+        t, w = gauss(np.sort(np.concatenate([most * np.linspace(0, 1, 9), cuts], axis=1), axis=1), 24)
+        r = g * np.exp(t)
+        whole = np.sum(psi(r)[..., 0] * r**2 * w, axis=1)
+        if math.isinf(last):
+            # What is left of a power of the distance follows from its end.
+            end = g[:, 0] * math.exp(8)
+            whole += psi(end)[..., 0] * end**2 / (law.decay - 2)
+        return np.stack([amount * whole.reshape(gaps.shape), -amount * gaps * psi(gaps)[..., 0]], axis=-1)
 
     return at
 

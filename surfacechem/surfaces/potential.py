@@ -25,7 +25,7 @@ from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, derivative
 from surfacechem.surfaces.approach import ApproachEnergy, fitted, straight
 from surfacechem.surfaces.curved_gap import GAP, Contact, bends, between_flats, density, over_gap, passages
-from surfacechem.surfaces.inner_sums import kernel
+from surfacechem.surfaces.inner_sums import extents, kernel
 from surfacechem.surfaces.pairwise import PairForces, interaction, length, lots, pair_traction
 from surfacechem.surfaces.patches import Budget, OutOfReachError
 from surfacechem.surfaces.projection import Array, Surface
@@ -265,12 +265,17 @@ class CurvedSurfaces(Potential):
         """None that could be told from the attraction."""
         return 0.0
 
-    def contact(self, d: float, pairs: bool = True) -> Contact:
+    def contact(self, d: float, pairs: bool = True, budget: Budget | None = None) -> Contact:
         """What the laws of the gap, and the pair laws by their energy between flats, give at an approach."""
         heat = [density(law) for law in self.heat_laws]
         # Conductances bend where laws of force may not.
-        levels = bends((*self.gap_laws, *self.heat_laws))
-        return over_gap(*self.surfaces(d), self._local(pairs), levels, heat, self.accuracy, self._floor)
+        levels = self._levels(pairs, self.heat_laws)
+        return over_gap(*self.surfaces(d), self._local(pairs), levels, heat, self.accuracy, self._floor, budget)
+
+    def _levels(self, pairs: bool, heat: Sequence[HeatTransfer] = ()) -> list[float]:
+        """Gaps at which local laws bend: those of pairs do at the distances at which a pair does."""
+        found = [bend for extent in extents(self.pairs) for bend in extent.bends] if pairs else []
+        return sorted({*bends((*self.gap_laws, *heat)), *found})
 
     def totals(self, approaches: Array, stretches: Array) -> Array:
         """What is told of each approach at its stretch of the area, shape (8, n).
@@ -280,11 +285,12 @@ class CurvedSurfaces(Potential):
         """
 
         def found() -> list[list[float]]:
-            rows = []
+            rows, budget = [], Budget(self.accuracy)
+            budget.integrals = len(approaches) * (1 + bool(self.pairs) + bool(self.pairs and self.gap_laws))
             for number, (d, stretch) in enumerate(zip(approaches.tolist(), stretches.tolist(), strict=True)):
                 log.info("forces at output times", extra={"done": number, "total": len(approaches)})
                 own = self.thinned(stretch)
-                (force, moment), local = own.forces(d), own.contact(d)
+                (force, moment), local = own.forces(d, budget), own.contact(d, budget=budget)
                 ours = [force[2], *moment[:2], local.force_1[2], local.gap, local.places, local.area, local.conductance]
                 rows.append([float(x) for x in ours])
             return rows
@@ -299,7 +305,7 @@ class CurvedSurfaces(Potential):
         """A small part of energy [J] and force [N] of the laws of the gap at the ends of the range."""
         floor = 0.0, 0.0
         for pair in map(self.surfaces, self.approach):
-            found = over_gap(*pair, self._local(True), bends(self.gap_laws), rtol=NEGLIGIBLE, floor=floor)
+            found = over_gap(*pair, self._local(True), self._levels(True), rtol=NEGLIGIBLE, floor=floor)
             force = abs(float(found.force_1[2]))
             floor = max(floor[0], NEGLIGIBLE * abs(found.energy)), max(floor[1], NEGLIGIBLE * force)
         return floor
@@ -333,13 +339,13 @@ class CurvedSurfaces(Potential):
     def _local(self, pairs: bool) -> list[Callable[[Array], Array]]:
         return [*map(density, self.gap_laws), *(map(between_flats, self.pairs) if pairs else ())]
 
-    def forces(self, d: float) -> tuple[Array, Array]:
+    def forces(self, d: float, budget: Budget | None = None) -> tuple[Array, Array]:
         """Force [N] and moment about the origin [N m] on body 1 at an approach, from all laws."""
         force, moment = np.zeros((2, 3))
         if self.pairs:
-            pair = interaction(*self.surfaces(d), self.pairs, self.accuracy)
+            pair = interaction(*self.surfaces(d), self.pairs, self.accuracy, budget)
             force, moment = pair.force_1.sum(axis=0), pair.moment_1.sum(axis=0)
         if self.gap_laws:
-            rest = self.contact(d, pairs=False)
+            rest = self.contact(d, pairs=False, budget=budget)
             force, moment = force + rest.force_1, moment + rest.moment_1
         return force, moment

@@ -22,6 +22,7 @@ from surfacechem.surfaces.curved_gap import between_flats, density, over_gap
 from surfacechem.surfaces.inner_sums import inner_sums, table
 from surfacechem.surfaces.pair_laws import InversePower, LennardJonesPair, PairTable, PenaltyPair
 from surfacechem.surfaces.pairwise import interaction
+from surfacechem.surfaces.potential import CurvedSurfaces
 from surfacechem.surfaces.projection import Surface
 from surfacechem.surfaces.shapes import Cap, Cavity, Cone, Cylinder, Disc, Paraboloid, Plane, Sphere, Torus
 
@@ -203,6 +204,27 @@ def test_between_flats_is_the_sum_over_planes():
     x = 3e-10 / g
     assert psi == pytest.approx(A * 9e-20 * (x**8 / 360 - x**2 / 6), rel=1e-9)
     assert traction == pytest.approx(-A * g * (x**10 / 45 - x**4 / 3), rel=1e-12)
+
+
+def test_between_flats_ends_with_a_law():
+    """W(g) = 2 pi n_1 n_2 times the integral of r psi from g to the end of the law."""
+    k, end = 2.0, 3.0
+    law = PenaltyPair(n_1=0.5, n_2=2.0, k=k, r_0=end)
+    g = np.array([[1e-9, 0.5], [2.9, 3.1]])
+    psi, traction = np.moveaxis(between_flats(law)(g), -1, 0)
+    left = np.maximum(end - g, 0)
+    assert psi == pytest.approx(math.pi * k * (end * left**3 / 3 - left**4 / 4), rel=1e-12)
+    assert traction == pytest.approx(-math.pi * k * g * left**2, rel=1e-12)
+
+
+def test_the_local_law_of_pairs_bends_where_they_do():
+    """Between a plane and a sphere, body 1, it is 2 pi R W(d) with the energy W between flats."""
+    law, d = PairTable(n_1=1.0, n_2=1.0, distances=[0.5, 1.0, 1.5, 2.0], energies=[4.0, 1.0, -0.5, 0.0]), 0.8
+    surfaces = CurvedSurfaces(shapes=(Sphere(R=9.0), Plane()), pairs=[law], approach=(0.7, 0.9), accuracy=1e-12)
+    psi = mpmath.quad(lambda r: 2 * mpmath.pi * r * law.energy(float(r)), [d, 1.0, 1.5, 2.0])
+    contact = surfaces.contact(d)
+    assert float(contact.force_1[2]) == pytest.approx(-2 * math.pi * 9.0 * float(psi), rel=1e-11)
+    assert contact.error <= 1e-12
 
 
 def test_a_sphere_pressed_into_a_penalty():
