@@ -262,19 +262,18 @@ def solved(run: Callable[[], R], talk: bool | None, brief: bool = False, waits: 
     from surfacechem.cli.terminal import following
     from surfacechem.solve.radau import stepper
 
+    def whole() -> R:
+        found = run()
+        getattr(found, "columns", None)  # as they are asked for the first time
+        return found
+
     if brief:
         stepper.load_briefly()
     if talk is not False and (waits or not stepper.is_compiled()):
         typer.echo("compiling the stepper, once on this machine; this takes a minute or less ...", err=True)
     with following(talk) as bar:
         bar.tell("running")
-        return wait_for(lambda: _with_columns(run()), bar.tick)
-
-
-def _with_columns(found: R) -> R:
-    """The same once the columns of its dataset are computed, if it has any."""
-    getattr(found, "columns", None)
-    return found
+        return wait_for(whole, bar.tick)
 
 
 def refuse_unwritable(*targets: Path) -> None:
