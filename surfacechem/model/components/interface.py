@@ -191,7 +191,7 @@ def energies(build: Build) -> Iterator[Constraint | Energy | Margin | Thermal]:
     _tractions(build, psi)
     if depends(psi, GAP):
         _contact_pressure(build, stored, bounds)
-        _warn_of_net_pressure(build)
+        _net_pressure(build)
     elif build.variables.has("p"):
         build.variables.define("p_contact", lambda: build.variables.get("p", "the contact"), "derived", "p")
     yield replace(energy, psi=psi)
@@ -244,8 +244,9 @@ def _energies(
     return found, Energy(symengine.Integer(0), rubs, rubbed)
 
 
-def _warn_of_net_pressure(build: Build) -> None:
-    """Warn of laws that take the attraction of a potential for relief of the contact.
+def _net_pressure(build: Build) -> None:
+    """Warn of laws that take the attraction of a potential for relief of the contact; where that takes all of it what
+    presses friction ends, and a step does.
 
     A law with an adhesive strength of its own has it back.
     """
@@ -259,6 +260,9 @@ def _warn_of_net_pressure(build: Build) -> None:
             f"{' and '.join(dict.fromkeys(net))}, although it presses the surfaces together. To read what the contact "
             "bears give the law `pressure: contact`, or a factor `of: p_contact`."
         )
+        if any(law in relieved for law in build.interface.frictions) and "p" not in build.scene.loading:
+            p = build.variables.get("p", "friction")
+            build.add(Margin("p", p, "attraction takes all pressure", terminal=False))
 
 
 def _per_reference_area(

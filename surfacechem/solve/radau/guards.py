@@ -454,13 +454,18 @@ def _resolved(w: Any, size: float) -> float:
 
 
 @compiled
-def _mark_coincident(w: Any, h: float, size: float) -> None:
-    """Keep as fired the margins that are across zero too, or within rounding of it in time."""
-    near = _resolved(w, size)
+def _mark_coincident(w: Any, h: float, size: float, first: int) -> bool:
+    """Keep as fired the margins that are across zero too, or within rounding of it in time; whether one besides the
+    first is well across: then the polynomial was too coarse to tell which comes first, as over a kink it knows not of.
+    """
+    near, passed = _resolved(w, size), False
     for m in range(w.n_margins):
         value, slope = w.margin[m], w.margin_slope[m]
         close = abs(value) * h <= near * abs(slope) if slope != 0.0 else abs(value) <= noise(w, m)
-        w.fired[m] = crosses(w, m) or (w.fired[m] != 0 and close)
+        across = crosses(w, m)
+        passed = passed or (m != first and across and not close and abs(value) > ALIKE * noise(w, m))
+        w.fired[m] = across or (w.fired[m] != 0 and close)
+    return passed
 
 
 @compiled
@@ -494,11 +499,13 @@ def find_event(w: Any, h: float) -> float:
     if size == 0.0:
         restore_sides(w)
         return 0.0
-    _mark_coincident(w, h, size)
+    if _mark_coincident(w, h, size, first):
+        restore_sides(w)
+        return 0.0
     short = _kink_at(w, first)
     if short >= 0:
         size = _short_of(w, h, short, size)
-        _mark_coincident(w, h, size)
+        _mark_coincident(w, h, size, short)
         w.fired[short] = 1
     # Where a strict margin is not zero at the end, the polynomial has seen what is not there.
     left = w.margin[first] * w.side[first]
