@@ -179,11 +179,12 @@ def rupture_error() -> Callable[[np.ndarray], float]:
 def slide_ours(name: str, rtol: float) -> Callable[[], np.ndarray]:
     """Times of the events, one run to each."""
     method, program, stop = solver(name), slider(), (Margin.stop(),)
+    options = {"explicit": name == "dop853"}
 
     def run() -> np.ndarray:
         y, mode, t, times = np.zeros(3), 0.0, 0.0, []
         for _event in range(EVENTS):
-            result = method.solve(problem(program, y, [t, t + FAR], rtol, parameters=[mode], margins=stop))
+            result = method.solve(problem(program, y, [t, t + FAR], rtol, parameters=[mode], margins=stop, **options))
             t, y, mode = result.t, result.y * [1.0, 0.0, 0.0], 1.0 - mode
             times.append(t)
         return np.array(times)

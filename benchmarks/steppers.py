@@ -8,7 +8,9 @@ are shown beside those that were kept before, and what has become slower against
 
 P1 is exothermic bonding with 200 outputs (exact solution), P2 a Bell cluster to its rupture, P3 a stick-slip slider
 through 24 events, P4 Robertson's problem to 1e11 s. "scipy-LSODA" and "scikit-sundae-CVODE" are the libraries
-called directly with a Python right-hand side, as a user would write it today.
+called directly with a Python right-hand side, as a user would write it today; those of peers.py are called as one who
+knows them would. Times are those of the processor. What ours is, is what `solver: auto` chooses: explicit steps on P1
+and P3, implicit ones on P2 and P4.
 """
 
 import argparse
@@ -22,8 +24,9 @@ import sys
 import time
 import timeit
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.metadata import version
+from importlib.util import find_spec
 from pathlib import Path
 
 import matplotlib
@@ -45,6 +48,7 @@ from events import (
     slide_ours,
 )
 from matplotlib import pyplot as plt
+from peers import installed
 from solver_problems import (
     PARAMETERS,
     exothermic,
@@ -59,8 +63,11 @@ from surfacechem.solve import names, solver
 from surfacechem.solve.contract import Problem, Result
 
 REPEATS = 3
-CASES = ("P1", "P2", "P3", "P4")
+OURS = {"P1": "dop853", "P2": "radau", "P3": "dop853", "P4": "radau"}
+CASES = tuple(OURS)
 ERRORS = (1e-4, 1e-6, 1e-7, 1e-8, 1e-10)
+PEER_TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11, 1e-12)
+OTHERS = {"heyoka": "heyoka", "numbalsoda": "numbalsoda", "libroadrunner": "roadrunner", "diffrax": "diffrax"}
 REGRESSION = 0.7
 """A ratio below this part of the one that was kept is more than the noise of an interleaved run."""
 ROBERTSON_END = np.array([2.083340149701255e-08, 8.333360770334713e-14])
@@ -90,13 +97,13 @@ def finished(result: Result) -> Result:
 
 def outputs_of(name: str, case: Problem) -> Run:
     """Outputs of a solver of ours."""
-    method = solver(name)
+    method, case = solver(name), replace(case, explicit=name == "dop853")
     return lambda: finished(method.solve(case)).outputs
 
 
 def end_of(name: str, case: Problem) -> Run:
     """End state of a solver of ours."""
-    method = solver(name)
+    method, case = solver(name), replace(case, explicit=name == "dop853")
     return lambda: finished(method.solve(case)).y
 
 
@@ -174,7 +181,7 @@ def event_curves(rtol: float) -> list[Curve]:
         ("P2", rupture_ours, rupture_direct, rupture_error()),
         ("P3", slide_ours, slide_direct, slide_error()),
     ):
-        curves.append(Curve(case, "radau", rtol, ours("radau", rtol), error, []))
+        curves += [Curve(case, name, rtol, ours(name, rtol), error, []) for name in {"radau": 0, OURS[case]: 0}]
         curves += [Curve(case, name, rtol, direct(run(rtol, 0.01 * rtol)), error, []) for name, run in DIRECT.items()]
     return curves
 
@@ -188,11 +195,12 @@ def measure(curves: list[Curve]) -> None:
     """Interleaved, so that a busy moment of the machine hits all alike; the first round warms up."""
     for repeat in range(REPEATS + 1):
         for curve in curves:
-            start = time.perf_counter()
+            start = time.process_time()
             answer = curve.run()
-            once = time.perf_counter() - start
+            once = time.process_time() - start
             if repeat:
-                curve.seconds.append(timeit.timeit(curve.run, number=calls(once)) / calls(once))
+                number = calls(once)
+                curve.seconds.append(timeit.timeit(curve.run, timer=time.process_time, number=number) / number)
                 curve.achieved = curve.error(answer)
 
 
@@ -271,7 +279,7 @@ def ratios(curves: list[Curve]) -> Ratios:
     """By case, error and solver: time at equal error and how many times longer than ours, NaN if it is not reached."""
     found = {}
     for case, error in itertools.product(dict.fromkeys(curve.case for curve in curves), ERRORS):
-        ours = seconds_at(curves, case, "radau", error)
+        ours = seconds_at(curves, case, OURS[case], error)
         for name in dict.fromkeys(curve.name for curve in curves if curve.case == case):
             taken = seconds_at(curves, case, name, error)
             found[case, f"{error:.0e}", name] = 1e6 * taken, taken / ours
@@ -319,7 +327,8 @@ def environment() -> dict[str, str]:
     info = Path("/proc/cpuinfo")
     lines = info.read_text().splitlines() if info.exists() else []
     cpu = next((line.split(":")[1].strip() for line in lines if line.startswith("model name")), "")
-    packages = ("surfacechem", "numpy", "scipy", "numba", "llvmlite", "symengine", "scikit-sundae", "cantera")
+    packages = ["surfacechem", "numpy", "scipy", "numba", "llvmlite", "symengine", "scikit-sundae", "cantera"]
+    packages += [name for name, module in OTHERS.items() if find_spec(module)]
     return {
         "date": time.strftime("%Y-%m-%d"),
         "processor": f"{cpu or platform.processor()}, {os.cpu_count()} cores",
@@ -330,9 +339,21 @@ def environment() -> dict[str, str]:
     }
 
 
+def peer_curves(cases: list[str]) -> list[Curve]:
+    """The libraries as one who knows them would call them."""
+    errors = {"P1": p1_error, "P2": rupture_error(), "P3": slide_error(), "P4": p4_error}
+    return [
+        Curve(case, name, rtol, make(case, rtol), errors[case], [])
+        for name, (make, fits) in installed().items()
+        for case in fits
+        if case in cases
+        for rtol in PEER_TOLERANCES
+    ]
+
+
 def all_curves(cases: list[str]) -> list[Curve]:
     """Every solver at every tolerance on the chosen cases."""
-    curves = []
+    curves = peer_curves(cases)
     if "P1" in cases:
         curves += [c for rtol in (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-9, 1e-10, 1e-11, 1e-12) for c in p1_curves(rtol)]
     if "P4" in cases:

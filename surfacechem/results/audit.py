@@ -152,9 +152,12 @@ class Residuals:
     entropy_scale: Any
 
 
-def residuals(system: System, named: Array, ledger: Array) -> Residuals:
-    """Balances of energy and entropy from named quantities [..., times, outputs] and ledger [..., times, accounts]."""
-    column = system.output_columns
+TOTALS = ("E_total", ("U_1", "U_2", "U_c")), ("S_total", ("S_1", "S_2", "S_c"))
+"""What is balanced, each with its parts."""
+
+
+def residuals(system: System, named: Mapping[str, Array], ledger: Array) -> Residuals:
+    """Balances of energy and entropy from what there is of TOTALS [..., times] and ledger [..., times, accounts]."""
     # Transitions at the very start come before the first output.
     ledger = ledger - ledger[..., :1, :]
 
@@ -162,17 +165,17 @@ def residuals(system: System, named: Array, ledger: Array) -> Residuals:
         """What the supplies do not explain of the change of a total, and the most that its parts and all accounts
         changed by.
         """
-        found = named[..., [column[name] for name in (total, *parts) if name in column]]
-        found = found - found[..., :1, :]
+        found = np.array([named[name] for name in (total, *parts) if name in named])
+        found -= found[..., :1]
         own = [accounts(system, ledger, kind) for kind in (*supplies, *sinks)]
-        residual = found[..., 0]
+        residual = found[0]
         for booked in own[: len(supplies)]:
             residual = residual - booked.sum(axis=-1)
-        tables = np.concatenate([found[..., 1:], *own], axis=-1)
-        return residual, np.abs(tables).max(axis=(-2, -1), initial=0.0)
+        most = np.abs(np.concatenate(own, axis=-1)).max(axis=(-2, -1), initial=0.0)
+        return residual, np.maximum(most, np.abs(found[1:]).max(axis=(0, -1), initial=0.0))
 
-    energy, most_energy = balance("E_total", ("U_1", "U_2", "U_c"), ("energy supply",), ("dissipation",))
-    entropy, most_entropy = balance("S_total", ("S_1", "S_2", "S_c"), ("entropy supply", "entropy production"), ())
+    energy, most_energy = balance(*TOTALS[0], ("energy supply",), ("dissipation",))
+    entropy, most_entropy = balance(*TOTALS[1], ("entropy supply", "entropy production"), ())
     return Residuals(energy, entropy, most_energy, most_entropy)
 
 
@@ -186,7 +189,8 @@ def audit(trajectory: Trajectory) -> Audit:
     model, result, outputs, steps = trajectory.model, trajectory.result, trajectory.outputs, trajectory.result.steps
     system, column = model.system, model.system.output_columns
     ledger = result.ledger_outputs - result.ledger_outputs[:1]
-    open_ones = residuals(system, outputs, result.ledger_outputs)
+    known = {name: outputs[:, column[name]] for total, parts in TOTALS for name in (total, *parts) if name in column}
+    open_ones = residuals(system, known, result.ledger_outputs)
     energy_scale, turned = float(open_ones.energy_scale), float(open_ones.entropy_scale)
     if steps:  # a brief load may come and go between outputs; the ends of the steps have seen it
         energy_scale = max(energy_scale, largest(accounts(system, steps.ledger, "energy supply", "dissipation")))

@@ -19,7 +19,7 @@ from surfacechem.expressions import derivative, magnitude
 from surfacechem.format.plans import Plan
 from surfacechem.model.system import System
 from surfacechem.quantities import VELOCITIES
-from surfacechem.results.audit import ROUNDINGS, residuals, resolved
+from surfacechem.results.audit import ROUNDINGS, TOTALS, residuals, resolved
 from surfacechem.runs import spectrum
 from surfacechem.runs.keeping import REACHED, STATUSES, Columns, Keep, reason_table, variable
 from surfacechem.solve.choice import EXPLICIT, IMPLICIT
@@ -68,6 +68,17 @@ def quiet(model: Model, problem: Problem) -> bool:
     """Whether runs may have no jumps: they are of one arc, and begin in the same modes whatever their values are."""
     one_arc = model.jumper is None or len(problem.segments) == 2
     return one_arc and all(mode.start is None for mode in model.system.modes)
+
+
+def of_each(best: np.ufunc, owner: Index, table: Array, count: int) -> Array:
+    """What is best of the rows of each of so many runs [rows, columns], which ``owner`` says in order; not a number
+    where a run has none.
+    """
+    found = np.full((count, table.shape[1]), np.nan)
+    runs, first = np.unique(owner, return_index=True)
+    if len(runs):
+        found[runs] = best.reduceat(table, first, axis=0)
+    return found
 
 
 def _starts_as_given(system: System, swept: set[str]) -> bool:
@@ -247,7 +258,7 @@ class ArrayRuns:
             "time_reached": end[:, 0].copy(),
             "steps": counts[:, FIRST_COUNTER].astype(np.int32),
         }
-        values = self._values(last)
+        values = self._values(last)[1]
         columns |= {f"{name}_last": values[name] for name in self.keep.last}
         columns |= self.along(found, clear)
         return clear, columns | self._event_columns(found)
@@ -281,12 +292,13 @@ class ArrayRuns:
                 reason[hit] = self.reasons.index(margin.reason)
                 clear[hit] &= ~led & (margin.below is None)
 
-    def _values(self, rows: Array) -> dict[str, Array]:
-        """States and named quantities at rows of arguments, by name."""
+    def _values(self, rows: Array) -> tuple[Array, dict[str, Array]]:
+        """States and named quantities at rows of arguments: the table of all of them, and its columns by name."""
         system = self.model.system
-        named = self.model.output_function(rows)
-        found = {state.name: rows[:, 1 + j] for j, state in enumerate(system.states)}
-        return found | {name: named[:, j] for name, j in system.output_columns.items()}
+        table = np.concatenate([rows[:, 1 : 1 + self.n], self.model.output_function(rows)], axis=1)
+        return table, dict(
+            zip((*(state.name for state in system.states), *system.output_columns), table.T, strict=True)
+        )
 
     def along(self, found: Ends, clear: Mask) -> Columns:
         """Series, extremes and balances, from outputs and steps."""
@@ -299,79 +311,76 @@ class ArrayRuns:
         t, y = times[np.minimum(owner, len(times) - 1), k], batch.outputs[owner, k, :n]
         rows = found.inputs(owner, t, y, np.zeros_like(y))
         rows[:, 1 + n : 1 + 2 * n] = rates_at(self.model.program, t, y, rows[:, 1 + 2 * n :])
-        values = self._values(rows)
-
-        def table(column: Array) -> Array:
-            """A column of the outputs as a table of the runs, not a number where a run did not arrive."""
-            whole = np.full((count, most), np.nan)
-            whole[owner, k] = column
-            return whole
-
-        columns: Columns = {name: table(values[name]) for name in keep.series}
+        table, values = self._values(rows)
+        columns: Columns = {}
+        for name in keep.series:
+            columns[name] = np.full((count, most), np.nan)
+            columns[name][owner, k] = values[name]
         columns |= self.balances(found, rows, values, reached)
         if not self.keeps_steps:
             return columns
-        return columns | self.extremes(found, clear, owner, values)
+        return columns | self.extremes(found, clear, owner, table, list(values))
 
-    def extremes(self, found: Ends, clear: Mask, owner: Index, values: Mapping[str, Array]) -> Columns:
-        """Largest and least values over the outputs, which ``owner`` says the runs of, and over the ends of steps."""
+    def extremes(self, found: Ends, clear: Mask, owner: Index, outputs: Array, names: list[str]) -> Columns:
+        """Largest and least values of quantities of these names over the outputs [outputs, names], which ``owner`` says
+        the runs of, and over the ends of steps.
+        """
         batch, n = found.batch, self.n
         taken = np.arange(batch.records.shape[1]) < np.where(clear, batch.counts[:, RECORDS], 0)[:, None]
         step_owner, m = np.nonzero(taken)
         steps = batch.records[step_owner, m]
-        beside = self._values(found.inputs(step_owner, steps[:, 0], steps[:, 1 : 1 + n], steps[:, 1 + n : 1 + 2 * n]))
+        inputs = found.inputs(step_owner, steps[:, 0], steps[:, 1 : 1 + n], steps[:, 1 + n : 1 + 2 * n])
+        parts = (owner, outputs), (step_owner, self._values(inputs)[0])
         columns: Columns = {}
-        for which, names, best in (("max", self.keep.max, np.fmax), ("min", self.keep.min, np.fmin)):
-            for name in names:
-                extreme = np.full(len(clear), np.nan)
-                best.at(extreme, owner, values[name])
-                best.at(extreme, step_owner, beside[name])
-                columns[f"{name}_{which}"] = extreme
+        for which, chosen, best in (("max", self.keep.max, np.fmax), ("min", self.keep.min, np.fmin)):
+            extreme = best(*(of_each(best, runs, table, len(clear)) for runs, table in parts))
+            columns |= {f"{name}_{which}": extreme[:, names.index(name)] for name in chosen}
         return columns
+
+    @cached_property
+    def totals(self) -> Function:
+        """The totals that are balanced."""
+        system = self.model.system
+        return compile_function(system.inputs, [system.expand(system.find(name).expression) for name, _ in TOTALS])
 
     def balances(self, found: Ends, rows: Array, values: Mapping[str, Array], reached: Mask) -> Columns:
         """Errors of the balances of each run over its outputs, as its audit has them."""
         system, batch, n = self.model.system, found.batch, self.n
-        count, most = reached.shape
         owner, k = np.nonzero(reached)
 
-        def whole(columns: Array) -> Array:
+        def whole(column: Array) -> Array:
             """A table of the runs; beyond the end of a run as at its start, so that nothing is exchanged there."""
-            filled = np.zeros((count, most, columns.shape[1]))
-            filled[owner, k] = columns
-            return np.where(reached[..., None], filled, filled[:, :1])
+            filled = np.zeros(reached.shape)
+            filled[owner, k] = column
+            return filled if reached.all() else np.where(reached, filled, filled[:, :1])
 
         # The same residuals and roundings as those of the audit of one run, over the outputs that there are.
-        named = whole(np.column_stack([values[name] for name in system.output_columns]))
+        every = [name for total, parts in TOTALS for name in (total, *parts)]
+        named = {name: whole(values[name]) for name in every if name in values}
         ledger = np.where(reached[..., None], batch.outputs[..., n:], batch.outputs[:, :1, n:])
         left = residuals(system, named, ledger)
-        totals = {"energy": "E_total", "entropy": "S_total"}
-        rounded = self._rounded(rows, values, totals)
+        rounded = of_each(np.fmax, owner, self._rounded(rows), len(reached))
         columns: Columns = {}
-        for which, name in totals.items():
+        for j, (which, (name, _)) in enumerate(zip(("energy", "entropy"), TOTALS, strict=True)):
             scale = getattr(left, f"{which}_scale")
-            largest = np.abs(named[..., system.output_columns[name]]).max(axis=1)
-            stored = np.maximum(whole(rounded[which][:, None]).max(axis=(1, 2)) / EPS, largest)
+            stored = np.maximum(rounded[:, j] / EPS, np.abs(named[name]).max(axis=1))
             stored = np.maximum(stored, scale) if which == "entropy" else stored
             rounding = EPS * stored * (ROUNDINGS + batch.counts[:, RECORDS])
             columns[f"{which}_error"] = resolved(getattr(left, which), scale, stored, rounding)
-        sites = np.zeros(count)
+        sites = np.zeros(len(reached))
         for j in system.account_columns.get("bonds", ()):
-            bonds = whole(values[system.ledger[j].law][:, None])[..., 0]
-            open_ones = np.abs(bonds - bonds[:, :1] - ledger[..., j])
-            sites = np.maximum(sites, open_ones.max(axis=1))
+            bonds = whole(values[system.ledger[j].law])
+            sites = np.maximum(sites, np.abs(bonds - bonds[:, :1] - ledger[..., j]).max(axis=1))
         return {**columns, "site_error": sites}
 
-    def _rounded(self, rows: Array, values: Mapping[str, Array], totals: Mapping[str, str]) -> dict[str, Array]:
-        """By how much the last bit of a state changes each total at most."""
-        found = {which: np.zeros(len(rows)) for which in totals}
-        for j in range(self.n):
-            moved = rows.copy()
-            moved[:, 1 + j] *= 1 + EPS
-            nudged = self._values(moved)
-            for which, name in totals.items():
-                found[which] = np.fmax(found[which], np.abs(nudged[name] - values[name]))
-        return found
+    def _rounded(self, rows: Array) -> Array:
+        """By how much the last bit of a state changes each total at most, shape (rows, 2)."""
+        totals, worst, moved = self.totals(rows), np.zeros((len(rows), len(TOTALS))), rows.copy()
+        for j in range(1, 1 + self.n):
+            moved[:, j] *= 1 + EPS
+            np.fmax(worst, np.abs(self.totals(moved) - totals), out=worst)
+            moved[:, j] = rows[:, j]
+        return worst
 
     def _event_columns(self, found: Ends) -> Columns:
         """First times of events after which a run goes on, and of values that are reached."""

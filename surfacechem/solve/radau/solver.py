@@ -164,7 +164,7 @@ class Dop853(Radau):
     name = "dop853"
 
     def solve(self, problem: Problem) -> Result:
-        return super().solve(replace(problem, explicit=True))
+        return super().solve(problem if problem.explicit else replace(problem, explicit=True))
 
     def solve_all(self, problems: Sequence[Problem], threads: int = 1) -> list[Result]:
         return super().solve_all([replace(problem, explicit=True) for problem in problems], threads)
@@ -195,23 +195,25 @@ def _whole(problem: Problem, batch: Any, i: int) -> Result:
     need, which a limit in seconds may change.
     """
     while True:
-        events, records, inside = batch.counts[i, [EVENTS, RECORDS, INSIDE]].tolist()
-        needed = records if problem.record_steps else 0, events, inside
-        if all(rows <= table.shape[1] for rows, table in zip(needed, batch[-4:-1], strict=True)):
-            return _result(problem, batch, i)
+        counts: list[int] = batch.counts[i].tolist()
+        steps, events, inside = needed = counts[RECORDS] * problem.record_steps, counts[EVENTS], counts[INSIDE]
+        room = batch.records.shape[1], batch.events.shape[1], batch.inside.shape[1]
+        if steps <= room[0] and events <= room[1] and inside <= room[2]:
+            return _result(problem, batch, i, counts)
         batch, i = _run_one(problem, needed), 0
 
 
-def _result(problem: Problem, batch: Any, i: int) -> Result:
+def _result(problem: Problem, batch: Any, i: int, counts: Sequence[int]) -> Result:
     program, n = problem.program, problem.program.n
-    counts: list[int] = batch.counts[i].tolist()
     outputs, end = counts[OUTPUTS], batch.ends[i]
     m = 1 + 2 * n + program.n_ledger
     values = batch.outputs[i, :outputs]
-    events, steps = batch.events[i, : counts[EVENTS]], batch.records[i, : counts[RECORDS]]
-    inside, moments = batch.inside[i, : counts[INSIDE]], batch.inside_times[i, : counts[INSIDE]]
-    if len(batch.counts) > 1:  # the room for the steps of many runs is not kept for those that they took
-        events, steps, inside, moments = events.copy(), steps.copy(), inside.copy(), moments.copy()
+    # The room for the steps of many runs is not kept for those that they took.
+    kept = np.array if len(batch.counts) > 1 else np.asarray
+
+    def written(table: Array, column: int) -> Array:
+        return kept(table[i, : counts[column]])
+
     return Result(
         problem=problem,
         status=_STATUSES[counts[END]],
@@ -223,20 +225,26 @@ def _result(problem: Problem, batch: Any, i: int) -> Result:
         times=problem.times if outputs == len(problem.times) else problem.times[:outputs],
         outputs=values[:, :n],
         ledger_outputs=values[:, n:],
-        events=(
-            Events(*_points(events[:, 1:], n), index=events[:, 0].astype(np.int64))
-            if counts[EVENTS]
-            else _no_events(n, program.n_ledger)
-        ),
+        events=_events(written(batch.events, EVENTS), n) if counts[EVENTS] else _no_events(n, program.n_ledger),
         counters=Counters(*counts[FIRST_COUNTER:STOP]),
-        steps=Points(*_points(steps, n)) if problem.record_steps else None,
-        inside=States(moments, inside[:, :n], inside[:, n:]) if problem.picture else None,
+        steps=Points(*_points(written(batch.records, RECORDS), n)) if problem.record_steps else None,
+        inside=_inside(written(batch.inside_times, INSIDE), written(batch.inside, INSIDE), n)
+        if problem.picture
+        else None,
     )
+
+
+def _events(rows: Array, n: int) -> Events:
+    return Events(*_points(rows[:, 1:], n), index=rows[:, 0].astype(np.int64))
+
+
+def _inside(moments: Array, rows: Array, n: int) -> States:
+    return States(moments, rows[:, :n], rows[:, n:])
 
 
 @cache
 def _no_events(n: int, q: int) -> Events:
-    return Events(*_points(np.empty((0, 1 + 2 * n + q)), n), index=np.empty(0, np.int64))
+    return _events(np.empty((0, 2 + 2 * n + q)), n)
 
 
 def solve_arrays(problem: Problem, *columns: Array, room: Room | None = None) -> Any:
