@@ -1,5 +1,6 @@
 """Figures that are computed when the documentation is built."""
 
+import csv
 import re
 import runpy
 import tomllib
@@ -180,6 +181,63 @@ def precision() -> Figure:
     return surfacechem.precision("exothermic", ["radau", "lsoda", "cvode"], tolerances, repeat=1).figure()
 
 
+def kept(name: str) -> list[dict[str, str]]:
+    """Rows of a benchmark."""
+    with (Path(__file__).parents[1] / "benchmarks" / "results" / name).open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def speed() -> Figure:
+    """Time against achieved error of ours and of other libraries as one who knows them calls them."""
+    figure, rows = new(7.2, 6.2), kept("steppers.csv")
+    for ax, problem in zip(figure.subplots(2, 2).flat, ("P1", "P2", "P3", "P4"), strict=True):
+        for name, style in SHOWN.items():
+            own = [row for row in rows if (row["case"], row["solver"]) == (problem, name) and float(row["error"]) < 1]
+            errors, times = ([float(row[key]) for row in own] for key in ("error", "microseconds"))
+            ax.loglog(errors, times, label=name, markersize=3.5, **style)
+        ax.set_title(problem, fontsize=9)
+        ax.invert_xaxis()
+        ax.set_xlabel("achieved relative error")
+        ax.set_ylabel("time [\N{GREEK SMALL LETTER MU}s]")
+    figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
+    return figure
+
+
+OTHERS = ("heyoka", "numbalsoda dop853", "numbalsoda LSODA", "libroadrunner", "diffrax", "scikit-sundae, compiled")
+SHOWN: dict[str, dict[str, Any]] = {
+    "radau": {"color": BLUE, "marker": "o", "linewidth": 2},
+    "dop853": {"color": RED, "marker": "o", "linewidth": 2},
+    **{
+        name: {"color": plots.COLOURS[2 + k % 4], "marker": "sv"[k // 4], "linewidth": 1}
+        for k, name in enumerate(OTHERS)
+    },
+    "scipy-LSODA": {"color": "0.5", "marker": "s", "linewidth": 1, "linestyle": "--"},
+}
+"""Solvers of the figure, ours first."""
+
+
+def growth() -> Figure:
+    """Cost against size."""
+    figure, rows = new(7.2, 5.0), kept("growth.csv")
+    names = list(dict.fromkeys(row["grows"] for row in rows))
+    panels = figure.subplots(2, 4, sharey=True)
+    colours = dict(zip(dict.fromkeys(row["cost"] for row in rows), plots.COLOURS, strict=False))
+    for ax, name in zip(panels.flat, names, strict=False):
+        for cost, colour in colours.items():
+            found = [row for row in rows if (row["grows"], row["cost"]) == (name, cost)]
+            if found:
+                sizes, seconds = np.array([(float(row["size"]), float(row["seconds"])) for row in found]).T
+                ax.loglog(sizes, seconds, "o-", color=colour, markersize=3.5)
+        ax.set_xlabel(name)
+    for ax in panels.flat[len(names) :]:
+        ax.set_axis_off()
+    for ax in panels[:, 0]:
+        ax.set_ylabel("time [s]")
+    lines = [panels.flat[0].plot([], [], "o-", color=c, markersize=3.5, label=n)[0] for n, c in colours.items()]
+    figure.legend(lines, list(colours), loc="outside lower center", ncols=4)
+    return figure
+
+
 GALLERY: dict[str, tuple[list[str], str | None]] = {
     "adhesion-cluster": (["phi"], None),
     "adhesion-cluster-held": (["phi"], None),
@@ -312,6 +370,8 @@ FIGURES: dict[str, Callable[[], Figure]] = {
     "gallery-gas-network.svg": gas_network,
     "accuracy.svg": accuracy,
     "precision.svg": precision,
+    "speed.svg": speed,
+    "growth.svg": growth,
     "signs.svg": signs,
     "press.svg": press,
     "rooms.svg": rooms,

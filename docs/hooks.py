@@ -3,13 +3,16 @@
 A page asks for a table with a comment: ``<!-- made: variables area-stretch -->``.
 """
 
+import csv
 import dataclasses
 import inspect
+import math
 import re
 from collections.abc import Callable, Iterator
 from functools import cache
 from importlib.metadata import version
 from io import BytesIO
+from pathlib import Path
 from typing import Any
 
 from mkdocs.structure.files import File, Files
@@ -427,6 +430,45 @@ def made_list_keys(section: str) -> str:
     return table(("key", "meaning", "holds", "unit", "range", "if not given"), rows)
 
 
+def made_ratios() -> str:
+    """How many times longer than ours other libraries take, as the benchmark has kept it."""
+    with (RESULTS / "ratios.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    wanted = [(case, error) for case in ("P1", "P2", "P3", "P4") for error in ("1e-06", "1e-10")]
+    found = {(row["solver"], row["case"], row["error"]): row["times ours"] for row in rows}
+    names = [name for name in dict.fromkeys(row["solver"] for row in rows) if name not in OURS]
+    heading = ("", *(f"{case} 10<sup>-{int(error[3:])}</sup>" for case, error in wanted))
+
+    def cell(value: str | None) -> str:
+        return "" if value is None else "not reached" if value == "nan" else f"{float(value):.2g}"
+
+    return table(heading, [(name, *(cell(found.get((name, *key))) for key in wanted)) for name in names])
+
+
+def made_growth() -> str:
+    """The power of the size with which each cost grows at the end."""
+    with (RESULTS / "growth.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    costs = list(dict.fromkeys(row["cost"] for row in rows))
+    shown = []
+    for name in dict.fromkeys(row["grows"] for row in rows):
+        cells = []
+        for cost in costs:
+            found = [(float(r["size"]), float(r["seconds"])) for r in rows if (r["grows"], r["cost"]) == (name, cost)]
+            if not found:
+                cells.append("")
+                continue
+            (small, before), (large, seconds) = found[-2:]
+            power = math.log(seconds / before) / math.log(large / small)
+            cells.append(f"{seconds:.2g} s at {large:,.0f}, power {power:.1f}")
+        shown.append((name, *cells))
+    return table(("", *costs), shown)
+
+
+RESULTS = Path(__file__).parents[1] / "benchmarks" / "results"
+OURS = ("radau", "dop853", "lsoda", "bdf", "scipy-radau", "cvode", "ida", "cantera")
+"""What is reached through a case: ours, and adapters."""
+
 MAKERS: dict[str, Callable[..., str]] = {
     "references": made_references,
     "cases": made_cases,
@@ -437,6 +479,8 @@ MAKERS: dict[str, Callable[..., str]] = {
     "variable_table": made_variable_table,
     "cli": made_cli,
     "solvers": made_solvers,
+    "ratios": made_ratios,
+    "growth": made_growth,
     "stability": made_stability,
     "regimes": made_regimes,
     "pictures": made_pictures,

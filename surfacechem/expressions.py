@@ -66,6 +66,24 @@ def derivative(expression: Expression, symbol: Expression) -> Expression:
     return result
 
 
+def terms_of(expression: Expression) -> dict[Any, list[Expression]]:
+    """Terms of a sum by the symbols that they contain: a derivative of it needs no others.
+
+    >>> import symengine
+    >>> x, y = symengine.symbols("x y")
+    >>> terms_of(x + 2 * y)
+    {x: [x], y: [2*y]}
+    """
+    import symengine
+
+    whole = symengine.sympify(expression)
+    found: dict[Any, list[Expression]] = {}
+    for term in whole.args if whole.is_Add else (whole,):
+        for symbol in term.free_symbols:
+            found.setdefault(symbol, []).append(term)
+    return found
+
+
 def gradient(expression: Expression, known: dict[Any, dict[Any, Expression]] | None = None) -> dict[Any, Expression]:
     """Derivatives that are not zero, by symbol: what an expression is made of is differentiated once, by the symbols
     that it contains. ``known`` keeps what has been differentiated.

@@ -14,7 +14,7 @@ import symengine
 
 from surfacechem.contracts.terms import RateLaw
 from surfacechem.errors import InputError
-from surfacechem.expressions import Expression, absolute, depends, derivative, exponents, where
+from surfacechem.expressions import Expression, absolute, depends, derivative, exponents, terms_of, where
 from surfacechem.model.balances import DISSIPATION, HEAT, INTERFACE, OUTSIDE, WORK, Power
 from surfacechem.model.build import Build
 from surfacechem.model.components.force import SHARED
@@ -83,7 +83,7 @@ def laws(build: Build) -> Iterator[Power | Account | Caution | Pair | Margin]:
         yield Account(formed, bond.dot - build.rows[name], "bonds", name)
     phi = symengine.Symbol("phi")
     if "phi" not in build.bonding and depends(build.psi, phi):
-        M, rate = _potential_per_area(build, "phi", phi), build.rate_of("phi")
+        M, rate = _potential_per_area(build, "phi", phi, build.psi), build.rate_of("phi")
         if rate != 0:
             yield Power(DISSIPATION, INTERFACE, INTERFACE, -M * rate, "prescribed_bonding")
 
@@ -99,18 +99,19 @@ def _changes(found: Iterable[Reaction]) -> dict[str, list[Expression]]:
 
 def _chemical_potentials(build: Build) -> dict[str, Expression]:
     """Chemical potential per bond or site [J], by bonding variable."""
-    mu = {}
+    mu, terms = {}, terms_of(build.psi)
     for name, bond in build.bonding.items():
-        M, single = _potential_per_area(build, name, bond.symbol) / bond.density, name == "phi"
+        psi = symengine.Add(*terms.get(bond.symbol, ()))
+        M, single = _potential_per_area(build, name, bond.symbol, psi) / bond.density, name == "phi"
         text = f"chemical potential {'per bond' if single else f'of {name} per site'}"
         quantity = Quantity("mu" if single else f"mu_{name}", "J", text, tag="e:muc")
         mu[name] = build.name(quantity, M, output=single)
     return mu
 
 
-def _potential_per_area(build: Build, name: str, symbol: symengine.Symbol) -> Expression:
+def _potential_per_area(build: Build, name: str, symbol: symengine.Symbol, psi: Expression) -> Expression:
     label, text = "M" if name == "phi" else f"M_{name}", f"chemical potential of {name} per area"
-    return build.name(Quantity(label, "J/m^2", text, tag="e:SMuc"), derivative(build.psi, symbol))
+    return build.name(Quantity(label, "J/m^2", text, tag="e:SMuc"), derivative(psi, symbol))
 
 
 def _reaction(
