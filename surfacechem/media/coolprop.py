@@ -9,7 +9,7 @@ import difflib
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -94,8 +94,8 @@ class CoolPropFluid(Fluid):
 
     @property
     def remark(self) -> str:
-        """What a mixture costs."""
-        if len(self.name.split("&")) == 1:
+        """What a mixture costs that neither boils nor condenses at its pressure, so that no phase is known."""
+        if len(self.name.split("&")) == 1 or any(_limits(self)[2:]):
             return ""
         return (
             f"{self.name} is a mixture, of which CoolProp needs some 20 to 50 ms for each value: each property takes "
@@ -120,23 +120,53 @@ class CoolPropFluid(Fluid):
         return COMBINED[quantity](lambda letter: self._properties(letter, T), T)
 
     def _properties(self, letter: str, T: Array) -> Array:
-        call = _coolprop().PropsSI
+        call, given = _coolprop().PropsSI, self._given(T)
         try:
-            found = np.asarray(call(letter, "T", T, "P", self.pressure, self.name), dtype=float)
+            found = np.asarray(call(letter, given, T, "P", self.pressure, self.name), dtype=float)
         except ValueError:
             found = np.full(T.shape, np.inf)
         for bad in T[~np.isfinite(found)]:
             try:  # CoolProp says why there is none only of a single value
-                value = call(letter, "T", float(bad), "P", self.pressure, self.name)
+                value = call(letter, given, float(bad), "P", self.pressure, self.name)
                 reason = f"no finite value at {bad:g} K, but {value}."
             except ValueError as error:
                 reason = _reason(error)
             raise InputError(f"{self.title}: {reason}")
         return found
 
+    def _given(self, T: Array) -> str:
+        """How CoolProp is told of temperatures: of a mixture, which boils and condenses at two of them, with the phase,
+        for which it looks a hundred times longer than for a property.
+        """
+        boils, condenses = _limits(self)[2:]
+        if boils == condenses:
+            return "T"
+        if condenses is not None and T.min() >= condenses:
+            return "T|gas"
+        return "T|liquid" if boils is not None and T.max() <= boils else "T"
+
     def limits(self) -> list[float | None]:
         """Least and largest temperature [K] of the properties, those of boiling and of condensing if it does."""
-        return [self._call("Tmin"), self._call("Tmax"), self._saturation(0), self._saturation(1)]
+        low, high, boils, condenses = self._call("Tmin"), self._call("Tmax"), self._saturation(0), self._saturation(1)
+        # Of mixtures near their critical point CoolProp finds but one of them.
+        if boils is not None and condenses is None:
+            condenses = self._end("gas", high, boils)
+        elif condenses is not None and boils is None:
+            boils = self._end("liquid", low, condenses)
+        return [low, high, boils, condenses]
+
+    def _end(self, phase: str, inside: float, outside: float) -> float | None:
+        """Where a phase ends, from a temperature inside it on; None where it is none there."""
+        state = partial(_coolprop().PhaseSI, "T")
+        if state(inside, "P", self.pressure, self.name) != phase:
+            return None
+        while abs(inside - outside) > BESIDE * inside:
+            middle = (inside + outside) / 2
+            if state(middle, "P", self.pressure, self.name) == phase:
+                inside = middle
+            else:
+                outside = middle
+        return inside
 
     def _call(self, letter: str) -> float:
         try:
@@ -156,7 +186,7 @@ class CoolPropFluid(Fluid):
 
 @cache
 def _limits(fluid: CoolPropFluid) -> tuple[float, float, float | None, float | None]:
-    low, high, boils, condenses = kept(fingerprint(fluid, "limits", version("CoolProp")), [], fluid.limits)
+    low, high, boils, condenses = kept(fingerprint(fluid, "limits", version("CoolProp")), [Path(__file__)], fluid.limits)
     return low, high, boils, condenses
 
 

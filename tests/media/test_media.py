@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+from CoolProp.CoolProp import PropsSI
 
 import surfacechem
 from surfacechem import format as case
@@ -124,7 +125,19 @@ def test_how_close_a_fit_is_is_told_where_it_is_not_close():
 
 
 def test_what_a_mixture_costs_is_told():
-    assert "20 to 50 ms for each value" in CoolPropFluid("Methane[0.9]&Ethane[0.1]", 1e5).remark
+    """Where it boils and condenses it is known which phase it has, and then it costs little."""
+    assert "20 to 50 ms for each value" in CoolPropFluid("CarbonDioxide[0.9]&Nitrogen[0.1]", 1e7).remark
+    assert CoolPropFluid("Methane[0.9]&Ethane[0.1]", 1e5).remark == ""
+
+
+@pytest.mark.parametrize(
+    ("name", "pressure"), [("Air.mix", 1e5), ("Water[0.5]&Ethanol[0.5]", 1e5), ("Methane[0.9]&Ethane[0.1]", 2e7)]
+)
+def test_a_mixture_has_the_properties_that_coolprop_finds_without_its_phase(name, pressure):
+    fluid, T = CoolPropFluid(name, pressure), np.array([290.0, 320.0])
+    for quantity, letter in (("rho_m", "D"), ("cp_m", "C")):
+        known = PropsSI(letter, "T", T, "P", pressure, name)
+        assert fluid.values(quantity, T) == pytest.approx(known, rel=1e-14)
 
 
 @pytest.mark.parametrize("name", ["Water", "INCOMP::MEG-50%"])
