@@ -186,7 +186,8 @@ class CoolPropFluid(Fluid):
 
 @cache
 def _limits(fluid: CoolPropFluid) -> tuple[float, float, float | None, float | None]:
-    low, high, boils, condenses = kept(fingerprint(fluid, "limits", version("CoolProp")), [Path(__file__)], fluid.limits)
+    mark = fingerprint(fluid, "limits", version("CoolProp"))
+    low, high, boils, condenses = kept(mark, [Path(__file__)], fluid.limits)
     return low, high, boils, condenses
 
 
