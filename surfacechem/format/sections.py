@@ -61,7 +61,7 @@ from surfacechem.model.components.mounting import TRACTIONS
 from surfacechem.quantities import VARIABLES
 from surfacechem.scene import MOST_CELLS, Conduction, Mounting
 from surfacechem.solve.run import OWN
-from surfacechem.tolerances import DEFAULT_RTOL, FLOOR, ROUNDING
+from surfacechem.tolerances import DEFAULT_RTOL, FLOOR
 
 BODY_NAME = r"[A-Za-z][A-Za-z0-9_-]*"
 
@@ -281,7 +281,8 @@ class SurfaceSection(Section):
     laws: Sequence[Potential] = key(ListOf(OneLaw(Potential)), "laws of the gap, integrated over it", ())
     heat: Sequence[HeatTransfer] = key(ListOf(OneLaw(HeatTransfer)), "conductances over the gap, integrated", ())
     approach: ApproachSection = key(Nested(ApproachSection), default=REQUIRED)
-    accuracy: float = quantity("1", "relative accuracy of the force", FLOOR, above=ROUNDING, at_most=0.1)
+    # A round number above ROUNDING, below which an integral is not known.
+    accuracy: float = quantity("1", "relative accuracy of the force", FLOOR, above=1e-12, at_most=0.1)
 
 
 # -- heat, mechanics, loading -----------------------------------------------------------------------------------------

@@ -132,10 +132,10 @@ def _settings(dataset: xarray.Dataset) -> dict[str, str]:
 def _brief(text: str) -> str:
     """A number, with its unit if it has one, in as many digits as a legend needs.
 
-    >>> _brief("6.6666666666666667e15 1/J/s"), _brief("radau"), _brief("0.1 MPa")
-    ('6.66667e+15 1/J/s', 'radau', '0.1 MPa')
+    >>> _brief("6.6666666666666667e15 1/J/s"), _brief("radau"), _brief("-0.1 MPa")
+    ('6.66667e+15 1/J/s', 'radau', '−0.1 MPa')
     """
-    return LONG_NUMBER.sub(lambda m: f"{float(m[0]):.6g}", text)
+    return style.minus(LONG_NUMBER.sub(lambda m: f"{float(m[0]):.6g}", text))
 
 
 def _united(found: Sequence[Sequence[Panel]]) -> list[Panel]:

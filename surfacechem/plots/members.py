@@ -66,7 +66,7 @@ def figure(dataset: xarray.Dataset, plan: Plan, variables: Sequence[str] | None 
 def chosen(dataset: xarray.Dataset, axes: Sequence[str], variables: Sequence[str] | None) -> list[str]:
     """The variables that are drawn: those asked for, else those of the ends that differ from run to run."""
     known = [str(n) for n, x in dataset.data_vars.items() if x.dtype.kind == "f" and x.dims[: len(axes)] == tuple(axes)]
-    refuse_unknown(variables or (), known, "no variable '{}' in the sweep")
+    refuse_unknown(variables or (), known, "no variable '{}' in the sweep", style.place(dataset))
     return list(dict.fromkeys(variables)) if variables else differing(dataset, axes, known)
 
 
@@ -159,7 +159,8 @@ def portraits(dataset: xarray.Dataset, axes: Sequence[str], variables: Sequence[
     # Along the runs there is time, or where a load ends them, the load.
     inner = [str(dim) for name in series for dim in dataset[name].dims if dim not in axes]
     known = [*series, *dict.fromkeys(inner)]
-    refuse_unknown((*(variables or ()), against), known, "no variable '{}' along the runs of the sweep")
+    asked = (*(variables or ()), against)
+    refuse_unknown(asked, known, "no variable '{}' along the runs of the sweep", style.place(dataset))
     usual = [name for _, *kind in KINDS[:2] for name in of_kind(dataset, series, *kind)]
     moving = [name for name in usual if name != against and varies(fair(dataset, name))]
     if not (names := list(dict.fromkeys(variables or moving[:MOST_PANELS]))):
@@ -208,7 +209,7 @@ def _between_outputs(dataset: xarray.Dataset, name: str) -> str:
     if shown >= SEEN * reached:
         return ""
     text, size = style.prefixed(unit(dataset[name]), np.array([reached]))
-    return f"between outputs, {symbol(name)} reaches {reached / size:.3g} {text}"
+    return style.minus(f"between outputs, {symbol(name)} reaches {reached / size:.3g} {text}")
 
 
 def colours(dataset: xarray.Dataset, axes: Sequence[str]) -> ScalarMappable:

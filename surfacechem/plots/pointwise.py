@@ -25,7 +25,7 @@ def figure(dataset: xarray.Dataset, variables: Sequence[str] | None = None, agai
     """
     known = [str(n) for n, x in dataset.data_vars.items() if x.dims == (POINT,) and x.dtype.kind == "f"]
     asked = [*(variables or ()), *filter(None, [against])]
-    refuse_unknown(asked, known, "no variable '{}' at the states")
+    refuse_unknown(asked, known, "no variable '{}' at the states", style.place(dataset))
     # Quantities, no derivatives, that are not the same at all states.
     differing = [name for name in known if len(np.unique(dataset[name].values)) > 1 and "_by_" not in name]
     if not differing:

@@ -198,7 +198,7 @@ def panels(dataset: xarray.Dataset, variables: Sequence[str] | None, against: st
     """Panels of the variables by unit, or of all that vary by kind, without the variable that is their axis."""
     known = curves(dataset)
     asked = (*(variables or ()), *filter(None, [against]))
-    refuse_unknown(asked, known, "no variable '{}' over time in the dataset")
+    refuse_unknown(asked, known, "no variable '{}' over time in the dataset", style.place(dataset))
     found = _by_unit(dataset, list(dict.fromkeys(variables))) if variables else _by_kind(dataset, known)
     found = [replace(panel, names=[name for name in panel.names if name != against]) for panel in found]
     return [panel for panel in found if panel.names]

@@ -195,7 +195,8 @@ def headings(plot: Figure, ax: Axes, dataset: xarray.Dataset, above: float = 0.0
     if (error := number(dataset, "error")) is not None:
         exact = str(attributes.get("error_source", "")).startswith("exact")
         exact = exact or any(str(name).endswith("_exact") for name in dataset)
-        facts.append(f"error {error:.1e} ({'exact solution' if exact else 'estimate'})")
+        kind = "exact solution" if exact else "estimate"
+        facts.append("error unknown" if np.isnan(error) else f"error {error:.1e} ({kind})")
     if "solver" in attributes and (rtol := number(dataset, "rtol")) is not None:
         facts.append(f"{attributes['solver']}, rtol {rtol:g}")
     if "time" in dataset.sizes and dataset.sizes.get("event", 0) > dataset.sizes["time"]:
@@ -352,12 +353,21 @@ def parameter_name(name: str) -> str:
 def valued(values: xarray.DataArray, place: int) -> str:
     """A value of a swept parameter with its name and unit.
 
-    >>> valued(xarray.DataArray([1e-10, 1e-9], name="rate", attrs={"units": "N s-1"}), 0)
-    'rate = 100 pN s⁻¹'
+    >>> valued(xarray.DataArray([-1e-10, 1e-9], name="rate", attrs={"units": "N s-1"}), 0)
+    'rate = −100 pN s⁻¹'
     """
     value = values.values[place]
     text, size = prefixed(unit(values), values.values[place : place + 1])
-    return f"{parameter_name(str(values.name))} = {value / size:.4g} {'' if text == '1' else text}".rstrip()
+    return minus(f"{parameter_name(str(values.name))} = {value / size:.4g} {'' if text == '1' else text}".rstrip())
+
+
+def minus(text: str) -> str:
+    """Text whose numbers have a minus, as those at axes, for a hyphen.
+
+    >>> minus("rate-and-state-aging at -3e-12 N, x = -.5")
+    'rate-and-state-aging at −3e−12 N, x = −.5'
+    """
+    return re.sub(r"(?<!\w)-(?=[\d.])|(?<=\de)-(?=\d)", "\N{MINUS SIGN}", text)
 
 
 def member_name(dataset: xarray.Dataset, place: Sequence[int]) -> str:

@@ -80,7 +80,7 @@ def _numbers(dataset: xarray.Dataset) -> list[str]:
 def groups(dataset: xarray.Dataset, variables: Sequence[str] | None) -> list[Panel]:
     """Panels of the variables, else of the most probable load at rupture, else of what depends on the sweep."""
     known, load = _numbers(dataset), rupture.load_of(dataset)
-    refuse_unknown(variables or (), known, "no variable '{}' in the sweep")
+    refuse_unknown(variables or (), known, "no variable '{}' in the sweep", style.place(dataset))
     names = [[name] for name in dict.fromkeys(variables or ())] or ([[f"{load}_mode"]] if load else _dependent(dataset))
     return [Panel("", unit(dataset[group[0]]), group) for group in names or [["time_reached"]]]
 

@@ -35,6 +35,15 @@ class Sheet:
         return "\n".join(lines)
 
 
+def counted(count: int, what: str) -> str:
+    """So many of what a noun names.
+
+    >>> counted(1, "run"), counted(61, "run")
+    ('1 run', '61 runs')
+    """
+    return f"{count} {what}{'s' if count != 1 else ''}"
+
+
 def columns(rows: Iterable[Sequence[str]]) -> list[str]:
     """Rows as text in columns."""
     table = [list(row) for row in rows]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from surfacechem.results.event_table import entropy_destroyed, event_counts, event_summary
-from surfacechem.runs.sheet import Rows, Sheet
+from surfacechem.runs.sheet import Rows, Sheet, counted
 from surfacechem.solve.jumps import ADMISSIBLE
 
 if TYPE_CHECKING:
@@ -143,18 +143,18 @@ def sweep_summary(solution: SweepSolution, written: Path | None, details: bool =
     if accuracy := solution.accuracy:
         known = accuracy.known
         missing = len(accuracy.errors) - len(known)
-        unknown = f"; unknown in {missing} runs" if missing else ""
+        unknown = f"; unknown in {counted(missing, 'run')}" if missing else ""
         error = f"{known.max():.2g} ({accuracy.source}){unknown}" if len(known) else f"unknown ({accuracy.source})"
     speed = f"run {duration(solution.seconds)}, compile {duration(solution.model.compile_seconds)}"
     if solution.system.whole:
         speed = f"surfaces {duration(solution.before_seconds)}, {speed}"
     energy, entropy, sites = (f"{solution.worst(balance):.1e}" for balance in ("energy", "entropy", "site"))
     count = sum(books.destroys for books in solution.audits)
-    verdict = f"ENTROPY DESTROYED in {count} runs" if count else "no law destroys entropy"
+    verdict = f"ENTROPY DESTROYED in {counted(count, 'run')}" if count else "no law destroys entropy"
     every = [
         ("swept", swept_in_words(solution.plan, solution.parameters, solution.system.changeable)),
         ("solved", _solved(solution.system, solution.run)),
-        ("ended", f"{len(solution.runs)} runs: {solution.ends}"),
+        ("ended", f"{counted(len(solution.runs), 'run')}: {solution.ends}"),
         ("error", error),
         ("time", f"{speed}; {solution.steps} steps"),
         ("events", _sweep_events(solution)),
@@ -189,7 +189,7 @@ def swept_in_words(plan: Plan, names: Mapping[str, str], units: Mapping[str, str
     for (name, path), axis in zip(names.items(), plan.axes, strict=False):
         first, last = axis.at(np.array([0, -1]) % len(axis))
         span = f"{first:g} to {last:g}" if len(axis) > 1 else f"{first:g}"
-        axes.append(f"{name} ({f'{span} {units[path]}'.removesuffix(' 1')}, {len(axis)} values)")
+        axes.append(f"{name} ({f'{span} {units[path]}'.removesuffix(' 1')}, {counted(len(axis), 'value')})")
     text = (" with " if plan.zipped else " by ").join(axes)
     if plan.sample is None:
         return text
@@ -328,16 +328,16 @@ def store_summary(stream: Stream, store: Store, checked: Checked | None, file: P
         ends += np.bincount(store.read("status", number), minlength=len(STATUSES))
         worst = np.fmax(worst, np.fmax.reduce(store.read("energy_error", number), initial=0.0))
     names = parameter_names(chunks.model.system, chunks.plan)
-    counted = ", ".join(f"{count} {word}" for count, word in zip(ends.tolist(), STATUSES, strict=True) if count)
+    words = ", ".join(f"{count} {word}" for count, word in zip(ends.tolist(), STATUSES, strict=True) if count)
     error = destroyed = ""
     if checked is not None:
         unknown = f"; unknown in {checked.unknown}" if checked.unknown else ""
         error = f"{checked.error:.2g} of {checked.count} runs ({checked.source}){unknown}"
-        destroyed = f"; ENTROPY DESTROYED in {checked.destroys} runs" if checked.destroys else ""
+        destroyed = f"; ENTROPY DESTROYED in {counted(checked.destroys, 'run')}" if checked.destroys else ""
     facts = [
         ("swept", swept_in_words(chunks.plan, names, chunks.model.system.changeable)),
         ("solved", _solved(chunks.model.system, chunks.run)),
-        ("ended", f"{ends.sum()} of {chunks.plan.size} runs: {counted}"),
+        ("ended", f"{ends.sum()} of {counted(chunks.plan.size, 'run')}: {words}"),
         *([("error", error)] if error else []),
         ("balances", f"energy {worst:.1e} at worst{destroyed}"),
         ("written", str(file) if file else f"{store.path}, {len(done)} of {layout.chunks} chunks"),

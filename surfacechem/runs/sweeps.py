@@ -29,6 +29,7 @@ from surfacechem.results.matching import exact_values, match
 from surfacechem.results.netcdf import Column, versions
 from surfacechem.runs import spectrum
 from surfacechem.runs.keeping import ENDS, EXTREMES, end_of, extreme
+from surfacechem.runs.sheet import counted
 from surfacechem.runs.spectrum import Lifetime, Statistics
 from surfacechem.solve.run import Model, Run, Trajectory
 from surfacechem.tolerances import EPS
@@ -237,7 +238,7 @@ class SweepSolution(Results):
 
     def __repr__(self) -> str:
         """Title, size and ends in a line."""
-        return f"<SweepSolution {self.title!r}: {len(self.runs)} runs, {self.ends}>"
+        return f"<SweepSolution {self.title!r}: {counted(len(self.runs), 'run')}, {self.ends}>"
 
     @property
     def system(self) -> System:

@@ -51,12 +51,14 @@ def test_sweeps_over_the_same_parameter_are_compared(sweeps, runs):
         figure([sweeps[0], runs[0]])
 
 
-def test_datasets_that_differ_in_all_are_named_by_title_or_file(runs):
-    other = surfacechem.run("pair-exchange").dataset
+def test_datasets_that_differ_in_all_are_named_by_title_or_file(runs, tmp_path):
+    solution = surfacechem.run("pair-exchange")
+    other = solution.dataset
     assert labels([runs[0], other]) == ["A body cools to a reservoir", "Two bodies exchange heat"]
     assert labels([runs[0], runs[0]]) == ["dataset 1", "dataset 2"]
-    with pytest.raises(InputError, match="no variable 'T_3'"):
-        figure([runs[0], other], ["T_3"])
+    solution.write(tmp_path / "pair.nc")
+    with pytest.raises(InputError, match=r"pair\.nc: no variable 'lost_1'"):
+        figure([runs[0].assign(lost_1=runs[0]["T_1"]), tmp_path / "pair.nc"], ["lost_1"])
 
 
 def test_one_run_that_needs_decades_gives_them_to_all():

@@ -204,6 +204,11 @@ def test_files_are_the_same_every_time(kind):
     assert len(first.getvalue()) > 5_000
 
 
+def test_an_error_that_is_not_known_is_told_so():
+    title = figure(dataset().assign_attrs(error=np.nan)).axes[0].get_title(loc="left")
+    assert "error unknown" in title
+
+
 def test_notebooks_show_it_and_settings_stay_as_they_were():
     before = dict(matplotlib.rcParams)
     assert figure(dataset())._repr_png_().startswith(b"\x89PNG")
