@@ -281,8 +281,8 @@ class SurfaceSection(Section):
     laws: Sequence[Potential] = key(ListOf(OneLaw(Potential)), "laws of the gap, integrated over it", ())
     heat: Sequence[HeatTransfer] = key(ListOf(OneLaw(HeatTransfer)), "conductances over the gap, integrated", ())
     approach: ApproachSection = key(Nested(ApproachSection), default=REQUIRED)
-    # A round number above ROUNDING, below which an integral is not known.
-    accuracy: float = quantity("1", "relative accuracy of the force", FLOOR, above=1e-12, at_most=0.1)
+    # Three digits more than the default are still above ROUNDING, below which no integral is known.
+    accuracy: float = quantity("1", "relative accuracy of the force", FLOOR, above=FLOOR / 1000, at_most=0.1)
 
 
 # -- heat, mechanics, loading -----------------------------------------------------------------------------------------
