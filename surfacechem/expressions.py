@@ -71,8 +71,9 @@ def terms_of(expression: Expression) -> dict[Any, list[Expression]]:
 
     >>> import symengine
     >>> x, y = symengine.symbols("x y")
-    >>> terms_of(x + 2 * y)
-    {x: [x], y: [2*y]}
+    >>> terms = terms_of(x + 2 * y)
+    >>> terms[x], terms[y]
+    ([x], [2*y])
     """
     import symengine
 
