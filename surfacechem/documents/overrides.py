@@ -35,12 +35,17 @@ def apply(tree: Tree, overrides: str | Sequence[str] | Mapping[str, object]) -> 
 
 
 def assignments(texts: Sequence[str]) -> dict[str, object]:
-    """Texts "path=value" as plain values.
+    """Texts "path=value" as plain values; InputError where a path is given twice.
 
     >>> assignments(["f=3 pN", "g=[1, 2]"])
     {'f': '3 pN', 'g': [1, 2]}
     """
-    return {path: tree.plain() for path, tree in _pairs(texts)}
+    found: dict[str, object] = {}
+    for path, tree in _pairs(texts):
+        if path in found:
+            raise InputError("it is given twice.", Place(ORIGIN, 0, path))
+        found[path] = tree.plain()
+    return found
 
 
 def written(overrides: str | Sequence[str] | Mapping[str, object]) -> list[str]:

@@ -345,6 +345,8 @@ def read_points(path: Path, evaluator: Evaluator) -> dict[str, list[float]]:
     for name, _ in text.columns:
         if name not in evaluator.given:
             raise text.error(text.heading[0], f"points cannot give '{name}'.{suggestion(name, evaluator.given)}")
+    if not text.rows:
+        raise text.error(text.heading[0], "there is no row of values below these names.")
     return {name: text.column(name, evaluator.given[name].quantity.unit, name) for name, _ in text.columns}
 
 

@@ -143,6 +143,7 @@ class TestRun:
             ["sweep", "bonding.yaml", "--over", "initial.T=[300]", "-o", "x.txt"],
             "written as '.txt': .nc, .nc4, .cdf, .csv, .parquet. Give x.nc",
         ),
+        (["sweep", "bonding.yaml", *["--over", "initial.T=[300]"] * 2], "initial.T: it is given twice."),
         (["equations", "bonding.yaml", "--format", "pyton"], "Did you mean 'python'?"),
         (["laws", "colomb"], "Did you mean 'coulomb'?"),
         (["plot", "nothing.nc"], "there is no file nothing.nc."),

@@ -138,6 +138,9 @@ def test_points_come_from_a_table_with_units(element, tmp_path):
     assert found["g_n"].values.tolist() == [-1e-9, 2e-9]
     assert found["T_c"].values.tolist() == [293.15, 303.15]
     assert found["phi"].values.tolist() == [0.5, 1.0]
+    path.write_text("g_n [nm], T_c [degC]\n")
+    with pytest.raises(InputError, match=r"points.csv:1: there is no row of values"):
+        read_points(path, element.evaluator)
     path.write_text("g_n nm\n-1\n")
     with pytest.raises(InputError, match=r"points.csv:1: the heading 'g_n nm' is no name with a unit"):
         read_points(path, element.evaluator)
