@@ -102,10 +102,14 @@ class _Code:
         self.arguments = function.args
         self.places = {symbol: place for place, symbol in enumerate(inputs)}
         self.known: dict[Any, Any] = {}
+        """Values of parts that have been formed where the code that is written now is reached."""
+        self.costs: dict[Any, bool] = {}
         named, reduced = symengine.cse([symengine.sympify(each) for each in expressions]) if expressions else ([], [])
-        for symbol, expression in named:
-            self.known[symbol] = self.value(expression)
+        self.definitions = dict(named)
         self.values = [self.value(expression) for expression in reduced]
+
+    def _parts(self, part: Any) -> Sequence[Any]:
+        return (self.definitions[part],) if part in self.definitions else part.args
 
     def _entry(self, argument: int, place: int) -> Any:
         pointer = self.builder.gep(self.arguments[argument], [ir.IntType(64)(8 * LANES * place)])
@@ -123,8 +127,8 @@ class _Code:
             left = [expression]
             while left:
                 part = left[-1]
-                missing = [each for each in part.args if each not in self.known] if part not in self.known else []
-                if missing:
+                missing = [each for each in self._first(part) if each not in self.known]
+                if missing and part not in self.known:
                     left += missing
                     continue
                 if part not in self.known:
@@ -132,6 +136,25 @@ class _Code:
                 left.pop()
             found = self.known[expression]
         return found
+
+    def _first(self, part: Any) -> Sequence[Any]:
+        """What is formed before a part: all it is made of, but what only some cases may need of a choice."""
+        parts = self._parts(part)
+        return parts[1:2] if type(part).__name__ == "Piecewise" and self._costs(part) else parts
+
+    def _costs(self, expression: Any) -> bool:
+        """Whether an expression takes longer than a jump around it."""
+        left = [expression]
+        while left:
+            part = left[-1]
+            parts = self._parts(part)
+            missing = [each for each in parts if each not in self.costs]
+            if missing and part not in self.costs:
+                left += missing
+                continue
+            self.costs[part] = _is_costly(part) or any(self.costs[each] for each in parts)
+            left.pop()
+        return self.costs[expression]
 
     def _made(self, part: Any) -> Any:
         kind = type(part).__name__
@@ -141,12 +164,41 @@ class _Code:
             return number(float(part))
         if kind in _TRUTHS:
             return _Constant(MASK, [int(kind == "BooleanTrue")] * LANES)
+        if part in self.definitions:
+            return self.known[self.definitions[part]]
+        if kind == "Piecewise" and self._costs(part):
+            return self._chosen(part.args)
         values = [self.known[each] for each in part.args]
         if kind in _OWN:
             return _OWN[kind](self, part, values)
         if kind in _LIBRARY:
             return self._by_library(_LIBRARY[kind], values)
         raise NotImplementedError(f"no vector code for {kind}: {part}")
+
+    def _chosen(self, args: Sequence[Any]) -> Any:
+        """The first value whose condition holds, of values that are formed only where a case needs them."""
+        value, condition, *rest = args
+        holds = self.value(condition)
+        first = self._where_any(holds, lambda: self.value(value))
+        if not rest:
+            return self.builder.select(holds, first, number(np.nan))
+        other = self._where_any(self.builder.not_(holds), lambda: self._chosen(rest))
+        return self.builder.select(holds, first, other)
+
+    def _where_any(self, mask: Any, made: Callable[[], Any]) -> Any:
+        """What is made in code that is jumped over where the mask holds for no case."""
+        bits = ir.IntType(LANES)
+        needed = self.builder.icmp_unsigned("!=", self.builder.bitcast(mask, bits), bits(0))
+        before = self.builder.block
+        outside = dict(self.known)
+        with self.builder.if_then(needed):
+            found = made()
+            inside = self.builder.block
+        self.known = outside
+        result = self.builder.phi(VECTOR)
+        result.add_incoming(found, inside)
+        result.add_incoming(number(0.0), before)
+        return result
 
     def _piecewise(self, _part: Any, values: Sequence[Any]) -> Any:
         """The first value whose condition holds."""
@@ -232,6 +284,12 @@ _LIBRARY = {name: name for name in (*_TRIGONOMETRIC, *_HYPERBOLIC, "erf", "erfc"
 """Functions of the C library, by the kind of their node."""
 
 
+def _is_costly(part: Any) -> bool:
+    """Whether an operation takes some ten times as long as a sum."""
+    kind = type(part).__name__
+    return kind in ("log", *_LIBRARY) or (kind == "Pow" and not part.args[1].is_Integer)
+
+
 def number(value: float) -> Any:
     """The same number at every place."""
     return _Constant(VECTOR, [value] * LANES)
@@ -239,6 +297,10 @@ def number(value: float) -> Any:
 
 def _whole(value: int) -> Any:
     return _Constant(WORDS, [value] * LANES)
+
+
+def _bits(value: float) -> int:
+    return int(np.float64(value).view(np.int64))
 
 
 def by_vector(builder: Any, function: str, value: Any) -> Any:
@@ -266,7 +328,9 @@ _LN2_HIGH = 0.693147180369123816490
 _LN2_LOW = float(Decimal(2).ln() - Decimal(_LN2_HIGH))
 """The logarithm of 2 in two parts, the first with zeros behind, so that its multiples are exact (fdlibm)."""
 _ROUNDER = 1.5 * 2.0**52
-"""Added and taken off again this rounds to a whole number."""
+"""Added and taken off again this rounds to a whole number, which stands in the last bits of the sum: many processors
+have no vector instruction that makes a word of a number, or shifts one with its sign.
+"""
 _LARGEST, _LEAST = 709.782712893384, -745.2
 """Where exp overflows, and where it is nothing."""
 _EXP = [1.0 / factorial(k) for k in range(2, 14)]
@@ -277,16 +341,15 @@ def exp(builder: Any, x: Any) -> Any:
     """Exponential of a vector: 2^k exp(r) with abs(r) at most half of the logarithm of 2 (Cody & Waite)."""
     inside = builder.select(builder.fcmp_ordered(">", x, number(_LARGEST)), number(_LARGEST), x)
     inside = builder.select(builder.fcmp_ordered(">=", inside, number(_LEAST)), inside, number(_LEAST))  # no NaN either
-    whole = builder.fsub(
-        builder.fadd(builder.fmul(inside, number(1.4426950408889634)), number(_ROUNDER)), number(_ROUNDER)
-    )
+    rounded = builder.fadd(builder.fmul(inside, number(1.4426950408889634)), number(_ROUNDER))
+    whole = builder.fsub(rounded, number(_ROUNDER))
     rest = builder.fsub(inside, builder.fmul(whole, number(_LN2_HIGH)))
     rest = builder.fsub(rest, builder.fmul(whole, number(_LN2_LOW)))
     series = builder.fmul(builder.fmul(rest, rest), _polynomial(builder, rest, _EXP))
     found = builder.fadd(number(1.0), builder.fadd(rest, series))
     # In two factors, as the whole power of 2 may lie beyond the range.
-    power = builder.fptosi(whole, WORDS)
-    half = builder.ashr(power, _whole(1))
+    power = builder.sub(builder.bitcast(rounded, WORDS), _whole(_bits(_ROUNDER)))
+    half = builder.sub(builder.lshr(builder.add(power, _whole(2048)), _whole(1)), _whole(1024))
     for part in (half, builder.sub(power, half)):
         bits = builder.shl(builder.add(part, _whole(1023)), _whole(52))
         found = builder.fmul(found, builder.bitcast(bits, VECTOR))
@@ -306,8 +369,10 @@ def log(builder: Any, x: Any) -> Any:
     tiny = builder.fcmp_ordered("<", x, number(2.0**-1022))
     scaled = builder.select(tiny, builder.fmul(x, number(2.0**54)), x)
     bits = builder.sub(builder.bitcast(scaled, WORDS), _whole(_ROOT_BITS))
-    power = builder.sitofp(builder.ashr(bits, _whole(52)), VECTOR)
-    power = builder.fsub(power, builder.select(tiny, number(54.0), number(0.0)))
+    # k + 1024 is above zero, and a word below 2^52 with the bits of that number is the number 2^52 more.
+    counted = builder.lshr(builder.add(bits, _whole(1024 << 52)), _whole(52))
+    counted = builder.bitcast(builder.or_(counted, _whole(_bits(2.0**52))), VECTOR)
+    power = builder.fsub(counted, builder.select(tiny, number(2.0**52 + 1078.0), number(2.0**52 + 1024.0)))
     kept = builder.add(builder.and_(bits, _whole(2**52 - 1)), _whole(_ROOT_BITS))
     f = builder.fsub(builder.bitcast(kept, VECTOR), number(1.0))
     s = builder.fdiv(f, builder.fadd(number(2.0), f))

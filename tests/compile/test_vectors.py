@@ -64,6 +64,27 @@ def test_functions_are_those_of_scalar_code(expression):
     assert compile_lanes([X, Y], [expression])(values) == pytest.approx(scalar.T, rel=1e-15)
 
 
+def test_values_of_a_choice_are_formed_where_a_case_needs_them():
+    """What is formed for one choice is there for another one, and for what comes behind both."""
+    low, high = symengine.exp(X) * Y, symengine.log(X + Y)
+    inner = symengine.Piecewise((high, Y < 2), (symengine.sqrt(low), True))
+    chosen = symengine.Piecewise((low, X < 1), (inner + low, X < 2), (Y, True))
+    others = symengine.Piecewise((high * chosen, Y < 1), (low, X < 3)), low + high
+    code = compile_lanes([X, Y], [chosen, *others])
+    for x, y in ((0.5, 0.5), (1.5, 0.5), (1.5, 2.5), (2.5, 1.5), (3.5, 0.5), (3.5, 1.5)):
+        exponential, logarithm = np.exp(x) * y, np.log(x + y)
+        second = (logarithm if y < 2 else np.sqrt(exponential)) + exponential
+        first = exponential if x < 1 else second if x < 2 else y
+        third = logarithm * first if y < 1 else exponential if x < 3 else np.nan
+        wanted = [first, third, exponential + logarithm]
+        # Alone, and where the others need every choice.
+        alike = np.repeat([[x], [y]], LANES, axis=1)
+        mixed = np.random.default_rng(3).uniform(0.1, 4, (2, LANES))
+        mixed[:, 3] = x, y
+        assert code(alike)[:, 0] == pytest.approx(wanted, rel=1e-15, nan_ok=True)
+        assert np.array_equal(code(alike)[:, 0], code(mixed)[:, 3], equal_nan=True)
+
+
 def test_a_function_without_code_is_told():
     with pytest.raises(NotImplementedError, match="gamma"):
         compile_lanes([X], [symengine.gamma(X)])

@@ -68,8 +68,8 @@ def _dips(w: Any, m: int, a: float, b: float, c: float) -> Any:
     side = lanes(w.side[m])
     at_a, at_b = side * lanes(w.margin_earlier[m]), side * lanes(w.margin_before[m])
     at_c = side * lanes(w.margin[m])
-    steepest = larger((at_a - at_b) / (b - a), (at_c - at_b) / (c - b))
-    return (absolute(side) > 0.5) & (at_b < at_a) & (at_b < at_c) & (at_b <= steepest * (c - a))
+    falls, rises = (at_a - at_b) * ((c - a) / (b - a)), (at_c - at_b) * ((c - a) / (c - b))
+    return (absolute(side) > 0.5) & (at_b < at_a) & (at_b < at_c) & (at_b <= larger(falls, rises))
 
 
 @compiled
@@ -84,23 +84,25 @@ def _put_margins(w: Any, x: float) -> None:
 
 @compiled
 def _may_meet(w: Any, good: Any) -> Any:
-    """Where guards have to be looked at closely: a quarter of the step may bring one to zero from where it is nearest,
-    as they change from each quarter to the next.
+    """Where guards have to be looked at closely: one is at zero at a quarter of the step, or no farther from it than
+    twice what it bends by from a quarter to the next. Between two points a parabola dips by an eighth of that.
     """
     for m in range(w.n_margins):
         put(w.margin[m], lanes(w.margin_first[m]))
         put(w.nearest[m], lanes(w.side[m]) * lanes(w.margin_first[m]))
-        put(w.farthest[m], 0.0)
+        put(w.bend[m], 0.0)
     for quarter in range(1, 5):
         _put_margins(w, 0.25 * quarter)
         for m in range(w.n_margins):
             value = lanes(w.margin[m])
             put(w.nearest[m], smaller(lanes(w.nearest[m]), lanes(w.side[m]) * value))
-            put(w.farthest[m], larger(lanes(w.farthest[m]), absolute(value - lanes(w.margin_before[m]))))
+            if quarter > 1:
+                bend = absolute(value - 2.0 * lanes(w.margin_before[m]) + lanes(w.margin_earlier[m]))
+                put(w.bend[m], larger(lanes(w.bend[m]), bend))
     close = same(0.0)
     for m in range(w.n_margins):
         if w.kinds[m, 4] != 0:
-            close = where(lanes(w.nearest[m]) > 2.0 * lanes(w.farthest[m]), close, 1.0)
+            close = where(lanes(w.nearest[m]) > 2.0 * lanes(w.bend[m]), close, 1.0)
             largest = lanes(w.margin_largest[m])
             put(w.margin_largest[m], where(good, larger(largest, absolute(lanes(w.margin[m]))), largest))
     return good & (close > 0.5)

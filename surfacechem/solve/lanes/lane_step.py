@@ -228,14 +228,17 @@ def _differs(w: Any, x: Any) -> Any:
         miss, scale = same(0.0), same(TINY)
         for m in range(w.n_ledger):
             if w.groups[m] == group:
-                defect = absolute(lanes(w.rates[w.n + m]) - lanes(w.slopes[w.n + m]))
-                rate = larger(lanes(w.q_rate[m]), defect)
-                # The quadrature of a smooth rate is better than its polynomial of order 7, by 6/7 of that power; 3/4 is
-                # what roots give.
-                root = square_root(square_root(defect / larger(rate, TINY)))
-                miss = larger(miss, h * defect * root * root * root)
                 scale = larger(scale, lanes(w.q_scale[m]))
-        norm = larger(norm, miss / (scale * max(LOOSER * w.rtol, LEAST)))
+        unit = h / scale
+        for m in range(w.n_ledger):
+            if w.groups[m] == group:
+                defect = absolute(lanes(w.rates[w.n + m]) - lanes(w.slopes[w.n + m]))
+                part = defect / larger(larger(lanes(w.q_rate[m]), defect), TINY)
+                # The quadrature of a smooth rate is better than its polynomial of order 7, by 6/7 of that power; 3/4 is
+                # what roots give: of the worst of all, as they take longer than the rest.
+                squared = unit * defect * unit * defect
+                miss = larger(miss, squared * squared * (part * part * part))
+        norm = larger(norm, square_root(square_root(miss)) / max(LOOSER * w.rtol, LEAST))
     for m in range(w.columns):
         blank = blank + 0.0 * lanes(w.rates[m])  # as in a step
     return norm + blank

@@ -30,10 +30,10 @@ MEMORY = {
     **_arrays("weight", "n"),
     **_arrays("q_largest q_rate q_scale", "n_ledger"),
     # guards: value now and at the two points before, at the start and at the end of the step; over its quarters how
-    # near to zero and how far from each to the next; largest value so far; side of zero, 0 where it is not known yet;
+    # near to zero and how much it bends; largest value so far; side of zero, 0 where it is not known yet;
     # whether each is met in the step
     **_arrays("margin margin_before margin_earlier margin_first margin_end", "n_margins"),
-    **_arrays("nearest farthest margin_largest side fired", "n_margins"),
+    **_arrays("nearest bend margin_largest side fired", "n_margins"),
     # the time, the end of the segment, and a time at which a step has to end
     **_arrays("t end aim"),
     # this step, the last one and one that failed, the norms of their errors, the next step; how far apart looks at the
