@@ -76,8 +76,29 @@ def solve(
     done: list[Trajectory] = []
     for start in range(0, len(pairs), PORTION):
         log.info("runs", extra={"done": start, "total": len(pairs)})
-        done += model.solve_all(pairs[start : start + PORTION], threads or os.cpu_count() or 1)
+        portion = pairs[start : start + PORTION]
+        try:
+            done += model.solve_all(portion, threads or os.cpu_count() or 1)
+        except InputError as error:
+            raise _with_values(model, portion, plan.points[start:], error) from None
     return done
+
+
+def _with_values(
+    model: Model,
+    runs: Sequence[tuple[Run, Mapping[str, float]]],
+    points: Sequence[Mapping[str, float]],
+    error: InputError,
+) -> InputError:
+    """The error with what is swept in the first run that is refused."""
+    for pair, point in zip(runs, points, strict=False):
+        try:
+            model.problem(*pair)
+        except InputError as found:
+            given = ", ".join(f"{path} = {value:g}" for path, value in point.items())
+            more = f"This is the run with {given}; a store, -o NAME.zarr, counts such runs as refused and goes on."
+            return InputError(f"{found.message} {more}", found.place)
+    return error
 
 
 def settings(system: System, plan: Plan, run: Run, values: Sequence[Mapping[str, float]]) -> list[Run]:

@@ -34,6 +34,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from surfacechem.errors import InputError, Place
 from surfacechem.quantities import raised
 from surfacechem.results.netcdf import CONVENTIONS, Column, replacing, save
 from surfacechem.runs.listing import plain
@@ -283,11 +284,14 @@ class Study:
 
 
 def targets(path: str | Path) -> dict[str, Path]:
-    """The files of a study by their suffix, side by side.
+    """The files of a study by their suffix, side by side; InputError where another suffix is asked for.
 
     >>> [str(path) for path in targets("a/study.nc").values()]
     ['a/study.nc', 'a/study.svg', 'a/study.png', 'a/study.html']
     """
-    stem = Path(path)
-    stem = stem.with_suffix("") if stem.suffix in SUFFIXES else stem
+    target = Path(path)
+    stem = target.with_suffix("")
+    if target.suffix and target.suffix not in SUFFIXES:
+        message = f"a study is written as {', '.join(SUFFIXES)}, not as '{target.suffix}'. Give {stem.name}."
+        raise InputError(message, Place(str(path)))
     return {suffix: stem.with_name(stem.name + suffix) for suffix in SUFFIXES}

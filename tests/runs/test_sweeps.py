@@ -261,7 +261,7 @@ REFUSED = [
     ({RATE: [1e-12, 1e-12]}, None, r"has a value twice"),
     ({RATE: [-1e-12]}, None, r"f never reaches 2e-10"),
     ({}, None, r"a sweep needs `over`"),
-    ({"initial.phi": [1.0, 2.0]}, None, r"phi rose above its bound 1"),
+    ({"initial.phi": [1.0, 2.0]}, None, r"phi rose above its bound 1.* This is the run with initial.phi = 2; a store"),
     (None, {"T_c": "310 K"}, r"T_c is no ramp"),
     (None, {"v": "1 m/s"}, r"no law reads a prescribed v"),
     (None, {"x": "1 m/s"}, r"sweep.until: unknown key 'x'"),

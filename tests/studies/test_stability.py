@@ -194,6 +194,13 @@ def folder(made):
     return made[1]
 
 
+def test_another_suffix_is_refused_before_anything_is_solved(tmp_path):
+    done = CliRunner().invoke(app, ["stability", "seconds", "-o", str(tmp_path / "study.txt")])
+    assert done.exit_code == 2
+    assert "not as '.txt'. Give study." in done.output
+    assert not list(tmp_path.iterdir())
+
+
 def test_the_dataset_holds_every_cell(folder):
     assert sorted(file.suffix for file in folder.iterdir()) == [".html", ".nc", ".png", ".svg"]
     with xarray.open_dataset(folder / "study.nc") as data:
