@@ -99,6 +99,8 @@ class Number(Content):
     spec: Spec
     difference: bool = False
     word: str = ""
+    wanted: str = ""
+    """What has to stand there, for the message where there is a mapping."""
 
     @property
     def words(self) -> str:  # type: ignore[override]
@@ -109,6 +111,8 @@ class Number(Content):
         """The value in SI, or the word."""
         if self.word and tree.value == self.word:
             return self.word
+        if self.wanted and isinstance(tree.value, dict):
+            raise tree.error(f"{self.wanted}, not {tree.shown}.")
         spec = self.spec.resolved(context.x)
         if context.whole:
             spec = replace(spec, unit=WHOLE.get(spec.unit, spec.unit))

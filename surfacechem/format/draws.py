@@ -31,6 +31,11 @@ class Distribution(ABC):
         """Values below which the parts ``u`` of all draws lie."""
 
     @property
+    def over_decades(self) -> bool:
+        """Whether ratios of its values are what is even."""
+        return False
+
+    @property
     def record(self) -> dict[str, Any]:
         """What makes it again."""
         return {"kind": type(self).__name__, **asdict(self)}  # type: ignore[call-overload]
@@ -43,6 +48,10 @@ class Uniform(Distribution):
     low: float
     high: float
     logarithmic: bool = False
+
+    @property
+    def over_decades(self) -> bool:
+        return self.logarithmic
 
     def at(self, u: Array) -> Array:
         if not self.logarithmic:
@@ -68,6 +77,10 @@ class Lognormal(Distribution):
 
     median: float
     sigma: float
+
+    @property
+    def over_decades(self) -> bool:
+        return True
 
     def at(self, u: Array) -> Array:
         values: Array = self.median * np.exp(self.sigma * _standard(u))

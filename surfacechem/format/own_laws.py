@@ -44,9 +44,9 @@ def embedded(tree: Tree, base: Path, allow_code: bool = False) -> tuple[Tree, li
         name = fields["file"].text("a file of laws")
         source = _source(fields, name, base, allow_code)
         checksum = hashlib.sha256(source.encode()).hexdigest()
-        wanted = fields["sha256"].text("sha256") if "sha256" in fields else checksum
-        if wanted != checksum:
-            raise fields["sha256"].error(f"{name} is another file than the one meant: its checksum is {checksum}.")
+        if "sha256" in fields and fields["sha256"].value != checksum:
+            message = f'{name} is another file than the one meant: its checksum is `sha256: "{checksum}"`.'
+            raise fields["sha256"].error(message)
         found += read(source, name, entry.place)
         texts = {"file": name, "sha256": checksum, "python": source}
         entries.append(Tree({key: Tree(text, entry.place) for key, text in texts.items()}, entry.place))

@@ -377,7 +377,12 @@ class RunSection(Section):
     """times, accuracy, solver, for example `run: {until: 5 s}`"""
 
     until: float | str | None = key(
-        Number(Spec("s", "end of the run", varies=False, above=0), word=STEADY),
+        Number(
+            Spec("s", "end of the run", varies=False, above=0),
+            word=STEADY,
+            wanted="where a load is reached, runs of a sweep end by `sweep.until` and stages of a history by their own "
+            "`until`; that of the run is a time, `until: 5 s`, or `steady`",
+        ),
         "end of the run [s], or where nothing changes any more",
     )
     outputs: int | None = key(

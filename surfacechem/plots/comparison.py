@@ -83,11 +83,11 @@ def colours_of(count: int) -> list[str]:
 
 
 def labels(datasets: Sequence[xarray.Dataset]) -> list[str]:
-    """What differs between datasets, for each of them: parameters and solver, else the title, else the file.
+    r"""What differs between datasets, for each of them: parameters and solver, else the title, else the file.
 
     >>> cases = [f"interface: {{friction: [coulomb: {{mu: {mu}}}]}}" for mu in (0.3, 0.6)]
     >>> labels([xarray.Dataset(attrs={"case": text, "solver": "radau"}) for text in cases])
-    ['mu = 0.3', 'mu = 0.6']
+    ['$\\mu$ = 0.3', '$\\mu$ = 0.6']
     """
     known = [_settings(dataset) for dataset in datasets]
     every = dict.fromkeys(path for each in known for path in each)
@@ -95,7 +95,7 @@ def labels(datasets: Sequence[xarray.Dataset]) -> list[str]:
     texts = [str(dataset.attrs.get("title", "")) for dataset in datasets]
     # More differences than fit into a legend are those of two different cases, whose titles tell them apart.
     if 0 < len(paths) <= MOST_DIFFERENCES:
-        names = _short(paths)
+        names = {path: style.parameter_name(name) for path, name in _short(paths).items()}
         texts = [", ".join(f"{name} = {each.get(path, 'not given')}" for path, name in names.items()) for each in known]
     # Datasets that still have the same name are told apart by their files.
     files = [Path(str(d.encoding.get("source", f"dataset {k}"))).stem for k, d in enumerate(datasets, 1)]
@@ -170,7 +170,7 @@ def _label_axis(axes: Sequence[Axes], datasets: Sequence[xarray.Dataset], over: 
     """The axis that all panels share: time, over decades from ``begin`` on, a variable, or the swept parameter."""
     first, values = datasets[0][over], np.concatenate([dataset[over].values for dataset in datasets])
     if over != "time" and "sweep" in datasets[0].attrs:
-        style.draw_parameter(axes[-1], first)
+        style.draw_parameter(axes[-1].xaxis, first)
         return
     if begin is not None:
         axes[-1].set_xlabel("Time [s]")

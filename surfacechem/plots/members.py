@@ -117,22 +117,11 @@ def fair(dataset: xarray.Dataset, name: str) -> Array:
     return np.asarray(values[:: -(-values.size // MOST_POINTS)], dtype=float)
 
 
-def axis_label(values: xarray.DataArray) -> str:
-    """Name and unit of a parameter, or of a time."""
-    return f"{axis_words(values)} [{unit_text(unit(values))}]"
-
-
-def axis_words(values: xarray.DataArray) -> str:
-    """Name of a parameter, and whose it is."""
-    name = str(values.name)
-    words = name.replace("_", " ") if len(name.partition("_")[0]) > 1 else symbol(name)
-    return words + style.owner(values)
-
-
 def quantity_label(values: xarray.DataArray) -> str:
     """Name and unit of a variable."""
-    is_time = unit(values) == TIME_UNIT
-    return axis_label(values) if is_time else f"{symbol(str(values.name))} [{unit_text(unit(values))}]"
+    name = str(values.name)
+    words = name.replace("_", " ") if unit(values) == TIME_UNIT else symbol(name)
+    return f"{words} [{unit_text(unit(values))}]"
 
 
 def maps(dataset: xarray.Dataset, plan: Plan, axes: Sequence[str], names: Sequence[str]) -> Figure:
@@ -143,12 +132,8 @@ def maps(dataset: xarray.Dataset, plan: Plan, axes: Sequence[str], names: Sequen
             values = np.ma.masked_invalid(dataset[name].values)
             image = ax.pcolormesh(x.values, y.values, values.T, shading="nearest", cmap="viridis", rasterized=True)
             plot.colorbar(image, ax=ax, label=quantity_label(dataset[name]))
-            ax.set_ylabel(axis_label(y))
-            if plan.axes[0].logarithmic:
-                style.logarithmic(ax.xaxis)
-            if plan.axes[1].logarithmic:
-                style.logarithmic(ax.yaxis)
-        grid[-1, 0].set_xlabel(axis_label(x))
+            style.draw_parameter(ax.yaxis, y, plan.axes[1].logarithmic)
+        style.draw_parameter(grid[-1, 0].xaxis, x, plan.axes[0].logarithmic)
         style.headings(plot, grid[0, 0], dataset)
     return plot
 
@@ -192,8 +177,8 @@ def curves(dataset: xarray.Dataset, axes: Sequence[str], names: Sequence[str], a
         if many:
             bar = plot.colorbar(colours(dataset, axes), ax=grid[:, 0].tolist())
             parameter = dataset[axes[0]]
-            style.label(bar.ax.yaxis, axis_words(parameter), unit(parameter), parameter.values)
-        others = ", ".join(axis_words(dataset[name]) for name in axes[1:]) if many else ""
+            style.label(bar.ax.yaxis, style.parameter_words(parameter), unit(parameter), parameter.values)
+        others = ", ".join(style.parameter_words(dataset[name]) for name in axes[1:]) if many else ""
         told = [f"curves of one colour differ in {others}"] if others else []
         told += filter(None, (_between_outputs(dataset, name) for name in names))
         style.headings(plot, grid[0, 0], dataset, more="   ".join(told))
@@ -235,7 +220,8 @@ def effects(
     dataset: xarray.Dataset, plan: Plan, axes: Sequence[str], parameters: Sequence[str], names: Sequence[str]
 ) -> Figure:
     """The distribution of each variable, and its median and band over each parameter, whatever the others are."""
-    logarithmic = [axis.logarithmic for axis in plan.axes] + [False] * len(parameters)
+    drawn = plan.sample.draws.values() if plan.sample else ()
+    decades = [*(axis.logarithmic for axis in plan.axes), *(draw.over_decades for draw in drawn)]
     with style.panels(
         2.2 + 2.0 * len(parameters), 0.8 + 2.1 * len(names), len(names), 1 + len(parameters), sharey="row"
     ) as (plot, grid):
@@ -244,12 +230,13 @@ def effects(
             values = fair(dataset, name)
             distribution(row[0], values)
             row[0].set_ylabel(quantity_label(whole))
-            for ax, parameter, ratios in zip(row[1:], parameters, logarithmic, strict=False):
+            for ax, parameter in zip(row[1:], parameters, strict=True):
                 over = dataset[parameter].broadcast_like(whole).transpose(*axes).values.ravel()
-                effect(ax, over[:: -(-over.size // MOST_POINTS)], values, ratios)
-        for ax, parameter in zip(grid[-1, 1:], parameters, strict=True):
-            # Beside a short first line there is room for the power of ten of the axis.
-            ax.set_xlabel(axis_label(dataset[parameter]).replace(" (", "\n(").replace(" [", "\n["), fontsize=8)
+                effect(ax, over[:: -(-over.size // MOST_POINTS)], values)
+        for column, parameter, ratios in zip(grid.T[1:], parameters, decades, strict=True):
+            for ax in column:
+                style.draw_parameter(ax.xaxis, dataset[parameter], ratios)
+                ax.xaxis.label.set(fontsize=8, visible=ax is column[-1])
         grid[-1, 0].set_xlabel("runs")
         style.headings(plot, grid[0, 0], dataset)
         grid[0, 0].set_title("5, 50 and 95 % of the runs", loc="left", fontsize=8, color="#555555")
@@ -265,7 +252,7 @@ def distribution(ax: Axes, values: Array) -> None:
             ax.axhline(level, color="black", linewidth=width)
 
 
-def effect(ax: Axes, over: Array, values: Array, logarithmic: bool) -> None:
+def effect(ax: Axes, over: Array, values: Array) -> None:
     """Median and band of the values in parts of a parameter with as many runs each, or at each of its values."""
     known = np.isfinite(values) & np.isfinite(over)
     over, values = over[known], values[known]
@@ -280,5 +267,3 @@ def effect(ax: Axes, over: Array, values: Array, logarithmic: bool) -> None:
     low, middle, high = np.array([np.percentile(values[part == k], BAND) for k in range(len(places))]).T
     ax.fill_between(places, low, high, color=COLOURS[1], alpha=0.25, linewidth=0)
     ax.plot(places, middle, color=COLOURS[1], marker="o", markersize=2.5)
-    if logarithmic:
-        style.logarithmic(ax.xaxis)

@@ -23,6 +23,8 @@ def load_of(dataset: xarray.Dataset) -> str:
     return loads[0] if loads else ""
 
 
+MARKERS = "osD"
+
 DENSE = 30
 """Points from which on large ones would hide each other."""
 
@@ -110,17 +112,23 @@ def _draw_spectrum(ax: Axes, dataset: xarray.Dataset, load: str) -> None:
 
 
 def _draw_told(ax: Axes, dataset: xarray.Dataset, told: Mapping[str, str], size: float) -> None:
-    """What each run tells over what is swept, by name with its label in the legend; exact values as lines."""
+    """What each run tells over what is swept, by name with its label in the legend, in a colour for each or for each
+    value of a second parameter; exact values as lines.
+    """
     parameter = dataset[str(dataset["status"].dims[0])]
-    style.draw_parameter(ax, parameter)
-    x = parameter.values
-    for (name, word), colour, marker in zip(told.items(), COLOURS, "osD", strict=False):
-        for j, (values, label) in enumerate(style.by_second(dataset, dataset[name].values)):
-            (points,) = ax.plot(x, values / size, marker, color=colour, markersize=3.5 if len(x) < DENSE else 2.0)
-            points.set(label=f"{word} {label}".strip(), alpha=1 / (1 + 0.5 * j))
-        if f"{name}_exact" in dataset:
-            for values, _ in style.by_second(dataset, dataset[f"{name}_exact"].values):
-                ax.plot(x, values / size, color=colour, linewidth=0.9, label="_")
+    style.draw_parameter(ax.xaxis, parameter)
+    x, large = parameter.values, 3.5 if len(parameter) < DENSE else 2.0
+    seconds = [label for _, label in style.by_second(dataset, dataset[next(iter(told))].values)]
+    for k, (name, marker) in enumerate(zip(told, MARKERS, strict=False)):
+        for look, end in ((marker, ""), ("-", "_exact")):
+            if name + end in dataset:
+                for j, (values, _) in enumerate(style.by_second(dataset, dataset[name + end].values)):
+                    colour = COLOURS[j if len(seconds) > 1 else k]
+                    ax.plot(x, values / size, look, color=colour, markersize=large, linewidth=0.9, label="_")
+    for label, colour in zip(seconds if len(seconds) > 1 else (), COLOURS, strict=False):
+        ax.plot([], [], color=colour, label=label)
+    for word, marker, colour in zip(told.values(), MARKERS, COLOURS, strict=False):
+        ax.plot([], [], marker, color="black" if len(seconds) > 1 else colour, markersize=large, label=word)
     ax.plot([], [], color="black", linewidth=0.9, label="exact" if any(f"{n}_exact" in dataset for n in told) else "_")
 
 

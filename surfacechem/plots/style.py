@@ -69,6 +69,9 @@ GREEK = ("alpha", "beta", "epsilon", "eta", "kappa", "lambda", "mu", "phi", "rho
 LETTERS, TITLE_LETTERS = 16, 9.5
 """Of a line of facts above the panels, and of the title and the words below an axis, in an inch."""
 
+READS_WELL = (1e-2, 1e4)
+"""Sizes of numbers that are read without counting zeros."""
+
 MOST_DECADES = 1e5
 """Largest over smallest value of a logarithmic axis that has ticks inside its decades."""
 
@@ -226,13 +229,13 @@ def legend(ax: Axes) -> None:
         ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), borderaxespad=0.4, handlelength=1.6)
 
 
-def meaning(values: xarray.DataArray, end: str = ":") -> str:
+def meaning(values: xarray.DataArray) -> str:
     """The meaning of a variable: its long name up to where details begin.
 
     >>> meaning(xarray.DataArray(0.0, attrs={"long_name": "state of bonds: 1 is bonded"}))
     'State of bonds'
     """
-    text = str(values.attrs.get("long_name", values.name)).partition(end)[0]
+    text = str(values.attrs.get("long_name", values.name)).partition(":")[0]
     return text[:1].upper() + text[1:]
 
 
@@ -296,19 +299,28 @@ def over_decades(values: Array) -> bool:
     return bool(np.ptp(steps) > FLAT * np.max(np.abs(steps)))
 
 
-def draw_parameter(ax: Axes, values: xarray.DataArray) -> None:
-    """The axis of a swept parameter: its meaning, or its name where that tells more, and unit."""
-    whole = ax.get_figure(root=True)
+def draw_parameter(axis: XAxis | YAxis, values: xarray.DataArray, decades: bool | None = None) -> None:
+    """The axis of a swept parameter: its meaning, or its name where that tells more, and unit; over decades where the
+    values want that, or where it is said.
+    """
+    whole, place = axis.axes.get_figure(root=True), axis.axes.get_subplotspec()
     assert whole is not None
-    words = "\n".join(wrap(parameter_words(values), int(TITLE_LETTERS * whole.get_figwidth())))
-    if not over_decades(values.values):
-        label(ax.xaxis, words, unit(values), values.values)
+    assert place is not None
+    rows, columns = place.get_gridspec().get_geometry()
+    room = whole.get_figwidth() / columns if isinstance(axis, XAxis) else whole.get_figheight() / rows
+    lines = wrap(parameter_words(values), int(TITLE_LETTERS * room), break_on_hyphens=False, break_long_words=False)
+    words = "\n".join(lines)
+    if not (over_decades(values.values) if decades is None else decades):
+        label(axis, words, unit(values), values.values)
         return
-    # The prefix suits the middle of the decades: at their upper end, nobody reads 100 pN/s from an axis in nN/s.
-    text, size = prefixed(unit(values), np.sqrt(np.abs(values.values[:1] * values.values[-1:])))
-    ax.set_xlabel(f"{words} [{text}]")
-    logarithmic(ax.xaxis)
-    ax.xaxis.set_major_formatter(lambda value, _: raised(f"10^{round(math.log10(value / size))}"))
+    text, size = prefixed(unit(values), _middle(values.values))
+    axis.set_label_text(f"{words} [{text}]")
+    logarithmic(axis, size=size)
+
+
+def _middle(values: Array) -> Array:
+    """The middle of decades, which a prefix has to suit: at their upper end, nobody reads 100 pN/s in nN/s."""
+    return np.sqrt(np.abs(values[:1] * values[-1:]))
 
 
 def parameter_words(values: xarray.DataArray) -> str:
@@ -323,7 +335,7 @@ def parameter_words(values: xarray.DataArray) -> str:
     load = re.search(r"\(loading\.(\w+)\.[\w.-]*rate\)$", str(values.attrs.get("long_name", "")))
     if load and unit(values).startswith(("N", "Pa")):
         return f"Loading rate of {symbol(load[1])}"
-    words = meaning(values, " (")
+    words = meaning(values).partition(" (")[0]
     held = re.search(r"\(loading\.(\w+)(\.level)?\)$", str(values.attrs.get("long_name", "")))
     if held and held[1] in VARIABLES:
         text = VARIABLES[held[1]].long_name.partition(",")[0]
@@ -342,22 +354,27 @@ def owner(values: xarray.DataArray) -> str:
 
 
 def parameter_name(name: str) -> str:
-    """The name of a swept parameter: a symbol with its subscript, or words.
+    r"""The name of a swept parameter: a symbol with its subscript, or words.
 
-    >>> parameter_name("K_0"), parameter_name("bond_energy")
-    ('$K_{0}$', 'bond energy')
+    >>> parameter_name("K_0"), parameter_name("mu"), parameter_name("bond_energy")
+    ('$K_{0}$', '$\\mu$', 'bond energy')
     """
-    return symbol(name) if "_" in name and len(name.partition("_")[0]) == 1 else name.replace("_", " ")
+    head = name.partition("_")[0]
+    return symbol(name) if len(head) == 1 or head in GREEK else name.replace("_", " ")
 
 
 def valued(values: xarray.DataArray, place: int) -> str:
-    """A value of a swept parameter with its name and unit.
+    """A value of a swept parameter with its name and unit, whose prefix is that of all values where these read well in
+    it.
 
-    >>> valued(xarray.DataArray([-1e-10, 1e-9], name="rate", attrs={"units": "N s-1"}), 0)
-    'rate = −100 pN s⁻¹'
+    >>> rates = xarray.DataArray([-1e-10, 2e-9], name="rate", attrs={"units": "N s-1"})
+    >>> valued(rates, 0), valued(rates, 1)
+    ('rate = −100 pN s⁻¹', 'rate = 2000 pN s⁻¹')
     """
     value = values.values[place]
-    text, size = prefixed(unit(values), values.values[place : place + 1])
+    text, size = prefixed(unit(values), _middle(values.values))
+    if not READS_WELL[0] <= np.abs(value) / size < READS_WELL[1]:
+        text, size = prefixed(unit(values), values.values[place : place + 1])
     return minus(f"{parameter_name(str(values.name))} = {value / size:.4g} {'' if text == '1' else text}".rstrip())
 
 
@@ -386,10 +403,14 @@ def by_second(dataset: xarray.Dataset, values: Array) -> list[tuple[Array, str]]
 
 
 class _Powers(LogFormatterSciNotation):
-    """Powers of ten as plain text, which is set in a tenth of the time of mathematics."""
+    """Powers of ten of a unit of some size as plain text, which is set in a tenth of the time of mathematics."""
+
+    def __init__(self, size: float, **settings: Any) -> None:
+        super().__init__(**settings)
+        self.size = size
 
     def __call__(self, x: float, pos: Any = None) -> str:
-        text = super().__call__(x, pos).removeprefix(r"$\mathdefault{").removesuffix("}$")
+        text = super().__call__(x / self.size, pos).removeprefix(r"$\mathdefault{").removesuffix("}$")
         return raised(text.replace(r"\times", "×").replace("{", "").replace("}", ""))
 
 
@@ -400,12 +421,12 @@ class _FewDecades(LogLocator):
         return super().tick_values(vmin, vmax) if vmax <= MOST_DECADES * vmin else np.empty(0)
 
 
-def logarithmic(*axes: XAxis | YAxis) -> None:
-    """Make axes logarithmic."""
+def logarithmic(*axes: XAxis | YAxis, size: float = 1.0) -> None:
+    """Make axes logarithmic, with labels of ticks in a unit of this size."""
     for axis in axes:
         axis.axes.set(**{f"{axis.axis_name}scale": "log"})
-        axis.set_major_formatter(_Powers())
-        axis.set_minor_formatter(_Powers(minor_thresholds=(1, 0.4)))
+        axis.set_major_formatter(_Powers(size))
+        axis.set_minor_formatter(_Powers(size, minor_thresholds=(1, 0.4)))
         axis.set_minor_locator(_FewDecades(subs="auto"))
 
 

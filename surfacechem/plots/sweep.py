@@ -43,7 +43,7 @@ def _finals(dataset: xarray.Dataset, axis: str, shown: Sequence[Panel]) -> Figur
         for ax, panel in zip(grid[:, 0], shown, strict=True):
             _draw_final(ax, dataset, panel.names)
             style.legend(ax)
-        style.draw_parameter(grid[-1, 0], dataset[axis])
+        style.draw_parameter(grid[-1, 0].xaxis, dataset[axis])
         style.headings(plot, grid[0, 0], dataset)
     return plot
 

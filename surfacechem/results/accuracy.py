@@ -26,6 +26,11 @@ a hundred times its tolerance, but near singular ends.
 UNKNOWN = "the error of the cells across bodies does not fall as their number grows"
 """Why the error of a run with cells is not known."""
 
+AT_START = "the run ended at its start"
+
+STILL = "nothing evolves, and no work is done"
+"""Why two runs at different tolerances tell nothing."""
+
 
 def first_tolerance(accuracy: float) -> float:
     """Relative tolerance of a step for an accuracy that is asked for.

@@ -15,7 +15,16 @@ import numpy as np
 from surfacechem.errors import InputError, suggestion
 from surfacechem.model.system import Profile, System
 from surfacechem.quantities import Quantity
-from surfacechem.results.netcdf import CONVENTIONS, TABLES, Column, dataset_path, package_version, save, save_table
+from surfacechem.results.netcdf import (
+    CONVENTIONS,
+    COORDINATES,
+    TABLES,
+    Column,
+    dataset_path,
+    package_version,
+    save,
+    save_table,
+)
 from surfacechem.solve.contract import Array
 from surfacechem.solve.run import Trajectory
 
@@ -142,9 +151,11 @@ class Results(ABC):
         import xarray
 
         data = {c.name: (c.dimensions, c.values, c.attributes) for c in self.columns}
-        names = [c.name for c in self.columns if c.dimensions == (c.name,) or c.name == "time"]
+        attributes = dict(self.attributes)
+        said = [*str(attributes.pop(COORDINATES, "")).split(), "time"]
+        names = [c.name for c in self.columns if c.dimensions == (c.name,) or c.name in said]
         coordinates = {name: data.pop(name) for name in names}
-        return xarray.Dataset(data, coords=coordinates, attrs=dict(self.attributes))
+        return xarray.Dataset(data, coords=coordinates, attrs=attributes)
 
     def __getitem__(self, name: str) -> xarray.DataArray:
         """A variable of the dataset, by its name; InputError where it has none of that name."""

@@ -17,7 +17,16 @@ import numpy as np
 
 from surfacechem.contracts.terms import Law
 from surfacechem.errors import InputError, Place, suggestion
-from surfacechem.results.accuracy import MARGIN, UNKNOWN, Accuracy, CellErrors, largest_errors, second_tolerance
+from surfacechem.results.accuracy import (
+    AT_START,
+    MARGIN,
+    STILL,
+    UNKNOWN,
+    Accuracy,
+    CellErrors,
+    largest_errors,
+    second_tolerance,
+)
 from surfacechem.results.audit import audit
 from surfacechem.results.dataset import profile_values
 from surfacechem.results.event_table import KINK, SIDE, event_times
@@ -188,7 +197,7 @@ def estimated(trajectory: Trajectory, second: Trajectory) -> Accuracy:
     """Errors of states and of the times of events as a second run at another tolerance tells them."""
     other = second.run.rtol
     if not len(trajectory.result.times):
-        return unknown("the run ended at its start")
+        return unknown(AT_START)
     if trajectory.status == "failed" and len(trajectory.result.times) < 2:
         return unknown(f"the run failed: {trajectory.reason}")
     ends_late = second.result.t > trajectory.result.t
@@ -197,8 +206,7 @@ def estimated(trajectory: Trajectory, second: Trajectory) -> Accuracy:
         return unknown(f"a second run at rtol {other:.0e} {fate}: {second.reason}")
     errors, note = apart(trajectory.looked, second)
     if not errors:
-        still = "nothing evolves, and no work is done"
-        return unknown(still if len(trajectory.result.times) > 1 else "the run ended at its start")
+        return unknown(STILL if len(trajectory.result.times) > 1 else AT_START)
     if note:  # one of the two went another way
         return unknown(f"a second run at rtol {other:.0e}, which had {note}")
     return Accuracy(stated(errors), second_run(second.run), errors, named=partial(of_named, trajectory.looked, second))
@@ -319,6 +327,10 @@ def with_cells(estimate: Accuracy, cells: CellErrors) -> Accuracy:
         return estimate
     if not cells.converged:
         return replace(estimate, error=math.nan, source=f"unknown: {UNKNOWN}", variables={}, named=dict)
+    if math.isnan(estimate.error):
+        # Where nothing evolves there is no other error than that of the laws.
+        words = f"estimate: a second run {cells.source.removeprefix('and one ')}"
+        return Accuracy(stated(cells.variables), words, cells.variables) if STILL in estimate.source else estimate
     errors = dict(estimate.variables)
     for name, error in cells.variables.items():
         errors[name] = errors.get(name, 0.0) + error

@@ -60,6 +60,9 @@ CSV, PARQUET = ".csv", ".parquet"
 TABLES = (CSV, PARQUET)
 """What names of files end with that hold a dataset as a table."""
 
+COORDINATES = "coordinates"
+"""The global attribute that names what is no variable but a coordinate, though no dimension is called like it."""
+
 WRITTEN = (*SUFFIXES, *TABLES)
 """What names of files end with that a run is written to."""
 
@@ -228,8 +231,11 @@ def read_netcdf(path: Path) -> xarray.Dataset:
             name: xarray.Variable(item.dimensions, np.asarray(item[...]), attributes(item), fastpath=True)
             for name, item in file.variables.items()
         }
-        coordinates = {name: found.pop(name) for name in list(found) if found[name].dims == (name,)}
-        dataset = xarray.Dataset(found, xarray.Coordinates(coordinates, indexes={}), attributes(file))
+        whole = attributes(file)
+        said = str(whole.pop(COORDINATES, "")).split()
+        names = [name for name in found if found[name].dims == (name,) or name in said]
+        coordinates = {name: found.pop(name) for name in names}
+        dataset = xarray.Dataset(found, xarray.Coordinates(coordinates, indexes={}), whole)
     dataset.encoding["source"] = str(path)
     return dataset
 

@@ -13,6 +13,7 @@ from surfacechem.errors import InputError
 from surfacechem.format.draws import permuted
 from surfacechem.results.store import StoredArray
 from surfacechem.runs.keeping import ENDS, STATUSES, Keep, RunByRun
+from surfacechem.runs.sweeps import SweepAccuracy
 from surfacechem.solve.contract import Index
 from surfacechem.solve.run import Trajectory
 from surfacechem.tolerances import FLOOR, TINY
@@ -48,6 +49,8 @@ class Checked:
     destroys: int
     """Runs in which a law or a jump destroys entropy."""
     source: str
+    why: str
+    """Why the error of the first run is not known whose is not."""
 
 
 def checked_arrays(size: int, count: int) -> tuple[dict[str, int], dict[str, StoredArray]]:
@@ -70,11 +73,11 @@ def check(stream: Stream, threads: int | None = None) -> Checked | None:
     chosen = {"checked": np.sort(permuted(np.arange(sizes["checked"]), plan.size, 0)), "hardest": _hardest(stream)}
     # Evenly spread by a permutation of the plan, the same for every writer.
     found: dict[str, Array] = {}
-    sources: list[str] = []
+    told: list[SweepAccuracy] = []
     for which, index in chosen.items():
-        columns, told = _columns(stream, index, sizes[which], threads)
+        columns, accuracies = _columns(stream, index, sizes[which], threads)
         found |= {f"{which}_{key}": values for key, values in columns.items()}
-        sources += told
+        told += accuracies
     store.write_beside(found)
 
     def both(key: str) -> Array:
@@ -84,18 +87,21 @@ def check(stream: Stream, threads: int | None = None) -> Checked | None:
     once = once[numbers >= 0]  # the hardest are filled up with -1 where fewer have not failed
     errors, destroys = both("error")[once], np.nansum(both("destroys_entropy")[once])
     worst = float(np.fmax.reduce(errors, initial=-np.inf))
-    return Checked(worst, int(np.isnan(errors).sum()), len(errors), int(destroys), "; ".join(dict.fromkeys(sources)))
+    source, why = "; ".join(dict.fromkeys(each.source for each in told)), next((a.why for a in told if a.why), "")
+    return Checked(worst, int(np.isnan(errors).sum()), len(errors), int(destroys), source, why)
 
 
-def _columns(stream: Stream, index: Index, size: int, threads: int | None) -> tuple[dict[str, Array], list[str]]:
-    """The arrays of the runs of these numbers, and where the errors are from."""
-    columns, sources = {key: np.full(size, np.nan) for key in KEYS}, []
+def _columns(
+    stream: Stream, index: Index, size: int, threads: int | None
+) -> tuple[dict[str, Array], list[SweepAccuracy]]:
+    """The arrays of the runs of these numbers, and what is known of the errors."""
+    columns, told = {key: np.full(size, np.nan) for key in KEYS}, []
     columns["run"] = np.append(index, np.full(size - len(index), -1))
-    for first, part, errors, source in _errors(stream, index, threads):
+    for first, part, errors, accuracy in _errors(stream, index, threads):
         for key, values in errors.items():
             columns[key][first : first + len(part)] = values
-        sources.append(source)
-    return columns, sources
+        told.append(accuracy)
+    return columns, told
 
 
 def _hardest(stream: Stream) -> Index:
@@ -114,7 +120,9 @@ def _hardest(stream: Stream) -> Index:
     return np.sort(numbers)
 
 
-def _errors(stream: Stream, index: Index, threads: int | None) -> Iterator[tuple[int, Index, dict[str, Any], str]]:
+def _errors(
+    stream: Stream, index: Index, threads: int | None
+) -> Iterator[tuple[int, Index, dict[str, Any], SweepAccuracy]]:
     """Errors and balances of runs by themselves, some at a time; nothing of one that is not admissible."""
     chunks = stream.chunks
     for first in range(0, len(index), AT_ONCE):
@@ -125,13 +133,13 @@ def _errors(stream: Stream, index: Index, threads: int | None) -> Iterator[tuple
             # One of them is refused: each alone, so that the others have an error.
             if len(part) > 1:
                 for k, one in enumerate(part.tolist()):
-                    for _, single, errors, source in _errors(stream, np.array([one]), threads):
-                        yield first + k, single, errors, source
+                    for _, single, errors, accuracy in _errors(stream, np.array([one]), threads):
+                        yield first + k, single, errors, accuracy
             continue
         assert done.accuracy is not None
         values = {name: [end[name] for end in done.run_ends] for name in TOLD}
         found = np.maximum(done.accuracy.errors, _apart(stream, part, done.runs))  # an unknown error stays unknown
-        yield first, part, {"error": found, **values}, done.accuracy.source
+        yield first, part, {"error": found, **values}, done.accuracy
 
 
 def _apart(stream: Stream, part: Index, runs: Sequence[Trajectory]) -> Array:

@@ -19,7 +19,7 @@ from surfacechem.errors import InputError, Place, suggestion
 from surfacechem.format.plans import Plan, recorded_plan
 from surfacechem.format.sections import ALL, SweepSection
 from surfacechem.results.dataset import quantities
-from surfacechem.results.netcdf import CONVENTIONS, Column, cf_unit, versions
+from surfacechem.results.netcdf import CONVENTIONS, COORDINATES, Column, cf_unit, versions
 from surfacechem.results.store import MOST_BYTES, Layout, Store, StoredArray, begin, opened, store_path
 from surfacechem.runs import keeping, sweeps
 from surfacechem.runs.arrays import ArrayRuns, JumpingRuns, quiet, solvable
@@ -326,7 +326,7 @@ def _attributes(chunks: ChunkRuns, job: Job) -> dict[str, Any]:
         "changes": job.changes,
         "run": json.dumps({**asdict(chunks.run), "times": list(chunks.run.times)}),
         "runs": chunks.plan.size,
-        "coordinates": " ".join(sweeps.parameter_names(chunks.model.system, chunks.plan)),
+        COORDINATES: " ".join(sweeps.parameter_names(chunks.model.system, chunks.plan)),
         "check": chunks.checked,
         "regime": chunks.model.system.regime,
         "reasons": chunks.one_by_one.reasons,

@@ -142,9 +142,8 @@ def sweep_summary(solution: SweepSolution, written: Path | None, details: bool =
     error = ""
     if accuracy := solution.accuracy:
         known = accuracy.known
-        missing = len(accuracy.errors) - len(known)
-        unknown = f"; unknown in {counted(missing, 'run')}" if missing else ""
-        error = f"{known.max():.2g} ({accuracy.source}){unknown}" if len(known) else f"unknown ({accuracy.source})"
+        error = f"{known.max():.2g} ({accuracy.source})" if len(known) else f"unknown ({accuracy.source})"
+        error = "; ".join(filter(None, (error, accuracy.unknown)))
     speed = f"run {duration(solution.seconds)}, compile {duration(solution.model.compile_seconds)}"
     if solution.system.whole:
         speed = f"surfaces {duration(solution.before_seconds)}, {speed}"
@@ -319,7 +318,7 @@ def store_summary(stream: Stream, store: Store, checked: Checked | None, file: P
     ended, in words.
     """
     from surfacechem.runs.keeping import STATUSES
-    from surfacechem.runs.sweeps import parameter_names
+    from surfacechem.runs.sweeps import parameter_names, unknown_in
 
     chunks, layout = stream.chunks, store.layout
     done = [number for number in range(layout.chunks) if (store.marks / str(number)).exists()]
@@ -331,8 +330,8 @@ def store_summary(stream: Stream, store: Store, checked: Checked | None, file: P
     words = ", ".join(f"{count} {word}" for count, word in zip(ends.tolist(), STATUSES, strict=True) if count)
     error = destroyed = ""
     if checked is not None:
-        unknown = f"; unknown in {checked.unknown}" if checked.unknown else ""
-        error = f"{checked.error:.2g} of {checked.count} runs ({checked.source}){unknown}"
+        error = f"{checked.error:.2g} of {checked.count} runs ({checked.source})"
+        error += f"; {unknown_in(checked.unknown, checked.why)}" if checked.unknown else ""
         destroyed = f"; ENTROPY DESTROYED in {counted(checked.destroys, 'run')}" if checked.destroys else ""
     facts = [
         ("swept", swept_in_words(chunks.plan, names, chunks.model.system.changeable)),

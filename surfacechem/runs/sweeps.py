@@ -20,13 +20,13 @@ from surfacechem.format import Case
 from surfacechem.format.plans import RUN, STATISTICS, Plan
 from surfacechem.model.system import System
 from surfacechem.references.base import SceneView
-from surfacechem.results.accuracy import UNKNOWN, CellErrors, second_tolerance
+from surfacechem.results.accuracy import AT_START, UNKNOWN, CellErrors, second_tolerance
 from surfacechem.results.audit import Audit, audit
 from surfacechem.results.dataset import DATASET_NAMES, Results, coverage_columns, quantities, quantity_columns
 from surfacechem.results.error_estimates import against_exact, closer, estimated, second_run, with_cells
 from surfacechem.results.event_table import entropy_destroyed, event_columns, event_times
 from surfacechem.results.matching import exact_values, match
-from surfacechem.results.netcdf import Column, versions
+from surfacechem.results.netcdf import COORDINATES, Column, versions
 from surfacechem.runs import spectrum
 from surfacechem.runs.keeping import ENDS, EXTREMES, end_of, extreme
 from surfacechem.runs.sheet import counted
@@ -134,11 +134,28 @@ class SweepAccuracy:
     errors: NDArray[np.float64]
     source: str
     exact: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+    why: str = ""
+    """Why the error of the first run is not known whose is not."""
 
     @property
     def known(self) -> NDArray[np.float64]:
         """The errors that are known."""
         return self.errors[np.isfinite(self.errors)]
+
+    @property
+    def unknown(self) -> str:
+        """Of how many runs the error is not known, and why; '' where of none."""
+        count = len(self.errors) - len(self.known)
+        return unknown_in(count, self.why) if count else ""
+
+
+def unknown_in(count: int, why: str) -> str:
+    """Of so many runs the error is not known, and why.
+
+    >>> unknown_in(2, "unknown: the run ended at its start")
+    'unknown in 2 runs: the run ended at its start'
+    """
+    return f"unknown in {': '.join(filter(None, (counted(count, 'run'), why.removeprefix('unknown: '))))}"
 
 
 def accuracy(
@@ -154,20 +171,21 @@ def accuracy(
         try:
             return _against_exact(case, done, named.name, second)
         except InputError as error:
-            unused = f"the exact solution {named.name} does not apply to this scene: {error.message}"
+            unused = f"the exact solution {named.name} does not apply to this scene: {error.message.rstrip('.')}"
     elif named is not None:
         unused = named.fixed
     left = cells()
+    why = "" if all(found.converged for found in left) else UNKNOWN
     if done.statistics:
         pairs = zip(done.statistics, second().statistics, left, strict=True)
         errors = [_of_statistics(ours, theirs) + found.largest for ours, theirs, found in pairs]
     else:
         runs = zip(done.runs, second().runs, left, strict=True)
-        errors = [with_cells(estimated(ours, theirs), found).error for ours, theirs, found in runs]
+        found = [with_cells(estimated(ours, theirs), each) for ours, theirs, each in runs]
+        errors = [each.error for each in found]
+        why = next((each.source for each in found if np.isnan(each.error)), "")
     source = ", ".join([second_run(second().run, "sweep"), *dict.fromkeys(f.source for f in left if f.variables)])
-    if unknown := sum(not found.converged for found in left):
-        source += f"; unknown in {unknown} of {len(left)} runs: {UNKNOWN}"
-    return SweepAccuracy(np.array(errors), "; ".join(filter(None, (source, unused))))
+    return SweepAccuracy(np.array(errors), "; ".join(filter(None, (source, unused))), why=why)
 
 
 def _second(done: SweepSolution, threads: int | None) -> SweepSolution:
@@ -185,10 +203,11 @@ def _against_exact(case: Case, done: SweepSolution, name: str, second: Callable[
     begun = [i for i, run in enumerate(done.runs) if len(run.looked.result.times) > 1]
     if not begun:
         raise InputError("all runs ended at their start.")
-    errors = np.full(len(done.runs), np.nan)
+    errors, why = np.full(len(done.runs), np.nan), ""
     exact = {which: errors.copy() for which in done.told if which in references.get(name).statistics}
     for i, run in enumerate(done.runs):
         if len(run.looked.result.times) < 2:
+            why = why or AT_START
             continue
         if exact:
             if i in (begun[0], begun[-1]):
@@ -198,8 +217,10 @@ def _against_exact(case: Case, done: SweepSolution, name: str, second: Callable[
             for which, values in exact.items():
                 values[i] = getattr(reference, which)
         else:
-            errors[i] = against_exact(run, case.scene, name, {}, second().runs[i] if event_times(run) else None).error
-    return SweepAccuracy(errors, f"exact solution {name}", exact)
+            found = against_exact(run, case.scene, name, {}, second().runs[i] if event_times(run) else None)
+            errors[i] = found.error
+            why = why or (found.source if np.isnan(found.error) else "")
+    return SweepAccuracy(errors, f"exact solution {name}", exact, why)
 
 
 def _of_statistics(found: Rupture, exact: references.Reference | Rupture) -> float:
@@ -420,11 +441,13 @@ class SweepSolution(Results):
         error: dict[str, str | float] = {}
         if self.accuracy:
             worst = float(np.max(self.accuracy.known)) if len(self.accuracy.known) else np.nan
-            error = {"error": worst, "error_source": self.accuracy.source}
+            source = "; ".join(filter(None, (self.accuracy.source, self.accuracy.unknown)))
+            error = {"error": worst, "error_source": source}
         departures = {"departures": json.dumps({"changes": dict(self.changes)})} if self.changes else {}
         return {
             **self._origin("made", f"with {self.run.solver} at rtol {self.run.rtol:g}"),
             "sweep": self.plan.record,
+            COORDINATES: " ".join(self.parameters),
             **departures,
             "status": self.status,
             "reason": self.ends,

@@ -108,6 +108,11 @@ MISTAKES = [
         "reference: bonding\nsweep: {over: {}}",
         "example `over: {loading.f.ramp.rate: {from: 1 pN/s, to: 1 nN/s, points: 31}}`; none is given.",
     ),
+    (
+        "{until: 5 s}",
+        "{until: {f: 1 pN}}",
+        "19: run.until: where a load is reached, runs of a sweep end by `sweep.until",
+    ),
     ("{until: 5 s}", "{outputs: 5}", "19: run: the run needs an end. Add `until: 1 s`, or a list of `times`."),
     ("{until: 5 s}", "{until: 5 s, outputs: [1 s]}", "19: run.outputs: outputs are a number, `outputs: 201`; a list"),
     ("{until: 5 s}", "{until: 5 s, outputs: 2.5}", "19: run.outputs: outputs must be a whole number, got 2.5."),

@@ -32,7 +32,7 @@ def entries(legend):
 
 def test_runs_have_colours_and_variables_have_dashes(runs):
     plot = figure(runs)
-    assert entries(plot.legends[0]) == ["T_1 = 500 K", "T_1 = 450"]
+    assert entries(plot.legends[0]) == ["$T_{1}$ = 500 K", "$T_{1}$ = 450"]
     lines = [line for line in plot.axes[0].get_lines() if len(line.get_xdata())]
     assert [(line.get_color(), line.get_linestyle()) for line in lines] == [
         (colour, dash) for colour in COLOURS[:2] for dash in ["-", "--"]

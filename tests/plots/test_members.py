@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import xarray
 
 import surfacechem
 from surfacechem import plots
@@ -15,6 +16,9 @@ SAMPLE = {
     "of": {K_0: {"normal": {"mean": 200, "std": 20}}, C_R: {"lognormal": {"median": 6e15, "sigma": 0.2}}},
     "runs": 128,
 }
+
+
+BOND_ENERGY = "Temperature-independent part of the bond energy density (bond-energy)"
 
 
 def stored(folder, **section):
@@ -39,7 +43,8 @@ def test_a_map_over_two_parameters(tmp_path):
     ax = plot.axes[0]
     assert np.array_equal(ax.collections[0].get_array(), opened(path)["T_last"].values.T)
     assert (ax.get_xscale(), ax.get_yscale()) == ("log", "linear")
-    assert (ax.get_xlabel(), ax.get_ylabel()) == ("$K_{0}$ (bond-energy) [J m⁻²]", "initial T [K]")
+    words = [" ".join(text.split()) for text in (ax.get_xlabel(), ax.get_ylabel())]
+    assert words == [f"{BOND_ENERGY} [J m⁻²]", "Initial temperature of lower and upper and interface [K]"]
 
 
 @pytest.fixture(scope="module")
@@ -60,8 +65,8 @@ def test_curves_over_two_parameters_have_the_colours_of_the_first(grid):
     curves, bar = plots.figure(grid, ["phi"]).axes
     assert [len({line.get_color() for line in curves.lines[k : k + 8]}) for k in (0, 8)] == [1, 1]
     assert curves.lines[0].get_color() != curves.lines[8].get_color()
-    assert curves.get_title("left").endswith("curves of one colour differ in initial T")
-    assert bar.get_ylabel() == "$K_{0}$ (bond-energy) [J m⁻²]"
+    assert curves.get_title("left").endswith("Initial temperature of lower and upper and interface")
+    assert bar.get_ylabel() == f"{BOND_ENERGY} [J m⁻²]"
 
 
 def test_distributions_and_effects_of_a_sample(drawn):
@@ -72,11 +77,11 @@ def test_distributions_and_effects_of_a_sample(drawn):
     assert heights == [128, 128]
     middle = rows[1, 0].lines[1].get_ydata()[0]
     assert middle == np.median(data["T_last"].values)
-    assert {ax.get_xlabel() for ax in rows[1, 1:]} == {
-        "$K_{0}$\n(bond-energy)\n[J m⁻²]",
-        "$c_{r}$\n(linear-affinity)\n[J⁻¹ s⁻¹]",
+    assert {" ".join(ax.get_xlabel().split()) for ax in rows[1, 1:]} == {
+        f"{BOND_ENERGY} [J m⁻²]",
+        "Rate constant per bond (linear-affinity) [J⁻¹ s⁻¹]",
     }
-    (effect,) = (ax for ax in rows[1] if ax.get_xlabel().startswith("$K"))
+    (effect,) = (ax for ax in rows[1] if ax.get_xlabel().startswith("Temperature"))
     assert np.all(np.diff(effect.lines[0].get_ydata()) > 0)
 
 
@@ -109,10 +114,23 @@ def test_what_is_briefer_than_the_outputs_of_a_sweep_is_told():
 def test_effects_of_three_parameters_of_a_grid(tmp_path):
     over = {K_0: [100.0, 200.0, 300.0], "initial.T": [290.0, 310.0], C_R: [5e15, 7e15]}
     path = stored(tmp_path, over=over, keep={"last": ["T"]})
-    effect = next(ax for ax in plots.figure(path, ["T_last"]).axes if ax.get_xlabel().startswith("$K"))
+    effect = next(ax for ax in plots.figure(path, ["T_last"]).axes if ax.get_xlabel().startswith("Temperature"))
     x, y = effect.lines[0].get_data()
     assert x.tolist() == [100, 200, 300]
     assert y.tolist() == np.median(opened(path)["T_last"].values, axis=(1, 2)).tolist()
+
+
+def test_effects_of_a_sample_in_memory_and_in_its_file(tmp_path):
+    """Its parameters are no dimensions, but coordinates all the same; those drawn by ratios lie over decades."""
+    ratios = {"uniform": {"from": 1, "to": 300, "spacing": "logarithmic"}}
+    drawn = {"runs": 16, "of": {K_0: ratios, "initial.T": {"uniform": {"from": 290, "to": 310}}}}
+    swept = surfacechem.load("exothermic", {"sweep": {"sample": drawn}}).sweep()
+    file = swept.write(tmp_path / "sample.nc")
+    for dataset in (swept.dataset, xarray.open_dataset(file), file):
+        effects = plots.figure(dataset, ["T_max"]).axes[1:]
+        assert [ax.get_xscale() for ax in effects] == ["log", "linear"]
+        assert effects[1].get_xlabel().startswith("Initial")
+    assert set(xarray.open_dataset(file).coords) == set(swept.dataset.coords) == {"K_0", "initial_T", "time"}
 
 
 def test_what_cannot_be_drawn_is_refused(drawn, tmp_path):

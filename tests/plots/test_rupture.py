@@ -31,13 +31,30 @@ def test_the_figure_has_spectrum_distributions_and_lifetimes(spectrum):
     assert forces.get_ylabel() == "$f$ at rupture [pN]"
     assert [text.get_text() for text in density.get_legend().get_texts()] == [
         "rate = 100 pN s⁻¹",
-        "rate = 1 nN s⁻¹",
+        "rate = 1000 pN s⁻¹",
     ]  # at 1 pN/s most bonds break before there is a force
     assert (density.get_title("right"), lifetime.get_yscale()) == ("2 of 3 runs", "log")
     for line in density.get_lines():
         x, y = (values[np.isfinite(line.get_ydata())] for values in line.get_data())
         assert np.trapezoid(y, x / 1e-12) == pytest.approx(1, abs=2e-3)  # [1/pN] over [pN]
         assert y.min() >= 0
+
+
+def test_a_second_parameter_has_colours_and_statistics_have_markers():
+    over = {"loading.f.ramp.rate": [1e-11, 1e-10, 1e-9], "interface.bonding.bell.k_off": [0.1, 1.0]}
+    forces, *_ = plots.figure(surfacechem.sweep("force-spectroscopy", over, {"f": "150 pN"}).dataset).axes
+    words = [text.get_text() for text in forces.get_legend().get_texts()]
+    assert words == [
+        r"$k_{\mathrm{off}}$ = 0.1 s⁻¹",
+        r"$k_{\mathrm{off}}$ = 1 s⁻¹",
+        "most probable",
+        "median",
+        "mean",
+        "exact",
+    ]
+    drawn = [line for line in forces.get_lines() if len(line.get_xdata())]
+    assert len({line.get_color() for line in drawn}) == 2
+    assert {line.get_marker() for line in drawn} == {"o", "s", "D", "None"}
 
 
 def test_lifetimes_under_constant_forces_have_a_figure():

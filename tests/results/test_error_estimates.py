@@ -10,6 +10,7 @@ from typer.testing import CliRunner
 import surfacechem
 from surfacechem.cli.main import app
 from surfacechem.errors import InputError
+from surfacechem.results.accuracy import STILL, CellErrors
 from surfacechem.results.error_estimates import (
     EVENTS,
     against_tighter,
@@ -17,6 +18,8 @@ from surfacechem.results.error_estimates import (
     estimated,
     event_errors,
     floors,
+    unknown,
+    with_cells,
 )
 from surfacechem.results.event_table import event_times
 from surfacechem.runs.summaries import run_summary, sweep_summary
@@ -26,6 +29,15 @@ from surfacechem.tolerances import EPS
 @pytest.fixture(scope="module")
 def stick_slip():
     return surfacechem.load("stick-slip")
+
+
+def test_where_nothing_evolves_the_error_is_that_of_the_laws():
+    laws = CellErrors({"t_n": 1e-9}, source="and one with forces of the surfaces wrong by their error, 1.0e-09")
+    found = with_cells(unknown(STILL), laws)
+    assert (found.error, found.variables) == (1e-9, {"t_n": 1e-9})
+    assert found.source == "estimate: a second run with forces of the surfaces wrong by their error, 1.0e-09"
+    late = unknown("a second run at rtol 1e-13 failed")
+    assert with_cells(late, laws) == late
 
 
 @pytest.mark.parametrize(

@@ -15,6 +15,7 @@ from surfacechem.cli.main import app
 from surfacechem.errors import InputError
 from surfacechem.references import get
 from surfacechem.runs import rerun
+from surfacechem.runs.checking import check
 from surfacechem.runs.summaries import sweep_summary
 from surfacechem.solve import run as integrate
 from surfacechem.solve.radau.solver import Radau
@@ -312,6 +313,23 @@ def test_an_exact_solution_is_that_of_every_run_or_of_none():
     assert "exact solution stick-slip does not apply to this scene" in alone.accuracy.source
     assert "exact solution stick-slip does not apply to this scene" in swept.accuracy.source
     assert swept.accuracy.errors[1] == pytest.approx(alone.accuracy.error, rel=1e-9, nan_ok=True)
+
+
+def test_why_an_error_is_not_known_is_said_once(tmp_path):
+    """Where friction at rest is that of sliding, when it slips is not known: a second run slips at other times."""
+    case = surfacechem.load("stick-slip")
+    swept = case.sweep({"interface.friction.coulomb.mu": [0.3, 0.6]})
+    why = "unknown in 1 run: a second run at rtol 1e-13, which had other events"
+    assert swept.accuracy.unknown.startswith(why)
+    assert str(sweep_summary(swept, None).facts).count(why) == 1
+    assert why in swept.dataset.attrs["error_source"]
+    stream = case.stream(swept.plan, tmp_path / "s.zarr")
+    stream.run()
+    checked = check(stream)
+    assert (checked.unknown, checked.why in case.run({"interface.friction.coulomb.mu": 0.6}).accuracy.source) == (
+        1,
+        True,
+    )
 
 
 def test_species_of_a_sweep_have_the_names_of_the_mechanism():
