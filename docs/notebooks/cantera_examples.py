@@ -26,7 +26,10 @@ folder = Path(tempfile.mkdtemp())
 
 # %%
 T, LENGTH, COUNT = 1073.15, 3e-3, 7
-VOLUME, CATALYST = 1e-4 * 0.3 * LENGTH / (COUNT - 1), 1e5 * 1e-4 * 0.3 * LENGTH / (COUNT - 1)
+VOLUME, CATALYST = (
+    1e-4 * 0.3 * LENGTH / (COUNT - 1),
+    1e5 * 1e-4 * 0.3 * LENGTH / (COUNT - 1),
+)
 
 BED = """
 bodies: {wall: {temperature: 1073.15 K}, core: {temperature: 1073.15 K}}
@@ -49,11 +52,18 @@ def bed(ours):
     surface.TP, inlet.TPX = (T, ct.one_atm), (T, ct.one_atm, "CH4:1, O2:1.5, AR:0.1")
     kind = ReactingGas if ours else ct.IdealGasReactor
     gas = kind(inlet, clone=True, volume=VOLUME, energy="off")
-    upstream, downstream = ct.Reservoir(inlet, clone=True), ct.Reservoir(inlet, clone=True)
-    feed = ct.MassFlowController(upstream, gas, mdot=0.4 / 60 * inlet.density * 1e-4 * 0.3)
+    upstream, downstream = (
+        ct.Reservoir(inlet, clone=True),
+        ct.Reservoir(inlet, clone=True),
+    )
+    feed = ct.MassFlowController(
+        upstream, gas, mdot=0.4 / 60 * inlet.density * 1e-4 * 0.3
+    )
     ct.PressureController(gas, downstream, primary=feed, K=1e-6)
     if ours:
-        catalyst = InterfaceReactor(folder / "bed.yaml", area=CATALYST, neighbours={"gas": gas})
+        catalyst = InterfaceReactor(
+            folder / "bed.yaml", area=CATALYST, neighbours={"gas": gas}
+        )
         net = ReactorNet([gas, catalyst])
     else:
         ct.ReactorSurface(surface, gas, A=CATALYST, clone=True)
@@ -108,12 +118,23 @@ for x_h in hydrogen:
     scale = (1 - x_h) / (1 - start["H"])  # the example scales what is left
     composition = {"H": x_h, **{name: value * scale for name, value in others.items()}}
     changes = {
-        "interface.mechanism.neighbours.gas": {"pressure": "20 torr", "composition": composition, "rest": "H2"},
+        "interface.mechanism.neighbours.gas": {
+            "pressure": "20 torr",
+            "composition": composition,
+            "rest": "H2",
+        },
         "run": {"until": "10 s", "outputs": 2, "solver": "cantera", "rtol": 1e-9},
     }
     data = surfacechem.load("diamond-growth", changes).run(error="balances").dataset
     molecules = float(data["production_C_d"][-1])  # 1/(m^2 s)
-    found.append(molecules / 6.02214076e26 * bulk.molecular_weights[0] / bulk.density * 1e6 * 3600)
+    found.append(
+        molecules
+        / 6.02214076e26
+        * bulk.molecular_weights[0]
+        / bulk.density
+        * 1e6
+        * 3600
+    )
 
 plt.figure()
 plt.plot(hydrogen, expected, "k-", lw=0.5)
@@ -136,7 +157,12 @@ potential, current = data["V_electron"].values, data["i_electron"].values
 anode = ct.Interface("lithium_ion_battery.yaml", "edge_anode_electrolyte")
 electrons, electrolyte = anode.adjacent["electron"], anode.adjacent["electrolyte"]
 anode.adjacent["anode"].X = {"Li[anode]": 0.5, "V[anode]": 0.5}
-electrolyte.X = {"C3H4O3[elyt]": 0.47901, "C4H6O3[elyt]": 0.37563, "Li+[elyt]": 0.07268, "PF6-[elyt]": 0.07268}
+electrolyte.X = {
+    "C3H4O3[elyt]": 0.47901,
+    "C4H6O3[elyt]": 0.37563,
+    "Li+[elyt]": 0.07268,
+    "PF6-[elyt]": 0.07268,
+}
 for phase in (anode, *anode.adjacent.values()):
     phase.TP = 300.0, ct.one_atm
 open_circuit = -anode.delta_gibbs[0] / ct.faraday
@@ -153,4 +179,6 @@ plt.xlabel("potential [V]")
 plt.ylabel("current into the electrode [A/m²]")
 zero = np.interp(0.0, np.sign(current[-1] - current[0]) * current, potential)
 print(f"no current at {zero:.4f} V, Gibbs energy of the reaction {open_circuit:.4f} V")
-np.testing.assert_allclose(current, expected, rtol=1e-8, atol=1e-9 * np.abs(current).max())
+np.testing.assert_allclose(
+    current, expected, rtol=1e-8, atol=1e-9 * np.abs(current).max()
+)

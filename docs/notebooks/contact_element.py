@@ -18,7 +18,8 @@ import surfacechem
 # interface: Sauer, Duong & Mandadapu (2021), section 5.
 
 # %%
-E_b, E_n, mu, h_1, h_2 = 2e12, 50e12, 0.3, 100.0, 250.0  # Pa/m, Pa/m, 1, W/(m^2 K), W/(m^2 K)
+# Pa/m, Pa/m, 1, W/(m^2 K), W/(m^2 K)
+E_b, E_n, mu, h_1, h_2 = 2e12, 50e12, 0.3, 100.0, 250.0
 INPUTS = ("g_n", "v", "phi", "T_1", "T_2", "T_c")
 
 
@@ -28,7 +29,13 @@ def element(g_n, v, phi, T_1, T_2, T_c):
     t_n = stiffness * g_n
     rub = np.where(g_n < 0, mu * E_n, 0.0)  # an open contact does not rub
     t_t = -rub * g_n * np.sign(v)
-    values = {"t_n": t_n, "t_coulomb": t_t, "D_coulomb": t_t * v, "q_1": h_1 * (T_c - T_1), "q_2": h_2 * (T_c - T_2)}
+    values = {
+        "t_n": t_n,
+        "t_coulomb": t_t,
+        "D_coulomb": t_t * v,
+        "q_1": h_1 * (T_c - T_1),
+        "q_2": h_2 * (T_c - T_2),
+    }
     one = np.ones_like(g_n)
     tangent = {
         ("t_n", "g_n"): stiffness,
@@ -81,7 +88,9 @@ ranges = {
 }
 points = {name: rng.uniform(*span, 1000) for name, span in ranges.items()}
 truth = scene.evaluate(points)
-print(f"{len(truth)} quantities at {truth.sizes['point']} points; all admissible: {bool(truth.admissible.all())}")
+print(
+    f"{len(truth)} quantities at {truth.sizes['point']} points; all admissible: {bool(truth.admissible.all())}"
+)
 
 # %%
 values, tangent = element(**{name: points[name] for name in INPUTS})
@@ -93,7 +102,9 @@ def distance(mine, theirs):
 
 
 for name, mine in values.items():
-    print(f"{name:12} [{truth[name].units:8}]  {distance(mine, truth[name].values):.1e}")
+    print(
+        f"{name:12} [{truth[name].units:8}]  {distance(mine, truth[name].values):.1e}"
+    )
 for (of, by), mine in tangent.items():
     slope = truth[f"{of}_by_{by}"]
     print(f"d{of}/d{by:5} [{slope.units:10}]  {distance(mine, slope.values):.1e}")
@@ -104,11 +115,21 @@ for (of, by), mine in tangent.items():
 
 # %%
 known = {f"{of}_by_{by}" for of, by in tangent}
-forgotten = [f"{of}_by_{by}" for of in values for by in INPUTS if f"{of}_by_{by}" in truth]
-forgotten = [name for name in forgotten if name not in known and np.any(truth[name] != 0)]
+forgotten = [
+    f"{of}_by_{by}" for of in values for by in INPUTS if f"{of}_by_{by}" in truth
+]
+forgotten = [
+    name for name in forgotten if name not in known and np.any(truth[name] != 0)
+]
 assert not forgotten, forgotten
 assert max(distance(mine, truth[name].values) for name, mine in values.items()) < 1e-13
-assert max(distance(mine, truth[f"{of}_by_{by}"].values) for (of, by), mine in tangent.items()) < 1e-13
+assert (
+    max(
+        distance(mine, truth[f"{of}_by_{by}"].values)
+        for (of, by), mine in tangent.items()
+    )
+    < 1e-13
+)
 
 # %% [markdown]
 # A tangent with an error shows at once. Without its factor $\phi$ the stiffness of the bonds would still pass a test
@@ -116,7 +137,9 @@ assert max(distance(mine, truth[f"{of}_by_{by}"].values) for (of, by), mine in t
 
 # %%
 wrong = np.where(points["g_n"] < 0, E_n, E_b)
-print(f"distance with the factor forgotten: {distance(wrong, truth['t_n_by_g_n'].values):.1e}")
+print(
+    f"distance with the factor forgotten: {distance(wrong, truth['t_n_by_g_n'].values):.1e}"
+)
 
 # %% [markdown]
 # The command line does the same with a table: `surfacechem evaluate contact.yaml points.csv -o truth.csv` reads states

@@ -16,7 +16,10 @@ from surfacechem import plots
 
 cure = surfacechem.load("epoxy-cure-adiabatic")
 one = cure.run()
-print(one.reason, f"hottest {float(one['T'].max()) - 273.15:.1f} degC, error {one.accuracy.error:.0e}")
+print(
+    one.reason,
+    f"hottest {float(one['T'].max()) - 273.15:.1f} degC, error {one.accuracy.error:.0e}",
+)
 one.plot(["T", "phi"])
 
 # %% [markdown]
@@ -32,14 +35,20 @@ window = surfacechem.load(
         "sweep": {
             "over": {
                 "initial.T": {"from": "150 degC", "to": "190 degC", "points": 50},
-                "bodies.upper.C": {"from": "0.5 kJ/m^2/K", "to": "5 kJ/m^2/K", "points": 40},
+                "bodies.upper.C": {
+                    "from": "0.5 kJ/m^2/K",
+                    "to": "5 kJ/m^2/K",
+                    "points": 40,
+                },
             },
             "keep": {"max": ["T"], "reach": {"phi": 0.8}},
             "checked": 20,
         }
     },
 )
-runs = window.stream(window.plan(), Path(tempfile.mkdtemp()) / "window.zarr").run().dataset
+runs = (
+    window.stream(window.plan(), Path(tempfile.mkdtemp()) / "window.zarr").run().dataset
+)
 plots.figure(runs, ["time_to_phi", "T_max"])
 
 # %% [markdown]
@@ -48,6 +57,8 @@ plots.figure(runs, ["time_to_phi", "T_max"])
 # %%
 good = (runs["time_to_phi"] <= 1800) & (runs["T_max"] <= 220 + 273.15)
 starts = runs["initial_T"].values[good.any(runs["time_to_phi"].dims[1]).values] - 273.15
-print(f"{float(good.mean()):.0%} of all; starts between {starts.min():.0f} and {starts.max():.0f} degC")
+print(
+    f"{float(good.mean()):.0%} of all; starts between {starts.min():.0f} and {starts.max():.0f} degC"
+)
 assert 0 < float(good.mean()) < 1
 assert np.all(np.diff(starts) > 0)

@@ -58,7 +58,11 @@ figure, ax = plt.subplots(figsize=(5.6, 3.6), layout="constrained")
 ax.semilogx(gaps, forces[:, 0] / forces[:, 2], label="integral")
 ax.semilogx(gaps, forces[:, 1] / forces[:, 2], "--", label="local law")
 ax.axhline(1.0, linestyle=":", color="black", label="Derjaguin")
-ax.set(xlabel="gap / radius", ylabel="force / that after Derjaguin", title="Sphere over a plane")
+ax.set(
+    xlabel="gap / radius",
+    ylabel="force / that after Derjaguin",
+    title="Sphere over a plane",
+)
 ax.legend()
 ax.grid(alpha=0.3)
 
@@ -84,10 +88,17 @@ for (name, (shapes, radius)), width in zip(pairs.items(), (3.5, 1.5, 1.5), stric
     powers = np.log(off[4] / off[0]) / np.log(gaps[4] / gaps[0])
     (line,) = ax.loglog(gaps, off[:, 0], linewidth=width, label=name)
     ax.loglog(gaps, off[:, 1], ":", color=line.get_color())
-    print(f"{name:20s}" + "    ".join(f"{a:.1e} ({n:.3f})" for a, n in zip(off[0], powers, strict=True)))
+    print(
+        f"{name:20s}"
+        + "    ".join(f"{a:.1e} ({n:.3f})" for a, n in zip(off[0], powers, strict=True))
+    )
     assert off[0, 1] < 0.01
 ax.loglog(gaps, gaps, "--", color="0.4", linewidth=0.8, label="gap / radius")
-ax.set(xlabel="gap / radius", ylabel="difference to the integral", title="Local law, and Derjaguin dotted")
+ax.set(
+    xlabel="gap / radius",
+    ylabel="difference to the integral",
+    title="Local law, and Derjaguin dotted",
+)
 ax.legend()
 ax.grid(alpha=0.3)
 
@@ -101,6 +112,11 @@ ax.grid(alpha=0.3)
 import surfacechem
 
 run = surfacechem.run("ball-in-a-socket").dataset
-rows = zip(run.approach.values * 1e9, run.force.values * 1e9, run.local_difference / run.force, strict=True)
+rows = zip(
+    run.approach.values * 1e9,
+    run.force.values * 1e9,
+    run.local_difference / run.force,
+    strict=True,
+)
 for approach, force, off in rows:
     print(f"{approach:6.3f} nm  {force:9.5f} nN  local law {off:+.1%}")

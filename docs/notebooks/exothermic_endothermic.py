@@ -109,8 +109,13 @@ figure, axes = plt.subplots(1, 2, figsize=(9, 3.2), sharey=True, layout="constra
 axes[0].set_ylabel("error / largest value")
 for ax, (name, run) in zip(axes, runs.items(), strict=True):
     for variable, style in (("T", "-"), ("phi", "--"), ("q_m", ":")):
-        error = np.abs(run[variable].values - exact[name][variable]) / np.abs(exact[name][variable]).max()
-        ax.semilogy(t, np.maximum(error, 1e-17), style, color=colours[name], label=variable)
+        error = (
+            np.abs(run[variable].values - exact[name][variable])
+            / np.abs(exact[name][variable]).max()
+        )
+        ax.semilogy(
+            t, np.maximum(error, 1e-17), style, color=colours[name], label=variable
+        )
         print(f"{name:12} {variable:4} {error.max():.1e}")
         assert error.max() < 1e-8
     ax.set(title=name, xlabel="time [s]")
@@ -122,7 +127,9 @@ for ax, (name, run) in zip(axes, runs.items(), strict=True):
 
 # %%
 for name, run in runs.items():
-    print(f"{name}: error {run.error:.1e}, energy {run.energy_error:.1e}, entropy {run.entropy_error:.1e}")
+    print(
+        f"{name}: error {run.error:.1e}, energy {run.energy_error:.1e}, entropy {run.entropy_error:.1e}"
+    )
 
 # %% [markdown]
 # ## The second law
@@ -134,5 +141,7 @@ for name, run in runs.items():
 for name, run in runs.items():
     total = float(run["S_total"][-1] - run["S_total"][0])
     produced = float(run["entropy_linear_affinity"][-1])
-    print(f"{name}: total entropy changed by {total:.6f}, produced {produced:.6f} J/(m^2 K)")
+    print(
+        f"{name}: total entropy changed by {total:.6f}, produced {produced:.6f} J/(m^2 K)"
+    )
     assert float(run["least_sigma_linear_affinity"]) > 0

@@ -59,8 +59,12 @@ def network(flow, hot_until):
     cold, outside = ct.Reservoir(air, clone=True), ct.Reservoir(air, clone=True)
     air.TP = 400.0, ct.one_atm
     hot = ct.Reservoir(air, clone=True)
-    feed = ct.MassFlowController(hot, chamber, mdot=lambda t: flow if t < hot_until else 0.0)
-    other = ct.MassFlowController(cold, chamber, mdot=lambda t: 0.0 if t < hot_until else flow)
+    feed = ct.MassFlowController(
+        hot, chamber, mdot=lambda t: flow if t < hot_until else 0.0
+    )
+    other = ct.MassFlowController(
+        cold, chamber, mdot=lambda t: 0.0 if t < hot_until else flow
+    )
     for source in (feed, other):
         ct.PressureController(chamber, outside, primary=source, K=1e-5)
     plate = InterfaceReactor(case, area=0.01, bodies={"chamber": chamber})
@@ -79,7 +83,9 @@ for stage in np.split(times, 2):
         gas.append(chamber.T)
     net.reinitialize()  # the feed jumps
 history = plate.dataset
-print(f"least bonding state {float(history.phi.min()):.3f}, at the end {float(history.phi[-1]):.3f}")
+print(
+    f"least bonding state {float(history.phi.min()):.3f}, at the end {float(history.phi[-1]):.3f}"
+)
 print(f"energy of the interface closed to {history.attrs['energy_error']:.1e}")
 assert history.phi.min() < 0.05
 assert history.phi[-1] > 0.5
@@ -105,5 +111,7 @@ alone = surfacechem.run(case).dataset
 for flow in (0.05, 0.5, 5.0):
     net, chamber, plate = network(flow, hot_until=np.inf)
     net.advance(50.0)
-    print(f"{flow:5g} kg/s: plate {plate['T_1']:.4f} K, of the case {float(alone.T_1[-1]):.4f} K")
+    print(
+        f"{flow:5g} kg/s: plate {plate['T_1']:.4f} K, of the case {float(alone.T_1[-1]):.4f} K"
+    )
 assert abs(plate["T_1"] - float(alone.T_1[-1])) < 0.01

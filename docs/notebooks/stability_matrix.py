@@ -15,7 +15,9 @@ import xarray
 from surfacechem.studies.stability import stability
 
 folder = Path(tempfile.mkdtemp())
-study = stability("capacity", "rupture", solvers=["radau", "cvode"], rtol=1e-6, quick=True, rounds=0)
+study = stability(
+    "capacity", "rupture", solvers=["radau", "cvode"], rtol=1e-6, quick=True, rounds=0
+)
 for path in study.write(folder / "matrix"):
     print(path.name)
 
@@ -36,7 +38,11 @@ print(data)
 chosen = data.sel(regime="capacity")
 figure, ax = plt.subplots(figsize=(5.5, 3.2), layout="constrained")
 for solver in data["solver"].values:
-    kept = chosen["digits"].sel(solver=solver).where(chosen["outcome"].sel(solver=solver) == "solved")
+    kept = (
+        chosen["digits"]
+        .sel(solver=solver)
+        .where(chosen["outcome"].sel(solver=solver) == "solved")
+    )
     ax.semilogx(chosen["value"], kept, "o-", label=solver)
 ax.set(xlabel=str(chosen["symbol"].item()), ylabel="digits kept", ylim=(0, 12))
 ax.legend()
@@ -50,7 +56,9 @@ ax.invert_xaxis()
 # %%
 for solver in data["solver"].values:
     cells = data.sel(solver=solver)
-    outcomes, counts = np.unique(cells["outcome"].values[cells["value"].notnull().values], return_counts=True)
+    outcomes, counts = np.unique(
+        cells["outcome"].values[cells["value"].notnull().values], return_counts=True
+    )
     print(solver, dict(zip(outcomes.tolist(), counts.tolist(), strict=True)))
 cvode = data.sel(solver="cvode")
 for regime, decade in np.argwhere((cvode["outcome"] == "failed").values):
@@ -68,7 +76,9 @@ ended = data.sel(regime="rupture", solver="radau")
 for k in range(ended.sizes["decade"]):
     cell = ended.isel(decade=k)
     if np.isfinite(cell["value"]):
-        print(f"{cell.value.item():8g}  {cell.outcome.item()}  {cell.digits.item():5.1f}  {cell.reason.item()[:50]}")
+        print(
+            f"{cell.value.item():8g}  {cell.outcome.item()}  {cell.digits.item():5.1f}  {cell.reason.item()[:50]}"
+        )
 assert set(ended["outcome"].values) <= {"refused", ""}
 
 # %% [markdown]
@@ -76,5 +86,8 @@ assert set(ended["outcome"].values) <= {"refused", ""}
 
 # %%
 steps = data["steps"].sel(regime="capacity").to_pandas().dropna()
-steps.index = [f"{value:.1e}" for value in data["value"].sel(regime="capacity").values[: len(steps)]]
+steps.index = [
+    f"{value:.1e}"
+    for value in data["value"].sel(regime="capacity").values[: len(steps)]
+]
 print(steps)

@@ -21,7 +21,9 @@ folder = Path(tempfile.mkdtemp())
 
 # %%
 rates = {"from": "0.01 pN/s", "to": "100 nN/s", "points": 57, "spacing": "logarithmic"}
-spectrum = surfacechem.sweep("force-spectroscopy", {"loading.f.ramp.rate": rates}, {"f": "200 pN"})
+spectrum = surfacechem.sweep(
+    "force-spectroscopy", {"loading.f.ramp.rate": rates}, {"f": "200 pN"}
+)
 print(f"largest error of the force: {spectrum.dataset.attrs['error']:.1e}")
 plots.figure(spectrum.dataset)
 
@@ -37,7 +39,11 @@ window = surfacechem.load(
     {
         "sweep": {
             "over": {
-                "interface.potential.bond-energy.K_0": {"from": "20 J/m^2", "to": "300 J/m^2", "points": 60},
+                "interface.potential.bond-energy.K_0": {
+                    "from": "20 J/m^2",
+                    "to": "300 J/m^2",
+                    "points": 60,
+                },
                 "interface.bonding.linear-affinity.c_r": {
                     "from": "1e15 1/J/s",
                     "to": "2e16 1/J/s",
@@ -60,13 +66,23 @@ plots.figure(stored.dataset, ["time_to_phi", "T_max"])
 
 # %%
 of = {
-    "interface.potential.bond-energy.K_0": {"normal": {"mean": "250 J/m^2", "std": "25 J/m^2"}},
-    "interface.bonding.linear-affinity.c_r": {"lognormal": {"median": "6.7e15 1/J/s", "sigma": 0.3}},
+    "interface.potential.bond-energy.K_0": {
+        "normal": {"mean": "250 J/m^2", "std": "25 J/m^2"}
+    },
+    "interface.bonding.linear-affinity.c_r": {
+        "lognormal": {"median": "6.7e15 1/J/s", "sigma": 0.3}
+    },
     "initial.T": {"uniform": {"from": "290 K", "to": "310 K"}},
 }
-section = {"sample": {"of": of, "runs": 10_000}, "keep": {"last": ["T", "phi"], "reach": {"phi": 0.5}}, "checked": 0}
+section = {
+    "sample": {"of": of, "runs": 10_000},
+    "keep": {"last": ["T", "phi"], "reach": {"phi": 0.5}},
+    "checked": 0,
+}
 case = surfacechem.load("exothermic", {"sweep": section})
 data = case.stream(case.plan(), folder / "drawn.zarr").run().dataset
 late = float(np.nanpercentile(data["time_to_phi"], 95))
-print(f"{data.sizes['run']} runs; half of the bonds within {late:.3f} s in 95 % of them")
+print(
+    f"{data.sizes['run']} runs; half of the bonds within {late:.3f} s in 95 % of them"
+)
 plots.figure(data)

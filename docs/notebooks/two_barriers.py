@@ -36,10 +36,16 @@ class TwoBarriers(RateLaw):
     k_2: float = parameter("1/s", "rate over the inner barrier at no force", above=0)
     x_2: float = parameter("m", "distance to the inner barrier", at_least=0)
 
-    def rate(self, phi: Expression, n_c: Expression, f: Expression, T_c: Expression) -> Expression:
+    def rate(
+        self, phi: Expression, n_c: Expression, f: Expression, T_c: Expression
+    ) -> Expression:
         """Net rate [1/(m^2 s)]."""
         work = f / (BOLTZMANN * T_c)
-        return -n_c * phi / (exp(-work * self.x_1) / self.k_1 + exp(-work * self.x_2) / self.k_2)
+        return (
+            -n_c
+            * phi
+            / (exp(-work * self.x_1) / self.k_1 + exp(-work * self.x_2) / self.k_2)
+        )
 
 
 # %% [markdown]

@@ -30,7 +30,9 @@ for path in study.write(folder / "study"):
 # they are found by `sel`.
 
 # %%
-data = xarray.open_dataset(folder / "study.nc").set_index(case="case_name", solver="solver_name")
+data = xarray.open_dataset(folder / "study.nc").set_index(
+    case="case_name", solver="solver_name"
+)
 print(data)
 
 # %% [markdown]
@@ -39,7 +41,9 @@ print(data)
 # %%
 for case in data["case"].values:
     chosen = data.sel(case=case)
-    print(f"{case}: {chosen.reference.item()}, uncertain by {chosen.uncertainty_max.item():.1e}")
+    print(
+        f"{case}: {chosen.reference.item()}, uncertain by {chosen.uncertainty_max.item():.1e}"
+    )
 
 # %% [markdown]
 # ## A figure of one's own
@@ -48,7 +52,9 @@ for case in data["case"].values:
 # which a library is called. Points below the uncertainty of the reference would be left out.
 
 # %%
-figure, axes = plt.subplots(1, data.sizes["case"], figsize=(8, 3.2), sharey=True, layout="constrained")
+figure, axes = plt.subplots(
+    1, data.sizes["case"], figsize=(8, 3.2), sharey=True, layout="constrained"
+)
 for ax, case in zip(axes, data["case"].values, strict=True):
     for solver in data["solver"].values:
         points = data.sel(case=case, solver=solver)
@@ -71,11 +77,18 @@ def seconds_at(points, error):
     order = np.argsort(points.error_max.values)
     errors, seconds = points.error_max.values[order], points.run_seconds.values[order]
     inside = errors[0] <= error <= errors[-1]
-    return float(np.exp(np.interp(np.log(error), np.log(errors), np.log(seconds)))) if inside else np.nan
+    return (
+        float(np.exp(np.interp(np.log(error), np.log(errors), np.log(seconds))))
+        if inside
+        else np.nan
+    )
 
 
 for solver in data["solver"].values:
-    times = [seconds_at(data.sel(case="exothermic", solver=solver), error) for error in (1e-5, 1e-7, 1e-9)]
+    times = [
+        seconds_at(data.sel(case="exothermic", solver=solver), error)
+        for error in (1e-5, 1e-7, 1e-9)
+    ]
     print(f"{solver:6}", *(f"{1e3 * time:10.3f} ms" for time in times))
 
 # %% [markdown]

@@ -23,6 +23,9 @@ from surfacechem.tolerances import EPS, UNRESOLVED
 LONG = 64
 """Rows between two that are kept of which one in the middle is kept, too, where the line between the two misses any."""
 
+TWICE = 2
+"""Outputs that many runs share for one that the closest of them has."""
+
 BENDS, CLOSER, ROUNDS = 100, 16, 2
 """Between how many known states a run is known closer at most, in how many parts of it, and how often in turn."""
 
@@ -146,6 +149,41 @@ def followed(trajectory: Trajectory) -> Trajectory:
     return _pictured(trajectory, part, _chosen(rows._replace(t=t), sides), ROUNDS)
 
 
+def shared(runs: Sequence[Trajectory], most: int) -> tuple[float, ...]:
+    """Output times that all runs share: as close to each other everywhere as in the picture of the closest of them, or
+    as close as ``most`` are, with what no line may pass over in any of them where there is room for that.
+    """
+    pictures = [followed(run) for run in runs if len(run.result.times) > 1]  # others have ended at their start
+    own, usual = [picture.result.times for picture in pictures], runs[0].run.times
+    every = np.unique(np.concatenate([*own, usual[-1:]]))
+    if len(own) < 2:
+        return tuple(every.tolist() if own else usual)
+    lengths, middles, density = np.diff(every), every[:-1] + np.diff(every) / 2, np.zeros(len(every) - 1)
+    for t in own:
+        within = slice(None, np.searchsorted(middles, t[-1]))  # a run that was stopped has no outputs later
+        each = np.diff(t)[np.searchsorted(t, middles[within], side="right") - 1]
+        density[within] = np.maximum(density[within], 1 / each)
+    # Two for one, since they are not where each picture has its own.
+    count = np.append(0.0, np.cumsum(TWICE * density * lengths))
+    parts = min(int(np.ceil(count[-1])) + 1, most)
+    times = [np.interp(np.linspace(0, count[-1], parts), count, every), every[[0, -1]]]
+    marked = np.unique(np.concatenate([_marks(picture) for picture in pictures]))
+    return tuple(np.unique(np.concatenate([*times, marked if len(marked) <= most else []])).tolist())
+
+
+def _marks(trajectory: Trajectory) -> Array:
+    """Times of both sides of events, and of the extremes of what is shown."""
+    t, quantities = trajectory.result.times, np.hstack([trajectory.result.outputs, trajectory.outputs])
+    return np.asarray(t[_beside(trajectory) | _edges(quantities)])
+
+
+def _beside(trajectory: Trajectory) -> Mask:
+    """Outputs at both sides of events."""
+    t = trajectory.result.times
+    moments = np.array([*trajectory.result.events.t, *(jump.t for jump in trajectory.jumps)])
+    return np.isin(t, moments) | np.isin(np.nextafter(t, np.inf), moments)
+
+
 def _pictured(trajectory: Trajectory, part: float, rows: States, rounds: int) -> Trajectory:
     """The trajectory with those of the rows that its picture needs, and others where it bends between them."""
     whole = trajectory.at(rows)
@@ -166,6 +204,5 @@ def _pictured(trajectory: Trajectory, part: float, rows: States, rounds: int) ->
         more = States(*map(np.concatenate, zip(rows, *bends, strict=True)))
         return _pictured(trajectory, part, _chosen(more, np.argsort(more.t, kind="stable")), rounds - 1)
     # Both sides of events are kept.
-    t, moments = result.times, np.array([*result.events.t, *(jump.t for jump in whole.jumps)])
-    beside = np.isin(t, moments) | np.isin(np.nextafter(t, np.inf), moments)
-    return whole.picked(needed(t, values[:, seen], allowed[seen], beside | _edges(quantities[:, seen])))
+    kept = _beside(whole) | _edges(quantities[:, seen])
+    return whole.picked(needed(result.times, values[:, seen], allowed[seen], kept))

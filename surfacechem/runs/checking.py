@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -125,10 +125,11 @@ def _errors(
 ) -> Iterator[tuple[int, Index, dict[str, Any], SweepAccuracy]]:
     """Errors and balances of runs by themselves, some at a time; nothing of one that is not admissible."""
     chunks = stream.chunks
+    even = replace(chunks.simulation.case.run, picture=None)  # no outputs are shown
     for first in range(0, len(index), AT_ONCE):
         part = index[first : first + AT_ONCE]
         try:
-            done = chunks.simulation.sweep_plan(chunks.plan.picked(part), chunks.changes, threads)
+            done = chunks.simulation.sweep_plan(chunks.plan.picked(part), chunks.changes, threads, even)
         except InputError:
             # One of them is refused: each alone, so that the others have an error.
             if len(part) > 1:

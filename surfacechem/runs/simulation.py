@@ -452,9 +452,13 @@ class Simulation:
         return self.sweep_plan(self.plan(over, until, sample, combine), changes, threads)
 
     def sweep_plan(
-        self, plan: Plan, changes: Mapping[str, float | str] | None = None, threads: int | None = None
+        self,
+        plan: Plan,
+        changes: Mapping[str, float | str] | None = None,
+        threads: int | None = None,
+        run: Run | None = None,
     ) -> SweepSolution:
-        """Run a plan whose values are in SI, with all of its runs in memory."""
+        """Run a plan whose values are in SI, with all of its runs in memory; ``run`` instead of the case's."""
         from surfacechem.format.sections import MOST_RUNS
         from surfacechem.runs import sweeps
 
@@ -465,11 +469,12 @@ class Simulation:
             raise InputError(message, path="sweep")
         freed, values = self._ready(changes or {}, plan)
         if freed is not self:
-            return freed.sweep_plan(plan, values, threads)
-        chosen, done, errors = self._resolved(self.case.run, values, plan, threads)
+            return freed.sweep_plan(plan, values, threads, run)
+        settings = run or self.case.run
+        chosen, done, errors = self._resolved(settings, values, plan, threads)
         model = done[0].model
-        run = model.chosen(self.case.run, done[0].values)
-        solution = sweeps.SweepSolution(model, plan, run, done, **chosen._origin(values))
+        taken = model.chosen(settings, done[0].values)
+        solution = sweeps.SweepSolution(model, plan, taken, done, **chosen._origin(values))
 
         @cache
         def added() -> list[CellErrors]:

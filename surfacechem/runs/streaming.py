@@ -67,7 +67,8 @@ class ChunkRuns:
         case = simulation.case
         # Where the case names no solver, the one that suits the scene.
         asked = case.run if "run.solver" in case.places else replace(case.run, solver=AUTO)
-        self.run = run or self.model.chosen(asked, self.model.values(changes))
+        chosen = run or self.model.chosen(asked, self.model.values(changes))
+        self.run = sweeps.following(self.model, plan, chosen, changes) if keep.series and run is None else chosen
         self.one_by_one = RunByRun(self.model, keep)
         arrays = ArrayRuns(self.model, plan, self.run, changes, keep)
         told = solvable(self.model, plan, self.run, arrays.problem)

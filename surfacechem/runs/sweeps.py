@@ -27,6 +27,7 @@ from surfacechem.results.error_estimates import against_exact, closer, estimated
 from surfacechem.results.event_table import entropy_destroyed, event_columns, event_times
 from surfacechem.results.matching import exact_values, match
 from surfacechem.results.netcdf import COORDINATES, Column, versions
+from surfacechem.results.picture import shared
 from surfacechem.runs import spectrum
 from surfacechem.runs.keeping import ENDS, EXTREMES, end_of, extreme
 from surfacechem.runs.sheet import counted
@@ -35,6 +36,12 @@ from surfacechem.solve.run import Model, Run, Trajectory
 from surfacechem.tolerances import EPS
 
 Rupture = Statistics | Lifetime
+
+MOST_FOLLOWED = 64
+"""Runs that the output times of a sweep follow; of more so many, evenly spread over them."""
+
+MOST_OUTPUTS = 128_000
+"""Outputs of all runs of a sweep together, where these need more than even times would be."""
 
 PORTION = 256
 """Runs that are solved at a time; between portions a sweep tells how far it is."""
@@ -67,7 +74,8 @@ def solve(
 ) -> list[Trajectory]:
     """The runs of a :func:`prepared` system over the plan; how a run ends is its status, never an exception."""
     values = [model.values({**changes, **point}) for point in plan.points]
-    runs = settings(model.system, plan, model.chosen(run, values[0]), values)
+    run = model.chosen(run, values[0])
+    runs = settings(model.system, plan, following(model, plan, run, changes, threads), values)
     if run.steady:
         from surfacechem.runs.at_rest import all_to_rest
 
@@ -82,6 +90,21 @@ def solve(
         except InputError as error:
             raise _with_values(model, portion, plan.points[start:], error) from None
     return done
+
+
+def following(model: Model, plan: Plan, run: Run, changes: Mapping[str, float], threads: int | None = None) -> Run:
+    """The settings with output times that follow the runs of a plan, or some that are evenly spread over many, where no
+    times are asked for.
+    """
+    if run.picture is None or plan.until is not None or run.steady:
+        return run
+    some = plan.picked(np.arange(0, plan.size, -(-plan.size // MOST_FOLLOWED)))
+    try:
+        pairs = [(run, model.values({**changes, **point})) for point in some.points]
+        done = model.solve_all(pairs, threads or os.cpu_count() or 1)
+    except InputError:
+        return run  # which of the runs are refused is said where all are solved
+    return replace(run, times=shared(done, max(len(run.times), MOST_OUTPUTS // plan.size)))
 
 
 def _with_values(

@@ -23,6 +23,7 @@ from surfacechem.results.store import Layout, StoredArray, opened
 from surfacechem.runs import checking, streaming
 from surfacechem.runs.checking import check
 from surfacechem.runs.keeping import STATUSES, Keep
+from surfacechem.solve.run import Run
 
 pytestmark = pytest.mark.around
 
@@ -119,7 +120,9 @@ def test_times_of_values_and_states_at_events(tmp_path):
     keep = {"reach": {"phi": 0.5, "T": "310 K"}, "series": ["T"]}
     simulation = case(keep=keep, over={K_0: [300.0, 30.0]})
     data = stored(tmp_path / "o.zarr", simulation).dataset
-    alone = simulation.run({K_0: 300.0}, replace(simulation.case.run, picture=None))
+    times = tuple(data["time"].values)
+    assert 50 < len(times) < 201  # outputs follow the runs
+    alone = simulation.run({K_0: 300.0}, replace(simulation.case.run, picture=None, times=times))
     np.testing.assert_allclose(data["T"].values[0], alone.dataset["T"].values, rtol=1e-9)  # its steps end elsewhere
     for name, value in (("phi", 0.5), ("T", 310.0)):
         t = data[f"time_to_{name}"].values[0]
@@ -342,7 +345,8 @@ def test_errors_of_runs_that_are_checked_are_those_of_a_sweep(tmp_path, monkeypa
     assert check(stream) is None
     data = stream.run(1).dataset
     found = check(stream)
-    swept = case(over={**over, "initial.phi": [0.0]}).sweep()
+    again = case(over={**over, "initial.phi": [0.0]})
+    swept = again.sweep_plan(again.plan(), run=replace(again.case.run, picture=None))
     assert np.array_equal(data["checked_run"], np.arange(14))
     for name in ("error", "energy_error", "entropy_error", "site_error", "destroys_entropy"):
         assert np.array_equal(data[f"checked_{name}"][:7], swept.dataset[name].values.ravel())
@@ -362,11 +366,12 @@ def test_an_error_that_is_unknown_and_an_end_that_is_no_number_count_for_no_smal
     kept = ends | {"T_last": np.array([300.0, np.nan, np.nan, 300.0])}
     monkeypatch.setattr(checking, "RunByRun", lambda *_: SimpleNamespace(columns=lambda *_: ends))
     done = SimpleNamespace(
-        accuracy=SimpleNamespace(errors=np.array([np.nan, 1e-9, 1e-9, 1e-9]), source=""),
+        accuracy=SimpleNamespace(errors=np.array([np.nan, 1e-9, 1e-9, 1e-9]), source="", why=""),
         run_ends=[dict.fromkeys(checking.TOLD, 0.0)] * 4,
         runs=[],
     )
     simulation, plan = (SimpleNamespace(**{name: lambda *_: done}) for name in ("sweep_plan", "picked"))
+    simulation.case = SimpleNamespace(run=Run((0.0, 1.0)))
     chunks = SimpleNamespace(
         model=None, keep=Keep(last=("T",)), columns=lambda _: kept, simulation=simulation, plan=plan, changes={}
     )

@@ -106,13 +106,32 @@ def test_biotin_breaks_near_the_forces_that_were_measured():
     assert (slow, fast) == (pytest.approx(200e-12, rel=0.02), pytest.approx(230e-12, rel=0.1))
 
 
-def test_extremes_are_those_of_the_runs_whatever_lies_between_the_times_that_all_share():
+def test_extremes_are_those_of_the_runs_and_of_the_outputs_that_all_share():
     data = surfacechem.sweep("stick-slip", {"loading.w_t.ramp.rate": ["1 mm/s", "2 mm/s"]}).dataset
     for at, speed in enumerate(("1 mm/s", "2 mm/s")):
         single = surfacechem.run("stick-slip", {"loading.w_t.ramp.rate": speed}).dataset
         assert data.v_max[at] == pytest.approx(single.v.max().item(), rel=0.01)
-        assert data.v_max[at] > 5 * data.v[at].max()
+        assert data.v_max[at] == pytest.approx(data.v[at].max().item(), rel=1e-12)
         assert data.t_t_min[at] == pytest.approx(single.t_t.min().item(), rel=0.01)
+
+
+def test_outputs_follow_the_runs_of_a_sweep():
+    """As close as in the closest of them: lines between them show what happens."""
+    case = surfacechem.load("exothermic")
+    few, many = (case.sweep({"initial.T": np.linspace(280, 320, n).tolist()}) for n in (2, 80))
+    own = [case.run(point).dataset for point in few.plan.points]
+    assert max(each.sizes["time"] for each in own) < few.dataset.sizes["time"] < 200
+    assert many.dataset.sizes["time"] < 4 * own[0].sizes["time"]
+    start = many.dataset.initial_T.values[41]
+    closer = surfacechem.run("exothermic", ["run.outputs=20001", f"initial.T={start}"]).dataset
+    for name in ("T", "phi", "q_reaction"):
+        lines = np.interp(closer.time.values, many.dataset.time.values, many.dataset[name].values[41])
+        assert np.abs(lines - closer[name].values).max() < 0.01 * np.ptp(closer[name].values)
+
+
+def test_outputs_that_are_asked_for_are_kept():
+    swept = surfacechem.load("stick-slip", ["run.outputs=21"]).sweep({"interface.friction.coulomb.mu": [0.2, 0.3]})
+    assert np.allclose(swept.dataset.time, np.linspace(0, 3, 21), rtol=1e-15)
 
 
 def test_a_sweep_compiles_nothing_once_it_has_run(spectrum, monkeypatch):
@@ -174,7 +193,9 @@ def test_runs_with_edges_or_fits_share_batches_and_stay_what_they_are(case, path
     one, two = (case.sweep({path: values}, threads=n) for n in (1, 2))
     assert rounds[0] == len(values) > 1
     for i in range(len(values)):
-        alone = case.run(one.plan.points[i], replace(case.case.run, picture=None)).trajectory
+        alone = case.run(
+            one.plan.points[i], replace(case.case.run, picture=None, times=one.runs[i].run.times)
+        ).trajectory
         for run in (one.runs[i], two.runs[i]):
             assert run.outputs.tobytes() == alone.outputs.tobytes()
             assert run.result.steps.y.tobytes() == alone.result.steps.y.tobytes()
