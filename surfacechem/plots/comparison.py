@@ -95,7 +95,7 @@ def labels(datasets: Sequence[xarray.Dataset]) -> list[str]:
     texts = [str(dataset.attrs.get("title", "")) for dataset in datasets]
     # More differences than fit into a legend are those of two different cases, whose titles tell them apart.
     if 0 < len(paths) <= MOST_DIFFERENCES:
-        names = {path: style.parameter_name(name) for path, name in _short(paths).items()}
+        names = _short(paths)
         texts = [", ".join(f"{name} = {each.get(path, 'not given')}" for path, name in names.items()) for each in known]
     # Datasets that still have the same name are told apart by their files.
     files = [Path(str(d.encoding.get("source", f"dataset {k}"))).stem for k, d in enumerate(datasets, 1)]
@@ -103,10 +103,10 @@ def labels(datasets: Sequence[xarray.Dataset]) -> list[str]:
 
 
 def _short(paths: Sequence[str]) -> dict[str, str]:
-    """The last words of paths, as many as tell them apart."""
+    """The last words of paths, as many as tell them apart, or the symbol for them."""
     last = [path.rpartition(".")[2] for path in paths]
     return {
-        path: name if last.count(name) == 1 else " ".join(path.split(".")[-2:])
+        path: style.parameter_name(name) if last.count(name) == 1 else " ".join(path.split(".")[-2:])
         for path, name in zip(paths, last, strict=True)
     }
 

@@ -167,14 +167,8 @@ def shared(runs: Sequence[Trajectory], most: int) -> tuple[float, ...]:
     count = np.append(0.0, np.cumsum(TWICE * density * lengths))
     parts = min(int(np.ceil(count[-1])) + 1, most)
     times = [np.interp(np.linspace(0, count[-1], parts), count, every), every[[0, -1]]]
-    marked = np.unique(np.concatenate([_marks(picture) for picture in pictures]))
+    marked = np.unique(np.concatenate([p.result.times[_beside(p) | _edges(p.result.outputs)] for p in pictures]))
     return tuple(np.unique(np.concatenate([*times, marked if len(marked) <= most else []])).tolist())
-
-
-def _marks(trajectory: Trajectory) -> Array:
-    """Times of both sides of events, and of the extremes of what is shown."""
-    t, quantities = trajectory.result.times, np.hstack([trajectory.result.outputs, trajectory.outputs])
-    return np.asarray(t[_beside(trajectory) | _edges(quantities)])
 
 
 def _beside(trajectory: Trajectory) -> Mask:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -252,7 +253,10 @@ def check_summary(
         "Roles": [(role.variable, role.role, role.by) for role in system.roles if role.role != "internal"],
         "Modes": [(mode.name, mode.legend) for mode in system.modes if len(mode.words) > 1],
         "Transitions": list(dict.fromkeys((item.name, item.reason) for item in system.edges)),
-        "Laws": [(law.contract, law.name()) for law in laws_of(scene)],
+        "Laws": [
+            (contract, f"{name}, {count} times" if count > 1 else name)
+            for (contract, name), count in Counter((law.contract, law.name()) for law in laws_of(scene)).items()
+        ],
         "Surfaces": surface_rows(scene),
         "Numbers": [(g.name, f"{g.value:.4g} {g.unit if g.unit != '1' else ''}".rstrip(), g.text) for g in groups],
         "Warnings": [(warning,) for warning in warnings],

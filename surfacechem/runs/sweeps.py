@@ -198,17 +198,20 @@ def accuracy(
     elif named is not None:
         unused = named.fixed
     left = cells()
-    why = "" if all(found.converged for found in left) else UNKNOWN
-    if done.statistics:
-        pairs = zip(done.statistics, second().statistics, left, strict=True)
-        errors = [_of_statistics(ours, theirs) + found.largest for ours, theirs, found in pairs]
-    else:
-        runs = zip(done.runs, second().runs, left, strict=True)
-        found = [with_cells(estimated(ours, theirs), each) for ours, theirs, each in runs]
-        errors = [each.error for each in found]
-        why = next((each.source for each in found if np.isnan(each.error)), "")
+    errors, why = _estimated(done, second(), left)
     source = ", ".join([second_run(second().run, "sweep"), *dict.fromkeys(f.source for f in left if f.variables)])
     return SweepAccuracy(np.array(errors), "; ".join(filter(None, (source, unused))), why=why)
+
+
+def _estimated(done: SweepSolution, second: SweepSolution, cells: Sequence[CellErrors]) -> tuple[list[float], str]:
+    """Errors of all runs, with those of their cells, from a second sweep; and why one of them is not known."""
+    if done.statistics:
+        pairs = zip(done.statistics, second.statistics, cells, strict=True)
+        errors = [_of_statistics(ours, theirs) + found.largest for ours, theirs, found in pairs]
+        return errors, "" if all(found.converged for found in cells) else UNKNOWN
+    runs = zip(done.runs, second.runs, cells, strict=True)
+    found = [with_cells(estimated(ours, theirs), each) for ours, theirs, each in runs]
+    return [each.error for each in found], next((each.source for each in found if np.isnan(each.error)), "")
 
 
 def _second(done: SweepSolution, threads: int | None) -> SweepSolution:
@@ -226,12 +229,10 @@ def _against_exact(case: Case, done: SweepSolution, name: str, second: Callable[
     begun = [i for i, run in enumerate(done.runs) if len(run.looked.result.times) > 1]
     if not begun:
         raise InputError("all runs ended at their start.")
-    errors, why = np.full(len(done.runs), np.nan), ""
+    errors, why = np.full(len(done.runs), np.nan), AT_START
     exact = {which: errors.copy() for which in done.told if which in references.get(name).statistics}
-    for i, run in enumerate(done.runs):
-        if len(run.looked.result.times) < 2:
-            why = why or AT_START
-            continue
+    for i in begun:
+        run = done.runs[i]
         if exact:
             if i in (begun[0], begun[-1]):
                 exact_values(name, {}, case.scene, run)
@@ -241,8 +242,7 @@ def _against_exact(case: Case, done: SweepSolution, name: str, second: Callable[
                 values[i] = getattr(reference, which)
         else:
             found = against_exact(run, case.scene, name, {}, second().runs[i] if event_times(run) else None)
-            errors[i] = found.error
-            why = why or (found.source if np.isnan(found.error) else "")
+            errors[i], why = found.error, found.source if np.isnan(found.error) else why
     return SweepAccuracy(errors, f"exact solution {name}", exact, why)
 
 

@@ -257,8 +257,13 @@ def at_nodes(rows: Array) -> Array:
 
 
 def on_step(end: float, size: float, rows: Array, t: Any) -> Array:
-    """Values of one such polynomial at a time, or at several in a row each."""
-    return np.asarray(np.power.outer((t - end) / size, np.arange(len(rows))) @ rows)
+    """Values of one such polynomial at a time, or at several in a row each; a step too short for the clock is its end.
+
+    >>> on_step(1.0, 0.5, np.array([[2.0], [4.0]]), 0.75), on_step(1.0, 0.0, np.array([[2.0], [4.0]]), 1.0)
+    (array([0.]), array([2.]))
+    """
+    part = (t - end) / size if size else np.zeros_like(t)
+    return np.asarray(np.power.outer(part, np.arange(len(rows))) @ rows)
 
 
 TO_POWERS = np.linalg.inv(np.vander(NODES, increasing=True)) / np.arange(1.0, len(NODES) + 1)[:, None]
