@@ -243,7 +243,7 @@ def _against_exact(case: Case, done: SweepSolution, name: str, second: Callable[
         else:
             found = against_exact(run, case.scene, name, {}, second().runs[i] if event_times(run) else None)
             errors[i], why = found.error, found.source if np.isnan(found.error) else why
-    return SweepAccuracy(errors, f"exact solution {name}", exact, why)
+    return SweepAccuracy(errors, f"exact solution {name}", exact, why if np.isnan(errors).any() else "")
 
 
 def _of_statistics(found: Rupture, exact: references.Reference | Rupture) -> float:

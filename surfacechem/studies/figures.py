@@ -210,7 +210,7 @@ class Picture:
         x, y = self.section.x, self.section.y
         ax.set(xlabel=x.name, ylabel=y.name, xscale=x.scale, yscale=y.scale)
         beside = [ax.plot([], [], label="exact", **EXACT)] if self._any("exact") else []
-        beside += [ax.plot([], [], "o", color="0.4", markersize=4, label="measured")] if self._any("data") else []
+        beside += [ax.plot([], [], "o", color="0.4", markersize=4, label="published")] if self._any("data") else []
         beside += [ax.plot([], [], ":", color="0.4", label="breaks the second law")] if self._any("refused") else []
         if beside or any(curve.label for curve in self.curves):
             ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))

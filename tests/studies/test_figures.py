@@ -65,16 +65,20 @@ def test_published_data_without_a_unit_are_numbers_of_the_axis(tmp_path):
     (picture,) = pictures(read_list(written(tmp_path, LIST[:-2] + ", data: {file: data.csv, x: t, y: T}}\n")))
     assert picture.curves[0].data == (pytest.approx([0.5]), pytest.approx([1.05]))
     legend = picture.draw().figure.axes[0].get_legend()
-    assert "measured" in [text.get_text() for text in legend.get_texts()]
+    assert "published" in [text.get_text() for text in legend.get_texts()]
 
 
 def test_the_fits_to_published_measurements_follow_the_points():
-    spectrum, steps, lifetimes = pictures(read_list("published"))
+    spectrum, steps, lifetimes, cure = pictures(read_list("published"))
     for picture, within in ((spectrum, 0.1), (steps, 0.005), (lifetimes, 0.25)):
         (curve,) = picture.curves
         x, y = curve.data
         assert np.interp(x, curve.x, curve.y) == pytest.approx(y, rel=within)
         assert "Measured: " in picture.caption
+    for curve in cure.curves:
+        x, y = curve.data
+        assert np.interp(x, curve.x, curve.y) == pytest.approx([0.95], abs=0.0015)  # that of lines is a third of it
+        assert y == pytest.approx([0.95])
 
 
 def test_the_distance_is_that_from_the_line_between_its_corners():
