@@ -121,7 +121,7 @@ class Chain:
 PIECE = 400
 """Expressions that are compiled at a time where there are many alike."""
 
-_ONE_THREAD = threading.Lock()
+_ONE_THREAD = threading.RLock()
 
 MANY = 50
 """States of a network beyond which a second function of its rates takes longer to compile than any run gains by it."""
@@ -181,14 +181,15 @@ class Program:
 
     @cached_property
     def rates(self) -> Function | None:
-        """The rates by time, state and parameters alone, compiled when they are first asked for."""
-        return self.solved()
+        """The rates by time, state and parameters alone, compiled when they are first asked for; by one thread, as
+        machine code that another one replaces is gone while tables have its address.
+        """
+        with _ONE_THREAD:
+            return vars(self).get("rates") or self.solved()
 
     @cached_property
     def lanes(self) -> Lanes | None:
-        """The code for eight cases at once, compiled when it is first asked for; by one thread, as machine code that
-        another one replaces is gone while tables have its address.
-        """
+        """The code for eight cases at once, compiled when it is first asked for, by one thread as well."""
         with _ONE_THREAD:
             return vars(self).get("lanes") or self.laned()
 

@@ -133,7 +133,8 @@ class ChunkRuns:
 def _put(columns: Columns, own: Index, found: Columns, count: int) -> None:
     """Put what is kept of some of so many runs into the columns of all."""
     for name, column in found.items():
-        whole = columns.setdefault(name, np.empty((count, *column.shape[1:]), dtype=column.dtype))
+        nothing = np.nan if column.dtype.kind == "f" else 0
+        whole = columns.setdefault(name, np.full((count, *column.shape[1:]), nothing, column.dtype))
         whole[own] = column
 
 

@@ -112,17 +112,18 @@ def test_rates_and_guards_of_a_case_are_those_of_its_scalar_code(member):
         assert program.lanes.margins(rows.T) == pytest.approx(guards, rel=1e-9, abs=1e-12 * np.abs(guards).max())
 
 
-def test_threads_share_the_code_of_a_program():
+@pytest.mark.parametrize(("code", "maker"), [("lanes", "laned"), ("rates", "solved")])
+def test_threads_share_the_code_of_a_program(code, maker):
     """Tables hold its address: machine code that another thread has made anew would leave them without any."""
     model = case_runs.load("exothermic").model
     made = []
 
     def slowly():
         made.append(time.sleep(0.05))
-        return model.program.laned()
+        return getattr(model.program, maker)()
 
-    program = replace(model.program, laned=slowly)
+    program = replace(model.program, **{maker: slowly})
     with ThreadPoolExecutor(2) as pool:
-        first, second = pool.map(lambda _: program.lanes, range(2))
+        first, second = pool.map(lambda _: getattr(program, code), range(2))
     assert first is second
     assert len(made) == 1
