@@ -40,6 +40,7 @@ def test_the_code_of_jumps_and_of_gaps_at_rest_is_compiled_once_and_counts_as_co
     spent = model.compile_seconds
     first = model.solve(case.run)
     assert bool(first.jumps) == (name != "at rest")
+    assert first.everywhere  # compiles the rates, which outputs need
     assert model.compile_seconds > spent
     monkeypatch.setattr("surfacechem.compile.program.symengine.Lambdify", None)  # nothing is compiled again
     if name == "at rest":
