@@ -328,9 +328,11 @@ def with_cells(estimate: Accuracy, cells: CellErrors) -> Accuracy:
     if not cells.converged:
         return replace(estimate, error=math.nan, source=f"unknown: {UNKNOWN}", variables={}, named=dict)
     if math.isnan(estimate.error):
+        if estimate.source != unknown(STILL).source:
+            return estimate
         # Where nothing evolves there is no other error than that of the laws.
         words = f"estimate: a second run {cells.source.removeprefix('and one ')}"
-        return Accuracy(stated(cells.variables), words, cells.variables) if STILL in estimate.source else estimate
+        return Accuracy(stated(cells.variables), words, cells.variables)
     errors = dict(estimate.variables)
     for name, error in cells.variables.items():
         errors[name] = errors.get(name, 0.0) + error

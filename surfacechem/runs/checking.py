@@ -50,7 +50,7 @@ class Checked:
     """Runs in which a law or a jump destroys entropy."""
     source: str
     why: str
-    """Why the error of the first run is not known whose is not."""
+    """Why the error of one of those runs is not known whose errors are not."""
 
 
 def checked_arrays(size: int, count: int) -> tuple[dict[str, int], dict[str, StoredArray]]:

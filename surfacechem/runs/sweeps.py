@@ -158,7 +158,7 @@ class SweepAccuracy:
     source: str
     exact: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
     why: str = ""
-    """Why the error of the first run is not known whose is not."""
+    """Why the error of one of those runs is not known whose errors are not."""
 
     @property
     def known(self) -> NDArray[np.float64]:

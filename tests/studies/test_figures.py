@@ -77,7 +77,8 @@ def test_the_fits_to_published_measurements_follow_the_points():
         assert "Measured: " in picture.caption
     for curve in cure.curves:
         x, y = curve.data
-        assert np.interp(x, curve.x, curve.y) == pytest.approx([0.95], abs=0.0015)  # that of lines is a third of it
+        # 0.3 % of the time where a reaction of first order has 5 % left, and a thousandth for lines between outputs.
+        assert np.interp(x, curve.x, curve.y) == pytest.approx([0.95], abs=0.003 * 0.05 * np.log(20) + 1e-3)
         assert y == pytest.approx([0.95])
 
 
