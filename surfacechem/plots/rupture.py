@@ -25,6 +25,9 @@ def load_of(dataset: xarray.Dataset) -> str:
 
 MARKERS = "osD"
 
+EARLY = 0.01
+"""Part of the shortest lifetime in which next to nothing happens."""
+
 DENSE = 30
 """Points from which on large ones would hide each other."""
 
@@ -155,9 +158,11 @@ def _draw_survival(ax: Axes, dataset: xarray.Dataset) -> None:
         # Where all have broken a run has ended.
         values = np.nan_to_num(survival[tuple(place)])
         ax.plot(times, values, color=colour, label=style.member_name(dataset, place))
-    if logarithmic(times):
+    lifetimes = np.sort(dataset["lifetime"].values[tuple(known.T)])
+    if logarithmic(times) or style.over_decades(lifetimes):
         style.logarithmic(ax.xaxis)
-        ax.set_xlim(times[times > 0][0], dataset["time_reached"].values.max())
+        begin = max(times[times > 0][0], EARLY * lifetimes[0])
+        ax.set_xlim(begin, dataset["time_reached"].values.max())
     else:
         ax.set(xlim=(0, dataset["time_reached"].values.max()))
     ax.set(xlabel="Time [s]", ylabel="Survival $S$ [1]")

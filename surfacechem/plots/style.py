@@ -320,7 +320,8 @@ def draw_parameter(axis: XAxis | YAxis, values: xarray.DataArray, decades: bool 
 
 def _middle(values: Array) -> Array:
     """The middle of decades, which a prefix has to suit: at their upper end, nobody reads 100 pN/s in nN/s."""
-    return np.sqrt(np.abs(values[:1] * values[-1:]))
+    sizes = np.abs(values[np.isfinite(values) & (values != 0)])
+    return np.sqrt(sizes.min(keepdims=True) * sizes.max(keepdims=True)) if len(sizes) else np.zeros(1)
 
 
 def parameter_words(values: xarray.DataArray) -> str:
@@ -356,9 +357,10 @@ def owner(values: xarray.DataArray) -> str:
 def parameter_name(name: str) -> str:
     r"""The name of a swept parameter: a symbol with its subscript, or words.
 
-    >>> parameter_name("K_0"), parameter_name("mu"), parameter_name("bond_energy")
-    ('$K_{0}$', '$\\mu$', 'bond energy')
+    >>> parameter_name("K_0"), parameter_name("mu"), parameter_name("bond_energy"), parameter_name("loading_f")
+    ('$K_{0}$', '$\\mu$', 'bond energy', '$f$')
     """
+    name = name.removeprefix("loading_")
     head = name.partition("_")[0]
     return symbol(name) if len(head) == 1 or head in GREEK else name.replace("_", " ")
 
@@ -367,13 +369,13 @@ def valued(values: xarray.DataArray, place: int) -> str:
     """A value of a swept parameter with its name and unit, whose prefix is that of all values where these read well in
     it.
 
-    >>> rates = xarray.DataArray([-1e-10, 2e-9], name="rate", attrs={"units": "N s-1"})
-    >>> valued(rates, 0), valued(rates, 1)
-    ('rate = −100 pN s⁻¹', 'rate = 2000 pN s⁻¹')
+    >>> rates = xarray.DataArray([0, -1e-10, 2e-9], name="rate", attrs={"units": "N s-1"})
+    >>> [valued(rates, k) for k in range(3)]
+    ['rate = 0 pN s⁻¹', 'rate = −100 pN s⁻¹', 'rate = 2000 pN s⁻¹']
     """
     value = values.values[place]
     text, size = prefixed(unit(values), _middle(values.values))
-    if not READS_WELL[0] <= np.abs(value) / size < READS_WELL[1]:
+    if value and not READS_WELL[0] <= np.abs(value) / size < READS_WELL[1]:
         text, size = prefixed(unit(values), values.values[place : place + 1])
     return minus(f"{parameter_name(str(values.name))} = {value / size:.4g} {'' if text == '1' else text}".rstrip())
 

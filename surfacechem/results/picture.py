@@ -153,7 +153,7 @@ def shared(runs: Sequence[Trajectory], most: int) -> tuple[float, ...]:
     """Output times that all runs share: as close to each other everywhere as in the picture of the closest of them, or
     as close as ``most`` are, with what no line may pass over in any of them where there is room for that.
     """
-    pictures = [followed(run) for run in runs if len(run.result.times) > 1]  # others have ended at their start
+    pictures = [picture for picture in map(followed, runs) if len(picture.result.times) > 1]  # others end at once
     own, usual = [picture.result.times for picture in pictures], runs[0].run.times
     every = np.unique(np.concatenate([*own, usual[-1:]]))
     if len(own) < 2:

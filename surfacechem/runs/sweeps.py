@@ -96,7 +96,7 @@ def following(model: Model, plan: Plan, run: Run, changes: Mapping[str, float], 
     """The settings with output times that follow the runs of a plan, or some that are evenly spread over many, where no
     times are asked for.
     """
-    if run.picture is None or plan.until is not None or run.steady:
+    if run.picture is None or plan.load or run.steady:
         return run
     some = plan.picked(np.arange(0, plan.size, -(-plan.size // MOST_FOLLOWED)))
     try:

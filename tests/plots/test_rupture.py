@@ -65,6 +65,19 @@ def test_lifetimes_under_constant_forces_have_a_figure():
     assert points.get_ydata() == pytest.approx(exact.get_ydata(), rel=1e-11)
     assert (above.get_xlabel(), above.get_yscale()) == ("Force per bond $f$ [pN]", "log")
     assert (len(below.get_lines()), below.get_xscale()) == (3, "log")
+    assert [text.get_text() for text in below.get_legend().get_texts()] == ["$f$ = 0 pN", "$f$ = 10 pN", "$f$ = 40 pN"]
+
+
+def test_survival_is_followed_and_drawn_over_decades():
+    """That of each run to a thousandth, whose lifetimes are decades apart, though no times are asked for."""
+    forces = [0.0, 4e-11, 8e-11]
+    data = surfacechem.load("bond-lifetimes", ["run={until: 1 h}"]).sweep({"loading.f": forces}).dataset
+    _, below = plots.figure(data).axes
+    assert below.get_xscale() == "log"
+    for line, lifetime in zip(below.get_lines(), data["lifetime"].values, strict=True):
+        x, y = line.get_data()
+        t = np.geomspace(lifetime / 100, 5 * lifetime, 50)
+        assert np.interp(t, x, y) == pytest.approx(np.exp(-t / lifetime), abs=1e-3)
 
 
 def test_variables_are_drawn_over_the_load_or_over_the_rate(spectrum):
