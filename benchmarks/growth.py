@@ -20,7 +20,7 @@ import numpy as np
 import surfacechem
 from mechanisms import CASE, mechanism
 from surfacechem.runs.simulation import Simulation
-from surfacechem.solve.radau.stepper import compile_stepper
+from surfacechem.solve.radau.stepper import LOOP
 
 RESULTS = Path(__file__).parent / "results" / "growth.csv"
 REPEATS = 3
@@ -142,7 +142,7 @@ def main() -> None:
     chosen = sys.argv[1] if len(sys.argv) > 1 else ""
     before = list(csv.reader(RESULTS.open()))[1:] if RESULTS.exists() else []
     rows = [row for row in before if chosen not in row[0]]
-    compile_stepper()
+    LOOP.load()
     # Scenes are compiled anew, and what is compiled once for all is there.
     os.environ["SURFACECHEM_CACHE"] = tempfile.mkdtemp()
     last: dict[tuple[str, str], tuple[int, float]] = {}

@@ -127,7 +127,7 @@ def prepare() -> None:
     from surfacechem.solve.radau import stepper
 
     del hypothesis, mpmath, numba, pytest, scipy, xarray
-    stepper.run_batch()
+    stepper.LOOP.load()
     assert "surfacechem.model" not in sys.modules
     assert "surfacechem.laws" not in sys.modules
 

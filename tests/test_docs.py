@@ -108,7 +108,7 @@ def run_python(block: Block, namespace: dict, page: Path) -> None:
 @each_page
 def test_page_runs_from_top_to_bottom(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    stepper.compile_stepper()
+    stepper.LOOP.load()
     namespace: dict = {"__name__": page.stem}
     for block in blocks(page):
         if block.language == "yaml" and block.title:

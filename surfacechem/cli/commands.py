@@ -268,8 +268,8 @@ def solved(run: Callable[[], R], talk: bool | None, brief: bool = False, waits: 
         return found
 
     if brief:
-        stepper.load_briefly()
-    if talk is not False and (waits or not stepper.is_compiled()):
+        stepper.LOOP.load_briefly()
+    if talk is not False and (waits or not stepper.LOOP.is_compiled):
         typer.echo("compiling the stepper, once on this machine; this takes a minute or less ...", err=True)
     with following(talk) as bar:
         bar.tell("running")

@@ -64,7 +64,7 @@ def write(simulation: Simulation, plan: Plan, target: Path, options: Options) ->
     with client_at(options.cluster) as client:
         stream = simulation.stream(plan, target, resume=options.resume, part=part)
         try:
-            store = solved(lambda: stream.run(None, client, counting()), talk, waits=stream.chunks.waits)
+            store = solved(lambda: stream.run(None, client, counting()), talk, brief=True, waits=stream.chunks.waits)
             errors = solved(lambda: check(stream), talk)
         except SignalledError as error:
             (number,) = error.args
@@ -87,7 +87,7 @@ def write_file(simulation: Simulation, plan: Plan, target: Path, talk: bool | No
 
     with TemporaryDirectory(prefix=f".{target.stem}-", dir=target.parent) as folder:
         stream = simulation.stream(plan, Path(folder) / "sweep.zarr")
-        store = solved(lambda: stream.run(told=counting()), talk, waits=stream.chunks.waits)
+        store = solved(lambda: stream.run(told=counting()), talk, brief=True, waits=stream.chunks.waits)
         status, sheet = store_summary(stream, store, solved(lambda: check(stream), talk), target)
         with store.dataset as data:
             if target.suffix.lower() in TABLES:

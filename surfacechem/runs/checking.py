@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -13,9 +13,8 @@ from surfacechem.errors import InputError
 from surfacechem.format.draws import permuted
 from surfacechem.results.store import StoredArray
 from surfacechem.runs.keeping import ENDS, STATUSES, Keep, RunByRun
-from surfacechem.runs.sweeps import SweepAccuracy
+from surfacechem.runs.sweeps import SweepAccuracy, SweepSolution
 from surfacechem.solve.contract import Index
-from surfacechem.solve.run import Trajectory
 from surfacechem.tolerances import FLOOR, TINY
 
 if TYPE_CHECKING:
@@ -139,16 +138,16 @@ def _errors(
             continue
         assert done.accuracy is not None
         values = {name: [end[name] for end in done.run_ends] for name in TOLD}
-        found = np.maximum(done.accuracy.errors, _apart(stream, part, done.runs))  # an unknown error stays unknown
+        found = np.maximum(done.accuracy.errors, _apart(stream, part, done))  # an unknown error stays unknown
         yield first, part, {"error": found, **values}, done.accuracy
 
 
-def _apart(stream: Stream, part: Index, runs: Sequence[Trajectory]) -> Array:
+def _apart(stream: Stream, part: Index, done: SweepSolution) -> Array:
     """How far what is stored of runs is from the same runs by themselves: their ends, relative to these; of one that an
     event has stopped the time alone, since its state may change there by any amount in the last digit of it.
     """
     chunks = stream.chunks
-    ends = RunByRun(chunks.model, Keep(last=chunks.keep.last)).columns(runs, 0)
+    ends = RunByRun(chunks.model, Keep(last=chunks.keep.last)).columns(done.runs, 0, done.audits)
     stored, largest = chunks.columns(part), np.zeros(len(part))
     for name in ("time_reached", *(f"{name}_last" for name in chunks.keep.last)):
         size = np.maximum(np.abs(ends[name]), FLOOR * np.nanmax(np.abs(ends[name]), initial=TINY))

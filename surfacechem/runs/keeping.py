@@ -173,10 +173,14 @@ class RunByRun:
         self.model, self.keep = model, keep
         self.reasons = reason_table(model.system)
 
-    def columns(self, runs: Sequence[Trajectory | None], times: int) -> Columns:
-        """What is kept of runs, None for one that was refused, with so many output times."""
+    def columns(self, runs: Sequence[Trajectory | None], times: int, audits: Sequence[Audit] = ()) -> Columns:
+        """What is kept of runs, None for one that was refused, with so many output times; audited anew, or as given."""
         refused = {"status": STATUSES.index("refused"), "reason": self.reasons.index(REFUSED), "steps": 0}
-        rows = [refused if run is None else self._kept(run, times) for run in runs]
+        books = audits or [None if run is None else audit(run) for run in runs]
+        rows = [
+            refused if run is None or own is None else self._kept(run, own, times)
+            for run, own in zip(runs, books, strict=True)
+        ]
         kinds = {name: kind for name, (kind, _, _) in described(self.model.system, self.keep).items()}
         found: Columns = {name: np.array([row.get(name, np.nan) for row in rows], kind) for name, kind in kinds.items()}
         for name in self.keep.series:
@@ -184,9 +188,9 @@ class RunByRun:
             found[name] = np.array([row.get(name, nothing) for row in rows])
         return found
 
-    def _kept(self, run: Trajectory, times: int) -> dict[str, Any]:
+    def _kept(self, run: Trajectory, books: Audit, times: int) -> dict[str, Any]:
         result, keep = run.result, self.keep
-        row = end_of(run, audit(run)) | {"status": STATUSES.index(run.status), "reason": self._code(run.reason)}
+        row = end_of(run, books) | {"status": STATUSES.index(run.status), "reason": self._code(run.reason)}
         names = [state.name for state in self.model.system.states] + [*self.model.system.output_columns]
         end = np.array([result.t]), result.y[None], result.ydot[None]
         last = dict(zip(names, [*result.y, *self.model.evaluate(result, *end)[0]], strict=True)) if keep.last else {}

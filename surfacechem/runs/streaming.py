@@ -82,7 +82,7 @@ class ChunkRuns:
     def waits(self) -> bool:
         """Whether the loop that steps eight runs at once has to be compiled before the first of them."""
         laned = any(way.problem.explicit and not way.jumps for way in self.ways)
-        return laned and self.model.program.lanes is not None and not lane_batch.is_compiled()
+        return laned and self.model.program.lanes is not None and not lane_batch.LOOP.is_compiled
 
     @cached_property
     def piece(self) -> int:

@@ -7,11 +7,11 @@ from surfacechem.solve.radau import stepper
 
 def main() -> None:
     """Compile what is not compiled yet and keep it."""
-    if stepper.is_compiled():
+    if stepper.LOOP.is_compiled:
         return
     print("compiling the stepper, once on this machine ...", end=" ", flush=True)
     start = time.perf_counter()
-    stepper.compile_stepper()
+    stepper.LOOP.load()
     print(f"{time.perf_counter() - start:.0f} s")
 
 

@@ -118,7 +118,7 @@ class TestRun:
     def test_the_compile_is_announced(self, call, monkeypatch):
         from surfacechem.solve.radau import stepper
 
-        monkeypatch.setattr(stepper, "is_compiled", lambda: False)
+        monkeypatch.setattr(stepper.Loop, "is_compiled", False)
         assert "compiling the stepper, once" in call("run", "bonding.yaml").stderr
         assert call("run", "bonding.yaml", "-q").stderr == ""
 

@@ -147,9 +147,9 @@ def test_what_does_not_fit_is_replaced(start, tmp_path: Path) -> None:
 @pytest.fixture(scope="module")
 def kept(tmp_path_factory):
     """A folder of the stepper of this machine: its own code and Numba's."""
-    stepper.compile_stepper()
-    folder = tmp_path_factory.mktemp("cache") / stepper._folder().name
-    shutil.copytree(stepper._folder(), folder)
+    stepper.LOOP.load()
+    folder = tmp_path_factory.mktemp("cache") / stepper.LOOP.folder.name
+    shutil.copytree(stepper.LOOP.folder, folder)
     return folder
 
 
@@ -183,12 +183,11 @@ def cut_off(kept: Path, tmp_path: Path) -> Path:
 def test_code_that_is_cut_off_is_not_called_but_made_anew(cut_off: Path, monkeypatch) -> None:
     made = []
     monkeypatch.setenv("SURFACECHEM_CACHE", str(cut_off.parent))
-    monkeypatch.setattr(stepper._Loaded, "kernel", None)
-    monkeypatch.setattr(stepper, "_compiled", lambda: made.append(stepper._folder()) or len)
-    stepper.load_briefly()
-    assert stepper._Loaded.kernel is None
-    assert not stepper.is_compiled()
-    assert stepper.run_batch() is len
+    loop = stepper.Loop(stepper.sources(), lambda: None)
+    monkeypatch.setattr(loop, "_compiled", lambda: made.append(loop.folder) or len)
+    loop.load_briefly()
+    assert not loop.is_compiled
+    assert loop.load() is len
     assert made == [cut_off]
 
 

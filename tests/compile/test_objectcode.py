@@ -14,8 +14,8 @@ from surfacechem.solve.radau import stepper
 
 @pytest.fixture(scope="module")
 def bare():
-    stepper.compile_stepper()
-    kernel = objectcode.load(stepper._folder())
+    stepper.LOOP.load()
+    kernel = objectcode.load(stepper.LOOP.folder)
     if kernel is None:
         pytest.skip("the code of this machine's stepper cannot be loaded by itself")
     return kernel
@@ -26,7 +26,7 @@ def test_the_same_bits(bare, name, monkeypatch):
     simulation = surfacechem.load(name)
     run = replace(simulation.case.run, rtol=1e-7, atol=None)
     usual = simulation.model.solve(run).result
-    monkeypatch.setattr(stepper, "run_batch", lambda: bare)
+    monkeypatch.setattr(stepper.LOOP, "_kernel", bare)
     again = simulation.model.solve(run).result
     assert again.counters == usual.counters
     np.testing.assert_array_equal(again.outputs, usual.outputs)

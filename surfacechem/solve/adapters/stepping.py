@@ -127,7 +127,7 @@ class SteppingSolver(Solver):
     """Whether x holds the algebraic variables too."""
 
     def prepare(self) -> None:
-        stepper.compile_stepper()  # consistent states are found by it
+        stepper.LOOP.load()  # consistent states are found by it
 
     @abstractmethod
     def begin(self, view: View, t: float, end: float, y: Array, ydot: Array) -> Method:

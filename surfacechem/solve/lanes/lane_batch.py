@@ -1,20 +1,16 @@
 """Runs of one model through the steps of eight at once, and one at a time where these steps are not for them."""
 
-import threading
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from surfacechem.compile.cache import compile_kernel, is_filled, kernel_folder
 from surfacechem.solve.contract import Array, Problem
 from surfacechem.solve.lanes.layout import LEFT, MEMORY, SIZES
 from surfacechem.solve.radau import stepper
 from surfacechem.solve.radau.solver import Room, batch_of, solve_arrays
 from surfacechem.solve.radau.stepper import END
-
-_LOCK = threading.Lock()
 
 
 def solve_batch(problem: Problem, *columns: Array, room: Room | None = None) -> Any:
@@ -37,7 +33,7 @@ def solve_batch(problem: Problem, *columns: Array, room: Room | None = None) -> 
 def run(batch: Any) -> None:
     """The runs of a batch, eight at once, with a memory of their own: threads may do so at the same time."""
     memory = np.zeros(_words(tuple(batch.sizes.tolist())), np.int64)
-    _kernel()(0, len(batch.counts), memory, tuple(batch))
+    LOOP.load()(0, len(batch.counts), memory, tuple(batch))
 
 
 @lru_cache(maxsize=64)
@@ -45,34 +41,17 @@ def _words(sizes: tuple[int, ...]) -> int:
     return stepper.words_of(dict(zip(SIZES, sizes, strict=True)), MEMORY)
 
 
-_SOURCES = ("vector", "layout", "lane_step", "lane_guards", "lane_run")
-
-
-class _Loaded:
-    kernel: Any = None
-
-
-def _kernel() -> Any:
-    """The compiled loop: compiled once per machine, then loaded from the cache."""
-    if _Loaded.kernel is None:
-        with _LOCK:
-            _Loaded.kernel = _Loaded.kernel or _compiled()
-    return _Loaded.kernel
-
-
-def is_compiled() -> bool:
-    """Whether the loop can be loaded instead of compiled (which takes some ten seconds, once)."""
-    return _Loaded.kernel is not None or is_filled(_folder())
-
-
-def _folder() -> Path:
-    here = Path(__file__).parent
-    own = [here / f"{name}.py" for name in _SOURCES]
-    return kernel_folder([*stepper.sources(), here.parent.parent / "compile" / "vectors.py", *own])
-
-
-def _compiled() -> Any:
+def _run_lanes() -> Any:
     from surfacechem.solve.lanes.lane_run import run_lanes
-    from surfacechem.solve.radau.work import PARTS
 
-    return compile_kernel(run_lanes, stepper.signature(), _folder(), PARTS)
+    return run_lanes
+
+
+def _sources() -> list[Path]:
+    here = Path(__file__).parent
+    own = [here / f"{name}.py" for name in ("vector", "layout", "lane_step", "lane_guards", "lane_run")]
+    return [*stepper.sources(), here.parent.parent / "compile" / "vectors.py", *own]
+
+
+LOOP = stepper.Loop(_sources(), _run_lanes, brief=True)
+"""The compiled loop over eight runs at once."""

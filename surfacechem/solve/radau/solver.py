@@ -124,7 +124,7 @@ class Radau(Solver):
     name = "radau"
 
     def prepare(self) -> None:
-        stepper.compile_stepper()
+        stepper.LOOP.load()
 
     def solve(self, problem: Problem) -> Result:
         return _whole(problem, _run_one(problem), 0)

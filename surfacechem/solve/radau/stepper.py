@@ -6,7 +6,7 @@ Importing this module imports neither Numba nor the kernel.
 import math
 import threading
 from collections import namedtuple
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -195,7 +195,6 @@ _SOURCES = (
     "outputs",
     "driver",
 )
-_LOCK = threading.Lock()
 
 
 def sources() -> list[Path]:
@@ -204,16 +203,48 @@ def sources() -> list[Path]:
     return [here / "coefficients.json", *(here / f"{name}.py" for name in _SOURCES)]
 
 
-def _folder() -> Path:
-    return kernel_folder(sources())
+class Loop:
+    """A compiled loop over a batch of runs: compiled once per machine, then loaded when it is first needed."""
+
+    def __init__(self, sources: Sequence[Path], written: Callable[[], Any], brief: bool = False) -> None:
+        self._sources, self._written, self._brief = sources, written, brief
+        self._kernel: Any = None
+        self._lock = threading.Lock()
+
+    @property
+    def folder(self) -> Path:
+        """Where its code is kept."""
+        return kernel_folder(self._sources)
+
+    @property
+    def is_compiled(self) -> bool:
+        """Whether it can be loaded instead of compiled (which takes some ten seconds, once)."""
+        return self._kernel is not None or is_filled(self.folder)
+
+    def load(self) -> Any:
+        """The compiled function; without its compiler where each call takes long beside what that costs."""
+        if self._kernel is None:
+            with self._lock:
+                self._kernel = self._kernel or (self._brief and objectcode.load(self.folder)) or self._compiled()
+        return self._kernel
+
+    def load_briefly(self) -> None:
+        """Load it without its compiler where that can be: ready sooner, slower to call; for a process of few runs."""
+        with self._lock:
+            self._kernel = self._kernel or objectcode.load(self.folder)
+
+    def _compiled(self) -> Any:
+        from surfacechem.solve.radau.work import PARTS
+
+        kernel = compile_kernel(self._written(), _signature(), self.folder, PARTS)
+        # A batch of no runs: Numba looks longer at the types of its first arguments than a brief run takes.
+        nothing = (np.zeros((len(SIZES),) * axes, dtype) if axes else dtype(0) for dtype, axes in BATCH.values())
+        kernel(0, 0, np.zeros(0, np.int64), tuple(nothing))
+        objectcode.keep(kernel, self.folder)
+        return kernel
 
 
-def is_compiled() -> bool:
-    """Whether the stepper can be loaded instead of compiled (which takes some ten seconds, once)."""
-    return _Loaded.kernel is not None or is_filled(_folder())
-
-
-def signature() -> Any:
+def _signature() -> Any:
     """Of a compiled loop: the first run and the one behind the last, memory, and the batch."""
     from numba import from_dtype, types
 
@@ -223,34 +254,20 @@ def signature() -> Any:
     return types.void(types.int64, types.int64, types.int64[::1], batch)
 
 
-def _compiled() -> Any:
+def _run_batch() -> Any:
     from surfacechem.solve.radau.driver import run_batch
-    from surfacechem.solve.radau.work import PARTS
 
-    kernel = compile_kernel(run_batch, signature(), _folder(), PARTS)
-    # A batch of no runs: Numba looks longer at the types of its first arguments than a brief run takes.
-    nothing = (np.zeros((len(SIZES),) * axes, dtype) if axes else dtype(0) for dtype, axes in BATCH.values())
-    kernel(0, 0, np.zeros(0, np.int64), tuple(nothing))
-    objectcode.keep(kernel, _folder())
-    return kernel
+    return run_batch
 
 
-class _Loaded:
-    kernel: Any = None
-
-
-def run_batch() -> Any:
-    """The compiled loop over a batch of runs, or of states to be made consistent."""
-    if _Loaded.kernel is None:
-        with _LOCK:
-            _Loaded.kernel = _Loaded.kernel or _compiled()
-    return _Loaded.kernel
+LOOP = Loop(sources(), _run_batch)
+"""Runs step by step, or states to be made consistent."""
 
 
 def run(batch: Any, first: int, last: int) -> None:
     """Run some of a batch with a memory of their own: threads may do so with different runs at the same time."""
     memory = np.zeros(_words_of(tuple(batch.sizes.tolist())), np.int64)
-    run_batch()(first, last, memory, tuple(batch))
+    LOOP.load()(first, last, memory, tuple(batch))
 
 
 class Repeated:
@@ -259,20 +276,7 @@ class Repeated:
     def __init__(self, batch: Any) -> None:
         memory = np.zeros(_words_of(tuple(batch.sizes.tolist())), np.int64)
         self._arguments = 0, len(batch.ends), memory, tuple(batch)
-        self._kernel = run_batch()
+        self._kernel = LOOP.load()
 
     def __call__(self) -> None:
         self._kernel(*self._arguments)
-
-
-def load_briefly() -> None:
-    """Load the stepper without its compiler where that can be: ready sooner, slower to call; for a process of few
-    runs.
-    """
-    with _LOCK:
-        _Loaded.kernel = _Loaded.kernel or objectcode.load(_folder())
-
-
-def compile_stepper() -> None:
-    """Compile the stepper now, as a set-up step, or load it if that has been done."""
-    run_batch()
