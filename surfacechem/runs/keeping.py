@@ -176,11 +176,8 @@ class RunByRun:
     def columns(self, runs: Sequence[Trajectory | None], times: int, audits: Sequence[Audit] = ()) -> Columns:
         """What is kept of runs, None for one that was refused, with so many output times; audited anew, or as given."""
         refused = {"status": STATUSES.index("refused"), "reason": self.reasons.index(REFUSED), "steps": 0}
-        books = audits or [None if run is None else audit(run) for run in runs]
-        rows = [
-            refused if run is None or own is None else self._kept(run, own, times)
-            for run, own in zip(runs, books, strict=True)
-        ]
+        books = iter(audits or (audit(run) for run in runs if run is not None))
+        rows = [refused if run is None else self._kept(run, next(books), times) for run in runs]
         kinds = {name: kind for name, (kind, _, _) in described(self.model.system, self.keep).items()}
         found: Columns = {name: np.array([row.get(name, np.nan) for row in rows], kind) for name, kind in kinds.items()}
         for name in self.keep.series:
