@@ -34,8 +34,10 @@ if TYPE_CHECKING:
     from surfacechem.runs.simulation import Simulation
 
 
-RUNS_OF_A_CHUNK, OF_A_SLOW_ONE = 2**14, 2**9
-"""Runs of a chunk at most: a second or two of the compiled loop. Of runs that are looked at one by one fewer."""
+EXPLICIT_RUNS, RUNS_OF_A_CHUNK, OF_A_SLOW_ONE = 2**16, 2**14, 2**9
+"""Runs of a chunk at most, of those that take explicit steps and of others: a second or two of the compiled loop. Of runs
+that are looked at one by one fewer.
+"""
 
 RUNS_OF_A_PIECE = 2**11
 """Runs that one thread takes at a time, so that all of them share a chunk."""
@@ -79,10 +81,14 @@ class ChunkRuns:
         self.arrays = arrays if self.ways else None
 
     @property
+    def explicit(self) -> bool:
+        """Whether runs take explicit steps and do not jump."""
+        return any(way.problem.explicit and not way.jumps for way in self.ways)
+
+    @property
     def waits(self) -> bool:
         """Whether the loop that steps eight runs at once has to be compiled before the first of them."""
-        laned = any(way.problem.explicit and not way.jumps for way in self.ways)
-        return laned and self.model.program.lanes is not None and not lane_batch.LOOP.is_compiled
+        return self.explicit and self.model.program.lanes is not None and not lane_batch.LOOP.is_compiled
 
     @cached_property
     def piece(self) -> int:
@@ -311,7 +317,7 @@ def _layout(chunks: ChunkRuns, job: Job) -> Layout:
         attributes = Column(name, (), None, q.unit, q.long_name).attributes
         variables[name] = StoredArray("float64", (*runs, "time"), attributes)
     more, beside = checked_arrays(plan.size, chunks.checked)
-    at_once = RUNS_OF_A_CHUNK if chunks.arrays else OF_A_SLOW_ONE
+    at_once = EXPLICIT_RUNS if chunks.explicit else RUNS_OF_A_CHUNK if chunks.arrays else OF_A_SLOW_ONE
     return Layout(sizes | more, runs, variables, beside, coordinates, _attributes(chunks, job), at_once)
 
 

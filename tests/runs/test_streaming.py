@@ -29,11 +29,13 @@ pytestmark = pytest.mark.around
 
 K_0 = "interface.potential.bond-energy.K_0"
 ENDS = {"last": ["T", "phi"]}
+SIZES = "EXPLICIT_RUNS", "RUNS_OF_A_CHUNK"
 
 
 @pytest.fixture(autouse=True)
 def small_chunks(monkeypatch):
-    monkeypatch.setattr(streaming, "RUNS_OF_A_CHUNK", 16)
+    for name in SIZES:
+        monkeypatch.setattr(streaming, name, 16)
 
 
 def case(name="exothermic", keep=None, over=None, **more):
@@ -60,7 +62,8 @@ def whole(tmp_path_factory):
     """A store that was written at once, by one thread."""
     path = tmp_path_factory.mktemp("whole") / "o.zarr"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(streaming, "RUNS_OF_A_CHUNK", 16)
+        for name in SIZES:
+            patch.setattr(streaming, name, 16)
         stored(path)
     return path
 
@@ -165,7 +168,7 @@ SCRIPT = """
 import sys, time
 from surfacechem.runs import checking, streaming
 from surfacechem.runs.checking import check
-streaming.RUNS_OF_A_CHUNK = 16
+streaming.EXPLICIT_RUNS = 16
 import surfacechem
 from surfacechem.results.store import Store
 write = Store.write
@@ -369,6 +372,7 @@ def test_an_error_that_is_unknown_and_an_end_that_is_no_number_count_for_no_smal
         accuracy=SimpleNamespace(errors=np.array([np.nan, 1e-9, 1e-9, 1e-9]), source="", why=""),
         run_ends=[dict.fromkeys(checking.TOLD, 0.0)] * 4,
         runs=[],
+        audits=[],
     )
     simulation, plan = (SimpleNamespace(**{name: lambda *_: done}) for name in ("sweep_plan", "picked"))
     simulation.case = SimpleNamespace(run=Run((0.0, 1.0)))
