@@ -229,7 +229,9 @@ def _pieced(x: Array, edge: float, near: Callable[[Array], Array], far: Callable
     """Two formulas, below an edge and from there on, each evaluated where it holds alone."""
     x = np.asarray(x)
     found, below = np.empty(x.shape), x < edge
-    found[below], found[~below] = near(x[below]), far(x[~below])
+    for formula, own in ((near, below), (far, ~below)):
+        if own.any():  # to form nothing takes as long as to form a few
+            found[own] = formula(x[own])
     return found
 
 

@@ -81,11 +81,11 @@ class SharedLoadCluster(Cluster):
             left = scaled_expint(1, x_0 + w)
             return w - np.log(left), 1.0 / (left * (x_0 + w))
 
-        early, nothing = scaled < 0.5 * whole, np.zeros_like(scaled)
-        first = increasing_root(elapsed, np.where(early, scaled, 0.0), nothing, nothing + max(1.0, x_0) * 50.0)
-        left = -np.log(np.where(early, 0.5, np.maximum(1.0 - scaled / whole, 2.0**-60)) * whole)
-        last = increasing_root(log_left, left, nothing, np.maximum(left, 1.0) + 1.0)
-        exponent = x_0 + np.where(early, first, last)
+        early, exponent = scaled < 0.5 * whole, np.full_like(scaled, x_0)
+        nothing = np.zeros(np.count_nonzero(early))
+        exponent[early] += increasing_root(elapsed, scaled[early], nothing, nothing + max(1.0, x_0) * 50.0)
+        left = -np.log(np.maximum(1.0 - scaled[~early] / whole, 2.0**-60) * whole)
+        exponent[~early] += increasing_root(log_left, left, np.zeros_like(left), np.maximum(left, 1.0) + 1.0)
         phi = np.where(t < self.end_time, self.load / exponent, 0.0)
         return {"phi": phi, "f": self.t_n / (self.n_c * phi)}
 
