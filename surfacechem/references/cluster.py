@@ -82,10 +82,15 @@ class SharedLoadCluster(Cluster):
             return w - np.log(left), 1.0 / (left * (x_0 + w))
 
         early, exponent = scaled < 0.5 * whole, np.full_like(scaled, x_0)
-        nothing = np.zeros(np.count_nonzero(early))
-        exponent[early] += increasing_root(elapsed, scaled[early], nothing, nothing + max(1.0, x_0) * 50.0)
+        # As 1/(x + 1) < e^x E_1(x) < 1/x, and dw > (1 - e^-w)/x_0 before, both start close below what is sought.
+        gone = scaled[early]
+        nothing = np.zeros_like(gone)
+        exponent[early] += increasing_root(
+            elapsed, gone, nothing, nothing + max(1.0, x_0) * 50.0, -np.log1p(-np.minimum(x_0 * gone, 0.5))
+        )
         left = -np.log(np.maximum(1.0 - scaled[~early] / whole, 2.0**-60) * whole)
-        exponent[~early] += increasing_root(log_left, left, np.zeros_like(left), np.maximum(left, 1.0) + 1.0)
+        most = np.maximum(left, 1.0) + 1.0
+        exponent[~early] += increasing_root(log_left, left, np.zeros_like(left), most, left - np.log(x_0 + most))
         phi = np.where(t < self.end_time, self.load / exponent, 0.0)
         return {"phi": phi, "f": self.t_n / (self.n_c * phi)}
 

@@ -83,6 +83,20 @@ def _put_margins(w: Any, x: float) -> None:
 
 
 @compiled
+def _put_last_margins(w: Any) -> None:
+    """The same at the end of each step, by the state that it ends with."""
+    for m in range(w.n_margins):
+        put(w.margin_earlier[m], lanes(w.margin_before[m]))
+        put(w.margin_before[m], lanes(w.margin[m]))
+    put(w.inputs[0], lanes(w.t) + lanes(w.h))
+    for m in range(w.n):
+        put(w.inputs[1 + m], lanes(w.y_new[m]))
+    evaluate(w, MARGINS, w.margin)
+    for m in range(w.n_margins):
+        put(w.margin_end[m], lanes(w.margin[m]))
+
+
+@compiled
 def _may_meet(w: Any, good: Any) -> Any:
     """Where guards have to be looked at closely: one is at zero at a quarter of the step, or no farther from it than
     twice what it bends by from a quarter to the next. Between two points a parabola dips by an eighth of that.
@@ -92,7 +106,10 @@ def _may_meet(w: Any, good: Any) -> Any:
         put(w.nearest[m], lanes(w.side[m]) * lanes(w.margin_first[m]))
         put(w.bend[m], 0.0)
     for quarter in range(1, 5):
-        _put_margins(w, 0.25 * quarter)
+        if quarter < 4:
+            _put_margins(w, 0.25 * quarter)
+        else:
+            _put_last_margins(w)
         for m in range(w.n_margins):
             value = lanes(w.margin[m])
             put(w.nearest[m], smaller(lanes(w.nearest[m]), lanes(w.side[m]) * value))
@@ -196,10 +213,6 @@ def meet(w: Any, good: Any) -> None:
         _scan(w, close)
     met = good & (lanes(w.onto) < 0.5) & (lanes(w.high) > 0.0)
     put(w.met, 1.0)
-    put(w.inputs[0], lanes(w.t) + lanes(w.h))
-    for m in range(w.n):
-        put(w.inputs[1 + m], lanes(w.y_new[m]))
-    evaluate(w, MARGINS, w.margin_end)
     if any_lane(met):
         _locate(w, met)
     for m in range(w.n_margins):

@@ -18,6 +18,7 @@ from surfacechem.solve.lanes.lane_step import (
     eighth_root,
     find_stiff,
     interpolate,
+    interpolate_accounts,
     larger,
     look,
     norm_of,
@@ -189,6 +190,18 @@ def _choose_sizes(w: Any) -> None:
 
 
 @compiled
+def _outputs_inside(w: Any) -> bool:
+    """Whether a run has an output before the end of its step."""
+    found = False
+    for lane in range(LANES):
+        i = w.run[lane]
+        if i >= 0:
+            k, times = w.counts[i, OUTPUTS], w.times[row_of(w.times, i)]
+            found = found or (k < times.shape[0] and times[k] < w.t[lane] + w.h[lane])
+    return found
+
+
+@compiled
 def _write_outputs(w: Any, lane: int, t_new: float) -> None:
     """The outputs up to the end of the step."""
     i = w.run[lane]
@@ -331,7 +344,8 @@ def _step(w: Any) -> None:
     if any_lane(good):
         find_stiff(w)
         interpolate(w)
-        look(w, good)
+        if not look(w, good) and _outputs_inside(w):
+            interpolate_accounts(w)
         if w.n_margins > 0:
             meet(w, good & (lanes(w.missed) == 1.0))
     for lane in range(LANES):

@@ -98,10 +98,10 @@ def norm_of(w: Any, row: Any) -> Any:
 
 
 @compiled
-def _evaluate_stage(w: Any, i: int, change: Any) -> None:
-    """Rates of a stage, by those of the stages before it."""
+def _evaluate_stage(w: Any, i: int, columns: int, change: Any) -> None:
+    """Rates of a stage, by those of the stages before it, and the changes up to it of the first so many columns."""
     h = lanes(w.h)
-    _change(i, w.k.ctypes.data, LANES * w.columns, change.ctypes.data)
+    _change(i, w.k.ctypes.data, LANES * w.columns, LANES * columns, change.ctypes.data)
     put(w.inputs[0], lanes(w.t) + EXPLICIT_NODES[i] * h)
     for m in range(w.n):
         put(w.inputs[1 + m], lanes(w.y[m]) + h * lanes(change[m]))
@@ -135,11 +135,12 @@ def _ledger_norms(w: Any) -> Any:
 @compiled
 def try_step(w: Any) -> None:
     """All stages of a step of each lane, and the norms of their errors."""
-    for i in range(1, STAGES_OF_DENSE):
-        _evaluate_stage(w, i, w.change_before if i == END_STAGE - 1 else w.change)
-    h = lanes(w.h)
-    _errors(0, w.k.ctypes.data, LANES * w.columns, w.coarse.ctypes.data)
-    _errors(1, w.k.ctypes.data, LANES * w.columns, w.fine.ctypes.data)
+    for i in range(1, END_STAGE):
+        _evaluate_stage(w, i, w.n, w.change_before if i == END_STAGE - 1 else w.change)
+    _evaluate_stage(w, END_STAGE, w.columns, w.change)
+    h, every = lanes(w.h), LANES * w.columns
+    _errors(0, w.k.ctypes.data, every, every, w.coarse.ctypes.data)
+    _errors(1, w.k.ctypes.data, every, every, w.fine.ctypes.data)
     largest, second = same(0.0), same(0.0)
     blank = same(0.0)
     for m in range(w.columns):
@@ -189,11 +190,20 @@ def find_stiff(w: Any) -> None:
 
 @compiled
 def interpolate(w: Any) -> None:
-    """The polynomials of the steps."""
+    """The polynomials of the states in the steps."""
     for i in range(STAGES_OF_DENSE, LAST_STAGE + 1):
-        _evaluate_stage(w, i, w.rates)
+        _evaluate_stage(w, i, w.n, w.rates)
     for d in range(ORDER):
-        _coefficients(d, w.k.ctypes.data, LANES * w.columns, w.polynomial[d].ctypes.data)
+        _coefficients(d, w.k.ctypes.data, LANES * w.columns, LANES * w.n, w.polynomial[d].ctypes.data)
+
+
+@compiled
+def interpolate_accounts(w: Any) -> None:
+    """The polynomials of the accounts, of steps that have those of the states."""
+    if w.n_ledger > 0:
+        for d in range(ORDER):
+            k, polynomial = w.k[0, w.n].ctypes.data, w.polynomial[d, w.n].ctypes.data
+            _coefficients(d, k, LANES * w.columns, LANES * w.n_ledger, polynomial)
 
 
 @compiled
@@ -252,8 +262,9 @@ def _miss(w: Any, x: Any, looks: Any) -> None:
 
 
 @compiled
-def look(w: Any, good: Any) -> None:
-    """The fraction of each step at which it has missed something, one where it has not, as far as the points tell.
+def look(w: Any, good: Any) -> bool:
+    """The fraction of each step at which it has missed something, one where it has not, as far as the points tell;
+    whether there are any.
 
     Beside the ends of a segment, and of steps that an event has cut short, there may be something narrow.
     """
@@ -261,11 +272,14 @@ def look(w: Any, good: Any) -> None:
     put(w.missed, 1.0)
     looks = good & (h > BRIEF * spacing)
     begins, ends = where(looks, lanes(w.begins), 0.0), where(looks, larger(lanes(w.last), lanes(w.onto)), 0.0)
+    points = where(looks, h / spacing, 0.0)
+    if not any_lane((begins > 0.5) | (ends > 0.5) | (points >= 1.0)):
+        return False
+    interpolate_accounts(w)
     if any_lane(begins > 0.5):
         # From the narrowest outwards: the first that differs says how short the step has to be.
         for k in range(DECADES, 0, -1):
             _miss(w, same(10.0**-k), begins)
-    points = where(looks, h / spacing, 0.0)
     i = 0.0
     while any_lane(points >= i + 1.0):
         # Of so many whole spacings each has one in its middle.
@@ -275,3 +289,4 @@ def look(w: Any, good: Any) -> None:
     if any_lane(ends > 0.5):
         for k in range(1, DECADES + 1):
             _miss(w, same(1.0 - 10.0**-k), ends)
+    return True

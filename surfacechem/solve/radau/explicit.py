@@ -55,7 +55,7 @@ _at_nodes = weighted_sums(DENSE)
 def _evaluate_stage(w: Any, h: float, i: int, change: Any) -> None:
     """Rates of a stage, by those of the stages before it."""
     inputs, y, k = w.inputs, w.y, w.k
-    _change(i, k.ctypes.data, w.n, change.ctypes.data)
+    _change(i, k.ctypes.data, w.n, w.n, change.ctypes.data)
     inputs[0] = w.base + (w.tau + EXPLICIT_NODES[i] * h)
     for m in range(w.n):
         inputs[1 + m] = y[m] + h * change[m]
@@ -66,8 +66,8 @@ def _evaluate_stage(w: Any, h: float, i: int, change: Any) -> None:
 def _error_of_step(w: Any, h: float) -> float:
     """The norm of the local error from the rates of all stages."""
     n, errors, change, largest, second = w.n, w.parts, w.slopes[0], 0.0, 0.0
-    _errors(0, w.k.ctypes.data, n, errors[0].ctypes.data)
-    _errors(1, w.k.ctypes.data, n, errors[4].ctypes.data)
+    _errors(0, w.k.ctypes.data, n, n, errors[0].ctypes.data)
+    _errors(1, w.k.ctypes.data, n, n, errors[4].ctypes.data)
     for m in range(n):
         size = max(abs(w.y[m]), abs(w.y[m] + h * change[m]))
         rate = h / max(w.atol[m] + w.rtol * size, TINY)
@@ -86,7 +86,7 @@ def _interpolate(w: Any, h: float) -> bool:
         _evaluate_stage(w, h, i, w.parts[0])
     w.residuals += LAST_STAGE + 1 - STAGES_OF_DENSE
     for i in range(7):
-        _at_nodes(i, w.k.ctypes.data, n, z[i].ctypes.data)
+        _at_nodes(i, w.k.ctypes.data, n, n, z[i].ctypes.data)
     total = 0.0
     for i in range(7):
         for m in range(n):

@@ -237,9 +237,10 @@ class Loop:
         from surfacechem.solve.radau.work import PARTS
 
         kernel = compile_kernel(self._written(), _signature(), self.folder, PARTS)
-        # A batch of no runs: Numba looks longer at the types of its first arguments than a brief run takes.
-        nothing = (np.zeros((len(SIZES),) * axes, dtype) if axes else dtype(0) for dtype, axes in BATCH.values())
-        kernel(0, 0, np.zeros(0, np.int64), tuple(nothing))
+        if not self._brief:
+            # A batch of no runs: Numba looks longer at the types of its first arguments than a brief run takes.
+            nothing = (np.zeros((len(SIZES),) * axes, dtype) if axes else dtype(0) for dtype, axes in BATCH.values())
+            kernel(0, 0, np.zeros(0, np.int64), tuple(nothing))
         objectcode.keep(kernel, self.folder)
         return kernel
 

@@ -178,20 +178,21 @@ def combine(
 
 
 def weighted_sums(table: Any) -> Any:
-    """A function that takes a row of this table times the rows of a matrix, given by its address, into another.
+    """A function that takes a row of this table times the rows of a matrix, given by its address, of some width, of which
+    it takes the first so many columns, into another.
 
     The factors stand in the code and those that are zero nowhere, so it takes half the time of :func:`combine`.
     """
 
     @_intrinsic
-    def sums(_context: Any, _row: Any, _values: Any, _states: Any, _out: Any) -> Any:
-        signature = types.void(*(types.intp,) * 4)
+    def sums(_context: Any, _row: Any, _values: Any, _width: Any, _columns: Any, _out: Any) -> Any:
+        signature = types.void(*(types.intp,) * 5)
 
         def generate(_context: Any, builder: Any, _signature: Any, args: Any) -> Any:
-            row, values, states, out = args
+            row, values, width, columns, out = args
 
             def place(start: Any, row: int, column: Any) -> Any:
-                entry = builder.add(builder.mul(_WORD(row), states), column)
+                entry = builder.add(builder.mul(_WORD(row), width), column)
                 return builder.gep(builder.inttoptr(start, _NUMBER.as_pointer()), [entry])
 
             done = builder.append_basic_block("done")
@@ -200,7 +201,7 @@ def weighted_sums(table: Any) -> Any:
                 block = builder.append_basic_block()
                 cases.add_case(_WORD(i), block)
                 builder.position_at_end(block)
-                with _strided_loop(builder, _WORD(0), states, _WORD(WIDTH), inc=True) as (first, _):
+                with _strided_loop(builder, _WORD(0), columns, _WORD(WIDTH), inc=True) as (first, _):
                     # Two sums, of which neither waits for the other.
                     totals = [_Constant(_VECTOR, [0.0] * WIDTH)] * 2
                     for k, j in enumerate(np.flatnonzero(factors)):
