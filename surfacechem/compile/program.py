@@ -10,8 +10,8 @@ import hashlib
 import pickle
 import platform
 import threading
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cache, cached_property, lru_cache, partial
 from importlib.metadata import version
 from pathlib import Path
@@ -121,6 +121,11 @@ class Chain:
 PIECE = 400
 """Expressions that are compiled at a time where there are many alike."""
 
+OPTIMISED = 200
+"""Expressions from which on they are not optimised: that takes ten times as long as to make code of them, for code that
+is faster by a quarter or less.
+"""
+
 _ONE_THREAD = threading.RLock()
 
 MANY = 50
@@ -137,7 +142,9 @@ class Program:
     n_margins: int
     residual: Function
     jacobian: Function
-    """dG/dy (row-major), then dG/dydot, of the core; then of its border and of the bands of the chains."""
+    """dG/dy (row-major), then dG/dydot, of the core; then of its border and of the bands of the chains. Of many only
+    those that may not be zero, whose places :attr:`nonzeros` has.
+    """
     ledger: Function | None
     """Rates of the quadratures integrated beside the state."""
     margins: Function | None
@@ -146,6 +153,8 @@ class Program:
     """Per state: no equation contains its derivative."""
     filler: Filler | None = None
     chains: tuple[Chain, ...] = ()
+    nonzeros: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
+    """Places of the derivatives that are formed, in their order; none where all are."""
     groups: tuple[int, ...] = ()
     """Per quadrature: errors of a group are measured by its largest, 0 to 2; -1 for what steps need not serve."""
     solved: Callable[[], Function | None] = lambda: None
@@ -164,7 +173,8 @@ class Program:
         """What the stepper reads of a program: its sizes (states, accounts, margins, inputs; in the core, chains, cells
         of chains); a row (code, user data, function, place in its result) for residual, jacobian, ledger, margins and
         rates, zero where absent, and then for their further pieces; which states are algebraic; a row (first, end,
-        anchor) for each chain; the group of each quadrature, -1 where it is in none.
+        anchor) for each chain; the places of the derivatives that are formed; the group of each quadrature,
+        -1 where it is in none.
         """
         core = self.chains[0].first if self.chains else self.n
         sizes = self.n, self.n_ledger, self.n_margins, self.n_inputs, core, len(self.chains), self.n - core
@@ -177,7 +187,7 @@ class Program:
                 place += part.n_out
         chains = np.array([(c.first, c.end, c.anchor) for c in self.chains], np.int64).reshape(-1, 3)
         groups = np.array(self.groups or (-1,) * self.n_ledger, np.int64)
-        return np.array(sizes, np.int64), np.array(code, np.int64), self.algebraic_mask, chains, groups
+        return np.array(sizes, np.int64), np.array(code, np.int64), self.algebraic_mask, chains, self.nonzeros, groups
 
     @cached_property
     def rates(self) -> Function | None:
@@ -215,7 +225,11 @@ class Program:
 
     def derivatives(self, inputs: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """dG/dy and dG/dydot as matrices [..., equation, variable]."""
-        values = self.jacobian(inputs)
+        values, core = self.jacobian(inputs), self.chains[0].first if self.chains else self.n
+        if len(self.nonzeros):
+            found = values
+            values = np.zeros((*found.shape[:-1], 2 * (core * (core + len(self.chains)) + 3 * (self.n - core))))
+            values[..., self.nonzeros] = found
         if not self.chains:
             both = values.reshape(*values.shape[:-1], 2, self.n, self.n)
         else:
@@ -262,8 +276,7 @@ def compile_function(
 
 
 def _level(count: int, steps: bool) -> int:
-    # Of many expressions LLVM makes little more at its highest level than at its first, in twice the time.
-    return 0 if not steps else 3 if count < PIECE else 1
+    return 3 if steps and count < OPTIMISED else 0
 
 
 @dataclass(frozen=True)
@@ -271,20 +284,22 @@ class _Derivatives:
     """What a Jacobian without chains is made from: to load its code, what it is differentiated from is enough."""
 
     residual: tuple[Any, ...]
-    states: tuple[Any, ...]
-    rates: tuple[Any, ...]
+    variables: tuple[Any, ...]
+    """The states, then their rates."""
     named: tuple[tuple[Any, Any], ...]
+    wanted: tuple[tuple[int, int], ...]
+    """Equation and variable of each derivative."""
 
     def __len__(self) -> int:
-        return 2 * len(self.states) * len(self.rates)
+        return len(self.wanted)
 
     def __iter__(self) -> Iterator[Any]:
-        return iter(_entries(self.residual, self.states, self.rates, (), self.named))
+        return iter(_entries(self.residual, self.variables, self.named, self.wanted))
 
     def origins(self) -> list[str]:
         """All that the entries follow from, as text."""
         names = [part for pair in self.named for part in pair]
-        return [*_differentiation(), *written((*self.states, *self.rates, *names, *self.residual))]
+        return [*_differentiation(), *written((*self.variables, *names, *self.residual))]
 
 
 @lru_cache(maxsize=128)  # a scene that is loaded again, or differs in numbers alone, has the same expressions
@@ -391,35 +406,73 @@ def jacobian(
     return [total(row) for row in residual], names
 
 
+def _depends(residual: Sequence[Any], variables: Sequence[Any], named: Named) -> list[list[int]]:
+    """The variables that each equation contains, itself or in what is named, in their order.
+
+    >>> x, y, z, r = symengine.symbols("x y z r")
+    >>> _depends([z + r, y], [x, y, z], [(r, x + 1)])
+    [[0, 2], [1]]
+    """
+    # Sets of variables as the bits of numbers.
+    known = {x: 1 << j for j, x in enumerate(variables)}
+
+    def read(expression: Any) -> int:
+        found = 0
+        for symbol in symengine.sympify(expression).free_symbols:
+            found |= known.get(symbol, 0)
+        return found
+
+    for symbol, expression in named:
+        known[symbol] = read(expression)
+    return [[j for j, bit in enumerate(reversed(f"{read(row):b}")) if bit == "1"] for row in residual]
+
+
+def _places(n: int, chains: Sequence[Chain], depends: Sequence[Sequence[int]]) -> dict[int, tuple[int, int]]:
+    """Equation and variable of the derivatives that may not be zero, by their places among all: by states, then by
+    rates, of the core, then of its border, then along the chains.
+    """
+    found: dict[int, tuple[int, int]] = {}
+    core, place = chains[0].first if chains else n, 0
+    for over in (0, n):
+        for i in range(core):
+            found |= {place + j - over: (i, j) for j in depends[i] if over <= j < over + core}
+            place += core
+    linked, border, sets = list(_linked(core, chains)), core * len(chains), [set(row) for row in depends]
+    for part in (linked[:border], linked[border:]):
+        for over in (0, n):
+            found |= {place + k: (i, over + j) for k, (i, j) in enumerate(part) if j >= 0 and over + j in sets[i]}
+            place += len(part)
+    return found
+
+
 def _entries(
-    residual: Sequence[Any], states: Sequence[Any], rates: Sequence[Any], chains: Sequence[Chain], named: Named
+    residual: Sequence[Any], variables: Sequence[Any], named: Named, wanted: Iterable[tuple[int, int]]
 ) -> list[Any]:
-    """Derivatives of the residual by states, then by rates: of the core, then of its border, then along the chains."""
-    core = chains[0].first if chains else len(states)
-    slopes, names = jacobian(residual, [*states, *rates], needed(named, residual))
-    linked = list(_linked(core, chains))
-    border = core * len(chains)
-    parts = ([(i, j) for i in range(core) for j in range(core)], linked[:border], linked[border:])
-    zero, entries = symengine.Integer(0), []
-    for part in parts:
-        for over in (states, rates):
-            entries += [slopes[i].get(over[j], zero) if j >= 0 else zero for i, j in part]
-    return expanded(names, entries)
+    """Derivatives of equations by variables."""
+    slopes, names = jacobian(residual, variables, named)
+    zero = symengine.Integer(0)
+    return expanded(names, [slopes[i].get(variables[j], zero) for i, j in wanted])
 
 
 def _slopes(
     inputs: Sequence[Any],
     residual: Sequence[Any],
-    states: Sequence[Any],
-    rates: Sequence[Any],
+    variables: Sequence[Any],
     chains: Sequence[Chain],
     named: Named,
-) -> Function:
-    """The code of the Jacobian."""
+) -> tuple[Function, NDArray[np.int64]]:
+    """The code of the Jacobian, and the places of the derivatives that it forms where these are not all."""
+    n, named = len(residual), needed(named, residual)
+    places = np.empty(0, np.int64)
+    if chains or 2 * n * n >= PIECE:
+        found = _places(n, chains, _depends(residual, variables, named))
+        places, wanted = np.array([*found], np.int64), tuple(found.values())
+    else:
+        wanted = tuple((i, over + j) for over in (0, n) for i in range(n) for j in range(n))
     if chains:
-        return compile_function(inputs, _entries(residual, states, rates, chains, named), PIECE, steps=True)
-    parts = _Derivatives(tuple(residual), tuple(states), tuple(rates), tuple(needed(named, residual)))
-    return _machine_code(tuple(inputs), parts, _level(len(parts), steps=True))
+        return compile_function(inputs, _entries(residual, variables, named, wanted), PIECE, steps=True), places
+    parts = _Derivatives(tuple(residual), tuple(variables), tuple(named), wanted)
+    return _machine_code(tuple(inputs), parts, _level(len(parts), steps=True)), places
 
 
 def compile_program(
@@ -444,7 +497,7 @@ def compile_program(
     inputs = [t, *states, *derivatives, *parameters]
     n, core = len(states), chains[0].first if chains else len(states)
     pieces = PIECE if chains else None
-    slopes = _slopes(inputs, residual, states, derivatives, chains, named)
+    slopes, nonzeros = _slopes(inputs, residual, [*states, *derivatives], chains, named)
     residual, ledger, margins = (expanded(named, rows) for rows in (residual, ledger, margins))
     known = {symbol for row in residual[:core] for symbol in row.free_symbols}
     read = {symbol for margin in margins for symbol in margin.free_symbols}
@@ -461,6 +514,7 @@ def compile_program(
         algebraic=tuple(rate not in known for rate in derivatives[:core]) + (False,) * (n - core),
         filler=filler,
         chains=tuple(chains),
+        nonzeros=nonzeros,
         solved=partial(_compiled_rates, inputs, residual, derivatives, chains),
         laned=partial(_compiled_lanes, inputs, residual, derivatives, chains, (ledger, margins)),
         plain_margins=not read & {*derivatives, *outside},

@@ -35,8 +35,8 @@ if TYPE_CHECKING:
 
 
 EXPLICIT_RUNS, RUNS_OF_A_CHUNK, OF_A_SLOW_ONE = 2**16, 2**14, 2**9
-"""Runs of a chunk at most, of those that take explicit steps and of others: a second or two of the compiled loop. Of runs
-that are looked at one by one fewer.
+"""Runs of a chunk at most, of those that take explicit steps and of others: a second or two of the compiled loop. Of
+runs that are looked at one by one fewer.
 """
 
 RUNS_OF_A_PIECE = 2**11

@@ -88,7 +88,7 @@ def rounding(result: Result) -> Array:
     """What rounding of the equations' terms leaves uncertain of each unknown at the end of a run, shape (states,)."""
     problem, n = result.problem, len(result.y)
     inputs = np.concatenate(([result.t], result.y, result.ydot, problem.parameters[-1]))
-    both = problem.program.jacobian(problem.program.filled(inputs)).reshape(2, n, n)
+    both = problem.program.derivatives(problem.program.filled(inputs))
     terms = np.abs(both[0] * result.y).sum(axis=1) + np.abs(both[1] * result.ydot).sum(axis=1)
     matrix = np.where(problem.program.algebraic_mask, both[0], both[1])
     try:

@@ -11,7 +11,7 @@ import numpy as np
 
 from surfacechem.solve.radau.linear import factor, fold_chains, solve_real
 from surfacechem.solve.radau.roundoff import spread_noise
-from surfacechem.solve.radau.work import JACOBIAN, RESIDUAL, any_true, compiled, evaluate, finite, set_inputs
+from surfacechem.solve.radau.work import RESIDUAL, any_true, compiled, evaluate, evaluate_jacobian, finite, set_inputs
 from surfacechem.tolerances import DIGITS, NEGLIGIBLE, SQRT_EPS, TINY
 
 CONSISTENT, NO_STATE, SINGULAR_STATE, NOT_FINITE_STATE = range(4)
@@ -53,7 +53,7 @@ def _fold(w: Any) -> bool:
 def _factor(w: Any) -> bool:
     """Factor the matrix of the unknowns, its columns in units of their largest entry beside that of its row."""
     n = w.core
-    evaluate(w, JACOBIAN, w.jacobian)
+    evaluate_jacobian(w)
     for i in range(n):
         for j in range(n):
             w.real[i, j] = w.jacobian[0 if w.algebraic[j] else 1, i, j]

@@ -32,7 +32,7 @@ from surfacechem.solve.radau.tables import (
     PAIR_VALUES,
     TO_PARTS,
 )
-from surfacechem.solve.radau.work import JACOBIAN, RESIDUAL, clear, combine, compiled, evaluate, finite, put
+from surfacechem.solve.radau.work import RESIDUAL, clear, combine, compiled, evaluate, evaluate_jacobian, finite, put
 from surfacechem.tolerances import EPS, NEGLIGIBLE, TINY
 
 CONVERGED, DIVERGED, NOT_FINITE = range(3)
@@ -103,7 +103,7 @@ def nested_four(k: int, top: int, x: Any, row: Any) -> tuple[float, float, float
 @compiled
 def _differentiate_at_start(w: Any) -> None:
     put(w, 0.0, w.y, w.ydot)
-    evaluate(w, JACOBIAN, w.jacobian)
+    evaluate_jacobian(w)
     w.jacobians += 1
 
 
@@ -129,7 +129,7 @@ def differentiate_system(w: Any, h: float, foresee: bool) -> bool:
         known, sizes = w.columns, w.rhs
         _row_sizes(w, known)
         set_stage(w, w.member + 1, h)
-        evaluate(w, JACOBIAN, w.jacobian)
+        evaluate_jacobian(w)
         w.jacobians += 1
         _row_sizes(w, sizes)
         stiffer = False

@@ -22,6 +22,8 @@ BATCH: dict[str, tuple[Any, int]] = {
     "code": (np.int64, 2),
     "algebraic": (np.bool_, 1),
     "chains": (np.int64, 2),
+    # places of the derivatives that are formed; none where all are
+    "nonzeros": (np.int64, 1),
     "groups": (np.int64, 1),
     # the method
     "rtol": (float, 0),

@@ -27,6 +27,7 @@ _strided_loop: Any = cgutils.for_range_slice
 _alloca: Any = cgutils.alloca_once
 _WORD = ir.IntType(64)
 _POINTER = ir.IntType(8).as_pointer()
+_NUMBER = ir.DoubleType()
 
 PARTS: set[str] = set()
 """Names of the functions that only the kernel itself calls."""
@@ -79,6 +80,41 @@ def evaluate(w: Any, which: int, result: Any) -> None:
     _call(w.code[which, 0], out, w.inputs.ctypes.data, w.code[which, 1])
     if w.code.shape[0] > FUNCTIONS:
         _evaluate_rest(w, which, out)
+
+
+@_intrinsic
+def _number(_context: Any, _address: Any) -> Any:
+    def generate(_context: Any, builder: Any, _signature: Any, args: Any) -> Any:
+        return builder.load(builder.inttoptr(args[0], _NUMBER.as_pointer()))
+
+    return types.float64(types.intp), generate
+
+
+@_intrinsic
+def _set_number(_context: Any, _address: Any, _value: Any) -> Any:
+    def generate(context: Any, builder: Any, _signature: Any, args: Any) -> Any:
+        builder.store(args[1], builder.inttoptr(args[0], _NUMBER.as_pointer()))
+        return context.get_dummy_value()
+
+    return types.void(types.intp, types.float64), generate
+
+
+@compiled
+def evaluate_jacobian(w: Any) -> None:
+    """The derivatives at the current inputs: of the core, its border and the bands, which lie one behind the other."""
+    evaluate(w, JACOBIAN, w.jacobian)
+    if len(w.nonzeros) == 0:
+        return
+    # From the last to the first each goes to its own place, which is not before that where it was written.
+    start, end = w.jacobian.ctypes.data, w.jacobian.size + w.border_derivatives.size + w.band_derivatives.size
+    for k in range(len(w.nonzeros) - 1, -1, -1):
+        value, place = _number(start + 8 * k), w.nonzeros[k]
+        for between in range(place + 1, end):
+            _set_number(start + 8 * between, 0.0)
+        _set_number(start + 8 * place, value)
+        end = place
+    for between in range(end):
+        _set_number(start + 8 * between, 0.0)
 
 
 @compiled
@@ -137,7 +173,6 @@ def finite(values: Any) -> bool:
 
 # -- Tables times stages -------------------------------------------------------------------------------------------
 
-_NUMBER = ir.DoubleType()
 _VECTOR = ir.VectorType(_NUMBER, WIDTH)
 
 
@@ -178,8 +213,8 @@ def combine(
 
 
 def weighted_sums(table: Any) -> Any:
-    """A function that takes a row of this table times the rows of a matrix, given by its address, of some width, of which
-    it takes the first so many columns, into another.
+    """A function that takes a row of this table times the rows of a matrix of some width, given by its address, of
+    which it takes the first so many columns, into another.
 
     The factors stand in the code and those that are zero nowhere, so it takes half the time of :func:`combine`.
     """
