@@ -58,7 +58,12 @@ def solvable(model: Model, plan: Plan, run: Run, problem: Problem) -> bool:
     system = model.system
     # Loads that jump may have to be searched for, and a load that ends the runs is one ramp.
     jumps = any(edge.times for edge in system.edges) or (plan.load and len(problem.segments) > 2)
-    own = run.solver in (IMPLICIT, EXPLICIT) and run.max_seconds is None and model.program.filler is None
+    own = (
+        run.solver in (IMPLICIT, EXPLICIT)
+        and run.max_seconds is None
+        and not run.steady
+        and model.program.filler is None
+    )
     shared = model.passing.is_empty or not (plan.load or model.passing.reads & set(plan.paths))
     shared = shared and not set(plan.paths) & set(system.cycles)
     return own and shared and not jumps and not system.equilibria and _starts_as_given(system, set(plan.paths))

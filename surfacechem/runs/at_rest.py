@@ -30,6 +30,10 @@ not stay what they are.
 PATH = "run.until"
 
 
+class UnrestError(InputError):
+    """A run that does not come to rest."""
+
+
 def refuse_histories(system: System) -> None:
     """InputError where no steady state can be."""
     moving = [item.name for item in system.named if depends(system.expand(item.expression), system.t)]
@@ -56,7 +60,7 @@ def to_rest(model: Model, run: Run, values: Mapping[str, float]) -> Run:
         alike = np.all(change <= NEGLIGIBLE * np.maximum(np.abs(near.result.y), scales))
         if near.status == "finished" and last * AFTER <= end and alike:
             return replace(run, times=_until(run, last), rest=last)
-    raise InputError(f"the case did not reach a steady state within {LONGEST:.3g} s: {name} still changes.", path=PATH)
+    raise UnrestError(f"the case did not reach a steady state within {LONGEST:.3g} s: {name} still changes.", path=PATH)
 
 
 def _looked(model: Model, run: Run, values: Mapping[str, float], end: float) -> Trajectory:

@@ -28,6 +28,9 @@ STATUSES = ("finished", "stopped", "failed", "refused")
 
 REFUSED, OTHER = "the values are not admissible at the start", "another reason"
 
+REST, UNREST = "came to rest", "it does not come to rest"
+"""Why a run until a steady state has ended, and why one has failed."""
+
 ENDS = {
     "status": "how the run ended",
     "reason": "why the run ended",
@@ -169,21 +172,26 @@ def extreme(run: Trajectory, name: str, which: str) -> float:
 class RunByRun:
     """Columns of runs that are solved and looked at one after the other: any scene, any end."""
 
-    def __init__(self, model: Model, keep: Keep) -> None:
+    def __init__(self, model: Model, keep: Keep, steady: bool = False) -> None:
         self.model, self.keep = model, keep
-        self.reasons = reason_table(model.system)
+        self.reasons = [*reason_table(model.system), *((REST, UNREST) if steady else ())]
 
-    def columns(self, runs: Sequence[Trajectory | None], times: int, audits: Sequence[Audit] = ()) -> Columns:
-        """What is kept of runs, None for one that was refused, with so many output times; audited anew, or as given."""
-        refused = {"status": STATUSES.index("refused"), "reason": self.reasons.index(REFUSED), "steps": 0}
-        books = iter(audits or (audit(run) for run in runs if run is not None))
-        rows = [refused if run is None else self._kept(run, next(books), times) for run in runs]
+    def columns(self, runs: Sequence[Trajectory | str], times: int, audits: Sequence[Audit] = ()) -> Columns:
+        """What is kept of runs, with so many output times, audited anew or as given; of one that there is none of, why
+        that is.
+        """
+        books = iter(audits or (audit(run) for run in runs if not isinstance(run, str)))
+        rows = [self._missing(run) if isinstance(run, str) else self._kept(run, next(books), times) for run in runs]
         kinds = {name: kind for name, (kind, _, _) in described(self.model.system, self.keep).items()}
         found: Columns = {name: np.array([row.get(name, np.nan) for row in rows], kind) for name, kind in kinds.items()}
         for name in self.keep.series:
             nothing = np.full(times, np.nan)
             found[name] = np.array([row.get(name, nothing) for row in rows])
         return found
+
+    def _missing(self, reason: str) -> dict[str, Any]:
+        status = "refused" if reason == REFUSED else "failed"
+        return {"status": STATUSES.index(status), "reason": self.reasons.index(reason), "steps": 0}
 
     def _kept(self, run: Trajectory, books: Audit, times: int) -> dict[str, Any]:
         result, keep = run.result, self.keep

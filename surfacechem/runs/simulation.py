@@ -527,9 +527,6 @@ class Simulation:
             raise InputError(message, path="bodies")
         if plan.until and not plan.load:
             raise InputError("a store keeps no lifetimes. Write the sweep to a file, -o NAME.nc.", path="sweep.until")
-        if self.case.run.steady:
-            message = "a store keeps runs of a given length, not `steady`. Write the sweep to a file, -o NAME.nc."
-            raise InputError(message, path="run.until")
         try:
             return streaming.stream(self, plan, path, changes=values, resume=resume, part=part)
         except InputError as error:

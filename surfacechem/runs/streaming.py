@@ -23,8 +23,9 @@ from surfacechem.results.netcdf import CONVENTIONS, COORDINATES, Column, cf_unit
 from surfacechem.results.store import MOST_BYTES, Layout, Store, StoredArray, begin, opened, store_path
 from surfacechem.runs import keeping, sweeps
 from surfacechem.runs.arrays import ArrayRuns, JumpingRuns, quiet, solvable
+from surfacechem.runs.at_rest import UnrestError, refuse_histories, to_rest
 from surfacechem.runs.checking import checked_arrays
-from surfacechem.runs.keeping import STATUSES, Columns, Keep, RunByRun, keep_of, variable
+from surfacechem.runs.keeping import REFUSED, STATUSES, UNREST, Columns, Keep, RunByRun, keep_of, variable
 from surfacechem.solve import AUTO
 from surfacechem.solve.contract import Index
 from surfacechem.solve.lanes import lane_batch
@@ -71,7 +72,7 @@ class ChunkRuns:
         asked = case.run if "run.solver" in case.places else replace(case.run, solver=AUTO)
         chosen = run or self.model.chosen(asked, self.model.values(changes))
         self.run = sweeps.following(self.model, plan, chosen, changes) if keep.series and run is None else chosen
-        self.one_by_one = RunByRun(self.model, keep)
+        self.one_by_one = RunByRun(self.model, keep, chosen.steady)
         arrays = ArrayRuns(self.model, plan, self.run, changes, keep)
         told = solvable(self.model, plan, self.run, arrays.problem)
         self.ways = [arrays] if told and quiet(self.model, arrays.problem) else []
@@ -123,16 +124,18 @@ class ChunkRuns:
         _put(columns, left, self.one_by_one.columns(self._solved(values, left), times), len(index))
         return columns
 
-    def _solved(self, values: Mapping[str, Any], chosen: Index) -> list[Trajectory | None]:
-        """Some runs by themselves, None for one whose values are not admissible."""
+    def _solved(self, values: Mapping[str, Any], chosen: Index) -> list[Trajectory | str]:
+        """Some runs by themselves; of one whose values are not admissible, or that does not come to rest, why."""
         points = [{path: float(column[i]) for path, column in values.items()} for i in chosen.tolist()]
         try:  # through the compiled loop together
             full = [self.model.values({**self.changes, **point}) for point in points]
             runs = sweeps.settings(self.model.system, self.plan, self.run, full)
+            if self.run.steady:  # each until its own rest, whatever the others are
+                runs = [to_rest(self.model, run, at) for run, at in zip(runs, full, strict=True)]
             return [*self.model.solve_all(list(zip(runs, full, strict=True)))]
-        except InputError:
+        except InputError as error:
             if len(chosen) == 1:
-                return [None]
+                return [UNREST if isinstance(error, UnrestError) else REFUSED]
         return [run for i in chosen.tolist() for run in self._solved(values, np.array([i]))]
 
 
@@ -283,6 +286,12 @@ def stream(
     target, case = store_path(path), simulation.case
     section = case.sweep or SweepSection()
     keep = keep_of(section.keep, sweeps.prepared(simulation.system, plan))
+    if case.run.steady:
+        refuse_histories(simulation.system)
+        if keep.series:
+            raise InputError(
+                "each run until `steady` has a length of its own, so that no series fit.", path="sweep.keep"
+            )
     checked = plan.size if section.checked == ALL else int(section.checked)
     chunks = ChunkRuns(simulation, plan, keep, changes, checked)
     job = Job(

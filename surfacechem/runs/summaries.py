@@ -13,6 +13,7 @@ import numpy as np
 
 from surfacechem.results.event_table import entropy_destroyed, event_counts, event_summary
 from surfacechem.runs.sheet import Rows, Sheet, counted
+from surfacechem.solve import ASKING, AUTO, OWN
 from surfacechem.solve.jumps import ADMISSIBLE
 
 if TYPE_CHECKING:
@@ -262,6 +263,7 @@ def check_summary(
         "Warnings": [(warning,) for warning in warnings],
     }
     facts = [("regime", f"{system.regime}: {REGIMES.get(system.regime, '')}"), ("run", _plan(system, run))]
+    facts += [("compiled", _compiled(system, run))] if run is not None else []
     return Sheet(title or "untitled", facts, sections)
 
 
@@ -301,6 +303,17 @@ def _plan(system: System, run: Run | None) -> str:
     if kinks := [margin.reason for margin in system.margins if not margin.terminal]:
         parts.append(f"kinks: {', '.join(kinks)}")
     return "; ".join(parts)
+
+
+def _compiled(system: System, run: Run) -> str:
+    """What of a run is machine code, and what is left to Python."""
+    if run.solver in ASKING:
+        return "the equations; Cantera makes the steps, and asks Python for every right-hand side"
+    if run.solver not in (*OWN, AUTO):
+        return f"the equations; {run.solver} is called from Python for every step, which looks for events"
+    if system.edges:
+        return "equations, steps and events; what follows at a transition is found in Python"
+    return "all of the run; Python prepares it and looks at its results"
 
 
 def _state_rows(system: System) -> list[tuple[str, ...]]:

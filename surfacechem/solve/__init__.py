@@ -28,10 +28,10 @@ for _file in sorted(Path(__file__).with_name("adapters").glob("*.py")):
     _declared = re.search(r"^NAMES = (\(.*\))$", _file.read_text(encoding="utf-8"), re.MULTILINE)
     _ADAPTERS.update(dict.fromkeys(ast.literal_eval(_declared[1]) if _declared else (), _file.stem))
 
-_OWN = {"radau": "Radau", "dop853": "Dop853"}
+OWN = {"radau": "Radau", "dop853": "Dop853"}
 """The methods of this package, and their classes."""
 
-names = (*_OWN, *sorted(_ADAPTERS, key=lambda name: name in ASKING))
+names = (*OWN, *sorted(_ADAPTERS, key=lambda name: name in ASKING))
 
 
 @cache
@@ -39,8 +39,8 @@ def solver(name: str) -> Solver:
     """The solver of this name; 'radau' is our own and the default."""
     if name not in names:
         raise ValueError(f"no solver '{name}'.{suggestion(name, names)}")
-    if name in _OWN:
-        made = getattr(import_module("surfacechem.solve.radau.solver"), _OWN[name])()
+    if name in OWN:
+        made = getattr(import_module("surfacechem.solve.radau.solver"), OWN[name])()
     else:
         made = import_module(f"surfacechem.solve.adapters.{_ADAPTERS[name]}").make(name)
     assert isinstance(made, Solver)

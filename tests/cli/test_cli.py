@@ -190,6 +190,18 @@ class TestCheck:
         assert float(values["kappa_2"]) == pytest.approx(150 / (2 * 300))
         assert "must be below 1: valid" in text
 
+    @pytest.mark.parametrize(
+        ("arguments", "told"),
+        [
+            (["dna-adhesive"], "all of the run"),
+            (["stick-slip"], "what follows at a transition is found in Python"),
+            (["bonding.yaml", "--set", "run.solver=lsoda"], "lsoda is called from Python for every step"),
+            (["bonding.yaml", "--set", "run.solver=cantera"], "asks Python for every right-hand side"),
+        ],
+    )
+    def test_what_is_left_to_python(self, call, arguments, told):
+        assert re.search(rf"^  compiled +.*{told}", call("check", *arguments).stdout, re.MULTILINE)
+
     def test_algebraic_rows_are_named(self, call, tmp_path):
         heat = "".join(f"  - conductance: {{between: [interface, {b}], h: 10 W/m^2/K}}\n" for b in ("lower", "upper"))
         bodies = BONDING.partition("interface:")[0].replace("T, C", "T_1, C", 1).replace("T, C", "T_2, C", 1)

@@ -5,6 +5,8 @@ import pytest
 
 import surfacechem
 from surfacechem.errors import InputError
+from surfacechem.runs.checking import check
+from surfacechem.runs.keeping import REST, STATUSES, UNREST
 
 STEADY = ["run.until=steady"]
 
@@ -45,7 +47,7 @@ def test_what_comes_to_no_rest_is_refused(case, message):
         surfacechem.load(case, STEADY).run()
 
 
-def test_runs_of_a_sweep_end_where_the_last_is_at_rest(tmp_path):
+def test_runs_of_a_sweep_end_where_the_last_is_at_rest():
     """When each was, and its state, as alone."""
     simulation = surfacechem.load("dna-adhesive", [*STEADY, "run.outputs=3"])
     data = simulation.sweep({"initial.T_2": [300.0, 340.0]}).dataset
@@ -56,5 +58,34 @@ def test_runs_of_a_sweep_end_where_the_last_is_at_rest(tmp_path):
         assert data["event_time"].values[i, 0] == alone["event_time"].values[0] == alone["time"].values[-1]
         assert float(data["phi"][i, -1]) == pytest.approx(float(alone["phi"][-1]), rel=1e-8)
     assert float(data["time"][-1]) == data["event_time"].values.max()
-    with pytest.raises(InputError, match="a store keeps runs of a given length"):
-        simulation.stream(simulation.plan({"initial.T_2": [300.0]}), tmp_path / "x.zarr")
+
+
+def test_runs_of_a_store_end_where_each_is_at_rest(tmp_path):
+    """And those that come to none fail, whatever is beside them."""
+    path = "interface.bonding.linear-affinity.c_r"
+    rates = [1.0, 1e14, 1e16]  # the first one takes three billion years
+    settings = {"run.until": "steady", "run.solver": "radau", "sweep": {"keep": {"last": ["T", "phi"]}}}
+    simulation = surfacechem.load("exothermic", settings)
+    stream = simulation.stream(simulation.plan({path: rates}), tmp_path / "o.zarr")
+    with stream.run().dataset as data:
+        assert [STATUSES[code] for code in data["status"].values] == ["failed", "finished", "finished"]
+        words = data.attrs["reasons"]
+        assert [words[code] for code in data["reason"].values] == [UNREST, REST, REST]
+        for i, rate in enumerate(rates[1:], start=1):
+            alone = simulation.run({path: rate}, error="balances").trajectory.result
+            assert float(data["time_reached"][i]) == alone.t
+            assert [float(data[f"{name}_last"][i]) for name in ("phi", "T")] == alone.y.tolist()
+    checked = check(stream)
+    assert checked.unknown == 1
+    assert 0 < checked.error < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("case", "keep", "message"),
+    [("stick-slip", {}, "w_t changes in time"), ("exothermic", {"series": ["T"]}, "a length of its own")],
+)
+def test_what_no_store_can_keep_until_rest_is_refused_before_it_is_made(case, keep, message, tmp_path):
+    simulation = surfacechem.load(case, {"run.until": "steady", "sweep": {"keep": keep}})
+    with pytest.raises(InputError, match=message):
+        simulation.stream(simulation.plan({"initial.T": [300.0]}), tmp_path / "o.zarr")
+    assert not (tmp_path / "o.zarr").exists()

@@ -379,6 +379,7 @@ def test_an_error_that_is_unknown_and_an_end_that_is_no_number_count_for_no_smal
     chunks = SimpleNamespace(
         model=None, keep=Keep(last=("T",)), columns=lambda _: kept, simulation=simulation, plan=plan, changes={}
     )
+    chunks.run = Run((0.0, 1.0))
     ((_, _, found, _),) = checking._errors(SimpleNamespace(chunks=chunks), np.arange(4), None)
     assert found["error"] == pytest.approx([np.nan, 1e-9, np.inf, 1 / 101], nan_ok=True)
 
