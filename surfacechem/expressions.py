@@ -26,7 +26,8 @@ is still a finite double, so error norms and matrix factorisations survive it.
 
 def is_symbolic(*values: Expression) -> bool:
     """Whether any of the values is a symbolic expression."""
-    return any(hasattr(value, "free_symbols") for value in values)
+    # Of the type, as an expression that is asked for its symbols collects them.
+    return any(hasattr(type(value), "free_symbols") for value in values)
 
 
 def depends(expression: Expression, symbol: Expression) -> bool:

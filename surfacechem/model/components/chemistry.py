@@ -137,7 +137,9 @@ def _with_rates(build: Build, found: Sequence[Reaction]) -> list[Reaction]:
     """The reactions with their net rates, as named quantities."""
     laws = {item.label: item.law for item in found if item.law.envelope is None}
     stated = {item.label: _rate(build, item.law, item.affinity) for item in found if item.label in laws}
-    rates = {label: _resolved(build, laws, stated, label) for label in laws}
+    loads = {symengine.Symbol(name) for name in ("g_n", "f", *(f"f_{name}" for name in build.bonding))}
+    loaded = {label for label in laws if any(loads & exponent.free_symbols for exponent in exponents(stated[label]))}
+    rates = {label: _resolved(build, laws, stated, label) if label in loaded else stated[label] for label in laws}
     forming = symengine.Add(*(law.stoichiometry().get("phi", 0) * rates[label] for label, law in laws.items()))
     # One while the bonding state may change, zero at a bound and beyond the reach of bonds. Only what bonds form by may
     # carry them beyond; a law with an envelope ends at its bound by itself.
@@ -200,11 +202,8 @@ def _resolved(build: Build, laws: Mapping[str, RateLaw], rates: Mapping[str, Exp
     It stays far faster than all else that changes the same species, so that what they share out does not depend on it.
     """
     law, rate = laws[label], rates[label]
-    loads = {symengine.Symbol(name) for name in ("g_n", "f", *(f"f_{name}" for name in build.bonding))}
     if any(role.by == SHARED and build.variables.was_read(role.variable) for role in build.variables.roles):
         return rate  # bonds that share a load rupture, which ends the run before
-    if not any(loads & exponent.free_symbols for exponent in exponents(rate)):
-        return rate
     own = law.stoichiometry()
     relaxation = _relaxation(build, own, law, rate)
     if relaxation == 0:

@@ -190,6 +190,11 @@ def _choose_sizes(w: Any) -> None:
 
 
 @compiled
+def _end_of_step(w: Any, lane: int) -> float:
+    return float(w.end[lane] if w.last[lane] > 0.5 else w.t[lane] + w.h[lane])
+
+
+@compiled
 def _outputs_inside(w: Any) -> bool:
     """Whether a run has an output before the end of its step."""
     found = False
@@ -197,7 +202,7 @@ def _outputs_inside(w: Any) -> bool:
         i = w.run[lane]
         if i >= 0:
             k, times = w.counts[i, OUTPUTS], w.times[row_of(w.times, i)]
-            found = found or (k < times.shape[0] and times[k] < w.t[lane] + w.h[lane])
+            found = found or (k < times.shape[0] and times[k] < _end_of_step(w, lane))
     return found
 
 
@@ -245,7 +250,7 @@ def _write_events(w: Any, lane: int) -> bool:
 @compiled
 def _accept(w: Any, lane: int) -> None:
     """Move on to the end of a step."""
-    t_new = w.end[lane] if w.last[lane] > 0.5 else w.t[lane] + w.h[lane]
+    t_new = _end_of_step(w, lane)
     _write_outputs(w, lane, t_new)
     for m in range(w.columns):
         w.y[m, lane] = w.y_new[m, lane]
