@@ -90,6 +90,9 @@ def test_runs_are_those_of_one_at_a_time(name, others, left):
     accounts = slice(1 + 2 * n, 1 + 2 * n + q)
     turned = np.abs(wanted.ends[:, accounts]).max(initial=1e-300)
     assert np.all(np.abs(found.ends - wanted.ends)[:, accounts] <= 1e-5 * turned)
+    for i, reached in enumerate(wanted.counts[:, OUTPUTS]):
+        apart = found.outputs[i, :reached, n:] - wanted.outputs[i, :reached, n:]
+        assert np.all(np.abs(apart) <= 1e-5 * turned)
 
 
 def test_runs_without_guards(left):
