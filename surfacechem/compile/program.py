@@ -310,11 +310,21 @@ def _machine_code(inputs: tuple[Any, ...], expressions: tuple[Any, ...] | _Deriv
 
     # Code is loaded in a tenth of the time that it takes to make.
     origins = expressions.origins() if isinstance(expressions, _Derivatives) else written(expressions)
-    mark = hashlib.sha256("\n".join((*_here(), str(opt_level), *written(inputs), *origins)).encode())
-    code = from_file(cache_root() / "code" / mark.hexdigest()[:32], make, pickle.loads, pickle.dumps)
+    mark = _digest((*_here(), str(opt_level), _mark_of(inputs), *origins))
+    code = from_file(cache_root() / "code" / mark[:32], make, pickle.loads, pickle.dumps)
     function, user = code.as_ctypes()
     address = ctypes.cast(function, ctypes.c_void_p).value
     return Function(int(address or 0), int(user.value), len(inputs), len(expressions), code)
+
+
+def _digest(lines: Iterable[str]) -> str:
+    return hashlib.sha256("\n".join(lines).encode()).hexdigest()
+
+
+@lru_cache(maxsize=8)
+def _mark_of(inputs: tuple[Any, ...]) -> str:
+    """What stands for inputs, which all functions of a scene share."""
+    return _digest(written(inputs))
 
 
 @cache
