@@ -144,15 +144,19 @@ def _errors(
 
 def _apart(stream: Stream, part: Index, done: SweepSolution) -> Array:
     """How far what is stored of runs is from the same runs by themselves: their ends, relative to these; of one that an
-    event has stopped the time alone, since its state may change there by any amount in the last digit of it. Of runs
-    until a steady state their states alone, as together they last as long as the longest.
+    event has stopped the time alone, since its state may change there by any amount in the last digit of it. Runs until
+    a steady state last as long as the longest by themselves: their states alone are compared, beside their scales.
     """
     chunks = stream.chunks
     ends = RunByRun(chunks.model, Keep(last=chunks.keep.last)).columns(done.runs, 0, done.audits)
     stored, largest = chunks.columns(part), np.zeros(len(part))
-    times = () if chunks.run.steady else ("time_reached",)
-    for name in (*times, *(f"{name}_last" for name in chunks.keep.last)):
-        size = np.maximum(np.abs(ends[name]), FLOOR * np.nanmax(np.abs(ends[name]), initial=TINY))
+    names = "time_reached", *(f"{name}_last" for name in chunks.keep.last)
+    least = {name: FLOOR * np.nanmax(np.abs(ends[name]), initial=TINY) for name in names}
+    if chunks.run.steady:
+        scales = {f"{state.name}_last": state.scale for state in chunks.model.system.states}
+        least = {name: scales[name] for name in scales if name in least}
+    for name, floor in least.items():
+        size = np.maximum(np.abs(ends[name]), floor)
         apart = np.nan_to_num(np.abs(stored[name] - ends[name]) / size)
         apart[np.isnan(stored[name]) != np.isnan(ends[name])] = np.inf
         counts = (name == "time_reached") | (ends["status"] == STATUSES.index("finished"))

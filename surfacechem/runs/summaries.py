@@ -347,8 +347,9 @@ def store_summary(stream: Stream, store: Store, checked: Checked | None, file: P
     words = ", ".join(f"{count} {word}" for count, word in zip(ends.tolist(), STATUSES, strict=True) if count)
     error = destroyed = ""
     if checked is not None:
-        error = f"{checked.error:.2g} of {checked.count} runs ({checked.source})"
-        error += f"; {unknown_in(checked.unknown, checked.why)}" if checked.unknown else ""
+        known = f"{checked.error:.2g} of {checked.count} runs ({checked.source})"
+        unknown = unknown_in(checked.unknown, checked.why) if checked.unknown else ""
+        error = "; ".join(filter(None, (known if checked.unknown < checked.count else "", unknown)))
         destroyed = f"; ENTROPY DESTROYED in {counted(checked.destroys, 'run')}" if checked.destroys else ""
     facts = [
         ("swept", swept_in_words(chunks.plan, names, chunks.model.system.changeable)),

@@ -7,6 +7,7 @@ import surfacechem
 from surfacechem.errors import InputError
 from surfacechem.runs.checking import check
 from surfacechem.runs.keeping import REST, STATUSES, UNREST
+from surfacechem.runs.summaries import store_summary
 
 STEADY = ["run.until=steady"]
 
@@ -78,6 +79,23 @@ def test_runs_of_a_store_end_where_each_is_at_rest(tmp_path):
     checked = check(stream)
     assert checked.unknown == 1
     assert 0 < checked.error < 1e-9
+
+
+def test_errors_of_a_store_until_rest_are_those_of_states(tmp_path):
+    """What dies away is next to nothing at the end, and by how much differs from run to run."""
+    simulation = surfacechem.load("dna-adhesive", STEADY)
+    stream = simulation.stream(simulation.plan({"initial.T_2": [300.0, 340.0]}), tmp_path / "o.zarr")
+    stream.run()
+    assert 0 < check(stream).error < 1e-7
+
+
+def test_errors_of_runs_that_come_to_no_rest_are_unknown(tmp_path):
+    simulation = surfacechem.load("exothermic", STEADY)
+    path = "interface.bonding.linear-affinity.c_r"
+    stream = simulation.stream(simulation.plan({path: [1.0, 2.0]}), tmp_path / "o.zarr")
+    store = stream.run()
+    status, sheet = store_summary(stream, store, check(stream))
+    assert (status, dict(sheet.facts)["error"]) == ("failed", "unknown in 2 runs")
 
 
 @pytest.mark.parametrize(
