@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from surfacechem.solve.lanes.lane_step import larger, put_inside, smaller
+from surfacechem.solve.lanes.lane_step import larger, put_end, put_inside, put_roughly, smaller
 from surfacechem.solve.lanes.vector import absolute, any_lane, lanes, put, same, where
 from surfacechem.solve.radau.explicit import DENSEST
 from surfacechem.solve.radau.tables import SCANNED
@@ -73,43 +73,31 @@ def _dips(w: Any, m: int, a: float, b: float, c: float) -> Any:
 
 
 @compiled
-def _put_margins(w: Any, x: float) -> None:
-    """The guards at the fraction x of each step, one behind the other."""
+def _put_margins(w: Any) -> None:
+    """The guards at the inputs, one behind the other."""
     for m in range(w.n_margins):
         put(w.margin_earlier[m], lanes(w.margin_before[m]))
         put(w.margin_before[m], lanes(w.margin[m]))
-    put_inside(w, same(x))
     evaluate(w, MARGINS, w.margin)
 
 
 @compiled
-def _put_last_margins(w: Any) -> None:
-    """The same at the end of each step, by the state that it ends with."""
-    for m in range(w.n_margins):
-        put(w.margin_earlier[m], lanes(w.margin_before[m]))
-        put(w.margin_before[m], lanes(w.margin[m]))
-    put(w.inputs[0], lanes(w.t) + lanes(w.h))
-    for m in range(w.n):
-        put(w.inputs[1 + m], lanes(w.y_new[m]))
-    evaluate(w, MARGINS, w.margin)
-    for m in range(w.n_margins):
-        put(w.margin_end[m], lanes(w.margin[m]))
-
-
-@compiled
-def _may_meet(w: Any, good: Any) -> Any:
+def may_meet(w: Any, good: Any) -> Any:
     """Where guards have to be looked at closely: one is at zero at a quarter of the step, or no farther from it than
     twice what it bends by from a quarter to the next. Between two points a parabola dips by an eighth of that.
     """
+    if w.n_margins == 0:
+        return good & ~good
     for m in range(w.n_margins):
         put(w.margin[m], lanes(w.margin_first[m]))
         put(w.nearest[m], lanes(w.side[m]) * lanes(w.margin_first[m]))
         put(w.bend[m], 0.0)
     for quarter in range(1, 5):
         if quarter < 4:
-            _put_margins(w, 0.25 * quarter)
+            put_roughly(w, 0.25 * quarter)
         else:
-            _put_last_margins(w)
+            put_end(w)
+        _put_margins(w)
         for m in range(w.n_margins):
             value = lanes(w.margin[m])
             put(w.nearest[m], smaller(lanes(w.nearest[m]), lanes(w.side[m]) * value))
@@ -120,9 +108,8 @@ def _may_meet(w: Any, good: Any) -> Any:
     for m in range(w.n_margins):
         if w.kinds[m, 4] != 0:
             close = where(lanes(w.nearest[m]) > 2.0 * lanes(w.bend[m]), close, 1.0)
-            largest = lanes(w.margin_largest[m])
-            put(w.margin_largest[m], where(good, larger(largest, absolute(lanes(w.margin[m]))), largest))
-    return good & (close > 0.5)
+        put(w.margin_end[m], lanes(w.margin[m]))
+    return good & (lanes(w.onto) < 0.5) & (close > 0.5)
 
 
 @compiled
@@ -133,7 +120,8 @@ def _scan(w: Any, searched: Any) -> None:
     earlier, before = 0.0, 0.0
     for i in range(POINTS.shape[0]):
         x = POINTS[i]
-        _put_margins(w, x)
+        put_inside(w, same(x))
+        _put_margins(w)
         found = same(0.0)
         for m in range(w.n_margins):
             if w.kinds[m, 4] == 0:
@@ -204,14 +192,20 @@ def _locate(w: Any, met: Any) -> None:
 
 
 @compiled
-def meet(w: Any, good: Any) -> None:
-    """Guards in the steps that pass: which are met, and where; at the end of a step onto one, how far it is."""
-    landing = good & (lanes(w.onto) > 0.5)
-    close = _may_meet(w, good & (lanes(w.onto) < 0.5))
+def meet(w: Any, good: Any, close: Any) -> None:
+    """Guards in the steps that pass: where they are ``close``, so that there are polynomials, which are met, and where;
+    at the end of a step onto one, how far it is.
+    """
+    landing, whole = good & (lanes(w.onto) > 0.5), good & (lanes(w.onto) < 0.5)
+    for m in range(w.n_margins):
+        if w.kinds[m, 4] != 0:
+            largest = lanes(w.margin_largest[m])
+            put(w.margin_largest[m], where(whole, larger(largest, absolute(lanes(w.margin_end[m]))), largest))
+    close = close & good
     put(w.high, 0.0)
     if any_lane(close):
         _scan(w, close)
-    met = good & (lanes(w.onto) < 0.5) & (lanes(w.high) > 0.0)
+    met = whole & (lanes(w.high) > 0.0)
     put(w.met, 1.0)
     if any_lane(met):
         _locate(w, met)

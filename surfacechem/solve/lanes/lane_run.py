@@ -10,15 +10,15 @@ import numpy as np
 
 from surfacechem.compile.vectors import LANES
 from surfacechem.solve.contract import Status
-from surfacechem.solve.lanes.lane_guards import lands, meet, start_margins
+from surfacechem.solve.lanes.lane_guards import lands, may_meet, meet, start_margins
 from surfacechem.solve.lanes.lane_step import (
     END_STAGE,
     ORDER,
     WORK,
     eighth_root,
     find_stiff,
+    has_points,
     interpolate,
-    interpolate_accounts,
     larger,
     look,
     norm_of,
@@ -348,11 +348,16 @@ def _step(w: Any) -> None:
     put(w.unclear, 0.0)
     if any_lane(good):
         find_stiff(w)
-        interpolate(w)
-        if not look(w, good) and _outputs_inside(w):
-            interpolate_accounts(w)
-        if w.n_margins > 0:
-            meet(w, good & (lanes(w.missed) == 1.0))
+        put(w.missed, 1.0)
+        close = may_meet(w, good)
+        seen, shown = has_points(w, good), _outputs_inside(w)
+        if seen or shown:
+            interpolate(w, w.columns)
+        elif any_lane(close):
+            interpolate(w, w.n)
+        if seen:
+            look(w, good)
+        meet(w, good & (lanes(w.missed) == 1.0), close)
     for lane in range(LANES):
         if w.run[lane] >= 0:
             _conclude(w, lane)

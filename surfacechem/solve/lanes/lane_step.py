@@ -189,21 +189,12 @@ def find_stiff(w: Any) -> None:
 
 
 @compiled
-def interpolate(w: Any) -> None:
-    """The polynomials of the states in the steps."""
+def interpolate(w: Any, columns: int) -> None:
+    """The polynomials of the steps, of the first so many columns."""
     for i in range(STAGES_OF_DENSE, LAST_STAGE + 1):
         _evaluate_stage(w, i, w.n, w.rates)
     for d in range(ORDER):
-        _coefficients(d, w.k.ctypes.data, LANES * w.columns, LANES * w.n, w.polynomial[d].ctypes.data)
-
-
-@compiled
-def interpolate_accounts(w: Any) -> None:
-    """The polynomials of the accounts, of steps that have those of the states."""
-    if w.n_ledger > 0:
-        for d in range(ORDER):
-            k, polynomial = w.k[0, w.n].ctypes.data, w.polynomial[d, w.n].ctypes.data
-            _coefficients(d, k, LANES * w.columns, LANES * w.n_ledger, polynomial)
+        _coefficients(d, w.k.ctypes.data, LANES * w.columns, LANES * columns, w.polynomial[d].ctypes.data)
 
 
 @compiled
@@ -216,6 +207,25 @@ def put_inside(w: Any, x: Any) -> None:
         for d in range(ORDER - 2, -1, -1):
             total = total * x + lanes(w.polynomial[d, m])
         put(w.inputs[1 + m], lanes(w.y[m]) + h * x * total)
+
+
+@compiled
+def put_roughly(w: Any, x: float) -> None:
+    """The same by the cubic through both ends of each step, for which it needs no further rates."""
+    h = lanes(w.h)
+    put(w.inputs[0], lanes(w.t) + x * h)
+    for m in range(w.n):
+        mean, first, last = lanes(w.change[m]), lanes(w.k[0, m]), lanes(w.k[END_STAGE, m])
+        bend = 3.0 * mean - 2.0 * first - last + x * (first + last - 2.0 * mean)
+        put(w.inputs[1 + m], lanes(w.y[m]) + h * x * (first + x * bend))
+
+
+@compiled
+def put_end(w: Any) -> None:
+    """Time and state at the end of each step."""
+    put(w.inputs[0], lanes(w.t) + lanes(w.h))
+    for m in range(w.n):
+        put(w.inputs[1 + m], lanes(w.y_new[m]))
 
 
 @compiled
@@ -262,24 +272,27 @@ def _miss(w: Any, x: Any, looks: Any) -> None:
 
 
 @compiled
-def look(w: Any, good: Any) -> bool:
-    """The fraction of each step at which it has missed something, one where it has not, as far as the points tell;
-    whether there are any.
+def has_points(w: Any, good: Any) -> bool:
+    """Whether a step is looked at inside."""
+    h, spacing = lanes(w.h), lanes(w.spacing_of)
+    beside = lanes(w.begins) + lanes(w.last) + lanes(w.onto) > 0.5
+    return bool(any_lane(good & (h > BRIEF * spacing) & (beside | (h >= spacing))))
+
+
+@compiled
+def look(w: Any, good: Any) -> None:
+    """The fraction of each step at which it has missed something, one where it has not, as far as the points tell.
 
     Beside the ends of a segment, and of steps that an event has cut short, there may be something narrow.
     """
     h, spacing = lanes(w.h), lanes(w.spacing_of)
-    put(w.missed, 1.0)
     looks = good & (h > BRIEF * spacing)
     begins, ends = where(looks, lanes(w.begins), 0.0), where(looks, larger(lanes(w.last), lanes(w.onto)), 0.0)
-    points = where(looks, h / spacing, 0.0)
-    if not any_lane((begins > 0.5) | (ends > 0.5) | (points >= 1.0)):
-        return False
-    interpolate_accounts(w)
     if any_lane(begins > 0.5):
         # From the narrowest outwards: the first that differs says how short the step has to be.
         for k in range(DECADES, 0, -1):
             _miss(w, same(10.0**-k), begins)
+    points = where(looks, h / spacing, 0.0)
     i = 0.0
     while any_lane(points >= i + 1.0):
         # Of so many whole spacings each has one in its middle.
@@ -289,4 +302,3 @@ def look(w: Any, good: Any) -> bool:
     if any_lane(ends > 0.5):
         for k in range(1, DECADES + 1):
             _miss(w, same(1.0 - 10.0**-k), ends)
-    return True
