@@ -416,43 +416,33 @@ def jacobian(
     return [total(row) for row in residual], names
 
 
-def _depends(residual: Sequence[Any], variables: Sequence[Any], named: Named) -> list[list[int]]:
-    """The variables that each equation contains, itself or in what is named, in their order.
+def _depends(residual: Sequence[Any], variables: Sequence[Any], named: Named) -> list[set[int]]:
+    """The variables that each equation contains, itself or in what is named.
 
     >>> x, y, z, r = symengine.symbols("x y z r")
     >>> _depends([z + r, y], [x, y, z], [(r, x + 1)])
-    [[0, 2], [1]]
+    [{0, 2}, {1}]
     """
-    # Sets of variables as the bits of numbers.
-    known = {x: 1 << j for j, x in enumerate(variables)}
+    known = {x: {j} for j, x in enumerate(variables)}
 
-    def read(expression: Any) -> int:
-        found = 0
-        for symbol in symengine.sympify(expression).free_symbols:
-            found |= known.get(symbol, 0)
-        return found
+    def read(expression: Any) -> set[int]:
+        symbols = symengine.sympify(expression).free_symbols
+        return set().union(*(known[symbol] for symbol in symbols if symbol in known))
 
     for symbol, expression in named:
         known[symbol] = read(expression)
-    return [[j for j, bit in enumerate(reversed(f"{read(row):b}")) if bit == "1"] for row in residual]
+    return [read(row) for row in residual]
 
 
-def _places(n: int, chains: Sequence[Chain], depends: Sequence[Sequence[int]]) -> dict[int, tuple[int, int]]:
-    """Equation and variable of the derivatives that may not be zero, by their places among all: by states, then by
-    rates, of the core, then of its border, then along the chains.
+def _derivatives(n: int, chains: Sequence[Chain]) -> Iterator[tuple[int, int]]:
+    """Equation and variable of all derivatives in their order, by states and then by rates: of the core, of its border,
+    along the chains; -1 where there is no variable.
     """
-    found: dict[int, tuple[int, int]] = {}
-    core, place = chains[0].first if chains else n, 0
-    for over in (0, n):
-        for i in range(core):
-            found |= {place + j - over: (i, j) for j in depends[i] if over <= j < over + core}
-            place += core
-    linked, border, sets = list(_linked(core, chains)), core * len(chains), [set(row) for row in depends]
-    for part in (linked[:border], linked[border:]):
+    core = chains[0].first if chains else n
+    linked, border = list(_linked(core, chains)), core * len(chains)
+    for part in ([(i, j) for i in range(core) for j in range(core)], linked[:border], linked[border:]):
         for over in (0, n):
-            found |= {place + k: (i, over + j) for k, (i, j) in enumerate(part) if j >= 0 and over + j in sets[i]}
-            place += len(part)
-    return found
+            yield from ((i, over + j if j >= 0 else j) for i, j in part)
 
 
 def _entries(
@@ -473,12 +463,12 @@ def _slopes(
 ) -> tuple[Function, NDArray[np.int64]]:
     """The code of the Jacobian, and the places of the derivatives that it forms where these are not all."""
     n, named = len(residual), needed(named, residual)
-    places = np.empty(0, np.int64)
-    if chains or 2 * n * n >= PIECE:
-        found = _places(n, chains, _depends(residual, variables, named))
-        places, wanted = np.array([*found], np.int64), tuple(found.values())
-    else:
-        wanted = tuple((i, over + j) for over in (0, n) for i in range(n) for j in range(n))
+    every, places = dict(enumerate(_derivatives(n, chains))), np.empty(0, np.int64)
+    if chains or len(every) >= PIECE:
+        depends = _depends(residual, variables, named)
+        every = {place: (i, j) for place, (i, j) in every.items() if j in depends[i]}
+        places = np.array([*every], np.int64)
+    wanted = tuple(every.values())
     if chains:
         return compile_function(inputs, _entries(residual, variables, named, wanted), PIECE, steps=True), places
     parts = _Derivatives(tuple(residual), tuple(variables), tuple(named), wanted)

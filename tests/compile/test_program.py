@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import symengine as se
 
+import surfacechem
 from surfacechem.compile import program
 from surfacechem.compile.program import compile_function, compile_program, expanded, jacobian
 
@@ -111,3 +112,18 @@ def test_derivatives_are_those_of_the_written_out_equations() -> None:
     for point in ([0.5, 2.0], [1.5, 0.3]):
         expected = compile_function([x, y], exact)(point)
         np.testing.assert_allclose(compile_function([x, y], entries)(point), expected, rtol=1e-13)
+
+
+@pytest.mark.parametrize("cells", [4, 40])
+def test_derivatives_along_chains_are_those_of_all_states(cells):
+    """Few are formed one and all, of many those that may not be zero."""
+    model = surfacechem.load("sudden-contact", [f"bodies.epoxy.conduction.cells={cells}"]).model
+    system, program = model.system, model.program
+    states, rates = [s.symbol for s in system.states], [s.dot for s in system.states]
+    rows = [system.expand(row) for row in system.rows.values()]
+    whole = compile_program(system.t, states, rates, [p.symbol for p in system.parameters], rows)
+    assert program.chains
+    assert not whole.chains
+    inputs = np.random.default_rng(1).uniform(300.0, 400.0, program.n_inputs)
+    for own, all_ in zip(program.derivatives(inputs), whole.derivatives(inputs), strict=True):
+        np.testing.assert_allclose(own, all_, rtol=1e-12)

@@ -137,9 +137,7 @@ def _with_rates(build: Build, found: Sequence[Reaction]) -> list[Reaction]:
     """The reactions with their net rates, as named quantities."""
     laws = {item.label: item.law for item in found if item.law.envelope is None}
     stated = {item.label: _rate(build, item.law, item.affinity) for item in found if item.label in laws}
-    loads = {symengine.Symbol(name) for name in ("g_n", "f", *(f"f_{name}" for name in build.bonding))}
-    loaded = {label for label in laws if any(loads & exponent.free_symbols for exponent in exponents(stated[label]))}
-    rates = {label: _resolved(build, laws, stated, label) if label in loaded else stated[label] for label in laws}
+    rates = stated | {label: _resolved(build, laws, stated, label) for label in _loaded(build, stated)}
     forming = symengine.Add(*(law.stoichiometry().get("phi", 0) * rates[label] for label, law in laws.items()))
     # One while the bonding state may change, zero at a bound and beyond the reach of bonds. Only what bonds form by may
     # carry them beyond; a law with an envelope ends at its bound by itself.
@@ -194,6 +192,12 @@ def _rate(build: Build, law: RateLaw, affinity: Expression) -> Expression:
     if found := exponents(rate):
         build.add(Capped(law.title, tuple(found)))
     return rate
+
+
+def _loaded(build: Build, rates: Mapping[str, Expression]) -> list[str]:
+    """The rates whose exponents read a load."""
+    loads = {symengine.Symbol(name) for name in ("g_n", "f", *(f"f_{name}" for name in build.bonding))}
+    return [label for label, rate in rates.items() if any(loads & item.free_symbols for item in exponents(rate))]
 
 
 def _resolved(build: Build, laws: Mapping[str, RateLaw], rates: Mapping[str, Expression], label: str) -> Expression:
