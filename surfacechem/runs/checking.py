@@ -13,7 +13,7 @@ from surfacechem.errors import InputError
 from surfacechem.format.draws import permuted
 from surfacechem.results.store import StoredArray
 from surfacechem.runs.keeping import ENDS, STATUSES, Keep, RunByRun
-from surfacechem.runs.sweeps import SweepAccuracy, SweepSolution
+from surfacechem.runs.sweeps import SweepAccuracy, SweepSolution, unknown_in
 from surfacechem.solve.contract import Index
 from surfacechem.tolerances import FLOOR, TINY
 
@@ -50,6 +50,12 @@ class Checked:
     source: str
     why: str
     """Why the error of one of those runs is not known whose errors are not."""
+
+    def __str__(self) -> str:
+        """The errors in words."""
+        known = f"{self.error:.2g} of {self.count} runs ({self.source})" if self.unknown < self.count else ""
+        unknown = unknown_in(self.unknown, self.why) if self.unknown else ""
+        return "; ".join(filter(None, (known, unknown)))
 
 
 def checked_arrays(size: int, count: int) -> tuple[dict[str, int], dict[str, StoredArray]]:

@@ -181,17 +181,19 @@ class RunByRun:
         that is.
         """
         books = iter(audits or (audit(run) for run in runs if not isinstance(run, str)))
-        rows = [self._missing(run) if isinstance(run, str) else self._kept(run, next(books), times) for run in runs]
+        failed = {reason: STATUSES.index("refused" if reason == REFUSED else "failed") for reason in self.reasons}
+        rows = [
+            {"status": failed[run], "reason": self.reasons.index(run), "steps": 0}
+            if isinstance(run, str)
+            else self._kept(run, next(books), times)
+            for run in runs
+        ]
         kinds = {name: kind for name, (kind, _, _) in described(self.model.system, self.keep).items()}
         found: Columns = {name: np.array([row.get(name, np.nan) for row in rows], kind) for name, kind in kinds.items()}
         for name in self.keep.series:
             nothing = np.full(times, np.nan)
             found[name] = np.array([row.get(name, nothing) for row in rows])
         return found
-
-    def _missing(self, reason: str) -> dict[str, Any]:
-        status = "refused" if reason == REFUSED else "failed"
-        return {"status": STATUSES.index(status), "reason": self.reasons.index(reason), "steps": 0}
 
     def _kept(self, run: Trajectory, books: Audit, times: int) -> dict[str, Any]:
         result, keep = run.result, self.keep

@@ -345,7 +345,7 @@ def store_summary(stream: Stream, store: Store, checked: Checked | None, file: P
         worst = np.fmax(worst, np.fmax.reduce(store.read("energy_error", number), initial=0.0))
     names = parameter_names(chunks.model.system, chunks.plan)
     words = ", ".join(f"{count} {word}" for count, word in zip(ends.tolist(), STATUSES, strict=True) if count)
-    error = _checked(checked) if checked is not None else ""
+    error = str(checked or "")
     destroys = checked.destroys if checked is not None else 0
     destroyed = f"; ENTROPY DESTROYED in {counted(destroys, 'run')}" if destroys else ""
     facts = [
@@ -359,12 +359,3 @@ def store_summary(stream: Stream, store: Store, checked: Checked | None, file: P
     stopped = ends[STATUSES.index("stopped")] == ends.sum()
     status = "failed" if ends[STATUSES.index("failed")] else "stopped" if stopped else "finished"
     return status, Sheet(chunks.simulation.case.title or "untitled", facts)
-
-
-def _checked(checked: Checked) -> str:
-    """The errors of the runs of a store that are checked."""
-    from surfacechem.runs.sweeps import unknown_in
-
-    known = f"{checked.error:.2g} of {checked.count} runs ({checked.source})"
-    unknown = unknown_in(checked.unknown, checked.why) if checked.unknown else ""
-    return "; ".join(filter(None, (known if checked.unknown < checked.count else "", unknown)))

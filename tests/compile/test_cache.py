@@ -183,7 +183,7 @@ def cut_off(kept: Path, tmp_path: Path) -> Path:
 def test_code_that_is_cut_off_is_not_called_but_made_anew(cut_off: Path, monkeypatch) -> None:
     made = []
     monkeypatch.setenv("SURFACECHEM_CACHE", str(cut_off.parent))
-    loop = stepper.Loop(stepper.sources(), lambda: None)
+    loop = stepper.Loop(stepper.sources(), "none", "none")
     monkeypatch.setattr(loop, "_compiled", lambda: made.append(loop.folder) or len)
     loop.load_briefly()
     assert not loop.is_compiled

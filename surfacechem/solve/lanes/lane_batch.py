@@ -41,17 +41,11 @@ def _words(sizes: tuple[int, ...]) -> int:
     return stepper.words_of(dict(zip(SIZES, sizes, strict=True)), MEMORY)
 
 
-def _run_lanes() -> Any:
-    from surfacechem.solve.lanes.lane_run import run_lanes
-
-    return run_lanes
-
-
 def _sources() -> list[Path]:
     here = Path(__file__).parent
     own = [here / f"{name}.py" for name in ("vector", "layout", "lane_step", "lane_guards", "lane_run")]
     return [*stepper.sources(), here.parent.parent / "compile" / "vectors.py", *own]
 
 
-LOOP = stepper.Loop(_sources(), _run_lanes, brief=True)
+LOOP = stepper.Loop(_sources(), "surfacechem.solve.lanes.lane_run", "run_lanes", brief=True)
 """The compiled loop over eight runs at once."""

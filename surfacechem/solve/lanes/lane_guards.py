@@ -21,12 +21,6 @@ TRIALS = 12
 
 
 @compiled
-def _is_limit(w: Any, m: int) -> bool:
-    """Whether the run may not go on where this guard is below zero."""
-    return bool(w.kinds[m, 0] == 1 and w.kinds[m, 1] <= 0)
-
-
-@compiled
 def start_margins(w: Any, fresh: Any) -> None:
     """Sides of zero of the guards at a start or restart; one that may be zero there is unclear."""
     unclear = same(0.0)
@@ -41,7 +35,7 @@ def start_margins(w: Any, fresh: Any) -> None:
         put(w.side[m], where(fresh, side, lanes(w.side[m])))
         if w.kinds[m, 4] == 0:
             put(w.side[m], 0.0)
-        elif _is_limit(w, m):
+        elif w.kinds[m, 0] == 1 and w.kinds[m, 1] <= 0:  # the run may not go on below zero
             unclear = where(side < 0.5, 1.0, unclear)
         else:
             unclear = where((side == 0.0) & (lanes(w.fired[m]) < 0.5), 1.0, unclear)

@@ -6,8 +6,9 @@ Importing this module imports neither Numba nor the kernel.
 import math
 import threading
 from collections import namedtuple
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -206,10 +207,13 @@ def sources() -> list[Path]:
 
 
 class Loop:
-    """A compiled loop over a batch of runs: compiled once per machine, then loaded when it is first needed."""
+    """A compiled loop over a batch of runs: compiled once per machine, then loaded when it is first needed.
 
-    def __init__(self, sources: Sequence[Path], written: Callable[[], Any], brief: bool = False) -> None:
-        self._sources, self._written, self._brief = sources, written, brief
+    The module of the function is imported where it has to be compiled, as it imports Numba.
+    """
+
+    def __init__(self, sources: Sequence[Path], module: str, function: str, brief: bool = False) -> None:
+        self._sources, self._module, self._function, self._brief = sources, module, function, brief
         self._kernel: Any = None
         self._lock = threading.Lock()
 
@@ -238,7 +242,7 @@ class Loop:
     def _compiled(self) -> Any:
         from surfacechem.solve.radau.work import PARTS
 
-        kernel = compile_kernel(self._written(), _signature(), self.folder, PARTS)
+        kernel = compile_kernel(getattr(import_module(self._module), self._function), _signature(), self.folder, PARTS)
         if not self._brief:
             # A batch of no runs: Numba looks longer at the types of its first arguments than a brief run takes.
             nothing = (np.zeros((len(SIZES),) * axes, dtype) if axes else dtype(0) for dtype, axes in BATCH.values())
@@ -257,13 +261,7 @@ def _signature() -> Any:
     return types.void(types.int64, types.int64, types.int64[::1], batch)
 
 
-def _run_batch() -> Any:
-    from surfacechem.solve.radau.driver import run_batch
-
-    return run_batch
-
-
-LOOP = Loop(sources(), _run_batch)
+LOOP = Loop(sources(), "surfacechem.solve.radau.driver", "run_batch")
 """Runs step by step, or states to be made consistent."""
 
 
