@@ -29,7 +29,7 @@ from surfacechem.solve.lanes.lane_step import (
     try_step,
 )
 from surfacechem.solve.lanes.layout import LEFT
-from surfacechem.solve.lanes.vector import any_lane, lanes, put, where
+from surfacechem.solve.lanes.vector import absolute, any_lane, lanes, put, same, where
 from surfacechem.solve.radau.driver import FEWEST, LEAST_NORM
 from surfacechem.solve.radau.explicit import FALLS, PATIENT
 from surfacechem.solve.radau.record import laying_out
@@ -79,14 +79,20 @@ def _end(w: Any, lane: int, status: int) -> None:
     counters = w.steps[lane], w.rejected[lane], LAST_STAGE * (w.steps[lane] + w.rejected[lane])
     for k, counter in enumerate(counters):
         counts[FIRST_COUNTER + k] = counter
-    w.over[lane], w.run[lane] = i, -1
+    w.over[lane] = i
+    _leave(w, lane)
+
+
+@compiled
+def _leave(w: Any, lane: int) -> None:
+    w.run[lane], w.next_output[lane] = -1, np.inf
 
 
 @compiled
 def _give_up(w: Any, lane: int) -> None:
     """Leave the run of a lane to other steps."""
     w.counts[w.run[lane], END] = LEFT
-    w.run[lane] = -1
+    _leave(w, lane)
 
 
 @compiled
@@ -166,6 +172,7 @@ def _start(w: Any) -> None:
             for m in range(w.columns):
                 w.outputs[i, 0, m] = w.y[m, lane]
             counts[OUTPUTS] = 1
+        _find_next_output(w, lane)
         if counts[RECORDS] == 0:
             _record(w, lane)
 
@@ -190,20 +197,14 @@ def _choose_sizes(w: Any) -> None:
 
 
 @compiled
-def _end_of_step(w: Any, lane: int) -> float:
-    return float(w.end[lane] if w.last[lane] > 0.5 else w.t[lane] + w.h[lane])
+def _end_of_step(w: Any) -> Any:
+    return where(lanes(w.last) > 0.5, lanes(w.end), lanes(w.t) + lanes(w.h))
 
 
 @compiled
-def _outputs_inside(w: Any) -> bool:
-    """Whether a run has an output before the end of its step."""
-    found = False
-    for lane in range(LANES):
-        i = w.run[lane]
-        if i >= 0:
-            k, times = w.counts[i, OUTPUTS], w.times[row_of(w.times, i)]
-            found = found or (k < times.shape[0] and times[k] < _end_of_step(w, lane))
-    return found
+def _find_next_output(w: Any, lane: int) -> None:
+    k, times = w.counts[w.run[lane], OUTPUTS], w.times[row_of(w.times, w.run[lane])]
+    w.next_output[lane] = times[k] if k < times.shape[0] else np.inf
 
 
 @compiled
@@ -222,6 +223,7 @@ def _write_outputs(w: Any, lane: int, t_new: float) -> None:
             outputs[k, m] = w.y_new[m, lane] if times[k] == t_new else inside
         k += 1
     counts[OUTPUTS] = k
+    _find_next_output(w, lane)
 
 
 @compiled
@@ -248,25 +250,37 @@ def _write_events(w: Any, lane: int) -> bool:
 
 
 @compiled
-def _accept(w: Any, lane: int) -> None:
-    """Move on to the end of a step."""
-    t_new = _end_of_step(w, lane)
-    _write_outputs(w, lane, t_new)
+def _take(w: Any, row: Any, values: Any) -> None:
+    """Put values where steps are taken."""
+    put(row, where(lanes(w.taken) > 0.5, values, lanes(row)))
+
+
+@compiled
+def _move_on(w: Any) -> None:
+    """To the ends of the steps that are taken."""
+    t_new = _end_of_step(w)
     for m in range(w.columns):
-        w.y[m, lane] = w.y_new[m, lane]
-        w.k[0, m, lane] = w.k[END_STAGE, m, lane]
+        _take(w, w.y[m], lanes(w.y_new[m]))
+        _take(w, w.k[0, m], lanes(w.k[END_STAGE, m]))
     for m in range(w.n_margins):
-        w.margin_first[m, lane] = w.margin_end[m, lane]
+        _take(w, w.margin_first[m], lanes(w.margin_end[m]))
     for m in range(w.n_ledger):
-        w.q_largest[m, lane] = max(w.q_largest[m, lane], abs(w.y[w.n + m, lane]))
-    w.t[lane] = t_new
-    w.steps[lane] += 1
-    w.begins[lane], w.again[lane], w.failed[lane] = 0.0, 0.0, 0
+        put(w.q_largest[m], larger(absolute(lanes(w.y[w.n + m])), lanes(w.q_largest[m])))
+    _take(w, w.t, t_new)
+    for flag in (w.begins, w.again):
+        _take(w, flag, same(0.0))
     # The controller learns nothing more from what is far below the tolerance.
-    w.h_last[lane], w.norm_last[lane] = w.h[lane], max(w.norm[lane], LEAST_NORM)
-    w.proposed[lane] = w.following[lane]
-    if t_new >= w.aim[lane]:
-        w.aim[lane] = np.inf
+    _take(w, w.h_last, lanes(w.h))
+    _take(w, w.norm_last, larger(lanes(w.norm), LEAST_NORM))
+    _take(w, w.proposed, lanes(w.following))
+    _take(w, w.aim, where(t_new >= lanes(w.aim), np.inf, lanes(w.aim)))
+
+
+@compiled
+def _accept(w: Any, lane: int) -> None:
+    """Count a step that is taken."""
+    w.steps[lane] += 1
+    w.failed[lane] = 0
     stiff = w.stiff[lane] > 0.5
     w.stiff_steps[lane] = w.stiff_steps[lane] + 2 if stiff else max(w.stiff_steps[lane] - 1, 0)
     _record(w, lane)
@@ -290,8 +304,8 @@ def _go_on(w: Any, lane: int) -> None:
 
 @compiled
 def _conclude(w: Any, lane: int) -> None:
-    """What becomes of the step of a lane: repeated, shorter or onto a guard; accepted; the last one."""
-    h, i = w.h[lane], w.run[lane]
+    """What becomes of the step of a lane: repeated, shorter or onto a guard; taken."""
+    h = w.h[lane]
     if w.again[lane] > 0.5 and w.norm[lane] > FALLS * w.norm_tried[lane] * (h / w.h_tried[lane]) ** 8:
         # The error of a step that is repeated has not fallen with its size: it is noise, or stiffness.
         w.stiff_steps[lane] += PATIENT
@@ -310,6 +324,17 @@ def _conclude(w: Any, lane: int) -> None:
         w.proposed[lane] = w.met[lane] * h
         w.rejected[lane] += 1
     elif w.landing[lane] == 0 or lands(w, lane):
+        w.taken[lane] = 1.0
+        t_new = w.end[lane] if w.last[lane] > 0.5 else w.t[lane] + h
+        if w.next_output[lane] <= t_new:
+            _write_outputs(w, lane, t_new)
+
+
+@compiled
+def _continue(w: Any, lane: int) -> None:
+    """Behind the step of a lane; other steps take over where these do not get on."""
+    i = w.run[lane]
+    if w.taken[lane] > 0.5:
         _accept(w, lane)
         _go_on(w, lane)
     doubtful = w.unclear[lane] + (w.failed[lane] > HOPELESS) + (w.stiff_steps[lane] >= 2 * PATIENT) > 0
@@ -350,7 +375,7 @@ def _step(w: Any) -> None:
         find_stiff(w)
         put(w.missed, 1.0)
         close = may_meet(w, good)
-        seen, shown = has_points(w, good), _outputs_inside(w)
+        seen, shown = has_points(w, good), any_lane(lanes(w.next_output) < _end_of_step(w))
         if seen or shown:
             interpolate(w, w.columns)
         elif any_lane(close):
@@ -358,9 +383,14 @@ def _step(w: Any) -> None:
         if seen:
             look(w, good)
         meet(w, good & (lanes(w.missed) == 1.0), close)
+    put(w.taken, 0.0)
     for lane in range(LANES):
         if w.run[lane] >= 0:
             _conclude(w, lane)
+    _move_on(w)
+    for lane in range(LANES):
+        if w.run[lane] >= 0:
+            _continue(w, lane)
     _write_margins(w)
 
 
@@ -370,7 +400,8 @@ def run_lanes(first: int, last: int, memory: Any, batch: Any) -> None:
     w.loose = loosening(w.rtol)
     following, busy = first, 0
     for lane in range(LANES):
-        w.run[lane] = w.over[lane] = -1
+        w.over[lane] = -1
+        _leave(w, lane)
     while busy > 0 or following < last:
         # Runs begin together, so that what is done at their starts and ends is done for several at once.
         begins = busy <= LANES - TOGETHER

@@ -34,8 +34,8 @@ MEMORY = {
     # whether each is met in the step
     **_arrays("margin margin_before margin_earlier margin_first margin_end", "n_margins"),
     **_arrays("nearest bend margin_largest side fired", "n_margins"),
-    # the time, the end of the segment, and a time at which a step has to end
-    **_arrays("t end aim"),
+    # the time, the end of the segment, a time at which a step has to end, and that of the next output
+    **_arrays("t end aim next_output"),
     # this step, the last one and one that failed, the norms of their errors, the next step; how far apart looks at the
     # equations are
     **_arrays("h h_last h_tried norm norm_last norm_tried proposed following spacing_of"),
@@ -44,8 +44,8 @@ MEMORY = {
     # a step onto a guard: its value at the end, its slope, the longest step to try, the last push across
     **_arrays("value slope longest nudge"),
     # flags: a start or restart; the first step of a segment, the last one; a step onto a guard; one that is repeated;
-    # one that is stiff; guards of which it is unclear whether they are met
-    **_arrays("fresh begins last onto again stiff unclear"),
+    # one that is stiff; guards of which it is unclear whether they are met; a step that is taken
+    **_arrays("fresh begins last onto again stiff unclear taken"),
     # the run of each lane, -1 where there is none, and the run that has just ended there; its segment; steps, rejected
     # ones, those in a row; twice the stiff ones; trials of a step onto a guard
     **_arrays("run over segment steps rejected failed stiff_steps landing", kind=int),
