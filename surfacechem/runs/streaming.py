@@ -35,9 +35,9 @@ if TYPE_CHECKING:
     from surfacechem.runs.simulation import Simulation
 
 
-EXPLICIT_RUNS, RUNS_OF_A_CHUNK, OF_A_SLOW_ONE = 2**16, 2**14, 2**9
-"""Runs of a chunk at most, of those that take explicit steps and of others: a second or two of the compiled loop. Of
-runs that are looked at one by one fewer.
+EXPLICIT_RUNS, IMPLICIT_RUNS, JUMPING_RUNS, SLOW_RUNS = 2**16, 2**14, 2**12, 2**9
+"""Runs of a chunk at most, about a second or two: of those that take explicit steps, or implicit ones, that jump, and
+that are looked at one by one.
 """
 
 RUNS_OF_A_PIECE = 2**11
@@ -85,6 +85,15 @@ class ChunkRuns:
     def explicit(self) -> bool:
         """Whether runs take explicit steps and do not jump."""
         return any(way.problem.explicit and not way.jumps for way in self.ways)
+
+    @property
+    def at_once(self) -> int:
+        """Runs of a chunk at most."""
+        if self.explicit:
+            return EXPLICIT_RUNS
+        if all(way.jumps for way in self.ways):
+            return JUMPING_RUNS if self.ways else SLOW_RUNS
+        return IMPLICIT_RUNS
 
     @property
     def waits(self) -> bool:
@@ -326,8 +335,7 @@ def _layout(chunks: ChunkRuns, job: Job) -> Layout:
         attributes = Column(name, (), None, q.unit, q.long_name).attributes
         variables[name] = StoredArray("float64", (*runs, "time"), attributes)
     more, beside = checked_arrays(plan.size, chunks.checked)
-    at_once = EXPLICIT_RUNS if chunks.explicit else RUNS_OF_A_CHUNK if chunks.arrays else OF_A_SLOW_ONE
-    return Layout(sizes | more, runs, variables, beside, coordinates, _attributes(chunks, job), at_once)
+    return Layout(sizes | more, runs, variables, beside, coordinates, _attributes(chunks, job), chunks.at_once)
 
 
 def _attributes(chunks: ChunkRuns, job: Job) -> dict[str, Any]:

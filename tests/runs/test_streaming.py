@@ -29,7 +29,7 @@ pytestmark = pytest.mark.around
 
 K_0 = "interface.potential.bond-energy.K_0"
 ENDS = {"last": ["T", "phi"]}
-SIZES = "EXPLICIT_RUNS", "RUNS_OF_A_CHUNK"
+SIZES = "EXPLICIT_RUNS", "IMPLICIT_RUNS", "JUMPING_RUNS"
 
 
 @pytest.fixture(autouse=True)
@@ -300,6 +300,22 @@ def test_a_killed_worker_of_a_cluster_changes_no_byte(whole, tmp_path):
         stored(tmp_path / "o.zarr", client=client, told=kill)
     assert told[-1].done == 60
     assert digest(tmp_path / "o.zarr") == digest(whole)
+
+
+@pytest.mark.parametrize(
+    ("name", "path", "size"),
+    [
+        ("exothermic", "initial.T", "EXPLICIT_RUNS"),
+        ("dna-adhesive", "initial.T_2", "IMPLICIT_RUNS"),
+        ("stick-slip", "initial.T", "JUMPING_RUNS"),
+        ("sticky-sphere", "mechanics.normal.k", "SLOW_RUNS"),
+    ],
+)
+def test_chunks_are_as_long_as_their_runs_are_brief(name, path, size, monkeypatch):
+    monkeypatch.setattr(streaming, size, 7)
+    simulation = surfacechem.load(name)
+    chunks = streaming.ChunkRuns(simulation, simulation.plan({path: [300.0]}), Keep(), {})
+    assert chunks.at_once == 7
 
 
 def test_chunks_of_a_grid_are_blocks_of_it():
