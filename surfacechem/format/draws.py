@@ -124,6 +124,10 @@ class Sample:
         u = METHODS[self.method](own, self.runs, len(sources), self.seed)[where] + INSIDE
         return {path: draw.at(u[:, sources.index(draw.source or path)]) for path, draw in self.draws.items()}
 
+    def of(self, path: str, index: Index) -> Array:
+        """The values of one parameter."""
+        return self.at(index)[path]
+
     @property
     def record(self) -> dict[str, Any]:
         """What makes it again."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -73,6 +73,37 @@ class Spaced:
         values[index == self.count - 1] = self.last
         values[index == 0] = self.first
         return values
+
+
+@dataclass(frozen=True)
+class Numbered:
+    """Values by their numbers, formed where they are asked for: part by part of many, or all as an array."""
+
+    at: Callable[[Index], Array]
+    count: int
+
+    @property
+    def shape(self) -> tuple[int]:
+        """That of the array."""
+        return (self.count,)
+
+    @property
+    def dtype(self) -> np.dtype[Any]:
+        """That of the array."""
+        return np.dtype(float)
+
+    def __getitem__(self, part: slice) -> Array:
+        """The values of a part."""
+        return self.at(np.arange(*part.indices(self.count)))
+
+
+def name_parts(path: str) -> list[str]:
+    """What a path is made of, as parts of a name.
+
+    >>> name_parts("interface.bonding[2].k-off.level")
+    ['interface', 'bonding_2', 'k_off']
+    """
+    return [p.replace("-", "_").replace("[", "_").strip("]") for p in path.removesuffix(".level").split(".")]
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 
 from surfacechem.errors import InputError, refuse_unknown
-from surfacechem.format.plans import RUN, Plan
+from surfacechem.format.plans import RUN, Plan, name_parts
 from surfacechem.plots import style
 from surfacechem.plots.run import KINDS, of_kind
 from surfacechem.plots.style import COLOURS, Array, symbol, unit, unit_text, varies
@@ -60,6 +60,7 @@ def figure(dataset: xarray.Dataset, plan: Plan, variables: Sequence[str] | None 
         return curves(dataset, axes, names)
     if len(axes) == 2 and RUN not in axes:
         return maps(dataset, plan, axes, names)
+    parameters.sort(key=lambda name: [*plan.paths, ""].index(path_of(name, plan)))
     return effects(dataset, plan, axes, parameters, names)
 
 
@@ -220,8 +221,10 @@ def effects(
     dataset: xarray.Dataset, plan: Plan, axes: Sequence[str], parameters: Sequence[str], names: Sequence[str]
 ) -> Figure:
     """The distribution of each variable, and its median and band over each parameter, whatever the others are."""
-    drawn = plan.sample.draws.values() if plan.sample else ()
-    decades = [*(axis.logarithmic for axis in plan.axes), *(draw.over_decades for draw in drawn)]
+    drawn = plan.sample.draws if plan.sample else {}
+    ratios = {axis.path: axis.logarithmic for axis in plan.axes}
+    ratios |= {path: draw.over_decades for path, draw in drawn.items()}
+    decades = {parameter: ratios.get(path_of(parameter, plan)) for parameter in parameters}
     with style.panels(
         2.2 + 2.0 * len(parameters), 0.8 + 2.1 * len(names), len(names), 1 + len(parameters), sharey="row"
     ) as (plot, grid):
@@ -233,14 +236,20 @@ def effects(
             for ax, parameter in zip(row[1:], parameters, strict=True):
                 over = dataset[parameter].broadcast_like(whole).transpose(*axes).values.ravel()
                 effect(ax, over[:: -(-over.size // MOST_POINTS)], values)
-        for column, parameter, ratios in zip(grid.T[1:], parameters, decades, strict=True):
+        for column, parameter in zip(grid.T[1:], parameters, strict=True):
             for ax in column:
-                style.draw_parameter(ax.xaxis, dataset[parameter], ratios)
+                style.draw_parameter(ax.xaxis, dataset[parameter], decades[parameter])
                 ax.xaxis.label.set(fontsize=8, visible=ax is column[-1])
         grid[-1, 0].set_xlabel("runs")
         style.headings(plot, grid[0, 0], dataset)
         grid[0, 0].set_title("5, 50 and 95 % of the runs", loc="left", fontsize=8, color="#555555")
     return plot
+
+
+def path_of(parameter: str, plan: Plan) -> str:
+    """The path of a swept parameter by its name in the dataset, which is the end of it; '' where none fits."""
+    ends = {path: "_" + "_".join(name_parts(path)) for path in plan.paths}
+    return next((path for path, end in ends.items() if end.endswith(f"_{parameter.removesuffix('_swept')}")), "")
 
 
 def distribution(ax: Axes, values: Array) -> None:

@@ -33,6 +33,9 @@ if TYPE_CHECKING:
 SUFFIX = ".zarr"
 MARKS = ".marks"
 
+PART = 2**20
+"""Values of a coordinate that are written at a time."""
+
 MOST_BYTES = 64 * 2**20
 """Size of a chunk of all variables together."""
 
@@ -277,7 +280,7 @@ def begin(path: Path, layout: Layout, resume: bool) -> Store:
     ours = json.loads(json.dumps(dict(layout.attributes)))
     different = [word for name, word in WORDS.items() if there.get(name) != ours.get(name)]
     if different:
-        raise InputError(f"belongs to another sweep: {', '.join(different)} differ.", place)
+        raise InputError(f"belongs to another sweep. Different: {', '.join(different)}.", place)
     return Store(path, layout)
 
 
@@ -295,16 +298,17 @@ def _make(path: Path, layout: Layout) -> None:
         )
         made.update_attributes(attributes)
     for column in layout.coordinates:
-        values = np.asarray(column.values)
+        values = column.values
         made = group.create_array(
             column.name,
             shape=values.shape,
-            chunks=tuple(min(size, 2**20) for size in values.shape),
+            chunks=tuple(min(size, PART) for size in values.shape),
             dtype=values.dtype,
             dimension_names=column.dimensions,
             attributes=column.attributes,
         )
-        made[...] = values
+        for first in range(0, values.shape[0], PART):  # of a plan there may be more values than memory
+            made[first : first + PART] = values[first : first + PART]
     # Coordinates are written at once, as they follow from the plan.
     with warnings.catch_warnings():
         # Not yet of the standard, and read by what knows it only: without, each array is looked for by itself.

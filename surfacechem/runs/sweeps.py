@@ -17,7 +17,7 @@ from surfacechem import references
 from surfacechem.errors import InputError
 from surfacechem.expressions import derivative
 from surfacechem.format import Case
-from surfacechem.format.plans import RUN, STATISTICS, Plan
+from surfacechem.format.plans import RUN, STATISTICS, Numbered, Plan, name_parts
 from surfacechem.model.system import System
 from surfacechem.references.base import SceneView
 from surfacechem.results.accuracy import AT_START, UNKNOWN, CellErrors, second_tolerance
@@ -261,7 +261,7 @@ def parameter_names(system: System, plan: Plan) -> dict[str, str]:
     taken = {*quantities(system), *system.inside, "time", RUN}
     found: dict[str, str] = {}
     for path in plan.paths:
-        parts = [p.replace("-", "_").replace("[", "_").strip("]") for p in path.removesuffix(".level").split(".")]
+        parts = name_parts(path)
         names = ["_".join(parts[-k:]) for k in range(1, len(parts) + 1)]
         found[next((name for name in names if name not in taken | set(found)), f"{names[-1]}_swept")] = path
     return found
@@ -274,10 +274,11 @@ def dimensions(plan: Plan, names: Mapping[str, str]) -> dict[str, int]:
 
 
 def parameter_columns(system: System, plan: Plan, names: Mapping[str, str]) -> list[Column]:
-    """The values of the swept parameters, each along its own dimension."""
+    """The values of the swept parameters, each along its own dimension, formed where they are asked for."""
     columns = []
-    drawn = plan.sample.at(np.arange(plan.sample.runs)) if plan.sample else {}
-    values = {axis.path: axis.every for axis in plan.axes} | drawn
+    sample, drawn = plan.sample, set(plan.sample.draws) if plan.sample else set()
+    values = {axis.path: Numbered(axis.at, len(axis)) for axis in plan.axes}
+    values |= {path: Numbered(partial(sample.of, path), sample.runs) for path in drawn} if sample else {}
     for name, path in names.items():
         state = next((s for s in system.states if s.path == path), None)
         if state is not None:
@@ -429,7 +430,8 @@ class SweepSolution(Results):
 
     def _coordinates(self, load: Column | None) -> list[Column]:
         """The swept parameters, and the times or, where a load ends the runs, the values of this."""
-        columns = parameter_columns(self.system, self.plan, self.parameters)
+        swept = parameter_columns(self.system, self.plan, self.parameters)
+        columns = [replace(column, values=column.values[:]) for column in swept]
         times = np.array([run.result.problem.times for run in self.runs])
         if self.plan.until is None or not self.plan.load or load is None:
             return [*columns, Column("time", ("time",), times[0], "s", "time since the start")]

@@ -122,6 +122,16 @@ def test_effects_of_three_parameters_of_a_grid(tmp_path):
     assert y.tolist() == np.median(opened(path)["T_last"].values, axis=(1, 2)).tolist()
 
 
+def test_effects_in_a_store_are_in_the_order_of_the_plan_each_with_its_own_scale(tmp_path):
+    over = {K_0: {"from": 1, "to": 300, "points": 3, "spacing": "logarithmic"}, "initial.phi": [0.0, 0.1, 0.2]}
+    simulation = surfacechem.load("exothermic", {"sweep": {"keep": {"last": ["T"]}}})
+    plan = simulation.plan({**over, "initial.T": [290.0, 300.0]})
+    with simulation.stream(plan, tmp_path / "o.zarr").run().dataset as data:
+        effects = plots.figure(data, ["T_last"]).axes[1:]
+    assert [ax.get_xscale() for ax in effects] == ["log", "linear", "linear"]
+    assert ["bonding" in ax.get_xlabel() for ax in effects] == [False, True, False]
+
+
 def test_effects_of_a_sample_in_memory_and_in_its_file(tmp_path):
     """Its parameters are no dimensions, but coordinates all the same; those drawn by ratios lie over decades."""
     ratios = {"uniform": {"from": 1, "to": 300, "spacing": "logarithmic"}}

@@ -19,6 +19,7 @@ from typer.testing import CliRunner
 import surfacechem
 from surfacechem.cli.main import app
 from surfacechem.errors import InputError, OutputError
+from surfacechem.results import store
 from surfacechem.results.store import Layout, StoredArray, opened
 from surfacechem.runs import checking, streaming
 from surfacechem.runs.checking import check
@@ -246,12 +247,18 @@ def test_a_damaged_chunk_is_computed_again(whole, tmp_path):
     assert digest(path) == digest(whole)
 
 
+def test_coordinates_are_written_in_parts(tmp_path, monkeypatch):
+    monkeypatch.setattr(store, "PART", 7)
+    with stored(tmp_path / "o.zarr").dataset as data:
+        np.testing.assert_array_equal(data["K_0"], np.linspace(100, 300, 60))
+
+
 def test_another_sweep_or_what_is_no_store_is_refused(whole, tmp_path):
     with pytest.raises(InputError, match="is there already: --resume goes on with it"):
         stored(whole)
-    with pytest.raises(InputError, match="belongs to another sweep: the case, what is kept differ"):
+    with pytest.raises(InputError, match=r"belongs to another sweep\. Different: the case, what is kept\."):
         stored(whole, case(keep={"last": ["T"]}), resume=True)
-    with pytest.raises(InputError, match="belongs to another sweep: the case, the plan differ"):
+    with pytest.raises(InputError, match=r"belongs to another sweep\. Different: the case, the plan\."):
         stored(whole, case(keep=ENDS, over={K_0: [1.0, 2.0]}), resume=True)
     (tmp_path / "foreign.zarr").mkdir()
     (tmp_path / "foreign.zarr" / "zarr.json").write_text("{}")
