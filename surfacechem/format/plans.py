@@ -77,7 +77,7 @@ class Spaced:
 
 @dataclass(frozen=True)
 class Numbered:
-    """Values by their numbers, formed where they are asked for: part by part of many, or all as an array."""
+    """Values by their numbers, formed where a slice is asked for: of many part by part."""
 
     at: Callable[[Index], Array]
     count: int
@@ -131,11 +131,6 @@ class Axis:
     @cached_property
     def _listed(self) -> Array:
         return np.asarray(self.values, dtype=float)
-
-    @property
-    def every(self) -> Array:
-        """All values."""
-        return self.at(np.arange(len(self)))
 
     @property
     def has_equals(self) -> bool:

@@ -247,9 +247,10 @@ def effects(
 
 
 def path_of(parameter: str, plan: Plan) -> str:
-    """The path of a swept parameter by its name in the dataset, which is the end of it; '' where none fits."""
-    ends = {path: "_" + "_".join(name_parts(path)) for path in plan.paths}
-    return next((path for path, end in ends.items() if end.endswith(f"_{parameter.removesuffix('_swept')}")), "")
+    """The path of a swept parameter by its name in the dataset, the last parts of the path; '' where none fits."""
+    wanted = parameter.removesuffix("_swept")
+    parts = {path: name_parts(path) for path in plan.paths}
+    return next((path for path, p in parts.items() if wanted in ("_".join(p[k:]) for k in range(len(p)))), "")
 
 
 def distribution(ax: Axes, values: Array) -> None:

@@ -82,7 +82,8 @@ class SharedLoadCluster(Cluster):
             return w - np.log(left), 1.0 / (left * (x_0 + w))
 
         early, exponent = scaled < 0.5 * whole, np.full_like(scaled, x_0)
-        # As 1/(x + 1) < e^x E_1(x) < 1/x, and dw > (1 - e^-w)/x_0 before, both start close below what is sought.
+        # Both searches start close below their roots: of the first, what has gone is less than (1 - e^-w)/x_0, and half
+        # of the whole less than 1/(2 x_0); of the second, e^x E_1(x) is more than 1/(x + 1), and w + 1 at most `most`.
         gone = scaled[early]
         nothing = np.zeros_like(gone)
         exponent[early] += increasing_root(

@@ -181,9 +181,9 @@ class RunByRun:
         that is.
         """
         books = iter(audits or (audit(run) for run in runs if not isinstance(run, str)))
-        failed = {reason: STATUSES.index("refused" if reason == REFUSED else "failed") for reason in self.reasons}
+        codes = {reason: STATUSES.index("refused" if reason == REFUSED else "failed") for reason in self.reasons}
         rows = [
-            {"status": failed[run], "reason": self.reasons.index(run), "steps": 0}
+            {"status": codes[run], "reason": self.reasons.index(run), "steps": 0}
             if isinstance(run, str)
             else self._kept(run, next(books), times)
             for run in runs

@@ -197,20 +197,15 @@ def _choose_sizes(w: Any) -> None:
 
 
 @compiled
-def _end_of_step(w: Any) -> Any:
-    return where(lanes(w.last) > 0.5, lanes(w.end), lanes(w.t) + lanes(w.h))
-
-
-@compiled
 def _find_next_output(w: Any, lane: int) -> None:
     k, times = w.counts[w.run[lane], OUTPUTS], w.times[row_of(w.times, w.run[lane])]
     w.next_output[lane] = times[k] if k < times.shape[0] else np.inf
 
 
 @compiled
-def _write_outputs(w: Any, lane: int, t_new: float) -> None:
+def _write_outputs(w: Any, lane: int) -> None:
     """The outputs up to the end of the step."""
-    i = w.run[lane]
+    i, t_new = w.run[lane], w.t_new[lane]
     counts, times, outputs = w.counts[i], w.times[row_of(w.times, i)], w.outputs[i]
     k = counts[OUTPUTS]
     while k < times.shape[0] and times[k] <= t_new:
@@ -258,7 +253,7 @@ def _take(w: Any, row: Any, values: Any) -> None:
 @compiled
 def _move_on(w: Any) -> None:
     """To the ends of the steps that are taken."""
-    t_new = _end_of_step(w)
+    t_new = lanes(w.t_new)
     for m in range(w.columns):
         _take(w, w.y[m], lanes(w.y_new[m]))
         _take(w, w.k[0, m], lanes(w.k[END_STAGE, m]))
@@ -325,9 +320,8 @@ def _conclude(w: Any, lane: int) -> None:
         w.rejected[lane] += 1
     elif w.landing[lane] == 0 or lands(w, lane):
         w.taken[lane] = 1.0
-        t_new = w.end[lane] if w.last[lane] > 0.5 else w.t[lane] + h
-        if w.next_output[lane] <= t_new:
-            _write_outputs(w, lane, t_new)
+        if w.next_output[lane] <= w.t_new[lane]:
+            _write_outputs(w, lane)
 
 
 @compiled
@@ -366,6 +360,7 @@ def _write_margins(w: Any) -> None:
 def _step(w: Any) -> None:
     """A trial step of every lane, and what becomes of each."""
     _choose_sizes(w)
+    put(w.t_new, where(lanes(w.last) > 0.5, lanes(w.end), lanes(w.t) + lanes(w.h)))
     set_weights(w)
     try_step(w)
     propose(w)
@@ -375,7 +370,7 @@ def _step(w: Any) -> None:
         find_stiff(w)
         put(w.missed, 1.0)
         close = may_meet(w, good)
-        seen, shown = has_points(w, good), any_lane(lanes(w.next_output) < _end_of_step(w))
+        seen, shown = has_points(w, good), any_lane(lanes(w.next_output) < lanes(w.t_new))
         if seen or shown:
             interpolate(w, w.columns)
         elif any_lane(close):

@@ -211,7 +211,7 @@ def put_inside(w: Any, x: Any) -> None:
 
 @compiled
 def put_roughly(w: Any, x: float) -> None:
-    """The same by the cubic through both ends of each step, for which it needs no further rates."""
+    """The same by the cubic Hermite polynomial of each step, for which it needs no further rates."""
     h = lanes(w.h)
     put(w.inputs[0], lanes(w.t) + x * h)
     for m in range(w.n):
