@@ -34,8 +34,8 @@ MEMORY = {
     # whether each is met in the step
     **_arrays("margin margin_before margin_earlier margin_first margin_end", "n_margins"),
     **_arrays("nearest bend margin_largest side fired", "n_margins"),
-    # the time, now and at the end of the step, the end of the segment, a time at which a step has to end, and the time of
-    # the next output
+    # the time, now and at the end of the step; the end of the segment, a time at which a step has to end, and the time
+    # of the next output
     **_arrays("t t_new end aim next_output"),
     # this step, the last one and one that failed, the norms of their errors, the next step; how far apart looks at the
     # equations are
