@@ -82,7 +82,9 @@ def groups(dataset: xarray.Dataset, variables: Sequence[str] | None) -> list[Pan
     known, load = _numbers(dataset), rupture.load_of(dataset)
     refuse_unknown(variables or (), known, "no variable '{}' in the sweep", style.place(dataset))
     names = [[name] for name in dict.fromkeys(variables or ())] or ([[f"{load}_mode"]] if load else _dependent(dataset))
-    return [Panel("", unit(dataset[group[0]]), group) for group in names or [["time_reached"]]]
+    # A store may have numbers of each run alone.
+    names = names or [[name] for name in members.differing(dataset, axes_of(dataset), known)]
+    return [Panel("", unit(dataset[group[0]]), group) for group in names]
 
 
 def _dependent(dataset: xarray.Dataset) -> list[list[str]]:
@@ -99,9 +101,11 @@ def _draw_final(ax: Axes, dataset: xarray.Dataset, names: Sequence[str]) -> None
     """Values at the end of each run."""
     x = dataset[axes_of(dataset)[0]].values
     ends = {name: members.final(dataset, name) for name in names}
+    at_end = any(dataset[name].ndim > len(axes_of(dataset)) for name in names)
     for name, end in ends.items():
+        own = symbol(name) if at_end or len(names) > 1 else ""  # what a number of each run is its axis says
         for values, label in style.by_second(dataset, end):
-            words = label or symbol(name) if len(names) == 1 else f"{symbol(name)} {label}".strip()
+            words = label or own if len(names) == 1 else f"{own} {label}".strip()
             ax.plot(x, values, marker="o" if len(x) < 3 else "", label=words)
-    said = f"Final {symbol(names[0])}" if len(names) == 1 else "Final value"
+    said = f"{'Final ' * at_end}{symbol(names[0])}" if len(names) == 1 else "Final value"
     style.label(ax.yaxis, said, unit(dataset[names[0]]), np.stack(list(ends.values())))

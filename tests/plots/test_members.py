@@ -113,6 +113,21 @@ def test_what_is_briefer_than_the_outputs_of_a_sweep_is_told():
     assert "between outputs" not in plots.figure(still, ["v"], "time").axes[0].get_title(loc="left")
 
 
+@pytest.mark.parametrize(("until", "names"), [(1.2, ["phi_last", "T_last"]), ("steady", ["T_last", "time_reached"])])
+def test_a_store_over_one_parameter_shows_what_depends_on_it(until, names, tmp_path):
+    """Not only the time that its runs have reached."""
+    settings = {"run.until": until, "sweep": {"keep": {"last": ["T", "phi"]}, "over": {K_0: [100.0, 200.0, 300.0]}}}
+    simulation = surfacechem.load("exothermic", settings)
+    with simulation.stream(simulation.plan(), tmp_path / "o.zarr").run().dataset as data:
+        # All bonds are there at rest, after different times.
+        for ax, name in zip(plots.figure(data).axes, names, strict=True):
+            x, y = ax.lines[0].get_data()
+            assert x.tolist() == [100, 200, 300]
+            np.testing.assert_allclose(y, data[name])
+            assert not ax.get_ylabel().startswith("Final")
+            assert ax.get_legend() is None
+
+
 def test_effects_of_three_parameters_of_a_grid(tmp_path):
     over = {K_0: [100.0, 200.0, 300.0], "initial.T": [290.0, 310.0], C_R: [5e15, 7e15]}
     path = stored(tmp_path, over=over, keep={"last": ["T"]})
