@@ -104,17 +104,43 @@ def check_start(system: System, values: Mapping[str, float], initial: Mapping[st
     given |= {state.symbol: initial[state.name] for state in system.states if not state.algebraic}
     given[system.t] = 0.0
     for margin, expression in system.limits:
-        try:
-            value = expression.subs({x: _exact(given[x]) for x in expression.free_symbols if x in given})
-            if value.free_symbols:  # needs an algebraic variable or a derivative, which only the run can find
-                continue
-            number = float(value)
-        except (RuntimeError, TypeError):  # an undefined number, zero over zero for instance
-            number = math.nan
-        if not number > 0:
+        number = _exactly(expression, given)
+        # One that needs an algebraic variable or a derivative only the run can find.
+        if number is not None and not number > 0:
             remedy = f" {margin.remedy}" if margin.remedy else ""
             message = f"at the start {margin.reason} ({margin.name} does not hold: {number:.6g}).{remedy}"
             raise InputError(message, path=margin.path)
+
+
+def _exactly(expression: Expression, given: Mapping[Any, float]) -> float | None:
+    """Value of an expression without rounding errors, which is not a number where it has none; None where it needs more
+    than is given.
+    """
+    terms = _sum(expression)
+    try:
+        if terms is not None:  # as most limits are
+            return math.fsum(sign * given[x] if x is not None else sign for x, sign in terms)
+        value = expression.subs({x: _exact(given[x]) for x in expression.free_symbols if x in given})
+        return None if value.free_symbols else float(value)
+    except KeyError:
+        return None
+    except (RuntimeError, TypeError, ValueError):  # an undefined number, zero over zero for instance
+        return math.nan
+
+
+@lru_cache(maxsize=1024)
+def _sum(expression: Expression) -> tuple[tuple[Any, float], ...] | None:
+    """Symbols and their signs, and numbers without a symbol, of an expression that is a sum of these alone."""
+    terms = []
+    for term in expression.args if isinstance(expression, symengine.Add) else (expression,):
+        number = isinstance(term, symengine.Float | symengine.Integer)
+        x, sign = (
+            (None, float(term)) if number else (-term, -1.0) if isinstance(-term, symengine.Symbol) else (term, 1.0)
+        )
+        if not (number or isinstance(x, symengine.Symbol)):
+            return None
+        terms.append((x, sign))
+    return tuple(terms)
 
 
 @lru_cache(maxsize=1024)

@@ -444,9 +444,12 @@ class Model:
         if run.solver != AUTO:
             return run
         try:
-            return replace(run, solver=method(self.problem(run, values), self.system.moves)[0])
+            return self._with_method(run, self.problem(run, values))
         except InputError:  # the run says so itself
             return replace(run, solver=OWN)
+
+    def _with_method(self, run: Run, problem: Problem) -> Run:
+        return replace(run, solver=method(problem, self.system.moves)[0]) if run.solver == AUTO else run
 
     def solve_values(self, run: Run, values: Mapping[str, float], *, nudged: bool = False) -> Trajectory:
         """Run with every value given, whatever bounds they need; under loads that are nudged by their last digit if so
@@ -458,7 +461,9 @@ class Model:
         self, runs: Sequence[tuple[Run, Mapping[str, float]]], threads: int = 1, *, nudged: bool = False
     ) -> list[Trajectory]:
         """Runs that differ in values and output times, together in the compiled loop."""
-        run = self.chosen(*runs[0])
+        before = PREPARING.seconds
+        problems = [self.problem(*pair, nudged=nudged) for pair in runs]
+        run = self._with_method(runs[0][0], problems[0])
         used = solver(run.solver)
         if self.program.filler is not None and run.solver not in ASKING:
             raise InputError(
@@ -466,27 +471,27 @@ class Model:
                 f"`solver: {ASKING[0]}` under `run`.",
                 path="run.solver",
             )
-        pairs = [
-            (each if each.solver == run.solver else replace(each, solver=run.solver), values) for each, values in runs
+        used.prepare()
+        self.compile_seconds += PREPARING.seconds - before
+        items = [
+            (each if each.solver == run.solver else replace(each, solver=run.solver), values, problem)
+            for (each, values), problem in zip(runs, problems, strict=True)
         ]
         # A limit in seconds is one of each run by itself.
-        groups = [[pair] for pair in pairs] if run.max_seconds else [pairs]
-        return [done for group in groups for done in self._solve_together(used, group, threads, nudged)]
+        groups = [[item] for item in items] if run.max_seconds else [items]
+        return [done for group in groups for done in self._solve_together(used, group, threads)]
 
     def _solve_together(
-        self, used: Solver, pairs: Sequence[tuple[Run, Mapping[str, float]]], threads: int, nudged: bool
+        self, used: Solver, items: Sequence[tuple[Run, Mapping[str, float], Problem]], threads: int
     ) -> list[Trajectory]:
         """Runs whose arcs are solved in batches; each has its part of their time."""
-        before = PREPARING.seconds
-        problems = [self.problem(*pair, nudged=nudged) for pair in pairs]
-        used.prepare()
         start, prepared = time.perf_counter(), PREPARING.seconds
-        flows = [self._flow(problem) for problem in problems]
-        ends = solve_together(flows, used, threads)
-        seconds = (time.perf_counter() - start - (PREPARING.seconds - prepared)) / len(pairs)
-        self.compile_seconds += PREPARING.seconds - before
+        ends = solve_together([self._flow(problem) for _, _, problem in items], used, threads)
+        compiling = PREPARING.seconds - prepared
+        seconds = (time.perf_counter() - start - compiling) / len(items)
+        self.compile_seconds += compiling
         done = []
-        for (run, values), (result, jumps, ended) in zip(pairs, ends, strict=True):
+        for (run, values, _), (result, jumps, ended) in zip(items, ends, strict=True):
             status, reason = ended or self.verdict(run, result, values)
             done.append(Trajectory(self, run, result, values, status, reason, seconds, jumps))
         return done

@@ -394,6 +394,31 @@ def solve_real(w: Any, x: Any) -> None:
 
 
 @compiled
+def bound_real(w: Any, x: Any) -> None:
+    """Overwrite sizes of entries of right-hand sides by bounds of what the real matrix, a large one, makes of them.
+
+    Source: Higham (2002), Accuracy and Stability of Numerical Algorithms, section 8.3: with the comparison matrices of
+    the factors, which have the sizes of their entries, nothing cancels.
+    """
+    a, order, places = w.real, w.order[0], w.places[0]
+    n = a.shape[0]
+    for k in range(n):
+        p = order[0, k]
+        x[k], x[p] = x[p], x[k]
+        for m in range(order[2, k]):
+            j = places[k, m]
+            x[k] += abs(a[k, j]) * x[j]
+    for k in range(n - 1, -1, -1):
+        for m in range(order[2, k], order[3, k]):
+            j = places[k, m]
+            x[k] += abs(a[k, j]) * x[j]
+        x[k] *= abs(a[k, k])
+    for k in range(n - 1, -1, -1):
+        q = order[1, k]
+        x[k], x[q] = x[q], x[k]
+
+
+@compiled
 def solve_complex(w: Any, pair: int, x: Any) -> None:
     """Overwrite the right-hand side by the solution with the complex matrix of a pair of eigenvalues."""
     if w.links > 0:

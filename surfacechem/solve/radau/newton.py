@@ -32,7 +32,17 @@ from surfacechem.solve.radau.tables import (
     PAIR_VALUES,
     TO_PARTS,
 )
-from surfacechem.solve.radau.work import RESIDUAL, clear, combine, compiled, evaluate, evaluate_jacobian, finite, put
+from surfacechem.solve.radau.work import (
+    RESIDUAL,
+    clear,
+    combine,
+    compiled,
+    copy,
+    evaluate,
+    evaluate_jacobian,
+    finite,
+    put,
+)
 from surfacechem.tolerances import EPS, NEGLIGIBLE, TINY
 
 CONVERGED, DIVERGED, NOT_FINITE = range(3)
@@ -154,9 +164,18 @@ def _factor_shifted(w: Any, m: int, shift: Any, matrix: Any, border: Any, bands:
     """Factor matrix m, the core of G_y + shift G_ydot, with the chains folded into it."""
     order, places = w.order[m], w.places[m]
     chained = w.links > 0
-    known = w.core >= LARGE and not chained and order[3, 0] >= 0
-    if known and factor_again(w.jacobian, w.entries[5], shift, matrix, order, places, w.pivot, w.delta):
-        return True
+    if w.core >= LARGE and not chained:
+        entries = w.entries[5]
+        if order[3, 0] >= 0 and factor_again(w.jacobian, entries, shift, matrix, order, places, w.pivot, w.delta):
+            return True
+        if m > 0:
+            # The real matrix, which is factored by now, has its entries in the same places.
+            for k in range(len(order)):
+                copy(w.order[0, k], order[k])
+            for k in range(w.core):
+                copy(w.places[0, k], places[k])
+            if factor_again(w.jacobian, entries, shift, matrix, order, places, w.pivot, w.delta):
+                return True
     shifted(w.jacobian, shift, matrix)
     if chained and not fold_shifted(w, shift, matrix, border, bands):
         return False

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from surfacechem.solve.radau.linear import solve_real
+from surfacechem.solve.radau.linear import LARGE, bound_real, solve_real
 from surfacechem.solve.radau.tables import GAMMA
 from surfacechem.solve.radau.work import RESIDUAL, clear, compiled, evaluate, set_inputs
 from surfacechem.tolerances import NEGLIGIBLE, ULPS
@@ -49,6 +49,36 @@ def _measure_wobble(w: Any, y: Any, ydot: Any) -> None:
 
 
 @compiled
+def _rounding_of(w: Any, i: int, y: Any, ydot: Any) -> float:
+    """Rounding errors of an equation of the core."""
+    total = 0.0
+    for j in range(w.core):
+        total += abs(w.jacobian[0, i, j] * y[j]) + abs(w.jacobian[1, i, j] * ydot[j])
+    border = 0.0
+    for c in range(w.links):
+        j = w.chains[c, 0]
+        border += abs(w.border_derivatives[0, i, c] * y[j])
+        border += abs(w.border_derivatives[1, i, c] * ydot[j])
+    return float(max(ULPS * (total + border), w.wobble[i]))
+
+
+@compiled
+def _bounds_serve(w: Any, y: Any, ydot: Any) -> bool:
+    """Put bounds of the noise in its place, from one solution instead of one for each variable; whether even they are
+    negligible beside the tolerance.
+    """
+    n, column = w.n, w.delta
+    for i in range(n):
+        column[i] = _rounding_of(w, i, y, ydot)
+    bound_real(w, column)
+    for j in range(n):
+        w.noise[j] = ULPS * abs(y[j]) + column[j]
+        if not w.noise[j] <= 1e-1 * NEGLIGIBLE * w.weight[j]:
+            return False
+    return True
+
+
+@compiled
 def spread_noise(w: Any, y: Any, ydot: Any) -> None:
     """Change of each variable that rounding errors of the residuals at a state can cause, into the noise.
 
@@ -56,20 +86,14 @@ def spread_noise(w: Any, y: Any, ydot: Any) -> None:
     """
     n, core, column = w.n, w.core, w.delta
     _measure_wobble(w, y, ydot)
+    if core >= LARGE and w.links == 0 and _bounds_serve(w, y, ydot):
+        return
     for j in range(n):
         w.noise[j] = ULPS * abs(y[j])
     for i in range(core if w.links == 0 else core + 1):
         clear(column)
         if i < core:
-            total = 0.0
-            for j in range(core):
-                total += abs(w.jacobian[0, i, j] * y[j]) + abs(w.jacobian[1, i, j] * ydot[j])
-            border = 0.0
-            for c in range(w.links):
-                j = w.chains[c, 0]
-                border += abs(w.border_derivatives[0, i, c] * y[j])
-                border += abs(w.border_derivatives[1, i, c] * ydot[j])
-            column[i] = max(ULPS * (total + border), w.wobble[i])
+            column[i] = _rounding_of(w, i, y, ydot)
         else:
             # Heat that enters a chain anywhere raises its temperatures everywhere: nothing cancels in one sum.
             _chain_noise(w, y, ydot, column)
