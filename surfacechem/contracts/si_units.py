@@ -32,6 +32,7 @@ _BASES: Mapping[str, Mapping[str, int]] = {
     "g": {"g": 1},
     "s": {"s": 1},
     "K": {"K": 1},
+    "A": {"A": 1},
     "mol": {"mol": 1},
     "rad": {"rad": 1},
     "Hz": {"s": -1},
@@ -39,14 +40,18 @@ _BASES: Mapping[str, Mapping[str, int]] = {
     "Pa": {"g": 1, "m": -1, "s": -2},
     "J": {"g": 1, "m": 2, "s": -2},
     "W": {"g": 1, "m": 2, "s": -3},
+    "V": {"g": 1, "m": 2, "s": -3, "A": -1},
 }
 """Powers of the base units in each unit; grams and not kilograms, as the prefix belongs to the gram."""
 
 _KILOGRAM = Decimal(1000)
 _PREFIXES = {"G": 9, "M": 6, "k": 3, "m": -3, "u": -6, "µ": -6, "μ": -6, "n": -9, "p": -12}
-_PREFIXED = ("m", "g", "s", "mol", "Hz", "N", "Pa", "J", "W")
+_PREFIXED = ("m", "g", "s", "mol", "Hz", "N", "Pa", "J", "W", "A", "V")
 THERMAL_ENERGY = Decimal("1.380649e-23") * Decimal("298.15")
 """kT [J] at 25 degC, in which energies of single bonds are given: 4.116 pN nm."""
+
+ELECTRON_VOLT = Decimal("1.602176634e-19")
+"""J."""
 
 _OTHERS: Mapping[str, tuple[Decimal | int, str]] = {
     "min": (60, "s"),
@@ -58,6 +63,10 @@ _OTHERS: Mapping[str, tuple[Decimal | int, str]] = {
     "kT": (THERMAL_ENERGY, "J"),
     "bar": (100_000, "Pa"),
     "atm": (101_325, "Pa"),
+    "torr": (Decimal(101_325) / 760, "Pa"),
+    "eV": (ELECTRON_VOLT, "J"),
+    "meV": (ELECTRON_VOLT / 1000, "J"),
+    "ppm": (Decimal("1e-6"), "1"),
     "percent": (Decimal("0.01"), "1"),
     "%": (Decimal("0.01"), "1"),
 }
@@ -65,7 +74,7 @@ _OTHERS: Mapping[str, tuple[Decimal | int, str]] = {
 
 
 def _table() -> dict[str, tuple[Decimal, Mapping[str, int]]]:
-    """Every known name with its factor to grams, metres, seconds, kelvin and moles, and with its powers of them."""
+    """Every known name with its factor to the base units, and with its powers of them."""
     found = {}
     for name, powers in _BASES.items():
         # One newton is a thousand g m/s^2.

@@ -299,9 +299,18 @@ def _at_same_places(a: Array, b: Array, x_a: Sequence[float], x_b: Sequence[floa
     """Two profiles at the places of the one that has fewer."""
     if x_a == x_b:
         return a, b
-    from scipy.interpolate import CubicSpline  # slow to import, and only profiles need it
+    return (_cubic(x_a, a, x_b), b) if len(x_a) > len(x_b) else (a, _cubic(x_b, b, x_a))
 
-    return (CubicSpline(x_a, a, axis=1)(x_b), b) if len(x_a) > len(x_b) else (a, CubicSpline(x_b, b, axis=1)(x_a))
+
+def _cubic(places: Sequence[float], rows: Array, wanted: Sequence[float]) -> Array:
+    """Values at other places along rows, by the polynomial through the four nearest ones of each."""
+    x, at = np.array(places), np.array(wanted)
+    width = min(len(x), 4)
+    first = np.clip(np.searchsorted(x, at) - width // 2, 0, len(x) - width)
+    near = first[:, None] + np.arange(width)
+    others = ~np.eye(width, dtype=bool)
+    factors = (at[:, None, None] - x[near][:, None]) / np.where(others, x[near][:, :, None] - x[near][:, None], 1.0)
+    return np.asarray((rows[:, near] * np.prod(factors, axis=2, where=others)).sum(axis=2))
 
 
 def beside_jumps(times: Array, first: Trajectory, second: Trajectory) -> Mask:

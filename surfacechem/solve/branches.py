@@ -9,19 +9,16 @@ found lies where the laws hold: a search ends at the ends of their domains.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem.compile.preparing import PREPARING
 from surfacechem.solve.contract import Array
-from surfacechem.tolerances import CBRT_EPS, DIGITS, NEGLIGIBLE, NOTHING, PICOMETRE, TINY
+from surfacechem.solve.zeros import zero
+from surfacechem.tolerances import CBRT_EPS, DIGITS, NEGLIGIBLE, NOTHING, PICOMETRE
 
 Curve = Callable[[Sequence[float] | Array], Array]
-
-CLOSEST: dict[str, Any] = {"xtol": TINY, "rtol": (1 + NEGLIGIBLE) * DIGITS, "maxiter": 300, "disp": False}
-"""How closely a root of the tractions is found: to rounding, a little more than the least that Brent's method takes."""
 
 FIRST, GROWTH, MARCH = NOTHING, 1.02, 2400
 """First step of the search for the next equilibrium, relative to the gap, its growth, and the number of steps."""
@@ -61,9 +58,6 @@ def push_ahead(driving: Curve, start: float, direction: float, least: Curve, *, 
 
 def zero_ahead(curve: Curve, start: float, direction: float, sign: float, noise: Curve | None = None) -> float | None:
     """The first zero in a direction of what has a sign before it; it may start with the other one within rounding."""
-    with PREPARING:
-        from scipy.optimize import brentq
-
     gaps = steps_ahead(start, direction)
     values = sign * curve(gaps)
     least = 0.0 if noise is None else noise(gaps)
@@ -74,14 +68,13 @@ def zero_ahead(curve: Curve, start: float, direction: float, sign: float, noise:
     j = first + int(crossed[0])
     if values[j] == 0.0:
         return float(gaps[j])
-    # The ends count as they were seen among the others: alone they may round to the other sign.
-    seen = {float(gaps[i]): float(values[i]) for i in (j - 1, j)}
 
     def value(g: float) -> float:
         # A formula may have no value just where it jumps to the other sign, as stiffness does at a bend of a traction.
-        return float(np.nan_to_num(seen[g] if g in seen else sign * curve([g])[0]))
+        return float(np.nan_to_num(sign * curve([g])[0]))
 
-    found = float(brentq(value, gaps[j - 1], gaps[j], **CLOSEST))
+    # The ends count as they were seen among the others: alone they may round to the other sign.
+    found = zero(value, (float(gaps[j - 1]), float(gaps[j])), (float(values[j - 1]), float(values[j])))
     # At a pole the sign changes too, but there is no zero.
     return None if abs(curve([found])[0]) > max(abs(values[j - 1]), abs(values[j])) else found
 

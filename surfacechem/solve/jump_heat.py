@@ -19,14 +19,13 @@ import numpy as np
 import symengine
 from numpy.polynomial import chebyshev
 
-from surfacechem.compile.preparing import PREPARING
 from surfacechem.compile.program import Function
 from surfacechem.expressions import derivative
 from surfacechem.model.automaton import INTERFACE, Sink
 from surfacechem.model.system import System
-from surfacechem.solve.branches import CLOSEST
 from surfacechem.solve.contract import Array, Mask
 from surfacechem.solve.equilibria import Equilibria, Heat, Point, Way, compiled
+from surfacechem.solve.zeros import zero
 from surfacechem.tolerances import ULPS
 
 Moments = Callable[[Array, Array], tuple[Array, Array]]
@@ -209,12 +208,10 @@ def shared(moments: Moments, takers: int, small: float, *, feeds_back: bool) -> 
 
 def _first(curve: Callable[[float], float], reached: float) -> float:
     """The part of the way beyond which a curve is below zero, from one that is reached already."""
-    with PREPARING:
-        from scipy.optimize import brentq
-
-    if not curve(reached) > 0:
+    here, there = curve(reached), curve(1.0)
+    if not here > 0:
         return reached
-    return float(brentq(curve, reached, 1.0, **CLOSEST)) if curve(1.0) < 0 else 1.0
+    return zero(curve, (reached, 1.0), (here, there)) if there < 0 else 1.0
 
 
 class LoadPath:

@@ -6,16 +6,13 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from surfacechem.solve.contract import Array, Margin
-from surfacechem.tolerances import DIGITS, NOISE, SQRT_EPS, TINY
+from surfacechem.solve.zeros import zero
+from surfacechem.tolerances import NOISE, SQRT_EPS
 
 POINTS = 16
 """Points of a step at which guards are looked at; zeros in pairs between two of them show in a lowest point."""
-
-HALVINGS = 10_000
-"""Most steps to a zero: a guard that jumps beside the start of a step at no time takes a thousand halvings."""
 
 
 @dataclass(frozen=True)
@@ -191,7 +188,7 @@ def _zero(value: Callable[[float], float], low: float, high: float) -> float:
     at_low, at_high = value(low), value(high)
     if not at_low > 0.0 > at_high:
         return high if at_high == 0.0 else float(np.nextafter(low, high))
-    return float(brentq(value, low, high, xtol=TINY, rtol=DIGITS, maxiter=HALVINGS))
+    return zero(value, (low, high), (at_low, at_high))
 
 
 def _may_dip(guards: Guards, times: Array, values: Array) -> NDArray[np.bool_]:
