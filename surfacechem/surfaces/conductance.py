@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cached_property
-from typing import Self
+from typing import Any, Self
 
 from surfacechem.contracts.terms import HeatTransfer, option
 from surfacechem.documents.cache_folder import Fingerprint, fingerprint, kept
@@ -58,8 +58,6 @@ class CurvedConductance(HeatTransfer):
         """The conductance over the approach."""
         pair, law, levels = self.pair, density(self.law), bends([self.law])
         mark = fingerprint(pair.shapes, self.law, pair.approach, pair.accuracy)
-
-        cuts = passages(*pair.surfaces(0.0), levels)
         budget = Budget(pair.accuracy)
 
         def sample(d: float) -> tuple[float, float, float]:
@@ -67,12 +65,14 @@ class CurvedConductance(HeatTransfer):
             found = pair.at_approach(d, lambda: over_gap(*pair.surfaces(d), [], levels, [law], finer, budget=budget))
             return found.conductance, found.conductance_slope, found.error
 
-        # A conductance and its slope are fitted like an energy and its force.
+        def integrated() -> list[Any]:
+            # A conductance and its slope are fitted like an energy and its force.
+            cuts = passages(*pair.surfaces(0.0), levels)
+            return fitted(sample, *pair.approach, pair.accuracy, cuts, budget=budget).numbers
+
         if mark not in KNOWN:
             with integrating():
-                found = kept(
-                    mark, CODE, lambda: fitted(sample, *pair.approach, pair.accuracy, cuts, budget=budget).numbers
-                )
+                found = kept(mark, CODE, integrated)
             KNOWN[mark] = ApproachEnergy.of(found)
         return KNOWN[mark]
 
