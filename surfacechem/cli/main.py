@@ -409,8 +409,7 @@ def plot(
     talk: Talk = None,
 ) -> None:
     """Plot runs over time or a variable, or sweeps over parameters."""
-    from surfacechem import plots
-    from surfacechem.results.netcdf import WRITTEN
+    from surfacechem.results.netcdf import WRITTEN, begin_reading
 
     # By its suffix, as a dataset that is missing must not be taken for the name of a case.
     cases = [source for source in sources if not source.rstrip("/").endswith((*WRITTEN, ".zarr"))]
@@ -418,6 +417,11 @@ def plot(
         raise InputError("a dataset is plotted as it is; give a case to change values of.", Place(path="--set"))
     target = output or Path("comparison.png" if len(sources) > 1 else f"{Path(sources[0]).stem}.png")
     check_picture(target)
+    for source in sources:
+        if source not in cases:
+            begin_reading(Path(source))
+    from surfacechem import plots
+
     solutions = {case: _run(case, changes, talk) for case in cases}
     names = listed(variables) if variables else None
     shown = [solutions[source].dataset if source in solutions else source for source in sources]

@@ -288,11 +288,26 @@ def _try_elsewhere(path: Path, seconds: float) -> None:
     In a damaged file HDF5 may go on without end, and nothing but the end of its process stops it: a thread would keep
     its locks, and crash the process that ends with it.
     """
+    with _BEGUN.pop(path, None) or _trial(path) as trial:
+        try:
+            code = trial.wait(timeout=seconds)
+        except subprocess.TimeoutExpired:
+            trial.kill()
+            raise TimeoutError(f"no answer in {seconds:g} s") from None
+    if code not in (0, 1):  # 1 is that of an exception, which is met again here
+        raise OSError(f"a process that reads it crashes (exit code {code})")
+
+
+def _trial(path: Path) -> subprocess.Popen[bytes]:
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
     command = [sys.executable, "-c", TRIAL, str(path)]
-    try:
-        done = subprocess.run(command, env=environment, capture_output=True, check=False, timeout=seconds)
-    except subprocess.TimeoutExpired:
-        raise TimeoutError(f"no answer in {seconds:g} s") from None
-    if done.returncode not in (0, 1):  # 1 is that of an exception, which is met again here
-        raise OSError(f"a process that reads it crashes (exit code {done.returncode})")
+    return subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+
+_BEGUN: dict[Path, subprocess.Popen[bytes]] = {}
+
+
+def begin_reading(path: Path) -> None:
+    """Begin to see whether a file that is read soon can be, beside what is done until then."""
+    if path.is_file():
+        _BEGUN[path] = _trial(path)
