@@ -181,6 +181,22 @@ class BondingVariable:
     """Name in the mechanism."""
 
 
+@dataclass(frozen=True)
+class Electrode:
+    """A phase beside the surface whose potential follows from its charge."""
+
+    phase: str
+    """Its name in names of quantities."""
+    title: str
+    potential: Quantity
+    start: float
+    """Its potential at the start [V]."""
+    capacitance: float
+    """[F/m^2]."""
+    current: Load | None = None
+    """Electric current into it from outside [A/m^2]; none without one."""
+
+
 class Engine(Protocol):
     """Something outside that gives parameters of the scene while it runs, from values of its variables."""
 
@@ -195,6 +211,10 @@ class Engine(Protocol):
     @property
     def histories(self) -> Sequence[tuple[Quantity, Load]]:
         """Histories of what it reads beside the state of the scene."""
+
+    @property
+    def electrodes(self) -> Sequence[Electrode]:
+        """What it reads the potential of, which belongs to the state of the scene."""
 
     def limits(self, values: Mapping[str, Any]) -> Iterable[tuple[str, Any, str]]:
         """What must stay positive of these histories, by name, each with its name and with the reason where it does

@@ -41,12 +41,13 @@ _BASES: Mapping[str, Mapping[str, int]] = {
     "J": {"g": 1, "m": 2, "s": -2},
     "W": {"g": 1, "m": 2, "s": -3},
     "V": {"g": 1, "m": 2, "s": -3, "A": -1},
+    "F": {"g": -1, "m": -2, "s": 4, "A": 2},
 }
 """Powers of the base units in each unit; grams and not kilograms, as the prefix belongs to the gram."""
 
 _KILOGRAM = Decimal(1000)
 _PREFIXES = {"G": 9, "M": 6, "k": 3, "m": -3, "u": -6, "µ": -6, "μ": -6, "n": -9, "p": -12}
-_PREFIXED = ("m", "g", "s", "mol", "Hz", "N", "Pa", "J", "W", "A", "V")
+_PREFIXED = ("m", "g", "s", "mol", "Hz", "N", "Pa", "J", "W", "A", "V", "F")
 THERMAL_ENERGY = Decimal("1.380649e-23") * Decimal("298.15")
 """kT [J] at 25 degC, in which energies of single bonds are given: 4.116 pN nm."""
 

@@ -432,7 +432,15 @@ def _mechanism(named: str | MechanismSection, tree: Tree, base: Path, content: s
     section = named if isinstance(named, MechanismSection) else MechanismSection(file=named)
     file = section.file if Path(section.file).suffix in (".yaml", ".yml") else f"{section.file}.yaml"
     neighbours = {
-        name: Neighbour(phase.pressure, phase.composition or {}, phase.rest, phase.electric_potential, phase.tree.place)
+        name: Neighbour(
+            phase.pressure,
+            phase.composition or {},
+            phase.rest,
+            phase.electric_potential,
+            phase.capacitance,
+            phase.current,
+            place=phase.tree.place,
+        )
         for name, phase in (section.neighbours or {}).items()
     }
 

@@ -203,6 +203,10 @@ class NeighbourSection(Section):
     electric_potential: Load | None = key(
         Prescribed("V"), "electric potential against the surface [V]", name="electric-potential"
     )
+    capacitance: float | None = quantity(
+        "F/m^2", "of what holds charge: its potential is that of the start, and follows from charge", above=0
+    )
+    current: Load | None = key(Prescribed("A/m^2"), "electric current into it from outside [A/m^2]")
 
 
 NUMBERS = Entries(others=amount("1"))

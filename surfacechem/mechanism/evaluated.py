@@ -23,6 +23,7 @@ from surfacechem.expressions import Expression, absolute
 from surfacechem.mechanism.mixture import Formula, Species, identifiers, word
 from surfacechem.mechanism.rates import MechanismReaction
 from surfacechem.quantities import MOLECULAR, Quantity
+from surfacechem.scene import Electrode
 
 Array = NDArray[np.float64]
 
@@ -51,7 +52,16 @@ class Neighbour:
     """The species whose mole fraction is what the others leave; none where they sum to one."""
     electric_potential: Load | None = None
     """Against the surface [V]; None where it is zero."""
+    capacitance: float | None = None
+    """Where the potential follows from charge, and is a number at the start [F/m^2]."""
+    current: Load | None = None
+    """Electric current into the phase from outside [A/m^2]."""
     place: Place | None = None
+
+    @property
+    def potential_at_start(self) -> float:
+        """[V]."""
+        return self.electric_potential.at_start() if self.electric_potential else 0.0
 
 
 def hold(surface: Any, given: Mapping[str, Neighbour] | None, place: Place | None) -> tuple[str, ...]:
@@ -64,10 +74,10 @@ def hold(surface: Any, given: Mapping[str, Neighbour] | None, place: Place | Non
         refuse_unknown([name], surface.adjacent, f"the surface {surface.name} has no neighbour '{{}}'", state.place)
     for name, phase in surface.adjacent.items():
         state = given.get(name, Neighbour(place=place))
-        if problem := _problem(phase, state):
+        if problem := _problem(phase, state) or _misheld(name, state):
             raise InputError(problem, state.place)
         held = HeldPhase(phase, state)
-        held.put(phase.T, [load.at_start() for _, load in held.histories])
+        held.put(phase.T, held.at_start)
     return lacking(surface)
 
 
@@ -90,6 +100,20 @@ def _problem(phase: Any, state: Neighbour) -> str:
     return uneven(name, {species: load.at_start() for species, load in state.composition.items()}, bool(state.rest))
 
 
+def _misheld(name: str, state: Neighbour) -> str:
+    """What is wrong with the charge of a phase; nothing where it holds none, or some."""
+    if state.capacitance is None:
+        need = f"the current into the neighbour {name} needs a `capacitance`, else its potential is given."
+        return "" if state.current is None else need
+    given = state.electric_potential
+    if given is not None and symengine.sympify(given.value(symengine.Symbol("t"))).free_symbols:
+        return (
+            f"the potential of the neighbour {name} follows from its charge, so `electric-potential` is a number, that "
+            "of the start. Remove `capacitance` where the potential is prescribed."
+        )
+    return ""
+
+
 def uneven(name: str, parts: Mapping[str, float], rest: bool) -> str:
     """What is wrong with mole fractions in a phase, all of them or all but a ``rest``; nothing where they are some."""
     for species, part in parts.items():
@@ -101,35 +125,51 @@ def uneven(name: str, parts: Mapping[str, float], rest: bool) -> str:
 
 
 class HeldPhase:
-    """A phase beside the surface, and the histories of its state in the order in which :meth:`put` takes them."""
+    """A phase beside the surface, and its ``states`` in the order in which :meth:`put` takes them: histories, or the
+    potential of an ``electrode``.
+    """
 
     def __init__(self, phase: Any, state: Neighbour) -> None:
         self.phase, self.pressure = phase, float(phase.P)
         self.species = np.array([phase.species_index(name) for name in state.composition], dtype=np.int64)
         self.rest = phase.species_index(state.rest) if state.rest else None
-        self.potential = state.electric_potential
+        self.given, self.electrode = state, None
         self.charges = FARADAY * np.asarray(phase.charges)
-        name, found = word(phase.name), []
+        name = word(phase.name)
+        found: list[tuple[Quantity, Load]] = []
         if state.pressure is not None:
             found.append((Quantity(f"p_{name}", "Pa", f"pressure of {phase.name}"), state.pressure))
-        if state.electric_potential is not None:
-            text = f"electric potential of {phase.name}"
-            found.append((Quantity(f"V_{name}", "V", text), state.electric_potential))
+        V = Quantity(f"V_{name}", "V", f"electric potential of {phase.name}")
+        if state.capacitance is not None:
+            start = state.potential_at_start
+            self.electrode = Electrode(name, phase.name, V, start, state.capacitance, state.current)
+        elif state.electric_potential is not None:
+            found.append((V, state.electric_potential))
         names = identifiers(state.composition, f"x_{name}_")
         for species, load in state.composition.items():
             found.append((Quantity(names[species], "1", f"mole fraction of {species} in {phase.name}"), load))
         self.histories = tuple(found)
+        charged = [V] if self.electrode else []
+        pressed = int(state.pressure is not None)
+        read = [quantity for quantity, _ in found]
+        self.states = (*read[:pressed], *charged, *read[pressed:])
         self._fractions = [*names.values()]
         self.enthalpies = np.zeros(phase.n_species)
         """Of its species where it was put last [J/kmol]."""
         self._parts: Sequence[float] = [math.nan]
         self._all = np.zeros(phase.n_species)
-        self._pressed, self._charged = state.pressure is not None, state.electric_potential is not None
+        self._pressed, self._charged = state.pressure is not None, V in self.states
 
     @property
     def taken_over(self) -> list[tuple[Quantity, Load]]:
         """Those of its pressure and composition, which a reactor may give."""
-        return [item for item in self.histories if item[1] is not self.potential]
+        return [item for item in self.histories if item[1] is not self.given.electric_potential]
+
+    @property
+    def at_start(self) -> list[float]:
+        """Its states at the start."""
+        starts = {quantity: load.at_start() for quantity, load in self.histories}
+        return [starts.get(quantity, self.given.potential_at_start) for quantity in self.states]
 
     def put(self, T: float, values: Sequence[float]) -> None:
         """Go to a temperature [K] and to values of the histories."""
@@ -277,7 +317,9 @@ class SurfaceEngine:
                 raise InputError(
                     f"the reactor of the neighbour {name} has other species than the mechanism: {', '.join(own)}."
                 )
-            known[name] = HeldPhase(known[name].phase, replace(state, electric_potential=known[name].potential))
+            given = known[name].given
+            electric = {key: getattr(given, key) for key in ("electric_potential", "capacitance", "current")}
+            known[name] = HeldPhase(known[name].phase, replace(state, **electric))
         made = copy.copy(self)
         made.held = list(known.values())
         return made
@@ -293,9 +335,14 @@ class SurfaceEngine:
         return tuple(item for held in self.held for item in held.histories)
 
     @property
+    def electrodes(self) -> tuple[Electrode, ...]:
+        """Neighbours whose potential follows from their charge."""
+        return tuple(held.electrode for held in self.held if held.electrode)
+
+    @property
     def reads(self) -> tuple[str, ...]:
         """Names of the variables."""
-        return (*self._own, *(quantity.name for quantity, _ in self.histories))
+        return (*self._own, *(quantity.name for held in self.held for quantity in held.states))
 
     def limits(self, values: Mapping[str, Expression]) -> Iterator[tuple[str, Expression, str]]:
         """What of the histories, by name, must stay positive, with its name and the reason where it does not."""
@@ -332,7 +379,7 @@ class SurfaceEngine:
         self.surface.TP = T, None
         both, species, first = np.empty((2, len(self._taken))), 0, 0
         for held in self.held:
-            last, end = first + len(held.histories), species + len(held.charges)
+            last, end = first + len(held.states), species + len(held.charges)
             held.put(T, states[first:last])
             held.energies(both[:, species:end])
             first, species = last, end

@@ -96,6 +96,8 @@ class Build:
     margins: list[Margin] = field(default_factory=list)
     powers: list[Power] = field(default_factory=list)
     """All that passes energy on, from which the ledger and the balances of energy follow."""
+    stored: list[Expression] = field(default_factory=list)
+    """Energies of what has no temperature, such as springs and charges."""
     loads: dict[str, Load] = field(default_factory=dict)
     """Histories that are in use, by variable."""
     constraints: list[Constraint] = field(default_factory=list)
@@ -169,6 +171,10 @@ class Build:
         """Add a named quantity and return its symbol."""
         self.named.append(Named(quantity, expression, output))
         return symengine.Symbol(quantity.name)
+
+    def store(self, quantity: Quantity, energy: Expression) -> None:
+        """Add an energy [J/m^2] of what has no temperature."""
+        self.stored.append(self.name(quantity, energy))
 
     def constant(self, name: str, path: str, spec: Spec, value: float, *, internal: bool = False) -> Expression:
         """A scene-level number as a run-time parameter."""

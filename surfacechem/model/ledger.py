@@ -140,8 +140,7 @@ def totals(build: Build) -> None:
         if S != 0:
             quantity = Quantity(f"S_{suffixes[member]}", "J/(m^2 K)", f"entropy of {member}")
             entropies.append(build.name(quantity, S))
-    moved = (f"E_{kind}_{axis}" for axis in build.motion.far_fields for kind in ("spring", "kinetic"))
-    energies += [symengine.Symbol(name) for name in moved if build.is_named(name)]
+    energies += build.stored
     build.name(Quantity("E_total", "J/m^2", "total energy"), sum(energies, symengine.Integer(0)))
     build.name(Quantity("S_total", "J/(m^2 K)", "total entropy"), sum(entropies, symengine.Integer(0)))
     _fluxes(build)

@@ -203,7 +203,7 @@ class FarField:
             ("kinetic", self.m * rate**2 / 2, "kinetic energy"),
         ):
             if energy != 0:
-                build.name(Quantity(f"E_{name}_{axis}", "J/m^2", f"{what}, {text}"), energy)
+                build.store(Quantity(f"E_{name}_{axis}", "J/m^2", f"{what}, {text}"), energy)
         bulk = self.w_dot - rate
         power = (self.carried(g) + self.c_b * bulk) * self.w_dot + self.F * moves
         if power != 0:

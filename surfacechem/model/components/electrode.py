@@ -1,0 +1,59 @@
+r"""Phases beside the surface that hold charge: their potential follows from it.
+
+The charge :math:`c\,\varphi` of a double layer per area changes by the current of the reactions, :math:`i`, and by the
+current from outside, :math:`j`: :math:`c\,\dot\varphi=i+j`. Both bring the work :math:`\varphi\,(i+j)`, which is
+stored as :math:`c\,\varphi^2/2`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import symengine
+
+from surfacechem.contracts.terms import Spec
+from surfacechem.model.balances import OUTSIDE, WORK, Power
+from surfacechem.model.build import Build
+from surfacechem.model.system import State
+from surfacechem.quantities import Quantity
+from surfacechem.scene import Electrode
+
+ELECTRODE = "electrode"
+"""The place where the work of charge arrives."""
+
+THERMAL = 0.025
+"""What a potential has to differ by to matter [V]: k_B T over an elementary charge at room temperature."""
+
+
+def variables(build: Build) -> Iterator[State]:
+    """The potentials."""
+    for electrode in _electrodes(build):
+        V = electrode.potential
+        build.variables.define(V.name, symengine.Symbol(V.name), "evolved", _path(electrode))
+        yield State(V, electrode.start, THERMAL)
+
+
+def laws(build: Build) -> Iterator[Power]:
+    """How charge changes potentials, and the work that it brings."""
+    for electrode in _electrodes(build):
+        name, title, V = electrode.phase, electrode.title, symengine.Symbol(electrode.potential.name)
+        spec = Spec("F/m^2", f"capacitance of {title}", above=0)
+        c = build.constant(f"c_{name}", f"{_path(electrode)}.capacitance", spec, electrode.capacitance)
+        made = f"i_{name}"
+        current = symengine.Symbol(made) if build.is_named(made) else symengine.Integer(0)
+        if electrode.current is not None:
+            quantity = Quantity(f"j_{name}", "A/m^2", f"current into {title} from outside, per reference area")
+            current = current + build.prescribe(quantity, electrode.current)
+        build.rows.kinematics(V.name, current / c)
+        text = f"energy of the charge of {title}"
+        build.store(Quantity(f"E_{name}", "J/m^2", text), c * V**2 / 2)
+        yield Power(WORK, OUTSIDE, ELECTRODE, V * current, f"W_{name}", f"work of the charge that enters {title}")
+
+
+def _electrodes(build: Build) -> tuple[Electrode, ...]:
+    engine = build.interface.engine
+    return tuple(engine.electrodes) if engine else ()
+
+
+def _path(electrode: Electrode) -> str:
+    return f"interface.mechanism.neighbours.{electrode.title}"
