@@ -417,9 +417,8 @@ def plot(
         raise InputError("a dataset is plotted as it is; give a case to change values of.", Place(path="--set"))
     target = output or Path("comparison.png" if len(sources) > 1 else f"{Path(sources[0]).stem}.png")
     check_picture(target)
-    for source in sources:
-        if source not in cases:
-            begin_reading(Path(source))
+    for source in set(sources) - set(cases):
+        begin_reading(Path(source))
     from surfacechem import plots
 
     solutions = {case: _run(case, changes, talk) for case in cases}
