@@ -350,19 +350,22 @@ def written(expressions: Sequence[Any]) -> list[str]:
     places: dict[Any, int] = {}
     parts: list[str] = []
     wanted = [symengine.sympify(expression) for expression in expressions]
-    left = wanted[::-1]
+    left: list[tuple[Any, Any]] = [(part, None) for part in reversed(wanted)]
     while left:
-        part = left[-1]
-        missing = () if part in places else [arg for arg in part.args if arg not in places]
-        if missing:
-            left += missing[::-1]
+        part, args = left.pop()
+        if part in places:
             continue
-        if part not in places:
-            places[part] = len(parts)
-            kind = type(part).__name__
-            own = [places[arg] for arg in part.args] or part
-            parts.append(float(part).hex() if kind == "RealDouble" else f"{kind} {own}")
-        left.pop()
+        if args is None:  # which SymEngine makes anew whenever it is asked
+            args = part.args
+            missing = [(arg, None) for arg in args if arg not in places]
+            if missing:
+                left.append((part, args))
+                left += missing[::-1]
+                continue
+        places[part] = len(parts)
+        kind = type(part).__name__
+        own = [places[arg] for arg in args] or part
+        parts.append(float(part).hex() if kind == "RealDouble" else f"{kind} {own}")
     return [*parts, str([places[part] for part in wanted])]
 
 

@@ -28,6 +28,8 @@ KINDS: tuple[tuple[str, str, str], ...] = (
     ("Temperature", "K|degC", r".*"),
     ("Bonding", "1", r"(?!formed_|departure_|x_|.*_residual$|J_c$|n_c$|gamma_m$|ln_theta$|drive$).*"),
     ("Mole fraction", "1", r"x_\w+"),
+    ("Potential", "V", r"V_\w+"),
+    ("Current", "A m-2", r"[ij]_\w+"),
     ("Film", "m", "d_m"),
     ("Growth", "m s-1", r"growth_\w+"),
     ("Gap", "m", r"g_\w*"),

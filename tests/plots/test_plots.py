@@ -93,6 +93,12 @@ def test_coverages_and_mole_fractions_have_panels_of_their_own():
     assert titles(plot)[1:3] == ["Coverage [1]", "Mole fraction [1]"]
 
 
+def test_electrodes_have_panels_of_potential_and_current():
+    t = np.linspace(0.0, 2.0, 21)
+    plot = figure(dataset(V_electron=("V", t - 3), i_electron=("A m-2", 5 - t)))
+    assert titles(plot)[2:4] == ["Potential [V]", "Current [A m⁻²]"]
+
+
 def test_chosen_variables_are_grouped_by_unit():
     assert labels(figure(dataset(), ["q_12", "phi", "q_1"])) == [["$q_{12}$", "$q_{1}$"], [r"$\phi$"]]
     (constant,) = figure(dataset(), ["v"]).axes

@@ -158,7 +158,7 @@ class _SystemReactor(HeldReactor):
         evaluation, x = self.evaluation, self.scaled * self.unit
         if not evaluation.put(t, x[: self.count] if self.counts else x):
             raise BackOffError("no consistent state")
-        rates = evaluation.rates() if self.counts else evaluation.ydot[evaluation.free]
+        rates = evaluation.rates() if self.counts else evaluation.slopes()
         return np.asarray(rates / self.unit)
 
 

@@ -31,6 +31,7 @@ class Evaluation:
         self.y, self.ydot, self.parameters = np.split(self.inputs[1:], [n, 2 * n])
         self.free, self.algebraic = map(np.flatnonzero, (~program.algebraic_mask, program.algebraic_mask))
         self.guess = self._found = y[self.algebraic]
+        self._nothing = np.zeros(n)
         self._counts = np.zeros((1, COLUMNS), np.int64)
         ends, table = self.inputs[: 2 * n + 1][None], self.parameters[None, None]
         self._rates = _Code(program.rates, self.inputs, self.ydot) if program.rates else None
@@ -49,7 +50,8 @@ class Evaluation:
         if self._rates is not None:
             self.y[:] = differential
             self._fill()
-            return all(map(math.isfinite, self._rates().tolist()))
+            # Nothing times a number is nothing, unless that is infinite or none.
+            return math.isfinite(self._rates().dot(self._nothing))
         self.y[self.free] = differential
         self.y[self.algebraic] = self.guess
         self.ydot[:] = 0.0
@@ -79,9 +81,13 @@ class Evaluation:
         self.y[:] = y
         self.guess = self._found = y[self.algebraic]
 
+    def slopes(self) -> Array:
+        """Derivatives of the differential variables."""
+        return self.ydot[self.free] if len(self.algebraic) else self.ydot
+
     def rates(self) -> Array:
         """Derivatives of the differential variables and of the ledger."""
-        return np.concatenate((self.ydot[self.free], self._ledger()))
+        return np.concatenate((self.slopes(), self._ledger()))
 
     def ledger(self) -> Array:
         """Rates of the ledger."""
