@@ -61,11 +61,6 @@ SHALLOW = 1e-10
 times the tolerance of a run that asks for none.
 """
 
-LONGEST_STEP = 3e-5
-"""Relative tolerance above which the compiled stepper takes this: a step that a looser one allows can be longer than a
-layer that none of its three stages lies in.
-"""
-
 PICTURE = 1e-3
 """Part of its range by which a straight line between two outputs may miss a quantity: a pixel of a large figure."""
 

@@ -23,7 +23,6 @@ from surfacechem.solve.run import Trajectory
 from surfacechem.studies.grid import BRIEF, BUDGET, Cell, attempt, check_options, filled
 from surfacechem.studies.report import PageSection, PageTable, Study, Variable
 from surfacechem.studies.truth import KINDS, MEANING, TOLERANCES, Errors, Subject, Truth, establish, looked_at
-from surfacechem.tolerances import LONGEST_STEP
 
 log = logging.getLogger(__name__)
 
@@ -56,8 +55,7 @@ Compilation is apart.
 Libraries are called step by step from Python through the adapters of this package, which look for events within each
 step, write the outputs and integrate the ledger of the balances. "In steps" is the part of the time inside the
 library's own steps, with the right-hand sides that it asked for: the least that a leaner adapter could come to. radau
-does all of it in compiled code; it takes tolerances above {LONGEST_STEP:g} as {LONGEST_STEP:g}. A count that a
-library does not tell is left empty.
+does all of it in compiled code. A count that a library does not tell is left empty.
 """
 
 

@@ -12,7 +12,7 @@ from solver_problems import problem
 
 from surfacechem.compile.program import compile_program
 from surfacechem.contracts.terms import HeatTransfer, parameter
-from surfacechem.format import load_text
+from surfacechem.format import load, load_text
 from surfacechem.runs.simulation import Simulation
 from surfacechem.solve import solver
 from surfacechem.solve.segments import Passing
@@ -30,19 +30,39 @@ def ends(simulation, run=None):
     return found, solution
 
 
-def check_scene(seed):
-    """A random scene ends where it should, or says how far from there it may be."""
+def check_scene(seed, rtol=0.0):
+    """A random scene ends where it should, or says how far from there it may be; at a tolerance, if given."""
     case = scene(seed)
-    found, solution = ends(Simulation(load_text(case.text)))
+    simulation = Simulation(load_text(case.text))
+    found, solution = ends(simulation, replace(simulation.case.run, rtol=rtol) if rtol else None)
     assert solution.trajectory.status == "finished", case.text
+    near = CLOSE + case.rounded + 10 * solution.accuracy.error + 3 * rtol
     for name, value in case.expected.items():
         error = abs(found[name] - value) / (case.size or abs(value) or 1.0)
-        assert error <= CLOSE + case.rounded + 10 * solution.accuracy.error, (name, found[name], value, case.text)
+        assert error <= near, (name, found[name], value, case.text)
 
 
 @pytest.mark.parametrize("seed", [*range(5), 16, *range(6, 10), 43])
 def test_no_narrow_layer_is_passed_over(seed):
     check_scene(seed)
+
+
+@pytest.mark.parametrize("rtol", [1e-2, 1e-3])
+@pytest.mark.parametrize("seed", [10, 216, 227, 326, 359])
+def test_nor_at_a_loose_tolerance(seed, rtol):
+    check_scene(seed, rtol)
+
+
+def test_loose_tolerances_are_honoured():
+    """Each decade takes fewer steps, and errs by no more than is allowed."""
+    simulation = Simulation(load("dna-adhesive"))
+    settings = replace(simulation.case.run, solver="radau")
+    exact = simulation.model.solve(replace(settings, rtol=1e-11)).result.outputs
+    runs = [simulation.model.solve(replace(settings, rtol=rtol)).result for rtol in (1e-4, 1e-3, 1e-2)]
+    assert runs[0].counters.steps > runs[1].counters.steps > runs[2].counters.steps
+    for run in runs:
+        error = np.abs(run.outputs - exact).max(axis=0) / np.abs(exact).max(axis=0)
+        assert error.max() <= run.problem.rtol
 
 
 @pytest.mark.slow

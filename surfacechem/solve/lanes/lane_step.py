@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from surfacechem.compile.vectors import LANES
 from surfacechem.solve.lanes.layout import MEMORY, SIZES
 from surfacechem.solve.lanes.vector import absolute, any_lane, floor, lanes, put, same, square_root, where
-from surfacechem.solve.radau.dense import FORESEEN, GROUPS, LEAST, LOOSER
+from surfacechem.solve.radau.dense import FORESEEN, GROUPS, booked
 from surfacechem.solve.radau.explicit import DENSEST, FELT, FOLLOWED, SHARE, STABLE
 from surfacechem.solve.radau.record import StepperRecord
 from surfacechem.solve.radau.step import BRIEF, DECADES, FAR, GROWTH, SAFETY, SHRINK
@@ -129,7 +129,7 @@ def _ledger_norms(w: Any) -> Any:
                 second = larger(second, absolute(lanes(w.fine[w.n + m])))
                 scale = larger(scale, lanes(w.q_scale[m]))
         norm = larger(norm, h * miss * miss / (square_root(miss * miss + 0.01 * second * second) + TINY) / scale)
-    return where(h < SHALLOW * lanes(w.t), 0.0, norm / max(LOOSER * w.rtol, LEAST))
+    return where(h < SHALLOW * lanes(w.t), 0.0, norm / booked(w.rtol))
 
 
 @compiled
@@ -258,7 +258,7 @@ def _differs(w: Any, x: Any) -> Any:
                 # what roots give: of the worst of all, as they take longer than the rest.
                 squared = unit * defect * unit * defect
                 miss = larger(miss, squared * squared * (part * part * part))
-        norm = larger(norm, square_root(square_root(miss)) / max(LOOSER * w.rtol, LEAST))
+        norm = larger(norm, square_root(square_root(miss)) / booked(w.rtol))
     for m in range(w.columns):
         blank = blank + 0.0 * lanes(w.rates[m])  # as in a step
     return norm + blank

@@ -188,10 +188,18 @@ def defect_norm(w: Any, defects: Any, h: float, remaining: float) -> float:
 
 
 @compiled
+def booked(rtol: float) -> float:
+    """Error of a quadrature that a tolerance of the states allows, relative to what is exchanged; however loose it is,
+    the books close to what changes no decision.
+    """
+    return float(min(max(LOOSER * rtol, LEAST), NEGLIGIBLE))
+
+
+@compiled
 def _group_norm(w: Any) -> float:
     """Largest error in units of what is allowed in its group."""
     # Accounts of one kind are added up: what one of them misses counts beside the largest.
-    norm, allowed = 0.0, max(LOOSER * w.rtol, LEAST)
+    norm, allowed = 0.0, booked(w.rtol)
     for group in range(GROUPS):
         miss, scale = 0.0, TINY
         for m in range(w.n_ledger):

@@ -14,7 +14,6 @@ from surfacechem.compile.program import MANY, Program
 from surfacechem.solve.contract import Array, Counters, Events, Margin, Points, Problem, Result, Solver, States, Status
 from surfacechem.solve.radau import stepper
 from surfacechem.solve.radau.stepper import COLUMNS, END, EVENTS, FIRST_COUNTER, INSIDE, OUTPUTS, RECORDS, STOP, Batch
-from surfacechem.tolerances import LONGEST_STEP
 
 EVENT_ROWS = 64
 STEP_ROWS = 512
@@ -74,7 +73,7 @@ def batch_of(
     n, q, m, count = program.n, program.n_ledger, program.n_margins, len(runs[0])
     return Batch(
         *(tables or (program.explicit_tables if explicit else program.tables)),
-        min(problem.rtol, LONGEST_STEP),
+        problem.rtol,
         _contiguous(problem.atol),
         int(explicit),
         _kinds(problem.margins, problem.in_play),
