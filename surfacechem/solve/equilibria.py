@@ -37,11 +37,19 @@ Heat = Callable[[Array], Array]
 DRIFT = 100.0
 """Traction out of balance that the integration explains, relative to its parts and in units of the tolerance."""
 
+MOST_DRIFT = 0.1
+"""The same relative to its parts, however loose the tolerance: of what cancels to less than that the sign is known."""
+
 BALANCED = ROUNDING
 """Tractions out of balance that count as none, relative to their parts: those of a run hold its rounding."""
 
 POLISH = 3
 """Newton steps that take the drift of an integration out of the gaps: each doubles the digits."""
+
+
+def drift_of(rtol: float) -> float:
+    """Traction out of balance that the integration explains at a tolerance, relative to its parts."""
+    return min(DRIFT * rtol, MOST_DRIFT)
 
 
 @dataclass(frozen=True)
@@ -466,7 +474,7 @@ class Folds:
             if found is None:
                 continue
             (_, sizes), (left, _) = self.equilibria.balance(point), self.equilibria.balance(found.point)
-            if np.all(np.abs(left) <= DRIFT * rtol * np.abs(sizes)):
+            if np.all(np.abs(left) <= drift_of(rtol) * np.abs(sizes)):
                 return index
         return -1
 

@@ -15,7 +15,7 @@ from surfacechem.model.automaton import RESTS
 from surfacechem.model.system import System
 from surfacechem.quantities import VELOCITIES
 from surfacechem.solve.contract import Array, Mask, Problem, Result, Status
-from surfacechem.solve.equilibria import BALANCED, DRIFT, Point
+from surfacechem.solve.equilibria import BALANCED, Point, drift_of
 from surfacechem.solve.jump_heat import LoadStep
 from surfacechem.solve.jumps import Jump, Jumper, Slack, booked
 from surfacechem.solve.radau.solver import consistent
@@ -226,7 +226,7 @@ class Instant:
     def _due(self, now: Array, playing: Mask, sizes: Array, point: Point) -> int | None:
         """The edge whose guard is closed, or is zero and closing; the drift of the integration is not closed."""
         small = CROSSED * sizes
-        closed = playing & (now < -np.maximum(DRIFT * self.rtol * sizes, small))
+        closed = playing & (now < -np.maximum(drift_of(self.rtol) * sizes, small))
         near = playing & ~closed & (now <= small) & ~self.strict[self.first :]
         if near.any():
             near &= self.jumper.guard_rates(self.consistent(point).inputs()) < 0
@@ -256,7 +256,7 @@ class Instant:
 
     def apply(self, index: int, point: Point, last: Point | None = None) -> Point | None:
         """Carry out an edge and book it; None where the run ends with it."""
-        largest, drift = float(self.sizes(point)[self.first + index]), DRIFT * self.rtol
+        largest, drift = float(self.sizes(point)[self.first + index]), drift_of(self.rtol)
         balanced = BALANCED if self.system.edges[index].times else drift
         slack = Slack(CROSSED * largest, drift * largest, balanced, self.rtol)
         step = self.step if self.step is not None and self.step.before.t == point.t else None

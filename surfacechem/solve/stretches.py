@@ -15,7 +15,7 @@ import numpy as np
 
 from surfacechem.model.system import START, System
 from surfacechem.solve.contract import Array, Index, Mask, Problem, Status
-from surfacechem.solve.equilibria import DRIFT
+from surfacechem.solve.equilibria import drift_of
 from surfacechem.solve.instant import ALOFT, AT_ONCE, FITTED, REACHED, velocity_scales
 from surfacechem.solve.jumps import Jumper, booked
 from surfacechem.solve.radau.solver import consistent, solve_arrays
@@ -175,7 +175,7 @@ class Stretches:
         """The edge that is due in each run: NONE, or UNKNOWN where that depends on what has happened before."""
         now, sizes, played = now[:, self.first :], sizes[:, self.first :], playing[:, self.first :]
         small = CROSSED * sizes
-        closed = played & (now < -np.maximum(DRIFT * self.problem.rtol * sizes, small))
+        closed = played & (now < -np.maximum(drift_of(self.problem.rtol) * sizes, small))
         near = played & ~closed & (now <= small) & ~self.strict
         some = near.any(axis=1)
         if some.any():

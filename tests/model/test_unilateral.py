@@ -309,6 +309,15 @@ def test_a_method_that_passes_an_impact_fails(monkeypatch):
     assert trajectory.reason.startswith("the method has not seen the gap close; radau does")
 
 
+@pytest.mark.parametrize("rtol", [1e-2, 3e-2])
+def test_rebounds_come_to_rest_at_loose_tolerances(rtol):
+    """The drift of an integration is less than what drifts, however loose the tolerance."""
+    case = surfacechem.load("bouncing-plate")
+    trajectory = case.model.solve(replace(case.case.run, solver="radau", rtol=rtol))
+    assert trajectory.status == "finished"
+    assert trajectory.result.y[0] == 0.0
+
+
 def test_rebounds_that_use_up_the_steps_are_named():
     """A damper makes those without loss slower and slower, and there is no end to them."""
     given = scene(Mounting(m=M, c_g=2.0, e=1.0))
