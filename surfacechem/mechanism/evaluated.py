@@ -304,6 +304,7 @@ class SurfaceEngine:
         self._taken = taken(surface, [held.phase for held in self.held])[open_ones].T / MOLECULAR
         self._last: tuple[Sequence[float], Array] = (), np.empty(0)
         self._energies = np.empty(0)
+        self._lay_out()
         self._brought: list[tuple[int, float, Sequence[float]]] = [(0, math.nan, ())]
         """Who has brought the surface where, as several may share it."""
 
@@ -322,7 +323,17 @@ class SurfaceEngine:
             known[name] = HeldPhase(known[name].phase, replace(state, **electric))
         made = copy.copy(self)
         made.held = list(known.values())
+        made._lay_out()
         return made
+
+    def _lay_out(self) -> None:
+        """Where the neighbours read their states, and write their energies."""
+        self._both, self._parts = np.empty((2, len(self._taken))), list[tuple[HeldPhase, slice, Array]]()
+        first = species = 0
+        for held in self.held:
+            last, end = first + len(held.states), species + len(held.charges)
+            self._parts.append((held, slice(first, last), self._both[:, species:end]))
+            first, species = last, end
 
     @property
     def charges(self) -> dict[str, dict[str, float]]:
@@ -367,7 +378,7 @@ class SurfaceEngine:
             # A stretched surface has fewer sites per area; coverages that a step tries need not sum to one.
             self.surface.site_density = amount * self._sites / MOLECULAR
             self.surface.set_unnormalized_coverages(values[2:end])
-            rates = self.surface.net_rates_of_progress[self.positions] * MOLECULAR
+            rates = self.surface.net_rates_of_progress.take(self.positions) * MOLECULAR
             found = np.concatenate((rates, self._energies))
         else:
             found = np.full(len(self.gives), math.nan)
@@ -377,11 +388,8 @@ class SurfaceEngine:
     def _bring(self, T: float, states: Sequence[float]) -> None:
         """Bring the surface and its neighbours to a temperature [K], and these to their states."""
         self.surface.TP = T, None
-        both, species, first = np.empty((2, len(self._taken))), 0, 0
-        for held in self.held:
-            last, end = first + len(held.states), species + len(held.charges)
-            held.put(T, states[first:last])
-            held.energies(both[:, species:end])
-            first, species = last, end
+        for held, read, written in self._parts:
+            held.put(T, states[read])
+            held.energies(written)
         if self.held:
-            self._energies = (both @ self._taken).ravel()
+            self._energies = self._both.dot(self._taken).ravel()

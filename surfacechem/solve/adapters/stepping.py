@@ -199,8 +199,11 @@ class _Run:
             self.guards.rows = lambda times, x: margins_at_rows(program, self.view.parameters, times, x)
         self.in_play = np.array((True,) * program.n_margins if problem.in_play is None else problem.in_play, bool)
         self.outputs: list[Array] = []
-        self.events: list[tuple[int, float, Array, Array, Array]] = []
-        self.steps: list[tuple[float, Array, Array, Array]] = []
+        self.fired: list[int] = []
+        self.events: list[tuple[Array, Array, Array, Array]] = []
+        """The same at events, whose margins these are."""
+        self.steps: list[tuple[Array, Array, Array, Array]] = []
+        """Times, states, rates and ledgers at the ends of steps, of some at a time."""
         self.count = self.residuals = self.jacobians = self.factorizations = self.rejected = 0
         self.stepping = 0.0
         """Time inside the library's steps [s]."""
@@ -226,7 +229,7 @@ class _Run:
             if not self.outputs and len(self.problem.times) and self.problem.times[0] <= start:
                 self.outputs.append(np.concatenate((self.y, self.ledger)))
             if self.problem.record_steps and not self.steps:
-                self.steps.append((start, self.y, self.ydot, self.ledger))
+                self.steps.append((np.array([start]), self.y[None], self.ydot[None], self.ledger[None]))
             stop = end if self.aim is None or self.aim <= start else self.aim
             method = self.solver.begin(self.view, start, stop, self.y, self.ydot)
             try:
@@ -303,8 +306,10 @@ class _Run:
         self.view.guess = self.y[self.view.algebraic]
         self.count += len(steps)
         if self.problem.record_steps:
-            self.steps.extend(zip(times.tolist(), y, ydot, ledgers[1:], strict=True))
-        self.events.extend((i, self.t, self.y, self.ydot, self.ledger) for i in fired)
+            self.steps.append((times, y, ydot, ledgers[1:]))
+        for i in fired:
+            self.fired.append(i)
+            self.events.append((times[-1:], y[-1:], ydot[-1:], ledgers[-1:]))
 
     def _put_out(
         self, steps: Sequence[DenseStep], inside: "_Inside", ledgers: Array, relied: NDArray[np.bool_]
@@ -380,13 +385,12 @@ class _Run:
         problem, program = self.problem, self.problem.program
         n, q = program.n, program.n_ledger
 
-        def points(rows: Sequence[tuple[float, Array, Array, Array]]) -> list[Array]:
-            columns = zip(*rows, strict=True) if rows else ((),) * 4
-            sizes: tuple[tuple[int, ...], ...] = ((), (n,), (n,), (q,))
-            return [np.array(column).reshape(len(rows), *size) for column, size in zip(columns, sizes, strict=True)]
+        none = np.empty(0), np.empty((0, n)), np.empty((0, n)), np.empty((0, q))
+
+        def points(parts: Sequence[tuple[Array, Array, Array, Array]]) -> list[Array]:
+            return [np.concatenate(column) for column in zip(none, *parts, strict=True)]
 
         outputs = np.array(self.outputs).reshape(-1, n + q)
-        index = np.array([event[0] for event in self.events], dtype=np.int64)
         return Result(
             problem=problem,
             status=status,
@@ -398,7 +402,7 @@ class _Run:
             times=problem.times[: len(outputs)],
             outputs=outputs[:, :n],
             ledger_outputs=outputs[:, n:],
-            events=Events(*points([event[1:] for event in self.events]), index=index),
+            events=Events(*points(self.events), index=np.array(self.fired, dtype=np.int64)),
             counters=Counters(self.count, self.rejected, self.residuals, self.jacobians, self.factorizations),
             steps=Points(*points(self.steps)) if problem.record_steps else None,
             stepping=self.stepping,
