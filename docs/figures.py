@@ -277,6 +277,7 @@ GALLERY: dict[str, tuple[list[str], str | None]] = {
     "generalised-bonding": (["T", "phi"], None),
     "generalised-bonding-sliding": (["T", "phi"], None),
     "hot-plate-bonds": (["g_n", "T_1", "T_2", "T_c", "phi"], None),
+    "lithium-charging": (["V_electron", "i_electron", "j_electron"], None),
     "lubricated-sliding": (["T_1", "T_2", "T_c", "t_film_shear"], None),
     "no-medium": (["T_1", "T_2"], None),
     "one-sided-contact": (["T_1", "T_2", "phi"], None),

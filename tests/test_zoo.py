@@ -133,7 +133,7 @@ STOPPED = {
 FLAGGED = ("debonding-cooling",)
 """Cases that are shown because they violate the second law."""
 
-ASKING = ("diamond-growth", "lithium-polarisation", "temperature-programmed-desorption")
+ASKING = ("diamond-growth", "lithium-charging", "lithium-polarisation", "temperature-programmed-desorption")
 """Cases of which Cantera gives the rates."""
 
 CELLS = {"sudden-contact": 1e-4, "epoxy-cure-thick": 6e-5}
