@@ -6,7 +6,7 @@ Source of the degree of rate control: Campbell (2017), ACS Catal. 7, 2770, doi 1
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,7 +14,7 @@ import numpy as np
 from surfacechem.errors import InputError, suggestion
 from surfacechem.format import Overrides, Source
 from surfacechem.model.system import System
-from surfacechem.quantities import GAS_CONSTANT
+from surfacechem.quantities import GAS_CONSTANT, Quantity
 from surfacechem.runs.at_rest import refuse_histories
 from surfacechem.runs.sheet import Rows, Sheet
 from surfacechem.runs.simulation import load
@@ -42,13 +42,15 @@ class SteadyState:
     time: float
     """Of a run that has come there [s]."""
     coverages: Mapping[str, float]
+    states: Mapping[str, float]
+    """All others, such as temperatures and potentials, by name."""
     rates: Mapping[str, float]
     control: Mapping[str, Mapping[str, float]]
     barriers: Mapping[str, float]
     equations: Mapping[str, str]
     """Of the reactions."""
     units: Mapping[str, str]
-    """Of the rates."""
+    """Of the rates, and of those states."""
 
     def __str__(self) -> str:
         """Tables of coverages, rates and control."""
@@ -61,12 +63,14 @@ class SteadyState:
         ]
         tables: dict[str, Rows] = {
             "Coverages": [(name, f"{value:.6g}") for name, value in self.coverages.items()],
+            "States": [(name, f"{value:.6g} {self.units[name]}") for name, value in self.states.items()],
             "Rates": [
                 (name, f"{value:.6g} {self.units[name]}", barriers.get(name, "")) for name, value in self.rates.items()
             ],
             "Degree of rate control": [("", "", *names), *control],
         }
-        return str(Sheet(self.title, [("steady", f"after {self.time:.3g} s")], tables))
+        shown = {title: rows for title, rows in tables.items() if rows}
+        return str(Sheet(self.title, [("steady", f"after {self.time:.3g} s")], shown))
 
 
 def steady(source: Source, of: Sequence[str] = (), overrides: Overrides = ()) -> SteadyState:
@@ -107,7 +111,8 @@ def steady(source: Source, of: Sequence[str] = (), overrides: Overrides = ()) ->
     return SteadyState(
         simulation.case.title,
         rest.time,
-        dict(zip(rest.species, np.where(rest.x > TRACE, rest.x, 0.0).tolist(), strict=True)),
+        rest.coverages,
+        {q.name: x for q, x in rest.found if not q.species},
         dict(zip(rest.wanted, rates.tolist(), strict=True)),
         {
             name: dict(zip(labels, column, strict=True))
@@ -115,7 +120,7 @@ def steady(source: Source, of: Sequence[str] = (), overrides: Overrides = ()) ->
         },
         dict(zip(rest.wanted, barriers.tolist(), strict=False)),
         {label: system.find(f"R_{label}").quantity.long_name.removeprefix("net rate of ") for label in labels},
-        {name: system.outputs[j].quantity.unit for name, j in rest.wanted.items()},
+        rest.units,
     )
 
 
@@ -137,7 +142,7 @@ HELD = re.compile(r"(bodies\..+|interface)\.temperature\.level|loading\.T\w*\.le
 
 def _held(system: System, values: Mapping[str, float]) -> list[str]:
     """Parameters that are the temperatures of bodies and interface, where all are held at the same one."""
-    if not all(state.quantity.species for state in system.states):
+    if any(state.is_temperature for state in system.states):
         return []
     paths = [parameter.path for parameter in system.parameters if HELD.fullmatch(parameter.path)]
     return paths if len({values[path] for path in paths}) == 1 else []
@@ -157,14 +162,30 @@ class _Rest:
             problem = reached.result.problem
             self.evaluation = Evaluation(problem.program, reached.result.y, problem.parameters[-1])
             states = [model.system.states[j] for j in self.evaluation.free]
-            self.species = [state.quantity.species or state.name for state in states]
-            self._sites = np.array([[bool(state.quantity.species) for state in states]], dtype=float)
+            self.quantities = [state.quantity for state in states]
+            self._sites = np.array([[bool(quantity.species) for quantity in self.quantities]], dtype=float)
             found = self._root(start := reached.result.y[self.evaluation.free])
             if found is not None and np.all(np.abs(found - start) <= NEGLIGIBLE * np.abs(found) + run.rtol):
                 self.x, self.largest = found, np.abs(reached.outputs).max(axis=0)
                 return
             self.time *= LONGER
         raise InputError(f"the case did not reach a steady state within {self.time / LONGER:.3g} s.")
+
+    @property
+    def found(self) -> Iterator[tuple[Quantity, float]]:
+        """The states with their values."""
+        return zip(self.quantities, self.x.tolist(), strict=True)
+
+    @property
+    def coverages(self) -> dict[str, float]:
+        """Those that are coverages, by species."""
+        return {quantity.species: x if x > TRACE else 0.0 for quantity, x in self.found if quantity.species}
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Of the quantities that were asked for, and of all other states."""
+        asked = (self.model.system.outputs[j].quantity for j in self.wanted.values())
+        return {quantity.name: quantity.unit for quantity in (*asked, *self.quantities) if not quantity.species}
 
     def rates(self, x: Array) -> Array:
         """Time derivatives of the states."""

@@ -80,6 +80,17 @@ def test_books_of_charge_and_energy():
     assert float(solution.audit.least["R1"]) >= 0
 
 
+def test_at_rest_under_a_current(edge):
+    """The reaction carries what is given, whatever its rate constant; the potential makes up for it."""
+    text = case("electric-potential: -2.9 V, capacitance: 0.2 F/m^2, current: -3 A/m^2")
+    rest = surfacechem.steady(text, of=["i_electron", "q_n"])
+    assert rest.coverages == {"(dummy)": 1.0}
+    assert rest.states["V_electron"] == pytest.approx(brentq(lambda V: current(edge, V) - 3.0, -3.3, -2.5), abs=1e-9)
+    assert rest.rates["i_electron"] == pytest.approx(3.0, rel=1e-9)
+    assert rest.control["i_electron"]["R1"] == pytest.approx(0.0, abs=1e-6)
+    assert "V_electron  -2.9" in str(rest)
+
+
 def test_a_capacitance_is_a_parameter():
     simulation = surfacechem.load(case("electric-potential: -3.3 V, capacitance: 0.2 F/m^2", until="1 ms"))
     slow = simulation.run({"interface.mechanism.neighbours.electron.capacitance": 2000.0})
