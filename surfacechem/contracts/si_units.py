@@ -52,7 +52,7 @@ THERMAL_ENERGY = Decimal("1.380649e-23") * Decimal("298.15")
 """kT [J] at 25 degC, in which energies of single bonds are given: 4.116 pN nm."""
 
 ELECTRON_VOLT = Decimal("1.602176634e-19")
-"""J."""
+"""J (exact, SI 2019)."""
 
 _OTHERS: Mapping[str, tuple[Decimal | int, str]] = {
     "min": (60, "s"),

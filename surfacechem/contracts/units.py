@@ -69,6 +69,10 @@ WORDS = {
     "an amount of substance": "mol",
     "an electric charge": "coulomb",
     "a capacitance": "farad",
+    "a capacitance per area": "F/m^2",
+    "an electric potential": "V",
+    "an electric current": "A",
+    "an electric current per area": "A/m^2",
 }
 """Dimensions in words, for messages, each with a unit that has it."""
 

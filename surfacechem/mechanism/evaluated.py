@@ -17,6 +17,7 @@ import numpy as np
 import symengine
 from numpy.typing import NDArray
 
+from surfacechem.contracts.si_units import ELECTRON_VOLT
 from surfacechem.contracts.terms import Load, RateLaw, option, parameter
 from surfacechem.errors import InputError, Place, refuse_unknown, suggestion
 from surfacechem.expressions import Expression, absolute
@@ -30,8 +31,8 @@ Array = NDArray[np.float64]
 GASES = frozenset(("ideal-gas", "Redlich-Kwong", "Peng-Robinson", "plasma"))
 """Cantera's models of phases whose pressure matters."""
 
-CHARGE = 1.602176634e-19
-"""Elementary charge [C] (exact, SI 2019)."""
+CHARGE = float(ELECTRON_VOLT)
+"""Elementary charge [C]: what an electron volt is in joules."""
 
 FARADAY = CHARGE * MOLECULAR
 """Charge of a kmol of elementary charges [C/kmol]."""
@@ -124,6 +125,10 @@ def uneven(name: str, parts: Mapping[str, float], rest: bool) -> str:
     return f"the mole fractions of the neighbour {name} sum to {total:.9g}, not to 1." if wrong else ""
 
 
+def _potential(phase: Any) -> Quantity:
+    return Quantity(f"V_{word(phase.name)}", "V", f"electric potential of {phase.name}")
+
+
 class HeldPhase:
     """A phase beside the surface, and its ``states`` in the order in which :meth:`put` takes them: histories, or the
     potential of an ``electrode``.
@@ -133,17 +138,14 @@ class HeldPhase:
         self.phase, self.pressure = phase, float(phase.P)
         self.species = np.array([phase.species_index(name) for name in state.composition], dtype=np.int64)
         self.rest = phase.species_index(state.rest) if state.rest else None
-        self.given, self.electrode = state, None
+        self.given, self.electrode = state, self._electrode(phase, state)
         self.charges = FARADAY * np.asarray(phase.charges)
         name = word(phase.name)
         found: list[tuple[Quantity, Load]] = []
         if state.pressure is not None:
             found.append((Quantity(f"p_{name}", "Pa", f"pressure of {phase.name}"), state.pressure))
-        V = Quantity(f"V_{name}", "V", f"electric potential of {phase.name}")
-        if state.capacitance is not None:
-            start = state.potential_at_start
-            self.electrode = Electrode(name, phase.name, V, start, state.capacitance, state.current)
-        elif state.electric_potential is not None:
+        V = _potential(phase)
+        if self.electrode is None and state.electric_potential is not None:
             found.append((V, state.electric_potential))
         names = identifiers(state.composition, f"x_{name}_")
         for species, load in state.composition.items():
@@ -159,6 +161,13 @@ class HeldPhase:
         self._parts: Sequence[float] = [math.nan]
         self._all = np.zeros(phase.n_species)
         self._pressed, self._charged = state.pressure is not None, V in self.states
+
+    @staticmethod
+    def _electrode(phase: Any, state: Neighbour) -> Electrode | None:
+        if state.capacitance is None:
+            return None
+        own = word(phase.name), phase.name, _potential(phase), state.potential_at_start
+        return Electrode(*own, state.capacitance, state.current)
 
     @property
     def taken_over(self) -> list[tuple[Quantity, Load]]:

@@ -35,6 +35,9 @@ CONVENTIONS = "CF-1.11"
 PATIENCE = 20.0
 """Time [s] that reading a small file may take: in one that is damaged HDF5 may look for something without end."""
 
+_BEGUN: dict[Path, subprocess.Popen[bytes]] = {}
+"""Processes that try files which are read soon."""
+
 SLOWEST = 1e7
 """Bytes per second that a disk gives at the least."""
 
@@ -302,9 +305,6 @@ def _trial(path: Path) -> subprocess.Popen[bytes]:
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
     command = [sys.executable, "-c", TRIAL, str(path)]
     return subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-
-
-_BEGUN: dict[Path, subprocess.Popen[bytes]] = {}
 
 
 def begin_reading(path: Path) -> None:

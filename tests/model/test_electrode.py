@@ -118,6 +118,12 @@ def test_beside_a_particle_that_fills(tmp_path):
     assert stored + became == pytest.approx(-3.0 * 40.0, rel=1e-9)
 
 
+def test_a_phase_that_gets_no_charge_is_refused():
+    text = case("electric-potential: -3 V").replace('"V[anode]": 0.5}', '"V[anode]": 0.5}, capacitance: 1 F/m^2', 1)
+    with pytest.raises(InputError, match="no reaction brings charge to anode, and no `current` does"):
+        surfacechem.load(text).model  # noqa: B018
+
+
 @pytest.mark.parametrize(
     ("electron", "message"),
     [
@@ -127,6 +133,7 @@ def test_beside_a_particle_that_fills(tmp_path):
             "the potential of the neighbour electron follows from its charge",
         ),
         ("capacitance: 0 F/m^2", "capacitance = 0 is outside its range: > 0"),
+        ("capacitance: 20 uF", "20 uF is a capacitance; capacitance needs a capacitance per area"),
         ("capacitence: 1 F/m^2", "Did you mean 'capacitance'"),
     ],
 )

@@ -1,5 +1,6 @@
 """LU of large matrices: again in the order of the one before, and never where that would be wrong."""
 
+from types import SimpleNamespace
 from typing import Any
 
 import numba
@@ -61,3 +62,22 @@ def test_an_order_that_is_not_whole_is_not_used_again() -> None:
     derivatives[0, :2, :2] = 1.0  # singular
     assert not factored(derivatives, 1.0, np.zeros((N, N)), order, places, False, np.ones(N))
     assert order[3, 0] < 0
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_bounds_hold_and_are_met_where_nothing_cancels(seed: int) -> None:
+    """Of a matrix with positive diagonal that dominates and no other positive entry the bound is the solution."""
+    draw = np.random.default_rng(seed)
+    entries = np.where(draw.random((N, N)) < 0.06, 0.05 * draw.random((N, N)), 0.0)  # no pivot off the diagonal
+    for signs in (-1.0, draw.choice([-1.0, 1.0], (N, N))):
+        matrix = signs * entries
+        np.fill_diagonal(matrix, 1.0 + entries.sum(axis=1))
+        a, sizes = np.zeros((N, N)), draw.random(N)
+        order, places = np.zeros((6, N), np.int64), np.zeros((N, N), np.int64)
+        assert factored(np.array([matrix, np.zeros((N, N))]), 1.0, a, order, places, False, np.ones(N))
+        bound = sizes.copy()
+        linear.bound_real.py_func(SimpleNamespace(real=a, order=[order], places=[places]), bound)
+        exact = np.abs(np.linalg.inv(matrix)) @ sizes
+        assert np.all(bound >= (1 - 1e-12) * exact)
+        if np.isscalar(signs):
+            np.testing.assert_allclose(bound, exact, rtol=1e-10)

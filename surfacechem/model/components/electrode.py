@@ -12,6 +12,8 @@ from collections.abc import Iterator
 import symengine
 
 from surfacechem.contracts.terms import Spec
+from surfacechem.errors import InputError
+from surfacechem.model import balances
 from surfacechem.model.balances import OUTSIDE, WORK, Power
 from surfacechem.model.build import Build
 from surfacechem.model.system import State
@@ -44,10 +46,14 @@ def laws(build: Build) -> Iterator[Power]:
         if electrode.current is not None:
             quantity = Quantity(f"j_{name}", "A/m^2", f"current into {title} from outside, per reference area")
             current = current + build.prescribe(quantity, electrode.current)
-        build.rows.kinematics(V.name, current / c)
-        text = f"energy of the charge of {title}"
-        build.store(Quantity(f"E_{name}", "J/m^2", text), c * V**2 / 2)
-        yield Power(WORK, OUTSIDE, ELECTRODE, V * current, f"W_{name}", f"work of the charge that enters {title}")
+        if current == 0:
+            message = f"no reaction brings charge to {title}, and no `current` does, so its potential stays as it is."
+            raise InputError(f"{message} Remove `capacitance`.", path=_path(electrode))
+        energy, rate = c * V**2 / 2, current / c
+        build.rows.kinematics(V.name, rate)
+        build.store(Quantity(f"E_{name}", "J/m^2", f"energy of the charge of {title}"), energy)
+        work = balances.power(energy, V, rate)
+        yield Power(WORK, OUTSIDE, ELECTRODE, work, f"W_{name}", f"work of the charge that enters {title}")
 
 
 def _electrodes(build: Build) -> tuple[Electrode, ...]:

@@ -20,8 +20,8 @@ from surfacechem.solve.radau.newton import (
     solve_stages,
     stage_count,
 )
-from surfacechem.solve.radau.roundoff import find_noise
-from surfacechem.solve.radau.step import MAGNIFIED, defect_inside, store_polynomial
+from surfacechem.solve.radau.roundoff import MAGNIFIED, find_noise
+from surfacechem.solve.radau.step import defect_inside, store_polynomial
 from surfacechem.solve.radau.tables import PROBE, PROBE_RATE, PROBE_SHAPE, SCANNED
 from surfacechem.solve.radau.work import compiled, copy
 from surfacechem.tolerances import FINER

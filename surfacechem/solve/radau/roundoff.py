@@ -20,6 +20,9 @@ DIFFERENCE = np.array([1.0, -5.0, 10.0, -10.0, 5.0, -1.0]) / np.sqrt(252.0)
 WINDOWS, NEAR = 3, NEGLIGIBLE
 """Differences that are taken, and how far apart their times are as parts of a step."""
 
+MAGNIFIED = 10.0
+"""Noise of the estimate, which extrapolates the noise of every stage, in units of that of one residual."""
+
 LARGEST = NEGLIGIBLE**2
 """Noise above this part of a variable, and of what it typically is, would mean a singular matrix, not rounding."""
 
@@ -63,22 +66,6 @@ def _rounding_of(w: Any, i: int, y: Any, ydot: Any) -> float:
 
 
 @compiled
-def _bounds_serve(w: Any, y: Any, ydot: Any) -> bool:
-    """Put bounds of the noise in its place, from one solution instead of one for each variable; whether even they are
-    negligible beside the tolerance.
-    """
-    n, column = w.n, w.delta
-    for i in range(n):
-        column[i] = _rounding_of(w, i, y, ydot)
-    bound_real(w, column)
-    for j in range(n):
-        w.noise[j] = ULPS * abs(y[j]) + column[j]
-        if not w.noise[j] <= 1e-1 * NEGLIGIBLE * w.weight[j]:
-            return False
-    return True
-
-
-@compiled
 def spread_noise(w: Any, y: Any, ydot: Any) -> None:
     """Change of each variable that rounding errors of the residuals at a state can cause, into the noise.
 
@@ -86,8 +73,6 @@ def spread_noise(w: Any, y: Any, ydot: Any) -> None:
     """
     n, core, column = w.n, w.core, w.delta
     _measure_wobble(w, y, ydot)
-    if core >= LARGE and w.links == 0 and _bounds_serve(w, y, ydot):
-        return
     for j in range(n):
         w.noise[j] = ULPS * abs(y[j])
     for i in range(core if w.links == 0 else core + 1):
@@ -118,11 +103,29 @@ def _chain_noise(w: Any, y: Any, ydot: Any, column: Any) -> None:
 
 
 @compiled
+def _bounds_serve(w: Any) -> bool:
+    """Put bounds of the noise at the start of a step in its place, from one solution instead of one for each variable;
+    whether what they make of the estimate is negligible beside the tolerance.
+    """
+    _measure_wobble(w, w.y, w.ydot)
+    for i in range(w.n):
+        w.delta[i] = _rounding_of(w, i, w.y, w.ydot)
+    bound_real(w, w.delta)
+    for j in range(w.n):
+        w.noise[j] = ULPS * abs(w.y[j]) + w.delta[j]
+        if not MAGNIFIED * w.noise[j] <= NEGLIGIBLE * w.weight[j]:
+            return False
+    return True
+
+
+@compiled
 def find_noise(w: Any) -> None:
     """Largest change of each variable at the start of the step that rounding errors can cause, into the noise."""
     if w.explicit != 0:  # nothing is divided by what may be small
         for j in range(w.n):
             w.noise[j] = ULPS * abs(w.y[j])
+        return
+    if w.core >= LARGE and w.links == 0 and _bounds_serve(w):
         return
     spread_noise(w, w.y, w.ydot)
     for j in range(w.n):

@@ -39,7 +39,7 @@ from surfacechem.solve.radau.newton import (
     solve_stages,
     stage_count,
 )
-from surfacechem.solve.radau.roundoff import find_noise
+from surfacechem.solve.radau.roundoff import MAGNIFIED, find_noise
 from surfacechem.solve.radau.stepper import STOP
 from surfacechem.solve.radau.tables import FINEST, START_SLOPE
 from surfacechem.solve.radau.work import LEDGER, RESIDUAL, compiled, copy, evaluate, finite, put, row_of, set_inputs
@@ -49,8 +49,6 @@ from surfacechem.tolerances import EPS, NEGLIGIBLE, ROUNDING, SOLVED, SQRT_EPS, 
 SAFETY = 0.9
 GROWTH = 8.0
 SHRINK = 0.1
-MAGNIFIED = 10.0
-"""Noise of the estimate, which extrapolates the noise of every stage, in units of that of one residual."""
 CONTRACTING = 0.05
 """Contraction of Newton's method aimed at: where it limits the step, a failure costs more than a smaller step."""
 LEAST_CONVERGENT = 0.5
