@@ -39,7 +39,7 @@ def laws(build: Build) -> Iterator[Power]:
     """How charge changes potentials, and the work that it brings."""
     for electrode in _electrodes(build):
         name, title, V = electrode.phase, electrode.title, symengine.Symbol(electrode.potential.name)
-        spec = Spec("F/m^2", f"capacitance of {title}", above=0)
+        spec = Spec("F/m^2", "capacitance", above=0)
         c = build.constant(f"c_{name}", f"{_path(electrode)}.capacitance", spec, electrode.capacitance)
         made = f"i_{name}"
         current = symengine.Symbol(made) if build.is_named(made) else symengine.Integer(0)
