@@ -13,7 +13,7 @@ from typing import Any, Self
 import cantera
 import numpy as np
 
-from surfacechem.solve.adapters.dense_step import DenseStep, at_nodes, hermite, on_step
+from surfacechem.solve.adapters.dense_step import DenseStep, Steps, at_nodes, hermite, on_step
 from surfacechem.solve.adapters.evaluation import Evaluation
 from surfacechem.solve.adapters.stepping import Method, StepError, SteppingSolver, View
 from surfacechem.solve.contract import Array
@@ -162,10 +162,11 @@ class _SystemReactor(HeldReactor):
     def rates(self, t: float) -> Array:
         self.view.residuals += 1
         evaluation, x = self.evaluation, self.scaled * self.unit
-        if not evaluation.put(t, x[: self.count] if self.counts else x):
+        # What is not finite Cantera refuses itself, as it does what is not found.
+        if not evaluation.reach(t, x[: self.count] if self.counts else x):
             raise BackOffError("no consistent state")
-        rates = evaluation.rates() if self.counts else evaluation.slopes()
-        return np.asarray(rates / self.unit)
+        rates: Array = (evaluation.rates() if self.counts else evaluation.slopes()) / self.unit
+        return rates
 
 
 def last_step(net: Any, start: float, end: float, unit: Array, columns: slice = slice(None)) -> DenseStep:
@@ -195,9 +196,9 @@ class _Stretch(Method):
         self.failure: Exception | None = None
 
     def advance(self) -> DenseStep:
-        return self.several(1)[0]
+        return self.several(1).step(0)
 
-    def several(self, most: int) -> list[DenseStep]:
+    def several(self, most: int) -> Steps:
         times, ends = [self.t], self.last or [self.reactor.scaled]
         while len(times) <= most and self.t < self.end and self.failure is None:
             # Cantera knows no time to stop at: a step beyond it would not have felt what is there.
@@ -219,21 +220,16 @@ class _Stretch(Method):
         if not self.last:
             ends[1:1] = ends[2:4]  # the first polynomial is a straight line
         self.last = ends[-3:]
-        unit = self.reactor.unit
-        return self._steps(
-            np.array(times), hermite(np.diff(times), np.concatenate(ends).reshape(-1, 3, len(unit)) * unit)
-        )
+        unit, n = self.reactor.unit, self.reactor.count
+        rows = hermite(np.diff(times), np.concatenate(ends).reshape(-1, 3, len(unit)) * unit)
+        return Steps(np.array(times), partial(self._step, times, rows), at_nodes(rows[..., :n]))
 
-    def _steps(self, times: Array, rows: Array) -> list[DenseStep]:
-        """Steps from and to these times by the coefficients of their polynomials, and their ledger if it is there."""
-        n, sizes = self.reactor.count, np.diff(times)
-        inside = at_nodes(rows[..., :n])
-        steps = []
-        for k, end in enumerate(times[1:].tolist()):
-            y = partial(on_step, end, sizes[k], rows[k][:, :n])
-            gained = partial(on_step, end, sizes[k], rows[k][:, n:]) if rows.shape[2] > n else None
-            steps.append(DenseStep(float(times[k]), end, y, y, gained, inside[k]))
-        return steps
+    def _step(self, times: Sequence[float], rows: Array, k: int) -> DenseStep:
+        """One of the steps from and to these times by the coefficients of its polynomial, and its ledger if any."""
+        start, end, n = times[k], times[k + 1], self.reactor.count
+        y = partial(on_step, end, end - start, rows[k][:, :n])
+        gained = partial(on_step, end, end - start, rows[k][:, n:]) if rows.shape[2] > n else None
+        return DenseStep(start, end, y, y, gained)
 
     @property
     def factorizations(self) -> int:

@@ -20,8 +20,7 @@ class DenseStep:
     """A step from ``start`` to ``end`` [s], with the variables at any time in it.
 
     ``many`` gives a row of them for each of several times, where a library can do so at once; ``ledger`` is what the
-    ledger has gained since the library began, where that integrates it; ``inside`` are the variables at NODES but the
-    first, where they are known.
+    ledger has gained since the library began, where that integrates it.
     """
 
     start: float
@@ -29,15 +28,37 @@ class DenseStep:
     y: Callable[[float], Array]
     many: Callable[[Array], Array] | None = None
     ledger: Callable[[float], Array] | None = None
-    inside: Array | None = None
-
-    def at_nodes(self, times: Array) -> Array:
-        """Variables at the times of NODES but the first, a row each."""
-        return self.rows(times) if self.inside is None or times[-1] < self.end else self.inside
 
     def rows(self, times: Array) -> Array:
         """Variables at several times, a row each."""
         return self.many(times) if self.many else np.array([self.y(t) for t in times.tolist()])
+
+
+@dataclass(frozen=True)
+class Steps:
+    """Steps one after another, each made where it is asked for.
+
+    ``times`` are the start of the first and the ends of all; ``inside`` [step, node, variable] are the variables at
+    NODES but the first, where they are known.
+    """
+
+    times: Array
+    step: Callable[[int], DenseStep]
+    inside: Array | None = None
+
+    @classmethod
+    def of(cls, steps: Sequence[DenseStep]) -> "Steps":
+        """Those of a list."""
+        return cls(np.array([steps[0].start, *(step.end for step in steps)]), steps.__getitem__)
+
+    def at_nodes(self, times: Array) -> Array:
+        """Variables at these times of NODES but the first of each step, the last of which may be cut: a row each."""
+        count = len(times)
+        known = 0 if self.inside is None else count - bool(times[-1, -1] < self.times[count])
+        rows = [self.step(k).rows(times[k]) for k in range(known, count)]
+        if self.inside is not None:
+            rows.insert(0, self.inside[:known].reshape(-1, self.inside.shape[2]))
+        return np.concatenate(rows)
 
 
 @dataclass
@@ -106,17 +127,20 @@ class Guards:
         ``values`` [step, point, guard] are those at some points of steps one after another, the end of each last. Most
         guards are bounds of states that are far from them in all steps of a run.
         """
-        values = np.where(active, values, 1.0)
-        starts = np.concatenate((np.where(active, self.now, 1.0)[None], values[:-1, -1]))
-        values = np.concatenate((starts[:, None], values), axis=1)
-        heights = values * self.sides
-        lowest, highest = heights.min(axis=1), heights.max(axis=1)
-        clear = ((lowest > highest - lowest) & ~self.due) | ~np.any(values, axis=1)
+        lowest, highest, ends = values.min(axis=1), values.max(axis=1), values[:, -1]
+        if not active.all():
+            lowest, highest, ends = (np.where(active, each, 1.0) for each in (lowest, highest, ends))
+        starts = np.concatenate((np.where(active, self.now, 1.0)[None], ends[:-1]))
+        lowest, highest = np.minimum(lowest, starts), np.maximum(highest, starts)
+        still = (lowest == 0.0) & (highest == 0.0)
+        below = self.sides < 0.0
+        lowest, highest = np.where(below, -highest, lowest), np.where(below, -lowest, highest)
+        clear = ((lowest > highest - lowest) & (self.sides != 0.0) & ~self.due) | still
         near = np.flatnonzero(~clear.all(axis=1))
         count = int(near[0]) if len(near) else len(values)
         if count:
-            self.largest = np.fmax(self.largest, highest[:count].max(axis=0))
-            self.now = values[count - 1, -1]
+            self.largest = np.fmax(self.largest, np.where(self.sides == 0.0, 0.0, highest[:count].max(axis=0)))
+            self.now = ends[count - 1]
         return count
 
     def untouched(self, times: Array, step: DenseStep, active: NDArray[np.bool_]) -> bool:

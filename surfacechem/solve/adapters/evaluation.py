@@ -6,11 +6,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 
-from surfacechem.compile.program import CODE, Function, Program
+from surfacechem.compile.program import CODE, Filler, Function, Program
 from surfacechem.solve.contract import Array
 from surfacechem.solve.radau import stepper
 from surfacechem.solve.radau.solver import search_batch
@@ -33,29 +33,42 @@ class Evaluation:
         self.guess = self._found = y[self.algebraic]
         self._nothing = np.zeros(n)
         self._counts = np.zeros((1, COLUMNS), np.int64)
-        ends, table = self.inputs[: 2 * n + 1][None], self.parameters[None, None]
         self._rates = _Code(program.rates, self.inputs, self.ydot) if program.rates else None
-        self._search = stepper.Repeated(search_batch(program, ends, table, self._counts))
+        self._filler = program.filler
         self._reads = _Code(program.filler.reads if program.filler else None, self.inputs)
         self._ledger = _Code(program.ledger, self.inputs)
         self._margins = _Code(program.margins, self.inputs)
 
+    @cached_property
+    def _search(self) -> stepper.Repeated:
+        ends, table = self.inputs[: 2 * self.program.n + 1][None], self.parameters[None, None]
+        return stepper.Repeated(search_batch(self.program, ends, table, self._counts))
+
     def put(self, t: float, differential: Array) -> bool:
         """Go to a state; whether derivatives and algebraic variables were found there."""
+        # Nothing times a number is nothing, unless that is infinite or none.
+        return self.reach(t, differential) and (self._rates is None or math.isfinite(self.ydot.dot(self._nothing)))
+
+    def reach(self, t: float, differential: Array) -> bool:
+        """Go to a state; whether algebraic variables were found there. Where there are none, derivatives may not be
+        finite.
+        """
         # At the same time the search begins at the same place: an integrator that differentiates by 1e-27 m would
         # else divide by it what rounding makes of two searches, and take a step that it does not correct for right.
         if t != self.inputs[0]:
             self.guess = self._found
-        self.inputs[0] = t
+            self.inputs[0] = t
         if self._rates is not None:
             self.y[:] = differential
-            self._fill()
-            # Nothing times a number is nothing, unless that is infinite or none.
-            return math.isfinite(self._rates().dot(self._nothing))
+            if self._filler is not None:
+                self._fill(self._filler)
+            self._rates()
+            return True
         self.y[self.free] = differential
         self.y[self.algebraic] = self.guess
         self.ydot[:] = 0.0
-        self._fill()
+        if self._filler is not None:
+            self._fill(self._filler)
         self._counts[:] = 0
         self._search()
         found = bool(self._counts[0, END] == 0)
@@ -68,13 +81,11 @@ class Evaluation:
         self.inputs[0] = t
         self.y[:] = y
         self.ydot[:] = ydot
-        if whole:
-            self._fill()
+        if whole and self._filler is not None:
+            self._fill(self._filler)
 
-    def _fill(self) -> None:
-        filler = self.program.filler
-        if filler is not None:
-            self.inputs[filler.positions] = filler.evaluate(self._reads().tolist())
+    def _fill(self, filler: Filler) -> None:
+        self.inputs[filler.positions] = filler.evaluate(self._reads().tolist())
 
     def restart(self, y: Array) -> None:
         """Take over a state after a jump; algebraic variables are searched from there."""
@@ -98,35 +109,48 @@ class Evaluation:
         return self._margins().copy()
 
 
-def at_rows(program: Program, parameters: Array, times: Array, y: Array) -> tuple[Array, Array, Array, Array]:
-    """The equations at many states with the same parameters: states with the algebraic variables found, which are not a
-    number where there are none, their derivatives, rates of the ledger and values of the margins, a row for each.
-    """
-    n, count = program.n, len(times)
-    rows = program.filled(_inputs(parameters, times, y))
-    if program.rates is not None:
-        rows[:, 1 + n : 1 + 2 * n] = program.rates(rows)
-        found = np.isfinite(rows[:, 1 + n : 1 + 2 * n]).all(axis=1)
-    else:
-        ends, counts = rows[:, : 1 + 2 * n].copy(), np.zeros((count, COLUMNS), np.int64)
-        table = np.ascontiguousarray(rows[:, None, 1 + 2 * n :])
-        stepper.run(search_batch(program, ends, table, counts), 0, count)
-        rows[:, : 1 + 2 * n], found = ends, counts[:, END] == 0
-    rows[~found, 1 : 1 + 2 * n] = np.nan
-    ledger, margins = (
-        function(rows) if function else np.zeros((count, 0)) for function in (program.ledger, program.margins)
-    )
-    return rows[:, 1 : 1 + n], rows[:, 1 + n : 1 + 2 * n], ledger, margins
+class Rows:
+    """A program at many states at once with the same parameters, in one buffer whose rows keep them."""
 
+    def __init__(self, program: Program, parameters: Array) -> None:
+        self.program = program
+        self._inputs = np.concatenate((np.zeros(1 + 2 * program.n), parameters))[None]
 
-def margins_at_rows(program: Program, parameters: Array, times: Array, y: Array) -> Array:
-    """Values of margins that read nothing but the state, at many states with the same parameters, a row for each."""
-    assert program.margins is not None
-    return program.margins(_inputs(parameters, times, y))
+    def __call__(self, times: Array, y: Array) -> tuple[Array, Array, Array, Array]:
+        """States with the algebraic variables found, which are not a number where there are none, their derivatives,
+        rates of the ledger and values of the margins, a row for each time.
+        """
+        program, n = self.program, self.program.n
+        rows = program.filled(self._filled(times, y))
+        states, ydot = rows[:, 1 : 1 + n], rows[:, 1 + n : 1 + 2 * n]
+        if program.rates is not None:
+            ydot[:] = program.rates(rows)
+            found = np.isfinite(ydot).all(axis=1)
+        else:
+            ends, counts = rows[:, : 1 + 2 * n].copy(), np.zeros((len(rows), COLUMNS), np.int64)
+            table = np.ascontiguousarray(rows[:, None, 1 + 2 * n :])
+            stepper.run(search_batch(program, ends, table, counts), 0, len(rows))
+            rows[:, : 1 + 2 * n], found = ends, counts[:, END] == 0
+        if not found.all():
+            states[~found] = ydot[~found] = np.nan
+        ledger, margins = (
+            function(rows) if function else np.zeros((len(rows), 0)) for function in (program.ledger, program.margins)
+        )
+        return states.copy(), ydot.copy(), ledger, margins
 
+    def margins(self, times: Array, y: Array) -> Array:
+        """Values of margins that read nothing but the state, a row for each time."""
+        assert self.program.margins is not None
+        return self.program.margins(self._filled(times, y))
 
-def _inputs(parameters: Array, times: Array, y: Array) -> Array:
-    return np.concatenate((times[:, None], y, np.zeros_like(y), np.tile(parameters, (len(times), 1))), axis=1)
+    def _filled(self, times: Array, y: Array) -> Array:
+        """Inputs at these states; those before are gone."""
+        n, count = self.program.n, len(times)
+        if count > len(self._inputs):
+            self._inputs = np.repeat(self._inputs[:1], count, axis=0)
+        rows = self._inputs[:count]
+        rows[:, 0], rows[:, 1 : 1 + n], rows[:, 1 + n : 1 + 2 * n] = times, y, 0.0
+        return rows
 
 
 class _Code:

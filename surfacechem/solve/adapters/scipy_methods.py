@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from scipy.integrate import BDF, LSODA, OdeSolver, Radau
 
-from surfacechem.solve.adapters.dense_step import DenseStep
+from surfacechem.solve.adapters.dense_step import DenseStep, Steps
 from surfacechem.solve.adapters.stepping import Method, NoStateError, StepError, SteppingSolver, View
 from surfacechem.solve.contract import Array
 from surfacechem.tolerances import EPS
@@ -36,7 +36,7 @@ class _Stretch(Method):
         except (ValueError, ArithmeticError) as error:
             raise StepError(str(error)) from error
 
-    def several(self, most: int) -> list[DenseStep]:
+    def several(self, most: int) -> Steps:
         steps: list[DenseStep] = []
         while self.failure is None and len(steps) < most and not (steps and self.t == self.end):
             try:
@@ -45,7 +45,7 @@ class _Stretch(Method):
                 self.failure = error  # an event may lie before it
         if not steps and self.failure is not None:
             raise self.failure
-        return steps
+        return Steps.of(steps)
 
     def advance(self) -> DenseStep:
         before, taken = self.t, 0

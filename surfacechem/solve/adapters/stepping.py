@@ -4,14 +4,15 @@ contract.
 
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from surfacechem.solve.adapters.dense_step import NODES, WEIGHTS, DenseStep, Guards, first_crossing, gained_at
-from surfacechem.solve.adapters.evaluation import Evaluation, at_rows, margins_at_rows
+from surfacechem.solve.adapters.dense_step import NODES, WEIGHTS, DenseStep, Guards, Steps, first_crossing, gained_at
+from surfacechem.solve.adapters.evaluation import Evaluation, Rows
 from surfacechem.solve.contract import Array, Counters, Events, Points, Problem, Result, Solver, Status
 from surfacechem.solve.radau import stepper
 from surfacechem.tolerances import NEGLIGIBLE, SQRT_EPS, ULPS
@@ -22,8 +23,10 @@ ENTROPY = 1
 MISSED = 100.0
 """Errors in units of the tolerance beyond which a step has not seen what lies before an event."""
 
-SEVERAL = 64
-"""Steps at a time that the equations are looked at together."""
+FEW, SEVERAL = 4, 128
+"""Steps at a time that the equations are looked at together, at first and at most: what comes after an event has been
+stepped through for nothing.
+"""
 
 LONGEST_FIRST = 1e3
 """First change of a state that its rate may predict, in units of the state."""
@@ -48,6 +51,7 @@ class View(Evaluation):
         super().__init__(problem.program, start, parameters)
         self.problem = problem
         self.differential = ~problem.program.algebraic_mask
+        self.rows = Rows(problem.program, parameters)
         self.atol = problem.atol[self.differential]
         self.residuals = self.jacobians = 0
         """Right-hand sides and Jacobians that the library has asked for; those for outputs and events do not count."""
@@ -99,9 +103,9 @@ class Method(ABC):
     def advance(self) -> DenseStep:
         """Take one step of the library's choice."""
 
-    def several(self, _most: int) -> list[DenseStep]:
+    def several(self, _most: int) -> Steps:
         """Take at least one step, and up to so many where earlier ones can still be looked into after later ones."""
-        return [self.advance()]
+        return Steps.of([self.advance()])
 
     @property
     def factorizations(self) -> int:
@@ -151,34 +155,61 @@ class SteppingSolver(Solver):
 
 
 @dataclass(frozen=True)
+class _Along:
+    """Values along steps one after another: at the start of the first, and at the nodes of each but its start."""
+
+    start: Array
+    rows: Array
+    """[step, node, ...]"""
+
+    @property
+    def ends(self) -> Array:
+        """At the ends of the steps."""
+        return np.asarray(self.rows[:, -1])
+
+    def starts(self) -> Array:
+        """At the starts of the steps."""
+        return np.concatenate((self.start[None], self.rows[:-1, -1]))
+
+    def part(self, first: int, end: int) -> "_Along":
+        """Those along some of the steps."""
+        return _Along(self.rows[first - 1, -1] if first else self.start, self.rows[first:end])
+
+    def within(self, k: int) -> Array:
+        """At all nodes of one step."""
+        return np.vstack((self.starts()[k], self.rows[k]))
+
+    def integral(self, sizes: Array) -> Array:
+        """Of these rates over steps of these sizes."""
+        return sizes[:, None] * (WEIGHTS[1:] @ self.rows + WEIGHTS[0] * self.starts())
+
+
+@dataclass(frozen=True)
 class _Inside:
-    """The equations at the quadrature points of steps one after another: arrays [step, point, ...]."""
+    """The equations at the quadrature points of steps one after another."""
 
     times: Array
-    y: Array
-    ydot: Array
-    ledger: Array
+    """Start of the first step and ends of all [s]."""
+    y: _Along
+    ydot: _Along
+    ledger: _Along
     """Rates of the ledger."""
-    margins: Array
+    margins: _Along
 
-    @classmethod
-    def of(cls, times: Array, parts: Iterable[tuple[Array, Array]]) -> "_Inside":
-        """From values at the start of the first step, and rows at all points of all steps but their starts."""
-
-        def whole(start: Array, rows: Array) -> Array:
-            inside = rows.reshape(len(times), len(NODES) - 1, len(start))
-            starts = np.concatenate((start[None], inside[:-1, -1]))
-            return np.concatenate((starts[:, None], inside), axis=1)
-
-        return cls(times, *(whole(*part) for part in parts))
+    @property
+    def sizes(self) -> Array:
+        """Lengths of the steps [s]."""
+        return np.diff(self.times)
 
     def part(self, first: int, end: int) -> "_Inside":
         """Those of some of the steps."""
-        return _Inside(*(each[first:end] for each in (self.times, self.y, self.ydot, self.ledger, self.margins)))
+        along = (each.part(first, end) for each in (self.y, self.ydot, self.ledger, self.margins))
+        return _Inside(self.times[first : end + 1], *along)
 
-    def integral(self, rates: Array) -> Array:
-        """Of rates at the points over each step."""
-        return (self.times[:, -1] - self.times[:, 0])[:, None] * (WEIGHTS @ rates)
+
+def _later(steps: Steps, first: int, k: int) -> DenseStep:
+    """One of the steps from some of them on."""
+    return steps.step(first + k)
 
 
 class _Run:
@@ -196,7 +227,7 @@ class _Run:
         self.plain = program.plain_margins and not program.algebraic_mask.any()
         """Whether margins read nothing but what a library integrates."""
         if self.plain:
-            self.guards.rows = lambda times, x: margins_at_rows(program, self.view.parameters, times, x)
+            self.guards.rows = lambda times, x: self.view.rows.margins(times, x)
         self.in_play = np.array((True,) * program.n_margins if problem.in_play is None else problem.in_play, bool)
         self.outputs: list[Array] = []
         self.fired: list[int] = []
@@ -253,27 +284,29 @@ class _Run:
 
     def _to_event(self, method: Method, end: float) -> list[int]:
         """Step until an event, the end or the budget's; returns the margins that fired."""
-        start, most = self.t, 1
+        # Where algebraic variables are searched from the state before, that is to be close.
+        start, most = self.t, 1 if len(self.view.algebraic) else FEW
         while self.t < end and self._over_budget() is None:
             before = time.perf_counter()
             steps = method.several(min(most, self.problem.max_steps - self.count))
             self.stepping += time.perf_counter() - before
-            if not steps[0].end > self.t:
+            if not steps.times[1] > self.t:
                 raise StepError("the step size fell to zero")
             if self.t == start:
-                self._check_first(steps[0], min(steps[0].end, end))
-            # Where algebraic variables are searched from the state before, that is to be close.
+                self._check_first(steps.step(0), min(float(steps.times[1]), end))
             most = 1 if len(self.view.algebraic) else min(4 * most, SEVERAL)
-            inside = self._inside(steps, min(steps[-1].end, end))
-            while steps:
-                far = self.guards.far(inside.margins[:, 1:], self.in_play) if self.problem.margins else len(steps)
+            inside = self._inside(steps, min(float(steps.times[-1]), end))
+            first, count = 0, len(steps.times) - 1
+            while first < count:
+                margins = inside.margins.rows[first:]
+                far = self.guards.far(margins, self.in_play) if self.problem.margins else count - first
                 if far:
-                    self._accept(steps[:far], inside.part(0, far))
+                    self._accept(partial(_later, steps, first), inside.part(first, first + far))
                 else:
-                    far, fired = 1, self._through(steps[0], end)
+                    far, fired = 1, self._through(steps.step(first), end)
                     if fired is not None:
                         return fired
-                steps, inside = steps[far:], inside.part(far, len(steps))
+                first += far
         return []
 
     def _through(self, step: DenseStep, end: float) -> list[int] | None:
@@ -282,49 +315,51 @@ class _Run:
         # Guards that are zero at one instant are so up to the error of the library's polynomial.
         resolution = min(self.problem.rtol, SQRT_EPS) * (within.end - self.t) + ULPS * abs(within.end)
         reached, fired = first_crossing(within, self.guards, self.in_play, resolution)
-        if fired and self.aim is None and not self._adds_up(self._inside([step], reached), MISSED)[0]:
+        inside = self._inside(Steps.of([step]), reached)
+        if fired and self.aim is None and not self._adds_up(inside, MISSED)[0]:
             self.aim = reached
             return []
-        self._accept([step], self._inside([step], reached), fired)
+        self._accept(lambda _: step, inside, fired)
         return fired or None
 
-    def _accept(self, steps: Sequence[DenseStep], inside: "_Inside", fired: Iterable[int] = ()) -> None:
+    def _accept(self, step: Callable[[int], DenseStep], inside: _Inside, fired: Iterable[int] = ()) -> None:
         """Move on to the end of these steps, with their outputs and events."""
-        times, y, ydot = (rows[:, -1] for rows in (inside.times, inside.y, inside.ydot))
-        gains = inside.integral(inside.ledger)
-        relied = np.full(len(steps), steps[0].ledger is None) | self._adds_up(inside, NEGLIGIBLE)
+        times, y, ydot = inside.times, inside.y.ends, inside.ydot.ends
+        gains = inside.ledger.integral(inside.sizes)
+        relied = (step(0).ledger is None) | self._adds_up(inside, NEGLIGIBLE)
         for k in np.flatnonzero(~relied).tolist():
-            gains[k] = self._gained(steps[k], inside.times[k, 0], times[k], gains[k])
-        ledgers = self.ledger + np.cumsum(np.vstack((np.zeros_like(self.ledger), gains)), axis=0)
-        self._put_out(steps, inside, ledgers, relied)
+            gains[k] = self._gained(step(k), float(times[k]), float(times[k + 1]), gains[k])
+        ledgers = np.cumsum(np.concatenate((self.ledger[None], gains)), axis=0)
+        self._put_out(step, inside, ledgers, relied)
         if not all(np.all(np.isfinite(rows)) for rows in (y, ydot, ledgers)):
             raise StepError("a state is not finite")
         if self.aim is not None and self.aim <= self.t:
             self.aim = None
         self.t, self.y, self.ydot, self.ledger = float(times[-1]), y[-1], ydot[-1], ledgers[-1]
-        self.ledger_rates, self.margins = inside.ledger[-1, -1], inside.margins[-1, -1]
+        self.ledger_rates, self.margins = inside.ledger.ends[-1], inside.margins.ends[-1]
         self.view.guess = self.y[self.view.algebraic]
-        self.count += len(steps)
+        self.count += len(y)
         if self.problem.record_steps:
-            self.steps.append((times, y, ydot, ledgers[1:]))
+            self.steps.append((times[1:], y, ydot, ledgers[1:]))
         for i in fired:
             self.fired.append(i)
             self.events.append((times[-1:], y[-1:], ydot[-1:], ledgers[-1:]))
 
     def _put_out(
-        self, steps: Sequence[DenseStep], inside: "_Inside", ledgers: Array, relied: NDArray[np.bool_]
+        self, step: Callable[[int], DenseStep], inside: _Inside, ledgers: Array, relied: NDArray[np.bool_]
     ) -> None:
         """Keep the outputs within steps, from the ledger at their ends and its rates inside."""
-        ends = inside.times[:, -1]
+        times = inside.times
         for t in self.problem.times[len(self.outputs) :].tolist():
-            if t > ends[-1]:
+            if t > times[-1]:
                 break
-            k = int(np.searchsorted(ends, t))
-            start, ledger = float(inside.times[k, 0]), ledgers[k + 1]
-            if t < ends[k]:
-                gain = gained_at((t - start) / (ends[k] - start), inside.ledger[k]) * (ends[k] - start)
-                ledger = ledgers[k] + (gain if relied[k] else self._gained(steps[k], start, t, gain))
-            row = np.concatenate((self._state(steps[k], t)[0], ledger))
+            k = int(np.searchsorted(times[1:], t))
+            start, end = times[k : k + 2].tolist()
+            ledger = ledgers[k + 1]
+            if t < end:
+                gain = gained_at((t - start) / (end - start), inside.ledger.within(k)) * (end - start)
+                ledger = ledgers[k] + (gain if relied[k] else self._gained(step(k), start, t, gain))
+            row = np.concatenate((self._state(step(k), t)[0], ledger))
             if not np.all(np.isfinite(row)):
                 raise StepError("an output is not finite")
             self.outputs.append(row)
@@ -336,18 +371,20 @@ class _Run:
         assert step.ledger is not None
         return np.where(self.entropic, quadrature, step.ledger(end) - step.ledger(start))
 
-    def _inside(self, steps: Sequence[DenseStep], reached: float) -> "_Inside":
+    def _inside(self, steps: Steps, reached: float) -> _Inside:
         """The equations at the quadrature points of steps up to a time within the last of them."""
-        view, ends = self.view, np.array([self.t, *(step.end for step in steps)])
-        ends[-1] = reached
-        times = ends[:-1, None] + np.diff(ends)[:, None] * NODES
+        view = self.view
+        ends = np.concatenate(([self.t], steps.times[1:-1], [reached]))
+        times = ends[:-1, None] + np.diff(ends)[:, None] * NODES[1:]
         times[:, -1] = ends[1:]
-        x = y = np.concatenate([step.at_nodes(row[1:]) for step, row in zip(steps, times, strict=True)])
+        x = y = steps.at_nodes(times)
         if not self.solver.keeps_algebraic:
             y = np.empty((len(x), len(self.y)))
             y[:, view.free], y[:, view.algebraic] = x, view.guess
-        rows = at_rows(self.problem.program, view.parameters, times[:, 1:].ravel(), y)
-        return _Inside.of(times, zip((self.y, self.ydot, self.ledger_rates, self.margins), rows, strict=True))
+        rows = view.rows(times.ravel(), y)
+        starts = (self.y, self.ydot, self.ledger_rates, self.margins)
+        along = (_Along(start, each.reshape(*times.shape, -1)) for start, each in zip(starts, rows, strict=True))
+        return _Inside(ends, *along)
 
     def _state(self, step: DenseStep, t: float) -> tuple[Array, Array]:
         """State and derivative inside the last step."""
@@ -375,9 +412,9 @@ class _Run:
         """In which steps the rates add up to the increment, to so many tolerances; a step that is tested at its end
         alone passes over a peak on the way.
         """
-        y = inside.y
-        missed = np.abs(inside.integral(inside.ydot) - (y[:, -1] - y[:, 0]))
-        sizes = self.problem.rtol * np.maximum(np.abs(y[:, -1]), np.abs(y[:, 0])) + self.problem.atol
+        ends, starts = inside.y.ends, inside.y.starts()
+        missed = np.abs(inside.ydot.integral(inside.sizes) - (ends - starts))
+        sizes = self.problem.rtol * np.maximum(np.abs(ends), np.abs(starts)) + self.problem.atol
         return np.asarray(np.all((missed <= factor * sizes)[:, self.view.differential], axis=1))
 
     def result(self, status: Status) -> Result:
