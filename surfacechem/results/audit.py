@@ -8,7 +8,7 @@ Source: Sauer, Duong & Mandadapu (2021), sections 3.3, 3.4 and 4.3.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import Any
@@ -264,15 +264,19 @@ def _destroyed(trajectory: Trajectory, laws: list[str], stored: float) -> float:
     amount, whole = lost(booked, seen)
     if amount <= SLACK * trajectory.run.rtol * whole:
         return 0.0
-    rounded = _rounding_of(trajectory, points, laws, np.flatnonzero((booked < 0) | (seen < 0)))
     digits = EPS * np.abs(ledger).sum(axis=1)
-    amount, whole = lost(booked, seen, rounded * lengths + digits[1:] + digits[:-1])
-    return 0.0 if amount <= EPS * stored or not whole else float(amount / whole)
+    for rounded in _rounding_of(trajectory, points, laws, np.flatnonzero((booked < 0) | (seen < 0))):
+        amount, whole = lost(booked, seen, rounded * lengths + digits[1:] + digits[:-1])
+        if amount <= EPS * stored or not whole:
+            return 0.0
+    return float(amount / whole)
 
 
-def _rounding_of(trajectory: Trajectory, points: Points, laws: list[str], chosen: NDArray[np.int64]) -> Array:
+def _rounding_of(trajectory: Trajectory, points: Points, laws: list[str], chosen: NDArray[np.int64]) -> Iterator[Array]:
     """Rounding of the production of laws in chosen steps, shape (steps,) [W/(m^2 K)]: by how much last digits of all
     that it depends on change it at the ends of a step, and errors within the tolerance of the states.
+
+    First of what is computed at once, then with one after another of what surroundings are asked for.
     """
     model, result = trajectory.model, trajectory.result
     ends = np.union1d(chosen, chosen + 1)
@@ -286,6 +290,12 @@ def _rounding_of(trajectory: Trajectory, points: Points, laws: list[str], chosen
     read = filler.reads(rows) if filler else np.empty(0)
     now = model.output_function(filled)[:, columns]
     found = EPS * np.abs(now)
+
+    def rounding() -> Array:
+        rates = np.zeros(len(points.t))
+        rates[ends] = found.sum(axis=1)
+        return np.maximum(rates[1:], rates[:-1])
+
     asking = []
     for j in range(rows.shape[1]):
         if filler and j in filler.positions:
@@ -296,14 +306,11 @@ def _rounding_of(trajectory: Trajectory, points: Points, laws: list[str], chosen
             asking.append(moved)
         else:
             found += np.nan_to_num(np.abs(model.output_function(moved)[:, columns] - now))
-    if filler and asking:
-        # Only where it reads another state, and moment by moment: neighbours of a surface are brought to theirs once.
-        moved = filler(np.stack(asking, axis=1))
-        then = model.output_function(moved.reshape(-1, rows.shape[1]))[:, columns].reshape(len(ends), len(asking), -1)
-        found += np.nan_to_num(np.abs(then - now[:, None])).sum(axis=1)
-    rates = np.zeros(len(points.t))
-    rates[ends] = found.sum(axis=1)
-    return np.maximum(rates[1:], rates[:-1])
+    yield rounding()
+    if filler:
+        for moved in asking:  # only where it reads another state
+            found += np.nan_to_num(np.abs(model.output_function(filler(moved))[:, columns] - now))
+            yield rounding()
 
 
 def lost(booked: Array, seen: Array, rounded: Array | float = 0.0) -> tuple[Any, Any]:

@@ -180,8 +180,7 @@ def defect_norm(w: Any, defects: Any, h: float, remaining: float) -> float:
         miss = abs(defects[m])
         if miss > 0.0:
             rate = max(rate, miss / h)
-            miss *= (miss / (h * rate)) ** (1.0 - 1.0 / s)
-        w.q_miss[m] = miss
+        w.q_miss[m], w.q_turned[m], w.q_excused[m] = miss, h * rate, 0.0
         w.q_largest[m] = max(w.q_largest[m], abs(w.q[m]))
         w.q_scale[m] = w.q_largest[m] + max(h, FORESEEN * remaining) * rate
     return _group_norm(w)
@@ -199,13 +198,16 @@ def booked(rtol: float) -> float:
 def _group_norm(w: Any) -> float:
     """Largest error in units of what is allowed in its group."""
     # Accounts of one kind are added up: what one of them misses counts beside the largest.
-    norm, allowed = 0.0, booked(w.rtol)
+    norm, allowed, power = 0.0, booked(w.rtol), 1.0 - 1.0 / stage_count(w.member)
     for group in range(GROUPS):
         miss, scale = 0.0, TINY
         for m in range(w.n_ledger):
             if w.groups[m] == group:
-                miss = max(miss, w.q_miss[m])
                 scale = max(scale, w.q_scale[m])
+                # A defect is more than the error that it stands for, whose power costs as much as the rest.
+                if w.q_miss[m] - w.q_excused[m] > miss:
+                    part = w.q_miss[m] / w.q_turned[m]
+                    miss = max(miss, w.q_miss[m] * part**power - w.q_excused[m])
         norm = max(norm, miss / scale)
     return norm / allowed
 
@@ -220,9 +222,9 @@ def excused_norm(w: Any, h: float) -> float:
         change = (1 + j % 3) * (1 - 2 * (j % 2)) * w.weight[j]
         w.inputs[1 + j] += change
         w.inputs[1 + n + j] += change / h
-    evaluate(w, LEDGER, w.q_nudged)
+    evaluate(w, LEDGER, w.q_excused)
     for m in range(w.n_ledger):
-        w.q_miss[m] -= h * abs(w.q_nudged[m] - w.rates[last, m])
+        w.q_excused[m] = h * abs(w.q_excused[m] - w.rates[last, m])
     return _group_norm(w)
 
 

@@ -150,9 +150,10 @@ MEMORY = {
     **_arrays("decades", SCAN_POINTS),
     # least and largest values of the states so far
     **_arrays("least largest", "n"),
-    # ledger: now, as a trial, correction of its polynomial, a probe; errors, what they are held against, the largest so
-    # far, rates at a state that differs by its tolerance; at the stages; rates there and, last, at the start
-    **_arrays("q q_trial q_correction q_probe q_miss q_scale q_largest q_nudged", "n_ledger"),
+    # ledger: now, as a trial, correction of its polynomial, a probe; defects, what the step turns over, what errors are
+    # held against, the largest so far, errors that the tolerance of the states excuses; at the stages; rates there and,
+    # last, at the start
+    **_arrays("q q_trial q_correction q_probe q_miss q_turned q_scale q_largest q_excused", "n_ledger"),
     **_arrays("q_stage", 7, "n_ledger"),
     **_arrays("rates", 8, "n_ledger"),
     # guards: value now, at the two points before, at the start of the step and elsewhere; largest so far; slope
