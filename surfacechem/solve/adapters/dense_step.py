@@ -51,6 +51,10 @@ class Steps:
         """Those of a list."""
         return cls(np.array([steps[0].start, *(step.end for step in steps)]), steps.__getitem__)
 
+    def since(self, first: int) -> Callable[[int], DenseStep]:
+        """Those from one of them on."""
+        return lambda k: self.step(first + k)
+
     def at_nodes(self, times: Array) -> Array:
         """Variables at these times of NODES but the first of each step, the last of which may be cut: a row each."""
         count = len(times)

@@ -109,7 +109,7 @@ class Evaluation:
         return self._margins().copy()
 
 
-class Rows:
+class Evaluations:
     """A program at many states at once with the same parameters, in one buffer whose rows keep them."""
 
     def __init__(self, program: Program, parameters: Array) -> None:

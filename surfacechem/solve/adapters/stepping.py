@@ -6,13 +6,12 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem.solve.adapters.dense_step import NODES, WEIGHTS, DenseStep, Guards, Steps, first_crossing, gained_at
-from surfacechem.solve.adapters.evaluation import Evaluation, Rows
+from surfacechem.solve.adapters.evaluation import Evaluation, Evaluations
 from surfacechem.solve.contract import Array, Counters, Events, Points, Problem, Result, Solver, Status
 from surfacechem.solve.radau import stepper
 from surfacechem.tolerances import NEGLIGIBLE, SQRT_EPS, ULPS
@@ -51,7 +50,7 @@ class View(Evaluation):
         super().__init__(problem.program, start, parameters)
         self.problem = problem
         self.differential = ~problem.program.algebraic_mask
-        self.rows = Rows(problem.program, parameters)
+        self.many = Evaluations(problem.program, parameters)
         self.atol = problem.atol[self.differential]
         self.residuals = self.jacobians = 0
         """Right-hand sides and Jacobians that the library has asked for; those for outputs and events do not count."""
@@ -207,11 +206,6 @@ class _Inside:
         return _Inside(self.times[first : end + 1], *along)
 
 
-def _later(steps: Steps, first: int, k: int) -> DenseStep:
-    """One of the steps from some of them on."""
-    return steps.step(first + k)
-
-
 class _Run:
     """A run in the making: where it stands, and what it has produced so far."""
 
@@ -227,7 +221,7 @@ class _Run:
         self.plain = program.plain_margins and not program.algebraic_mask.any()
         """Whether margins read nothing but what a library integrates."""
         if self.plain:
-            self.guards.rows = lambda times, x: self.view.rows.margins(times, x)
+            self.guards.rows = lambda times, x: self.view.many.margins(times, x)
         self.in_play = np.array((True,) * program.n_margins if problem.in_play is None else problem.in_play, bool)
         self.outputs: list[Array] = []
         self.fired: list[int] = []
@@ -301,7 +295,7 @@ class _Run:
                 margins = inside.margins.rows[first:]
                 far = self.guards.far(margins, self.in_play) if self.problem.margins else count - first
                 if far:
-                    self._accept(partial(_later, steps, first), inside.part(first, first + far))
+                    self._accept(steps.since(first), inside.part(first, first + far))
                 else:
                     far, fired = 1, self._through(steps.step(first), end)
                     if fired is not None:
@@ -381,7 +375,7 @@ class _Run:
         if not self.solver.keeps_algebraic:
             y = np.empty((len(x), len(self.y)))
             y[:, view.free], y[:, view.algebraic] = x, view.guess
-        rows = view.rows(times.ravel(), y)
+        rows = view.many(times.ravel(), y)
         starts = (self.y, self.ydot, self.ledger_rates, self.margins)
         along = (_Along(start, each.reshape(*times.shape, -1)) for start, each in zip(starts, rows, strict=True))
         return _Inside(ends, *along)
