@@ -1,5 +1,7 @@
 """Steady states against Cantera alone: coverages, degrees of rate control, apparent barriers."""
 
+from contextlib import suppress
+
 import cantera as ct
 import numpy as np
 import pytest
@@ -36,9 +38,15 @@ def alone(T=650.0, reaction=0, factor=1.0):
     surface = ct.Interface("ptcombust.yaml", "Pt_surf")
     gas = surface.adjacent["gas"]
     gas.TPX, surface.TP = (T, ct.one_atm, "CO:0.02, O2:0.21, N2:0.77"), (T, None)
-    surface.coverages = "PT(S):0.5, O(S):0.5"
     surface.set_multiplier(factor, reaction)
-    surface.advance_coverages(1.0, rtol=1e-12, atol=1e-22, max_steps=100000)
+    for free in (0.5, 0.6, 0.4, 0.7, 0.3, 0.8):
+        surface.coverages = {"PT(S)": free, "O(S)": 1 - free}
+        # Rounding decides whether CVODES comes through at such a tolerance; where it began is forgotten.
+        with suppress(ct.CanteraError):
+            surface.advance_coverages(1.0, rtol=1e-12, atol=1e-22, max_steps=100000)
+            break
+    else:
+        pytest.fail("Cantera finds no steady state")
     return surface.coverages, surface.get_net_production_rates(gas)[gas.species_index("CO2")] * 6.02214076e26
 
 
