@@ -176,7 +176,8 @@ class _Along:
 
     def within(self, k: int) -> Array:
         """At all nodes of one step."""
-        return np.vstack((self.starts()[k], self.rows[k]))
+        one = self.part(k, k + 1)
+        return np.vstack((one.start, one.rows[0]))
 
     def integral(self, sizes: Array) -> Array:
         """Of these rates over steps of these sizes."""
