@@ -1,5 +1,6 @@
 """Crossings inside a step of a library: the same ones as the compiled stepper finds, on random polynomials."""
 
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -13,6 +14,7 @@ from surfacechem.solve.adapters.dense_step import (
     NODES,
     DenseStep,
     Guards,
+    Steps,
     at_nodes,
     first_crossing,
     gained_at,
@@ -129,6 +131,14 @@ def test_a_polynomial_follows_from_its_derivatives_at_the_ends_of_a_step():
         nodes = start + (end - start) * NODES
         np.testing.assert_allclose(on_step(end, end - start, rows[k], nodes)[:, 0], power(nodes), atol=1e-12)
         np.testing.assert_allclose(at_nodes(rows)[k, :, 0], power(nodes[1:]), atol=1e-12)
+    one = [
+        DenseStep(*pair, partial(on_step, pair[1], pair[1] - pair[0], row))
+        for pair, row in zip(pairwise(times), rows, strict=True)
+    ]
+    for last in (2.25, 2.125):  # the second step is cut
+        nodes = np.array([0.5 + 1.5 * NODES[1:], 2.0 + (last - 2.0) * NODES[1:]])
+        for steps in (Steps.of(one), Steps(times, one.__getitem__, at_nodes(rows))):
+            np.testing.assert_allclose(steps.at_nodes(nodes)[:, 0], power(nodes.ravel()), atol=1e-12)
 
 
 def test_a_ledger_is_the_integral_of_its_rates():

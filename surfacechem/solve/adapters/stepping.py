@@ -277,13 +277,21 @@ class _Run:
         limit = self.problem.max_seconds
         return Status.STOPPED if limit is not None and time.monotonic() - self.started > limit else None
 
+    def _within_budget(self, most: int) -> int:
+        """So many steps, or those that the budget has left at the pace so far, at least one."""
+        most, limit = min(most, self.problem.max_steps - self.count), self.problem.max_seconds
+        if limit is None or not self.count:
+            return most
+        passed = time.monotonic() - self.started
+        return max(1, min(most, int(self.count * (limit - passed) / passed)))
+
     def _to_event(self, method: Method, end: float) -> list[int]:
         """Step until an event, the end or the budget's; returns the margins that fired."""
         # Where algebraic variables are searched from the state before, that is to be close.
         start, most = self.t, 1 if len(self.view.algebraic) else FEW
         while self.t < end and self._over_budget() is None:
             before = time.perf_counter()
-            steps = method.several(min(most, self.problem.max_steps - self.count))
+            steps = method.several(self._within_budget(most))
             self.stepping += time.perf_counter() - before
             if not steps.times[1] > self.t:
                 raise StepError("the step size fell to zero")
