@@ -1,6 +1,7 @@
 """Solvers by name, and the honesty of the adapters: what a library gets wrong must not be reported as a success."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from surfacechem.quantities import VARIABLES
 from surfacechem.results.event_table import event_times
 from surfacechem.solve import names, solver
 from surfacechem.solve.adapters import stepping
+from surfacechem.solve.adapters.evaluation import Evaluation
 from surfacechem.solve.contract import Problem, Status
 from surfacechem.solve.diagnose import runaway
 
@@ -50,6 +52,17 @@ def steep(name: str, row, start: float, end: float, **more):
     program = compile_program(T, [Y], [DY], [], [row], [2 * Y * DY])
     more |= {"times": [start, end], "record_steps": True}
     return solver(name).solve(problem(program, [1.0], [start, end], 1e-8, **more))
+
+
+@pytest.mark.parametrize("name", ["lsoda", "cantera"])
+def test_steps_ahead_take_no_more_than_the_time_that_is_left(name, monkeypatch) -> None:
+    ticks, reach, limit = [], Evaluation.reach, 130.0
+    monkeypatch.setattr(Evaluation, "reach", lambda self, *state: ticks.append(state) or reach(self, *state))
+    clock = SimpleNamespace(monotonic=lambda: float(len(ticks)), perf_counter=lambda: 0.0)  # a second an evaluation
+    monkeypatch.setattr(stepping, "time", clock)
+    result = steep(name, DY - se.cos(50 * T), 0.0, 50.0, max_seconds=limit)
+    assert result.status == Status.STOPPED
+    assert limit <= len(ticks) < 1.1 * limit
 
 
 LAYER = Y * DY - 1e17

@@ -204,7 +204,7 @@ def _group_norm(w: Any) -> float:
         for m in range(w.n_ledger):
             if w.groups[m] == group:
                 scale = max(scale, w.q_scale[m])
-                # A defect is more than the error that it stands for, whose power costs as much as the rest.
+                # An error is less than its defect: its power, the costliest part, only where it may be the largest.
                 if w.q_miss[m] - w.q_excused[m] > miss:
                     part = w.q_miss[m] / w.q_turned[m]
                     miss = max(miss, w.q_miss[m] * part**power - w.q_excused[m])
