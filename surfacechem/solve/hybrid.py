@@ -34,7 +34,7 @@ from surfacechem.solve.contract import (
 from surfacechem.solve.equilibria import Point
 from surfacechem.solve.instant import ENDLESS, MANY, MISSED, REACHED, Instant
 from surfacechem.solve.jumps import Jumper
-from surfacechem.tolerances import ATOM, BRIEF, DIGITS, ULPS
+from surfacechem.tolerances import ATOM, BRIEF, DIGITS, NOISE, ULPS
 
 Found = TypeVar("Found")
 Flow = Generator[Problem, Result, Found]
@@ -172,15 +172,23 @@ class Hybrid:
             index = self.jumper.folds.reached(point, self.problem.rtol)
         if index >= 0:
             return self.instant.apply(index, self.jumper.folds.in_time(index, point, end), point)
-        # At a gap of zero stiffness may jump, and Newton's method stalls: on with the point on the other side.
-        closing = self._gaps & (np.abs(point.y) < ATOM) & (point.y * point.ydot < 0)
-        if lost and closing.any():
-            return replace(point, y=np.where(closing, -point.y, point.y))
-        # What time could not resolve any more goes on in a time of its own.
-        if arc.status is Status.STEP_UNDERFLOW and arc.result.t > 0 and self._renewed < RENEWALS:
-            return point
+        if lost and not self._is_limited(arc):
+            # At a gap of zero stiffness may jump, and Newton's method stalls: on with the point on the other side.
+            closing = self._gaps & (np.abs(point.y) < ATOM) & (point.y * point.ydot < 0)
+            if closing.any():
+                return replace(point, y=np.where(closing, -point.y, point.y))
+            # What time could not resolve any more goes on in a time of its own.
+            if arc.status is Status.STEP_UNDERFLOW and arc.result.t > 0 and self._renewed < RENEWALS:
+                return point
         self.instant.status = arc.status
         return None
+
+    def _is_limited(self, arc: Arc) -> bool:
+        """Whether a limit is zero at the end of an arc for all that can be told."""
+        count = min(self.instant.first, len(arc.result.margins))
+        limits = np.array([m.terminal and not m.strict for m in self.problem.margins[:count]], dtype=bool)
+        zero = np.abs(arc.result.margins[:count]) <= NOISE * self.instant.sizes(arc.start)[:count]
+        return bool(np.any(limits & zero & self.system.in_play(arc.start.parameters)[:count]))
 
     def _last_of(self, start: float, end: float) -> float:
         """The end of an arc: before a breakpoint that no load has, at which a formula is that of what follows."""

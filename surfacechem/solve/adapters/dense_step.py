@@ -264,6 +264,9 @@ HERMITE = np.linalg.inv(
 )
 """From values, slopes and second derivatives at -1 and at 0 to the coefficients of their polynomial."""
 
+DERIVATIVES = np.tile(np.arange(3.0), 2)
+"""Their orders."""
+
 AT_NODES = np.power.outer(NODES[1:] - 1.0, np.arange(6.0))
 """Powers of (time - end) / size at the nodes but the first."""
 
@@ -272,7 +275,7 @@ def hermite(sizes: Array, ends: Array) -> Array:
     """Coefficients [step, power, variable] of polynomials in (time - end) / size, for steps of these sizes one after
     another, from value, slope and second derivative at their ends: [end, derivative, variable].
     """
-    scales = np.power.outer(sizes, np.tile(np.arange(3.0), 2))[..., None]
+    scales = np.power.outer(sizes, DERIVATIVES)[..., None]
     return np.asarray(HERMITE @ (np.concatenate((ends[:-1], ends[1:]), axis=1) * scales))
 
 
