@@ -34,6 +34,7 @@ import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self, dataclass_transform
 
 from surfacechem.contracts.units import quotient
@@ -62,7 +63,7 @@ class Spec:
 
     def resolved(self, x: str) -> Spec:
         """The specification with the unit that "[x]" stands for."""
-        return dataclasses.replace(self, unit=resolved_unit(self.unit, x))
+        return _resolved(self, x)
 
     def check(self, name: str, value: float) -> None:
         """Raise InputError unless the value is finite and in range."""
@@ -76,6 +77,11 @@ class Spec:
         """The allowed range in words."""
         bounds = (("> ", self.above), (">= ", self.at_least), ("<= ", self.at_most))
         return " and ".join(f"{sign}{bound:g}" for sign, bound in bounds if math.isfinite(bound)) or "any"
+
+
+@lru_cache(maxsize=1024)  # asked for each entry of a list
+def _resolved(spec: Spec, x: str) -> Spec:
+    return dataclasses.replace(spec, unit=resolved_unit(spec.unit, x))
 
 
 def resolved_unit(unit: str, x: str) -> str:

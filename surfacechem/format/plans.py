@@ -250,15 +250,20 @@ def recorded_plan(record: object) -> Plan:
         raise InputError("the attribute 'sweep' is no plan of a sweep.") from None
 
 
-def plan_of(section: SweepSection, units: Mapping[str, str], until: Mapping[str, float] | None = None) -> Plan:
+def plan_of(
+    section: SweepSection,
+    units: Mapping[str, str],
+    until: Mapping[str, float] | None = None,
+    arrays: Mapping[str, Array] | None = None,
+) -> Plan:
     """The plan in SI; ``units`` are those of the parameters that may be changed, by path.
 
-    ``until`` goes before what the section says of it.
+    ``until`` and ``arrays``, values in SI, go before what the section says of them.
     """
-    ends = until or section.until
+    ends, arrays = until or section.until, arrays or {}
     if not section.over and section.sample is None:
         raise section.error(NOTHING_SWEPT)
-    axes = [_axis(path, tree, units) for path, tree in section.over.items()]
+    axes = [_axis(path, tree, units, arrays.get(path)) for path, tree in section.over.items()]
     sample = None
     if (drawn := section.sample) is not None:
         known = {_known(path, tree, units): tree for path, tree in drawn.of.items()}
@@ -291,13 +296,23 @@ def _known(path: str, tree: Tree, units: Mapping[str, str]) -> str:
     return path
 
 
-def _axis(path: str, tree: Tree, units: Mapping[str, str]) -> Axis:
+def _axis(path: str, tree: Tree, units: Mapping[str, str], array: Array | None) -> Axis:
     path = _known(path, tree, units)
+    if array is not None:
+        return Axis(path, _even(array) or array.tolist())
     values = SWEPT.read(tree, path, Context(x=units[path]))
     if not isinstance(values, RangeSection):
         return Axis(path, list(values))
     logarithmic = _logarithmic(values)
     return Axis(path, Spaced(values.first, values.last, values.points, logarithmic), logarithmic)
+
+
+def _even(array: Array) -> Spaced | None:
+    """Values at equal distances as what they are, of which neither a plan nor its record keeps each."""
+    if not (len(array) and np.isfinite(array).all()):
+        return None
+    spaced = Spaced(float(array[0]), float(array[-1]), len(array))
+    return spaced if np.array_equal(spaced.at(np.arange(len(array))), array) else None
 
 
 def _logarithmic(values: RangeSection | UniformSection) -> bool:

@@ -559,7 +559,10 @@ class Simulation:
         from surfacechem.format.plans import plan_of, read_sweep, read_until
 
         section = self.case.sweep
-        lists = {path: x.tolist() if isinstance(x, np.ndarray) else x for path, x in (over or {}).items()}
+        # Arrays may be long: they are not read as a list in a case is, entry by entry with its unit.
+        rows = {path: x for path, x in (over or {}).items() if isinstance(x, np.ndarray)}
+        arrays = {path: x.astype(float) for path, x in rows.items() if x.ndim == 1 and x.dtype.kind in "iuf"}
+        lists = {**(over or {}), **{path: x.tolist() for path, x in rows.items()}, **dict.fromkeys(arrays, [])}
         given = {"over": None if over is None else lists, "combine": combine, "sample": sample}
         if any(value is not None for value in given.values()):
             said = {name: value for name, value in given.items() if value is not None}
@@ -569,7 +572,7 @@ class Simulation:
                 "a sweep needs `sweep: {over: ...}` in the case, or parameters to sweep over.", path="sweep"
             )
         ends = None if until is None else read_until(from_plain(dict(until), Place(path="sweep.until")))
-        return plan_of(section, self._units, ends)
+        return plan_of(section, self._units, ends, arrays)
 
     @cached_property
     def _units(self) -> dict[str, str]:
