@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem.references.base import Array
-from surfacechem.tolerances import DIGITS
+from surfacechem.tolerances import DIGITS, SQRT_EPS
 
 ITERATIONS = 400
 """At most: halving alone takes 52 to the last digit, and one for each factor of two between the ends of a bracket."""
@@ -52,14 +52,15 @@ def increasing_root(
 ) -> Array:
     """Arguments at which `function`, which gives value and slope and increases on [low, high], reaches `target`.
 
-    Newton's method, kept inside a shrinking bracket.
-
-    It starts at `low` unless a better guess is given.
+    Newton's method, kept inside a shrinking bracket, from `low` unless a better guess is given. It ends where its next
+    step, by the two before it as it converges quadratically, would be less than the last digit: where one is, rounding
+    makes many more.
 
     >>> increasing_root(lambda x: (x**2, 2 * x), np.array([2.0]), np.array([1.0]), np.array([2.0]))
     array([1.41421356])
     """
     x = low if start is None else np.clip(start, low, high)
+    before, settled = np.zeros_like(x), np.zeros(np.shape(x), dtype=bool)
     for _ in range(ITERATIONS):
         value, slope = function(x)
         error = value - target
@@ -70,8 +71,10 @@ def increasing_root(
         following = np.where(inside, newton, 0.5 * (low + high))
         reached = np.abs(error) <= DIGITS * np.abs(target)
         step = np.minimum(np.abs(following - x), high - low)
-        settled = reached | (step <= DIGITS * np.abs(x))
-        x = np.where((error == 0.0) | (reached & ~inside), x, following)
+        last = inside & (step <= SQRT_EPS * np.abs(x)) & (step**3 <= DIGITS * np.abs(x) * before**2)
+        ends = reached | (step <= DIGITS * np.abs(x)) | last
+        x = np.where(settled | (error == 0.0) | (reached & ~inside), x, following)
+        before, settled = step, settled | ends
         if settled.all():
             return x
     raise ArithmeticError(f"no root found between {low} and {high}")
@@ -138,7 +141,9 @@ class Separable:
             return self._elapsed(start, point, from_end), np.abs(stop - start) / self._rate(point, from_end)
 
         target = np.minimum(t, self.duration) - self.times[j]
-        share = increasing_root(elapsed, target, np.zeros_like(target), np.ones_like(target))
+        with np.errstate(all="ignore"):
+            guess = np.nan_to_num(target / (self.times[j + 1] - self.times[j]))
+        share = increasing_root(elapsed, target, np.zeros_like(target), np.ones_like(target), guess)
         distance = np.where(t < self.duration, start + share * (stop - start), 0.0)
         rest = self.length - distance
         return np.where(from_end, rest, distance), np.where(from_end, distance, rest)
