@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import cached_property
 from io import BufferedIOBase, TextIOBase
 from pathlib import Path
 
@@ -58,10 +59,14 @@ class Case:
             raise InputError(message, self.places[""])
         return self.own_run
 
+    @cached_property
+    def _outline(self) -> System:
+        return assemble(outline(self.scene))
+
     def refuse_nothing(self) -> None:
         """InputError where the scene has no state; no integral is made for it."""
         try:
-            refuse_nothing(assemble(outline(self.scene)), self.file or "CASE")
+            refuse_nothing(self._outline, self.file or "CASE")
         except InputError as error:
             raise self.located(error) from None
 
