@@ -408,6 +408,10 @@ def _initial(case: Document, mechanism: Mechanism | None) -> dict[str, float]:
     values = dict(case.initial or {})
     given = values.pop("coverages", None)
     if mechanism is not None and given is not None:
+        for species, variable in mechanism.species.items():
+            if variable in values:
+                message = f"{variable} is a coverage; give it as `coverages: {{{species}: ...}}`, all of which sum to 1."
+                raise InputError(message, case.tree.value["initial"].value[variable].place)
         return values | mechanism.coverages(given, case.tree.value["initial"].value["coverages"].place)
     if mechanism is not None:
         message = "the coverages of the mechanism: add `initial: {coverages: {species: value}}`."

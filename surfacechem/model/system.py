@@ -169,6 +169,8 @@ class Margin:
     """The state whose bound it is, and the bound."""
     when: When = field(default_factory=dict)
     """Modes in which it is in play."""
+    at_start: bool = False
+    """Whether it holds ever after if it holds at the start."""
 
     @property
     def masked(self) -> Expression:
@@ -499,7 +501,8 @@ class System:
         """The margins that change in the course of a run; when time alone leads to a peak is known before."""
         evolved = {x for state in self.states for x in (state.symbol, state.dot)} | {x.symbol for x in self.memory}
         moving = {True: evolved, False: evolved | {self.t}}
-        return tuple(m for m in self.margins if self.expand(m.masked).free_symbols & moving[m.peak])
+        margins = [m for m in self.margins if not m.at_start]
+        return tuple(m for m in margins if self.expand(m.masked).free_symbols & moving[m.peak])
 
     @cached_property
     def limits(self) -> tuple[tuple[Margin, Expression], ...]:

@@ -188,7 +188,7 @@ class Hybrid:
         count = min(self.instant.first, len(arc.result.margins))
         limits = np.array([m.terminal and not m.strict for m in self.problem.margins[:count]], dtype=bool)
         zero = np.abs(arc.result.margins[:count]) <= NOISE * self.instant.sizes(arc.start)[:count]
-        return bool(np.any(limits & zero & self.system.in_play(arc.start.parameters)[:count]))
+        return bool(np.any(limits & zero & self.instant.in_play(arc.start)[:count]))
 
     def _last_of(self, start: float, end: float) -> float:
         """The end of an arc: before a breakpoint that no load has, at which a formula is that of what follows."""

@@ -14,6 +14,7 @@ from scipy.linalg import expm
 import surfacechem
 from mechanisms import KMOL, SHIPPED, load, loading_read, loads, mechanism_texts, pulled, states
 from surfacechem.documents.shipped import mechanisms
+from surfacechem.errors import InputError
 from surfacechem.laws.bulk import Constant
 from surfacechem.laws.contact import ConstantInterfaceCapacity
 from surfacechem.laws.heat import Conductance
@@ -131,8 +132,52 @@ def test_phi_counts_bonds_and_is_in_the_dataset():
     assert phi.output
     assert numbers(system, [phi.expression], {"theta_AB_s": 0.4}) == pytest.approx([0.4])
     (law,) = mechanism.reactions
-    assert {p.path for p in system.parameters} >= {"interface.mechanism.reactions.R1.A", "interface.theta_AB_s.density"}
+    assert {p.path for p in system.parameters} >= {"interface.mechanism.reactions.R1.A", "interface.sites"}
     assert next(p for p in system.parameters if p.path == f"{law.path}.A").spec.unit == "m^2/s"
+
+
+FILM = """
+T_0: 298.15 K
+bodies: {lower: {temperature: T, C: 2 kJ/m^2/K}, upper: {temperature: T, C: 1 kJ/m^2/K}}
+interface: {temperature: T, mechanism: {file: dna-film.yaml, bonds: [AB(s)]}}
+initial: {T: 298.15 K, coverages: {A(s): 0.5, B(s): 0.5}}
+run: {until: 1 ms, outputs: 21}
+"""
+
+
+def test_the_site_density_is_one_parameter_of_all_species(tmp_path):
+    (tmp_path / "case.yaml").write_text(FILM)
+    text = (mechanisms() / "dna-film.yaml").read_text(encoding="utf-8")
+    (tmp_path / "dna-film.yaml").write_text(text)
+    simulation = surfacechem.load(tmp_path / "case.yaml")
+    (tmp_path / "dna-film.yaml").write_text(text.replace("site-density: 1.0e-4", "site-density: 3.0e-4"))
+    expected = surfacechem.load(tmp_path / "case.yaml").run().dataset
+    sites = simulation.model.values()["interface.sites"]
+    found = simulation.run({"interface.sites": 3 * sites})
+    for name in ("theta_AB_s", "theta_A_s", "T", "phi"):
+        np.testing.assert_allclose(found.dataset[name], expected[name], rtol=1e-9, atol=1e-12)
+    assert found.audit.site_error < 1e-9
+    assert abs(float(found.dataset["theta_AB_s"][-1]) - float(simulation.run().dataset["theta_AB_s"][-1])) > 0.005
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"initial.theta_AB_s": 0.3}, "the coverages sum to more than one"),
+        ({"initial.theta_A_s": 0.2}, "the coverages sum to less than one"),
+    ],
+)
+def test_coverages_that_are_changed_sum_to_one(changes, words, tmp_path):
+    (tmp_path / "case.yaml").write_text(FILM)
+    simulation = surfacechem.load(tmp_path / "case.yaml")
+    with pytest.raises(InputError, match=words):
+        simulation.run(changes)
+    with pytest.raises(InputError, match=words):
+        simulation.sweep({path: [0.0, value] for path, value in changes.items()}, combine="zip")
+    whole = simulation.run({"initial.theta_AB_s": 0.3, "initial.theta_A_s": 0.35, "initial.theta_B_s": 0.35})
+    assert whole.status == "finished"
+    with pytest.raises(InputError, match=r"theta_AB_s is a coverage; give it as `coverages: \{AB\(s\): \.\.\.\}`"):
+        surfacechem.load(tmp_path / "case.yaml", "initial.theta_AB_s=0.3")
 
 
 def test_a_run_that_leaves_the_range_of_the_thermodynamic_data_says_so():

@@ -24,7 +24,7 @@ from surfacechem.model.parts import Bond, Energy, Thermal
 from surfacechem.model.sliding.formulation import arrangement, displacement, in_parallel, in_series
 from surfacechem.model.system import Margin, Named, State
 from surfacechem.quantities import VARIABLES, Quantity
-from surfacechem.scene import Sites
+from surfacechem.scene import BondingVariable, Sites
 from surfacechem.tolerances import NOTHING, SLACK
 
 LOGARITHM = "ln_phi"
@@ -48,7 +48,7 @@ BY_SIDE = {GAP < 0: SIDE < 0, GAP > 0: SIDE > 0, -GAP < 0: -SIDE < 0, -GAP > 0: 
 """Conditions on the side of touch as conditions on its mode."""
 
 
-def variables(build: Build) -> Iterator[Bond]:
+def variables(build: Build) -> Iterator[Bond | Margin]:
     """Histories under ``loading``, each of which comes to life when something reads it, and the bonding states."""
     for name, load in build.scene.loading.items():
         if name in build.thermal.nodes:
@@ -67,14 +67,36 @@ def variables(build: Build) -> Iterator[Bond]:
         yield _bonding_state(build, VARIABLES["phi"], density, limit)
     for variable in build.interface.variables:
         name, by = variable.name, f"interface.{variable.name}"
-        spec = Spec("1/m^2", "site density", above=0)
-        amount = build.constant(f"N_{name}", f"{by}.density", spec, variable.density)
+        amount = _amount(build, variable)
         yield _bonding_state(build, Quantity(name, "1", variable.long_name, species=variable.species), amount, 1.0)
         # What it amounts to where it is one: N_x per reference area, n_x per current area.
         build.variables.define(f"N_{name}", symengine.sympify(amount), "constant", by)
         build.variables.define(f"n_{name}", partial(_per_current_area, build, amount), "derived", by)
     if build.interface.bonds:
         build.variables.define("phi", partial(_bonded_part, build), "derived", "coverages of bonds")
+    yield from _covered(build)
+
+
+def _amount(build: Build, variable: BondingVariable) -> Expression:
+    """What a bonding variable amounts to where it is one [1/m^2]: of all species of a surface they go with its sites."""
+    if not variable.species or build.interface.sites is None:
+        spec = Spec("1/m^2", "site density", above=0)
+        return build.constant(f"N_{variable.name}", f"interface.{variable.name}.density", spec, variable.density)
+    part = variable.density / build.interface.sites.density
+    N_c = build.variables.get("N_c", "the bonding state", "interface")
+    return N_c if part == 1.0 else part * N_c
+
+
+def _covered(build: Build) -> Iterator[Margin]:
+    """The coverages of a surface sum to one at the start, and then always."""
+    coverages = [build.bonding[variable.name].symbol for variable in build.interface.variables if variable.species]
+    if not coverages:
+        return
+    slack, left = build.variables.get("slack", "the coverages"), 1 - symengine.Add(*coverages)
+    remedy = "Change the coverage of another species by as much."
+    for name, side in (("less than one", -1), ("more than one", 1)):
+        reason = f"the coverages sum to {name}"
+        yield Margin("sum of coverages = 1", slack + side * left, reason, remedy=remedy, path="initial", at_start=True)
 
 
 def _bonded_part(build: Build) -> Expression:
