@@ -250,6 +250,17 @@ def recorded_plan(record: object) -> Plan:
         raise InputError("the attribute 'sweep' is no plan of a sweep.") from None
 
 
+def numbered(over: Mapping[str, object]) -> tuple[dict[str, object], dict[str, Array]]:
+    """Values as a case lists them, and apart from these, which are read entry by entry, those that come as arrays of
+    numbers, which may be long.
+    """
+    rows = {path: x for path, x in over.items() if isinstance(x, np.ndarray)}
+    arrays = {path: x.astype(float) for path, x in rows.items() if x.ndim == 1 and x.dtype.kind in "iuf"}
+    return {
+        path: [] if path in arrays else rows[path].tolist() if path in rows else x for path, x in over.items()
+    }, arrays
+
+
 def plan_of(
     section: SweepSection,
     units: Mapping[str, str],

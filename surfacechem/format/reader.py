@@ -410,7 +410,7 @@ def _initial(case: Document, mechanism: Mechanism | None) -> dict[str, float]:
     if mechanism is not None and given is not None:
         for species, variable in mechanism.species.items():
             if variable in values:
-                message = f"{variable} is a coverage; give it as `coverages: {{{species}: ...}}`, all of which sum to 1."
+                message = f"{variable} is a coverage; give it in `coverages: {{{species}: ...}}`, which sum to 1."
                 raise InputError(message, case.tree.value["initial"].value[variable].place)
         return values | mechanism.coverages(given, case.tree.value["initial"].value["coverages"].place)
     if mechanism is not None:

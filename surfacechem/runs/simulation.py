@@ -556,13 +556,10 @@ class Simulation:
         InputError
             Where there is no parameter of a path, or nothing to sweep.
         """
-        from surfacechem.format.plans import plan_of, read_sweep, read_until
+        from surfacechem.format.plans import numbered, plan_of, read_sweep, read_until
 
         section = self.case.sweep
-        # Arrays may be long: they are not read as a list in a case is, entry by entry with its unit.
-        rows = {path: x for path, x in (over or {}).items() if isinstance(x, np.ndarray)}
-        arrays = {path: x.astype(float) for path, x in rows.items() if x.ndim == 1 and x.dtype.kind in "iuf"}
-        lists = {**(over or {}), **{path: x.tolist() for path, x in rows.items()}, **dict.fromkeys(arrays, [])}
+        lists, arrays = numbered(over or {})
         given = {"over": None if over is None else lists, "combine": combine, "sample": sample}
         if any(value is not None for value in given.values()):
             said = {name: value for name, value in given.items() if value is not None}

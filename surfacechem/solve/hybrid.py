@@ -172,16 +172,20 @@ class Hybrid:
             index = self.jumper.folds.reached(point, self.problem.rtol)
         if index >= 0:
             return self.instant.apply(index, self.jumper.folds.in_time(index, point, end), point)
-        if lost and not self._is_limited(arc):
-            # At a gap of zero stiffness may jump, and Newton's method stalls: on with the point on the other side.
-            closing = self._gaps & (np.abs(point.y) < ATOM) & (point.y * point.ydot < 0)
-            if closing.any():
-                return replace(point, y=np.where(closing, -point.y, point.y))
-            # What time could not resolve any more goes on in a time of its own.
-            if arc.status is Status.STEP_UNDERFLOW and arc.result.t > 0 and self._renewed < RENEWALS:
-                return point
-        self.instant.status = arc.status
-        return None
+        beyond = self._beyond(arc, point) if lost and not self._is_limited(arc) else None
+        if beyond is None:
+            self.instant.status = arc.status
+        return beyond
+
+    def _beyond(self, arc: Arc, point: Point) -> Point | None:
+        """Where a solver that was lost may go on."""
+        # At a gap of zero stiffness may jump, and Newton's method stalls: on with the point on the other side.
+        closing = self._gaps & (np.abs(point.y) < ATOM) & (point.y * point.ydot < 0)
+        if closing.any():
+            return replace(point, y=np.where(closing, -point.y, point.y))
+        # What time could not resolve any more goes on in a time of its own.
+        unresolved = arc.status is Status.STEP_UNDERFLOW and arc.result.t > 0 and self._renewed < RENEWALS
+        return point if unresolved else None
 
     def _is_limited(self, arc: Arc) -> bool:
         """Whether a limit is zero at the end of an arc for all that can be told."""

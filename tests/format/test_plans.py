@@ -87,6 +87,17 @@ def test_a_plan_of_a_case_has_a_grid_and_a_sample(bonding, tmp_path, monkeypatch
     assert all(np.array_equal(values, found[path]) for path, values in again.at(np.arange(40)).items())
 
 
+def test_arrays_are_the_lists_of_their_numbers(bonding):
+    for values in (np.linspace(1.0, 300.0, 7), np.geomspace(1.0, 300.0, 7), np.array([2, 5, 3]), np.array([7.0])):
+        plan, listed = (bonding.plan({K_0: given}) for given in (values, values.tolist()))
+        assert plan.at(np.arange(plan.size))[K_0].tolist() == listed.at(np.arange(plan.size))[K_0].tolist()
+        assert recorded_plan(plan.record).at(np.arange(plan.size))[K_0].tolist() == values.tolist()
+    assert len(bonding.plan({K_0: np.linspace(1.0, 300.0, 100_000)}).record) < 200
+    for wrong in (np.array([1.0, np.nan]), np.array([1.0, np.inf, 2.0]), np.array([]), np.ones(2), np.ones((2, 1))):
+        with pytest.raises(InputError, match=K_0):
+            bonding.plan({K_0: wrong})
+
+
 def test_values_that_go_together_are_runs_of_one_dimension(bonding):
     solution = bonding.sweep({K_0: [100.0, 300.0, 200.0], "initial.phi": [0.0, 0.2, 0.0]}, combine="zip")
     data = solution.dataset

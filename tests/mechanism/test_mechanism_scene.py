@@ -176,7 +176,7 @@ def test_coverages_that_are_changed_sum_to_one(changes, words, tmp_path):
         simulation.sweep({path: [0.0, value] for path, value in changes.items()}, combine="zip")
     whole = simulation.run({"initial.theta_AB_s": 0.3, "initial.theta_A_s": 0.35, "initial.theta_B_s": 0.35})
     assert whole.status == "finished"
-    with pytest.raises(InputError, match=r"theta_AB_s is a coverage; give it as `coverages: \{AB\(s\): \.\.\.\}`"):
+    with pytest.raises(InputError, match=r"theta_AB_s is a coverage; give it in `coverages: \{AB\(s\): \.\.\.\}`"):
         surfacechem.load(tmp_path / "case.yaml", "initial.theta_AB_s=0.3")
 
 

@@ -78,7 +78,7 @@ def variables(build: Build) -> Iterator[Bond | Margin]:
 
 
 def _amount(build: Build, variable: BondingVariable) -> Expression:
-    """What a bonding variable amounts to where it is one [1/m^2]: of all species of a surface they go with its sites."""
+    """What a bonding variable amounts to where it is one [1/m^2]; species of a surface go with its sites."""
     if not variable.species or build.interface.sites is None:
         spec = Spec("1/m^2", "site density", above=0)
         return build.constant(f"N_{variable.name}", f"interface.{variable.name}.density", spec, variable.density)
