@@ -186,13 +186,21 @@ class Jumper:
         return compiled(self.system, rates)
 
     @cached_property
-    def _books(self) -> Function:
+    def _totals(self) -> Function:
         """What a jump conserves, the total entropy, and the potentials of the far-field tractions; then the magnitudes
         of the first two. It takes longer to call than to compute.
         """
         system = self.system
         totals = [system.jump_energy, system.find("S_total").expression]
         return compiled(system, [*totals, *system.given.values(), *(magnitude(system.expand(x)) for x in totals)])
+
+    def _books(self, rows: Array) -> Array:
+        """The same at arguments of compiled functions; a magnitude that is no number there, as at a bound, says
+        nothing.
+        """
+        found = self._totals(rows)
+        found[..., -2:] = np.where(np.isfinite(found[..., -2:]), found[..., -2:], 0.0)
+        return found
 
     @cached_property
     def _energy(self) -> Function:

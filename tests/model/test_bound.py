@@ -1,6 +1,7 @@
 """Bounds of the bonding state: reached, held and left again as the law turns round."""
 
 import math
+from functools import partial
 
 import numpy as np
 import pytest
@@ -8,8 +9,8 @@ from scenes import SITES, bodies, together, varying
 from scipy.optimize import brentq
 from solved import closed
 
-from surfacechem.laws.bonding import BondEnergy, BondSprings, LatticeGas, LinearEnthalpy
-from surfacechem.laws.bonds import Bell
+from surfacechem.laws.bonding import BondEnergy, BondSprings, LatticeGas, LinearEnthalpy, PartnerMixing
+from surfacechem.laws.bonds import Bell, ReversibleBell
 from surfacechem.laws.cohesive import ExponentialCohesiveZone, TensileStrength
 from surfacechem.laws.contact import BondedContact, BondStiffness
 from surfacechem.laws.factors import LinearInTemperature, Proportional
@@ -24,7 +25,9 @@ from surfacechem.laws.kinetics import (
 from surfacechem.laws.loading import Hold, Table
 from surfacechem.model.assemble import assemble
 from surfacechem.quantities import BOLTZMANN
+from surfacechem.results.solution import Solution
 from surfacechem.scene import Body, Interface, Mounting, Scene, Sites
+from surfacechem.solve.run import Model, Run
 
 E, K, TOP = 1e12, 0.5, 2e-6
 """Bonds of stiffness E and energy K, torn by a gap that rises to TOP in a second and falls to nothing in another."""
@@ -99,6 +102,24 @@ def test_fewer_partners_than_sites_bound_what_does_not_read_them():
     (complete,) = trajectory.jumps
     assert complete.t == pytest.approx(math.log(2.0) / 3.0, rel=1e-11)
     assert trajectory.end("phi") == 0.5
+
+
+@pytest.mark.parametrize("solver", ["radau", "lsoda"])
+@pytest.mark.parametrize("epsilon", [2e-19, 6e-19, 1e-18])
+@pytest.mark.parametrize(
+    ("mixing", "sites", "bound"),
+    [(LatticeGas, SITES, 1.0), (partial(PartnerMixing, a=1e-16), Sites(1e16, 5e15), 0.5)],
+    ids=["lattice", "partners"],
+)
+def test_bonds_too_strong_for_an_equilibrium_below_the_bound_are_complete(mixing, sites, bound, epsilon, solver):
+    """Fifty k_B T and more: what is left unbonded is less than the last digit of the bonding state."""
+    law = ReversibleBell(k_off=0.1)
+    scene = isothermal(law, sites, 0.01, [mixing(epsilon=epsilon)], {"f": Hold(level=0.0)})
+    trajectory = Model(assemble(scene)).solve(Run([0.0, 1.0, 4.0], 1e-8, solver=solver))
+    assert [jump.edge.name for jump in trajectory.jumps] == ["complete"]
+    assert trajectory.result.outputs[1:, 0].tolist() == [bound, bound]
+    assert Solution(trajectory).audit.findings == ()
+    assert all(jump.verdict == "admissible" for jump in trajectory.jumps)
 
 
 @pytest.mark.parametrize("phi_eq", [0.0, 1.0])

@@ -12,18 +12,19 @@ in Acary & Brogliato (2008), Numerical Methods for Nonsmooth Dynamical Systems, 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
 import symengine
 
 from surfacechem.contracts.terms import reads
-from surfacechem.expressions import Expression, where
+from surfacechem.expressions import Expression, magnitude, where
 from surfacechem.model.automaton import Constraint, Edge, Mode
 from surfacechem.model.build import Build
 from surfacechem.model.components.interface import LOGARITHM
 from surfacechem.quantities import Quantity
-from surfacechem.tolerances import INSIDE
+from surfacechem.tolerances import EPS, INSIDE
 
 SINGULAR = type(symengine.zoo), type(symengine.nan), type(symengine.oo)
 
@@ -66,19 +67,31 @@ def bound(build: Build, rate: Expression) -> Constraint:
 
 def _may_leave_the_range(build: Build) -> bool:
     """Whether any law but those of an envelope does not keep the bonding state in its range by its form."""
-    top = next((item.value for item in build.parameters.items if item.path == "phi_max"), None)
+    top = _top(build)
     if top is None or LOGARITHM in build.scene.initial:
         return False
     laws = [law for law in build.interface.reactions if law.envelope is None]
     return not all(law.keeps_range and (top == 1.0 or "n_2" in reads(law.statement)) for law in laws)
 
 
+def _top(build: Build) -> float | None:
+    """The upper bound, where there is one."""
+    return next((item.value for item in build.parameters.items if item.path == "phi_max"), None)
+
+
+def _vanishes(argument: Expression, phi: Expression, numbers: Mapping[Any, float]) -> bool:
+    """Whether what a logarithm is taken of is nothing at a bonding state, but for rounding."""
+    there = argument.subs({PHI: phi})
+    value, size = (x.subs(numbers) for x in (there, magnitude(there)))
+    return not (value.free_symbols or size.free_symbols) and abs(float(value)) <= 0.5 * EPS * float(size)
+
+
 def _rate_at(build: Build, rate: Expression, at: Expression, inside: Expression, name: str) -> Expression:
     """The rate at a bound; next to it where it has a pole or a logarithm of nothing there; as it is if that fails."""
-    whole = build.expanded(rate)
+    whole, numbers = build.expanded(rate), {item.symbol: item.value for item in build.parameters.items}
     for phi in (at, inside):
         there = whole.subs({PHI: phi})
-        vanishing = any(logarithm.args[0].subs({PHI: phi}) == 0 for logarithm in whole.atoms(symengine.log))
+        vanishing = any(_vanishes(logarithm.args[0], phi, numbers) for logarithm in whole.atoms(symengine.log))
         if not vanishing and not there.atoms(*SINGULAR):
             break
     else:
