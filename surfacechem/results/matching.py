@@ -129,7 +129,7 @@ def _choose_sides(
         if abs(exact[name][-1] - close) > STEEPER * abs(close - far) + SAME * abs(close)
     }
     if jumped:
-        _take_nearer(exact, jumped, run, np.arange(len(times)) == len(times) - 1)
+        _take_nearer(exact, jumped, run, times >= times[-1] * (1 - SIDE))
 
 
 def _take_nearer(exact: dict[str, Array], others: Mapping[str, Array], run: Trajectory, at: NDArray[np.bool_]) -> None:

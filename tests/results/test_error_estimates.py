@@ -31,6 +31,14 @@ def stick_slip():
     return surfacechem.load("stick-slip")
 
 
+def test_what_rounding_leaves_of_an_end_is_compared_with_what_the_exact_solution_has_before_its_own():
+    found = surfacechem.load("shared-load-rupture").run({"loading.t_n": 1.1e4})
+    assert found.trajectory.reason.startswith("the bonds ruptured")
+    late = found.dataset.isel(time=slice(-6, None))
+    assert np.all(np.isfinite(found.dataset["f_exact"]))
+    np.testing.assert_allclose(late["phi_exact"], late["phi"], rtol=0.1)
+
+
 def test_where_nothing_evolves_the_error_is_that_of_the_laws():
     laws = CellErrors({"t_n": 1e-9}, source="and one with forces of the surfaces wrong by their error, 1.0e-09")
     found = with_cells(unknown(STILL), laws)

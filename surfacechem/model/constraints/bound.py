@@ -67,36 +67,31 @@ def bound(build: Build, rate: Expression) -> Constraint:
 
 def _may_leave_the_range(build: Build) -> bool:
     """Whether any law but those of an envelope does not keep the bonding state in its range by its form."""
-    top = _top(build)
+    top = next((item.value for item in build.parameters.items if item.path == "phi_max"), None)
     if top is None or LOGARITHM in build.scene.initial:
         return False
     laws = [law for law in build.interface.reactions if law.envelope is None]
     return not all(law.keeps_range and (top == 1.0 or "n_2" in reads(law.statement)) for law in laws)
 
 
-def _top(build: Build) -> float | None:
-    """The upper bound, where there is one."""
-    return next((item.value for item in build.parameters.items if item.path == "phi_max"), None)
+def _is_singular(whole: Expression, phi: Expression, numbers: Mapping[Any, float]) -> bool:
+    """Whether a rate has a pole or a logarithm of nothing, but for rounding, at a bonding state."""
 
+    def vanishes(argument: Expression) -> bool:
+        value, size = (x.subs(numbers) for x in (argument, magnitude(argument)))
+        return not (value.free_symbols or size.free_symbols) and abs(float(value)) <= 0.5 * EPS * float(size)
 
-def _vanishes(argument: Expression, phi: Expression, numbers: Mapping[Any, float]) -> bool:
-    """Whether what a logarithm is taken of is nothing at a bonding state, but for rounding."""
-    there = argument.subs({PHI: phi})
-    value, size = (x.subs(numbers) for x in (there, magnitude(there)))
-    return not (value.free_symbols or size.free_symbols) and abs(float(value)) <= 0.5 * EPS * float(size)
+    arguments = (logarithm.args[0].subs({PHI: phi}) for logarithm in whole.atoms(symengine.log))
+    return bool(whole.subs({PHI: phi}).atoms(*SINGULAR)) or any(map(vanishes, arguments))
 
 
 def _rate_at(build: Build, rate: Expression, at: Expression, inside: Expression, name: str) -> Expression:
-    """The rate at a bound; next to it where it has a pole or a logarithm of nothing there; as it is if that fails."""
+    """The rate at a bound; next to it where it is singular there; as it is if that fails."""
     whole, numbers = build.expanded(rate), {item.symbol: item.value for item in build.parameters.items}
-    for phi in (at, inside):
-        there = whole.subs({PHI: phi})
-        vanishing = any(_vanishes(logarithm.args[0], phi, numbers) for logarithm in whole.atoms(symengine.log))
-        if not vanishing and not there.atoms(*SINGULAR):
-            break
-    else:
+    phi = next((phi for phi in (at, inside) if not _is_singular(whole, phi, numbers)), None)
+    if phi is None:
         return rate
-    if there == 0:
+    if whole.subs({PHI: phi}) == 0:
         return symengine.Integer(0)
     # The quantities that the rate reads, also through others, are named at the bound as well: what is written once is
     # computed once there, too.
