@@ -94,9 +94,9 @@ def _covered(build: Build) -> Iterator[Margin]:
         return
     slack, left = build.variables.get("slack", "the coverages"), 1 - symengine.Add(*coverages)
     remedy = "Change the coverage of another species by as much."
-    for name, side in (("less than one", -1), ("more than one", 1)):
-        reason = f"the coverages sum to {name}"
-        yield Margin("sum of coverages = 1", slack + side * left, reason, remedy=remedy, path="initial", at_start=True)
+    for end, side, word in (("sum >= 1", -1, "less"), ("sum <= 1", 1, "more")):
+        reason = f"the coverages sum to {word} than one"
+        yield Margin(end, slack + side * left, reason, remedy=remedy, path="initial", at_start=True)
 
 
 def _bonded_part(build: Build) -> Expression:
