@@ -229,46 +229,52 @@ def put_end(w: Any) -> None:
 
 
 @compiled
-def _differs(w: Any, x: Any) -> Any:
-    """Where the equations at the fraction x of the step, or the rates of the ledger, are far from the polynomials."""
-    put_inside(w, x)
-    evaluate(w, RATES, w.rates)
-    for m in range(w.columns):
-        total = float(ORDER) * lanes(w.polynomial[ORDER - 1, m])
-        for d in range(ORDER - 2, -1, -1):
-            total = total * x + float(d + 1) * lanes(w.polynomial[d, m])
-        put(w.slopes[m], total)
-    h, norm, blank = lanes(w.h), same(0.0), same(0.0)
+def _prepare_looks(w: Any) -> None:
+    """How far the rate of each column may be from the slope of its polynomial, and the coefficients of that slope."""
+    h = lanes(w.h)
     for m in range(w.n):
         size = larger(absolute(lanes(w.y[m])), absolute(lanes(w.y_new[m])))
-        error = absolute(lanes(w.rates[m]) - lanes(w.slopes[m])) / larger(w.rtol * size + w.atol[m], TINY)
-        norm = where(error <= norm, norm, error)
-    norm = norm * h / (GAMMA[DENSEST] * w.loose)
+        put(w.allowed[m], FAR * GAMMA[DENSEST] * w.loose * larger(w.rtol * size + w.atol[m], TINY) / h)
     for group in range(GROUPS):
-        miss, scale = same(0.0), same(TINY)
+        scale = same(TINY)
         for m in range(w.n_ledger):
             if w.groups[m] == group:
                 scale = larger(scale, lanes(w.q_scale[m]))
-        unit = h / scale
         for m in range(w.n_ledger):
             if w.groups[m] == group:
-                defect = absolute(lanes(w.rates[w.n + m]) - lanes(w.slopes[w.n + m]))
-                part = defect / larger(larger(lanes(w.q_rate[m]), defect), TINY)
-                # The quadrature of a smooth rate is better than its polynomial of order 7, by 6/7 of that power; 3/4 is
-                # what roots give: of the worst of all, as they take longer than the rest.
-                squared = unit * defect * unit * defect
-                miss = larger(miss, squared * squared * (part * part * part))
-        norm = larger(norm, square_root(square_root(miss)) / booked(w.rtol))
+                put(w.allowed[w.n + m], FAR * booked(w.rtol) * scale / h)
+    for d in range(ORDER):
+        for m in range(w.columns):
+            put(w.slope_of[d, m], float(d + 1) * lanes(w.polynomial[d, m]))
+
+
+@compiled
+def _agrees(w: Any, x: Any) -> Any:
+    """Where the equations at the fraction x of the step, and the rates of the ledger, are close to the polynomials."""
+    put_inside(w, x)
+    evaluate(w, RATES, w.rates)
+    agrees = x >= 0.0
     for m in range(w.columns):
-        blank = blank + 0.0 * lanes(w.rates[m])  # as in a step
-    return norm + blank
+        total = lanes(w.slope_of[ORDER - 1, m])
+        for d in range(ORDER - 2, -1, -1):
+            total = total * x + lanes(w.slope_of[d, m])
+        defect, allowed = absolute(lanes(w.rates[m]) - total), lanes(w.allowed[m])
+        close = defect <= allowed  # what is no number is not
+        if m >= w.n and any_lane(~close):
+            # The quadrature of a smooth rate is better than its polynomial of order 7, by 6/7 of that power; 3/4 is
+            # what products give.
+            part = defect / larger(larger(lanes(w.q_rate[m - w.n]), defect), TINY)
+            squared = (defect / allowed) * (defect / allowed)
+            close = squared * squared * (part * part * part) <= 1.0
+        agrees = agrees & close
+    return agrees
 
 
 @compiled
 def _miss(w: Any, x: Any, looks: Any) -> None:
     """Keep where the lanes that look there have missed something, if they have not before."""
     missed = lanes(w.missed)
-    put(w.missed, where((looks > 0.5) & (missed == 1.0) & ~(_differs(w, x) <= FAR), x, missed))
+    put(w.missed, where((looks > 0.5) & (missed == 1.0) & ~_agrees(w, x), x, missed))
 
 
 @compiled
@@ -287,6 +293,7 @@ def look(w: Any, good: Any) -> None:
     """
     h, spacing = lanes(w.h), lanes(w.spacing_of)
     looks = good & (h > BRIEF * spacing)
+    _prepare_looks(w)
     begins, ends = where(looks, lanes(w.begins), 0.0), where(looks, larger(lanes(w.last), lanes(w.onto)), 0.0)
     if any_lane(begins > 0.5):
         # From the narrowest outwards: the first that differs says how short the step has to be.

@@ -20,11 +20,11 @@ MEMORY = {
     # t, y, ydot, parameters: what every function of the program is given
     **_arrays("inputs", "n_inputs"),
     # states and accounts at the start and at the end of the step, their changes per time at its last two stages, the
-    # two estimates of their error, their rates at a point inside and the slopes of their polynomials there
-    **_arrays("y y_new change change_before coarse fine rates slopes", "columns"),
-    # rates at the stages, and the coefficients of the polynomial of the step
+    # two estimates of their error, their rates at a point inside and how far they may be from the slopes there
+    **_arrays("y y_new change change_before coarse fine rates allowed", "columns"),
+    # rates at the stages, and the coefficients of the polynomial of the step and of its slope
     **_arrays("k", 16, "columns"),
-    **_arrays("polynomial", 7, "columns"),
+    **_arrays("polynomial slope_of", 7, "columns"),
     # weights of the error norm; of each account the largest value, and in this step the largest rate and what its error
     # is held against
     **_arrays("weight", "n"),
