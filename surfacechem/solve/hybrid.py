@@ -188,10 +188,12 @@ class Hybrid:
         return point if unresolved else None
 
     def _is_limited(self, arc: Arc) -> bool:
-        """Whether a limit is zero at the end of an arc for all that can be told."""
-        count = min(self.instant.first, len(arc.result.margins))
+        """Whether an arc has brought a limit to zero for all that can be told."""
+        count, guards = min(self.instant.first, len(arc.result.margins)), self.problem.program.margins
+        if not count or guards is None:
+            return False
         limits = np.array([m.terminal and not m.strict for m in self.problem.margins[:count]], dtype=bool)
-        zero = np.abs(arc.result.margins[:count]) <= NOISE * self.instant.sizes(arc.start)[:count]
+        zero = np.abs(arc.result.margins[:count]) <= NOISE * np.abs(guards(arc.start.inputs())[:count])
         return bool(np.any(limits & zero & self.instant.in_play(arc.start)[:count]))
 
     def _last_of(self, start: float, end: float) -> float:
