@@ -12,7 +12,7 @@ from solver_problems import exothermic_problem
 import surfacechem
 from surfacechem.solve.lanes import lane_batch
 from surfacechem.solve.radau.solver import solve_arrays
-from surfacechem.solve.radau.stepper import END, EVENTS, OUTPUTS
+from surfacechem.solve.radau.stepper import END, EVENTS, FIRST_COUNTER, OUTPUTS
 
 RUNS = 11
 """Not a multiple of eight, so that lanes run empty."""
@@ -93,6 +93,20 @@ def test_runs_are_those_of_one_at_a_time(name, others, left):
     for i, reached in enumerate(wanted.counts[:, OUTPUTS]):
         apart = found.outputs[i, :reached, n:] - wanted.outputs[i, :reached, n:]
         assert np.all(np.abs(apart) <= 1e-5 * turned)
+
+
+def test_accounts_of_no_group_shorten_no_step(left):
+    """What is integrated but not balanced, as amounts that are made, is not held against its polynomial."""
+    simulation = case_runs.load("exothermic")
+    problem = problem_of(simulation)
+    columns = columns_of(simulation, problem)
+    accounted = lane_batch.solve_batch(problem, *columns)
+    free = replace(problem, program=replace(problem.program, groups=(-1,) * problem.program.n_ledger))
+    found = lane_batch.solve_batch(free, *columns)
+    assert left[0] == 0
+    assert np.all(found.counts[:, FIRST_COUNTER] <= accounted.counts[:, FIRST_COUNTER])
+    assert np.all(found.counts[:, FIRST_COUNTER + 1] <= accounted.counts[:, FIRST_COUNTER + 1])
+    assert found.ends[:, 1:3] == pytest.approx(accounted.ends[:, 1:3], rel=1e-7)
 
 
 def test_runs_without_guards(left):

@@ -235,6 +235,8 @@ def _prepare_looks(w: Any) -> None:
     for m in range(w.n):
         size = larger(absolute(lanes(w.y[m])), absolute(lanes(w.y_new[m])))
         put(w.allowed[m], FAR * GAMMA[DENSEST] * w.loose * larger(w.rtol * size + w.atol[m], TINY) / h)
+    for m in range(w.n_ledger):
+        put(w.allowed[w.n + m], same(np.inf))  # of what belongs to no group it only has to be a number
     for group in range(GROUPS):
         scale = same(TINY)
         for m in range(w.n_ledger):
