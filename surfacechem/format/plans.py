@@ -254,11 +254,13 @@ def numbered(over: Mapping[str, object]) -> tuple[dict[str, object], dict[str, A
     """Values as a case lists them, and apart from these, which are read entry by entry, those that come as arrays of
     numbers, which may be long.
     """
-    rows = {path: x for path, x in over.items() if isinstance(x, np.ndarray)}
-    arrays = {path: x.astype(float) for path, x in rows.items() if x.ndim == 1 and x.dtype.kind in "iuf"}
-    return {
-        path: [] if path in arrays else rows[path].tolist() if path in rows else x for path, x in over.items()
-    }, arrays
+    lists, arrays = dict(over), {}
+    for path, values in over.items():
+        if isinstance(values, np.ndarray):
+            lists[path] = values.tolist()
+            if values.ndim == 1 and values.dtype.kind in "iuf":
+                lists[path], arrays[path] = [], values.astype(float)
+    return lists, arrays
 
 
 def plan_of(

@@ -79,6 +79,7 @@ def _is_singular(whole: Expression, phi: Expression, numbers: Mapping[Any, float
 
     def vanishes(argument: Expression) -> bool:
         value, size = (x.subs(numbers) for x in (argument, magnitude(argument)))
+        # One rounding: next to a bound, at INSIDE, it is more.
         return not (value.free_symbols or size.free_symbols) and abs(float(value)) <= 0.5 * EPS * float(size)
 
     arguments = (logarithm.args[0].subs({PHI: phi}) for logarithm in whole.atoms(symengine.log))

@@ -221,9 +221,8 @@ class _Stretch(Method):
             ends[1:1] = ends[2:4]  # the first polynomial is a straight line
         self.last = ends[-3:]
         unit, n = self.reactor.unit, self.reactor.count
-        moments = np.array(times)
-        rows = hermite(moments[1:] - moments[:-1], np.concatenate(ends).reshape(-1, 3, len(unit)) * unit)
-        return Steps(moments, partial(self._step, times, rows), at_nodes(rows[..., :n]))
+        rows = hermite(np.diff(times), np.concatenate(ends).reshape(-1, 3, len(unit)) * unit)
+        return Steps(np.array(times), partial(self._step, times, rows), at_nodes(rows[..., :n]))
 
     def _step(self, times: Sequence[float], rows: Array, k: int) -> DenseStep:
         """One of the steps from and to these times by the coefficients of its polynomial, and its ledger if any."""

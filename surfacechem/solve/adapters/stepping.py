@@ -201,7 +201,7 @@ class _Inside:
     @cached_property
     def sizes(self) -> Array:
         """Lengths of the steps [s]."""
-        return self.times[1:] - self.times[:-1]
+        return np.diff(self.times)
 
     def part(self, first: int, end: int) -> "_Inside":
         """Those of some of the steps."""
@@ -380,7 +380,7 @@ class _Run:
         """The equations at the quadrature points of steps up to a time within the last of them."""
         view = self.view
         ends = np.concatenate(([self.t], steps.times[1:-1], [reached]))
-        times = ends[:-1, None] + (ends[1:] - ends[:-1])[:, None] * NODES[1:]
+        times = ends[:-1, None] + np.diff(ends)[:, None] * NODES[1:]
         times[:, -1] = ends[1:]
         x = y = steps.at_nodes(times)
         if not self.solver.keeps_algebraic:
