@@ -221,7 +221,8 @@ def _interface(case: Document, mechanism: Mechanism | None) -> Interface:
     if mechanism is None:
         return own
     if section.has("sites"):
-        raise section.error("the mechanism gives the sites; remove `sites` or `mechanism`.", "sites")
+        remedy = "remove `sites` or `mechanism`. `sweep --over interface.sites=[...]` changes them"
+        raise section.error(f"the mechanism gives the sites; {remedy}.", "sites")
     return replace(
         own,
         potentials=(*own.potentials, *mechanism.potentials),
