@@ -206,7 +206,7 @@ class LoadedRate(cantera.ExtensibleRate):
         assert self.bound is not None
         symbols = _Symbols(T_c=symengine.Symbol("T_c"))
         expression = self.bound.coefficient(symbols, 0.0)
-        code = compile_function(list(symbols.values()), [expression], pieces=1)
+        code = compile_function(list(symbols.values()), [expression])
         arguments, value = (ctypes.c_double * len(symbols))(), (ctypes.c_double * 1)()
         function = CODE(code.address)
         places = ctypes.addressof(value), ctypes.addressof(arguments), code.user

@@ -15,8 +15,9 @@ import pickle
 import platform
 import sys
 import warnings
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -46,6 +47,17 @@ def kernel_folder(sources: Sequence[Path]) -> Path:
     for source in (Path(cache_folder.__file__), Path(__file__), Path(__file__).with_name("objectcode.py"), *sources):
         digest.update(source.read_bytes())
     return cache_root() / f"kernel-{digest.hexdigest()[:16]}"
+
+
+def code_file(origins: Iterable[str]) -> Path:
+    """Where machine code of expressions that follows from these texts, here, is kept."""
+    digest = hashlib.sha256("\n".join((*_libraries(), platform.machine(), processor(), *origins)).encode())
+    return cache_root() / "code" / digest.hexdigest()[:32]
+
+
+@cache
+def _libraries() -> tuple[str, ...]:
+    return version("symengine"), version("llvmlite")
 
 
 def is_filled(folder: Path) -> bool:

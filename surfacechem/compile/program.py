@@ -8,12 +8,10 @@ user's cache folder, reached as a raw pointer by the stepper and as a vectorised
 import ctypes
 import hashlib
 import pickle
-import platform
 import threading
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
 from functools import cache, cached_property, lru_cache, partial
-from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,12 +20,13 @@ import symengine
 from numpy.typing import ArrayLike, NDArray
 
 from surfacechem import expressions as calculus
-from surfacechem.compile.cache import processor
+from surfacechem.compile.cache import code_file
 from surfacechem.compile.preparing import PREPARING
-from surfacechem.documents.cache_folder import cache_root, from_file
+from surfacechem.documents.cache_folder import from_file
 from surfacechem.expressions import derivative, gradient
 
 if TYPE_CHECKING:
+    from surfacechem.compile.alike import Loop
     from surfacechem.compile.vectors import LaneFunction
 
 CODE = ctypes.PYFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
@@ -52,32 +51,23 @@ class Function:
     n_out: int
     keep: Any
     """Owns the machine code: the address is valid as long as this object lives."""
-    rest: tuple["Function", ...] = ()
-    """Further code for the later results, where the function is compiled in pieces."""
 
     def __call__(self, inputs: ArrayLike) -> NDArray[np.float64]:
         values = np.ascontiguousarray(inputs, dtype=float)
         if not (self.n_out and values.size):  # machine code of nothing cannot be called, nor on nothing
-            return np.empty((*values.shape[:-1], self.size))
-        if not self.rest and values.shape == (self.n_in,):
+            return np.empty((*values.shape[:-1], self.n_out))
+        if values.shape == (self.n_in,):
             # In half of the time that the library takes to look at what it is given.
             code, row, results = self._called
             found = results()
             code(found, row.from_buffer(values), self.user)
             return np.frombuffer(found)
-        if not self.rest:
-            return np.asarray(self.keep(values))
-        return np.concatenate([np.asarray(self.keep(values)), *(part(values) for part in self.rest)], axis=-1)
+        return np.asarray(self.keep(values))
 
     @cached_property
     def _called(self) -> tuple[Any, Any, Any]:
         """The code as Python calls it by itself, and the types of its inputs and results."""
         return CODE(self.address), ctypes.c_double * self.n_in, ctypes.c_double * self.n_out
-
-    @property
-    def size(self) -> int:
-        """Number of results of all pieces."""
-        return self.n_out + sum(part.n_out for part in self.rest)
 
 
 @dataclass(frozen=True)
@@ -118,8 +108,8 @@ class Chain:
     anchor: int
 
 
-PIECE = 400
-"""Expressions that are compiled at a time where there are many alike."""
+SPARSE = 400
+"""Derivatives from which on those that are zero are not formed."""
 
 OPTIMISED = 200
 """Expressions from which on they are not optimised: that takes ten times as long as to make code of them, for code that
@@ -171,20 +161,14 @@ class Program:
     @cached_property
     def tables(self) -> tuple[NDArray[Any], ...]:
         """What the stepper reads of a program: its sizes (states, accounts, margins, inputs; in the core, chains, cells
-        of chains); a row (code, user data, function, place in its result) for residual, jacobian, ledger, margins and
-        rates, zero where absent, and then for their further pieces; which states are algebraic; a row (first, end,
-        anchor) for each chain; the places of the derivatives that are formed; the group of each quadrature,
-        -1 where it is in none.
+        of chains); a row (code, user data) for residual, jacobian, ledger, margins and rates, zero where absent; which
+        states are algebraic; a row (first, end, anchor) for each chain; the places of the derivatives that are formed;
+        the group of each quadrature, -1 where it is in none.
         """
         core = self.chains[0].first if self.chains else self.n
         sizes = self.n, self.n_ledger, self.n_margins, self.n_inputs, core, len(self.chains), self.n - core
         functions = (self.residual, self.jacobian, self.ledger, self.margins, None)
-        code = [(f.address, f.user, which, 0) if f else (0, 0, which, 0) for which, f in enumerate(functions)]
-        for which, f in enumerate(functions):
-            place = f.n_out if f else 0
-            for part in f.rest if f else ():
-                code.append((part.address, part.user, which, place))
-                place += part.n_out
+        code = [(f.address, f.user) if f else (0, 0) for f in functions]
         chains = np.array([(c.first, c.end, c.anchor) for c in self.chains], np.int64).reshape(-1, 3)
         groups = np.array(self.groups or (-1,) * self.n_ledger, np.int64)
         return np.array(sizes, np.int64), np.array(code, np.int64), self.algebraic_mask, chains, self.nonzeros, groups
@@ -211,7 +195,7 @@ class Program:
         assert self.lanes is not None
         sizes = self.n, self.n_ledger, self.n_margins, self.n_inputs, self.n + self.n_ledger
         functions = None, None, None, self.lanes.margins, self.lanes.rates
-        code = [(f.address if f else 0, 0, which, 0) for which, f in enumerate(functions)]
+        code = [(f.address if f else 0, 0) for f in functions]
         return np.array(sizes, np.int64), np.array(code, np.int64), *self.tables[2:]
 
     @cached_property
@@ -220,7 +204,7 @@ class Program:
         assert self.rates is not None
         sizes, code, *others = self.tables
         code = code.copy()
-        code[4, :2] = self.rates.address, self.rates.user
+        code[4] = self.rates.address, self.rates.user
         return sizes, code, *others
 
     def derivatives(self, inputs: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -260,19 +244,28 @@ def _scattered(values: NDArray[np.float64], n: int, chains: Sequence[Chain]) -> 
 
 
 def compile_function(
-    inputs: Sequence[Any], expressions: Sequence[Any], pieces: int | None = None, steps: bool = False
+    inputs: Sequence[Any], expressions: Sequence[Any], own: Collection[Any] = (), steps: bool = False
 ) -> Function:
     """Compile a vector of expressions; inputs that no expression contains are allowed.
 
     What ``steps`` call a thousand times is optimised; of other code, which takes twice as long to optimise as to make,
-    the calls are few. Compile time grows faster than the number of expressions: many alike are compiled in ``pieces``
-    of so many each, which there is nothing to gain from optimising.
+    the calls are few. Expressions that are alike but for the inputs that are their ``own``, as those of cells, are
+    loops over one.
     """
-    if pieces:
-        starts = range(0, len(expressions), pieces)
-        parts = [_machine_code(tuple(inputs), tuple(expressions[start : start + pieces]), 0) for start in starts]
-        return replace(parts[0], rest=tuple(parts[1:]))
-    return _machine_code(tuple(inputs), tuple(expressions), _level(len(expressions), steps))
+    if not own:
+        return _machine_code(tuple(inputs), tuple(expressions), _level(len(expressions), steps))
+    from surfacechem.compile.alike import loops_of
+
+    return _looped(inputs, *loops_of(inputs, expressions, own))
+
+
+def _looped(inputs: Sequence[Any], loops: Sequence["Loop"], rest: Sequence[Any]) -> Function:
+    """The code of loops and of what is in none."""
+    from surfacechem.compile.alike import Alike
+
+    left = tuple(expression for expression in rest if expression != 0)
+    code = Alike(inputs, loops, rest, _machine_code(tuple(inputs), left, 0) if left else None)
+    return Function(code.address, code.table.ctypes.data, len(inputs), len(rest), code)
 
 
 def _level(count: int, steps: bool) -> int:
@@ -310,33 +303,22 @@ def _machine_code(inputs: tuple[Any, ...], expressions: tuple[Any, ...] | _Deriv
 
     # Code is loaded in a tenth of the time that it takes to make.
     origins = expressions.origins() if isinstance(expressions, _Derivatives) else written(expressions)
-    mark = _digest((*_here(), str(opt_level), _mark_of(inputs), *origins))
-    code = from_file(cache_root() / "code" / mark[:32], make, pickle.loads, pickle.dumps)
+    code = from_file(code_file([str(opt_level), _mark_of(inputs), *origins]), make, pickle.loads, pickle.dumps)
     function, user = code.as_ctypes()
     address = ctypes.cast(function, ctypes.c_void_p).value
     return Function(int(address or 0), int(user.value), len(inputs), len(expressions), code)
 
 
-def _digest(lines: Iterable[str]) -> str:
-    return hashlib.sha256("\n".join(lines).encode()).hexdigest()
-
-
 @lru_cache(maxsize=8)
 def _mark_of(inputs: tuple[Any, ...]) -> str:
     """What stands for inputs, which all functions of a scene share."""
-    return _digest(written(inputs))
+    return hashlib.sha256("\n".join(written(inputs)).encode()).hexdigest()
 
 
 @cache
 def _differentiation() -> list[str]:
     """The sources by which is differentiated."""
     return [hashlib.sha256(Path(file).read_bytes()).hexdigest() for file in (__file__, calculus.__file__)]
-
-
-@cache
-def _here() -> tuple[str, ...]:
-    """What machine code is made by, and for."""
-    return version("symengine"), platform.machine(), processor()
 
 
 def written(expressions: Sequence[Any]) -> list[str]:
@@ -467,15 +449,35 @@ def _slopes(
     """The code of the Jacobian, and the places of the derivatives that it forms where these are not all."""
     n, named = len(residual), needed(named, residual)
     every, places = dict(enumerate(_derivatives(n, chains))), np.empty(0, np.int64)
-    if chains or len(every) >= PIECE:
+    if chains or len(every) >= SPARSE:
         depends = _depends(residual, variables, named)
         every = {place: (i, j) for place, (i, j) in every.items() if j in depends[i]}
         places = np.array([*every], np.int64)
     wanted = tuple(every.values())
     if chains:
-        return compile_function(inputs, _entries(residual, variables, named, wanted), PIECE, steps=True), places
+        return _chained_slopes(inputs, residual, chains[0].first, named, wanted), places
     parts = _Derivatives(tuple(residual), tuple(variables), tuple(named), wanted)
     return _machine_code(tuple(inputs), parts, _level(len(parts), steps=True)), places
+
+
+def _chained_slopes(
+    inputs: Sequence[Any], residual: Sequence[Any], core: int, named: Named, wanted: Sequence[tuple[int, int]]
+) -> Function:
+    """The code of derivatives where there are chains, whose equations are differentiated by their forms."""
+    from surfacechem.compile.alike import loops_of
+
+    n = len(residual)
+    rows = [symengine.Integer(0)] * core + expanded(named, residual[core:])
+    loops, rest = loops_of(inputs, rows, own_of_chains(inputs, core, n))
+    places = {(i, 1 + j): place for place, (i, j) in enumerate(wanted)}
+    left = _entries([*residual[:core], *rest[core:]], inputs[1 : 1 + 2 * n], named, wanted)
+    known = {symbol: place for place, symbol in enumerate(inputs)}
+    return _looped(inputs, [loop.slopes(known, places) for loop in loops], left)
+
+
+def own_of_chains(inputs: Sequence[Any], core: int, n: int) -> set[Any]:
+    """Of the inputs those that belong to one cell: its state and rate."""
+    return {*inputs[1 + core : 1 + n], *inputs[1 + n + core : 1 + 2 * n]}
 
 
 def compile_program(
@@ -499,7 +501,7 @@ def compile_program(
         raise ValueError(f"{counts}: a system needs as many equations as states, and one derivative a state.")
     inputs = [t, *states, *derivatives, *parameters]
     n, core = len(states), chains[0].first if chains else len(states)
-    pieces = PIECE if chains else None
+    own = own_of_chains(inputs, core, n)
     slopes, nonzeros = _slopes(inputs, residual, [*states, *derivatives], chains, named)
     residual, ledger, margins = (expanded(named, rows) for rows in (residual, ledger, margins))
     known = {symbol for row in residual[:core] for symbol in row.free_symbols}
@@ -510,10 +512,10 @@ def compile_program(
         n_parameters=len(parameters),
         n_ledger=len(ledger),
         n_margins=len(margins),
-        residual=compile_function(inputs, residual, pieces, steps=True),
+        residual=compile_function(inputs, residual, own, steps=True),
         jacobian=slopes,
-        ledger=compile_function(inputs, ledger, pieces, steps=True) if ledger else None,
-        margins=compile_function(inputs, margins, pieces, steps=True) if margins else None,
+        ledger=compile_function(inputs, ledger, own, steps=True) if ledger else None,
+        margins=compile_function(inputs, margins, own, steps=True) if margins else None,
         algebraic=tuple(rate not in known for rate in derivatives[:core]) + (False,) * (n - core),
         filler=filler,
         chains=tuple(chains),

@@ -68,39 +68,58 @@ def compile_lanes(inputs: Sequence[Any], expressions: Sequence[Any]) -> LaneFunc
 
     NotImplementedError where an expression contains what has no code here.
     """
-    module = ir.Module(name="lanes")
-    code = _Code(module, inputs, expressions)
+    builder = function_body()
+    places = {symbol: place for place, symbol in enumerate(inputs)}
+    out, given, _ = builder.function.args
+    code = Code(builder, lambda symbol: builder.load(_entry(builder, given, places[symbol]), align=8), expressions)
     for number, value in enumerate(code.values):
-        code.store(number, value)
-    code.builder.ret_void()
-    engine = _engine(str(module))
+        builder.store(value, _entry(builder, out, number), align=8)
+    builder.ret_void()
+    engine = loaded(object_code(builder))
     return LaneFunction(int(engine.get_function_address("f")), len(expressions), engine)
 
 
-def _engine(text: str) -> Any:
-    """An engine that holds the machine code of a module, made for this processor."""
+def _entry(builder: Any, argument: Any, place: int) -> Any:
+    pointer = builder.gep(argument, [ir.IntType(64)(8 * LANES * place)])
+    return builder.bitcast(pointer, VECTOR.as_pointer())
+
+
+def function_body() -> Any:
+    """A builder of the body of a function ``f`` in a module of its own."""
+    kind = ir.FunctionType(ir.VoidType(), [_POINTER] * 3)
+    function: Any = ir.Function(ir.Module(name="lanes"), kind, name="f")
+    return ir.IRBuilder(function.append_basic_block())
+
+
+def object_code(builder: Any) -> bytes:
+    """The machine code of the builder's module, made for this processor."""
     _binding.initialize_native_target()
     _binding.initialize_native_asmprinter()
     features = _binding.get_host_cpu_features().flatten()
     target = _binding.Target.from_default_triple()
-    machine = target.create_target_machine(cpu=_binding.get_host_cpu_name(), features=features, opt=2)
-    module = _binding.parse_assembly(text)
-    builder = _binding.create_pass_builder(machine, _binding.create_pipeline_tuning_options(speed_level=2))
-    builder.getModulePassManager().run(module, builder)
-    engine = _binding.create_mcjit_compiler(module, machine)  # which owns both from here on
+    machine = target.create_target_machine(cpu=_binding.get_host_cpu_name(), features=features, opt=2, jit=True)
+    module = _binding.parse_assembly(str(builder.module))
+    passes = _binding.create_pass_builder(machine, _binding.create_pipeline_tuning_options(speed_level=2))
+    passes.getModulePassManager().run(module, passes)
+    return bytes(machine.emit_object(module))
+
+
+def loaded(code: bytes) -> Any:
+    """An engine that holds machine code."""
+    _binding.initialize_native_target()
+    _binding.initialize_native_asmprinter()
+    machine = _binding.Target.from_default_triple().create_target_machine(jit=True)
+    engine = _binding.create_mcjit_compiler(_binding.parse_assembly(""), machine)  # which owns both from here on
+    engine.add_object_file(_binding.ObjectFileRef.from_data(code))
     engine.finalize_object()
     return engine
 
 
-class _Code:
-    """The body of the function: a value for each expression, each part of the graph once."""
+class Code:
+    """Vectors for expressions, each part of the graph once; ``read`` gives those of the symbols."""
 
-    def __init__(self, module: Any, inputs: Sequence[Any], expressions: Sequence[Any]) -> None:
-        self.module = module
-        function: Any = ir.Function(module, ir.FunctionType(ir.VoidType(), [_POINTER] * 3), name="f")
-        self.builder: Any = ir.IRBuilder(function.append_basic_block())
-        self.arguments = function.args
-        self.places = {symbol: place for place, symbol in enumerate(inputs)}
+    def __init__(self, builder: Any, read: Callable[[Any], Any], expressions: Sequence[Any]) -> None:
+        self.builder, self.read = builder, read
         self.known: dict[Any, Any] = {}
         """Values of parts that have been formed where the code that is written now is reached."""
         self.costs: dict[Any, bool] = {}
@@ -110,14 +129,6 @@ class _Code:
 
     def _parts(self, part: Any) -> Sequence[Any]:
         return (self.definitions[part],) if part in self.definitions else part.args
-
-    def _entry(self, argument: int, place: int) -> Any:
-        pointer = self.builder.gep(self.arguments[argument], [ir.IntType(64)(8 * LANES * place)])
-        return self.builder.bitcast(pointer, VECTOR.as_pointer())
-
-    def store(self, place: int, value: Any) -> None:
-        """Write a result."""
-        self.builder.store(value, self._entry(0, place), align=8)
 
     def value(self, expression: Any) -> Any:
         """The vector of a number, a symbol or a function, or the mask of a condition."""
@@ -158,14 +169,14 @@ class _Code:
 
     def _made(self, part: Any) -> Any:
         kind = type(part).__name__
-        if part in self.places:
-            return self.builder.load(self._entry(1, self.places[part]), align=8)
+        if part in self.definitions:
+            return self.known[self.definitions[part]]
+        if part.is_Symbol:
+            return self.read(part)
         if part.is_Number or kind in _CONSTANTS:
             return number(float(part))
         if kind in _TRUTHS:
             return _Constant(MASK, [int(kind == "BooleanTrue")] * LANES)
-        if part in self.definitions:
-            return self.known[self.definitions[part]]
         if kind == "Piecewise" and self._costs(part):
             return self._chosen(part.args)
         values = [self.known[each] for each in part.args]
@@ -255,7 +266,7 @@ class _Code:
     def _by_library(self, name: str, values: Sequence[Any]) -> Any:
         """A function of the C library at each place."""
         kind = ir.FunctionType(NUMBER, [NUMBER] * len(values))
-        function = self.module.globals.get(name) or ir.Function(self.module, kind, name=name)
+        function = self.builder.module.globals.get(name) or ir.Function(self.builder.module, kind, name=name)
         found = _Constant(VECTOR, ir.Undefined)
         for lane in range(LANES):
             place = ir.IntType(32)(lane)
@@ -269,19 +280,31 @@ _TRUTHS = {"BooleanTrue", "BooleanFalse"}
 _RELATIONS = {"LessThan": "<=", "StrictLessThan": "<", "Equality": "==", "Unequality": "!="}
 _OWN: dict[str, Callable[[Any, Any, Any], Any]] = {
     "Add": lambda code, _part, values: reduce(code.builder.fadd, values),
-    "Mul": _Code._product,
-    "Pow": _Code._power,
+    "Mul": Code._product,
+    "Pow": Code._power,
     "log": lambda code, _part, values: log(code.builder, *values),
-    "Piecewise": _Code._piecewise,
-    **dict.fromkeys(_RELATIONS, _Code._relation),
-    **dict.fromkeys(("And", "Or"), _Code._joined),
-    **dict.fromkeys(("Max", "Min"), _Code._extreme),
+    "Piecewise": Code._piecewise,
+    **dict.fromkeys(_RELATIONS, Code._relation),
+    **dict.fromkeys(("And", "Or"), Code._joined),
+    **dict.fromkeys(("Max", "Min"), Code._extreme),
 }
 """What makes the vectors of a node of the graph, by its kind."""
 _TRIGONOMETRIC = "sin", "cos", "tan", "asin", "acos", "atan"
 _HYPERBOLIC = "sinh", "cosh", "tanh", "asinh", "acosh", "atanh"
 _LIBRARY = {name: name for name in (*_TRIGONOMETRIC, *_HYPERBOLIC, "erf", "erfc")} | {"Abs": "fabs"}
 """Functions of the C library, by the kind of their node."""
+
+
+def has_code(expression: Any) -> bool:
+    """Whether there are vectors for all that an expression contains."""
+    left = [expression]
+    while left:
+        part = left.pop()
+        kind = type(part).__name__
+        if not (part.is_Symbol or part.is_Number or kind in {*_CONSTANTS, *_TRUTHS, *_OWN, *_LIBRARY}):
+            return False
+        left += part.args
+    return True
 
 
 def _is_costly(part: Any) -> bool:

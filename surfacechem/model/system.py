@@ -385,6 +385,12 @@ class System:
         """Names of the states inside bodies, which the profiles show together, and of one that stands for none."""
         return frozenset([STAND_IN, *(name for profile in self.profiles for name in profile.states)])
 
+    @cached_property
+    def of_cells(self) -> frozenset[Any]:
+        """States inside bodies and their rates, as symbols: each belongs to one cell."""
+        states = (state for state in self.states if state.name in self.inside - {STAND_IN})
+        return frozenset(symbol for state in states for symbol in (state.symbol, state.dot))
+
     @property
     def rests(self) -> bool:
         """Whether nothing changes with time: nothing evolves, and no history that is read does."""

@@ -230,8 +230,8 @@ def _least(trajectory: Trajectory) -> dict[str, float]:
     for j in system.account_columns.get("entropy production", ()):
         rates = values.get(f"sigma_{system.ledger[j].law}", np.empty(0))
         if len(rates):
-            # A law that ends the run may have no value there.
-            ended = trajectory.status == "stopped" and len(rates) > 1 and not np.isfinite(rates[-1])
+            # A law that ends the run may have no value there, or that of a point beyond its end by rounding.
+            ended = trajectory.status == "stopped" and len(rates) > 1
             least[system.ledger[j].law] = float((rates[:-1] if ended else rates).min())
     return least
 
@@ -254,9 +254,8 @@ def _destroyed(trajectory: Trajectory, laws: list[str], stored: float) -> float:
         points = result.steps
     ledger = points.ledger.copy()
     rates = np.array([trajectory.within_bounds[f"sigma_{law}"][-len(points.t) :] for law in laws]).sum(axis=0)
-    if trajectory.status == "stopped":  # a law that ends there may have no value
-        rates[-1:] = np.nan_to_num(rates[-1:], posinf=0.0, neginf=0.0)
-        ledger[-1:] = np.where(np.isfinite(ledger[-1:]), ledger[-1:], ledger[-2:][:1])
+    if trajectory.status == "stopped":  # where a law may end, and have no value
+        rates[-1:], ledger[-1:] = 0.0, ledger[-2:][:1]
     columns = [j for j, a in enumerate(accounts) if a.kind == "entropy production" and a.law in laws]
     booked, lengths = np.diff(ledger[:, columns].sum(axis=1)), np.diff(points.t)
     # The end of a step tells of it, but for the first of an arc: between arcs production may jump.

@@ -17,7 +17,7 @@ import numpy as np
 import symengine
 from numpy.typing import ArrayLike, NDArray
 
-from surfacechem.compile.program import PIECE, Function, compile_function, expanded, jacobian
+from surfacechem.compile.program import Function, compile_function, expanded, jacobian
 from surfacechem.contracts.terms import Load
 from surfacechem.contracts.units import parse, quotient
 from surfacechem.documents import document
@@ -225,7 +225,7 @@ class Slopes:
         self._entries = np.array([*found], dtype=np.int64).reshape(-1, 2).T
         self.pattern[self._entries[0], self._entries[1]] = True
         whole = expanded(names, [*rows, *found.values(), *margins])
-        self._function = compile_function(inputs, whole, PIECE if system.profiles else None)
+        self._function = compile_function(inputs, whole, system.of_cells)
 
     def __call__(self, table: Array) -> tuple[Array, Array, Array]:
         """Values, derivatives of shape (points, rows, arguments), and margins."""

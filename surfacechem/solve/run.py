@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem.compile.preparing import PREPARING
-from surfacechem.compile.program import PIECE, Chain, Filler, Function, Program, compile_function, compile_program
+from surfacechem.compile.program import Chain, Filler, Function, Program, compile_function, compile_program
 from surfacechem.contracts.terms import Spec
 from surfacechem.errors import PATHS, InputError, suggestion
 from surfacechem.model.checks import check_start
@@ -322,7 +322,7 @@ class Model:
         self.program = replace(program, groups=tuple(GROUPS.get(account.kind, -1) for account in system.ledger))
         self.jumper = Jumper(system, self.program) if system.in_stretches else None
         outputs = [system.expand(item.expression) for item in system.outputs]
-        self.output_function: Function = compile_function(inputs, outputs, PIECE if system.profiles else None)
+        self.output_function: Function = compile_function(inputs, outputs, system.of_cells)
         self.compile_seconds = time.perf_counter() - start
         """Time to compile the equations, and what is first needed in a run: of gaps at rest, of guards and of jumps."""
 

@@ -77,13 +77,15 @@ def _may_leave_the_range(build: Build) -> bool:
 def _is_singular(whole: Expression, phi: Expression, numbers: Mapping[Any, float]) -> bool:
     """Whether a rate has a pole or a logarithm of nothing, but for rounding, at a bonding state."""
 
-    def vanishes(argument: Expression) -> bool:
-        value, size = (x.subs(numbers) for x in (argument, magnitude(argument)))
+    def has_none(argument: Expression) -> bool:
+        both = [x.subs(numbers) for x in (argument, magnitude(argument))]
+        if any(x.free_symbols for x in both):
+            return False
         # One rounding: next to a bound, at INSIDE, it is more.
-        return not (value.free_symbols or size.free_symbols) and abs(float(value)) <= 0.5 * EPS * float(size)
+        return any(x.atoms(*SINGULAR) for x in both) or abs(float(both[0])) <= 0.5 * EPS * float(both[1])
 
     arguments = (logarithm.args[0].subs({PHI: phi}) for logarithm in whole.atoms(symengine.log))
-    return bool(whole.subs({PHI: phi}).atoms(*SINGULAR)) or any(map(vanishes, arguments))
+    return bool(whole.subs({PHI: phi}).atoms(*SINGULAR)) or any(map(has_none, arguments))
 
 
 def _rate_at(build: Build, rate: Expression, at: Expression, inside: Expression, name: str) -> Expression:

@@ -154,18 +154,15 @@ class Evaluations:
 
 
 class _Code:
-    """A compiled function of a buffer of inputs, each of its pieces: a call from NumPy takes five times as long."""
+    """A compiled function of a buffer of inputs: a call from NumPy takes five times as long."""
 
     def __init__(self, function: Function | None, inputs: Array, out: Array | None = None) -> None:
-        self.out = np.zeros(function.size if function else 0) if out is None else out
-        self._calls: list[Callable[[], object]] = []
-        place = self.out.ctypes.data
-        for part in (function, *function.rest) if function else ():
-            self._calls.append(partial(CODE(part.address), place, inputs.ctypes.data, part.user))
-            place += part.n_out * self.out.itemsize
+        self.out = np.zeros(function.n_out if function else 0) if out is None else out
+        self._call: Callable[[], object] = lambda: None
+        if function:
+            self._call = partial(CODE(function.address), self.out.ctypes.data, inputs.ctypes.data, function.user)
         self._keep = function
 
     def __call__(self) -> Array:
-        for call in self._calls:
-            call()
+        self._call()
         return self.out

@@ -42,10 +42,9 @@ def compiled(function: Any) -> Any:
 
 
 RESIDUAL, JACOBIAN, LEDGER, MARGINS, RATES = np.arange(5)
-FUNCTIONS = 5
-"""Rows of the table of addresses (code, user data, function, place in its result); further rows are later parts of
-functions that are compiled in pieces. NumPy's integers, as Numba compiles what takes a Python constant anew for each
-constant."""
+"""Rows of the table of addresses (code, user data). NumPy's integers, as Numba compiles what takes a Python constant
+anew for each constant.
+"""
 
 WORK = StepperRecord("Work", SIZES, NUMBERS, MEMORY)
 lay_out = laying_out(WORK)
@@ -67,19 +66,9 @@ def _call(_context: Any, _address: Any, _out: Any, _inputs: Any, _user: Any) -> 
 
 
 @compiled
-def _evaluate_rest(w: Any, which: int, out: int) -> None:
-    for part in range(FUNCTIONS, w.code.shape[0]):
-        if w.code[part, 2] == which:
-            _call(w.code[part, 0], out + 8 * w.code[part, 3], w.inputs.ctypes.data, w.code[part, 1])
-
-
-@compiled
 def evaluate(w: Any, which: int, result: Any) -> None:
     """Call a function of the program on the current inputs."""
-    out = result.ctypes.data
-    _call(w.code[which, 0], out, w.inputs.ctypes.data, w.code[which, 1])
-    if w.code.shape[0] > FUNCTIONS:
-        _evaluate_rest(w, which, out)
+    _call(w.code[which, 0], result.ctypes.data, w.inputs.ctypes.data, w.code[which, 1])
 
 
 @_intrinsic

@@ -1,0 +1,340 @@
+"""Expressions that are alike, as those of the cells of a body: each form is compiled once, and called in a loop.
+
+The balances of cells, their derivatives and the terms of sums over them are one function of other states and other
+numbers. The code of such a form is vectors, each of whose places belongs to a cell; which states and numbers it reads
+is a table beside it. So the time to compile does not grow with the number of cells, nor does another grid need any.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import hashlib
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from functools import cache, lru_cache
+from itertools import chain
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import symengine
+from llvmlite import ir
+from numpy.typing import NDArray
+
+from surfacechem.compile import vectors
+from surfacechem.compile.cache import code_file
+from surfacechem.compile.preparing import PREPARING
+from surfacechem.compile.vectors import LANES, NUMBER, VECTOR, Code, function_body, loaded, object_code
+from surfacechem.documents.cache_folder import from_file
+from surfacechem.expressions import derivative, gradient
+
+if TYPE_CHECKING:
+    from surfacechem.compile.program import Function
+
+_Constant: Any = ir.Constant
+_WORD: Any = ir.IntType(64)
+_HEAD = 5
+"""Words before those of the loops: results, and of the rest how many, code, user data and the table of its places."""
+_OF_LOOP = 5
+"""Words of a loop: cases, and the tables of what all read, of what each reads, of its numbers and of its place."""
+
+
+@dataclass(frozen=True)
+class Form:
+    """Functions of what all of a loop read, of what each reads, and of its numbers."""
+
+    expressions: tuple[Any, ...]
+    shared: tuple[Any, ...]
+    own: tuple[Any, ...]
+    numbers: tuple[Any, ...]
+
+
+    @property
+    def has_code(self) -> bool:
+        """Whether each case reads what is its own, by functions that have, with their derivatives, code for vectors."""
+        slopes = (slope for row in self.expressions for slope in gradient(row).values())
+        return bool(self.own) and all(map(vectors.has_code, (*self.expressions, *slopes)))
+
+
+@dataclass(frozen=True)
+class Loop:
+    """The cases of a form: for each the inputs that it reads, its numbers, and the results to which it is added."""
+
+    form: Form
+    own: list[tuple[int, ...]] = field(default_factory=list)
+    numbers: list[tuple[float, ...]] = field(default_factory=list)
+    places: list[list[int]] = field(default_factory=list)
+
+    def tables(self, inputs: Mapping[Any, int]) -> tuple[NDArray[Any], ...]:
+        """What all read, and by vectors of cases what each reads, its numbers and its places."""
+        count = -(-len(self.places) // LANES)
+
+        def by_vectors(rows: Sequence[Any], kind: type) -> NDArray[Any]:
+            table: NDArray[Any] = np.array([*rows, *[rows[-1]] * (count * LANES - len(rows))], kind)
+            return np.ascontiguousarray(table.reshape(count, LANES, -1).swapaxes(1, 2))
+
+        shared = np.array([inputs[symbol] for symbol in self.form.shared], np.int64)
+        return shared, by_vectors(self.own, np.int64), by_vectors(self.numbers, float), np.array(self.places, np.int64)
+
+    def slopes(self, inputs: Mapping[Any, int], places: Mapping[tuple[int, int], int]) -> Loop:
+        """Derivatives of rows by all inputs, as far as these have ``places``, by row and input."""
+        (row,), shared = self.form.expressions, tuple(inputs[symbol] for symbol in self.form.shared)
+        variables = {place for _, place in places}
+        symbols = enumerate((*self.form.own, *self.form.shared))
+        by = {k: derivative(row, x) for k, x in symbols if x in self.form.own or inputs[x] in variables}
+        by = {k: slope for k, slope in by.items() if slope != 0}
+        rows = [[places[i, (own + shared)[k]] for k in by] for own, (i,) in zip(self.own, self.places, strict=True)]
+        return Loop(replace(self.form, expressions=tuple(by.values())), self.own, self.numbers, rows)
+
+
+Found = tuple[str, tuple[int, ...], tuple[float, ...]]
+"""A form as text, and what stands in it from left to right: places of inputs, and numbers."""
+
+
+class _Forms:
+    """The forms of expressions: which they share, and what each puts into its form."""
+
+    def __init__(self, inputs: Sequence[Any], own: Collection[Any]) -> None:
+        self.places = {symbol: place for place, symbol in enumerate(inputs) if symbol in own}
+        self._known: dict[Any, Found] = {symbol: ("x", (place,), ()) for symbol, place in self.places.items()}
+
+    def of(self, part: Any) -> Found:
+        """The form of a part."""
+        found = self._known.get(part)
+        if found is not None:
+            return found
+        kind = type(part).__name__
+        if kind == "RealDouble":
+            return "c", (), (float(part),)
+        if kind in _IN_ANY_ORDER:
+            texts, own, numbers = zip(*sorted(map(self.of, part.args)), strict=True)
+            found = f"{kind}({', '.join(texts)})", tuple(chain(*own)), tuple(chain(*numbers))
+        else:
+            found = self._whole(part)
+        self._known[part] = found
+        return found
+
+    def _whole(self, part: Any) -> Found:
+        """The form of what is no sum or product: its numbers belong to it."""
+        own = self._own(part)
+        form = part.xreplace({x: symengine.Symbol(f"x{k}") for k, x in enumerate(own)})
+        numbers = [float(number).hex() for number in form.atoms(symengine.RealDouble)]
+        return f"{form} {' '.join(sorted(numbers))}", tuple(self.places[x] for x in own), ()
+
+    def _own(self, part: Any) -> list[Any]:
+        return sorted((x for x in part.free_symbols if x in self.places), key=self.places.__getitem__)
+
+    def form(self, part: Any) -> Form:
+        """The function that a part and those that are alike are."""
+        own: dict[Any, Any] = {}
+        numbers: list[Any] = []
+
+        def made(part: Any) -> Any:
+            kind = type(part).__name__
+            if kind == "RealDouble":
+                numbers.append(symengine.Symbol(f"number {len(numbers)}"))
+                return numbers[-1]
+            if kind in _IN_ANY_ORDER:
+                return (symengine.Add if kind == "Add" else symengine.Mul)(*map(made, sorted(part.args, key=self.of)))
+            return part.xreplace({x: own.setdefault(x, symengine.Symbol(f"own {len(own)}")) for x in self._own(part)})
+
+        whole = made(symengine.sympify(part))
+        shared = sorted(whole.free_symbols - {*own.values(), *numbers}, key=str)
+        return Form((whole,), tuple(shared), tuple(own.values()), tuple(numbers))
+
+
+_IN_ANY_ORDER = "Add", "Mul"
+"""Kinds whose arguments are put in an order that those alike have in common: along the cells."""
+
+
+def loops_of(inputs: Sequence[Any], expressions: Sequence[Any], own: Collection[Any]) -> tuple[list[Loop], list[Any]]:
+    """The loops over parts that are alike but for what is their ``own``, and the rest of each expression.
+
+    >>> x = symengine.symbols("x0:20")
+    >>> k = symengine.Symbol("k")
+    >>> rows = [k * (i + 0.5) * (a - b) for i, (a, b) in enumerate(zip(x, x[1:]))]
+    >>> (loop,), rest = loops_of([k, *x], [*rows, k**2], x)
+    >>> loop.form.expressions, len(loop.places), rest[-2:]
+    ((k*(-own 0 + own 1)*number 0,), 19, [0, k**2])
+    """
+    forms, loops = _forms(tuple(inputs), frozenset(own)), dict[tuple[str, tuple[int, ...]], Loop]()
+    parts: list[tuple[Any, Any, int]] = []
+    for place, expression in enumerate(expressions):
+        for term in _terms(expression):
+            text, read, numbers = forms.of(term)
+            first = {x: k for k, x in enumerate(dict.fromkeys(read))}
+            loop = loops.get(key := (text, tuple(first[x] for x in read)))
+            if loop is None:
+                loop = loops[key] = Loop(forms.form(term))
+            loop.own.append(tuple(first))
+            loop.numbers.append(numbers)
+            loop.places.append([place])
+            parts.append((key, term, place))
+    # In an order that does not depend on that of the terms of sums.
+    several = {key: loop for key, loop in sorted(loops.items()) if len(loop.places) >= LANES and loop.form.has_code}
+    rest: list[list[Any]] = [[] for _ in expressions]
+    for key, term, place in parts:
+        if key not in several:
+            rest[place].append(term)
+    return [*several.values()], [symengine.Add(*terms) for terms in rest]
+
+
+@lru_cache(maxsize=2)
+def _forms(inputs: tuple[Any, ...], own: frozenset[Any]) -> _Forms:
+    """Which all functions of a scene share."""
+    return _Forms(inputs, own)
+
+
+def _terms(expression: Any) -> Sequence[Any]:
+    """The terms of a long sum, or the expression."""
+    if expression == 0:
+        return ()
+    args = expression.args if type(expression).__name__ == "Add" else ()
+    return args if len(args) > LANES else (expression,)
+
+
+class Alike:
+    """The code of loops with the tables that it reads, and the code of the rest."""
+
+    def __init__(
+        self, inputs: Sequence[Any], loops: Sequence[Loop], rest: Sequence[Any], code: Function | None
+    ) -> None:
+        left = np.array([place for place, expression in enumerate(rest) if expression != 0], np.int64)
+        places = {symbol: place for place, symbol in enumerate(inputs)}
+        tables = [loop.tables(places) for loop in loops]
+        head = [len(rest), len(left), *((code.address, code.user) if code else (0, 0)), left.ctypes.data]
+        words = [
+            word
+            for loop, own in zip(loops, tables, strict=True)
+            for word in (len(loop.places), *(table.ctypes.data for table in own))
+        ]
+        self.table = np.array([*head, *words], np.int64)
+        self._engine = _code_of(tuple(loop.form for loop in loops))
+        self._keep = code, left, tables
+        self.address = int(self._engine.get_function_address("f"))
+        self._n_out = len(rest)
+        self._call: Any = ctypes.PYFUNCTYPE(None, *[ctypes.c_void_p] * 3)(self.address)
+
+    def __call__(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The results of rows of inputs."""
+        rows = values.reshape(-1, values.shape[-1])
+        found = np.empty((len(rows), self._n_out))
+        for out, given in zip(found, rows, strict=True):
+            self._call(out.ctypes.data, given.ctypes.data, self.table.ctypes.data)
+        return found.reshape(*values.shape[:-1], self._n_out)
+
+
+@lru_cache(maxsize=64)
+@PREPARING
+def _code_of(forms: tuple[Form, ...]) -> Any:
+    """Code of loops over these forms, and around them that of the rest: ``void f(double *out, const double *inputs,
+    void *user)``, whose user data are the words of the table.
+    """
+
+    def made() -> bytes:
+        code = _Loops()
+        code.nothing()
+        code.rest()
+        for number, form in enumerate(forms):
+            code.loop(form, _HEAD + _OF_LOOP * number)
+        code.builder.ret_void()
+        return object_code(code.builder)
+
+    origins = (str((form.expressions, form.shared, form.own, form.numbers)) for form in forms)
+    return loaded(from_file(code_file([*_sources(), *origins]), made, bytes, bytes))
+
+
+@cache
+def _sources() -> tuple[str, ...]:
+    """The sources by which code is made here."""
+    return tuple(hashlib.sha256(Path(file).read_bytes()).hexdigest() for file in (__file__, vectors.__file__))
+
+
+class _Loops:
+    """The body of the function."""
+
+    def __init__(self) -> None:
+        self.builder = function_body()
+        self.out, self.inputs, self.user = self.builder.function.args
+
+    def nothing(self) -> None:
+        """Results to which all is added."""
+        with self._each(self._word(0)) as i:
+            self.builder.store(NUMBER(0.0), self._entry(self.out, i))
+
+    def rest(self) -> None:
+        """Call the code of what is in no loop."""
+        b = self.builder
+        count, address, user, places = map(self._word, range(1, _HEAD))
+        with b.if_then(b.icmp_signed(">", count, _WORD(0))):
+            values = b.bitcast(b.alloca(NUMBER, count), self.out.type)
+            code = b.inttoptr(address, b.function.ftype.as_pointer())
+            b.call(code, [values, self.inputs, b.inttoptr(user, self.user.type)])
+            with self._each(count) as i:
+                self._add(self._read(places, i, _WORD), self._read(values, i))
+
+    def loop(self, form: Form, head: int) -> None:
+        """Add the values of a form, for as many cases as the words of its loop tell."""
+        b = self.builder
+        count, shared, own, numbers, places = (self._word(head + k) for k in range(_OF_LOOP))
+        known, results = {}, [b.alloca(VECTOR) for _ in form.expressions]
+        for k, symbol in enumerate(form.shared):
+            known[symbol] = self._vector([self._read(self.inputs, self._read(shared, _WORD(k), _WORD))] * LANES)
+        with self._each(b.sdiv(b.add(count, _WORD(LANES - 1)), _WORD(LANES))) as block:
+            first = b.mul(block, _WORD(LANES))
+            for k, symbol in enumerate(form.own):
+                row = b.add(b.mul(first, _WORD(len(form.own))), _WORD(LANES * k))
+                which = [self._read(own, b.add(row, _WORD(lane)), _WORD) for lane in range(LANES)]
+                known[symbol] = self._vector([self._read(self.inputs, place) for place in which])
+            for k, symbol in enumerate(form.numbers):
+                row = b.add(b.mul(first, _WORD(len(form.numbers))), _WORD(LANES * k))
+                known[symbol] = self._read(numbers, row, VECTOR)
+            values = Code(b, known.__getitem__, form.expressions).values
+            for vector, value in zip(results, values, strict=True):
+                b.store(value, vector, align=8)
+            left = b.sub(count, first)
+            with self._each(b.select(b.icmp_signed("<", left, _WORD(LANES)), left, _WORD(LANES))) as lane:
+                row = b.mul(b.add(first, lane), _WORD(len(values)))
+                for k, vector in enumerate(results):
+                    number = self._read(b.bitcast(vector, self.out.type), lane)
+                    self._add(self._read(places, b.add(row, _WORD(k)), _WORD), number)
+
+    def _word(self, place: int) -> Any:
+        return self._read(self.user, _WORD(place), _WORD)
+
+    def _entry(self, start: Any, place: Any, kind: Any = NUMBER) -> Any:
+        """A pointer to a word or a number, so many behind a pointer or an address."""
+        start = start if start.type == self.out.type else self.builder.inttoptr(start, self.out.type)
+        entry = self.builder.gep(start, [self.builder.mul(place, _WORD(8))])
+        return self.builder.bitcast(entry, kind.as_pointer())
+
+    def _read(self, start: Any, place: Any, kind: Any = NUMBER) -> Any:
+        return self.builder.load(self._entry(start, place, kind), align=8)
+
+    def _add(self, place: Any, value: Any) -> None:
+        entry = self._entry(self.out, place)
+        self.builder.store(self.builder.fadd(self.builder.load(entry), value), entry)
+
+    def _vector(self, values: Sequence[Any]) -> Any:
+        found = _Constant(VECTOR, ir.Undefined)
+        for lane, value in enumerate(values):
+            found = self.builder.insert_element(found, value, ir.IntType(32)(lane))
+        return found
+
+    @contextmanager
+    def _each(self, count: Any) -> Iterator[Any]:
+        """Code for each number below a count."""
+        b = self.builder
+        before, test = b.block, b.append_basic_block()
+        b.branch(test)
+        b.position_at_end(test)
+        number = b.phi(count.type)
+        number.add_incoming(_WORD(0), before)
+        body, after = b.append_basic_block(), b.append_basic_block()
+        b.cbranch(b.icmp_signed("<", number, count), body, after)
+        b.position_at_end(body)
+        yield number
+        number.add_incoming(b.add(number, _WORD(1)), b.block)
+        b.branch(test)
+        b.position_at_end(after)
