@@ -49,7 +49,6 @@ class Form:
     own: tuple[Any, ...]
     numbers: tuple[Any, ...]
 
-
     @property
     def has_code(self) -> bool:
         """Whether each case reads what is its own, by functions that have, with their derivatives, code for vectors."""
