@@ -43,8 +43,8 @@ SPARE, FASTEST = 3.0, 16.0
 by which cells are multiplied at once."""
 
 MOST_CHOSEN = 1024
-"""Cells across a body at most that an accuracy chooses: the time to compile two bodies of them is some seconds, and
-grows with their square."""
+"""Cells across a body at most that an accuracy chooses: two bodies of them take a second to get ready, each of the
+several times that errors are looked for."""
 
 TRIALS = 6
 """Grids after which a search for an accuracy ends; two or three are the rule."""
