@@ -117,7 +117,9 @@ def _formulation(build: Build, d: Direction, mount: Held | None, elastic: bool) 
     rate_dependent = any(_feels_velocity(law, d) for law in laws)
     rate_dependent = rate_dependent or (not elastic and mount is not None and mount.damped)
     sticks = any(law.has_limit for law in laws)
-    alone = not elastic and not rate_dependent and mount is not None and mount.quasi_static
+    # An elastic gap carries the load while it sticks. Bonds that break may leave friction that holds it again.
+    holds = elastic and (not sticks or any(law.breaks_bonds for law in laws))
+    alone = not (holds or rate_dependent) and mount is not None and mount.quasi_static
     dead_load = alone and not (mount.law.k or in_parallel(build))  # type: ignore[union-attr]
     return Formulation(d, mount, elastic, sticks, rate_dependent, dead_load, bool(laws) or not elastic)
 

@@ -248,12 +248,17 @@ def _balance(
         if limit is None:
             message = "nothing resists the far-field traction F_t. Give the tangential mounting k, m or a damper."
             raise InputError(message, PLACE)
-        reason = "the dead load exceeds what sticking bears, and nothing holds what slides; a mass or a stiffness would"
-        yield Margin("sticks", limit - absolute(far.force(u, NONE) - t_a - carried), reason)
+        yield _sticks(limit, far.force(u, NONE) - t_a - carried)
     else:
         stiffness = far.k if far.k != 0 else 1
         yield from far.balance(build, rate, tractions, active=slides, held=stiffness * du, slides=1)
     return False
+
+
+def _sticks(limit: Expression, needed: Expression) -> Margin:
+    """A traction that nothing else carries may not exceed what sticking bears."""
+    reason = "the dead load exceeds what sticking bears, and nothing holds what slides; a mass or a stiffness would"
+    return Margin("sticks", limit - absolute(needed), reason)
 
 
 def _elastic_rows(
@@ -264,6 +269,8 @@ def _elastic_rows(
     if kind.rate_dependent:
         build.rows.kinematics("g_t", rate - v)
         return (yield from _sliding_row(build, kind, slides, t_e - t_f))
+    if kind.dead_load:
+        yield _sticks(build.motion.stick_limits["t"], t_e)
     residual = t_f - t_e
     build.rows.equilibrium("g_t", build.total_derivative(residual), slides, dg - rate)
     size = absolute(t_e) + absolute(t_f)
