@@ -57,7 +57,7 @@ class Form:
 
 
 @dataclass(frozen=True)
-class Loop:
+class Repeated:
     """The cases of a form: for each the inputs that it reads, its numbers, and the results to which it is added."""
 
     form: Form
@@ -76,7 +76,7 @@ class Loop:
         shared = np.array([inputs[symbol] for symbol in self.form.shared], np.int64)
         return shared, by_vectors(self.own, np.int64), by_vectors(self.numbers, float), np.array(self.places, np.int64)
 
-    def slopes(self, inputs: Mapping[Any, int], places: Mapping[tuple[int, int], int]) -> Loop:
+    def slopes(self, inputs: Mapping[Any, int], places: Mapping[tuple[int, int], int]) -> Repeated:
         """Derivatives of rows by all inputs, as far as these have ``places``, by row and input."""
         (row,), shared = self.form.expressions, tuple(inputs[symbol] for symbol in self.form.shared)
         variables = {place for _, place in places}
@@ -84,7 +84,7 @@ class Loop:
         by = {k: derivative(row, x) for k, x in symbols if x in self.form.own or inputs[x] in variables}
         by = {k: slope for k, slope in by.items() if slope != 0}
         rows = [[places[i, (own + shared)[k]] for k in by] for own, (i,) in zip(self.own, self.places, strict=True)]
-        return Loop(replace(self.form, expressions=tuple(by.values())), self.own, self.numbers, rows)
+        return Repeated(replace(self.form, expressions=tuple(by.values())), self.own, self.numbers, rows)
 
 
 Found = tuple[str, tuple[int, ...], tuple[float, ...]]
@@ -117,7 +117,7 @@ class _Forms:
     def _whole(self, part: Any) -> Found:
         """The form of what is no sum or product: its numbers belong to it."""
         own = self._own(part)
-        form = part.xreplace({x: symengine.Symbol(f"x{k}") for k, x in enumerate(own)})
+        form = part.xreplace({x: symengine.Symbol(f"x {k}") for k, x in enumerate(own)})
         numbers = [float(number).hex() for number in form.atoms(symengine.RealDouble)]
         return f"{form} {' '.join(sorted(numbers))}", tuple(self.places[x] for x in own), ()
 
@@ -147,7 +147,9 @@ _IN_ANY_ORDER = "Add", "Mul"
 """Kinds whose arguments are put in an order that those alike have in common: along the cells."""
 
 
-def loops_of(inputs: Sequence[Any], expressions: Sequence[Any], own: Collection[Any]) -> tuple[list[Loop], list[Any]]:
+def loops_of(
+    inputs: Sequence[Any], expressions: Sequence[Any], own: Collection[Any]
+) -> tuple[list[Repeated], list[Any]]:
     """The loops over parts that are alike but for what is their ``own``, and the rest of each expression.
 
     >>> x = symengine.symbols("x0:20")
@@ -157,7 +159,7 @@ def loops_of(inputs: Sequence[Any], expressions: Sequence[Any], own: Collection[
     >>> loop.form.expressions, len(loop.places), rest[-2:]
     ((k*(-own 0 + own 1)*number 0,), 19, [0, k**2])
     """
-    forms, loops = _forms(tuple(inputs), frozenset(own)), dict[tuple[str, tuple[int, ...]], Loop]()
+    forms, loops = _forms(tuple(inputs), frozenset(own)), dict[tuple[str, tuple[int, ...]], Repeated]()
     parts: list[tuple[Any, Any, int]] = []
     for place, expression in enumerate(expressions):
         for term in _terms(expression):
@@ -165,7 +167,7 @@ def loops_of(inputs: Sequence[Any], expressions: Sequence[Any], own: Collection[
             first = {x: k for k, x in enumerate(dict.fromkeys(read))}
             loop = loops.get(key := (text, tuple(first[x] for x in read)))
             if loop is None:
-                loop = loops[key] = Loop(forms.form(term))
+                loop = loops[key] = Repeated(forms.form(term))
             loop.own.append(tuple(first))
             loop.numbers.append(numbers)
             loop.places.append([place])
@@ -197,7 +199,7 @@ class Alike:
     """The code of loops with the tables that it reads, and the code of the rest."""
 
     def __init__(
-        self, inputs: Sequence[Any], loops: Sequence[Loop], rest: Sequence[Any], code: Function | None
+        self, inputs: Sequence[Any], loops: Sequence[Repeated], rest: Sequence[Any], code: Function | None
     ) -> None:
         left = np.array([place for place, expression in enumerate(rest) if expression != 0], np.int64)
         places = {symbol: place for place, symbol in enumerate(inputs)}
