@@ -58,33 +58,41 @@ class Form:
 
 @dataclass(frozen=True)
 class Repeated:
-    """The cases of a form: for each the inputs that it reads, its numbers, and the results to which it is added."""
+    """The cases of a form, one behind the other: the inputs that each reads, its numbers, and the results to which it
+    is added.
+    """
 
     form: Form
-    own: list[tuple[int, ...]] = field(default_factory=list)
-    numbers: list[tuple[float, ...]] = field(default_factory=list)
-    places: list[list[int]] = field(default_factory=list)
+    own: list[int] = field(default_factory=list)
+    numbers: list[float] = field(default_factory=list)
+    places: list[int] = field(default_factory=list)
+
+    @property
+    def count(self) -> int:
+        return len(self.places) // len(self.form.expressions)
 
     def tables(self, inputs: Mapping[Any, int]) -> tuple[NDArray[Any], ...]:
         """What all read, and by vectors of cases what each reads, its numbers and its places."""
-        count = -(-len(self.places) // LANES)
+        vectors = -(-self.count // LANES)
 
-        def by_vectors(rows: Sequence[Any], kind: type) -> NDArray[Any]:
-            table: NDArray[Any] = np.array([*rows, *[rows[-1]] * (count * LANES - len(rows))], kind)
-            return np.ascontiguousarray(table.reshape(count, LANES, -1).swapaxes(1, 2))
+        def by_vectors(values: Sequence[Any], kind: type) -> NDArray[Any]:
+            rows: NDArray[Any] = np.array(values, kind).reshape(self.count, -1)
+            table = np.pad(rows, ((0, vectors * LANES - self.count), (0, 0)), "edge")
+            return np.ascontiguousarray(table.reshape(vectors, LANES, -1).swapaxes(1, 2))
 
         shared = np.array([inputs[symbol] for symbol in self.form.shared], np.int64)
         return shared, by_vectors(self.own, np.int64), by_vectors(self.numbers, float), np.array(self.places, np.int64)
 
     def slopes(self, inputs: Mapping[Any, int], places: Mapping[tuple[int, int], int]) -> Repeated:
         """Derivatives of rows by all inputs, as far as these have ``places``, by row and input."""
-        (row,), shared = self.form.expressions, tuple(inputs[symbol] for symbol in self.form.shared)
+        (row,), shared = self.form.expressions, [inputs[symbol] for symbol in self.form.shared]
         variables = {place for _, place in places}
         symbols = enumerate((*self.form.own, *self.form.shared))
         by = {k: derivative(row, x) for k, x in symbols if x in self.form.own or inputs[x] in variables}
         by = {k: slope for k, slope in by.items() if slope != 0}
-        rows = [[places[i, (own + shared)[k]] for k in by] for own, (i,) in zip(self.own, self.places, strict=True)]
-        return Repeated(replace(self.form, expressions=tuple(by.values())), self.own, self.numbers, rows)
+        cases = zip(np.array(self.own).reshape(self.count, -1).tolist(), self.places, strict=True)
+        found = [places[i, (own + shared)[k]] for own, i in cases for k in by]
+        return Repeated(replace(self.form, expressions=tuple(by.values())), self.own, self.numbers, found)
 
 
 Found = tuple[str, tuple[int, ...], tuple[float, ...]]
@@ -156,28 +164,31 @@ def loops_of(
     >>> k = symengine.Symbol("k")
     >>> rows = [k * (i + 0.5) * (a - b) for i, (a, b) in enumerate(zip(x, x[1:]))]
     >>> (loop,), rest = loops_of([k, *x], [*rows, k**2], x)
-    >>> loop.form.expressions, len(loop.places), rest[-2:]
+    >>> loop.form.expressions, loop.count, rest[-2:]
     ((k*(-own 0 + own 1)*number 0,), 19, [0, k**2])
     """
     forms, loops = _forms(tuple(inputs), frozenset(own)), dict[tuple[str, tuple[int, ...]], Repeated]()
-    parts: list[tuple[Any, Any, int]] = []
+    members: dict[tuple[str, tuple[int, ...]], list[Any]] = {}
     for place, expression in enumerate(expressions):
         for term in _terms(expression):
             text, read, numbers = forms.of(term)
             first = {x: k for k, x in enumerate(dict.fromkeys(read))}
-            loop = loops.get(key := (text, tuple(first[x] for x in read)))
+            key = text, tuple(map(first.__getitem__, read))
+            loop = loops.get(key)
             if loop is None:
-                loop = loops[key] = Repeated(forms.form(term))
-            loop.own.append(tuple(first))
-            loop.numbers.append(numbers)
-            loop.places.append([place])
-            parts.append((key, term, place))
+                loop, members[key] = Repeated(forms.form(term)), []
+                loops[key] = loop
+            loop.own.extend(first)
+            loop.numbers.extend(numbers)
+            loop.places.append(place)
+            members[key].append(term)
     # In an order that does not depend on that of the terms of sums.
-    several = {key: loop for key, loop in sorted(loops.items()) if len(loop.places) >= LANES and loop.form.has_code}
+    several = {key: loop for key, loop in sorted(loops.items()) if loop.count >= LANES and loop.form.has_code}
     rest: list[list[Any]] = [[] for _ in expressions]
-    for key, term, place in parts:
+    for key, loop in loops.items():
         if key not in several:
-            rest[place].append(term)
+            for place, term in zip(loop.places, members[key], strict=True):
+                rest[place].append(term)
     return [*several.values()], [symengine.Add(*terms) for terms in rest]
 
 
@@ -208,7 +219,7 @@ class Alike:
         words = [
             word
             for loop, own in zip(loops, tables, strict=True)
-            for word in (len(loop.places), *(table.ctypes.data for table in own))
+            for word in (loop.count, *(table.ctypes.data for table in own))
         ]
         self.table = np.array([*head, *words], np.int64)
         self._engine = _code_of(tuple(loop.form for loop in loops))

@@ -440,39 +440,43 @@ def _entries(
 
 
 def _slopes(
-    inputs: Sequence[Any],
-    residual: Sequence[Any],
-    variables: Sequence[Any],
-    chains: Sequence[Chain],
-    named: Named,
+    inputs: Sequence[Any], residual: Sequence[Any], variables: Sequence[Any], named: Named
 ) -> tuple[Function, NDArray[np.int64]]:
     """The code of the Jacobian, and the places of the derivatives that it forms where these are not all."""
-    n, named = len(residual), needed(named, residual)
-    every, places = dict(enumerate(_derivatives(n, chains))), np.empty(0, np.int64)
-    if chains or len(every) >= SPARSE:
-        depends = _depends(residual, variables, named)
-        every = {place: (i, j) for place, (i, j) in every.items() if j in depends[i]}
-        places = np.array([*every], np.int64)
-    wanted = tuple(every.values())
-    if chains:
-        return _chained_slopes(inputs, residual, chains[0].first, named, wanted), places
+    named = needed(named, residual)
+    wanted, places = tuple(_derivatives(len(residual), ())), np.empty(0, np.int64)
+    if len(wanted) >= SPARSE:
+        wanted, places = _nonzeros(residual, variables, (), named)
     parts = _Derivatives(tuple(residual), tuple(variables), tuple(named), wanted)
     return _machine_code(tuple(inputs), parts, _level(len(parts), steps=True)), places
 
 
-def _chained_slopes(
-    inputs: Sequence[Any], residual: Sequence[Any], core: int, named: Named, wanted: Sequence[tuple[int, int]]
-) -> Function:
-    """The code of derivatives where there are chains, whose equations are differentiated by their forms."""
+def _nonzeros(
+    residual: Sequence[Any], variables: Sequence[Any], chains: Sequence[Chain], named: Named
+) -> tuple[tuple[tuple[int, int], ...], NDArray[np.int64]]:
+    """Equation and variable of the derivatives that may not be zero, and their places."""
+    depends = _depends(residual, variables, named)
+    every = {k: (i, j) for k, (i, j) in enumerate(_derivatives(len(residual), chains)) if j in depends[i]}
+    return tuple(every.values()), np.array([*every], np.int64)
+
+
+def _chained(
+    inputs: Sequence[Any], residual: Sequence[Any], variables: Sequence[Any], chains: Sequence[Chain], named: Named
+) -> tuple[Function, Function, NDArray[np.int64]]:
+    """The code of the equations and of their Jacobian where there are chains, whose forms are differentiated once; and
+    the places of its derivatives.
+    """
     from surfacechem.compile.alike import loops_of
 
-    n = len(residual)
-    rows = [symengine.Integer(0)] * core + expanded(named, residual[core:])
-    loops, rest = loops_of(inputs, rows, own_of_chains(inputs, core, n))
+    core, named, whole = chains[0].first, needed(named, residual), expanded(named, residual)
+    others = [symengine.Integer(0)] * core
+    loops, rest = loops_of(inputs, others + whole[core:], own_of_chains(inputs, core, len(residual)))
+    wanted, nonzeros = _nonzeros(residual, variables, chains, named)
     places = {(i, 1 + j): place for place, (i, j) in enumerate(wanted)}
-    left = _entries([*residual[:core], *rest[core:]], inputs[1 : 1 + 2 * n], named, wanted)
     known = {symbol: place for place, symbol in enumerate(inputs)}
-    return _looped(inputs, [loop.slopes(known, places) for loop in loops], left)
+    left = _entries([*residual[:core], *rest[core:]], variables, named, wanted)
+    slopes = _looped(inputs, [loop.slopes(known, places) for loop in loops], left)
+    return _looped(inputs, loops, [*whole[:core], *rest[core:]]), slopes, nonzeros
 
 
 def own_of_chains(inputs: Sequence[Any], core: int, n: int) -> set[Any]:
@@ -501,10 +505,14 @@ def compile_program(
         raise ValueError(f"{counts}: a system needs as many equations as states, and one derivative a state.")
     inputs = [t, *states, *derivatives, *parameters]
     n, core = len(states), chains[0].first if chains else len(states)
-    own = own_of_chains(inputs, core, n)
-    slopes, nonzeros = _slopes(inputs, residual, [*states, *derivatives], chains, named)
-    residual, ledger, margins = (expanded(named, rows) for rows in (residual, ledger, margins))
-    known = {symbol for row in residual[:core] for symbol in row.free_symbols}
+    own, variables = own_of_chains(inputs, core, n), [*states, *derivatives]
+    if chains:
+        equations, slopes, nonzeros = _chained(inputs, residual, variables, chains, named)
+    else:
+        slopes, nonzeros = _slopes(inputs, residual, variables, named)
+        equations = compile_function(inputs, expanded(named, residual), steps=True)
+    residual, ledger, margins = (expanded(named, rows) for rows in (residual[:core], ledger, margins))
+    known = {symbol for row in residual for symbol in row.free_symbols}
     read = {symbol for margin in margins for symbol in margin.free_symbols}
     outside = {inputs[j] for j in filler.positions} if filler else set()
     return Program(
@@ -512,7 +520,7 @@ def compile_program(
         n_parameters=len(parameters),
         n_ledger=len(ledger),
         n_margins=len(margins),
-        residual=compile_function(inputs, residual, own, steps=True),
+        residual=equations,
         jacobian=slopes,
         ledger=compile_function(inputs, ledger, own, steps=True) if ledger else None,
         margins=compile_function(inputs, margins, own, steps=True) if margins else None,

@@ -37,7 +37,7 @@ def test_loops_are_what_each_expression_is(count):
 def test_what_is_alike_is_one_form_along_the_cells():
     x, expressions = cells(50)
     loops, rest = loops_of([T, k, *x], expressions, x)
-    assert [len(loop.places) for loop in loops] == [49, 49, 50]
+    assert [loop.count for loop in loops] == [49, 49, 50]
     assert [place for place, item in enumerate(rest) if item != 0] == [50, 51]
 
 
