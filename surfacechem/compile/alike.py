@@ -57,7 +57,7 @@ class Form:
 
 
 @dataclass(frozen=True)
-class Repeated:
+class FormLoop:
     """The cases of a form, one behind the other: the inputs that each reads, its numbers, and the results to which it
     is added.
     """
@@ -83,7 +83,7 @@ class Repeated:
         shared = np.array([inputs[symbol] for symbol in self.form.shared], np.int64)
         return shared, by_vectors(self.own, np.int64), by_vectors(self.numbers, float), np.array(self.places, np.int64)
 
-    def slopes(self, inputs: Mapping[Any, int], places: Mapping[tuple[int, int], int]) -> Repeated:
+    def slopes(self, inputs: Mapping[Any, int], places: Mapping[tuple[int, int], int]) -> FormLoop:
         """Derivatives of rows by all inputs, as far as these have ``places``, by row and input."""
         (row,), shared = self.form.expressions, [inputs[symbol] for symbol in self.form.shared]
         variables = {place for _, place in places}
@@ -92,7 +92,7 @@ class Repeated:
         by = {k: slope for k, slope in by.items() if slope != 0}
         cases = zip(np.array(self.own).reshape(self.count, -1).tolist(), self.places, strict=True)
         found = [places[i, (own + shared)[k]] for own, i in cases for k in by]
-        return Repeated(replace(self.form, expressions=tuple(by.values())), self.own, self.numbers, found)
+        return FormLoop(replace(self.form, expressions=tuple(by.values())), self.own, self.numbers, found)
 
 
 Found = tuple[str, tuple[int, ...], tuple[float, ...]]
@@ -157,7 +157,7 @@ _IN_ANY_ORDER = "Add", "Mul"
 
 def loops_of(
     inputs: Sequence[Any], expressions: Sequence[Any], own: Collection[Any]
-) -> tuple[list[Repeated], list[Any]]:
+) -> tuple[list[FormLoop], list[Any]]:
     """The loops over parts that are alike but for what is their ``own``, and the rest of each expression.
 
     >>> x = symengine.symbols("x0:20")
@@ -167,7 +167,7 @@ def loops_of(
     >>> loop.form.expressions, loop.count, rest[-2:]
     ((k*(-own 0 + own 1)*number 0,), 19, [0, k**2])
     """
-    forms, loops = _forms(tuple(inputs), frozenset(own)), dict[tuple[str, tuple[int, ...]], Repeated]()
+    forms, loops = _forms(tuple(inputs), frozenset(own)), dict[tuple[str, tuple[int, ...]], FormLoop]()
     members: dict[tuple[str, tuple[int, ...]], list[Any]] = {}
     for place, expression in enumerate(expressions):
         for term in _terms(expression):
@@ -176,7 +176,7 @@ def loops_of(
             key = text, tuple(map(first.__getitem__, read))
             loop = loops.get(key)
             if loop is None:
-                loop, members[key] = Repeated(forms.form(term)), []
+                loop, members[key] = FormLoop(forms.form(term)), []
                 loops[key] = loop
             loop.own.extend(first)
             loop.numbers.extend(numbers)
@@ -210,7 +210,7 @@ class Alike:
     """The code of loops with the tables that it reads, and the code of the rest."""
 
     def __init__(
-        self, inputs: Sequence[Any], loops: Sequence[Repeated], rest: Sequence[Any], code: Function | None
+        self, inputs: Sequence[Any], loops: Sequence[FormLoop], rest: Sequence[Any], code: Function | None
     ) -> None:
         left = np.array([place for place, expression in enumerate(rest) if expression != 0], np.int64)
         places = {symbol: place for place, symbol in enumerate(inputs)}

@@ -26,7 +26,7 @@ from surfacechem.documents.cache_folder import from_file
 from surfacechem.expressions import derivative, gradient
 
 if TYPE_CHECKING:
-    from surfacechem.compile.alike import Repeated
+    from surfacechem.compile.alike import FormLoop
     from surfacechem.compile.vectors import LaneFunction
 
 CODE = ctypes.PYFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
@@ -259,7 +259,7 @@ def compile_function(
     return _looped(inputs, *loops_of(inputs, expressions, own))
 
 
-def _looped(inputs: Sequence[Any], loops: Sequence["Repeated"], rest: Sequence[Any]) -> Function:
+def _looped(inputs: Sequence[Any], loops: Sequence["FormLoop"], rest: Sequence[Any]) -> Function:
     """The code of loops and of what is in none."""
     from surfacechem.compile.alike import Alike
 
