@@ -230,10 +230,19 @@ def _least(trajectory: Trajectory) -> dict[str, float]:
     for j in system.account_columns.get("entropy production", ()):
         rates = values.get(f"sigma_{system.ledger[j].law}", np.empty(0))
         if len(rates):
-            # A law that ends the run may have no value there, or that of a point beyond its end by rounding.
-            ended = trajectory.status == "stopped" and len(rates) > 1
-            least[system.ledger[j].law] = float((rates[:-1] if ended else rates).min())
+            past = _is_past_its_end(trajectory, rates[-1]) and len(rates) > 1
+            least[system.ledger[j].law] = float((rates[:-1] if past else rates).min())
     return least
+
+
+def _is_past_its_end(trajectory: Trajectory, value: float) -> bool:
+    """Whether the last point tells nothing of a law's production, since the run stopped there where a law may end: it
+    has no value, or is at the same instant as the point before, on either side of the end by rounding.
+    """
+    steps = trajectory.result.steps
+    at_once = SLACK * trajectory.run.rtol
+    brief = steps is not None and len(steps.t) > 1 and bool(steps.t[-1] - steps.t[-2] <= at_once * steps.t[-1])
+    return trajectory.status == "stopped" and (brief or not np.isfinite(value))
 
 
 def _losses(trajectory: Trajectory, least: Mapping[str, float], stored: float) -> tuple[Mapping[str, float], float]:
@@ -254,8 +263,8 @@ def _destroyed(trajectory: Trajectory, laws: list[str], stored: float) -> float:
         points = result.steps
     ledger = points.ledger.copy()
     rates = np.array([trajectory.within_bounds[f"sigma_{law}"][-len(points.t) :] for law in laws]).sum(axis=0)
-    if trajectory.status == "stopped":  # where a law may end, and have no value
-        rates[-1:], ledger[-1:] = 0.0, ledger[-2:][:1]
+    if len(rates) > 1 and _is_past_its_end(trajectory, rates[-1] + ledger[-1].sum()):
+        rates[-1], ledger[-1] = 0.0, ledger[-2]
     columns = [j for j, a in enumerate(accounts) if a.kind == "entropy production" and a.law in laws]
     booked, lengths = np.diff(ledger[:, columns].sum(axis=1)), np.diff(points.t)
     # The end of a step tells of it, but for the first of an arc: between arcs production may jump.

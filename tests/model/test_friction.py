@@ -8,6 +8,7 @@ from scenes import SITES, together
 from scipy.integrate import solve_ivp
 from solved import closed
 
+import surfacechem
 from surfacechem.errors import InputError
 from surfacechem.laws.cohesive import AdhesionIntensity, AdhesionLoss, ExponentialCohesiveZone, XuNeedleman
 from surfacechem.laws.contact import Penalty, TangentialStiffness
@@ -242,3 +243,21 @@ def test_what_two_directions_do_not_know_is_refused():
         assemble(at_an_angle([ZONE], (Coulomb(mu=MU),), STIFF))
     with pytest.raises(InputError, match="elastic gap g_t of its potential has one"):
         assemble(at_an_angle([Penalty(E_n=E_N), TangentialStiffness(E_t=1e12)], (Coulomb(mu=MU),), HEAVY))
+
+
+def test_a_dead_load_on_an_elastic_gap_ends_where_sticking_gives_way():
+    found = surfacechem.run(
+        """
+        T_0: 300 K
+        bodies: {lower: {temperature: 300 K}, upper: {temperature: 300 K}}
+        interface:
+          temperature: 300 K
+          potential: [{tangential-stiffness: {E_t: 1 GPa/mm}}]
+          friction: [{coulomb: {mu: 0.5}}]
+        loading: {p: 2 MPa, F_t: {ramp: {start: 0 MPa, rate: 1 MPa/s}}}
+        run: {until: 2 s}
+        """
+    )
+    assert found.status == "stopped"
+    assert "the dead load exceeds what sticking bears" in found.reason
+    assert found.trajectory.result.t == pytest.approx(1.0, rel=1e-9)

@@ -1,12 +1,16 @@
 """What the audit says of laws that destroy entropy: judged by what each turns over, in runs and in sweeps alike."""
 
+import math
 from dataclasses import replace
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from case_runs import solved
 
 import surfacechem
 from surfacechem.format import load_text
+from surfacechem.results import audit
 from surfacechem.runs.simulation import Simulation
 
 BURST = """
@@ -79,3 +83,42 @@ def test_a_balance_that_is_open_is_told(name, scale):
     assert audit.findings == ()
     off = getattr(audit, name) + 1e-3 * getattr(audit, scale)
     assert replace(audit, **{name: off}).findings == (f"the balance of {name} is open by 1.0e-03",)
+
+
+FILM = """
+T_0: 300 K
+bodies: {{lower: {{temperature: 300 K}}, upper: {{temperature: 300 K}}}}
+interface:
+  temperature: 300 K
+  sites: 1e18 1/m^2
+  potential: [{{bond-energy: {{K_0: 0.8 J/m^2, phi_eq: 1}}}}]
+  bonding: [{{mass-action: {{k_on: 0 1/s, k_off: 0.1 1/s}}}}]
+  friction: [{{viscous: {{eta: 1 Pa s}}}}]
+loading: {{g_n: {{ramp: {{start: 1 um, rate: -1 um/s}}}}, v: 1 m/s}}
+initial: {{phi: 1}}
+run: {{until: 2 s, rtol: {rtol}}}
+"""
+"""A film that thins to nothing while bonds break against their potential."""
+
+
+@pytest.mark.parametrize("rtol", [1e-6, 1e-9, 1e-11])
+def test_the_end_of_one_law_hides_no_other(rtol):
+    solution = surfacechem.run(FILM.format(rtol=rtol))
+    assert solution.status == "stopped", solution.reason
+    assert "viscous" in solution.reason
+    assert solution.audit.violations == ("mass_action",)
+
+
+@pytest.mark.parametrize(
+    ("status", "last", "value", "past"),
+    [
+        ("stopped", 1.0 + 1e-10, -5.0, True),  # within the tolerance of time: on either side of the limit by rounding
+        ("stopped", 2.0, -5.0, False),  # what a whole step destroys counts
+        ("stopped", 2.0, math.inf, True),
+        ("finished", 1.0 + 1e-10, -5.0, False),
+    ],
+)
+def test_the_last_point_is_left_out_only_where_a_law_ends(status, last, value, past):
+    steps = SimpleNamespace(t=np.array([0.0, 1.0, last]))
+    trajectory = SimpleNamespace(status=status, run=SimpleNamespace(rtol=1e-9), result=SimpleNamespace(steps=steps))
+    assert audit._is_past_its_end(trajectory, value) is past
