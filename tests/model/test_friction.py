@@ -261,3 +261,49 @@ def test_a_dead_load_on_an_elastic_gap_ends_where_sticking_gives_way():
     assert found.status == "stopped"
     assert "the dead load exceeds what sticking bears" in found.reason
     assert found.trajectory.result.t == pytest.approx(1.0, rel=1e-9)
+
+
+def test_without_a_load_nothing_has_to_be_borne():
+    found = surfacechem.run(
+        """
+        T_0: 300 K
+        bodies: {lower: {temperature: 300 K}, upper: {temperature: 300 K}}
+        interface:
+          temperature: 300 K
+          potential: [{tangential-stiffness: {E_t: 1 GPa/mm}}]
+          friction: [{coulomb: {mu: 0.5}}]
+        loading: {p: {ramp: {start: 0 MPa, rate: 2 MPa/s}}, F_t: {ramp: {start: 0 MPa, rate: 0.9 MPa/s}}}
+        run: {until: 2 s}
+        """
+    )
+    assert found.status == "finished"
+
+
+def a_dead_load_on_bonds(mu_b, mu_ub):
+    """A ramp of 1 MPa/s on an elastic gap under 2 MPa that half of all bonds help to stick."""
+    return surfacechem.run(
+        f"""
+        T_0: 300 K
+        bodies: {{lower: {{temperature: 300 K}}, upper: {{temperature: 300 K}}}}
+        interface:
+          temperature: 300 K
+          sites: 1e18 1/m^2
+          potential: [{{tangential-stiffness: {{E_t: 1 GPa/mm}}}}]
+          friction: [{{bonded-coulomb: {{mu: 0.1, mu_b: {mu_b}, mu_ub: {mu_ub}}}}}]
+          bonding: [{{mass-action: {{k_on: 0 1/s, k_off: 1e-9 1/s}}}}]
+        initial: {{phi: 0.5}}
+        loading: {{p: 2 MPa, F_t: {{ramp: {{start: 0 MPa, rate: 1 MPa/s}}}}}}
+        run: {{until: 2 s}}
+        """
+    )
+
+
+@pytest.mark.parametrize(
+    ("mu_b", "mu_ub", "end", "breaks"), [(0.5, 0.2, 0.7, []), (0.2, 0.5, 1.0, [0.7])], ids=["weaker", "stronger"]
+)
+def test_a_dead_load_is_held_once_more_where_friction_is_larger_without_bonds(mu_b, mu_ub, end, breaks):
+    found = a_dead_load_on_bonds(mu_b, mu_ub)
+    assert "the dead load exceeds what sticking bears" in found.reason
+    assert found.trajectory.result.t == pytest.approx(end, rel=1e-9)
+    assert [jump.t for jump in found.trajectory.jumps] == pytest.approx(breaks, rel=1e-9)
+    assert found.trajectory.result.y[0] == pytest.approx(0.0 if breaks else 0.5, abs=1e-9)

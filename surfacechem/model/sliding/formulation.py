@@ -7,7 +7,7 @@ speed of sliding. What sticking bears is half an axis for each direction: of a l
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import symengine
@@ -117,19 +117,14 @@ def _formulation(build: Build, d: Direction, mount: Held | None, elastic: bool) 
     rate_dependent = any(_feels_velocity(law, d) for law in laws)
     rate_dependent = rate_dependent or (not elastic and mount is not None and mount.damped)
     sticks = any(law.has_limit for law in laws)
-    free = mount is not None and not rate_dependent and _moves_freely(build, mount)
-    dead_load = free and not (elastic and _holds_again(laws))
+    dead_load = mount is not None and not rate_dependent and _moves_freely(build, mount)
+    dead_load = dead_load and (sticks or not elastic)
     return Formulation(d, mount, elastic, sticks, rate_dependent, dead_load, bool(laws) or not elastic)
 
 
 def _moves_freely(build: Build, mount: Held) -> bool:
     """Whether nothing but its load and friction acts on a displacement."""
     return mount.quasi_static and not (mount.law.k or in_parallel(build))
-
-
-def _holds_again(laws: Sequence[Friction]) -> bool:
-    """Whether an elastic gap carries a load always, or may do so again when bonds that break have changed friction."""
-    return not any(law.has_limit for law in laws) or any(law.breaks_bonds for law in laws)
 
 
 def _feels_velocity(law: Friction, d: Direction) -> bool:

@@ -17,7 +17,7 @@ import symengine
 
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, absolute, depends, derivative, norm, sign, where
-from surfacechem.model.automaton import NONE, ONE, Constraint, Equilibrium, Mode, When
+from surfacechem.model.automaton import NONE, ONE, Constraint, Edge, Equilibrium, Mode, When
 from surfacechem.model.balances import MECHANICS, OUTSIDE, WORK, Power
 from surfacechem.model.build import Build, Record
 from surfacechem.model.components.mounting import ACROSS, ALONG, KEYS, FarField, far_field
@@ -224,7 +224,7 @@ def _velocity_state(build: Build, kind: Formulation) -> str:
 
 def _balance(
     build: Build, kind: Formulation, far: FarField, slides: Expression, carried: Expression, t_a: Expression
-) -> Generator[Equilibrium | Margin, None, bool]:
+) -> Generator[Record, None, bool]:
     """Rows of the displacement and its velocity; returns whether this is in proportion to the tractions."""
     name = kind.d.displacement
     u, du = symengine.symbols(f"{name} d{name}_dt")
@@ -248,29 +248,40 @@ def _balance(
         if limit is None:
             message = "nothing resists the far-field traction F_t. Give the tangential mounting k, m or a damper."
             raise InputError(message, PLACE)
-        yield _sticks(limit, far.force(u, NONE) - t_a - carried)
+        yield from _sticks(build, limit, far.force(u, NONE) - t_a - carried)
     else:
         stiffness = far.k if far.k != 0 else 1
         yield from far.balance(build, rate, tractions, active=slides, held=stiffness * du, slides=1)
     return False
 
 
-def _sticks(limit: Expression, needed: Expression) -> Margin:
-    """A traction that nothing else carries may not exceed what sticking bears."""
+def _sticks(build: Build, limit: Expression, needed: Expression) -> Iterator[Margin | Constraint]:
+    """A traction that nothing else carries may not exceed what sticking bears, with its bonds or once they have broken.
+
+    Where it bears more without them they break, and it sticks on.
+    """
+    breaks = breaks_bonds(build)
+    limit = build.expanded(limit)
+    without = limit.subs(breaks)
     reason = "the dead load exceeds what sticking bears, and nothing holds what slides; a mass or a stiffness would"
-    return Margin("sticks", limit - absolute(needed), reason)
+    spare = where(without > limit, without, limit) - absolute(needed)
+    yield Margin("sticks", where(absolute(needed) > 0, spare, 1), reason)
+    if without != limit:
+        spare = where(without > limit, limit - absolute(needed), 1)
+        because = "sticking gives way, and holds again without bonds"
+        yield Constraint(edges=(Edge("slip", spare, because, {}, breaks, heat="local", strict=True),))
 
 
 def _elastic_rows(
     build: Build, kind: Formulation, slides: Expression, t_f: Expression, t_e: Expression, v: Expression
-) -> Generator[Equilibrium | Margin, None, bool]:
+) -> Generator[Record, None, bool]:
     """Rows of the elastic gap and of sliding without inertia; returns whether that is in proportion to tractions."""
     dg, rate = symengine.Symbol("dg_t_dt"), build.motion.gap_rates["u_t"]
     if kind.rate_dependent:
         build.rows.kinematics("g_t", rate - v)
         return (yield from _sliding_row(build, kind, slides, t_e - t_f))
     if kind.dead_load:
-        yield _sticks(build.motion.stick_limits["t"], t_e)
+        yield from _sticks(build, build.motion.stick_limits["t"], t_e)
     residual = t_f - t_e
     build.rows.equilibrium("g_t", build.total_derivative(residual), slides, dg - rate)
     size = absolute(t_e) + absolute(t_f)
