@@ -28,17 +28,28 @@ CLASSES = {"exothermic": 1, "endothermic": -1}
 """Classes of reactions, with the sign of their heat."""
 
 
-@dataclass(frozen=True, repr=False)
-class Solution(Results):
-    """What a run hands back. ``dataset`` is the xarray Dataset; ``write`` saves the same as netCDF."""
+@dataclass(frozen=True)
+class Judgement:
+    """What is known of how far a run is from the truth."""
 
-    trajectory: Trajectory
-    """The run, with its states at the times at which runs are compared."""
     accuracy: Accuracy | None = None
     exact: Callable[[Trajectory], Mapping[str, Array]] | None = None
     """Exact values at the outputs of a run, by variable, where the case has any."""
     notes: tuple[str, ...] = ()
     """What else a reader of the results has to know."""
+
+
+@dataclass(frozen=True, repr=False)
+class Solution(Results):
+    """What a run hands back. ``dataset`` is the xarray Dataset; ``write`` saves the same as netCDF.
+
+    The error of the run, which an exact solution or a second run tells, is found when it is first asked for.
+    """
+
+    trajectory: Trajectory
+    """The run, with its states at the times at which runs are compared."""
+    judge: Callable[[], Judgement] = Judgement
+    """What finds the error of the run."""
     case_run: Run | None = None
     """How the case would be run; where the run was another, the dataset says so."""
     surface: Any = None
@@ -60,6 +71,25 @@ class Solution(Results):
     def reason(self) -> str:
         """Why the run ended."""
         return self.trajectory.reason
+
+    @cached_property
+    def judgement(self) -> Judgement:
+        """How far the run is from the truth, and what tells it."""
+        return self.judge()
+
+    def __getstate__(self) -> dict[str, Any]:
+        """A pickle carries the error itself, not what would find it."""
+        return {**vars(self), "judgement": self.judgement, "judge": Judgement}
+
+    @property
+    def accuracy(self) -> Accuracy | None:
+        """The error of the run, and where it is from."""
+        return self.judgement.accuracy
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What else a reader of the results has to know."""
+        return self.judgement.notes
 
     @cached_property
     def shown(self) -> Trajectory:
@@ -112,8 +142,8 @@ class Solution(Results):
         for law, low in books.least.items():
             text = f"least entropy production of {law.replace('_', ' ')}"
             columns.append(Column(f"least_sigma_{law}", (), np.float64(low), "W/(m^2 K)", text))
-        computed = {column.name: column for column in along}
-        for name, values in (self.exact(trajectory) if self.exact else {}).items():
+        computed, exact = {column.name: column for column in along}, self.judgement.exact
+        for name, values in (exact(trajectory) if exact else {}).items():
             c = computed[name]
             columns.append(Column(f"{name}_exact", c.dimensions, values, c.unit, f"exact {c.long_name}"))
         columns = self._with_errors(columns)

@@ -24,7 +24,7 @@ from surfacechem.results import spatial
 from surfacechem.results.accuracy import Accuracy, CellErrors
 from surfacechem.results.error_estimates import accuracy, check_way, exact_outputs, inexact, of_laws, verified
 from surfacechem.results.event_table import event_times
-from surfacechem.results.solution import Solution
+from surfacechem.results.solution import Judgement, Solution
 from surfacechem.scene import Scene
 from surfacechem.solve import AUTO
 from surfacechem.solve.run import Model, Run, Trajectory, values_of
@@ -241,8 +241,8 @@ class Simulation:
         run
             Other output times, solver and tolerances than the case's.
         error
-            Where the error of the run is from: "auto", the exact solution of the case if there is one, else a second
-            run at a tighter tolerance; "estimate", always a second run; "balances", no second run.
+            Where the error of the run is from, once it is asked for: "auto", the exact solution of the case if there is
+            one, else a second run at a tighter tolerance; "estimate", always a second run; "balances", no second run.
 
         Returns
         -------
@@ -265,27 +265,39 @@ class Simulation:
         estimate: Accuracy | None = None
         if settings.solver == AUTO:
             trajectory, estimate = verified(trajectory)
-        case, unused = chosen.case, self._unused(values)
+        case = chosen.case
+
+        def judged() -> Judgement:
+            return chosen._judged(trajectory, self._unused(values), error, estimate, errors)
+
+        return Solution(
+            trajectory,
+            judge=judged,
+            case_run=case.run,
+            surface=case.scene.surface,
+            error_from=error,
+            **chosen._origin(values),
+        )
+
+    def _judged(
+        self, trajectory: Trajectory, unused: str, way: str, estimate: Accuracy | None, errors: list[CellErrors]
+    ) -> Judgement:
+        """The error of a run in one of the ways, from a second run that there was or from one that is made; ``unused``
+        says why the exact solution does not count, ``errors`` are those of its cells where these are known.
+        """
+        case = self.case
         exact = (case.reference.name, case.reference.options) if case.reference and not unused else None
 
         def added() -> CellErrors:
             if not errors:
-                errors.append(chosen._cell_errors(trajectory))
-            return errors[0].beside(chosen._law_errors(trajectory))
+                errors.append(self._cell_errors(trajectory))
+            return errors[0].beside(self._law_errors(trajectory))
 
-        found = accuracy(trajectory, case.scene, exact, error, added, estimate)
-        if unused and error == "auto":
+        found = accuracy(trajectory, case.scene, exact, way, added, estimate)
+        if unused and way == "auto":
             found = replace(found, source=f"{found.source}; {unused}")
-        return Solution(
-            trajectory,
-            accuracy=found,
-            exact=exact_outputs(found, exact, case.scene),
-            case_run=case.run,
-            surface=case.scene.surface,
-            error_from=error,
-            notes=spatial.missed(case.scene, (errors or [CellErrors()])[0], found),
-            **chosen._origin(values),
-        )
+        notes = spatial.missed(case.scene, (errors or [CellErrors()])[0], found)
+        return Judgement(found, exact_outputs(found, exact, case.scene), notes)
 
     def _origin(self, changes: Mapping[str, float]) -> dict[str, Any]:
         """Where results are from."""

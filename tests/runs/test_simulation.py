@@ -12,6 +12,7 @@ from ruamel.yaml import YAML
 import surfacechem
 from surfacechem.documents import shipped
 from surfacechem.errors import InputError
+from surfacechem.results.error_estimates import accuracy
 from surfacechem.runs import rerun
 
 pytestmark = pytest.mark.around
@@ -96,6 +97,17 @@ def test_a_parameter_at_its_default_is_swept(cure, tmp_path):
     assert cure.sweep({M: [1.0]}).dataset.phi.shape == (1, cure.run({M: 1.0}).dataset.sizes["time"])
     record = rerun.read(swept.write(tmp_path / "swept.nc"))
     assert rerun.differences(record, rerun.run_again(record)) == []
+
+
+def test_the_error_is_found_once_and_when_it_is_asked_for(simulation, monkeypatch):
+    asked = []
+    monkeypatch.setattr("surfacechem.runs.simulation.accuracy", lambda *given: asked.append(given) or accuracy(*given))
+    solution = simulation.run()
+    assert solution.audit.energy_error < 1e-9
+    assert not asked
+    assert solution.accuracy is solution.accuracy
+    assert solution.dataset.error == solution.accuracy.error
+    assert len(asked) == 1
 
 
 @pytest.mark.parametrize("name", ["exothermic", "stick-slip"])
