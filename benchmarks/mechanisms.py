@@ -123,7 +123,6 @@ def by_surface(file: Path, rtol: float) -> Callable[[], np.ndarray]:
 
 def by_reactor(file: Path, rtol: float, longest: float = 0.0) -> Callable[[], np.ndarray]:
     """Coverages of a reactor in Python, whose steps may be limited [s]."""
-
     surface = surface_of(file)
 
     def end() -> np.ndarray:

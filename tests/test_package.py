@@ -61,6 +61,26 @@ def test_the_wheel_runs_by_itself(dist, tmp_path):
     assert float(error) < 1e-8
 
 
+@pytest.mark.slow
+def test_a_wheel_for_a_platform_compiles_nothing_and_computes_the_same(tmp_path):
+    command = [sys.executable, "-m", "build", "--wheel", "--no-isolation", "--outdir", str(tmp_path), str(ROOT)]
+    subprocess.run(command, env={**os.environ, "SURFACECHEM_COMPILE": "1"}, capture_output=True, check=True)
+    (path,) = tmp_path.glob("*.whl")
+    assert not path.name.endswith("none-any.whl")
+    shutil.unpack_archive(path, tmp_path / "unpacked", "zip")
+    environment = {"PYTHONPATH": str(tmp_path / "unpacked"), "SURFACECHEM_CACHE": str(tmp_path / "cache")}
+    environment = os.environ | environment
+    code = """
+import surfacechem
+from surfacechem.solve.radau.stepper import LOOP
+assert LOOP.is_compiled
+print(surfacechem.run("dna-adhesive").trajectory.result.outputs.tobytes().hex())
+"""
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == surfacechem.run("dna-adhesive").trajectory.result.outputs.tobytes().hex()
+
+
 def test_wheel_has_the_command_and_the_license(wheel):
     info = {name.split(".dist-info/")[1]: name for name in wheel.namelist() if ".dist-info/" in name}
     assert "surfacechem = surfacechem.cli:app" in wheel.read(info["entry_points.txt"]).decode()

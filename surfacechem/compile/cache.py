@@ -6,6 +6,9 @@ noted when it was made, and where no other user could have written it. Each file
 it is whole, and is never removed: processes that compile at once do so each for itself and the last one's file stays,
 as sound as the others'; none waits for another or sees what is half done. A cache that cannot be written, read or
 trusted costs compile time, never a result.
+
+A wheel that was built for a platform carries code for all its processors that are not old. Where that fits it is copied
+into the folder instead of compiled.
 """
 
 import gc
@@ -13,10 +16,11 @@ import hashlib
 import os
 import pickle
 import platform
+import shutil
 import sys
 import warnings
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -27,6 +31,16 @@ from surfacechem.documents.cache_folder import cache_root, keep_file, make_folde
 
 FILE = "kernel.numba"
 """File of what Numba loads; others of the folder that begin with `kernel.` hold the same code in other forms."""
+
+
+SHIPPED = Path(__file__).with_name("shipped")
+"""Where a wheel carries code that was compiled when it was built."""
+
+V3 = ("x86-64-v3", ("avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe"))
+PLATFORMS = {"x86_64": V3, "amd64": V3}
+"""By the name of a machine for what processors such code is, and the instruction sets that these have; of others it is
+for all.
+"""
 
 
 def processor() -> str:
@@ -40,13 +54,53 @@ def processor() -> str:
 
 def kernel_folder(sources: Sequence[Path]) -> Path:
     """Where code compiled from these sources, here, is kept."""
+    return cache_root() / f"kernel-{_mark(sources, sys.version, processor())}"
+
+
+def shipped_folder(sources: Sequence[Path], place: Path = SHIPPED) -> Path:
+    """Where a wheel carries code compiled from these sources for this platform."""
+    return place / _mark(sources, sys.implementation.cache_tag)
+
+
+def _mark(sources: Sequence[Path], *where: str) -> str:
+    """A digest of what compiled code follows from."""
     digest = hashlib.sha256()
-    for text in (version("numba"), version("llvmlite"), sys.version, platform.machine(), processor()):
+    for text in (version("numba"), version("llvmlite"), platform.machine(), *where):
         digest.update(text.encode())
     # These files decide in which form code is kept.
     for source in (Path(cache_folder.__file__), Path(__file__), Path(__file__).with_name("objectcode.py"), *sources):
         digest.update(source.read_bytes())
-    return cache_root() / f"kernel-{digest.hexdigest()[:16]}"
+    return digest.hexdigest()[:16]
+
+
+def fill(folder: Path, shipped: Path) -> None:
+    """Copy code that a wheel carries into an empty folder, if there is any and this processor runs it."""
+    if folder.exists() or not shipped.is_dir():
+        return
+    import llvmlite.binding as llvm
+
+    _, needed = PLATFORMS.get(platform.machine().lower(), ("", ()))
+    if not {*needed} <= {name for name, has in llvm.get_host_cpu_features().items() if has}:
+        return
+    with suppress(OSError):  # what cannot be kept is compiled for each process
+        make_folder(folder)
+        for path in sorted(shipped.iterdir(), key=lambda path: path.name == FILE):  # what it is found by comes last
+            keep_file(folder / path.name, path.read_bytes())
+
+
+def ship(sources: Sequence[Path], place: Path, load: Callable[[], object]) -> None:
+    """Put what ``load`` compiles into a folder that a wheel is to carry; Numba must not have been imported before."""
+    name, _ = PLATFORMS.get(platform.machine().lower(), ("generic", ()))
+    os.environ |= {"NUMBA_CPU_NAME": name, "NUMBA_CPU_FEATURES": ""}
+    load()
+    from numba.core import serialize
+
+    numbas: Any = serialize
+    made, target = kernel_folder(sources), shipped_folder(sources, place)
+    shutil.copytree(made, target)
+    content = _content(made)
+    assert content is not None
+    keep_file(target / FILE, sealed(numbas.dumps((None, pickle.loads(content)[1]))))
 
 
 def code_file(origins: Iterable[str]) -> Path:
@@ -88,7 +142,7 @@ class _Kept:
         self.cache_path = str(folder)
 
     def load_overload(self, _signature: Any, context: Any) -> Any:
-        """What has been compiled for a processor like this one; None where there is nothing sound."""
+        """What has been compiled for a processor like this one or, by a wheel, for all; None where nothing is sound."""
         from numba.core.compiler import CompileResult
 
         content = _content(self.folder)
@@ -97,7 +151,8 @@ class _Kept:
         context.refresh()
         processor, reduced = pickle.loads(content)
         result: Any = CompileResult
-        return result._rebuild(context, *reduced) if processor == context.codegen().magic_tuple() else None
+        fits = processor is None or processor == context.codegen().magic_tuple()
+        return result._rebuild(context, *reduced) if fits else None
 
     def save_overload(self, _signature: Any, compiled: Any) -> None:
         """Keep what has just been compiled."""

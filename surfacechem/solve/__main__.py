@@ -1,12 +1,24 @@
-"""``python -m surfacechem.solve``: compile the stepper ahead of the first run."""
+"""``python -m surfacechem.solve``: compile the stepper ahead of the first run, or for a wheel."""
 
+import os
+import sys
 import time
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
+from surfacechem.compile.cache import ship
 from surfacechem.solve.radau import stepper
 
 
 def main() -> None:
-    """Compile what is not compiled yet and keep it."""
+    """Compile what is not compiled yet and keep it; with the name of a folder, into that, for all processors of this
+    platform.
+    """
+    if len(sys.argv) > 1:
+        with TemporaryDirectory() as cache:
+            os.environ["SURFACECHEM_CACHE"] = cache
+            ship(stepper.sources(), Path(sys.argv[1]), stepper.LOOP.load)
+        return
     if stepper.LOOP.is_compiled:
         return
     print("compiling the stepper, once on this machine ...", end=" ", flush=True)

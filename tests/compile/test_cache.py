@@ -2,6 +2,7 @@
 same."""
 
 import os
+import platform
 import shutil
 import subprocess
 import sys
@@ -168,6 +169,21 @@ def test_a_flipped_bit_is_never_loaded(kept: Path, tmp_path: Path, monkeypatch) 
             assert file != objectcode.FILE or objectcode.load(folder) is None
             assert not is_filled(folder)  # so that the next process makes all of it anew
             shutil.rmtree(folder)
+
+
+def test_what_a_wheel_carries_is_taken_where_the_processor_runs_it(kept: Path, tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setenv("SURFACECHEM_CACHE", str(tmp_path))
+    monkeypatch.setattr(stepper, "shipped_folder", lambda _: kept)
+    monkeypatch.setitem(kernelcache.PLATFORMS, platform.machine().lower(), ("new", ("instructions to come",)))
+    loop = stepper.Loop(stepper.sources(), "none", "none")
+    assert not loop.is_compiled
+    monkeypatch.setitem(kernelcache.PLATFORMS, platform.machine().lower(), ("usual", ()))
+    assert loop.is_compiled
+    loop.load_briefly()
+    assert loop.load() is not None
+    (loop.folder / kernelcache.FILE).write_bytes(b"damaged")
+    # What is there is not written over, but made anew.
+    assert not stepper.Loop(stepper.sources(), "none", "none").is_compiled
 
 
 @pytest.fixture

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from surfacechem.compile import objectcode
-from surfacechem.compile.cache import compile_kernel, is_filled, kernel_folder
+from surfacechem.compile.cache import compile_kernel, fill, is_filled, kernel_folder, shipped_folder
 
 BATCH: dict[str, tuple[Any, int]] = {
     # the program
@@ -220,8 +220,10 @@ class Loop:
 
     @property
     def folder(self) -> Path:
-        """Where its code is kept."""
-        return kernel_folder(self._sources)
+        """Where its code is kept, from the start if the wheel carries any that fits."""
+        folder = kernel_folder(self._sources)
+        fill(folder, shipped_folder(self._sources))
+        return folder
 
     @property
     def is_compiled(self) -> bool:
