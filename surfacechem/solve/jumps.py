@@ -398,7 +398,8 @@ class Jumper:
         slip, path = self.equilibria.slip, self._load_path
         if step is None or edge.heat == "snap" or slip is None or not after.parameters[slip] or not path.varies:
             return None
-        made, small = float(self._made(after.inputs()[None], release)[0, -1]), self._rounding(after, release.energy)
+        made = float(self._made(after.inputs()[None], release)[0, -1])
+        small = DIGITS * max(float(self._books(after.inputs())[-2]), abs(release.energy))
         if not made > small:
             return None
         broken = release.energy - release.level if edge.heat == "local" else 0.0
@@ -506,7 +507,3 @@ class Jumper:
         goes_on &= admissible | (edge.violation != "refuse")
         jumps = Jumps(Point.of(rows, n), Point.of(after, n), released, gain, work, heat, entropy, goes_on)
         return jumps, after
-
-    def _rounding(self, point: Point, energy: float) -> float:
-        """Energy that does not count at a point, beside what it was before [J/m^2]."""
-        return DIGITS * max(float(self._books(point.inputs())[-2]), abs(energy))

@@ -69,7 +69,10 @@ def near_places(
     """
     sought = size * (1 + math.tan(min(abs(outer.shape.tilt) + abs(inner.shape.tilt), STEEPEST)))
     low, high = np.nan_to_num(np.transpose(outer.shape.span), posinf=sought, neginf=-sought)
-    extents = _extents(outer, low, high)
+    grid = np.stack(np.meshgrid(*np.linspace(low, high, 9).T, indexing="ij"), axis=-1)
+    tangents = outer.derivatives(grid, FIRST)[1:]
+    # Lengths of the surface along its two parameters, at most.
+    extents = np.linalg.norm(tangents, axis=-1).max(axis=(1, 2)) * (high - low)
     wide = min(grain, extents.max() / COARSE * PER_GRAIN)
     # A surface without a grain needs no more than the coarsest places.
     halvings = np.ceil(np.log2(np.maximum(PER_GRAIN * extents / grain / COARSE, 1))).astype(int)
@@ -131,13 +134,6 @@ def _near_grid(
 def _mesh(axes: Iterable[ArrayLike]) -> Indices:
     """All pairs (n, 2) of places along two axes."""
     return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
-
-
-def _extents(outer: Surface, low: Array, high: Array) -> Array:
-    """Lengths of a surface along its two parameters, at most [m]."""
-    grid = np.stack(np.meshgrid(*np.linspace(low, high, 9).T, indexing="ij"), axis=-1)
-    tangents = outer.derivatives(grid, FIRST)[1:]
-    return np.asarray(np.linalg.norm(tangents, axis=-1).max(axis=(1, 2)) * (high - low))
 
 
 def _lowest(gaps: Array, closed: tuple[bool, bool], noise: float) -> Indices:

@@ -117,14 +117,10 @@ def _formulation(build: Build, d: Direction, mount: Held | None, elastic: bool) 
     rate_dependent = any(_feels_velocity(law, d) for law in laws)
     rate_dependent = rate_dependent or (not elastic and mount is not None and mount.damped)
     sticks = any(law.has_limit for law in laws)
-    dead_load = mount is not None and not rate_dependent and _moves_freely(build, mount)
-    dead_load = dead_load and (sticks or not elastic)
+    # Where nothing but its load and friction acts on the displacement, and may hold it.
+    free = mount is not None and mount.quasi_static and not (mount.law.k or in_parallel(build))
+    dead_load = free and not rate_dependent and (sticks or not elastic)
     return Formulation(d, mount, elastic, sticks, rate_dependent, dead_load, bool(laws) or not elastic)
-
-
-def _moves_freely(build: Build, mount: Held) -> bool:
-    """Whether nothing but its load and friction acts on a displacement."""
-    return mount.quasi_static and not (mount.law.k or in_parallel(build))
 
 
 def _feels_velocity(law: Friction, d: Direction) -> bool:
