@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 from html import escape
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
@@ -486,14 +486,14 @@ class Simulation:
         chosen, done, errors = self._resolved(settings, values, plan, threads)
         model = done[0].model
         taken = model.chosen(settings, done[0].values)
-        solution = sweeps.SweepSolution(model, plan, taken, done, **chosen._origin(values))
 
         @cache
         def added() -> list[CellErrors]:
             of_cells = errors or [chosen._cell_errors(run) for run in done]
             return [found.beside(chosen._law_errors(run)) for found, run in zip(of_cells, done, strict=True)]
 
-        return replace(solution, accuracy=sweeps.accuracy(chosen.case, solution, threads, added))
+        judge = partial(sweeps.accuracy, chosen.case, threads=threads, cells=added)
+        return sweeps.SweepSolution(model, plan, taken, done, judge, **chosen._origin(values))
 
     def stream(
         self,

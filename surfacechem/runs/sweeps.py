@@ -300,7 +300,17 @@ class SweepSolution(Results):
     run: Run
     """Settings of all runs; where a load ends them, each has output times of its own."""
     runs: Sequence[Trajectory]
-    accuracy: SweepAccuracy | None = None
+    judge: Callable[[SweepSolution], SweepAccuracy] | None = None
+    """What finds the errors of the runs."""
+
+    def __getstate__(self) -> dict[str, Any]:
+        """A pickle carries the errors themselves, not what would find them."""
+        return {**vars(self), "accuracy": self.accuracy, "judge": None}
+
+    @cached_property
+    def accuracy(self) -> SweepAccuracy | None:
+        """The errors of the runs, found when they are first asked for, and where they are from."""
+        return self.judge(self) if self.judge else None
 
     def __repr__(self) -> str:
         """Title, size and ends in a line."""

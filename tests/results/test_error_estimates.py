@@ -258,7 +258,7 @@ def test_a_sweep_of_which_no_error_is_known_says_so(tmp_path):
         {"initial.T": [290.0, 300.0]}
     )
     assert np.all((swept.accuracy.errors > 0) & (swept.accuracy.errors < 1e-9))
-    nothing = replace(swept, accuracy=replace(swept.accuracy, errors=np.full(2, np.nan)))
+    nothing = replace(swept, judge=lambda _: replace(swept.accuracy, errors=np.full(2, np.nan)))
     assert "error      unknown (estimate: a second sweep at rtol 1e-13 that" in str(sweep_summary(nothing, None))
     assert np.isnan(nothing.attributes["error"])
 
