@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Literal
 
 import numpy as np
@@ -50,10 +50,19 @@ ROUNDED = (
 )
 
 
+AHEAD = np.ldexp(1.0, np.arange(-4, 3))
+"""Parts of the last step by which a look ahead of the end of a run goes."""
+
+
 def cause(
-    system: System, program: Program, margins: Sequence[Margin], result: Result, values: Mapping[str, float]
+    system: System,
+    program: Program,
+    margins: Sequence[Margin],
+    result: Result,
+    values: Mapping[str, float],
+    named: Callable[[Array], Array],
 ) -> tuple[str, str]:
-    """Status of a run that could not go on, and why, in words."""
+    """Status of a run that could not go on, and why, in words; ``named`` gives named quantities at rows of inputs."""
     where = f"t = {result.t:.9g} s"
     parameters = result.problem.parameters[result.segments_at(np.array([result.t]))[0]]
     inputs = np.concatenate(([result.t], result.y, result.ydot, parameters))
@@ -72,6 +81,8 @@ def cause(
         return "stopped", f"{reason} at {where}"
     if (fast := runaway(system.states, result)) is not None:
         return "stopped", f"{fast} near {where}"
+    if (lost := beyond_numbers(system, result, inputs, named)) is not None:
+        return "stopped", f"{lost} leaves the range of numbers near {where}"
     return "failed", f"{REASONS[result.status]} at {where}{too_fast(system, result, values)}"
 
 
@@ -147,6 +158,24 @@ def runaway(states: Sequence[State], result: Result) -> str | None:
         return f"{names[0]} runs away, faster and faster"
     unit = states[j].quantity.unit
     return f"{states[j].name} runs away: it changes by {result.ydot[j]:.3g} {unit}/s, faster and faster"
+
+
+def beyond_numbers(system: System, result: Result, inputs: Array, named: Callable[[Array], Array]) -> str | None:
+    """The named quantity that is the first to have no finite value as the states go on as they do, where that is why a
+    run could not; of several that from which the others follow.
+    """
+    if result.status is not Status.NOT_FINITE or result.steps is None or len(result.steps.t) < 2:
+        return None
+    n, ahead = len(result.y), np.append(0.0, AHEAD) * np.diff(result.steps.t)[-1]
+    rows = np.tile(inputs, (len(ahead), 1))
+    rows[:, 0] += ahead
+    rows[:, 1 : 1 + n] += ahead[:, None] * result.ydot
+    with np.errstate(all="ignore"):
+        number = np.isfinite(named(rows))
+    first = np.where(number.all(axis=0) | ~number[0], len(ahead), np.argmin(number, axis=0))
+    if first.min(initial=len(ahead)) == len(ahead):
+        return None
+    return list(system.output_columns)[int(np.argmin(first))]
 
 
 def _is_faster(result: Result, j: int) -> bool:

@@ -522,7 +522,7 @@ class Model:
             if are_led_back(self.system, self.program, margin, at, y, inputs[:, 1 + 2 * len(result.y) :])[0]:
                 return "failed", f"{margin.reason} at {where}: {ROUNDED}"
             return "stopped", f"{self.system.reason(margin, inputs[0])} at {where}"
-        return cause(self.system, self.program, self.margins, result, values)
+        return cause(self.system, self.program, self.margins, result, values, self.named)
 
     def evaluate(
         self, result: Result, t: Array, y: Array, ydot: Array, segment: NDArray[np.int64] | None = None

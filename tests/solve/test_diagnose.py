@@ -1,5 +1,8 @@
 """What random scenes brought to light: each cause by itself, in the smallest scene that shows it."""
 
+from types import SimpleNamespace
+
+import numpy as np
 import pytest
 from scenes import SITES, bodies, path, perfect_contact, varying
 from solved import solve
@@ -18,6 +21,8 @@ from surfacechem.laws.loading import Hold, Ramp
 from surfacechem.model.assemble import assemble
 from surfacechem.results.solution import Solution
 from surfacechem.scene import Interface, Medium, Scene
+from surfacechem.solve.contract import Status
+from surfacechem.solve.diagnose import beyond_numbers
 
 APART = {"T_1": 300.0, "T_2": 310.0}
 
@@ -69,3 +74,19 @@ def test_a_parameter_that_varies_out_of_its_range_stops_the_run():
     trajectory = run(scene, 1.5)
     assert trajectory.status == "stopped"
     assert trajectory.reason.startswith("pressure conductance: H left its range (> 0) as it varies near t = 1.13333")
+
+
+def test_what_is_no_number_a_little_later_is_named():
+    result = SimpleNamespace(status=Status.NOT_FINITE, steps=SimpleNamespace(t=np.array([0.0, 1.0])))
+    result.y, result.ydot = np.array([1.0]), np.array([1.0])
+    system = SimpleNamespace(output_columns={"even": 0, "late": 1, "soon": 2, "never": 3})
+
+    def named(rows):
+        y = rows[:, 1]
+        return np.column_stack([y, np.log(5.0 - y), 1.0 / (2.0 - y), np.full(len(y), np.nan)])
+
+    inputs = np.array([1.0, 1.0, 1.0])
+    assert beyond_numbers(system, result, inputs, named) == "soon"
+    assert beyond_numbers(system, result, inputs, lambda rows: named(rows)[:, [0, 0, 0, 3]]) is None
+    result.status = Status.SINGULAR
+    assert beyond_numbers(system, result, inputs, named) is None
