@@ -79,10 +79,9 @@ def cause(
         elif any(state.is_temperature for state in algebraic):
             reason += ": ignition, or sliding that nothing steadies"
         return "stopped", f"{reason} at {where}"
-    if (fast := runaway(system.states, result)) is not None:
-        return "stopped", f"{fast} near {where}"
-    if (lost := beyond_numbers(system, result, inputs, named)) is not None:
-        return "stopped", f"{lost} leaves the range of numbers near {where}"
+    ends = filter(None, (runaway(system.states, result), beyond_numbers(system, result, inputs, named)))
+    if (end := next(ends, None)) is not None:
+        return "stopped", f"{end} near {where}"
     return "failed", f"{REASONS[result.status]} at {where}{too_fast(system, result, values)}"
 
 
@@ -161,8 +160,8 @@ def runaway(states: Sequence[State], result: Result) -> str | None:
 
 
 def beyond_numbers(system: System, result: Result, inputs: Array, named: Callable[[Array], Array]) -> str | None:
-    """The named quantity that is the first to have no finite value as the states go on as they do, where that is why a
-    run could not; of several that from which the others follow.
+    """The named quantity that is the first to have no finite value as states go on as they do, where that is why a run
+    could not; of several that from which the others follow.
     """
     if result.status is not Status.NOT_FINITE or result.steps is None or len(result.steps.t) < 2:
         return None
@@ -175,7 +174,7 @@ def beyond_numbers(system: System, result: Result, inputs: Array, named: Callabl
     first = np.where(number.all(axis=0) | ~number[0], len(ahead), np.argmin(number, axis=0))
     if first.min(initial=len(ahead)) == len(ahead):
         return None
-    return list(system.output_columns)[int(np.argmin(first))]
+    return f"{list(system.output_columns)[int(np.argmin(first))]} leaves the range of numbers"
 
 
 def _is_faster(result: Result, j: int) -> bool:

@@ -86,7 +86,7 @@ def test_what_is_no_number_a_little_later_is_named():
         return np.column_stack([y, np.log(5.0 - y), 1.0 / (2.0 - y), np.full(len(y), np.nan)])
 
     inputs = np.array([1.0, 1.0, 1.0])
-    assert beyond_numbers(system, result, inputs, named) == "soon"
+    assert beyond_numbers(system, result, inputs, named) == "soon leaves the range of numbers"
     assert beyond_numbers(system, result, inputs, lambda rows: named(rows)[:, [0, 0, 0, 3]]) is None
     result.status = Status.SINGULAR
     assert beyond_numbers(system, result, inputs, named) is None
