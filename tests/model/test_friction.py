@@ -307,3 +307,23 @@ def test_a_dead_load_is_held_once_more_where_friction_is_larger_without_bonds(mu
     assert found.trajectory.result.t == pytest.approx(end, rel=1e-9)
     assert [jump.t for jump in found.trajectory.jumps] == pytest.approx(breaks, rel=1e-9)
     assert found.trajectory.result.y[0] == pytest.approx(0.0 if breaks else 0.5, abs=1e-9)
+
+
+@pytest.mark.parametrize("delta", [0.3, 1.0])
+def test_friction_that_falls_as_soon_as_sliding_begins_has_no_velocity(delta):
+    """As steeply as at once, or more: without a mass nothing says how fast it slides."""
+    found = surfacechem.run(
+        f"""
+        T_0: 300 K
+        bodies: {{lower: {{temperature: 300 K}}, upper: {{temperature: 300 K}}}}
+        interface:
+          temperature: 300 K
+          friction: [{{stribeck: {{mu_s: 0.6, mu_k: 0.4, v_s: 1 mm/s, delta: {delta}}}}}]
+        mechanics: {{tangential: {{k: 1 MPa/mm, c_b: 1e3 Pa s/m}}}}
+        loading: {{p: 1 MPa, w_t: {{ramp: {{start: 0 mm, rate: 1 mm/s}}}}}}
+        run: {{until: 2 s}}
+        """
+    )
+    assert found.status == "stopped"
+    assert "no steady sliding velocity" in found.reason
+    assert found.trajectory.result.t == pytest.approx(0.6, rel=1e-5)

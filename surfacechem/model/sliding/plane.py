@@ -36,7 +36,7 @@ from surfacechem.model.constraints.set_valued import SLIP, breaks_bonds, set_val
 from surfacechem.model.sliding.formulation import PLACE, UNSTABLE, Formulation, evolve, name_traction
 from surfacechem.model.system import STABLE, Given, Margin
 from surfacechem.quantities import VARIABLES
-from surfacechem.tolerances import MOMENT, PICOMETRE, ROUNDING, SQRT_EPS, STILL
+from surfacechem.tolerances import MOMENT, PICOMETRE, ROUNDING, SQRT_EPS, STILL, TINY
 
 SPEED, TURNED = symengine.symbols("speed turn")
 BEGAN = symengine.symbols("began began_2")
@@ -195,7 +195,8 @@ def _steady(build: Build, sides: Sequence[Side], largest: Expression) -> tuple[E
     build.rows.switched("speed", SLIP, -along.subs({SPEED: 0}) / slope - SPEED if linear else along, SPEED)
     build.rows.switched("turn", SLIP * norm(*pull), across, TURNED)  # what nothing pulls has no direction
     build.motion.slides_by |= {"speed": SPEED, "turn": TURNED}
-    return still, -derivative(build.expanded(along), SPEED)
+    # The slope at rest is that of the speeds to come.
+    return still, -derivative(build.expanded(along), SPEED).subs({SPEED: SPEED + TINY})
 
 
 def _unit_vector() -> tuple[Expression, Expression]:

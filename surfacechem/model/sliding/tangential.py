@@ -38,7 +38,7 @@ from surfacechem.model.sliding.formulation import (
 from surfacechem.model.sliding.rate_and_state import DRIVE, stands_for_velocity
 from surfacechem.model.system import STABLE, Margin
 from surfacechem.quantities import VARIABLES
-from surfacechem.tolerances import STILL
+from surfacechem.tolerances import STILL, TINY
 
 WORDS = {-1.0: "slides backward", 0.0: "sticks", 1.0: "slides forward"}
 
@@ -322,7 +322,9 @@ def _sliding_row(
             "mass or a damper.",
             PLACE,
         )
-    yield Margin(f"{STABLE}{v}", slope, UNSTABLE, when=_while_sliding(kind), stability=str(v))
+    # The slope at rest is that of the velocities to come.
+    ahead = slope.subs({v: v + SLIP * TINY}) if kind.sticks else slope
+    yield Margin(f"{STABLE}{v}", ahead, UNSTABLE, when=_while_sliding(kind), stability=str(v))
     return in_proportion
 
 
