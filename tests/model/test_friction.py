@@ -309,21 +309,33 @@ def test_a_dead_load_is_held_once_more_where_friction_is_larger_without_bonds(mu
     assert found.trajectory.result.y[0] == pytest.approx(0.0 if breaks else 0.5, abs=1e-9)
 
 
+STRIBECK = """
+T_0: 300 K
+bodies: {lower: {temperature: 300 K}, upper: {temperature: 300 K}}
+interface:
+  temperature: 300 K
+  friction: [{stribeck: {mu_s: MU_S, mu_k: 0.5, v_s: 1 mm/s, delta: DELTA}}]
+mechanics: {tangential: {k: 1 MPa/mm, c_b: 1e3 Pa s/m}}
+loading: {p: 1 MPa, w_t: {ramp: {start: 0 mm, rate: 1 mm/s}}}
+run: {until: 2 s}
+"""
+
+
 @pytest.mark.parametrize("delta", [0.3, 1.0])
 def test_friction_that_falls_as_soon_as_sliding_begins_has_no_velocity(delta):
     """As steeply as at once, or more: without a mass nothing says how fast it slides."""
-    found = surfacechem.run(
-        f"""
-        T_0: 300 K
-        bodies: {{lower: {{temperature: 300 K}}, upper: {{temperature: 300 K}}}}
-        interface:
-          temperature: 300 K
-          friction: [{{stribeck: {{mu_s: 0.6, mu_k: 0.4, v_s: 1 mm/s, delta: {delta}}}}}]
-        mechanics: {{tangential: {{k: 1 MPa/mm, c_b: 1e3 Pa s/m}}}}
-        loading: {{p: 1 MPa, w_t: {{ramp: {{start: 0 mm, rate: 1 mm/s}}}}}}
-        run: {{until: 2 s}}
-        """
-    )
+    found = surfacechem.run(STRIBECK.replace("DELTA", str(delta)).replace("MU_S", "0.7"))
     assert found.status == "stopped"
     assert "no steady sliding velocity" in found.reason
-    assert found.trajectory.result.t == pytest.approx(0.6, rel=1e-5)
+    assert found.trajectory.result.t == pytest.approx(0.7, rel=1e-5)
+
+
+@pytest.mark.parametrize("more", [[], ["interface.potential=[{tangential-stiffness: {E_t: 1 MPa/um}}]"]])
+@pytest.mark.parametrize("damper", ["1e3 Pa s/m", "0 Pa s/m"])
+def test_friction_that_grows_with_velocity_from_rest_on_slides_as_fast_as_is_pulled(damper, more):
+    case = STRIBECK.replace("DELTA", "1").replace("MU_S", "0.4").replace("1e3 Pa s/m", damper)
+    found = surfacechem.run(case, more)
+    assert found.status == "finished"
+    # In the end as fast as the far field, by friction of mu_k less a part e^-1 of what it has grown by.
+    assert found["v"][-1] == pytest.approx(1e-3, rel=1e-6)
+    assert found["t_stribeck"][-1] == pytest.approx(1e6 * (0.5 - 0.1 / np.e), rel=1e-6)

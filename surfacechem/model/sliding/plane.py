@@ -192,11 +192,12 @@ def _steady(build: Build, sides: Sequence[Side], largest: Expression) -> tuple[E
         along, across = (where(rubs > 0, *pair) for pair in zip(_elliptic(pull, sizes), (along, across), strict=True))
     slope = derivative(along, SPEED)
     linear = slope != 0 and not depends(slope, SPEED)
+    if not linear:  # the slope at rest is that of the speeds to come
+        along = build.expanded(along).subs({SPEED: SPEED + TINY})
     build.rows.switched("speed", SLIP, -along.subs({SPEED: 0}) / slope - SPEED if linear else along, SPEED)
     build.rows.switched("turn", SLIP * norm(*pull), across, TURNED)  # what nothing pulls has no direction
     build.motion.slides_by |= {"speed": SPEED, "turn": TURNED}
-    # The slope at rest is that of the speeds to come.
-    return still, -derivative(build.expanded(along), SPEED).subs({SPEED: SPEED + TINY})
+    return still, -derivative(build.expanded(along), SPEED)
 
 
 def _unit_vector() -> tuple[Expression, Expression]:

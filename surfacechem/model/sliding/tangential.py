@@ -310,6 +310,9 @@ def _sliding_row(
         balance = whole.subs({v: 0}) / slope - v
     # What sticks may have nothing that resists sliding, as where nothing presses it, and no such balance.
     if kind.sticks:
+        if not in_proportion:  # the slope at rest is that of the velocities to come
+            balance = build.expanded(driving).subs({v: v + SLIP * TINY})
+            slope = -derivative(balance, v)
         build.rows.switched(str(v), slides, balance, v)
     else:
         build.rows.balance(str(v), balance)
@@ -322,9 +325,7 @@ def _sliding_row(
             "mass or a damper.",
             PLACE,
         )
-    # The slope at rest is that of the velocities to come.
-    ahead = slope.subs({v: v + SLIP * TINY}) if kind.sticks else slope
-    yield Margin(f"{STABLE}{v}", ahead, UNSTABLE, when=_while_sliding(kind), stability=str(v))
+    yield Margin(f"{STABLE}{v}", slope, UNSTABLE, when=_while_sliding(kind), stability=str(v))
     return in_proportion
 
 
