@@ -8,6 +8,7 @@ from typing import ClassVar
 
 from surfacechem.contracts.terms import Friction, UnderPressure, parameter
 from surfacechem.expressions import Expression, absolute, asinh_exp, decay, exp, log, positive, power, sinh_exp, where
+from surfacechem.tolerances import TINY
 
 
 class Coulomb(UnderPressure, Friction):
@@ -105,7 +106,9 @@ class Stribeck(UnderPressure, Friction):
     def traction(self, p: Expression, v: Expression, direction: Expression) -> Expression:
         """Tangential traction [Pa]."""
         # Without the guard of exp, since the exponent is never positive: slopes combine with their like.
-        fall = decay(power(absolute(v) / self.v_s, self.delta))
+        # From one on the slope of the power at rest is that of the velocities to come; below one it is infinite.
+        ahead = v + where(self.delta < 1, 0, TINY) * direction
+        fall = decay(power(absolute(ahead) / self.v_s, self.delta))
         return (self.mu_k + (self.mu_s - self.mu_k) * fall) * p * direction + self.c_v * v
 
     def limit(self, p: Expression) -> Expression:

@@ -336,6 +336,7 @@ def test_friction_that_grows_with_velocity_from_rest_on_slides_as_fast_as_is_pul
     case = STRIBECK.replace("DELTA", "1").replace("MU_S", "0.4").replace("1e3 Pa s/m", damper)
     found = surfacechem.run(case, more)
     assert found.status == "finished"
+    assert found.accuracy.error < 1e-8
     # In the end as fast as the far field, by friction of mu_k less a part e^-1 of what it has grown by.
     assert found["v"][-1] == pytest.approx(1e-3, rel=1e-6)
     assert found["t_stribeck"][-1] == pytest.approx(1e6 * (0.5 - 0.1 / np.e), rel=1e-6)

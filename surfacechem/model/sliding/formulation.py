@@ -14,7 +14,7 @@ import symengine
 
 from surfacechem.contracts.terms import Friction, Potential, TangentialPotential, reads
 from surfacechem.errors import InputError, Place
-from surfacechem.expressions import Expression, absolute, depends, derivative, sqrt, where
+from surfacechem.expressions import Expression, absolute, depends, derivative, log, sqrt, where
 from surfacechem.model.automaton import NONE, ONE
 from surfacechem.model.build import Build
 from surfacechem.model.components.mounting import (
@@ -121,6 +121,11 @@ def _formulation(build: Build, d: Direction, mount: Held | None, elastic: bool) 
     free = mount is not None and mount.quasi_static and not (mount.law.k or in_parallel(build))
     dead_load = free and not rate_dependent and (sticks or not elastic)
     return Formulation(d, mount, elastic, sticks, rate_dependent, dead_load, bool(laws) or not elastic)
+
+
+def growth(slope: Expression) -> Expression:
+    """What says that friction grows with velocity, from how fast it does: a slope may be infinite at rest."""
+    return where(slope > 0, log(1 + where(slope > 0, slope, 0)), slope)
 
 
 def _feels_velocity(law: Friction, d: Direction) -> bool:

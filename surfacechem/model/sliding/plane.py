@@ -33,7 +33,7 @@ from surfacechem.model.automaton import NONE, Constraint, Mode, Register
 from surfacechem.model.build import Build, Record
 from surfacechem.model.components.mounting import ACROSS, LENGTH, Direction, FarField, far_field
 from surfacechem.model.constraints.set_valued import SLIP, breaks_bonds, set_valued
-from surfacechem.model.sliding.formulation import PLACE, UNSTABLE, Formulation, evolve, name_traction
+from surfacechem.model.sliding.formulation import PLACE, UNSTABLE, Formulation, evolve, growth, name_traction
 from surfacechem.model.system import STABLE, Given, Margin
 from surfacechem.quantities import VARIABLES
 from surfacechem.tolerances import MOMENT, PICOMETRE, ROUNDING, SQRT_EPS, STILL, TINY
@@ -136,14 +136,16 @@ def motion(build: Build, kinds: Sequence[Formulation]) -> Iterator[Record]:
     if kinds[0].inertial:
         still = _inertial(build, sides, largest)
     else:
-        still, growth = _steady(build, sides, largest)
+        still, slope = _steady(build, sides, largest)
         if a != b:
             # Without inertia friction along one direction alone leaves open how sliding begins.
             reason = "dry friction acts along one of two directions: the way of slip is undetermined"
             ratio = where(largest > 0, where(a > b, b, a) / where(largest > 0, largest, 1) - SQRT_EPS, 1)
             remedy = "Give the mounting a mass `m`, or friction along the other direction, too."
             yield Margin("friction in both directions", ratio, reason, remedy=remedy)
-        yield Margin(f"{STABLE}speed", growth, UNSTABLE, when={SLIP: (1,)}, stability="speed")
+        # The slope at rest is that of the speeds to come.
+        ahead = growth(slope.subs({SPEED: SPEED + TINY}))
+        yield Margin(f"{STABLE}speed", ahead, UNSTABLE, when={SLIP: (1,)}, stability="speed")
     pull = _scaled(sides, largest)
     # Sliding begins where the pull points; what nothing holds back begins in the direction of its drive.
     drive = [build.total_derivative(side.far.force(NONE, NONE) - side.t_a) for side in sides]
@@ -192,8 +194,6 @@ def _steady(build: Build, sides: Sequence[Side], largest: Expression) -> tuple[E
         along, across = (where(rubs > 0, *pair) for pair in zip(_elliptic(pull, sizes), (along, across), strict=True))
     slope = derivative(along, SPEED)
     linear = slope != 0 and not depends(slope, SPEED)
-    if not linear:  # the slope at rest is that of the speeds to come
-        along = build.expanded(along).subs({SPEED: SPEED + TINY})
     build.rows.switched("speed", SLIP, -along.subs({SPEED: 0}) / slope - SPEED if linear else along, SPEED)
     build.rows.switched("turn", SLIP * norm(*pull), across, TURNED)  # what nothing pulls has no direction
     build.motion.slides_by |= {"speed": SPEED, "turn": TURNED}

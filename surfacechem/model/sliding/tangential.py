@@ -31,6 +31,7 @@ from surfacechem.model.sliding.formulation import (
     displacement,
     evolve,
     formulations,
+    growth,
     in_parallel,
     in_series,
     name_traction,
@@ -310,9 +311,6 @@ def _sliding_row(
         balance = whole.subs({v: 0}) / slope - v
     # What sticks may have nothing that resists sliding, as where nothing presses it, and no such balance.
     if kind.sticks:
-        if not in_proportion:  # the slope at rest is that of the velocities to come
-            balance = build.expanded(driving).subs({v: v + SLIP * TINY})
-            slope = -derivative(balance, v)
         build.rows.switched(str(v), slides, balance, v)
     else:
         build.rows.balance(str(v), balance)
@@ -325,6 +323,8 @@ def _sliding_row(
             "mass or a damper.",
             PLACE,
         )
+    if kind.sticks and not in_proportion:  # the slope at rest is that of the velocities to come
+        slope = growth(slope.subs({v: v + SLIP * TINY}))
     yield Margin(f"{STABLE}{v}", slope, UNSTABLE, when=_while_sliding(kind), stability=str(v))
     return in_proportion
 
