@@ -245,38 +245,32 @@ def test_what_two_directions_do_not_know_is_refused():
         assemble(at_an_angle([Penalty(E_n=E_N), TangentialStiffness(E_t=1e12)], (Coulomb(mu=MU),), HEAVY))
 
 
-def test_a_dead_load_on_an_elastic_gap_ends_where_sticking_gives_way():
-    found = surfacechem.run(
-        """
+def on_an_elastic_gap(loading):
+    """Coulomb friction in series with 1 GPa/mm, as is loaded, without anything else that moves along."""
+    return surfacechem.run(
+        f"""
         T_0: 300 K
-        bodies: {lower: {temperature: 300 K}, upper: {temperature: 300 K}}
+        bodies: {{lower: {{temperature: 300 K}}, upper: {{temperature: 300 K}}}}
         interface:
           temperature: 300 K
-          potential: [{tangential-stiffness: {E_t: 1 GPa/mm}}]
-          friction: [{coulomb: {mu: 0.5}}]
-        loading: {p: 2 MPa, F_t: {ramp: {start: 0 MPa, rate: 1 MPa/s}}}
-        run: {until: 2 s}
+          potential: [{{tangential-stiffness: {{E_t: 1 GPa/mm}}}}]
+          friction: [{{coulomb: {{mu: 0.5}}}}]
+        loading: {loading}
+        run: {{until: 2 s}}
         """
     )
+
+
+def test_a_dead_load_on_an_elastic_gap_ends_where_sticking_gives_way():
+    found = on_an_elastic_gap("{p: 2 MPa, F_t: {ramp: {start: 0 MPa, rate: 1 MPa/s}}}")
     assert found.status == "stopped"
     assert "the dead load exceeds what sticking bears" in found.reason
     assert found.trajectory.result.t == pytest.approx(1.0, rel=1e-9)
 
 
 def test_without_a_load_nothing_has_to_be_borne():
-    found = surfacechem.run(
-        """
-        T_0: 300 K
-        bodies: {lower: {temperature: 300 K}, upper: {temperature: 300 K}}
-        interface:
-          temperature: 300 K
-          potential: [{tangential-stiffness: {E_t: 1 GPa/mm}}]
-          friction: [{coulomb: {mu: 0.5}}]
-        loading: {p: {ramp: {start: 0 MPa, rate: 2 MPa/s}}, F_t: {ramp: {start: 0 MPa, rate: 0.9 MPa/s}}}
-        run: {until: 2 s}
-        """
-    )
-    assert found.status == "finished"
+    loading = "{p: {ramp: {start: 0 MPa, rate: 2 MPa/s}}, F_t: {ramp: {start: 0 MPa, rate: 0.9 MPa/s}}}"
+    assert on_an_elastic_gap(loading).status == "finished"
 
 
 def a_dead_load_on_bonds(mu_b, mu_ub):
