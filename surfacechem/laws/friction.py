@@ -107,8 +107,8 @@ class Stribeck(UnderPressure, Friction):
         """Tangential traction [Pa]."""
         # Without the guard of exp, since the exponent is never positive: slopes combine with their like.
         # From one on the slope of the power at rest is that of the velocities to come; below one it is infinite.
-        ahead = v + where(self.delta < 1, 0, TINY) * direction
-        fall = decay(power(absolute(ahead) / self.v_s, self.delta))
+        ahead = absolute(v) / self.v_s + where(self.delta < 1, 0, TINY)
+        fall = decay(power(ahead, self.delta))
         return (self.mu_k + (self.mu_s - self.mu_k) * fall) * p * direction + self.c_v * v
 
     def limit(self, p: Expression) -> Expression:
