@@ -146,16 +146,7 @@ def measured(name: str) -> list[str]:
             break
     theirs = seconds(lambda: script(rates, problem, times, rtol))
     if not np.isfinite(reached):
-        return [
-            name,
-            f"{1e3 * spent:.2f}",
-            f"{1e3 * judged:.2f}",
-            f"{own:.1e}",
-            "",
-            "",
-            "",
-            "fails at the tightest tolerance",
-        ]
+        return [name, *f"{1e3 * spent:.2f} {1e3 * judged:.2f} {own:.1e}".split(), "", "", "", "fails at the tightest"]
     note = "" if reached <= own else "as good as ours at no tolerance"
     row = f"{1e3 * spent:.2f} {1e3 * judged:.2f} {own:.1e} {1e3 * theirs:.2f} {reached:.1e} {theirs / spent:.2f}"
     return [name, *row.split(), note]

@@ -57,8 +57,8 @@ def kernel_folder(sources: Sequence[Path]) -> Path:
     return cache_root() / f"kernel-{_mark(sources, sys.version, processor())}"
 
 
-def shipped_folder(sources: Sequence[Path], place: Path = SHIPPED) -> Path:
-    """Where a wheel carries code compiled from these sources for this platform."""
+def shipped_folder(sources: Sequence[Path], place: Path) -> Path:
+    """Where in a place a wheel carries code compiled from these sources for this platform."""
     return place / _mark(sources, sys.implementation.cache_tag)
 
 
@@ -73,19 +73,20 @@ def _mark(sources: Sequence[Path], *where: str) -> str:
     return digest.hexdigest()[:16]
 
 
-def fill(folder: Path, shipped: Path) -> None:
-    """Copy code that a wheel carries into an empty folder, if there is any and this processor runs it."""
-    if folder.exists() or not shipped.is_dir():
+def fill(folder: Path, sources: Sequence[Path]) -> None:
+    """Copy code that a wheel carries into a folder that is not there yet, if it fits and this processor runs it."""
+    if folder.exists() or not SHIPPED.is_dir():  # as in a checkout, where no digest is formed in vain
         return
     import llvmlite.binding as llvm
 
     _, needed = PLATFORMS.get(platform.machine().lower(), ("", ()))
-    if not {*needed} <= {name for name, has in llvm.get_host_cpu_features().items() if has}:
-        return
-    with suppress(OSError):  # what cannot be kept is compiled for each process
-        make_folder(folder)
-        for path in sorted(shipped.iterdir(), key=lambda path: path.name == FILE):  # what it is found by comes last
-            keep_file(folder / path.name, path.read_bytes())
+    # What it is found by comes last.
+    files = sorted(shipped_folder(sources, SHIPPED).glob("kernel.*"), key=lambda path: path.name == FILE)
+    if files and {*needed} <= {name for name, has in llvm.get_host_cpu_features().items() if has}:
+        with suppress(OSError):  # what cannot be kept is compiled for each process
+            make_folder(folder)
+            for path in files:
+                keep_file(folder / path.name, path.read_bytes())
 
 
 def ship(sources: Sequence[Path], place: Path, load: Callable[[], object]) -> None:

@@ -173,7 +173,8 @@ def test_a_flipped_bit_is_never_loaded(kept: Path, tmp_path: Path, monkeypatch) 
 
 def test_what_a_wheel_carries_is_taken_where_the_processor_runs_it(kept: Path, tmp_path: Path, monkeypatch) -> None:
     monkeypatch.setenv("SURFACECHEM_CACHE", str(tmp_path))
-    monkeypatch.setattr(stepper, "shipped_folder", lambda _: kept)
+    monkeypatch.setattr(kernelcache, "SHIPPED", tmp_path / "wheel")
+    shutil.copytree(kept, kernelcache.shipped_folder(stepper.sources(), tmp_path / "wheel"))
     monkeypatch.setitem(kernelcache.PLATFORMS, platform.machine().lower(), ("new", ("instructions to come",)))
     loop = stepper.Loop(stepper.sources(), "none", "none")
     assert not loop.is_compiled

@@ -245,24 +245,26 @@ def test_what_two_directions_do_not_know_is_refused():
         assemble(at_an_angle([Penalty(E_n=E_N), TangentialStiffness(E_t=1e12)], (Coulomb(mu=MU),), HEAVY))
 
 
-def on_an_elastic_gap(loading):
-    """Coulomb friction in series with 1 GPa/mm, as is loaded, without anything else that moves along."""
-    return surfacechem.run(
-        f"""
-        T_0: 300 K
-        bodies: {{lower: {{temperature: 300 K}}, upper: {{temperature: 300 K}}}}
-        interface:
-          temperature: 300 K
-          potential: [{{tangential-stiffness: {{E_t: 1 GPa/mm}}}}]
-          friction: [{{coulomb: {{mu: 0.5}}}}]
-        loading: {loading}
-        run: {{until: 2 s}}
-        """
-    )
+def on_an_elastic_gap(loading, friction="coulomb: {mu: 0.5}", more=()):
+    """Friction in series with 1 GPa/mm, as is loaded, without anything else that moves along."""
+    case = f"""
+    T_0: 300 K
+    bodies: {{lower: {{temperature: 300 K}}, upper: {{temperature: 300 K}}}}
+    interface:
+      temperature: 300 K
+      potential: [{{tangential-stiffness: {{E_t: 1 GPa/mm}}}}]
+      friction: [{{{friction}}}]
+    loading: {loading}
+    run: {{until: 2 s}}
+    """
+    return surfacechem.run(case, more)
+
+
+RAMP = "{p: 2 MPa, F_t: {ramp: {start: 0 MPa, rate: 1 MPa/s}}}"
 
 
 def test_a_dead_load_on_an_elastic_gap_ends_where_sticking_gives_way():
-    found = on_an_elastic_gap("{p: 2 MPa, F_t: {ramp: {start: 0 MPa, rate: 1 MPa/s}}}")
+    found = on_an_elastic_gap(RAMP)
     assert found.status == "stopped"
     assert "the dead load exceeds what sticking bears" in found.reason
     assert found.trajectory.result.t == pytest.approx(1.0, rel=1e-9)
@@ -273,30 +275,14 @@ def test_without_a_load_nothing_has_to_be_borne():
     assert on_an_elastic_gap(loading).status == "finished"
 
 
-def a_dead_load_on_bonds(mu_b, mu_ub):
-    """A ramp of 1 MPa/s on an elastic gap under 2 MPa that half of all bonds help to stick."""
-    return surfacechem.run(
-        f"""
-        T_0: 300 K
-        bodies: {{lower: {{temperature: 300 K}}, upper: {{temperature: 300 K}}}}
-        interface:
-          temperature: 300 K
-          sites: 1e18 1/m^2
-          potential: [{{tangential-stiffness: {{E_t: 1 GPa/mm}}}}]
-          friction: [{{bonded-coulomb: {{mu: 0.1, mu_b: {mu_b}, mu_ub: {mu_ub}}}}}]
-          bonding: [{{mass-action: {{k_on: 0 1/s, k_off: 1e-9 1/s}}}}]
-        initial: {{phi: 0.5}}
-        loading: {{p: 2 MPa, F_t: {{ramp: {{start: 0 MPa, rate: 1 MPa/s}}}}}}
-        run: {{until: 2 s}}
-        """
-    )
-
-
 @pytest.mark.parametrize(
     ("mu_b", "mu_ub", "end", "breaks"), [(0.5, 0.2, 0.7, []), (0.2, 0.5, 1.0, [0.7])], ids=["weaker", "stronger"]
 )
 def test_a_dead_load_is_held_once_more_where_friction_is_larger_without_bonds(mu_b, mu_ub, end, breaks):
-    found = a_dead_load_on_bonds(mu_b, mu_ub)
+    """Half of all bonds help to stick."""
+    bonds = ["interface.sites=1e18 1/m^2", "interface.bonding=[{mass-action: {k_on: 0 1/s, k_off: 1e-9 1/s}}]"]
+    friction = f"bonded-coulomb: {{mu: 0.1, mu_b: {mu_b}, mu_ub: {mu_ub}}}"
+    found = on_an_elastic_gap(RAMP, friction, [*bonds, "initial={phi: 0.5}"])
     assert "the dead load exceeds what sticking bears" in found.reason
     assert found.trajectory.result.t == pytest.approx(end, rel=1e-9)
     assert [jump.t for jump in found.trajectory.jumps] == pytest.approx(breaks, rel=1e-9)

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from surfacechem.compile import objectcode
-from surfacechem.compile.cache import compile_kernel, fill, is_filled, kernel_folder, shipped_folder
+from surfacechem.compile.cache import compile_kernel, fill, is_filled, kernel_folder
 
 BATCH: dict[str, tuple[Any, int]] = {
     # the program
@@ -222,7 +222,7 @@ class Loop:
     def folder(self) -> Path:
         """Where its code is kept, from the start if the wheel carries any that fits."""
         folder = kernel_folder(self._sources)
-        fill(folder, shipped_folder(self._sources))
+        fill(folder, self._sources)
         return folder
 
     @property
