@@ -562,7 +562,7 @@ UNTIL = Entries(
 )
 
 
-ALL = "all"
+ALL, NONE = "all", "none"
 NAMES = Shapes(OneOf("choice", lambda: (ALL,)), items=ListOf(Text(), "[T, phi]"))
 
 
@@ -583,6 +583,11 @@ class KeepSection(Section):
         Entries(others=amount("[x]"), names=lambda case: case.units, what="variables"),
         "values by variable, the time at which each is first reached is kept: `reach: {phi: 0.95}`",
         MappingProxyType({}),
+    )
+    balances: str = key(
+        OneOf("choice", lambda: (ALL, NONE)),
+        "errors of the balances of each run; with `none` no ledger is integrated, and those that are checked tell them",
+        ALL,
     )
 
 

@@ -110,10 +110,12 @@ class ArrayRuns:
         self.parameter_columns = {path: paths.index(path) for path in plan.paths if path in paths}
         self.state_columns = [(j, state) for j, state in enumerate(system.states) if state.path in plan.paths]
         self.reasons = reason_table(system)
-        every = bool(keep.max or keep.min or keep.series)
+        self.keeps_steps = bool(keep.max or keep.min)
+        every = self.keeps_steps or bool(keep.series)
+        self.keeps_course = every or keep.balances
+        """Whether more is kept than ends and events."""
         self.shape = self.problem.times if every else self.problem.times[[0, -1]]
         """Output times of a run of the case."""
-        self.keeps_steps = bool(keep.max or keep.min)
 
     def _first_problem(self, changes: Mapping[str, float]) -> Problem:
         """The problem of the first run that is admissible; InputError where none of the first is."""
@@ -265,7 +267,7 @@ class ArrayRuns:
         }
         values = self._values(last)[1]
         columns |= {f"{name}_last": values[name] for name in self.keep.last}
-        columns |= self.along(found, clear)
+        columns |= self.along(found, clear) if self.keeps_course else {}
         return clear, columns | self._event_columns(found)
 
     def _verdicts(self, found: Ends, last: Array) -> tuple[Any, Any, Mask]:
@@ -321,7 +323,7 @@ class ArrayRuns:
         for name in keep.series:
             columns[name] = np.full((count, most), np.nan)
             columns[name][owner, k] = values[name]
-        columns |= self.balances(found, rows, values, reached)
+        columns |= self.balances(found, rows, values, reached) if self.keep.balances else {}
         if not self.keeps_steps:
             return columns
         return columns | self.extremes(found, clear, owner, table, list(values))

@@ -43,6 +43,9 @@ ENDS = {
 }
 """What is told of the end of every run, in words; only the time has a unit, seconds."""
 
+BALANCES = tuple(f"{kind}_error" for kind in ("energy", "entropy", "site"))
+"""Those of them that are errors of balances."""
+
 EXTREMES = {"max": (np.fmax, "at most, over outputs and steps"), "min": (np.fmin, "at least, over the same")}
 """Extremes of a run: what the names of their columns end with, what finds them, and words."""
 
@@ -61,25 +64,26 @@ class Keep:
     events: tuple[str, ...] = ()
     at_events: tuple[str, ...] = ()
     reach: Mapping[str, float] | None = None
+    balances: bool = True
+    """Whether the errors of the balances are."""
 
 
 def recorded_keep(record: str) -> Keep:
     """What is kept, as a store says it."""
-    content = json.loads(record)
-    reach = content.pop("reach")
-    return Keep(**{name: tuple(names) for name, names in content.items()}, reach=reach)
+    content: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in json.loads(record).items()}
+    return Keep(**content)
 
 
-def end_of(run: Trajectory, books: Audit) -> dict[str, Any]:
-    """What ENDS tells of a run and its balances."""
-    return {
-        "status": run.status,
-        "reason": run.reason,
-        "time_reached": run.result.t,
-        "steps": run.result.counters.steps,
-        **{f"{kind}_error": getattr(books, f"{kind}_error") for kind in ("energy", "entropy", "site")},
-        "destroys_entropy": books.destroys or entropy_destroyed(run.jumps) > 0,
-    }
+def end_of(run: Trajectory) -> dict[str, Any]:
+    """What ENDS tells of a run beside its balances."""
+    steps = run.result.counters.steps
+    return {"status": run.status, "reason": run.reason, "time_reached": run.result.t, "steps": steps}
+
+
+def balances_of(run: Trajectory, books: Audit) -> dict[str, Any]:
+    """What ENDS tells of the balances of a run."""
+    destroys = books.destroys or entropy_destroyed(run.jumps) > 0
+    return {**{name: getattr(books, name) for name in BALANCES}, "destroys_entropy": destroys}
 
 
 def keep_of(section: KeepSection | None, system: System) -> Keep:
@@ -100,7 +104,7 @@ def keep_of(section: KeepSection | None, system: System) -> Keep:
     for name in section.reach:
         if name not in known["quantities"]:
             raise section.error(f"nothing in this case is called '{name}'.", "reach")
-    return Keep(**found, reach=dict(section.reach))
+    return Keep(**found, reach=dict(section.reach), balances=section.balances == ALL)
 
 
 def event_names(system: System) -> list[str]:
@@ -110,13 +114,16 @@ def event_names(system: System) -> list[str]:
 
 
 def reaching(system: System, keep: Keep) -> System:
-    """The system that also locates where quantities reach the values of which the times are kept."""
+    """The system that also locates where quantities reach the values of which the times are kept; with no ledger where
+    no balances are kept.
+    """
     symbols = {state.name: state.symbol for state in system.states}
     margins = []
     for name, value in (keep.reach or {}).items():
         expression = symbols.get(name) or system.find(name).expression
         margins.append(Margin(f"{REACHED}{name}", expression - value, f"{name} reaches {value:g}", terminal=False))
-    return replace(system, margins=(*system.margins, *margins))
+    ledger = system.ledger if keep.balances else ()
+    return replace(system, margins=(*system.margins, *margins), ledger=ledger)
 
 
 def reason_table(system: System) -> list[str]:
@@ -148,6 +155,7 @@ def described(system: System, keep: Keep) -> dict[str, tuple[str, str, str]]:
         name: (codes.get(name, "float64"), "s" if name == "time_reached" else "1", text)
         for name, text in ENDS.items()
         if name != "destroys_entropy"  # of the runs that are checked alone
+        and (keep.balances or name not in BALANCES)
     }
     words = {"last": "at the end of the run", **{which: word for which, (_, word) in EXTREMES.items()}}
     for which, word in words.items():
@@ -180,7 +188,7 @@ class RunByRun:
         """What is kept of runs, with so many output times, audited anew or as given; of one that there is none of, why
         that is.
         """
-        books = iter(audits or (audit(run) for run in runs if not isinstance(run, str)))
+        books = iter(audits or (self._audited(run) for run in runs if not isinstance(run, str)))
         codes = {reason: STATUSES.index("refused" if reason == REFUSED else "failed") for reason in self.reasons}
         rows = [
             {"status": codes[run], "reason": self.reasons.index(run), "steps": 0}
@@ -195,9 +203,16 @@ class RunByRun:
             found[name] = np.array([row.get(name, nothing) for row in rows])
         return found
 
-    def _kept(self, run: Trajectory, books: Audit, times: int) -> dict[str, Any]:
+    def _audited(self, run: Trajectory) -> Audit | None:
+        return audit(run) if self.keep.balances else None
+
+    def _kept(self, run: Trajectory, books: Audit | None, times: int) -> dict[str, Any]:
         result, keep = run.result, self.keep
-        row = end_of(run, books) | {"status": STATUSES.index(run.status), "reason": self._code(run.reason)}
+        row = (
+            end_of(run)
+            | (balances_of(run, books) if books else {})
+            | {"status": STATUSES.index(run.status), "reason": self._code(run.reason)}
+        )
         names = [state.name for state in self.model.system.states] + [*self.model.system.output_columns]
         end = np.array([result.t]), result.y[None], result.ydot[None]
         last = dict(zip(names, [*result.y, *self.model.evaluate(result, *end)[0]], strict=True)) if keep.last else {}

@@ -40,8 +40,8 @@ EXPLICIT_RUNS, IMPLICIT_RUNS, JUMPING_RUNS, SLOW_RUNS = 2**16, 2**14, 2**12, 2**
 that are looked at one by one.
 """
 
-RUNS_OF_A_PIECE = 2**11
-"""Runs that one thread takes at a time, so that all of them share a chunk."""
+RUNS_OF_A_PIECE = 2**12
+"""Runs that one thread takes at a time at most: of fewer, calls of NumPy and what threads wait for each other show."""
 
 
 def processors() -> int:
@@ -249,7 +249,9 @@ class Stream:
         try:
             for number in numbers:
                 index = self.store.layout.index(number)
-                size = len(index) if client else self.chunks.piece
+                # All threads share a chunk, in parts that are alike.
+                rounds = -(-len(index) // (threads * self.chunks.piece))
+                size = len(index) if client else -(-len(index) // (threads * rounds))
                 parts = [index[first : first + size] for first in range(0, len(index), size)]
                 waiting.append((number, [submit(part) for part in parts]))
                 if len(waiting) > ahead:

@@ -330,6 +330,14 @@ def _state_rows(system: System) -> list[tuple[str, ...]]:
     return rows
 
 
+def _worst(stream: Stream, chunks: Sequence[int]) -> str:
+    """The worst balance of energy in some chunks of a store."""
+    if not stream.chunks.keep.balances:
+        return "not kept"
+    errors = [np.fmax.reduce(stream.store.read("energy_error", number), initial=0.0) for number in chunks]
+    return f"energy {np.fmax.reduce(errors, initial=0.0):.1e} at worst"
+
+
 def store_summary(stream: Stream, store: Store, checked: Checked | None, file: Path | None = None) -> tuple[str, Sheet]:
     """How a sweep ended that went into a store, or through one into a file, in a word; and what it was and how its runs
     ended, in words.
@@ -339,10 +347,9 @@ def store_summary(stream: Stream, store: Store, checked: Checked | None, file: P
 
     chunks, layout = stream.chunks, store.layout
     done = [number for number in range(layout.chunks) if (store.marks / str(number)).exists()]
-    ends, worst = np.zeros(len(STATUSES), np.int64), 0.0
+    ends = np.zeros(len(STATUSES), np.int64)
     for number in done:
         ends += np.bincount(store.read("status", number), minlength=len(STATUSES))
-        worst = np.fmax(worst, np.fmax.reduce(store.read("energy_error", number), initial=0.0))
     names = parameter_names(chunks.model.system, chunks.plan)
     words = ", ".join(f"{count} {word}" for count, word in zip(ends.tolist(), STATUSES, strict=True) if count)
     error = str(checked or "")
@@ -353,7 +360,7 @@ def store_summary(stream: Stream, store: Store, checked: Checked | None, file: P
         ("solved", _solved(chunks.model.system, chunks.run)),
         ("ended", f"{ends.sum()} of {counted(chunks.plan.size, 'run')}: {words}"),
         *([("error", error)] if error else []),
-        ("balances", f"energy {worst:.1e} at worst{destroyed}"),
+        ("balances", f"{_worst(stream, done)}{destroyed}"),
         ("written", str(file) if file else f"{store.path}, {len(done)} of {layout.chunks} chunks"),
     ]
     stopped = ends[STATUSES.index("stopped")] == ends.sum()

@@ -29,7 +29,7 @@ from surfacechem.results.matching import exact_values, match
 from surfacechem.results.netcdf import COORDINATES, Column, versions
 from surfacechem.results.picture import shared
 from surfacechem.runs import spectrum
-from surfacechem.runs.keeping import ENDS, EXTREMES, end_of, extreme
+from surfacechem.runs.keeping import ENDS, EXTREMES, balances_of, end_of, extreme
 from surfacechem.runs.sheet import counted
 from surfacechem.runs.spectrum import Lifetime, Statistics
 from surfacechem.solve.run import Model, Run, Trajectory
@@ -339,7 +339,7 @@ class SweepSolution(Results):
     @cached_property
     def run_ends(self) -> list[dict[str, Any]]:
         """What ENDS tells of each run."""
-        return [end_of(run, books) for run, books in zip(self.runs, self.audits, strict=True)]
+        return [end_of(run) | balances_of(run, books) for run, books in zip(self.runs, self.audits, strict=True)]
 
     def worst(self, balance: str) -> float:
         """Largest error over all runs of the balance of energy, entropy or site."""

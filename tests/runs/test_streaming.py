@@ -24,6 +24,7 @@ from surfacechem.results.store import Layout, StoredArray, opened
 from surfacechem.runs import checking, streaming
 from surfacechem.runs.checking import check
 from surfacechem.runs.keeping import STATUSES, Keep
+from surfacechem.runs.summaries import store_summary
 from surfacechem.solve.run import Run
 
 pytestmark = pytest.mark.around
@@ -118,6 +119,23 @@ def test_the_method_that_suits_the_scene_keeps_the_same_values(name, tmp_path):
         np.testing.assert_allclose(found[f"{state}_last"], wanted[f"{state}_last"], atol=1e-8 * size, err_msg=state)
     for balance in ("energy_error", "entropy_error", "site_error"):
         assert np.all(found[balance] < 1e-9)
+
+
+@pytest.mark.parametrize("name", SWEPT)
+def test_without_balances_the_rest_is_the_same(name, tmp_path):
+    keep = {"last": "all", "events": "all"}
+    whole, bare = (case(name, {**keep, "balances": kept}, SWEPT[name]) for kept in ("all", "none"))
+    stream = bare.stream(bare.plan(), tmp_path / "bare.zarr")
+    assert stream.chunks.model.program.ledger is None
+    found, wanted = stream.run(1).dataset, stored(tmp_path / "whole.zarr", whole).dataset
+    assert set(wanted) - set(found) == {"energy_error", "entropy_error", "site_error"}
+    for key in (key for key in found if key not in ("steps", "reason")):
+        # At a rupture a state changes by much in the last digit of the time.
+        size = np.nanmax(np.abs(wanted[key].values), initial=0.0)
+        np.testing.assert_allclose(found[key].values, wanted[key].values, rtol=1e-7, atol=1e-7 * size, err_msg=key)
+    checked = check(stream)  # by runs that have theirs
+    assert np.all(checked.error < 1e-6), str(checked)
+    assert "balances   not kept" in str(store_summary(stream, stream.store, checked)[1])
 
 
 def test_times_of_values_and_states_at_events(tmp_path):
