@@ -6,7 +6,7 @@ Source: Sauer, Duong & Mandadapu (2021), section on heat transfer: the sum of ga
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
 from functools import lru_cache
 from typing import Any
@@ -16,7 +16,7 @@ import symengine
 from surfacechem.errors import InputError, suggestion
 from surfacechem.expressions import Expression, depends
 from surfacechem.model.build import Build
-from surfacechem.model.system import System
+from surfacechem.model.system import Array, System
 from surfacechem.tolerances import CBRT_EPS, EPS
 
 OPENINGS = tuple(10.0 ** (k / 8) for k in range(-80, -16))
@@ -95,52 +95,56 @@ def refuse_idle_initial_values(build: Build) -> None:
         raise InputError(message, path=f"initial.{name}")
 
 
-def check_start(system: System, values: Mapping[str, float], initial: Mapping[str, float]) -> None:
-    """Raise InputError if the initial state is outside the range in which the laws hold.
+class StartLimits:
+    """The limits of a system as they are held against a start."""
 
-    ``values`` holds the parameters of the first piece of time by path, ``initial`` the states by name.
+    def __init__(self, system: System) -> None:
+        states = [None if state.algebraic else state.symbol for state in system.states]
+        symbols = [system.t, *states, *(parameter.symbol for parameter in system.parameters)]
+        self._places = {symbol: place for place, symbol in enumerate(symbols) if symbol is not None}
+        self._limits = [(margin, expression, _sum(expression, self._places)) for margin, expression in system.limits]
+
+    def check(self, y: Array, parameters: Array) -> None:
+        """Raise InputError if these states and parameters are outside the range in which the laws hold."""
+        numbers = [0.0, *y.tolist(), *parameters.tolist(), 1.0]
+        for margin, expression, terms in self._limits:
+            if terms is None:
+                number = self._exactly(expression, numbers)
+            else:
+                number = math.fsum([sign * numbers[place] for place, sign in terms])
+            # One that needs an algebraic variable or a derivative only the run can find.
+            if number is not None and not number > 0:
+                remedy = f" {margin.remedy}" if margin.remedy else ""
+                message = f"at the start {margin.reason} ({margin.name} does not hold: {number:.6g}).{remedy}"
+                raise InputError(message, path=margin.path)
+
+    def _exactly(self, expression: Expression, numbers: Sequence[float]) -> float | None:
+        """Value of an expression without rounding errors, which is not a number where it has none; None where it needs
+        more than is given.
+        """
+        known = {x: self._places[x] for x in expression.free_symbols if x in self._places}
+        try:
+            value = expression.subs({x: _exact(numbers[place]) for x, place in known.items()})
+            return None if value.free_symbols else float(value)
+        except (RuntimeError, TypeError, ValueError):  # an undefined number, zero over zero for instance
+            return math.nan
+
+
+def _sum(expression: Expression, places: Mapping[Any, int]) -> list[tuple[int, float]] | None:
+    """Places and factors of the terms of an expression that is a sum of known symbols and numbers alone, as most limits
+    are; a number is its factor times what is last.
     """
-    given = {parameter.symbol: values[parameter.path] for parameter in system.parameters}
-    given |= {state.symbol: initial[state.name] for state in system.states if not state.algebraic}
-    given[system.t] = 0.0
-    for margin, expression in system.limits:
-        number = _exactly(expression, given)
-        # One that needs an algebraic variable or a derivative only the run can find.
-        if number is not None and not number > 0:
-            remedy = f" {margin.remedy}" if margin.remedy else ""
-            message = f"at the start {margin.reason} ({margin.name} does not hold: {number:.6g}).{remedy}"
-            raise InputError(message, path=margin.path)
-
-
-def _exactly(expression: Expression, given: Mapping[Any, float]) -> float | None:
-    """Value of an expression without rounding errors, which is not a number where it has none; None where it needs more
-    than is given.
-    """
-    terms = _sum(expression)
-    try:
-        if terms is not None:  # as most limits are
-            return math.fsum(sign * given[x] if x is not None else sign for x, sign in terms)
-        value = expression.subs({x: _exact(given[x]) for x in expression.free_symbols if x in given})
-        return None if value.free_symbols else float(value)
-    except KeyError:
-        return None
-    except (RuntimeError, TypeError, ValueError):  # an undefined number, zero over zero for instance
-        return math.nan
-
-
-@lru_cache(maxsize=1024)
-def _sum(expression: Expression) -> tuple[tuple[Any, float], ...] | None:
-    """Symbols and their signs, and numbers without a symbol, of an expression that is a sum of these alone."""
     terms = []
     for term in expression.args if isinstance(expression, symengine.Add) else (expression,):
-        number = isinstance(term, symengine.Float | symengine.Integer)
-        x, sign = (
-            (None, float(term)) if number else (-term, -1.0) if isinstance(-term, symengine.Symbol) else (term, 1.0)
-        )
-        if not (number or isinstance(x, symengine.Symbol)):
+        if isinstance(term, symengine.Float | symengine.Integer):
+            terms.append((-1, float(term)))
+        elif term in places:
+            terms.append((places[term], 1.0))
+        elif -term in places:
+            terms.append((places[-term], -1.0))
+        else:
             return None
-        terms.append((x, sign))
-    return tuple(terms)
+    return terms
 
 
 @lru_cache(maxsize=1024)

@@ -100,7 +100,7 @@ class State:
         """Name in the dataset."""
         return self.quantity.name
 
-    @property
+    @cached_property
     def path(self) -> str:
         """Path of its initial value, or of what is given in its place."""
         return f"initial.{self.given.quantity.name if self.given else self.start or self.name}"

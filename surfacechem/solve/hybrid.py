@@ -265,14 +265,14 @@ def unbegun(problem: Problem, status: Status, end: float, ledger: Array) -> Resu
 def merged(problem: Problem, arcs: Sequence[Arc], status: Status, end: float, ledger: Array) -> Result:
     """The arcs as one result, which ends at this time with this ledger."""
     results = [arc.result for arc in arcs]
-    last = results[-1]
+    last, first = results[-1], arcs[0]
+    segments = np.array([*(arc.start.t for arc in arcs), problem.segments[-1]])
+    problem = replace(problem, segments=segments, parameters=np.array([arc.start.parameters for arc in arcs]))
+    if len(arcs) == 1 and not (first.start.t or first.booked.any()):  # as it stands
+        return replace(last, problem=problem, status=status, t=end, ledger=ledger, times=first.times)
     events = _rows([(arc, arc.result.events, slice(None)) for arc in arcs])
     return Result(
-        problem=replace(
-            problem,
-            segments=np.array([*(arc.start.t for arc in arcs), problem.segments[-1]]),
-            parameters=np.array([arc.start.parameters for arc in arcs]),
-        ),
+        problem=problem,
         status=status,
         t=end,
         y=last.y,

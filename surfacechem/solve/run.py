@@ -17,7 +17,7 @@ from surfacechem.compile.preparing import PREPARING
 from surfacechem.compile.program import Chain, Filler, Function, Program, compile_function, compile_program
 from surfacechem.contracts.terms import Spec
 from surfacechem.errors import PATHS, InputError, suggestion
-from surfacechem.model.checks import check_start
+from surfacechem.model.checks import StartLimits
 from surfacechem.model.system import System
 from surfacechem.solve import ASKING, AUTO, solver
 from surfacechem.solve import segments as pieces
@@ -237,10 +237,12 @@ def values_of(system: System, changes: Mapping[str, float] | None = None) -> dic
     """Every parameter and initial value by path, with some of them changed."""
     values = {parameter.path: parameter.at(0.0) for parameter in system.parameters}
     values |= {state.path: state.at_start[1] for state in system.states}
+    if not changes:
+        return values
     specs = {s.path: POSITIVE if s.given and not s.given.state else STATE for s in system.states}
     specs |= {parameter.path: parameter.spec for parameter in system.parameters}
-    known = system.changeable if changes else {}
-    for path, value in (changes or {}).items():
+    known = system.changeable
+    for path, value in changes.items():
         if path not in known:
             raise InputError(f"no parameter '{path}' to change.{suggestion(path, known, PATHS)}")
         specs[path].check(path, float(value))
@@ -368,24 +370,20 @@ class Model:
         """
         system, end = self.system, run.times[-1]
         segments = pieces.segments(system, end, values)
-        scales = np.array([state.finest or state.scale for state in system.states])
         parameters = pieces.segment_parameters(system, segments[:-1], run.rtol, values)
         if passing:
             fastest = max((values[path] for path in system.cycles), default=0.0)
             segments, parameters = self.passing.pieces(segments, parameters, fastest, run.max_steps)
         pieces.start_modes(system, parameters, values)
-        first = {**values, **dict(zip([p.path for p in system.parameters], parameters[0].tolist(), strict=True))}
-        initial = {state.name: state.from_given(values) for state in system.states}
-        check_start(system, first, initial)
+        y = np.array([state.from_given(values) for state in system.states])
+        self._limits.check(y, parameters[0])
         if nudged:
             pieces.nudge(system, parameters)
-        y = np.array(list(initial.values()))
         if system.equilibria:
             y, parameters = self._settled(y, parameters)
         start = stable_start(system, self.program, y, parameters[0])
         if system.equilibria:  # the gaps given are where the search begins; what it finds has to be admissible, too
-            first |= dict(zip([p.path for p in system.parameters], parameters[0].tolist(), strict=True))
-            check_start(system, first, dict(zip(initial, start.tolist(), strict=True)))
+            self._limits.check(start, parameters[0])
         return Problem(
             program=self.program,
             y0=start,
@@ -393,7 +391,7 @@ class Model:
             segments=segments,
             parameters=parameters,
             rtol=run.rtol,
-            atol=scales * (run.atol if run.atol is not None else NONE_OF_SCALE * run.rtol),
+            atol=self._scales * (run.atol if run.atol is not None else NONE_OF_SCALE * run.rtol),
             margins=self._guards,
             max_steps=run.max_steps,
             max_seconds=run.max_seconds,
@@ -410,6 +408,14 @@ class Model:
             message = "there is no gap at which the tractions are in equilibrium at the start."
             raise InputError(message, path="mechanics")
         return settled.y, np.where(settled.parameters != parameters[0], settled.parameters, parameters)
+
+    @cached_property
+    def _limits(self) -> StartLimits:
+        return StartLimits(self.system)
+
+    @cached_property
+    def _scales(self) -> Array:
+        return np.array([state.finest or state.scale for state in self.system.states])
 
     @cached_property
     def _guards(self) -> tuple[Margin, ...]:

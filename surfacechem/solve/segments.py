@@ -40,7 +40,7 @@ def segments(system: System, end: float, values: Mapping[str, float]) -> Array:
 
 def segment_parameters(system: System, starts: Array, rtol: float, values: Mapping[str, float]) -> Array:
     """Parameters of each piece: loads as they start it, bounds with the slack that the tolerance needs."""
-    rows = np.empty((len(starts), len(system.parameters)))
+    rows = np.repeat([[values[parameter.path] for parameter in system.parameters]], len(starts), axis=0)
     for j, parameter in enumerate(system.parameters):
         if parameter.load is not None:
             rows[:, j] = [parameter.at(float(start)) for start in starts]
@@ -48,8 +48,6 @@ def segment_parameters(system: System, starts: Array, rtol: float, values: Mappi
             rows[:, j] = min(max(values[parameter.path], STRAY * rtol), LARGEST_SLACK)
         elif parameter.path == TOLERANCE:
             rows[:, j] = rtol
-        else:
-            rows[:, j] = values[parameter.path]
     return rows
 
 
@@ -62,12 +60,12 @@ def nudge(system: System, parameters: Array) -> None:
 def start_modes(system: System, parameters: Array, values: Mapping[str, float]) -> None:
     """Modes and registers that follow from the initial state."""
     symbols = [p.symbol for p in system.parameters]
-    initial = {state.symbol: state.from_given(values) for state in system.states}
-    initial |= dict(zip(symbols, parameters[0].tolist(), strict=True)) | {system.t: 0}
-    for mode in system.modes:
-        if mode.start is not None:
-            start = float(system.expand(mode.start).subs(initial))
-            parameters[:, symbols.index(mode.symbol)] = start
+    found = [mode for mode in system.modes if mode.start is not None]
+    initial = {state.symbol: state.from_given(values) for state in system.states} if found else {}
+    initial |= dict(zip(symbols, parameters[0].tolist(), strict=True)) | {system.t: 0} if found else {}
+    for mode in found:
+        start = float(system.expand(mode.start).subs(initial))
+        parameters[:, symbols.index(mode.symbol)] = start
     for register in system.registers:
         if register.given is not None:
             parameters[:, symbols.index(register.symbol)] = register.given(values)

@@ -139,15 +139,15 @@ def integrate_ledger(w: Any, h: float) -> None:
         set_stage(w, i, h)
         evaluate(w, LEDGER, w.rates[i])
     # Radau's quadrature has the order 2s - 1 of the method, its polynomial that of the stages plus one.
-    for m in range(w.n_ledger):
-        defect = w.rates[7, m]
-        for i in range(s):
-            defect -= START_RATE[k, i] * w.rates[i, m]
-            total = 0.0
-            for j in range(s):
-                total += COLLOCATION[k, i, j] * w.rates[j, m]
-            w.q_stage[i, m] = h * total
-        w.q_correction[m] = h * defect
+    count, rates, stages, defects = w.n_ledger, w.rates, w.q_stage, w.q_correction
+    combine(COLLOCATION[k].ctypes.data, 7, s, s, rates.ctypes.data, count, stages.ctypes.data)
+    copy(rates[7], defects)
+    for i in range(s):
+        for m in range(count):
+            stages[i, m] *= h
+            defects[m] -= START_RATE[k, i] * rates[i, m]
+    for m in range(count):
+        defects[m] *= h
 
 
 @compiled
@@ -172,12 +172,14 @@ def defect_norm(w: Any, defects: Any, h: float, remaining: float) -> float:
     the quadrature 2s - 1: for a smooth rate its error, relative to what the step turns over, is that power of the
     defect.
     """
-    s = stage_count(w.member)
+    largest, rates = w.q_turned, w.rates
     for m in range(w.n_ledger):
-        rate = abs(w.rates[7, m])
-        for i in range(s):
-            rate = max(rate, abs(w.rates[i, m]))
-        miss = abs(defects[m])
+        largest[m] = abs(rates[7, m])
+    for i in range(stage_count(w.member)):
+        for m in range(w.n_ledger):
+            largest[m] = max(largest[m], abs(rates[i, m]))
+    for m in range(w.n_ledger):
+        rate, miss = largest[m], abs(defects[m])
         if miss > 0.0:
             rate = max(rate, miss / h)
         w.q_miss[m], w.q_turned[m], w.q_excused[m] = miss, h * rate, 0.0

@@ -154,7 +154,7 @@ MEMORY = {
     # held against, the largest so far, errors that the tolerance of the states excuses; at the stages; rates there and,
     # last, at the start
     **_arrays("q q_trial q_correction q_probe q_miss q_turned q_scale q_largest q_excused", "n_ledger"),
-    **_arrays("q_stage", 7, "n_ledger"),
+    **_arrays("q_stage", ROWS, "n_ledger"),
     **_arrays("rates", 8, "n_ledger"),
     # guards: value now, at the two points before, at the start of the step and elsewhere; largest so far; slope
     **_arrays("margin margin_before margin_earlier margin_first margin_probe margin_largest margin_slope", "n_margins"),
