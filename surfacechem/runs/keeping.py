@@ -188,7 +188,8 @@ class RunByRun:
         """What is kept of runs, with so many output times, audited anew or as given; of one that there is none of, why
         that is.
         """
-        books = iter(audits or (self._audited(run) for run in runs if not isinstance(run, str)))
+        found = [run for run in runs if not isinstance(run, str)]
+        books = iter(audits or map(audit, found) if self.keep.balances else [None] * len(found))
         codes = {reason: STATUSES.index("refused" if reason == REFUSED else "failed") for reason in self.reasons}
         rows = [
             {"status": codes[run], "reason": self.reasons.index(run), "steps": 0}
@@ -197,14 +198,11 @@ class RunByRun:
             for run in runs
         ]
         kinds = {name: kind for name, (kind, _, _) in described(self.model.system, self.keep).items()}
-        found: Columns = {name: np.array([row.get(name, np.nan) for row in rows], kind) for name, kind in kinds.items()}
+        kept: Columns = {name: np.array([row.get(name, np.nan) for row in rows], kind) for name, kind in kinds.items()}
         for name in self.keep.series:
             nothing = np.full(times, np.nan)
-            found[name] = np.array([row.get(name, nothing) for row in rows])
-        return found
-
-    def _audited(self, run: Trajectory) -> Audit | None:
-        return audit(run) if self.keep.balances else None
+            kept[name] = np.array([row.get(name, nothing) for row in rows])
+        return kept
 
     def _kept(self, run: Trajectory, books: Audit | None, times: int) -> dict[str, Any]:
         result, keep = run.result, self.keep

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from surfacechem.compile.program import Function, Program, compile_function
+from surfacechem.compile.program import Function, compile_function
 from surfacechem.expressions import Expression, derivative
 from surfacechem.model.automaton import FOLD, SIDE, SLIP
 from surfacechem.model.system import System
@@ -396,8 +396,8 @@ def _warmed(rows: Array, heat: Heat | None) -> Array:
 class Folds:
     """The edges of a system that are folds, by index."""
 
-    def __init__(self, equilibria: Equilibria, program: Program) -> None:
-        self.equilibria, self.program, self.system = equilibria, program, equilibria.system
+    def __init__(self, equilibria: Equilibria) -> None:
+        self.equilibria, self.system = equilibria, equilibria.system
         self.items = {index: edge.fold for index, edge in enumerate(self.system.edges) if edge.fold is not None}
 
     @cached_property
@@ -416,18 +416,19 @@ class Folds:
         return found
 
     @cached_property
-    def _approaches(self) -> dict[int, Function]:
-        """Tangent, how fast it changes, and how each balance does by itself."""
-        states, t, found = self.system.states, self.system.t, {}
-        alone = [derivative(self.system.expand(row), t) for row in self.system.rows.values()] if self.items else []
-        for index, fold in self.items.items():
-            tangent = self.system.expand(fold.tangent)
-            change = sum((derivative(tangent, s.symbol) * s.dot for s in states), derivative(tangent, t))
-            found[index] = compiled(self.system, [tangent, change, *alone])
-        return found
+    def _approach(self) -> Function:
+        """For each gap the driving traction, and how fast it changes."""
+        states, t, found = self.system.states, self.system.t, []
+        for item in self.equilibria.items:
+            residual = self.system.expand(item.residual)
+            change = sum((derivative(residual, s.symbol) * s.dot for s in states), derivative(residual, t))
+            found += [residual, change]
+        return compiled(self.system, found)
 
-    def _shape(self, index: int, point: Point) -> tuple[Array, Array, Way]:
-        """How the tangent of a fold falls along each gap, how each warms the states, and the way that is lost."""
+    def _shape(self, index: int, point: Point) -> tuple[Array, Way, Array]:
+        """How the tangent of a fold falls along each gap, the way that is lost, and what moves along it with what it
+        warms.
+        """
         n = len(self.equilibria.items)
         values = np.atleast_1d(self._shapes[index](point.inputs()))
         falls, warming, entries = np.split(values, [n, n + n * len(self.system.states)])
@@ -435,7 +436,8 @@ class Folds:
         free, weights = self.equilibria.free(point), np.zeros(n)
         weights[free] = np.linalg.svd(entries.reshape(n, n)[np.ix_(free, free)])[2][-1] if len(free) > 1 else 1.0
         weights /= weights[np.abs(weights).argmax()]
-        return falls, warming.reshape(n, -1), self.equilibria.together(point, weights)
+        way = self.equilibria.together(point, weights)
+        return falls, way, way.moves + warming.reshape(n, -1).T @ way.pulls
 
     def at(self, index: int, point: Point) -> Lost | None:
         """The fold itself, from a point close to it; None where it is out of reach, or the edge is none.
@@ -445,11 +447,12 @@ class Folds:
         """
         if index not in self.items or not len(self.equilibria.free(point)):
             return None
-        falls, warming, way = self._shape(index, point)
+        falls, way, moves = self._shape(index, point)
         direction, onward = float(np.sign(falls @ way.pulls)), self.equilibria.onward_along(point, way)
         if onward and direction != onward:
             return None
-        there = replace(way, moves=way.moves + warming.T @ way.pulls)
+
+        there = replace(way, moves=moves)
 
         def ahead(gaps: Sequence[float] | Array) -> Array:
             return np.asarray(self._tangents[index](self.equilibria.along(point, there, gaps))).reshape(-1)
@@ -464,7 +467,7 @@ class Folds:
         point = self.equilibria.with_slip(lost.point, 0.0)
         if self._tangents[index](point.inputs())[0] > FOLD:
             return None
-        falls, _, way = self._shape(index, point)
+        falls, way, _ = self._shape(index, point)
         return Lost(point, way, float(np.sign(falls @ way.pulls)))
 
     def reached(self, point: Point, rtol: float) -> int:
@@ -481,28 +484,14 @@ class Folds:
     def in_time(self, index: int, point: Point, end: float) -> Point:
         """A point close to a fold at the time of the fold, where that is before the end; else as it is.
 
-        Near a fold the square of the tangent stiffness falls in proportion to time.
+        The traction that resists at the gap of the fold vanishes in proportion to time, whatever the run has missed of
+        a gap that moves ever faster.
         """
-        if index not in self.items:
+        lost = self.at(index, point)
+        if lost is None:
             return point
-        approach = self._approaches[index]
-        alone = approach(point.inputs())[2:]
-        tangent, change, *_ = approach(replace(point, ydot=self._rates(point, alone)).inputs())
-        left = float(-tangent / (2 * change)) if tangent > 0 > change else 0.0
+        beside = point.ydot - point.ydot[lost.way.column] * self._shape(index, point)[2]
+        values = self._approach(replace(lost.point, ydot=beside).inputs())
+        push, change = (lost.direction * float(lost.way.pulls @ part) for part in (values[::2], values[1::2]))
+        left = -push / change if push < 0 < change else 0.0
         return replace(point, t=point.t + left) if left < min(SOON * point.t, end - point.t) else point
-
-    def _rates(self, point: Point, alone: Array) -> Array:
-        """Rates of all states, those of algebraic ones from how their balances change."""
-        program = self.program
-        inputs = program.filled(replace(point, ydot=np.zeros_like(point.y)).inputs())
-        by_state, by_rate = program.derivatives(inputs)
-        balances = np.asarray(by_rate.any(axis=1))
-        matrix = np.where(balances[:, None], by_rate, by_state)
-        # What is algebraic in a balance that has rates follows these without delay, and no gap follows it.
-        matrix[balances & program.algebraic_mask] = np.eye(len(matrix))[balances & program.algebraic_mask]
-        change = np.where(balances, program.residual(inputs), alone)
-        change[balances & program.algebraic_mask] = 0.0
-        try:
-            return np.asarray(np.linalg.solve(matrix, -change))
-        except np.linalg.LinAlgError:
-            return np.zeros_like(point.y)

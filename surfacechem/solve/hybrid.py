@@ -112,6 +112,11 @@ class Arc:
     booked: Array
     """Ledger at its start."""
 
+    @property
+    def is_whole(self) -> bool:
+        """Whether nothing has come before it, neither time nor a jump."""
+        return not (self.start.t or self.booked.any())
+
 
 class Hybrid:
     """One run of a system with edges."""
@@ -265,11 +270,11 @@ def unbegun(problem: Problem, status: Status, end: float, ledger: Array) -> Resu
 def merged(problem: Problem, arcs: Sequence[Arc], status: Status, end: float, ledger: Array) -> Result:
     """The arcs as one result, which ends at this time with this ledger."""
     results = [arc.result for arc in arcs]
-    last, first = results[-1], arcs[0]
+    last = results[-1]
     segments = np.array([*(arc.start.t for arc in arcs), problem.segments[-1]])
     problem = replace(problem, segments=segments, parameters=np.array([arc.start.parameters for arc in arcs]))
-    if len(arcs) == 1 and not (first.start.t or first.booked.any()):  # as it stands
-        return replace(last, problem=problem, status=status, t=end, ledger=ledger, times=first.times)
+    if len(arcs) == 1 and arcs[0].is_whole:
+        return replace(last, problem=problem, status=status, t=end, ledger=ledger, times=arcs[0].times)
     events = _rows([(arc, arc.result.events, slice(None)) for arc in arcs])
     return Result(
         problem=problem,
@@ -284,7 +289,7 @@ def merged(problem: Problem, arcs: Sequence[Arc], status: Status, end: float, le
         ledger_outputs=np.concatenate([arc.booked + arc.result.ledger_outputs for arc in arcs]),
         events=Events(*events, index=np.concatenate([result.events.index for result in results])),
         counters=Counters(*map(sum, zip(*(result.counters for result in results), strict=True))),
-        steps=_steps(arcs) if problem.record_steps else None,
+        steps=_steps(arcs),
         stepping=sum((result.stepping for result in results), 0.0),
         segment=np.repeat(np.arange(len(arcs)), [len(arc.times) for arc in arcs]),
         known=_known(arcs),
@@ -305,8 +310,10 @@ def _known(arcs: Sequence[Arc]) -> States | None:
     return States(np.minimum(start[number] + t[kept], end[number]), y[kept], booked[number] + ledger[kept], number)
 
 
-def _steps(arcs: Sequence[Arc]) -> Points:
-    """The steps of all arcs, each with the number of its arc."""
+def _steps(arcs: Sequence[Arc]) -> Points | None:
+    """The steps of all arcs, each with the number of its arc, where they are recorded."""
+    if not arcs[0].result.problem.record_steps:
+        return None
     taken = [(arc, arc.result.steps) for arc in arcs if arc.result.steps is not None]
     # The start of an arc, and what time cannot tell from it, is the event that ends the last one.
     kept = [(arc, some, (arc.start.t + some.t > arc.start.t) | (arc is arcs[0])) for arc, some in taken]

@@ -138,7 +138,7 @@ class Jumper:
         self.system = system
         self.states = [state.name for state in system.states]
         self.equilibria = Equilibria(system)
-        self.folds = Folds(self.equilibria, program)
+        self.folds = Folds(self.equilibria)
         memory = {item.symbol for item in system.memory}
         kept = [p.symbol in memory or p.path == RESTS for p in system.parameters]
         self.mode_columns = [j for j, keep in enumerate(kept) if keep]

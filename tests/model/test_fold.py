@@ -1,6 +1,7 @@
 """Folds in shear and in mixed mode: where they are, what they release, and where the gaps come to rest."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from scipy.optimize import brentq, fsolve
 from scipy.special import lambertw
 from solved import closed
 
+import surfacechem
 from surfacechem.format import load_text
 from surfacechem.laws.cohesive import ExponentialCohesiveZone, XuNeedleman
 from surfacechem.laws.factors import Power
@@ -107,6 +109,14 @@ def test_moment_and_state_of_a_fold_are_those_of_the_fold_itself(k, C):
     assert snap.t == pytest.approx(w / 1e-6, rel=5e-15)
     assert snap.before.y == pytest.approx([g, T], rel=5e-15)
     assert snap.after.y == pytest.approx([apart, hot], rel=1e-13)
+
+
+def test_the_time_of_a_fold_is_known_better_than_the_gap_that_leads_to_it():
+    """Zones snap on where the run ends before the fold, by more than its tolerance where that is the tightest."""
+    simulation = surfacechem.load("cohesive-cycles")
+    runs = [simulation.model.solve(replace(simulation.case.run, rtol=rtol)) for rtol in (1e-8, 1e-10, 1e-12)]
+    for late in range(1, 6, 2):
+        assert [run.jumps[late].t for run in runs] == pytest.approx([runs[-1].jumps[late].t] * 3, rel=1e-15)
 
 
 def gradient(z, w_n, w_t, k_t):
