@@ -1,7 +1,8 @@
 """Sweeps into a store: time of all and of the stepper alone, memory, and the same work by other libraries.
 
 Times are seconds of processors, so that what else a machine does counts as little as can be; each figure is that of a
-process of its own. ``python benchmarks/sweeps.py [RUNS]``; peers that are not installed are left out.
+process of its own. ``python benchmarks/sweeps.py [RUNS]``; peers that are not installed are left out. What is "bare"
+keeps no balances.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ K_0 = "interface.potential.bond-energy.K_0"
 ENDS = {"last": ["T", "phi"]}
 SWEPT = {
     "exothermic": (K_0, 1.0, 300.0, ENDS),
+    "exothermic, bare": (K_0, 1.0, 300.0, {**ENDS, "balances": "none"}),
     "shared-load-rupture": ("loading.t_n", 600.0, 1000.0, {"last": ["phi"]}),
     "stick-slip": ("interface.friction.coulomb.mu_s", 0.5, 0.7, {"last": ["u_t"], "events": "all"}),
     "debonding": ("interface.limits.tensile-strength.t_max", 2e7, 1e9, {"last": ["T"], "events": "all"}),
@@ -37,7 +39,7 @@ def stored(case: str, runs: int) -> dict[str, float]:
 
     path, low, high, keep = SWEPT[case]
     section = {"over": {path: {"from": low, "to": high, "points": runs}}, "keep": keep}
-    simulation = surfacechem.load(case, {"sweep": section})
+    simulation = surfacechem.load(case.partition(",")[0], {"sweep": section})
     inside = [0.0]
 
     def timed(run):
@@ -223,6 +225,7 @@ def main(runs: int) -> None:
     for case, count in (
         ("exothermic", runs // 10),
         ("exothermic", runs),
+        ("exothermic, bare", runs),
         ("shared-load-rupture", runs // 10),
         ("stick-slip", runs // 100),
         ("debonding", runs // 100),

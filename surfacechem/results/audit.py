@@ -165,14 +165,12 @@ def residuals(system: System, named: Mapping[str, Array], ledger: Array) -> Resi
         """What the supplies do not explain of the change of a total, and the most that its parts and all accounts
         changed by.
         """
-        found = np.array([named[name] for name in (total, *parts) if name in named])
-        found -= found[..., :1]
+        residual, *found = [named[name] - named[name][..., :1] for name in (total, *parts) if name in named]
         own = [accounts(system, ledger, kind) for kind in (*supplies, *sinks)]
-        residual = found[0]
         for booked in own[: len(supplies)]:
             residual = residual - booked.sum(axis=-1)
-        most = np.abs(np.concatenate(own, axis=-1)).max(axis=(-2, -1), initial=0.0)
-        return residual, np.maximum(most, np.abs(found[1:]).max(axis=(0, -1), initial=0.0))
+        exchanged = np.concatenate([*own, *[part[..., None] for part in found]], axis=-1)
+        return residual, np.abs(exchanged).max(axis=(-2, -1), initial=0.0)
 
     energy, most_energy = balance(*TOTALS[0], ("energy supply",), ("dissipation",))
     entropy, most_entropy = balance(*TOTALS[1], ("entropy supply", "entropy production"), ())

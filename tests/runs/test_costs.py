@@ -26,7 +26,7 @@ def test_a_run_with_its_error_and_its_audit_takes_few_calls():
     case = surfacechem.load("exothermic")
     _ = case.run().audit  # what is made once a model
     runs = []
-    assert calls_of(lambda: runs.append(case.run({"interface.potential.bond-energy.K_0": 301.0}))) < 1800
+    assert calls_of(lambda: runs.append(case.run({"interface.potential.bond-energy.K_0": 301.0}))) < 600
     assert calls_of(lambda: runs[0].audit) < 240
     assert runs[0].accuracy.source == "exact solution exothermic-bonding"
 
@@ -34,4 +34,4 @@ def test_a_run_with_its_error_and_its_audit_takes_few_calls():
 def test_a_second_run_takes_few_calls():
     case = surfacechem.load("catch-bond")
     _ = case.run().audit
-    assert calls_of(case.run) < 1150
+    assert calls_of(case.run) < 350
