@@ -76,11 +76,14 @@ def _missed(ways: Sequence[Array], values: Array, left: Index, rows: Index, righ
     """By how much lines from one row to another miss rows between them at worst, the one way or the other: over time or
     its logarithm; ``values`` has shape (quantities, times).
     """
-    start, rise, missed = values[:, left], values[:, right] - values[:, left], np.zeros(len(rows))
+    start, missed = values.take(left, axis=1), np.zeros(len(rows))
+    rise, risen = values.take(right, axis=1) - start, values.take(rows, axis=1) - start
     for over in ways:
         length = over[right] - over[left]
         part = np.divide(over[rows] - over[left], length, out=np.zeros_like(length), where=length > 0)
-        missed = np.fmax(missed, np.abs(values[:, rows] - (start + part * rise)).max(axis=0, initial=0.0))
+        apart = part * rise
+        np.abs(np.subtract(risen, apart, out=apart), out=apart)
+        missed = np.fmax(missed, apart.max(axis=0, initial=0.0))
     return missed
 
 
