@@ -1,5 +1,6 @@
 """The compiled stepper: hard problems with known answers, events, batches, failures."""
 
+import math
 from dataclasses import replace
 
 import numba
@@ -131,6 +132,19 @@ def test_initial_layer_far_below_rounding() -> None:
     assert result.steps is not None
     assert result.steps.t[1] < 1e-199
     assert result.y[0] == pytest.approx(np.cos(1.0), rel=1e-8)
+
+
+@pytest.mark.parametrize("name", ["radau", "dop853"])
+@pytest.mark.parametrize(("k", "power"), [(50.0, 1), (5.0, 1), (500.0, 2), (50.0, 2)])
+@pytest.mark.parametrize("rtol", [1e-6, 1e-8, 1e-10, 1e-12])
+def test_a_kink_that_no_margin_tells_of_is_stepped_through_to_the_tolerance(rtol, k, power, name) -> None:
+    """A rate that bends as y = t - 1 passes zero: steps across it are rejected, those tried in their place, too."""
+    t, y, dy, p = se.symbols("t y dy p")
+    beyond = 0.5 if power == 1 else 0.05
+    exact = math.expm1(k * beyond) / k if power == 1 else math.tan(math.sqrt(k) * beyond) / math.sqrt(k)
+    program = compile_program(t, [y], [dy], [p], [dy - 1 - se.Piecewise((p * y**power, y > 0), (0.0, True))])
+    ended = solver(name).solve(problem(program, [-1.0], [0.0, 1 + beyond], rtol, atol=1e-6 * rtol, parameters=[k]))
+    assert ended.y[0] == pytest.approx(exact, rel=10 * rtol)
 
 
 def test_what_grows_from_below_the_tolerance_is_not_damped() -> None:

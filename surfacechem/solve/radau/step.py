@@ -121,18 +121,24 @@ def error_norm(w: Any, floor: float) -> float:
 
 
 @compiled
-def estimate_error(w: Any, h: float) -> float:
-    """Norm of the local error."""
+def _defect_at_start(w: Any, h: float, y: Any) -> bool:
+    """By how much the slope of the polynomial at the start of the step misses the equations at a state, into the error;
+    whether it is finite.
+    """
     k = w.member
-    n = w.n
-    for m in range(n):
+    for m in range(w.n):
         slope = 0.0
         for j in range(stage_count(k)):
             slope += START_SLOPE[k, j] * w.z[j, m]
         w.delta[m] = slope / h
-    # The equations at the start, with the slope of the polynomial there.
-    put(w, 0.0, w.y, w.delta)
-    if not filter_residual(w):
+    put(w, 0.0, y, w.delta)
+    return bool(filter_residual(w))
+
+
+@compiled
+def estimate_error(w: Any, h: float) -> float:
+    """Norm of the local error."""
+    if not _defect_at_start(w, h, w.y):
         return np.inf
     norm = error_norm(w, 0.0)
     if norm < NOISY:
@@ -143,11 +149,11 @@ def estimate_error(w: Any, h: float) -> float:
 
 
 @compiled
-def estimate_again(w: Any) -> float:
+def estimate_again(w: Any, h: float) -> float:
     """The estimate filtered a second time, where a stiff transient made the first one too large."""
     for m in range(w.n):
-        w.inputs[1 + m] = w.y[m] + w.error[m]
-    if not filter_residual(w):
+        w.trial[m] = w.y[m] + w.error[m]
+    if not _defect_at_start(w, h, w.trial):
         return np.inf
     return float(max(error_norm(w, MAGNIFIED), NOISY))
 
@@ -419,7 +425,7 @@ def advance_implicitly(w: Any, h: float, i: int, size_last: float, norm_last: fl
         if outcome == CONVERGED:
             norm = estimate_error(w, h)
             if norm >= 1.0 and repeated:
-                norm = min(norm, estimate_again(w))
+                norm = min(norm, estimate_again(w, h))
             if norm < 1.0:
                 proposed = next_size(w, h, norm, size_last, norm_last)
                 return GOOD, h, norm, min(h, proposed) if failed else proposed
