@@ -140,8 +140,8 @@ CELLS = {"sudden-contact": 1e-4, "epoxy-cure-thick": 6e-5}
 """Cases whose bodies are divided into cells, and the accuracy that these have; the second asks for 1e-4 itself."""
 
 FOLDS = {"sticky-sphere": 1e-9 / (2 * 1e-6**0.5), "cohesive-cycles": 1e-9 / (2 * 1e-6**0.5)}
-"""Cases whose tractions are known to 1e-9, integrated over surfaces or along a run at 1e-10: up to a millionth of the run
-before a fold that falls like the root of the time that is left."""
+"""Cases whose tractions are known to 1e-9, integrated over surfaces or along a run at 1e-10: up to a millionth of the
+run before a fold that falls like the root of the time that is left."""
 
 
 @every_case
