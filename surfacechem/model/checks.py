@@ -108,22 +108,23 @@ class StartLimits:
         """Raise InputError if these states and parameters are outside the range in which the laws hold."""
         numbers = [0.0, *y.tolist(), *parameters.tolist(), 1.0]
         for margin, expression, terms in self._limits:
-            if terms is None:
-                number = self._exactly(expression, numbers)
-            else:
-                number = math.fsum([sign * numbers[place] for place, sign in terms])
+            number = self._exactly(expression, terms, numbers)
             # One that needs an algebraic variable or a derivative only the run can find.
             if number is not None and not number > 0:
                 remedy = f" {margin.remedy}" if margin.remedy else ""
                 message = f"at the start {margin.reason} ({margin.name} does not hold: {number:.6g}).{remedy}"
                 raise InputError(message, path=margin.path)
 
-    def _exactly(self, expression: Expression, numbers: Sequence[float]) -> float | None:
+    def _exactly(
+        self, expression: Expression, terms: Sequence[tuple[int, float]] | None, numbers: Sequence[float]
+    ) -> float | None:
         """Value of an expression without rounding errors, which is not a number where it has none; None where it needs
-        more than is given.
+        more than is given. Its terms are those of a sum.
         """
-        known = {x: self._places[x] for x in expression.free_symbols if x in self._places}
         try:
+            if terms is not None:
+                return math.fsum([factor * numbers[place] for place, factor in terms])
+            known = {x: self._places[x] for x in expression.free_symbols if x in self._places}
             value = expression.subs({x: _exact(numbers[place]) for x, place in known.items()})
             return None if value.free_symbols else float(value)
         except (RuntimeError, TypeError, ValueError):  # an undefined number, zero over zero for instance
