@@ -357,7 +357,7 @@ class ArrayRuns:
 
         def whole(column: Array) -> Array:
             """A table of the runs; beyond the end of a run as at its start, so that nothing is exchanged there."""
-            # The runs next to each other in memory: NumPy finds what is largest along few outputs fifty times sooner.
+            # The runs next to each other in memory: NumPy is slow to find what is largest along few outputs in a row.
             filled = np.zeros(reached.shape, order="F")
             filled[owner, k] = column
             return filled if reached.all() else np.where(reached, filled, filled[:, :1])

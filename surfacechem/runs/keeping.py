@@ -206,11 +206,8 @@ class RunByRun:
 
     def _kept(self, run: Trajectory, books: Audit | None, times: int) -> dict[str, Any]:
         result, keep = run.result, self.keep
-        row = (
-            end_of(run)
-            | (balances_of(run, books) if books else {})
-            | {"status": STATUSES.index(run.status), "reason": self._code(run.reason)}
-        )
+        row = end_of(run) | {"status": STATUSES.index(run.status), "reason": self._code(run.reason)}
+        row |= balances_of(run, books) if books else {}
         names = [state.name for state in self.model.system.states] + [*self.model.system.output_columns]
         end = np.array([result.t]), result.y[None], result.ydot[None]
         last = dict(zip(names, [*result.y, *self.model.evaluate(result, *end)[0]], strict=True)) if keep.last else {}

@@ -60,12 +60,11 @@ def nudge(system: System, parameters: Array) -> None:
 def start_modes(system: System, parameters: Array, values: Mapping[str, float]) -> None:
     """Modes and registers that follow from the initial state."""
     symbols = [p.symbol for p in system.parameters]
-    found = [mode for mode in system.modes if mode.start is not None]
-    initial = {state.symbol: state.from_given(values) for state in system.states} if found else {}
-    initial |= dict(zip(symbols, parameters[0].tolist(), strict=True)) | {system.t: 0} if found else {}
-    for mode in found:
-        start = float(system.expand(mode.start).subs(initial))
-        parameters[:, symbols.index(mode.symbol)] = start
+    if started := [mode for mode in system.modes if mode.start is not None]:
+        initial = {state.symbol: state.from_given(values) for state in system.states}
+        initial |= dict(zip(symbols, parameters[0].tolist(), strict=True)) | {system.t: 0}
+        for mode in started:
+            parameters[:, symbols.index(mode.symbol)] = float(system.expand(mode.start).subs(initial))
     for register in system.registers:
         if register.given is not None:
             parameters[:, symbols.index(register.symbol)] = register.given(values)

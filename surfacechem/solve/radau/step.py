@@ -153,6 +153,7 @@ def estimate_again(w: Any, h: float) -> float:
     """The estimate filtered a second time, where a stiff transient made the first one too large."""
     for m in range(w.n):
         w.trial[m] = w.y[m] + w.error[m]
+    # With the slope formed anew: the search for noise has left another among the inputs.
     if not _defect_at_start(w, h, w.trial):
         return np.inf
     return float(max(error_norm(w, MAGNIFIED), NOISY))
