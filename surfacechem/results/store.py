@@ -51,7 +51,10 @@ WORDS = {
 }
 """Attributes that two writers of a store must share, and how messages call them."""
 
-NEEDED = "stores need Zarr, which is not installed: pip install 'surfacechem[sweeps]', or write to a name with .nc."
+NEEDED = (
+    "stores, and files of a sweep with `keep`, need Zarr, which is not installed: pip install 'surfacechem[sweeps]', "
+    "or leave out `keep` and write to a name with .nc."
+)
 
 
 @dataclass(frozen=True)
