@@ -178,3 +178,9 @@ CREEP = 1e-25
 
 INSTANT = 1e-100
 """Time [s] that is none: a rate at the cap of an exponent, 1e130 times its prefactor, is over within it."""
+
+DRIFT = 100.0
+"""Traction out of balance that the integration explains, relative to its parts and in units of the tolerance."""
+
+MOST_DRIFT = 0.1
+"""The same relative to its parts, however loose the tolerance: of what cancels to less than that the sign is known."""

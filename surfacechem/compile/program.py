@@ -161,12 +161,12 @@ class Program:
     @cached_property
     def tables(self) -> tuple[NDArray[Any], ...]:
         """What the stepper reads of a program: its sizes (states, accounts, margins, inputs; in the core, chains, cells
-        of chains); a row (code, user data) for residual, jacobian, ledger, margins and rates, zero where absent; which
-        states are algebraic; a row (first, end, anchor) for each chain; the places of the derivatives that are formed;
-        the group of each quadrature, -1 where it is in none.
+        of chains; nothing of edges); a row (code, user data) for residual, jacobian, ledger, margins and rates, zero
+        where absent; which states are algebraic; a row (first, end, anchor) for each chain; the places of the
+        derivatives that are formed; the group of each quadrature, -1 where it is in none.
         """
         core = self.chains[0].first if self.chains else self.n
-        sizes = self.n, self.n_ledger, self.n_margins, self.n_inputs, core, len(self.chains), self.n - core
+        sizes = self.n, self.n_ledger, self.n_margins, self.n_inputs, core, len(self.chains), self.n - core, 0, 0, 0
         functions = (self.residual, self.jacobian, self.ledger, self.margins, None)
         code = [(f.address, f.user) if f else (0, 0) for f in functions]
         chains = np.array([(c.first, c.end, c.anchor) for c in self.chains], np.int64).reshape(-1, 3)

@@ -525,13 +525,10 @@ class System:
         """Which guards are in play in the modes among the parameters: the moving margins, then the edges."""
         return tuple(all(parameters[j] in values for j, values in when) for when in self._when)
 
-    def playing(self, table: Array) -> NDArray[np.bool_]:
-        """The same for many rows of parameters, shape (runs, guards)."""
-        found = np.ones((len(table), len(self._when)), dtype=bool)
-        for k, when in enumerate(self._when):
-            for j, values in when:
-                found[:, k] &= np.any([table[:, j] == value for value in values], axis=0)
-        return found
+    @property
+    def rules(self) -> list[tuple[int, int, float]]:
+        """The same as rows (guard, parameter, value): each of its parameters has to have one of its values."""
+        return [(k, j, value) for k, when in enumerate(self._when) for j, values in when for value in values]
 
     @property
     def moves(self) -> bool:
@@ -542,6 +539,11 @@ class System:
     def in_stretches(self) -> bool:
         """Whether a run is made of stretches, each in a time of its own."""
         return any(parameter.path == START for parameter in self.parameters)
+
+    @property
+    def searches(self) -> bool:
+        """Whether what follows at an edge is searched for: the equilibrium of a gap, or what loads that jump do."""
+        return bool(self.equilibria) or any(edge.times for edge in self.edges)
 
     @property
     def jump_energy(self) -> Expression:

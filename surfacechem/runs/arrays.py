@@ -26,11 +26,13 @@ from surfacechem.solve.choice import EXPLICIT, IMPLICIT
 from surfacechem.solve.contract import Array, Index, Mask, Problem, Status
 from surfacechem.solve.diagnose import are_led_back
 from surfacechem.solve.lanes.lane_batch import solve_batch
-from surfacechem.solve.radau.solver import consistent, rates_at
-from surfacechem.solve.radau.stepper import END, EVENTS, FIRST_COUNTER, OUTPUTS, RECORDS
+from surfacechem.solve.radau.solver import consistent, rates_at, solve_arrays
+from surfacechem.solve.radau.stepper import ARCS, END, EVENTS, FIRST_COUNTER, OUTPUTS, RECORDS
 from surfacechem.solve.run import Model, Run
-from surfacechem.solve.stretches import Stretches
 from surfacechem.tolerances import CROSSED, EPS, MICROMETRE, PICOMETRE
+
+MOST = 4096, 1024
+"""Steps and events of a run for which there is room at most: what has more is looked at by itself."""
 
 TRIED = 100
 """Runs of a plan that are tried for one that is admissible, whose problem the others share."""
@@ -56,8 +58,8 @@ class Ends:
 def solvable(model: Model, plan: Plan, run: Run, problem: Problem) -> bool:
     """Whether runs of a plan differ in nothing but values of states and parameters: so that arrays tell all."""
     system = model.system
-    # Loads that jump may have to be searched for, and a load that ends the runs is one ramp.
-    jumps = any(edge.times for edge in system.edges) or (plan.load and len(problem.segments) > 2)
+    # A load that ends the runs is one ramp.
+    jumps = system.searches or (plan.load and len(problem.segments) > 2)
     own = (
         run.solver in (IMPLICIT, EXPLICIT)
         and run.max_seconds is None
@@ -66,7 +68,7 @@ def solvable(model: Model, plan: Plan, run: Run, problem: Problem) -> bool:
     )
     shared = model.passing.is_empty or not (plan.load or model.passing.reads & set(plan.paths))
     shared = shared and not set(plan.paths) & set(system.cycles)
-    return own and shared and not jumps and not system.equilibria and _starts_as_given(system, set(plan.paths))
+    return own and shared and not jumps and _starts_as_given(system, set(plan.paths))
 
 
 def quiet(model: Model, problem: Problem) -> bool:
@@ -415,13 +417,8 @@ class JumpingRuns(ArrayRuns):
     """Runs of a plan that arrays tell with their jumps."""
 
     jumps = True
-
-    @cached_property
-    def stretches(self) -> Stretches:
-        """What carries them from stretch to stretch."""
-        model = self.model
-        assert model.jumper is not None
-        return Stretches(model.system, model.jumper, replace(self.problem, record_steps=self.keeps_steps))
+    room = 0, 16, 0, 0
+    """Steps and events for which a run has room; as many as the runs before have needed."""
 
     def solve(self, values: Mapping[str, Array]) -> tuple[Mask, Columns]:
         """Which runs with these values the arrays tell, and what is kept of those."""
@@ -436,8 +433,27 @@ class JumpingRuns(ArrayRuns):
         segments = self.problem.segments[None]
         if self.ramp is not None:
             segments = np.column_stack([np.zeros(len(own)), ends[own]])
-        course = self.stretches.run(y0[own], table[own], segments, times, ends[own] / self.run.samples)
-        clear, columns = self._columns(Ends(course, course.table, course.segments, times))
-        clear &= course.told
+        batch = self._carried(y0[own], table[own], ends[own] / self.run.samples, segments, times)
+        arcs = batch.arcs
+        begun = np.where(np.arange(arcs.shape[1]) < batch.counts[:, ARCS, None], arcs[..., 0], np.inf)
+        segments = np.column_stack([begun, np.full(len(own), np.inf)])
+        clear, columns = self._columns(Ends(batch, arcs[..., 5:], segments, times))
         told[own[~clear]] = False
         return told, {name: column[clear] for name, column in columns.items()}
+
+    def _carried(self, y0: Array, table: Array, spacing: Array, segments: Array, times: Array) -> Any:
+        """Runs along their edges; once more where there was no room for what happens in them."""
+        jumper, program = self.model.jumper, self.model.program
+        assert jumper is not None
+        jumper.expect_jumps()
+        problem = replace(
+            self.problem, edges=jumper.edge_tables, times=times[0], record_steps=self.keeps_steps, picture=0.0
+        )
+        unseen = np.zeros((1, program.n_ledger + program.n_margins))
+        room = self.room
+        while True:
+            batch = solve_arrays(problem, y0, table, spacing, unseen, segments, times, room=room)
+            steps, events = np.minimum(batch.counts[:, [RECORDS, EVENTS]].max(axis=0), MOST).tolist()
+            if steps * self.keeps_steps <= room[0] and events <= room[1]:
+                return batch
+            room = self.room = max(steps * self.keeps_steps, room[0]), max(events, room[1]), 0, 0

@@ -311,8 +311,8 @@ def _compiled(system: System, run: Run) -> str:
         return "the equations; Cantera makes the steps, and asks Python for every right-hand side"
     if run.solver not in (*OWN, AUTO):
         return f"the equations; {run.solver} is called from Python for every step, which looks for events"
-    if system.edges:
-        return "equations, steps and events; what follows at a transition is found in Python"
+    if system.searches:
+        return "equations, steps and events; what follows at a transition is searched for in Python"
     return "all of the run; Python prepares it and looks at its results"
 
 

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem.compile.program import Program
+from surfacechem.tolerances import NEGLIGIBLE
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -33,6 +34,8 @@ class Status(IntEnum):
     SINGULAR = 6
     STOPPED = 7
     FAILED = 8
+    LEFT = 9
+    """Not told here: something that is looked for in another way."""
 
     @property
     def success(self) -> bool:
@@ -49,7 +52,16 @@ REASONS = {
     Status.SINGULAR: "the equations do not determine the derivatives and algebraic variables here (singular matrix)",
     Status.STOPPED: "the time allowed for the run was used up",
     Status.FAILED: "the library failed",
+    Status.LEFT: "the compiled loop leaves it to others",
 }
+
+
+AT_ONCE = 12
+"""Edges at one moment from which on they are chatter."""
+
+ALOFT, FITTED = 1.5, 0.1 * NEGLIGIBLE
+"""A time beyond that of the return, in parts of it, and the part of an arc below which the first step is fitted to it:
+what is longer a step meets by itself."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +79,8 @@ class Margin:
     """Whether the equations neither jump nor bend there: then the step onto it has to pass the test of its error."""
     strict: bool = False
     """Whether it has to be passed: touched, or passed for a moment by less than the tolerance, it holds."""
+    domain: bool = False
+    """Whether a law ends there: what it says beyond, be it by rounding, has no meaning."""
 
     @classmethod
     def stop(cls) -> "Margin":
@@ -87,6 +101,49 @@ class Margin:
     def peak(cls) -> "Margin":
         """A narrow peak: a step ends there that is short enough to have seen it."""
         return cls(terminal=False, direction=0, smooth=True)
+
+
+class EdgeTables(NamedTuple):
+    """What the compiled loop reads of the edges of a system, along which it then carries runs by itself."""
+
+    sizes: Index
+    """Numbers of what is looked at before and after a jump, of what is asked of all nodes, and of what is reset."""
+    code: Index
+    """A row (code, user data) for magnitudes and rates of guards, books, nodes, times of return and each reset; zero
+    where it has not been compiled yet."""
+    edges: Index
+    """A row (measured state, who takes the heat, refuses, place among those that return) for each edge."""
+    when: Index
+    """Rows (guard, parameter, value): a guard is in play where each of its parameters has one of its values."""
+    held: Index
+    """Parameters that change along edges."""
+    clocks: Index
+    """Parameters that are times, that of the start of an arc first."""
+    nodes: Index
+    """The state of each node; -1 for those that pass their heat on."""
+    accounts: Index
+    """A row (kind, place) for each account."""
+    least_peaks: Array
+    """Sizes of the states that count however small they have been."""
+
+
+def integers(rows: Sequence[Any], *shape: int) -> Index:
+    """An array of integers of this shape."""
+    return np.array(rows, np.int64).reshape(shape)
+
+
+NO_EDGES = EdgeTables(
+    sizes=np.zeros(3, np.int64),
+    code=integers([], 0, 2),
+    edges=integers([], 0, 4),
+    when=integers([], 0, 3),
+    held=integers([], 0),
+    clocks=integers([], 0),
+    nodes=integers([], 0),
+    accounts=integers([], 0, 2),
+    least_peaks=np.zeros(0),
+)
+"""Runs end at the edges."""
 
 
 @dataclass(frozen=True)
@@ -126,6 +183,8 @@ class Problem:
     """Whether another problem continues this one: then a kink at its very end counts, as one between segments."""
     explicit: bool = False
     """Whether steps may be explicit where the equations give their rates and are not stiff."""
+    edges: EdgeTables = NO_EDGES
+    """The edges along which the method itself goes on, if it can."""
 
     def __post_init__(self) -> None:
         """Compiled code takes these sizes on trust."""
@@ -190,6 +249,18 @@ class Events(Points):
     index: Index = field(kw_only=True)
 
 
+class Course(NamedTuple):
+    """How the compiled loop has gone along edges."""
+
+    arcs: Array
+    """Of each arc its start, its length, how many steps, outputs and states inside steps there were before, and its
+    parameters."""
+    jumps: Array
+    """Of each jump the edge, how many arcs there were before, the energy that it turns into heat, the entropy that it
+    produces, heat and entropy that it passes on, whether it is admissible, the work done in it, by what does it; then
+    t, y, ydot and parameters before it and after it."""
+
+
 @dataclass(slots=True)
 class Result:
     """A trajectory up to where it ended. Outputs beyond the stop are absent."""
@@ -215,6 +286,8 @@ class Result:
     """Segment of each output, where their times do not tell."""
     inside: States | None = None
     """What a picture needs inside steps and at the start of segments."""
+    course: Course | None = None
+    """How it has gone along edges, where the method carries them out."""
     known: States | None = None
     """All states that are known, where the result is of several arcs and a picture is wanted."""
 
@@ -258,6 +331,8 @@ class Solver(ABC):
     name: str
     counts_rejected = True
     """Whether it is known how many steps the method has rejected."""
+    crosses_edges = False
+    """Whether the method goes on along edges by itself."""
 
     def prepare(self) -> None:  # noqa: B027 - most methods need nothing
         """Load what the first solve needs, so that it does not count as run time."""

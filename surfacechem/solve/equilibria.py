@@ -7,7 +7,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -29,16 +28,10 @@ from surfacechem.solve.branches import (
     zero_ahead,
 )
 from surfacechem.solve.contract import Array
-from surfacechem.tolerances import ATOM, NANOMETRE, NEGLIGIBLE, PICOMETRE, ROUNDING, SOLVED, SOON
+from surfacechem.tolerances import ATOM, DRIFT, MOST_DRIFT, NANOMETRE, NEGLIGIBLE, PICOMETRE, ROUNDING, SOLVED, SOON
 
 Heat = Callable[[Array], Array]
 """Inputs with the temperatures that a jump to them gives."""
-
-DRIFT = 100.0
-"""Traction out of balance that the integration explains, relative to its parts and in units of the tolerance."""
-
-MOST_DRIFT = 0.1
-"""The same relative to its parts, however loose the tolerance: of what cancels to less than that the sign is known."""
 
 BALANCED = ROUNDING
 """Tractions out of balance that count as none, relative to their parts: those of a run hold its rounding."""
@@ -54,18 +47,17 @@ def drift_of(rtol: float) -> float:
 
 @dataclass(frozen=True)
 class Point:
-    """A state with the parameters that hold there, or many of them."""
+    """A state with the parameters that hold there."""
 
-    t: Any
+    t: float
     y: Array
     ydot: Array
     parameters: Array
 
     @classmethod
     def of(cls, inputs: Array, n: int) -> Point:
-        """The point, or many at once, at arguments of compiled functions with so many states."""
-        t, y, ydot, parameters = np.split(inputs, [1, 1 + n, 1 + 2 * n], axis=-1)
-        return cls(t[..., 0], y, ydot, parameters)
+        """The point at arguments of compiled functions with so many states."""
+        return cls(float(inputs[0]), inputs[1 : 1 + n], inputs[1 + n : 1 + 2 * n], inputs[1 + 2 * n :])
 
     def inputs(self) -> Array:
         """Arguments of compiled functions."""

@@ -23,6 +23,7 @@ from surfacechem.solve.contract import (
     Array,
     Counters,
     Events,
+    Index,
     Points,
     Problem,
     Result,
@@ -33,7 +34,7 @@ from surfacechem.solve.contract import (
 )
 from surfacechem.solve.equilibria import Point
 from surfacechem.solve.instant import ENDLESS, MANY, MISSED, REACHED, Instant
-from surfacechem.solve.jumps import Jumper
+from surfacechem.solve.jumps import Jump, Jumper
 from surfacechem.tolerances import ATOM, BRIEF, DIGITS, NOISE, ULPS
 
 Found = TypeVar("Found")
@@ -256,6 +257,49 @@ class Hybrid:
             instant.status, instant.reason = Status.FAILED, MISSED
             return None
         return arc
+
+
+def carried(problem: Problem, jumper: Jumper) -> Flow[tuple[Result, list[Jump], str] | None]:
+    """A run whose edges the compiled loop carries out: its result, its jumps, and why it ended if they tell; None where
+    the loop leaves it to others.
+    """
+    result = yield replace(problem, edges=jumper.edge_tables)
+    if result.status is Status.LEFT and jumper.expect_jumps():
+        result = yield replace(problem, edges=jumper.edge_tables)
+    if result.course is None or result.status in (Status.LEFT, *LOST):
+        return None
+    start, end = problem.segments[[0, -1]].tolist()
+    jumps = jumper.carried_out(*result.course, start, end)
+    result = told(problem, result)
+    if result.status is Status.MAX_STEPS and sum(jump.edge.returns is not None for jump in jumps) > MANY:
+        return replace(result, status=Status.FAILED), jumps, ENDLESS
+    return result, jumps, ""
+
+
+def told(problem: Problem, result: Result) -> Result:
+    """A result of the compiled loop with its arcs as segments."""
+    assert result.course is not None
+    arcs = result.course.arcs
+    problem = replace(problem, segments=np.append(arcs[:, 0], problem.segments[-1]), parameters=arcs[:, 5:])
+    if len(arcs) == 1 and not len(result.course.jumps):
+        return replace(result, problem=problem)
+
+    def segments(column: int, count: int) -> Index:
+        """The arc of each of so many points."""
+        return np.repeat(np.arange(len(arcs)), np.diff(arcs[:, column], append=count).astype(np.int64))
+
+    outputs = States(result.times, result.outputs, result.ledger_outputs, segments(3, len(result.times)))
+    steps, inside, known = result.steps, result.inside, None
+    if steps is not None:
+        steps = replace(steps, segment=segments(2, len(steps.t)))
+    if inside is not None and steps is not None:
+        inside = inside._replace(segment=segments(4, len(inside.t)))
+        parts: tuple[tuple[Any, ...], ...] = outputs, (steps.t, steps.y, steps.ledger, steps.segment), inside
+        t, y, ledger, segment = map(np.concatenate, zip(*parts, strict=True))
+        kept = in_order(t, np.zeros_like(segment), segment)
+        ends = np.append(arcs[1:, 0], result.t)[segment[kept]]
+        known = States(np.minimum(t[kept], ends), y[kept], ledger[kept], segment[kept])
+    return replace(result, problem=problem, segment=outputs.segment, steps=steps, known=known)
 
 
 def unbegun(problem: Problem, status: Status, end: float, ledger: Array) -> Result:

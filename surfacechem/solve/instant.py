@@ -13,26 +13,17 @@ import numpy as np
 
 from surfacechem.model.automaton import RESTS
 from surfacechem.model.system import System
-from surfacechem.quantities import VELOCITIES
-from surfacechem.solve.contract import Array, Mask, Problem, Result, Status
+from surfacechem.solve.contract import ALOFT, AT_ONCE, FITTED, Array, Mask, Problem, Result, Status
 from surfacechem.solve.equilibria import BALANCED, Point, drift_of
 from surfacechem.solve.jump_heat import LoadStep
-from surfacechem.solve.jumps import Jump, Jumper, Slack, booked
+from surfacechem.solve.jumps import Jump, Jumper, Slack, booked, velocity_scales
 from surfacechem.solve.radau.solver import consistent
-from surfacechem.tolerances import BRIEF, CROSSED, MICROMETRE, NEGLIGIBLE, PICOMETRE, SOLVED, SOON
+from surfacechem.tolerances import BRIEF, CROSSED, MICROMETRE, PICOMETRE, SOLVED, SOON
 
 REACHED = SOLVED
 """Part of the time within which two moments are one: a step onto an event solves for its time."""
 
-AT_ONCE = 12
-"""Edges at one moment from which on they are chatter."""
-
 NO_PUSH = "nothing pushes it off where it rests; with a mass or a damper any disturbance would"
-
-
-ALOFT, FITTED = 1.5, 0.1 * NEGLIGIBLE
-"""A time beyond that of the return, in parts of it, and the part of an arc below which the first step is fitted to it:
-what is longer a step meets by itself."""
 
 MANY = 1000
 """Rebounds of a run from which on they are what its steps were used for."""
@@ -42,11 +33,6 @@ ENDLESS = (
 )
 
 MISSED = "the method has not seen the gap close; radau does, or a tighter tolerance"
-
-
-def velocity_scales(system: System) -> Array:
-    """Scales of the velocities among the states, zero for the others."""
-    return np.array([(state.finest or state.scale) * (state.name in VELOCITIES) for state in system.states])
 
 
 class Rebounds:

@@ -65,7 +65,7 @@ class JumpHeat:
         return [1 + self.states.index(sink.node) for sink in self.nodes.values() if not sink.prescribed]
 
     @cached_property
-    def _columns(self) -> Function:
+    def asked(self) -> Function:
         """Temperature, energy and capacity of each node, and its part of the heat that each maker makes."""
         shares = [{s.node: s.share for s in sinks} for sinks in self.system.sinks.values()]
         columns = [
@@ -77,7 +77,7 @@ class JumpHeat:
 
     def at(self, rows: Array) -> tuple[Array, Array, Array, Array]:
         """Temperature, energy, capacity and shares of what each maker makes, of each node, shape (rows, nodes)."""
-        values = self._columns(rows).reshape(len(rows), len(self.nodes), -1)
+        values = self.asked(rows).reshape(len(rows), len(self.nodes), -1)
         return values[:, :, 0], values[:, :, 1], values[:, :, 2], values[:, :, 3:]
 
     @cached_property

@@ -6,10 +6,10 @@ Mandadapu (2021), section 6.3, for sudden debonding.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 import symengine
@@ -18,10 +18,20 @@ from surfacechem.compile.program import Function, Program, compile_function
 from surfacechem.expressions import derivative, magnitude
 from surfacechem.model.automaton import INTERFACE, RESTS, Edge
 from surfacechem.model.balances import elastic_energy
-from surfacechem.model.system import Account, System
-from surfacechem.solve.contract import Array, Mask
+from surfacechem.model.system import START, Account, System
+from surfacechem.quantities import VELOCITIES
+from surfacechem.solve.contract import Array, EdgeTables, Mask, integers
 from surfacechem.solve.equilibria import BALANCED, Equilibria, Folds, Lost, Point, compiled
 from surfacechem.solve.jump_heat import JumpHeat, LoadPath, LoadStep
+from surfacechem.solve.radau.stepper import (
+    BONDS,
+    ENTROPY_OUT,
+    HEAT_OUT,
+    NOT_BOOKED,
+    PRODUCED,
+    RELEASED,
+    WORK,
+)
 from surfacechem.tolerances import ATOM, DIGITS, ROUNDING
 
 ADMISSIBLE, VIOLATES, IMPOSSIBLE = "admissible", "destroys entropy", "impossible"
@@ -80,26 +90,11 @@ class Jump:
         return self.verdict == IMPOSSIBLE or (self.verdict == VIOLATES and self.edge.violation == "refuse")
 
 
-@dataclass(frozen=True)
-class Jumps:
-    """Jumps of many runs along one edge, the run as first axis of all."""
-
-    before: Point
-    after: Point
-    released: Array
-    entropy: Array
-    work: Mapping[str, Array]
-    heat_out: Array
-    entropy_out: Array
-    goes_on: Mask
-    """Which of the runs may go on."""
-
-
-def booked(jump: Jump | Jumps, account: Account, states: Sequence[str]) -> Any:
-    """What a jump, or each of many, adds to an account of the ledger; ``states`` are the names of the states."""
+def booked(jump: Jump, account: Account, states: Sequence[str]) -> float:
+    """What a jump adds to an account of the ledger; ``states`` are the names of the states."""
     if account.kind == "bonds":
         j = states.index(account.law)
-        return jump.after.y[..., j] - jump.before.y[..., j]
+        return float(jump.after.y[j] - jump.before.y[j])
     if account.law != "events":
         return jump.work.get(account.quantity.name, 0.0)
     amounts = {
@@ -109,6 +104,11 @@ def booked(jump: Jump | Jumps, account: Account, states: Sequence[str]) -> Any:
         "entropy supply": -jump.entropy_out,
     }
     return amounts[account.kind]
+
+
+def velocity_scales(system: System) -> Array:
+    """Scales of the velocities among the states, zero for the others."""
+    return np.array([(state.finest or state.scale) * (state.name in VELOCITIES) for state in system.states])
 
 
 class ImpossibleError(Exception):
@@ -139,6 +139,8 @@ class Jumper:
         self.states = [state.name for state in system.states]
         self.equilibria = Equilibria(system)
         self.folds = Folds(self.equilibria)
+        self._jumps = False
+        """Whether jumps are expected, so that what only they need is worth compiling."""
         memory = {item.symbol for item in system.memory}
         kept = [p.symbol in memory or p.path == RESTS for p in system.parameters]
         self.mode_columns = [j for j, keep in enumerate(kept) if keep]
@@ -241,6 +243,77 @@ class Jumper:
         if "n" in moved:
             moved["n"].update(self.system.follows)
         return [(axis, [1 + self.states.index(name) for name in names]) for axis, names in moved.items()]
+
+    # -- what the compiled loop asks ------------------------------------------------------------------------------
+
+    @cached_property
+    def edge_tables(self) -> EdgeTables:
+        """What the compiled loop reads of the edges; with what only jumps need once these are expected."""
+        system, given = self.system, list(self.system.given)
+        nodes = list(self._heat.nodes.values()) if system.edges else []
+        functions: list[Function | None] = [self.magnitudes, *[None] * (4 + len(system.edges))]
+        if self._jumps and system.edges:
+            asked = self._heat.asked if nodes else None
+            functions[1:] = self.guard_rates, self._totals, asked, self.times_of_return, *self._resets
+        starts = [j for j, p in enumerate(system.parameters) if p.path == START]
+        sizes = 4 + len(given), len(nodes) * (3 + len(system.sinks)), len(self.states) + len(self.mode_columns)
+        return EdgeTables(
+            sizes=integers(sizes, 3),
+            code=integers([(f.address, f.user) if f else (0, 0) for f in functions], -1, 2),
+            edges=integers([self._row(edge) for edge in system.edges], -1, 4),
+            when=integers(system.rules, -1, 3),
+            held=integers(self.mode_columns, -1),
+            clocks=integers([*starts, *system.origins], -1),
+            nodes=integers([-1 if node.prescribed else self.states.index(node.node) for node in nodes], -1),
+            accounts=integers([self._account(account, given) for account in system.ledger], -1, 2),
+            least_peaks=velocity_scales(system),
+        )
+
+    def _row(self, edge: Edge) -> tuple[int, int, bool, int]:
+        """A row of the table of edges."""
+        returns = [item for item in self.system.edges if item.returns is not None]
+        taker = self._first_maker(edge)
+        return (
+            self.states.index(edge.measure) if edge.measure else -1,
+            list(self.system.sinks).index(INTERFACE) if taker < 0 else taker,
+            edge.violation == "refuse",
+            next((k for k, item in enumerate(returns) if item is edge), -1),
+        )
+
+    def expect_jumps(self) -> bool:
+        """Compile what only jumps need; whether that was not done before."""
+        before, self._jumps = self._jumps, True
+        if not before:
+            vars(self).pop("edge_tables", None)
+        return not before
+
+    def _account(self, account: Account, given: Sequence[str]) -> tuple[int, int]:
+        """How the compiled loop books jumps on an account: as :func:`booked` does."""
+        if account.kind == "bonds":
+            return BONDS, self.states.index(account.law)
+        if account.law != "events":
+            name = account.quantity.name
+            return (WORK, 2 + given.index(name)) if name in given else (NOT_BOOKED, 0)
+        sums = {"dissipation": RELEASED, "entropy production": PRODUCED, "energy supply": HEAT_OUT}
+        return sums.get(account.kind, ENTROPY_OUT), 0
+
+    def carried_out(self, arcs: Array, rows: Array, start: float, end: float) -> list[Jump]:
+        """The jumps that the compiled loop has carried out, from its rows of arcs and of jumps between these times."""
+        edges, given, found, last = self.system.edges, list(self.system.given), [], start
+        columns = 7 + len(given)
+        width = (rows.shape[1] - columns) // 2
+        for row, numbers in zip(rows, rows[:, :columns].tolist(), strict=True):
+            index, arc, released, gain, heat, entropy, admissible, *work = numbers
+            point, after = (Point.of(row[k : k + width], len(self.states)) for k in (columns, columns + width))
+            began, length = arcs[int(arc) - 1, :2].tolist() if arc else (math.nan, 0.0)
+            # The length of the arc before is sharper than the difference of two times.
+            since = length + (point.t - min(began + length, end)) if began == last else point.t - last
+            verdict, done = ADMISSIBLE if admissible else VIOLATES, dict(zip(given, work, strict=True))
+            found.append(
+                Jump(point.t, edges[int(index)], point, after, released, gain, verdict, since, done, "", heat, entropy)
+            )
+            last = point.t
+        return found
 
     # -- what an instant asks -------------------------------------------------------------------------------------
 
@@ -485,25 +558,3 @@ class Jumper:
         small = ROUNDING * np.maximum(np.maximum(np.abs(books[:, 1]), np.abs(now[:, 1])), np.abs(entropy_out))
         small += DIGITS * still[:, -1] + np.abs(moved[:, 1] - still[:, 1])
         return gain, gain >= -small, dict(zip(self.system.given, (now[:, 2:-2] - books[:, 2:-2]).T, strict=True))
-
-    # -- many jumps at once ---------------------------------------------------------------------------------------
-
-    def make_all(self, index: int, rows: Array, noise: Array) -> tuple[Jumps, Array]:
-        """Carry out an edge at many points, as :meth:`make` does each where no gap has to find its equilibrium; the
-        arguments of compiled functions after it.
-
-        ``rows`` are these arguments before it, ``noise`` is the rounding of the guard at each.
-        """
-        edge, n = self.system.edges[index], len(self.states)
-        values, start = self._resets[index](rows), rows.copy()
-        start[:, 1 : 1 + n], start[:, 1 + n : 1 + 2 * n] = values[:, :n], 0.0
-        start[:, [1 + 2 * n + j for j in self.mode_columns]] = values[:, n:]
-        books, level = self._books(rows), self._books(start)[:, 0]
-        made = np.zeros((len(rows), len(self.system.sinks) + 1))
-        made[:, self._first_maker(edge)] = books[:, 0] - level
-        after, released, heat, entropy = self._warmed(start, made, books[:, 0])
-        gain, admissible, work = self._judged(edge, rows, after, books, noise, entropy)
-        goes_on = np.isfinite(level) & np.all(np.isfinite(after), axis=1)
-        goes_on &= admissible | (edge.violation != "refuse")
-        jumps = Jumps(Point.of(rows, n), Point.of(after, n), released, gain, work, heat, entropy, goes_on)
-        return jumps, after

@@ -25,7 +25,7 @@ from surfacechem.solve.choice import EXPLICIT, method
 from surfacechem.solve.contract import Array, Index, Margin, Mask, Problem, Result, Solver, States, Status, among
 from surfacechem.solve.diagnose import ROUNDED, are_led_back, cause
 from surfacechem.solve.equilibria import Equilibria, Point
-from surfacechem.solve.hybrid import Flow, Hybrid, solve_together, without_stall
+from surfacechem.solve.hybrid import Flow, Hybrid, carried, solve_together, without_stall
 from surfacechem.solve.jumps import Jump, Jumper
 from surfacechem.solve.radau.solver import consistent, output_rates
 from surfacechem.solve.segments import Passing
@@ -420,7 +420,10 @@ class Model:
     @cached_property
     def _guards(self) -> tuple[Margin, ...]:
         """How a solver meets the zeros of limits, and behind them of the guards of edges."""
-        limits = (Margin.peak() if m.peak else Margin.stop() if m.terminal else Margin.restart() for m in self.margins)
+        limits = (
+            Margin.peak() if m.peak else replace(Margin.stop(), domain=m.domain) if m.terminal else Margin.restart()
+            for m in self.margins
+        )
         return (*limits, *(Margin.bear() if edge.strict else Margin.stop() for edge in self.system.edges))
 
     def solve(self, run: Run, changes: Mapping[str, float] | None = None) -> Trajectory:
@@ -492,7 +495,7 @@ class Model:
     ) -> list[Trajectory]:
         """Runs whose arcs are solved in batches; each has its part of their time."""
         start, prepared = time.perf_counter(), PREPARING.seconds
-        ends = solve_together([self._flow(problem) for _, _, problem in items], used, threads)
+        ends = solve_together([self._flow(problem, used.crosses_edges) for _, _, problem in items], used, threads)
         compiling = PREPARING.seconds - prepared
         seconds = (time.perf_counter() - start - compiling) / len(items)
         self.compile_seconds += compiling
@@ -502,15 +505,20 @@ class Model:
             done.append(Trajectory(self, run, result, values, status, reason, seconds, jumps))
         return done
 
-    def _flow(self, problem: Problem) -> Flow[tuple[Result, tuple[Jump, ...], tuple[str, str] | None]]:
-        """A run as a flow: its result, its jumps, and how it ended where a jump ended it."""
+    def _flow(self, problem: Problem, crosses: bool) -> Flow[tuple[Result, tuple[Jump, ...], tuple[str, str] | None]]:
+        """A run as a flow: its result, its jumps, and how it ended where a jump ended it; a method that ``crosses``
+        edges is asked to.
+        """
         if self.jumper is None:
             return (yield from without_stall(problem, self.system.sliding)), (), None
-        hybrid = Hybrid(self.system, self.jumper, problem, len(self.margins))
-        result, instant = (yield from hybrid.run()), hybrid.instant
-        word = "failed" if instant.status is Status.FAILED else "stopped"
-        ended = (word, f"{instant.reason} at t = {result.t:.9g} s") if instant.reason else None
-        return result, tuple(instant.jumps), ended
+        crosses = crosses and not self.system.searches and self.program.filler is None
+        told = (yield from carried(problem, self.jumper)) if crosses else None
+        if told is None:
+            hybrid = Hybrid(self.system, self.jumper, problem, len(self.margins))
+            told = (yield from hybrid.run()), hybrid.instant.jumps, hybrid.instant.reason
+        result, jumps, reason = told
+        word = "failed" if result.status is Status.FAILED else "stopped"
+        return result, tuple(jumps), (word, f"{reason} at t = {result.t:.9g} s") if reason else None
 
     def verdict(self, run: Run, result: Result, values: Mapping[str, float]) -> tuple[str, str]:
         """How a run ended, and why, in words."""

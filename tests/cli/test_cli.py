@@ -194,7 +194,7 @@ class TestCheck:
         ("arguments", "told"),
         [
             (["dna-adhesive"], "all of the run"),
-            (["stick-slip"], "what follows at a transition is found in Python"),
+            (["cohesive-cycles"], "what follows at a transition is searched for in Python"),
             (["bonding.yaml", "--set", "run.solver=lsoda"], "lsoda is called from Python for every step"),
             (["bonding.yaml", "--set", "run.solver=cantera"], "asks Python for every right-hand side"),
         ],

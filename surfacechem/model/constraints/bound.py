@@ -78,7 +78,10 @@ def _is_singular(whole: Expression, phi: Expression, numbers: Mapping[Any, float
     """Whether a rate has a pole or a logarithm of nothing, but for rounding, at a bonding state."""
 
     def has_none(argument: Expression) -> bool:
-        both = [x.subs(numbers) for x in (argument, magnitude(argument))]
+        try:
+            both = [x.subs(numbers) for x in (argument, magnitude(argument))]
+        except RuntimeError:  # a condition on a number that is undefined
+            return True
         if any(x.free_symbols for x in both):
             return False
         # One rounding: next to a bound, at INSIDE, it is more.

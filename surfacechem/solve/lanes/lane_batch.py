@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from surfacechem.solve.contract import Array, Problem
-from surfacechem.solve.lanes.layout import LEFT, MEMORY, SIZES
+from surfacechem.solve.contract import Array, Problem, Status
+from surfacechem.solve.lanes.layout import MEMORY, SIZES
 from surfacechem.solve.radau import stepper
 from surfacechem.solve.radau.solver import Room, batch_of, solve_arrays
 from surfacechem.solve.radau.stepper import END
@@ -21,7 +21,7 @@ def solve_batch(problem: Problem, *columns: Array, room: Room | None = None) -> 
     runs = y0, parameters, spacing, np.array((problem.max_steps,)), *others
     batch = batch_of(problem, runs, room, problem.program.lane_tables)
     run(batch)
-    left = np.flatnonzero(batch.counts[:, END] == LEFT)
+    left = np.flatnonzero(batch.counts[:, END] == Status.LEFT)
     if len(left):
         own = (rows[left] if len(rows) == len(y0) else rows for rows in columns)
         repeated = solve_arrays(problem, *own, room=room)

@@ -28,7 +28,6 @@ from surfacechem.solve.lanes.lane_step import (
     smaller,
     try_step,
 )
-from surfacechem.solve.lanes.layout import LEFT
 from surfacechem.solve.lanes.vector import absolute, any_lane, lanes, put, same, where
 from surfacechem.solve.radau.driver import FEWEST, LEAST_NORM
 from surfacechem.solve.radau.explicit import FALLS, PATIENT
@@ -41,7 +40,7 @@ from surfacechem.tolerances import NEGLIGIBLE, SQRT_EPS, ULPS
 
 _lay_out = laying_out(WORK)
 
-FINISHED, EVENT = int(Status.FINISHED), int(Status.EVENT)
+FINISHED, EVENT, LEFT = int(Status.FINISHED), int(Status.EVENT), int(Status.LEFT)
 HOPELESS = 12
 """Trials of a step in a row after which it is noise or stiffness that they meet: each is a half of the last or less."""
 TOGETHER = 4

@@ -8,9 +8,6 @@ from surfacechem.compile.vectors import LANES
 SIZES = ("n", "n_ledger", "n_margins", "n_inputs", "columns")
 """Sizes of a program, in the order in which it tells them: the columns are what is integrated, states and accounts."""
 
-LEFT = -1
-"""In place of a status: the run is not for these steps."""
-
 
 def _arrays(names: str, *shape: str | int, kind: type = float) -> dict[str, tuple[type, tuple[str | int, ...]]]:
     return dict.fromkeys(names.split(), (kind, (*shape, LANES)))

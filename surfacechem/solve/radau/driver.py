@@ -4,13 +4,14 @@ from typing import Any
 
 import numpy as np
 
-from surfacechem.solve.contract import Status
+from surfacechem.solve.contract import ALOFT, FITTED, Status
+from surfacechem.solve.edges import find_magnitudes, jump, resolve
 from surfacechem.solve.radau.consistency import find_consistent
 from surfacechem.solve.radau.dense import finish_step, hold_rates, ledger_norm
 from surfacechem.solve.radau.guards import AT_START, find_event, keep_sides, mark_at_end, restore_sides, start_margins
 from surfacechem.solve.radau.linear import LARGE
 from surfacechem.solve.radau.newton import stage_count
-from surfacechem.solve.radau.outputs import write_outputs, write_picture
+from surfacechem.solve.radau.outputs import write_now, write_outputs, write_picture
 from surfacechem.solve.radau.step import (
     BRIEF,
     GOOD,
@@ -24,12 +25,33 @@ from surfacechem.solve.radau.step import (
     store_polynomial,
     unseen,
 )
-from surfacechem.solve.radau.stepper import END, EVENTS, FIRST_COUNTER, INSIDE, OUTPUTS, RECORDS
-from surfacechem.solve.radau.work import any_true, clear, compiled, copy, lay_out, row_of
-from surfacechem.tolerances import NEGLIGIBLE, ROUNDING, SHALLOW, SQRT_EPS
+from surfacechem.solve.radau.stepper import (
+    ARCS,
+    END,
+    EVENTS,
+    FIRST_COUNTER,
+    INSIDE,
+    OUTPUTS,
+    RECORDS,
+    RETURNS,
+)
+from surfacechem.solve.radau.work import (
+    MARGINS,
+    any_true,
+    clear,
+    compiled,
+    copy,
+    evaluate,
+    keep_largest,
+    lay_out,
+    put,
+    row_of,
+)
+from surfacechem.tolerances import DIGITS, MICROMETRE, NEGLIGIBLE, PICOMETRE, ROUNDING, SHALLOW, SQRT_EPS
 
 FINISHED = int(Status.FINISHED)
 EVENT = int(Status.EVENT)
+LEFT = int(Status.LEFT)
 
 
 PATIENCE = 40
@@ -53,45 +75,58 @@ TAKEN, AGAIN, MISSED, ENDED = range(4)
 
 @compiled
 def _write_state(w: Any, row: Any, t: float) -> None:
-    """[t | y | ydot | ledger] of the current state."""
+    """[t | y | ydot | ledger] of the current state, the ledger on top of what was booked before the arc."""
     n = w.n
     row[0] = t
     for j in range(n):
         row[1 + j] = w.y[j]
         row[1 + n + j] = w.ydot[j]
     for m in range(w.n_ledger):
-        row[1 + 2 * n + m] = w.q[m]
+        row[1 + 2 * n + m] = w.booked[m] + w.q[m]
+
+
+@compiled
+def _now(w: Any) -> float:
+    """Time of the run."""
+    return float(w.origin + (w.base + w.tau))
 
 
 @compiled
 def _write_events(w: Any, events: Any, counts: Any) -> bool:
-    """A row for each guard that fired; True if one of them is terminal."""
+    """A row for each guard that fired, but for those of edges, which are written as these are carried out; True if one
+    of them is terminal.
+    """
     now = w.base + w.tau
     terminal = False
     for m in range(w.n_margins):
         if w.fired[m] == 0:
             continue
+        terminal = terminal or w.kinds[m, 0] == 1
+        if m >= w.n_margins - w.edges.shape[0]:
+            continue
         k = min(counts[EVENTS], events.shape[0]) - 1
         if w.kinds[m, 0] == 0:
             # A step ends just short of a kink and the next one passes it: that is one event.
-            while k >= 0 and now - events[k, 1] <= ROUNDING * now and events[k, 0] != m:
+            while k >= w.first_event and now - (events[k, 1] - w.origin) <= ROUNDING * now and events[k, 0] != m:
                 k -= 1
-            if k >= 0 and now - events[k, 1] <= ROUNDING * now:
+            if k >= w.first_event and now - (events[k, 1] - w.origin) <= ROUNDING * now:
                 continue
         if counts[EVENTS] < events.shape[0]:
             row = events[counts[EVENTS]]
             row[0] = m
-            _write_state(w, row[1:], now)
+            _write_state(w, row[1:], _now(w))
         # Those for which there is no room are counted all the same: the run is then repeated with room for all.
         counts[EVENTS] += 1
-        terminal = terminal or w.kinds[m, 0] == 1
     return terminal
 
 
 @compiled
 def _record(w: Any, records: Any, counts: Any) -> None:
+    # What time cannot tell from the start of an arc is the event that ended the last one.
+    if counts[RECORDS] > 0 and w.clocks.shape[0] > 0 and _now(w) == w.origin:
+        return
     if counts[RECORDS] < records.shape[0]:
-        _write_state(w, records[counts[RECORDS]], w.base + w.tau)
+        _write_state(w, records[counts[RECORDS]], _now(w))
     counts[RECORDS] += 1
 
 
@@ -104,18 +139,16 @@ def _start(w: Any, i: int) -> int:
     counts, times, outputs = w.counts[i], w.times[row_of(w.times, i)], w.outputs[i]
     start_margins(w)
     clear(w.fired)
-    if counts[OUTPUTS] == 0 and times.shape[0] > 0 and times[0] <= w.base:
-        copy(w.y, outputs[0])
-        copy(w.q, outputs[0, w.n :])
-        counts[OUTPUTS] = 1
+    while counts[OUTPUTS] < times.shape[0] and times[counts[OUTPUTS]] - w.origin <= w.base:
+        write_now(w, outputs[counts[OUTPUTS]])
+        counts[OUTPUTS] += 1
     if counts[RECORDS] == 0:
         _record(w, w.records[i], counts)
     elif w.picture > 0.0 and w.tau == 0.0:
         # The other side of where a segment begins.
         if counts[INSIDE] < w.inside_times.shape[1]:
-            w.inside_times[i, counts[INSIDE]] = w.base
-            copy(w.y, w.inside[i, counts[INSIDE]])
-            copy(w.q, w.inside[i, counts[INSIDE], w.n :])
+            w.inside_times[i, counts[INSIDE]] = w.origin + w.base
+            write_now(w, w.inside[i, counts[INSIDE]])
         counts[INSIDE] += 1
     return GOOD
 
@@ -192,11 +225,14 @@ def _accept(w: Any, i: int, size: float, end: float, goes_on: bool) -> None:
     reached = w.base + (w.tau + size)
     whole = size == (end - w.base) - w.tau or reached >= end
     times = w.times[row_of(w.times, i)]
-    counts[OUTPUTS] = write_outputs(w, times, w.outputs[i], counts[OUTPUTS], size, end if whole else reached)
+    # Outputs at the end of an arc are those up to the end of what the arc is in.
+    shown = w.shown if whole and end == w.arc_end else end if whole else reached
+    counts[OUTPUTS] = write_outputs(w, times, w.outputs[i], counts[OUTPUTS], size, shown)
     if w.picture > 0.0:
         counts[INSIDE] = write_picture(w, w.inside_times[i], w.inside[i], counts[INSIDE], size)
     store_polynomial(w, size, 1.0)
     accept(w, size)
+    keep_largest(w.y, w.peaks_seen)
     _record(w, w.records[i], counts)
     if whole:
         w.tau = end - w.base
@@ -255,37 +291,200 @@ def _run_segment(w: Any, i: int, end: float, goes_on: bool) -> int:
 
 
 @compiled
-def _run(w: Any, i: int) -> None:
-    """One run, from its initial state through its segments."""
-    segments, counts, end = w.segments[row_of(w.segments, i)], w.counts[i], w.ends[i]
+def _forget(w: Any, i: int) -> None:
+    """Begin without a past, as a run or an arc does."""
     clear(w.fired)
-    w.steps = w.rejected = w.residuals = w.jacobians = w.factorizations = w.iterations = 0
     w.member = w.last_member = w.tries = w.calm = w.fresh = w.refused = 0
     if w.core >= LARGE:
         for m in range(w.order.shape[0]):
             w.order[m, 3, 0] = -1  # that of another run counts for nothing
     clear(w.q)
-    peaks = w.peaks[row_of(w.peaks, i)]
+    clear(w.ydot)
+    w.explicit, w.stiff_steps, w.h_refused = w.explicitly, 0, 0.0
+    w.first_event = w.counts[i, EVENTS]
+
+
+@compiled
+def _run_segments(w: Any, i: int) -> int:
+    """A run that ends at events: GOOD, or the status that ends it."""
+    segments, peaks = w.segments[row_of(w.segments, i)], w.peaks[row_of(w.peaks, i)]
+    _forget(w, i)
     copy(peaks[: w.n_ledger], w.q_largest)
     copy(peaks[w.n_ledger : w.n_ledger + w.n_margins], w.margin_largest)
-    w.explicit, w.stiff_steps, w.h_refused = w.explicitly, 0, 0.0
-    copy(w.y0[i], w.y)
     extremes = peaks[w.n_ledger + w.n_margins :]
     for j in range(w.n):
         w.least[j] = extremes[j] if extremes.shape[0] > 0 else np.inf
         w.largest[j] = extremes[w.n + j] if extremes.shape[0] > 0 else -np.inf
-    clear(w.ydot)
-    status = GOOD
+    for m in range(w.n_margins):
+        w.playing[m] = w.kinds[m, 4]
+    w.arc_end = w.shown = np.inf
     for segment in range(segments.shape[0] - 1):
-        w.base = segments[segment]
-        w.tau = 0.0
+        w.base, w.tau = segments[segment], 0.0
         copy(w.parameters[i, segment], w.inputs[1 + 2 * w.n :])
         more = w.goes_on != 0 or segment + 2 < segments.shape[0]
         status = _run_segment(w, i, segments[segment + 1], more)
         if status != GOOD:
-            break
+            return status
+    return GOOD
+
+
+@compiled
+def _begin_arc(w: Any, i: int) -> None:
+    """An arc from the moment, in a time of its own."""
+    n, counts, t = w.n, w.counts[i], w.moment[0]
+    if counts[ARCS] < w.arcs.shape[1]:
+        row = w.arcs[i, counts[ARCS]]
+        row[0] = t
+        row[2], row[3], row[4] = counts[RECORDS], counts[OUTPUTS], counts[INSIDE]
+        copy(w.moment[1 + 2 * n :], row[5:])
+    counts[ARCS] += 1
+    _forget(w, i)
+    w.origin, w.tau = t, 0.0
+    copy(w.moment[1 : 1 + n], w.y)
+    keep_largest(w.y, w.peaks_seen)
+    copy(w.exchanged, w.q_largest)
+    copy(w.moment, w.inputs)
+    w.inputs[1 + 2 * n + w.clocks[0]] = t
+    for k in range(1, w.clocks.shape[0]):
+        w.inputs[1 + 2 * n + w.clocks[k]] -= t
+
+
+@compiled
+def _see_guards(w: Any, aloft: float) -> None:
+    """How large the guards have been: what has rebounded has never been away, for all that its rounding tells."""
+    copy(w.magnitude, w.margin_largest)
+    first = w.n_margins - w.edges.shape[0]
+    for e in range(w.edges.shape[0]):
+        if w.edges[e, RETURNS] >= 0:
+            w.margin_largest[first + e] = 0.0 if aloft > 0.0 else max(w.magnitude[first + e], MICROMETRE)
+
+
+@compiled
+def _run_arc(w: Any, i: int, end: float, goes_on: bool) -> int:
+    """Flow from the moment until an edge or a limit, or to the end of a segment; GOOD, or the status that ends the arc,
+    which is at the new moment.
+    """
+    aloft = w.aloft if w.rebounded == w.moment[0] else 0.0
+    _begin_arc(w, i)
+    _see_guards(w, aloft)
+    # Not to a breakpoint that no load has, as a formula there is that of what follows.
+    last = end if w.jumps_next else max(end - DIGITS * end, 0.5 * (w.origin + end))
+    w.arc_end, w.shown, w.base = last - w.origin, end - w.origin, 0.0
+    status = GOOD
+    if 0.0 < ALOFT * aloft < FITTED * w.arc_end:
+        # What returns so soon that a step might miss it has a piece of its own.
+        status = _run_segment(w, i, ALOFT * aloft, True)
+        w.base, w.tau = w.base + w.tau, 0.0
+    if status == GOOD:
+        status = _run_segment(w, i, w.arc_end, goes_on)
+    if w.counts[i, ARCS] <= w.arcs.shape[1]:
+        w.arcs[i, w.counts[i, ARCS] - 1, 1] = w.base + w.tau
+    for m in range(w.n_ledger):
+        w.booked[m] += w.q[m]
+    keep_largest(w.booked, w.exchanged)
+    clear(w.q)
+    w.moment[0] = end if status == GOOD else min(_now(w), end)
+    copy(w.y, w.moment[1:])
+    copy(w.ydot, w.moment[1 + w.n :])
+    return status
+
+
+@compiled
+def _has_missed(w: Any) -> bool:
+    """Whether an arc has ended beyond what it should have ended at, by more than has a meaning for bodies."""
+    first, missed = w.n_margins - w.edges.shape[0], False
+    if w.edges.shape[0] == 0:
+        return missed
+    put(w, 0.0, w.y, w.ydot)
+    evaluate(w, MARGINS, w.margin_probe)
+    for e in range(w.edges.shape[0]):
+        closed = w.edges[e, RETURNS] >= 0 and w.playing[first + e] == 1 and w.margin_probe[first + e] < -PICOMETRE
+        missed = missed or (closed and w.fired[first + e] == 0)
+    return missed
+
+
+@compiled
+def _carry_out(w: Any, i: int) -> int:
+    """The edge at which an arc has ended: GOOD, EVENT where it was a limit, LEFT where an instant has to look."""
+    first, last, limit = w.n_margins - w.edges.shape[0], -1, False
+    for m in range(w.n_margins):
+        fired = w.fired[m] != 0
+        last = m if fired else last
+        limit = limit or (fired and m < first and w.kinds[m, 0] == 1)
+    if last < first:
+        return EVENT
+    find_magnitudes(w)
+    return GOOD if not limit and jump(w, i, last - first) else LEFT
+
+
+@compiled
+def _begin_arcs(w: Any, i: int) -> None:
+    """The start of a run that goes on along edges."""
+    clear(w.booked)
+    clear(w.exchanged)
+    copy(w.least_peaks, w.peaks_seen)
+    w.rebounded, w.aloft = -np.inf, 0.0
+    for k in range(w.jumped.shape[0]):
+        w.jumped[k] = -np.inf
+    for j in range(w.n):
+        w.least[j] = w.largest[j] = w.y[j]
+        w.moment[1 + j] = w.y[j]
+
+
+@compiled
+def _begin_segment(w: Any, i: int, segment: int) -> None:
+    """The moment at the start of a segment: with its parameters, but for the modes and registers, which last."""
+    parameters, first = w.parameters[i], 1 + 2 * w.n
+    for k in range(w.held.shape[0]):
+        w.reset[k] = w.moment[first + w.held[k]]
+    copy(parameters[segment], w.moment[first:])
+    for k in range(w.held.shape[0] if segment > 0 else 0):
+        w.moment[first + w.held[k]] = w.reset[k]
+    w.moment[0] = w.segments[row_of(w.segments, i), segment]
+    clear(w.moment[1 + w.n : first])
+    w.jumps_next = segment + 1 == parameters.shape[0]
+    for j in range(0 if w.jumps_next else parameters.shape[1]):
+        if parameters[segment, j] != parameters[segment + 1, j]:
+            w.jumps_next = 1
+
+
+@compiled
+def _run_arcs(w: Any, i: int) -> int:
+    """A run that goes on along edges: GOOD, or the status that ends it."""
+    segments = w.segments[row_of(w.segments, i)]
+    last = segments.shape[0] - 1
+    _begin_arcs(w, i)
+    for segment in range(last):
+        _begin_segment(w, i, segment)
+        end = segments[segment + 1]
+        while True:
+            if not resolve(w, i, segments[last]):
+                return LEFT
+            if w.moment[0] >= end:
+                break
+            status = _run_arc(w, i, end, segment + 1 < last)
+            if status in (GOOD, EVENT) and _has_missed(w):
+                return LEFT
+            if status == EVENT:
+                status = _carry_out(w, i)
+            elif status == GOOD:
+                break
+            if status != GOOD:
+                return status
+    return GOOD
+
+
+@compiled
+def _run(w: Any, i: int) -> None:
+    """One run, from its initial state to its end."""
+    counts, end, segments = w.counts[i], w.ends[i], w.segments[row_of(w.segments, i)]
+    w.steps = w.rejected = w.residuals = w.jacobians = w.factorizations = w.iterations = 0
+    w.origin, w.base, w.tau = 0.0, segments[0], 0.0
+    clear(w.booked)
+    copy(w.y0[i], w.y)
+    status = _run_arcs(w, i) if w.clocks.shape[0] > 0 else _run_segments(w, i)
     counts[END] = FINISHED if status == GOOD else status
-    _write_state(w, end, segments[-1] if status == GOOD else w.base + w.tau)
+    _write_state(w, end, segments[-1] if status == GOOD else _now(w))
     if w.n_margins > 0:
         start_margins(w)
         copy(w.margin, end[end.shape[0] - w.n_margins :])

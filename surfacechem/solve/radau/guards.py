@@ -51,7 +51,7 @@ def start_margins(w: Any) -> None:
     copy(w.margin, w.margin_before)
     for m in range(w.n_margins):
         value = w.margin[m]
-        if w.kinds[m, 4] == 0:
+        if w.playing[m] == 0:
             w.side[m] = OUT_OF_PLAY
             continue
         w.margin_largest[m] = max(w.margin_largest[m], abs(value))

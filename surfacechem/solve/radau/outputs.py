@@ -70,12 +70,12 @@ def _write_by_step(w: Any, size: float, h: float, output: Any) -> None:
 
 
 @compiled
-def write_four(w: Any, times: Any, outputs: Any, first: int, end: int, h: float) -> None:
+def write_four(w: Any, times: Any, outputs: Any, first: int, end: int, h: float, origin: float) -> None:
     """Up to four outputs on the polynomials of the step."""
     k, x, n = w.member, w.fractions, w.n
     top, last = stage_count(k) + 1, end - 1
     for i in range(4):
-        x[i] = min(max(((times[min(first + i, last)] - w.base) - w.tau) / h, 0.0), 1.0)
+        x[i] = min(max((((times[min(first + i, last)] - origin) - w.base) - w.tau) / h, 0.0), 1.0)
     second, third, fourth = min(first + 1, last), min(first + 2, last), min(first + 3, last)
     for m in range(n + w.n_ledger):
         start, row = (w.y[m], w.polynomial[m]) if m < n else (w.q[m - n], w.q_polynomial[m - n])
@@ -130,32 +130,49 @@ def _restore_step(w: Any, h: float) -> None:
 
 
 @compiled
-def _write_inside(w: Any, times: Any, outputs: Any, first: int, last: int, h: float) -> None:
-    """States at times between the ends of the step."""
+def _write_inside(w: Any, times: Any, outputs: Any, first: int, last: int, h: float, origin: float) -> None:
+    """States at times between the ends of the step, counted from an origin."""
     if _polynomial_serves(w, h):
         for i in range(first, last, 4):
-            write_four(w, times, outputs, i, last, h)
+            write_four(w, times, outputs, i, last, h, origin)
         return
     theta, contraction, guessed, tries = w.theta, w.contraction, w.guessed, w.tries
     store_polynomial(w, h, 0.0)
     for i in range(first, last):
-        _write_by_step(w, (times[i] - w.base) - w.tau, h, outputs[i])
+        _write_by_step(w, ((times[i] - origin) - w.base) - w.tau, h, outputs[i])
     _restore_step(w, h)
     # What Newton's method knew decides on the next step, which must not depend on the outputs that were asked for.
     w.theta, w.contraction, w.guessed, w.tries = theta, contraction, guessed, tries
 
 
 @compiled
+def _add_booked(w: Any, rows: Any, first: int, last: int) -> None:
+    """What was booked before the arc, in rows of states and ledgers."""
+    for i in range(first, last):
+        for m in range(w.n_ledger):
+            rows[i, w.n + m] += w.booked[m]
+
+
+@compiled
+def write_now(w: Any, row: Any) -> None:
+    """State and ledger of now."""
+    copy(w.y, row)
+    for m in range(w.n_ledger):
+        row[w.n + m] = w.booked[m] + w.q[m]
+
+
+@compiled
 def write_outputs(w: Any, times: Any, outputs: Any, first: int, h: float, end: float) -> int:
-    """Outputs up to the end of the step; returns how many the run has now."""
+    """Outputs up to the end of the step, which lies at this time of the arc; returns how many the run has now."""
     last = first
-    while last < times.shape[0] and times[last] < end:
+    while last < times.shape[0] and times[last] - w.origin < end:
         last += 1
     if last > first:
-        _write_inside(w, times, outputs, first, last, h)
-    if last < times.shape[0] and times[last] == end:
+        _write_inside(w, times, outputs, first, last, h, w.origin)
+    if last < times.shape[0] and times[last] - w.origin == end:
         end_of_step(w, h, outputs[last], w.trial_dot, outputs[last, w.n :])
         last += 1
+    _add_booked(w, outputs, first, last)
     return last
 
 
@@ -194,7 +211,7 @@ def write_picture(w: Any, times: Any, states: Any, first: int, h: float) -> int:
     """States inside the step without which its picture would not be true, over time and over its logarithm; returns
     how many the run has now, those among them for which there was no room.
     """
-    start = w.before + (w.base + w.tau)
+    start = w.before + (w.origin + (w.base + w.tau))
     growth = h / start if start > 0.0 else 0.0
     parts, ratios = _parts(w, h, growth)
     if ratios > 0 and growth <= parts * np.expm1(np.log1p(growth) / ratios):
@@ -206,5 +223,8 @@ def write_picture(w: Any, times: Any, states: Any, first: int, h: float) -> int:
             times[i] = w.base + (w.tau + h * (i + 1 - first) / parts)
         for i in range(middle, last):
             times[i] = w.base + (w.tau + start * np.expm1(np.log1p(growth) * (i + 1 - middle) / ratios))
-        _write_inside(w, times, states, first, last, h)
+        _write_inside(w, times, states, first, last, h, 0.0)
+        _add_booked(w, states, first, last)
+        for i in range(first, last):
+            times[i] += w.origin
     return last

@@ -11,15 +11,41 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from surfacechem.compile.program import MANY, Program
-from surfacechem.solve.contract import Array, Counters, Events, Margin, Points, Problem, Result, Solver, States, Status
+from surfacechem.solve.contract import (
+    NO_EDGES,
+    Array,
+    Counters,
+    Course,
+    EdgeTables,
+    Events,
+    Margin,
+    Points,
+    Problem,
+    Result,
+    Solver,
+    States,
+    Status,
+)
 from surfacechem.solve.radau import stepper
-from surfacechem.solve.radau.stepper import COLUMNS, END, EVENTS, FIRST_COUNTER, INSIDE, OUTPUTS, RECORDS, STOP, Batch
+from surfacechem.solve.radau.stepper import (
+    ARCS,
+    COLUMNS,
+    END,
+    EVENTS,
+    FIRST_COUNTER,
+    INSIDE,
+    JUMPS,
+    OUTPUTS,
+    RECORDS,
+    STOP,
+    Batch,
+)
 
 EVENT_ROWS = 64
 STEP_ROWS = 512
 INSIDE_ROWS = 4096
-Room: TypeAlias = tuple[int, int, int]
-"""So many steps, events, and states inside steps of a run."""
+Room: TypeAlias = tuple[int, int, int, int]
+"""So many steps, events, states inside steps, and jumps of a run."""
 CHUNK = 256
 """Runs a thread takes at a time."""
 _STATUSES = tuple(Status)
@@ -28,8 +54,11 @@ _STATUSES = tuple(Status)
 @lru_cache(maxsize=256)
 def _kinds(margins: tuple[Margin, ...], in_play: tuple[bool, ...] | None = None) -> NDArray[np.int64]:
     playing = in_play or (True,) * len(margins)
-    rows = [(m.terminal, m.direction, m.smooth, m.strict, plays) for m, plays in zip(margins, playing, strict=True)]
-    return np.array(rows, np.int64).reshape(-1, 5)
+    rows = [
+        (m.terminal, m.direction, m.smooth, m.strict, plays, m.domain)
+        for m, plays in zip(margins, playing, strict=True)
+    ]
+    return np.array(rows, np.int64).reshape(-1, 6)
 
 
 @lru_cache(maxsize=4)
@@ -59,6 +88,15 @@ def _contiguous(values: ArrayLike) -> Array:
     return np.ascontiguousarray(values, dtype=float)
 
 
+def _with_edges(tables: Sequence[NDArray[Any]], edges: EdgeTables) -> Sequence[NDArray[Any]]:
+    """The tables of a program, and those of edges."""
+    sizes, code, *others = tables
+    if len(edges.clocks):
+        sizes, code = sizes.copy(), np.concatenate([code, edges.code])
+        sizes[-3:] = edges.sizes
+    return sizes, code, *others, *edges[2:]
+
+
 def batch_of(
     problem: Problem, runs: Sequence[Array], room: Room | None = None, tables: Sequence[NDArray[Any]] | None = None
 ) -> Any:
@@ -69,10 +107,11 @@ def batch_of(
     program, times = problem.program, runs[-1]
     explicit = tables is None and problem.explicit and program.rates is not None
     steps, filled = STEP_ROWS if problem.record_steps else 0, INSIDE_ROWS if problem.picture else 0
-    step_rows, event_rows, rows = room or (steps, EVENT_ROWS if problem.margins else 0, filled)
+    step_rows, event_rows, rows, jump_rows = room or (steps, EVENT_ROWS if problem.margins else 0, filled, EVENT_ROWS)
     n, q, m, count = program.n, program.n_ledger, program.n_margins, len(runs[0])
+    arc_rows, jump_rows = (event_rows + len(problem.parameters), jump_rows) if len(problem.edges.clocks) else (0, 0)
     return Batch(
-        *(tables or (program.explicit_tables if explicit else program.tables)),
+        *_with_edges(tables or (program.explicit_tables if explicit else program.tables), problem.edges),
         problem.rtol,
         _contiguous(problem.atol),
         int(explicit),
@@ -88,6 +127,8 @@ def batch_of(
         np.empty((count, event_rows, 2 + 2 * n + q)) if event_rows else _no_rows(count),
         np.empty((count, rows, n + q)) if problem.picture else _no_rows(count),
         np.empty((count, rows)),
+        np.empty((count, arc_rows, 5 + program.n_parameters)),
+        np.empty((count, jump_rows, 3 + problem.edges.sizes[0] + 2 * program.n_inputs)),
     )
 
 
@@ -121,6 +162,7 @@ class Radau(Solver):
     """
 
     name = "radau"
+    crosses_edges = True
 
     def prepare(self) -> None:
         stepper.LOOP.load()
@@ -139,7 +181,8 @@ class Radau(Solver):
             # What problems of one batch have in common, beside the model and its margins.
             shape = len(problem.segments), problem.atol.tobytes(), problem.rtol
             picture = problem.picture and (problem.picture, problem.before)
-            alike.setdefault((*shape, problem.in_play, problem.goes_on, picture), []).append(i)
+            crosses = len(problem.edges.clocks) > 0
+            alike.setdefault((*shape, problem.in_play, problem.goes_on, picture, crosses), []).append(i)
         most = min(CHUNK, -(-len(problems) // threads))
         chunks = [group[k : k + most] for group in alike.values() for k in range(0, len(group), most)]
         with ThreadPoolExecutor(threads) as pool:
@@ -195,9 +238,9 @@ def _whole(problem: Problem, batch: Any, i: int) -> Result:
     """
     while True:
         counts: list[int] = batch.counts[i].tolist()
-        steps, events, inside = needed = counts[RECORDS] * problem.record_steps, counts[EVENTS], counts[INSIDE]
-        room = batch.records.shape[1], batch.events.shape[1], batch.inside.shape[1]
-        if steps <= room[0] and events <= room[1] and inside <= room[2]:
+        needed = counts[RECORDS] * problem.record_steps, counts[EVENTS], counts[INSIDE], counts[JUMPS]
+        tables = batch.records, batch.events, batch.inside, batch.jumps
+        if all(count <= table.shape[1] for count, table in zip(needed, tables, strict=True)):
             return _result(problem, batch, i, counts)
         batch, i = _run_one(problem, needed), 0
 
@@ -230,6 +273,7 @@ def _result(problem: Problem, batch: Any, i: int, counts: Sequence[int]) -> Resu
         inside=_inside(written(batch.inside_times, INSIDE), written(batch.inside, INSIDE), n)
         if problem.picture
         else None,
+        course=Course(written(batch.arcs, ARCS), written(batch.jumps, JUMPS)) if counts[ARCS] else None,
     )
 
 
@@ -273,9 +317,10 @@ def search_batch(program: Program, ends: Array, table: Array, counts: NDArray[np
     """
     rows, nothing = np.zeros((1, 0)), _no_rows(len(ends))
     return Batch(
-        *program.tables,
+        *program.tables, *NO_EDGES[2:],
         1.0, np.ones(program.n), 0, _kinds(()), 0, 0.0, 0.0,
-        ends, table, np.zeros(0), np.empty(0, np.int64), rows, rows, rows, ends, counts, *(nothing,) * 4, rows,
+        ends, table, np.zeros(0), np.empty(0, np.int64), rows, rows, rows, ends, counts,
+        *(nothing,) * 4, rows, *(nothing,) * 2,
     )  # fmt: skip
 
 

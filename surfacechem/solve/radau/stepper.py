@@ -16,6 +16,7 @@ import numpy as np
 
 from surfacechem.compile import objectcode
 from surfacechem.compile.cache import compile_kernel, fill, is_filled, kernel_folder
+from surfacechem.solve.contract import AT_ONCE
 
 BATCH: dict[str, tuple[Any, int]] = {
     # the program
@@ -26,12 +27,20 @@ BATCH: dict[str, tuple[Any, int]] = {
     # places of the derivatives that are formed; none where all are
     "nonzeros": (np.int64, 1),
     "groups": (np.int64, 1),
+    # the edges, where runs go on along them: see EdgeTables
+    "edges": (np.int64, 2),
+    "when": (np.int64, 2),
+    "held": (np.int64, 1),
+    "clocks": (np.int64, 1),
+    "nodes": (np.int64, 1),
+    "accounts": (np.int64, 2),
+    "least_peaks": (float, 1),
     # the method
     "rtol": (float, 0),
     "atol": (float, 1),
     # whether steps are explicit as long as the equations are not stiff
     "explicitly": (int, 0),
-    # guards: a row (terminal, direction, smooth, strict, in play) for each
+    # guards: a row (terminal, direction, smooth, strict, in play, domain) for each
     "kinds": (np.int64, 2),
     # runs that others follow
     "goes_on": (int, 0),
@@ -57,6 +66,9 @@ BATCH: dict[str, tuple[Any, int]] = {
     # states inside steps, and their times
     "inside": (float, 3),
     "inside_times": (float, 2),
+    # arcs and jumps, where runs go on along edges: see Course
+    "arcs": (float, 3),
+    "jumps": (float, 3),
 }
 """Entries of a batch of runs: type and number of axes. The first axis of the last two groups is the run."""
 
@@ -64,14 +76,20 @@ _named: Any = namedtuple
 Batch: Any = _named("Batch", BATCH)
 """What a batch of runs reads, and the rows that it writes."""
 
-END, OUTPUTS, EVENTS, RECORDS, INSIDE, FIRST_COUNTER, STOP, COLUMNS = 0, 1, 2, 3, 4, 5, 11, 12
+END, OUTPUTS, EVENTS, RECORDS, INSIDE, FIRST_COUNTER, STOP, ARCS, JUMPS, COLUMNS = 0, 1, 2, 3, 4, 5, 11, 12, 13, 14
 """Columns of the table of counts: status, outputs written, events, recorded steps, states inside steps; then six
-counters, and a flag that is set from outside to end the run.
+counters, a flag that is set from outside to end the run, arcs and jumps.
 """
 
-SIZES = ("n", "n_ledger", "n_margins", "n_inputs", "core", "links", "cells")
+MEASURE, TAKER, REFUSES, RETURNS = range(4)
+"""Columns of the table of edges."""
+
+BONDS, WORK, RELEASED, PRODUCED, HEAT_OUT, ENTROPY_OUT, NOT_BOOKED = range(7)
+"""Kinds of accounts on which jumps are booked: the change of a state, that of a book; four sums of a jump."""
+
+SIZES = ("n", "n_ledger", "n_margins", "n_inputs", "core", "links", "cells", "n_books", "n_nodal", "n_reset")
 """Sizes of a program, in the order in which it tells them: the core is what is in no chain, the links are the chains,
-the cells what is in them.
+the cells what is in them; then of jumps what is looked at before and after them, of the nodes and what is reset.
 """
 
 NUMBERS: dict[str, type] = {
@@ -92,6 +110,11 @@ NUMBERS: dict[str, type] = {
     **dict.fromkeys(("member", "last_member", "tries", "calm", "fresh", "refused"), int),
     # Whether steps are explicit now; twice the number of those that were stiff.
     **dict.fromkeys(("explicit", "stiff_steps"), int),
+    # Where edges are carried out: the time at which the arc began and that of the last rebound, with how long it stays
+    # away; where the arc ends at the latest, and up to where it has outputs, in its own time. The first event of the
+    # arc; whether loads change at the end of the segment.
+    **dict.fromkeys(("origin", "rebounded", "aloft", "arc_end", "shown"), float),
+    **dict.fromkeys(("first_event", "jumps_next"), int),
 }
 """Numbers of a trajectory that change."""
 
@@ -161,7 +184,19 @@ MEMORY = {
     # side of zero on which each was last seen, at the start of the step and at the point before; ends of the interval
     # in which it reaches zero; which have fired
     **_arrays("side side_first side_last low high", "n_margins"),
-    **_arrays("fired", "n_margins", kind=int),
+    **_arrays("fired playing", "n_margins", kind=int),
+    # moments between arcs: t, y, ydot, parameters, followed by how large the states have been; the same after a jump,
+    # and before it with the measured state moved by its rounding; what is looked at there
+    **_arrays("moment", "n_inputs"),
+    **_arrays("sized peaks_seen", "n"),
+    **_arrays("after nudged", "n_inputs"),
+    **_arrays("books_before books_after books_nudged", "n_books"),
+    **_arrays("nodal targets", "n_nodal"),
+    **_arrays("reset", "n_reset"),
+    **_arrays("magnitude", "n_margins"),
+    **_arrays("booked exchanged", "n_ledger"),
+    # times of the last jumps, the latest last
+    **_arrays("jumped", AT_ONCE),
 }
 """Arrays that a trajectory writes to: type and shape."""
 
@@ -197,6 +232,7 @@ _SOURCES = (
     "dense",
     "guards",
     "outputs",
+    "../edges",
     "driver",
 )
 

@@ -41,9 +41,11 @@ def compiled(function: Any) -> Any:
     return _njit(error_model="numpy", _nrt=False, no_cpython_wrapper=True, no_cfunc_wrapper=True)(function)
 
 
-RESIDUAL, JACOBIAN, LEDGER, MARGINS, RATES = np.arange(5)
-"""Rows of the table of addresses (code, user data). NumPy's integers, as Numba compiles what takes a Python constant
-anew for each constant.
+RESIDUAL, JACOBIAN, LEDGER, MARGINS, RATES, MAGNITUDES, GUARD_RATES, BOOKS, NODES, TIMES_OF_RETURN, RESETS = np.arange(
+    11
+)
+"""Rows of the table of addresses (code, user data), of resets the first. NumPy's integers, as Numba compiles what takes
+a Python constant anew for each constant.
 """
 
 WORK = StepperRecord("Work", SIZES, NUMBERS, MEMORY)
@@ -69,6 +71,12 @@ def _call(_context: Any, _address: Any, _out: Any, _inputs: Any, _user: Any) -> 
 def evaluate(w: Any, which: int, result: Any) -> None:
     """Call a function of the program on the current inputs."""
     _call(w.code[which, 0], result.ctypes.data, w.inputs.ctypes.data, w.code[which, 1])
+
+
+@compiled
+def evaluate_at(w: Any, which: int, inputs: Any, result: Any) -> None:
+    """Call a function of the program on these inputs."""
+    _call(w.code[which, 0], result.ctypes.data, inputs.ctypes.data, w.code[which, 1])
 
 
 @_intrinsic
@@ -158,6 +166,13 @@ def finite(values: Any) -> bool:
     for value in values:
         total += 0.0 * value
     return total == 0.0
+
+
+@compiled
+def keep_largest(values: Any, largest: Any) -> None:
+    """Keep the largest magnitudes seen."""
+    for j in range(values.shape[0]):
+        largest[j] = max(largest[j], abs(values[j]))
 
 
 # -- Tables times stages -------------------------------------------------------------------------------------------

@@ -1,0 +1,284 @@
+"""Edges of the compiled loop: which of them is due at a moment, and the jump along it.
+
+It is what an instant does where no gap has to be searched for and nothing rare happens; the rest is left to that.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from surfacechem.solve.radau.consistency import find_consistent
+from surfacechem.solve.radau.stepper import (
+    ARCS,
+    BONDS,
+    ENTROPY_OUT,
+    EVENTS,
+    HEAT_OUT,
+    JUMPS,
+    MEASURE,
+    PRODUCED,
+    REFUSES,
+    RELEASED,
+    RETURNS,
+    TAKER,
+    WORK,
+)
+from surfacechem.solve.radau.work import (
+    BOOKS,
+    GUARD_RATES,
+    MAGNITUDES,
+    MARGINS,
+    NODES,
+    RESETS,
+    TIMES_OF_RETURN,
+    compiled,
+    copy,
+    evaluate,
+    evaluate_at,
+    finite,
+    set_inputs,
+)
+from surfacechem.tolerances import BRIEF, CROSSED, DIGITS, DRIFT, MOST_DRIFT, ROUNDING, SOLVED, ULPS
+
+NONE, UNKNOWN = -1, -2
+"""Instead of the edge that is due: there is none; it has to be looked at by itself."""
+
+OPEN, CLOSED, NEAR = range(3)
+
+NEWTON = 60
+
+
+@compiled
+def find_playing(w: Any) -> None:
+    """Which guards are in play in the modes of the moment."""
+    for m in range(w.n_margins):
+        w.playing[m] = 1
+    k, rules = 0, w.when.shape[0]
+    while k < rules:
+        guard, column, holds = w.when[k, 0], w.when[k, 1], False
+        while k < rules and w.when[k, 0] == guard and w.when[k, 1] == column:
+            holds = holds or w.moment[1 + 2 * w.n + column] == w.when[k, 2]
+            k += 1
+        if not holds:
+            w.playing[guard] = 0
+
+
+@compiled
+def find_magnitudes(w: Any) -> None:
+    """Magnitudes of the guards at the peaks of the states, to which their rounding is in proportion."""
+    for j in range(w.n):
+        w.sized[j] = max(w.peaks_seen[j], abs(w.moment[1 + j]))
+    if w.n_margins == 0:
+        return
+    evaluate_at(w, MAGNITUDES, w.moment, w.magnitude)
+    for m in range(w.n_margins):
+        if not abs(w.magnitude[m]) < np.inf:
+            w.magnitude[m] = 0.0
+
+
+@compiled
+def _find_guards(w: Any) -> None:
+    """The guards at the moment, with the rates and algebraic variables that belong to it among the inputs."""
+    copy(w.moment, w.inputs)
+    for j in range(w.n):
+        w.trial[j], w.trial_dot[j] = w.moment[1 + j], 0.0
+    if w.n_margins > 0:
+        find_consistent(w)
+        set_inputs(w, w.trial, w.trial_dot)
+        evaluate(w, MARGINS, w.margin_probe)
+
+
+@compiled
+def _is_beyond(w: Any, first: int) -> bool:
+    """Whether a jump has carried the state beyond a limit."""
+    beyond = False
+    for m in range(first):
+        slack = 0.0 if w.kinds[m, 5] == 1 else CROSSED * w.magnitude[m]
+        beyond = beyond or (w.kinds[m, 0] == 1 and w.playing[m] == 1 and w.margin_probe[m] < -slack)
+    return beyond
+
+
+@compiled
+def _closing(w: Any, m: int) -> int:
+    """Whether the guard of an edge is CLOSED, or is zero and NEAR to it; the drift of the integration is not closed."""
+    value, size, small = w.margin_probe[m], w.magnitude[m], CROSSED * w.magnitude[m]
+    if w.playing[m] == 0 or value > small:
+        return OPEN
+    if value < -max(min(DRIFT * w.rtol, MOST_DRIFT) * size, small):
+        return CLOSED
+    return NEAR if w.kinds[m, 3] == 0 else OPEN
+
+
+@compiled
+def _due(w: Any, first: int) -> int:
+    """The edge whose guard is closed, or is zero and closing."""
+    due, near = NONE, False
+    for m in range(first, w.n_margins):
+        w.fired[m] = _closing(w, m)
+        near = near or w.fired[m] == NEAR
+    if near and w.code[GUARD_RATES, 0] == 0:
+        return UNKNOWN
+    if near:
+        evaluate(w, GUARD_RATES, w.margin_slope)
+    for m in range(w.n_margins - 1, first - 1, -1):
+        closes = w.fired[m] == NEAR and w.margin_slope[m - first] < 0.0
+        # What has jumped at this moment must not jump back by rounding.
+        if closes and w.jumped[-1] == w.moment[0]:
+            return UNKNOWN
+        if closes or w.fired[m] == CLOSED:
+            due = m - first
+    return due
+
+
+@compiled
+def resolve(w: Any, i: int, end: float) -> bool:
+    """Carry out all edges that are due at the moment; False where an instant has to."""
+    first = w.n_margins - w.edges.shape[0]
+    while True:
+        t = w.moment[0]
+        find_magnitudes(w)
+        find_playing(w)
+        _find_guards(w)
+        if w.jumped[-1] >= 0.0 and _is_beyond(w, first):
+            return False
+        due = _due(w, first)
+        if due == NONE:
+            return True
+        endless = w.jumped[0] >= t - SOLVED * max(t, BRIEF * end)
+        if due == UNKNOWN or endless or not jump(w, i, due):
+            return False
+
+
+@compiled
+def _look(w: Any, row: Any, books: Any) -> None:
+    """What is looked at in a jump; a magnitude that is no number there, as at a bound, says nothing."""
+    evaluate_at(w, BOOKS, row, books)
+    for k in range(books.shape[0] - 2, books.shape[0]):
+        if not abs(books[k]) < np.inf:
+            books[k] = 0.0
+
+
+@compiled
+def _warm(w: Any, taker: int, made: float) -> tuple[float, float]:
+    """Give the heat that a jump makes to the nodes after it; heat and entropy that leave through those that pass it on.
+
+    Each temperature is where its energy has risen by what the node takes.
+    """
+    row, nodes, heat, entropy = w.after, w.nodes.shape[0], 0.0, 0.0
+    if nodes == 0:
+        return heat, entropy
+    width = w.nodal.shape[0] // nodes
+    evaluate_at(w, NODES, row, w.nodal)
+    for k in range(nodes):
+        taken = w.nodal[k * width + 3 + taker] * made
+        w.targets[k] = w.nodal[k * width + 1] + taken
+        if w.nodes[k] < 0:
+            heat += taken
+            entropy += taken / w.nodal[k * width]
+    for _iteration in range(NEWTON):
+        moves = False
+        for k in range(nodes):
+            if w.nodes[k] >= 0:
+                T = row[1 + w.nodes[k]]
+                change = (w.targets[k] - w.nodal[k * width + 1]) / w.nodal[k * width + 2]
+                moves = moves or abs(change) > ULPS * abs(T)
+                row[1 + w.nodes[k]] = T + change if T + change > 0.0 else np.nan
+        if not moves:
+            break
+        evaluate_at(w, NODES, row, w.nodal)
+    return heat, entropy
+
+
+@compiled
+def _book(w: Any, made: float, gain: float, heat: float, entropy: float) -> None:
+    """What the jump adds to the accounts."""
+    for m in range(w.n_ledger):
+        kind, place = w.accounts[m, 0], w.accounts[m, 1]
+        if kind == BONDS:
+            w.booked[m] += w.after[1 + place] - w.moment[1 + place]
+        elif kind == WORK:
+            w.booked[m] += w.books_after[place] - w.books_before[place]
+        elif kind == RELEASED:
+            w.booked[m] += made
+        elif kind == PRODUCED:
+            w.booked[m] += gain
+        elif kind == HEAT_OUT:
+            w.booked[m] -= heat
+        elif kind == ENTROPY_OUT:
+            w.booked[m] -= entropy
+
+
+@compiled
+def _write_event(w: Any, i: int, e: int) -> None:
+    """The edge and the moment at which it is carried out."""
+    counts, n = w.counts[i], w.n
+    if counts[EVENTS] < w.events.shape[1]:
+        row = w.events[i, counts[EVENTS]]
+        row[0] = w.n_margins - w.edges.shape[0] + e
+        copy(w.moment[: 1 + 2 * n], row[1:])
+        copy(w.booked, row[2 + 2 * n :])
+    counts[EVENTS] += 1
+
+
+@compiled
+def _write_jump(
+    w: Any, i: int, e: int, made: float, gain: float, heat: float, entropy: float, admissible: bool
+) -> None:
+    counts, given = w.counts[i], w.books_before.shape[0] - 4
+    if counts[JUMPS] < w.jumps.shape[1]:
+        row = w.jumps[i, counts[JUMPS]]
+        row[0], row[1], row[2], row[3], row[4], row[5], row[6] = e, counts[ARCS], made, gain, heat, entropy, admissible
+        for k in range(given):
+            row[7 + k] = w.books_after[2 + k] - w.books_before[2 + k]
+        copy(w.moment, row[7 + given :])
+        copy(w.after, row[7 + given + w.moment.shape[0] :])
+    counts[JUMPS] += 1
+
+
+@compiled
+def jump(w: Any, i: int, e: int) -> bool:
+    """Carry out an edge: reset, share out the heat, judge by the second law, book. False where an instant has to."""
+    n, t, taker, measure = w.n, w.moment[0], w.edges[e, TAKER], w.edges[e, MEASURE]
+    rounding = CROSSED * w.magnitude[w.n_margins - w.edges.shape[0] + e]
+    if w.code[BOOKS, 0] == 0:
+        return False
+    copy(w.moment, w.after)
+    evaluate_at(w, RESETS + e, w.moment, w.reset)
+    for j in range(n):
+        w.after[1 + j], w.after[1 + n + j] = w.reset[j], 0.0
+    for k in range(w.held.shape[0]):
+        w.after[1 + 2 * n + w.held[k]] = w.reset[n + k]
+    before, now, nudged = w.books_before, w.books_after, w.books_nudged
+    _look(w, w.moment, before)
+    _look(w, w.after, now)
+    made, heat, entropy = before[0] - now[0], 0.0, 0.0
+    if not finite(now[:1]):
+        return False
+    if abs(made) <= DIGITS * max(now[-2], abs(before[0])):
+        made = 0.0
+    else:
+        heat, entropy = _warm(w, taker, made)
+        _look(w, w.after, now)
+    copy(w.moment, w.nudged)
+    if measure >= 0:
+        w.nudged[1 + measure] += rounding
+    _look(w, w.nudged, nudged)
+    gain = now[1] - before[1] + entropy
+    small = ROUNDING * max(abs(before[1]), abs(now[1]), abs(entropy)) + DIGITS * before[-1] + abs(nudged[1] - before[1])
+    admissible = gain >= -small
+    if not finite(w.after) or (w.edges[e, REFUSES] == 1 and not admissible):
+        return False
+    _write_event(w, i, e)
+    _write_jump(w, i, e, made, gain, heat, entropy, admissible)
+    _book(w, made, gain, heat, entropy)
+    copy(w.after, w.moment)
+    for k in range(w.jumped.shape[0] - 1):
+        w.jumped[k] = w.jumped[k + 1]
+    w.jumped[-1] = t
+    if w.edges[e, RETURNS] >= 0:
+        evaluate_at(w, TIMES_OF_RETURN, w.after, w.margin_slope)
+        w.rebounded, w.aloft = t, -np.inf
+        for k in range(w.edges.shape[0]):
+            if w.edges[k, RETURNS] >= 0:
+                w.aloft = max(w.aloft, w.margin_slope[w.edges[k, RETURNS]])
+    return True

@@ -1,0 +1,145 @@
+"""Runs whose edges the compiled loop carries out: each as arc by arc, event by event; the rest is left to that."""
+
+from dataclasses import replace
+
+import case_runs
+import numpy as np
+import pytest
+import zoo
+from random_scenes import random_scene
+
+from surfacechem.model.assemble import assemble
+from surfacechem.solve import hybrid
+from surfacechem.solve.contract import Status
+from surfacechem.solve.radau import solver as radau
+from surfacechem.solve.radau.solver import Radau
+from surfacechem.solve.run import Model, Run
+
+JUMPING = {
+    "area-stretch": 0,
+    "bouncing-plate": 79,
+    "compliant-debonding": 4,
+    "coulomb-stop": 1,
+    "debonding": 1,
+    "debonding-cooling": 1,
+    "stick-slip": 12,
+    "stick-slip-debonding": 10,
+    "stick-slip-rebonding": 8,
+}
+"""Cases and the number of their jumps."""
+
+CARRIED = {1: 4, 20: 0, 21: 6, 23: 1, 32: 8, 35: 3, 46: 1, 67: 3, 70: 9, 89: 25, 131: 3, 148: 22}
+"""Random scenes of one to two hundred segments, and the number of their jumps; a limit stops 23."""
+
+LEFT = 47
+"""One in which a jump leads beyond a limit."""
+
+
+@pytest.fixture
+def carried(monkeypatch):
+    """Whether the compiled loop has carried each run to its end."""
+    ends = []
+
+    def watched(problem, jumper):
+        found = yield from hybrid.carried(problem, jumper)
+        ends.append(found is not None)
+        return found
+
+    monkeypatch.setattr("surfacechem.solve.run.carried", watched)
+    return ends
+
+
+def both(monkeypatch, model, run, changes=None):
+    """A run along its edges in the compiled loop, and arc by arc."""
+    compiled = model.solve(run, changes)
+    monkeypatch.setattr(Radau, "crosses_edges", False)
+    by_arcs = model.solve(run, changes)
+    monkeypatch.undo()
+    return compiled, by_arcs
+
+
+def told(points):
+    return np.column_stack([points.t, points.y, points.ydot, points.ledger])
+
+
+def assert_same(found, wanted):
+    """Two runs are the same to the last bit."""
+    a, b = found.result, wanted.result
+    assert (found.status, found.reason, a.status, a.t) == (wanted.status, wanted.reason, b.status, b.t)
+    assert (a.counters.steps, a.counters.rejected) == (b.counters.steps, b.counters.rejected)
+    for name in ("y", "ydot", "ledger", "times", "outputs", "ledger_outputs"):
+        np.testing.assert_array_equal(getattr(a, name), getattr(b, name))
+    np.testing.assert_array_equal(told(a.steps), told(b.steps))
+    np.testing.assert_array_equal(a.problem.segments, b.problem.segments)
+    np.testing.assert_array_equal(a.problem.parameters, b.problem.parameters)
+    for which, other in ((a.segment, b.segment), (a.steps.segment, b.steps.segment)):
+        assert which is other is None or which.tolist() == other.tolist()
+    assert len(found.jumps) == len(wanted.jumps)
+    for one, other in zip(found.jumps, wanted.jumps, strict=True):
+        assert (one.t, one.edge, one.verdict, one.released) == (other.t, other.edge, other.verdict, other.released)
+        assert (one.entropy, one.heat_out, one.entropy_out) == (other.entropy, other.heat_out, other.entropy_out)
+        assert one.since == pytest.approx(other.since, rel=1e-15)
+        assert dict(one.work) == dict(other.work)
+        for side in ("before", "after"):
+            np.testing.assert_array_equal(getattr(one, side).inputs(), getattr(other, side).inputs())
+
+
+@pytest.mark.parametrize("name", JUMPING)
+def test_a_case_goes_along_its_edges_as_arc_by_arc(name, monkeypatch):
+    simulation = case_runs.load(name)
+    model, run = simulation.model, simulation.case.run
+    (*_, path) = (path for path in model.system.changeable if path.split(".")[0] != "initial")
+    for factor in (1.0, 1.02):
+        compiled, by_arcs = both(monkeypatch, model, run, {path: model.values()[path] * factor})
+        assert_same(compiled, by_arcs)
+        assert factor != 1.0 or len(compiled.jumps) == JUMPING[name]
+        a, b = compiled.result.known or compiled.result.states(), by_arcs.result.known or by_arcs.result.states()
+        # Where pictures begin anew with each arc, they have somewhat more or fewer states.
+        assert len(a.t) == pytest.approx(len(b.t), rel=0.02)
+        assert np.all(np.diff(a.t) >= 0)
+
+
+@pytest.mark.parametrize("seed", [*CARRIED, LEFT])
+def test_a_random_scene_goes_along_its_edges_as_arc_by_arc_or_is_left_to_that(seed, monkeypatch, carried):
+    scene, end = random_scene(seed)
+    model = Model(assemble(scene))
+    run = Run(np.linspace(0.0, end, 21).tolist(), 1e-11, max_steps=20_000)
+    compiled, by_arcs = both(monkeypatch, model, run)
+    assert carried == [seed in CARRIED]
+    assert_same(compiled, by_arcs)
+    assert len(compiled.jumps) == CARRIED.get(seed, len(by_arcs.jumps))
+
+
+def test_explicit_steps_go_along_edges_too(monkeypatch):
+    simulation = case_runs.load("stick-slip")
+    assert_same(*both(monkeypatch, simulation.model, replace(simulation.case.run, solver="dop853")))
+
+
+def test_what_has_no_room_is_solved_once_more(monkeypatch):
+    simulation = case_runs.load("stick-slip")
+    whole = simulation.model.solve(simulation.case.run)
+    monkeypatch.setattr(radau, "EVENT_ROWS", 1)
+    monkeypatch.setattr(radau, "STEP_ROWS", 10)
+    assert_same(simulation.model.solve(simulation.case.run), whole)
+
+
+def test_steps_that_run_out_between_jumps_end_the_run_there():
+    simulation = case_runs.load("bouncing-plate")
+    ended = simulation.model.solve(replace(simulation.case.run, max_steps=50))
+    assert ended.result.status is Status.MAX_STEPS
+    assert ended.result.counters.steps == 50
+    assert ended.jumps[-1].t < ended.result.t < simulation.model.solve(simulation.case.run).result.t
+
+
+@zoo.each("moving")
+def test_guards_are_in_play_by_the_rules_of_the_compiled_loop(member):
+    system = member.system
+    paths = [parameter.path for parameter in system.parameters]
+    for modes in ({}, member.modes):
+        values = np.array([parameter.value for parameter in system.parameters], dtype=float)
+        for path, value in modes.items():
+            values[paths.index(path) if path in paths else 0] = value
+        asked = {(k, j) for k, j, _ in system.rules}
+        held = {(k, j) for k, j, value in system.rules if values[j] == value}
+        playing = [all(pair in held for pair in asked if pair[0] == k) for k in range(len(system.in_play(values)))]
+        assert tuple(playing) == system.in_play(values)
