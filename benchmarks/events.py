@@ -1,8 +1,8 @@
 """Two problems with events for the benchmark, solved by ours and by the libraries called directly.
 
 P2 is a Bell cluster under a growing force that ruptures in finite time, between two bodies and a light interface. P3
-is a stick-slip slider whose bonds re-form in stick: 24 events, after each of which the run is restarted by hand, with
-the mode changed and the bonds broken.
+is a stick-slip slider whose bonds re-form in stick: 24 events, at each of which the mode changes and bonds break. Ours
+carries them out itself; the libraries are restarted by hand.
 """
 
 import math
@@ -16,9 +16,10 @@ from scipy.optimize import brentq
 from sksundae.cvode import CVODE
 from solver_problems import problem, solved_as_arrays
 
-from surfacechem.compile.program import Program, compile_program
+from surfacechem.compile.program import Program, compile_function, compile_program
+from surfacechem.expressions import magnitude
 from surfacechem.solve import solver
-from surfacechem.solve.contract import Margin, Problem, Status
+from surfacechem.solve.contract import EdgeTables, Margin, Problem, Status
 from surfacechem.solve.radau.stepper import END
 
 RUPTURE = np.array([0.2, 1.0, 4000.0, 1e-9])
@@ -62,12 +63,12 @@ SLIDER = {"drive": 0.1, "mass": 1.0, "kinetic": 0.5, "bonded": 0.5, "ageing": 2.
 
 
 @cache
-def slider() -> Program:
+def slider() -> tuple[Program, EdgeTables]:
     """Stretch w of the spring, velocity v and bonds phi; bonds form in stick (mode 0), and are broken in slip (1).
 
-    The margin is the friction left in stick, the velocity in slip.
+    Stick ends where no friction is left, slip where no velocity is.
     """
-    t, w, v, phi, mode = se.symbols("t w v phi mode")
+    t, w, v, phi, mode, start = se.symbols("t w v phi mode start")
     dw, dv, dphi = se.symbols("dw dv dphi")
     p = SLIDER
     rows = [
@@ -75,10 +76,29 @@ def slider() -> Program:
         p["mass"] * dv - mode * (w - p["kinetic"]),
         dphi - (1 - mode) * (1 - phi) / p["ageing"],
     ]
-    friction_left = p["kinetic"] + p["bonded"] * phi - w
-    return compile_program(
-        t, [w, v, phi], [dw, dv, dphi], [mode], rows, margins=[(1 - mode) * friction_left + mode * v]
+    guards = [p["kinetic"] + p["bonded"] * phi - w, v]
+    peaks = {state: se.Symbol(f"peak of {state}") for state in (w, v, phi)}
+    inputs = [t, w, v, phi, dw, dv, dphi, mode, start]
+    asked = (
+        compile_function([*inputs, *peaks.values()], [magnitude(guard, peaks) for guard in guards]),
+        compile_function(inputs, [p["bonded"] * dphi - dw, dv]),
+        compile_function(inputs, [se.Integer(0)] * 4),
+        None,
+        None,
+        *(compile_function(inputs, [w, se.Integer(0), se.Integer(0), se.Integer(after)]) for after in (1, 0)),
     )
+    edges = EdgeTables(
+        sizes=np.array([4, 0, 4]),
+        code=np.array([(f.address, f.user) if f else (0, 0) for f in asked]),
+        edges=np.array([(-1, 0, 0, -1)] * 2),
+        when=np.array([(0, 0, 0), (1, 0, 1)]),
+        held=np.array([0]),
+        clocks=np.array([1]),
+        nodes=np.zeros(0, np.int64),
+        accounts=np.zeros((0, 2), np.int64),
+        least_peaks=np.zeros(3),
+    )
+    return compile_program(t, [w, v, phi], [dw, dv, dphi], [mode, start], rows, margins=guards), edges
 
 
 def slider_events(count: int) -> np.ndarray:
@@ -177,17 +197,15 @@ def rupture_error() -> Callable[[np.ndarray], float]:
 
 
 def slide_ours(name: str, rtol: float) -> Callable[[], np.ndarray]:
-    """Times of the events, one run to each."""
-    method, program, stop = solver(name), slider(), (Margin.stop(),)
-    options = {"explicit": name == "dop853"}
+    """Times of the events."""
+    method, (program, edges) = solver(name), slider()
+    end, margins = float(slider_events(EVENTS + 1)[-2:].mean()), (Margin.stop(), Margin.stop())
+    options = {"margins": margins, "edges": edges, "explicit": name == "dop853"}
+    case = problem(program, np.zeros(3), [0.0, end], rtol, parameters=[0.0, 0.0], **options)
 
     def run() -> np.ndarray:
-        y, mode, t, times = np.zeros(3), 0.0, 0.0, []
-        for _event in range(EVENTS):
-            result = method.solve(problem(program, y, [t, t + FAR], rtol, parameters=[mode], margins=stop, **options))
-            t, y, mode = result.t, result.y * [1.0, 0.0, 0.0], 1.0 - mode
-            times.append(t)
-        return np.array(times)
+        found = method.solve(case).events.t
+        return found if len(found) == EVENTS else np.full(EVENTS, np.nan)
 
     return run
 
