@@ -9,8 +9,9 @@ from scenes import SITES, bodies, together, varying
 from scipy.optimize import brentq
 from solved import closed
 
+from surfacechem.errors import InputError
 from surfacechem.laws.bonding import BondEnergy, BondSprings, LatticeGas, LinearEnthalpy, PartnerMixing
-from surfacechem.laws.bonds import Bell, ReversibleBell
+from surfacechem.laws.bonds import Bell, DudkoHummerSzabo, ReversibleBell
 from surfacechem.laws.cohesive import ExponentialCohesiveZone, TensileStrength
 from surfacechem.laws.contact import BondedContact, BondStiffness
 from surfacechem.laws.factors import LinearInTemperature, Proportional
@@ -156,3 +157,15 @@ def test_mixing_entropy_yields_to_stretched_springs():
     gap = math.sqrt(2 * (6e-20 - BOLTZMANN * 300.0 * math.log(1e-15)) / 1e-3)
     assert trajectory.jumps[1].t == pytest.approx(2 - gap / 1e-7, rel=1e-4)
     assert trajectory.end("phi") > 1e-6
+
+
+def test_a_law_that_is_undefined_at_a_bound_leaves_the_range_there():
+    """The barrier is zero without bonds, and there is no rate by it."""
+    barrier = varying(2e-19, Proportional(of="phi", about=1.0))
+    law = DudkoHummerSzabo(k_off=0.5, x_off=1e-9, barrier=barrier, nu=0.5)
+    kept, bonded = Hold(level=300.0), BondEnergy(K_0=K)
+    interface = Interface(kept, [bonded], (), [FORMS, law], SITES)
+    loading = {"f": Hold(level=1e-12)}
+    scene = Scene((Body("lower", kept), Body("upper", kept)), interface, (), loading, None, 300.0, {"phi": 0.0})
+    with pytest.raises(InputError, match="barrier left its range"):
+        Model(assemble(scene)).solve(Run([0.0, 1.0], 1e-9))
