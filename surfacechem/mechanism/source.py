@@ -214,7 +214,13 @@ class Source:
             known = [str(key) for key in self.data]
             guess = next(iter(get_close_matches("phases", known, 1)), None)
             raise self.error(f"no `phases` in the mechanism.{suggestion('phases', known)}", self.data, guess)
-        surfaces = [known for known, entry in phases.items() if entry.get("thermo") in SURFACES] or list(phases)
+        surfaces = [known for known, entry in phases.items() if entry.get("thermo") in SURFACES]
+        if name is None and not surfaces and len(phases) > 1:
+            raise InputError(
+                f"the mechanism has no phase that is a surface ({' or '.join(SURFACES)}), only {', '.join(phases)}.",
+                place,
+            )
+        surfaces = surfaces or list(phases)
         if name is None and len(surfaces) > 1:
             raise InputError(f"the mechanism has several phases, name one.{suggestion('', surfaces)}", place)
         name = surfaces[0] if name is None else name

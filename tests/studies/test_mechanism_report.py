@@ -169,6 +169,11 @@ def test_the_figure_shows_every_reaction_once(call, tmp_path):
     [
         (("selectins",), "no mechanism file selectins.yaml. Did you mean 'selectin.yaml'?"),
         (("ptcombus",), "no mechanism file ptcombus.yaml. Did you mean 'ptcombust.yaml'?"),
+        (("covdepsurf",), "Did you mean 'example_data/covdepsurf.yaml'?"),
+        (
+            ("KOH",),
+            "no phase that is a surface (ideal-surface or coverage-dependent-surface), only KOH_plasma, K_solid",
+        ),
         (("sofc",), "several phases, name one. Known: metal_surface, oxide_surface."),
         (("selectin", "--phase", "contatc"), "has no phase 'contatc'. Did you mean 'contact'?"),
         (("selectin", "-T", "360..280 K"), "--temperature: '360..280 K' is no range upwards"),
