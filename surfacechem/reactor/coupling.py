@@ -7,19 +7,20 @@ is then the reactor's, and what flows into it the reactor receives.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
-from typing import Any, NoReturn
+from typing import Any
 
 import cantera
 
 from surfacechem.contracts.terms import Load
+from surfacechem.contracts.units import parse
 from surfacechem.errors import InputError, refuse_unknown, suggestion
 from surfacechem.laws.loading import Hold
 from surfacechem.mechanism.evaluated import Neighbour, SurfaceEngine
 from surfacechem.model.components.interface import LOADABLE
 from surfacechem.quantities import VARIABLES
-from surfacechem.reactor.gas import Receiver
+from surfacechem.reactor.gas import Receiver, refuse
 from surfacechem.scene import Body, Scene
 
 FORCES = ("Pa", "N", "W/m^2")
@@ -75,6 +76,14 @@ def with_loads(scene: Scene, values: Mapping[str, float]) -> Scene:
     return replace(scene, loading={**scene.loading, **{name: Hold(level=value) for name, value in values.items()}})
 
 
+def function_of(name: str, load: Callable[[float], float] | float | str) -> Callable[[float], float]:
+    """A load as a function of time; InputError for what is neither that nor a number or a text with a unit."""
+    if callable(load):
+        return load
+    level = parse(load, VARIABLES[name].unit, name=name) if name in VARIABLES else 0.0  # of no load, as is said later
+    return lambda _: level
+
+
 def with_neighbours(scene: Scene, reactors: Mapping[str, Any]) -> Scene:
     """The scene with phases beside its surface whose pressures and compositions are given while it runs; electric
     potentials stay those of the case.
@@ -117,20 +126,6 @@ def _replaced(body: Body, reactor: Any) -> Body:
             f"that it shares. Write `{body.name}: {{temperature: 300 K}}`; the value is not used."
         )
     return replace(body, temperature=Hold(level=float(reactor.T)))
-
-
-REFUSED: list[Any] = []
-"""Connectors that were refused: Cantera's part of the reactors they join keeps pointing to them."""
-
-
-def refuse(connector: Any, message: str) -> NoReturn:
-    """InputError for a connector while Cantera makes it, which then carries nothing between the reactors it joins."""
-    REFUSED.append(connector)
-    if isinstance(connector, cantera.FlowDevice):
-        connector.device_coefficient = 0.0
-    else:
-        connector.area = 0.0
-    raise InputError(message)
 
 
 class StandIn(cantera.Reservoir):

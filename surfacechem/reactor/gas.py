@@ -3,13 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Self
+from typing import Any, NoReturn, Self
 
 import cantera
 import numpy as np
 
+from surfacechem.contracts.terms import Spec
+from surfacechem.contracts.units import parse
+from surfacechem.errors import InputError
 from surfacechem.solve.adapters.cantera_network import HeldReactor
 from surfacechem.solve.contract import Array
+
+REFUSED: list[Any] = []
+"""Connectors that were refused: Cantera's part of the reactors they join keeps pointing to them."""
+
+
+def refuse(connector: Any, message: str) -> NoReturn:
+    """InputError for a connector while Cantera makes it, which then carries nothing between the reactors it joins."""
+    REFUSED.append(connector)
+    if isinstance(connector, cantera.FlowDevice):
+        connector.device_coefficient = 0.0
+    else:
+        connector.area = 0.0
+    raise InputError(message)
 
 
 class Receiver:
@@ -76,31 +92,48 @@ class ReactingGasAtPressure(Gas, cantera.ExtensibleIdealGasConstPressureReactor)
         return np.asarray(phase.partial_molar_enthalpies)
 
 
+MASS = Spec("kg", "mass at the start", above=0)
+
+
 class ReactingSolid(Receiver, HeldReactor):
     """A solid or a liquid beside the surface of an interface, such as the particle of an electrode or its electrolyte.
 
     ``InterfaceReactor(..., neighbours={name: solid})`` makes it a neighbour. Its amounts change, each a variable in
     units of all that is there at the start; temperature and pressure are held as they are, whatever heat that takes.
-    An electric potential is that of the case.
+    An electric potential is that of the case. Nothing else flows in or out: connectors are refused.
 
     Parameters
     ----------
     phase
-        A ``cantera.Solution`` in the state of the start, which is kept, not cloned.
+        A ``cantera.Solution`` in the state of the start.
     mass
-        Its mass at the start [kg].
+        Its mass at the start: kg, or a text with a unit.
+    clone
+        Whether it has a copy of the phase, or the phase itself, whose state then follows it.
     name
         Its name in the network.
+
+    Raises
+    ------
+    InputError
+        For what is no mass.
     """
 
-    def __new__(cls, phase: Any, *, mass: float, name: str = "solid") -> Self:
-        """Keep the phase itself."""
-        return super().__new__(cls, phase, name=name)
+    switches = {  # noqa: RUF012 - never changed
+        "chemistry_enabled": (True, "Set multipliers on the phase of the interface beside it."),
+        "energy_enabled": (False, "Its temperature is held; let a gas or a body have one that follows."),
+    }
 
-    def __init__(self, phase: Any, *, mass: float, name: str = "solid") -> None:
-        super().__init__(phase, name=name)
+    def __new__(cls, phase: Any, *, mass: float | str, clone: bool = True, name: str = "solid") -> Self:
+        """Keep the phase itself, or a copy which Cantera makes for a reservoir."""
+        return super().__new__(cls, cantera.Reservoir(phase, clone=True).phase if clone else phase, name=name)
+
+    def __init__(self, phase: Any, *, mass: float | str, clone: bool = True, name: str = "solid") -> None:
+        super().__init__(self.surface, name=name)
+        kilograms = parse(mass, "kg", name="mass")
+        MASS.check("mass", kilograms)
         self.names = tuple(phase.species_names)
-        self.whole = mass / phase.mean_molecular_weight
+        self.whole = kilograms / phase.mean_molecular_weight
         """Amount at the start [kmol]."""
         self.x = phase.X
 
@@ -118,6 +151,20 @@ class ReactingSolid(Receiver, HeldReactor):
     def mass(self) -> float:
         """Present mass [kg]."""
         return float(self.amounts @ self.phase.molecular_weights)
+
+    @property  # type: ignore[misc]  # it follows from the mass
+    def volume(self) -> float:
+        """Present volume [m^3]."""
+        return self.mass / float(self.phase.density)
+
+    def _add_wall(self, wall: Any) -> None:
+        refuse(wall, f"a wall on {self.name} would be without effect: its temperature and pressure are held.")
+
+    def _add_inlet(self, device: Any) -> None:
+        refuse(device, f"a flow into {self.name} would be lost: only reactions of interfaces change its amounts.")
+
+    def _add_outlet(self, device: Any) -> None:
+        refuse(device, f"a flow out of {self.name} has no source: only reactions of interfaces change its amounts.")
 
     def start(self) -> Array:
         return np.asarray(self.x)

@@ -7,7 +7,7 @@ from bisect import bisect_right
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, NoReturn, Self
 
 import cantera
 import numpy as np
@@ -17,9 +17,9 @@ from surfacechem.contracts.terms import Spec
 from surfacechem.contracts.units import parse
 from surfacechem.errors import InputError
 from surfacechem.format import Case
-from surfacechem.reactor.coupling import Port, node_of, refuse, suffix_of
+from surfacechem.reactor.coupling import Port, function_of, node_of, suffix_of
 from surfacechem.reactor.embedded import EmbeddedScene, EndError
-from surfacechem.reactor.gas import Receiver
+from surfacechem.reactor.gas import Receiver, refuse
 from surfacechem.reactor.history import History
 from surfacechem.runs.simulation import Simulation
 from surfacechem.solve.adapters.cantera_network import LEDGER_UNIT, BackOffError, HeldReactor, contents
@@ -43,16 +43,16 @@ class InterfaceReactor(HeldReactor):
     ----------
     case
         A case file, the name of a shipped case, a Case or a Simulation.
+    overrides
+        Changes of the case, as in ``surfacechem.load``.
     area
         What turns what the scene counts per area into what the network counts: m^2, or a text with a unit.
     bodies
         Reactors that take the place of bodies: {body: reactor}.
     neighbours
         Gases beside the surface of its mechanism, by their names there: {phase: ReactingGas}.
-    overrides
-        Changes of the case, as in ``surfacechem.load``.
     name
-        Its name in the network.
+        Its name in the network; a ``ReactorNet`` of this package numbers names that occur twice.
 
     Raises
     ------
@@ -61,14 +61,18 @@ class InterfaceReactor(HeldReactor):
     """
 
     scene: EmbeddedScene
+    switches = {  # noqa: RUF012 - never changed
+        "chemistry_enabled": (True, "Reactions stop with `phase.set_multiplier(0.0)`."),
+        "energy_enabled": (True, "Hold temperatures in the case: `bodies: {lower: {temperature: 300 K}}`."),
+    }
 
     def __new__(
         cls,
         case: str | Path | Case | Simulation,
+        overrides: Sequence[str] | Mapping[str, object] = (),
         *,
         bodies: Mapping[str, Any] | None = None,
         neighbours: Mapping[str, Any] | None = None,
-        overrides: Sequence[str] | Mapping[str, object] = (),
         name: str = "interface",
         **_: Any,
     ) -> Self:
@@ -81,17 +85,18 @@ class InterfaceReactor(HeldReactor):
     def __init__(
         self,
         case: str | Path | Case | Simulation,
+        overrides: Sequence[str] | Mapping[str, object] = (),
         *,
         area: float | str = 1.0,
         bodies: Mapping[str, Any] | None = None,
         neighbours: Mapping[str, Any] | None = None,
-        overrides: Sequence[str] | Mapping[str, object] = (),
         name: str = "interface",
     ) -> None:
         super().__init__(self.surface, name=name)  # Cantera's own part was made in __new__
-        self.area, self.bodies = parse(area, "m^2", name="area"), dict(bodies or {})
-        self.neighbours = dict(neighbours or {})
-        AREA.check("area", self.area)
+        self._walls: list[Any] = []
+        """Those which have its area."""
+        self.area = area
+        self.bodies, self.neighbours = dict(bodies or {}), dict(neighbours or {})
         self.ports: dict[str, Port] = {}
         self.loads: dict[str, Callable[[float], float]] = {}
         self.passes_breakpoints = False
@@ -103,10 +108,12 @@ class InterfaceReactor(HeldReactor):
         """Time of the start or of the last jump, after which steps begin at the rounding of the time."""
         self._connecting = False
         """Whether a wall is made that carries heat between a body and the reactor in its place."""
+        self._varied = False
+        """Whether Cantera varies multipliers while it asks for rates."""
         self.evaluations, self.seconds = 0, 0.0
         self._take_up(self.scene)
         for body, reactor in self.bodies.items():
-            self._connect(reactor, self.scene.account(body))
+            self._connect(reactor, body)
         for k, neighbour in enumerate(self.neighbours.values()):
             if isinstance(neighbour, Receiver):
                 neighbour.sources.append(partial(self._given, k))
@@ -114,6 +121,19 @@ class InterfaceReactor(HeldReactor):
     def __repr__(self) -> str:
         """Title and states in a line."""
         return f"<InterfaceReactor {self.name!r}: {self.scene.case.title!r}, {', '.join(self.scene.states)}>"
+
+    @property
+    def area(self) -> float:
+        """Size of the interface, by which the network counts what the scene counts per area: m^2, or set as a text."""
+        return self._area
+
+    @area.setter
+    def area(self, value: float | str) -> None:
+        area = parse(value, "m^2", name="area")
+        AREA.check("area", area)
+        self._area = area
+        for wall in self._walls:
+            wall.area = area
 
     def _take_up(self, scene: EmbeddedScene) -> None:
         self.scene = scene
@@ -130,12 +150,15 @@ class InterfaceReactor(HeldReactor):
         self._asked: object = None
         """All that those rates depend on; None where they may depend on more."""
         self._heard = np.array([*self._paths()], dtype=np.int64)
+        self._accounts = {body: scene.account(body) for body in self.bodies}
+        """Where the variables say what heat the bodies need that reactors stand for."""
         self.history = History(scene)
 
-    def _connect(self, reactor: Any, account: int) -> None:
+    def _connect(self, reactor: Any, body: str) -> None:
         """What must be given to the body to keep the reactor's temperature, the reactor loses."""
         self._connecting = True
-        cantera.Wall(self, reactor, A=self.area, Q=lambda t: -float(self.attempt(self._rates, t)[account]))
+        heat = lambda t: -float(self.attempt(self._rates, t)[self._accounts[body]])  # noqa: E731
+        self._walls.append(cantera.Wall(self, reactor, A=self.area, Q=heat))
         self._connecting = False
 
     def _given(self, k: int, t: float) -> tuple[Array, float]:
@@ -158,12 +181,29 @@ class InterfaceReactor(HeldReactor):
         """Called by Cantera where a flow device begins here."""
         refuse(device, f"{self.name} has no volume from which a flow could come. Let it begin in a reactor beside it.")
 
+    def add_sensitivity_reaction(self, m: int) -> None:
+        """Ask for sensitivities to the rate of a reaction, by its index from 0; this reactor is in a network already.
+
+        Give the interface to that before the reactors that take from it, or the network stops: only then has Cantera
+        told it the rate that it varies when they ask.
+        """
+        super().add_sensitivity_reaction(m)
+        self._varied = True
+
     def add_sensitivity_species_enthalpy(self, species: Any) -> None:
         """Refused: the species' thermo is in the formulas of the scene, where Cantera does not change it."""
         raise InputError(
             f"sensitivities to the enthalpy of {species} are not known in a network. Change the species in the "
             "mechanism, or use `add_sensitivity_reaction`."
         )
+
+    @property
+    def _contents(self) -> NoReturn:
+        raise InputError(
+            f"{self.name} has no mass, volume or composition: it is an area. Its states are `{self.name}[name]`."
+        )
+
+    mass = volume = density = Y = _contents
 
     @property
     def T(self) -> float:
@@ -205,8 +245,8 @@ class InterfaceReactor(HeldReactor):
             self.put(self.start())
         return self.ports[name].reservoir
 
-    def load(self, name: str, function: Callable[[float], float]) -> None:
-        """Let a function of time [s] be a load, in SI units, in place of one that the case prescribes.
+    def load(self, name: str, function: Callable[[float], float] | float | str) -> None:
+        """Let a function of time [s], or what does not change, be a load in place of one that the case prescribes.
 
         Where it jumps, end an ``advance`` there and call ``reinitialize`` on the network.
 
@@ -215,17 +255,24 @@ class InterfaceReactor(HeldReactor):
         name
             Any load that acts by its present value: ``p``, ``F_n``, ``F_t``, ``f``, ``Q_1`` and the like.
         function
-            Its value in SI at a time [s].
+            Its value in SI at a time [s]; or a number in SI or a text with a unit, at all times.
 
         Raises
         ------
         InputError
-            For what is no such load, or after the network has run.
+            For what is no such load or is given already, or after the network has run.
         """
+        given = function_of(name, function)
+        self._take_up(self._loaded(name, given))
+        self.loads[name] = given
+
+    def _loaded(self, name: str, function: Callable[[float], float]) -> EmbeddedScene:
+        """The scene with another load."""
         self._refuse_late(f"the load {name}")
+        if name in self.loads:
+            raise InputError(f"the load {name} of {self.name} is given already, by `load` or by `press`: give it once.")
         loads = {**self.loads, name: function}
-        self._take_up(EmbeddedScene(self.scene.case, self.bodies, self.ports, loads, self.neighbours))
-        self.loads = loads
+        return EmbeddedScene(self.scene.case, self.bodies, self.ports, loads, self.neighbours)
 
     def press(self, gas: Any, outside: Any) -> None:
         """Let a reactor press the gap open against another one, ``outside``, and grow as the gap opens.
@@ -236,25 +283,28 @@ class InterfaceReactor(HeldReactor):
         Parameters
         ----------
         gas, outside
-            Reactors on either side; pressures in Pa, the wall between them has the area of the interface.
+            Reactors on either side; pressures in Pa, the wall between them has the area of the interface, also later.
 
         Raises
         ------
         InputError
-            Where the gap has no rate of its own, or where edges of the scene depend on F_n: they would be located at
-            pressures of the past.
+            Where the gap has no rate of its own, where F_n is given already, or where edges of the scene depend on
+            F_n: they would be located at pressures of the past.
         """
         if "g_n" not in self.scene.states:
             raise InputError("a reactor presses on a gap that has a rate of its own: give it a damper or a mass.")
-        self.load("F_n", lambda _: gas.phase.P - outside.phase.P)
-        read = self.scene.edges_that_read("F_n")
+        push = lambda _: gas.phase.P - outside.phase.P  # noqa: E731
+        scene = self._loaded("F_n", push)
+        read = scene.edges_that_read("F_n")
         if read:
             raise InputError(
                 f"{read[0]} depends on the load of the gap, which a reactor gives at the ends of steps. Prescribe F_n."
             )
-        gap = self.scene.states.index("g_n")
+        self._take_up(scene)
+        self.loads["F_n"] = push
+        gap = scene.states.index("g_n")
         rate = lambda t: float(self.attempt(self._rates, t)[gap])  # noqa: E731
-        cantera.Wall(gas, outside, A=self.area, velocity=rate)
+        self._walls.append(cantera.Wall(gas, outside, A=self.area, velocity=rate))
 
     def _refuse_late(self, what: str) -> None:
         if self.evaluations:
@@ -264,11 +314,6 @@ class InterfaceReactor(HeldReactor):
 
     def replace_initialize(self, start: float) -> None:
         super().replace_initialize(start)
-        if self.surfaces:
-            self.error = InputError(
-                f"a ReactorSurface on {self.name} has no gas to react with. Put it on the reactor of the gas."
-            )
-            raise self.error
         self._restarted = start
         if start != self.t:
             self.begin_piece(start, 0.0)
@@ -283,6 +328,11 @@ class InterfaceReactor(HeldReactor):
 
     def rates(self, t: float) -> Array:
         began = time.perf_counter()
+        if self._varied and self._current:
+            raise InputError(
+                f"others have asked {self.name} for rates before Cantera has told it which of them it varies, so "
+                f"sensitivities would be wrong. Give {self.name} to the network before the reactors that take from it."
+            )
         if not self.passes_breakpoints:
             self._check_piece(t)
         rates = np.asarray(self._rates(t) / self.unit)
@@ -297,7 +347,7 @@ class InterfaceReactor(HeldReactor):
         # All reactors of a network have been put before it asks for rates.
         if self._current and self._last is not None and self._last[0] == t:
             return self._last[2]
-        asked = t, self.x[: len(self.scene.states)].tobytes(), self._listen(), [f(t) for f in self.loads.values()]
+        asked = t, self.x[: len(self.scene.states)].tobytes(), self.heard(t)
         # The integrator differentiates by every variable in turn, and most are lines of the ledger.
         if asked == self._asked and self._last is not None:
             self._current = True
@@ -320,6 +370,10 @@ class InterfaceReactor(HeldReactor):
         """Whether steps have become as short as the rounding of the time, other than at a start."""
         step = t - self._last[0] if self._last is not None else 0.0
         return 0 < step <= 2 * DIGITS * t and t - self._restarted > ROUNDING * t
+
+    def heard(self, t: float) -> object:
+        """All that its rates at a time [s] depend on beside its variables."""
+        return self.area, self._listen(), [f(t) for f in self.loads.values()]
 
     def _listen(self) -> bytes:
         """Take over temperatures, heats, multipliers and compositions from the network, and tell them as bytes."""
@@ -451,6 +505,8 @@ class InterfaceReactor(HeldReactor):
 
 
 def _case(case: str | Path | Case | Simulation, overrides: Sequence[str] | Mapping[str, object]) -> Case:
+    if overrides and isinstance(case, Simulation | Case):
+        raise InputError("a case that is read already takes no overrides: give them to `surfacechem.load`.")
     if isinstance(case, Simulation):
         return case.case
     return case if isinstance(case, Case) else cases.load(case, overrides)

@@ -222,3 +222,49 @@ def test_a_particle_and_its_electrolyte_at_a_held_potential(tmp_path):
     known = solve_ivp(rates, (0, 40), start, method="LSODA", rtol=1e-9, atol=1e-12).y[:, -1]
     np.testing.assert_allclose(np.concatenate((anode.x, electrolyte.x)), known, atol=1e-7)
     assert anode.x[0] > 0.7
+
+
+def graphite(x=0.5, **options):
+    phase = ct.Solution("lithium_ion_battery.yaml", "anode")
+    phase.TPX = 300, ct.one_atm, (x, 1 - x)
+    return phase, ReactingSolid(phase, **options)
+
+
+def test_particles_of_one_phase_have_each_their_own(tmp_path):
+    path = tmp_path / "case.yaml"
+    path.write_text(ELECTRODE)
+    phase, large = graphite(0.1, mass="20 g")
+    small = ReactingSolid(phase, mass=0.002)
+    assert large.mass == pytest.approx(0.02, rel=1e-12)
+    assert large.volume == pytest.approx(0.02 / phase.density, rel=1e-12)
+    cells = [InterfaceReactor(path, neighbours={"anode": solid}) for solid in (large, small)]
+    network(large, small, *cells).advance(1.0)
+    np.testing.assert_allclose(phase.X, [0.1, 0.9], rtol=1e-12)
+    assert (small.x[0] - 0.1) > 5 * (large.x[0] - 0.1) > 0
+    assert small.name == "solid_2"
+    assert ReactingSolid(phase, mass=1.0, clone=False).phase is phase
+
+
+@pytest.mark.parametrize(
+    ("mass", "message"),
+    [(-1, "mass = -1 is outside"), (0, "mass = 0 is outside"), ("20 m", "20 m is a length; mass needs a mass")],
+)
+def test_a_solid_has_a_mass(mass, message):
+    with pytest.raises(InputError, match=message):
+        graphite(mass=mass)
+
+
+@pytest.mark.parametrize(
+    ("use", "message"),
+    [
+        (lambda solid, air: ct.MassFlowController(air, solid, mdot=1e-2), "a flow into solid would be lost"),
+        (lambda solid, air: ct.Valve(solid, air, K=1.0), "a flow out of solid has no source"),
+        (lambda solid, air: ct.Wall(air, solid, U=100.0), "temperature and pressure are held"),
+        (lambda solid, _: setattr(solid, "chemistry_enabled", False), "chemistry_enabled of solid is always True"),
+        (lambda solid, _: setattr(solid, "energy_enabled", True), "energy_enabled of solid is always False"),
+    ],
+)
+def test_what_a_solid_would_not_feel_is_refused(use, message):
+    _, solid = graphite(mass=0.02)
+    with pytest.raises(InputError, match=message):
+        use(solid, ct.Reservoir(ct.Solution("air.yaml"), clone=True))

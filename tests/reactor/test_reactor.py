@@ -180,6 +180,13 @@ def test_components_have_names():
     assert net.solver_stats["rhs_evals"] > 0
     with pytest.raises(InputError, match=r"no quantity 'Tc'\. Did you mean 'T_c'"):
         interface["Tc"]
+    for ask in (
+        lambda: interface.component_index("Tc"),
+        lambda: interface.set_advance_limit("Tc", 1.0),
+        lambda: net.global_component_index("Tc", 0),
+    ):
+        with pytest.raises(InputError, match=r"interface has no component 'Tc'\. Did you mean 'T_c'"):
+            ask()
 
 
 def test_sensitivity_to_a_rate():
@@ -229,6 +236,20 @@ def test_a_stirred_gas_as_the_second_body(warm):
     np.testing.assert_allclose(dataset["T_2"][-1], gas.T)
     assert dataset.attrs["energy_error"] < 1e-7
     assert dataset.attrs["case"] == ""
+
+
+def test_a_wall_on_the_other_body_leaves_the_heat_of_the_stirred_gas(warm):
+    """It adds lines to the ledger, before that of the heat that the gas gives; and the area is set later."""
+    gas, oven = stirred(350.0), stirred(400.0)
+    interface = InterfaceReactor(warm, area=0.1, bodies={"upper": gas})
+    ct.Wall(oven, interface.body("lower"), A=0.7, U=10.0)
+    interface.area = 0.7
+    net = ReactorNet([gas, oven, interface])
+    net.rtol = RTOL
+    before = interface["E_total"] * interface.area + energy(gas) + energy(oven)
+    net.advance(5.0)
+    assert interface["E_total"] * interface.area + energy(gas) + energy(oven) == pytest.approx(before, abs=1e-3)
+    assert gas.T < 349
 
 
 def test_heat_through_a_wall(tmp_path):
@@ -305,6 +326,11 @@ def test_area_is_positive_and_has_its_unit():
     assert InterfaceReactor("exothermic", area="2 cm^2").area == pytest.approx(2e-4, rel=1e-15)
     with pytest.raises(InputError, match=r"2 cm is a length; area needs an area \[m\^2\]"):
         InterfaceReactor("exothermic", area="2 cm")
+    interface = InterfaceReactor("exothermic")
+    interface.area = "3 cm^2"
+    assert interface.area == pytest.approx(3e-4, rel=1e-15)
+    with pytest.raises(InputError, match="area = -1 is outside its range"):
+        interface.area = -1
 
 
 def test_a_chamber_that_is_not_in_the_network(tmp_path):
@@ -394,6 +420,30 @@ def test_a_surface_on_an_interface_is_refused():
         ReactorNet([interface]).advance(1.0)
 
 
+@pytest.mark.parametrize(
+    ("use", "message"),
+    [
+        (lambda i: setattr(i, "chemistry_enabled", False), r"always True\. Reactions stop with `phase\.set_multiplier"),
+        (lambda i: setattr(i, "energy_enabled", False), r"energy_enabled of interface is always True\. Hold temp"),
+        (lambda i: i.mass, "interface has no mass, volume or composition"),
+        (lambda i: i.Y, "interface has no mass, volume or composition"),
+        (lambda i: setattr(i.phase, "TP", (350.0, 1e5)), "its reactions and their multipliers only"),
+        (lambda i: setattr(i.phase, "f", 1e-12), "its reactions and their multipliers only"),
+        (lambda i: i.phase.coverages, "its reactions and their multipliers only"),
+        (lambda i: i.phase.set_unnormalized_coverages([0.3, 0.7]), "set it under `initial`"),
+    ],
+)
+def test_what_would_be_ignored_or_of_nothing_is_refused(use, message):
+    with pytest.raises(InputError, match=message):
+        use(InterfaceReactor("dna-adhesive"))
+
+
+def test_overrides_stand_second_as_in_load():
+    assert InterfaceReactor("dna-adhesive", ["initial.T_1=350 K"])["T_1"] == 350.0
+    with pytest.raises(InputError, match="a case that is read already takes no overrides"):
+        InterfaceReactor(surfacechem.load("dna-adhesive"), ["initial.T_1=350 K"])
+
+
 @pytest.mark.parametrize(("case", "name"), [("dna-adhesive", "T_c"), ("exothermic", "T")])
 def test_the_temperature_is_that_of_the_interface(case, name):
     interface, net = network(case)
@@ -468,6 +518,35 @@ def test_a_load_given_as_a_function_acts_like_a_history():
     np.testing.assert_allclose(found.x, expected.x, rtol=LOOSE, atol=LOOSE * np.abs(expected.x).max())
 
 
+def test_a_load_that_does_not_change(tmp_path):
+    (tmp_path / "piston.yaml").write_text(PISTON)
+    interfaces = [InterfaceReactor(tmp_path / "piston.yaml") for _ in range(3)]
+    for interface, load in zip(interfaces, (lambda _: 1e3, 1e3, "1 kPa"), strict=True):
+        interface.load("F_n", load)
+        ReactorNet([interface]).advance(0.1)
+    assert interfaces[0]["g_n"] == interfaces[1]["g_n"] == interfaces[2]["g_n"] > 0
+    with pytest.raises(InputError, match="F_m' is no load that a network can give"):
+        InterfaceReactor(tmp_path / "piston.yaml").load("F_m", 1.0)
+    with pytest.raises(InputError, match="F_n needs a pressure"):
+        InterfaceReactor(tmp_path / "piston.yaml").load("F_n", None)
+
+
+def test_a_load_is_given_once(tmp_path):
+    (tmp_path / "piston.yaml").write_text(PISTON)
+    pressed, loaded = (InterfaceReactor(tmp_path / "piston.yaml") for _ in range(2))
+    gas, outside = oven(), oven()
+    pressed.press(gas, outside)
+    loaded.load("F_n", 0.0)
+    for again in (
+        lambda: pressed.press(gas, outside),
+        lambda: pressed.load("F_n", 0.0),
+        lambda: loaded.press(gas, outside),
+    ):
+        with pytest.raises(InputError, match="the load F_n of interface is given already"):
+            again()
+    assert len(gas.walls) == 1
+
+
 def test_what_a_gas_loses_on_a_piston_is_work_on_the_interface_and_outside(tmp_path):
     (tmp_path / "piston.yaml").write_text(PISTON)
     air = ct.Solution("air.yaml")
@@ -475,8 +554,9 @@ def test_what_a_gas_loses_on_a_piston_is_work_on_the_interface_and_outside(tmp_p
     gas = ct.IdealGasReactor(air, clone=True, volume=2e-4)
     air.TP = 300.0, 1.0e5
     outside = ct.Reservoir(air, clone=True)
-    interface = InterfaceReactor(tmp_path / "piston.yaml", area=0.01)
+    interface = InterfaceReactor(tmp_path / "piston.yaml", area=0.03)
     interface.press(gas, outside)
+    interface.area = 0.01
     net = ReactorNet([gas, interface])
     net.rtol = RTOL
 

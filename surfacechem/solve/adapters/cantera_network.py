@@ -6,13 +6,14 @@ inside the last step come from the integrator's own polynomial, whose derivative
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache, partial
-from typing import Any, Self
+from typing import Any, NoReturn, Self
 
 import cantera
 import numpy as np
 
+from surfacechem.errors import InputError, refuse_unknown
 from surfacechem.solve.adapters.dense_step import DenseStep, Steps, at_nodes, hermite, on_step
 from surfacechem.solve.adapters.evaluation import Evaluation
 from surfacechem.solve.adapters.stepping import Method, StepError, SteppingSolver, View
@@ -46,12 +47,40 @@ reactions:
 """
 
 
+MULTIPLIERS_ONLY = (
+    "the phase of an interface stands for its reactions and their multipliers only. Its state is the scene's: read "
+    "`interface['phi']` and `interface.T`, and set it under `initial`."
+)
+
+
+class Contents(cantera.Interface):
+    """A Cantera surface whose reactions have multipliers; its state is nobody's, and refused where it is asked for."""
+
+    def __setattr__(self, name: str, value: object) -> None:
+        """Refuse what would be ignored; private names are Cantera's own."""
+        if name != "name" and not name.startswith("_"):
+            raise InputError(MULTIPLIERS_ONLY)
+        super().__setattr__(name, value)
+
+
+def _refuse_state(_: object) -> NoReturn:
+    raise InputError(MULTIPLIERS_ONLY)
+
+
+for _name in (
+    *("T", "P", "X", "Y", "TP", "TPX", "TPY", "coverages", "concentrations", "state", "density", "electric_potential"),
+    *("site_density", "net_rates_of_progress", "net_production_rates", "advance_coverages"),
+    *("set_unnormalized_coverages", "set_unnormalized_mole_fractions", "set_unnormalized_mass_fractions"),
+):
+    setattr(Contents, _name, property(_refuse_state))
+
+
 def contents(reactions: Sequence[str] = ("bond",)) -> Any:
     """A Cantera surface that stands for a scene: one reaction for each of ours, its rate constant the multiplier."""
     species = (f"- {{name: {name}, composition: {{}}, thermo: {{model: constant-cp}}}}" for name in reactions)
     entries = (f"- {{equation: open => {name}, rate-constant: {{A: 1, b: 0, Ea: 0}}}}" for name in reactions)
     text = CONTENTS.format(names=", ".join(reactions), species="\n".join(species), reactions="\n".join(entries))
-    return cantera.Interface(yaml=text, name="interface")
+    return Contents(yaml=text, name="interface")
 
 
 @cache
@@ -64,6 +93,17 @@ class BackOffError(Exception):
     """There are no rates here, but a shorter step may end where there are."""
 
 
+def _switch(name: str) -> property:
+    """A switch of Cantera's reactors that cannot be changed, which it would be without effect."""
+
+    def change(self: HeldReactor, on: bool) -> None:
+        kept, instead = self.switches[name]
+        if on != kept:
+            raise InputError(f"{name} of {self.name} is always {kept}. {instead}")
+
+    return property(lambda self: self.switches[name][0], change)
+
+
 class HeldReactor(cantera.ExtensibleReactor):
     """A reactor whose state and rates are not Cantera's. The only place that knows how Cantera calls its hooks.
 
@@ -74,6 +114,8 @@ class HeldReactor(cantera.ExtensibleReactor):
     surface: Any
     names: tuple[str, ...]
     error: Exception | None = None
+    switches: Mapping[str, tuple[bool, str]]
+    """Those of Cantera's reactors that stand as they are: whether they are on, and what else does as one may want."""
     asked: float = 0.0
     """Time of the last evaluation [s]: after a step of the integrator, its end."""
 
@@ -82,6 +124,8 @@ class HeldReactor(cantera.ExtensibleReactor):
         made = super().__new__(cls, surface, clone=False, name=name)  # type: ignore[call-arg]
         made.surface = surface
         return made
+
+    chemistry_enabled, energy_enabled = _switch("chemistry_enabled"), _switch("energy_enabled")
 
     def start(self) -> Array:
         """Present values of the variables."""
@@ -113,6 +157,11 @@ class HeldReactor(cantera.ExtensibleReactor):
     # -- Cantera 3.2's hooks ---------------------------------------------------------------------------------------
 
     def replace_initialize(self, _start: float) -> None:
+        if self.surfaces:
+            self.error = InputError(
+                f"a ReactorSurface on {self.name} has no gas to react with. Put it on the reactor of the gas."
+            )
+            raise self.error
         self.n_vars = len(self.names)
 
     def replace_get_state(self, y: Any) -> None:
@@ -132,6 +181,7 @@ class HeldReactor(cantera.ExtensibleReactor):
         return self.names[i]
 
     def replace_component_index(self, name: str) -> int:
+        refuse_unknown([name], self.names, f"{self.name} has no component '{{}}'")
         return self.names.index(name)
 
 
