@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import cached_property
@@ -13,7 +14,7 @@ import numpy as np
 from surfacechem.errors import InputError
 from surfacechem.reactor.interface import InterfaceReactor
 from surfacechem.reactor.watch import AHEAD, Watch
-from surfacechem.solve.adapters.cantera_network import last_step
+from surfacechem.solve.adapters.cantera_network import HeldReactor, last_step
 from surfacechem.solve.adapters.dense_step import Guards, first_crossing
 from surfacechem.solve.contract import Array, Counters, Margin
 
@@ -36,7 +37,8 @@ class ReactorNet(cantera.ReactorNet):
     Parameters
     ----------
     reactors
-        Reactors of Cantera and interfaces, in any order.
+        Reactors of Cantera and interfaces, whose order is that of indices. Interfaces whose reactions get sensitivities
+        stand before the reactors that take from them.
     """
 
     def __init__(self, reactors: Sequence[Any] = ()) -> None:
@@ -45,9 +47,11 @@ class ReactorNet(cantera.ReactorNet):
         self._steps = 0
         self._fresh = True
         self._started = -np.inf
-        # What others take of an interface has to be evaluated with the multipliers that Cantera gives it in its turn.
-        super().__init__(sorted(reactors, key=lambda reactor: not isinstance(reactor, InterfaceReactor)))
+        self._around: list[object] = []
+        """What the interfaces depend on beside their variables, at the present time."""
+        super().__init__(reactors)
         self.interfaces += [reactor for reactor in reactors if isinstance(reactor, InterfaceReactor)]
+        _number([reactor for reactor in reactors if isinstance(reactor, HeldReactor)])
 
     @cached_property
     def _watch(self) -> Watch:
@@ -145,8 +149,16 @@ class ReactorNet(cantera.ReactorNet):
             interface.jump(self.time)
             self._record(interface, self.time)
         self.reinitialize()
-        self._watch.restart()
-        self._steps, self._started = 0, self.time
+
+    def reinitialize(self) -> None:
+        """Start the integration anew from the present states of the reactors, as Cantera's method of this name does.
+
+        What a script changes of an interface or of what is beside it, as an area or a multiplier, needs no such call.
+        """
+        super().reinitialize()
+        if not self._fresh:
+            self._watch.restart()
+            self._steps, self._started = 0, self.time
 
     def step(self) -> float:
         """Take one step of the integrator, or go to the next breakpoint where a step could pass it.
@@ -243,7 +255,13 @@ class ReactorNet(cantera.ReactorNet):
         """Breakpoints ahead, in order."""
         if self._fresh:
             self._begin()
+        elif self._surroundings() != self._around:  # the integrator has been beyond this time, with what was before
+            self._anew(f"what a script has changed at t = {self.time:g} s")
+            self._around = self._surroundings()
         return sorted({b for interface in self.interfaces for b in interface.scene.breakpoints if b > self.time})
+
+    def _surroundings(self) -> list[object]:
+        return [interface.heard(float(self.time)) for interface in self.interfaces]
 
     def _begin(self) -> None:
         self._fresh, self._started = False, self.time
@@ -253,6 +271,7 @@ class ReactorNet(cantera.ReactorNet):
             if interface.scene.moments:
                 interface.jump(self.time)
             interface.record(self.time)
+        self._around = self._surroundings()
         if self._watch.interfaces:
             self.reinitialize()
 
@@ -278,6 +297,7 @@ class ReactorNet(cantera.ReactorNet):
             interface.begin_piece(t, self.rtol)
         if pieces:
             self._anew(f"the breakpoint t = {t:g} s")
+        self._around = self._surroundings()
 
     def _record(self, interface: InterfaceReactor, t: float) -> None:
         stats = self.solver_stats
@@ -308,3 +328,13 @@ class ReactorNet(cantera.ReactorNet):
         finally:
             for interface in self.interfaces:
                 interface.passes_breakpoints = False
+
+
+def _number(reactors: Sequence[Any]) -> None:
+    """Give names that occur again a number."""
+    counts = Counter[str]()
+    for reactor in reactors:
+        name = reactor.name
+        counts[name] += 1
+        if counts[name] > 1:
+            reactor.name = f"{name}_{counts[name]}"

@@ -131,7 +131,7 @@ def test_sensitivity_of_the_gas_to_a_reaction_of_the_surface(tmp_path):
     def water(multiplier, wanted):
         gas = fuel(energy="off")
         interface = interface_of(tmp_path, HELD, gas, area=AREA)
-        net = network(gas, interface)
+        net = network(interface, gas)
         interface.phase.set_multiplier(multiplier, 1)
         if wanted:
             interface.add_sensitivity_reaction(1)
@@ -142,6 +142,35 @@ def test_sensitivity_of_the_gas_to_a_reaction_of_the_surface(tmp_path):
     (more, _), (less, _), (_, found) = water(1.01, False), water(0.99, False), water(1.0, True)
     assert abs(found) > 1e-3
     assert found == pytest.approx((np.log(more) - np.log(less)) / (np.log(1.01) - np.log(0.99)), rel=1e-3)
+
+
+@pytest.mark.parametrize(("kind", "error"), [(ReactorNet, InputError), (ct.ReactorNet, ct.CanteraError)])
+def test_a_gas_that_asks_before_rates_are_varied(kind, error, tmp_path):
+    gas = fuel()
+    interface = interface_of(tmp_path, HELD, gas, area=AREA)
+    net = kind([gas, interface])
+    interface.add_sensitivity_reaction(1)
+    with pytest.raises(error, match="Give interface to the network before the reactors that take from it"):
+        net.advance(1e-6)
+
+
+def energy_of(gas):
+    return gas.mass * gas.phase.int_energy_mass
+
+
+@pytest.mark.parametrize("stepwise", [False, True])
+def test_an_area_that_changes_while_the_network_runs(stepwise, tmp_path):
+    """The gas loses what the surface takes, as with a network that starts there."""
+    gas = fuel()
+    interface = interface_of(tmp_path, WARM, gas, area=AREA)
+    net = network(gas, interface)
+    net.advance(1e-6)
+    before = np.array([energy_of(gas), interface["E_total"]])
+    interface.area = 3 * AREA
+    while net.time < 1e-5:
+        net.step() if stepwise else net.advance(1e-5)
+    lost, taken = np.array([energy_of(gas), interface["E_total"]]) - before
+    assert 3 * AREA * taken == pytest.approx(-lost, rel=1e-6)
 
 
 @pytest.mark.parametrize(

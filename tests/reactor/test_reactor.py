@@ -200,6 +200,43 @@ def test_sensitivity_to_a_rate():
     assert net.sensitivity_parameter_name(0) == "interface: open => linear_affinity"
 
 
+def test_indices_are_those_of_the_reactors_as_given():
+    """A sensitivity to a reaction of the second gas is that of the gases alone."""
+    gas = ct.Solution("h2o2.yaml")
+
+    def found(kind, *others):
+        gases = []
+        for T in (1000.0, 1300.0):
+            gas.TPX = T, 1e5, "H2:2, O2:1, AR:5"
+            gases.append(ct.IdealGasReactor(gas, clone=True))
+        reactors = [*gases, *others]
+        net = kind(reactors)
+        gases[1].add_sensitivity_reaction(2)
+        net.advance(1e-5)
+        assert all(one is other for one, other in zip(net.reactors, reactors, strict=True))
+        assert net.get_state()[net.global_component_index("temperature", 1)] == gases[1].T
+        return net.sensitivity("H", 0, 1)
+
+    assert found(ReactorNet, InterfaceReactor("dna-adhesive")) == pytest.approx(found(ct.ReactorNet), rel=1e-4)
+
+
+def test_names_that_occur_twice_get_numbers():
+    interfaces = [InterfaceReactor("exothermic") for _ in range(3)]
+    ReactorNet([*interfaces, InterfaceReactor("exothermic", name="glue")])
+    assert [interface.name for interface in interfaces] == ["interface", "interface_2", "interface_3"]
+
+
+@pytest.mark.parametrize("beside", ["dna-adhesive", "debonding"])
+def test_what_a_script_changes_takes_effect_at_once(beside):
+    """The integrator has been beyond the present time, with what was before; in another way where a scene jumps."""
+    interface, net = network("exothermic", others=[InterfaceReactor(beside)])
+    net.advance(0.05)
+    before = interface["phi"]
+    interface.phase.set_multiplier(0.0)
+    net.advance(0.2)
+    assert interface["phi"] == pytest.approx(before, rel=1e-12)
+
+
 @pytest.fixture
 def warm(tmp_path):
     """The plates of DNA bonds, one of them cold and kept so."""
