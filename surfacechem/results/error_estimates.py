@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 
@@ -34,7 +35,7 @@ from surfacechem.scene import Scene
 from surfacechem.solve.choice import method
 from surfacechem.solve.contract import Array, Mask, Problem, States
 from surfacechem.solve.run import Run, Trajectory
-from surfacechem.tolerances import BRIEF, EPS, FLOOR, SQRT_EPS, TIGHTEST, UNRESOLVED
+from surfacechem.tolerances import BRIEF, EPS, FLOOR, NEGLIGIBLE, NONE_OF_SCALE, SQRT_EPS, TIGHTEST, UNRESOLVED
 
 EARLIER = "ended earlier"
 """What is said of a second run that did not come as far."""
@@ -45,6 +46,12 @@ from the balances, which costs nothing."""
 
 LOOKS = 400
 """Times at which an exact solution is evaluated at most."""
+
+MOMENTS = 10.0 ** np.arange(-15, 1)
+"""Parts of a run in which one state may drive another."""
+
+ENERGY, ENTROPY = "J/m^2", "J/(m^2 K)"
+"""Units of accounts that belong together."""
 
 EVENTS = "event times"
 """What stands for the times of events among the compared variables."""
@@ -276,6 +283,13 @@ def of_named(ours: Trajectory, theirs: Trajectory) -> dict[str, float]:
     with np.errstate(invalid="ignore"):  # what is infinite in both is the same
         missed = np.fmax(np.abs(first.outputs - true) - rounded, 0.0)
     errors = np.fmax.reduce(np.divide(missed, size, out=np.zeros_like(missed), where=size > 0), initial=0.0)
+    if np.any(errors > NEGLIGIBLE):  # what errors within the tolerance make of a zero has no digits
+        some = second.some
+        felt = some.felt(ours.run.rtol * np.maximum(np.abs(some.result.outputs), state_floors(theirs)))
+        nothing = np.abs(second.outputs).max(axis=0, initial=0.0) <= np.array(list(felt.values()))
+        return {
+            name: float(e) for name, e, no in zip(names, errors, nothing, strict=True) if not (no and e > NEGLIGIBLE)
+        }
     return dict(zip(names, errors.tolist(), strict=True))
 
 
@@ -388,11 +402,7 @@ def sizes(trajectory: Trajectory, named: Collection[str] = ()) -> dict[str, Arra
         largest = np.abs(trajectory.outputs[:, columns]).max(axis=0, initial=0.0)
         found |= zip(own, np.fmax(largest, _changes(trajectory, columns)).T, strict=True)
     if len(own) < len(named):
-        found |= {
-            name: np.full(len(result.times), np.abs(values).max(initial=0.0))
-            for name, values in exchanged(trajectory).items()
-            if name in named
-        }
+        found |= {name: np.full(len(result.times), size) for name, size in _exchanged_sizes(trajectory).items()}
     end, speed, size = trajectory.run.times[-1], np.abs(trajectory.rates), np.maximum(np.abs(result.outputs), least)
     most = np.where(size < BRIEF * end * speed, np.inf, size.max(axis=0, initial=0.0))
     whole = np.fmin(size + result.times[:, None] * speed, most)
@@ -408,9 +418,26 @@ def floors(trajectory: Trajectory) -> dict[str, float]:
     system = trajectory.model.system
     found = dict(zip(system.state_columns, state_floors(trajectory).tolist(), strict=True))
     found |= {p.name: max((found[state] for state in p.states), default=0.0) for p in system.profiles}
-    others = dict(zip(system.output_columns, trajectory.outputs.T, strict=True)) | exchanged(trajectory)
+    others = dict(zip(system.output_columns, trajectory.outputs.T, strict=True))
     largest = {name: float(np.max(np.abs(values), initial=0.0)) for name, values in others.items()}
-    return largest | found
+    return largest | _exchanged_sizes(trajectory) | found
+
+
+def _exchanged_sizes(trajectory: Trajectory) -> dict[str, float]:
+    """The largest value of each account, at least the part of all that is stored or exchanged with it that is no more
+    of a state: what a spring releases at no extension is rounding. Energy over temperature is an entropy.
+    """
+    system = trajectory.model.system
+    units = [each.unit for each in (*(o.quantity for o in system.outputs), *(a.quantity for a in system.ledger))]
+    values = np.concatenate([trajectory.outputs, trajectory.result.ledger_outputs], axis=1)
+    sizes, whole = np.abs(values).max(axis=0, initial=0.0), dict.fromkeys(units, 0.0)
+    for unit, size in zip(units, sizes, strict=True):
+        whole[unit] = max(whole[unit], float(size))
+    if (hottest := whole.get("K", 0.0)) > 0 and ENTROPY in whole:
+        whole[ENTROPY] = max(whole[ENTROPY], whole.get(ENERGY, 0.0) / hottest)
+    least = [NONE_OF_SCALE * whole[unit] for unit in units]
+    own = np.maximum(sizes, least)[len(system.outputs) :].tolist()
+    return dict(zip((account.quantity.name for account in system.ledger), own, strict=True))
 
 
 def state_floors(trajectory: Trajectory) -> Array:
@@ -419,8 +446,31 @@ def state_floors(trajectory: Trajectory) -> Array:
     least = np.minimum(trajectory.result.problem.atol / trajectory.run.rtol, scales)
     # What never exceeds the last digit of its scale is nothing, however tight the absolute tolerance: a species that no
     # reaction makes has a coverage of rounding.
-    never = np.abs(trajectory.result.outputs).max(axis=0, initial=0.0) < EPS * scales
-    return np.asarray(np.where(never, np.maximum(least, EPS * scales), least))
+    most = np.abs(trajectory.result.outputs).max(axis=0, initial=0.0)
+    least = np.where(most < EPS * scales, np.maximum(least, EPS * scales), least)
+    small = (most > 0) & (most < least)
+    if small.any():  # nor is a velocity that the last digit of a load drives
+        ends = {0, len(trajectory.result.times) // 2, len(trajectory.result.times) - 1}
+        driven = _driven(trajectory.picked(np.array(sorted(ends))))
+        least = np.where(small & (most <= UNRESOLVED * EPS * driven), np.maximum(least, driven), least)
+    return np.asarray(least)
+
+
+def _driven(trajectory: Trajectory) -> Array:
+    """How large each state becomes at most, if it grows by what all others are, over a moment of any length in the time
+    of the run, as an implicit step has it: of a mass on a spring its gap times its frequency, shape (states,).
+    """
+    program, result = trajectory.model.program, trajectory.result
+    segment = result.segments_at(result.times, result.segment)
+    inputs = trajectory.model.inputs(result, result.times, result.outputs, trajectory.rates, segment)
+    by_state, by_rate = program.derivatives(program.filled(inputs))
+    others, found = np.abs(result.outputs), np.zeros(program.n)
+    for length in trajectory.run.times[-1] * MOMENTS:
+        with suppress(np.linalg.LinAlgError):
+            kept = np.linalg.solve(by_rate + length * by_state, by_rate)
+            coupled = np.abs(kept) * (1 - np.eye(program.n))
+            found = np.fmax(found, np.einsum("tij,tj->ti", coupled, others).max(axis=0, initial=0.0))
+    return found
 
 
 def difference(found: Mapping[str, Array], expected: Mapping[str, Array]) -> str:

@@ -1,6 +1,7 @@
 """What the audit says of laws that destroy entropy: judged by what each turns over, in runs and in sweeps alike."""
 
 import math
+from copy import copy
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -122,3 +123,31 @@ def test_the_last_point_is_left_out_only_where_a_law_ends(status, last, value, p
     steps = SimpleNamespace(t=np.array([0.0, 1.0, last]))
     trajectory = SimpleNamespace(status=status, run=SimpleNamespace(rtol=1e-9), result=SimpleNamespace(steps=steps))
     assert audit._is_past_its_end(trajectory, value) is past
+
+
+OPEN_GAP = """
+bodies: {{a: {{temperature: 300 K}}, b: {{temperature: 300 K}}}}
+interface: {{potential: [penalty: {{E_n: 1 MPa/um}}]}}
+mechanics: {{normal: {{k: 20 MPa/mm}}}}
+loading: {{w_n: {{harmonic: {{mean: 5 um, amplitude: 3 um, frequency: 1 Hz}}}}}}
+run: {{until: 1 s, rtol: {rtol}}}
+"""
+"""An open gap that follows its spring: no energy is stored, no work done."""
+
+
+@pytest.mark.parametrize("rtol", [1e-3, 1e-6, 1e-11])
+def test_work_that_errors_alone_do_leaves_no_balance_open(rtol):
+    solution = surfacechem.run(OPEN_GAP.format(rtol=rtol))
+    assert solution.warnings == ()
+    assert solution.audit.energy_error < rtol
+
+
+@pytest.mark.parametrize(("mean", "part"), [("5 um", 1e-8), ("0 um", 1e-6)])
+def test_work_that_is_booked_wrong_is_told(mean, part):
+    """A part of what the spring would hold at the gap, open, or of what it does hold, where the gap closes."""
+    trajectory = surfacechem.run(OPEN_GAP.format(rtol=1e-11), [f"loading.w_n.harmonic.mean={mean}"]).trajectory
+    assert audit.audit(trajectory).findings == ()
+    result = copy(trajectory.result)
+    result.ledger_outputs = result.ledger_outputs + part * np.linspace(0, 0.1, len(result.times))[:, None]
+    findings = audit.audit(replace(trajectory, result=result)).findings
+    assert any("the balance of energy is open" in finding for finding in findings)

@@ -280,3 +280,30 @@ def test_a_variable_says_its_error_and_the_summary_the_worst():
     solution = surfacechem.run("press-hold-pull")
     assert solution["M_theta_bond_s"].attrs["error"] > 0.01 > solution["t_n"].attrs["error"]
     assert "of what follows from the states up to 0." in str(run_summary(solution, None))
+
+
+def on_a_spring(mechanics: str, loading: str, interface: str = "interface: {potential: [penalty: {E_n: 1 MPa/um}]}"):
+    bodies = "bodies: {a: {temperature: 300 K}, b: {temperature: 300 K}}"
+    return f"{bodies}\n{interface}\nmechanics: {{normal: {{{mechanics}}}}}\nloading: {{w_n: {loading}}}\n"
+
+
+@pytest.mark.parametrize(
+    "scene",
+    [
+        on_a_spring("k: 20 MPa/mm", "{harmonic: {mean: 5 um, amplitude: 3 um, frequency: 1 Hz}}"),  # never touched
+        on_a_spring("k: 20 MPa/mm", "{harmonic: {amplitude: 5 um, frequency: 1 Hz}}", ""),  # rigid, opens and closes
+        on_a_spring("k: 20 kPa/mm, m: 1 kg/m^2", "5 um") + "initial: {g_n: 5 um}\n",  # at rest
+    ],
+    ids=["open", "rigid", "resting"],
+)
+def test_what_is_nothing_is_not_wrong(scene):
+    """A spring at no extension, what it releases there, and a mass in equilibrium are known to their rounding."""
+    solution = surfacechem.run(f"{scene}run: {{until: 3 s}}")
+    assert max(solution.accuracy.everywhere.values()) < 1e-9
+    assert solution.warnings == ()
+
+
+def test_a_small_velocity_that_is_no_rounding_has_its_error():
+    scene = on_a_spring("k: 20 kPa/mm, m: 1 kg/m^2", "5 um")
+    solution = surfacechem.run(f"{scene}initial: {{g_n: 5.000001 um}}\nrun: {{until: 10 ms, rtol: 1e-3}}")
+    assert solution.accuracy.variables["v_n"] > 1e-9
