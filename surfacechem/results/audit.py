@@ -124,16 +124,11 @@ class Audit:
         energy = _relative(np.maximum(np.abs(self.energy) - self.energy_rounding, 0), self.energy_scale)
         entropy = _relative(np.maximum(np.abs(self.entropy) - self.entropy_rounding, 0), self.entropy_scale)
         open_balances = (("energy", energy), ("entropy", entropy), ("sites", self.site_error))
-        limit = _limit(self.rtol)
+        limit = OPEN * max(self.rtol, FINEST)
         found += [
             f"the balance of {name} is open by {error:.1e}" for name, error in open_balances if not error <= limit
         ]
         return tuple(found)
-
-
-def _limit(rtol: float) -> float:
-    """Relative residual above which a balance of a run counts as open."""
-    return float(OPEN * max(rtol, FINEST))
 
 
 def _relative(residual: Array, scale: Any) -> Any:
@@ -214,7 +209,7 @@ def audit(trajectory: Trajectory) -> Audit:
         sites = np.maximum(sites, np.abs(bonds - bonds[:1] - ledger[:, j]))
     rounding = EPS * energy_stored * roundings + untimed
     left = largest(open_ones.energy)
-    if left > rounding + min(_limit(trajectory.run.rtol), UNRESOLVED) * energy_scale:
+    if left > rounding + OPEN * FINEST * energy_scale:
         # Tractions of a gap on a spring that nothing pulls are differences of large ones: what they do is an error.
         errors = _exchanged_by_errors(trajectory)
         if left <= errors and UNRESOLVED * energy_scale <= errors:
@@ -305,7 +300,7 @@ def _exchanged_by_errors(trajectory: Trajectory) -> float:
     columns = [j for kind in ("energy supply", "dissipation") for j in system.account_columns.get(kind, ())]
     if ledger is None or len(points.t) < 2:
         return 0.0
-    *_, powers = _rounding_of(trajectory, points, ledger, columns, np.arange(len(points.t) - 1))
+    powers = next(_rounding_of(trajectory, points, ledger, columns, np.arange(len(points.t) - 1)))
     return float(powers @ np.diff(points.t))
 
 
