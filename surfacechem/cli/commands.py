@@ -217,11 +217,13 @@ def chosen(simulation: Simulation, solver: str | None, rtol: float | None, accur
     from surfacechem.results.accuracy import first_tolerance
     from surfacechem.solve import AUTO, names
     from surfacechem.solve.run import OWN
+    from surfacechem.tolerances import TIGHTEST
 
     refuse_unknown([] if solver is None else [solver], (AUTO, *names), "no solver '{}'", Place(path="--solver"))
-    for option, value, most in (("--rtol", rtol, 0.1), ("--accuracy", accuracy, 1.0)):
-        if value is not None and not 0 < value <= most:
-            raise InputError(f"{value:g} is outside its range: > 0 and <= {most:g}.", Place(path=option))
+    if rtol is not None and not TIGHTEST <= rtol <= 0.1:  # what is tighter is rounding
+        raise InputError(f"{rtol:g} is outside its range: >= {TIGHTEST:g} and <= 0.1.", Place(path="--rtol"))
+    if accuracy is not None and not 0 < accuracy <= 1:
+        raise InputError(f"{accuracy:g} is outside its range: > 0 and <= 1.", Place(path="--accuracy"))
     if rtol is not None and (accuracy is not None or solver == AUTO):
         raise InputError("the tolerance has two roles: give an accuracy or a tolerance.", Place(path="--rtol"))
     run = simulation.case.run

@@ -65,6 +65,12 @@ class Tree:
         return InputError(message, self.place)
 
     @property
+    def blamed(self) -> Place:
+        """Where it is wrong as a whole: at what has been set in it from outside, else where it stands."""
+        entries = self.value.values() if isinstance(self.value, dict) else ()
+        return next((entry.place for entry in entries if entry.place.file == ORIGIN), self.place)
+
+    @property
     def shown(self) -> str:
         """The value as it stands in a message."""
         kinds = {dict: "a mapping", list: "a list", type(None): "nothing", bool: str(self.value).lower()}

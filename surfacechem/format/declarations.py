@@ -30,7 +30,7 @@ from surfacechem import laws
 from surfacechem.contracts.terms import Factor, Law, Load, Spec, Varying, resolved_unit
 from surfacechem.contracts.units import WHOLE, quotient
 from surfacechem.contracts.units import parse as si
-from surfacechem.documents.document import Tree
+from surfacechem.documents.document import ORIGIN, Tree
 from surfacechem.errors import InputError, Place
 from surfacechem.format import csvtable
 from surfacechem.quantities import INTERNAL, VARIABLES
@@ -560,9 +560,12 @@ class Section:
         """Whether any of these keys is given."""
         return isinstance(self.tree.value, dict) and any(name in self.tree.value for name in names)
 
-    def error(self, message: str, name: str = "") -> InputError:
-        """An input error at a key, or at the section where that is not given."""
-        return (self.tree.value[name] if name and self.has(name) else self.tree).error(message)
+    def error(self, message: str, *names: str) -> InputError:
+        """An input error at a key, of several that do not go together at one that is set from outside, else the first;
+        at the section where none is given.
+        """
+        given: list[Tree] = [self.tree.value[name] for name in names if self.has(name)]
+        return min([*given, self.tree][: len(given) or 1], key=lambda tree: tree.place.file != ORIGIN).error(message)
 
 
 S = TypeVar("S", bound=Section)
@@ -620,7 +623,7 @@ def read_law(law: type[L], tree: Tree, context: Context) -> L:
     try:
         return law(**_values(law_keys(law), tree, context, law.name()), place=tree.place)
     except InputError as error:
-        raise error.at(tree.place) from None
+        raise error.at(tree.blamed) from None
 
 
 def _values(declared: Mapping[str, Key], tree: Tree, context: Context, called: str) -> dict[str, Any]:

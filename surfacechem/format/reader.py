@@ -262,7 +262,9 @@ def _surface(case: Document) -> CurvedSurfaces | None:
         raise section.error(f"{text}: leave one of the two out.", "laws")
     low, high = section.approach.low, section.approach.high
     if not low < high:
-        raise section.approach.error(f"the least approach {low:g} m must be below the largest, {high:g} m.", "from")
+        raise section.approach.error(
+            f"the least approach {low:g} m must be below the largest, {high:g} m.", "from", "to"
+        )
     _refuse_outside(case, low, high)
     return CurvedSurfaces(
         shapes=(section.bodies[first], section.bodies[second]),
@@ -369,7 +371,7 @@ def _stiffness(body: BodySection) -> float | None:
     if body.stiffness is not None:
         for name in ("E", "H"):
             if body.has(name):
-                raise body.error("the stiffness has two roles: give `stiffness`, or `E` and `H`.", name)
+                raise body.error("the stiffness has two roles: give `stiffness`, or `E` and `H`.", name, "stiffness")
         return body.stiffness
     for name, other in (("E", "H"), ("H", "E")):
         if body.has(other) and not body.has(name):
@@ -390,7 +392,7 @@ def _stage(name: str, section: StageSection) -> Stage:
     """A stage with its end: after a time, at an event, or where a variable has a value."""
     stage, until = Stage(name, section.more, place=section.tree.place), section.until
     if section.has("for") and section.has("until"):
-        raise section.error("the stage has two ends: give `for` or `until`.", "until")
+        raise section.error("the stage has two ends: give `for` or `until`.", "until", "for")
     if not isinstance(until, Mapping):
         return replace(stage, duration=section.duration, event=until or "")
     ((variable, value),) = until.items()
@@ -513,10 +515,12 @@ def _changed(law: L, tree: Tree) -> L:
 def run_of(section: RunSection) -> Run:
     """The run that the section states."""
     if section.has("accuracy") and section.has("rtol"):
-        raise section.error("the tolerance has two roles: give `accuracy` or `rtol`.", "accuracy")
+        raise section.error("the tolerance has two roles: give `accuracy` or `rtol`.", "accuracy", "rtol")
     solver = section.solver or (solvers.AUTO if section.accuracy is not None else OWN)
     if section.solver == solvers.AUTO and section.has("rtol"):
-        raise section.error("the tolerance has two roles: with `solver: auto` it follows from `accuracy`.", "rtol")
+        raise section.error(
+            "the tolerance has two roles: with `solver: auto` it follows from `accuracy`.", "rtol", "solver"
+        )
     # An accuracy begins with a margin; `solver: auto` repeats a run that misses it, with a tighter tolerance.
     usual = DEFAULT_RTOL if section.accuracy is None else first_tolerance(section.accuracy)
     return Run(
@@ -537,7 +541,7 @@ def _times(section: RunSection) -> tuple[float, ...]:
     if (listed := section.times) is not None:
         for name in ("until", "outputs", "spacing", "first"):
             if section.has(name):
-                raise section.error(f"the output times have two roles: give `times` or `{name}`.", name)
+                raise section.error(f"the output times have two roles: give `times` or `{name}`.", name, "times")
         if max(listed, default=0.0) == 0.0:
             raise section.error("at least one time after 0 is needed.", "times")
         # Every run begins at zero, whether that is an output or not.
@@ -546,7 +550,7 @@ def _times(section: RunSection) -> tuple[float, ...]:
         raise section.error("the run needs an end. Add `until: 1 s`, or a list of `times`.")
     else:
         if section.until == STEADY and section.spacing != LINEAR:
-            raise section.error("logarithmic spacing needs an end in time, not `until: steady`.", "spacing")
+            raise section.error("logarithmic spacing needs an end in time, not `until: steady`.", "spacing", "until")
         times = _spaced(section, 1.0 if isinstance(section.until, str) else section.until)
     if any(b <= a for a, b in pairwise(times)):
         message = "output times must increase from each to the next."
@@ -559,12 +563,12 @@ def _spaced(section: RunSection, end: float) -> tuple[float, ...]:
     count, first = section.outputs or OUTPUTS, section.first
     if section.spacing == LINEAR:
         if first is not None:
-            raise section.error("`first` belongs to `spacing: logarithmic`.", "first")
+            raise section.error("`first` belongs to `spacing: logarithmic`.", "first", "spacing")
         return (*(end * (i / (count - 1)) for i in range(count - 1)), end)
     if first is None:
         raise section.error("logarithmic spacing needs `first`: the first output time after 0.", "spacing")
     if first > end:
-        raise section.error(f"first = {first:g} is outside its range: <= {end:g}.", "first")
+        raise section.error(f"first = {first:g} is outside its range: <= {end:g}.", "first", "until")
     # Differences of logarithms, as the ratio of the ends may overflow; the end itself is exact.
     ratio = math.log(end) - math.log(first)
     return (0.0, *(first * math.exp(ratio * i / max(count - 2, 1)) for i in range(count - 2)), end)

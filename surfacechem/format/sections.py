@@ -61,7 +61,7 @@ from surfacechem.model.components.mounting import TRACTIONS
 from surfacechem.quantities import VARIABLES
 from surfacechem.scene import MOST_CELLS, Conduction, Mounting
 from surfacechem.solve.run import OWN
-from surfacechem.tolerances import DEFAULT_RTOL, FLOOR
+from surfacechem.tolerances import DEFAULT_RTOL, FLOOR, TIGHTEST
 
 BODY_NAME = r"[A-Za-z][A-Za-z0-9_-]*"
 
@@ -409,7 +409,7 @@ class RunSection(Section):
     rtol: float | None = quantity(
         "1",
         f"relative tolerance of each step, instead of `accuracy`; {DEFAULT_RTOL:g} if neither is given",
-        above=0,
+        at_least=TIGHTEST,
         at_most=0.1,
     )
     atol: float | None = quantity(

@@ -102,6 +102,9 @@ class Table(Load):
             raise InputError("times and values of a table must be finite.")
         if any(b < a for a, b in pairwise(self.times)):
             raise InputError("times of a table must never decrease.")
+        for t, later in zip(self.times, self.times[2:], strict=False):
+            if t == later:
+                raise InputError(f"a table has no time three times, as {t:g} s; twice is a jump.")
 
     def breakpoints(self) -> tuple[float, ...]:
         """Every time of the table."""

@@ -129,6 +129,7 @@ class TestRun:
         (["run", "bondin.yaml"], "no file and no case 'bondin.yaml'"),
         (["run", "bonding.yaml", "--solver", "radua"], "no solver 'radua'. Did you mean 'radau'?"),
         (["run", "bonding.yaml", "--rtol", "2"], "--rtol: 2 is outside its range"),
+        (["run", "bonding.yaml", "--rtol", "1e-20"], "--rtol: 1e-20 is outside its range: >= 1e-13"),
         (["run", "bonding.yaml", "--set", "initial.T=-1 K"], "outside its range"),
         (["run", "bonding.yaml", "--set", "initial.T=3 m"], "initial.T"),
         (["run", "bonding.yaml", "-o", "no/folder/x.nc"], "no/folder/x.nc: cannot be written"),
