@@ -9,16 +9,16 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from surfacechem.documents.document import Tree
+from surfacechem.documents.document import ORIGIN, Tree
 from surfacechem.documents.overrides import parameter_path
-from surfacechem.errors import PATHS, InputError, refuse_unknown
+from surfacechem.errors import PATHS, InputError, Place, refuse_unknown
 from surfacechem.format import csvtable
 from surfacechem.format.declarations import Context, keys, read
 from surfacechem.format.draws import Array, Distribution, Drawn, Index, Lognormal, Normal, Sample, Uniform
@@ -158,6 +158,8 @@ class Plan:
     zipped: bool = False
     """Whether the values of the axes go together, instead of as a grid."""
     sample: Sample | None = None
+    places: Mapping[str, Place] = field(default_factory=dict, compare=False)
+    """Where it is given what is swept, by path, and where the runs end."""
 
     def __post_init__(self) -> None:
         """Different parameters, as many as a grid may have; those that go together have as many values."""
@@ -208,6 +210,11 @@ class Plan:
         """The swept values of each run by path, the last dimension fastest."""
         values = self.at(np.arange(self.size))
         return [dict(zip(values, row, strict=True)) for row in zip(*(x.tolist() for x in values.values()), strict=True)]
+
+    def located(self, error: InputError) -> InputError:
+        """An error of what is swept with the place where that is given."""
+        place = self.places.get(error.place.path) if error.place and not error.place.file else None
+        return InputError(error.message, place) if place else error
 
     @property
     def load(self) -> str:
@@ -277,20 +284,27 @@ def plan_of(
     if not section.over and section.sample is None:
         raise section.error(NOTHING_SWEPT)
     axes = [_axis(path, tree, units, arrays.get(path)) for path, tree in section.over.items()]
-    sample = None
+    sample, trees = None, {_known(path, tree, units): tree for path, tree in section.over.items()}
     if (drawn := section.sample) is not None:
         known = {_known(path, tree, units): tree for path, tree in drawn.of.items()}
+        trees |= known
         draws = {path: _distribution(path, tree, units[path]) for path, tree in known.items()}
         sample = Sample(draws, drawn.runs, drawn.method, drawn.seed)
-    return Plan(axes, next(iter(ends.items())) if ends else None, section.combine != GRID, sample)
+    places = {path: replace(tree.place, path="") for path, tree in trees.items()}
+    if ends:
+        said = section.tree.value["until"].place if section.has("until") and not until else Place(ORIGIN)
+        places["sweep.until"] = replace(said, path="")
+    return Plan(axes, next(iter(ends.items())) if ends else None, section.combine != GRID, sample, places)
 
 
 def read_sweep(tree: Tree, usual: SweepSection | None = None) -> SweepSection:
     """A sweep; what it does not say is as in the usual one."""
     section = read(SweepSection, csvtable.embedded(tree, str(Path.cwd())), Context())
-    for name in keys(SweepSection) if usual is not None else ():
-        if not section.has(name):
-            setattr(section, name, getattr(usual, name))
+    if usual is not None:
+        for name in keys(SweepSection):
+            if not section.has(name):
+                setattr(section, name, getattr(usual, name))
+        section.tree = replace(section.tree, value={**usual.tree.mapping(), **section.tree.mapping()})
     return section
 
 

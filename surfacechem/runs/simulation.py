@@ -14,7 +14,7 @@ import numpy as np
 
 from surfacechem import format as cases
 from surfacechem.contracts.units import parse
-from surfacechem.documents.document import from_plain
+from surfacechem.documents.document import ORIGIN, from_plain
 from surfacechem.documents.overrides import parameter_path
 from surfacechem.errors import PATHS, InputError, Place, suggestion
 from surfacechem.format import Case, Overrides, Source
@@ -372,7 +372,7 @@ class Simulation:
                 self._sweep_models[key] = Model(sweeps.prepared(self.system, plan)) if key else self.model
             return sweeps.solve(self._sweep_models[key], plan, settings, values, threads)
         except InputError as error:
-            raise self.case.located(error) from None
+            raise self.case.located(plan.located(error) if plan else error) from None
 
     def _layers(self, *runs: Trajectory) -> dict[str, float]:
         """By body, the least layer that heat has reached when runs, or events in them, are first looked at."""
@@ -542,7 +542,7 @@ class Simulation:
         try:
             return streaming.stream(self, plan, path, changes=values, resume=resume, part=part)
         except InputError as error:
-            raise self.case.located(error) from None
+            raise self.case.located(plan.located(error)) from None
 
     def plan(
         self,
@@ -575,12 +575,12 @@ class Simulation:
         given = {"over": None if over is None else lists, "combine": combine, "sample": sample}
         if any(value is not None for value in given.values()):
             said = {name: value for name, value in given.items() if value is not None}
-            section = read_sweep(from_plain(said, Place(path="sweep")), section)
+            section = read_sweep(from_plain(said, Place(ORIGIN, path="sweep")), section)
         if section is None:
             raise InputError(
                 "a sweep needs `sweep: {over: ...}` in the case, or parameters to sweep over.", path="sweep"
             )
-        ends = None if until is None else read_until(from_plain(dict(until), Place(path="sweep.until")))
+        ends = None if until is None else read_until(from_plain(dict(until), Place(ORIGIN, path="sweep.until")))
         return plan_of(section, self._units, ends, arrays)
 
     @cached_property

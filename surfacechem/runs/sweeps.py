@@ -73,7 +73,7 @@ def solve(
     model: Model, plan: Plan, run: Run, changes: Mapping[str, float], threads: int | None = None
 ) -> list[Trajectory]:
     """The runs of a :func:`prepared` system over the plan; how a run ends is its status, never an exception."""
-    values = [model.values({**changes, **point}) for point in plan.points]
+    values = _values(model, plan, changes)
     run = model.chosen(run, values[0])
     runs = settings(model.system, plan, following(model, plan, run, changes, threads), values)
     if run.steady:
@@ -118,10 +118,27 @@ def _with_values(
         try:
             model.problem(*pair)
         except InputError as found:
-            given = ", ".join(f"{path} = {value:g}" for path, value in point.items())
-            more = f"This is the run with {given}; a store, -o NAME.zarr, counts such runs as refused and goes on."
-            return InputError(f"{found.message} {more}", found.place)
+            return _of_run(point, found)
     return error
+
+
+def _of_run(point: Mapping[str, float], error: InputError, path: str = "") -> InputError:
+    """The error with what is swept in its run."""
+    given = ", ".join(f"{path} = {value:g}" for path, value in point.items())
+    more = f"This is the run with {given}; a store, -o NAME.zarr, counts such runs as refused and goes on."
+    return InputError(f"{error.message} {more}", error.place, path=path)
+
+
+def _values(model: Model, plan: Plan, changes: Mapping[str, float]) -> list[dict[str, float]]:
+    """The values of each run; InputError for the first that is out of its range."""
+    values = []
+    for point in plan.points:
+        try:
+            values.append(model.values({**changes, **point}))
+        except InputError as error:
+            path = next((path for path in point if error.message.startswith(f"{path} ")), "")
+            raise _of_run(point, error, path) from None
+    return values
 
 
 def settings(system: System, plan: Plan, run: Run, values: Sequence[Mapping[str, float]]) -> list[Run]:
@@ -133,7 +150,8 @@ def settings(system: System, plan: Plan, run: Run, values: Sequence[Mapping[str,
         return [run] * len(values)
     variable, target = plan.until
     if system.breakpoints:
-        raise InputError(f"runs until {variable} is reached cannot have histories with breakpoints.", path="sweep")
+        message = f"runs until {variable} is reached cannot have histories with breakpoints."
+        raise InputError(message, path="sweep.until")
     line = spectrum.history(system, variable)
     shape = np.asarray(run.times) / run.times[-1]
     runs = []

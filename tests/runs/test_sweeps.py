@@ -297,6 +297,33 @@ def test_bad_sweeps_are_refused(over, until, message):
         surfacechem.sweep("force-spectroscopy", over, until)
 
 
+PULLED = """
+interface: {temperature: 25 degC, bonding: [bell: {k_off: 1 1/s, x_off: 0.3 nm}]}
+loading: {f: {ramp: {rate: 10 pN/s}}}
+initial: {phi: 1}
+run: {until: 2 s}
+sweep:
+  until: {f: 40 pN}
+  over:
+    interface.bonding.bell.x_off: [0.1 nm, 0.2 nm]
+    interface.bonding.bell.k_off: [1 1/s, -1 1/s]
+"""
+
+
+@pytest.mark.parametrize(
+    ("changes", "given", "message"),
+    [
+        ("", {}, "case.yaml:10: .*k_off = -1 is outside its range.* run with .*x_off = 1e-10, .*k_off = -1; a store"),
+        ("", {"over": {"interface.bonding.bell.k_off": [1, -1]}}, "override: .*k_off = -1 is outside its range"),
+        ("loading.f=10 pN", {"over": {"initial.phi": [0.5, 1]}}, "case.yaml:7: f is no ramp"),
+        ("loading.f=10 pN", {"until": {"f": "20 pN"}}, "override: f is no ramp"),
+    ],
+)
+def test_what_is_wrong_in_a_sweep_is_where_it_is_given(changes, given, message):
+    with pytest.raises(InputError, match=f"^{message}"):
+        surfacechem.load(PULLED, [changes] if changes else []).sweep(**given)
+
+
 def test_a_case_without_a_sweep(bonding):
     with pytest.raises(InputError, match=r"a sweep needs `sweep: {over: ...}` in the case"):
         bonding.sweep()
