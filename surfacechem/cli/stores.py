@@ -81,7 +81,7 @@ def write(simulation: Simulation, plan: Plan, target: Path, options: Options) ->
 
 def write_file(simulation: Simulation, plan: Plan, target: Path, talk: bool | None) -> None:
     """Run a sweep into a store that becomes one file, netCDF or a table, when it is whole."""
-    from surfacechem.results.netcdf import TABLES, replacing, save_table
+    from surfacechem.results.netcdf import save_kept
     from surfacechem.runs.checking import check
     from surfacechem.runs.summaries import store_summary
 
@@ -90,11 +90,7 @@ def write_file(simulation: Simulation, plan: Plan, target: Path, talk: bool | No
         store = solved(lambda: stream.run(told=counting()), talk, brief=True, waits=stream.chunks.waits)
         status, sheet = store_summary(stream, store, solved(lambda: check(stream), talk), target)
         with store.dataset as data:
-            if target.suffix.lower() in TABLES:
-                save_table(target, data.drop_dims(["checked", "hardest"], errors="ignore"))
-            else:
-                with replacing(target) as path:
-                    data.to_netcdf(path)
+            save_kept(data, target)
     if talk is not False:
         show(sheet)
     leave_with(status)

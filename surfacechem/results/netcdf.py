@@ -243,6 +243,16 @@ def read_netcdf(path: Path) -> xarray.Dataset:
     return dataset
 
 
+def save_kept(dataset: xarray.Dataset, target: Path) -> Path:
+    """Write what a sweep has kept as one file, netCDF or a table."""
+    if target.suffix.lower() in TABLES:
+        save_table(target, dataset.drop_dims(["checked", "hardest"], errors="ignore"))
+    else:
+        with replacing(target) as path:
+            dataset.to_netcdf(path)
+    return target
+
+
 def save_table(target: Path, dataset: xarray.Dataset) -> None:
     """A row for each output, whole or not at all; each column is headed by its name and unit, ``v [m s-1]``.
 

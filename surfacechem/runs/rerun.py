@@ -7,7 +7,8 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, TypeVar
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -15,10 +16,14 @@ from surfacechem import format as cases
 from surfacechem import solve as solvers
 from surfacechem.errors import InputError, Place
 from surfacechem.format.plans import recorded_plan
-from surfacechem.results.netcdf import reading
+from surfacechem.results.netcdf import Column, dataset_path, reading, save_kept
 from surfacechem.results.solution import Solution
+from surfacechem.runs.checking import check
 from surfacechem.runs.simulation import Simulation
 from surfacechem.runs.sweeps import SweepSolution
+
+if TYPE_CHECKING:
+    import xarray
 
 A = TypeVar("A")
 
@@ -78,7 +83,23 @@ def read(path: str | Path) -> Record:
     return reading(Path(path), record)
 
 
-def run_again(record: Record, allow_code: bool = False) -> Solution | SweepSolution:
+@dataclass(frozen=True)
+class Kept:
+    """A sweep again of whose runs a part is kept."""
+
+    data: xarray.Dataset
+
+    @property
+    def columns(self) -> list[Column]:
+        """Its variables."""
+        return [Column(str(name), (), each.values, "", "") for name, each in self.data.variables.items()]
+
+    def write(self, path: str | Path) -> Path:
+        """Write the file."""
+        return save_kept(self.data, dataset_path(path))
+
+
+def run_again(record: Record, allow_code: bool = False) -> Solution | SweepSolution | Kept:
     """The case of a record, run or swept as it was; with ``allow_code`` by laws whose source the record keeps."""
     mechanism = record.attribute("mechanism", str) if "mechanism" in record.attributes else None
     text = record.attribute("case", str)
@@ -86,6 +107,8 @@ def run_again(record: Record, allow_code: bool = False) -> Solution | SweepSolut
         raise record.error("holds no case, as its scene was built in Python; run it there.")
     where = f"case in {record.path}"
     case = cases.load_text(text, record.path.stem, record.path.parent, mechanism, file=where, allow_code=allow_code)
+    if "keep" in record.attributes:
+        return _kept_again(record, case)
     departures = _departures(record)
     solver, rtol = record.attribute("solver", str), record.attribute("rtol", float)
     if solver not in solvers.names:
@@ -112,6 +135,21 @@ def run_again(record: Record, allow_code: bool = False) -> Solution | SweepSolut
     return Simulation(replace(case, own_run=run)).sweep_plan(plan, departures.get("changes"))
 
 
+def _kept_again(record: Record, case: cases.Case) -> Kept:
+    """A sweep again that has kept what its case says, in one file."""
+    try:
+        plan = recorded_plan(record.attribute("sweep", str))
+        changes = dict(json.loads(record.attribute("changes", str)))
+    except (InputError, TypeError, ValueError, RecursionError):
+        raise record.error("the attributes 'sweep' and 'changes' are not those of a sweep.") from None
+    with TemporaryDirectory() as folder:
+        stream = Simulation(case).stream(plan, Path(folder) / "again.zarr", changes)
+        store = stream.run()
+        check(stream)
+        with store.dataset as data:
+            return Kept(data.load())
+
+
 def _departures(record: Record) -> Mapping[str, Any]:
     """In which way the run was not that of its case."""
     if "departures" not in record.attributes:
@@ -129,7 +167,7 @@ def _departures(record: Record) -> Mapping[str, Any]:
     return found
 
 
-def differences(record: Record, solution: Solution | SweepSolution) -> list[str]:
+def differences(record: Record, solution: Solution | SweepSolution | Kept) -> list[str]:
     """Names of the variables that are not bit for bit those of the record, or in one of the two only."""
     ours = {column.name: np.asarray(column.values) for column in solution.columns}
     theirs = record.variables

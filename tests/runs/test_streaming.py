@@ -380,6 +380,9 @@ def test_what_is_kept_goes_into_one_file_as_into_a_store(tmp_path):
         xarray.testing.assert_equal(stored.load(), file.load())
         with (tmp_path / "o.csv").open() as table:
             assert [float(row["T_last [K]"]) for row in csv.DictReader(table)] == file["T_last"].values.tolist()
+    again = CliRunner().invoke(app, ["rerun", str(tmp_path / "o.nc"), "-o", str(tmp_path / "again.nc")])
+    assert "variables are bit for bit the same" in again.output
+    assert CliRunner().invoke(app, ["rerun", str(tmp_path / "again.nc")]).exit_code == 0
 
 
 def test_errors_of_runs_that_are_checked_are_those_of_a_sweep(tmp_path, monkeypatch):
