@@ -82,7 +82,18 @@ def cause(
     ends = filter(None, (runaway(system.states, result), beyond_numbers(system, result, inputs, named)))
     if (end := next(ends, None)) is not None:
         return "stopped", f"{end} near {where}"
-    return "failed", f"{REASONS[result.status]} at {where}{too_fast(system, result, values)}"
+    return "failed", f"{REASONS[result.status]} at {where}{_spent(result)}{too_fast(system, result, values)}"
+
+
+def _spent(result: Result) -> str:
+    """How many steps a run may take where it has taken all of them, and how many of these it was not free to choose."""
+    if result.status is not Status.MAX_STEPS:
+        return ""
+    problem = result.problem
+    ended = int(np.searchsorted(problem.segments, result.t)) - 1
+    many = NEGLIGIBLE * problem.max_steps < ended
+    words = f", and {ended} of them ended at events, or where loads turn or pass what is narrow" if many else ""
+    return f" (`run.max-steps` is {problem.max_steps}{words})"
 
 
 def are_led_back(

@@ -15,9 +15,10 @@ from surfacechem.laws.cohesive import AdhesionIntensity
 from surfacechem.laws.contact_conductance import PressureConductance
 from surfacechem.laws.factors import Linear
 from surfacechem.laws.films import FilmCapacity
+from surfacechem.laws.friction import Coulomb
 from surfacechem.laws.heat import GasGap
 from surfacechem.laws.kinetics import LinearAffinity, Relaxation
-from surfacechem.laws.loading import Hold, Ramp
+from surfacechem.laws.loading import Harmonic, Hold, Ramp
 from surfacechem.model.assemble import assemble
 from surfacechem.results.solution import Solution
 from surfacechem.scene import Interface, Medium, Scene
@@ -90,3 +91,11 @@ def test_what_is_no_number_a_little_later_is_named():
     assert beyond_numbers(system, result, inputs, lambda rows: named(rows)[:, [0, 0, 0, 3]]) is None
     result.status = Status.SINGULAR
     assert beyond_numbers(system, result, inputs, named) is None
+
+
+def test_a_run_that_takes_too_many_steps_says_how_many_and_what_for():
+    loading = {"p": Hold(level=5e6), "v": Harmonic(amplitude=1e-2, frequency=50.0)}
+    friction = Interface(None, frictions=[Coulomb(mu=0.3)])
+    reason = solve(Scene(bodies(), friction, [], loading, None, 300.0, APART), 10.0, max_steps=1000).reason
+    assert "`run.max-steps` is 1000, and " in reason
+    assert " of them ended at events, or where loads turn" in reason
