@@ -284,17 +284,20 @@ def plan_of(
     if not section.over and section.sample is None:
         raise section.error(NOTHING_SWEPT)
     axes = [_axis(path, tree, units, arrays.get(path)) for path, tree in section.over.items()]
-    sample, trees = None, {_known(path, tree, units): tree for path, tree in section.over.items()}
+    sample, trees = None, dict(zip((axis.path for axis in axes), section.over.values(), strict=True))
     if (drawn := section.sample) is not None:
         known = {_known(path, tree, units): tree for path, tree in drawn.of.items()}
         trees |= known
         draws = {path: _distribution(path, tree, units[path]) for path, tree in known.items()}
         sample = Sample(draws, drawn.runs, drawn.method, drawn.seed)
-    places = {path: replace(tree.place, path="") for path, tree in trees.items()}
-    if ends:
-        said = section.tree.value["until"].place if section.has("until") and not until else Place(ORIGIN)
-        places["sweep.until"] = replace(said, path="")
-    return Plan(axes, next(iter(ends.items())) if ends else None, section.combine != GRID, sample, places)
+    end = next(iter(ends.items())) if ends else None
+    return Plan(axes, end, section.combine != GRID, sample, _places(section, trees, until))
+
+
+def _places(section: SweepSection, trees: Mapping[str, Tree], until: Mapping[str, float] | None) -> dict[str, Place]:
+    """Where what is swept is given, and where the runs end, without the paths, which messages name."""
+    end = Tree(None, Place(ORIGIN)) if until else section.tree.value.get("until", section.tree)
+    return {path: replace(tree.place, path="") for path, tree in {**trees, "sweep.until": end}.items()}
 
 
 def read_sweep(tree: Tree, usual: SweepSection | None = None) -> SweepSection:

@@ -35,7 +35,7 @@ from surfacechem.scene import Scene
 from surfacechem.solve.choice import method
 from surfacechem.solve.contract import Array, Mask, Problem, States
 from surfacechem.solve.run import Run, Trajectory
-from surfacechem.tolerances import BRIEF, EPS, FLOOR, NEGLIGIBLE, NONE_OF_SCALE, SQRT_EPS, TIGHTEST, UNRESOLVED
+from surfacechem.tolerances import BRIEF, EPS, FINER, FLOOR, NEGLIGIBLE, NONE_OF_SCALE, SQRT_EPS, TIGHTEST, UNRESOLVED
 
 EARLIER = "ended earlier"
 """What is said of a second run that did not come as far."""
@@ -283,14 +283,19 @@ def of_named(ours: Trajectory, theirs: Trajectory) -> dict[str, float]:
     with np.errstate(invalid="ignore"):  # what is infinite in both is the same
         missed = np.fmax(np.abs(first.outputs - true) - rounded, 0.0)
     errors = np.fmax.reduce(np.divide(missed, size, out=np.zeros_like(missed), where=size > 0), initial=0.0)
-    if np.any(errors > NEGLIGIBLE):  # what errors within the tolerance make of a zero has no digits
-        some = second.some
-        felt = some.felt(ours.run.rtol * np.maximum(np.abs(some.result.outputs), state_floors(theirs)))
-        nothing = np.abs(second.outputs).max(axis=0, initial=0.0) <= np.array(list(felt.values()))
-        return {
-            name: float(e) for name, e, no in zip(names, errors, nothing, strict=True) if not (no and e > NEGLIGIBLE)
-        }
-    return dict(zip(names, errors.tolist(), strict=True))
+    nothing = _squares(ours.run.rtol, second.some, state_floors(theirs)) if errors.max(initial=0) > NEGLIGIBLE else ()
+    return {name: error for name, error in zip(names, errors.tolist(), strict=True) if name not in nothing}
+
+
+def _squares(rtol: float, trajectory: Trajectory, least: Array) -> list[str]:
+    """Named quantities that never exceed what errors of this part of the states make of them, and that only by their
+    squares, as the energy of a spring at no extension: of such a zero no digit is known, and none is missed.
+    """
+    changes = rtol * np.maximum(np.abs(trajectory.result.outputs), least)
+    made, by_less = (np.array(list(trajectory.felt(each).values())) for each in (changes, changes / FINER))
+    largest = np.abs(trajectory.outputs).max(axis=0, initial=0.0)
+    squares = (largest <= made) & (2 * FINER * by_less <= made)
+    return [name for name, is_one in zip(trajectory.model.system.output_columns, squares, strict=True) if is_one]
 
 
 def _changes(trajectory: Trajectory, columns: list[int]) -> Array:

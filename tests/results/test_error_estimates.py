@@ -307,3 +307,11 @@ def test_a_small_velocity_that_is_no_rounding_has_its_error():
     scene = on_a_spring("k: 20 kPa/mm, m: 1 kg/m^2", "5 um")
     solution = surfacechem.run(f"{scene}initial: {{g_n: 5.000001 um}}\nrun: {{until: 10 ms, rtol: 1e-3}}")
     assert solution.accuracy.variables["v_n"] > 1e-9
+
+
+def test_a_flux_that_the_tolerance_does_not_resolve_has_its_error():
+    """Between bodies of almost the same temperature: a difference of large numbers, not a square of errors."""
+    text = "bodies: {a: {temperature: T_1, C: 1 kJ/m^2/K}, b: {temperature: T_2, C: 1 kJ/m^2/K}}\nT_0: 300 K\n"
+    text += "heat: [conductance: {between: [a, b], h: 1e6}]\nloading: {Q_1: 1 W/m^2}\ninitial: {T_1: 300, T_2: 300}\n"
+    solution = surfacechem.run(f"{text}run: {{until: 1 s, rtol: 1e-6}}")
+    assert "q_12" in solution.accuracy.everywhere
