@@ -89,6 +89,21 @@ class Kept:
 
     data: xarray.Dataset
 
+    @classmethod
+    def of(cls, record: Record, case: cases.Case) -> Kept:
+        """A sweep again that has kept what its case says, in one file."""
+        try:
+            plan = recorded_plan(record.attribute("sweep", str))
+            changes = dict(json.loads(record.attribute("changes", str)))
+        except (InputError, TypeError, ValueError, RecursionError):
+            raise record.error("the attributes 'sweep' and 'changes' are not those of a sweep.") from None
+        with TemporaryDirectory() as folder:
+            stream = Simulation(case).stream(plan, Path(folder) / "again.zarr", changes)
+            store = stream.run()
+            check(stream)
+            with store.dataset as data:
+                return cls(data.load())
+
     @property
     def columns(self) -> list[Column]:
         """Its variables."""
@@ -108,7 +123,7 @@ def run_again(record: Record, allow_code: bool = False) -> Solution | SweepSolut
     where = f"case in {record.path}"
     case = cases.load_text(text, record.path.stem, record.path.parent, mechanism, file=where, allow_code=allow_code)
     if "keep" in record.attributes:
-        return _kept_again(record, case)
+        return Kept.of(record, case)
     departures = _departures(record)
     solver, rtol = record.attribute("solver", str), record.attribute("rtol", float)
     if solver not in solvers.names:
@@ -133,21 +148,6 @@ def run_again(record: Record, allow_code: bool = False) -> Solution | SweepSolut
     except InputError as error:
         raise error.at(record.place) from None
     return Simulation(replace(case, own_run=run)).sweep_plan(plan, departures.get("changes"))
-
-
-def _kept_again(record: Record, case: cases.Case) -> Kept:
-    """A sweep again that has kept what its case says, in one file."""
-    try:
-        plan = recorded_plan(record.attribute("sweep", str))
-        changes = dict(json.loads(record.attribute("changes", str)))
-    except (InputError, TypeError, ValueError, RecursionError):
-        raise record.error("the attributes 'sweep' and 'changes' are not those of a sweep.") from None
-    with TemporaryDirectory() as folder:
-        stream = Simulation(case).stream(plan, Path(folder) / "again.zarr", changes)
-        store = stream.run()
-        check(stream)
-        with store.dataset as data:
-            return Kept(data.load())
 
 
 def _departures(record: Record) -> Mapping[str, Any]:
