@@ -301,7 +301,7 @@ def _forget(w: Any, i: int) -> None:
     clear(w.q)
     clear(w.ydot)
     w.explicit, w.stiff_steps, w.h_refused = w.explicitly, 0, 0.0
-    w.first_event = w.counts[i, EVENTS]
+    w.first_event, w.rejected_before = w.counts[i, EVENTS], w.rejected
 
 
 @compiled

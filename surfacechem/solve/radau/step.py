@@ -377,7 +377,7 @@ def _may_try(w: Any, h: float, i: int) -> int:
     """GOOD, or why run i tries no step of this size."""
     if too_small(w, h):
         return STEP_UNDERFLOW
-    if w.steps + w.rejected >= w.max_steps[row_of(w.max_steps, i)]:
+    if w.steps + (w.rejected - w.rejected_before) >= w.max_steps[row_of(w.max_steps, i)]:
         return MAX_STEPS
     return STOPPED if w.counts[i, STOP] != 0 else GOOD
 
