@@ -21,13 +21,13 @@ from surfacechem.model.system import System
 from surfacechem.quantities import VELOCITIES
 from surfacechem.results.audit import ROUNDINGS, TOTALS, residuals, resolved
 from surfacechem.runs import spectrum
-from surfacechem.runs.keeping import REACHED, STATUSES, Columns, Keep, reason_table, variable
+from surfacechem.runs.keeping import REACHED, STATUSES, Columns, Keep, crossed, reason_table, variable
 from surfacechem.solve.choice import EXPLICIT, IMPLICIT
 from surfacechem.solve.contract import Array, Index, Mask, Problem, Status
 from surfacechem.solve.diagnose import are_led_back
 from surfacechem.solve.lanes.lane_batch import solve_batch
 from surfacechem.solve.radau.solver import consistent, rates_at, solve_arrays
-from surfacechem.solve.radau.stepper import ARCS, END, EVENTS, FIRST_COUNTER, OUTPUTS, RECORDS
+from surfacechem.solve.radau.stepper import ARCS, END, EVENTS, FIRST_COUNTER, JUMPS, OUTPUTS, RECORDS
 from surfacechem.solve.run import Model, Run
 from surfacechem.tolerances import CROSSED, EPS, MICROMETRE, PICOMETRE
 
@@ -36,6 +36,10 @@ MOST = 4096, 1024
 
 TRIED = 100
 """Runs of a plan that are tried for one that is admissible, whose problem the others share."""
+
+
+Values = tuple[Array, dict[str, Array]]
+"""States and named quantities at rows of arguments: the table of all of them, and its columns by name."""
 
 
 @dataclass(frozen=True)
@@ -257,6 +261,13 @@ class ArrayRuns:
         counts, count = batch.counts, len(batch.counts)
         end, every = batch.ends, np.arange(count)
         last = found.inputs(every, end[:, 0], end[:, 1 : 1 + n], end[:, 1 + n : 1 + 2 * n])
+        whole = np.flatnonzero(counts[:, END] == Status.FINISHED)  # at outputs rates are those of the equations, too
+        if self.keep.last and len(whole):
+            rows = last[whole]
+            rows[:, 1 + n : 1 + 2 * n] = rates_at(
+                self.model.program, rows[:, 0], rows[:, 1 : 1 + n], rows[:, 1 + 2 * n :]
+            )
+            last[whole] = rows
         status, reason, clear = self._verdicts(found, last)
         # What its tables were too short for, and what ended before its first output, is looked at by itself.
         clear &= (counts[:, EVENTS] <= batch.events.shape[1]) & (counts[:, OUTPUTS] > 0)
@@ -301,7 +312,7 @@ class ArrayRuns:
                 reason[hit] = self.reasons.index(margin.reason)
                 clear[hit] &= ~led & (margin.below is None)
 
-    def _values(self, rows: Array) -> tuple[Array, dict[str, Array]]:
+    def _values(self, rows: Array) -> Values:
         """States and named quantities at rows of arguments: the table of all of them, and its columns by name."""
         system = self.model.system
         table = np.concatenate([rows[:, 1 : 1 + self.n], self.model.output_function(rows)], axis=1)
@@ -339,12 +350,27 @@ class ArrayRuns:
         step_owner, m = np.nonzero(taken)
         steps = batch.records[step_owner, m]
         inputs = found.inputs(step_owner, steps[:, 0], steps[:, 1 : 1 + n], steps[:, 1 + n : 1 + 2 * n])
-        parts = (owner, outputs), (step_owner, self._values(inputs)[0])
+        parts = [(owner, outputs), (step_owner, self._values(inputs)[0])]
+        jump_owner, t, (_, after) = self._beside_jumps(found)
+        # Where one jump follows another at the same time, nothing lasts between them.
+        goes_on = (np.diff(jump_owner, append=-1) != 0) | (np.diff(t, append=np.inf) > 0)
+        parts.append((jump_owner[goes_on], after[0][goes_on]))
         columns: Columns = {}
         for which, chosen, best in (("max", self.keep.max, np.fmax), ("min", self.keep.min, np.fmin)):
-            extreme = best(*(of_each(best, runs, table, len(clear)) for runs, table in parts))
+            extreme = best.reduce([of_each(best, runs, table, len(clear)) for runs, table in parts])
             columns |= {f"{name}_{which}": extreme[:, names.index(name)] for name in chosen}
         return columns
+
+    def _beside_jumps(self, found: Ends) -> tuple[Index, Array, tuple[Values, Values]]:
+        """Runs and times of their jumps, and the values right before each and right after it."""
+        rows, program, width = found.batch.jumps, self.model.program, self.model.program.n_inputs
+        owner, k = np.nonzero(np.arange(rows.shape[1]) < found.batch.counts[:, JUMPS, None])
+        before, after = rows[owner, k, -2 * width : -width], rows[owner, k, -width:]
+        y, ydot = slice(1, 1 + self.n), slice(1 + self.n, 1 + 2 * self.n)
+        if len(owner):
+            point = consistent(program, after[:, 0], after[:, y], 0.0, after[:, 1 + 2 * self.n :])
+            after[:, y], after[:, ydot] = point.y, point.ydot
+        return owner, before[:, 0], (self._values(before), self._values(after))
 
     @cached_property
     def totals(self) -> Function:
@@ -410,6 +436,14 @@ class ArrayRuns:
             columns[column] = rows[:, 1]
             for state in keep.at_events if name in keep.events else ():
                 columns[f"{state}_at_{variable(name)}"] = rows[:, 2 + self.model.system.state_columns[state]]
+        if keep.reach:
+            owner, t, (before, after) = self._beside_jumps(found)
+            for name, level in keep.reach.items():
+                first = np.full(len(happened), np.inf)
+                np.minimum.at(first, owner, np.where(crossed(before[1][name], after[1][name], level), t, np.inf))
+                columns[f"time_to_{name}"] = np.fmin(
+                    columns[f"time_to_{name}"], np.where(first < np.inf, first, np.nan)
+                )
         return columns
 
 
@@ -450,10 +484,11 @@ class JumpingRuns(ArrayRuns):
             self.problem, edges=jumper.edge_tables, times=times[0], record_steps=self.keeps_steps, picture=0.0
         )
         unseen = np.zeros((1, program.n_ledger + program.n_margins))
-        room = self.room
+        room, looks = self.room, self.keeps_steps or bool(self.keep.reach)
         while True:
             batch = solve_arrays(problem, y0, table, spacing, unseen, segments, times, room=room)
             steps, events = np.minimum(batch.counts[:, [RECORDS, EVENTS]].max(axis=0), MOST).tolist()
-            if steps * self.keeps_steps <= room[0] and events <= room[1]:
+            steps, jumps = steps * self.keeps_steps, events * looks
+            if steps <= room[0] and events <= room[1] and jumps <= room[3]:
                 return batch
-            room = self.room = max(steps * self.keeps_steps, room[0]), max(events, room[1]), 0, 0
+            room = self.room = max(steps, room[0]), max(events, room[1]), 0, max(jumps, room[3])

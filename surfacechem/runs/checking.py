@@ -15,7 +15,7 @@ from surfacechem.results.store import StoredArray
 from surfacechem.runs.keeping import ENDS, STATUSES, Keep, RunByRun
 from surfacechem.runs.sweeps import SweepAccuracy, SweepSolution, unknown_in
 from surfacechem.solve.contract import Index
-from surfacechem.tolerances import FLOOR, TINY
+from surfacechem.tolerances import FLOOR, TINY, UNRESOLVED
 
 if TYPE_CHECKING:
     from surfacechem.runs.streaming import Stream
@@ -149,9 +149,10 @@ def _errors(
 
 
 def _apart(stream: Stream, part: Index, done: SweepSolution) -> Array:
-    """How far what is stored of runs is from the same runs by themselves: their ends, relative to these; of one that an
-    event has stopped the time alone, since its state may change there by any amount in the last digit of it. Runs until
-    a steady state last as long as the longest by themselves: their states alone are compared, beside their scales.
+    """How far what is stored of runs is from the same runs by themselves: their ends, relative to these, by more than
+    may be rounding; of one that an event has stopped the time alone, since its state may change there by any amount in
+    the last digit of it. Runs until a steady state last as long as the longest by themselves: their states alone are
+    compared, beside their scales.
     """
     chunks = stream.chunks
     ends = RunByRun(chunks.model, Keep(last=chunks.keep.last)).columns(done.runs, 0, done.audits)
@@ -161,9 +162,11 @@ def _apart(stream: Stream, part: Index, done: SweepSolution) -> Array:
     if chunks.run.steady:
         scales = {f"{state.name}_last": state.scale for state in chunks.model.system.states}
         least = {name: scales[name] for name in scales if name in least}
+    rounded = [run.some.roundings for run in done.runs]
     for name, floor in least.items():
         size = np.maximum(np.abs(ends[name]), floor)
-        apart = np.nan_to_num(np.abs(stored[name] - ends[name]) / size)
+        known = UNRESOLVED * np.array([each.get(name.removesuffix("_last"), 0.0) for each in rounded])
+        apart = np.fmax(np.abs(stored[name] - ends[name]) - known, 0.0) / size
         apart[np.isnan(stored[name]) != np.isnan(ends[name])] = np.inf
         counts = (name == "time_reached") | (ends["status"] == STATUSES.index("finished"))
         largest = np.maximum(largest, np.where(counts, apart, 0.0))

@@ -18,6 +18,8 @@ from surfacechem.results.audit import Audit, audit
 from surfacechem.results.dataset import quantities
 from surfacechem.results.event_table import entropy_destroyed, events_of
 from surfacechem.solve.contract import REASONS, Status
+from surfacechem.solve.jumps import Jump
+from surfacechem.solve.radau.solver import rates_at
 from surfacechem.solve.run import Model, Trajectory
 
 Columns = dict[str, NDArray[Any]]
@@ -46,7 +48,10 @@ ENDS = {
 BALANCES = tuple(f"{kind}_error" for kind in ("energy", "entropy", "site"))
 """Those of them that are errors of balances."""
 
-EXTREMES = {"max": (np.fmax, "at most, over outputs and steps"), "min": (np.fmin, "at least, over the same")}
+EXTREMES = {
+    "max": (np.fmax, "at most, over outputs, steps and jumps"),
+    "min": (np.fmin, "at least, over outputs, steps and jumps"),
+}
 """Extremes of a run: what the names of their columns end with, what finds them, and words."""
 
 REACHED = "reaches "
@@ -172,9 +177,21 @@ def described(system: System, keep: Keep) -> dict[str, tuple[str, str, str]]:
 
 
 def extreme(run: Trajectory, name: str, which: str) -> float:
-    """The largest or the smallest value of a quantity over the outputs and the steps of a run."""
+    """The largest or the smallest value of a quantity over the outputs and the steps of a run, and where jumps lead."""
+    seen = np.concatenate([run.everywhere[name], run.beside_jumps[1][name][last_of_moments(run.jumps)]])
     with np.errstate(invalid="ignore"):
-        return float(EXTREMES[which][0].reduce(run.everywhere[name], initial=np.nan))
+        return float(EXTREMES[which][0].reduce(seen, initial=np.nan))
+
+
+def last_of_moments(jumps: Sequence[Jump]) -> NDArray[np.bool_]:
+    """Which jumps no other one follows at the same time, so that the run goes on from there."""
+    later = np.diff([jump.t for jump in jumps], append=np.inf)[: len(jumps)] > 0
+    return np.asarray(later & ~np.array([jump.stops for jump in jumps], dtype=bool))
+
+
+def crossed(before: NDArray[Any], after: NDArray[Any], level: float) -> NDArray[np.bool_]:
+    """Which jumps carry a quantity across a level, or onto it."""
+    return ((before < level) & (after >= level)) | ((before > level) & (after <= level))
 
 
 class RunByRun:
@@ -209,8 +226,12 @@ class RunByRun:
         row = end_of(run) | {"status": STATUSES.index(run.status), "reason": self._code(run.reason)}
         row |= balances_of(run, books) if books else {}
         names = [state.name for state in self.model.system.states] + [*self.model.system.output_columns]
-        end = np.array([result.t]), result.y[None], result.ydot[None]
-        last = dict(zip(names, [*result.y, *self.model.evaluate(result, *end)[0]], strict=True)) if keep.last else {}
+        t, y, ydot = np.array([result.t]), result.y[None], result.ydot[None]
+        if result.status is Status.FINISHED:  # at outputs rates are those of the equations, too
+            ydot = rates_at(self.model.program, t, y, result.problem.parameters[-1:])
+        last = (
+            dict(zip(names, [*result.y, *self.model.evaluate(result, t, y, ydot)[0]], strict=True)) if keep.last else {}
+        )
         row |= {f"{name}_last": last[name] for name in keep.last}
         row |= {f"{name}_{which}": extreme(run, name, which) for which in EXTREMES for name in getattr(keep, which)}
         reached = len(result.times)
@@ -230,6 +251,12 @@ class RunByRun:
             elif (name := variable(event.name)) and f"time_{name}" not in row:
                 row[f"time_{name}"] = event.t
                 row |= {f"{state}_at_{name}": event.before[columns[state]] for state in self.keep.at_events}
+        for name, level in (self.keep.reach or {}).items():
+            before, after = (side[name] for side in run.beside_jumps)
+            where = np.flatnonzero(crossed(before, after, level))
+            if len(where):
+                column = f"time_to_{name}"
+                row[column] = min(row.get(column, np.inf), run.jumps[where[0]].t)
         return row
 
     def _code(self, reason: str) -> int:

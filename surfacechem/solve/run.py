@@ -216,6 +216,21 @@ class Trajectory:
         return dict(zip(names, (*states.T, *named.T), strict=True))
 
     @cached_property
+    def beside_jumps(self) -> tuple[dict[str, Array], dict[str, Array]]:
+        """States and named quantities right before each jump and right after it, shape (jumps,)."""
+        model, n = self.model, len(self.model.system.states)
+        names = [*(state.name for state in model.system.states), *model.system.output_columns]
+        told: list[dict[str, Array]] = []
+        for sides in zip(*((jump.before.inputs(), jump.after.inputs()) for jump in self.jumps), strict=True):
+            rows = np.array(sides)
+            if told:  # an integration has left rates and algebraic variables before a jump
+                found = consistent(model.program, rows[:, 0], rows[:, 1 : 1 + n], 0.0, rows[:, 1 + 2 * n :])
+                rows[found.valid, 1 : 1 + 2 * n] = np.hstack((found.y, found.ydot))[found.valid]
+            told.append(dict(zip(names, np.hstack((rows[:, 1 : 1 + n], model.named(rows.copy()))).T, strict=True)))
+        nothing = dict.fromkeys(names, np.empty(0))
+        return (told[0], told[1]) if told else (nothing, nothing)
+
+    @cached_property
     def within_bounds(self) -> dict[str, Array]:
         """The same where rounding has carried no bonds below none."""
         result, steps = self.result, self.result.steps
