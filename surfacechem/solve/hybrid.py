@@ -177,11 +177,26 @@ class Hybrid:
         elif lost:
             index = self.jumper.folds.reached(point, self.problem.rtol)
         if index >= 0:
-            return self.instant.apply(index, self.jumper.folds.in_time(index, point, end), point)
+            reached = self.jumper.folds.in_time(index, point, end)
+            self._show_until(reached)
+            return self.instant.apply(index, reached, point)
         beyond = self._beyond(arc, point) if lost and not self._is_limited(arc) else None
         if beyond is None:
             self.instant.status = arc.status
         return beyond
+
+    def _show_until(self, reached: Point) -> None:
+        """Give the outputs on the last of the way to a fold, which no integration comes to, the state of the fold."""
+        times = self.problem.times[self._written :]
+        times = times[times < reached.t]
+        if len(times):
+            arc, count = self.arcs[-1], (len(times), 1)
+            outputs = np.concatenate([arc.result.outputs, np.tile(reached.y, count)])
+            ledger = np.concatenate([arc.result.ledger_outputs, np.tile(arc.result.ledger, count)])
+            shown = np.append(arc.result.times, times - arc.start.t)
+            result = replace(arc.result, times=shown, outputs=outputs, ledger_outputs=ledger)
+            self.arcs[-1] = replace(arc, result=result, times=np.append(arc.times, times))
+            self._written += len(times)
 
     def _beyond(self, arc: Arc, point: Point) -> Point | None:
         """Where a solver that was lost may go on."""
