@@ -210,7 +210,7 @@ def accuracy(
     # Options of a reference are those of the case as written, so that they fit no other run.
     if named is not None and not named.options:
         try:
-            return _against_exact(case, done, named.name, second)
+            return _held(done, _against_exact(case, done, named.name, second))
         except InputError as error:
             unused = f"the exact solution {named.name} does not apply to this scene: {error.message.rstrip('.')}"
     elif named is not None:
@@ -218,7 +218,18 @@ def accuracy(
     left = cells()
     errors, why = _estimated(done, second(), left)
     source = ", ".join([second_run(second().run, "sweep"), *dict.fromkeys(f.source for f in left if f.variables)])
-    return SweepAccuracy(np.array(errors), "; ".join(filter(None, (source, unused))), why=why)
+    return _held(done, SweepAccuracy(np.array(errors), "; ".join(filter(None, (source, unused))), why=why))
+
+
+def _held(done: SweepSolution, found: SweepAccuracy) -> SweepAccuracy:
+    """The errors with a word where they miss what was asked for: the runs of a sweep share one tolerance, and none is
+    repeated at a tighter one.
+    """
+    wanted = done.run.accuracy
+    if wanted is None or not np.any(found.known > wanted):
+        return found
+    missed = f"{wanted:.0e} was asked, which takes a tighter `rtol` under `run` here"
+    return replace(found, source=f"{found.source}; {missed}")
 
 
 def _estimated(done: SweepSolution, second: SweepSolution, cells: Sequence[CellErrors]) -> tuple[list[float], str]:
