@@ -54,7 +54,6 @@ class Options:
 
 def write(simulation: Simulation, plan: Plan, target: Path, options: Options) -> None:
     """Run a sweep into a store; an interrupt says how to go on."""
-    from surfacechem.runs.checking import check
     from surfacechem.runs.streaming import failed_runs
     from surfacechem.runs.summaries import store_summary
 
@@ -65,7 +64,7 @@ def write(simulation: Simulation, plan: Plan, target: Path, options: Options) ->
         stream = simulation.stream(plan, target, resume=options.resume, part=part)
         try:
             store = solved(lambda: stream.run(None, client, counting()), talk, brief=True, waits=stream.chunks.waits)
-            errors = solved(lambda: check(stream), talk)
+            errors = solved(stream.check, talk)
         except SignalledError as error:
             (number,) = error.args
             word = "interrupted" if number == signal.SIGINT else f"ended by {signal.Signals(number).name}"
@@ -82,13 +81,12 @@ def write(simulation: Simulation, plan: Plan, target: Path, options: Options) ->
 def write_file(simulation: Simulation, plan: Plan, target: Path, talk: bool | None) -> None:
     """Run a sweep into a store that becomes one file, netCDF or a table, when it is whole."""
     from surfacechem.results.netcdf import save_kept
-    from surfacechem.runs.checking import check
     from surfacechem.runs.summaries import store_summary
 
     with TemporaryDirectory(prefix=f".{target.stem}-", dir=target.parent) as folder:
         stream = simulation.stream(plan, Path(folder) / "sweep.zarr")
         store = solved(lambda: stream.run(told=counting()), talk, brief=True, waits=stream.chunks.waits)
-        status, sheet = store_summary(stream, store, solved(lambda: check(stream), talk), target)
+        status, sheet = store_summary(stream, store, solved(stream.check, talk), target)
         with store.dataset as data:
             save_kept(data, target)
     if talk is not False:

@@ -21,10 +21,10 @@ from surfacechem.format.sections import ALL, SweepSection
 from surfacechem.results.dataset import quantities
 from surfacechem.results.netcdf import CONVENTIONS, COORDINATES, Column, cf_unit, versions
 from surfacechem.results.store import MOST_BYTES, Layout, Store, StoredArray, begin, opened, store_path
-from surfacechem.runs import keeping, sweeps
+from surfacechem.runs import checking, keeping, sweeps
 from surfacechem.runs.arrays import ArrayRuns, JumpingRuns, quiet, solvable
 from surfacechem.runs.at_rest import UnrestError, refuse_histories, to_rest
-from surfacechem.runs.checking import checked_arrays
+from surfacechem.runs.checking import Checked, checked_arrays
 from surfacechem.runs.keeping import REFUSED, STATUSES, UNREST, Columns, Keep, RunByRun, keep_of, variable
 from surfacechem.solve import AUTO
 from surfacechem.solve.contract import Index
@@ -234,6 +234,10 @@ class Stream:
                 failed += int(np.sum(columns["status"] >= STATUSES.index("failed")))
                 told(Progress(runs, done, failed, resumed))
         return self.store
+
+    def check(self, threads: int | None = None) -> Checked | None:
+        """Find the errors of the runs that are checked and store them, once every chunk is there; None before."""
+        return checking.check(self, threads)
 
     def _computed(self, numbers: Sequence[int], threads: int, client: Any) -> Iterator[tuple[int, Columns]]:
         """The columns of chunks, in order; the next are computed while one is written."""
