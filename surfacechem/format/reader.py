@@ -237,11 +237,10 @@ def _interface(case: Document, mechanism: Mechanism | None) -> Interface:
 
 def _heat_over(surface: CurvedSurfaces) -> Iterator[HeatTransfer]:
     """Heat paths over the gap of two surfaces."""
-    if surface.heat_laws:
-        from surfacechem.surfaces.conductance import CurvedConductance
+    from surfacechem.surfaces.potential import CurvedConductance
 
-        for law in surface.heat_laws:
-            yield CurvedConductance(law=law, pair=surface, between=law.between, closure=law.closure, place=law.place)
+    for law in surface.heat_laws:
+        yield CurvedConductance(law=law, pair=surface, between=law.between, closure=law.closure, place=law.place)
 
 
 def _surface(case: Document) -> CurvedSurfaces | None:

@@ -205,7 +205,7 @@ def divided(
         if coefficients is not None:
             found.append((a, b, coefficients))
         elif _extent(a, b, powers) > SHORTEST * _extent(ends[0], ends[-1], powers):
-            middle = math.sqrt(a * b) if powers else (a + b) / 2
+            middle = approach_at(0.0, a, b, powers)
             # The lower half is the next, so that pieces are found in order.
             waiting += [(middle, b), (a, middle)]
         else:

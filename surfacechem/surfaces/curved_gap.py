@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from surfacechem.contracts.terms import HeatTransfer, PairEnergy, Potential, Varying, optional, reads
 from surfacechem.errors import InputError
-from surfacechem.surfaces.inner_sums import extents, kernel
+from surfacechem.surfaces.inner_sums import extents, kernel, with_slope
 from surfacechem.surfaces.level_cuts import with_levels
 from surfacechem.surfaces.nodes import gauss
 from surfacechem.surfaces.pairwise import check_finite, length
@@ -69,10 +69,7 @@ def density(law: Potential | HeatTransfer) -> Callable[[Array], Array]:
         what = f"reads {foreign[0]}" if foreign else f"has a {varying[0]} that varies"
         raise InputError(f"{law.name()} {what}; over curved surfaces a law may read the gap g_n alone.", law.place)
     g = symengine.Symbol(GAP)
-    value = symengine.sympify(law.statement(**({GAP: g} if GAP in reads(law.statement) else {})))
-    # Branches that divide by zero are not taken.
-    compiled = symengine.Lambdify([g], [value, value.diff(g)], backend="llvm")
-    return lambda gaps: np.asarray(compiled(gaps.reshape(-1, 1))).reshape(*gaps.shape, 2)
+    return with_slope(law.statement(**({GAP: g} if GAP in reads(law.statement) else {})), g)
 
 
 def between_flats(law: PairEnergy) -> Density:

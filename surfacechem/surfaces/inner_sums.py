@@ -13,6 +13,7 @@ import numpy as np
 
 from surfacechem.contracts.terms import PairEnergy, Shape
 from surfacechem.errors import InputError
+from surfacechem.expressions import Expression
 from surfacechem.surfaces.nodes import Extent, Kernel, Sums, divided, gauss, is_round, order_of, tensor_grid
 from surfacechem.surfaces.projection import Array, Projection, Surface
 from surfacechem.surfaces.rays import ray_grid
@@ -64,13 +65,21 @@ def kernel(law: PairEnergy) -> Kernel:
     import symengine
 
     r = symengine.Symbol("r")
-    psi = symengine.sympify(law.energy(r))
-    compiled: Kernel = symengine.Lambdify([r], [psi, psi.diff(r)], backend="llvm")
+    return with_slope(law.energy(r), r)
 
-    def values(distances: Array) -> Array:
+
+def with_slope(formula: Expression, symbol: Expression) -> Kernel:
+    """A formula and its slope over the one symbol in it as machine code, (n, 2) for n values of that."""
+    import symengine
+
+    value = symengine.sympify(formula)
+    # Branches that divide by zero are not taken.
+    compiled: Kernel = symengine.Lambdify([symbol], [value, value.diff(symbol)], backend="llvm")
+
+    def values(places: Array) -> Array:
         # The machine code takes no empty array.
-        flat = compiled(distances.reshape(-1, 1)) if distances.size else np.empty(0)
-        return np.asarray(flat).reshape(*distances.shape, 2)
+        flat = compiled(places.reshape(-1, 1)) if places.size else np.empty(0)
+        return np.asarray(flat).reshape(*places.shape, 2)
 
     return values
 

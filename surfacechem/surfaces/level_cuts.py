@@ -146,10 +146,7 @@ class LevelPatches(Patches):
     def divided(self, k: int) -> Self:
         """The same where nothing changes across a direction: divided at the levels once for all."""
         passed, rest = self[self.along == k], self[self.along != k]
-        cut = passed.crossing(k, passed.low[:, 1 - k])
-        below, above = passed.high.copy(), passed.low.copy()
-        below[:, k], above[:, k] = cut, cut
-        return rest.joined(replace(passed, high=below), replace(passed, low=above))
+        return rest.joined(passed.cut(k, passed.crossing(k, passed.low[:, 1 - k])))
 
     def crossing(self, k: int, across: Array) -> Array:
         """Where along a direction each patch passes its level, at a place (n,) across it; its end where it does not."""
@@ -179,7 +176,11 @@ def with_levels(patches: Patches, other: Surface, levels: Sequence[float], noise
     """Patches of a surface, each with the level of the gap to the other, or the edge of that, which passes through it,
     if one does.
     """
-    patches = _at_corners(patches)
+    for k in range(2):
+        if not patches.alike[k]:
+            # The places that patches gather around, where gaps are least, are at corners of them.
+            around = (patches.low[:, k] < 0) & (patches.high[:, k] > 0)
+            patches = patches[~around].joined(patches[around].cut(k, 0.0))
     parts = {name: getattr(patches, name) for name in ("surface", "alike", *Patches.arrays)}
     none = np.zeros(len(patches), dtype=int)
     found = LevelPatches(
@@ -208,19 +209,3 @@ def with_levels(patches: Patches, other: Surface, levels: Sequence[float], noise
             break
         found = found[~slight].joined(Patches.halved(found[slight]).marked())
     return found.left()
-
-
-def _at_corners(patches: Patches) -> Patches:
-    """Patches divided so that the places they gather around, where gaps are least, are at corners of them."""
-    for k in range(2):
-        if patches.alike[k]:
-            continue
-        around = (patches.low[:, k] < 0) & (patches.high[:, k] > 0)
-        side = np.arange(2) == k
-        passed = patches[around]
-        below, above = (
-            replace(passed, high=np.where(side, 0.0, passed.high)),
-            replace(passed, low=np.where(side, 0.0, passed.low)),
-        )
-        patches = patches[~around].joined(below, above)
-    return patches

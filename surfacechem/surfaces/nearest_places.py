@@ -13,7 +13,7 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from surfacechem.errors import InputError
 from surfacechem.surfaces.projection import FIRST, NEWTONS, POLE, Array, Surface, descended, newton_step
@@ -82,8 +82,7 @@ def near_places(
         raise InputError(f"{text}, too many to look at: give it a smaller extent, or fewer and coarser details.")
 
     def parameters(nodes: Indices) -> Array:
-        at = low + (high - low) * np.where(alike, 0.5, nodes / steps)
-        return np.asarray(np.maximum(at, [POLE, -np.inf]) if outer.shape.about_axis and low[0] == 0 else at)
+        return outer.off_pole(low + (high - low) * np.where(alike, 0.5, nodes / steps))
 
     def gap(at: Array) -> Array:
         take((len(at) + ANY) * inner.search)
@@ -131,7 +130,7 @@ def _near_grid(
     return found
 
 
-def _mesh(axes: Iterable[ArrayLike]) -> Indices:
+def _mesh(axes: Iterable[ArrayLike]) -> NDArray[Any]:
     """All pairs (n, 2) of places along two axes."""
     return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
 
@@ -154,9 +153,7 @@ def _settled(
     """The places (n, 2) of least gap near some, no step longer than that of the grid, over a ``long`` surface [m], and
     the gaps there.
     """
-    low, high = np.transpose(outer.shape.span)
-    low = np.where(outer.shape.closed, -np.inf, low) + (POLE if outer.shape.about_axis else 0.0)
-    high = np.where(outer.shape.closed, np.inf, high)
+    low, high = outer.bounds
 
     def slope(at: Array) -> tuple[Array, Array]:
         D = outer.derivatives(at, FIRST)
@@ -207,7 +204,7 @@ def _rolled(gap: Callable[[Array], Array], at: Array, steps: Array, bounds: Arra
     options: Any = {"initial_simplex": [at, *corners], "xatol": SQRT_EPS * steps.max(), "fatol": SAME * steps.max()}
     rest = minimize(value, list(at), method="Nelder-Mead", bounds=list(bounds.T), options=options)
     at, least = np.asarray(rest.x), float(rest.fun)
-    around = np.stack(np.meshgrid(*[np.linspace(-1, 1, ACROSS)] * 2, indexing="ij"), axis=-1).reshape(-1, 2)
+    around = _mesh([np.linspace(-1, 1, ACROSS)] * 2)
     size = 1.0
     for _ in range(NEWTONS):
         places = np.clip(at + size * steps * around, *bounds)

@@ -88,9 +88,7 @@ class Extent:
         return sorted(gap for gap in found if gap > 0)
 
 
-@lru_cache
-def _legendre(order: int) -> tuple[Array, Array]:
-    return np.polynomial.legendre.leggauss(order)
+_legendre = lru_cache(np.polynomial.legendre.leggauss)
 
 
 def order_of(level: int) -> int:

@@ -90,7 +90,10 @@ def interaction(
     amounts = np.array([law.n_1 * law.n_2 for law in laws])[:, None]
 
     def integrand(x: Array, level: int) -> tuple[Array, int]:
-        found, pairs = _sums(x, inner, laws, level, rtol)
+        sums, pairs = inner_sums(inner, x, laws, level, rtol)
+        found = np.empty((len(x), len(laws), COUNT))
+        for j, (energy, push) in enumerate(sums):
+            found[:, j, 0], found[:, j, 1:4], found[:, j, 4:] = energy, push, cross(x, push)
         return found * amounts, pairs
 
     # What is left out is a hundredth of the accuracy, but for factors of order one.
@@ -231,15 +234,6 @@ def length(lower: Surface, upper: Surface) -> float:
     ends = [end for s in shapes if not s.about_axis for end, closed in zip(s.span, s.closed, strict=True) if not closed]
     spans = [b - a for a, b in ends if np.isfinite(b - a)]
     return float(max([*shapes[0].lengths, *shapes[1].lengths, *spans], default=1.0))
-
-
-def _sums(x: Array, inner: Surface, laws: Sequence[PairEnergy], level: int, rtol: float) -> tuple[Array, int]:
-    """Integrals (n, laws, 7) over the inner surface for points (n, 3), and the number of pairs."""
-    sums, pairs = inner_sums(inner, x, laws, level, rtol)
-    found = np.empty((len(x), len(laws), COUNT))
-    for j, (energy, push) in enumerate(sums):
-        found[:, j, 0], found[:, j, 1:4], found[:, j, 4:] = energy, push, cross(x, push)
-    return found, pairs
 
 
 def _sizes(found: Array, gap: float, reach: Array) -> Array:

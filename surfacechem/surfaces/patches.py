@@ -144,11 +144,14 @@ class Patches:
         found = self
         for k in range(2):
             if not self.alike[k]:
-                middle = (found.low[:, k] + found.high[:, k]) / 2
-                low, high = found.low.copy(), found.high.copy()
-                low[:, k], high[:, k] = middle, middle
-                found = replace(found, high=high).joined(replace(found, low=low))
+                found = found.cut(k, (found.low[:, k] + found.high[:, k]) / 2)
         return found
+
+    def cut(self, k: int, at: Array | float) -> Self:
+        """What is below substituted parameters (n,) along a direction, and then what is above."""
+        low, high = self.low.copy(), self.high.copy()
+        low[:, k] = high[:, k] = at
+        return replace(self, high=high).joined(replace(self, low=low))
 
     def joined(self, *others: Self) -> Self:
         """These and others."""

@@ -1,7 +1,7 @@
-"""Free energy of two curved surfaces as a function of their approach, from integrals at a few approaches.
+"""Free energy of two curved surfaces and heat conductance between them over their approach, from a few integrals.
 
-It is a potential of the gap like any other, so that every gap model can be driven by it. In a scene with surfaces all
-that is per area elsewhere is that of the whole pair: N for Pa, J for J/m^2, kg for kg/m^2.
+The energy is a potential of the gap like any other, so that every gap model can be driven by it. In a scene with
+surfaces all that is per area elsewhere is that of the whole pair: N for Pa, J for J/m^2, kg for kg/m^2.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from surfacechem.surfaces.patches import Budget, OutOfReachError
 from surfacechem.surfaces.projection import Array, Surface
 from surfacechem.tolerances import ATOM, FLOOR, NEGLIGIBLE, NOISE, ROUNDING, SQRT_EPS
 
-KNOWN: dict[Fingerprint, tuple[tuple[ApproachEnergy, ...], ApproachEnergy | None]] = {}
+KNOWN: dict[Fingerprint, tuple[ApproachEnergy, ...]] = {}
 """Curves that have been integrated, by what they are the curves of."""
 
 log = logging.getLogger(__name__)
@@ -185,9 +185,9 @@ class CurvedSurfaces(Potential):
             with integrating():
                 found = kept(mark, CODE, lambda: [curve.numbers for curve in self.integrated(parts)])
             log.info("running")
-            curves = tuple(map(ApproachEnergy.of, found))
-            KNOWN[mark] = curves[: len(parts)], next(iter(curves[len(parts) :]), None)
-        return KNOWN[mark]
+            KNOWN[mark] = tuple(map(ApproachEnergy.of, found))
+        curves = KNOWN[mark]
+        return curves[: len(parts)], next(iter(curves[len(parts) :]), None)
 
     def integrated(self, parts: Sequence[PairEnergy]) -> list[ApproachEnergy]:
         """Those energies from their integrals."""
@@ -349,3 +349,64 @@ class CurvedSurfaces(Potential):
             rest = self.contact(d, pairs=False, budget=budget)
             force, moment = force + rest.force_1, moment + rest.moment_1
         return force, moment
+
+
+class CurvedConductance(HeatTransfer):
+    """Conductance [W/K] between two curved bodies at the approach g_n, from one per area over the gap."""
+
+    law: HeatTransfer = option("conductance per area, a law of the gap")
+    pair: CurvedSurfaces = option("the two surfaces")
+
+    @property
+    def channel(self) -> str:  # type: ignore[override]
+        """What carries the heat."""
+        return self.law.channel
+
+    @property
+    def limits(self) -> Mapping[str, tuple[float, float]]:
+        """The approaches between which it is known."""
+        return self.pair.limits
+
+    @property
+    def called(self) -> str:
+        """The key of its range."""
+        return self.pair.called
+
+    def outline(self) -> Self:
+        """The same with a conductance that is a straight line."""
+        return self.bind({"curve": straight(*self.pair.approach)})
+
+    @property
+    def error(self) -> float:
+        """Relative error of the conductance, and of its slope."""
+        return self.curve.error
+
+    def erring(self) -> Self:
+        """The same, larger by its error."""
+        return self.bind({"curve": self.curve.erring()})
+
+    @cached_property
+    def curve(self) -> ApproachEnergy:
+        """The conductance over the approach."""
+        pair, law, levels = self.pair, density(self.law), bends([self.law])
+        mark = fingerprint(pair.shapes, self.law, pair.approach, pair.accuracy)
+        budget = Budget(pair.accuracy)
+
+        def sample(d: float) -> tuple[float, float, float]:
+            finer = max(pair.accuracy / 64, ROUNDING)
+            found = pair.at_approach(d, lambda: over_gap(*pair.surfaces(d), [], levels, [law], finer, budget=budget))
+            return found.conductance, found.conductance_slope, found.error
+
+        def integrated() -> list[Any]:
+            # A conductance and its slope are fitted like an energy and its force.
+            cuts = passages(*pair.surfaces(0.0), levels)
+            return fitted(sample, *pair.approach, pair.accuracy, cuts, budget=budget).numbers
+
+        if mark not in KNOWN:
+            with integrating():
+                KNOWN[mark] = (ApproachEnergy.of(kept(mark, CODE, integrated)),)
+        return KNOWN[mark][0]
+
+    def conductance(self, g_n: Expression) -> Expression:
+        """Conductance [W/K]."""
+        return self.curve.energy(g_n)

@@ -185,9 +185,7 @@ class Surface:
             distances = np.linalg.norm(places - self.derivatives(found, FIRST)[0], axis=-1)
             order, rivals = np.lexsort((distances, which)), (which, found)
             at = found[order[np.unique(which[order], return_index=True)[1]]].reshape(*x.shape[:-1], 2)
-        # At the pole itself no direction along the surface has a length.
-        if self.shape.about_axis and self.shape.span[0][0] == 0:
-            at = np.maximum(at, [POLE, -np.inf])
+        at = self.off_pole(at)
         D = self.derivatives(at, FIRST)
         normal, away = self.normals(D), x - D[0]
         # Beyond an edge the distance is not along the normal, which then tells the side only.
@@ -199,6 +197,18 @@ class Surface:
         off = at_edge[..., None]
         direction = np.where(off, np.divide(away, gap[..., None], out=np.zeros_like(away), where=off), normal)
         return Projection(self, at, D[0], normal, direction, gap, beyond, rivals)
+
+    @cached_property
+    def bounds(self) -> tuple[Array, Array]:
+        """Least and largest parameters (2,) of a search: what comes round has no edge that a step could leave."""
+        low, high = np.transpose(self.shape.span)
+        low = np.where(self.shape.closed, -np.inf, low) + (POLE if self.shape.about_axis else 0.0)
+        return low, np.where(self.shape.closed, np.inf, high)
+
+    def off_pole(self, at: Array) -> Array:
+        """Parameters (..., 2) beside a pole in place of those at it, where no direction along it has a length."""
+        begins_at_pole = self.shape.about_axis and self.shape.span[0][0] == 0
+        return np.asarray(np.maximum(at, [POLE, -np.inf])) if begins_at_pole else at
 
     @cached_property
     def edges(self) -> list[tuple[int, int, float]]:
@@ -233,17 +243,17 @@ class Surface:
         """Parameters (n, 2) of nearest points of some (n, 3) by Newton's method; a step that does not come nearer is
         halved.
         """
-        low, high = np.transpose(self.shape.span)
-        # What comes round has no edge that a step could leave.
-        low = np.where(self.shape.closed, -np.inf, low) + (POLE if self.shape.about_axis else 0.0)
-        high = np.where(self.shape.closed, np.inf, high)
+        low, high = self.bounds
 
         def value(at: Array, which: Indices) -> Array:
             return np.asarray(np.linalg.norm(places[which] - self.derivatives(at, FIRST)[0], axis=-1))
 
         def step(at: Array, which: Indices) -> Array:
             D = self.derivatives(at, SECOND)
-            move = _step(D, places[which] - D[0], at <= low, at >= high)
+            away = places[which] - D[0]
+            slope = np.stack([-_dot(away, D[1]), -_dot(away, D[2])], axis=-1)
+            metric, hessian = _forms(D, away)
+            move = newton_step(slope, hessian, metric, at <= low, at >= high)
             if self.shape.about_axis:
                 move[..., 1] = 0.0  # the angle about the axis is that of the start
             return move
@@ -330,16 +340,12 @@ def _metric(D: Array) -> tuple[Array, Array, Array]:
     return _dot(D[1], D[1]), _dot(D[1], D[2]), _dot(D[2], D[2])
 
 
-def _determinant(form: tuple[Array, Array, Array]) -> Array:
-    return form[0] * form[2] - form[1] ** 2
-
-
 def _degenerate(D: Array, away: Array) -> NDArray[np.bool_]:
     """Whether points are where normals meet, so that not one point is nearest but many."""
-    metric, hessian = _forms(D, away)
+    (E, F, G), (a, b, c) = _forms(D, away)
     # Eigenvalues of the second in terms of the first, 1 - distance * curvature, vanish there.
-    ratio = _determinant(hessian) / _determinant(metric)
-    trace = (metric[0] * hessian[2] + metric[2] * hessian[0] - 2 * metric[1] * hessian[1]) / _determinant(metric)
+    area = E * G - F**2
+    ratio, trace = (a * c - b**2) / area, (E * c + G * a - 2 * F * b) / area
     return np.asarray((ratio <= SAME) & (np.abs(ratio) <= SAME * np.maximum(np.abs(trace), 1)))
 
 
@@ -385,13 +391,6 @@ def descended(
         if len(which) == 0:
             break
     return found
-
-
-def _step(D: Array, away: Array, lowest: Any, highest: Any) -> Array:
-    """Newton's step towards the nearest point."""
-    metric, hessian = _forms(D, away)
-    slope = np.stack([-_dot(away, D[1]), -_dot(away, D[2])], axis=-1)
-    return newton_step(slope, hessian, metric, lowest, highest)
 
 
 def newton_step(

@@ -41,11 +41,6 @@ OVERSHOOT = 0.1
 """Part of the range of heights by which a spline through them may be above the highest, as summits lie between."""
 
 
-def _each(starts: Sequence[Array]) -> tuple[Indices, Array]:
-    """As many starts for each point, those of one after those of another."""
-    return np.repeat(np.arange(len(starts[0])), len(starts)), np.stack(starts, axis=1).reshape(-1, 2)
-
-
 def _leads_nowhere_else(
     away: Array, slopes: Array, ends: Sequence[NDArray[np.bool_]], widths: Sequence[float]
 ) -> Array:
@@ -218,7 +213,8 @@ class Turned(Shape):
     def starts(self, x: Array) -> tuple[Indices, Array]:
         """At the angle of the points about the axis and at the opposite one."""
         angle, radius = np.arctan2(x[:, 1], x[:, 0]), np.hypot(x[:, 0], x[:, 1])
-        return _each([np.stack([radius, angle + shift], axis=-1) for shift in (0.0, math.pi)])
+        starts = np.stack([radius, angle, radius, angle + math.pi], axis=-1).reshape(-1, 2)
+        return np.repeat(np.arange(len(x)), 2), starts
 
     @abstractmethod
     def point(self, u: Expression, v: Expression) -> Point:

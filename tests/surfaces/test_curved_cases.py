@@ -58,22 +58,43 @@ def force(g):
     return float(FORCE([g])[0])
 
 
-def data(tmp_path, text):
+def written(tmp_path, text, scene=SCENE):
     path = tmp_path / "case.yaml"
-    path.write_text(SCENE + text)
-    return surfacechem.run(path).dataset
+    path.write_text(scene + text)
+    return path
+
+
+def data(tmp_path, text, scene=SCENE):
+    return surfacechem.run(written(tmp_path, text, scene)).dataset
+
+
+def integrated(push, c, m, start, time):
+    """The gap [m] under a force [N] by an integration in nm and us."""
+
+    def scaled(t, y):
+        pull = push(y[0] * 1e-9)
+        return [y[1], (pull - c * y[1] * 1e-3) / m * 1e-3] if m else [pull / c * 1e3]
+
+    found = solve_ivp(
+        scaled, (0, 1), [start, 0.0] if m else [start], "DOP853", time.values * 1e6, rtol=1e-13, atol=1e-13
+    )
+    return found.y[0] * 1e-9
 
 
 RAMP = "loading: {F_n: {ramp: {start: -1 nN, rate: 1.5 mN/s}}}\n"
 MOVED = "loading: {g_n: {ramp: {start: 5 nm, rate: -4 mm/s}}}\n"
+HELD = """
+mechanics: {normal: {k: 5 N/m}}
+loading: {w_n: {ramp: {start: 6 nm, rate: -4 mm/s}}}
+initial: {T: 300 K, g_n: 6 nm}
+"""
 
 
 @pytest.mark.parametrize("evolves", [True, False])
-def test_a_prescribed_gap_bears_the_force_in_newtons(tmp_path, monkeypatch, evolves):
+def test_a_prescribed_gap_bears_the_force_in_newtons(tmp_path, evolves):
     """Whether anything evolves beside it or not: a curve of force over distance is a run, too."""
-    if not evolves:
-        monkeypatch.setitem(globals(), "SCENE", SCENE.replace("temperature: T, C: 1e-18 J/K", "temperature: 300 K"))
-    found = data(tmp_path, MOVED + (START if evolves else "") + RUN)
+    scene = SCENE if evolves else SCENE.replace("temperature: T, C: 1e-18 J/K", "temperature: 300 K")
+    found = data(tmp_path, MOVED + (START if evolves else "") + RUN, scene)
     assert found.t_n.attrs["units"] == "N"
     assert found.W_g_n.attrs["units"] == found.energy_residual.attrs["units"] == "J"
     exact = [force(g) for g in found.g_n.values]
@@ -85,10 +106,7 @@ def test_a_prescribed_gap_bears_the_force_in_newtons(tmp_path, monkeypatch, evol
 
 @pytest.mark.parametrize("rtol", every(2, [1e-2, 1e-6]))
 def test_the_error_of_a_run_holds_that_of_its_integrals(tmp_path, rtol):
-    held = "mechanics: {normal: {k: 5 N/m}}\nloading: {w_n: {ramp: {start: 6 nm, rate: -4 mm/s}}}\n"
-    path = tmp_path / "case.yaml"
-    path.write_text(SCENE + f"  accuracy: {rtol}\n" + held + "initial: {T: 300 K, g_n: 6 nm}\n" + RUN)
-    found = surfacechem.run(path)
+    found = surfacechem.run(written(tmp_path, f"  accuracy: {rtol}\n{HELD}{RUN}"))
     exact = np.array([force(g) for g in found.dataset.g_n.values])
     off, told = np.abs(found.dataset.t_n.values / exact - 1).max(), found.accuracy.variables
     assert off <= told["t_n"] < 10 * rtol
@@ -100,8 +118,7 @@ def test_the_error_of_a_run_holds_that_of_its_integrals(tmp_path, rtol):
 
 
 def test_a_quasi_static_gap_is_where_spring_and_force_balance(tmp_path):
-    drive = "mechanics: {normal: {k: 5 N/m}}\nloading: {w_n: {ramp: {start: 6 nm, rate: -4 mm/s}}}\n"
-    found = data(tmp_path, drive + "initial: {T: 300 K, g_n: 6 nm}\n" + RUN)
+    found = data(tmp_path, HELD + RUN)
     for w, g in zip(found.w_n.values[::5], found.g_n.values[::5], strict=True):
         exact = brentq(lambda x, w=w: 5.0 * (w - x) - force(x), w - 0.4e-9, w, xtol=1e-20, rtol=1e-14)
         assert g == pytest.approx(exact, rel=1e-8)
@@ -112,46 +129,28 @@ def test_a_mass_or_a_damper_moves_as_integrated_by_itself(tmp_path, m, c):
     holds = ", ".join(f"{name}: {value} {unit}" for name, value, unit in (("m", m, "kg"), ("c_g", c, "N s/m")) if value)
     text = f"mechanics: {{normal: {{k: 0.5 N/m, {holds}}}}}\nloading: {{w_n: 5 nm}}\ninitial: {{T: 300 K, g_n: 4 nm}}\n"
     found = data(tmp_path, text + RUN)
-
-    # In nm and us.
-    def scaled(t, y):
-        if m:
-            pull = 0.5 * (5e-9 - y[0] * 1e-9) - force(y[0] * 1e-9)
-            return [y[1], (pull - c * y[1] * 1e-3) / m * 1e-3]
-        return [(0.5 * (5e-9 - y[0] * 1e-9) - force(y[0] * 1e-9)) / c * 1e3]
-
-    start = [4.0, 0.0] if m else [4.0]
-    exact = solve_ivp(scaled, (0, 1), start, "DOP853", found.time.values * 1e6, rtol=1e-13, atol=1e-13).y[0]
-    assert found.g_n.values == pytest.approx(exact * 1e-9, rel=1e-8)
+    exact = integrated(lambda g: 0.5 * (5e-9 - g) - force(g), c, m, 4.0, found.time)
+    assert found.g_n.values == pytest.approx(exact, rel=1e-8)
     assert found.attrs["energy_error"] < 1e-9
 
 
 WALL = SCENE.replace("from: 0.4 nm", "from: 0.12 nm")
 
 
-def test_a_dead_load_holds_a_sphere_where_the_force_is_its_own(tmp_path, monkeypatch):
-    monkeypatch.setitem(globals(), "SCENE", WALL)
-    found = data(tmp_path, f"{RAMP}initial: {{T: 300 K, g_n: 0.15 nm}}\n" + RUN)
+def test_a_dead_load_holds_a_sphere_where_the_force_is_its_own(tmp_path):
+    found = data(tmp_path, f"{RAMP}initial: {{T: 300 K, g_n: 0.15 nm}}\n" + RUN, WALL)
     for pull, g in zip(found.F_n.values[::5], found.g_n.values[::5], strict=True):
         exact = brentq(lambda x, pull=pull: pull - force(x), 1.2e-10, 2e-10, xtol=1e-22, rtol=1e-14)
         assert g == pytest.approx(exact, rel=1e-8)
 
 
 @pytest.mark.parametrize(("m", "c"), every(2, [(0.0, 1e-6), (2e-15, 0.0)]))
-def test_a_dead_load_moves_a_sphere_as_integrated_by_itself(tmp_path, monkeypatch, m, c):
-    monkeypatch.setitem(globals(), "SCENE", WALL)
+def test_a_dead_load_moves_a_sphere_as_integrated_by_itself(tmp_path, m, c):
     holds = "m: 2e-15 kg" if m else "c_g: 1e-6 N s/m"
     text = f"mechanics: {{normal: {{{holds}}}}}\nloading: {{F_n: 1 nN}}\ninitial: {{T: 300 K, g_n: 0.25 nm}}\n"
-    found = data(tmp_path, text + RUN)
-
-    # In nm and us.
-    def scaled(t, y):
-        pull = 1e-9 - force(y[0] * 1e-9)
-        return [y[1], pull / m * 1e-3] if m else [pull / c * 1e3]
-
-    start = [0.25, 0.0] if m else [0.25]
-    exact = solve_ivp(scaled, (0, 1), start, "DOP853", found.time.values * 1e6, rtol=1e-13, atol=1e-13).y[0]
-    assert found.g_n.values == pytest.approx(exact * 1e-9, rel=1e-8)
+    found = data(tmp_path, text + RUN, WALL)
+    exact = integrated(lambda g: 1e-9 - force(g), c, m, 0.25, found.time)
+    assert found.g_n.values == pytest.approx(exact, rel=1e-8)
     assert found.attrs["energy_error"] < 1e-9
 
 
@@ -167,16 +166,13 @@ def test_densities_thin_out_as_the_area_grows(tmp_path):
 
 
 def test_a_stretch_of_the_area_is_refused_where_laws_of_the_gap_have_no_densities_to_thin_out(tmp_path):
-    path = tmp_path / "case.yaml"
-    text = SCENE.replace("  pair:", "  laws: [penalty: {E_n: 1 Pa/m}]\n  pair:")
-    path.write_text(text + "loading: {g_n: 1 nm, J_c: 1.2}\n" + START + RUN)
+    scene = SCENE.replace("  pair:", "  laws: [penalty: {E_n: 1 Pa/m}]\n  pair:")
     with pytest.raises(InputError, match=r"case.yaml:\d+: .*`laws` are those of the area as it is"):
-        surfacechem.run(path)
+        data(tmp_path, "loading: {g_n: 1 nm, J_c: 1.2}\n" + START + RUN, scene)
 
 
 def test_other_numbers_of_the_pair_can_be_swept_and_change_the_force(tmp_path):
-    path = tmp_path / "case.yaml"
-    path.write_text(SCENE + "loading: {g_n: 1 nm}\n" + START + RUN)
+    path = written(tmp_path, "loading: {g_n: 1 nm}\n" + START + RUN)
     simulation, changed = surfacechem.load(path), {"surface.pair.lennard-jones-pair.n_1": 1e19}
     usual, doubled = (simulation.run(changes).dataset for changes in ({}, changed))
     for name in ("t_n", "force"):
@@ -225,11 +221,9 @@ def test_heat_flows_over_the_curved_gap_as_integrated_over_the_sphere():
     ],
 )
 def test_bad_input_is_one_line_with_its_place(tmp_path, old, new, message):
-    path = tmp_path / "case.yaml"
     assert old in SCENE
-    path.write_text(SCENE.replace(old, new) + "loading: {g_n: 1 nm}\n" + START + RUN)
     with pytest.raises(InputError, match=message):
-        surfacechem.run(path)
+        data(tmp_path, "loading: {g_n: 1 nm}\n" + START + RUN, SCENE.replace(old, new))
 
 
 JUMP = """
@@ -262,11 +256,10 @@ class Jump(PairEnergy):
 def test_what_is_wrong_is_told_before_anything_is_integrated(tmp_path, monkeypatch, old, new, message):
     (tmp_path / "jump.py").write_text(JUMP)
     monkeypatch.setattr(potential, "fitted", None)
-    text = "laws: [jump.py]" + SCENE + "loading: {g_n: {ramp: {start: 5 nm, rate: -4 mm/s}}}\n" + START + RUN
+    text = "laws: [jump.py]" + SCENE + MOVED + START + RUN
     assert old in text
-    (tmp_path / "case.yaml").write_text(text.replace(old, new))
     with pytest.raises(InputError, match=message):
-        surfacechem.run(tmp_path / "case.yaml")
+        data(tmp_path, "", text.replace(old, new))
 
 
 def test_the_field_of_tractions_is_that_of_the_sum_over_pairs():
@@ -298,13 +291,9 @@ def test_a_scene_without_surfaces_imports_nothing_of_them():
 
 
 def test_a_ball_pressed_into_a_penalty_has_its_area_of_contact(tmp_path):
-    path = tmp_path / "case.yaml"
     law = "  laws: [penalty: {E_n: 1e15 Pa/m}]\n  approach: {from: -2 nm, to: 9 nm}\n"
-    text = (
-        SCENE[: SCENE.index("  pair:")] + law + "loading: {g_n: {ramp: {start: 1 nm, rate: -2 mm/s}}}\n" + START + RUN
-    )
-    path.write_text(text)
-    found = surfacechem.run(path).dataset
+    text = law + "loading: {g_n: {ramp: {start: 1 nm, rate: -2 mm/s}}}\n" + START + RUN
+    found = data(tmp_path, text, SCENE[: SCENE.index("  pair:")])
     inside = np.maximum(-found.g_n.values, 0.0)
     assert found.t_n.values == pytest.approx(-np.pi * 1e15 * 5e-8 * inside**2, rel=1e-8, abs=1e-18)
     assert found.contact_area.values[-1] == pytest.approx(2 * np.pi * 5e-8 * 1e-9, rel=1e-9)

@@ -265,11 +265,27 @@ def test_a_table_and_a_penalty_of_pairs_end_where_they_say():
     assert pair(Sphere(R=1.0), Plane(), 0.2, [penalty], 1e-8).energy[0] == pytest.approx(float(exact), rel=1e-8)
 
 
+class Slow(InversePower):
+    """A law that says that it falls off faster than it does."""
+
+    decay = 4.0
+    parts = None
+
+
+SLOW = Slow(n_1=1e18, n_2=1e18, psi_0=-4e-21, r_0=1e-9, m=2.2)
+
+
 @pytest.mark.parametrize(
     ("make", "message"),
     [
         (lambda: pair(Sphere(R=1.0), Plane(), -0.1, [power(4)]), "overlap or touch, their gap is -0.1 m"),
-        (lambda: pair(Plane(), Plane(), 0.1, [power(4)]), "endless: give one of them a length"),
+        (lambda: pair(Plane(), Plane(turn=0.3), 1.0, [power(6)]), "surfaces are endless: give one of them a length"),
+        (lambda: pair(Plane(), Cylinder(R=1.0, turn=0.3), 1.0, [power(6)]), "both surfaces are endless"),
+        (lambda: pair(Plane(), Disc(), 1e-9, [power(4.0)]), "give the disc a radius"),
+        (lambda: pair(Plane(), Cone(slope=0.7), 1e-9, [power(3.0)]), "give the cone a radius"),
+        (lambda: pair(Plane(), Paraboloid(R=1e-8), 1e-9, [power(3.0)]), "give the paraboloid a radius"),
+        (lambda: pair(Plane(), Sphere(R=1e-8), 1e-9, [power(2.01)]), "too slowly for the accuracy 1e-10"),
+        (lambda: pair(Plane(), Sphere(R=5e-8), 1e-9, [SLOW]), r"slow falls off like r\^-2.2 .* slower than r\^-4"),
         (
             lambda: over_gap(Surface(Paraboloid(R=1.0)), Surface(Plane(), True, 0.1), [], heat=[GAS]),
             "conductance .* no end",
@@ -298,33 +314,6 @@ def test_cylinders_that_overlap_are_seen_however_large_their_angles_are_as_numbe
     found = over_gap(lower, upper, [density(Penalty(E_n=stiffness))], rtol=1e-3)
     shallow = math.pi * math.sqrt(R * r) * depth**2 * stiffness
     assert math.isclose(-found.force_1[2], shallow, rel_tol=5 * depth / r)
-
-
-@pytest.mark.parametrize(
-    ("shape", "m", "words"),
-    [
-        (Disc(), 4.0, "give the disc a radius"),
-        (Cone(slope=0.7), 3.0, "give the cone a radius"),
-        (Paraboloid(R=1e-8), 3.0, "give the paraboloid a radius"),
-        (Sphere(R=1e-8), 2.01, "too slowly for the accuracy 1e-10"),
-    ],
-)
-def test_sums_without_end_are_refused(shape, m, words):
-    with pytest.raises(InputError, match=words):
-        pair(Plane(), shape, 1e-9, [power(m)])
-
-
-class Slow(InversePower):
-    """A law that says that it falls off faster than it does."""
-
-    decay = 4.0
-    parts = None
-
-
-def test_a_law_that_falls_off_slower_than_it_says_is_refused():
-    law = Slow(n_1=1e18, n_2=1e18, psi_0=-4e-21, r_0=1e-9, m=2.2)
-    with pytest.raises(InputError, match=r"slow falls off like r\^-2.2 .* slower than r\^-4"):
-        pair(Plane(), Sphere(R=5e-8), 1e-9, [law])
 
 
 EDGED = [Cone(slope=0.3, radius=0.5), Cap(R=1.0, angle=0.3), Plane(length=1.0, width=1.0, tilt=0.2)]
@@ -362,9 +351,3 @@ def test_bodies_that_are_far_apart_see_all_of_each_other():
     found = pair(Cylinder(R=1.0), Sphere(R=1.0), 100.0, [power(6)], rtol=1e-6)
     line = 4 * math.pi * 2 * math.pi * 3 * math.pi / 8 / 102.0**5
     assert float(found.energy[0]) == pytest.approx(line, rel=2e-3)
-
-
-@pytest.mark.parametrize(("lower", "upper"), [(Plane(), Plane(turn=0.3)), (Plane(), Cylinder(R=1.0, turn=0.3))])
-def test_bodies_without_end_along_each_other_are_refused(lower, upper):
-    with pytest.raises(InputError, match="both surfaces are endless"):
-        pair(lower, upper, 1.0, [power(6)])

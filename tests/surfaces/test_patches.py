@@ -97,9 +97,8 @@ def test_a_wave_pressed_into_a_plane_bears_what_one_integral_says():
         return math.hypot(1, A * k * math.sin(k * x))
 
     area = 0.5 * 6 * quad(stretch, 0, edge, epsabs=0, epsrel=1e-12)[0]
-    load = (
-        0.5 * 6 * quad(lambda x: (depth - A * (1 - math.cos(k * x))) * stretch(x), 0, edge, epsabs=0, epsrel=1e-12)[0]
-    )
+    pressed = quad(lambda x: (depth - A * (1 - math.cos(k * x))) * stretch(x), 0, edge, epsabs=0, epsrel=1e-12)[0]
+    load = 0.5 * 6 * pressed
     assert -found.force_1[2] == pytest.approx(load, rel=1e-9)
     assert found.area == pytest.approx(area, rel=1e-6)
 
