@@ -100,21 +100,17 @@ class XuNeedleman(TangentialPotential):
         ratio = (1 - self.q) / (self.r - 1)
         constant = (1 - self.r) * ratio - self.q * shear
         linear = ratio - (self.r - self.q) / (self.r - 1) * shear
-        return self.Phi_n * _decaying(g_n / self.g_0, constant, linear)
+        u, falling = g_n / self.g_0, decay(g_n / self.g_0)
+        # Below -EXPONENT_CAP the whole goes on along its tangent.
+        level = constant - linear * EXPONENT_CAP
+        tangent = math.exp(EXPONENT_CAP) * (level + (linear - level) * (u + EXPONENT_CAP))
+        return self.Phi_n * where(u > -EXPONENT_CAP, constant * falling + linear * u * falling, tangent)
 
 
 def _separated(u: Expression) -> Expression:
     """(1 + u) exp(-u), written so that its derivatives do not cancel."""
     falling = decay(u)
     return falling + u * falling
-
-
-def _decaying(u: Expression, constant: Expression, linear: Expression) -> Expression:
-    """(constant + linear * u) exp(-u), continued by its tangent below -EXPONENT_CAP."""
-    bare = decay(u)
-    top, beyond = math.exp(EXPONENT_CAP), u + EXPONENT_CAP
-    level = constant - linear * EXPONENT_CAP
-    return where(u > -EXPONENT_CAP, constant * bare + linear * u * bare, top * (level + (linear - level) * beyond))
 
 
 class AdhesionIntensity(TangentialPotential):

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 from surfacechem.contracts.terms import HeatTransfer, UnderPressure, option, parameter
 from surfacechem.expressions import Expression, power
-from surfacechem.laws.tabulated import ConductanceTable
+from surfacechem.laws.heat import ConductanceTable
 
 
 class PressureConductance(UnderPressure, HeatTransfer):

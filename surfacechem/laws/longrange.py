@@ -118,7 +118,7 @@ class LennardJonesSpherePlane(LennardJones):
         return 2 * math.pi * self.R / self.area * self.stiffness * self.g_0**3 * (near - far)
 
 
-class LennardJonesDerjaguin(LennardJones):
+class LennardJonesDerjaguin(LennardJonesSpherePlane):
     r"""Lennard-Jones type attraction and repulsion between a large sphere and a plane.
 
     .. math::
@@ -135,11 +135,6 @@ class LennardJonesDerjaguin(LennardJones):
     >>> f"{tip.energy(g_n=3e-9):.9g}"
     '-0.0213183455'
     """
-
-    repelling, attracting, strongest = (2520, 7), (-6, 1), 15 ** (-1 / 6)
-
-    R: float = parameter("m", "radius of the sphere", above=0)
-    area: float = parameter("m^2", "reference area", above=0)
 
     def _sum(self, g_n: Expression, *terms: tuple[int, int]) -> Expression:
         return 2 * math.pi * self.R / self.area * self.stiffness * self.g_0**3 * _repelling(g_n / self.g_0, *terms)

@@ -18,11 +18,7 @@ from surfacechem.laws.bulk import Quadratic
 from surfacechem.laws.cohesive import ExponentialCohesiveZone, XuNeedleman
 from surfacechem.laws.friction import Coulomb, Stribeck
 from surfacechem.laws.loading import Hold
-from surfacechem.laws.longrange import (
-    WALL,
-    LennardJonesFlatFlat,
-    VanDerWaalsSpherePlane,
-)
+from surfacechem.laws.longrange import WALL, LennardJonesFlatFlat, VanDerWaalsSpherePlane
 from surfacechem.model.assemble import assemble
 from surfacechem.runs.listing import law_table
 from surfacechem.scene import Body, Interface, Scene
