@@ -44,11 +44,7 @@ gauss = cache(np.polynomial.legendre.leggauss)
 
 
 def increasing_root(
-    function: Callable[[Array], tuple[Array, Array]],
-    target: Array,
-    low: Array,
-    high: Array,
-    start: Array | None = None,
+    function: Callable[[Array], tuple[Array, Array]], target: Array, low: Array, high: Array, start: Array | None = None
 ) -> Array:
     """Arguments at which `function`, which gives value and slope and increases on [low, high], reaches `target`.
 

@@ -63,7 +63,7 @@ class BellConstantForce(BellBond):
     @property
     def half_life(self) -> float:
         """Time [s] in which half of the bonds break; zero below 1e-323 s."""
-        return math.log(2.0) * math.exp(-max(self.log_rate, -700.0))
+        return math.log(2.0) * self.lifetime
 
     def quantities(self, t: Array) -> Quantities:
         broken = np.exp(np.log(t) + self.log_rate)

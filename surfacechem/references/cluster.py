@@ -10,13 +10,7 @@ import numpy as np
 
 from surfacechem.contracts.terms import parameter
 from surfacechem.errors import InputError
-from surfacechem.references._numerics import (
-    Separable,
-    increasing_root,
-    remainder,
-    scaled_expint,
-    short_integral,
-)
+from surfacechem.references._numerics import Separable, increasing_root, remainder, scaled_expint, short_integral
 from surfacechem.references.base import Array, Quantities, read
 from surfacechem.references.bell import BellBond
 

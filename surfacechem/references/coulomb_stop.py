@@ -46,9 +46,4 @@ class CoulombStop(UniformBody):
         v = np.where(t < self.stop_time, self.v_i - self.mu * self.p / self.m * sliding, 0.0)
         slip = sliding * 0.5 * (self.v_i + v)
         heat = self.mu * self.p * slip
-        return {
-            "v": v,
-            "u_t": slip,
-            "heat": heat,
-            "T": self.heated(heat),
-        }
+        return {"v": v, "u_t": slip, "heat": heat, "T": self.heated(heat)}

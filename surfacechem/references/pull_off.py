@@ -13,7 +13,7 @@ from surfacechem.errors import InputError
 from surfacechem.references._bodies import UniformBody
 from surfacechem.references._numerics import gauss, increasing_root
 from surfacechem.references.base import Array, Parameters, Quantities, Reference, SceneView, read
-from surfacechem.references.semenov_fold import scaled_rise
+from surfacechem.references.semenov_fold import log_remainder, scaled_rise
 
 PANEL = 0.25
 """Length of a panel in arsinh of the distance from the fold; the poles of 1 / cosh are pi / 2 away, so that
@@ -72,15 +72,8 @@ class SpringAndZone(Reference):
             raise InputError(f"{self.name}: stable for every displacement; there is no jump.")
         distance = np.array([-math.log(self.severity)])
         low, high = np.sqrt(2.0 * distance), distance + np.sqrt(distance * (distance + 2.0))
-
-        def beyond(v: Array) -> tuple[Array, Array]:
-            """The function v - ln(1 + v), by its series up to 0.1 (the 17th term is 0.1^18 / 18), and its slope."""
-            near = np.minimum(v, 0.1)
-            series = sum((-1) ** n * near**n / n for n in range(2, 18))
-            return np.where(v < 0.1, series, v - np.log1p(v)), v / (1.0 + v)
-
         smaller = float(scaled_rise(np.array([self.severity]))[0])
-        larger = 1.0 + float(increasing_root(beyond, distance, low, high)[0])
+        larger = 1.0 + float(increasing_root(log_remainder, distance, low, high)[0])
         return self._fold(smaller, larger, math.inf), self._fold(larger, -1.0, smaller)
 
     def _fold(self, x: float, low: float, high: float) -> PullOffFold:

@@ -76,11 +76,12 @@ def scaled_rise(severity: Array) -> Array:
         distance = np.abs(np.log1p(severity - 1.0))
         low = np.minimum(2.0 / (1.0 + np.sqrt(1.0 + 2.0 / distance)), almost_one)
     high = np.minimum(np.sqrt(2.0 * distance), almost_one)
-    v = increasing_root(_distance_from_fold, distance, np.minimum(low, high), high)
+    v = increasing_root(lambda v: log_remainder(-v), distance, np.minimum(low, high), high)
     return np.where(v < 0.5, 1.0 - v, severity / math.e * np.exp(1.0 - v))
 
 
-def _distance_from_fold(v: Array) -> tuple[Array, Array]:
-    r""":math:`-v-\ln(1-v)`, by its series where the two would cancel, and its slope."""
-    series = sum(np.minimum(v, SERIES_LIMIT) ** n / n for n in range(2, 18))
-    return np.where(v < SERIES_LIMIT, series, -v - np.log1p(-v)), v / (1.0 - v)
+def log_remainder(x: Array) -> tuple[Array, Array]:
+    r""":math:`x-\ln(1+x)`, by its series where the two would cancel, and the size of its slope."""
+    near = np.clip(x, -SERIES_LIMIT, SERIES_LIMIT)
+    series = sum((-1) ** n * near**n / n for n in range(2, 18))
+    return np.where(np.abs(x) < SERIES_LIMIT, series, x - np.log1p(x)), np.abs(x) / (1.0 + x)

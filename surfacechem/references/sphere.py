@@ -79,16 +79,20 @@ class SphereOnSpring(Reference):
         return {**super().from_scene(scene), **drive, **surface_values(scene, "R", "g_0")}
 
     @abstractmethod
+    def derivative(self, g: Array, order: int) -> Array:
+        """A derivative of the energy [J] over the approach."""
+
     def energy(self, g: Array) -> Array:
         """Energy [J] at an approach."""
+        return self.derivative(g, 0)
 
-    @abstractmethod
     def force(self, g: Array) -> Array:
         """Force [N] at an approach, tension positive: the slope of the energy."""
+        return self.derivative(g, 1)
 
-    @abstractmethod
     def slope(self, g: Array) -> Array:
         """Slope of the force [N/m]."""
+        return self.derivative(g, 2)
 
     @property
     def end_time(self) -> float:
@@ -186,8 +190,7 @@ class AttractingSphereOnSpring(SphereOnSpring):
         """Well within the repulsion [m]."""
         return SHALLOW * self.g_0
 
-    def _sum(self, g: Array, order: int) -> Array:
-        """A derivative of the energy over the approach."""
+    def derivative(self, g: Array, order: int) -> Array:
         whole = np.zeros_like(g)
         for m, a in POWERS.items():
             # In units of the range, so that no power is out of the range of numbers.
@@ -196,15 +199,6 @@ class AttractingSphereOnSpring(SphereOnSpring):
             whole += a * factor * (near ** (3 - m - order) - far ** (3 - m - order))
         size = 4 * math.pi**2 * self.R * self.n_1 * self.n_2 * self.psi_0
         return np.asarray(size * self.g_0 ** (3 - order) * whole)
-
-    def energy(self, g: Array) -> Array:
-        return self._sum(g, 0)
-
-    def force(self, g: Array) -> Array:
-        return self._sum(g, 1)
-
-    def slope(self, g: Array) -> Array:
-        return self._sum(g, 2)
 
 
 class CohesiveSphereOnSpring(SphereOnSpring):
@@ -251,14 +245,8 @@ class CohesiveSphereOnSpring(SphereOnSpring):
         }
         return np.asarray(depth * self.g_0**-order * zone + contact[order])
 
-    def energy(self, g: Array) -> Array:
-        return 2 * math.pi * self.R * (self.flats(g + 2 * self.R, -1) - self.flats(g, -1))
-
-    def force(self, g: Array) -> Array:
-        return 2 * math.pi * self.R * (self.flats(g + 2 * self.R, 0) - self.flats(g, 0))
-
-    def slope(self, g: Array) -> Array:
-        return 2 * math.pi * self.R * (self.flats(g + 2 * self.R, 1) - self.flats(g, 1))
+    def derivative(self, g: Array, order: int) -> Array:
+        return 2 * math.pi * self.R * (self.flats(g + 2 * self.R, order - 1) - self.flats(g, order - 1))
 
 
 class AttractingSphereInCavity(Reference):

@@ -119,10 +119,7 @@ def test_an_exact_solution_is_added_by_its_file_alone(added):
     ("change", "reason"),
     [
         ("bodies.body.capacity=quadratic", "it misses the equation of T_1 by"),
-        (
-            "heat=[radiation: {between: [body, reservoir], epsilon_1: 0.9}]",
-            "it needs h (conductance",
-        ),
+        ("heat=[radiation: {between: [body, reservoir], epsilon_1: 0.9}]", "it needs h (conductance"),
         ("reference={name: newton-cooling, h: 44}", "it is given for h = 44 W/(m^2 K); the scene has 40 W/(m^2 K)."),
     ],
 )
