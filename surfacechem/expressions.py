@@ -177,18 +177,11 @@ def magnitude(expression: Expression, sizes: Mapping[Any, Expression] | None = N
                 sides.insert(0, sides[0] + sides[1])
                 conditions.insert(0, symengine.Le(symengine.Abs(apart), NOISE * bound(apart)))
             return symengine.Piecewise(*zip(sides, conditions, strict=True))
-        if e.is_Add:
-            return symengine.Add(*map(bound, e.args))
-        if e.is_Mul:  # each factor errs while the others stand
-            others = [symengine.Mul(*e.args[:i], *e.args[i + 1 :]) for i in range(len(e.args))]
-            return symengine.Add(*(bound(a) * symengine.Abs(rest) for a, rest in zip(e.args, others, strict=True)))
-        found = symengine.Abs(e)
-        for i, a in enumerate(e.args):
-            if a.free_symbols:  # |f'(a)| M(a), and |f| for the rounding of f itself
-                slot = symengine.Dummy()
-                slope = e.func(*e.args[:i], slot, *e.args[i + 1 :]).diff(slot).subs({slot: a})
-                found += symengine.Abs(slope) * bound(a)
-        return found
+        if e.is_Add or e.is_Mul:  # each term or factor errs while the others stand
+            return symengine.Add(*(symengine.Abs(_partial(e, i)) * bound(a) for i, a in enumerate(e.args)))
+        # |f'(a)| M(a), and |f| for the rounding of f itself
+        errors = (symengine.Abs(_partial(e, i)) * bound(a) for i, a in enumerate(e.args) if a.free_symbols)
+        return symengine.Add(symengine.Abs(e), *errors)
 
     return bound(symengine.sympify(expression))
 
