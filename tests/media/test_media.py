@@ -30,11 +30,7 @@ from surfacechem.solve.run import Model, Run
 pytestmark = pytest.mark.around
 
 BOUND = 1e-8
-FLUIDS = [
-    ("Air", 1e5, 250.0, 600.0),
-    ("Water", 1e6, 280.0, 440.0),
-    ("INCOMP::MEG-50%", 1e5, 260.0, 360.0),
-]
+FLUIDS = [("Air", 1e5, 250.0, 600.0), ("Water", 1e6, 280.0, 440.0), ("INCOMP::MEG-50%", 1e5, 260.0, 360.0)]
 
 
 def medium(fluid="Water", p=1e5, thickness=2e-6) -> Medium:
@@ -57,6 +53,14 @@ def solved(scene: Scene, *times: float, **changes: float):
 # -- fits -------------------------------------------------------------------------------------------------------------
 
 
+def off(fluid, quantity, T, *asked):
+    """Largest relative error of a fit at some temperatures."""
+    pieces = fluid.fit(quantity, *asked)
+    index = np.searchsorted([piece.high for piece in pieces], T)
+    values = np.array([pieces[i](t) for i, t in zip(index, T, strict=True)])
+    return np.max(np.abs(values / fluid.values(quantity, T) - 1))
+
+
 @pytest.mark.parametrize(("name", "p", "low", "high"), FLUIDS, ids=[row[0] for row in FLUIDS])
 def test_fits_are_within_their_bound(name, p, low, high):
     fluid = CoolPropFluid(name, p)
@@ -64,11 +68,8 @@ def test_fits_are_within_their_bound(name, p, low, high):
     for quantity in COMBINED:
         if name.startswith("INCOMP") and quantity == "gamma_m":
             continue
-        pieces = fluid.fit(quantity, low, high)
-        assert [pieces[0].low, *(piece.high for piece in pieces)][-1] == high
-        index = np.searchsorted([piece.high for piece in pieces], T)
-        values = np.array([pieces[i](t) for i, t in zip(index, T, strict=True)])
-        assert np.max(np.abs(values / fluid.values(quantity, T) - 1)) < BOUND, quantity
+        assert fluid.fit(quantity, low, high)[-1].high == high
+        assert off(fluid, quantity, T, low, high) < BOUND, quantity
 
 
 def test_kinks_and_jumps_lie_between_pieces():
@@ -95,11 +96,8 @@ def test_beside_a_critical_pressure_a_message_says_what_to_do():
 def test_near_a_critical_point_a_fit_is_as_close_as_it_says():
     """CoolProp's heat capacity of carbon dioxide at 80 bar is not smooth at 306.64 K, where it is largest."""
     fluid = CoolPropFluid("CO2", 8e6)
-    pieces = fluid.fit("cp_m", 306.5, 306.8, fits.ROUGH)
     T = np.random.default_rng(7).uniform(306.5, 306.8, 400)
-    index = np.searchsorted([piece.high for piece in pieces], T)
-    values = np.array([pieces[i](t) for i, t in zip(index, T, strict=True)])
-    assert np.max(np.abs(values / fluid.values("cp_m", T) - 1)) < 2 * fits.ROUGH
+    assert off(fluid, "cp_m", T, 306.5, 306.8, fits.ROUGH) < 2 * fits.ROUGH
 
 
 @dataclasses.dataclass(frozen=True)
@@ -366,10 +364,9 @@ def test_a_gas_film_in_contact_keeps_the_thickness_of_the_voids():
 
 def test_a_run_that_reaches_the_pole_of_a_viscosity_stops():
     found = Medium(None, {"eta_m": Vogel(a=6e-5, b=90.0, c=165.0), "k_m": 0.1}, 2e-6)
-    scene = lubricated(found, T=170.0, capacity=False)
-    scene = dataclasses.replace(scene, loading={**scene.loading, "Q_1": Hold(level=-2e3), "Q_2": Hold(level=-2e3)})
-    scene = dataclasses.replace(scene, loading={**scene.loading, "v": Hold(level=0.0)})
-    trajectory = solved(scene, 0.0, 10.0)
+    scene = lubricated(found, v=0.0, T=170.0, capacity=False)
+    cooled = {"Q_1": Hold(level=-2e3), "Q_2": Hold(level=-2e3)}
+    trajectory = solved(dataclasses.replace(scene, loading={**scene.loading, **cooled}), 0.0, 10.0)
     assert trajectory.status == "stopped"
     assert "T_c left the range of the law vogel" in trajectory.reason
 
