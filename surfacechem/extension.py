@@ -64,11 +64,8 @@ class Surroundings(cantera.ExtensibleRateData):
     def update(self, surface: Any) -> bool:
         """Take over the state; always, since a force can change at constant temperature."""
         self.T, self._coverages = surface.T, None
-        if self.surface is None or self.surface() is not surface:
-            self._meet(surface)
-        return True
-
-    def _meet(self, surface: Any) -> None:
+        if self.surface is not None and self.surface() is surface:
+            return True
         if not self.names:
             self.names = [surface.species(k).name for k in range(surface.n_species)]
         # Only what takes attributes can be referred to weakly; a strong reference would keep the surface alive.
@@ -76,6 +73,7 @@ class Surroundings(cantera.ExtensibleRateData):
         self.loads = getattr(surface, "__dict__", {})
         if self.surface is None:
             self._coverages = self._of(surface)
+        return True
 
     @property
     def coverages(self) -> dict[str, float]:
@@ -222,21 +220,16 @@ class LoadedRate(cantera.ExtensibleRate):
             arguments[i] = load if isinstance(load, float) else self._read_from(data, name)
         evaluate()
         found: float = value[0]
-        if found > TOP:
-            self._tell_of_cap(found, data.T)
-        return found
-
-    def _tell_of_cap(self, found: float, T: float) -> None:
-        assert self.bound is not None
-        largest = max(self.bound.A * T**self.bound.b, 1.0) * TOP
-        if not self.capped and found > largest:
+        law = self.bound
+        if found > TOP and law is not None and found > max(law.A * data.T**law.b, 1.0) * TOP and not self.capped:
             self.capped = True
             warnings.warn(
-                f"reaction {self.bound.equation}: the logarithm of its rate of type {self.kind} is above "
+                f"reaction {law.equation}: the logarithm of its rate of type {self.kind} is above "
                 f"{EXPONENT_CAP:g}; beyond that the rate goes on along its tangent.",
                 RuntimeWarning,
-                stacklevel=3,
+                stacklevel=2,
             )
+        return found
 
     def _read_from(self, data: Surroundings, name: str) -> float:
         """A coverage or a load, which may be given by species."""
