@@ -74,7 +74,7 @@ def _fields(surface: CurvedSurfaces, approaches: Array, stretches: Array) -> Seq
     """Gap and traction over points of body 1, which gather where body 2 is nearest."""
     from surfacechem.surfaces.pairwise import length
     from surfacechem.surfaces.patches import Budget, outer_patches
-    from surfacechem.surfaces.projection import FIRST, POLE
+    from surfacechem.surfaces.projection import FIRST
 
     lower, upper = surface.surfaces(float(approaches.min()))
     size = length(lower, upper)
@@ -82,9 +82,7 @@ def _fields(surface: CurvedSurfaces, approaches: Array, stretches: Array) -> Seq
     lower = patches.surface
     counts = [ALONG, AROUND] if patches.alike[1] else [ACROSS, ACROSS]
     at = np.stack(np.meshgrid(*map(patches.line, (0, 1), counts), indexing="ij"), axis=-1)
-    if lower.shape.about_axis and lower.shape.span[0][0] == 0:
-        at = np.maximum(at, [POLE, -np.inf])
-    D = lower.derivatives(at, FIRST)
+    D = lower.derivatives(lower.off_pole(at), FIRST)
     x, normals = D[0], lower.normals(D)
     near = [replace(upper, approach=d).nearest(x) for d in approaches.tolist()]
     gap, opposite = np.array([one.gap for one in near]), np.array([one.point for one in near])

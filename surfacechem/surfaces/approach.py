@@ -157,7 +157,10 @@ def fitted(
     sample, inside = Sampled(samples, budget or Budget(rtol)), [cut for cut in cuts if low < cut < high]
     sample.budget.integrals = (1 + len(inside)) * FEWEST + 1
     first = sample(low)  # what has no force there is refused before anything else is computed
-    powers = low > 0 and not inside and one_sign([sample(d)[0] for d in (low, math.sqrt(low * high), high)], floor[0])
+    powers = low > 0 and not inside
+    if powers:  # and its energies all above or all below zero, and more than nothing
+        energies = [sample(d)[0] for d in (low, math.sqrt(low * high), high)]
+        powers = min(energies) > floor[0] or max(energies) < -floor[0]
     least = 0.0 if powers else floor[1]
     # What pieces miss of a slope of ln E adds up along them: then they are made once more, closer.
     for aim in (rtol, rtol / CLOSER):
@@ -183,11 +186,6 @@ def missed(curve: ApproachEnergy, at: Mapping[float, tuple[float, float, float]]
         off = np.abs([curve.factor * piece.force(d) for d in inside] - forces) / units
         worst = max(worst, float(off.max()) / size_of(forces / units, least))
     return worst
-
-
-def one_sign(energies: Sequence[float], floor: float) -> bool:
-    """Whether energies are all above or all below zero, and more than nothing."""
-    return min(energies) > floor or max(energies) < -floor
 
 
 def divided(

@@ -5,7 +5,7 @@ else on nodes that gather around that.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -17,7 +17,7 @@ from surfacechem.expressions import Expression
 from surfacechem.surfaces.nodes import Extent, Kernel, Sums, divided, gauss, is_round, order_of, tensor_grid
 from surfacechem.surfaces.projection import Array, Projection, Surface
 from surfacechem.surfaces.rays import ray_grid
-from surfacechem.surfaces.shapes import Plane
+from surfacechem.surfaces.shapes import Sphere
 from surfacechem.tolerances import NEGLIGIBLE, TINY
 
 LEFT_OUT = 0.01
@@ -39,24 +39,6 @@ a tenth of the accuracy of the smaller; and how many of the gaps tell what it is
 
 FEW = 56
 """Points up to which sums are made one by one where no table is good enough or used again: twice what that takes."""
-
-
-@dataclass(frozen=True)
-class Circles:
-    """Circles around the feet on a plane, a sphere or a cavity: their distances from points at the gaps (n,), how far
-    they lie below the feet, and their areas, each (n, k).
-    """
-
-    gap: Array
-    r: Array
-    down: Array
-    area: Array
-
-    def profile(self, law: Callable[[Array], Array]) -> Array:
-        """Sums (n, 2) over the circles: energy and force along the normal; what points across that cancels."""
-        psi, slope = np.moveaxis(law(self.r), -1, 0)
-        push = -slope * self.area / self.r * (self.gap[:, None] + self.down)
-        return np.stack([(psi * self.area).sum(-1), push.sum(-1)], axis=-1)
 
 
 @lru_cache(maxsize=64)
@@ -150,8 +132,37 @@ class RoundSums:
 
     def at(self, gaps: Array) -> tuple[Array, int]:
         """The sums, and the number of pairs of points that they take."""
-        circles = _around(self.shape, gaps, self.farther, self.extent, self.level)
-        return np.concatenate([circles.profile(kernel(law)) for law in self.laws], axis=-1), circles.area.size
+        r, height, area = self._circles(gaps)
+        sums = []
+        for law in self.laws:
+            psi, slope = np.moveaxis(kernel(law)(r), -1, 0)
+            # Energy, and force along the normal; what points across that cancels.
+            sums += [(psi * area).sum(-1), (-slope * area / r * height).sum(-1)]
+        return np.stack(sums, axis=-1), area.size
+
+    def _circles(self, gap: Array) -> tuple[Array, Array, Array]:
+        """Circles around the feet: their distances from the points, how far they lie below them, and their areas, each
+        (n, k).
+        """
+        bent = self.shape.bulge / self.shape.R if isinstance(self.shape, Sphere) else 0.0
+        last = math.pi / abs(bent) if bent else math.inf
+        ends = [np.zeros_like(gap)]
+        for bend in self.extent.bends:
+            # The circle at which the distance is that of a bend, from the law of cosines.
+            chord = np.sqrt(np.maximum(bend - gap, 0.0) * (bend + gap) / np.maximum(1 + bent * gap, TINY))
+            ends.append(2 / abs(bent) * np.arcsin(np.minimum(chord * abs(bent) / 2, 1)) if bent else chord)
+        if math.isinf(self.extent.cutoff):
+            ends.append(np.minimum(gap * self.farther, last))
+        out = np.arcsinh(np.stack(ends[::-1], axis=1) / gap[:, None])
+        t, w = gauss(divided(np.minimum.accumulate(out, axis=1)[:, ::-1], self.level), order_of(self.level))
+        gap = gap[:, None]
+        s = gap * np.sinh(t)
+        ds = w * np.hypot(gap, s)
+        chord = 2 * np.sin(bent * s / 2) / bent if bent else s
+        radius = np.sin(bent * s) / bent if bent else s
+        # The law of cosines for a chord, which does not cancel next to the foot.
+        r = np.sqrt(gap**2 + (1 + bent * gap) * chord**2)
+        return r, gap + bent * chord**2 / 2, 2 * math.pi * np.abs(radius) * ds
 
 
 @lru_cache(maxsize=4096)
@@ -207,29 +218,3 @@ def tabulated(profile: RoundSums, gaps: Array) -> tuple[Array, int]:
     for which, values in parts:
         found[which] = values
     return found, pairs
-
-
-def _around(shape: Shape, gap: Array, farther: float, extent: Extent, level: int) -> Circles:
-    """Circles around the feet on a plane, a sphere or a cavity of points at gaps (n,), up to where laws end or, where
-    they do not, so many times ``farther`` than the gap.
-    """
-    bent = 0.0 if isinstance(shape, Plane) else getattr(shape, "bulge") / getattr(shape, "R")  # noqa: B009
-    last = math.pi / abs(bent) if bent else math.inf
-    ends = [np.zeros_like(gap)]
-    for bend in extent.bends:
-        # The circle at which the distance is that of a bend, from the law of cosines.
-        chord = np.sqrt(np.maximum(bend - gap, 0.0) * (bend + gap) / np.maximum(1 + bent * gap, TINY))
-        ends.append(2 / abs(bent) * np.arcsin(np.minimum(chord * abs(bent) / 2, 1)) if bent else chord)
-    if math.isinf(extent.cutoff):
-        ends.append(np.minimum(gap * farther, last))
-    edges = divided(
-        np.minimum.accumulate(np.arcsinh(np.stack(ends[::-1], axis=1) / gap[:, None]), axis=1)[:, ::-1], level
-    )
-    t, w = gauss(edges, order_of(level))
-    s = gap[:, None] * np.sinh(t)
-    ds = w * np.hypot(gap[:, None], s)
-    chord = 2 * np.sin(bent * s / 2) / bent if bent else s
-    out = np.sin(bent * s) / bent if bent else s
-    # The law of cosines for a chord, which does not cancel next to the foot.
-    r = np.sqrt(gap[:, None] ** 2 + (1 + bent * gap[:, None]) * chord**2)
-    return Circles(gap, r, bent * chord**2 / 2, 2 * math.pi * np.abs(out) * ds)

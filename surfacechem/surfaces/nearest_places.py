@@ -92,9 +92,7 @@ def near_places(
     gaps = _near_grid(lambda nodes: gap(parameters(nodes)), steps, halvings, extents, wide)
     chosen = _lowest(gaps, outer.shape.closed, NOISE * size)
     chosen = chosen[gaps[tuple(chosen.T)] <= gaps.min() + wide]
-    poles = (
-        chosen[:, 0] == 0 if outer.shape.about_axis and low[0] == 0 and not alike[1] else np.zeros(len(chosen), bool)
-    )
+    poles = (chosen[:, 0] == 0) & (outer.shape.about_axis and low[0] == 0 and not alike[1])
     if poles.any():
         # At a pole no direction leads anywhere: the search begins beside it, where the gap is least.
         chosen, poles = np.concatenate([chosen, [[1, int(np.argmin(gaps[1]))]]]), np.append(poles, False)

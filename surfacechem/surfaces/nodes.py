@@ -82,9 +82,8 @@ class Extent:
     def levels(self, shape: Shape) -> list[float]:
         """Gaps to a shape [m] at which sums over it bend: there its nearest or its farthest point is at a bend."""
         found = set(self.bends)
-        if is_round(shape) and not isinstance(shape, Plane):
-            bulge, R = getattr(shape, "bulge"), getattr(shape, "R")  # noqa: B009
-            found |= {bulge * (bend - 2 * R) for bend in self.bends}
+        if isinstance(shape, Sphere) and is_round(shape):
+            found |= {shape.bulge * (bend - 2 * shape.R) for bend in self.bends}
         return sorted(gap for gap in found if gap > 0)
 
 

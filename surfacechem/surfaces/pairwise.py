@@ -64,11 +64,7 @@ class PairForces:
 
 
 def interaction(
-    lower: Surface,
-    upper: Surface,
-    laws: Sequence[PairEnergy],
-    rtol: float = PRECISE,
-    budget: Budget | None = None,
+    lower: Surface, upper: Surface, laws: Sequence[PairEnergy], rtol: float = PRECISE, budget: Budget | None = None
 ) -> PairForces:
     """The double integrals of some laws over two surfaces; InputError where an accuracy is out of reach, or takes more
     than a ``budget`` that is that of other integrals, too.

@@ -194,7 +194,9 @@ class CurvedSurfaces(Potential):
         self._refuse_jumps()
         if self.heat_laws:
             # A conductance that has no end is refused before any force is integrated.
-            self.at_approach(self.approach[0], self._conducts)
+            with self.at_approach(self.approach[0]):
+                heat = [density(law) for law in self.heat_laws]
+                over_gap(*self.surfaces(self.approach[0]), [], bends(self.heat_laws), heat, NEGLIGIBLE)
         # Errors of the samples must not look like what a polynomial misses.
         rtol, finer = self.accuracy, max(self.accuracy / 64, ROUNDING)
 
@@ -203,7 +205,8 @@ class CurvedSurfaces(Potential):
 
         def of_pairs(k: int, d: float) -> tuple[float, float, float]:
             if d not in met:
-                met[d] = self.at_approach(d, lambda: interaction(*self.surfaces(d), parts, finer, budget))
+                with self.at_approach(d):
+                    met[d] = interaction(*self.surfaces(d), parts, finer, budget)
             return float(met[d].energy[k]), float(met[d].force_1[k, 2]), met[d].error
 
         ends = passages(*self.surfaces(0.0), sorted({law.cutoff for law in parts if math.isfinite(law.cutoff)}))
@@ -216,8 +219,8 @@ class CurvedSurfaces(Potential):
 
         @cache
         def of_gap(d: float) -> tuple[float, float, float]:
-            pair = self.surfaces(d)
-            contact = self.at_approach(d, lambda: over_gap(*pair, laws, levels, (), finer, floor, spent))
+            with self.at_approach(d):
+                contact = over_gap(*self.surfaces(d), laws, levels, (), finer, floor, spent)
             return contact.energy, float(contact.force_1[2]), contact.error
 
         # Where bodies just touch, or a law has faded, the force is that of rounding; what counts is that in the range.
@@ -225,11 +228,6 @@ class CurvedSurfaces(Potential):
             energy, force, _ = of_gap(d)
             floor = max(floor[0], NEGLIGIBLE * abs(energy)), max(floor[1], NEGLIGIBLE * abs(force))
         return [*found, fitted(of_gap, *self.approach, rtol, cuts, floor, spent)]
-
-    def _conducts(self) -> Contact:
-        """What the conductances give at the least approach, by and large."""
-        heat = [density(law) for law in self.heat_laws]
-        return over_gap(*self.surfaces(self.approach[0]), [], bends(self.heat_laws), heat, NEGLIGIBLE)
 
     def _refuse_jumps(self) -> None:
         """InputError where the energy of a law jumps, so that no force is its slope."""
@@ -245,10 +243,11 @@ class CurvedSurfaces(Potential):
                 text = f"the energy of {law.name()} jumps at {name} = {at:.6g} m, where it has no force"
                 raise InputError(f"{text}; let it change over a length.", law.place)
 
-    def at_approach(self, d: float, compute: Callable[[], Any]) -> Any:
-        """What is computed at an approach, which messages name."""
+    @contextmanager
+    def at_approach(self, d: float) -> Iterator[None]:
+        """Messages name the approach at which something is computed."""
         try:
-            return compute()
+            yield
         except InputError as error:
             raise InputError(f"at the approach g_n = {d:.4g} m {error.message}", self.place) from None
 
@@ -394,7 +393,8 @@ class CurvedConductance(HeatTransfer):
 
         def sample(d: float) -> tuple[float, float, float]:
             finer = max(pair.accuracy / 64, ROUNDING)
-            found = pair.at_approach(d, lambda: over_gap(*pair.surfaces(d), [], levels, [law], finer, budget=budget))
+            with pair.at_approach(d):
+                found = over_gap(*pair.surfaces(d), [], levels, [law], finer, budget=budget)
             return found.conductance, found.conductance_slope, found.error
 
         def integrated() -> list[Any]:

@@ -65,11 +65,7 @@ def tilted_plates(degree):
 def main():
     """Write what two numbers of points agree on."""
     found = {}
-    for form, counts in (
-        (parallel_cylinders, (400, 480)),
-        (crossed_cylinders, (150, 200)),
-        (tilted_plates, (5, 6)),
-    ):
+    for form, counts in ((parallel_cylinders, (400, 480)), (crossed_cylinders, (150, 200)), (tilted_plates, (5, 6))):
         few, many = (form(n) for n in counts)
         assert abs(few / many - 1) < mpf(10) ** -DIGITS, form
         found[form.__name__] = mpmath.nstr(many, DIGITS, strip_zeros=False)

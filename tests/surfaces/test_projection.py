@@ -49,9 +49,7 @@ BEYOND = [
     (Paraboloid(R=1.0, radius=0.5), [0.9, 0.4, 0.3]),
 ]
 every_surface = pytest.mark.parametrize(
-    "surface",
-    SURFACES,
-    ids=lambda item: f"{item.shape.name()} {'above' if item.upper else 'below'}",
+    "surface", SURFACES, ids=lambda item: f"{item.shape.name()} {'above' if item.upper else 'below'}"
 )
 
 
