@@ -192,9 +192,9 @@ class Surface:
         size = np.linalg.norm(away, axis=-1)
         side = _dot(away, normal)
         # Behind an edge and beyond it is beside the body, not in it.
-        beyond, at_edge = self._beyond(at, away, D[1:3]), self._at_edge(at) & (size > 0)
+        beyond, at_edge = self._beyond(at, away, D[1:3])
         gap = np.where((side < 0) & ~np.any(beyond > 0, axis=-1), -size, size)
-        off = at_edge[..., None]
+        off = (at_edge & (size > 0))[..., None]
         direction = np.where(off, np.divide(away, gap[..., None], out=np.zeros_like(away), where=off), normal)
         return Projection(self, at, D[0], normal, direction, gap, beyond, rivals)
 
@@ -224,20 +224,16 @@ class Surface:
                     found.append((k, side, end))
         return found
 
-    def _beyond(self, at: Array, away: Array, tangents: Array) -> Array:
-        """How far points that are ``away`` from their feet are beyond each edge [m], (..., edges)."""
-        found = np.empty((*at.shape[:-1], len(self.edges)))
+    def _beyond(self, at: Array, away: Array, tangents: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """How far points that are ``away`` from their feet are beyond each edge [m], (..., edges), and whether the feet
+        are at an edge or a tip.
+        """
+        found, at_edge = np.empty((*at.shape[:-1], len(self.edges))), np.zeros(at.shape[:-1], dtype=bool)
         for j, (k, side, end) in enumerate(self.edges):
             left, size = side * (end - at[..., k]), np.linalg.norm(tangents[k], axis=-1)
             found[..., j] = np.where(left > POLE, -left * size, side * _dot(away, tangents[k]) / size)
-        return found
-
-    def _at_edge(self, at: Array) -> NDArray[np.bool_]:
-        """Whether parameters are those of an edge or a tip."""
-        found = np.zeros(at.shape[:-1], dtype=bool)
-        for k, side, end in self.edges:
-            found |= side * (end - at[..., k]) <= (POLE if self.shape.about_axis and side < 0 else 0.0)
-        return found
+            at_edge |= left <= (POLE if self.shape.about_axis and side < 0 else 0.0)
+        return found, at_edge
 
     def _search(self, places: Array, starts: Array) -> Array:
         """Parameters (n, 2) of nearest points of some (n, 3) by Newton's method; a step that does not come nearer is
