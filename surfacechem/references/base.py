@@ -31,7 +31,8 @@ Quantities: TypeAlias = Mapping[str, Array | float]
 
 
 def read(**readings: str) -> dict[str, tuple[str, str]]:
-    """How parameters are read off a scene: by which reading of the :class:`SceneView`, and what it is called there.
+    """How parameters are read off a scene: by which reading of the :class:`SceneView`, and what it is called there,
+    with a minus sign before that where its sign is the other one.
 
     >>> read(friction="mu", initial="p phi_i=phi", temperature="T_i")["phi_i"]
     ('initial', 'phi')

@@ -6,7 +6,7 @@ import numpy as np
 
 from surfacechem.contracts.terms import parameter
 from surfacechem.references._bodies import UniformBody
-from surfacechem.references.base import Array, Parameters, Quantities, SceneView
+from surfacechem.references.base import Array, Quantities, read
 
 
 class CoolingToZero(UniformBody):
@@ -25,9 +25,7 @@ class CoolingToZero(UniformBody):
 
     Q: float = parameter("W/m^2", "heat extracted", above=0)
 
-    @classmethod
-    def from_scene(cls, scene: SceneView) -> Parameters:
-        return {**super().from_scene(scene), "Q": -scene.heat_supply}
+    told = read(heat_supply="Q=-Q")
 
     @property
     def end_time(self) -> float:

@@ -7,7 +7,7 @@ import numpy as np
 from surfacechem.contracts.terms import parameter
 from surfacechem.references._bodies import FrictionallyHeated, UniformBody
 from surfacechem.references._numerics import first_difference, increasing_root, second_difference
-from surfacechem.references.base import Array, Parameters, Quantities, SceneView, read
+from surfacechem.references.base import Array, Quantities, read
 
 
 class ThinningFilm(FrictionallyHeated):
@@ -70,11 +70,7 @@ class ClosingFilm(UniformBody):
     g_i: float = parameter("m", "initial gap", above=0)
     a: float = parameter("m/s", "closing speed", above=0)
 
-    @classmethod
-    def from_scene(cls, scene: SceneView) -> Parameters:
-        opening = scene.ramp("g_n")
-        film = {"eta": scene.friction("eta"), "v": scene.initial("v"), "g_i": scene.initial("g_n")}
-        return {**film, "a": None if opening is None else -opening, **super().from_scene(scene)}
+    told = read(friction="eta", initial="v g_i=g_n", ramp="a=-g_n")
 
     @property
     def end_time(self) -> float:

@@ -8,10 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from surfacechem.errors import InputError
+
 if TYPE_CHECKING:
     from surfacechem.contracts.terms import Law
     from surfacechem.scene import Scene
     from surfacechem.solve.run import Trajectory
+    from surfacechem.surfaces.potential import CurvedSurfaces
 
 
 class SceneView:
@@ -32,10 +35,10 @@ class SceneView:
         return dict(zip(self._system.output_columns, self.run.outputs[0].tolist(), strict=True))
 
     def read(self, reading: str, name: str) -> float | None:
-        """What one of the readings below tells, of a name if it asks for one."""
+        """What one of the readings below tells, of a name if it asks for one; a minus sign before it turns the sign."""
         found = getattr(self, reading)
-        told: float | None = found(name) if callable(found) else found
-        return told
+        told: float | None = found(name.removeprefix("-")) if callable(found) else found
+        return -told if told is not None and name.startswith("-") else told
 
     # -- laws, loads, supports -----------------------------------------------------------------------------------------
 
@@ -62,6 +65,23 @@ class SceneView:
             paths += [law.path, *(factor.path for factor in law.factors)]
         found = [self.run.values[f"{path}.{name}"] for path in paths if f"{path}.{name}" in self.run.values]
         return found[0] if len(found) == 1 else None
+
+    def surface(self, name: str) -> float | None:
+        """A parameter of the shapes of two bodies, or of a law between them."""
+        laws: list[Law] = [*self.surfaces.shapes, *self.surfaces.gap_laws]
+        found = {own: getattr(law, own) for law in laws for own, _ in law.specs()}
+        # Those of pairs of points may have been changed for this run alone.
+        found |= {path.rpartition(".")[2]: x for path, x in self.run.values.items() if path.startswith("surface.pair.")}
+        return found.get(name)
+
+    @property
+    def surfaces(self) -> CurvedSurfaces:
+        """The two surfaces; InputError where the scene has none."""
+        from surfacechem.surfaces.potential import CurvedSurfaces
+
+        if not isinstance(self.scene.surface, CurvedSurfaces):
+            raise InputError("it needs two bodies with shapes; the scene has no `surface`.")
+        return self.scene.surface
 
     def ramp(self, name: str) -> float | None:
         """The constant rate at which a variable is driven, in its unit per second."""

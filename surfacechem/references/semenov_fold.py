@@ -9,7 +9,7 @@ import numpy as np
 from surfacechem.contracts.terms import parameter
 from surfacechem.errors import InputError
 from surfacechem.references._numerics import increasing_root
-from surfacechem.references.base import Array, Parameters, Quantities, Reference, SceneView, read
+from surfacechem.references.base import Array, Quantities, Reference, read
 
 SERIES_LIMIT = 0.1
 """Up to here a series of 16 terms is exact: the next is 0.1^18 / 18 against 0.1^2 / 2."""
@@ -39,14 +39,8 @@ class SemenovFold(Reference):
     H: float = parameter("W/(m^2 K)", "sum of the conductances to the bodies", above=0)
     D_0: float = parameter("W/m^2", "dissipation at T_0", at_least=0)
 
-    told = read(constant="T_0", total_conductance="H", heating_at_T_0="D_0", friction="beta")
-
-    @classmethod
-    def from_scene(cls, scene: SceneView) -> Parameters:
-        told = dict(super().from_scene(scene))
-        if (decay := told["beta"]) is not None:  # per kelvin, of the factor of a law; here what grows is counted
-            told["beta"] = -decay
-        return told
+    # The factor of a law has what decays per kelvin; here what grows is counted.
+    told = read(constant="T_0", total_conductance="H", heating_at_T_0="D_0", friction="beta=-beta")
 
     def __post_init__(self) -> None:
         """Refuse what has ignited."""

@@ -6,17 +6,13 @@ import math
 from abc import abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from surfacechem.contracts.terms import Law, parameter
+from surfacechem.contracts.terms import parameter
 from surfacechem.errors import InputError
 from surfacechem.references._numerics import increasing_root
 from surfacechem.references.base import Array, Parameters, Quantities, Reference, SceneView, read
-
-if TYPE_CHECKING:
-    from surfacechem.surfaces.potential import CurvedSurfaces
 
 PLACES = 4001
 """Approaches among which the steepest attraction is looked for before it is found to rounding."""
@@ -26,24 +22,6 @@ SHALLOW, DEEP = 1e-2, 1e3
 
 POWERS = {10: 1 / 45, 4: -1 / 3}
 """Powers of a pair energy of Lennard-Jones type, eq. e:psi12ex."""
-
-
-def pair_of(scene: SceneView) -> CurvedSurfaces:
-    """The two surfaces of a scene."""
-    from surfacechem.surfaces.potential import CurvedSurfaces
-
-    if not isinstance(scene.scene.surface, CurvedSurfaces):
-        raise InputError("it needs two bodies with shapes; the scene has no `surface`.")
-    return scene.scene.surface
-
-
-def surface_values(scene: SceneView, *names: str) -> dict[str, float | None]:
-    """Parameters of the shapes and laws of a scene with surfaces by name; None where none of them has it."""
-    laws: list[Law] = [*pair_of(scene).shapes, *pair_of(scene).gap_laws]
-    found = {name: getattr(law, name) for law in laws for name, _ in law.specs()}
-    # Those of pairs of points may have been changed for this run alone.
-    found |= {path.rpartition(".")[2]: x for path, x in scene.run.values.items() if path.startswith("surface.pair.")}
-    return {name: found.get(name) for name in names}
 
 
 @dataclass(frozen=True)
@@ -66,7 +44,7 @@ class SphereOnSpring(Reference):
     w_turn: float = parameter("m", "displacement at which it turns")
     speed: float = parameter("m/s", "speed both ways", above=0)
 
-    told = read(normal="k")
+    told = read(normal="k", surface="R g_0")
 
     @classmethod
     def from_scene(cls, scene: SceneView) -> Parameters:
@@ -76,7 +54,7 @@ class SphereOnSpring(Reference):
             raise InputError("it needs a table of `w_n` that goes to one displacement and back at one speed.")
         speed = (values[0] - values[1]) / times[1]
         drive = {"w_i": values[0], "w_turn": values[1], "speed": speed}
-        return {**super().from_scene(scene), **drive, **surface_values(scene, "R", "g_0")}
+        return {**super().from_scene(scene), **drive}
 
     @abstractmethod
     def derivative(self, g: Array, order: int) -> Array:
@@ -181,9 +159,7 @@ class AttractingSphereOnSpring(SphereOnSpring):
     n_2: float = parameter("1/m^2", "density of points on body 2", above=0)
     psi_0: float = parameter("J", "interaction energy of a pair", above=0)
 
-    @classmethod
-    def from_scene(cls, scene: SceneView) -> Parameters:
-        return {**super().from_scene(scene), **surface_values(scene, "n_1", "n_2", "psi_0")}
+    told = read(surface="n_1 n_2 psi_0")
 
     @property
     def lowest(self) -> float:
@@ -221,9 +197,7 @@ class CohesiveSphereOnSpring(SphereOnSpring):
     t_max: float = parameter("Pa", "strength", above=0)
     E_n: float = parameter("Pa/m", "contact stiffness in compression", above=0)
 
-    @classmethod
-    def from_scene(cls, scene: SceneView) -> Parameters:
-        return {**super().from_scene(scene), **surface_values(scene, "t_max", "E_n")}
+    told = read(surface="t_max E_n")
 
     @property
     def lowest(self) -> float:
@@ -278,17 +252,16 @@ class AttractingSphereInCavity(Reference):
 
     T_i: float = parameter("K", "temperature, which stays", above=0)
 
-    told = read(ramp="rate=g_n", initial="g_i=g_n", temperature="T_i")
+    told = read(ramp="rate=g_n", initial="g_i=g_n", temperature="T_i", surface="n_1 n_2 psi_0 g_0")
 
     @classmethod
     def from_scene(cls, scene: SceneView) -> Parameters:
         from surfacechem.surfaces.shapes import Sphere
 
-        own = surface_values(scene, "n_1", "n_2", "psi_0", "g_0")
-        radii = [shape.R for shape in pair_of(scene).shapes if isinstance(shape, Sphere)]
+        radii = [shape.R for shape in scene.surfaces.shapes if isinstance(shape, Sphere)]
         if len(radii) != 2:
             raise InputError("it needs a sphere in a cavity.")
-        return {**super().from_scene(scene), **own, "R": min(radii), "H": max(radii)}
+        return {**super().from_scene(scene), "R": min(radii), "H": max(radii)}
 
     def quantities(self, t: Array) -> Quantities:
         g = self.g_i + self.rate * t
