@@ -164,15 +164,11 @@ class CurvedSurfaces(Potential):
         """Where the tension is largest."""
         return {"g_n": self.strongest}
 
-    @cached_property
-    def unit(self) -> float:
-        """A length that makes powers of the distance numbers of usual size [m]."""
-        return max(abs(end) for end in self.approach)
-
     def parts(self, law: PairEnergy) -> list[tuple[Expression, PairEnergy]]:
         """Laws of which one is a sum, each with its factor."""
         if law.parts is not None:
-            return list(law.parts(self.unit))
+            # In units of a length that makes powers of the distance numbers of usual size.
+            return list(law.parts(max(abs(end) for end in self.approach)))
         return [(1.0, law.given({"n_1": 1.0, "n_2": 1.0}))]
 
     @cached_property
