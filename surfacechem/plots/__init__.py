@@ -61,10 +61,6 @@ def figure(
 
         return comparison.figure(datasets, variables, against)
     (dataset,) = datasets
-    if "time" not in dataset and "point" in dataset.dims:
-        from surfacechem.plots import pointwise
-
-        return pointwise.figure(dataset, variables, against)
     if "study" in dataset.attrs:
         if variables or against:
             raise InputError("the figure of a study has no choice of variables.")
@@ -77,4 +73,6 @@ def figure(
         return sweep.figure(dataset, variables, against)
     from surfacechem.plots import run
 
+    if "time" not in dataset and "point" in dataset.dims:
+        return run.at_states(dataset, variables, against)
     return run.figure(dataset, variables, against)

@@ -177,5 +177,5 @@ def _label_axis(axes: Sequence[Axes], datasets: Sequence[xarray.Dataset], over: 
         for ax in axes:
             run.show_decades(ax, begin, float(values.max()))
         return
-    words = "Time" if over == "time" else f"{style.meaning(first)} {symbol(over)}"
+    words = "Time" if over == "time" else style.variable_words(first)
     style.label(axes[-1].xaxis, words, unit(first), values)

@@ -1,4 +1,5 @@
-"""Figures of runs: states, fluxes and balances over time, the exact solution dashed where the dataset has one.
+"""Figures of runs: states, fluxes and balances over time, the exact solution dashed where the dataset has one; and of
+quantities at given states, over what these differ in.
 
 Events are thin lines with their names, stages and modes are bands.
 """
@@ -100,6 +101,9 @@ COLOURED = len(style.COLOURS) - 1
 # Names in a label of curves that coincide.
 MOST_NAMES = 3
 
+# Units of what is shown of given states if nothing is asked for, tractions and heat fluxes, and how many panels.
+AT_STATES, MOST_AT_STATES = ("Pa", "W m-2", "N", "W"), 4
+
 
 @dataclass(frozen=True)
 class Panel:
@@ -121,24 +125,13 @@ def figure(dataset: xarray.Dataset, variables: Sequence[str] | None = None, agai
         return curved.figure(dataset)
     shown = panels(dataset, variables, against)
     usual = not variables and against is None
-    balances = usual and _balances_err(dataset)
-    if len(shown) + balances == 0 or dataset.sizes["time"] == 0:
-        raise InputError("there is nothing to plot: the dataset holds no output times or none of its variables varies.")
+    # A balance has a panel where it closes to less than the last digit, or it is not known how far it does.
+    errors = [style.number(dataset, error) for name, error in RESIDUALS.items() if usual and name in dataset]
+    balances = any(error is None or not error < CLOSED for error in errors)
     below = curved.ROWS if usual and curved.carries(dataset) else 0
-    return _stacked(dataset, shown, against, balances, below)
-
-
-def _balances_err(dataset: xarray.Dataset) -> bool:
-    """Whether a balance closes to less than the last digit, or it is not known how far it does."""
-    largest = [style.number(dataset, error) for name, error in RESIDUALS.items() if name in dataset]
-    return any(error is None or not error < CLOSED for error in largest)
-
-
-def _stacked(
-    dataset: xarray.Dataset, shown: Sequence[Panel], against: str | None, balances: bool, below: int
-) -> Figure:
-    """Panels that share an axis, the balances, and rows of surfaces below, if any."""
     rows = len(shown) + balances
+    if rows == 0 or dataset.sizes["time"] == 0:
+        raise InputError("there is nothing to plot: the dataset holds no output times or none of its variables varies.")
     height = 0.9 + (2.6 if against else 1.55) * rows + curved.HEIGHT * below
     with style.panels(6.4, height, rows + below, sharex=not below) as (plot, grid):
         axes = grid[:rows, 0].tolist()
@@ -149,22 +142,38 @@ def _stacked(
             _draw(ax, dataset, panel, against or "time", first)
         if balances:
             _draw_balances(axes[-1], dataset)
-        above, more = draw_axis(axes, dataset, against, first)
+        if against is None:
+            above, more = _draw_time(axes, dataset, first)
+        else:
+            style.label_variable(axes[-1].xaxis, dataset[against])
+            above, more = 0.0, _counted([name for _, name in _named(_moments(dataset))], {})
         style.headings(plot, axes[0], dataset, above, more)
     return plot
 
 
-def draw_axis(
-    axes: Sequence[Axes], dataset: xarray.Dataset, against: str | None, first: float | None
-) -> tuple[float, str]:
-    """Label the axis that all panels share: time, logarithmic from ``first`` on where that is given, or the variable
-    that takes its place; returns how many points names need above the panels, and the events that have none there.
+def at_states(dataset: xarray.Dataset, variables: Sequence[str] | None = None, against: str | None = None) -> Figure:
+    """Each of the variables at given states, else tractions and heat fluxes that differ, or where there are none the
+    first that do; over ``against``, else over the first that differs.
     """
-    if against is None:
-        return _draw_time(axes, dataset, first)
-    words = f"{meaning(dataset[against])} {symbol(against)}"
-    style.label(axes[-1].xaxis, words, unit(dataset[against]), dataset[against].values)
-    return 0.0, _counted([name for _, name in _named(_moments(dataset))], {})
+    known = [str(n) for n, x in dataset.data_vars.items() if x.dims == ("point",) and x.dtype.kind == "f"]
+    asked = [*(variables or ()), *filter(None, [against])]
+    refuse_unknown(asked, known, "no variable '{}' at the states", style.place(dataset))
+    # Quantities, no derivatives, that are not the same at all states.
+    differing = [name for name in known if len(np.unique(dataset[name].values)) > 1 and "_by_" not in name]
+    if not differing:
+        raise InputError("a figure needs states that differ.", style.place(dataset))
+    over = against or differing[0]
+    others = [name for name in differing if name != over]
+    usual = [name for name in others if unit(dataset[name]) in AT_STATES] or others
+    names = variables or usual[:MOST_AT_STATES]
+    with style.panels(6.4, 0.7 + 1.9 * len(names), len(names), sharex=True) as (plot, grid):
+        order = np.argsort(dataset[over].values, kind="stable")
+        for ax, name in zip(grid[:, 0], names, strict=True):
+            ax.plot(dataset[over].values[order], dataset[name].values[order], "o-", markersize=3)
+            style.label(ax.yaxis, symbol(name), unit(dataset[name]), dataset[name].values)
+        style.label_variable(grid[-1, 0].xaxis, dataset[over])
+        style.headings(plot, grid[0, 0], dataset)
+    return plot
 
 
 def first_shown(dataset: xarray.Dataset, panels: Sequence[Panel]) -> float | None:
@@ -257,11 +266,12 @@ def _draw(ax: Axes, dataset: xarray.Dataset, panel: Panel, over: str, first: flo
     """The curves of a panel, with the unit that suits what is seen of them from ``first`` on."""
     t = dataset[over].values
     _draw_curves(ax, dataset, panel, t)
-    _draw_exact(ax, dataset, panel, t)
+    exact = [f"{name}_exact" for name in panel.names if f"{name}_exact" in curves(dataset)]
+    for k, name in enumerate(exact):
+        ax.plot(t, dataset[name].values, linestyle=EXACT, color="black", linewidth=0.9, label="_" if k else "exact")
     start = first or 0.0
-    if first is None and over == "time" and _begins_suddenly(dataset, panel):
-        start = EARLY * t[-1]
-        _show_behind_spike(ax, dataset, panel, start)
+    if first is None and over == "time" and panel.unit == FLUX:
+        start = _show_behind_spike(ax, dataset, panel)
     drawn = _drawn(dataset, panel, t >= start if start else slice(None))
     words = panel.title or ", ".join(map(symbol, panel.names[:MOST_NAMES]))
     style.label(ax.yaxis, words, panel.unit, drawn, between=" " if len(panel.title) < ONE_LINE else "\n")
@@ -271,35 +281,27 @@ def _draw(ax: Axes, dataset: xarray.Dataset, panel: Panel, over: str, first: flo
     style.legend(ax)
 
 
-def _draw_exact(ax: Axes, dataset: xarray.Dataset, panel: Panel, t: Array) -> None:
-    """The exact curves that the dataset has of those of a panel."""
-    exact = [f"{name}_exact" for name in panel.names if f"{name}_exact" in curves(dataset)]
-    for name in exact:
-        label = "exact" if name == exact[0] else "_"
-        ax.plot(t, dataset[name].values, linestyle=EXACT, color="black", linewidth=0.9, label=label)
-
-
 def _drawn(dataset: xarray.Dataset, panel: Panel, rows: Any = slice(None)) -> Array:
     """What a panel shows at some of its points, as far as it is finite."""
     values = np.concatenate([dataset[name].values[rows] for name in panel.names])
     return np.asarray(values[np.isfinite(values)])
 
 
-def _begins_suddenly(dataset: xarray.Dataset, panel: Panel) -> bool:
-    """Whether nothing would be seen of fluxes but how they begin."""
+def _show_behind_spike(ax: Axes, dataset: xarray.Dataset, panel: Panel) -> float:
+    """Where nothing would be seen of fluxes but how they begin, limit the panel to what they are from a time on, and
+    say how large they are before; returns that time, 0 where all is seen.
+    """
     t = dataset["time"].values
-    late = _drawn(dataset, panel, t >= EARLY * t[-1]) if panel.unit == FLUX else np.empty(0)
-    return bool(late.size and np.ptp(_drawn(dataset, panel)) > SUDDEN * np.ptp(late) > 0)
-
-
-def _show_behind_spike(ax: Axes, dataset: xarray.Dataset, panel: Panel, start: float) -> None:
-    """Limit the panel to what its curves are from a time on, and say how large they are before."""
-    late, largest = _drawn(dataset, panel, dataset["time"].values >= start), style.largest(_drawn(dataset, panel))
-    margin = 0.1 * np.ptp(late)
+    start = float(EARLY * t[-1])
+    whole, late = _drawn(dataset, panel), _drawn(dataset, panel, t >= start)
+    if not (late.size and np.ptp(whole) > SUDDEN * np.ptp(late) > 0):
+        return 0.0
+    margin, largest = 0.1 * np.ptp(late), style.largest(whole)
     ax.set_ylim(late.min() - margin, late.max() + margin)
     text, size = style.prefixed(panel.unit, np.array([largest]))
     told = f"{largest / size:.2g} {text} at the start"
     ax.annotate(told, (0.98, 0.95), xycoords="axes fraction", va="top", ha="right", color="0.4", fontsize=8)
+    return start
 
 
 def _draw_curves(ax: Axes, dataset: xarray.Dataset, panel: Panel, t: Array) -> None:
@@ -346,7 +348,9 @@ def _draw_balances(ax: Axes, dataset: xarray.Dataset) -> None:
 
 
 def _draw_time(axes: Sequence[Axes], dataset: xarray.Dataset, first: float | None) -> tuple[float, str]:
-    """The axis of time, with bands of modes and lines at events; returns what :func:`draw_axis` does."""
+    """The axis of time, logarithmic from ``first`` on where that is given, with bands of modes and lines at events;
+    returns how many points names need above the panels, and the events that have none there.
+    """
     times = dataset["time"].values
     if first is None:
         style.label(axes[-1].xaxis, "Time", "s", times)
@@ -374,11 +378,17 @@ def show_decades(ax: Axes, first: float, last: float) -> None:
 
 
 def _moments(dataset: xarray.Dataset) -> dict[float, str]:
-    """What the events are called, by their times."""
+    """What the events are called, by their times: by name, or by reason where the name is the variable that passes
+    zero.
+    """
     if "event_time" not in dataset:
         return {}
-    style.check(dataset, {"event_time": ("event",)})
-    return dict(zip(dataset["event_time"].values.tolist(), _words(dataset), strict=True))
+    named = {name: ("event",) for name in ("event_name", "event_reason") if name in dataset}
+    style.check(dataset, {"event_time": ("event",)}, named)
+    texts = [dataset[name].values.astype(str).tolist() for name in named] or [[""] * dataset.sizes["event"]]
+    quantities = [name for name in curves(dataset) if not is_mode(dataset[name])]
+    events = zip(dataset["event_time"].values.tolist(), texts[0], texts[-1], strict=True)
+    return {t: why if name.partition(" ")[0] in quantities else name for t, name, why in events}
 
 
 def _named(moments: Mapping[float, str]) -> list[tuple[float, str]]:
@@ -408,18 +418,22 @@ def _draw_events(axes: Sequence[Axes], width: float, moments: Mapping[float, str
 
 def _places(ax: Axes, events: Sequence[tuple[float, str]]) -> list[tuple[float, str]]:
     """Times and names of events, those that a figure cannot tell apart as one: a slip, and the stop that ends it."""
-    ax.get_xlim()  # limits that follow from what is drawn are not known before
-    across = ax.transScale + ax.transLimits
     found: list[tuple[float, list[str]]] = []
     last = -np.inf
     for t, name in sorted(events):
-        at = float(across.transform((t, 0.0))[0])
+        at = _across_panel(ax, t)
         if at - last > CLOSE:
             found.append((t, []))
             last = at
         if name not in found[-1][1]:
             found[-1][1].append(name)
     return [(t, " and ".join(names)) for t, names in found]
+
+
+def _across_panel(ax: Axes, x: float) -> float:
+    """Where a value of x lies, from 0 at the left to 1 at the right of a panel."""
+    ax.get_xlim()  # limits that follow from what is drawn are not known before
+    return float((ax.transScale + ax.transLimits).transform((x, 0.0))[0])
 
 
 def _numbered(ax: Axes, width: float, places: Sequence[tuple[float, str]], below: int) -> tuple[int, str]:
@@ -436,17 +450,6 @@ def _counted(names: Sequence[str], lines: Mapping[str, str]) -> str:
     counts = Counter(names).most_common(MOST_NAMES)
     kinds = {name: f" ({line})" for name, line in lines.items()}
     return ", ".join(f"{f'{count} ' if count > 1 else ''}{name}{kinds.get(name, '')}" for name, count in counts)
-
-
-def _words(dataset: xarray.Dataset) -> list[str]:
-    """What each event is called: its name, or its reason where the name is the variable that passes zero."""
-    named = {name: ("event",) for name in ("event_name", "event_reason") if name in dataset}
-    style.check(dataset, {}, named)
-    texts = [dataset[name].values.astype(str).tolist() for name in named] or [[""] * dataset.sizes["event"]]
-    quantities = [name for name in curves(dataset) if not is_mode(dataset[name])]
-    return [
-        why if name.partition(" ")[0] in quantities else name for name, why in zip(texts[0], texts[-1], strict=True)
-    ]
 
 
 def _draw_bands(axes: Sequence[Axes], dataset: xarray.Dataset) -> list[tuple[float, str]]:
@@ -481,14 +484,12 @@ def _write(ax: Axes, width: float, items: Sequence[tuple[float, str]], below: in
     """Small words above a panel, each over its time, in as many rows as they need so that none is on another; returns
     how many. Nothing is written where there is no room for all.
     """
-    ax.get_xlim()  # limits that follow from what is drawn are not known before
-    across = ax.transScale + ax.transLimits
     placed: list[tuple[float, int, str]] = []
     ends = [0.0] * lanes
     letter = LETTER / (width - BESIDE)
     for x, text in sorted(items):
         half = letter * len(text) / 2
-        middle = min(max(float(across.transform((x, 0.0))[0]), half), 1 - half)
+        middle = min(max(_across_panel(ax, x), half), 1 - half)
         lane = next((k for k, end in enumerate(ends) if middle - half >= end), None)
         if lane is None:
             return 0

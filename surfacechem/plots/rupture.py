@@ -75,8 +75,7 @@ def _draw_over(ax: Axes, dataset: xarray.Dataset, load: str, values: Array, belo
         # Curves that coincide, as lifetimes do, are seen below each other.
         width = 1.2 + below * (len(members) - 1 - k)
         ax.plot(dataset[load].values, values[place], color=colour, linewidth=width, label=label)
-    words = f"{style.meaning(dataset[load])} {symbol(load)}"
-    style.label(ax.xaxis, words, unit(dataset[load]), dataset[load].values)
+    style.label_variable(ax.xaxis, dataset[load])
     if len(members) < dataset["status"].size:
         ax.set_title(f"{len(members)} of {dataset['status'].size} runs", loc="right", fontsize=8, color="#555555")
 

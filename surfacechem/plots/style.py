@@ -239,6 +239,11 @@ def meaning(values: xarray.DataArray) -> str:
     return text[:1].upper() + text[1:]
 
 
+def variable_words(values: xarray.DataArray) -> str:
+    """The meaning of a variable and its symbol."""
+    return f"{meaning(values)} {symbol(str(values.name))}"
+
+
 def unit(values: xarray.DataArray) -> str:
     """The unit of a variable in the notation of the CF conventions."""
     return str(values.attrs.get("units", "1"))
@@ -440,6 +445,11 @@ def label(axis: XAxis | YAxis, words: str, unit: str, values: Array, between: st
         axis.axes.ticklabel_format(axis="x" if isinstance(axis, XAxis) else "y", useOffset=False, scilimits=(-4, 5))
     else:
         axis.set_major_formatter(lambda value, _: Formatter.fix_minus(f"{value / size:.10g}"))
+
+
+def label_variable(axis: XAxis | YAxis, values: xarray.DataArray) -> None:
+    """A variable along a linear axis: its meaning, symbol and unit."""
+    label(axis, variable_words(values), unit(values), values.values)
 
 
 def varies(values: Array) -> bool:

@@ -249,3 +249,27 @@ def test_temperatures_in_degrees_celsius():
     assert (kelvins.get_ylabel(), celsius.get_ylabel()) == ("Temperature [K]", "Temperature [°C]")
     curves = zip(kelvins.lines, celsius.lines, strict=True)
     assert all(np.allclose(one.get_ydata() - other.get_ydata(), 273.15, rtol=1e-12) for one, other in curves)
+
+
+CONTACT = {
+    "bodies": {"lower": {"temperature": "300 K"}, "upper": {"temperature": "300 K"}},
+    "interface": {"potential": [{"penalty": {"E_n": "50 MPa/um"}}], "friction": [{"coulomb": {"mu": 0.3}}]},
+    "loading": {"g_n": "-1 nm", "v": "1 mm/s"},
+}
+
+
+def test_tractions_are_drawn_over_what_the_states_differ_in():
+    case = surfacechem.load(CONTACT)
+    data = case.evaluate({"g_n": [2e-9, -4e-9, -2e-9]})
+    plot = figure(data)
+    assert titles(plot)[0] == "$t_{n}$ [kPa]"
+    (line,) = plot.axes[0].get_lines()
+    assert line.get_xdata() == pytest.approx([-4e-9, -2e-9, 2e-9])
+    assert line.get_ydata() == pytest.approx([-200e3, -100e3, 0])
+    assert "[nm]" in plot.axes[-1].get_xlabel()
+    (slope,) = figure(data, ["t_n_by_g_n"], "t_n").axes
+    assert np.all(np.diff(slope.get_lines()[0].get_xdata()) >= 0)
+    with pytest.raises(InputError, match="no variable 't' at the states"):
+        figure(data, ["t"])
+    with pytest.raises(InputError, match="needs states that differ"):
+        figure(case.evaluate())
