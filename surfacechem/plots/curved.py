@@ -55,10 +55,11 @@ def draw(axes: Sequence[Axes], dataset: xarray.Dataset) -> None:
     # Each has an axis of its own, whose words stand apart from the panel below.
     engine: Any = axes[0].figure.get_layout_engine()
     engine.set(h_pad=APART)
-    even = _around(dataset)
-    _draw_profiles(axes[0], dataset, even)
+    even, (along, at) = _around(dataset), _section(dataset)
+    reach = _reach(dataset, along, at)
+    _draw_profiles(axes[0], dataset, even, along, at, reach)
     if even:
-        _draw_tractions(axes[1], dataset)
+        _draw_tractions(axes[1], dataset, along, at, reach)
     else:
         _draw_field(axes[1], dataset)
     _draw_force(axes[2], dataset)
@@ -117,10 +118,8 @@ def _chosen(dataset: xarray.Dataset) -> Iterator[tuple[int, Any, str]]:
         yield k, matplotlib.colormaps["viridis"](share * 0.9), f"$g_n$ = {approach[k] / size:.3g} {text}"
 
 
-def _draw_profiles(ax: Axes, dataset: xarray.Dataset, even: bool) -> None:
+def _draw_profiles(ax: Axes, dataset: xarray.Dataset, even: bool, along: Array, at: Any, reach: float) -> None:
     """Section through both bodies; the upper one at several approaches."""
-    along, at = _section(dataset)
-    reach = _reach(dataset, along, at)
     signs = (1, -1) if even else (1,)
     for sign in signs:
         ax.plot(sign * along, dataset["surface_z"].values[at], color="black", label="body 1" if sign > 0 else "_")
@@ -140,10 +139,8 @@ def _draw_profiles(ax: Axes, dataset: xarray.Dataset, even: bool) -> None:
     style.legend(ax)
 
 
-def _draw_tractions(ax: Axes, dataset: xarray.Dataset) -> None:
+def _draw_tractions(ax: Axes, dataset: xarray.Dataset, along: Array, at: Any, reach: float) -> None:
     """Traction over the distance from the axis at several approaches."""
-    along, at = _section(dataset)
-    reach = _reach(dataset, along, at)
     shown = np.abs(along) <= reach
     values = dataset["traction"].values[:, *at]
     for k, colour, _ in _chosen(dataset):

@@ -50,9 +50,8 @@ SEEN = 0.99
 """Part of the largest value of a variable that an output has to come to; less is told."""
 
 
-def figure(dataset: xarray.Dataset, plan: Plan, variables: Sequence[str] | None = None) -> Figure:
+def figure(dataset: xarray.Dataset, plan: Plan, axes: Sequence[str], variables: Sequence[str] | None = None) -> Figure:
     """The figure of a grid of two parameters, of a sample, or of more parameters."""
-    axes = [str(name) for name in dataset["status"].dims]
     dataset = with_ends(dataset, axes)
     parameters = [str(name) for name, x in dataset.coords.items() if len(x.dims) == 1 and x.dims[0] in axes]
     names = chosen(dataset, axes, variables)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from functools import partial
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import xarray
@@ -36,26 +35,21 @@ def figure(dataset: xarray.Dataset, load: str, variables: Sequence[str] | None =
     """The spectrum, the distribution p(f) at some of its places and the lifetime against the load, or ``variables``
     over the load.
     """
-    draws: list[Callable[[Axes], None]] = [
-        partial(_draw_series, dataset=dataset, load=load, name=n) for n in variables or ()
-    ]
-    if not variables:
-        over = [partial(_draw_density, dataset=dataset, load=load), partial(_draw_lifetime, dataset=dataset, load=load)]
-        draws = [partial(_draw_spectrum, dataset=dataset, load=load), *(over if has_series(dataset, load) else ())]
-    with style.panels(6.4, 0.7 + 2.3 * len(draws), len(draws)) as (plot, grid):
-        for ax, draw in zip(grid[:, 0], draws, strict=True):
-            draw(ax)
+    series = (f"density_{load}", "lifetime")
+    held = all(name in dataset and load in dataset[name].dims for name in series)  # what runs were at each load, too
+    names = variables or ("", *(series if held else ()))
+    with style.panels(6.4, 0.7 + 2.3 * len(names), len(names)) as (plot, grid):
+        for ax, name in zip(grid[:, 0], names, strict=True):
+            if name:
+                _draw_series(ax, dataset, load, name)
+            else:
+                _draw_spectrum(ax, dataset, load)
             style.legend(ax)
         for ax in grid[2:, 0] if not variables else ():
             ax.sharex(grid[1, 0])
             ax.get_legend().remove()  # the colours are those of the distributions
         style.headings(plot, grid[0, 0], dataset)
     return plot
-
-
-def has_series(dataset: xarray.Dataset, load: str) -> bool:
-    """Whether a dataset holds what its runs were at each load, too."""
-    return all(name in dataset and load in dataset[name].dims for name in (f"density_{load}", "lifetime"))
 
 
 def _members(dataset: xarray.Dataset, load: str) -> list[tuple[tuple[int, ...], str]]:
@@ -80,29 +74,20 @@ def _draw_over(ax: Axes, dataset: xarray.Dataset, load: str, values: Array, belo
         ax.set_title(f"{len(members)} of {dataset['status'].size} runs", loc="right", fontsize=8, color="#555555")
 
 
-def _draw_density(ax: Axes, dataset: xarray.Dataset, load: str) -> None:
-    """The distribution of the load at rupture, up to where all bonds are broken."""
-    text, size = style.prefixed(unit(dataset[load]), dataset[load].values)
-    _draw_over(ax, dataset, load, np.maximum(dataset[f"density_{load}"].values * size, 0.0))
-    ax.set_ylabel(f"$p$({symbol(load)}) [1/{text}]")
-
-
-def _draw_lifetime(ax: Axes, dataset: xarray.Dataset, load: str) -> None:
-    _draw_over(ax, dataset, load, dataset["lifetime"].values, below=0.7)
-    ax.set(ylabel=rf"Lifetime $\tau$({symbol(load)}) [s]")
-    style.logarithmic(ax.yaxis)
-
-
 def _draw_series(ax: Axes, dataset: xarray.Dataset, load: str, name: str) -> None:
-    """A variable over the load."""
-    if name == f"density_{load}":
-        return _draw_density(ax, dataset, load)
-    if name == "lifetime":
-        return _draw_lifetime(ax, dataset, load)
+    """A variable over the load; the distribution of the load at rupture up to where all bonds are broken."""
     values = dataset[name].values
-    _draw_over(ax, dataset, load, values)
-    style.label(ax.yaxis, symbol(name), unit(dataset[name]), values)
-    return None
+    if name == f"density_{load}":
+        text, size = style.prefixed(unit(dataset[load]), dataset[load].values)
+        _draw_over(ax, dataset, load, np.maximum(values * size, 0.0))
+        ax.set_ylabel(f"$p$({symbol(load)}) [1/{text}]")
+    elif name == "lifetime":
+        _draw_over(ax, dataset, load, values, below=0.7)
+        ax.set_ylabel(rf"Lifetime $\tau$({symbol(load)}) [s]")
+        style.logarithmic(ax.yaxis)
+    else:
+        _draw_over(ax, dataset, load, values)
+        style.label(ax.yaxis, symbol(name), unit(dataset[name]), values)
 
 
 def _draw_spectrum(ax: Axes, dataset: xarray.Dataset, load: str) -> None:

@@ -25,7 +25,7 @@ def figure(dataset: xarray.Dataset, variables: Sequence[str] | None = None, agai
     if against:
         return members.portraits(dataset, axes, variables, against)
     if are_many(dataset, axes):
-        return members.figure(dataset, plan, variables)
+        return members.figure(dataset, plan, axes, variables)
     style.check(dataset, {"time_reached": tuple(axes), **{name: (name,) for name in axes}})
     shown, load = groups(dataset, variables), rupture.load_of(dataset)
     chosen = [name for panel in shown for name in panel.names]
@@ -33,17 +33,12 @@ def figure(dataset: xarray.Dataset, variables: Sequence[str] | None = None, agai
         return rupture.figure(dataset, load, variables)
     if not variables and "lifetime" in dataset and dataset["lifetime"].dims == tuple(axes):
         return rupture.lifetimes(dataset)
-    return _finals(dataset, axes[0], shown)
-
-
-def _finals(dataset: xarray.Dataset, axis: str, shown: Sequence[Panel]) -> Figure:
-    """Values at the ends of the runs over the first parameter, in panels."""
     height = 0.9 + (2.8 if len(shown) == 1 else 1.7) * len(shown)
     with style.panels(6.4, height, len(shown), sharex=True) as (plot, grid):
         for ax, panel in zip(grid[:, 0], shown, strict=True):
             _draw_final(ax, dataset, panel.names)
             style.legend(ax)
-        style.draw_parameter(grid[-1, 0].xaxis, dataset[axis])
+        style.draw_parameter(grid[-1, 0].xaxis, dataset[axes[0]])
         style.headings(plot, grid[0, 0], dataset)
     return plot
 
