@@ -257,7 +257,7 @@ def _curve(figure: FigureSection, section: CurveSection) -> Line:
     dataset, exact_ends = _computed(section, folder, f"{figure.y.variable}_exact")
     axes = {"x": figure.x, "y": figure.y}
     per = {name: _unit(dataset, axis, section.per.get(name, axis.per)) for name, axis in axes.items()}
-    x, y = (_values(dataset, axis, axis.variable) / per[name] for name, axis in axes.items())
+    x, y = (_values(dataset, axis) / per[name] for name, axis in axes.items())
     exact = tuple(np.array(section.exact, dtype=float).T) if section.exact else None
     if exact_ends is not None:
         exact = x, exact_ends / per["y"]
@@ -286,9 +286,9 @@ def _computed(section: CurveSection, folder: Path, exact: str) -> tuple[xarray.D
     return dataset, np.array([end[exact].values[-1] if exact in end else np.nan for end in ends])
 
 
-def _values(dataset: xarray.Dataset, axis: AxisSection, name: str) -> Array:
+def _values(dataset: xarray.Dataset, axis: AxisSection) -> Array:
     """A variable of a run over time, or of a sweep what its runs end at."""
-    if name not in dataset.variables:
+    if (name := axis.variable) not in dataset.variables:
         raise axis.error(f"no variable '{name}'.{suggestion(name, list(map(str, dataset.variables)))}", "variable")
     values = dataset[name]
     return np.asarray(values.values if values.ndim == 1 else values.isel(time=-1).values, dtype=float)

@@ -15,7 +15,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from surfacechem.errors import InputError, Place, suggestion
+from surfacechem.errors import InputError, Place, refuse_unknown
 from surfacechem.solve import names, solver
 from surfacechem.solve.contract import Counters
 from surfacechem.solve.run import Trajectory
@@ -121,9 +121,7 @@ def check_options(
     """InputError for a solver that there is not, a tolerance that no solver takes, rounds out of bounds, and for none
     of the first two; ``options`` names the three.
     """
-    for name in solvers:
-        if name not in names:
-            raise InputError(f"no solver '{name}'.{suggestion(name, names)}", Place(path=options[0]))
+    refuse_unknown(solvers, names, "no solver '{}'", Place(path=options[0]))
     for rtol in tolerances:
         if not 0 < rtol <= LOOSEST:
             raise InputError(f"{rtol:g} is outside its range: > 0 and <= {LOOSEST:g}.", Place(path=options[1]))

@@ -12,7 +12,7 @@ from pathlib import Path
 from statistics import median
 
 from surfacechem.documents.overrides import written
-from surfacechem.errors import InputError, Place, suggestion
+from surfacechem.errors import InputError, Place, refuse_unknown
 from surfacechem.results.audit import audit
 from surfacechem.results.error_estimates import computed
 from surfacechem.results.event_table import event_times
@@ -166,9 +166,7 @@ def _subjects(
         text = "nothing evolves whose error could be compared; name what follows, `--variables t_n` for instance."
         raise lone.located(InputError(text, Place(path="bodies")))
     known = {name for one in subjects for name in one.names}
-    for name in variables:
-        if name not in known:
-            raise InputError(f"no variable '{name}' in the cases.{suggestion(name, known)}", Place(path="variables"))
+    refuse_unknown(variables, known, "no variable '{}' in the cases", Place(path="variables"))
     return subjects
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from surfacechem.errors import InputError, suggestion
+from surfacechem.errors import InputError, refuse_unknown
 from surfacechem.format import Overrides, Source
 from surfacechem.model.system import System
 from surfacechem.quantities import GAS_CONSTANT, Quantity
@@ -127,9 +127,7 @@ def steady(source: Source, of: Sequence[str] = (), overrides: Overrides = ()) ->
 def _wanted(system: System, of: Sequence[str]) -> dict[str, int]:
     """Places of quantities among the outputs; of all productions if none is named."""
     names = [item.name for item in system.outputs]
-    for name in of:
-        if name not in names:
-            raise InputError(f"the case has no quantity '{name}'.{suggestion(name, names)}")
+    refuse_unknown(of, names, "the case has no quantity '{}'")
     wanted = [*of] or [name for name in names if name.startswith("production_")]
     if not wanted:
         raise InputError("nothing is made in a neighbour: name the rates that matter, `--of R_R1` for instance.")

@@ -16,7 +16,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
 
-from surfacechem.errors import InputError, suggestion
+from surfacechem.errors import refuse_unknown
 from surfacechem.references.base import Reference
 from surfacechem.solve.contract import Array
 
@@ -137,7 +137,5 @@ def regimes() -> dict[str, Regime]:
 def chosen(names: Sequence[str]) -> list[Regime]:
     """The regimes of these names, or all; InputError with the nearest guess."""
     known = regimes()
-    for name in names:
-        if name not in known:
-            raise InputError(f"no regime '{name}'.{suggestion(name, known)}")
+    refuse_unknown(names, known, "no regime '{}'")
     return [known[name] for name in names or known]

@@ -22,11 +22,6 @@ LOST = "heat capacity at T was lost"
 N_C = 1e18
 
 
-def decades(first: float, last: float, points: int) -> list[float]:
-    """Times on a logarithmic axis."""
-    return [float(t) for t in np.geomspace(first, last, points)]
-
-
 @regime(
     "Endothermic bonding, kappa to 1",
     "1 - kappa",
@@ -48,7 +43,7 @@ def endothermic(value: float) -> Trial:
     if value == 0.0:
         return Trial("endothermic-kappa-0p99", [5.0], Refused(LOST), changes)
     exact = EndothermicBonding(C_1=1.0, C_2=1.0, T_0=256.0, K_2=K_2, tau=1.0)
-    return Trial("endothermic-kappa-0p99", decades(1e-2 * value, 5.0, 25), Exact.of(exact), changes)
+    return Trial("endothermic-kappa-0p99", np.geomspace(1e-2 * value, 5.0, 25).tolist(), Exact.of(exact), changes)
 
 
 def bonding_while_sliding(
@@ -66,7 +61,7 @@ def bonding_while_sliding(
         "loading.v": 1.0,
         "initial.T": T_i,
     }
-    return Trial("generalised-bonding-sliding", decades(1e-2 * tau, 1e6, 25), Exact.of(exact), changes)
+    return Trial("generalised-bonding-sliding", np.geomspace(1e-2 * tau, 1e6, 25).tolist(), Exact.of(exact), changes)
 
 
 @regime(
@@ -113,7 +108,8 @@ def affinity(a: float, T: float = 310.0, rate: float = 1.0) -> Trial:
         "interface.potential.bond-energy.K_0": K,
         "interface.bonding.exponential-affinity.C_r": rate * n * n / K,
     }
-    return Trial("exponential-affinity", decades(1e-6 / rate, 5.0 / rate, 22), Exact.of(exact), changes)
+    times = np.geomspace(1e-6 / rate, 5.0 / rate, 22).tolist()
+    return Trial("exponential-affinity", times, Exact.of(exact), changes)
 
 
 @regime("Thermal runaway of an activated reaction", "E_a / (R_g T)", (1.0, 5.0, 10.0, 24.0, 50.0, 100.0, 200.0))

@@ -28,7 +28,7 @@ def three_temperatures(**parameters: float) -> Trial:
         "loading.Q_c": p["D_0"],
     }
     layer = p["C_c"] / (p["h_1"] + p["h_2"])
-    times = [float(t) for t in np.geomspace(min(layer, 1.0), 10.0, 25)]
+    times = np.geomspace(min(layer, 1.0), 10.0, 25).tolist()
     return Trial("three-temperatures", times, Exact.of(exact), changes)
 
 
