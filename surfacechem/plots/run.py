@@ -125,13 +125,24 @@ def figure(dataset: xarray.Dataset, variables: Sequence[str] | None = None, agai
         return curved.figure(dataset)
     shown = panels(dataset, variables, against)
     usual = not variables and against is None
-    # A balance has a panel where it closes to less than the last digit, or it is not known how far it does.
-    errors = [style.number(dataset, error) for name, error in RESIDUALS.items() if usual and name in dataset]
-    balances = any(error is None or not error < CLOSED for error in errors)
-    below = curved.ROWS if usual and curved.carries(dataset) else 0
-    rows = len(shown) + balances
-    if rows == 0 or dataset.sizes["time"] == 0:
+    balances = usual and _balances_err(dataset)
+    if len(shown) + balances == 0 or dataset.sizes["time"] == 0:
         raise InputError("there is nothing to plot: the dataset holds no output times or none of its variables varies.")
+    below = curved.ROWS if usual and curved.carries(dataset) else 0
+    return _stacked(dataset, shown, against, balances, below)
+
+
+def _balances_err(dataset: xarray.Dataset) -> bool:
+    """Whether a balance closes to less than the last digit, or it is not known how far it does."""
+    largest = [style.number(dataset, error) for name, error in RESIDUALS.items() if name in dataset]
+    return any(error is None or not error < CLOSED for error in largest)
+
+
+def _stacked(
+    dataset: xarray.Dataset, shown: Sequence[Panel], against: str | None, balances: bool, below: int
+) -> Figure:
+    """Panels that share an axis, the balances, and rows of surfaces below, if any."""
+    rows = len(shown) + balances
     height = 0.9 + (2.6 if against else 1.55) * rows + curved.HEIGHT * below
     with style.panels(6.4, height, rows + below, sharex=not below) as (plot, grid):
         axes = grid[:rows, 0].tolist()
@@ -142,18 +153,14 @@ def figure(dataset: xarray.Dataset, variables: Sequence[str] | None = None, agai
             _draw(ax, dataset, panel, against or "time", first)
         if balances:
             _draw_balances(axes[-1], dataset)
-        if against is None:
-            above, more = _draw_time(axes, dataset, first)
-        else:
-            style.label_variable(axes[-1].xaxis, dataset[against])
-            above, more = 0.0, _counted([name for _, name in _named(_moments(dataset))], {})
+        above, more = _draw_axis(axes, dataset, against, first)
         style.headings(plot, axes[0], dataset, above, more)
     return plot
 
 
 def at_states(dataset: xarray.Dataset, variables: Sequence[str] | None = None, against: str | None = None) -> Figure:
-    """Each of the variables at given states, else tractions and heat fluxes that differ, or where there are none the
-    first that do; over ``against``, else over the first that differs.
+    """Each of the variables at given states, else tractions and heat fluxes that differ, over ``against``, else over
+    the first that differs.
     """
     known = [str(n) for n, x in dataset.data_vars.items() if x.dims == ("point",) and x.dtype.kind == "f"]
     asked = [*(variables or ()), *filter(None, [against])]
@@ -163,9 +170,7 @@ def at_states(dataset: xarray.Dataset, variables: Sequence[str] | None = None, a
     if not differing:
         raise InputError("a figure needs states that differ.", style.place(dataset))
     over = against or differing[0]
-    others = [name for name in differing if name != over]
-    usual = [name for name in others if unit(dataset[name]) in AT_STATES] or others
-    names = variables or usual[:MOST_AT_STATES]
+    names = variables or _usual_at_states(dataset, [name for name in differing if name != over])
     with style.panels(6.4, 0.7 + 1.9 * len(names), len(names), sharex=True) as (plot, grid):
         order = np.argsort(dataset[over].values, kind="stable")
         for ax, name in zip(grid[:, 0], names, strict=True):
@@ -174,6 +179,11 @@ def at_states(dataset: xarray.Dataset, variables: Sequence[str] | None = None, a
         style.label_variable(grid[-1, 0].xaxis, dataset[over])
         style.headings(plot, grid[0, 0], dataset)
     return plot
+
+
+def _usual_at_states(dataset: xarray.Dataset, names: Sequence[str]) -> Sequence[str]:
+    """Tractions and heat fluxes among these, or where there are none the first."""
+    return ([name for name in names if unit(dataset[name]) in AT_STATES] or names)[:MOST_AT_STATES]
 
 
 def first_shown(dataset: xarray.Dataset, panels: Sequence[Panel]) -> float | None:
@@ -266,9 +276,7 @@ def _draw(ax: Axes, dataset: xarray.Dataset, panel: Panel, over: str, first: flo
     """The curves of a panel, with the unit that suits what is seen of them from ``first`` on."""
     t = dataset[over].values
     _draw_curves(ax, dataset, panel, t)
-    exact = [f"{name}_exact" for name in panel.names if f"{name}_exact" in curves(dataset)]
-    for k, name in enumerate(exact):
-        ax.plot(t, dataset[name].values, linestyle=EXACT, color="black", linewidth=0.9, label="_" if k else "exact")
+    _draw_exact(ax, dataset, panel, t)
     start = first or 0.0
     if first is None and over == "time" and panel.unit == FLUX:
         start = _show_behind_spike(ax, dataset, panel)
@@ -279,6 +287,13 @@ def _draw(ax: Axes, dataset: xarray.Dataset, panel: Panel, over: str, first: flo
         middle = float(drawn.mean())
         ax.set_ylim(middle - 0.05 * abs(middle or 1.0), middle + 0.05 * abs(middle or 1.0))
     style.legend(ax)
+
+
+def _draw_exact(ax: Axes, dataset: xarray.Dataset, panel: Panel, t: Array) -> None:
+    """The exact curves that the dataset has of those of a panel."""
+    exact = [f"{name}_exact" for name in panel.names if f"{name}_exact" in curves(dataset)]
+    for k, name in enumerate(exact):
+        ax.plot(t, dataset[name].values, linestyle=EXACT, color="black", linewidth=0.9, label="_" if k else "exact")
 
 
 def _drawn(dataset: xarray.Dataset, panel: Panel, rows: Any = slice(None)) -> Array:
@@ -347,11 +362,17 @@ def _draw_balances(ax: Axes, dataset: xarray.Dataset) -> None:
     style.legend(ax)
 
 
-def _draw_time(axes: Sequence[Axes], dataset: xarray.Dataset, first: float | None) -> tuple[float, str]:
-    """The axis of time, logarithmic from ``first`` on where that is given, with bands of modes and lines at events;
-    returns how many points names need above the panels, and the events that have none there.
+def _draw_axis(
+    axes: Sequence[Axes], dataset: xarray.Dataset, against: str | None, first: float | None
+) -> tuple[float, str]:
+    """The axis that all panels share: a variable, or time, logarithmic from ``first`` on where that is given, with
+    bands of modes and lines at events; returns how many points names need above the panels, and the events that have
+    none there.
     """
-    times = dataset["time"].values
+    times, moments = dataset["time"].values, _moments(dataset)
+    if against:
+        style.label_variable(axes[-1].xaxis, dataset[against])
+        return 0.0, _counted([name for _, name in _named(moments)], {})
     if first is None:
         style.label(axes[-1].xaxis, "Time", "s", times)
     else:
@@ -359,7 +380,6 @@ def _draw_time(axes: Sequence[Axes], dataset: xarray.Dataset, first: float | Non
         for ax in axes:
             show_decades(ax, first, times[-1])
     stages = _draw_bands(axes, dataset) if len(times) > 1 else []
-    moments = _moments(dataset)
     width = float(axes[0].figure.bbox.width / axes[0].figure.dpi)
     below = _write(axes[0], width, stages, 0)
     rows, more = _draw_events(axes, width, moments, below)

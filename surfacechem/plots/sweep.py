@@ -33,12 +33,17 @@ def figure(dataset: xarray.Dataset, variables: Sequence[str] | None = None, agai
         return rupture.figure(dataset, load, variables)
     if not variables and "lifetime" in dataset and dataset["lifetime"].dims == tuple(axes):
         return rupture.lifetimes(dataset)
+    return _finals(dataset, axes[0], shown)
+
+
+def _finals(dataset: xarray.Dataset, axis: str, shown: Sequence[Panel]) -> Figure:
+    """Values at the ends of the runs over the first parameter, in panels."""
     height = 0.9 + (2.8 if len(shown) == 1 else 1.7) * len(shown)
     with style.panels(6.4, height, len(shown), sharex=True) as (plot, grid):
         for ax, panel in zip(grid[:, 0], shown, strict=True):
             _draw_final(ax, dataset, panel.names)
             style.legend(ax)
-        style.draw_parameter(grid[-1, 0].xaxis, dataset[axes[0]])
+        style.draw_parameter(grid[-1, 0].xaxis, dataset[axis])
         style.headings(plot, grid[0, 0], dataset)
     return plot
 
