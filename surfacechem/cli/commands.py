@@ -10,7 +10,7 @@ import threading
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn, TypeVar
 
 import typer
 from typer import Argument, Option
@@ -90,6 +90,14 @@ def _signals_raised() -> Iterator[None]:
             signal.signal(number, handler)
 
 
+def end_by_signal(error: SignalledError, kept: str) -> NoReturn:
+    """End the process as a signal asks, with what is left of the work."""
+    (number,) = error.args
+    word = "interrupted" if number == signal.SIGINT else f"ended by {signal.Signals(number).name}"
+    _tell(f"{word}; {kept}")
+    os._exit(SIGNALLED + number)  # at once: compiled code may run on in another thread, and would be waited for
+
+
 def _tell(message: object) -> None:
     """A line on stderr; the exit code says it where nothing can be written there."""
     with suppress(OSError):
@@ -124,10 +132,7 @@ class Commands(TyperGroup):
             _tell(error)
             raise typer.Exit(UNWRITTEN if isinstance(error, OutputError) else BAD_INPUT) from None
         except SignalledError as error:
-            (number,) = error.args
-            name = "interrupted" if number == signal.SIGINT else f"ended by {signal.Signals(number).name}"
-            _tell(f"{name}; nothing was written.")
-            os._exit(SIGNALLED + number)  # at once: compiled code may run on in another thread, and would be waited for
+            end_by_signal(error, "nothing was written.")
         except BrokenPipeError:
             raise  # the reader has enough
         except OSError as error:
@@ -295,9 +300,9 @@ def check_picture(target: Path) -> None:
     refuse_unwritable(target)
 
 
-def listed(text: str) -> list[str]:
-    """Words with commas between."""
-    return [part.strip() for part in text.split(",") if part.strip()]
+def listed(text: str | None) -> list[str] | None:
+    """Words with commas between; None where nothing is given."""
+    return None if text is None else [part.strip() for part in text.split(",") if part.strip()]
 
 
 def leave_with(status: str, reason: str = "") -> None:

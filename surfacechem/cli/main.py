@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from typer import Argument, Option
@@ -154,7 +154,7 @@ def sweep(
     if stores.asked_for(output, {"--resume": resume, "--part": part, "--cluster": cluster, "--only": only}):
         assert output is not None
         plan = simulation.plan(values, end)
-        return stores.write(simulation, plan, output, stores.Options(resume, part, cluster, only, talk))
+        return stores.write(simulation, plan, output, talk, resume=resume, part=part, cluster=cluster, only=only)
     target = dataset_path(output or f"{simulation.case.name}-sweep.nc")
     refuse_unwritable(target)
     if simulation.case.sweep is not None and simulation.case.sweep.keep is not None:
@@ -422,9 +422,8 @@ def plot(
     from surfacechem import plots
 
     solutions = {case: _run(case, changes, talk) for case in cases}
-    names = listed(variables) if variables else None
     shown = [solutions[source].dataset if source in solutions else source for source in sources]
-    plots.write(plots.figure(shown, names, against, celsius), target)
+    plots.write(plots.figure(shown, listed(variables), against, celsius), target)
     if talk is not False:
         typer.echo(str(target))
     for solution in solutions.values():
@@ -546,14 +545,13 @@ def precision(
     from surfacechem.studies import precision as studies
 
     settings = {
-        "solvers": None if solvers is None else listed(solvers),
+        "solvers": listed(solvers),
         "tolerances": None if tolerances is None else _tolerances(tolerances),
-        "variables": None if variables is None else listed(variables),
+        "variables": listed(variables),
         "repeat": repeat,
     }
-    given = {name: value for name, value in settings.items() if value is not None}
-    study = partial(studies.precision, cases, overrides=changes or (), **given)  # type: ignore[arg-type]
-    _conduct(study, output or Path("precision"), talk)
+    study = partial(studies.precision, cases, overrides=changes or ())
+    _conduct(study, settings, output or Path("precision"), talk)
 
 
 @app.command(epilog=STABILITY_CODES)
@@ -579,24 +577,24 @@ def stability(
     """
     from surfacechem.studies import stability as studies
 
-    settings = {"solvers": None if solvers is None else listed(solvers), "rtol": rtol, "rounds": search}
-    given = {name: value for name, value in settings.items() if value is not None}
-    study = partial(studies.stability, *(regimes or ()), quick=quick, **given)  # type: ignore[arg-type]
-    _conduct(study, output or Path("stability"), talk)
+    settings = {"solvers": listed(solvers), "rtol": rtol, "rounds": search}
+    study = partial(studies.stability, *(regimes or ()), quick=quick)
+    _conduct(study, settings, output or Path("stability"), talk)
 
 
-def _conduct(run: Callable[[], Study], target: Path, talk: bool | None) -> None:
-    """Run a study, which takes minutes; write and print it."""
+def _conduct(study: Callable[..., Study], settings: Mapping[str, Any], target: Path, talk: bool | None) -> None:
+    """Run a study, which takes minutes, with those settings that are given; write and print it."""
     from surfacechem.studies.report import targets
 
     files = targets(target).values()
     refuse_unwritable(*files)
-    study = solved(run, talk)
-    study.write(target)
+    given = {name: value for name, value in settings.items() if value is not None}
+    found = solved(partial(study, **given), talk)
+    found.write(target)
     if talk is not False:
-        show_page(study.page)
+        show_page(found.page)
         typer.echo(f"\nwritten to {', '.join(map(str, files))}")
-    leave_with(study.status)
+    leave_with(found.status)
 
 
 def _tolerances(text: str) -> list[float]:
@@ -608,7 +606,7 @@ def _tolerances(text: str) -> list[float]:
     place = Place(path="--tolerances")
     loose, dots, tight = text.partition("..")
     try:
-        values = [float(part) for part in ((loose, tight) if dots else listed(text))]
+        values = [float(part) for part in ((loose, tight) if dots else listed(text) or ())]
     except ValueError:
         message = f"'{text}' are no tolerances; give numbers, 1e-4,1e-8, or decades, 1e-4..1e-12."
         raise InputError(message, place) from None

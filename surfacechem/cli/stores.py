@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 import logging
-import os
 import re
-import signal
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
-import typer
-
-from surfacechem.cli.commands import SIGNALLED, SignalledError, leave_with, solved
+from surfacechem.cli.commands import SignalledError, end_by_signal, leave_with, solved
 from surfacechem.cli.terminal import PATIENCE, show
 from surfacechem.errors import InputError, Place
 
@@ -40,38 +35,33 @@ def asked_for(output: Path | None, options: dict[str, object]) -> bool:
     return False
 
 
-@dataclass(frozen=True)
-class Options:
-    """What the command line says of a store."""
-
-    resume: bool
-    part: str | None
-    cluster: str | None
-    only: str | None
-    """How the runs of a store ended that are run again, beside it."""
-    talk: bool | None
-
-
-def write(simulation: Simulation, plan: Plan, target: Path, options: Options) -> None:
-    """Run a sweep into a store; an interrupt says how to go on."""
+def write(
+    simulation: Simulation,
+    plan: Plan,
+    target: Path,
+    talk: bool | None,
+    resume: bool,
+    part: str | None,
+    cluster: str | None,
+    only: str | None,
+) -> None:
+    """Run a sweep into a store; an interrupt says how to go on. ``only`` is how the runs of a store ended that are run
+    again, beside it.
+    """
     from surfacechem.runs.streaming import failed_runs
     from surfacechem.runs.summaries import store_summary
 
-    talk, part = options.talk, part_of(options.part)
-    if options.only is not None:
-        plan, target = failed_runs(target, options.only), target.with_name(f"{target.stem}-{options.only}.zarr")
-    with client_at(options.cluster) as client:
-        stream = simulation.stream(plan, target, resume=options.resume, part=part)
+    numbers = part_of(part)
+    if only is not None:
+        plan, target = failed_runs(target, only), target.with_name(f"{target.stem}-{only}.zarr")
+    with client_at(cluster) as client:
+        stream = simulation.stream(plan, target, resume=resume, part=numbers)
         try:
             store = solved(lambda: stream.run(None, client, counting()), talk, brief=True, waits=stream.chunks.waits)
             errors = solved(stream.check, talk)
         except SignalledError as error:
-            (number,) = error.args
-            word = "interrupted" if number == signal.SIGINT else f"ended by {signal.Signals(number).name}"
-            typer.echo(f"surfacechem: {word}; what is stored is kept: go on with --resume.", err=True)
-            os._exit(
-                SIGNALLED + number
-            )  # at once, as compiled code may run on; a chunk without its mark does not count
+            # A chunk without its mark does not count.
+            end_by_signal(error, "what is stored is kept: go on with --resume.")
     status, sheet = store_summary(stream, store, errors)
     if talk is not False:
         show(sheet)
