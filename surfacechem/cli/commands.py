@@ -149,21 +149,8 @@ def written_to(text: str) -> Any:
 
 
 ORDER = (
-    *(
-        "new",
-        "cases",
-        "laws",
-        "check",
-        "run",
-        "plot",
-        "report",
-        "sweep",
-        "evaluate",
-        "equations",
-        "mechanism",
-        "steady",
-    ),
-    *("rerun", "precision", "stability", "figures", "schema"),
+    *("new", "cases", "laws", "check", "run", "plot", "report", "sweep", "evaluate", "equations", "mechanism"),
+    *("steady", "rerun", "precision", "stability", "figures", "schema"),
 )
 """Commands in the order in which one uses them; others follow."""
 

@@ -112,8 +112,7 @@ def run(
 def sweep(
     case: CaseName,
     output: Annotated[
-        Path | None,
-        written_to("netCDF file, or NAME.zarr for a store of any size; default <case name>-sweep.nc."),
+        Path | None, written_to("netCDF file, or NAME.zarr for a store of any size; default <case name>-sweep.nc.")
     ] = None,
     over: Annotated[
         list[str] | None,
@@ -496,8 +495,7 @@ def rerun(
     file: Annotated[Path, Argument(metavar="FILE.nc", help="A dataset that a run has written.")],
     output: Annotated[Path | None, written_to("Write the new dataset here.")] = None,
     allow_code: Annotated[
-        bool,
-        Option("--allow-code", help="Execute the laws whose source code the dataset contains; read it first."),
+        bool, Option("--allow-code", help="Execute the laws whose source code the dataset contains; read it first.")
     ] = False,
     talk: Talk = None,
 ) -> None:

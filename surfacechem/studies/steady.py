@@ -111,7 +111,7 @@ def steady(source: Source, of: Sequence[str] = (), overrides: Overrides = ()) ->
     return SteadyState(
         simulation.case.title,
         rest.time,
-        rest.coverages,
+        {q.species: x if x > TRACE else 0.0 for q, x in rest.found if q.species},
         {q.name: x for q, x in rest.found if not q.species},
         dict(zip(rest.wanted, rates.tolist(), strict=True)),
         {
@@ -173,11 +173,6 @@ class _Rest:
     def found(self) -> Iterator[tuple[Quantity, float]]:
         """The states with their values."""
         return zip(self.quantities, self.x.tolist(), strict=True)
-
-    @property
-    def coverages(self) -> dict[str, float]:
-        """Those that are coverages, by species."""
-        return {quantity.species: x if x > TRACE else 0.0 for quantity, x in self.found if quantity.species}
 
     @property
     def units(self) -> dict[str, str]:

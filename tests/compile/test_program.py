@@ -91,10 +91,7 @@ def test_what_is_named_is_differentiated_once() -> None:
     """Each name stands twice in the next: written out, the equation has 2^60 terms."""
     t, x, dx = se.symbols("t x dx")
     names = se.symbols("r:61")
-    named = [
-        (names[0], x),
-        *((after, 1 + before / (1 + before)) for before, after in pairwise(names)),
-    ]
+    named = [(names[0], x), *((after, 1 + before / (1 + before)) for before, after in pairwise(names))]
     program = compile_program(t, [x], [dx], [], [dx - names[-1]], named=named)
     value, slope = 0.9, 1.0
     for _ in names[1:]:

@@ -54,11 +54,7 @@ def chatter(V: float, m: float = 10.0, k: float = 1e8) -> Trial:
     first = exact.onset_time + exact.slip.duration
     # In the middle of three sticks.
     times = [first + (j + 0.5) * exact.stick_time + j * exact.slip.duration for j in range(3)]
-    changes = {
-        "loading.w_t": {"ramp": {"rate": V}},
-        "mechanics.tangential.m": m,
-        "mechanics.tangential.k": k,
-    }
+    changes = {"loading.w_t": {"ramp": {"rate": V}}, "mechanics.tangential.m": m, "mechanics.tangential.k": k}
 
     def at_rest(cycle: StickSlip, t: Array) -> dict[str, Array]:
         found = cycle.solution(t)
