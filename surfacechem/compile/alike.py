@@ -8,13 +8,11 @@ is a table beside it. So the time to compile does not grow with the number of ce
 from __future__ import annotations
 
 import ctypes
-import hashlib
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from functools import cache, lru_cache
+from functools import lru_cache
 from itertools import chain
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -26,7 +24,7 @@ from surfacechem.compile import vectors
 from surfacechem.compile.cache import code_file
 from surfacechem.compile.preparing import PREPARING
 from surfacechem.compile.vectors import LANES, NUMBER, VECTOR, Code, function_body, loaded, object_code
-from surfacechem.documents.cache_folder import from_file
+from surfacechem.documents.cache_folder import from_file, source_digest
 from surfacechem.expressions import derivative, gradient
 
 if TYPE_CHECKING:
@@ -253,14 +251,9 @@ def _code_of(forms: tuple[Form, ...]) -> Any:
         code.builder.ret_void()
         return object_code(code.builder)
 
+    sources = map(source_digest, (__file__, vectors.__file__))  # by which code is made
     origins = (str((form.expressions, form.shared, form.own, form.numbers)) for form in forms)
-    return loaded(from_file(code_file([*_sources(), *origins]), made, bytes, bytes))
-
-
-@cache
-def _sources() -> tuple[str, ...]:
-    """The sources by which code is made here."""
-    return tuple(hashlib.sha256(Path(file).read_bytes()).hexdigest() for file in (__file__, vectors.__file__))
+    return loaded(from_file(code_file([*sources, *origins]), made, bytes, bytes))
 
 
 class _Loops:

@@ -225,11 +225,7 @@ def _function(system: System, printer: _Python, name: str, text: str, rows: Sequ
     usual = "None" if pieced else "PARAMETERS"
     lines = [f"def {name}(t, y, ydot, parameters={usual}):", f'    """{text}"""']
     lines += ["    parameters = parameters_at(t) if parameters is None else parameters"] if pieced else []
-    for names, source in (
-        (states, "y"),
-        (rates, "ydot"),
-        ([str(p.symbol) for p in system.parameters], "parameters"),
-    ):
+    for names, source in ((states, "y"), (rates, "ydot"), ([str(p.symbol) for p in system.parameters], "parameters")):
         if names:
             lines += _unpacked([printer.name(n) for n in names], source)
     for item in quantities_read(system.named, [row.expression for row in rows]):

@@ -11,8 +11,7 @@ import pickle
 import threading
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from functools import cache, cached_property, lru_cache, partial
-from pathlib import Path
+from functools import cached_property, lru_cache, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from surfacechem import expressions as calculus
 from surfacechem.compile.cache import code_file
 from surfacechem.compile.preparing import PREPARING
-from surfacechem.documents.cache_folder import from_file
+from surfacechem.documents.cache_folder import from_file, source_digest
 from surfacechem.expressions import derivative, gradient
 
 if TYPE_CHECKING:
@@ -292,7 +291,8 @@ class _Derivatives:
     def origins(self) -> list[str]:
         """All that the entries follow from, as text."""
         names = [part for pair in self.named for part in pair]
-        return [*_differentiation(), *written((*self.variables, *names, *self.residual))]
+        differentiation = map(source_digest, (__file__, calculus.__file__))
+        return [*differentiation, *written((*self.variables, *names, *self.residual))]
 
 
 @lru_cache(maxsize=128)  # a scene that is loaded again, or differs in numbers alone, has the same expressions
@@ -313,12 +313,6 @@ def _machine_code(inputs: tuple[Any, ...], expressions: tuple[Any, ...] | _Deriv
 def _mark_of(inputs: tuple[Any, ...]) -> str:
     """What stands for inputs, which all functions of a scene share."""
     return hashlib.sha256("\n".join(written(inputs)).encode()).hexdigest()
-
-
-@cache
-def _differentiation() -> list[str]:
-    """The sources by which is differentiated."""
-    return [hashlib.sha256(Path(file).read_bytes()).hexdigest() for file in (__file__, calculus.__file__)]
 
 
 def written(expressions: Sequence[Any]) -> list[str]:

@@ -148,14 +148,8 @@ def _names(system: System) -> dict[str, str]:
     names |= {str(p.symbol): rf"\text{{{p.spec.text}}}" for p in system.parameters if _outside(p)}
     for item in system.named:
         names[f"{item.name} of a fit"] = rf"{symbol(item.name)}\!\left(T\right)"
-    return names | _species(system)
-
-
-def _species(system: System) -> dict[str, str]:
-    """Coverages and site densities by the names of their species."""
-    names: dict[str, str] = {}
     for state in system.states:
-        if species := state.quantity.species:
+        if species := state.quantity.species:  # coverages and site densities
             index = rf"\mathrm{{{species.translate(SPECIAL)}}}"
             names |= {state.name: rf"\theta_{{{index}}}", f"N_{state.name}": f"N_{{{index}}}"}
     return names

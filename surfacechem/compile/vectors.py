@@ -9,7 +9,7 @@ vectors of this length is served by several shorter ones.
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from functools import reduce
@@ -115,6 +115,19 @@ def loaded(code: bytes) -> Any:
     return engine
 
 
+def _arguments_first(whole: Any, parts: Callable[[Any], Sequence[Any]], known: Mapping[Any, Any]) -> Iterator[Any]:
+    """All that an expression is made of and that is not known, what is nested deeply without a stack; whoever asks for
+    the next makes each known.
+    """
+    left = [whole]
+    while left:
+        missing = [each for each in parts(left[-1]) if each not in known] if left[-1] not in known else []
+        if missing:
+            left += missing
+        elif (part := left.pop()) not in known:
+            yield part
+
+
 class Code:
     """Vectors for expressions, each part of the graph once; ``read`` gives those of the symbols."""
 
@@ -132,21 +145,9 @@ class Code:
 
     def value(self, expression: Any) -> Any:
         """The vector of a number, a symbol or a function, or the mask of a condition."""
-        found = self.known.get(expression)
-        if found is None:
-            # Arguments before the whole, so that what is nested deeply needs no stack.
-            left = [expression]
-            while left:
-                part = left[-1]
-                missing = [each for each in self._first(part) if each not in self.known]
-                if missing and part not in self.known:
-                    left += missing
-                    continue
-                if part not in self.known:
-                    self.known[part] = self._made(part)
-                left.pop()
-            found = self.known[expression]
-        return found
+        for part in _arguments_first(expression, self._first, self.known):
+            self.known[part] = self._made(part)
+        return self.known[expression]
 
     def _first(self, part: Any) -> Sequence[Any]:
         """What is formed before a part: all it is made of, but what only some cases may need of a choice."""
@@ -155,16 +156,8 @@ class Code:
 
     def _costs(self, expression: Any) -> bool:
         """Whether an expression takes longer than a jump around it."""
-        left = [expression]
-        while left:
-            part = left[-1]
-            parts = self._parts(part)
-            missing = [each for each in parts if each not in self.costs]
-            if missing and part not in self.costs:
-                left += missing
-                continue
-            self.costs[part] = _is_costly(part) or any(self.costs[each] for each in parts)
-            left.pop()
+        for part in _arguments_first(expression, self._parts, self.costs):
+            self.costs[part] = _is_costly(part) or any(self.costs[each] for each in self._parts(part))
         return self.costs[expression]
 
     def _made(self, part: Any) -> Any:
@@ -201,7 +194,7 @@ class Code:
         bits = ir.IntType(LANES)
         needed = self.builder.icmp_unsigned("!=", self.builder.bitcast(mask, bits), bits(0))
         before = self.builder.block
-        outside = dict(self.known)
+        outside, self.known = self.known, dict(self.known)
         with self.builder.if_then(needed):
             found = made()
             inside = self.builder.block

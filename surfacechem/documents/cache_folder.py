@@ -161,11 +161,12 @@ def _code(kind: type) -> tuple[bytes, bool]:
     source = getattr(sys.modules.get(kind.__module__), "__file__", None)
     if source is None or not Path(source).is_relative_to(PACKAGE):
         return f"{_SERIAL.setdefault(kind, next(_NUMBERS))}".encode(), False
-    return f"{kind.__module__}.{kind.__qualname__} {_source(source)}".encode(), True
+    return f"{kind.__module__}.{kind.__qualname__} {source_digest(source)}".encode(), True
 
 
 @cache
-def _source(file: str) -> str:
+def source_digest(file: str) -> str:
+    """The SHA-256 of a file with code that something follows from."""
     return hashlib.sha256(Path(file).read_bytes()).hexdigest()
 
 
@@ -177,7 +178,7 @@ def kept(mark: Fingerprint, code: Iterable[Path], find: Callable[[], Any]) -> An
     """
     if not mark.lasts:
         return find()
-    sources = sorted(_source(str(path)) for path in code)
+    sources = sorted(source_digest(str(path)) for path in code)
     libraries = [version(name) for name in ("numpy", "scipy", "symengine")]
     name = fingerprint(mark.digest, sources, libraries).digest[:32]
     return from_file(cache_root() / "numbers" / f"{name}.json", find, json.loads, lambda x: json.dumps(x).encode())
