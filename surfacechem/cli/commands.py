@@ -19,7 +19,7 @@ from typer.core import TyperGroup
 from surfacechem.errors import InputError, OutputError, Place, SurfacechemError, refuse_unknown
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from surfacechem.runs.simulation import Simulation
     from surfacechem.solve.run import Run
@@ -202,6 +202,13 @@ Talk = Annotated[
         show_default=False,
     ),
 ]
+
+
+def loaded(case: str, changes: Sequence[str] | None) -> Simulation:
+    """A case with its changes; what runs cases is imported when this is called."""
+    from surfacechem.runs.simulation import load
+
+    return load(case, changes or ())
 
 
 def chosen(simulation: Simulation, solver: str | None, rtol: float | None, accuracy: float | None = None) -> Run:

@@ -32,6 +32,7 @@ from surfacechem.cli.commands import (
     law_names,
     leave_with,
     listed,
+    loaded,
     refuse_unwritable,
     solved,
     written_to,
@@ -40,7 +41,6 @@ from surfacechem.cli.terminal import show, show_page
 from surfacechem.errors import InputError, Place, refuse_unknown
 
 if TYPE_CHECKING:
-    from surfacechem.results.solution import Solution
     from surfacechem.studies.report import Study
 
 MOST_DECADES = 20
@@ -90,10 +90,9 @@ def run(
 ) -> None:
     """Run a case, write its dataset and print a summary."""
     from surfacechem.results.netcdf import dataset_path
-    from surfacechem.runs.simulation import load
     from surfacechem.runs.summaries import run_summary
 
-    simulation = load(case, changes or ())
+    simulation = loaded(case, changes)
     settings = chosen(simulation, solver, rtol, accuracy)
     target = output or Path(f"{simulation.case.name}.nc")
     if target.exists() and Path(simulation.case.file).exists() and target.samefile(simulation.case.file):
@@ -145,10 +144,9 @@ def sweep(
     from surfacechem.cli import stores
     from surfacechem.documents.overrides import assignments
     from surfacechem.results.netcdf import dataset_path
-    from surfacechem.runs.simulation import load
     from surfacechem.runs.summaries import sweep_summary
 
-    simulation = load(case, changes or ())
+    simulation = loaded(case, changes)
     values, end = assignments(over or ()) or None, assignments([until] if until else ()) or None
     if stores.asked_for(output, {"--resume": resume, "--part": part, "--cluster": cluster, "--only": only}):
         assert output is not None
@@ -176,11 +174,10 @@ def check(
     """Describe a case in words, without running it."""
     from surfacechem.results.error_estimates import reasons
     from surfacechem.runs.check import consistent_start, groups, start_warnings, warnings
-    from surfacechem.runs.simulation import load
     from surfacechem.runs.summaries import check_summary
     from surfacechem.solve import AUTO
 
-    simulation = load(case, changes or ())
+    simulation = loaded(case, changes)
     system, scene = simulation.system, simulation.case.scene
     if system.rests:
         show(check_summary(simulation.case.title, system, scene, None, [], warnings(system)))
@@ -221,10 +218,9 @@ def evaluate(
     """
     from surfacechem.results.netcdf import dataset_path
     from surfacechem.runs.points import read_points
-    from surfacechem.runs.simulation import load
     from surfacechem.runs.summaries import points_summary
 
-    simulation = load(case, changes or ())
+    simulation = loaded(case, changes)
     target = dataset_path(output or f"{simulation.case.name}-points.nc") if points or output else None
     if target:
         refuse_unwritable(target)
@@ -420,20 +416,13 @@ def plot(
         begin_reading(Path(source))
     from surfacechem import plots
 
-    solutions = {case: _run(case, changes, talk) for case in cases}
+    solutions = {case: solved(loaded(case, changes).run, talk, brief=True) for case in cases}
     shown = [solutions[source].dataset if source in solutions else source for source in sources]
     plots.write(plots.figure(shown, listed(variables), against, celsius), target)
     if talk is not False:
         typer.echo(str(target))
     for solution in solutions.values():
         leave_with(solution.status, solution.reason)
-
-
-def _run(case: str, changes: Changes, talk: bool | None) -> Solution:
-    """A case that is run to be shown; a dataset is shown without what runs cases being imported."""
-    from surfacechem.runs.simulation import load
-
-    return solved(load(case, changes or ()).run, talk, brief=True)
 
 
 @app.command(epilog=EXIT_CODES)
@@ -482,7 +471,7 @@ def report(
         raise InputError("a dataset is reported as it is; give a case to change values of.", Place(path="--set"))
     target = run_report.report_path(output or f"{Path(source).stem}.html")
     refuse_unwritable(target)
-    solution = None if is_file else _run(source, changes, talk)
+    solution = None if is_file else solved(loaded(source, changes).run, talk, brief=True)
     solved(lambda: run_report.write(solution.dataset if solution else source, target), talk)
     if talk is not False:
         typer.echo(str(target))
