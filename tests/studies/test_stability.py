@@ -184,16 +184,6 @@ def made(tmp_path_factory):
     return studies[0], folder
 
 
-@pytest.fixture
-def study(made):
-    return made[0]
-
-
-@pytest.fixture
-def folder(made):
-    return made[1]
-
-
 def test_another_suffix_is_refused_before_anything_is_solved(tmp_path):
     done = CliRunner().invoke(app, ["stability", "seconds", "-o", str(tmp_path / "study.txt")])
     assert done.exit_code == 2
@@ -201,7 +191,8 @@ def test_another_suffix_is_refused_before_anything_is_solved(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_the_dataset_holds_every_cell(folder):
+def test_the_dataset_holds_every_cell(made):
+    _, folder = made
     assert sorted(file.suffix for file in folder.iterdir()) == [".html", ".nc", ".png", ".svg"]
     with xarray.open_dataset(folder / "study.nc") as data:
         assert dict(data["digits"].sizes) == {"regime": 2, "decade": 4, "solver": 2}
@@ -216,7 +207,8 @@ def test_the_dataset_holds_every_cell(folder):
         assert data.attrs["versions"].startswith("surfacechem ")
 
 
-def test_the_report_says_what_every_solver_keeps_and_what_was_left_out(study, monkeypatch):
+def test_the_report_says_what_every_solver_keeps_and_what_was_left_out(made, monkeypatch):
+    study, _ = made
     text, html = study.page.text(), study.page.html()
     assert "Least digits kept over all values, at rtol 1e-10" in text
     assert "tau [s]: 1e-15 .. 1e+15" in text
@@ -236,7 +228,8 @@ def test_the_report_says_what_every_solver_keeps_and_what_was_left_out(study, mo
     assert "<p>Nothing.</p>" in everything.page.html()
 
 
-def test_the_figure_holds_regimes_solvers_and_marks(study, folder):
+def test_the_figure_holds_regimes_solvers_and_marks(made):
+    study, folder = made
     text = (folder / "study.svg").read_text()
     for word in ("seconds", "ignition", "radau", "ida", "R  ended for the right reason", "digits", "possible"):
         assert f"<!-- {word} -->" in text
