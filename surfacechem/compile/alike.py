@@ -7,7 +7,6 @@ is a table beside it. So the time to compile does not grow with the number of ce
 
 from __future__ import annotations
 
-import ctypes
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -23,14 +22,14 @@ from numpy.typing import NDArray
 from surfacechem.compile import vectors
 from surfacechem.compile.cache import code_file
 from surfacechem.compile.preparing import PREPARING
-from surfacechem.compile.vectors import LANES, NUMBER, VECTOR, Code, function_body, loaded, object_code
+from surfacechem.compile.program import CODE
+from surfacechem.compile.vectors import LANES, NUMBER, VECTOR, Code, function_body, gathered, loaded, object_code
 from surfacechem.documents.cache_folder import from_file, source_digest
 from surfacechem.expressions import derivative, gradient
 
 if TYPE_CHECKING:
     from surfacechem.compile.program import Function
 
-_Constant: Any = ir.Constant
 _WORD: Any = ir.IntType(64)
 _HEAD = 5
 """Words before those of the loops: results, and of the rest how many, code, user data and the table of its places."""
@@ -224,7 +223,7 @@ class Alike:
         self._keep = code, left, tables
         self.address = int(self._engine.get_function_address("f"))
         self._n_out = len(rest)
-        self._call: Any = ctypes.PYFUNCTYPE(None, *[ctypes.c_void_p] * 3)(self.address)
+        self._call: Any = CODE(self.address)
 
     def __call__(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """The results of rows of inputs."""
@@ -285,13 +284,13 @@ class _Loops:
         count, shared, own, numbers, places = (self._word(head + k) for k in range(_OF_LOOP))
         known, results = {}, [b.alloca(VECTOR) for _ in form.expressions]
         for k, symbol in enumerate(form.shared):
-            known[symbol] = self._vector([self._read(self.inputs, self._read(shared, _WORD(k), _WORD))] * LANES)
+            known[symbol] = gathered(b, [self._read(self.inputs, self._read(shared, _WORD(k), _WORD))] * LANES)
         with self._each(b.sdiv(b.add(count, _WORD(LANES - 1)), _WORD(LANES))) as block:
             first = b.mul(block, _WORD(LANES))
             for k, symbol in enumerate(form.own):
                 row = b.add(b.mul(first, _WORD(len(form.own))), _WORD(LANES * k))
                 which = [self._read(own, b.add(row, _WORD(lane)), _WORD) for lane in range(LANES)]
-                known[symbol] = self._vector([self._read(self.inputs, place) for place in which])
+                known[symbol] = gathered(b, [self._read(self.inputs, place) for place in which])
             for k, symbol in enumerate(form.numbers):
                 row = b.add(b.mul(first, _WORD(len(form.numbers))), _WORD(LANES * k))
                 known[symbol] = self._read(numbers, row, VECTOR)
@@ -320,12 +319,6 @@ class _Loops:
     def _add(self, place: Any, value: Any) -> None:
         entry = self._entry(self.out, place)
         self.builder.store(self.builder.fadd(self.builder.load(entry), value), entry)
-
-    def _vector(self, values: Sequence[Any]) -> Any:
-        found = _Constant(VECTOR, ir.Undefined)
-        for lane, value in enumerate(values):
-            found = self.builder.insert_element(found, value, ir.IntType(32)(lane))
-        return found
 
     @contextmanager
     def _each(self, count: Any) -> Iterator[Any]:

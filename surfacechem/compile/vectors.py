@@ -9,7 +9,7 @@ vectors of this length is served by several shorter ones.
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from functools import reduce
@@ -260,12 +260,9 @@ class Code:
         """A function of the C library at each place."""
         kind = ir.FunctionType(NUMBER, [NUMBER] * len(values))
         function = self.builder.module.globals.get(name) or ir.Function(self.builder.module, kind, name=name)
-        found = _Constant(VECTOR, ir.Undefined)
-        for lane in range(LANES):
-            place = ir.IntType(32)(lane)
-            own = [self.builder.extract_element(value, place) for value in values]
-            found = self.builder.insert_element(found, self.builder.call(function, own), place)
-        return found
+        places = map(ir.IntType(32), range(LANES))
+        given = ([self.builder.extract_element(value, place) for value in values] for place in places)
+        return gathered(self.builder, (self.builder.call(function, own) for own in given))
 
 
 _CONSTANTS = {"Pi", "Exp1"}
@@ -309,6 +306,14 @@ def _is_costly(part: Any) -> bool:
 def number(value: float) -> Any:
     """The same number at every place."""
     return _Constant(VECTOR, [value] * LANES)
+
+
+def gathered(builder: Any, values: Iterable[Any]) -> Any:
+    """A vector of numbers, each put in its place as it is formed."""
+    found = _Constant(VECTOR, ir.Undefined)
+    for lane, value in enumerate(values):
+        found = builder.insert_element(found, value, ir.IntType(32)(lane))
+    return found
 
 
 def _whole(value: int) -> Any:
