@@ -33,13 +33,8 @@ def dataset(times=None, **more):
         **more,
     }
     data = {name: ("time", values, {"units": unit, "long_name": name}) for name, (unit, values) in variables.items()}
-    attributes = {
-        "title": "A test",
-        "reason": "reached the end",
-        "energy_error": 1e-12,
-        "solver": "radau",
-        "rtol": 1e-10,
-    }
+    said = {"title": "A test", "reason": "reached the end", "solver": "radau"}
+    attributes = {**said, "energy_error": 1e-12, "rtol": 1e-10}
     return xarray.Dataset(data, coords={"time": ("time", t, {"units": "s"})}, attrs=attributes)
 
 
@@ -113,12 +108,9 @@ def test_chosen_variables_are_grouped_by_unit():
 def test_the_largest_of_many_have_colours_and_names():
     t = np.linspace(0.0, 2.0, 21)
     many = {f"theta_{k}": ("1", (k + 1) * t / 40) for k in range(20)}
-    ax = figure(dataset(**many), [*many]).axes[0]
-    assert [text.get_text() for text in ax.get_legend().get_texts()] == [
-        *(rf"$\theta_{{{k}}}$" for k in range(19, 13, -1)),
-        "14 smaller",
-    ]
-    assert [line.get_color() for line in ax.get_lines()][6:] == 14 * ["0.75"]
+    plot = figure(dataset(**many), [*many])
+    assert labels(plot)[0] == [*(rf"$\theta_{{{k}}}$" for k in range(19, 13, -1)), "14 smaller"]
+    assert [line.get_color() for line in plot.axes[0].get_lines()][6:] == 14 * ["0.75"]
 
 
 def test_another_axis_than_time():

@@ -16,6 +16,10 @@ def spectrum():
     return surfacechem.load("force-spectroscopy").sweep(rates, {"f": "150 pN"}).dataset
 
 
+def words(ax):
+    return [text.get_text() for text in ax.get_legend().get_texts()]
+
+
 def test_lifetimes_are_those_under_a_constant_force_at_every_rate(spectrum):
     exact = np.exp(-spectrum["f"].values * 0.4e-9 / (BOLTZMANN * 300)) / 0.1
     found = spectrum["lifetime"].values
@@ -27,12 +31,10 @@ def test_lifetimes_are_those_under_a_constant_force_at_every_rate(spectrum):
 def test_the_figure_has_spectrum_distributions_and_lifetimes(spectrum):
     forces, density, lifetime = plots.figure(spectrum).axes
     assert (forces.get_xlabel(), forces.get_xscale()) == ("Loading rate of $f$ [pN s⁻¹]", "log")
-    assert [text.get_text() for text in forces.get_legend().get_texts()] == ["most probable", "median", "mean", "exact"]
+    assert words(forces) == ["most probable", "median", "mean", "exact"]
     assert forces.get_ylabel() == "$f$ at rupture [pN]"
-    assert [text.get_text() for text in density.get_legend().get_texts()] == [
-        "rate = 100 pN s⁻¹",
-        "rate = 1000 pN s⁻¹",
-    ]  # at 1 pN/s most bonds break before there is a force
+    # At 1 pN/s most bonds break before there is a force.
+    assert words(density) == ["rate = 100 pN s⁻¹", "rate = 1000 pN s⁻¹"]
     assert (density.get_title("right"), lifetime.get_yscale()) == ("2 of 3 runs", "log")
     for line in density.get_lines():
         x, y = (values[np.isfinite(line.get_ydata())] for values in line.get_data())
@@ -43,15 +45,8 @@ def test_the_figure_has_spectrum_distributions_and_lifetimes(spectrum):
 def test_a_second_parameter_has_colours_and_statistics_have_markers():
     over = {"loading.f.ramp.rate": [1e-11, 1e-10, 1e-9], "interface.bonding.bell.k_off": [0.1, 1.0]}
     forces, *_ = plots.figure(surfacechem.sweep("force-spectroscopy", over, {"f": "150 pN"}).dataset).axes
-    words = [text.get_text() for text in forces.get_legend().get_texts()]
-    assert words == [
-        r"$k_{\mathrm{off}}$ = 0.1 s⁻¹",
-        r"$k_{\mathrm{off}}$ = 1 s⁻¹",
-        "most probable",
-        "median",
-        "mean",
-        "exact",
-    ]
+    rates = [rf"$k_{{\mathrm{{off}}}}$ = {rate} s⁻¹" for rate in (0.1, 1)]
+    assert words(forces) == [*rates, "most probable", "median", "mean", "exact"]
     drawn = [line for line in forces.get_lines() if len(line.get_xdata())]
     assert len({line.get_color() for line in drawn}) == 2
     assert {line.get_marker() for line in drawn} == {"o", "s", "D", "None"}
@@ -65,7 +60,7 @@ def test_lifetimes_under_constant_forces_have_a_figure():
     assert points.get_ydata() == pytest.approx(exact.get_ydata(), rel=1e-11)
     assert (above.get_xlabel(), above.get_yscale()) == ("Force per bond $f$ [pN]", "log")
     assert (len(below.get_lines()), below.get_xscale()) == (3, "log")
-    assert [text.get_text() for text in below.get_legend().get_texts()] == ["$f$ = 0 pN", "$f$ = 10 pN", "$f$ = 40 pN"]
+    assert words(below) == ["$f$ = 0 pN", "$f$ = 10 pN", "$f$ = 40 pN"]
 
 
 def test_survival_is_followed_and_drawn_over_decades():

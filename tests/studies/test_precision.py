@@ -307,15 +307,6 @@ def test_the_report_contains_everything(written):
     assert not re.search(r'(src|href)="(?!#)', text)
 
 
-def again(study, folder, monkeypatch):
-    """The dataset that the command of a study makes."""
-    monkeypatch.chdir(folder)
-    done = CliRunner().invoke(app, shlex.split(study.command)[1:])
-    assert done.exit_code == 0, done.output
-    with xarray.open_dataset("precision.nc") as data:
-        return data.load()
-
-
 @pytest.mark.usefixtures("blank")
 def test_the_command_holds_whatever_was_given_from_python(tmp_path, monkeypatch):
     """A case by its path, a tolerance of many digits, nothing instead of a reference, a nested value."""
@@ -323,9 +314,12 @@ def test_the_command_holds_whatever_was_given_from_python(tmp_path, monkeypatch)
     path.write_text(surfacechem.load("exothermic").case.text)
     changes = {"reference": None, "loading": {"p": "3 Pa"}, "run.until": np.int64(1), "run.rtol": "1e-7"}
     study = run(path, ["radau"], [1.23456789e-7], overrides=changes)
-    found = again(study, tmp_path, monkeypatch)
-    for name in ("tolerance", "error_max", "reference"):
-        np.testing.assert_array_equal(found[name], study.dataset[name])
+    monkeypatch.chdir(tmp_path)
+    done = CliRunner().invoke(app, shlex.split(study.command)[1:])
+    assert done.exit_code == 0, done.output
+    with xarray.open_dataset("precision.nc") as found:
+        for name in ("tolerance", "error_max", "reference"):
+            np.testing.assert_array_equal(found[name], study.dataset[name])
 
 
 @pytest.mark.parametrize(
