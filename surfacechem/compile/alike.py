@@ -21,9 +21,10 @@ from numpy.typing import NDArray
 
 from surfacechem.compile import vectors
 from surfacechem.compile.cache import code_file
+from surfacechem.compile.objectcode import engine
 from surfacechem.compile.preparing import PREPARING
 from surfacechem.compile.program import CODE
-from surfacechem.compile.vectors import LANES, NUMBER, VECTOR, Code, function_body, gathered, loaded, object_code
+from surfacechem.compile.vectors import LANES, NUMBER, VECTOR, Code, function_body, gathered, object_code
 from surfacechem.documents.cache_folder import from_file, source_digest
 from surfacechem.expressions import derivative, gradient
 
@@ -252,7 +253,7 @@ def _code_of(forms: tuple[Form, ...]) -> Any:
 
     sources = map(source_digest, (__file__, vectors.__file__))  # by which code is made
     origins = (str((form.expressions, form.shared, form.own, form.numbers)) for form in forms)
-    return loaded(from_file(code_file([*sources, *origins]), made, bytes, bytes))
+    return engine(from_file(code_file([*sources, *origins]), made, bytes, bytes))
 
 
 class _Loops:

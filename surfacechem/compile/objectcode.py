@@ -80,22 +80,28 @@ def load(folder: Path) -> Callable[..., None] | None:
     return Kernel(name.decode(), code)
 
 
+def engine(code: bytes, unused: Sequence[str] = ()) -> Any:
+    """An engine that holds machine code; what it names and does not use ends the process."""
+    import llvmlite.binding as llvm
+
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    machine = llvm.Target.from_default_triple().create_target_machine(jit=True)
+    missing = llvm.parse_assembly("\n".join(f"declare void @{name}()" for name in unused))
+    found = llvm.create_mcjit_compiler(missing, machine)  # which owns both from here on
+    abort = ctypes.cast(ctypes.CDLL(None).abort, ctypes.c_void_p).value if unused else None
+    for name in unused:  # in this engine alone: Numba may be at work in the same process
+        found.add_global_mapping(missing.get_function(name), abort)
+    found.add_object_file(llvm.ObjectFileRef.from_data(code))
+    found.finalize_object()
+    return found
+
+
 class Kernel:
     """Machine code of a function of integers, numbers, contiguous arrays and tuples of these that returns nothing."""
 
     def __init__(self, name: str, code: bytes) -> None:
-        import llvmlite.binding as llvm
-
-        llvm.initialize_native_target()
-        llvm.initialize_native_asmprinter()
-        machine = llvm.Target.from_default_triple().create_target_machine(jit=True)
-        missing = llvm.parse_assembly("\n".join(f"declare void @{name}()" for name in UNUSED))
-        self._engine = llvm.create_mcjit_compiler(missing, machine)
-        abort = ctypes.cast(ctypes.CDLL(None).abort, ctypes.c_void_p).value
-        for symbol in UNUSED:  # in this engine alone: Numba may be at work in the same process
-            self._engine.add_global_mapping(missing.get_function(symbol), abort)
-        self._engine.add_object_file(llvm.ObjectFileRef.from_data(code))
-        self._engine.finalize_object()
+        self._engine = engine(code, UNUSED)
         self._address = self._engine.get_function_address(name)
         self._call: Any = None
         self._nothing, self._error = ctypes.c_void_p(), ctypes.c_void_p()

@@ -21,6 +21,7 @@ import symengine
 from llvmlite import binding, ir
 from numpy.typing import NDArray
 
+from surfacechem.compile.objectcode import engine
 from surfacechem.compile.preparing import PREPARING
 
 LANES = 8
@@ -75,8 +76,8 @@ def compile_lanes(inputs: Sequence[Any], expressions: Sequence[Any]) -> LaneFunc
     for number, value in enumerate(code.values):
         builder.store(value, _entry(builder, out, number), align=8)
     builder.ret_void()
-    engine = loaded(object_code(builder))
-    return LaneFunction(int(engine.get_function_address("f")), len(expressions), engine)
+    held = engine(object_code(builder))
+    return LaneFunction(int(held.get_function_address("f")), len(expressions), held)
 
 
 def _entry(builder: Any, argument: Any, place: int) -> Any:
@@ -102,17 +103,6 @@ def object_code(builder: Any) -> bytes:
     passes = _binding.create_pass_builder(machine, _binding.create_pipeline_tuning_options(speed_level=2))
     passes.getModulePassManager().run(module, passes)
     return bytes(machine.emit_object(module))
-
-
-def loaded(code: bytes) -> Any:
-    """An engine that holds machine code."""
-    _binding.initialize_native_target()
-    _binding.initialize_native_asmprinter()
-    machine = _binding.Target.from_default_triple().create_target_machine(jit=True)
-    engine = _binding.create_mcjit_compiler(_binding.parse_assembly(""), machine)  # which owns both from here on
-    engine.add_object_file(_binding.ObjectFileRef.from_data(code))
-    engine.finalize_object()
-    return engine
 
 
 def _arguments_first(whole: Any, parts: Callable[[Any], Sequence[Any]], known: Mapping[Any, Any]) -> Iterator[Any]:
@@ -157,7 +147,10 @@ class Code:
     def _costs(self, expression: Any) -> bool:
         """Whether an expression takes longer than a jump around it."""
         for part in _arguments_first(expression, self._parts, self.costs):
-            self.costs[part] = _is_costly(part) or any(self.costs[each] for each in self._parts(part))
+            kind = type(part).__name__
+            # These take some ten times as long as a sum.
+            slow = kind in ("log", *_LIBRARY) or (kind == "Pow" and not part.args[1].is_Integer)
+            self.costs[part] = slow or any(self.costs[each] for each in self._parts(part))
         return self.costs[expression]
 
     def _made(self, part: Any) -> Any:
@@ -295,12 +288,6 @@ def has_code(expression: Any) -> bool:
             return False
         left += part.args
     return True
-
-
-def _is_costly(part: Any) -> bool:
-    """Whether an operation takes some ten times as long as a sum."""
-    kind = type(part).__name__
-    return kind in ("log", *_LIBRARY) or (kind == "Pow" and not part.args[1].is_Integer)
 
 
 def number(value: float) -> Any:
