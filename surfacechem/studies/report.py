@@ -120,6 +120,12 @@ class Page:
         font = mathml.font() if any(section.equations for section in self.sections) else ""
         return template.render(page=self, figures=self._figures(), drawn=drawn, machine=machine(), font=font)
 
+    def write(self, target: Path) -> None:
+        """Save it as one HTML file, whole or not at all."""
+        text = self.html()
+        with replacing(target) as temporary:
+            temporary.write_text(text, encoding="utf-8")
+
     def _figures(self) -> list[str]:
         """The figure as SVG, and the one that a phone shows in its place if it is narrower."""
         if self.draw is None:
@@ -278,8 +284,7 @@ class Study:
         for suffix in (".svg", ".png"):
             plots.write(figure, files[suffix])
             figure.set_layout_engine("none")  # both have the same, which takes as long to find as to draw
-        with replacing(files[".html"]) as temporary:
-            temporary.write_text(self.page.html(), encoding="utf-8")
+        self.page.write(files[".html"])
         return list(files.values())
 
 

@@ -26,7 +26,6 @@ from surfacechem.model.system import System
 from surfacechem.plots import drawing, figure, opened, save
 from surfacechem.results import spatial
 from surfacechem.results.dataset import Results
-from surfacechem.results.netcdf import replacing
 from surfacechem.results.solution import Solution
 from surfacechem.runs.check import laws_of
 from surfacechem.runs.listing import FORMULA, plain, source
@@ -103,9 +102,7 @@ def report_path(path: str | Path) -> Path:
 def write(data: xarray.Dataset | str | Path, path: str | Path) -> Path:
     """Save the report of a dataset as one HTML file, whole or not at all."""
     target = report_path(path)
-    text = page(data).html()
-    with replacing(target) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+    page(data).write(target)
     return target
 
 
