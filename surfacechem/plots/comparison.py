@@ -56,7 +56,7 @@ def figure(
         plot.legend(handles=handles, loc="outside lower left", ncols=1 if len(max(names, key=len)) > LONG else 2)
         titles = {str(dataset.attrs.get("title", "")) for dataset in datasets}
         title = titles.pop() if len(titles) == 1 else f"{len(datasets)} datasets"
-        plot.suptitle(title, x=0.01, ha="left", fontsize=11, fontweight="bold")
+        plot.suptitle(title, **style.TITLE)
     return plot
 
 

@@ -183,7 +183,7 @@ def curves(dataset: xarray.Dataset, axes: Sequence[str], names: Sequence[str], a
         told += filter(None, (_between_outputs(dataset, name) for name in names))
         style.headings(plot, grid[0, 0], dataset, more="   ".join(told))
         if len(members) < count:
-            grid[0, 0].set_title(f"{len(members)} of {count} runs", loc="left", fontsize=8, color="#555555")
+            grid[0, 0].set_title(f"{len(members)} of {count} runs", loc="left", **style.NOTE)
     return plot
 
 
@@ -241,7 +241,7 @@ def effects(
                 ax.xaxis.label.set(fontsize=8, visible=ax is column[-1])
         grid[-1, 0].set_xlabel("runs")
         style.headings(plot, grid[0, 0], dataset)
-        grid[0, 0].set_title("5, 50 and 95 % of the runs", loc="left", fontsize=8, color="#555555")
+        grid[0, 0].set_title("5, 50 and 95 % of the runs", loc="left", **style.NOTE)
     return plot
 
 

@@ -158,11 +158,11 @@ def _stacked(
     return plot
 
 
-def at_states(dataset: xarray.Dataset, variables: Sequence[str] | None = None, against: str | None = None) -> Figure:
+def at_states(dataset: xarray.Dataset, variables: Sequence[str] | None, against: str | None) -> Figure:
     """Each of the variables at given states, else tractions and heat fluxes that differ, over ``against``, else over
     the first that differs.
     """
-    known = [str(n) for n, x in dataset.data_vars.items() if x.dims == ("point",) and x.dtype.kind == "f"]
+    known = curves(dataset, "point")
     asked = [*(variables or ()), *filter(None, [against])]
     refuse_unknown(asked, known, "no variable '{}' at the states", style.place(dataset))
     # Quantities, no derivatives, that are not the same at all states.
@@ -199,9 +199,9 @@ def first_shown(dataset: xarray.Dataset, panels: Sequence[Panel]) -> float | Non
     return float(max(times[times > 0][0], SHOWN * times[-1]))
 
 
-def curves(dataset: xarray.Dataset) -> list[str]:
-    """Names of the numbers that are functions of time alone."""
-    return [str(n) for n, values in dataset.data_vars.items() if values.dims == ("time",) and values.dtype.kind == "f"]
+def curves(dataset: xarray.Dataset, over: str = "time") -> list[str]:
+    """Names of the numbers that are functions of time, or of another dimension, alone."""
+    return [str(n) for n, values in dataset.data_vars.items() if values.dims == (over,) and values.dtype.kind == "f"]
 
 
 def is_mode(values: xarray.DataArray) -> bool:

@@ -71,7 +71,7 @@ def _draw_over(ax: Axes, dataset: xarray.Dataset, load: str, values: Array, belo
         ax.plot(dataset[load].values, values[place], color=colour, linewidth=width, label=label)
     style.label_variable(ax.xaxis, dataset[load])
     if len(members) < dataset["status"].size:
-        ax.set_title(f"{len(members)} of {dataset['status'].size} runs", loc="right", fontsize=8, color="#555555")
+        ax.set_title(f"{len(members)} of {dataset['status'].size} runs", loc="right", **style.NOTE)
 
 
 def _draw_series(ax: Axes, dataset: xarray.Dataset, load: str, name: str) -> None:

@@ -66,6 +66,10 @@ PREFIXES = {-5: "f", -4: "p", -3: "n", -2: "µ", -1: "m", 0: "", 1: "k", 2: "M",
 GREEK = ("alpha", "beta", "epsilon", "eta", "kappa", "lambda", "mu", "phi", "rho", "sigma", "tau", "theta")
 
 
+TITLE: Any = {"x": 0.01, "ha": "left", "fontsize": 11, "fontweight": "bold"}
+NOTE: Any = {"fontsize": 8, "color": "#555555"}
+"""How the title of a figure looks, and a note above its panels."""
+
 LETTERS, TITLE_LETTERS = 16, 9.5
 """Of a line of facts above the panels, and of the title and the words below an axis, in an inch."""
 
@@ -193,7 +197,7 @@ def headings(plot: Figure, ax: Axes, dataset: xarray.Dataset, above: float = 0.0
     """Title, how it ended, error, solver and what ``more`` there is to say, so many points above the axes."""
     attributes = dataset.attrs
     title = wrap(str(attributes.get("title", "")), int(TITLE_LETTERS * plot.get_figwidth())) or [""]
-    plot.suptitle("\n".join(title), x=0.01, ha="left", fontsize=11, fontweight="bold")
+    plot.suptitle("\n".join(title), **TITLE)
     facts = [str(attributes.get("reason", ""))]
     if (error := number(dataset, "error")) is not None:
         exact = str(attributes.get("error_source", "")).startswith("exact")
@@ -208,7 +212,7 @@ def headings(plot: Figure, ax: Axes, dataset: xarray.Dataset, above: float = 0.0
     lines = _packed([*facts, more], room)
     more_lines = above + 10 * (len(lines) - 1) + 14 * (len(title) - 1)
     plot.set_figheight(plot.get_figheight() + more_lines / 72)  # the panels keep their height
-    ax.set_title("\n".join(lines), loc="left", fontsize=8, color="#555555", pad=6 + above)
+    ax.set_title("\n".join(lines), loc="left", pad=6 + above, **NOTE)
 
 
 def _packed(facts: Sequence[str], room: int) -> list[str]:
