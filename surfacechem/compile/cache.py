@@ -190,12 +190,8 @@ def _changes(parts: Collection[str]) -> list[tuple[Any, str, Any]]:
     codegen: Any = JITCPUCodegen
     flags: Any = TargetConfig
     llvm: Any = vars(llvm_bindings)["llvm"]
-    optimise, finalise, set_environment = (
-        library._optimize_final_module,
-        library._finalize_final_module,
-        codegen.set_env,
-    )
-    pass_builder, digests = llvm.create_pass_builder, dict[Any, int]()
+    optimise, finalise = library._optimize_final_module, library._finalize_final_module
+    set_environment, pass_builder, digests = codegen.set_env, llvm.create_pass_builder, dict[Any, int]()
 
     # Numba optimises and translates every function together with all it calls, level by level, as if each were called
     # from Python. Of the parts of a kernel only the code between is kept; the whole is optimised and translated once.

@@ -114,11 +114,8 @@ def python(system: System, title: str = "") -> str:
         for state in system.states
     )
     heading = f"{title}: {system.regime}" if title else system.regime
-    held = (
-        f"y holds\n\n{states}\n\nand ydot their time derivatives."
-        if states
-        else "Nothing evolves: y and ydot are empty."
-    )
+    evolving = f"y holds\n\n{states}\n\nand ydot their time derivatives."
+    held = evolving if states else "Nothing evolves: y and ydot are empty."
     text = f"{_safe(heading)}.\n\nt is time [s]. {held}"
     return "\n\n".join([f'"""{text}\n"""\n\nimport math\n', parameters, *_pieces(system), *functions])
 

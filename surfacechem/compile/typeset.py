@@ -97,9 +97,8 @@ class Statement(NamedTuple):
 def equations(system: System) -> tuple[list[Equation], dict[str, str]]:
     """The balances of a scene and the quantities that they read; and the LaTeX of its parameters, by their paths."""
     printer = Paper(_names(system))
-    return [printer.equation(line) for line in lines(system)], {
-        p.path: printer.text(p.symbol) for p in system.parameters
-    }
+    symbols = {p.path: printer.text(p.symbol) for p in system.parameters}
+    return [printer.equation(line) for line in lines(system)], symbols
 
 
 def lines(system: System) -> list[Statement]:
@@ -113,9 +112,7 @@ def lines(system: System) -> list[Statement]:
         if item.name in loads and isinstance(item.expression, symengine.Add)
     }
     named = [
-        Named(
-            item.quantity, _plain(Named(item.quantity, item.expression.xreplace({} if item.name in loads else given)))
-        )
+        Named(item.quantity, _plain(item.name, item.expression.xreplace({} if item.name in loads else given)))
         for item in system.named
         if item.expression not in levels
     ]
@@ -273,11 +270,11 @@ def _grouped(system: System, item: Named, sides: Split, text: str) -> Iterator[S
         yield Statement(item.name, left, right, text, when if len(found) > 1 else "")
 
 
-def _plain(item: Named) -> Expression:
+def _plain(name: str, expression: Expression) -> Expression:
     """The expression of a named quantity without its guards; that of a fit by its name."""
-    if any(str(x).startswith(f"{item.name}_ends_") for x in symengine.sympify(item.expression).free_symbols):
-        return symengine.Symbol(f"{item.name} of a fit")
-    return readable(item.expression)
+    if any(str(x).startswith(f"{name}_ends_") for x in symengine.sympify(expression).free_symbols):
+        return symengine.Symbol(f"{name} of a fit")
+    return readable(expression)
 
 
 def _tabulated(expression: Expression) -> Expression:

@@ -258,6 +258,8 @@ def symbol(name: str) -> str:
 
     >>> symbol("T_1"), symbol("phi"), symbol("D_coulomb"), symbol("R_linear_affinity")
     ('$T_{1}$', '$\\phi$', '$D_{\\mathrm{coulomb}}$', '$R_{\\mathrm{linear\\ affinity}}$')
+    >>> symbol("theta_bond_s")
+    '$\\theta_{\\mathrm{bond\\ s}}$'
     """
     head, _, subscript = name.partition("_")
     base = f"\\{head}" if head in GREEK else (head if len(head) == 1 else rf"\mathrm{{{head}}}")

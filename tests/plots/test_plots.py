@@ -11,7 +11,6 @@ import surfacechem
 from surfacechem.errors import InputError
 from surfacechem.plots import figure, save
 from surfacechem.plots.run import logarithmic, merged
-from surfacechem.plots.style import symbol
 
 pytestmark = pytest.mark.around
 
@@ -230,10 +229,6 @@ def test_runs_that_ended_at_once_and_values_that_are_not_finite():
     values = np.linspace(300.0, 400.0, 21)
     values[3] = np.nan  # leaves a gap
     save(figure(dataset(T_3=("K", values)), ["T_3"]), BytesIO(), "png")
-
-
-def test_symbols():
-    assert symbol("theta_bond_s") == r"$\theta_{\mathrm{bond\ s}}$"
 
 
 def test_temperatures_in_degrees_celsius():
