@@ -169,13 +169,9 @@ def _draw(
 def _label_axis(axes: Sequence[Axes], datasets: Sequence[xarray.Dataset], over: str, begin: float | None) -> None:
     """The axis that all panels share: time, over decades from ``begin`` on, a variable, or the swept parameter."""
     first, values = datasets[0][over], np.concatenate([dataset[over].values for dataset in datasets])
-    if over != "time" and "sweep" in datasets[0].attrs:
+    if over == "time":
+        run.label_time(axes, values, unit(first), begin)
+    elif "sweep" in datasets[0].attrs:
         style.draw_parameter(axes[-1].xaxis, first)
-        return
-    if begin is not None:
-        axes[-1].set_xlabel("Time [s]")
-        for ax in axes:
-            run.show_decades(ax, begin, float(values.max()))
-        return
-    words = "Time" if over == "time" else style.variable_words(first)
-    style.label(axes[-1].xaxis, words, unit(first), values)
+    else:
+        style.label(axes[-1].xaxis, style.variable_words(first), unit(first), values)

@@ -373,12 +373,7 @@ def _draw_axis(
     if against:
         style.label_variable(axes[-1].xaxis, dataset[against])
         return 0.0, _counted([name for _, name in _named(moments)], {})
-    if first is None:
-        style.label(axes[-1].xaxis, "Time", "s", times)
-    else:
-        axes[-1].set_xlabel("Time [s]")
-        for ax in axes:
-            show_decades(ax, first, times[-1])
+    label_time(axes, times, "s", first)
     stages = _draw_bands(axes, dataset) if len(times) > 1 else []
     width = float(axes[0].figure.bbox.width / axes[0].figure.dpi)
     below = _write(axes[0], width, stages, 0)
@@ -386,15 +381,22 @@ def _draw_axis(
     return LANE * (below + rows), more
 
 
-def show_decades(ax: Axes, first: float, last: float) -> None:
-    """A logarithmic axis of time, without what has happened before it begins."""
-    drawn = [np.asarray(line.get_ydata())[np.asarray(line.get_xdata()) >= first] for line in ax.get_lines()]
-    seen = np.concatenate([values[np.isfinite(values)] for values in drawn])
-    if ax.get_yscale() == "linear" and varies(seen):
-        margin = 0.05 * np.ptp(seen)
-        ax.set_ylim(seen.min() - margin, seen.max() + margin)
-    style.logarithmic(ax.xaxis)
-    ax.set_xlim(first, last)
+def label_time(axes: Sequence[Axes], times: Array, unit: str, first: float | None) -> None:
+    """The axis of time that panels share; where ``first`` is given a logarithmic one from there on, without what has
+    happened before.
+    """
+    if first is None:
+        style.label(axes[-1].xaxis, "Time", unit, times)
+        return
+    axes[-1].set_xlabel("Time [s]")
+    for ax in axes:
+        drawn = [np.asarray(line.get_ydata())[np.asarray(line.get_xdata()) >= first] for line in ax.get_lines()]
+        seen = np.concatenate([values[np.isfinite(values)] for values in drawn])
+        if ax.get_yscale() == "linear" and varies(seen):
+            margin = 0.05 * np.ptp(seen)
+            ax.set_ylim(seen.min() - margin, seen.max() + margin)
+        style.logarithmic(ax.xaxis)
+        ax.set_xlim(first, float(times.max()))
 
 
 def _moments(dataset: xarray.Dataset) -> dict[float, str]:
