@@ -250,9 +250,8 @@ def _safe(text: str) -> str:
 
 def _unpacked(names: Sequence[str], source: str) -> list[str]:
     left = f"{names[0]}," if len(names) == 1 else ", ".join(names)
-    return (
-        _broken("    (", left, f") = {source}") if len(left) > WIDTH or len(names) == 1 else [f"    {left} = {source}"]
-    )
+    bracketed = len(left) > WIDTH or len(names) == 1
+    return _broken("    (", left, f") = {source}") if bracketed else [f"    {left} = {source}"]
 
 
 def _assignment(printer: _Python, name: str, expression: Expression, text: str) -> list[str]:
