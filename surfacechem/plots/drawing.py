@@ -167,14 +167,11 @@ def _given(scene: Scene) -> list[str]:
         ("given", [symbol(name) for name in scene.loading]),
         ("stages", [stage.name for stage in scene.programme]),
     ]
-    return [line for word, names in rows if names for line in _filled(f"{word}: {_few(names)}")]
+    return [line for word, names in rows if names for line in _filled(word, names)]
 
 
-def _filled(text: str) -> list[str]:
-    return [text] if "$" in text else wrap(text, LETTERS, subsequent_indent="    ")
-
-
-def _few(names: Sequence[str]) -> str:
-    # Reactions of a mechanism may be many.
+def _filled(word: str, names: Sequence[str]) -> list[str]:
+    """A word and names in lines; four of them, since reactions of a mechanism may be many."""
     unique = list(dict.fromkeys(names))
-    return ", ".join(unique[:4]) + (f" and {len(unique) - 4} more" if len(unique) > 4 else "")
+    text = f"{word}: {', '.join(unique[:4])}" + (f" and {len(unique) - 4} more" if len(unique) > 4 else "")
+    return [text] if "$" in text else wrap(text, LETTERS, subsequent_indent="    ")
