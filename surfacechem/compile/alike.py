@@ -97,10 +97,11 @@ Found = tuple[str, tuple[int, ...], tuple[float, ...]]
 """A form as text, and what stands in it from left to right: places of inputs, and numbers."""
 
 
+@lru_cache(maxsize=2)  # all functions of a scene share them
 class _Forms:
     """The forms of expressions: which they share, and what each puts into its form."""
 
-    def __init__(self, inputs: Sequence[Any], own: Collection[Any]) -> None:
+    def __init__(self, inputs: tuple[Any, ...], own: frozenset[Any]) -> None:
         self.places = {symbol: place for place, symbol in enumerate(inputs) if symbol in own}
         self._known: dict[Any, Found] = {symbol: ("x", (place,), ()) for symbol, place in self.places.items()}
 
@@ -165,7 +166,7 @@ def loops_of(
     >>> loop.form.expressions, loop.count, rest[-2:]
     ((k*(-own 0 + own 1)*number 0,), 19, [0, k**2])
     """
-    forms, loops = _forms(tuple(inputs), frozenset(own)), dict[tuple[str, tuple[int, ...]], FormLoop]()
+    forms, loops = _Forms(tuple(inputs), frozenset(own)), dict[tuple[str, tuple[int, ...]], FormLoop]()
     members: dict[tuple[str, tuple[int, ...]], list[Any]] = {}
     for place, expression in enumerate(expressions):
         for term in _terms(expression):
@@ -188,12 +189,6 @@ def loops_of(
             for place, term in zip(loop.places, members[key], strict=True):
                 rest[place].append(term)
     return [*several.values()], [symengine.Add(*terms) for terms in rest]
-
-
-@lru_cache(maxsize=2)
-def _forms(inputs: tuple[Any, ...], own: frozenset[Any]) -> _Forms:
-    """Which all functions of a scene share."""
-    return _Forms(inputs, own)
 
 
 def _terms(expression: Any) -> Sequence[Any]:

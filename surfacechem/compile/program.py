@@ -252,7 +252,7 @@ def compile_function(
     loops over one.
     """
     if not own:
-        return _machine_code(tuple(inputs), tuple(expressions), _level(len(expressions), steps))
+        return _machine_code(tuple(inputs), tuple(expressions), steps)
     from surfacechem.compile.alike import loops_of
 
     return _looped(inputs, *loops_of(inputs, expressions, own))
@@ -263,12 +263,8 @@ def _looped(inputs: Sequence[Any], loops: Sequence["FormLoop"], rest: Sequence[A
     from surfacechem.compile.alike import Alike
 
     left = tuple(expression for expression in rest if expression != 0)
-    code = Alike(inputs, loops, rest, _machine_code(tuple(inputs), left, 0) if left else None)
+    code = Alike(inputs, loops, rest, _machine_code(tuple(inputs), left) if left else None)
     return Function(code.address, code.table.ctypes.data, len(inputs), len(rest), code)
-
-
-def _level(count: int, steps: bool) -> int:
-    return 3 if steps and count < OPTIMISED else 0
 
 
 @dataclass(frozen=True)
@@ -297,7 +293,11 @@ class _Derivatives:
 
 @lru_cache(maxsize=128)  # a scene that is loaded again, or differs in numbers alone, has the same expressions
 @PREPARING
-def _machine_code(inputs: tuple[Any, ...], expressions: tuple[Any, ...] | _Derivatives, opt_level: int) -> Function:
+def _machine_code(
+    inputs: tuple[Any, ...], expressions: tuple[Any, ...] | _Derivatives, steps: bool = False
+) -> Function:
+    opt_level = 3 if steps and len(expressions) < OPTIMISED else 0
+
     def make() -> Any:
         return symengine.Lambdify(list(inputs), list(expressions), backend="llvm", cse=True, opt_level=opt_level)
 
@@ -442,7 +442,7 @@ def _slopes(
     if len(wanted) >= SPARSE:
         wanted, places = _nonzeros(residual, variables, (), named)
     parts = _Derivatives(tuple(residual), tuple(variables), tuple(named), wanted)
-    return _machine_code(tuple(inputs), parts, _level(len(parts), steps=True)), places
+    return _machine_code(tuple(inputs), parts, steps=True), places
 
 
 def _nonzeros(
