@@ -115,10 +115,13 @@ def _grid(rows: Iterable[Sequence[Text]], indent: int) -> RenderableType:
     return Padding(grid, (0, 0, 0, indent))
 
 
-class Bar:
-    """How far a command is, on a terminal, once it has taken some time; nothing elsewhere."""
+class Bar(logging.Handler):
+    """How far a command is, as the package logs it with the numbers ``done`` and ``total`` of a message: on a terminal,
+    once it has taken some time; nothing elsewhere.
+    """
 
     def __init__(self, talk: bool | None) -> None:
+        super().__init__(logging.INFO)
         self.wanted, self.verbose = talk is None and is_terminal(sys.stderr), talk is True
         self.begun = time.monotonic()
         self.words, self.done, self.total = "", 0, 0
@@ -130,6 +133,9 @@ class Bar:
         if self.verbose:
             counted = f" ({done}/{total})" if total else ""
             typer.echo(f"{time.monotonic() - self.begun:8.2f} s  {words}{counted}", err=True)
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self.tell(record.getMessage(), getattr(record, "done", 0), getattr(record, "total", 0))
 
     def tick(self) -> None:
         """Draw what was told last."""
@@ -153,17 +159,8 @@ class Bar:
         """Remove it."""
         if self.shown is not None:
             self.shown.stop()
-
-
-class _Followed(logging.Handler):
-    """Tells a bar what the package logs, with the numbers ``done`` and ``total`` of a message."""
-
-    def __init__(self, bar: Bar) -> None:
-        super().__init__(logging.INFO)
-        self.bar = bar
-
-    def emit(self, record: logging.LogRecord) -> None:
-        self.bar.tell(record.getMessage(), getattr(record, "done", 0), getattr(record, "total", 0))
+            self.shown = None
+        super().close()
 
 
 @contextmanager
@@ -172,8 +169,8 @@ def following(talk: bool | None) -> Iterator[Bar]:
     is true, and nothing where it is false.
     """
     bar, logger = Bar(talk), logging.getLogger(LOGGER)
-    handler, level = _Followed(bar), logger.level
-    logger.addHandler(handler)
+    level = logger.level
+    logger.addHandler(bar)
     # Where nobody listens messages are not even put together.
     if bar.wanted or bar.verbose:
         logger.setLevel(logging.INFO)
@@ -181,5 +178,5 @@ def following(talk: bool | None) -> Iterator[Bar]:
         yield bar
     finally:
         bar.close()
-        logger.removeHandler(handler)
+        logger.removeHandler(bar)
         logger.setLevel(level)
