@@ -442,8 +442,7 @@ def _places(ax: Axes, events: Sequence[tuple[float, str]]) -> list[tuple[float, 
     """Times and names of events, those that a figure cannot tell apart as one: a slip, and the stop that ends it."""
     found: list[tuple[float, list[str]]] = []
     last = -np.inf
-    for t, name in sorted(events):
-        at = _across_panel(ax, t)
+    for t, at, name in _across_panel(ax, events):
         if at - last > CLOSE:
             found.append((t, []))
             last = at
@@ -452,10 +451,13 @@ def _places(ax: Axes, events: Sequence[tuple[float, str]]) -> list[tuple[float, 
     return [(t, " and ".join(names)) for t, names in found]
 
 
-def _across_panel(ax: Axes, x: float) -> float:
-    """Where a value of x lies, from 0 at the left to 1 at the right of a panel."""
+def _across_panel(ax: Axes, items: Sequence[tuple[float, str]]) -> list[tuple[float, float, str]]:
+    """Values of x with their texts in order, and where each lies, from 0 at the left to 1 at the right of a panel."""
     ax.get_xlim()  # limits that follow from what is drawn are not known before
-    return float((ax.transScale + ax.transLimits).transform((x, 0.0))[0])
+    items = sorted(items)
+    points = np.array([(x, 0.0) for x, _ in items]).reshape(-1, 2)
+    places = (ax.transScale + ax.transLimits).transform(points)[:, 0].tolist()
+    return [(x, place, text) for (x, text), place in zip(items, places, strict=True)]
 
 
 def _numbered(ax: Axes, width: float, places: Sequence[tuple[float, str]], below: int) -> tuple[int, str]:
@@ -509,9 +511,9 @@ def _write(ax: Axes, width: float, items: Sequence[tuple[float, str]], below: in
     placed: list[tuple[float, int, str]] = []
     ends = [0.0] * lanes
     letter = LETTER / (width - BESIDE)
-    for x, text in sorted(items):
+    for _, at, text in _across_panel(ax, items):
         half = letter * len(text) / 2
-        middle = min(max(_across_panel(ax, x), half), 1 - half)
+        middle = min(max(at, half), 1 - half)
         lane = next((k for k, end in enumerate(ends) if middle - half >= end), None)
         if lane is None:
             return 0
