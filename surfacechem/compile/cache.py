@@ -43,6 +43,10 @@ for all.
 """
 
 
+_version = cache(version)
+"""Version of a library, which takes long to look up."""
+
+
 def processor() -> str:
     """Name of the processor; where it is not told, the instruction sets Numba finds still guard the machine code."""
     try:
@@ -106,13 +110,9 @@ def ship(sources: Sequence[Path], place: Path, load: Callable[[], object]) -> No
 
 def code_file(origins: Iterable[str]) -> Path:
     """Where machine code of expressions that follows from these texts, here, is kept."""
-    digest = hashlib.sha256("\n".join((*_libraries(), platform.machine(), processor(), *origins)).encode())
+    libraries = map(_version, ("symengine", "llvmlite"))
+    digest = hashlib.sha256("\n".join((*libraries, platform.machine(), processor(), *origins)).encode())
     return cache_root() / "code" / digest.hexdigest()[:32]
-
-
-@cache
-def _libraries() -> tuple[str, ...]:
-    return version("symengine"), version("llvmlite")
 
 
 def is_filled(folder: Path) -> bool:
