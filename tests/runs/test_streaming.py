@@ -23,7 +23,7 @@ from surfacechem.results import store
 from surfacechem.results.store import Layout, StoredArray, opened
 from surfacechem.runs import checking, streaming
 from surfacechem.runs.checking import check
-from surfacechem.runs.keeping import STATUSES, Keep
+from surfacechem.runs.keeping import STATUSES, Keep, extreme
 from surfacechem.runs.summaries import store_summary
 from surfacechem.solve.run import Run
 
@@ -97,7 +97,7 @@ def test_what_is_kept_of_a_run_is_that_of_the_run_by_itself(name, tmp_path):
         for key in data.data_vars:
             variable, _, which = key.rpartition("_")
             if which in ("max", "min"):
-                assert one[key] == getattr(np, f"nan{which}")(run.everywhere[variable])
+                assert one[key] == extreme(run, variable, which)
             if which == "last" and variable in run.model.system.state_columns:
                 assert one[key] == run.result.y[run.model.system.state_columns[variable]]
         events = alone.dataset["event_name"].values if "event_name" in alone.dataset else ()
@@ -156,6 +156,25 @@ def test_times_of_values_and_states_at_events(tmp_path):
     assert data["time_debond"].values[0] > 0
     assert data["phi_at_debond"].values[0] > 0
     assert np.isnan(data["time_debond"].values[1])
+
+
+@pytest.mark.parametrize(
+    ("name", "path", "keep", "level"),
+    [
+        ("debonding", K_0, {"reach": {"T": 320}, "max": ["T"]}, "T"),
+        ("cohesive-pull-off", "initial.T", {"reach": {"g_n": 5e-8}, "max": ["g_n"]}, "g_n"),
+        ("bouncing-plate", "mechanics.normal.e", {"reach": {"v_n": 1}, "max": ["v_n"]}, "v_n"),
+    ],
+)
+def test_levels_and_extremes_are_met_in_jumps_too(name, path, keep, level, tmp_path):
+    """Both in arrays and one run at a time: the jump carries the quantity across the level, to its largest value."""
+    given = {K_0: [100.0], "initial.T": [300.0], "mechanics.normal.e": [0.7]}[path]
+    found = stored(tmp_path / "s.zarr", case(name, keep=keep, over={path: given})).dataset
+    run = surfacechem.load(name).run({path: given[0]}).trajectory
+    (jump,) = (j for j in run.jumps if j.t == found[f"time_to_{level}"].item())
+    j = run.model.system.state_columns[level]
+    assert jump.before.y[j] < keep["reach"][level] <= jump.after.y[j]
+    assert found[f"{level}_max"].item() >= (1 - 1e-9) * jump.after.y[j]
 
 
 def test_a_run_whose_values_are_not_admissible_is_refused_and_leaves_the_others_alone(tmp_path):
@@ -407,6 +426,14 @@ def test_errors_of_runs_that_are_checked_are_those_of_a_sweep(tmp_path, monkeypa
     assert sorted(steps[few]) == sorted(np.sort(steps)[-3:])
 
 
+def test_what_is_nothing_but_rounding_at_the_end_is_no_error(tmp_path):
+    """Heat flows into one body as out of the other, and their mean is the rounding of both."""
+    simulation = case("cooling-to-zero", over={"initial.T": [100, 1000]})
+    stream = simulation.stream(simulation.plan(), tmp_path / "s.zarr")
+    stream.run()
+    assert stream.check().error < 1e-10
+
+
 def test_an_error_that_is_unknown_and_an_end_that_is_no_number_count_for_no_small_error(monkeypatch):
     ends = {"status": np.zeros(4, int), "time_reached": np.ones(4), "T_last": np.array([300.0, np.nan, 300.0, 303.0])}
     ends["status"][:] = STATUSES.index("finished")
@@ -415,7 +442,7 @@ def test_an_error_that_is_unknown_and_an_end_that_is_no_number_count_for_no_smal
     done = SimpleNamespace(
         accuracy=SimpleNamespace(errors=np.array([np.nan, 1e-9, 1e-9, 1e-9]), source="", why=""),
         run_ends=[dict.fromkeys(checking.TOLD, 0.0)] * 4,
-        runs=[],
+        runs=[SimpleNamespace(some=SimpleNamespace(roundings={}))] * 4,
         audits=[],
     )
     simulation, plan = (SimpleNamespace(**{name: lambda *_: done}) for name in ("sweep_plan", "picked"))

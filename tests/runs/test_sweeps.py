@@ -384,3 +384,19 @@ def test_species_of_a_sweep_have_the_names_of_the_mechanism():
     data = surfacechem.load("dna-adhesive").sweep({"T_0": [298.0, 299.0]}).dataset
     assert data["coverage"].dims == ("T_0", "time", "species")
     np.testing.assert_array_equal(data["coverage"].sel(species="bond(s)"), data["theta_bond_s"])
+
+
+def test_a_sweep_that_misses_the_accuracy_that_was_asked_for_says_so():
+    done = surfacechem.load("cohesive-cycles").sweep({"bodies.lower.C": [0.001]})
+    assert done.accuracy.errors[0] > 1e-8
+    assert "1e-08 was asked, which takes a tighter `rtol`" in done.accuracy.source
+
+
+def test_outputs_on_the_last_of_the_way_to_a_fold_are_before_it():
+    """Runs that snap at one time but for a digit share outputs there."""
+    done = surfacechem.load("snap-in").sweep({"initial.T": [300.0, 303.0]})
+    assert done.accuracy.errors.max() < 1e-7
+    for run in done.runs:
+        states = [run.result.outputs[run.result.times < jump.t][-1] for jump in run.jumps]
+        for state, jump in zip(states, run.jumps, strict=True):
+            assert abs(state[0] - jump.before.y[0]) < 0.1 * abs(jump.after.y[0] - jump.before.y[0])
