@@ -166,7 +166,7 @@ def _apart(stream: Stream, part: Index, done: SweepSolution) -> Array:
     for name, floor in least.items():
         size = np.maximum(np.abs(ends[name]), floor)
         known = UNRESOLVED * np.array([each.get(name.removesuffix("_last"), 0.0) for each in rounded])
-        apart = np.fmax(np.abs(stored[name] - ends[name]) - known, 0.0) / size
+        apart = np.nan_to_num(np.fmax(np.abs(stored[name] - ends[name]) - known, 0.0) / size)
         apart[np.isnan(stored[name]) != np.isnan(ends[name])] = np.inf
         counts = (name == "time_reached") | (ends["status"] == STATUSES.index("finished"))
         largest = np.maximum(largest, np.where(counts, apart, 0.0))
