@@ -7,6 +7,7 @@ Mandadapu (2021), section 6.3, for sudden debonding.
 from __future__ import annotations
 
 import math
+import threading
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -111,6 +112,9 @@ def velocity_scales(system: System) -> Array:
     return np.array([(state.finest or state.scale) * (state.name in VELOCITIES) for state in system.states])
 
 
+_ONE_THREAD = threading.RLock()
+
+
 class ImpossibleError(Exception):
     """A jump has no end, with the reason in words."""
 
@@ -141,6 +145,7 @@ class Jumper:
         self.folds = Folds(self.equilibria)
         self._jumps = False
         """Whether jumps are expected, so that what only they need is worth compiling."""
+        self._tables: EdgeTables | None = None
         memory = {item.symbol for item in system.memory}
         kept = [p.symbol in memory or p.path == RESTS for p in system.parameters]
         self.mode_columns = [j for j, keep in enumerate(kept) if keep]
@@ -246,9 +251,14 @@ class Jumper:
 
     # -- what the compiled loop asks ------------------------------------------------------------------------------
 
-    @cached_property
+    @property
     def edge_tables(self) -> EdgeTables:
         """What the compiled loop reads of the edges; with what only jumps need once these are expected."""
+        with _ONE_THREAD:
+            self._tables = self._tables or self._edge_tables()
+            return self._tables
+
+    def _edge_tables(self) -> EdgeTables:
         system, given = self.system, list(self.system.given)
         nodes = list(self._heat.nodes.values()) if system.edges else []
         functions: list[Function | None] = [self.magnitudes, *[None] * (4 + len(system.edges))]
@@ -282,9 +292,9 @@ class Jumper:
 
     def expect_jumps(self) -> bool:
         """Compile what only jumps need; whether that was not done before."""
-        before, self._jumps = self._jumps, True
-        if not before:
-            vars(self).pop("edge_tables", None)
+        with _ONE_THREAD:
+            before, self._jumps = self._jumps, True
+            self._tables = self._tables if before else None
         return not before
 
     def _account(self, account: Account, given: Sequence[str]) -> tuple[int, int]:
