@@ -125,49 +125,35 @@ def uneven(name: str, parts: Mapping[str, float], rest: bool) -> str:
     return f"the mole fractions of the neighbour {name} sum to {total:.9g}, not to 1." if wrong else ""
 
 
-def _potential(phase: Any) -> Quantity:
-    return Quantity(f"V_{word(phase.name)}", "V", f"electric potential of {phase.name}")
-
-
 class HeldPhase:
     """A phase beside the surface, and its ``states`` in the order in which :meth:`put` takes them: histories, or the
     potential of an ``electrode``.
     """
 
     def __init__(self, phase: Any, state: Neighbour) -> None:
-        self.phase, self.pressure = phase, float(phase.P)
+        self.phase, self.given, self.pressure = phase, state, float(phase.P)
         self.species = np.array([phase.species_index(name) for name in state.composition], dtype=np.int64)
         self.rest = phase.species_index(state.rest) if state.rest else None
-        self.given, self.electrode = state, self._electrode(phase, state)
         self.charges = FARADAY * np.asarray(phase.charges)
         name = word(phase.name)
-        found: list[tuple[Quantity, Load]] = []
-        if state.pressure is not None:
-            found.append((Quantity(f"p_{name}", "Pa", f"pressure of {phase.name}"), state.pressure))
-        V = _potential(phase)
-        if self.electrode is None and state.electric_potential is not None:
-            found.append((V, state.electric_potential))
+        p = Quantity(f"p_{name}", "Pa", f"pressure of {phase.name}")
+        V = Quantity(f"V_{name}", "V", f"electric potential of {phase.name}")
         names = identifiers(state.composition, f"x_{name}_")
-        for species, load in state.composition.items():
-            found.append((Quantity(names[species], "1", f"mole fraction of {species} in {phase.name}"), load))
-        self.histories = tuple(found)
-        charged = [V] if self.electrode else []
-        pressed = int(state.pressure is not None)
-        read = [quantity for quantity, _ in found]
-        self.states = (*read[:pressed], *charged, *read[pressed:])
+        x = [Quantity(names[species], "1", f"mole fraction of {species} in {phase.name}") for species in names]
+        self.electrode: Electrode | None = None
+        if state.capacitance is not None:
+            own = name, phase.name, V, state.potential_at_start
+            self.electrode = Electrode(*own, state.capacitance, state.current)
+        potential = None if self.electrode else state.electric_potential
+        loads = zip((p, V, *x), (state.pressure, potential, *state.composition.values()), strict=True)
+        self.histories = tuple((quantity, load) for quantity, load in loads if load is not None)
+        self._pressed, self._charged = state.pressure is not None, self.electrode is not None or potential is not None
+        self.states = (*((p,) if self._pressed else ()), *((V,) if self._charged else ()), *x)
         self._fractions = [*names.values()]
         self.enthalpies = np.zeros(phase.n_species)
         """Of its species where it was put last [J/kmol]."""
         self._parts: Sequence[float] = [math.nan]
         self._all = np.zeros(phase.n_species)
-        self._pressed, self._charged = state.pressure is not None, V in self.states
-
-    @staticmethod
-    def _electrode(phase: Any, state: Neighbour) -> Electrode | None:
-        if state.capacitance is None:
-            return None
-        own = word(phase.name), phase.name, _potential(phase), state.potential_at_start
-        return Electrode(*own, state.capacitance, state.current)
 
     @property
     def taken_over(self) -> list[tuple[Quantity, Load]]:

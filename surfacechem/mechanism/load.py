@@ -16,13 +16,7 @@ from surfacechem.contracts.terms import Potential, RateLaw
 from surfacechem.documents import document
 from surfacechem.documents import shipped as data
 from surfacechem.errors import InputError, Place, refuse_unknown, suggestion
-from surfacechem.mechanism.evaluated import (
-    EvaluatedReaction,
-    Neighbour,
-    NeighbourReaction,
-    SurfaceEngine,
-    hold,
-)
+from surfacechem.mechanism.evaluated import EvaluatedReaction, Neighbour, NeighbourReaction, SurfaceEngine, hold
 from surfacechem.mechanism.interaction import KEY, interactions
 from surfacechem.mechanism.keys import Check, has_neighbours, is_evaluated
 from surfacechem.mechanism.mixture import IdealMixture, Species, Spring, identifiers, unpaired
@@ -262,14 +256,9 @@ def _reaction(
         message = f"{title}: {elastic[0]} is elastic, which Cantera's equilibrium constant does not know. "
         raise InputError(f"{message}Write two one-way reactions.", place)
     given |= {"whole": whole, "value": 0.0}
-    if beside := _outside(whole, variables):
+    if beside := {name: nu for name, nu in whole.items() if name not in variables}:
         return NeighbourReaction(enthalpy=0.0, gibbs=0.0, beside=beside, **given)
     return EvaluatedReaction(**given)
-
-
-def _outside(whole: Mapping[str, float], own: Mapping[str, str]) -> dict[str, float]:
-    """What of a change belongs to no species of the surface."""
-    return {name: nu for name, nu in whole.items() if name not in own}
 
 
 def _lowered(
