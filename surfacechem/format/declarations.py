@@ -482,21 +482,23 @@ class Later(Content):
 # -- keys and sections ------------------------------------------------------------------------------------------------
 
 
+@dataclass(eq=False)
 class Key:
     """A key of a section: what it holds, what it means, and what is meant where it is left out."""
 
-    def __init__(self, content: Content, text: str = "", default: Any = None, name: str = "") -> None:
-        self.content = content
-        # What stands there, by the parameter or the section that it is, if nothing else is said.
-        if not text and isinstance(content, Number):
-            text = content.spec.text
-        elif not text and isinstance(content, Nested):
-            text = (content.cls.__doc__ or "").strip().splitlines()[0]
-        self.text = text
-        self.default = default
-        self.name = name
-        self.attribute = ""
-        """Field of its class; empty for a key that a section has beside them."""
+    content: Content
+    text: str = ""
+    default: Any = None
+    name: str = ""
+    attribute: str = field(default="", init=False)
+    """Field of its class; empty for a key that a section has beside them."""
+
+    def __post_init__(self) -> None:
+        """What stands there, by the parameter or the section that it is, if nothing else is said."""
+        if not self.text and isinstance(self.content, Number):
+            self.text = self.content.spec.text
+        elif not self.text and isinstance(self.content, Nested):
+            self.text = _first_line(self.content.cls)
 
     def __set_name__(self, owner: type, attribute: str) -> None:
         """A key goes by the name of its field unless it has another."""
@@ -644,7 +646,11 @@ def schema_of(cls: type[Section] | type[Law]) -> Schema:
     declared = {**keys(cls), **cls.more_keys(None)} if issubclass(cls, Section) else law_keys(cls)
     properties = {name: item.schema() for name, item in declared.items()}
     found = closed(properties, [name for name, item in declared.items() if item.required])
-    return {**found, "description": (cls.__doc__ or "").strip().splitlines()[0]}
+    return {**found, "description": _first_line(cls)}
+
+
+def _first_line(cls: type) -> str:
+    return (cls.__doc__ or "").strip().splitlines()[0]
 
 
 def closed(properties: Mapping[str, Schema], required: Sequence[str] = ()) -> Schema:

@@ -42,8 +42,14 @@ def embedded(tree: Tree, base: Path, allow_code: bool = False) -> tuple[Tree, li
         if "file" not in fields:
             raise entry.error("a file of laws needs its name, `file: my_laws.py`.")
         name = fields["file"].text("a file of laws")
-        source = _source(fields, name, base, allow_code)
+        inside = fields.get("python")
+        source = str(inside.value) if inside else document.read(document.named(fields["file"], base, "a file of laws"))
         checksum = hashlib.sha256(source.encode()).hexdigest()
+        if inside and not allow_code and checksum not in _run:
+            raise inside.error(
+                f"the case carries code of its own, {name}, which runs only where you allow it: by `--allow-code`, or "
+                "`allow_code=True` in Python. Read it before."
+            )
         if "sha256" in fields and fields["sha256"].value != checksum:
             message = f'{name} is another file than the one meant: its checksum is `sha256: "{checksum}"`.'
             raise fields["sha256"].error(message)
@@ -51,19 +57,6 @@ def embedded(tree: Tree, base: Path, allow_code: bool = False) -> tuple[Tree, li
         texts = {"file": name, "sha256": checksum, "python": source}
         entries.append(Tree({key: Tree(text, entry.place) for key, text in texts.items()}, entry.place))
     return replace(tree, value={**tree.value, "laws": replace(given, value=entries)}), found
-
-
-def _source(fields: dict[str, Tree], name: str, base: Path, allow_code: bool) -> str:
-    """The source of an entry: in the entry itself, or in the file that it names."""
-    if "python" not in fields:
-        return document.read(document.named(fields["file"], base, "a file of laws"))
-    source = str(fields["python"].value)
-    if not allow_code and hashlib.sha256(source.encode()).hexdigest() not in _run:
-        raise fields["python"].error(
-            f"the case carries code of its own, {name}, which runs only where you allow it: by `--allow-code`, or "
-            "`allow_code=True` in Python. Read it before."
-        )
-    return source
 
 
 def read(source: str, name: str, place: Place | None = None) -> Sequence[type[Law]]:

@@ -280,7 +280,7 @@ def plan_of(
 
     ``until`` and ``arrays``, values in SI, go before what the section says of them.
     """
-    ends, arrays = until or section.until, arrays or {}
+    arrays = arrays or {}
     if not section.over and section.sample is None:
         raise section.error(NOTHING_SWEPT)
     axes = [_axis(path, tree, units, arrays.get(path)) for path, tree in section.over.items()]
@@ -290,14 +290,10 @@ def plan_of(
         trees |= known
         draws = {path: _distribution(path, tree, units[path]) for path, tree in known.items()}
         sample = Sample(draws, drawn.runs, drawn.method, drawn.seed)
-    end = next(iter(ends.items())) if ends else None
-    return Plan(axes, end, section.combine != GRID, sample, _places(section, trees, until))
-
-
-def _places(section: SweepSection, trees: Mapping[str, Tree], until: Mapping[str, float] | None) -> dict[str, Place]:
-    """Where what is swept is given, and where the runs end, without the paths, which messages name."""
-    end = Tree(None, Place(ORIGIN)) if until else section.tree.value.get("until", section.tree)
-    return {path: replace(tree.place, path="") for path, tree in {**trees, "sweep.until": end}.items()}
+    ends = until or section.until
+    trees["sweep.until"] = Tree(None, Place(ORIGIN)) if until else section.tree.value.get("until", section.tree)
+    places = {path: replace(tree.place, path="") for path, tree in trees.items()}  # paths are what messages name
+    return Plan(axes, next(iter(ends.items())) if ends else None, section.combine != GRID, sample, places)
 
 
 def read_sweep(tree: Tree, usual: SweepSection | None = None) -> SweepSection:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
@@ -12,7 +12,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, TypeVar
 
 from surfacechem import solve as solvers
-from surfacechem.contracts.terms import HeatTransfer, Law, Load, Property
+from surfacechem.contracts.terms import Law, Load, Property
 from surfacechem.contracts.units import WHOLE
 from surfacechem.documents.document import Tree
 from surfacechem.errors import InputError, Place, suggestion
@@ -144,8 +144,12 @@ def scene_of(case: Document, mechanism: Mechanism | None) -> Scene:
     """The scene that the sections state."""
     interface, surface, heat = _interface(case, mechanism), _surface(case), case.heat
     if surface is not None:
+        from surfacechem.surfaces.potential import CurvedConductance
+
         interface = replace(interface, potentials=(*interface.potentials, surface))
-        heat = (*heat, *_heat_over(surface))
+        for law in surface.heat_laws:
+            own = CurvedConductance(law=law, pair=surface, between=law.between, closure=law.closure, place=law.place)
+            heat = (*heat, own)
     scene = Scene(
         bodies=_bodies(case),
         interface=interface,
@@ -212,7 +216,7 @@ def _interface(case: Document, mechanism: Mechanism | None) -> Interface:
         section.potential,
         section.friction,
         section.bonding,
-        _sites(section, list(case.bodies or UNNAMED)) or _one_site(case),
+        _sites(case),
         partition,
         limits=section.limits,
         loss=loss,
@@ -233,14 +237,6 @@ def _interface(case: Document, mechanism: Mechanism | None) -> Interface:
         engine=mechanism.engine,
         remarks=mechanism.remarks,
     )
-
-
-def _heat_over(surface: CurvedSurfaces) -> Iterator[HeatTransfer]:
-    """Heat paths over the gap of two surfaces."""
-    from surfacechem.surfaces.potential import CurvedConductance
-
-    for law in surface.heat_laws:
-        yield CurvedConductance(law=law, pair=surface, between=law.between, closure=law.closure, place=law.place)
 
 
 def _surface(case: Document) -> CurvedSurfaces | None:
@@ -303,17 +299,16 @@ def _partition(case: Document) -> tuple[float, float]:
     return shares.get(next(iter(case.bodies)), 0.0), shares.get("surroundings", 0.0)
 
 
-def _one_site(case: Document) -> Sites | None:
-    """One site per square metre for bonds whose density nothing reads: under a given force, without stored energy."""
-    section = case.interface
-    alone = section.bonding and not section.potential and not section.has("mechanism")
-    return Sites(1.0, 1.0) if alone and "f" in (case.loading or {}) else None
-
-
-def _sites(section: InterfaceSection, bodies: Sequence[str]) -> Sites | None:
-    sites = section.sites
+def _sites(case: Document) -> Sites | None:
+    """The density of sites; one per square metre for bonds whose density nothing reads: under a given force, without
+    stored energy.
+    """
+    section, bodies, sites = case.interface, list(case.bodies or UNNAMED), case.interface.sites
+    if sites is None:
+        alone = section.bonding and not section.potential and not section.has("mechanism")
+        return Sites(1.0, 1.0) if alone and "f" in (case.loading or {}) else None
     if not isinstance(sites, Mapping):
-        return None if sites is None else Sites(sites, sites)
+        return Sites(sites, sites)
     for name in bodies:
         if name not in sites:
             raise section.error(f"the sites of {name} are missing: give both bodies a density.", "sites")
