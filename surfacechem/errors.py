@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Self
 
@@ -59,6 +60,15 @@ class PlacedError(SurfacechemError):
 
 class InputError(PlacedError):
     """The input is wrong; nothing was computed."""
+
+
+@contextmanager
+def placed(place: Place) -> Iterator[None]:
+    """Input errors from inside get this place, unless they already know one."""
+    try:
+        yield
+    except InputError as error:
+        raise error.at(place) from None
 
 
 class OutputError(PlacedError):

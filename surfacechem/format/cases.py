@@ -19,7 +19,7 @@ from surfacechem.documents import document, shipped
 from surfacechem.documents import overrides as changes
 from surfacechem.documents.document import Tree
 from surfacechem.errors import InputError, Place, nearest
-from surfacechem.format import csvtable, own_laws
+from surfacechem.format import csvtable, height_files, own_laws
 from surfacechem.format.reader import ExactSolution, exact_solution_of, read_document, run_of, scene_of
 from surfacechem.format.sections import NOTHING_SWEPT, SweepSection
 from surfacechem.model.assemble import assemble, outline
@@ -136,8 +136,6 @@ def load_text(
     # With the text of its tables a case can be read again without their files.
     whole = csvtable.embedded(tree, str(base))
     if isinstance(tree.value, dict) and "surface" in tree.value:
-        from surfacechem.format import height_files
-
         whole = height_files.embedded(whole, str(base))
     whole, own = own_laws.embedded(whole, Path(base), allow_code)
     if whole != tree:

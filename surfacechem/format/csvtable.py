@@ -11,7 +11,7 @@ from itertools import pairwise
 from surfacechem.contracts.units import parse
 from surfacechem.documents import document
 from surfacechem.documents.document import Tree
-from surfacechem.errors import InputError, Place, suggestion
+from surfacechem.errors import InputError, Place, placed, suggestion
 from surfacechem.laws.loading import Table
 
 TEXTS = {
@@ -56,10 +56,8 @@ def table(tree: Tree, unit: str) -> Table | None:
     for (line, _), (earlier, later) in zip(content.rows[1:], pairwise(times), strict=True):
         if later < earlier:
             raise content.error(line, "times must never decrease.")
-    try:
+    with placed(content.place):
         return Table(times=times, values=values, place=tree.place)
-    except InputError as error:
-        raise error.at(content.place) from None
 
 
 def digest(text: str) -> str:

@@ -31,7 +31,7 @@ from surfacechem.contracts.terms import Factor, Law, Load, Spec, Varying, resolv
 from surfacechem.contracts.units import WHOLE, quotient
 from surfacechem.contracts.units import parse as si
 from surfacechem.documents.document import ORIGIN, Tree
-from surfacechem.errors import InputError, Place
+from surfacechem.errors import InputError, Place, placed
 from surfacechem.format import csvtable
 from surfacechem.quantities import INTERNAL, VARIABLES
 
@@ -140,10 +140,8 @@ class Number(Content):
 def number(tree: Tree, spec: Spec, name: str, *, difference: bool = False) -> float:
     """A number in SI, in the range of its specification."""
     value = si(tree.plain(), spec.unit, tree.place, name, difference=difference)
-    try:
+    with placed(tree.place):
         spec.check(name, value)
-    except InputError as error:
-        raise error.at(tree.place) from None
     return value
 
 
@@ -288,10 +286,8 @@ class OneLaw(Content):
             law, parameters = tree.value, Tree(None, tree.place)
         else:
             raise tree.error(f"a law is `name: {{parameters}}`, not {tree.shown}.")
-        try:
+        with placed(tree.place):
             found = laws.find(self.contract, law)
-        except InputError as error:
-            raise error.at(tree.place) from None
         return read_law(found, parameters, context)
 
     def schema(self) -> Schema:
@@ -622,10 +618,8 @@ def read_law(law: type[L], tree: Tree, context: Context) -> L:
     if issubclass(law, Factor):
         of = tree.mapping().get("of", Tree(law_keys(law)["of"].default, tree.place))
         context = replace(context, x=context.units[of.choice("variable", context.units)])
-    try:
+    with placed(tree.blamed):
         return law(**_values(law_keys(law), tree, context, law.name()), place=tree.place)
-    except InputError as error:
-        raise error.at(tree.blamed) from None
 
 
 def _values(declared: Mapping[str, Key], tree: Tree, context: Context, called: str) -> dict[str, Any]:

@@ -56,8 +56,7 @@ class Uniform(Distribution):
     def at(self, u: Array) -> Array:
         if not self.logarithmic:
             return self.low + (self.high - self.low) * u
-        values: Array = np.exp(np.log(self.low) + np.log(self.high / self.low) * u)
-        return values
+        return np.asarray(np.exp(np.log(self.low) + np.log(self.high / self.low) * u))
 
 
 @dataclass(frozen=True)
@@ -83,8 +82,7 @@ class Lognormal(Distribution):
         return True
 
     def at(self, u: Array) -> Array:
-        values: Array = self.median * np.exp(self.sigma * _standard(u))
-        return values
+        return np.asarray(self.median * np.exp(self.sigma * _standard(u)))
 
 
 @dataclass(frozen=True)

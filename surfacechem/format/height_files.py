@@ -90,7 +90,4 @@ def from_netcdf(path: Path) -> Numbers:
 
 def _in_metres(values: Any, axis: str, place: Place) -> Any:
     """A variable of a file in metres."""
-    try:
-        return values.astype(float) * parse(f"1 {values.attrs.get('units', '1')}", "m", name=axis)
-    except InputError as error:
-        raise error.at(place) from None
+    return values.astype(float) * parse(f"1 {values.attrs.get('units', '1')}", "m", place, axis)

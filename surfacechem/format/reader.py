@@ -8,7 +8,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, TypeVar
 
 from surfacechem import solve as solvers
@@ -445,18 +444,12 @@ def _mechanism(named: str | MechanismSection, tree: Tree, base: Path, content: s
         for name, phase in (section.neighbours or {}).items()
     }
 
-    def load(path: Path, shown: str) -> Mechanism:
-        loaded = load_mechanism(path, section.phase, section.bonds or (), tree.place, evaluate, neighbours, shown)
-        return _renumbered(loaded, section.species, section.reactions)
-
     if content is None:
         path = find(file, base, (tree.value["file"] if isinstance(named, MechanismSection) else tree).place)
-        return load(path, str(path))
-    # Cantera and the messages want a file by its own name.
-    with TemporaryDirectory() as folder:
-        path = Path(folder) / Path(file).name
-        path.write_text(content, encoding="utf-8")
-        return load(path, file)
+        file = str(path)
+    chosen = section.phase, section.bonds or ()
+    loaded = load_mechanism(Path(file), *chosen, tree.place, evaluate, neighbours, file, content)
+    return _renumbered(loaded, section.species, section.reactions)
 
 
 def _renumbered(mechanism: Mechanism, species: Tree | None, reactions: Tree | None) -> Mechanism:

@@ -74,6 +74,7 @@ def load_mechanism(
     evaluate: bool = False,
     neighbours: Mapping[str, Neighbour] | None = None,
     name: str = "",
+    text: str | None = None,
 ) -> Mechanism:
     """Read one surface phase of a Cantera mechanism.
 
@@ -81,10 +82,12 @@ def load_mechanism(
     is where the case names the mechanism, for errors that are not in the mechanism file itself. With ``evaluate`` what
     is not lowered is left to Cantera, which gives its rates while a scene runs; ``neighbours`` are the states in which
     the phases beside the surface are held, None leaves them as the file has them. ``name`` is what errors call the file
-    if not by its path.
+    if not by its path, ``text`` is what it holds where that is already at hand.
     """
-    path = find(str(path), Path(), Place(document.ORIGIN))
-    source = Source(name or str(path), document.read(path, name, LIMITS))
+    if text is None:
+        path = find(str(path), Path(), Place(document.ORIGIN))
+        text = document.read(path, name, LIMITS)
+    source = Source(name or str(path), text)
     entry = source.phase(phase, place)
     # Before Cantera, which ignores what it does not know.
     Check(source, entry, evaluate).run()
