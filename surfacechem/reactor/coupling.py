@@ -154,8 +154,7 @@ class Port:
     """A body as a reservoir in the network, with its present temperature and the heat through its walls."""
 
     def __init__(self, name: str, node: str, heat_name: str) -> None:
-        self.node, self.heat_name = node, heat_name
-        self.name = name
+        self.name, self.node, self.heat_name = name, node, heat_name
         self.reservoir = StandIn(cantera.Solution(yaml=STAND_IN, name="body"), clone=False, name=name)
 
     def warm(self, temperature: float) -> None:

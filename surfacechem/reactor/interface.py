@@ -353,18 +353,21 @@ class InterfaceReactor(HeldReactor):
             self._current = True
             return self._last[2]
         if self._stands_still(t) and self._last is not None:
-            self.reason = f"{self.scene.closest(self._last[0], self._last[1])} near t = {t:.9g} s"
-            self.error = InterfaceStopped(self.reason)
-            raise self.error
+            raise self._stopped(f"{self.scene.closest(self._last[0], self._last[1])} near t = {t:.9g} s")
         try:
             rates = self.scene.rates(t, self.x)
         except EndError as end:
             stop = f"{end} at t = {t:.9g} s"
             if self._last is None or abs(t - self._last[0]) <= ROUNDING * abs(t):
-                self.reason, self.error = stop, InterfaceStopped(stop)
+                raise self._stopped(stop) from None
             raise self.error or BackOffError(stop) from None
         self._last, self._asked, self._current = (t, self.x, rates), asked, True
         return rates
+
+    def _stopped(self, reason: str) -> InterfaceStopped:
+        """The end of the scene here, which is also kept where Cantera loses it."""
+        self.reason, self.error = reason, InterfaceStopped(reason)
+        return self.error
 
     def _stands_still(self, t: float) -> bool:
         """Whether steps have become as short as the rounding of the time, other than at a start."""
@@ -435,9 +438,7 @@ class InterfaceReactor(HeldReactor):
             self._refuse_sudden_heat(t)
             self.ledger = self.ledger + booked
         except EndError as end:
-            self.reason = f"{end} at t = {t:.9g} s"
-            self.error = InterfaceStopped(self.reason)
-            raise self.error from None
+            raise self._stopped(f"{end} at t = {t:.9g} s") from None
         self._last, self._asked, self._current, self._restarted = None, None, False, t
         for port in self.ports.values():
             port.warm(float(self.x[self.scene.states.index(port.node)]))
