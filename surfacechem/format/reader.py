@@ -154,7 +154,7 @@ def scene_of(case: Document, mechanism: Mechanism | None) -> Scene:
         interface=interface,
         surface=surface,
         heat=heat,
-        loading=case.loading or {},
+        loading=dict(case.loading),
         surroundings=case.surroundings.temperature if case.surroundings else None,
         T_0=case.T_0,
         initial=_initial(case, mechanism),
@@ -251,7 +251,7 @@ def _surface(case: Document) -> CurvedSurfaces | None:
         raise section.error(f"{missing[0]} has no shape: give one to both bodies.", "bodies")
     if not (section.pair or section.laws):
         raise section.error("nothing acts between the surfaces: give a law under `pair` or `laws`.")
-    if section.laws and "J_c" in (case.loading or {}):
+    if section.laws and "J_c" in case.loading:
         text = "`laws` are those of the area as it is; a stretch `J_c` thins out the points of `pair` alone"
         raise section.error(f"{text}: leave one of the two out.", "laws")
     low, high = section.approach.low, section.approach.high
@@ -273,7 +273,7 @@ def _surface(case: Document) -> CurvedSurfaces | None:
 
 def _refuse_outside(case: Document, low: float, high: float) -> None:
     """InputError where the gap is not among the approaches at the start."""
-    history, starts = (case.loading or {}).get("g_n"), {"initial": (case.initial or {}).get("g_n", low)}
+    history, starts = case.loading.get("g_n"), {"initial": case.initial.get("g_n", low)}
     if history is not None:
         starts["loading"] = history.at_start()
     for where, start in starts.items():
@@ -305,7 +305,7 @@ def _sites(case: Document) -> Sites | None:
     section, bodies, sites = case.interface, list(case.bodies or UNNAMED), case.interface.sites
     if sites is None:
         alone = section.bonding and not section.potential and not section.has("mechanism")
-        return Sites(1.0, 1.0) if alone and "f" in (case.loading or {}) else None
+        return Sites(1.0, 1.0) if alone and "f" in case.loading else None
     if not isinstance(sites, Mapping):
         return Sites(sites, sites)
     for name in bodies:
@@ -401,7 +401,7 @@ def _initial(case: Document, mechanism: Mechanism | None) -> dict[str, float]:
     """Initial values by variable, not a number for names that no variable has; whether each evolves, and what its names
     may be, the assembly decides.
     """
-    values = dict(case.initial or {})
+    values = dict(case.initial)
     given = values.pop("coverages", None)
     if mechanism is not None and given is not None:
         for species, variable in mechanism.species.items():
@@ -434,20 +434,20 @@ def _mechanism(named: str | MechanismSection, tree: Tree, base: Path, content: s
     neighbours = {
         name: Neighbour(
             phase.pressure,
-            phase.composition or {},
+            dict(phase.composition),
             phase.rest,
             phase.electric_potential,
             phase.capacitance,
             phase.current,
             place=phase.tree.place,
         )
-        for name, phase in (section.neighbours or {}).items()
+        for name, phase in section.neighbours.items()
     }
 
     if content is None:
         path = find(file, base, (tree.value["file"] if isinstance(named, MechanismSection) else tree).place)
         file = str(path)
-    chosen = section.phase, section.bonds or ()
+    chosen = section.phase, section.bonds
     loaded = load_mechanism(Path(file), *chosen, tree.place, evaluate, neighbours, file, content)
     return _renumbered(loaded, section.species, section.reactions)
 

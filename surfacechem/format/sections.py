@@ -198,7 +198,9 @@ class NeighbourSection(Section):
     """state in which a phase beside the surface is held, each value a number or a history"""
 
     pressure: Load | None = key(Prescribed("Pa"), "pressure [Pa]")
-    composition: Mapping[str, Load] | None = key(Entries(others=Prescribed("1")), "mole fractions by species")
+    composition: Mapping[str, Load] = key(
+        Entries(others=Prescribed("1")), "mole fractions by species", MappingProxyType({})
+    )
     rest: str = key(Text(), "the species whose mole fraction is what the others leave", "")
     electric_potential: Load | None = key(
         Prescribed("V"), "electric potential against the surface [V]", name="electric-potential"
@@ -219,9 +221,11 @@ class MechanismSection(Section):
 
     file: str = key(Text(), "the name of a Cantera surface mechanism", REQUIRED)
     phase: str | None = key(Text(), "the phase, where there are several")
-    bonds: Sequence[str] | None = key(ListOf(Text()), "species that count as bonds")
-    neighbours: Mapping[str, NeighbourSection] | None = key(
-        Entries(others=Nested(NeighbourSection)), "states in which the phases beside the surface are held, by name"
+    bonds: Sequence[str] = key(ListOf(Text()), "species that count as bonds", ())
+    neighbours: Mapping[str, NeighbourSection] = key(
+        Entries(others=Nested(NeighbourSection)),
+        "states in which the phases beside the surface are held, by name",
+        MappingProxyType({}),
     )
     species: Tree | None = key(
         Later(Entries(others=Entries(others=Shapes(amount("1"), NUMBERS)))), "other numbers of species, by name"
@@ -658,11 +662,11 @@ class Document(Section):
     heat: Sequence[HeatTransfer] = key(ListOf(OneLaw(HeatTransfer)), "heat paths", ())
     surroundings: SurroundingsSection | None = key(Nested(SurroundingsSection))
     mechanics: MechanicsSection = key(Nested(MechanicsSection), default=MechanicsSection())
-    loading: Mapping[str, Load] | None = key(LOADING, "prescribed variables")
+    loading: Mapping[str, Load] = key(LOADING, "prescribed variables", MappingProxyType({}))
     programme: Sequence[Mapping[str, StageSection]] = key(
         ListOf(STAGE, "- approach: {w_n: -1 um/s, until: {p: 10 kPa}}"), "stages of the loading", ()
     )
-    initial: Mapping[str, Any] | None = key(INITIAL, "initial values of what evolves")
+    initial: Mapping[str, Any] = key(INITIAL, "initial values of what evolves", MappingProxyType({}))
     run: RunSection | None = key(Nested(RunSection))
     reference: Tree | None = key(Later(REFERENCE), "an exact solution to compare with")
     sweep: SweepSection | None = key(Nested(SweepSection))

@@ -129,17 +129,14 @@ class IdealMixture(Potential):
     def _energy(self, values: Mapping[str, Expression]) -> Expression:
         T = values["T_c"]
         total: Expression = 0
-        for species in self.species:
-            theta = values[species.variable]
-            amount = values[species.amount]
-            elastic = species.spring.energy(values["g_n"]) if species.spring else 0
-            # Mixing in proportion to T is a term of its own: it drops out of the internal energy as a whole.
-            total += amount * theta * (BOLTZMANN * species.gibbs(T) + elastic)
-            total += amount * BOLTZMANN * T * (mixing(theta) - theta)
         around: Expression = 0
         seen: set[frozenset[str]] = set()
         for species in self.species:
             theta, amount = values[species.variable], values[species.amount]
+            elastic = species.spring.energy(values["g_n"]) if species.spring else 0
+            # Mixing in proportion to T is a term of its own: it drops out of the internal energy as a whole.
+            total += amount * theta * (BOLTZMANN * species.gibbs(T) + elastic)
+            total += amount * BOLTZMANN * T * (mixing(theta) - theta)
             for interaction in species.interactions:
                 other, pair = values[interaction.variable], frozenset((species.name, interaction.on))
                 if interaction.on == species.name:

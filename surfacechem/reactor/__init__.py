@@ -1,8 +1,8 @@
 """A scene in a Cantera reactor network, beside gas reactors, reservoirs, walls and flow controllers.
 
 ``interface`` (the reactor that holds a scene), ``network`` (a ReactorNet that stops at breakpoints and limits),
-``coupling`` (how other reactors touch its bodies), ``gas`` (gases and solids that react with it), ``history`` (what it
-went through, as a dataset).
+``coupling`` (how other reactors touch its bodies), ``gas`` (gases and solids that react with it), ``embedded`` (the
+scene in it, and what it went through).
 """
 
 from surfacechem.reactor.gas import ReactingGas, ReactingGasAtPressure, ReactingSolid

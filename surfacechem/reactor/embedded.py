@@ -1,4 +1,6 @@
-"""A scene whose surroundings are given while it runs: assembled, compiled and evaluated for a reactor of a network."""
+"""A scene whose surroundings are given while it runs: assembled, compiled and evaluated for a reactor of a network, and
+what it went through as the solution that a run hands back.
+"""
 
 from __future__ import annotations
 
@@ -19,14 +21,15 @@ from surfacechem.model.assemble import assemble
 from surfacechem.model.system import System
 from surfacechem.quantities import MOLECULAR
 from surfacechem.reactor import coupling
+from surfacechem.results.solution import Solution
 from surfacechem.solve.adapters.evaluation import Evaluation
-from surfacechem.solve.contract import Array, Problem
+from surfacechem.solve.contract import Array, Counters, Events, Problem, Result, Status
 from surfacechem.solve.diagnose import STALLED
 from surfacechem.solve.equilibria import Point
 from surfacechem.solve.instant import Instant
 from surfacechem.solve.jumps import Jump
-from surfacechem.solve.run import Model, Run
-from surfacechem.tolerances import SQRT_EPS, TINY
+from surfacechem.solve.run import Model, Run, Trajectory
+from surfacechem.tolerances import DEFAULT_RTOL, SQRT_EPS, TINY
 
 FOREVER = 1e300
 """End of the last piece of time [s]."""
@@ -331,3 +334,79 @@ class EmbeddedScene:
             raise EndError(self.moments.instant.reason)
         states = self.evaluation.y[self.evaluation.free]
         return np.concatenate((states, x[len(self.states) :] + booked)), booked
+
+
+class History:
+    """Recorded states of a scene, each with the parameters that held."""
+
+    def __init__(self, scene: EmbeddedScene) -> None:
+        self.scene = scene
+        self.rtol = DEFAULT_RTOL
+        self.counters = Counters()
+        self.times: list[float] = []
+        self.rows: list[tuple[Array, Array, Array, Array]] = []
+
+    def append(self, t: float, x: Array) -> None:
+        """Keep variables at a time; a time that is there already is kept as it is."""
+        if self.times and t <= self.times[-1]:
+            return
+        evaluation, n = self.scene.evaluation, len(self.scene.states)
+        self.scene.put(t, x)
+        self.times.append(t)
+        self.rows.append((evaluation.y.copy(), evaluation.ydot.copy(), x[n:].copy(), evaluation.parameters.copy()))
+
+    def solution(self, stop: str, seconds: float, *, alone: bool) -> Solution:
+        """The recorded states as a run, ended by ``stop`` where that is not empty.
+
+        Only what ran ``alone`` carries its case, from which a run can be made again.
+        """
+        if len(self.times) < 2:
+            raise InputError("nothing was recorded yet: advance the network, or call `record`, at least twice.")
+        run = Run(times=(0.0, self.times[-1]), rtol=self.rtol, solver="cantera")
+        reason = stop or f"reached the end at t = {self.times[-1]:.9g} s"
+        status = "stopped" if stop else "finished"
+        result = self._result(Status.EVENT if stop else Status.FINISHED)
+        case, moments = self.scene.case, self.scene.moments
+        jumps = tuple(moments.jumps) if moments else ()
+        return Solution(
+            Trajectory(self.scene.model, run, result, self.scene.values, status, reason, seconds, jumps),
+            title=case.title,
+            source=case.source,
+            case=case.text if alone else "",
+            mechanism=case.mechanism_text or "",
+        )
+
+    def _result(self, status: Status) -> Result:
+        problem = self._problem()
+        y, ydot, ledger, _ = self.rows[-1]
+        n, q = problem.program.n, problem.program.n_ledger
+        none = Events(*(np.empty(shape) for shape in (0, (0, n), (0, n), (0, q))), index=np.empty(0, np.int64))
+        return Result(
+            problem=problem,
+            status=status,
+            t=self.times[-1],
+            y=y,
+            ydot=ydot,
+            ledger=ledger,
+            margins=np.zeros(problem.program.n_margins),
+            times=problem.times,
+            outputs=np.array([row[0] for row in self.rows]),
+            ledger_outputs=np.array([row[2] for row in self.rows]),
+            events=none,
+            counters=self.counters,
+        )
+
+    def _problem(self) -> Problem:
+        """A piece of time up to each record, with the parameters that held there."""
+        base, times = self.scene.problem, np.array(self.times)
+        before = times[0] - max(1.0, abs(times[0]))
+        return Problem(
+            program=base.program,
+            y0=self.rows[0][0],
+            times=times,
+            segments=np.concatenate(([before], times)),
+            parameters=np.array([row[3] for row in self.rows]),
+            rtol=self.rtol,
+            atol=base.atol,
+            margins=base.margins,
+        )

@@ -18,9 +18,8 @@ from surfacechem.contracts.units import parse
 from surfacechem.errors import InputError
 from surfacechem.format import Case
 from surfacechem.reactor.coupling import Port, function_of, node_of, suffix_of
-from surfacechem.reactor.embedded import EmbeddedScene, EndError
+from surfacechem.reactor.embedded import EmbeddedScene, EndError, History
 from surfacechem.reactor.gas import Receiver, refuse
-from surfacechem.reactor.history import History
 from surfacechem.runs.simulation import Simulation
 from surfacechem.solve.adapters.cantera_network import LEDGER_UNIT, BackOffError, HeldReactor, contents
 from surfacechem.solve.contract import Array
