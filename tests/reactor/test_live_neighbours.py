@@ -38,12 +38,6 @@ def fuel(kind=ReactingGas, **options):
     return kind(gas, clone=True, volume=1e-4, **options)
 
 
-def interface_of(tmp_path, text, gas, **options):
-    path = tmp_path / "case.yaml"
-    path.write_text(text)
-    return InterfaceReactor(path, neighbours={"gas": gas}, **options)
-
-
 def network(*reactors):
     net = ReactorNet(reactors)
     net.rtol, net.atol = 1e-11, 1e-18
@@ -51,10 +45,10 @@ def network(*reactors):
 
 
 @pytest.mark.parametrize(("kind", "held"), [(ReactingGas, "int_energy"), (ReactingGasAtPressure, "enthalpy")])
-def test_mass_elements_and_energy_stay_what_they_are(kind, held, tmp_path):
+def test_mass_elements_and_energy_stay_what_they_are(kind, held):
     """A closed box, or a balloon: what the gas loses the surface and the bodies have."""
     gas = fuel(kind)
-    interface = interface_of(tmp_path, WARM, gas, area=AREA)
+    interface = InterfaceReactor(WARM, neighbours={"gas": gas}, area=AREA)
     net, surface = network(gas, interface), ct.Interface("sofc.yaml", "metal_surface")
 
     def books():
@@ -84,9 +78,9 @@ def test_mass_elements_and_energy_stay_what_they_are(kind, held, tmp_path):
     assert data["production_H2O"].values[0] == pytest.approx(made[0], rel=1e-2)
 
 
-def test_at_constant_temperature_as_cantera_s_own_surface(tmp_path):
+def test_at_constant_temperature_as_cantera_s_own_surface():
     gas, theirs = fuel(energy="off"), fuel(ct.IdealGasReactor, energy="off")
-    interface = interface_of(tmp_path, HELD, gas, area=AREA)
+    interface = InterfaceReactor(HELD, neighbours={"gas": gas}, area=AREA)
     surface = ct.Interface("sofc.yaml", "metal_surface")
     surface.TP = 1000, ct.one_atm
     surface.coverages = "(m):1"
@@ -102,10 +96,10 @@ def test_at_constant_temperature_as_cantera_s_own_surface(tmp_path):
     assert np.abs(gas.phase.X - fuel().phase.X).max() > 0.1
 
 
-def test_two_halves_of_a_case_beside_one_gas_are_the_whole(tmp_path):
+def test_two_halves_of_a_case_beside_one_gas_are_the_whole():
     whole, shared = fuel(), fuel()
-    one = interface_of(tmp_path, WARM, whole, area=AREA)
-    case = surfacechem.load(tmp_path / "case.yaml").case
+    one = InterfaceReactor(WARM, neighbours={"gas": whole}, area=AREA)
+    case = surfacechem.load(WARM).case
     halves = [InterfaceReactor(case, area=AREA / 2, neighbours={"gas": shared}, name=name) for name in "ab"]
     network(whole, one).advance(1e-4)
     network(shared, *halves).advance(1e-4)
@@ -114,23 +108,23 @@ def test_two_halves_of_a_case_beside_one_gas_are_the_whole(tmp_path):
         np.testing.assert_allclose(half.T, one.T, rtol=1e-8)
 
 
-def test_a_reservoir_is_a_neighbour_that_stays_as_it_is(tmp_path):
+def test_a_reservoir_is_a_neighbour_that_stays_as_it_is():
     gas = ct.Solution("sofc.yaml", "gas")
     gas.TPX = 1000, ct.one_atm, FUEL
-    interface = interface_of(tmp_path, HELD, ct.Reservoir(gas, clone=True))
+    interface = InterfaceReactor(HELD, neighbours={"gas": ct.Reservoir(gas, clone=True)})
     network(interface).advance(1e-5)
-    held = InterfaceReactor(tmp_path / "case.yaml")
+    held = InterfaceReactor(HELD)
     network(held).advance(1e-5)
     count = len(held.scene.states)
     np.testing.assert_allclose(interface.x[:count], held.x[:count], atol=1e-9)
 
 
-def test_sensitivity_of_the_gas_to_a_reaction_of_the_surface(tmp_path):
+def test_sensitivity_of_the_gas_to_a_reaction_of_the_surface():
     """Against the change by another rate: what the gas receives feels the multiplier."""
 
     def water(multiplier, wanted):
         gas = fuel(energy="off")
-        interface = interface_of(tmp_path, HELD, gas, area=AREA)
+        interface = InterfaceReactor(HELD, neighbours={"gas": gas}, area=AREA)
         net = network(interface, gas)
         interface.phase.set_multiplier(multiplier, 1)
         if wanted:
@@ -145,9 +139,9 @@ def test_sensitivity_of_the_gas_to_a_reaction_of_the_surface(tmp_path):
 
 
 @pytest.mark.parametrize(("kind", "error"), [(ReactorNet, InputError), (ct.ReactorNet, ct.CanteraError)])
-def test_a_gas_that_asks_before_rates_are_varied(kind, error, tmp_path):
+def test_a_gas_that_asks_before_rates_are_varied(kind, error):
     gas = fuel()
-    interface = interface_of(tmp_path, HELD, gas, area=AREA)
+    interface = InterfaceReactor(HELD, neighbours={"gas": gas}, area=AREA)
     net = kind([gas, interface])
     interface.add_sensitivity_reaction(1)
     with pytest.raises(error, match="Give interface to the network before the reactors that take from it"):
@@ -159,10 +153,10 @@ def energy_of(gas):
 
 
 @pytest.mark.parametrize("stepwise", [False, True])
-def test_an_area_that_changes_while_the_network_runs(stepwise, tmp_path):
+def test_an_area_that_changes_while_the_network_runs(stepwise):
     """The gas loses what the surface takes, as with a network that starts there."""
     gas = fuel()
-    interface = interface_of(tmp_path, WARM, gas, area=AREA)
+    interface = InterfaceReactor(WARM, neighbours={"gas": gas}, area=AREA)
     net = network(gas, interface)
     net.advance(1e-6)
     before = np.array([energy_of(gas), interface["E_total"]])
@@ -187,14 +181,13 @@ def test_an_area_that_changes_while_the_network_runs(stepwise, tmp_path):
         ),
     ],
 )
-def test_what_is_no_neighbour(neighbours, message, tmp_path):
-    (tmp_path / "case.yaml").write_text(WARM)
+def test_what_is_no_neighbour(neighbours, message):
     with pytest.raises(InputError, match=message):
-        InterfaceReactor(tmp_path / "case.yaml", neighbours={name: make() for name, make in neighbours.items()})
+        InterfaceReactor(WARM, neighbours={name: make() for name, make in neighbours.items()})
 
 
-def test_a_gas_that_is_not_in_the_network(tmp_path):
-    interface = interface_of(tmp_path, WARM, fuel())
+def test_a_gas_that_is_not_in_the_network():
+    interface = InterfaceReactor(WARM, neighbours={"gas": fuel()})
     with pytest.raises(InputError, match="the reactor that is the neighbour gas of interface is not in the network"):
         ReactorNet([interface]).advance(1.0)
     with pytest.raises(InputError, match="no reaction of the scene has a neighbour"):
@@ -217,7 +210,7 @@ run: {until: 40 s, solver: cantera}
 """
 
 
-def test_a_particle_and_its_electrolyte_at_a_held_potential(tmp_path):
+def test_a_particle_and_its_electrolyte_at_a_held_potential():
     """What the anode takes the electrolyte loses; beside SciPy along Cantera's rates."""
 
     def phase(name, *parts):
@@ -227,9 +220,7 @@ def test_a_particle_and_its_electrolyte_at_a_held_potential(tmp_path):
 
     anode = ReactingSolid(phase("anode", 0.5, 0.5), mass=0.02)
     electrolyte = ReactingSolid(phase("electrolyte", 0.48, 0.37, 0.08, 0.07), mass=0.1, name="electrolyte")
-    path = tmp_path / "case.yaml"
-    path.write_text(ELECTRODE)
-    cell = InterfaceReactor(path, neighbours={"anode": anode, "electrolyte": electrolyte})
+    cell = InterfaceReactor(ELECTRODE, neighbours={"anode": anode, "electrolyte": electrolyte})
     net, before, lithium = network(anode, electrolyte, cell), anode.mass, anode.amounts[0] + electrolyte.amounts[2]
     start = np.concatenate((anode.x, electrolyte.x))
     net.advance(40.0)
@@ -259,14 +250,12 @@ def graphite(x=0.5, **options):
     return phase, ReactingSolid(phase, **options)
 
 
-def test_particles_of_one_phase_have_each_their_own(tmp_path):
-    path = tmp_path / "case.yaml"
-    path.write_text(ELECTRODE)
+def test_particles_of_one_phase_have_each_their_own():
     phase, large = graphite(0.1, mass="20 g")
     small = ReactingSolid(phase, mass=0.002)
     assert large.mass == pytest.approx(0.02, rel=1e-12)
     assert large.volume == pytest.approx(0.02 / phase.density, rel=1e-12)
-    cells = [InterfaceReactor(path, neighbours={"anode": solid}) for solid in (large, small)]
+    cells = [InterfaceReactor(ELECTRODE, neighbours={"anode": solid}) for solid in (large, small)]
     network(large, small, *cells).advance(1.0)
     np.testing.assert_allclose(phase.X, [0.1, 0.9], rtol=1e-12)
     assert (small.x[0] - 0.1) > 5 * (large.x[0] - 0.1) > 0

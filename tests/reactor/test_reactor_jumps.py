@@ -12,10 +12,7 @@ from surfacechem.reactor import InterfaceReactor, InterfaceStopped, ReactorNet
 
 pytestmark = pytest.mark.around
 
-CASES = {
-    "debonding": 1e-12,
-    "stick-slip": 1e-7,
-}
+CASES = {"debonding": 1e-12, "stick-slip": 1e-7}
 """How closely Cantera's integrator meets events and states at its tolerance, relative to their largest."""
 
 
@@ -101,15 +98,14 @@ run: {{until: 2 s, outputs: 5}}
 """
 
 
-def test_beside_a_closed_chamber(tmp_path):
+def test_beside_a_closed_chamber():
     """A gas of constant heat capacity in a closed chamber is a body with that capacity."""
     chamber = ct.IdealGasReactor(ct.Solution(yaml=GAS), clone=True, volume=2.0)
     capacity = chamber.mass * chamber.phase.cv_mass / 0.5
     body = f"{{temperature: T_2, C: {capacity:.17g}, capacity: constant}}"
-    (tmp_path / "body.yaml").write_text(CHAMBER.format(chamber=body, also=", T_2: 300 K"))
-    (tmp_path / "gas.yaml").write_text(CHAMBER.format(chamber="{temperature: 300 K}", also=""))
-    solution = surfacechem.load(tmp_path / "body.yaml").run(error="balances")
-    interface, net = network(tmp_path / "gas.yaml", area=0.5, bodies={"chamber": chamber})
+    solution = surfacechem.load(CHAMBER.format(chamber=body, also=", T_2: 300 K")).run(error="balances")
+    alone = CHAMBER.format(chamber="{temperature: 300 K}", also="")
+    interface, net = network(alone, area=0.5, bodies={"chamber": chamber})
     net.advance(2.0)
     compare(interface, solution, 1e-7)
     assert pytest.approx(float(solution.dataset["T_2"][-1]), rel=1e-8) == chamber.T
@@ -117,14 +113,14 @@ def test_beside_a_closed_chamber(tmp_path):
 
 
 def test_a_reactor_takes_no_heat_at_once():
-    pulled = ["bodies.upper={temperature: 300 K, stiffness: 2e13 Pa/m}"]
+    pulled = [
+        "bodies.upper={temperature: 300 K, stiffness: 2e13 Pa/m}",
+        "heat=[{conductance: {between: [lower, upper], h: 10}}]",
+    ]
     chamber = ct.IdealGasReactor(ct.Solution(yaml=GAS), clone=True)
-    _, net = network("debonding", bodies={"upper": chamber}, overrides=[*pulled, *SEPARATE])
+    _, net = network("debonding", bodies={"upper": chamber}, overrides=pulled)
     with pytest.raises(InputError, match=r"a reactor takes heat in time only. Give the body a heat capacity"):
         net.advance(10.0)
-
-
-SEPARATE = ["heat=[{conductance: {between: [lower, upper], h: 10}}]"]
 
 
 def test_an_ordinary_network_is_refused_where_it_would_go_on_beyond_a_jump():
