@@ -49,13 +49,7 @@ def test_a_column_of_another_name_is_chosen_by_name(tmp_path):
 def test_it_is_the_table_written_into_the_case(tmp_path):
     from_file = load(tmp_path, "t [s], Q_1 [W/m^2]\n0, 0\n1, 6\n3, 0\n").run()
     written = CASE.replace("{file: heat.csv}", "{times: [0, 1, 3], values: [0, 6, 0]}")
-    assert np.array_equal(from_file.dataset.T, surfacechem.load(_write(tmp_path, written)).run().dataset.T)
-
-
-def _write(folder, text):
-    path = folder / "written.yaml"
-    path.write_text(text)
-    return path
+    assert np.array_equal(from_file.dataset.T, surfacechem.load(written).run().dataset.T)
 
 
 def test_the_text_is_kept(tmp_path):
@@ -105,17 +99,17 @@ def test_bad_files_are_refused_by_line(tmp_path, content, message):
         load(tmp_path, content)
 
 
-def test_a_table_in_the_case_has_its_lines(tmp_path):
+def test_a_table_in_the_case_has_its_lines():
     inline = CASE.replace("{file: heat.csv}", '{csv: "t [s], Q_1 [W/m^2]\\n0, 0\\n1, x"}')
     with pytest.raises(InputError, match=r"written.yaml:7: .*csv: line 3 of the table: Q_1 is no number"):
-        surfacechem.load(_write(tmp_path, inline))
+        cases.load_text(inline, "written")
 
 
 def test_a_missing_file(tmp_path):
     with pytest.raises(InputError, match=r"loading.Q_1.table.file: no file heat.csv beside the case"):
-        surfacechem.load(_write(tmp_path, CASE))
+        cases.load_text(CASE, base=tmp_path)
     with pytest.raises(InputError, match="two roles: give `file` or `csv`"):
-        surfacechem.load(_write(tmp_path, CASE.replace("heat.csv", 'heat.csv, csv: "t [s]"')))
+        cases.load_text(CASE.replace("heat.csv", 'heat.csv, csv: "t [s]"'), base=tmp_path)
 
 
 @pytest.mark.parametrize("name", ["{}/secret.csv", "../secret.csv", "link.csv"])
