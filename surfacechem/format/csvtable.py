@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import re
 from dataclasses import replace
-from hashlib import sha256
 from itertools import pairwise
 
 from surfacechem.contracts.units import parse
@@ -58,11 +57,6 @@ def table(tree: Tree, unit: str) -> Table | None:
             raise content.error(line, "times must never decrease.")
     with placed(content.place):
         return Table(times=times, values=values, place=tree.place)
-
-
-def digest(text: str) -> str:
-    """A short name of a table, the same for the same text."""
-    return sha256(text.encode()).hexdigest()[:12]
 
 
 class CSVText:

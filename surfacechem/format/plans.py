@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -376,4 +377,4 @@ def _column(table: TableSection, path: str, unit: str) -> Drawn:
     values = content.column(table.column or variable, unit, variable)
     if not values:
         raise table.error("the table has no rows.")
-    return Drawn(tuple(values), source=csvtable.digest(table.csv))
+    return Drawn(tuple(values), source=sha256(table.csv.encode()).hexdigest()[:12])

@@ -239,10 +239,6 @@ class EmbeddedScene:
             raise InputError(message)
         return len(self.states) + self.accounts.index(wanted)
 
-    def give(self, path: str, value: float) -> None:
-        """Set a parameter of the present piece of time."""
-        self.evaluation.parameters[self.places[path]] = value
-
     def edges_that_read(self, name: str) -> list[str]:
         """Names of the edges whose guards depend on a load."""
         system = self.model.system
@@ -252,7 +248,7 @@ class EmbeddedScene:
     def put(self, t: float, x: Array) -> bool:
         """Go to a time and variables, under the loads of that time; whether a state was found."""
         for path, function in self.loads.items():
-            self.give(path, float(function(t)))
+            self.evaluation.parameters[self.places[path]] = float(function(t))
         return self.evaluation.put(t, x[: len(self.states)])
 
     def rates(self, t: float, x: Array) -> Array:

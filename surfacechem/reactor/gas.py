@@ -41,17 +41,15 @@ class Gas(Receiver):
     """What a gas adds to Cantera's own balances.
 
     ``temperature`` is the place of that among its variables: after it come mass fractions, the first is the mass.
+    ``energies`` is Cantera's name of what a species holds of the quantity in whose balance it is [J/kmol].
     """
 
     temperature: int
+    energies: str
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
         self.weights = self.phase.molecular_weights  # type: ignore[attr-defined]
-
-    def energies(self, phase: Any) -> Array:
-        """What a species holds of the quantity in whose balance the temperature is [J/kmol]."""
-        raise NotImplementedError
 
     def after_eval(self, t: float, _lhs: Any, rhs: Any) -> None:
         """Called by Cantera after its own balances of mass, energy and species, which this adds to."""
@@ -62,7 +60,7 @@ class Gas(Receiver):
             total = float(amounts @ self.weights)
             rates[0] += total
             if self.energy_enabled:  # type: ignore[attr-defined]  # its left side is the heat capacity
-                rates[self.temperature] += enthalpy - float(amounts @ self.energies(phase))
+                rates[self.temperature] += enthalpy - float(amounts @ getattr(phase, self.energies))
             rates[first : first + len(masses)] += masses - total * phase.Y
 
 
@@ -75,9 +73,7 @@ class ReactingGas(Gas, cantera.ExtensibleIdealGasReactor):
     """
 
     temperature = 2
-
-    def energies(self, phase: Any) -> Array:
-        return np.asarray(phase.partial_molar_int_energies)
+    energies = "partial_molar_int_energies"
 
 
 class ReactingGasAtPressure(Gas, cantera.ExtensibleIdealGasConstPressureReactor):
@@ -87,9 +83,7 @@ class ReactingGasAtPressure(Gas, cantera.ExtensibleIdealGasConstPressureReactor)
     """
 
     temperature = 1
-
-    def energies(self, phase: Any) -> Array:
-        return np.asarray(phase.partial_molar_enthalpies)
+    energies = "partial_molar_enthalpies"
 
 
 MASS = Spec("kg", "mass at the start", above=0)
