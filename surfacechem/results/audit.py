@@ -144,39 +144,29 @@ def resolved(residual: Array, scale: Any, stored: Any, rounding: Any) -> Any:
     return _relative(residual, np.where(unresolved, np.maximum(scale, stored), scale))
 
 
-@dataclass(frozen=True)
-class Residuals:
-    """What the balances leave open at the outputs of one run or of many, and the most that was exchanged till then."""
-
-    energy: Array
-    entropy: Array
-    energy_scale: Any
-    entropy_scale: Any
-
-
 TOTALS = ("E_total", ("U_1", "U_2", "U_c")), ("S_total", ("S_1", "S_2", "S_c"))
 """What is balanced, each with its parts."""
 
+BOOKED = (("energy supply",), ("dissipation",)), (("entropy supply", "entropy production"), ())
+"""Kinds of accounts that explain how these change, and of others that tell, too, how much was exchanged."""
 
-def residuals(system: System, named: Mapping[str, Array], ledger: Array) -> Residuals:
-    """Balances of energy and entropy from what there is of TOTALS [..., times] and ledger [..., times, accounts]."""
+
+def residuals(system: System, named: Mapping[str, Array], ledger: Array) -> list[tuple[Array, Any]]:
+    """What the balances of TOTALS leave open at the outputs of one run or of many, and the most that was exchanged till
+    then; from what there is of TOTALS and of their parts [..., times], and the ledger [..., times, accounts].
+    """
     # Transitions at the very start come before the first output.
     ledger = ledger - ledger[..., :1, :]
 
-    def balance(total: str, parts: tuple[str, ...], supplies: tuple[str, ...], sinks: tuple[str, ...]) -> Any:
-        """What the supplies do not explain of the change of a total, and the most that its parts and all accounts
-        changed by.
-        """
-        residual, *found = [named[name] - named[name][..., :1] for name in (total, *parts) if name in named]
+    found = []
+    for (total, parts), (supplies, sinks) in zip(TOTALS, BOOKED, strict=True):
+        residual, *changes = [named[name] - named[name][..., :1] for name in (total, *parts) if name in named]
         own = [accounts(system, ledger, kind) for kind in (*supplies, *sinks)]
         for booked in own[: len(supplies)]:
             residual = residual - booked.sum(axis=-1)
-        exchanged = np.concatenate([*own, *[part[..., None] for part in found]], axis=-1)
-        return residual, np.abs(exchanged).max(axis=(-2, -1), initial=0.0)
-
-    energy, most_energy = balance(*TOTALS[0], ("energy supply",), ("dissipation",))
-    entropy, most_entropy = balance(*TOTALS[1], ("entropy supply", "entropy production"), ())
-    return Residuals(energy, entropy, most_energy, most_entropy)
+        exchanged = np.concatenate([*own, *[part[..., None] for part in changes]], axis=-1)
+        found.append((residual, np.abs(exchanged).max(axis=(-2, -1), initial=0.0)))
+    return found
 
 
 def accounts(system: System, ledger: Array, *kinds: str) -> Array:
@@ -190,13 +180,13 @@ def audit(trajectory: Trajectory) -> Audit:
     system, column = model.system, model.system.output_columns
     ledger = result.ledger_outputs - result.ledger_outputs[:1]
     known = {name: outputs[:, column[name]] for total, parts in TOTALS for name in (total, *parts) if name in column}
-    open_ones = residuals(system, known, result.ledger_outputs)
-    energy_scale, turned = float(open_ones.energy_scale), float(open_ones.entropy_scale)
+    (energy, exchanged), (entropy, turned) = residuals(system, known, result.ledger_outputs)
+    energy_scale, entropy_scale = float(exchanged), float(turned)
     if steps:  # a brief load may come and go between outputs; the ends of the steps have seen it
         energy_scale = max(energy_scale, largest(accounts(system, steps.ledger, "energy supply", "dissipation")))
     E, S = (outputs[:, column[name]] for name in ("E_total", "S_total"))
     energy_stored = max(trajectory.roundings["E_total"] / EPS, largest(E))
-    entropy_stored = max(trajectory.roundings["S_total"] / EPS, turned, largest(S))
+    entropy_stored = max(trajectory.roundings["S_total"] / EPS, entropy_scale, largest(S))
     roundings, untimed = ROUNDINGS, 0.0
     if steps and len(steps.t):
         roundings += len(steps.t)
@@ -208,7 +198,7 @@ def audit(trajectory: Trajectory) -> Audit:
         bonds = trajectory.everywhere[system.ledger[j].law][: len(ledger)]
         sites = np.maximum(sites, np.abs(bonds - bonds[:1] - ledger[:, j]))
     rounding = EPS * energy_stored * roundings + untimed
-    left = largest(open_ones.energy)
+    left = largest(energy)
     if left > rounding + OPEN * FINEST * energy_scale:
         # Tractions of a gap on a spring that nothing pulls are differences of large ones: what they do is an error.
         errors = _exchanged_by_errors(trajectory)
@@ -216,11 +206,11 @@ def audit(trajectory: Trajectory) -> Audit:
             rounding, energy_stored = errors, max(energy_stored, errors / (SLACK * trajectory.run.rtol))
     least = _least(trajectory)
     return Audit(
-        energy=open_ones.energy,
-        entropy=open_ones.entropy,
+        energy=energy,
+        entropy=entropy,
         sites=sites,
         energy_scale=energy_scale,
-        entropy_scale=turned,
+        entropy_scale=entropy_scale,
         rtol=trajectory.run.rtol,
         energy_stored=energy_stored,
         entropy_stored=entropy_stored,

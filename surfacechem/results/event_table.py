@@ -127,7 +127,7 @@ def event_times(trajectory: Trajectory) -> dict[str, Any]:
     end, fastest, slow = trajectory.run.times[-1] * (1 - SIDE), 0.0, -np.inf
     times: dict[str, list[float]] = {}
     for event in events_of(trajectory):
-        if event.jump and event.jump.edge.returns is not None:
+        if event.jump and event.jump.edge.is_impact:
             speed = abs(float(event.before[columns["v_n"]]))
             fastest = max(fastest, speed)
             slow = event.t if speed < NEGLIGIBLE * fastest else -np.inf

@@ -117,6 +117,10 @@ class ArrayRuns:
         self.state_columns = [(j, state) for j, state in enumerate(system.states) if state.path in plan.paths]
         self.reasons = reason_table(system)
         self.keeps_steps = bool(keep.max or keep.min)
+        self.impacts = [len(model.margins) + j for j, edge in enumerate(system.edges) if edge.is_impact]
+        """Columns of the guards of impacts."""
+        self.unseen = np.zeros((1, model.program.n_ledger + model.program.n_margins))
+        """Largest accounts and guards where nothing has been seen before."""
         every = self.keeps_steps or bool(keep.series)
         self.keeps_course = every or keep.balances
         """Whether more is kept than ends and events."""
@@ -171,9 +175,9 @@ class ArrayRuns:
         peaks, quiet = self.guards(rows)
         ends, times = self.ends(rows)
         told = self._admissible(values, rows) & quiet & np.isfinite(ends) & (ends > 0)
-        if not told.any():
-            return told, {}
         own = np.flatnonzero(told)
+        if not len(own):
+            return told, {}
         peaks, times = (shared if len(shared) == 1 else shared[own] for shared in (peaks, times))
         segments = self.problem.segments[None]
         if self.ramp is not None:
@@ -181,10 +185,14 @@ class ArrayRuns:
         # Looks at the equations follow the length of a run; outputs are for what is kept of its course.
         problem = replace(self.problem, times=times[0], record_steps=self.keeps_steps, picture=0.0)
         spacing = segments[:, -1] / self.run.samples
-        batch = solve_batch(problem, y0[own], table[own], spacing, peaks, segments, times)
-        clear, columns = self._columns(Ends(batch, table[own], segments, times))
+        clear, columns = self._columns(self._solved(problem, y0[own], table[own], spacing, peaks, segments, times))
         told[own[~clear]] = False
         return told, {name: column[clear] for name, column in columns.items()}
+
+    def _solved(self, problem: Problem, y0: Array, table: Array, *others: Array) -> Ends:
+        """The runs; ``others`` are spacing, peaks, segments and times as the stepper takes them."""
+        *_, segments, times = others
+        return Ends(solve_batch(problem, y0, table, *others), table, segments, times)
 
     def starts(self, values: Mapping[str, Array]) -> tuple[Array, Array]:
         """Parameters [run, segment, parameter] and initial states [run, state]."""
@@ -232,9 +240,8 @@ class ArrayRuns:
         """Largest accounts and guards before the start, as a first arc has them, and which starts no edge is due at."""
         model, count = self.model, len(rows)
         program, jumper = model.program, model.jumper
-        nothing = np.zeros((1, program.n_ledger + program.n_margins))
         if jumper is None or program.margins is None:
-            return nothing, np.ones(count, dtype=bool)
+            return self.unseen, np.ones(count, dtype=bool)
         # As an instant sees them at the start of a run, when nothing has been seen before.
         first, scales = (
             len(model.margins),
@@ -249,8 +256,7 @@ class ArrayRuns:
         now = program.margins(seen)
         playing = np.array(model.system.in_play(self.problem.parameters[0]))
         quiet: Mask = np.all(((now > CROSSED * sizes) | ~playing)[:, first:], axis=1)
-        returns = [first + j for j, edge in enumerate(model.system.edges) if edge.returns is not None]
-        sizes[:, returns] = np.maximum(sizes[:, returns], MICROMETRE)
+        sizes[:, self.impacts] = np.maximum(sizes[:, self.impacts], MICROMETRE)
         return np.concatenate([np.zeros((count, program.n_ledger)), sizes], axis=1), quiet
 
     # -- from arrays to columns ---------------------------------------------------------------------------------------
@@ -286,7 +292,7 @@ class ArrayRuns:
     def _verdicts(self, found: Ends, last: Array) -> tuple[Any, Any, Mask]:
         """Codes of status and reason, and which runs they are known of without a look at each."""
         model, batch = self.model, found.batch
-        system, outcome = model.system, batch.counts[:, END]
+        outcome = batch.counts[:, END]
         ended, stopped = outcome == Status.FINISHED, outcome == Status.EVENT
         reason = np.full(len(outcome), self.reasons.index(self.reasons[0]), np.int16)
         whole = model.jumper is None or self.jumps
@@ -294,9 +300,8 @@ class ArrayRuns:
         if whole and stopped.any():
             self._stops(found, last, stopped, reason, clear)
         elif not whole:  # a gap that has closed unseen
-            first, gaps = len(model.margins), batch.ends[:, -model.program.n_margins :]
-            returns = [first + j for j, edge in enumerate(system.edges) if edge.returns is not None]
-            clear &= ~(gaps[:, returns] < -PICOMETRE).any(axis=1)
+            gaps = batch.ends[:, -model.program.n_margins :]
+            clear &= ~(gaps[:, self.impacts] < -PICOMETRE).any(axis=1)
         return np.where(stopped, STATUSES.index("stopped"), 0).astype(np.int8), reason, clear
 
     def _stops(self, found: Ends, last: Array, stopped: Mask, reason: Any, clear: Mask) -> None:
@@ -395,15 +400,14 @@ class ArrayRuns:
         named = {name: whole(values[name]) for name in every if name in values}
         outputs = np.asfortranarray(batch.outputs[..., n:])
         ledger = np.where(reached[..., None], outputs, outputs[:, :1])
-        left = residuals(system, named, ledger)
         rounded = of_each(np.fmax, owner, self._rounded(rows), len(reached))
         columns: Columns = {}
-        for j, (which, (name, _)) in enumerate(zip(("energy", "entropy"), TOTALS, strict=True)):
-            scale = getattr(left, f"{which}_scale")
+        left = zip(("energy", "entropy"), TOTALS, residuals(system, named, ledger), strict=True)
+        for j, (which, (name, _), (residual, scale)) in enumerate(left):
             stored = np.maximum(rounded[:, j] / EPS, np.abs(named[name]).max(axis=1))
             stored = np.maximum(stored, scale) if which == "entropy" else stored
             rounding = EPS * stored * (ROUNDINGS + batch.counts[:, RECORDS])
-            columns[f"{which}_error"] = resolved(getattr(left, which), scale, stored, rounding)
+            columns[f"{which}_error"] = resolved(residual, scale, stored, rounding)
         sites = np.zeros(len(reached))
         for j in system.account_columns.get("bonds", ()):
             bonds = whole(values[system.ledger[j].law])
@@ -454,41 +458,23 @@ class JumpingRuns(ArrayRuns):
     room = 0, 16, 0, 0
     """Steps and events for which a run has room; as many as the runs before have needed."""
 
-    def solve(self, values: Mapping[str, Array]) -> tuple[Mask, Columns]:
-        """Which runs with these values the arrays tell, and what is kept of those."""
-        table, y0 = self.starts(values)
-        rows = np.concatenate([np.zeros((len(y0), 1)), y0, np.zeros_like(y0), table[:, 0]], axis=1)
-        ends, times = self.ends(rows)
-        told = self._admissible(values, rows) & np.isfinite(ends) & (ends > 0)
-        own = np.flatnonzero(told)
-        if not len(own):
-            return told, {}
-        times = times if len(times) == 1 else times[own]
-        segments = self.problem.segments[None]
-        if self.ramp is not None:
-            segments = np.column_stack([np.zeros(len(own)), ends[own]])
-        batch = self._carried(y0[own], table[own], ends[own] / self.run.samples, segments, times)
-        arcs = batch.arcs
-        begun = np.where(np.arange(arcs.shape[1]) < batch.counts[:, ARCS, None], arcs[..., 0], np.inf)
-        segments = np.column_stack([begun, np.full(len(own), np.inf)])
-        clear, columns = self._columns(Ends(batch, arcs[..., 5:], segments, times))
-        told[own[~clear]] = False
-        return told, {name: column[clear] for name, column in columns.items()}
+    def guards(self, rows: Array) -> tuple[Array, Mask]:
+        """Nothing has been seen, and edges may be due."""
+        return self.unseen, np.ones(len(rows), dtype=bool)
 
-    def _carried(self, y0: Array, table: Array, spacing: Array, segments: Array, times: Array) -> Any:
+    def _solved(self, problem: Problem, y0: Array, table: Array, *others: Array) -> Ends:
         """Runs along their edges; once more where there was no room for what happens in them."""
-        jumper, program = self.model.jumper, self.model.program
+        jumper, room, looks = self.model.jumper, self.room, self.keeps_steps or bool(self.keep.reach)
         assert jumper is not None
         jumper.expect_jumps()
-        problem = replace(
-            self.problem, edges=jumper.edge_tables, times=times[0], record_steps=self.keeps_steps, picture=0.0
-        )
-        unseen = np.zeros((1, program.n_ledger + program.n_margins))
-        room, looks = self.room, self.keeps_steps or bool(self.keep.reach)
+        problem = replace(problem, edges=jumper.edge_tables)
         while True:
-            batch = solve_arrays(problem, y0, table, spacing, unseen, segments, times, room=room)
+            batch = solve_arrays(problem, y0, table, *others, room=room)
             steps, events = np.minimum(batch.counts[:, [RECORDS, EVENTS]].max(axis=0), MOST).tolist()
             steps, jumps = steps * self.keeps_steps, events * looks
             if steps <= room[0] and events <= room[1] and jumps <= room[3]:
-                return batch
+                break
             room = self.room = max(steps, room[0]), max(events, room[1]), 0, max(jumps, room[3])
+        arcs = batch.arcs
+        begun = np.where(np.arange(arcs.shape[1]) < batch.counts[:, ARCS, None], arcs[..., 0], np.inf)
+        return Ends(batch, arcs[..., 5:], np.column_stack([begun, np.full(len(y0), np.inf)]), others[-1])
