@@ -86,7 +86,5 @@ def _rest_of(reached: Trajectory) -> tuple[float, str]:
     y, last = known.y[:, evolved], result.y[evolved]
     away = np.abs(y - last) > problem.rtol * np.abs(last) + problem.atol[evolved]
     when = np.array([np.flatnonzero(column)[-1] + 1 if column.any() else 1 for column in away.T], dtype=int)
-    worst = int(when.argmax())
-    return float(known.t[min(int(when[worst]), len(known.t) - 1)]), reached.model.system.states[
-        int(evolved[worst])
-    ].name
+    last_state = reached.model.system.states[int(evolved[when.argmax()])]
+    return float(known.t[min(int(when.max()), len(known.t) - 1)]), last_state.name

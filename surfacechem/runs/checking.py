@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from surfacechem.errors import InputError
 from surfacechem.format.draws import permuted
 from surfacechem.results.store import StoredArray
-from surfacechem.runs.keeping import ENDS, STATUSES, Keep, RunByRun
+from surfacechem.runs.keeping import BALANCES, ENDS, STATUSES, Keep, RunByRun
 from surfacechem.runs.sweeps import SweepAccuracy, SweepSolution, unknown_in
 from surfacechem.solve.contract import Index
 from surfacechem.tolerances import FLOOR, TINY, UNRESOLVED
@@ -28,7 +28,7 @@ HARDEST = 100
 AT_ONCE = 200
 """Runs that are checked together, with all of their steps in memory."""
 
-TOLD = ("energy_error", "entropy_error", "site_error", "destroys_entropy")
+TOLD = (*BALANCES, "destroys_entropy")
 
 KEYS = {
     "run": ("int64", "number of the run in the plan, the last dimension fastest; -1 for none"),

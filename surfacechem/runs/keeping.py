@@ -136,11 +136,8 @@ def reason_table(system: System) -> list[str]:
     margins = system.moving_margins
     ends = [text for margin in margins for text in (margin.reason, *(margin.below or ("", ""))[1:]) if text]
     failures = [text for status, text in REASONS.items() if not status.success]
-    return list(
-        dict.fromkeys(
-            [REASONS[Status.FINISHED], REFUSED, *ends, *(edge.reason for edge in system.edges), *failures, OTHER]
-        )
-    )
+    edges = [edge.reason for edge in system.edges]
+    return list(dict.fromkeys([REASONS[Status.FINISHED], REFUSED, *ends, *edges, *failures, OTHER]))
 
 
 def variable(name: str) -> str:

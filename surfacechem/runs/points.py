@@ -7,7 +7,7 @@ from the balances there is solved for: the rates of what evolves, the values of 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -143,7 +143,8 @@ class Evaluator:
     def at(self, points: Points) -> tuple[list[Column], list[Column], list[str]]:
         """Columns of what is given, what follows and the derivatives; why laws do not hold, by point."""
         table, asked = self._table(points)
-        sought = self._sought(asked.values())
+        # The balances that hold are those of what the points do not give.
+        sought = np.flatnonzero(~np.isin(self.unknown, [item.column for item in asked.values()])).tolist()
         unknown = [self.unknown[i] for i in sought]
         # All that may be given, in one order, but for what is solved for.
         own = {name: item for name, item in self.given.items() if item.column not in unknown}
@@ -158,16 +159,10 @@ class Evaluator:
             # The argument of what is a logarithm is ln x, whose derivative by x is 1/x.
             per = 1 / item.values(table) if item.is_log else 1.0
             derivatives += _by(item.quantity, [*shown.values()], total[:, :, k].T * per, there[:, k])
-        return found, derivatives, [self._refusal(row) for row in margins]
-
-    def _sought(self, asked: Iterable[Argument]) -> list[int]:
-        """Balances that hold at the points: those of what they do not give."""
-        taken = {item.column for item in asked}
-        return [i for i, column in enumerate(self.unknown) if column not in taken]
-
-    def _refusal(self, margins: Array) -> str:
-        """Why a law does not hold, at a point with these margins; empty where all do."""
-        return next((m.reason for m, value in zip(self.margins, margins, strict=True) if not value > 0), "")
+        # The first margin that is closed; behind all of them stands that none is.
+        closed = np.column_stack([~(margins > 0), np.ones(len(margins), dtype=bool)])
+        reasons = np.array([*(margin.reason for margin in self.margins), ""])
+        return found, derivatives, reasons[closed.argmax(axis=1)].tolist()
 
     def _table(self, points: Points) -> tuple[Array, dict[str, Argument]]:
         """The arguments of compiled functions at each point, and what the points give."""

@@ -139,14 +139,11 @@ def run_again(record: Record, allow_code: bool = False) -> Solution | SweepSolut
             max_steps=departures.get("max_steps", case.run.max_steps),
             max_seconds=None,  # seconds are not the same twice
         )
+        plan = recorded_plan(record.attribute("sweep", str)) if "sweep" in record.attributes else None
     except InputError as error:
         raise error.at(record.place) from None
-    if "sweep" not in record.attributes:
+    if plan is None:
         return Simulation(case).run(departures.get("changes"), run, departures.get("error", "auto"))
-    try:
-        plan = recorded_plan(record.attribute("sweep", str))
-    except InputError as error:
-        raise error.at(record.place) from None
     return Simulation(replace(case, own_run=run)).sweep_plan(plan, departures.get("changes"))
 
 

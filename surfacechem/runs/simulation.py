@@ -577,9 +577,8 @@ class Simulation:
             said = {name: value for name, value in given.items() if value is not None}
             section = read_sweep(from_plain(said, Place(ORIGIN, path="sweep")), section)
         if section is None:
-            raise InputError(
-                "a sweep needs `sweep: {over: ...}` in the case, or parameters to sweep over.", path="sweep"
-            )
+            message = "a sweep needs `sweep: {over: ...}` in the case, or parameters to sweep over."
+            raise InputError(message, path="sweep")
         ends = None if until is None else read_until(from_plain(dict(until), Place(ORIGIN, path="sweep.until")))
         return plan_of(section, self._units, ends, arrays)
 

@@ -304,9 +304,8 @@ def stream(
     if case.run.steady:
         refuse_histories(simulation.system)
         if keep.series:
-            raise InputError(
-                "each run until `steady` has a length of its own, so that no series fit.", path="sweep.keep"
-            )
+            message = "each run until `steady` has a length of its own, so that no series fit."
+            raise InputError(message, path="sweep.keep")
     checked = plan.size if section.checked == ALL else int(section.checked)
     chunks = ChunkRuns(simulation, plan, keep, changes, checked)
     job = Job(
