@@ -562,12 +562,9 @@ def reasons(problem: Problem, run: Run, moves: bool) -> list[tuple[str, str, str
     part = f"a hundredth of the accuracy {asked(run):.0e}, as errors of smooth runs are below 100 rtol"
     if run.rtol == TIGHTEST:
         part = f"for the accuracy {asked(run):.0e}; below this is rounding"
+    again = "a second run must agree to the accuracy, else it is verified in turn"
     return [
         ("solver", *method(problem, moves)),
         ("rtol", f"{run.rtol:.0e}", part),
-        (
-            "verified",
-            f"{second_tolerance(run.rtol):.0e}",
-            "a second run must agree to the accuracy, else it is verified in turn",
-        ),
+        ("verified", f"{second_tolerance(run.rtol):.0e}", again),
     ]

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from surfacechem import references
 from surfacechem.errors import InputError
-from surfacechem.model.system import System
 from surfacechem.references._bodies import ConstantCapacity, QuadraticEnergy
 from surfacechem.references.base import Reference, SceneView
 from surfacechem.results.event_table import SIDE
@@ -64,12 +63,7 @@ def _in_range() -> Iterator[None]:
 
 @_in_range()
 def exact_values(
-    name: str,
-    options: Mapping[str, float],
-    scene: Scene,
-    run: Trajectory,
-    to_the_end: bool = False,
-    side: float = SIDE,
+    name: str, options: Mapping[str, float], scene: Scene, run: Trajectory, to_the_end: bool = False, side: float = SIDE
 ) -> dict[str, Array]:
     """Exact values at the output times by the names of the scene's variables; InputError if it is another scene's.
 
@@ -205,22 +199,17 @@ def _with_profiles(reference: Reference, exact: Mapping[str, Array], scene: Scen
 def renamed(exact: Mapping[str, Array], run: Trajectory) -> dict[str, Array]:
     """Exact values under the names of the scene; those it does not have are left out."""
     system = run.model.system
-    states, outputs = system.state_columns, system.output_columns
+    known = system.state_columns | system.output_columns
+    temperatures = [state.name for state in system.states if state.is_temperature and state.name not in system.inside]
+    rates = [own for own in known if own.startswith("R_")]
+    # What an exact solution calls otherwise.
+    others = {"T": temperatures, "R_c": rates, "sigma_chem": [f"sigma_{own[2:]}" for own in rates]}
     result = {}
     for name, values in exact.items():
-        if name in states or name in outputs:
-            result[name] = values
-        elif len(candidates := _standing_for(name, system)) == 1:
+        candidates = [name] if name in known else others.get(name, [])
+        if len(candidates) == 1:
             result[candidates[0]] = values
     return result
-
-
-def _standing_for(name: str, system: System) -> list[str]:
-    """Names in a scene of what an exact solution calls otherwise."""
-    if name == "T":
-        return [state.name for state in system.states if state.is_temperature and state.name not in system.inside]
-    rates = [own for own in (*system.state_columns, *system.output_columns) if own.startswith("R_")]
-    return {"R_c": rates, "sigma_chem": [f"sigma_{own[2:]}" for own in rates]}.get(name, [])
 
 
 def _check_start(exact: Mapping[str, Array], run: Trajectory) -> None:
