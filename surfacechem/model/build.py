@@ -17,15 +17,7 @@ from surfacechem.model import balances
 from surfacechem.model.automaton import Constraint, Edge, Equilibrium, Mode, Register
 from surfacechem.model.balances import Node, Power, Rows
 from surfacechem.model.parts import NO_ENERGY, NO_NODES, Bond, Energy, HeatPath, Thermal
-from surfacechem.model.system import (
-    Account,
-    Margin,
-    Named,
-    Note,
-    Range,
-    Role,
-    State,
-)
+from surfacechem.model.system import Account, Margin, Named, Note, Range, Role, State, definitions
 from surfacechem.model.variables import Parameters, Variables
 from surfacechem.quantities import Quantity
 from surfacechem.scene import Interface, Scene
@@ -113,9 +105,8 @@ class Build:
         """Names that are taken."""
         custom = [body.temperature for body in self.scene.bodies if isinstance(body.temperature, str)]
         capacities = [f"C_{node}" for node in (*custom, self.interface.temperature) if isinstance(node, str)]
-        self.parameters = Parameters(
-            [*NAMED, *custom, *capacities, *(variable.name for variable in self.interface.variables)]
-        )
+        bonds = [variable.name for variable in self.interface.variables]
+        self.parameters = Parameters([*NAMED, *custom, *capacities, *bonds])
         self.variables = Variables(self.parameters)
 
     @property
@@ -205,10 +196,7 @@ class Build:
 
     def rate_of(self, name: str) -> Expression:
         """Time derivative of a prescribed variable that stores energy, which must not jump."""
-        if name in self.motion.drives:
-            return self.motion.drives[name]
-        load = self.loads[name]
-        if load.jumps():
+        if name not in self.motion.drives and (load := self.loads[name]).jumps():
             raise InputError(
                 f"{name} stores energy, so it cannot jump (at t = {load.jumps()[0]:g} s): the work would be unknown. "
                 "Give the jump a duration.",
@@ -325,10 +313,8 @@ class Build:
         """A quantity per current area, and per reference area too where the two differ; returns the nominal one."""
         if self.stretch == 1:
             return self.name(quantity, nominal)
-        per_reference = Quantity(
-            f"{quantity.name}_nominal", quantity.unit, f"{quantity.long_name} per reference area", tag=quantity.tag
-        )
-        symbol = self.name(per_reference, nominal)
+        name, text = f"{quantity.name}_nominal", f"{quantity.long_name} per reference area"
+        symbol = self.name(Quantity(name, quantity.unit, text, tag=quantity.tag), nominal)
         self.name(quantity, symbol / self.stretch)
         return symbol
 
@@ -429,7 +415,4 @@ class Build:
 
     def expanded(self, expression: Expression) -> Expression:
         """The expression without names of quantities."""
-        result: dict[Any, Expression] = {}
-        for item in self.named:
-            result[symengine.Symbol(item.name)] = without(item.expression, result)
-        return without(expression, result)
+        return without(expression, definitions(self.named))

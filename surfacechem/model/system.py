@@ -131,6 +131,14 @@ class Named:
         return self.quantity.name
 
 
+def definitions(named: Sequence[Named]) -> dict[Any, Expression]:
+    """Every name with its expression, in which there are no others of these names."""
+    result: dict[Any, Expression] = {}
+    for item in named:
+        result[symengine.Symbol(item.name)] = without(item.expression, result)
+    return result
+
+
 @dataclass(frozen=True)
 class Account:
     """A line of the ledger, integrated beside the state.
@@ -345,10 +353,7 @@ class System:
     @cached_property
     def definitions(self) -> dict[Any, Expression]:
         """Every name with its expression in t, states, derivatives and parameters only."""
-        result: dict[Any, Expression] = {}
-        for item in self.named:
-            result[symengine.Symbol(item.name)] = without(item.expression, result)
-        return result
+        return definitions(self.named)
 
     def expand(self, expression: Expression) -> Expression:
         """The expression in t, states, derivatives and parameters only."""

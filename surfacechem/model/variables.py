@@ -9,17 +9,7 @@ from typing import Any, TypeVar
 
 import symengine
 
-from surfacechem.contracts.terms import (
-    Factor,
-    Law,
-    Load,
-    Spec,
-    UnderPressure,
-    Varying,
-    optional,
-    reads,
-    resolved_unit,
-)
+from surfacechem.contracts.terms import Factor, Law, Load, Spec, UnderPressure, Varying, optional, reads, resolved_unit
 from surfacechem.errors import InputError, Place, suggestion
 from surfacechem.expressions import Expression, product
 from surfacechem.model.system import Parameter, Role

@@ -161,9 +161,8 @@ def _initial_bonding(build: Build, name: str) -> float:
     if name != "phi" or LOGARITHM not in initial:
         return build.initial(name)
     if "phi" in initial:
-        raise InputError(
-            f"phi has two roles: given by itself and by {LOGARITHM}. Remove one of them.", path="initial.phi"
-        )
+        message = f"phi has two roles: given by itself and by {LOGARITHM}. Remove one of them."
+        raise InputError(message, path="initial.phi")
     if initial[LOGARITHM] < math.log(math.ulp(0.0)):
         message = f"{LOGARITHM} = {initial[LOGARITHM]:g} is no bonding state that a number can hold."
         raise InputError(message, path=f"initial.{LOGARITHM}")

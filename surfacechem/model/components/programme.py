@@ -126,6 +126,5 @@ def _variable(build: Build, item: Stage) -> Expression:
         return symengine.Symbol(item.variable)
     roles = (role.variable for role in build.variables.roles if role.role not in ("constant", "internal"))
     known = {*roles, *build.thermal.nodes} - INTERNAL
-    raise InputError(
-        f"the stage {item.name} waits for '{item.variable}'.{suggestion(item.variable, known)}", item.place
-    )
+    message = f"the stage {item.name} waits for '{item.variable}'.{suggestion(item.variable, known)}"
+    raise InputError(message, item.place)

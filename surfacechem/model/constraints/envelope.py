@@ -21,7 +21,7 @@ import symengine
 from surfacechem.contracts.terms import RateLaw
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, absolute, derivative, where
-from surfacechem.model.automaton import Constraint, Edge, Mode
+from surfacechem.model.automaton import NONE, ONE, Constraint, Edge, Mode
 from surfacechem.model.build import Build
 from surfacechem.model.components.mounting import far_field, held
 from surfacechem.model.system import Margin
@@ -80,7 +80,6 @@ def softening(
     build: Build, law: RateLaw, forming: Expression, free: Expression
 ) -> tuple[list[Constraint | Margin], Expression]:
     """What starts and ends the loss of bonds, and the rate of a bound law with an envelope, where others form bonds."""
-    mode = MODE
     phi, g_n, n_c = (build.variables.get(name, law) for name in ("phi", "g_n", "n_c"))
     left = build.variables.call(law, law.envelope)
     peak = law.peak()  # type: ignore[attr-defined]
@@ -90,13 +89,12 @@ def softening(
     if build.variables.has("v_n"):
         rate = rate.subs({symengine.Symbol("dg_n_dt"): build.variables.get("v_n", "the envelope")})
     overshoot = build.name(VARIABLES["overshoot"], forming * free / n_c - rate, output=False)
-    none, one = symengine.Integer(0), symengine.Integer(1)
-    lost, bound = {mode: -one}, build.mode("held")
-    breaks = {mode: one} if bound is None else {mode: one, bound: none}
+    lost, bound = {MODE: -ONE}, build.mode("held")
+    breaks = {MODE: ONE} if bound is None else {MODE: ONE, bound: NONE}
     # Where there are no bonds, and none form, none break.
     present = where(phi > 0, left - phi, where(forming * free > 0, left - phi, 1))
     beyond = where(phi > 0, left - phi + NOTHING, 1)
-    keeps, loses, parted = {mode: (0,)}, {mode: (1,)}, {mode: (-1,)}
+    keeps, loses, parted = {MODE: (0,)}, {MODE: (1,)}, {MODE: (-1,)}
     remains = where(left < phi, where(left > 0, left, 0), phi)
     if "g_n" in build.motion.gap_rates and not build.variables.has("v_n"):
         build.motion.follows[phi] = remains
@@ -105,13 +103,13 @@ def softening(
         Edge("yield", beyond, fewer, reset={phi: remains}, equilibrates=True, heat="snap", when=keeps),
         # Bonds turn back from the envelope where the gap does: rounding must not take them there again.
         Edge("soften", present, "bonds begin to break as the gap opens", breaks, strict=True, when=keeps),
-        *_tear(build, mode, phi, left),
-        Edge("part", left, "the last bonds break", lost, {phi: none}, equilibrates=True, heat="snap", when=loses),
-        Edge("unload", overshoot, "bonds do not reach what the gap leaves", {mode: none}, when=loses),
+        *_tear(build, phi, left),
+        Edge("part", left, "the last bonds break", lost, {phi: NONE}, equilibrates=True, heat="snap", when=loses),
+        Edge("unload", overshoot, "bonds do not reach what the gap leaves", {MODE: NONE}, when=loses),
     ]
     if forming != 0:
         margin, reason = where(forming > 0, -left, 1), "the gap is closed enough to bond"
-        edges.append(Edge("rejoin", margin, reason, {mode: none}, strict=True, when=parted))
+        edges.append(Edge("rejoin", margin, reason, {MODE: NONE}, strict=True, when=parted))
     # A run begins with no more bonds than the gap leaves.
     given = where(build.t > 0, 1, where(left > 0, left, 0) - phi + build.variables.get("slack", "the bonds"))
     reason, remedy = "there are more bonds than the gap leaves", "Give fewer bonds under `initial`, or a smaller gap."
@@ -120,20 +118,19 @@ def softening(
 
     def apart(edge: Edge) -> dict[Expression, Expression]:
         """What lets the normal gap jump takes bonds off their envelope, or leaves them where they reach it anew."""
-        return {mode: where(mode > 0, 0, mode)} if edge.equilibrates and mode not in edge.modes else {}
+        return {MODE: where(MODE > 0, 0, MODE)} if edge.equilibrates and MODE not in edge.modes else {}
 
     stated: list[Constraint | Margin] = [*agrees, within, Constraint(modes, edges=tuple(edges), beside=apart)]
     return stated, build.variables.call(law, law.statement, {"overshoot": overshoot})
 
 
-def _tear(build: Build, mode: Expression, phi: Expression, left: Expression) -> list[Edge]:
+def _tear(build: Build, phi: Expression, left: Expression) -> list[Edge]:
     """A quasi-static gap whose mounting is softer than the fall of the traction tears open at once."""
     mount = held(build, "n")
     if mount is None or not mount.quasi_static or "g_n" not in build.motion.gap_rates:
         return []
     g, k = symengine.Symbol("g_n"), far_field(build, mount).k
     slope = derivative(derivative(build.psi, g).subs({phi: left}), g)
-    guard, lost = (k + slope) / (k + absolute(slope)), {mode: symengine.Integer(-1)}
+    guard, lost = (k + slope) / (k + absolute(slope)), {MODE: -ONE}
     reason = "the traction falls faster with the gap than the bodies unload: the interface tears open"
-    gone, when = {phi: symengine.Integer(0)}, {mode: (1,)}
-    return [Edge("tear", guard, reason, lost, gone, equilibrates=True, heat="snap", when=when)]
+    return [Edge("tear", guard, reason, lost, {phi: NONE}, equilibrates=True, heat="snap", when={MODE: (1,)})]
