@@ -16,7 +16,7 @@ import re
 from decimal import Decimal
 from functools import lru_cache
 from numbers import Real
-from typing import Any
+from typing import Any, cast
 
 from surfacechem.contracts import si_units
 from surfacechem.errors import InputError, Place, suggestion
@@ -112,6 +112,8 @@ def parse(
 
 
 def _number(value: object, unit: str, name: str, difference: bool) -> float:
+    if getattr(value, "ndim", None) == 0:  # what an index into an array of xarray gives
+        value = cast("Any", value).item()
     if isinstance(value, Real) and not isinstance(value, bool):
         return _as_float(value)
     if not isinstance(value, str):

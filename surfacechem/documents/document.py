@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from io import StringIO
 from numbers import Integral, Real
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from surfacechem.errors import InputError, Place, suggestion
 
@@ -358,6 +358,8 @@ def join(path: str, key: str) -> str:
 
 def from_plain(value: object, place: Place) -> Tree:
     """A tree of plain Python data, all at one place."""
+    if getattr(value, "ndim", None) == 0:  # a number, or a text, of NumPy or xarray
+        value = cast("Any", value).item()
     if isinstance(value, Mapping):
         return Tree({str(key): from_plain(item, place) for key, item in value.items()}, place)
     if isinstance(value, list | tuple):

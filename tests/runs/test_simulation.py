@@ -7,6 +7,7 @@ import pickle
 import numpy as np
 import pandas
 import pytest
+import xarray
 from ruamel.yaml import YAML
 
 import surfacechem
@@ -61,9 +62,11 @@ def test_output_times_start_at_zero_and_increase(simulation, times):
 
 def test_a_constant_history_is_changed_by_its_name_in_any_unit():
     sliding = surfacechem.load("sliding-dry")
-    changed = [sliding.run({"loading.v": v}) for v in ("50 mm/s", 0.05, np.float32(0.05), np.int64(1))]
+    changed = [sliding.run({"loading.v": v}) for v in ("50 mm/s", 0.05, np.float32(0.05), np.array(1))]
     speeds = [float(solution.dataset["v"][0]) for solution in changed]
     assert speeds == pytest.approx([0.05, 0.05, 0.05, 1.0], rel=1e-7)
+    at_a_place = xarray.DataArray([0.05], dims="run")[0]
+    assert surfacechem.load("sliding-dry", {"loading.v": at_a_place}).run().dataset["v"][0] == 0.05
 
 
 def test_a_table_has_no_numbers_to_change():
