@@ -244,9 +244,13 @@ def read_netcdf(path: Path) -> xarray.Dataset:
 
 
 def save_kept(dataset: xarray.Dataset, target: Path) -> Path:
-    """Write what a sweep has kept as one file, netCDF or a table."""
+    """Write what a sweep has kept as one file, netCDF or a table, which has words for codes."""
     if target.suffix.lower() in TABLES:
-        save_table(target, dataset.drop_dims(["checked", "hardest"], errors="ignore"))
+        runs = dataset.drop_dims(["checked", "hardest"], errors="ignore")
+        words = {"status": runs["status"].attrs["flag_meanings"].split(), "reason": runs.attrs["reasons"]}
+        told = {name: runs[name].copy(data=np.array(texts, object)[runs[name].values]) for name, texts in words.items()}
+        # A table has the rows of its first variable: outputs where there are series.
+        save_table(target, runs.assign(told)[sorted(runs.data_vars, key=lambda name: -runs[name].ndim)])
     else:
         with replacing(target) as path:
             dataset.to_netcdf(path)
@@ -279,7 +283,10 @@ def table(dataset: xarray.Dataset) -> Any:
 
 
 def reading(path: Path, read: Callable[[], R]) -> R:
-    """What is read from a netCDF file; InputError where there is none, it is a table, or damaged."""
+    """What is read from a netCDF file; InputError where there is none, it is a store, a table, or damaged."""
+    if path.is_dir():
+        remedy = "`surfacechem sweep CASE -o NAME.zarr --resume` computes what it misses, and `plot` draws it"
+        raise InputError(f"is a folder. A store is not run again: {remedy}.", Place(str(path)))
     if path.suffix.lower() in TABLES:
         remedy = f"Write the run to {path.with_suffix('.nc').name}, which holds events, errors and the case, too."
         raise InputError(f"is a table of numbers, which is for other programs. {remedy}", Place(str(path)))

@@ -53,8 +53,10 @@ TOLERANCES = tuple(10.0**-digits for digits in (4, 6, 8, 10))
 def page(data: xarray.Dataset | str | Path) -> Page:
     """The report of a dataset of a run or a sweep, or of its file."""
     dataset = opened(data)
+    place = Place(str(data)) if isinstance(data, str | Path) else None
+    if "keep" in dataset.attrs:
+        raise InputError("is a sweep that keeps a part of its runs, of which there is no report; plot it.", place)
     if "case" not in dataset.attrs or "status" not in dataset.attrs:
-        place = Place(str(data)) if isinstance(data, str | Path) else None
         raise InputError("this is no dataset of a run or of a sweep.", place)
     attributes, omissions = dataset.attrs, []
     command, again = _again(data, attributes)
