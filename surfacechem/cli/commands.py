@@ -277,11 +277,15 @@ def solved(run: Callable[[], R], talk: bool | None, brief: bool = False, waits: 
         return wait_for(whole, bar.tick)
 
 
-def refuse_unwritable(*targets: Path) -> None:
-    """InputError where a file could not be written, so that nothing is computed in vain; leaves no trace."""
+def refuse_unwritable(*targets: Path, read: Sequence[str | Path] = ()) -> None:
+    """InputError where a file could not be written, or is one of those that are read, so that nothing is computed in
+    vain; leaves no trace.
+    """
     from surfacechem.results.netcdf import replacing
 
     for target in targets:
+        if target.exists() and any(Path(source).exists() and target.samefile(source) for source in read):
+            raise InputError("is what is read; give another file.", Place(str(target)))
         # As a dataset is written, but for its content.
         with suppress(_TriedError), replacing(target):
             raise _TriedError

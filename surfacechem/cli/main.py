@@ -95,9 +95,7 @@ def run(
     simulation = loaded(case, changes)
     settings = chosen(simulation, solver, rtol, accuracy)
     target = output or Path(f"{simulation.case.name}.nc")
-    if target.exists() and Path(simulation.case.file).exists() and target.samefile(simulation.case.file):
-        raise InputError("is the case itself; give another file to write to.", Place(str(target)))
-    refuse_unwritable(dataset_path(target))
+    refuse_unwritable(dataset_path(target), read=[simulation.case.file])
     solution = solved(lambda: simulation.run(run=settings, error=error), talk, brief=True)
     solution.write(target)  # also of a run that failed: what it reached tells why
     if talk is not False:
@@ -131,7 +129,9 @@ def sweep(
     only: Annotated[
         str | None,
         Option(
-            "--only", metavar="STATUS", help="Repeat only the runs of the store with this status, for example failed."
+            "--only",
+            metavar="STATUS",
+            help="Repeat runs of the store with this status, failed say, beside it.",
         ),
     ] = None,
     changes: Changes = None,
@@ -150,10 +150,10 @@ def sweep(
     values, end = assignments(over or ()) or None, assignments([until] if until else ()) or None
     if stores.asked_for(output, {"--resume": resume, "--part": part, "--cluster": cluster, "--only": only}):
         assert output is not None
-        plan = simulation.plan(values, end)
+        plan = partial(simulation.plan, values, end)
         return stores.write(simulation, plan, output, talk, resume=resume, part=part, cluster=cluster, only=only)
     target = dataset_path(output or f"{simulation.case.name}-sweep.nc")
-    refuse_unwritable(target)
+    refuse_unwritable(target, read=[simulation.case.file])
     if simulation.case.sweep is not None and simulation.case.sweep.keep is not None:
         return stores.write_file(simulation, simulation.plan(values, end), target, talk)
     solution = solved(lambda: simulation.sweep(values, end), talk)
@@ -223,7 +223,7 @@ def evaluate(
     simulation = loaded(case, changes)
     target = dataset_path(output or f"{simulation.case.name}-points.nc") if points or output else None
     if target:
-        refuse_unwritable(target)
+        refuse_unwritable(target, read=[simulation.case.file, *([points] if points else [])])
     found = simulation.evaluated(read_points(points, simulation.evaluator) if points else None)
     if target:
         found.write(target)
@@ -466,7 +466,7 @@ def report(
     from surfacechem.results.netcdf import WRITTEN
     from surfacechem.studies import run_report
 
-    is_file = source.endswith(WRITTEN)
+    is_file = source.rstrip("/").endswith((*WRITTEN, ".zarr"))
     if is_file and changes:
         raise InputError("a dataset is reported as it is; give a case to change values of.", Place(path="--set"))
     target = run_report.report_path(output or f"{Path(source).stem}.html")
@@ -494,7 +494,7 @@ def rerun(
 
     record = again.read(file)
     if output:
-        refuse_unwritable(dataset_path(output))
+        refuse_unwritable(dataset_path(output), read=[file])
     solution = solved(lambda: again.run_again(record, allow_code), talk, brief=True)
     if output:
         solution.write(output)

@@ -7,6 +7,7 @@ import re
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import count
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
@@ -37,7 +38,7 @@ def asked_for(output: Path | None, options: dict[str, object]) -> bool:
 
 def write(
     simulation: Simulation,
-    plan: Plan,
+    planned: Callable[[], Plan],
     target: Path,
     talk: bool | None,
     resume: bool,
@@ -48,12 +49,10 @@ def write(
     """Run a sweep into a store; an interrupt says how to go on. ``only`` is how the runs of a store ended that are run
     again, beside it.
     """
-    from surfacechem.runs.streaming import failed_runs
     from surfacechem.runs.summaries import store_summary
 
     numbers = part_of(part)
-    if only is not None:
-        plan, target = failed_runs(target, only), target.with_name(f"{target.stem}-{only}.zarr")
+    plan, target = repeated(target, only, resume or part is not None) if only else (planned(), target)
     with client_at(cluster) as client:
         stream = simulation.stream(plan, target, resume=resume, part=numbers)
         try:
@@ -66,6 +65,19 @@ def write(
     if talk is not False:
         show(sheet)
     leave_with(status)
+
+
+def repeated(source: Path, status: str, goes_on: bool) -> tuple[Plan, Path]:
+    """The plan of the runs of a store that ended in one way, and the store beside it that they go into: a new one, or
+    the last where that goes on.
+    """
+    from surfacechem.runs.streaming import failed_runs
+
+    def numbered(k: int) -> Path:
+        return source.with_name(f"{source.stem}-{status}{f'-{k}' if k > 1 else ''}.zarr")
+
+    new = next(k for k in count(1) if not numbered(k).exists())
+    return failed_runs(source, status), numbered(max(new - goes_on, 1))
 
 
 def write_file(simulation: Simulation, plan: Plan, target: Path, talk: bool | None) -> None:

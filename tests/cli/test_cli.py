@@ -138,7 +138,7 @@ class TestRun:
             ["run", "bonding.yaml", "-o", "x.txt"],
             "x.txt: no dataset is written as '.txt': .nc, .nc4, .cdf, .csv, .parquet.",
         ),
-        (["run", "bonding.yaml", "-o", "bonding.yaml"], "is the case itself"),
+        (["run", "bonding.yaml", "-o", "bonding.yaml"], "no dataset is written as '.yaml'"),
         (["run", "loop.yaml"], "surfacechem: loop.yaml: is a link to loop.yaml, where no file is."),
         (
             ["sweep", "bonding.yaml", "--over", "initial.T=[300]", "-o", "x.txt"],
@@ -170,6 +170,22 @@ def test_bad_input_is_one_message_and_nothing_is_written(call, tmp_path, argumen
     assert done.stdout == ""
     assert files(tmp_path) == {"loop.yaml"}
     assert (tmp_path / "bonding.yaml").read_text() == BONDING
+
+
+def test_what_is_read_is_not_written_over(call, tmp_path):
+    (tmp_path / "points.csv").write_text("phi [1]\n0.5\n")
+    (tmp_path / "case.nc").write_text(BONDING)
+    assert call("run", "bonding.yaml", "-q").exit_code == 0
+    kept = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    for given in (
+        ["evaluate", "bonding.yaml", "points.csv", "-o", "points.csv"],
+        ["rerun", "bonding.nc", "-o", "bonding.nc"],
+        ["run", "case.nc", "-o", "case.nc"],
+        ["sweep", "case.nc", "--over", "initial.T=[300]", "-o", "case.nc"],
+    ):
+        done = call(*given)
+        assert (done.exit_code, done.stderr) == (2, f"surfacechem: {given[-1]}: is what is read; give another file.\n")
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == kept
 
 
 class TestCheck:

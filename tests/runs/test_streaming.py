@@ -399,9 +399,28 @@ def test_what_is_kept_goes_into_one_file_as_into_a_store(tmp_path):
         xarray.testing.assert_equal(stored.load(), file.load())
         with (tmp_path / "o.csv").open() as table:
             assert [float(row["T_last [K]"]) for row in csv.DictReader(table)] == file["T_last"].values.tolist()
+    for told, given in {
+        "is a folder. A store is not run again": ["rerun", "o.zarr"],
+        "o.zarr: is a sweep that keeps a part of its runs": ["report", "o.zarr"],
+        "o.nc: is a sweep that keeps a part of its runs, of which there is no report; plot it": ["report", "o.nc"],
+    }.items():
+        assert told in CliRunner().invoke(app, [given[0], str(tmp_path / given[1])]).output
     again = CliRunner().invoke(app, ["rerun", str(tmp_path / "o.nc"), "-o", str(tmp_path / "again.nc")])
     assert "variables are bit for bit the same" in again.output
     assert CliRunner().invoke(app, ["rerun", str(tmp_path / "again.nc")]).exit_code == 0
+
+
+def test_a_table_of_series_has_a_row_for_each_output_and_words_for_codes(tmp_path):
+    kept = ["--set", "run.outputs=4", "--set", "sweep.keep={last: [phi], series: [T]}"]
+    given = ["sweep", "exothermic", "--over", f"{K_0}=[100, 200]", "--over", "initial.phi=[0, 1.2]", *kept, "-q"]
+    for suffix in ("nc", "csv"):
+        assert CliRunner().invoke(app, [*given, "-o", str(tmp_path / f"o.{suffix}")]).exit_code == 0
+    with (tmp_path / "o.csv").open() as table, xarray.open_dataset(tmp_path / "o.nc") as file:
+        rows = list(csv.DictReader(table))
+        shown = np.array([float(row["T [K]"] or "nan") for row in rows])
+        np.testing.assert_array_equal(shown, file["T"].values.ravel())
+    ends = {(row["status [1]"], row["reason [1]"]) for row in rows}
+    assert ends == {("finished", "reached the end"), ("refused", "the values are not admissible at the start")}
 
 
 def test_errors_of_runs_that_are_checked_are_those_of_a_sweep(tmp_path, monkeypatch):
@@ -464,6 +483,11 @@ def test_runs_that_failed_are_run_again_alone(tmp_path):
     assert 0 < failed.sizes["K_0"] < 8
     again = ["--set", "sweep.keep={last: [T]}", "-o", str(path), "--only", "failed"]
     assert CliRunner().invoke(app, [*given, *again]).exit_code == 0
+    # Once more with another setting, and going on with that; the plan is that of the store.
+    once_more = ["sweep", "exothermic", *again, "--set", "run.max-steps=500"]
+    assert [CliRunner().invoke(app, [*once_more, *more]).exit_code for more in ([], ["--resume"])] == [0, 0]
+    assert np.array_equal(opened(tmp_path / "o-failed-2.zarr")["K_0"], failed["K_0"])
+    assert len(list(tmp_path.iterdir())) == 3
     data = opened(tmp_path / "o-failed.zarr")
     assert np.array_equal(data["K_0"], failed["K_0"])
     alone = surfacechem.load("exothermic").run({K_0: data["K_0"].values[0]}).dataset
