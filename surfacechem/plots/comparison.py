@@ -7,6 +7,7 @@ import re
 from collections.abc import Sequence
 from itertools import cycle
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -44,7 +45,8 @@ def figure(
     over, panels = _content(datasets, variables, against)
     if not panels:
         raise InputError("there is nothing to plot: none of the variables varies.")
-    names, colours = labels(datasets), colours_of(len(datasets))
+    shown = [over, *(name for panel in panels for name in panel.names)]
+    names, colours = _told(datasets, shown), colours_of(len(datasets))
     starts = [run.first_shown(dataset, panels) for dataset in datasets] if over == "time" else []
     # What needs decades is lost on a linear axis; what does not can be read on both.
     begin = min((start for start in starts if start is not None), default=None)
@@ -146,6 +148,22 @@ def _united(found: Sequence[Sequence[Panel]]) -> list[Panel]:
     return [Panel(*key, list(several)) for key, several in names.items()]
 
 
+def _told(datasets: Sequence[xarray.Dataset], shown: Sequence[str]) -> list[str]:
+    """The labels of datasets, which say where a curve is below another one and so not seen."""
+    names = labels(datasets)
+    twins = [next(k for k, other in enumerate(datasets) if _coincide(other, each, shown)) for each in datasets]
+    return [names[k] + (f", the same as {names[j]}" if j < k else "") for k, j in enumerate(twins)]
+
+
+def _coincide(one: xarray.Dataset, other: xarray.Dataset, names: Sequence[str]) -> bool:
+    """Whether two datasets hold the same values of these."""
+    both = [name for name in names if name in one or name in other]
+    return all(
+        name in one and name in other and np.array_equal(one[name].values, other[name].values, equal_nan=True)
+        for name in both
+    )
+
+
 def _draw(
     ax: Axes, datasets: Sequence[xarray.Dataset], panel: Panel, over: str, colours: Sequence[str], begin: float | None
 ) -> None:
@@ -156,8 +174,9 @@ def _draw(
             if name in dataset:
                 values = members.final(dataset, name) if "sweep" in dataset.attrs else dataset[name].values
                 drawn.append(values if begin is None else values[dataset[over].values >= begin])
-                marker = "o" if len(values) < 3 else ""
-                ax.plot(dataset[over].values, values, color=colour, linestyle=dash, linewidth=1.3, marker=marker)
+                points = "sweep" in dataset.attrs or len(values) < 3
+                look: Any = {"marker": style.marker(ax, len(values)), "markersize": style.MARKER} if points else {}
+                ax.plot(dataset[over].values, values, color=colour, linestyle=dash, linewidth=1.3, **look)
     words = panel.title or ", ".join(map(symbol, panel.names[:2]))
     style.label(ax.yaxis, words, panel.unit, np.concatenate(drawn))
     several = panel.names if len(panel.names) > 1 else ()

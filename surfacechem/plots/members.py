@@ -103,17 +103,18 @@ def with_ends(dataset: xarray.Dataset, axes: Sequence[str]) -> xarray.Dataset:
 
 
 def final(dataset: xarray.Dataset, name: str) -> Array:
-    """The last value that each run reached."""
+    """The last value that each run reached; nan where it failed or was refused."""
     values: Array = dataset[name].values
-    if values.ndim == dataset["status"].ndim:
-        return values
-    last = values.shape[-1] - 1 - np.argmax(np.isfinite(values)[..., ::-1], axis=-1)
-    return np.asarray(np.take_along_axis(values, last[..., None], axis=-1)[..., 0])
+    if values.ndim > dataset["status"].ndim:
+        last = values.shape[-1] - 1 - np.argmax(np.isfinite(values)[..., ::-1], axis=-1)
+        values = np.take_along_axis(values, last[..., None], axis=-1)[..., 0]
+    return np.where(style.lost(dataset, *style.LOST), np.nan, values)
 
 
 def fair(dataset: xarray.Dataset, name: str) -> Array:
-    """Finite values of a variable, of a fair part of the runs where they are many."""
-    values = dataset[name].values.ravel()
+    """Values of a variable, of a fair part of the runs where they are many."""
+    series = dataset[name].ndim > dataset["status"].ndim
+    values = (dataset[name].values if series else final(dataset, name)).ravel()
     return np.asarray(values[:: -(-values.size // MOST_POINTS)], dtype=float)
 
 
@@ -129,7 +130,7 @@ def maps(dataset: xarray.Dataset, plan: Plan, axes: Sequence[str], names: Sequen
     x, y = (dataset[name] for name in axes)
     with style.panels(5.6, 0.6 + 3.3 * len(names), len(names), sharex=True) as (plot, grid):
         for ax, name in zip(grid[:, 0], names, strict=True):
-            values = np.ma.masked_invalid(dataset[name].values)
+            values = np.ma.masked_invalid(final(dataset, name))
             image = ax.pcolormesh(x.values, y.values, values.T, shading="nearest", cmap="viridis", rasterized=True)
             plot.colorbar(image, ax=ax, label=quantity_label(dataset[name]))
             style.draw_parameter(ax.yaxis, y, plan.axes[1].logarithmic)
@@ -169,7 +170,7 @@ def curves(dataset: xarray.Dataset, axes: Sequence[str], names: Sequence[str], a
         for ax, name in zip(grid[:, 0], names, strict=True):
             values = dataset[name].values.reshape(count, -1)[members]
             for line, run, k in zip(values, x, members, strict=True):
-                ax.plot(run, line, **looks(dataset, axes, k))
+                ax.plot(run, line, drawstyle=style.drawn_as(dataset[name]), **looks(dataset, axes, k))
             style.label(ax.yaxis, symbol(name), unit(dataset[name]), values)
             style.legend(ax)
         style.label(grid[-1, 0].xaxis, "Time" if against in (None, "time") else symbol(against), unit(over), x)
@@ -181,9 +182,8 @@ def curves(dataset: xarray.Dataset, axes: Sequence[str], names: Sequence[str], a
         others = ", ".join(style.parameter_words(dataset[name]) for name in axes[1:]) if many else ""
         told = [f"curves of one colour differ in {others}"] if others else []
         told += filter(None, (_between_outputs(dataset, name) for name in names))
+        told += [f"{len(members)} of {count} runs"] if len(members) < count else []
         style.headings(plot, grid[0, 0], dataset, more="   ".join(told))
-        if len(members) < count:
-            grid[0, 0].set_title(f"{len(members)} of {count} runs", loc="left", **style.NOTE)
     return plot
 
 
@@ -240,8 +240,7 @@ def effects(
                 style.draw_parameter(ax.xaxis, dataset[parameter], decades[parameter])
                 ax.xaxis.label.set(fontsize=8, visible=ax is column[-1])
         grid[-1, 0].set_xlabel("runs")
-        style.headings(plot, grid[0, 0], dataset)
-        grid[0, 0].set_title("5, 50 and 95 % of the runs", loc="left", **style.NOTE)
+        style.headings(plot, grid[0, 0], dataset, more="5, 50 and 95 % of the runs")
     return plot
 
 

@@ -204,15 +204,10 @@ def curves(dataset: xarray.Dataset, over: str = "time") -> list[str]:
     return [str(n) for n, values in dataset.data_vars.items() if values.dims == (over,) and values.dtype.kind == "f"]
 
 
-def is_mode(values: xarray.DataArray) -> bool:
-    """True for a mode of the automaton, as the long name of a variable says."""
-    return str(values.attrs.get("long_name", "")).startswith("mode (")
-
-
 def of_kind(dataset: xarray.Dataset, names: Sequence[str], units: str, pattern: str) -> list[str]:
     """Those of the names that a panel of the usual figure shows; modes are shown as bands, exact values dashed."""
     fitting = [name for name in names if re.fullmatch(units, unit(dataset[name])) and re.fullmatch(pattern, name)]
-    return [name for name in fitting if not (name.endswith("_exact") or is_mode(dataset[name]))]
+    return [name for name in fitting if not (name.endswith("_exact") or style.is_mode(dataset[name]))]
 
 
 def panels(dataset: xarray.Dataset, variables: Sequence[str] | None, against: str | None) -> list[Panel]:
@@ -329,7 +324,8 @@ def _draw_curves(ax: Axes, dataset: xarray.Dataset, panel: Panel, t: Array) -> N
         groups, rest = groups[:COLOURED], groups[COLOURED:]
     for names in groups:
         label = " = ".join([*map(symbol, names[:MOST_NAMES]), *(["..."] if len(names) > MOST_NAMES else [])])
-        ax.plot(t, dataset[names[0]].values, label=label, marker=marker)
+        look = style.drawn_as(dataset[names[0]])
+        ax.plot(t, dataset[names[0]].values, label=label, marker=marker, drawstyle=look)
     for k, names in enumerate(rest):
         label = "_" if k else f"{len(rest)} smaller"
         ax.plot(t, dataset[names[0]].values, label=label, marker=marker, color="0.75", linewidth=0.8, zorder=1)
@@ -408,7 +404,7 @@ def _moments(dataset: xarray.Dataset) -> dict[float, str]:
     named = {name: ("event",) for name in ("event_name", "event_reason") if name in dataset}
     style.check(dataset, {"event_time": ("event",)}, named)
     texts = [dataset[name].values.astype(str).tolist() for name in named] or [[""] * dataset.sizes["event"]]
-    quantities = [name for name in curves(dataset) if not is_mode(dataset[name])]
+    quantities = [name for name in curves(dataset) if not style.is_mode(dataset[name])]
     events = zip(dataset["event_time"].values.tolist(), texts[0], texts[-1], strict=True)
     return {t: why if name.partition(" ")[0] in quantities else name for t, name, why in events}
 
@@ -480,7 +476,7 @@ def _draw_bands(axes: Sequence[Axes], dataset: xarray.Dataset) -> list[tuple[flo
     """The stages of a programme, every other one, whose middles and names it returns; else times in which a mode is not
     what it was at the start.
     """
-    modes = [str(name) for name, values in dataset.data_vars.items() if is_mode(values) and values.dims == ("time",)]
+    modes = [name for name in curves(dataset) if style.is_mode(dataset[name])]
     staged, named = "stage" in modes, []
     for name in ["stage"] if staged else modes:
         spans = _spans(dataset, name)

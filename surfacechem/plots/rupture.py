@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 import xarray
@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 
 from surfacechem.format.plans import STATISTICS
 from surfacechem.plots import style
+from surfacechem.plots.members import final
 from surfacechem.plots.run import logarithmic
 from surfacechem.plots.style import COLOURS, MOST_CURVES, Array, symbol, unit
 
@@ -27,6 +28,9 @@ MARKERS = "osD"
 EARLY = 0.01
 """Part of the shortest lifetime in which next to nothing happens."""
 
+HEIGHT, LINE = 2.3, 1.2
+"""Height of a panel [inch], and width of a curve over the load in points."""
+
 DENSE = 30
 """Points from which on large ones would hide each other."""
 
@@ -38,7 +42,7 @@ def figure(dataset: xarray.Dataset, load: str, variables: Sequence[str] | None =
     series = (f"density_{load}", "lifetime")
     held = all(name in dataset and load in dataset[name].dims for name in series)  # what runs were at each load, too
     names = variables or ("", *(series if held else ()))
-    with style.panels(6.4, 0.7 + 2.3 * len(names), len(names)) as (plot, grid):
+    with style.panels(6.4, 0.7 + HEIGHT * len(names), len(names)) as (plot, grid):
         for ax, name in zip(grid[:, 0], names, strict=True):
             if name:
                 _draw_series(ax, dataset, load, name)
@@ -47,7 +51,8 @@ def figure(dataset: xarray.Dataset, load: str, variables: Sequence[str] | None =
             style.legend(ax)
         for ax in grid[2:, 0] if not variables else ():
             ax.sharex(grid[1, 0])
-            ax.get_legend().remove()  # the colours are those of the distributions
+            if legend := ax.get_legend():
+                legend.remove()  # the colours are those of the distributions
         style.headings(plot, grid[0, 0], dataset)
     return plot
 
@@ -62,16 +67,28 @@ def _members(dataset: xarray.Dataset, load: str) -> list[tuple[tuple[int, ...], 
     return [(tuple(at), style.member_name(dataset, at)) for at in chosen.tolist()]
 
 
-def _draw_over(ax: Axes, dataset: xarray.Dataset, load: str, values: Array, below: float = 0.0) -> None:
-    """Values of some runs over the load."""
+def _draw_over(
+    ax: Axes, dataset: xarray.Dataset, load: str, values: Array, scale: Callable[[Array], Array] = np.asarray
+) -> None:
+    """Values of some runs over the load, as one curve where theirs coincide on this scale."""
     members = _members(dataset, load)
-    for k, ((place, label), colour) in enumerate(zip(members, COLOURS, strict=False)):
-        # Curves that coincide, as lifetimes do, are seen below each other.
-        width = 1.2 + below * (len(members) - 1 - k)
-        ax.plot(dataset[load].values, values[place], color=colour, linewidth=width, label=label)
+    notes = [f"{len(members)} of {dataset['status'].size} runs"] if len(members) < dataset["status"].size else []
+    shown = np.array([values[place] for place, _ in members])
+    if len(members) > 1 and _coincide(scale(shown)):
+        ax.plot(dataset[load].values, np.fmin.reduce(shown), color="black", linewidth=LINE)
+        notes.append("their curves coincide" if notes else "the curves of all runs coincide")
+    else:
+        for (place, label), colour in zip(members, COLOURS, strict=False):
+            ax.plot(dataset[load].values, values[place], color=colour, linewidth=LINE, label=label)
     style.label_variable(ax.xaxis, dataset[load])
-    if len(members) < dataset["status"].size:
-        ax.set_title(f"{len(members)} of {dataset['status'].size} runs", loc="right", **style.NOTE)
+    ax.set_title(", ".join(notes), loc="right", **style.NOTE)
+
+
+def _coincide(curves: Array) -> bool:
+    """Whether curves are nowhere farther from each other than their line is wide, where they are known."""
+    low, high = np.fmin.reduce(curves), np.fmax.reduce(curves)
+    apart, range_ = np.fmax.reduce(high - low), np.fmax.reduce(high) - np.fmin.reduce(low)
+    return bool(apart * 72 * HEIGHT <= LINE * range_)
 
 
 def _draw_series(ax: Axes, dataset: xarray.Dataset, load: str, name: str) -> None:
@@ -82,7 +99,7 @@ def _draw_series(ax: Axes, dataset: xarray.Dataset, load: str, name: str) -> Non
         _draw_over(ax, dataset, load, np.maximum(values * size, 0.0))
         ax.set_ylabel(f"$p$({symbol(load)}) [1/{text}]")
     elif name == "lifetime":
-        _draw_over(ax, dataset, load, values, below=0.7)
+        _draw_over(ax, dataset, load, values, np.log)
         ax.set_ylabel(rf"Lifetime $\tau$({symbol(load)}) [s]")
         style.logarithmic(ax.yaxis)
     else:
@@ -109,7 +126,7 @@ def _draw_told(ax: Axes, dataset: xarray.Dataset, told: Mapping[str, str], size:
     for k, (name, marker) in enumerate(zip(told, MARKERS, strict=False)):
         for look, end in ((marker, ""), ("-", "_exact")):
             if name + end in dataset:
-                for j, (values, _) in enumerate(style.by_second(dataset, dataset[name + end].values)):
+                for j, (values, _) in enumerate(style.by_second(dataset, final(dataset, name + end))):
                     colour = COLOURS[j if len(seconds) > 1 else k]
                     ax.plot(x, values / size, look, color=colour, markersize=large, linewidth=0.9, label="_")
     for label, colour in zip(seconds if len(seconds) > 1 else (), COLOURS, strict=False):

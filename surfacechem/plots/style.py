@@ -76,6 +76,9 @@ LETTERS, TITLE_LETTERS = 16, 9.5
 READS_WELL = (1e-2, 1e4)
 """Sizes of numbers that are read without counting zeros."""
 
+POWERS = (-4, 5)
+"""Powers of ten of the largest values of an axis, between which its ticks need none."""
+
 MOST_DECADES = 1e5
 """Largest over smallest value of a logarithmic axis that has ticks inside its decades."""
 
@@ -198,7 +201,7 @@ def headings(plot: Figure, ax: Axes, dataset: xarray.Dataset, above: float = 0.0
     attributes = dataset.attrs
     title = wrap(str(attributes.get("title", "")), int(TITLE_LETTERS * plot.get_figwidth())) or [""]
     plot.suptitle("\n".join(title), **TITLE)
-    facts = [str(attributes.get("reason", ""))]
+    facts = [str(attributes.get("reason", "")) or _ends(dataset)]
     if (error := number(dataset, "error")) is not None:
         exact = str(attributes.get("error_source", "")).startswith("exact")
         exact = exact or any(str(name).endswith("_exact") for name in dataset)
@@ -208,11 +211,55 @@ def headings(plot: Figure, ax: Axes, dataset: xarray.Dataset, above: float = 0.0
         facts.append(f"{attributes['solver']}, rtol {rtol:g}")
     if "time" in dataset.sizes and dataset.sizes.get("event", 0) > dataset.sizes["time"]:
         facts.append(f"{dataset.sizes['event']} events between {dataset.sizes['time']} outputs")
-    room = int(LETTERS * (plot.get_figwidth() - 0.8))
+    place = ax.get_subplotspec()
+    columns = place.get_gridspec().ncols if place else 1
+    # Where there are columns, the middle of a line over the first one has to be within it, or the others make room.
+    room = int(LETTERS * (plot.get_figwidth() - 0.8) * min(1.0, 2 / columns))
     lines = _packed([*facts, more], room)
     more_lines = above + 10 * (len(lines) - 1) + 14 * (len(title) - 1)
     plot.set_figheight(plot.get_figheight() + more_lines / 72)  # the panels keep their height
     ax.set_title("\n".join(lines), loc="left", pad=6 + above, **NOTE)
+
+
+LOST = ("failed", "refused")
+"""Statuses of runs whose last values are no ends."""
+
+
+def _ends(dataset: xarray.Dataset) -> str:
+    """How many runs of a store ended in which way; '' of what is none."""
+    words = str(dataset["status"].attrs.get("flag_meanings", "")).split() if "status" in dataset else []
+    counts = {word: int(np.count_nonzero(dataset["status"].values == code)) for code, word in enumerate(words)}
+    counts |= {"missing": dataset["status"].size - sum(counts.values())} if words else {}
+    return ", ".join(f"{count} {word}" for word, count in counts.items() if count)
+
+
+def lost(dataset: xarray.Dataset, *words: str) -> NDArray[np.bool_]:
+    """Which runs of a sweep ended in one of these ways, which a store has as codes."""
+    status = dataset["status"]
+    codes = str(status.attrs.get("flag_meanings", "")).split()
+    return np.isin(status.values, [codes.index(word) if codes else word for word in words])
+
+
+def mark_lost(axes: Sequence[Axes], dataset: xarray.Dataset) -> None:
+    """Marks on the axis of what is swept where runs have no ends, so that it reaches as far as the sweep."""
+    x = dataset[str(dataset["status"].dims[0])].values
+    for word, marker in zip(LOST, "xd", strict=True):
+        where = lost(dataset, word).reshape(len(x), -1).any(axis=1)
+        for k, ax in enumerate(axes if where.any() else ()):
+            look: Any = {"color": "0.4", "markerfacecolor": "white", "clip_on": False, "zorder": 3}
+            across, label = ax.get_xaxis_transform(), "_" if k else word
+            ax.plot(x[where], np.zeros(where.sum()), marker, markersize=5, transform=across, label=label, **look)
+
+
+MARKER, FREE = 3.5, 2
+"""Diameter of the markers of runs in points, and how many of them have to fit between two."""
+
+
+def marker(ax: Axes, count: int) -> str:
+    """What marks points that are so few across a figure that their line would be taken for a curve known everywhere."""
+    whole = ax.get_figure(root=True)
+    assert whole is not None
+    return "o" if count * MARKER * (1 + FREE) <= 72 * whole.get_figwidth() else ""
 
 
 def _packed(facts: Sequence[str], room: int) -> list[str]:
@@ -239,13 +286,23 @@ def meaning(values: xarray.DataArray) -> str:
     >>> meaning(xarray.DataArray(0.0, attrs={"long_name": "state of bonds: 1 is bonded"}))
     'State of bonds'
     """
-    text = str(values.attrs.get("long_name", values.name)).partition(":")[0]
+    text = re.split(r":| \(-?\d+:", str(values.attrs.get("long_name", values.name)))[0]
     return text[:1].upper() + text[1:]
 
 
 def variable_words(values: xarray.DataArray) -> str:
     """The meaning of a variable and its symbol."""
     return f"{meaning(values)} {symbol(str(values.name))}"
+
+
+def is_mode(values: xarray.DataArray) -> bool:
+    """True for a mode of the automaton, as the long name of a variable says."""
+    return str(values.attrs.get("long_name", "")).startswith("mode (")
+
+
+def drawn_as(values: xarray.DataArray) -> Any:
+    """How a variable goes from one output to the next: a mode in a step."""
+    return "steps-post" if is_mode(values) else "default"
 
 
 def unit(values: xarray.DataArray) -> str:
@@ -446,9 +503,13 @@ def logarithmic(*axes: XAxis | YAxis, size: float = 1.0) -> None:
 def label(axis: XAxis | YAxis, words: str, unit: str, values: Array, between: str = " ") -> None:
     """What lies along a linear axis, with its unit and labels of ticks in the prefix that suits these values."""
     text, size = prefixed(unit, values)
+    power = math.floor(math.log10(largest(values) or 1.0))
+    if size == 1.0 and not POWERS[0] <= power < POWERS[1]:
+        # As a factor at the end of the axis it would be read as that of another panel.
+        text, size = raised(f"10^{power} {text}").removesuffix(" 1"), 10.0**power
     axis.set_label_text(f"{words}{between}[{text}]")
     if size == 1.0:
-        axis.axes.ticklabel_format(axis="x" if isinstance(axis, XAxis) else "y", useOffset=False, scilimits=(-4, 5))
+        axis.axes.ticklabel_format(axis="x" if isinstance(axis, XAxis) else "y", useOffset=False, scilimits=POWERS)
     else:
         axis.set_major_formatter(lambda value, _: Formatter.fix_minus(f"{value / size:.10g}"))
 

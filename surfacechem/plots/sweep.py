@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import xarray
@@ -42,6 +43,8 @@ def _finals(dataset: xarray.Dataset, axis: str, shown: Sequence[Panel]) -> Figur
     with style.panels(6.4, height, len(shown), sharex=True) as (plot, grid):
         for ax, panel in zip(grid[:, 0], shown, strict=True):
             _draw_final(ax, dataset, panel.names)
+        style.mark_lost(grid[:, 0].tolist(), dataset)
+        for ax in grid[:, 0]:
             style.legend(ax)
         style.draw_parameter(grid[-1, 0].xaxis, dataset[axis])
         style.headings(plot, grid[0, 0], dataset)
@@ -106,6 +109,8 @@ def _draw_final(ax: Axes, dataset: xarray.Dataset, names: Sequence[str]) -> None
         own = symbol(name) if at_end or len(names) > 1 else ""  # what a number of each run is its axis says
         for values, label in style.by_second(dataset, end):
             words = label or own if len(names) == 1 else f"{own} {label}".strip()
-            ax.plot(x, values, marker="o" if len(x) < 3 else "", label=words)
+            look: Any = {"linestyle": "none"} if style.is_mode(dataset[name]) else {}
+            marker = style.marker(ax, 0 if look else len(x))
+            ax.plot(x, values, marker=marker, markersize=style.MARKER, label=words, **look)
     said = f"{'Final ' * at_end}{symbol(names[0])}" if len(names) == 1 else "Final value"
     style.label(ax.yaxis, said, unit(dataset[names[0]]), np.stack(list(ends.values())))

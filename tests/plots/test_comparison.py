@@ -38,6 +38,8 @@ def test_runs_have_colours_and_variables_have_dashes(runs):
         (colour, dash) for colour in COLOURS[:2] for dash in ["-", "--"]
     ]
     assert lines[2].get_ydata()[0] == 450
+    twice = figure([runs[0], runs[0]])
+    assert entries(twice.legends[0]) == ["dataset 1", "dataset 2, the same as dataset 1"]
     assert entries(plot.axes[0].get_legend()) == ["$T_{1}$", "$T_{2}$"]
     (phases,) = figure(runs, ["q_1"], "T_1").axes
     assert np.array_equal(phases.get_lines()[1].get_xdata(), runs[1]["T_1"])

@@ -87,7 +87,7 @@ def test_distributions_and_effects_of_a_sample(drawn):
 
 def test_curves_of_a_sample_are_a_fair_part_that_is_said(drawn):
     (ax,) = plots.figure(drawn, ["phi"]).axes
-    assert (len(ax.lines), ax.get_title("left")) == (100, "100 of 128 runs")
+    assert (len(ax.lines), ax.get_title("left")) == (100, "128 finished   100 of 128 runs")
     assert np.array_equal(ax.lines[-1].get_ydata(), opened(drawn)["phi"].values[-1])
 
 
@@ -174,3 +174,48 @@ def test_the_words_of_a_parameter_stay_inside_the_figure():
     assert words.get_text().startswith("Temperature-independent part")
     assert plot.bbox.x0 <= words.get_window_extent().x0 < words.get_window_extent().x1 <= plot.bbox.x1
     assert [ax.get_ylabel() for ax in plot.axes] == ["Final $T$ [K]", "Final $\\phi$ [1]"]
+
+
+@pytest.mark.parametrize("whole", [False, True])
+def test_runs_that_failed_or_were_refused_are_told_and_in_no_line(whole, tmp_path):
+    over = {"initial.T": [100.0, 300.0, 1000.0]}
+    simulation = surfacechem.load("cooling-to-zero", {"run.max-steps": 50, "sweep": {"checked": 0, "over": over}})
+    stream = simulation.stream(simulation.plan(), tmp_path / "o.zarr")
+    data = simulation.sweep().dataset if whole else stream.run().dataset
+    with data:
+        ax = plots.figure(data).axes[0]
+    assert "2 failed" in ax.get_title("left")
+    ends, failed = ax.lines
+    assert np.isnan(ends.get_ydata()).tolist() == [True, True, False]
+    assert (failed.get_xdata().tolist(), failed.get_label()) == ([100, 300], "failed")
+
+
+def test_an_axis_reaches_as_far_as_a_sweep_whose_runs_are_refused(tmp_path):
+    over = {"interface.potential.bond-energy.K_2": [300.0, 500.0, 700.0]}
+    simulation = surfacechem.load("endothermic", {"reference": None, "sweep": {"checked": 0, "over": over}})
+    with simulation.stream(simulation.plan(), tmp_path / "o.zarr").run().dataset as data:
+        ax = plots.figure(data).axes[0]
+    assert ax.get_title("left") == "2 finished, 1 refused"
+    assert ax.get_xlim()[1] > 700
+
+
+def test_points_are_marked_where_they_are_few_and_modes_are_points_without_a_line(tmp_path):
+    def lines(points):
+        over = {"loading.w_n.ramp.rate": {"from": 1e-7, "to": 5e-6, "points": points}}
+        section = {"checked": 0, "over": over, "keep": {"last": ["T", "bonded"]}}
+        simulation = surfacechem.load("debonding", {"reference": None, "sweep": section})
+        with simulation.stream(simulation.plan(), tmp_path / f"{points}.zarr").run().dataset as data:
+            return [ax.lines[0] for ax in plots.figure(data, ["T_last", "bonded_last"]).axes]
+
+    looks = [[(line.get_linestyle(), line.get_marker()) for line in lines(points)] for points in (9, 200)]
+    assert looks == [[("-", "o"), ("None", "o")], [("-", ""), ("None", "o")]]
+
+
+def test_a_large_number_has_its_power_in_the_words_of_its_axis():
+    over = {K_0: [100.0, 300.0], "initial.T": [290.0, 310.0], C_R: [1e15, 1e16]}
+    plot = surfacechem.load("exothermic").sweep(over).plot()
+    plot.canvas.draw()
+    assert {ax.xaxis.get_offset_text().get_text() for ax in plot.axes} == {""}
+    assert plot.axes[-1].get_xlabel().endswith("[10¹⁶ J⁻¹ s⁻¹]")
+    assert plot.axes[-1].get_xticklabels()[-1].get_text().startswith(("1", "0.8"))
+    assert plot.axes[0].get_title("left").startswith("8 finished")

@@ -36,6 +36,9 @@ def test_the_figure_has_spectrum_distributions_and_lifetimes(spectrum):
     # At 1 pN/s most bonds break before there is a force.
     assert words(density) == ["rate = 100 pN s⁻¹", "rate = 1000 pN s⁻¹"]
     assert (density.get_title("right"), lifetime.get_yscale()) == ("2 of 3 runs", "log")
+    (common,) = lifetime.get_lines()  # as the curves of both rates coincide
+    assert np.isfinite(common.get_ydata()).sum() == np.isfinite(spectrum["lifetime"].values).any(axis=0).sum()
+    assert lifetime.get_title("right") == "2 of 3 runs, their curves coincide"
     for line in density.get_lines():
         x, y = (values[np.isfinite(line.get_ydata())] for values in line.get_data())
         assert np.trapezoid(y, x / 1e-12) == pytest.approx(1, abs=2e-3)  # [1/pN] over [pN]
