@@ -176,6 +176,7 @@ def _draw(
                 drawn.append(values if begin is None else values[dataset[over].values >= begin])
                 points = "sweep" in dataset.attrs or len(values) < 3
                 look: Any = {"marker": style.marker(ax, len(values)), "markersize": style.MARKER} if points else {}
+                look["drawstyle"] = style.drawn_as(dataset[name])
                 ax.plot(dataset[over].values, values, color=colour, linestyle=dash, linewidth=1.3, **look)
     words = panel.title or ", ".join(map(symbol, panel.names[:2]))
     style.label(ax.yaxis, words, panel.unit, np.concatenate(drawn))

@@ -73,3 +73,10 @@ def test_one_run_that_needs_decades_gives_them_to_all():
     slow, fast = run(0.1), run(1e4)
     scales = [figure(each).axes[-1].get_xscale() for each in ([slow, slow], [slow, fast], [fast, slow])]
     assert scales == ["linear", "log", "log"]
+
+
+def test_modes_go_in_steps():
+    data = surfacechem.run("debonding").dataset
+    for plot in (figure(data, ["bonded"]), figure([data, data], ["bonded"])):
+        assert plot.axes[0].get_ylabel() == "Mode [1]"
+        assert plot.axes[0].get_lines()[0].get_drawstyle() == "steps-post"
