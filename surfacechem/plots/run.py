@@ -191,7 +191,7 @@ def first_shown(dataset: xarray.Dataset, panels: Sequence[Panel]) -> float | Non
     times = dataset["time"].values
     # Fluxes and powers follow from what changes: where they start is no reason for another axis.
     names = [name for panel in panels if panel.unit != FLUX for name in panel.names if name in dataset]
-    moments = np.array(list(_moments(dataset)))
+    moments = np.array([t for t, _ in _moments(dataset)])
     late = int(np.sum(moments > times[-1] / 10))
     crowded = late >= CROWD and 2 * late > len(moments) and not logarithmic(times)
     if crowded or not logarithmic(times, [dataset[name].values for name in names]):
@@ -395,26 +395,28 @@ def label_time(axes: Sequence[Axes], times: Array, unit: str, first: float | Non
         ax.set_xlim(first, float(times.max()))
 
 
-def _moments(dataset: xarray.Dataset) -> dict[float, str]:
-    """What the events are called, by their times: by name, or by reason where the name is the variable that passes
+def _moments(dataset: xarray.Dataset) -> list[tuple[float, str]]:
+    """Times of the events and what they are called: by name, or by reason where the name is the variable that passes
     zero.
     """
     if "event_time" not in dataset:
-        return {}
+        return []
     named = {name: ("event",) for name in ("event_name", "event_reason") if name in dataset}
     style.check(dataset, {"event_time": ("event",)}, named)
     texts = [dataset[name].values.astype(str).tolist() for name in named] or [[""] * dataset.sizes["event"]]
     quantities = [name for name in curves(dataset) if not style.is_mode(dataset[name])]
     events = zip(dataset["event_time"].values.tolist(), texts[0], texts[-1], strict=True)
-    return {t: why if name.partition(" ")[0] in quantities else name for t, name, why in events}
+    return [(t, why if name.partition(" ")[0] in quantities else name) for t, name, why in events]
 
 
-def _named(moments: Mapping[float, str]) -> list[tuple[float, str]]:
+def _named(moments: Sequence[tuple[float, str]]) -> list[tuple[float, str]]:
     """Times and names of the events that have one; ends of stages show as bands."""
-    return [(t, name) for t, name in moments.items() if name and not name.startswith("end of ")]
+    return [(t, name) for t, name in moments if name and not name.startswith("end of ")]
 
 
-def _draw_events(axes: Sequence[Axes], width: float, moments: Mapping[float, str], below: int) -> tuple[int, str]:
+def _draw_events(
+    axes: Sequence[Axes], width: float, moments: Sequence[tuple[float, str]], below: int
+) -> tuple[int, str]:
     """Thin vertical lines at the events, one for those that follow each other closely; returns the rows of names above
     the panels, and the events that have none there.
     """
@@ -425,7 +427,7 @@ def _draw_events(axes: Sequence[Axes], width: float, moments: Mapping[float, str
     names = Counter(text for _, text in places)
     repeat = 1 < len(names) < names.total()
     lines = dict(zip([name for name, _ in names.most_common()], KIND_LINES, strict=False)) if repeat else {}
-    ends = _places(axes[0], [(t, "") for t in moments if t not in dict(named)])
+    ends = _places(axes[0], [(t, "") for t, _ in moments if t not in dict(named)])
     for (moment, text), ax in product([*places, *ends], axes):
         ax.axvline(moment, color="black", linewidth=0.6, linestyle=lines.get(text, KIND_LINES[0]))
     if len(names) == 1 and len(places) > 1:

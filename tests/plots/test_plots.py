@@ -260,3 +260,9 @@ def test_tractions_are_drawn_over_what_the_states_differ_in():
         figure(data, ["t"])
     with pytest.raises(InputError, match="needs states that differ"):
         figure(case.evaluate())
+
+
+def test_events_at_one_time_are_all_counted():
+    plot = figure(surfacechem.run("bouncing-plate").dataset)
+    said = [text.get_text() for text in plot.findobj(matplotlib.text.Text)]
+    assert any("78 impact (dotted), rest" in text for text in said)
