@@ -9,6 +9,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -103,7 +104,8 @@ class Margin:
         return cls(terminal=False, direction=0, smooth=True)
 
 
-class EdgeTables(NamedTuple):
+@dataclass(frozen=True, kw_only=True)
+class EdgeTables:
     """What the compiled loop reads of the edges of a system, along which it then carries runs by itself."""
 
     sizes: Index
@@ -125,6 +127,12 @@ class EdgeTables(NamedTuple):
     """A row (kind, place) for each account."""
     least_peaks: Array
     """Sizes of the states that count however small they have been."""
+
+    @cached_property
+    def words(self) -> Index:
+        """Address and lengths of each table that is read by name, one behind the other."""
+        tables = self.edges, self.when, self.held, self.clocks, self.nodes, self.accounts, self.least_peaks
+        return np.array([word for table in tables for word in (table.ctypes.data, *table.shape)], np.int64)
 
 
 def integers(rows: Sequence[Any], *shape: int) -> Index:

@@ -22,7 +22,7 @@ from numba.extending import (
     register_model,
 )
 
-from surfacechem.solve.radau.stepper import BATCH
+from surfacechem.solve.radau.stepper import BATCH, EDGE_TABLES, EDGE_WORDS
 
 _intrinsic: Any = intrinsic
 _Constant: Any = ir.Constant
@@ -47,7 +47,7 @@ def _layout(
     """The fields of a record and its number of words."""
     fields: dict[str, _Field] = {}
     place = 0
-    for name, (dtype, axes) in BATCH.items():
+    for name, (dtype, axes) in {**EDGE_TABLES, **BATCH}.items():
         entry = _NUMBA.get(dtype) or numba.from_dtype(np.dtype(dtype))
         fields[name] = _Field(types.Array(entry, axes, "C") if axes else entry, None, place)
         place += 1 + axes
@@ -160,6 +160,9 @@ def laying_out(record: StepperRecord) -> Any:
                     store(place, given.data)
                     for axis in range(kind.ndim):
                         store(place + 1 + axis, builder.extract_value(given.shape, axis))
+                    if name == "edge_words":
+                        for word in range(EDGE_WORDS):
+                            store(word, builder.load(builder.gep(given.data, [_WORD(word)])))
                     if name == "sizes":
                         for j, size in enumerate(record.sizes):
                             entry = builder.gep(given.data, [_WORD(j)])

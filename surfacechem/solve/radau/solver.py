@@ -94,7 +94,12 @@ def _with_edges(tables: Sequence[NDArray[Any]], edges: EdgeTables) -> Sequence[N
     if len(edges.clocks):
         sizes, code = sizes.copy(), np.concatenate([code, edges.code])
         sizes[-3:] = edges.sizes
-    return sizes, code, *others, *edges[2:]
+    return sizes, code, *others, edges.words
+
+
+def _jump_rows(problem: Problem, count: int, rows: int) -> Array:
+    """Room for so many jumps of each run."""
+    return np.empty((count, rows, 3 + problem.edges.sizes[0] + 2 * problem.program.n_inputs))
 
 
 def batch_of(
@@ -127,8 +132,8 @@ def batch_of(
         np.empty((count, event_rows, 2 + 2 * n + q)) if event_rows else _no_rows(count),
         np.empty((count, rows, n + q)) if problem.picture else _no_rows(count),
         np.empty((count, rows)),
-        np.empty((count, arc_rows, 5 + program.n_parameters)),
-        np.empty((count, jump_rows, 3 + problem.edges.sizes[0] + 2 * program.n_inputs)),
+        np.empty((count, arc_rows, 5 + program.n_parameters)) if arc_rows else _no_rows(count),
+        _jump_rows(problem, count, jump_rows) if jump_rows else _no_rows(count),
     )
 
 
@@ -317,7 +322,7 @@ def search_batch(program: Program, ends: Array, table: Array, counts: NDArray[np
     """
     rows, nothing = np.zeros((1, 0)), _no_rows(len(ends))
     return Batch(
-        *program.tables, *NO_EDGES[2:],
+        *program.tables, NO_EDGES.words,
         1.0, np.ones(program.n), 0, _kinds(()), 0, 0.0, 0.0,
         ends, table, np.zeros(0), np.empty(0, np.int64), rows, rows, rows, ends, counts,
         *(nothing,) * 4, rows, *(nothing,) * 2,

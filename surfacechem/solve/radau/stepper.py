@@ -18,6 +18,20 @@ from surfacechem.compile import objectcode
 from surfacechem.compile.cache import compile_kernel, fill, is_filled, kernel_folder
 from surfacechem.solve.contract import AT_ONCE
 
+EDGE_TABLES: dict[str, tuple[Any, int]] = {
+    "edges": (np.int64, 2),
+    "when": (np.int64, 2),
+    "held": (np.int64, 1),
+    "clocks": (np.int64, 1),
+    "nodes": (np.int64, 1),
+    "accounts": (np.int64, 2),
+    "least_peaks": (float, 1),
+}
+"""Tables of edges, where runs go on along them: type and number of axes, as EdgeTables has them."""
+
+EDGE_WORDS = sum(1 + axes for _, axes in EDGE_TABLES.values())
+"""Words that tell where they are: of each its address and its lengths."""
+
 BATCH: dict[str, tuple[Any, int]] = {
     # the program
     "sizes": (np.int64, 1),
@@ -27,14 +41,8 @@ BATCH: dict[str, tuple[Any, int]] = {
     # places of the derivatives that are formed; none where all are
     "nonzeros": (np.int64, 1),
     "groups": (np.int64, 1),
-    # the edges, where runs go on along them: see EdgeTables
-    "edges": (np.int64, 2),
-    "when": (np.int64, 2),
-    "held": (np.int64, 1),
-    "clocks": (np.int64, 1),
-    "nodes": (np.int64, 1),
-    "accounts": (np.int64, 2),
-    "least_peaks": (float, 1),
+    # address and lengths of each of the tables of edges: one array is taken apart sooner than seven
+    "edge_words": (np.int64, 1),
     # the method
     "rtol": (float, 0),
     "atol": (float, 1),
@@ -284,7 +292,7 @@ class Loop:
         kernel = compile_kernel(getattr(import_module(self._module), self._function), _signature(), self.folder, PARTS)
         if not self._brief:
             # A batch of no runs: Numba looks longer at the types of its first arguments than a brief run takes.
-            nothing = (np.zeros((len(SIZES),) * axes, dtype) if axes else dtype(0) for dtype, axes in BATCH.values())
+            nothing = (np.zeros((EDGE_WORDS,) * axes, dtype) if axes else dtype(0) for dtype, axes in BATCH.values())
             kernel(0, 0, np.zeros(0, np.int64), tuple(nothing))
         objectcode.keep(kernel, self.folder)
         return kernel
