@@ -90,10 +90,11 @@ def _contiguous(values: ArrayLike) -> Array:
 
 def _with_edges(tables: Sequence[NDArray[Any]], edges: EdgeTables) -> Sequence[NDArray[Any]]:
     """The tables of a program, and those of edges."""
+    if edges is NO_EDGES:
+        return *tables, edges.words
     sizes, code, *others = tables
-    if len(edges.clocks):
-        sizes, code = sizes.copy(), np.concatenate([code, edges.code])
-        sizes[-3:] = edges.sizes
+    sizes, code = sizes.copy(), np.concatenate([code, edges.code])
+    sizes[-3:] = edges.sizes
     return sizes, code, *others, edges.words
 
 
@@ -114,7 +115,7 @@ def batch_of(
     steps, filled = STEP_ROWS if problem.record_steps else 0, INSIDE_ROWS if problem.picture else 0
     step_rows, event_rows, rows, jump_rows = room or (steps, EVENT_ROWS if problem.margins else 0, filled, EVENT_ROWS)
     n, q, m, count = program.n, program.n_ledger, program.n_margins, len(runs[0])
-    arc_rows, jump_rows = (event_rows + len(problem.parameters), jump_rows) if len(problem.edges.clocks) else (0, 0)
+    arc_rows, jump_rows = (0, 0) if problem.edges is NO_EDGES else (event_rows + len(problem.parameters), jump_rows)
     return Batch(
         *_with_edges(tables or (program.explicit_tables if explicit else program.tables), problem.edges),
         problem.rtol,
@@ -186,7 +187,7 @@ class Radau(Solver):
             # What problems of one batch have in common, beside the model and its margins.
             shape = len(problem.segments), problem.atol.tobytes(), problem.rtol
             picture = problem.picture and (problem.picture, problem.before)
-            crosses = len(problem.edges.clocks) > 0
+            crosses = problem.edges is not NO_EDGES
             alike.setdefault((*shape, problem.in_play, problem.goes_on, picture, crosses), []).append(i)
         most = min(CHUNK, -(-len(problems) // threads))
         chunks = [group[k : k + most] for group in alike.values() for k in range(0, len(group), most)]
@@ -243,9 +244,14 @@ def _whole(problem: Problem, batch: Any, i: int) -> Result:
     """
     while True:
         counts: list[int] = batch.counts[i].tolist()
-        needed = counts[RECORDS] * problem.record_steps, counts[EVENTS], counts[INSIDE], counts[JUMPS]
-        tables = batch.records, batch.events, batch.inside, batch.jumps
-        if all(count <= table.shape[1] for count, table in zip(needed, tables, strict=True)):
+        steps, events, inside, jumps = needed = (
+            counts[RECORDS] * problem.record_steps,
+            counts[EVENTS],
+            counts[INSIDE],
+            counts[JUMPS],
+        )
+        fits = steps <= batch.records.shape[1] and events <= batch.events.shape[1] and inside <= batch.inside.shape[1]
+        if fits and jumps <= batch.jumps.shape[1]:
             return _result(problem, batch, i, counts)
         batch, i = _run_one(problem, needed), 0
 
