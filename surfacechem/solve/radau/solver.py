@@ -98,9 +98,12 @@ def _with_edges(tables: Sequence[NDArray[Any]], edges: EdgeTables) -> Sequence[N
     return sizes, code, *others, edges.words
 
 
-def _jump_rows(problem: Problem, count: int, rows: int) -> Array:
-    """Room for so many jumps of each run."""
-    return np.empty((count, rows, 3 + problem.edges.sizes[0] + 2 * problem.program.n_inputs))
+def _edge_rows(problem: Problem, count: int, arcs: int, jumps: int) -> tuple[Array, Array]:
+    """Room for so many arcs and jumps of each run."""
+    if problem.edges is NO_EDGES:
+        return _no_rows(count), _no_rows(count)
+    inputs, parameters = problem.program.n_inputs, problem.program.n_parameters
+    return np.empty((count, arcs, 5 + parameters)), np.empty((count, jumps, 3 + problem.edges.sizes[0] + 2 * inputs))
 
 
 def batch_of(
@@ -115,7 +118,6 @@ def batch_of(
     steps, filled = STEP_ROWS if problem.record_steps else 0, INSIDE_ROWS if problem.picture else 0
     step_rows, event_rows, rows, jump_rows = room or (steps, EVENT_ROWS if problem.margins else 0, filled, EVENT_ROWS)
     n, q, m, count = program.n, program.n_ledger, program.n_margins, len(runs[0])
-    arc_rows, jump_rows = (0, 0) if problem.edges is NO_EDGES else (event_rows + len(problem.parameters), jump_rows)
     return Batch(
         *_with_edges(tables or (program.explicit_tables if explicit else program.tables), problem.edges),
         problem.rtol,
@@ -133,8 +135,7 @@ def batch_of(
         np.empty((count, event_rows, 2 + 2 * n + q)) if event_rows else _no_rows(count),
         np.empty((count, rows, n + q)) if problem.picture else _no_rows(count),
         np.empty((count, rows)),
-        np.empty((count, arc_rows, 5 + program.n_parameters)) if arc_rows else _no_rows(count),
-        _jump_rows(problem, count, jump_rows) if jump_rows else _no_rows(count),
+        *_edge_rows(problem, count, event_rows + len(problem.parameters), jump_rows),
     )
 
 
