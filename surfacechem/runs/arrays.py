@@ -369,6 +369,7 @@ class ArrayRuns:
     def _beside_jumps(self, found: Ends) -> tuple[Index, Array, tuple[Values, Values]]:
         """Runs and times of their jumps, and the values right before each and right after it."""
         rows, program, width = found.batch.jumps, self.model.program, self.model.program.n_inputs
+        rows = rows if rows.shape[1] else np.empty((len(rows), 0, 2 * width))  # where runs end at their edges
         owner, k = np.nonzero(np.arange(rows.shape[1]) < found.batch.counts[:, JUMPS, None])
         before, after = rows[owner, k, -2 * width : -width], rows[owner, k, -width:]
         y, ydot = slice(1, 1 + self.n), slice(1 + self.n, 1 + 2 * self.n)
