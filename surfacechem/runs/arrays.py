@@ -26,13 +26,16 @@ from surfacechem.solve.choice import EXPLICIT, IMPLICIT
 from surfacechem.solve.contract import Array, Index, Mask, Problem, Status
 from surfacechem.solve.diagnose import are_led_back
 from surfacechem.solve.lanes.lane_batch import solve_batch
-from surfacechem.solve.radau.solver import consistent, rates_at, solve_arrays
+from surfacechem.solve.radau.solver import Room, consistent, rates_at, solve_arrays
 from surfacechem.solve.radau.stepper import ARCS, END, EVENTS, FIRST_COUNTER, JUMPS, OUTPUTS, RECORDS
 from surfacechem.solve.run import Model, Run
 from surfacechem.tolerances import CROSSED, EPS, MICROMETRE, PICOMETRE
 
 MOST = 4096, 1024
 """Steps and events of a run for which there is room at most: what has more is looked at by itself."""
+
+PILOTS = 16
+"""Runs of a batch that tell how much happens in the others."""
 
 TRIED = 100
 """Runs of a plan that are tried for one that is admissible, whose problem the others share."""
@@ -456,7 +459,7 @@ class JumpingRuns(ArrayRuns):
     """Runs of a plan that arrays tell with their jumps."""
 
     jumps = True
-    room = 0, 16, 0, 0
+    room: Room = 0, 16, 0, 0
     """Steps and events for which a run has room; as many as the runs before have needed."""
 
     def guards(self, rows: Array) -> tuple[Array, Mask]:
@@ -465,17 +468,23 @@ class JumpingRuns(ArrayRuns):
 
     def _solved(self, problem: Problem, y0: Array, table: Array, *others: Array) -> Ends:
         """Runs along their edges; once more where there was no room for what happens in them."""
-        jumper, room, looks = self.model.jumper, self.room, self.keeps_steps or bool(self.keep.reach)
+        jumper, looks = self.model.jumper, self.keeps_steps or bool(self.keep.reach)
         assert jumper is not None
         jumper.expect_jumps()
-        problem = replace(problem, edges=jumper.edge_tables)
-        while True:
-            batch = solve_arrays(problem, y0, table, *others, room=room)
-            steps, events = np.minimum(batch.counts[:, [RECORDS, EVENTS]].max(axis=0), MOST).tolist()
-            steps, jumps = steps * self.keeps_steps, events * looks
-            if steps <= room[0] and events <= room[1] and jumps <= room[3]:
-                break
-            room = self.room = max(steps, room[0]), max(events, room[1]), 0, max(jumps, room[3])
+        problem, columns = replace(problem, edges=jumper.edge_tables), (y0, table, *others)
+        # A few of them tell for how much the others need room.
+        some = np.arange(0, len(y0), max(len(y0) // PILOTS, 1))
+        few = [column[some] if len(column) == len(y0) else column for column in columns]
+        for given in (few, columns):
+            fits = False
+            while not fits:
+                room = self.room
+                batch = solve_arrays(problem, *given, room=room)
+                steps, events = np.minimum(batch.counts[:, [RECORDS, EVENTS]].max(axis=0), MOST).tolist()
+                needed = steps * self.keeps_steps, events, 0, events * looks
+                fits = all(each <= had for each, had in zip(needed, room, strict=True))
+                if not fits:
+                    self.room = tuple(max(each + each // 4, had) for each, had in zip(needed, room, strict=True))
         arcs = batch.arcs
         begun = np.where(np.arange(arcs.shape[1]) < batch.counts[:, ARCS, None], arcs[..., 0], np.inf)
         return Ends(batch, arcs[..., 5:], np.column_stack([begun, np.full(len(y0), np.inf)]), others[-1])
