@@ -258,7 +258,8 @@ def save_kept(dataset: xarray.Dataset, target: Path) -> Path:
 
 
 def save_table(target: Path, dataset: xarray.Dataset) -> None:
-    """A row for each output, whole or not at all; each column is headed by its name and unit, ``v [m s-1]``.
+    """A row for each output, whole or not at all; each column is headed by its name and unit, ``v [m s-1]``, that of
+    words by its name.
 
     What has other dimensions than the first variable, events and profiles for instance, is in netCDF only.
     """
@@ -278,7 +279,7 @@ def table(dataset: xarray.Dataset) -> Any:
         # Of a table with more than a hundred columns pandas says that it is made of many parts.
         warnings.simplefilter("ignore")
         frame = dataset[names].to_dataframe().reset_index()
-    units = {name: dataset[name].attrs.get("units", "1") for name in frame}
+    units = {name: dataset[name].attrs.get("units", "1") for name in frame if dataset[name].dtype.kind not in "OUT"}
     return frame.rename(columns={name: f"{name} [{unit}]" for name, unit in units.items()})
 
 

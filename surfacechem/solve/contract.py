@@ -65,6 +65,12 @@ ALOFT, FITTED = 1.5, 0.1 * NEGLIGIBLE
 what is longer a step meets by itself."""
 
 
+WARMED = 60
+"""Newton steps in which a body takes on the temperature of its energy at most: where this grows with the square of the
+temperature, far away each halves it, so that these are 18 decades.
+"""
+
+
 @dataclass(frozen=True)
 class Margin:
     """What happens where a margin crosses zero; direction -1 is falling, +1 rising, 0 both.

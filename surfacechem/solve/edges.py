@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from surfacechem.solve.contract import WARMED
 from surfacechem.solve.radau.consistency import find_consistent
 from surfacechem.solve.radau.stepper import (
     ARCS,
@@ -44,8 +45,7 @@ NONE, UNKNOWN = -1, -2
 """Instead of the edge that is due: there is none; it has to be looked at by itself."""
 
 OPEN, CLOSED, NEAR = range(3)
-
-NEWTON = 60
+"""How the guard of an edge stands."""
 
 
 @compiled
@@ -175,7 +175,7 @@ def _warm(w: Any, taker: int, made: float) -> tuple[float, float]:
         if w.nodes[k] < 0:
             heat += taken
             entropy += taken / w.nodal[k * width]
-    for _iteration in range(NEWTON):
+    for _iteration in range(WARMED):
         moves = False
         for k in range(nodes):
             if w.nodes[k] >= 0:

@@ -16,7 +16,7 @@ from surfacechem.model.system import System
 from surfacechem.solve.contract import ALOFT, AT_ONCE, FITTED, Array, Mask, Problem, Result, Status
 from surfacechem.solve.equilibria import BALANCED, Point, drift_of
 from surfacechem.solve.jump_heat import LoadStep
-from surfacechem.solve.jumps import Jump, Jumper, Slack, booked, velocity_scales
+from surfacechem.solve.jumps import Jump, Jumper, Slack, velocity_scales
 from surfacechem.solve.radau.solver import consistent
 from surfacechem.tolerances import BRIEF, CROSSED, MICROMETRE, PICOMETRE, SOLVED, SOON
 
@@ -256,6 +256,5 @@ class Instant:
             self.status, self.reason = Status.EVENT, f"{jump.edge.reason}, which {word}"
             return None
         self.rebounds.see(jump)
-        changes = [booked(jump, account, self.jumper.states) for account in self.system.ledger]
-        self.booked = self.booked + np.array(changes)
+        self.booked = self.booked + self.jumper.booked(jump)
         return jump.after

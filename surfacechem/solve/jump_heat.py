@@ -23,7 +23,7 @@ from surfacechem.compile.program import Function
 from surfacechem.expressions import derivative
 from surfacechem.model.automaton import INTERFACE, Sink
 from surfacechem.model.system import System
-from surfacechem.solve.contract import Array, Mask
+from surfacechem.solve.contract import WARMED, Array, Mask
 from surfacechem.solve.equilibria import Equilibria, Heat, Point, Way, compiled
 from surfacechem.solve.zeros import zero
 from surfacechem.tolerances import ULPS
@@ -31,8 +31,6 @@ from surfacechem.tolerances import ULPS
 Moments = Callable[[Array, Array], tuple[Array, Array]]
 """From ways and what each taker has taken up to there, shape (ways, takers): the heat made up to each way, shape
 (ways,), and the shares at these moments, shape (ways, takers)."""
-
-NEWTON = 60
 
 DEGREE = 16
 """Degree of shares and heat on a panel; half of it tells how good that is."""
@@ -113,7 +111,7 @@ class JumpHeat:
         free = list(zip([j for j, s in enumerate(self.nodes.values()) if not s.prescribed], self.free, strict=True))
         rows, left = rows.copy(), np.arange(len(rows))
         # Each row ends where it has converged: what it becomes does not depend on the others.
-        for _ in range(NEWTON if free else 0):
+        for _ in range(WARMED if free else 0):
             moves = np.zeros(len(left), dtype=bool)
             for j, column in free:
                 T = rows[left, column]

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -19,7 +19,7 @@ from surfacechem.compile.program import Function, Program, compile_function
 from surfacechem.expressions import derivative, magnitude
 from surfacechem.model.automaton import INTERFACE, RESTS, Edge
 from surfacechem.model.balances import elastic_energy
-from surfacechem.model.system import START, Account, System
+from surfacechem.model.system import START, System
 from surfacechem.quantities import VELOCITIES
 from surfacechem.solve.contract import Array, EdgeTables, Mask, integers
 from surfacechem.solve.equilibria import BALANCED, Equilibria, Folds, Lost, Point, compiled
@@ -89,22 +89,6 @@ class Jump:
     def stops(self) -> bool:
         """Whether the run cannot, or may not, go on."""
         return self.verdict == IMPOSSIBLE or (self.verdict == VIOLATES and self.edge.violation == "refuse")
-
-
-def booked(jump: Jump, account: Account, states: Sequence[str]) -> float:
-    """What a jump adds to an account of the ledger; ``states`` are the names of the states."""
-    if account.kind == "bonds":
-        j = states.index(account.law)
-        return float(jump.after.y[j] - jump.before.y[j])
-    if account.law != "events":
-        return jump.work.get(account.quantity.name, 0.0)
-    amounts = {
-        "dissipation": jump.released,
-        "entropy production": jump.entropy,
-        "energy supply": -jump.heat_out,
-        "entropy supply": -jump.entropy_out,
-    }
-    return amounts[account.kind]
 
 
 def velocity_scales(system: System) -> Array:
@@ -275,7 +259,7 @@ class Jumper:
             held=integers(self.mode_columns, -1),
             clocks=integers([*starts, *system.origins], -1),
             nodes=integers([-1 if node.prescribed else self.states.index(node.node) for node in nodes], -1),
-            accounts=integers([self._account(account, given) for account in system.ledger], -1, 2),
+            accounts=integers(self._accounts, -1, 2),
             least_peaks=velocity_scales(system),
         )
 
@@ -297,15 +281,36 @@ class Jumper:
             self._tables = self._tables if before else None
         return not before
 
-    def _account(self, account: Account, given: Sequence[str]) -> tuple[int, int]:
-        """How the compiled loop books jumps on an account: as :func:`booked` does."""
-        if account.kind == "bonds":
-            return BONDS, self.states.index(account.law)
-        if account.law != "events":
-            name = account.quantity.name
-            return (WORK, 2 + given.index(name)) if name in given else (NOT_BOOKED, 0)
+    @cached_property
+    def _accounts(self) -> list[tuple[int, int]]:
+        """How jumps are booked on each account: its kind, and its place among states or books."""
+        given, found = list(self.system.given), []
         sums = {"dissipation": RELEASED, "entropy production": PRODUCED, "energy supply": HEAT_OUT}
-        return sums.get(account.kind, ENTROPY_OUT), 0
+        for account in self.system.ledger:
+            name = account.quantity.name
+            if account.kind == "bonds":
+                found.append((BONDS, self.states.index(account.law)))
+            elif account.law == "events":
+                found.append((sums.get(account.kind, ENTROPY_OUT), 0))
+            else:
+                found.append((WORK, 2 + given.index(name)) if name in given else (NOT_BOOKED, 0))
+        return found
+
+    def booked(self, jump: Jump) -> Array:
+        """What a jump adds to the accounts of the ledger."""
+        changes = jump.after.y - jump.before.y
+        sums = {
+            RELEASED: jump.released,
+            PRODUCED: jump.entropy,
+            HEAT_OUT: -jump.heat_out,
+            ENTROPY_OUT: -jump.entropy_out,
+        }
+        amounts = []
+        for account, (kind, place) in zip(self.system.ledger, self._accounts, strict=True):
+            # The work of loads that jump, and on the last of the way to a fold, is that of other accounts, too.
+            work = jump.work.get(account.quantity.name, 0.0)
+            amounts.append(changes[place] if kind == BONDS else sums.get(kind, work))
+        return np.array(amounts)
 
     def carried_out(self, arcs: Array, rows: Array, start: float, end: float) -> list[Jump]:
         """The jumps that the compiled loop has carried out, from its rows of arcs and of jumps between these times."""

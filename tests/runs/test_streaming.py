@@ -419,7 +419,7 @@ def test_a_table_of_series_has_a_row_for_each_output_and_words_for_codes(tmp_pat
         rows = list(csv.DictReader(table))
         shown = np.array([float(row["T [K]"] or "nan") for row in rows])
         np.testing.assert_array_equal(shown, file["T"].values.ravel())
-    ends = {(row["status [1]"], row["reason [1]"]) for row in rows}
+    ends = {(row["status"], row["reason"]) for row in rows}
     assert ends == {("finished", "reached the end"), ("refused", "the values are not admissible at the start")}
 
 

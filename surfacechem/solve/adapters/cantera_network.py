@@ -181,7 +181,9 @@ class HeldReactor(cantera.ExtensibleReactor):
         return self.names[i]
 
     def replace_component_index(self, name: str) -> int:
-        refuse_unknown([name], self.names, f"{self.name} has no component '{{}}'")
+        if name not in self.names:  # lines of the ledger, in a unit that is none, are of no use
+            known = [each for each in self.names if not each.endswith(f" / {LEDGER_UNIT:g}")]
+            refuse_unknown([name], known, f"{self.name} has no component '{{}}'")
         return self.names.index(name)
 
 

@@ -368,7 +368,7 @@ def _run_arc(w: Any, i: int, end: float, goes_on: bool) -> int:
     _begin_arc(w, i)
     _see_guards(w, aloft)
     # Not to a breakpoint that no load has, as a formula there is that of what follows.
-    last = end if w.jumps_next else max(end - DIGITS * end, 0.5 * (w.origin + end))
+    last = end if w.loads_change else max(end - DIGITS * end, 0.5 * (w.origin + end))
     w.arc_end, w.shown, w.base = last - w.origin, end - w.origin, 0.0
     status = GOOD
     if 0.0 < ALOFT * aloft < FITTED * w.arc_end:
@@ -442,10 +442,10 @@ def _begin_segment(w: Any, i: int, segment: int) -> None:
         w.moment[first + w.held[k]] = w.reset[k]
     w.moment[0] = w.segments[row_of(w.segments, i), segment]
     clear(w.moment[1 + w.n : first])
-    w.jumps_next = segment + 1 == parameters.shape[0]
-    for j in range(0 if w.jumps_next else parameters.shape[1]):
+    w.loads_change = segment + 1 == parameters.shape[0]
+    for j in range(0 if w.loads_change else parameters.shape[1]):
         if parameters[segment, j] != parameters[segment + 1, j]:
-            w.jumps_next = 1
+            w.loads_change = 1
 
 
 @compiled

@@ -122,7 +122,7 @@ NUMBERS: dict[str, type] = {
     # away; where the arc ends at the latest, and up to where it has outputs, in its own time. The first event of the
     # arc, and steps rejected before it; whether loads change at the end of the segment.
     **dict.fromkeys(("origin", "rebounded", "aloft", "arc_end", "shown"), float),
-    **dict.fromkeys(("first_event", "rejected_before", "jumps_next"), int),
+    **dict.fromkeys(("first_event", "rejected_before", "loads_change"), int),
 }
 """Numbers of a trajectory that change."""
 
