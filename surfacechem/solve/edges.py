@@ -136,6 +136,8 @@ def resolve(w: Any, i: int, end: float) -> bool:
     first = w.n_margins - w.edges.shape[0]
     while True:
         t = w.moment[0]
+        if w.jumped[0] >= t - SOLVED * max(t, BRIEF * end):  # chatter, also of arcs that take no time
+            return False
         find_magnitudes(w)
         find_playing(w)
         _find_guards(w)
@@ -144,8 +146,7 @@ def resolve(w: Any, i: int, end: float) -> bool:
         due = _due(w, first)
         if due == NONE:
             return True
-        endless = w.jumped[0] >= t - SOLVED * max(t, BRIEF * end)
-        if due == UNKNOWN or endless or not jump(w, i, due):
+        if due == UNKNOWN or not jump(w, i, due):
             return False
 
 
