@@ -176,7 +176,7 @@ def _ledger_limit(w: Any, h: float, remaining: float) -> float:
     limit = h * max(least, 0.9 * max(norm, NEGLIGIBLE) ** (-1.0 / power))
     if norm <= 1.0:
         return max(limit, h)
-    if w.refused > PATIENCE + w.steps // 2:
+    if w.refused > PATIENCE + (w.steps - w.steps_before) // 2:
         return np.inf
     w.refused += 1
     w.h_refused, w.norm_refused = h, norm
@@ -301,7 +301,7 @@ def _forget(w: Any, i: int) -> None:
     clear(w.q)
     clear(w.ydot)
     w.explicit, w.stiff_steps, w.h_refused = w.explicitly, 0, 0.0
-    w.first_event, w.rejected_before = w.counts[i, EVENTS], w.rejected
+    w.first_event, w.steps_before, w.rejected_before = w.counts[i, EVENTS], w.steps, w.rejected
 
 
 @compiled

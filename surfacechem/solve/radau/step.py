@@ -326,7 +326,7 @@ def restart(w: Any) -> int:
     w.tau = w.h_last = w.h_factored = 0.0
     w.contraction = 1.0
     w.calm = 0
-    w.refused = min(w.refused, w.steps // 2)
+    w.refused = min(w.refused, (w.steps - w.steps_before) // 2)
     w.fresh = INVALID
     w.member = preferred_member(w.rtol)
     w.inputs[0] = w.base

@@ -120,9 +120,9 @@ NUMBERS: dict[str, type] = {
     **dict.fromkeys(("explicit", "stiff_steps"), int),
     # Where edges are carried out: the time at which the arc began and that of the last rebound, with how long it stays
     # away; where the arc ends at the latest, and up to where it has outputs, in its own time. The first event of the
-    # arc, and steps rejected before it; whether loads change at the end of the segment.
+    # arc, and the steps taken and rejected before it; whether loads change at the end of the segment.
     **dict.fromkeys(("origin", "rebounded", "aloft", "arc_end", "shown"), float),
-    **dict.fromkeys(("first_event", "rejected_before", "loads_change"), int),
+    **dict.fromkeys(("first_event", "steps_before", "rejected_before", "loads_change"), int),
 }
 """Numbers of a trajectory that change."""
 
