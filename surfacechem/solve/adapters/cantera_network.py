@@ -7,6 +7,7 @@ inside the last step come from the integrator's own polynomial, whose derivative
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from functools import cache, partial
 from typing import Any, NoReturn, Self
 
@@ -244,37 +245,36 @@ class _Stretch(Method):
         self.longest = min(LONGEST * (end - t), view.problem.spacing)
         self.t, self.end = t, end
         self.net.max_time_step = self.longest
-        self.last: list[Array] = []
+        self.last: Array | None = None
+        """Variables and their first two derivatives after the last step."""
         self.failure: Exception | None = None
 
     def advance(self) -> DenseStep:
         return self.several(1).step(0)
 
     def several(self, most: int) -> Steps:
-        times, ends = [self.t], self.last or [self.reactor.scaled]
+        reactor, step, derivative = self.reactor, self.net.step, self.net.get_derivative
+        times, ends = [self.t], np.zeros((most + 1, 3, len(reactor.unit)))
+        ends[0] = reactor.scaled if self.last is None else self.last
         while len(times) <= most and self.t < self.end and self.failure is None:
             # Cantera knows no time to stop at: a step beyond it would not have felt what is there.
             if self.end - self.t < self.longest:
                 self.net.max_time_step = max(self.end - self.t, NOISE * self.end)
             try:
-                self.t = self.net.step()
-                state, rate = self.reactor.scaled, self.net.get_derivative(1)
-                try:
-                    bend = self.net.get_derivative(2)
-                except cantera.CanteraError:  # the first polynomial is a straight line
-                    bend = np.zeros_like(rate)
-                ends += [state, rate, bend]
+                self.t, row = step(), ends[len(times)]
+                row[0], row[1] = reactor.scaled, derivative(1)
+                with suppress(cantera.CanteraError):  # the first polynomial is a straight line
+                    row[2] = derivative(2)
                 times.append(self.t)
             except (cantera.CanteraError, ArithmeticError) as error:
                 self.failure = error  # an event may lie before it
         if len(times) == 1:
             raise StepError(str(self.failure)) from self.failure
-        if not self.last:
-            ends[1:1] = ends[2:4]  # the first polynomial is a straight line
-        self.last = ends[-3:]
-        unit, n = self.reactor.unit, self.reactor.count
-        rows = hermite(np.diff(times), np.concatenate(ends).reshape(-1, 3, len(unit)) * unit)
-        return Steps(np.array(times), partial(self._step, times, rows), at_nodes(rows[..., :n]))
+        if self.last is None:
+            ends[0, 1:] = ends[1, 1:]  # the first polynomial is a straight line
+        self.last = ends[len(times) - 1]
+        rows = hermite(np.diff(times), ends[: len(times)] * reactor.unit)
+        return Steps(np.array(times), partial(self._step, times, rows), at_nodes(rows[..., : reactor.count]))
 
     def _step(self, times: Sequence[float], rows: Array, k: int) -> DenseStep:
         """One of the steps from and to these times by the coefficients of its polynomial, and its ledger if any."""

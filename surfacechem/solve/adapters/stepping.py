@@ -23,7 +23,7 @@ ENTROPY = 1
 MISSED = 100.0
 """Errors in units of the tolerance beyond which a step has not seen what lies before an event."""
 
-FEW, MORE, SEVERAL = 8, 8, 128
+FEW, MORE, SEVERAL = 8, 16, 256
 """Steps at a time that the equations are looked at together, at first, how many times more each time, and at most. What
 comes after an event has been stepped through for nothing; from 64 to 256 at most make no difference to a run of a
 hundred reactions.
@@ -331,7 +331,8 @@ class _Run:
         """Move on to the end of these steps, with their outputs and events."""
         times, y, ydot = inside.times, inside.y.ends, inside.ydot.ends
         gains = inside.ledger.integral(inside.sizes)
-        relied = (step(0).ledger is None) | self._adds_up(inside, NEGLIGIBLE)
+        # What the library does not integrate itself there is nothing else to rely on for.
+        relied = np.ones(len(y), bool) if step(0).ledger is None else self._adds_up(inside, NEGLIGIBLE)
         for k in np.flatnonzero(~relied).tolist():
             gains[k] = self._gained(step(k), float(times[k]), float(times[k + 1]), gains[k])
         ledgers = np.cumsum(np.concatenate((self.ledger[None], gains)), axis=0)
