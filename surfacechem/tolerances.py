@@ -64,7 +64,7 @@ times the tolerance of a run that asks for none.
 PICTURE = 1e-3
 """Part of its range by which a straight line between two outputs may miss a quantity: a pixel of a large figure."""
 
-FINER = 16
+FINER = 8
 """The stepper follows the states so many times closer, as quantities that depend on them may bend more."""
 
 UNRESOLVED = 100.0

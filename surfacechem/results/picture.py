@@ -18,7 +18,7 @@ from surfacechem.solve import solver
 from surfacechem.solve.contract import Array, Index, Mask, States
 from surfacechem.solve.radau.solver import consistent
 from surfacechem.solve.run import Trajectory
-from surfacechem.tolerances import EPS, UNRESOLVED
+from surfacechem.tolerances import EPS, FINER, UNRESOLVED
 
 LONG = 64
 """Rows between two that are kept of which one in the middle is kept, too, where the line between the two misses any."""
@@ -195,7 +195,8 @@ def _pictured(trajectory: Trajectory, part: float, rows: States, rounds: int) ->
     # What may be an error is not pictured, and what is early counts for no range.
     values = np.where(np.isfinite(quantities), quantities, 0.0)
     known, rtol = values if early.all() else values[~early], whole.run.rtol
-    allowed = part * np.ptp(known, axis=0) + UNRESOLVED * rtol * np.abs(values).max(axis=0) + noise
+    # The rest of the part is what the states that are known miss of those between them.
+    allowed = (1 - 1 / FINER) * part * np.ptp(known, axis=0) + UNRESOLVED * rtol * np.abs(values).max(axis=0) + noise
     seen = np.ptp(values, axis=0) > allowed
     if rounds and (bends := _bends(whole, allowed[first:], seen[first:])):
         more = States(*map(np.concatenate, zip(rows, *bends, strict=True)))
