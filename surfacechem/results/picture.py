@@ -170,15 +170,32 @@ def shared(runs: Sequence[Trajectory], most: int) -> tuple[float, ...]:
     count = np.append(0.0, np.cumsum(TWICE * density * lengths))
     parts = min(int(np.ceil(count[-1])) + 1, most)
     times = [np.interp(np.linspace(0, count[-1], parts), count, every), every[[0, -1]]]
-    marked = np.unique(np.concatenate([p.result.times[_beside(p) | _edges(p.result.outputs)] for p in pictures]))
+    marked = np.unique(
+        np.concatenate([np.append(p.result.times[_beside(p) | _edges(p.result.outputs)], _steps(p)) for p in pictures])
+    )
     return tuple(np.unique(np.concatenate([*times, marked if len(marked) <= most else []])).tolist())
+
+
+def _moments(trajectory: Trajectory) -> Array:
+    """Times of events."""
+    return np.array([*trajectory.result.events.t, *(jump.t for jump in trajectory.jumps)])
 
 
 def _beside(trajectory: Trajectory) -> Mask:
     """Outputs at both sides of events."""
-    t = trajectory.result.times
-    moments = np.array([*trajectory.result.events.t, *(jump.t for jump in trajectory.jumps)])
+    t, moments = trajectory.result.times, _moments(trajectory)
     return np.isin(t, moments) | np.isin(np.nextafter(t, np.inf), moments)
+
+
+def _steps(trajectory: Trajectory) -> Array:
+    """Times at both sides of breakpoints at which a load steps, so that the picture has them: an output at a breakpoint
+    is one before the step.
+    """
+    t, breaks = trajectory.result.times, trajectory.result.problem.segments[1:-1]
+    breaks = breaks[
+        np.isin(breaks, t) & np.isin(np.nextafter(breaks, -1.0), t) & ~np.isin(breaks, _moments(trajectory))
+    ]
+    return np.concatenate((breaks, np.nextafter(breaks, np.inf)))
 
 
 def _pictured(trajectory: Trajectory, part: float, rows: States, rounds: int) -> Trajectory:

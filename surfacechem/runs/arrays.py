@@ -55,10 +55,10 @@ class Ends:
     segments: Array
     times: Array
 
-    def inputs(self, owner: Index, t: Array, y: Array, ydot: Array) -> Array:
-        """Arguments of compiled functions at points of the runs that own them."""
+    def inputs(self, owner: Index, t: Array, y: Array, ydot: Array, after: bool = False) -> Array:
+        """Arguments of compiled functions at points of the runs that own them; at a breakpoint before it or after."""
         breaks = self.segments[np.minimum(owner, len(self.segments) - 1), 1:-1]
-        segment = (t[:, None] > breaks).sum(axis=1)
+        segment = (t[:, None] >= breaks if after else t[:, None] > breaks).sum(axis=1)
         return np.concatenate([t[:, None], y, ydot, self.table[owner, segment]], axis=1)
 
 
@@ -119,12 +119,14 @@ class ArrayRuns:
         self.parameter_columns = {path: paths.index(path) for path in plan.paths if path in paths}
         self.state_columns = [(j, state) for j, state in enumerate(system.states) if state.path in plan.paths]
         self.reasons = reason_table(system)
-        self.keeps_steps = bool(keep.max or keep.min)
+        self.keeps_extremes = bool(keep.max or keep.min)
+        self.breaks = self.problem.segments[1:-1]
+        self.keeps_steps = self.keeps_extremes or bool(keep.reach and len(self.breaks))
         self.impacts = [len(model.margins) + j for j, edge in enumerate(system.edges) if edge.is_impact]
         """Columns of the guards of impacts."""
         self.unseen = np.zeros((1, model.program.n_ledger + model.program.n_margins))
         """Largest accounts and guards where nothing has been seen before."""
-        every = self.keeps_steps or bool(keep.series)
+        every = self.keeps_extremes or bool(keep.series)
         self.keeps_course = every or keep.balances
         """Whether more is kept than ends and events."""
         self.shape = self.problem.times if every else self.problem.times[[0, -1]]
@@ -345,13 +347,13 @@ class ArrayRuns:
             columns[name] = np.full((count, most), np.nan)
             columns[name][owner, k] = values[name]
         columns |= self.balances(found, rows, values, reached) if self.keep.balances else {}
-        if not self.keeps_steps:
+        if not self.keeps_extremes:
             return columns
         return columns | self.extremes(found, clear, owner, table, list(values))
 
     def extremes(self, found: Ends, clear: Mask, owner: Index, outputs: Array, names: list[str]) -> Columns:
         """Largest and least values of quantities of these names over the outputs [outputs, names], which ``owner`` says
-        the runs of, and over the ends of steps.
+        the runs of, over the ends of steps, and behind leaps.
         """
         batch, n = found.batch, self.n
         taken = np.arange(batch.records.shape[1]) < np.where(clear, batch.counts[:, RECORDS], 0)[:, None]
@@ -359,24 +361,39 @@ class ArrayRuns:
         steps = batch.records[step_owner, m]
         inputs = found.inputs(step_owner, steps[:, 0], steps[:, 1 : 1 + n], steps[:, 1 + n : 1 + 2 * n])
         parts = [(owner, outputs), (step_owner, self._values(inputs)[0])]
-        jump_owner, t, (_, after) = self._beside_jumps(found)
-        # Where one jump follows another at the same time, nothing lasts between them.
-        goes_on = (np.diff(jump_owner, append=-1) != 0) | (np.diff(t, append=np.inf) > 0)
-        parts.append((jump_owner[goes_on], after[0][goes_on]))
+        leap_owner, t, (_, after) = self._leaps(found)
+        # Where one leap follows another at the same time, nothing lasts between them.
+        goes_on = (np.diff(leap_owner, append=-1) != 0) | (np.diff(t, append=np.inf) > 0)
+        parts.append((leap_owner[goes_on], after[0][goes_on]))
         columns: Columns = {}
         for which, chosen, best in (("max", self.keep.max, np.fmax), ("min", self.keep.min, np.fmin)):
             extreme = best.reduce([of_each(best, runs, table, len(clear)) for runs, table in parts])
             columns |= {f"{name}_{which}": extreme[:, names.index(name)] for name in chosen}
         return columns
 
-    def _beside_jumps(self, found: Ends) -> tuple[Index, Array, tuple[Values, Values]]:
-        """Runs and times of their jumps, and the values right before each and right after it."""
-        rows, program, width = found.batch.jumps, self.model.program, self.model.program.n_inputs
-        rows = rows if rows.shape[1] else np.empty((len(rows), 0, 2 * width))  # where runs end at their edges
-        owner, k = np.nonzero(np.arange(rows.shape[1]) < found.batch.counts[:, JUMPS, None])
-        before, after = rows[owner, k, -2 * width : -width], rows[owner, k, -width:]
+    def _leaps(self, found: Ends) -> tuple[Index, Array, tuple[Values, Values]]:
+        """Runs and times of their jumps and of the breakpoints of loads that they have passed between these, in order;
+        the values right before each and right after it.
+        """
+        batch, program, width = found.batch, self.model.program, self.model.program.n_inputs
         y, ydot = slice(1, 1 + self.n), slice(1 + self.n, 1 + 2 * self.n)
-        if len(owner):
+        # Where runs end at their edges there are no jumps, and steps are recorded where something is looked for in them.
+        rows, records = (
+            table if table.shape[1] else np.empty((len(table), 0, 2 * width)) for table in (batch.jumps, batch.records)
+        )
+        owner, k = np.nonzero(np.arange(rows.shape[1]) < batch.counts[:, JUMPS, None])
+        before, after = rows[owner, k, -2 * width : -width], rows[owner, k, -width:]
+        times, taken = records[..., 0], np.arange(records.shape[1]) < batch.counts[:, RECORDS, None]
+        of, m = np.nonzero(taken & np.isin(times, self.breaks) & (times < batch.ends[:, :1]))
+        calm = ~np.isin(of + 1j * times[of, m], owner + 1j * before[:, 0])
+        of, steps = of[calm], records[of[calm], m[calm]]
+        known = of, steps[:, 0], steps[:, y], steps[:, ydot]
+        before = np.concatenate((before, found.inputs(*known)))
+        after = np.concatenate((after, found.inputs(*known, after=True)))
+        owner = np.concatenate((owner, of))
+        order = np.lexsort((before[:, 0], owner))
+        owner, before, after = owner[order], before[order], after[order]
+        if len(owner):  # rates and algebraic variables are still those before
             point = consistent(program, after[:, 0], after[:, y], 0.0, after[:, 1 + 2 * self.n :])
             after[:, y], after[:, ydot] = point.y, point.ydot
         return owner, before[:, 0], (self._values(before), self._values(after))
@@ -445,7 +462,7 @@ class ArrayRuns:
             for state in keep.at_events if name in keep.events else ():
                 columns[f"{state}_at_{variable(name)}"] = rows[:, 2 + self.model.system.state_columns[state]]
         if keep.reach:
-            owner, t, (before, after) = self._beside_jumps(found)
+            owner, t, (before, after) = self._leaps(found)
             for name, level in keep.reach.items():
                 first = np.full(len(happened), np.inf)
                 np.minimum.at(first, owner, np.where(crossed(before[1][name], after[1][name], level), t, np.inf))

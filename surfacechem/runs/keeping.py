@@ -18,7 +18,6 @@ from surfacechem.results.audit import Audit, audit
 from surfacechem.results.dataset import quantities
 from surfacechem.results.event_table import entropy_destroyed, events_of
 from surfacechem.solve.contract import REASONS, Status
-from surfacechem.solve.jumps import Jump
 from surfacechem.solve.radau.solver import rates_at
 from surfacechem.solve.run import Model, Trajectory
 
@@ -174,20 +173,14 @@ def described(system: System, keep: Keep) -> dict[str, tuple[str, str, str]]:
 
 
 def extreme(run: Trajectory, name: str, which: str) -> float:
-    """The largest or the smallest value of a quantity over the outputs and the steps of a run, and where jumps lead."""
-    seen = np.concatenate([run.everywhere[name], run.beside_jumps[1][name][last_of_moments(run.jumps)]])
+    """The largest or the smallest value of a quantity over the outputs and the steps of a run, and behind leaps."""
+    seen = np.concatenate([run.everywhere[name], run.leaps.after[name][run.leaps.lasts]])
     with np.errstate(invalid="ignore"):
         return float(EXTREMES[which][0].reduce(seen, initial=np.nan))
 
 
-def last_of_moments(jumps: Sequence[Jump]) -> NDArray[np.bool_]:
-    """Which jumps no other one follows at the same time, so that the run goes on from there."""
-    later = np.diff([jump.t for jump in jumps], append=np.inf)[: len(jumps)] > 0
-    return np.asarray(later & ~np.array([jump.stops for jump in jumps], dtype=bool))
-
-
 def crossed(before: NDArray[Any], after: NDArray[Any], level: float) -> NDArray[np.bool_]:
-    """Which jumps carry a quantity across a level, or onto it."""
+    """Which leaps carry a quantity across a level, or onto it."""
     return ((before < level) & (after >= level)) | ((before > level) & (after <= level))
 
 
@@ -249,11 +242,10 @@ class RunByRun:
                 row[f"time_{name}"] = event.t
                 row |= {f"{state}_at_{name}": event.before[columns[state]] for state in self.keep.at_events}
         for name, level in (self.keep.reach or {}).items():
-            before, after = (side[name] for side in run.beside_jumps)
-            where = np.flatnonzero(crossed(before, after, level))
+            where = np.flatnonzero(crossed(run.leaps.before[name], run.leaps.after[name], level))
             if len(where):
                 column = f"time_to_{name}"
-                row[column] = min(row.get(column, np.inf), run.jumps[where[0]].t)
+                row[column] = min(row.get(column, np.inf), float(run.leaps.t[where[0]]))
         return row
 
     def _code(self, reason: str) -> int:

@@ -331,11 +331,11 @@ class Result:
         return t, y, ledger, segment
 
 
-def in_order(t: Array, *segments: Index) -> Index:
-    """Places of what is known at these times, in order of the segments, the last of them first, then each time once."""
-    order = np.lexsort((segments[0], t, *segments[1:]))
+def in_order(t: Array, segment: Index) -> Index:
+    """Places of what is known at these times, in order of the segments and of the times in them, each time once."""
+    order = np.lexsort((t, segment))
     new = np.ones(len(order), dtype=bool)
-    new[1:] = np.any([np.diff(column[order]) != 0 for column in (t, *segments)], axis=0)
+    new[1:] = (np.diff(t[order]) != 0) | (np.diff(segment[order]) != 0)
     return order[new]
 
 

@@ -311,7 +311,7 @@ def told(problem: Problem, result: Result) -> Result:
         inside = inside._replace(segment=segments(4, len(inside.t)))
         parts: tuple[tuple[Any, ...], ...] = outputs, (steps.t, steps.y, steps.ledger, steps.segment), inside
         t, y, ledger, segment = map(np.concatenate, zip(*parts, strict=True))
-        kept = in_order(t, np.zeros_like(segment), segment)
+        kept = in_order(t, segment)
         ends = np.append(arcs[1:, 0], result.t)[segment[kept]]
         known = States(np.minimum(t[kept], ends), y[kept], ledger[kept], segment[kept])
     return replace(result, problem=problem, segment=outputs.segment, steps=steps, known=known)
@@ -359,14 +359,17 @@ def _known(arcs: Sequence[Arc]) -> States | None:
     """What is known of the arcs, in the time and ledger of the run, where a picture is wanted."""
     if not arcs[0].result.problem.picture:
         return None
-    found = [arc.result.scattered() for arc in arcs]
-    t, y, ledger, segment = map(np.concatenate, zip(*found, strict=True))
+    found = [arc.result.scattered()[:3] for arc in arcs]
+    # Outputs come first, whose times are those that were asked for.
+    t = np.concatenate(
+        [np.append(arc.times, arc.start.t + rows[0][len(arc.times) :]) for arc, rows in zip(arcs, found, strict=True)]
+    )
+    y, ledger = (np.concatenate([rows[k] for rows in found]) for k in (1, 2))
     number = np.repeat(np.arange(len(arcs)), [len(rows[0]) for rows in found])
-    kept = in_order(t, segment, number)
+    end, booked = np.array([arc.end for arc in arcs]), np.array([arc.booked for arc in arcs])
+    kept = in_order(t, number)
     number = number[kept]
-    start, end = np.array([(arc.start.t, arc.end) for arc in arcs]).T
-    booked = np.array([arc.booked for arc in arcs])
-    return States(np.minimum(start[number] + t[kept], end[number]), y[kept], booked[number] + ledger[kept], number)
+    return States(np.minimum(t[kept], end[number]), y[kept], booked[number] + ledger[kept], number)
 
 
 def _steps(arcs: Sequence[Arc]) -> Points | None:

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -109,6 +109,16 @@ class Run:
         atol = None if self.atol is None else self.atol * rtol / self.rtol
         used = OWN if self.solver == EXPLICIT else self.solver
         return replace(self, rtol=rtol, atol=atol, solver=used, samples=CLOSER * self.samples, **others)
+
+
+class Leaps(NamedTuple):
+    """Moments at which quantities may leap, in order of time, with states and named quantities on both sides."""
+
+    t: Array
+    before: dict[str, Array]
+    after: dict[str, Array]
+    lasts: Mask
+    """Those that no other one follows at the same time, so that the run goes on from there."""
 
 
 @dataclass(frozen=True)
@@ -216,19 +226,34 @@ class Trajectory:
         return dict(zip(names, (*states.T, *named.T), strict=True))
 
     @cached_property
-    def beside_jumps(self) -> tuple[dict[str, Array], dict[str, Array]]:
-        """States and named quantities right before each jump and right after it, shape (jumps,)."""
-        model, n = self.model, len(self.model.system.states)
+    def leaps(self) -> Leaps:
+        """Jumps, and the breakpoints of loads between them that the run has passed."""
+        model, result, n = self.model, self.result, len(self.model.system.states)
+        t, stops = np.array([jump.t for jump in self.jumps]), np.array([jump.stops for jump in self.jumps], bool)
+        before = np.array([jump.before.inputs() for jump in self.jumps]).reshape(-1, model.program.n_inputs)
+        after = np.array([jump.after.inputs() for jump in self.jumps]).reshape(before.shape)
+        if (steps := result.steps) is not None:
+            breaks = np.isin(steps.t, result.problem.segments[1:-1]) & ~np.isin(steps.t, t) & (steps.t < result.t)
+            at, y, ydot, segment = (
+                steps.t[breaks],
+                steps.y[breaks],
+                steps.ydot[breaks],
+                result.segments_at(steps.t[breaks]),
+            )
+            before = np.concatenate((before, model.inputs(result, at, y, ydot, segment)))
+            after = np.concatenate((after, model.inputs(result, at, y, ydot, segment + 1)))
+            t, stops = np.concatenate((t, at)), np.concatenate((stops, np.zeros(len(at), bool)))
+        if len(t):  # rates and algebraic variables are still those before
+            found = consistent(model.program, after[:, 0], after[:, 1 : 1 + n], 0.0, after[:, 1 + 2 * n :])
+            after[found.valid, 1 : 1 + 2 * n] = np.hstack((found.y, found.ydot))[found.valid]
+        order = np.argsort(t, kind="stable")
         names = [*(state.name for state in model.system.states), *model.system.output_columns]
-        told: list[dict[str, Array]] = []
-        for sides in zip(*((jump.before.inputs(), jump.after.inputs()) for jump in self.jumps), strict=True):
-            rows = np.array(sides)
-            if told:  # an integration has left rates and algebraic variables before a jump
-                found = consistent(model.program, rows[:, 0], rows[:, 1 : 1 + n], 0.0, rows[:, 1 + 2 * n :])
-                rows[found.valid, 1 : 1 + 2 * n] = np.hstack((found.y, found.ydot))[found.valid]
-            told.append(dict(zip(names, np.hstack((rows[:, 1 : 1 + n], model.named(rows.copy()))).T, strict=True)))
-        nothing = dict.fromkeys(names, np.empty(0))
-        return (told[0], told[1]) if told else (nothing, nothing)
+        sides = [
+            dict(zip(names, np.hstack((rows[:, 1 : 1 + n], model.named(rows.copy()))).T, strict=True))
+            for rows in (before[order], after[order])
+        ]
+        lasts = (np.diff(t[order], append=np.inf) > 0) & ~stops[order]
+        return Leaps(t[order], sides[0], sides[1], lasts)
 
     @cached_property
     def within_bounds(self) -> dict[str, Array]:

@@ -177,6 +177,36 @@ def test_levels_and_extremes_are_met_in_jumps_too(name, path, keep, level, tmp_p
     assert found[f"{level}_max"].item() >= (1 - 1e-9) * jump.after.y[j]
 
 
+STEPPED = """
+T_0: 300 K
+bodies:
+  lower: {temperature: T, capacity: constant, C: 2 kJ/m^2/K}
+  upper: {temperature: T, capacity: constant, C: 2 kJ/m^2/K}
+interface: {temperature: T, friction: [coulomb: {mu: 0.3}]}
+loading: {p: 100 kPa, v: {table: {times: [0 s, 4 s, 4 s, 5 s, 9 s], values: %s}}}
+initial: {T: 300 K}
+run: {until: 9 s}
+"""
+
+
+@pytest.mark.parametrize("after", [1000, 1])
+def test_levels_and_extremes_are_met_where_loads_step_too(after, tmp_path):
+    """In arrays, one run at a time, and at the times that runs share, which lie on both sides of the step."""
+    text, over = (
+        STEPPED % [f"{v} mm/s" for v in (1, 1, 1000, after, after)],
+        {"interface.friction.coulomb.mu": [0.1, 0.3]},
+    )
+    for k, more in enumerate(({}, {"run.max-seconds": 1000})):
+        keep = {"max": ["v", "D_coulomb"], "reach": {"v": "0.5 m/s"}}
+        simulation = surfacechem.load(text, {"sweep": {"over": over, "keep": keep}, **more})
+        found = stored(tmp_path / f"{k}.zarr", simulation).dataset
+        np.testing.assert_allclose(found["D_coulomb_max"], [1e4, 3e4], rtol=1e-12)
+        assert (found["v_max"].values.tolist(), found["time_to_v"].values.tolist()) == ([1.0, 1.0], [4.0, 4.0])
+    shared = surfacechem.load(text).sweep(over).dataset
+    assert shared["v"].sel(time=[4.0, np.nextafter(4.0, 5.0)]).values[0] == pytest.approx([1e-3, 1.0])
+    assert shared["v_max"].values.tolist() == [1.0, 1.0]
+
+
 def test_a_run_whose_values_are_not_admissible_is_refused_and_leaves_the_others_alone(tmp_path):
     simulation = case(keep=ENDS, over={"initial.phi": [0.2, 1.2, 0.4], "initial.T": [-1.0, 300.0]})
     data = stored(tmp_path / "o.zarr", simulation).dataset

@@ -22,6 +22,7 @@ JUMPING = {
     "coulomb-stop": 1,
     "debonding": 1,
     "debonding-cooling": 1,
+    "pulled-at-an-angle": 1,
     "stick-slip": 12,
     "stick-slip-debonding": 10,
     "stick-slip-rebonding": 8,
@@ -70,6 +71,8 @@ def assert_same(found, wanted):
     for name in ("y", "ydot", "ledger", "times", "outputs", "ledger_outputs"):
         np.testing.assert_array_equal(getattr(a, name), getattr(b, name))
     np.testing.assert_array_equal(told(a.steps), told(b.steps))
+    for one, other in zip(a.known or a.states(), b.known or b.states(), strict=True):
+        np.testing.assert_array_equal(one, other)
     np.testing.assert_array_equal(a.problem.segments, b.problem.segments)
     np.testing.assert_array_equal(a.problem.parameters, b.problem.parameters)
     for which, other in ((a.segment, b.segment), (a.steps.segment, b.steps.segment)):

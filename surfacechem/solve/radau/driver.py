@@ -385,6 +385,8 @@ def _run_arc(w: Any, i: int, end: float, goes_on: bool) -> int:
     clear(w.q)
     w.moment[0] = end if status == GOOD else min(_now(w), end)
     copy(w.y, w.moment[1:])
+    for j in range(w.n):
+        w.least[j], w.largest[j] = min(w.least[j], w.y[j]), max(w.largest[j], w.y[j])
     copy(w.ydot, w.moment[1 + w.n :])
     return status
 

@@ -189,14 +189,15 @@ def _parts(w: Any, h: float, growth: float) -> Any:
         # What is given may be a ramp since the segment began, which bends over the logarithm alone.
         by_ratio = max(by_ratio, abs(x - w.decades[i]) * h / ((w.tau + h) * FINER))
     for m in range(w.n):
-        low, high, missed, beside = min(w.least[m], w.y[m]), max(w.largest[m], w.y[m]), 0.0, 0.0
-        total = w.scanned[last, m]
+        # Of the steps before count their ends, which others know who go on from an arc.
+        low = w.least[m] = min(w.least[m], w.y[m])
+        high = w.largest[m] = max(w.largest[m], w.y[m])
+        missed, beside, total = 0.0, 0.0, w.scanned[last, m]
         for i in range(last + 1):
             change = w.scanned[i, m]
             low, high = min(low, w.y[m] + change), max(high, w.y[m] + change)
             missed = max(missed, abs(change - SCANNED[w.member, i] * total))
             beside = max(beside, abs(change - w.decades[i] * total))
-        w.least[m], w.largest[m] = low, high
         size = high - low + UNSEEN * w.weight[m]
         by_time, by_ratio = max(by_time, missed / size), max(by_ratio, beside / size)
     # What a line misses goes with the square of its length.
