@@ -82,7 +82,7 @@ def keep_file(path: Path, data: bytes) -> None:
 
 
 def untrusted(paths: Iterable[Path]) -> str | None:
-    """Why what is at paths of the cache could be another user's; None where it cannot be, or nothing is there."""
+    """Reason why files at paths of the cache could be another user's; None where they cannot be, or do not exist."""
     if not hasattr(os, "getuid"):
         return None  # on Windows a user's folder is writable to that user alone
     root = cache_root()
@@ -171,7 +171,7 @@ def source_digest(file: str) -> str:
 
 
 def kept(mark: Fingerprint, code: Iterable[Path], find: Callable[[], Any]) -> Any:
-    """What ``find`` gives, made of numbers, texts and lists; from its file where that is.
+    """Result of ``find``, made of numbers, texts and lists; read from its file in the cache where that exists.
 
     ``code`` are the files, beside those of the classes in ``mark``, that it follows from; versions of libraries other
     than NumPy, SciPy and SymEngine belong into the mark.
@@ -185,7 +185,7 @@ def kept(mark: Fingerprint, code: Iterable[Path], find: Callable[[], Any]) -> An
 
 
 def from_file(path: Path, find: Callable[[], Any], read: Callable[[bytes], Any], write: Callable[[Any], bytes]) -> Any:
-    """What ``find`` gives, read from its file in the cache where that is, else written there."""
+    """Result of ``find``, read from its file in the cache where that exists, else computed and written there."""
     folder = path.parent
     with suppress(OSError, ValueError):
         if untrusted((folder, path)) is None and (content := unsealed(path.read_bytes())) is not None:

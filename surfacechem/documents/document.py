@@ -24,7 +24,7 @@ DEEPEST = 24
 
 @dataclass(frozen=True)
 class Limits:
-    """How much a document may hold."""
+    """Limits on the size of a document."""
 
     largest: int = 1_000_000
     """Bytes."""
@@ -66,7 +66,7 @@ class Tree:
 
     @property
     def blamed(self) -> Place:
-        """Where it is wrong as a whole: at what has been set in it from outside, else where it stands."""
+        """Place to blame when it is wrong as a whole: that of an entry set from outside, else its own."""
         entries = self.value.values() if isinstance(self.value, dict) else ()
         return next((entry.place for entry in entries if entry.place.file == ORIGIN), self.place)
 
@@ -319,7 +319,7 @@ class _Builder:
 
 
 def labels(items: Iterable[Tree]) -> list[str | None]:
-    """What each item of a list is called in paths: the name of a law, numbered if it is not the first; else None."""
+    """Name of each item of a list in paths: that of a law, numbered if it is not the first of this name; else None."""
     seen: dict[str, int] = {}
     result: list[str | None] = []
     for item in items:

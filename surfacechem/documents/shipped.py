@@ -1,4 +1,4 @@
-"""Where the cases and mechanisms that come with surfacechem are: in the installed package, else in the checkout."""
+"""Folders of the cases and mechanisms that come with surfacechem: in the installed package, else in the checkout."""
 
 from pathlib import Path
 
