@@ -40,7 +40,7 @@ class Case:
     description: str
     scene: Scene
     own_run: Run | None
-    """How it is run; a case that is only evaluated need not say it."""
+    """Run settings; None for a case that is only evaluated and gives none."""
     reference: ExactSolution | None
     sweep: SweepSection | None
     text: str
@@ -48,11 +48,11 @@ class Case:
     places: Mapping[str, Place]
     file: str
     unused: str = ""
-    """Why the exact solution that the case names does not count after a change; empty where it does."""
+    """Reason why the exact solution that the case names does not count after a change; empty where it does."""
 
     @property
     def run(self) -> Run:
-        """How it is run; InputError where it does not say it."""
+        """Run settings; InputError where the case gives none."""
         if self.own_run is None:
             self.refuse_nothing()
             message = "the case needs `run`: times, accuracy, solver, for example `run: {until: 5 s}`."

@@ -1,4 +1,4 @@
-"""How a section of the case format is declared: its keys, what each holds, and what a key that is left out means.
+"""Declaration of a section of the case format: its keys, the content of each, and the meaning of a key left out.
 
 A section is a class whose fields are its keys; a law is one too, by its parameters and options. From what the keys
 hold follow the reader, the strict checks of keys and values, the JSON Schema and the tables of the documentation.
@@ -73,10 +73,10 @@ class Context:
 
 
 class Content(ABC):
-    """What a key holds: how it is read and how it is described."""
+    """Content of a key: how it is read and how it is described."""
 
     words: str = ""
-    """What stands there, for the documentation."""
+    """Description of the content, for the documentation."""
 
     @abstractmethod
     def read(self, tree: Tree, name: str, context: Context) -> Any:
@@ -100,7 +100,7 @@ class Number(Content):
     difference: bool = False
     word: str = ""
     wanted: str = ""
-    """What has to stand there, for the message where there is a mapping."""
+    """Description of the expected content, for the message where there is a mapping."""
 
     @property
     def words(self) -> str:  # type: ignore[override]
@@ -154,7 +154,7 @@ class Whole(Content):
     step: int = 1
     word: str = ""
     wanted: str = ""
-    """What has to stand there, for the message where it is no number."""
+    """Description of the expected content, for the message where it is no number."""
 
     @property
     def words(self) -> str:  # type: ignore[override]
@@ -388,9 +388,9 @@ class Entries(Content):
     by_scene: bool = False
     """Whether the scene refuses what is not known, as it can tell which names it has."""
     at_most: int | None = None
-    """How many there may be; then there is at least one."""
+    """Largest number of entries; where it is given, there is at least one."""
     wanted: str = ""
-    """What has to stand there, for the message where there are none or too many."""
+    """Description of the expected entries, for the message where there are none or too many."""
     words: str = "mapping"
 
     def read(self, tree: Tree, name: str, context: Context) -> dict[str, Any]:
@@ -426,13 +426,13 @@ class Entries(Content):
 
 @dataclass(frozen=True)
 class Shapes(Content):
-    """What is read by its shape: a mapping, a list, or a value."""
+    """Content that is read by its shape: a mapping, a list, or a value."""
 
     value: Content | None = None
     mapping: Content | None = None
     items: Content | None = None
     wanted: str = ""
-    """What has to stand there, for the message where it is none of them."""
+    """Description of the expected content, for the message where it has none of these shapes."""
 
     @property
     def words(self) -> str:  # type: ignore[override]
@@ -490,7 +490,7 @@ class Key:
     """Field of its class; empty for a key that a section has beside them."""
 
     def __post_init__(self) -> None:
-        """What stands there, by the parameter or the section that it is, if nothing else is said."""
+        """Take over the description of the parameter or the section if no other is given."""
         if not self.text and isinstance(self.content, Number):
             self.text = self.content.spec.text
         elif not self.text and isinstance(self.content, Nested):

@@ -14,17 +14,17 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 INSIDE = 2.0**-53
-"""What is added to numbers in [0, 1), so that none is zero, where a normal distribution has no value."""
+"""Offset of numbers in [0, 1), so that none is zero, where the quantile of a normal distribution is infinite."""
 
 ROUNDS = 6
 """Rounds of a permutation: four make one that cannot be told from a random one, two more cost nothing."""
 
 
 class Distribution(ABC):
-    """How the value of a parameter is distributed."""
+    """Probability distribution of the value of a parameter."""
 
     source: str = ""
-    """What is drawn once for all parameters that have it in common; empty where each is drawn by itself."""
+    """Name of the random number that all parameters with this source share; empty where each has its own."""
 
     @abstractmethod
     def at(self, u: Array) -> Array:
@@ -37,7 +37,7 @@ class Distribution(ABC):
 
     @property
     def record(self) -> dict[str, Any]:
-        """What makes it again."""
+        """Entries from which the distribution can be made again."""
         return {"kind": type(self).__name__, **asdict(self)}  # type: ignore[call-overload]
 
 
@@ -128,7 +128,7 @@ class Sample:
 
     @property
     def record(self) -> dict[str, Any]:
-        """What makes it again."""
+        """Entries from which the sample can be made again."""
         draws = {path: draw.record for path, draw in self.draws.items()}
         return {"draws": draws, "runs": self.runs, "method": self.method, "seed": self.seed}
 
@@ -196,7 +196,7 @@ METHODS: Mapping[str, Callable[[Index, int, int, int], Array]] = {
 
 
 def permuted(index: Index, count: int, key: int) -> Index:
-    """Where a permutation of the numbers below ``count`` leads these, without a table of it.
+    """Images of these numbers under a pseudorandom permutation of those below ``count``, without a table of it.
 
     A Feistel network permutes the numbers below a power of four, and is walked until it is back below the count.
     Source: Black & Rogaway (2002), Ciphers with arbitrary finite domains, doi 10.1007/3-540-45760-7_9.

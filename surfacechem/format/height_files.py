@@ -16,7 +16,7 @@ from surfacechem.format.csvtable import CSVText
 
 AXES = "xyz"
 HOLES = ("", "nan", "na", "inf", "-inf")
-"""What tables of instruments say where a height is missing."""
+"""Entries of tables of instruments for a height that is missing."""
 
 NETCDF = ".nc"
 

@@ -85,7 +85,7 @@ def read(source: str, name: str, place: Place | None = None) -> Sequence[type[La
 
 
 def _failure(error: BaseException) -> str:
-    """What an error in the code says."""
+    """Message of an error that the code of own laws raises."""
     if isinstance(error, PlacedError):
         return error.message
     if isinstance(error, SystemExit):

@@ -40,7 +40,7 @@ from surfacechem.format.sections import (
 
 # Statistics of the load at rupture, with their words, where runs end at a load.
 SURVIVAL = "survival"
-"""What stands for a load in `until` where each run ends when so few of its bonds are left."""
+"""Word in `until`, in place of a load, with which each run ends when so few of its bonds are left."""
 
 STATISTICS = {"mode": "most probable", "median": "median", "mean": "mean"}
 
@@ -99,7 +99,7 @@ class Numbered:
 
 
 def name_parts(path: str) -> list[str]:
-    """What a path is made of, as parts of a name.
+    """Components of a path, as parts of a name.
 
     >>> name_parts("interface.bonding[2].k-off.level")
     ['interface', 'bonding_2', 'k_off']
@@ -142,7 +142,7 @@ class Axis:
 
     @property
     def record(self) -> dict[str, Any]:
-        """What makes it again."""
+        """Entries from which the axis can be made again."""
         if isinstance(self.values, Spaced):
             return {"path": self.path, **vars(self.values)}
         return {"path": self.path, "values": list(self.values), "logarithmic": self.logarithmic}
@@ -150,8 +150,8 @@ class Axis:
 
 @dataclass(frozen=True)
 class Plan:
-    """What is swept. With ``until`` every run ends where that prescribed variable, a ramp, reaches the value, or where
-    the survival of its bonds has fallen to it.
+    """Plan of a sweep. With ``until`` every run ends where that prescribed variable, a ramp, reaches the value, or
+    where the survival of its bonds has fallen to it.
     """
 
     axes: Sequence[Axis] = ()
@@ -160,7 +160,7 @@ class Plan:
     """Whether the values of the axes go together, instead of as a grid."""
     sample: Sample | None = None
     places: Mapping[str, Place] = field(default_factory=dict, compare=False)
-    """Where it is given what is swept, by path, and where the runs end."""
+    """Places in the input of the swept parameters, by path, and of the end of the runs."""
 
     def __post_init__(self) -> None:
         """Different parameters, as many as a grid may have; those that go together have as many values."""

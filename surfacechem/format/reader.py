@@ -75,7 +75,7 @@ class ExactSolution:
 
     @property
     def fixed(self) -> str:
-        """Why it belongs to no other scene than that of the case, in words; empty where it follows changes."""
+        """Reason why it applies to no other scene than that of the case, in words; empty where it follows changes."""
         if not self.options:
             return ""
         own = f"it is given with {', '.join(self.options)}, and the scene was changed"

@@ -70,7 +70,7 @@ EVOLVING = ("g_n", "v_n", "u_t", "u_t2", "v_t", "v", "v_2", "g_t", "w_n", "w_t",
 
 LUMP, INSULATED, QUADRATIC = "lump", "insulated", "quadratic"
 STEADY = "steady"
-"""What stands for the end of a run that ends where nothing changes any more."""
+"""Word for the end of a run that ends in a steady state."""
 
 LINEAR, LOGARITHMIC = SPACINGS = ("linear", "logarithmic")
 GRID = "grid"
