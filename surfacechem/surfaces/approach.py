@@ -26,7 +26,7 @@ DEGREES = (2, 4, 8, 16, 32)
 """Degrees of the polynomials in the approach that are tried one after the other."""
 
 CLOSER = 8
-"""How much closer a second fit is held, which the errors of the integrals leave room for."""
+"""Factor by which a second fit is tighter, for which the errors of the integrals leave room."""
 
 ENOUGH, FEWEST = 8, 9
 """Degree from which it is told whether a higher one is worth it, and the places that a piece takes beside its end."""
@@ -57,7 +57,7 @@ class ApproachPiece:
     powers: bool
 
     def _place(self, d: Expression) -> tuple[Expression, float]:
-        """Where an approach is from -1 to 1, and half of the length of that."""
+        """Coordinate of an approach in the piece, from -1 to 1, and half of the length of the piece."""
         ends = (math.log(self.low), math.log(self.high)) if self.powers else (self.low, self.high)
         half = (ends[1] - ends[0]) / 2
         # A product with 1 / half would be a factor of its own in a high power, too large for a number.
@@ -125,7 +125,7 @@ class Sampled:
         self.at: dict[float, tuple[float, float, float]] = {}
 
     def __call__(self, d: float) -> tuple[float, float, float]:
-        """What it is there."""
+        """Sample at an approach, logged and computed where it is not known yet."""
         if d not in self.at:
             amount = {"done": len(self.at), "total": max(self.budget.integrals, len(self.at) + 1)}
             logger.info("integral over the surfaces at the approach %.3g m", d, extra=amount)
@@ -217,7 +217,7 @@ def _extent(a: float, b: float, powers: bool) -> float:
 
 
 def value_at(sample: Samples, d: float, powers: bool) -> float:
-    """What a polynomial is at an approach: the force, or the slope of ln E over ln d."""
+    """Value at an approach that a polynomial interpolates: the force, or the slope of ln E over ln d."""
     energy, force, _ = sample(d)
     return force * d / energy if powers else force
 
@@ -248,7 +248,7 @@ def polynomial(sample: Sampled, a: float, b: float, powers: bool, rtol: float, l
 
 
 def size_of(values: Array, least: float) -> float:
-    """What errors of values in a piece are relative to: the smallest of one sign, or a small part of the largest."""
+    """Size to which errors of values in a piece are relative: the smallest of one sign, or a part of the largest."""
     sizes = np.abs(values)
     one_sided = values.min() >= 0 or values.max() <= 0
     return float(max(sizes.min() if one_sided else sizes.max(), NEGLIGIBLE * sizes.max(), least, TINY))

@@ -165,7 +165,7 @@ def _outline(plate: Surface, far: float) -> Array:
 
 
 def _within(plate: Surface, x: Array) -> NDArray[np.bool_]:
-    """Which points (n, 3) in the plane of a plate are on it."""
+    """Whether each of the points (n, 3) in the plane of a plate is on it."""
     return np.asarray(np.all(np.abs((x @ plate.axes)[:, :2]) <= np.max(plate.shape.span, axis=1) * (1 + NOISE), axis=1))
 
 
@@ -230,7 +230,7 @@ def _check_end(patches: Patches, rules: Rules, sizes: Array) -> None:
 
 
 def counts_at(x: Array, near: Projection, laws: Sequence[Density], heat: Sequence[Callable[[Array], Array]]) -> Array:
-    """What is integrated, per area, at points (n, 3) of body 1, in the order of :class:`Contact`."""
+    """Integrands per area at points (n, 3) of body 1, in the order of :class:`Contact`."""
     count = np.zeros((*near.gap.shape, 16))
     for law in laws:
         psi, traction = np.moveaxis(law(near.gap), -1, 0)

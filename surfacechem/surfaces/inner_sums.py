@@ -33,8 +33,8 @@ PART = 0.5
 """Length of these pieces: over one a sum of r^-10 falls to a fiftieth."""
 
 FALL, NEAR_END = 100.0, 6
-"""How much smaller a sum may be at one end of a table than at the other, so that what the table misses of the larger is
-a tenth of the accuracy of the smaller; and how many of the gaps tell what it is there, as it may change its sign.
+"""Largest ratio of a sum in a table to its size at the smaller end, so that the error of the larger is a tenth of the
+accuracy of the smaller; and the number of gaps over which that size is taken, as the sum may change its sign.
 """
 
 FEW = 56
@@ -67,7 +67,7 @@ def with_slope(formula: Expression, symbol: Expression) -> Kernel:
 
 
 def extents(laws: Sequence[PairEnergy]) -> dict[Extent, list[int]]:
-    """Which laws have nodes of their own: those that bend or end at distances of their own, all others together."""
+    """Numbers of the laws that share nodes, by extent: one for each set of kinks and cutoff, one for all without."""
     found: dict[tuple[float, ...], list[int]] = {}
     for k, law in enumerate(laws):
         bends = law.kinks.get("r", ())

@@ -57,7 +57,7 @@ class LevelPatches(Patches):
     crossed: NDArray[np.bool_]
     """Whether an edge divides each in another way."""
     leaves: Array
-    """Where across that direction the level leaves each at its low and its high end (n, 2), unless not sought yet."""
+    """Coordinates across that direction at which the level leaves each at its ends (n, 2), unless not sought yet."""
 
     @property
     def fewest(self) -> int:
@@ -149,7 +149,7 @@ class LevelPatches(Patches):
         return rest.joined(passed.cut(k, passed.crossing(k, passed.low[:, 1 - k])))
 
     def crossing(self, k: int, across: Array) -> Array:
-        """Where along a direction each patch passes its level, at a place (n,) across it; its end where it does not."""
+        """Coordinate along a direction where each patch passes its level, at one (n,) across it; else its end."""
         from scipy.optimize.elementwise import find_root
 
         def above(t: Array, across: Array, which: Array) -> Array:
@@ -168,7 +168,7 @@ class LevelPatches(Patches):
         return x, self.other.nearest(x)
 
     def heights(self, near: Projection) -> Array:
-        """How far (n, ..., levels) [m] points are beyond edges, along which a gap may jump, and over levels of it."""
+        """Distances (n, ..., levels) [m] of points beyond edges, along which a gap may jump, and over its levels."""
         return np.concatenate([near.beyond, near.gap[..., None] - self.levels], axis=-1)
 
 

@@ -48,7 +48,7 @@ class NearPlaces:
 
     @property
     def count(self) -> int:
-        """How many are as near as the nearest."""
+        """Number of places that are as near as the nearest."""
         return int(np.sum(self.gap <= self.gap[0] + SAME * abs(self.gap[0])))
 
 

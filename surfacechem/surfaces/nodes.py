@@ -71,8 +71,8 @@ def is_round(shape: Shape) -> bool:
 
 @dataclass(frozen=True)
 class Extent:
-    """How far laws of the distance reach: the power with which they fall off at least, the distance at which they end,
-    infinite where they do not, and distances (increasing) [m] at which they bend, their end the last of them.
+    """Range of laws of the distance: the power with which they decay at least, their cutoff, infinite where there is
+    none, and distances (increasing) [m] at which they have kinks, the cutoff the last of them.
     """
 
     decay: float
@@ -154,8 +154,8 @@ def tensor_grid(surface: Surface, x: Array, found: Projection, reach: Array, lev
 
 
 def _within(surface: Surface, k: int, tangent: Array, distance: Array) -> Array:
-    """How far parameters along a direction may be from those of a foot, with the length (n,) of its tangent, where
-    their points are within a distance (n,) of it.
+    """Bound on the difference of parameters along a direction from those of a foot, with the length (n,) of its
+    tangent, for points within a distance (n,) of it.
     """
     shape = surface.shape
     # A chord of an angle, or a line across its half plane, is not as short; other parameters are lengths.

@@ -37,7 +37,7 @@ class InversePower(PairEnergy):
         return self.m
 
     def parts(self, unit: float) -> Sequence[tuple[Expression, PairEnergy]]:
-        """What the energy is a sum of."""
+        """Terms of the energy: factor and law of each."""
         return [(self.psi_0 * (self.r_0 / unit) ** self.m, _power(self.m, unit))]
 
 
@@ -60,7 +60,7 @@ class LennardJonesPair(PairEnergy):
         return self.psi_0 * ((self.g_0 / r) ** 10 / 45 - (self.g_0 / r) ** 4 / 3)
 
     def parts(self, unit: float) -> Sequence[tuple[Expression, PairEnergy]]:
-        """What the energy is a sum of."""
+        """Terms of the energy: factor and law of each."""
         ratio = self.g_0 / unit
         return [(self.psi_0 * ratio**10 / 45, _power(10, unit)), (-self.psi_0 * ratio**4 / 3, _power(4, unit))]
 
@@ -85,7 +85,7 @@ class PenaltyPair(PairEnergy):
 
     @property
     def cutoff(self) -> float:  # type: ignore[override]
-        """Where it ends [m]."""
+        """Cutoff distance [m]."""
         return self.r_0
 
 
@@ -121,7 +121,7 @@ class PairTable(PairEnergy):
 
     @property
     def cutoff(self) -> float:  # type: ignore[override]
-        """Where it ends [m]."""
+        """Cutoff distance [m]."""
         return self.distances[-1]
 
     @property

@@ -53,7 +53,7 @@ SHALLOWEST = 2.0**-20
 """Part of the size of a surface below which a gap is one of contact."""
 
 Levels = NDArray[np.int_]
-"""Which of the orders each patch has."""
+"""Index of the order that each patch has."""
 
 Integrand = Callable[[Array, int], tuple[Array, int]]
 """Values (n, ...) per area at points (n, 3), with rules of a level inside, and how many were looked at together."""
@@ -73,7 +73,7 @@ class Patches:
     alike: tuple[bool, bool]
 
     arrays: ClassVar[Sequence[str]] = ("at", "scale", "low", "high")
-    """What each patch has of its own."""
+    """Names of the arrays with an entry for each patch."""
 
     @property
     def kinds(self) -> Levels:
@@ -90,7 +90,7 @@ class Patches:
         return replace(self, **{name: getattr(self, name)[chosen] for name in self.arrays})
 
     def __len__(self) -> int:
-        """How many they are."""
+        """Number of patches."""
         return len(self.at)
 
     def nodes(self, order: int) -> tuple[Array, Array]:
@@ -148,7 +148,7 @@ class Patches:
         return found
 
     def cut(self, k: int, at: Array | float) -> Self:
-        """What is below substituted parameters (n,) along a direction, and then what is above."""
+        """Parts below substituted parameters (n,) along a direction, followed by the parts above."""
         low, high = self.low.copy(), self.high.copy()
         low[:, k] = high[:, k] = at
         return replace(self, high=high).joined(replace(self, low=low))
@@ -239,14 +239,14 @@ class OutOfReachError(InputError):
 
 
 class Budget:
-    """What integrals take together, at least so many, in pairs of points; OutOfReachError before it is too much."""
+    """Cost of integrals, at least so many together, in pairs of points; OutOfReachError before it is too much."""
 
     def __init__(self, rtol: float) -> None:
         """For an accuracy that messages name."""
         self.rtol, self.integrals, self.done, self.spent = rtol, 1, 0, 0.0
 
     def whole(self, ahead: float) -> float:
-        """What all integrals take at least, where those that are done and the next one take so much."""
+        """Least cost of all integrals, where those that are done and the next one take so much."""
         return ahead * max(1.0, self.integrals / max(self.done + 1, FIRST_FEW))
 
     def take(self, points: int) -> None:
@@ -303,9 +303,8 @@ class Rules:
 
 @dataclass(frozen=True)
 class Known:
-    """What is known of some patches: levels of the rules over and inside each, values (n, ...), by how much these
-    changed with the last rule over it and inside it, and with the one before (n, 2, ...), and whether a higher order
-    gained little.
+    """Results on some patches: levels of the rules over and inside each, values (n, ...), their changes with the last
+    rule over it and inside it, and with the one before (n, 2, ...), and whether a higher order gained little.
     """
 
     patches: Patches
@@ -383,7 +382,7 @@ def _expected(met: Sequence[tuple[float, float]], rtol: float) -> float:
 
 
 def _started(rules: Rules, patches: Patches, level: Levels, inside: Levels, nested: bool) -> Known:
-    """What rules of some levels, and those before, say of patches."""
+    """Results on patches by rules of some levels and of those before."""
     value = rules(patches, level, inside)
     steps = range(1, patches.fewest + 1)
     over = _changes(value, *(rules(patches, level - k, inside) for k in steps))

@@ -39,7 +39,7 @@ log = logging.getLogger(__name__)
 PACKAGE = Path(__file__).parents[1]
 CODE = [*(path for room in ("surfaces", "laws", "contracts") for path in sorted((PACKAGE / room).glob("*.py")))]
 CODE += [PACKAGE / f"{name}.py" for name in ("expressions", "quantities", "tolerances")]
-"""What integrals follow from: of the laws all that they share, too."""
+"""Source files from which integrals follow: of the laws all that they share, too."""
 
 
 class _Spent(threading.local):
@@ -53,7 +53,7 @@ SPENT = _Spent()
 
 @contextmanager
 def integrating() -> Iterator[None]:
-    """What is done meanwhile is time spent on integrals."""
+    """Count the time spent meanwhile as time spent on integrals."""
     start = time.perf_counter()
     try:
         yield
@@ -66,7 +66,7 @@ LOOKS = 2000
 
 
 def jump(law: Callable[[Array], Array], places: Array) -> float | None:
-    """Where the energy of a law, the first of its values (n, 2), jumps between increasing places, if it does."""
+    """First jump between increasing places of the energy of a law, the first of its values (n, 2); None without any."""
     a, b = places[:-1], places[1:]
     low, high = law(a)[:, 0], law(b)[:, 0]
     sizes = np.maximum(np.abs(low), np.abs(high))
@@ -161,7 +161,7 @@ class CurvedSurfaces(Potential):
 
     @property
     def peaks(self) -> Mapping[str, float]:
-        """Where the tension is largest."""
+        """Gap at which the tension is largest."""
         return {"g_n": self.strongest}
 
     def parts(self, law: PairEnergy) -> list[tuple[Expression, PairEnergy]]:
@@ -261,7 +261,7 @@ class CurvedSurfaces(Potential):
         return 0.0
 
     def contact(self, d: float, pairs: bool = True, budget: Budget | None = None) -> Contact:
-        """What the laws of the gap, and the pair laws by their energy between flats, give at an approach."""
+        """Contact at an approach by the laws of the gap, and by the pair laws through their energy between flats."""
         heat = [density(law) for law in self.heat_laws]
         # Conductances bend where laws of force may not.
         levels = self._levels(pairs, self.heat_laws)
@@ -273,7 +273,7 @@ class CurvedSurfaces(Potential):
         return sorted({*bends((*self.gap_laws, *heat)), *found})
 
     def totals(self, approaches: Array, stretches: Array) -> Array:
-        """What is told of each approach at its stretch of the area, shape (8, n).
+        """Results for each approach at its stretch of the area, shape (8, n).
 
         Force on body 1 [N], its moments about x and y [N m], force of the local law [N], least gap [m], number of
         places that are as near, area of contact [m^2], conductance [W/K].
@@ -354,7 +354,7 @@ class CurvedConductance(HeatTransfer):
 
     @property
     def channel(self) -> str:  # type: ignore[override]
-        """What carries the heat."""
+        """Carrier of the heat."""
         return self.law.channel
 
     @property

@@ -85,7 +85,7 @@ class Projection:
 
     @cached_property
     def tied(self) -> NDArray[np.bool_]:
-        """Where another point is as near."""
+        """Whether another point is as near, for each."""
         shape, size = self.surface.shape, np.abs(self.gap)
         x = self.point + self.gap[..., None] * self.direction
         D = self.surface.derivatives(self.at, SECOND)
@@ -212,8 +212,8 @@ class Surface:
 
     @cached_property
     def edges(self) -> list[tuple[int, int, float]]:
-        """Where the surface ends: along which parameter, below minus one or above plus one, and at which value of it;
-        a tip is an edge, a pole none.
+        """Edges of the surface: number of the parameter, side (minus one below, plus one above), and its value there; a
+        tip is an edge, a pole none.
         """
         found = []
         for k, ends in enumerate(self.shape.span):
@@ -225,8 +225,8 @@ class Surface:
         return found
 
     def _beyond(self, at: Array, away: Array, tangents: Array) -> tuple[Array, NDArray[np.bool_]]:
-        """How far points that are ``away`` from their feet are beyond each edge [m], (..., edges), and whether the feet
-        are at an edge or a tip.
+        """Distances beyond each edge [m], (..., edges), of points that are ``away`` from their feet, and whether the
+        feet are at an edge or a tip.
         """
         found, at_edge = np.empty((*at.shape[:-1], len(self.edges))), np.zeros(at.shape[:-1], dtype=bool)
         for j, (k, side, end) in enumerate(self.edges):
