@@ -1,4 +1,4 @@
-"""How other reactors touch the bodies of a scene, and what that changes in the scene.
+"""Coupling of other reactors to the bodies of a scene, and the changes that it makes in the scene.
 
 A body with a heat capacity keeps it, and stands in the network as a reservoir with its temperature: heat through
 Cantera's walls on that reservoir is its external heat. A body without one can be replaced by a reactor: its temperature
@@ -32,7 +32,7 @@ phases:
 species:
 - {name: nitrogen, composition: {N: 2}, thermo: {model: constant-cp}}
 """
-"""What a reservoir is made of that stands for a body; nothing of it matters but its temperature."""
+"""Mechanism of a reservoir that stands for a body; nothing of it matters but its temperature."""
 
 
 def suffix_of(scene: Scene, name: str) -> str:
@@ -137,7 +137,7 @@ class StandIn(cantera.Reservoir):
         super()._add_wall(wall)
 
     def rigid(self) -> str:
-        """Why a wall on it does not move."""
+        """Reason why a wall on it cannot move, with the remedy."""
         return (
             f"a wall on {self.name} moves, and its work would be lost: a body stores heat here, not volume. Leave out "
             "`velocity` and `K`, or put the moving wall between two gases."

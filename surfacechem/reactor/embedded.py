@@ -55,7 +55,7 @@ class Beside:
     species: NDArray[np.int64]
     """Those which reactions make."""
     accounts: NDArray[np.int64]
-    """Where the variables say how much of each."""
+    """Indices of the variables that hold the amount of each."""
 
     def state(self) -> Array:
         """Its present pressure and mole fractions."""
@@ -88,7 +88,7 @@ class Moments:
 
     @property
     def jumps(self) -> list[Jump]:
-        """What has happened so far."""
+        """Jumps so far."""
         return self.instant.jumps
 
     def until(self, goal: float, rtol: float) -> None:
@@ -269,7 +269,7 @@ class EmbeddedScene:
             raise EndError(self.model.margins[int(closed.argmax())].reason)
 
     def closest(self, t: float, x: Array) -> str:
-        """Why the scene ends where the integrator goes on no more: the limit that has come closest."""
+        """Reason for the end where the integrator cannot go on: that of the limit that has come closest."""
         evaluation, start = self.evaluation, self.start()
         self.put(0.0, start)
         terminal = np.flatnonzero(self._terminal)

@@ -29,7 +29,7 @@ def refuse(connector: Any, message: str) -> NoReturn:
 
 
 class Receiver:
-    """What is beside interfaces: what their reactions make it receives."""
+    """Neighbour of interfaces that receives the products of their reactions."""
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
@@ -38,7 +38,7 @@ class Receiver:
 
 
 class Gas(Receiver):
-    """What a gas adds to Cantera's own balances.
+    """Terms that a gas adds to Cantera's own balances.
 
     ``temperature`` is the place of that among its variables: after it come mass fractions, the first is the mass.
     ``energies`` is Cantera's name of what a species holds of the quantity in whose balance it is [J/kmol].

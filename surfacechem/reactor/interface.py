@@ -150,11 +150,11 @@ class InterfaceReactor(HeldReactor):
         """All that those rates depend on; None where they may depend on more."""
         self._heard = np.array([*self._paths()], dtype=np.int64)
         self._accounts = {body: scene.account(body) for body in self.bodies}
-        """Where the variables say what heat the bodies need that reactors stand for."""
+        """Indices of the variables that hold the heat needed by the bodies for which reactors stand."""
         self.history = History(scene)
 
     def _connect(self, reactor: Any, body: str) -> None:
-        """What must be given to the body to keep the reactor's temperature, the reactor loses."""
+        """Connect a reactor by a wall through which it loses the heat that keeps the body at its temperature."""
         self._connecting = True
         heat = lambda t: -float(self.attempt(self._rates, t)[self._accounts[body]])  # noqa: E731
         self._walls.append(cantera.Wall(self, reactor, A=self.area, Q=heat))
@@ -500,7 +500,7 @@ class InterfaceReactor(HeldReactor):
 
     @property
     def dataset(self) -> xarray.Dataset:
-        """What was recorded, with the variables and attributes of a run."""
+        """Dataset of the recorded history, with the variables and attributes of a run."""
         return self.history.solution(self.reason, self.seconds, alone=not self.coupled).dataset
 
 

@@ -19,7 +19,7 @@ from surfacechem.solve.adapters.dense_step import Guards, first_crossing
 from surfacechem.solve.contract import Array, Counters, Margin
 
 GROWTH = 1e4
-"""How much longer than the last a step of CVODE may be: after the first step this, later 10."""
+"""Largest ratio of a step of CVODE to the one before: after the first step this, later 10."""
 
 STEPS_OF_A_RESIDUAL = 10
 """Steps between two looks at whether anything changes still, as in Cantera."""
@@ -48,7 +48,7 @@ class ReactorNet(cantera.ReactorNet):
         self._fresh = True
         self._started = -np.inf
         self._around: list[object] = []
-        """What the interfaces depend on beside their variables, at the present time."""
+        """Quantities on which the interfaces depend beside their variables, at the present time."""
         super().__init__(reactors)
         self.interfaces += [reactor for reactor in reactors if isinstance(reactor, InterfaceReactor)]
         _number([reactor for reactor in reactors if isinstance(reactor, HeldReactor)])

@@ -43,7 +43,7 @@ class Event:
 
 
 class Watch:
-    """What is known of the step that the integrator has taken last."""
+    """Events and dense output of the step that the integrator has taken last."""
 
     def __init__(self, net: Any, interfaces: Sequence[InterfaceReactor]) -> None:
         self.net = net
@@ -102,6 +102,6 @@ class Watch:
                 item.ledger = item.ledger + (high - low) / 2 * (WEIGHTS @ np.array(rates))
 
     def _step_of(self, item: InterfaceReactor, now: float) -> DenseStep:
-        """What is left of the step from now, with the variables of an interface."""
+        """Dense output of the rest of the step from now, for the variables of an interface."""
         first = sum(reactor.n_vars for reactor in takewhile(lambda reactor: reactor is not item, self.net.reactors))
         return last_step(self.net, now, self.known, item.unit, slice(first, first + item.n_vars))
