@@ -54,7 +54,7 @@ HIDDEN = 1 / 200
 """Part of its range by which a curve has to differ from another to be seen beside it."""
 
 EXACT: Mapping[str, Any] = {"color": "0.8", "linewidth": 4.5, "zorder": 1}
-"""How an exact curve is drawn."""
+"""Style of exact curves."""
 
 
 def _anything(content: Content) -> Entries:
@@ -140,7 +140,7 @@ class Line:
     x: Array
     y: Array
     refused: NDArray[np.bool_]
-    """Where the second law is broken, though energy is conserved."""
+    """Whether the second law is broken at each point, though energy is conserved."""
     exact: tuple[Array, Array] | None
     data: tuple[Array, Array] | None
 
@@ -180,7 +180,7 @@ class Picture:
 
     @property
     def caption(self) -> str:
-        """What it shows, its source, and how far it is from the exact curves."""
+        """Title, source, and largest distance from the exact curves."""
         known = [curve.distance for curve in self.curves if curve.exact is not None]
         far = [f"Largest distance from the exact curve: {max(known):.0e} of its range."] if known else []
         return " ".join([f"{self.section.title}.", *([f"{self.section.source}."] if self.section.source else []), *far])
@@ -252,7 +252,7 @@ def write_all(content: ListSection, folder: Path, suffix: str) -> list[tuple[Pat
 
 
 def _curve(figure: FigureSection, section: CurveSection) -> Line:
-    """What a case gives along the axes."""
+    """Line of a case along the axes."""
     folder = Path(section.tree.place.file).parent
     dataset, exact_ends = _computed(section, folder, f"{figure.y.variable}_exact")
     axes = {"x": figure.x, "y": figure.y}
@@ -295,7 +295,7 @@ def _values(dataset: xarray.Dataset, axis: AxisSection) -> Array:
 
 
 def _unit(dataset: xarray.Dataset, axis: AxisSection, per: Tree | None) -> float:
-    """What counts as one along an axis [SI]."""
+    """Value that counts as one along an axis [SI]."""
     if per is None or axis.variable not in dataset.variables:
         return 1.0
     return si(per.plain(), _own_unit(dataset[axis.variable]), per.place, "per")

@@ -70,7 +70,7 @@ class Curves:
             self._numbers |= {symbol: float(getattr(law, name)) for name, symbol in _symbols(law).items()}
 
     def _names(self, springs: Mapping[str, Any]) -> dict[str, Expression]:
-        """What a law may read; the gap is that at which the pulled bond carries the force."""
+        """Expressions of the names that a law may read; the gap is that at which the pulled bond carries the force."""
         pulled = springs.get(self.pulled)
         gap = pulled.rest_length + FORCE / pulled.stiffness if pulled else 0.0
         known: dict[str, Expression] = {**self._coverages, "T_c": TEMPERATURE, "f": FORCE, "g_n": gap}

@@ -123,7 +123,7 @@ def glance(results: Results) -> str:
 
 
 def _ending(attributes: Any) -> str:
-    """How it ended, how accurate and how fast it was."""
+    """Text on the end, the accuracy and the speed of a run."""
     text = f"{attributes['status']}: {attributes['reason']}; {attributes['solver']} at rtol {attributes['rtol']:g}."
     if "error" in attributes:
         text += f" Error {attributes['error']:.2g} ({attributes['error_source']})."
@@ -191,7 +191,7 @@ def _events(dataset: xarray.Dataset) -> list[PageSection]:
 
 
 def _balances(attributes: Any) -> PageSection:
-    """How well the balances close."""
+    """Section on the residuals of the balances."""
     rows = [(name, f"{attributes[f'{name}_error']:.2g}") for name in ("energy", "entropy", "site")]
     destroyed = attributes.get("entropy_violations", "none")
     rows.append(("laws that destroy entropy", destroyed))

@@ -233,7 +233,7 @@ def _judged(expected: Expectation, rtol: float, known: float, done: Trajectory |
 
 
 def _unfinished(expected: Expectation, known: float, error: Exception) -> Attempt:
-    """What an error makes of a problem: right where its refusal was expected, for that reason."""
+    """Attempt that ended in an error: right where its refusal was expected, for that reason."""
     reason = error.message if isinstance(error, InputError) else f"{type(error).__name__}: {error}"
     right = isinstance(expected, Refused) and expected.reason in reason
     return Attempt(REFUSED if right else FAILED, reason, MOST if right else 0.0, known)

@@ -32,7 +32,7 @@ TRACE = EPS**2
 
 @dataclass(frozen=True)
 class SteadyState:
-    """Where a mechanism comes to rest: coverages by species, and rates of what was asked for, in SI units.
+    """Steady state of a mechanism: coverages by species, and rates of what was asked for, in SI units.
 
     ``control`` are degrees of rate control, d ln(rate) / d ln(factor on a reaction), by rate and reaction; they sum to
     one. ``barriers`` are apparent activation energies, R T^2 d ln(rate) / dT [J/mol], where the temperature is held.
