@@ -1,4 +1,4 @@
-"""What the commands share: options, exit codes, errors that are one message, runs that can be interrupted."""
+"""Parts that the commands share: options, exit codes, errors that are one message, runs that can be interrupted."""
 
 from __future__ import annotations
 

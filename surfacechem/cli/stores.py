@@ -131,7 +131,7 @@ def client_at(address: str | None) -> Iterator[Any]:
 
 
 def counting() -> Callable[[Progress], None]:
-    """What is told how far a sweep is, and logs it with its speed."""
+    """Callback that logs the progress of a sweep with its speed."""
     begun = time.monotonic()
 
     def told(now: Progress) -> None:

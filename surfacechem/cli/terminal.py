@@ -1,4 +1,4 @@
-"""What a terminal shows: sheets with colours and columns that fit it, and bars of what takes longer than two seconds.
+"""Terminal output: sheets with colours and columns that fit it, and bars of what takes longer than two seconds.
 
 Files and pipes get plain text and no bars. Rich is imported where a terminal shows something, never else.
 """
@@ -116,8 +116,8 @@ def _grid(rows: Iterable[Sequence[Text]], indent: int) -> RenderableType:
 
 
 class Bar(logging.Handler):
-    """How far a command is, as the package logs it with the numbers ``done`` and ``total`` of a message: on a terminal,
-    once it has taken some time; nothing elsewhere.
+    """Progress bar of a command, from the numbers ``done`` and ``total`` of messages that the package logs: on a
+    terminal, once it has taken some time; nothing elsewhere.
     """
 
     def __init__(self, talk: bool | None) -> None:
@@ -128,7 +128,7 @@ class Bar(logging.Handler):
         self.shown: Any = None
 
     def tell(self, words: str, done: int = 0, total: int = 0) -> None:
-        """What is being done, and how much of it is; nothing is drawn before :meth:`tick`."""
+        """Set what is being done, and how much of it is; nothing is drawn before :meth:`tick`."""
         self.words, self.done, self.total = words, done, total
         if self.verbose:
             counted = f" ({done}/{total})" if total else ""
