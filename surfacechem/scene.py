@@ -89,7 +89,7 @@ class Conduction(Law):
 
 
 class Mounting(Law):
-    r"""How the far field holds the bodies in one direction of the gap. What is left out is not there.
+    r"""Mounting of the bodies in one direction of the gap: mass, springs and dampers. Terms left out are absent.
 
     .. math:: m \ddot g = k (w - g) + c_b (\dot w - \dot g) + F - t - c_g \dot g
 
@@ -214,16 +214,16 @@ class Engine(Protocol):
 
     @property
     def electrodes(self) -> Sequence[Electrode]:
-        """What it reads the potential of, which belongs to the state of the scene."""
+        """Electrodes whose potentials it reads, which belong to the state of the scene."""
 
     def limits(self, values: Mapping[str, Any]) -> Iterable[tuple[str, Any, str]]:
-        """What must stay positive of these histories, by name, each with its name and with the reason where it does
+        """Margins of these histories, by name, that must stay positive: name, expression, and the reason where it does
         not.
         """
 
     @property
     def names(self) -> Mapping[str, str]:
-        """What the species that reactions make beside the interface are called in names of quantities."""
+        """Names, as parts of names of quantities, of species that reactions make beside the interface, by species."""
 
     @property
     def charges(self) -> Mapping[str, Mapping[str, float]]:
@@ -235,7 +235,7 @@ class Engine(Protocol):
 
 @dataclass(frozen=True)
 class Medium:
-    """What fills the space between the bodies: a fluid, or single properties by name (k_m, eta_m, rho_m, cp_m).
+    """Medium between the bodies: a fluid, or single properties by name (k_m, eta_m, rho_m, cp_m).
 
     A property that is given goes before that of the fluid. Without ``thickness`` [m] it fills the normal gap, or is a
     film whose thickness changes by ``growth``.
@@ -251,7 +251,7 @@ class Medium:
 
 @dataclass(frozen=True)
 class Interface:
-    """What stands between the bodies.
+    """Interface between the bodies: its laws, bonding variables, temperature and medium.
 
     ``temperature`` is the interface's node, a prescribed history, or None where there is no medium: then friction and
     reaction heat go straight into the bodies, the fraction ``partition`` into body 1, the fraction ``loss`` into the
@@ -271,9 +271,9 @@ class Interface:
     loss: float = 0.0
     medium: Medium | None = None
     engine: Engine | None = None
-    """What evaluates those rates that are not formulas."""
+    """Engine that evaluates those rates that are not formulas."""
     remarks: Sequence[str] = ()
-    """What a reader of the results has to know about where the laws come from."""
+    """Remarks on the source of the laws, for readers of the results."""
 
 
 @dataclass(frozen=True)
@@ -288,11 +288,11 @@ class Scene:
     T_0: float | None = None
     initial: Mapping[str, float] = field(default_factory=dict)
     normal: Mounting | None = None
-    """How the normal gap is held, where it moves by a balance."""
+    """Mounting of the normal gap, where it moves by a balance."""
     tangential: Mounting | None = None
-    """How the tangential displacement is held, where it moves by a balance."""
+    """Mounting of the tangential displacement, where it moves by a balance."""
     transverse: Mounting | None = None
-    """How the displacement across it is held, where not as ``tangential``; the mass is the same."""
+    """Mounting of the displacement across it, where it differs from ``tangential``; the mass is the same."""
     programme: Sequence[Stage] = ()
     """Stages of the loading, one after the other."""
     surface: Potential | None = None
