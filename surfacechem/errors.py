@@ -13,7 +13,7 @@ LINES, NEAR = 240, 6
 """Characters of names that a message lists all, some two lines, and how many it lists of more: the nearest."""
 
 LAWS, PATHS = "`surfacechem laws`", "`surfacechem equations CASE`"
-"""What lists all laws, and all paths of parameters of a case."""
+"""Commands, as messages name them, that list all laws, and all paths of parameters of a case."""
 
 LONGEST = 2000
 """Characters of a message: more is not read."""
@@ -26,7 +26,7 @@ SUFFIX = re.compile(r"\.(ya?ml|nc|csv)$")
 
 @dataclass(frozen=True)
 class Place:
-    """Where in the input something stands: file, line (from 1), the dotted path of keys, and column (from 0)."""
+    """Location in the input: file, line (from 1), the dotted path of keys, and column (from 0)."""
 
     file: str = ""
     line: int = 0
@@ -72,7 +72,7 @@ def placed(place: Place) -> Iterator[None]:
 
 
 class OutputError(PlacedError):
-    """What was computed could not be written."""
+    """Computed results could not be written."""
 
 
 def printable(text: str) -> str:

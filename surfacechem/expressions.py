@@ -256,7 +256,7 @@ def product(*factors: Expression) -> Expression:
 
 
 def _exponential(factor: Expression) -> tuple[Expression, Expression]:
-    """What a product has beside exponentials, guarded ones included, and their exponents."""
+    """Split a product into the factors beside exponentials, guarded ones included, and the sum of their exponents."""
     import symengine
 
     node = symengine.sympify(factor)

@@ -50,7 +50,7 @@ class LoadedInterface(cantera.Interface):
 
 
 class Surroundings(cantera.ExtensibleRateData):
-    """What the rates of a type read: temperature, coverages, and the attributes of the surface."""
+    """Data that the rates of a type read: temperature, coverages, and the attributes of the surface."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -200,7 +200,7 @@ class LoadedRate(cantera.ExtensibleRate):
 
     @cached_property
     def coefficient(self) -> tuple[list[tuple[int, str]], Any, Any, Callable[[], None]]:
-        """What the coefficient reads beside the temperature with its place, arguments, value, and what computes it."""
+        """Compiled coefficient: numbers and names of arguments beside the temperature, arguments, value, evaluation."""
         assert self.bound is not None
         symbols = _Symbols(T_c=symengine.Symbol("T_c"))
         expression = self.bound.coefficient(symbols, 0.0)
@@ -245,7 +245,7 @@ class LoadedRate(cantera.ExtensibleRate):
 
 
 class ByAffinity(Surroundings):
-    """What rates by affinity read: the chemical potentials over R T too."""
+    """Data that rates by affinity read: the chemical potentials over R T too."""
 
     def update(self, surface: Any) -> bool:
         """Take over the state."""

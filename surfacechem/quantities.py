@@ -41,7 +41,7 @@ class Quantity:
     latex: str = ""
     tag: str = ""
     species: str = ""
-    """Where it is the coverage of a species, its name in the mechanism."""
+    """Name in the mechanism of the species, for a coverage; else empty."""
 
 
 def _table(*rows: tuple[str, ...]) -> dict[str, Quantity]:
@@ -107,7 +107,7 @@ VARIABLES = _table(
     ("mu", "J", "chemical potential change of the reaction per bond", r"\mu_c", "e:muc"),
     ("dmu_dphi", "J", "derivative of the chemical potential per bond with respect to the bonding state"),
 )
-"""What laws may read. Temperatures of bodies and interface resolve to the node that carries them."""
+"""Variables that laws may read. Temperatures of bodies and interface resolve to the node that carries them."""
 
 GAPS = frozenset(("g_n", "g_t", "u_t", "u_t2"))
 """Distances between the bodies, which may be exactly zero."""
@@ -115,7 +115,7 @@ GAPS = frozenset(("g_n", "g_t", "u_t", "u_t2"))
 VELOCITIES = frozenset(("v_n", "v_t", "v", "v_2", "speed"))
 
 INTERNAL = frozenset(("t", "T_from", "T_to", "ln_theta", "gamma_m", "f_m", "dmu_dphi"))
-"""What laws read of each other, and no case names."""
+"""Variables that laws read of each other, and no case names."""
 
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 

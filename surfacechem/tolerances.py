@@ -1,4 +1,4 @@
-"""When two numbers are the same: the thresholds that every room shares, each with its derivation.
+"""Thresholds within which two numbers are equal, which every room shares, each with its derivation.
 
 What decides whether a number is zero is one of these times the size of what it is made of, a tolerance of the run
 (rtol, atol), or what the clock resolves. Nothing else is imported here, so that compiled code may freeze the values.
@@ -89,7 +89,7 @@ nanokelvin. No run is asked for more digits than nine, which leaves that of a va
 """
 
 SLACK = 1e-6
-"""How far beyond its bounds a bonding variable may be while no run has said how accurate it is: the coarsest relative
+"""Largest excess of a bonding variable over its bounds while no run has said how accurate it is: the coarsest relative
 tolerance in use.
 """
 
@@ -148,8 +148,8 @@ LOOSEST = 1e-3
 """Loosest tolerance that is chosen for a run: NEGLIGIBLE. With more a method does not have its order."""
 
 FLOOR = 1e-9
-"""What is smaller counts as this part of the whole where its error is made relative: times of events of a run, exact
-answers of their largest. NOTHING of it.
+"""Fraction of the whole that replaces a smaller value where its error is made relative: of the run for times of events,
+of their largest for exact answers. The same as NOTHING.
 """
 
 CONSERVED = 1e-10
