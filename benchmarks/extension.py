@@ -1,4 +1,4 @@
-"""What a rate of bonds under load costs in Cantera: one of `surfacechem.extension` beside one written by hand.
+"""Cost of a rate of bonds under load in Cantera: one of `surfacechem.extension` beside one written by hand.
 
     python benchmarks/extension.py
 

@@ -1,4 +1,4 @@
-"""How the cost of a scene grows with its size: reactions, species, cells, events, outputs, length, cases.
+"""Growth of the cost of a scene with its size: reactions, species, cells, events, outputs, length, cases.
 
     python benchmarks/growth.py [part of a name]
 
@@ -129,7 +129,7 @@ GROWTH: dict[str, tuple[tuple[int, ...], Callable[[int], dict[str, float]]]] = {
 
 
 def measured(chosen: str) -> Iterator[tuple[str, str, int, float]]:
-    """What grows, which cost, the size and the cost [s]."""
+    """Yield the name of what grows, which cost, the size and the cost [s]."""
     for name, (sizes, cost) in GROWTH.items():
         if chosen in name:
             for size in sizes:

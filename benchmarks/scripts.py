@@ -1,4 +1,4 @@
-"""What `run` of every shipped case costs beside a script that calls LSODA of SciPy, at equal error.
+"""Cost of `run` of every shipped case beside a script that calls LSODA of SciPy, at equal error.
 
     python benchmarks/scripts.py [--cases exothermic,debonding] [output folder]
 
@@ -54,7 +54,7 @@ def seconds(call: Callable[[], object]) -> float:
 
 
 def obstacle(simulation: Simulation, solution: Solution) -> str:
-    """Why LSODA alone cannot solve a case; empty where it can."""
+    """Reason why LSODA alone cannot solve a case; empty where it can."""
     system, program = simulation.system, simulation.model.program
     if system.outside is not None:
         return "rates come from Cantera itself"

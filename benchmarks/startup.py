@@ -1,4 +1,4 @@
-"""Where the time of a command-line run goes: processor time of each part of a run, in a fresh process each time.
+"""Processor time of each part of a command-line run, in a fresh process each time.
 
     python benchmarks/startup.py [case] [repetitions]
 

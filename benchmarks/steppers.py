@@ -323,7 +323,7 @@ def compare(found: Ratios, before: Ratios) -> list[str]:
 
 
 def environment() -> dict[str, str]:
-    """What this ran on, when and with what."""
+    """Date, machine and versions with which this ran."""
     info = Path("/proc/cpuinfo")
     lines = info.read_text().splitlines() if info.exists() else []
     cpu = next((line.split(":")[1].strip() for line in lines if line.startswith("model name")), "")

@@ -1,4 +1,4 @@
-"""What the force between two curved surfaces costs: errors, pairs of points and processor time over accuracy and gap.
+"""Cost of the force between two curved surfaces: errors, pairs of points and processor time over accuracy and gap.
 
     python benchmarks/surfaces.py
 

@@ -310,7 +310,7 @@ GALLERY: dict[str, tuple[list[str], str | None]] = {
     "viscous-heating": (["T", "t_viscous"], None),
     "weakening-friction": (["T", "D_coulomb"], None),
 }
-"""What is plotted of a case, and over what if not time; of others the usual panels."""
+"""Variables that are plotted of a case, and the abscissa if not time; of others the usual panels."""
 
 SWEPT = (
     *("biotin-streptavidin", "bond-lifetimes", "catch-bond", "force-spectroscopy"),
@@ -338,7 +338,7 @@ def gas_network() -> Figure:
 
 
 def rooms() -> Figure:
-    """How many modules of each room import each other room; rooms from the top down, as the contracts order them."""
+    """Figure of how many modules of each room import each other room, in the order of the contracts from the top."""
     package = Path(surfacechem.__file__).parent
     contracts = tomllib.loads((package.parent / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"]
     names = [room for floor in contracts["contracts"][0]["layers"] for room in floor.split(" | ")]

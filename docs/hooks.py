@@ -41,7 +41,7 @@ PLACES = {
     "pair": "surface.pair",
     "factor": "the list `times` of a parameter that varies",
 }
-"""Where the laws of a contract stand in a case file."""
+"""Place of the laws of a contract in a case file."""
 
 LAWS = """\
 A law is one class in one file: its name in a case file, its parameters with units and ranges, its formula and its
@@ -325,7 +325,7 @@ def made_keys(section: str, *more: str) -> str:
 
 
 def _held(item: Any) -> tuple[str, ...]:
-    """What a key holds: in words, its unit, its range, its default."""
+    """Content of a key: in words, its unit, its range, its default."""
     from surfacechem.format import declarations as d
 
     law = item.content.content if isinstance(item.content, d.ListOf) else item.content
@@ -348,7 +348,7 @@ def _linked(text: str) -> str:
 
 
 def made_variable_table() -> str:
-    """What laws may read and cases may prescribe."""
+    """Table of the variables that laws may read and cases may prescribe."""
     from surfacechem.model.components.interface import LOADABLE
 
     can = {*LOADABLE, "T_1", "T_2", "T_c"}
@@ -387,7 +387,7 @@ def stability_study() -> Any:
 
 
 def made_stability() -> str:
-    """What each solver keeps of each regime."""
+    """Table of the results of each solver in each regime."""
     summary = stability_study().sections[0].tables[0]
     return table(("regime", "from .. to", *summary.heading[2:]), [tuple(row) for row in summary.rows])
 
@@ -431,7 +431,7 @@ def made_list_keys(section: str) -> str:
 
 
 def made_ratios() -> str:
-    """How many times longer than ours other libraries take, as the benchmark has kept it."""
+    """Table of run times of other libraries relative to ours, as the benchmark has kept them."""
     with (RESULTS / "ratios.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
     wanted = [(case, error) for case in ("P1", "P2", "P3", "P4") for error in ("1e-06", "1e-10")]
@@ -467,7 +467,7 @@ def made_growth() -> str:
 
 RESULTS = Path(__file__).parents[1] / "benchmarks" / "results"
 OURS = ("radau", "dop853", "lsoda", "bdf", "scipy-radau", "cvode", "ida", "cantera")
-"""What is reached through a case: ours, and adapters."""
+"""Solvers that are reached through a case: ours, and adapters."""
 
 MAKERS: dict[str, Callable[..., str]] = {
     "references": made_references,

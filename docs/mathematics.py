@@ -16,10 +16,10 @@ DOLLARS = re.compile(r"\$\$(.+?)\$\$|\$([^$<>\n]+?)\$", re.DOTALL)
 CODE = re.compile(r"(<(?:pre|code|script|style)\b.*?</(?:pre|code|script|style)>)", re.DOTALL)
 
 SCRIPTS = re.compile(r'<script (?:src=""|type="text/x-mathjax-config"|type="module")>.*?</script>', re.DOTALL)
-"""What the converter of notebooks adds to fetch MathJax and Mermaid."""
+"""Scripts that the converter of notebooks adds to fetch MathJax and Mermaid."""
 
 FETCHED = re.compile(r"""<(?:script|link|img)\b[^>]*(?:src|rel="stylesheet" href)="?https?:|import\(["']https?:""")
-"""What a page would load from a network."""
+"""References that a page would load from a network."""
 
 LOG = logging.getLogger("mkdocs.hooks.mathematics")
 
