@@ -65,7 +65,7 @@ def figure(
 def _content(
     datasets: Sequence[xarray.Dataset], variables: Sequence[str] | None, against: str | None
 ) -> tuple[str, list[Panel]]:
-    """What lies along the axis, and the panels."""
+    """Variable along the axis, and the panels."""
     sweeps = ["sweep" in dataset.attrs for dataset in datasets]
     if any("study" in dataset.attrs for dataset in datasets) or any(sweeps) != all(sweeps):
         raise InputError("a figure takes runs or sweeps, not both.")
@@ -85,7 +85,7 @@ def colours_of(count: int) -> list[str]:
 
 
 def labels(datasets: Sequence[xarray.Dataset]) -> list[str]:
-    r"""What differs between datasets, for each of them: parameters and solver, else the title, else the file.
+    r"""Label of each dataset by what differs between them: parameters and solver, else the title, else the file.
 
     >>> cases = [f"interface: {{friction: [coulomb: {{mu: {mu}}}]}}" for mu in (0.3, 0.6)]
     >>> labels([xarray.Dataset(attrs={"case": text, "solver": "radau"}) for text in cases])

@@ -72,7 +72,7 @@ def _around(dataset: xarray.Dataset) -> bool:
 
 
 def _facing(dataset: xarray.Dataset) -> NDArray[np.bool_]:
-    """Which points are on the side that is nearest: seen from above a closed body covers itself."""
+    """Whether each point is on the side that is nearest: seen from above a closed body covers itself."""
     from scipy.ndimage import label
 
     x, y = (dataset[f"surface_{axis}"].values for axis in "xy")

@@ -63,7 +63,7 @@ def figure(scene: Scene) -> Figure:
 
 
 def _temperature(temperature: str | Load | None) -> str:
-    """What a member's temperature is, in words."""
+    """Temperature of a member, in words."""
     if temperature is None:
         return "no temperature of its own"
     if isinstance(temperature, Load):
@@ -129,7 +129,7 @@ def _far(body: Body) -> bool:
 
 
 def _far_side(axes: Axes, body: Body, edge: float, way: int) -> None:
-    """What the far side of a body that conducts is held at, or cooled by."""
+    """Draw the temperature at which the far side of a body that conducts is held, or of its coolant."""
     if body.conduction is None or body.conduction.far is None:
         return
     end = edge + way * 0.3

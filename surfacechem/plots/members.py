@@ -30,7 +30,7 @@ MOST_PANELS = 3
 TIME_UNIT = "s"
 
 COUNTED = ("steps", "destroys_entropy")
-"""What tells of the solver or the laws, not of what happens."""
+"""Variables on the solver or the laws, not on what happens."""
 
 RANKS = (
     *(r"lifetime", r"(phi|theta).*_last", r"T.*_max", r"(phi|T).*(?<!_m..)"),
@@ -205,7 +205,7 @@ def colours(dataset: xarray.Dataset, axes: Sequence[str]) -> ScalarMappable:
 
 
 def looks(dataset: xarray.Dataset, axes: Sequence[str], member: int) -> dict[str, Any]:
-    """How the curve of a run looks: a colour that tells its parameter where there is one, a legend where few are."""
+    """Style of the curve of a run: a colour that tells its parameter where there is one, a legend where few are."""
     shape = dataset["status"].shape
     if RUN not in axes and np.prod(shape) <= style.MOST_CURVES:
         place = [int(k) for k in np.unravel_index(member, shape)]

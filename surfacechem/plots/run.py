@@ -187,7 +187,7 @@ def _usual_at_states(dataset: xarray.Dataset, names: Sequence[str]) -> Sequence[
 
 
 def first_shown(dataset: xarray.Dataset, panels: Sequence[Panel]) -> float | None:
-    """Where a logarithmic axis of time begins; None where a linear one shows what the panels hold."""
+    """Time at which a logarithmic axis begins; None where a linear one shows what the panels hold."""
     times = dataset["time"].values
     # Fluxes and powers follow from what changes: where they start is no reason for another axis.
     names = [name for panel in panels if panel.unit != FLUX for name in panel.names if name in dataset]
@@ -292,14 +292,14 @@ def _draw_exact(ax: Axes, dataset: xarray.Dataset, panel: Panel, t: Array) -> No
 
 
 def _drawn(dataset: xarray.Dataset, panel: Panel, rows: Any = slice(None)) -> Array:
-    """What a panel shows at some of its points, as far as it is finite."""
+    """Finite values that a panel shows, at some of its points."""
     values = np.concatenate([dataset[name].values[rows] for name in panel.names])
     return np.asarray(values[np.isfinite(values)])
 
 
 def _show_behind_spike(ax: Axes, dataset: xarray.Dataset, panel: Panel) -> float:
-    """Where nothing would be seen of fluxes but how they begin, limit the panel to what they are from a time on, and
-    say how large they are before; returns that time, 0 where all is seen.
+    """Limit a panel of fluxes to their range from a time on where a spike at the start hides all else, and note the
+    size of the spike; returns that time, 0 where all is seen.
     """
     t = dataset["time"].values
     start = float(EARLY * t[-1])
@@ -468,7 +468,7 @@ def _numbered(ax: Axes, width: float, places: Sequence[tuple[float, str]], below
 
 
 def _counted(names: Sequence[str], lines: Mapping[str, str]) -> str:
-    """How often the most frequent events happen, and their kinds of lines."""
+    """Counts of the most frequent events, and their kinds of lines, in words."""
     counts = Counter(names).most_common(MOST_NAMES)
     kinds = {name: f" ({line})" for name, line in lines.items()}
     return ", ".join(f"{f'{count} ' if count > 1 else ''}{name}{kinds.get(name, '')}" for name, count in counts)

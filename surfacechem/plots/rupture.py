@@ -116,8 +116,8 @@ def _draw_spectrum(ax: Axes, dataset: xarray.Dataset, load: str) -> None:
 
 
 def _draw_told(ax: Axes, dataset: xarray.Dataset, told: Mapping[str, str], size: float) -> None:
-    """What each run tells over what is swept, by name with its label in the legend, in a colour for each or for each
-    value of a second parameter; exact values as lines.
+    """Draw the results of each run over what is swept, by name with its label in the legend, in a colour for each or
+    for each value of a second parameter; exact values as lines.
     """
     parameter = dataset[str(dataset["status"].dims[0])]
     style.draw_parameter(ax.xaxis, parameter)

@@ -68,7 +68,7 @@ GREEK = ("alpha", "beta", "epsilon", "eta", "kappa", "lambda", "mu", "phi", "rho
 
 TITLE: Any = {"x": 0.01, "ha": "left", "fontsize": 11, "fontweight": "bold"}
 NOTE: Any = {"fontsize": 8, "color": "#555555"}
-"""How the title of a figure looks, and a note above its panels."""
+"""Style of the title of a figure, and of a note above its panels."""
 
 LETTERS, TITLE_LETTERS = 16, 9.5
 """Of a line of facts above the panels, and of the title and the words below an axis, in an inch."""
@@ -226,7 +226,7 @@ LOST = ("failed", "refused")
 
 
 def _ends(dataset: xarray.Dataset) -> str:
-    """How many runs of a store ended in which way; '' of what is none."""
+    """Numbers of runs of a store by the way in which they ended, in words; '' of what is none."""
     words = str(dataset["status"].attrs.get("flag_meanings", "")).split() if "status" in dataset else []
     counts = {word: int(np.count_nonzero(dataset["status"].values == code)) for code, word in enumerate(words)}
     counts |= {"missing": dataset["status"].size - sum(counts.values())} if words else {}
@@ -234,7 +234,7 @@ def _ends(dataset: xarray.Dataset) -> str:
 
 
 def lost(dataset: xarray.Dataset, *words: str) -> NDArray[np.bool_]:
-    """Which runs of a sweep ended in one of these ways, which a store has as codes."""
+    """Whether each run of a sweep ended in one of these ways, which a store has as codes."""
     status = dataset["status"]
     codes = str(status.attrs.get("flag_meanings", "")).split()
     return np.isin(status.values, [codes.index(word) if codes else word for word in words])
@@ -256,7 +256,7 @@ MARKER, FREE = 3.5, 2
 
 
 def marker(ax: Axes, count: int) -> str:
-    """What marks points that are so few across a figure that their line would be taken for a curve known everywhere."""
+    """Marker of points so few across a figure that their line would pass for a curve known everywhere; else ''."""
     whole = ax.get_figure(root=True)
     assert whole is not None
     return "o" if count * MARKER * (1 + FREE) <= 72 * whole.get_figwidth() else ""
@@ -301,7 +301,7 @@ def is_mode(values: xarray.DataArray) -> bool:
 
 
 def drawn_as(values: xarray.DataArray) -> Any:
-    """How a variable goes from one output to the next: a mode in a step."""
+    """Style of the line of a variable from one output to the next: a step for a mode."""
     return "steps-post" if is_mode(values) else "default"
 
 
@@ -393,7 +393,7 @@ def _middle(values: Array) -> Array:
 
 
 def parameter_words(values: xarray.DataArray) -> str:
-    """What a swept parameter is, and whose.
+    """Words for a swept parameter, with its owner.
 
     >>> said = {"long_name": "rate of change (loading.f.ramp.rate)", "units": "N s-1"}
     >>> parameter_words(xarray.DataArray(1e-9, name="rate", attrs=said))
@@ -413,7 +413,7 @@ def parameter_words(values: xarray.DataArray) -> str:
 
 
 def owner(values: xarray.DataArray) -> str:
-    """Whose a swept parameter is, by the path that its long name ends with; '' where its own name tells that.
+    """Owner of a swept parameter, by the path that its long name ends with; '' where its own name tells that.
 
     >>> owner(xarray.DataArray(1.0, name="C", attrs={"long_name": "heat capacity per area (bodies.upper.C)"}))
     ' (upper)'
@@ -501,7 +501,7 @@ def logarithmic(*axes: XAxis | YAxis, size: float = 1.0) -> None:
 
 
 def label(axis: XAxis | YAxis, words: str, unit: str, values: Array, between: str = " ") -> None:
-    """What lies along a linear axis, with its unit and labels of ticks in the prefix that suits these values."""
+    """Label a linear axis with words and unit, and its ticks in the prefix that suits these values."""
     text, size = prefixed(unit, values)
     power = math.floor(math.log10(largest(values) or 1.0))
     if size == 1.0 and not POWERS[0] <= power < POWERS[1]:

@@ -52,7 +52,7 @@ def _finals(dataset: xarray.Dataset, axis: str, shown: Sequence[Panel]) -> Figur
 
 
 def plan_of(dataset: xarray.Dataset) -> Plan:
-    """What a dataset says was swept; InputError where it does not hold its parameters."""
+    """Plan of the sweep that a dataset records; InputError where it does not hold its parameters."""
     axes = axes_of(dataset)
     style.check(dataset, {}, {"status": tuple(axes)})
     plan = recorded_plan(dataset.attrs["sweep"])
