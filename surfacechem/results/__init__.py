@@ -1,1 +1,1 @@
-"""What a run hands over: dataset, events, balances and the error of each answer."""
+"""Results of a run: dataset, events, balances and the error of each answer."""

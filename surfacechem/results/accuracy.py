@@ -1,4 +1,4 @@
-"""How errors are made relative, and how they are estimated where no exact solution is known."""
+"""Relative errors, and their estimates where no exact solution is known."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ a hundred times its tolerance, but near singular ends.
 """
 
 UNKNOWN = "the error of the cells across bodies does not fall as their number grows"
-"""Why the error of a run with cells is not known."""
+"""Reason why the error of a run with cells is not known."""
 
 AT_START = "the run ended at its start"
 
 STILL = "nothing evolves, and no work is done"
-"""Why two runs at different tolerances tell nothing."""
+"""Reason why two runs at different tolerances tell nothing."""
 
 
 def first_tolerance(accuracy: float) -> float:
@@ -93,7 +93,7 @@ def largest_errors(
 
 @dataclass(frozen=True)
 class Accuracy:
-    """How far a run is from the truth: the largest relative error of the compared variables and where it is from."""
+    """Error of a run: the largest relative error of the compared variables, and its source."""
 
     error: float
     source: str
@@ -102,7 +102,7 @@ class Accuracy:
     exact: Mapping[str, Any] = field(default_factory=dict)
     """Exact values at the output times, by variable, where an exact solution was named."""
     asked: float | None = None
-    """What was asked for, where the tolerance was chosen from it."""
+    """Accuracy that was asked for, where the tolerance was chosen from it."""
     named: Callable[[], Mapping[str, float]] = dict
     """The errors of what follows from the compared variables, by variable, where they are known."""
 
@@ -124,7 +124,7 @@ class CellErrors:
     in_noise: bool = False
     """Whether the tolerance of the run hides what more cells would change."""
     source: str = "and one with half of the cells"
-    """What the errors are from, after the words for those of the tolerance."""
+    """Source of the errors, in words after those for the errors of the tolerance."""
 
     @property
     def largest(self) -> float:

@@ -116,7 +116,7 @@ class Audit:
 
     @cached_property
     def findings(self) -> tuple[str, ...]:
-        """What is wrong with the balances, in words; nothing, as a rule."""
+        """Defects of the balances, in words; none, as a rule."""
         found = [f"the law {law.replace('_', ' ')} destroys entropy" for law in self.violations]
         if self.destroys and not found:
             found = ["the laws together destroy entropy"]
@@ -145,14 +145,14 @@ def resolved(residual: Array, scale: Any, stored: Any, rounding: Any) -> Any:
 
 
 TOTALS = ("E_total", ("U_1", "U_2", "U_c")), ("S_total", ("S_1", "S_2", "S_c"))
-"""What is balanced, each with its parts."""
+"""Totals that are balanced, each with its parts."""
 
 BOOKED = (("energy supply",), ("dissipation",)), (("entropy supply", "entropy production"), ())
 """Kinds of accounts that explain how these change, and of others that tell, too, how much was exchanged."""
 
 
 def residuals(system: System, named: Mapping[str, Array], ledger: Array) -> list[tuple[Array, Any]]:
-    """What the balances of TOTALS leave open at the outputs of one run or of many, and the most that was exchanged till
+    """Residuals of the balances of TOTALS at the outputs of one run or of many, and the most that was exchanged till
     then; from what there is of TOTALS and of their parts [..., times], and the ledger [..., times, accounts].
     """
     # Transitions at the very start come before the first output.
@@ -338,8 +338,8 @@ def _rounding_of(
 
 
 def lost(booked: Array, seen: Array, rounded: Array | float = 0.0) -> tuple[Any, Any]:
-    """What is destroyed and what is turned over along the last axis: by the ledger, or at the ends of the steps if that
-    is more.
+    """Amounts destroyed and turned over along the last axis: by the ledger, or at the ends of the steps if that is
+    more.
 
     >>> [float(x) for x in lost(np.array([1.0, -0.25]), np.array([0.75, -0.5]), 0.125)]
     [0.375, 1.25]

@@ -112,7 +112,7 @@ def _above(module: str) -> Any:
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Results(ABC):
-    """What a run and a sweep hand back: ``dataset`` is the xarray Dataset, ``write`` saves the same as netCDF."""
+    """Results of a run or a sweep: ``dataset`` is the xarray Dataset, ``write`` saves the same as netCDF."""
 
     title: str = ""
     source: str = ""
@@ -210,7 +210,7 @@ class Results(ABC):
         return written
 
     def _repr_html_(self) -> str:
-        """What a notebook shows: the summary and a small figure."""
+        """HTML for a notebook: the summary and a small figure."""
         return str(_above("studies.run_report").glance(self))
 
     def write(self, path: str | Path) -> Path:

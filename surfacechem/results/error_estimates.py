@@ -1,4 +1,4 @@
-"""How far a run is from the truth: against an exact solution, a second run at another tolerance, or its own balances.
+"""Error of a run: against an exact solution, a second run at another tolerance, or from its own balances.
 
 >>> import surfacechem
 >>> case = surfacechem.load("exothermic")
@@ -38,11 +38,12 @@ from surfacechem.solve.run import Run, Trajectory
 from surfacechem.tolerances import BRIEF, EPS, FINER, FLOOR, NEGLIGIBLE, NONE_OF_SCALE, SQRT_EPS, TIGHTEST, UNRESOLVED
 
 EARLIER = "ended earlier"
-"""What is said of a second run that did not come as far."""
+"""Note on a second run that did not come as far."""
 
 WAYS = ("auto", "estimate", "balances")
-"""How a run tells its error: against the exact solution if there is one, else by a second run; always by a second run;
-from the balances, which costs nothing."""
+"""Sources of the error: an exact solution if there is one, else a second run; always a second run; the balances, which
+costs nothing.
+"""
 
 LOOKS = 400
 """Times at which an exact solution is evaluated at most."""
@@ -54,7 +55,7 @@ ENERGY, ENTROPY = "J/m^2", "J/(m^2 K)"
 """Units of accounts that belong together."""
 
 EVENTS = "event times"
-"""What stands for the times of events among the compared variables."""
+"""Name of the times of events among the compared variables."""
 
 
 def check_way(way: str) -> None:
@@ -103,7 +104,7 @@ def inexact(scene: Scene) -> list[Law]:
 
 
 def of_laws(trajectory: Trajectory, other: Trajectory, scene: Scene) -> CellErrors:
-    """What errors of the numbers that laws compute make of a run, from another whose laws are wrong by these errors."""
+    """Errors of a run from those of the numbers that laws compute, by another run whose laws are wrong by these."""
     also = [name for name in trajectory.model.system.output_columns if name == "t_n" or name.startswith("q_")]
     errors, note = apart(trajectory, other, also=also)
     if note or trajectory.status != other.status:
@@ -149,7 +150,7 @@ def against_exact(
 def exact_outputs(
     found: Accuracy, exact: tuple[str, Mapping[str, float]] | None, scene: Scene
 ) -> Callable[[Trajectory], dict[str, Array]] | None:
-    """What gives the exact values at the outputs of a run; None where its accuracy is from elsewhere."""
+    """Function for the exact values at the outputs of a run; None where its accuracy is from elsewhere."""
     if exact is None or not found.exact:
         return None
     from surfacechem.results.matching import exact_values
@@ -159,8 +160,8 @@ def exact_outputs(
 
 
 def _off_events(trajectory: Trajectory, late: float) -> Mask:
-    """Which outputs are no moments beside a jump or the end of what physics stopped, whose times may err by this part
-    of them: there the side on which an exact solution is, and its slope, are those of a time.
+    """Whether each output is away from every jump and from the end of what physics stopped, whose times may err by this
+    part of them: near these the side of an exact solution, and its slope, depend on the time.
     """
     result, end = trajectory.result, trajectory.run.times[-1]
     stopped = [result.t] if trajectory.status == "stopped" else []
@@ -230,7 +231,7 @@ def stated(errors: Mapping[str, float]) -> float:
 
 
 def second_run(run: Run, kind: str = "run") -> str:
-    """What an estimate is from, in words: what is briefer, and that no law tells of, may be missed by both runs."""
+    """Source of an estimate, in words: what is briefer, and that no law tells of, may be missed by both runs."""
     return f"estimate: a second {kind} at rtol {run.rtol:.0e} that resolves 1/{run.samples:.0f} of the time"
 
 
@@ -299,7 +300,7 @@ def _squares(rtol: float, trajectory: Trajectory, least: Array) -> list[str]:
 
 
 def _changes(trajectory: Trajectory, columns: list[int]) -> Array:
-    """What some named quantities change by within the time that has passed, at the rates of the outputs."""
+    """Changes of some named quantities within the time that has passed, at the rates of the outputs."""
     result = trajectory.result
     passed = SQRT_EPS * result.times
     y, segment = result.outputs + passed[:, None] * trajectory.rates, result.segments_at(result.times, result.segment)
@@ -343,7 +344,7 @@ def beside_jumps(times: Array, first: Trajectory, second: Trajectory) -> Mask:
 
 
 def clear_of(times: Array, pairs: Sequence[tuple[float, float]]) -> Mask:
-    """Which times lie between none of these pairs, the times at which two runs have the same event."""
+    """Whether each time lies between none of these pairs, the times at which two runs have the same event."""
     ways = np.array(pairs).reshape(-1, 2)
     early, late = ways.min(axis=1) * (1 - SIDE), ways.max(axis=1) * (1 + SIDE)
     return np.asarray(np.all((times[:, None] < early) | (times[:, None] > late), axis=1))
@@ -388,10 +389,10 @@ def computed(trajectory: Trajectory) -> dict[str, Array]:
 
 
 def sizes(trajectory: Trajectory, named: Collection[str] = ()) -> dict[str, Array]:
-    """What errors of states are relative to, at each output: their value and what it changes by within the time that
-    has passed, at most their largest value, but where it changes by itself in a moment; at the end, unless it is
-    that of physics, their value alone. Of profiles the least that counts, of what is ``named`` beside the states the
-    largest value, or what it changes by within the time that has passed if that is more.
+    """Sizes to which errors of states are relative, at each output: value plus change within the time that has passed,
+    at most the largest value, unless it changes by itself in a moment; at the end, unless that is one of physics, the
+    value alone. For profiles the least that counts, for what is ``named`` beside the states the largest value, or the
+    change within the time that has passed if that is more.
 
     The error of a run is then such that every state is, to this part of itself, the value of a time that is right to
     this part of itself, which is all that can be said near a zero; and that it is right to this part of its largest
@@ -462,8 +463,8 @@ def state_floors(trajectory: Trajectory) -> Array:
 
 
 def _driven(trajectory: Trajectory) -> Array:
-    """How large each state becomes at most, if it grows by what all others are, over a moment of any length in the time
-    of the run, as an implicit step has it: of a mass on a spring its gap times its frequency, shape (states,).
+    """Largest size that each state reaches if all others drive it over a moment of any length in the time of the run,
+    as in an implicit step: for a mass on a spring its gap times its frequency, shape (states,).
     """
     program, result = trajectory.model.program, trajectory.result
     segment = result.segments_at(result.times, result.segment)
@@ -558,7 +559,7 @@ def rounding_of_time(trajectory: Trajectory) -> float:
 
 
 def reasons(problem: Problem, run: Run, moves: bool) -> list[tuple[str, str, str]]:
-    """What was chosen for a run, of a scene whose gap ``moves`` by a balance or does not, and why, a row each."""
+    """Settings chosen for a run, whose gap moves by a balance or does not, and the reasons, a row each."""
     part = f"a hundredth of the accuracy {asked(run):.0e}, as errors of smooth runs are below 100 rtol"
     if run.rtol == TIGHTEST:
         part = f"for the accuracy {asked(run):.0e}; below this is rounding"

@@ -26,7 +26,7 @@ REST = "rest"
 STEADY = "steady"
 
 KINK = "kink of "
-"""How the names of events begin that change nothing but a formula."""
+"""Prefix of the names of events that change nothing but a formula."""
 
 
 @dataclass(frozen=True)
@@ -166,7 +166,7 @@ def event_findings(jumps: Sequence[Jump], unit: str = "J/(m^2 K)") -> list[str]:
 
 
 def event_waits(trajectory: Trajectory) -> list[str]:
-    """What a run that reached its end was still waiting for."""
+    """Transitions for which a run that reached its end was still waiting, in words."""
     parameters, last = trajectory.model.system.parameters, trajectory.jumps[-1:]
     findings = []
     for mode in trajectory.model.system.modes:

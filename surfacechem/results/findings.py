@@ -1,4 +1,4 @@
-"""What a reader of a run has to know, in words, beside its balances and events.
+"""Findings on a run for its reader, in words, beside its balances and events.
 
 Pairs of rates that contradict the equilibrium of the potential, rates so fast that none resolves them, laws out of
 their sense or range, fluxes and errors that are no result.

@@ -54,7 +54,7 @@ order, 2e-16, and rounding 1e-12.
 
 @contextmanager
 def _in_range() -> Iterator[None]:
-    """What overflows belongs to another scene."""
+    """Raise InputError for an arithmetic error, such as an overflow: the scene is another."""
     try:
         yield
     except ArithmeticError:
@@ -102,7 +102,7 @@ def exact_values(
 def _choose_sides(
     exact: dict[str, Array], before_end: Mapping[str, Array], solution: Solution, run: Trajectory, side: float
 ) -> None:
-    """Where an output time is that of a jump, take the exact values on the side on which the run has it.
+    """Take the exact values, at output times that are those of a jump, on the side on which the run has it.
 
     That may be a jump of the run or of its loads, or one of the solution at the very end, of which rounding decides
     whether a run still has it.

@@ -57,17 +57,17 @@ with netCDF4.Dataset(sys.argv[1]) as file:
 """A process that reads all of a file, whatever the errors on the way."""
 
 SUFFIXES = (".nc", ".nc4", ".cdf")
-"""What names of netCDF files end with."""
+"""Suffixes of netCDF files."""
 
 CSV, PARQUET = ".csv", ".parquet"
 TABLES = (CSV, PARQUET)
-"""What names of files end with that hold a dataset as a table."""
+"""Suffixes of files that hold a dataset as a table."""
 
 COORDINATES = "coordinates"
 """The global attribute that names what is no variable but a coordinate, though no dimension is called like it."""
 
 WRITTEN = (*SUFFIXES, *TABLES)
-"""What names of files end with that a run is written to."""
+"""Suffixes of files to which a run is written."""
 
 
 @dataclass(frozen=True)
@@ -171,7 +171,7 @@ def replacing(target: Path) -> Iterator[Path]:
 
 
 def _reason(path: Path, error: OSError) -> str:
-    """Why a file could not be written. HDF5 does not say; plain writing meets what it has met."""
+    """Reason why a file could not be written. HDF5 does not say; plain writing meets what it has met."""
     if error.strerror:
         return error.strerror
     try:
@@ -284,7 +284,7 @@ def table(dataset: xarray.Dataset) -> Any:
 
 
 def reading(path: Path, read: Callable[[], R]) -> R:
-    """What is read from a netCDF file; InputError where there is none, it is a store, a table, or damaged."""
+    """Result of ``read`` on a netCDF file; InputError where there is none, it is a store, a table, or damaged."""
     if path.is_dir():
         remedy = "`surfacechem sweep CASE -o NAME.zarr --resume` computes what it misses, and `plot` draws it"
         raise InputError(f"is a folder. A store is not run again: {remedy}.", Place(str(path)))

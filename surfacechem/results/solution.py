@@ -30,18 +30,18 @@ CLASSES = {"exothermic": 1, "endothermic": -1}
 
 @dataclass(frozen=True)
 class Judgement:
-    """What is known of how far a run is from the truth."""
+    """Error of a run, as far as it is known."""
 
     accuracy: Accuracy | None = None
     exact: Callable[[Trajectory], Mapping[str, Array]] | None = None
     """Exact values at the outputs of a run, by variable, where the case has any."""
     notes: tuple[str, ...] = ()
-    """What else a reader of the results has to know."""
+    """Further notes for readers of the results."""
 
 
 @dataclass(frozen=True, repr=False)
 class Solution(Results):
-    """What a run hands back. ``dataset`` is the xarray Dataset; ``write`` saves the same as netCDF.
+    """Results of a run. ``dataset`` is the xarray Dataset; ``write`` saves the same as netCDF.
 
     The error of the run, which an exact solution or a second run tells, is found when it is first asked for.
     """
@@ -49,13 +49,13 @@ class Solution(Results):
     trajectory: Trajectory
     """The run, with its states at the times at which runs are compared."""
     judge: Callable[[], Judgement] = Judgement
-    """What finds the error of the run."""
+    """Function that finds the error of the run."""
     case_run: Run | None = None
-    """How the case would be run; where the run was another, the dataset says so."""
+    """Run settings of the case; where the run was another, the dataset says so."""
     surface: Any = None
     """Free energy of two curved surfaces, where the scene has any."""
     error_from: str = "auto"
-    """Where the error was asked to be from."""
+    """Source of the error that was asked for."""
 
     def __repr__(self) -> str:
         """Title, end and error in a line."""
@@ -69,12 +69,12 @@ class Solution(Results):
 
     @property
     def reason(self) -> str:
-        """Why the run ended."""
+        """Reason for the end of the run."""
         return self.trajectory.reason
 
     @cached_property
     def judgement(self) -> Judgement:
-        """How far the run is from the truth, and what tells it."""
+        """Error of the run, and its source."""
         return self.judge()
 
     def __getstate__(self) -> dict[str, Any]:
@@ -88,7 +88,7 @@ class Solution(Results):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What else a reader of the results has to know."""
+        """Further notes for readers of the results."""
         return self.judgement.notes
 
     @cached_property
@@ -108,7 +108,7 @@ class Solution(Results):
 
     @cached_property
     def warnings(self) -> tuple[str, ...]:
-        """What a reader of the results has to know, in words."""
+        """Warnings for readers of the results, in words."""
         trajectory = self.trajectory
         return (
             *self.audit.findings,
@@ -161,7 +161,7 @@ class Solution(Results):
 
     @cached_property
     def _surface_columns(self) -> tuple[list[Column], float]:
-        """What two curved surfaces carry, and the time that it took [s]."""
+        """Columns on two curved surfaces, and the time that they took [s]."""
         from surfacechem.results.surface_fields import surface_columns
 
         return surface_columns(self.shown, self.surface)

@@ -111,7 +111,7 @@ def part(scene: Scene, divisor: int, given: bool = True) -> Scene:
 
 
 def grid(scene: Scene) -> tuple[object, ...]:
-    """What tells the cells of a scene from those of another."""
+    """Settings that tell the cells of a scene from those of another."""
     return tuple((law.cells, law.layer, law.accuracy) for _, law in _laws(scene))
 
 

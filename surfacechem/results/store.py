@@ -68,7 +68,7 @@ class StoredArray:
 
 @dataclass(frozen=True)
 class Layout:
-    """What is in a store: sizes of its dimensions, of which those of the runs come first; arrays; coordinates."""
+    """Layout of a store: sizes of its dimensions, of which those of the runs come first; arrays; coordinates."""
 
     sizes: Mapping[str, int]
     runs: tuple[str, ...]

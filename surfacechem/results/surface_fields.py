@@ -1,4 +1,4 @@
-"""What two curved surfaces carry at some output times of a run: moment, area of contact, and fields over body 1."""
+"""Results on two curved surfaces at some output times of a run: moment, area of contact, and fields over body 1."""
 
 from __future__ import annotations
 
