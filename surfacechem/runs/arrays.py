@@ -85,8 +85,8 @@ def quiet(model: Model, problem: Problem) -> bool:
 
 
 def of_each(best: np.ufunc, owner: Index, table: Array, count: int) -> Array:
-    """What is best of the rows of each of so many runs [rows, columns], which ``owner`` says in order; not a number
-    where a run has none.
+    """Reduction by ``best`` of the rows of each of so many runs [rows, columns], which ``owner`` says in order; not a
+    number where a run has none.
     """
     found = np.full((count, table.shape[1]), np.nan)
     runs, first = np.unique(owner, return_index=True)
@@ -147,7 +147,7 @@ class ArrayRuns:
 
     @cached_property
     def limits(self) -> Function | None:
-        """What must be above zero at the start, as far as it needs no derivatives; then the sizes of its terms."""
+        """Margins that must be above zero at the start, but those of derivatives; then the sizes of their terms."""
         system = self.model.system
         rates = {state.dot for state in system.states}
         found = [expression for _, expression in system.limits if not expression.free_symbols & rates]
@@ -174,7 +174,7 @@ class ArrayRuns:
     # -- from values to arrays ----------------------------------------------------------------------------------------
 
     def solve(self, values: Mapping[str, Array]) -> tuple[Mask, Columns]:
-        """Which runs with these values the arrays tell, and what is kept of those."""
+        """Solve runs with these values: whether the arrays tell each, and the columns of those that they tell."""
         table, y0 = self.starts(values)
         rows = np.concatenate([np.zeros((len(y0), 1)), y0, np.zeros_like(y0), table[:, 0]], axis=1)
         peaks, quiet = self.guards(rows)
@@ -216,7 +216,7 @@ class ArrayRuns:
         return table, y0
 
     def _admissible(self, values: Mapping[str, Array], rows: Array) -> Mask:
-        """Which starts are within all ranges, and beyond doubt within all limits."""
+        """Whether each start is within all ranges, and beyond doubt within all limits."""
         told: Mask = np.all(np.isfinite(rows), axis=1)
         system = self.model.system
         specs = {parameter.path: parameter.spec for parameter in system.parameters}
@@ -232,7 +232,7 @@ class ArrayRuns:
         return told
 
     def ends(self, rows: Array) -> tuple[Array, Array]:
-        """When each run ends, and the output times: of each, where a load ends them, else of all."""
+        """Time at which each run ends, and the output times: of each, where a load ends them, else of all."""
         if self.ramp is None:
             return np.full(len(rows), self.problem.segments[-1]), self.shape[None]
         assert self.plan.until is not None
@@ -267,7 +267,7 @@ class ArrayRuns:
     # -- from arrays to columns ---------------------------------------------------------------------------------------
 
     def _columns(self, found: Ends) -> tuple[Mask, Columns]:
-        """What is kept of runs, and which of them the arrays tell."""
+        """Whether the arrays tell each run, and the columns of those that they tell."""
         batch, n = found.batch, self.n
         counts, count = batch.counts, len(batch.counts)
         end, every = batch.ends, np.arange(count)

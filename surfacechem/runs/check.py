@@ -1,4 +1,4 @@
-"""What can be told about a scene before it runs: its numbers without dimension, its time scales, what is unused."""
+"""Check of a scene before it runs: its dimensionless numbers, its time scales, what is unused."""
 
 from __future__ import annotations
 
@@ -191,7 +191,7 @@ def _time_scales(start: Start, end: float) -> Iterator[Group]:
 
 
 def warnings(system: System) -> list[str]:
-    """What is given but has no effect, beside what the assembly found."""
+    """Warnings of the assembly, and of what is given but has no effect."""
     rows = [*system.residual(), *map(system.expand, _evaluated(system))]
     read = {symbol for row in rows for symbol in row.free_symbols}
     idle = [
@@ -205,7 +205,7 @@ def warnings(system: System) -> list[str]:
 
 
 def _evaluated(system: System) -> list[Expression]:
-    """What a run evaluates beside the equations."""
+    """Formulas that a run evaluates beside the equations."""
     formulas = [*[a.rate for a in system.ledger], *[m.masked for m in system.margins]]
     formulas += [*[i.expression for i in system.outputs], *[c.resistance for c in system.noted(Conductor)]]
     formulas += [x for item in system.edges for x in (item.masked, *item.modes.values(), *item.reset.values())]
@@ -222,7 +222,7 @@ def _heat_shares(system: System) -> list[Expression]:
 
 
 def start_warnings(model: Model, problem: Problem, start: Start | None, end: float) -> list[str]:
-    """What the start gives reason to be cautious of, and bodies that should not be one lump."""
+    """Warnings about the state at the start, and about bodies that should not be one lump."""
     first = np.concatenate([np.zeros(1), problem.y0, np.zeros(len(problem.y0)), problem.parameters[0]])
     lumps = lumpings(model.system, start, end) if start is not None else []
     return [*cautioned(model.system, first[None]), *(text for body in lumps for text in body.warnings())]
@@ -275,7 +275,7 @@ class Lumping:
         yield f"Fo_{self.number}", self.fourier, f"k t / (C L) of {self.body}: length of the run against conduction"
 
     def warnings(self) -> Iterator[str]:
-        """What is wrong with a lump, and by how much."""
+        """Warnings about a body as one lump, with the size of the error."""
         if not self.is_lump:
             return
         remedy = "Give its `conduction` a number of cells."

@@ -35,12 +35,12 @@ KEYS = {
     "error": ("float64", "largest relative error of the run"),
     **{name: ("float64", ENDS[name]) for name in TOLD},
 }
-"""What is stored of a run that is checked: type and meaning."""
+"""Columns that are stored of a run that is checked: type and meaning."""
 
 
 @dataclass(frozen=True)
 class Checked:
-    """What was found: the worst error that is known, how many are not, and where the errors are from."""
+    """Result of a check: the worst error that is known, how many are not, and the source of the errors."""
 
     error: float
     unknown: int
@@ -49,7 +49,7 @@ class Checked:
     """Runs in which a law or a jump destroys entropy."""
     source: str
     why: str
-    """Why the error of one of those runs is not known whose errors are not."""
+    """Reason why the error is not known, of one of the runs of which it is not."""
 
     def __str__(self) -> str:
         """The errors in words."""
@@ -149,10 +149,10 @@ def _errors(
 
 
 def _apart(stream: Stream, part: Index, done: SweepSolution) -> Array:
-    """How far what is stored of runs is from the same runs by themselves: their ends, relative to these, by more than
-    may be rounding; of one that an event has stopped the time alone, since its state may change there by any amount in
-    the last digit of it. Runs until a steady state last as long as the longest by themselves: their states alone are
-    compared, beside their scales.
+    """Distance of what is stored of runs from the same runs by themselves: of their ends, relative to these, by more
+    than may be rounding; for one that an event has stopped of the time alone, since its state may change there by any
+    amount in the last digit of it. Runs until a steady state last as long as the longest by themselves: their states
+    alone are compared, beside their scales.
     """
     chunks = stream.chunks
     ends = RunByRun(chunks.model, Keep(last=chunks.keep.last)).columns(done.runs, 0, done.audits)

@@ -1,4 +1,4 @@
-"""What a store keeps of each run, as columns: ends, extremes, times of events, series; how runs end as codes."""
+"""Columns that a store keeps of each run: ends, extremes, times of events, series; codes for how runs end."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ from surfacechem.solve.radau.solver import rates_at
 from surfacechem.solve.run import Model, Trajectory
 
 Columns = dict[str, NDArray[Any]]
-"""What is kept by name, the run as first axis."""
+"""Columns that are kept, by name, the run as first axis."""
 
 STATUSES = ("finished", "stopped", "failed", "refused")
-"""How a run ends, in the order of its codes; refused is one whose values are not admissible at its start."""
+"""Ends of runs, in the order of their codes; refused is one whose values are not admissible at its start."""
 
 REFUSED, OTHER = "the values are not admissible at the start", "another reason"
 
 REST, UNREST = "came to rest", "it does not come to rest"
-"""Why a run until a steady state has ended, and why one has failed."""
+"""Reasons for the end of a run until a steady state, and for its failure."""
 
 ENDS = {
     "status": "how the run ended",
@@ -42,7 +42,7 @@ ENDS = {
     "site_error": "largest residual of the site balances",
     "destroys_entropy": "1 where a law or a jump does, else 0",
 }
-"""What is told of the end of every run, in words; only the time has a unit, seconds."""
+"""Columns on the end of every run, with their meaning; only the time has a unit, seconds."""
 
 BALANCES = tuple(f"{kind}_error" for kind in ("energy", "entropy", "site"))
 """Those of them that are errors of balances."""
@@ -54,7 +54,7 @@ EXTREMES = {
 """Extremes of a run: what the names of their columns end with, what finds them, and words."""
 
 REACHED = "reaches "
-"""How the names of margins begin that tell when a quantity reaches a value."""
+"""Prefix of the names of margins that tell when a quantity reaches a value."""
 
 
 @dataclass(frozen=True)
@@ -73,25 +73,25 @@ class Keep:
 
 
 def recorded_keep(record: str) -> Keep:
-    """What is kept, as a store says it."""
+    """Selection of what is kept, from its record in a store."""
     content: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in json.loads(record).items()}
     return Keep(**content)
 
 
 def end_of(run: Trajectory) -> dict[str, Any]:
-    """What ENDS tells of a run beside its balances."""
+    """Entries of ENDS for a run, beside its balances."""
     steps = run.result.counters.steps
     return {"status": run.status, "reason": run.reason, "time_reached": run.result.t, "steps": steps}
 
 
 def balances_of(run: Trajectory, books: Audit) -> dict[str, Any]:
-    """What ENDS tells of the balances of a run."""
+    """Entries of ENDS for the balances of a run."""
     destroys = books.destroys or entropy_destroyed(run.jumps) > 0
     return {**{name: getattr(books, name) for name in BALANCES}, "destroys_entropy": destroys}
 
 
 def keep_of(section: KeepSection | None, system: System) -> Keep:
-    """What is kept, by name: of all ends, extremes and events where nothing is said; InputError at an unknown name."""
+    """Selection of what is kept, by name: all ends, extremes and events by default; InputError at an unknown name."""
     states = [state.name for state in system.states if state.name not in system.inside]
     known = {"quantities": [*quantities(system)], "events": event_names(system), "states": states}
     if section is None:
@@ -131,7 +131,7 @@ def reaching(system: System, keep: Keep) -> System:
 
 
 def reason_table(system: System) -> list[str]:
-    """Why runs end, in the order of the codes."""
+    """Reasons for the ends of runs, in the order of the codes."""
     margins = system.moving_margins
     ends = [text for margin in margins for text in (margin.reason, *(margin.below or ("", ""))[1:]) if text]
     failures = [text for status, text in REASONS.items() if not status.success]
@@ -180,7 +180,7 @@ def extreme(run: Trajectory, name: str, which: str) -> float:
 
 
 def crossed(before: NDArray[Any], after: NDArray[Any], level: float) -> NDArray[np.bool_]:
-    """Which leaps carry a quantity across a level, or onto it."""
+    """Whether each leap carries a quantity across a level, or onto it."""
     return ((before < level) & (after >= level)) | ((before > level) & (after <= level))
 
 
@@ -192,8 +192,8 @@ class RunByRun:
         self.reasons = [*reason_table(model.system), *((REST, UNREST) if steady else ())]
 
     def columns(self, runs: Sequence[Trajectory | str], times: int, audits: Sequence[Audit] = ()) -> Columns:
-        """What is kept of runs, with so many output times, audited anew or as given; of one that there is none of, why
-        that is.
+        """Columns that are kept of runs, with so many output times, audited anew or as given; a run that failed or was
+        refused is given by the reason.
         """
         found = [run for run in runs if not isinstance(run, str)]
         books = iter(audits or map(audit, found) if self.keep.balances else [None] * len(found))

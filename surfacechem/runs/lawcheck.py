@@ -1,5 +1,5 @@
-"""What every law has to keep, tried on one of somebody's own: documented, with units, the same for floats and symbols,
-and never against the second law.
+"""Check of a law of one's own against what every law has to keep: documented, with units, the same for floats and
+symbols, and never against the second law.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ INSIDE, ROOM = (0.1, 0.9), 600.0
 """Parts of a range that are drawn from, and twice the temperature [K] of a room."""
 
 READABLE = {*VARIABLES, "x", "T", "N_c", "M", "u", "r"}
-"""What formulas may read in every scene, beside temperatures and coverages by name."""
+"""Names that formulas may read in every scene, beside temperatures and coverages by name."""
 
 GIVEN, VALUES = (0.0, 1.0, 3.0), (1.0, 2.0, 0.5)
 OPTIONS: dict[str, Any] = {
@@ -46,7 +46,7 @@ DOCUMENTED = {
 
 
 def problems(law: type[Law]) -> list[str]:
-    """What a law does not keep, in words; nothing where all is well."""
+    """Rules that a law breaks, in words; none where all is well."""
     found = [message for mark, message in DOCUMENTED.items() if mark not in (inspect.getdoc(law) or "")]
     found += [f"{name} has no meaning: say what it is" for name, spec in law.specs() if not spec.text]
     for name, spec in law.specs():
@@ -72,7 +72,7 @@ def worked_numbers(law: type[Law]) -> Iterator[str]:
 
 
 def tried(law: type[Law]) -> Iterator[str]:
-    """What is wrong at random parameters and states, told once."""
+    """Yield the first error at random parameters and states, if any."""
     for seed in range(TRIALS):
         draw = random.Random(seed)
         try:
@@ -100,7 +100,7 @@ def _instance(law: type[Law], draw: random.Random) -> Any:
 
 
 def _differs(law: Law, values: dict[str, float]) -> str:
-    """Where floats and symbols do not agree, or no number comes out."""
+    """Disagreement of floats and symbols, or a result that is no number; empty where there is none."""
     symbols = {name: symengine.Symbol(name) for name in values}
     number = law.statement(**values)
     if isinstance(number, tuple):  # a place in space, which its own tests look at
@@ -114,7 +114,7 @@ def _differs(law: Law, values: dict[str, float]) -> str:
 
 
 def against(law: Law, values: dict[str, float]) -> str:
-    """Where a law drives what it has to resist."""
+    """Violation of the second law, by a law that drives what it has to resist; empty where there is none."""
     if isinstance(law, Friction) and "v" in values:
         for v in (0.7, -0.7):
             own = values | {"v": v} | ({"direction": math.copysign(1.0, v)} if "direction" in values else {})
@@ -134,7 +134,7 @@ def _shown(values: dict[str, float]) -> str:
 
 
 def report(found: list[type[Law]]) -> tuple[str, bool]:
-    """What is wrong with each law, as text, and whether all is well."""
+    """Errors of each law, as text, and whether all is well."""
     lines, well = [], True
     for law in found:
         wrong = problems(law)

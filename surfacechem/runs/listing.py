@@ -1,4 +1,4 @@
-"""What comes with the package, as text: the laws by contract and the cases."""
+"""Listings of what comes with the package, as text: the laws by contract and the cases."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ def parameters(law: type[Law]) -> Iterator[str]:
 
 
 def source(law: type[Law]) -> str:
-    """Where a law comes from, as its docstring says."""
+    """Source of a law, as its docstring gives it."""
     found = re.search(r"Source: (.*?)(?:\n\n|\Z)", inspect.getdoc(law) or "", re.DOTALL)
     text = " ".join(found[1].split()) if found else "not stated"
     return ROLE.sub(lambda m: plain(m[1]), text)

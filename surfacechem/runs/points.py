@@ -43,7 +43,7 @@ TRIALS = 50
 
 POINT = ("point",)
 LEVEL = ".level"
-"""How the paths of the values end at which histories are held."""
+"""Suffix of the paths of the values at which histories are held."""
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -51,11 +51,11 @@ class PointResults(Results):
     """Quantities at points: ``dataset`` is the xarray Dataset, ``write`` saves the same as netCDF."""
 
     values: Sequence[Column]
-    """What is given, and what follows from it."""
+    """Quantities that are given, and those that follow from them."""
     slopes: Sequence[Column]
     """Derivatives of what follows by what is given."""
     refused: Sequence[str]
-    """Why the laws do not hold at a point, by point; empty where they do."""
+    """Reason why the laws do not hold at a point, by point; empty where they do."""
 
     def __repr__(self) -> str:
         """Number of points in a line."""
@@ -75,7 +75,7 @@ class PointResults(Results):
 
     @property
     def attributes(self) -> Mapping[str, str | float | int]:
-        """Where the dataset is from."""
+        """Attributes of the dataset: its origin."""
         return {**self._origin("evaluated", f"at {len(self.refused)} points"), "versions": versions()}
 
 
@@ -102,7 +102,7 @@ def held(scene: Scene) -> Scene:
 
 @dataclass(frozen=True)
 class Argument:
-    """What points may give: its place among the arguments of compiled functions, and what it is."""
+    """Argument that points may give: its place among those of compiled functions, and its quantity."""
 
     column: int
     quantity: Quantity

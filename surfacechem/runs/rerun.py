@@ -36,12 +36,12 @@ DEPARTURES: Mapping[str, tuple[type, ...]] = {
     "max_steps": (int,),
     "error": (str,),
 }
-"""What a file may say of how its run was not that of its case."""
+"""Settings, with their types, in which a file may say that its run was not that of its case."""
 
 
 @dataclass(frozen=True)
 class Record:
-    """What a file holds: its attributes and every variable."""
+    """Content of a file: its attributes and every variable."""
 
     path: Path
     attributes: Mapping[str, Any]
@@ -60,7 +60,7 @@ class Record:
 
     @property
     def place(self) -> Place:
-        """Where the record is from, for messages."""
+        """Place of the record, for messages."""
         return Place(str(self.path))
 
     def error(self, message: str) -> InputError:

@@ -1,4 +1,4 @@
-"""What commands tell: a title, facts under their labels, and tables; plain as text, on a terminal with colours."""
+"""Output of commands: a title, facts under their labels, and tables; plain as text, on a terminal with colours."""
 
 from __future__ import annotations
 

@@ -133,7 +133,7 @@ class Simulation:
         """Time that the integrals over surfaces took."""
 
     def _repr_html_(self) -> str:
-        """What a notebook shows: the title, what is solved for, and the summary of ``check``."""
+        """HTML for a notebook: the title, what is solved for, and the summary of ``check``."""
         from surfacechem.runs.check import warnings
         from surfacechem.runs.summaries import check_summary
 
@@ -300,14 +300,14 @@ class Simulation:
         return Judgement(found, exact_outputs(found, exact, case.scene), notes)
 
     def _origin(self, changes: Mapping[str, float]) -> dict[str, Any]:
-        """Where results are from."""
+        """Origin of results: texts of the case, changes, and time spent before."""
         case = self.case
         texts = {"title": case.title, "source": case.source, "case": case.text, "mechanism": case.mechanism_text or ""}
         spent = max(simulation.integrals_seconds for simulation in self._grids.values())
         return {**texts, "changes": changes, "before_seconds": spent}
 
     def _unused(self, values: Mapping[str, float]) -> str:
-        """Why the exact solution of the case does not count with these values; empty where it does."""
+        """Reason why the exact solution of the case does not count with these values; empty where it does."""
         if self.case.reference is None or not values:
             return self.case.unused
         own = self.model.values()
@@ -399,7 +399,7 @@ class Simulation:
         return own.added_to(found)
 
     def _law_errors(self, trajectory: Trajectory) -> CellErrors:
-        """What errors of the numbers that laws compute for themselves make of a run; nothing where none has any."""
+        """Errors of a run from those of the numbers that laws compute for themselves; none where no law has any."""
         if not inexact(self.case.scene):
             return CellErrors()
         return of_laws(trajectory, self._erring._as_before(trajectory), self.case.scene)

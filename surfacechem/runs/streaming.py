@@ -78,7 +78,7 @@ class ChunkRuns:
         self.ways = [arrays] if told and quiet(self.model, arrays.problem) else []
         if told and self.model.system.edges:
             self.ways.append(JumpingRuns(self.model, plan, self.run, changes, keep))
-        """How runs become arrays, in the order in which they are tried; the rest is looked at one by one."""
+        """Ways to compute runs as arrays, in the order in which they are tried; the rest is looked at one by one."""
         self.arrays = arrays if self.ways else None
 
     @property
@@ -111,14 +111,14 @@ class ChunkRuns:
         return int(np.clip(MOST_BYTES // (2 * row), 2**6, RUNS_OF_A_PIECE))
 
     def flags(self, name: str) -> dict[str, Any]:
-        """What the codes of a variable mean, where it holds codes."""
+        """Attributes with the meaning of the codes of a variable, where it holds codes."""
         words = {"status": STATUSES, "reason": self.one_by_one.reasons}.get(name)
         if words is None:
             return {}
         return {"flag_values": list(range(len(words))), "flag_meanings": " ".join(map(variable, words))}
 
     def columns(self, index: Index) -> Columns:
-        """What is kept of the runs of these numbers."""
+        """Columns that are kept of the runs of these numbers."""
         values = self.plan.at(index)
         times = len(self.run.times)
         columns: Columns = {}
@@ -182,13 +182,13 @@ def _runs_of(job: Job) -> ChunkRuns:
 
 
 def columns_of(job: Job, index: Index) -> Columns:
-    """What is kept of some runs of a sweep, computed in any process."""
+    """Columns that are kept of some runs of a sweep, computed in any process."""
     return _runs_of(job).columns(index)
 
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a sweep is."""
+    """Progress of a sweep."""
 
     runs: int
     done: int
@@ -344,7 +344,7 @@ def _layout(chunks: ChunkRuns, job: Job) -> Layout:
 
 
 def _attributes(chunks: ChunkRuns, job: Job) -> dict[str, Any]:
-    """Where a store is from: the same for all that write to it, and nothing that changes from time to time."""
+    """Origin of a store: the same for all that write to it, and nothing that changes from time to time."""
     case = chunks.simulation.case
     return {
         "Conventions": CONVENTIONS,

@@ -1,4 +1,4 @@
-"""What the command line tells about a run and about a scene: one fact a line."""
+"""Summaries of a run and of a scene for the command line: one fact a line."""
 
 from __future__ import annotations
 
@@ -69,8 +69,8 @@ def states(system: System) -> str:
 
 
 def run_summary(solution: Solution, written: Path | None, details: bool = False) -> Sheet:
-    """What was solved, how it ended, how accurate and how fast it was, and where it is; with ``details`` every error
-    and count, and the events.
+    """Summary of a run: what was solved, its end, accuracy and speed, and where it is; with ``details`` every error and
+    count, and the events.
     """
     from surfacechem.solve import solver
 
@@ -138,8 +138,8 @@ def _balances(books: Audit, unit: str) -> str:
 
 
 def sweep_summary(solution: SweepSolution, written: Path | None, details: bool = False) -> Sheet:
-    """What was swept, how the runs ended, how accurate and how fast they were, and where they are; with ``details`` how
-    each run ended.
+    """Summary of a sweep: what was swept, the ends of the runs, their accuracy and speed, and where they are; with
+    ``details`` the end of each run.
     """
     error = ""
     if accuracy := solution.accuracy:
@@ -167,7 +167,7 @@ def sweep_summary(solution: SweepSolution, written: Path | None, details: bool =
 
 
 def sweep_details(solution: SweepSolution) -> dict[str, Rows]:
-    """How each run of a sweep ended, or each of the first ones, with its parameters."""
+    """Table of the end of each run of a sweep, or of the first ones, with their parameters."""
     errors = solution.accuracy.errors if solution.accuracy else np.full(len(solution.runs), np.nan)
     shown = range(min(len(solution.runs), MOST_RUNS))
     points = solution.plan.at(np.arange(len(shown)))
@@ -219,7 +219,7 @@ def points_summary(found: PointResults, written: Path | None) -> Sheet:
 
 
 def _sweep_events(solution: SweepSolution) -> str:
-    """What jumped in all runs, and what the second law says to it."""
+    """Jumps of all runs, and the verdicts of the second law on them, in words."""
     runs = [run.jumps for run in solution.runs]
     jumps = [jump for run in runs for jump in run]
     if not jumps:
@@ -293,7 +293,7 @@ def _numbers(law: Law) -> str:
 
 
 def _plan(system: System, run: Run | None) -> str:
-    """How a scene is run, and where its steps end."""
+    """Solver, outputs and ends of steps of a run, in words."""
     if run is None:
         return "none, as everything is given; `surfacechem evaluate` gives its quantities at any state"
     outputs = f"{len(run.times)} output times" if run.picture is None else "outputs that follow the run"
@@ -306,7 +306,7 @@ def _plan(system: System, run: Run | None) -> str:
 
 
 def _compiled(system: System, run: Run) -> str:
-    """What of a run is machine code, and what is left to Python."""
+    """Parts of a run that are machine code, and those that are left to Python, in words."""
     if run.solver in ASKING:
         return "the equations; Cantera makes the steps, and asks Python for every right-hand side"
     if run.solver not in (*OWN, AUTO):
@@ -339,8 +339,8 @@ def _worst(stream: Stream, chunks: Sequence[int]) -> str:
 
 
 def store_summary(stream: Stream, store: Store, checked: Checked | None, file: Path | None = None) -> tuple[str, Sheet]:
-    """How a sweep ended that went into a store, or through one into a file, in a word; and what it was and how its runs
-    ended, in words.
+    """Word for the end of a sweep that went into a store, or through one into a file; and its summary with the ends of
+    its runs.
     """
     from surfacechem.runs.keeping import STATUSES
     from surfacechem.runs.sweeps import parameter_names

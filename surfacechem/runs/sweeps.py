@@ -176,7 +176,7 @@ class SweepAccuracy:
     source: str
     exact: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
     why: str = ""
-    """Why the error of one of those runs is not known whose errors are not."""
+    """Reason why the error is not known, of one of the runs of which it is not."""
 
     @property
     def known(self) -> NDArray[np.float64]:
@@ -202,8 +202,8 @@ def unknown_in(count: int, why: str) -> str:
 def accuracy(
     case: Case, done: SweepSolution, threads: int | None, cells: Callable[[], Sequence[CellErrors]]
 ) -> SweepAccuracy:
-    """How far each run is from the truth: from the exact solution of the case, else from a second sweep; not a number
-    where that is not known. ``cells`` finds the errors of the cells across bodies of each run.
+    """Error of each run: from the exact solution of the case, else from a second sweep; not a number where it is not
+    known. ``cells`` finds the errors of the cells across bodies of each run.
     """
     unused, named = case.unused, case.reference
     second = cache(lambda: _second(done, threads))
@@ -322,7 +322,7 @@ def parameter_columns(system: System, plan: Plan, names: Mapping[str, str]) -> l
 
 @dataclass(frozen=True, repr=False)
 class SweepSolution(Results):
-    """What a sweep hands back: its runs in the order of :attr:`Plan.points`, their error, and their dataset."""
+    """Results of a sweep: its runs in the order of :attr:`Plan.points`, their error, and their dataset."""
 
     model: Model
     plan: Plan
@@ -330,7 +330,7 @@ class SweepSolution(Results):
     """Settings of all runs; where a load ends them, each has output times of its own."""
     runs: Sequence[Trajectory]
     judge: Callable[[SweepSolution], SweepAccuracy] | None = None
-    """What finds the errors of the runs."""
+    """Function that finds the errors of the runs."""
 
     def __getstate__(self) -> dict[str, Any]:
         """A pickle carries the errors themselves, not what would find them."""
@@ -367,7 +367,7 @@ class SweepSolution(Results):
 
     @cached_property
     def run_ends(self) -> list[dict[str, Any]]:
-        """What ENDS tells of each run."""
+        """Entries of ENDS for each run."""
         return [end_of(run) | balances_of(run, books) for run, books in zip(self.runs, self.audits, strict=True)]
 
     def worst(self, balance: str) -> float:
@@ -390,7 +390,7 @@ class SweepSolution(Results):
 
     @property
     def ends(self) -> str:
-        """How many runs ended in which way, in words."""
+        """Numbers of runs by the way in which they ended, in words."""
         every = [run.status for run in self.runs]
         return ", ".join(f"{every.count(status)} {status}" for status in dict.fromkeys(every))
 
@@ -481,7 +481,7 @@ class SweepSolution(Results):
         return [*columns, Column("time", (*self.axes, self.inner), each, "s", "time since the start")]
 
     def _of_runs(self) -> list[Column]:
-        """How each run ended, and what its balances, jumps and error are."""
+        """Columns on the runs: end, balances, jumps and error."""
         columns = [
             self._of_each(name, [end[name] for end in self.run_ends], "s" if name == "time_reached" else "1", text)
             for name, text in ENDS.items()
