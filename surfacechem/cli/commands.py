@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 R = TypeVar("R")
 
 SELDOM = (100_000, 20, 20)
-"""Thresholds of the collection of garbage: objects made between two, and how many of those between larger ones."""
+"""Thresholds of Python's garbage collection: objects made between two, and how many of those between larger ones."""
 
 # Exit code of each way in which a run ends.
 STATUS = {"finished": 0, "stopped": 3, "failed": 4}
@@ -71,7 +71,7 @@ def _end(number: int, _frame: object) -> None:
 
 @contextmanager
 def _signals_raised() -> Iterator[None]:
-    """Signals that end the process are exceptions meanwhile, so that files that are not finished are removed.
+    """Raise signals that end the process as exceptions meanwhile, so that files that are not finished are removed.
 
     What the process was told to ignore, as by nohup, it ignores; a handler that is not Python's stays, since it could
     not be put back.
@@ -99,7 +99,7 @@ def end_by_signal(error: SignalledError, kept: str) -> NoReturn:
 
 
 def _tell(message: object) -> None:
-    """A line on stderr; the exit code says it where nothing can be written there."""
+    """Print a line on stderr; where nothing can be written there the exit code says it."""
     with suppress(OSError):
         typer.echo(f"surfacechem: {message}", err=True)
 
@@ -212,7 +212,7 @@ def loaded(case: str, changes: Sequence[str] | None) -> Simulation:
 
 
 def chosen(simulation: Simulation, solver: str | None, rtol: float | None, accuracy: float | None = None) -> Run:
-    """The case's settings with those of the command line; a tolerance leaves no choice of one."""
+    """Run settings of the case, changed by the command line; a tolerance given there replaces an automatic choice."""
     from surfacechem.results.accuracy import first_tolerance
     from surfacechem.solve import AUTO, names
     from surfacechem.solve.run import OWN
@@ -278,8 +278,8 @@ def solved(run: Callable[[], R], talk: bool | None, brief: bool = False, waits: 
 
 
 def refuse_unwritable(*targets: Path, read: Sequence[str | Path] = ()) -> None:
-    """InputError where a file could not be written, or is one of those that are read, so that nothing is computed in
-    vain; leaves no trace.
+    """Raise InputError where a file could not be written, or is one of those that are read, so that nothing is computed
+    in vain; leaves no trace.
     """
     from surfacechem.results.netcdf import replacing
 
@@ -292,7 +292,7 @@ def refuse_unwritable(*targets: Path, read: Sequence[str | Path] = ()) -> None:
 
 
 def check_picture(target: Path) -> None:
-    """InputError where a file name asks for no kind of picture, or the file could not be written."""
+    """Raise InputError where a file name asks for no kind of picture, or the file could not be written."""
     kind = target.suffix.lower().removeprefix(".")
     refuse_unknown([kind], ("png", "svg", "pdf"), "no format '{}'", Place(path=str(target)))
     refuse_unwritable(target)

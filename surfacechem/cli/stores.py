@@ -1,4 +1,4 @@
-"""Sweeps into a store on the command line: how far they are, how they end, and how to go on with one that was ended."""
+"""Sweeps into a store on the command line: progress, ends of runs, and resuming after an interrupt."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ def write_file(simulation: Simulation, plan: Plan, target: Path, talk: bool | No
 
 
 def part_of(text: str | None) -> tuple[int, int]:
-    """The number of a part, and of how many.
+    """Number of a part, and number of parts.
 
     >>> part_of("3/16"), part_of(None)
     ((3, 16), (1, 1))

@@ -26,10 +26,10 @@ PATIENCE = 2.0
 """Seconds after which a bar tells how far a command is."""
 
 COLOURS = {"finished": "green", "stopped": "yellow", "failed": "red", "warning": "yellow", "refused": "yellow"}
-"""Of labels; others are cyan."""
+"""Colours of labels; others are cyan."""
 
 NAME = 40
-"""Letters from which on the first cell of a row is no name, and may be broken."""
+"""Number of letters from which on the first cell of a row is no name, and may be broken."""
 
 ALARM = "ENTROPY DESTROYED"
 
