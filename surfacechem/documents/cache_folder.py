@@ -1,4 +1,4 @@
-"""The user's cache folder, and what takes long to find: fits of properties, integrals over surfaces, machine code.
+"""The user's cache folder, for what takes long to compute: fits of properties, integrals over surfaces, machine code.
 
 A file is named by a digest of all that it follows from, so that it is never used where it does not hold, and is read
 where its SHA-256 is right and no other user could have written it. What cannot be written, read or trusted costs time,
@@ -31,7 +31,7 @@ OTHERS = stat.S_IWGRP | stat.S_IWOTH
 """Permission of others to write."""
 
 MOST = 4096
-"""Files of one kind that are kept; at 5 to 100 kB some 100 MB."""
+"""Largest number of files of one kind that are kept; at 5 to 100 kB some 100 MB."""
 
 
 def cache_root() -> Path:
@@ -199,7 +199,7 @@ def from_file(path: Path, find: Callable[[], Any], read: Callable[[bytes], Any],
 
 
 def _forget(folder: Path) -> None:
-    """Of more than MOST files in a folder the older half goes."""
+    """Remove the older half of more than MOST files in a folder."""
     with os.scandir(folder) as entries:
         files = [entry.path for entry in entries]
     if len(files) > MOST:

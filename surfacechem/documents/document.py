@@ -27,9 +27,9 @@ class Limits:
     """Limits on the size of a document."""
 
     largest: int = 1_000_000
-    """Bytes."""
+    """Size in bytes."""
     most: int = 20_000
-    """Values, with what aliases repeat; they are read in some 2 s."""
+    """Number of values, with what aliases repeat; they are read in some 2 s."""
 
 
 # Of a case; longer tables belong into files of their own.
