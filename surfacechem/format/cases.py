@@ -64,7 +64,7 @@ class Case:
         return assemble(outline(self.scene))
 
     def refuse_nothing(self) -> None:
-        """InputError where the scene has no state; no integral is made for it."""
+        """Raise InputError where the scene has no state; no integral is made for it."""
         try:
             refuse_nothing(self._outline, self.file or "CASE")
         except InputError as error:

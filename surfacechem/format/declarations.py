@@ -83,7 +83,7 @@ class Content(ABC):
         """The value; InputError with its place where it is none."""
 
     definition: ClassVar[str] = ""
-    """The definition in the schema that is its own."""
+    """Name of its own definition in the schema."""
 
     def schema(self) -> Schema:
         """JSON Schema of what may stand there."""
@@ -462,16 +462,16 @@ class Shapes(Content):
 
 @dataclass(frozen=True)
 class Later(Content):
-    """Something whose units are known only when the scene is assembled."""
+    """Content whose units are known only when the scene is assembled."""
 
     content: Content
 
     def read(self, tree: Tree, name: str, context: Context) -> Tree:
-        """It as it stands."""
+        """The tree as it stands."""
         return tree
 
     def schema(self) -> Schema:
-        """That of what it will be."""
+        """Schema of what it will be."""
         return self.content.schema()
 
 

@@ -28,7 +28,7 @@ class Distribution(ABC):
 
     @abstractmethod
     def at(self, u: Array) -> Array:
-        """Values below which the parts ``u`` of all draws lie."""
+        """Quantiles: values below which the parts ``u`` of all draws lie."""
 
     @property
     def over_decades(self) -> bool:
@@ -43,7 +43,7 @@ class Distribution(ABC):
 
 @dataclass(frozen=True)
 class Uniform(Distribution):
-    """Each value between two is as likely, or each ratio."""
+    """Uniform distribution between two values, or of the logarithm between theirs."""
 
     low: float
     high: float
@@ -61,7 +61,7 @@ class Uniform(Distribution):
 
 @dataclass(frozen=True)
 class Normal(Distribution):
-    """A mean and a standard deviation."""
+    """Normal distribution, by its mean and standard deviation."""
 
     mean: float
     std: float
@@ -72,7 +72,7 @@ class Normal(Distribution):
 
 @dataclass(frozen=True)
 class Lognormal(Distribution):
-    """A median, and the standard deviation of the logarithm."""
+    """Lognormal distribution, by its median and the standard deviation of the logarithm."""
 
     median: float
     sigma: float
@@ -87,7 +87,7 @@ class Lognormal(Distribution):
 
 @dataclass(frozen=True)
 class Drawn(Distribution):
-    """The rows of a table, each as likely; columns of one table are drawn by the same row."""
+    """Uniform distribution over the rows of a table; columns of one table are drawn by the same row."""
 
     values: tuple[float, ...]
     source: str = ""
@@ -147,7 +147,7 @@ def recorded_sample(content: Mapping[str, Any]) -> Sample:
 
 
 def _blocks(index: Index) -> Iterator[tuple[int, int]]:
-    """First and number of indices that follow each other."""
+    """Start and length of each run of consecutive indices."""
     starts = np.flatnonzero(np.diff(index, prepend=-2) != 1)
     yield from zip(index[starts].tolist(), np.diff(starts, append=len(index)).tolist(), strict=True)
 
@@ -217,7 +217,7 @@ def permuted(index: Index, count: int, key: int) -> Index:
 
 
 def mixed(x: NDArray[np.uint64], key: int) -> NDArray[np.uint64]:
-    """Numbers whose bits all depend on all bits of x and the key.
+    """Hash of numbers: its bits all depend on all bits of x and the key.
 
     Source: Steele, Lea & Flood (2014), Fast splittable pseudorandom number generators, doi 10.1145/2714064.2660195.
     """

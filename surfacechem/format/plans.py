@@ -78,7 +78,7 @@ class Spaced:
 
 @dataclass(frozen=True)
 class Numbered:
-    """Values by their numbers, formed where a slice is asked for: of many part by part."""
+    """Array of values by their numbers, evaluated only where a slice is asked for: of many part by part."""
 
     at: Callable[[Index], Array]
     count: int
@@ -298,7 +298,7 @@ def plan_of(
 
 
 def read_sweep(tree: Tree, usual: SweepSection | None = None) -> SweepSection:
-    """A sweep; what it does not say is as in the usual one."""
+    """A sweep; keys that are left out are as in the usual one."""
     section = read(SweepSection, csvtable.embedded(tree, str(Path.cwd())), Context())
     if usual is not None:
         for name in keys(SweepSection):
@@ -335,7 +335,7 @@ def _axis(path: str, tree: Tree, units: Mapping[str, str], array: Array | None) 
 
 
 def _even(array: Array) -> Spaced | None:
-    """Values at equal distances as what they are, of which neither a plan nor its record keeps each."""
+    """Equally spaced values as a range, so that neither a plan nor its record keeps each of them."""
     if not (len(array) and np.isfinite(array).all()):
         return None
     spaced = Spaced(float(array[0]), float(array[-1]), len(array))

@@ -1,4 +1,4 @@
-"""From the sections of a case to its scene and its run; what keys say together is checked here."""
+"""Reader from the sections of a case to its scene and its run, with the checks of keys against each other."""
 
 from __future__ import annotations
 
@@ -119,7 +119,7 @@ def read_document(tree: Tree, base: str = ".", mechanism_text: str | None = None
 
 
 def _refuse_bonds(interface: Mapping[str, Tree]) -> None:
-    """InputError where an interface of bodies with shapes has bonds or friction of its own."""
+    """Raise InputError where an interface of bodies with shapes has bonds or friction of its own."""
     # Before numbers are read, whose units would be those of a pair.
     for name in OF_FLATS:
         if name in interface:
@@ -272,7 +272,7 @@ def _surface(case: Document) -> CurvedSurfaces | None:
 
 
 def _refuse_outside(case: Document, low: float, high: float) -> None:
-    """InputError where the gap is not among the approaches at the start."""
+    """Raise InputError where the gap is not among the approaches at the start."""
     history, starts = case.loading.get("g_n"), {"initial": case.initial.get("g_n", low)}
     if history is not None:
         starts["loading"] = history.at_start()

@@ -179,7 +179,7 @@ def _property(name: str, key_name: str) -> Any:
 
 
 class MediumSection(Section):
-    """what fills the space between the bodies"""
+    """medium: what fills the space between the bodies"""
 
     fluid: str | None = key(Text(), "name of a fluid that CoolProp knows")
     pressure: float | None = quantity("Pa", "pressure of the fluid", above=0)
@@ -240,7 +240,7 @@ SHARES = Entries(others=SHARE, names=lambda case: [*case.bodies, "surroundings"]
 
 
 class InterfaceSection(Section):
-    """what is between the bodies"""
+    """interface between the bodies"""
 
     temperature: str | Load | None = key(
         Temperature(), "a name, a value or a history; left out where there is no medium"
@@ -305,7 +305,7 @@ class SurroundingsSection(Section):
 
 
 class MechanicsSection(Section):
-    """how the bodies are mounted, for a gap that moves"""
+    """mechanics of the mounted bodies, for a gap that moves"""
 
     normal: Mounting | None = key(Nested(Mounting), "how the normal gap is held")
     tangential: Mounting | None = key(Nested(Mounting), "how the tangential displacement is held")
@@ -526,7 +526,7 @@ class TableSection(Section):
 
 
 class DistributionSection(Section):
-    """how an uncertain parameter is distributed: one of these"""
+    """distribution of an uncertain parameter: one of these"""
 
     called = "a distribution"
 
@@ -571,7 +571,7 @@ NAMES = Shapes(OneOf("choice", lambda: (ALL,)), items=ListOf(Text(), "[T, phi]")
 
 
 class KeepSection(Section):
-    """what a store keeps of each run"""
+    """content of a store: what is kept of each run"""
 
     called = "the section keep"
 
