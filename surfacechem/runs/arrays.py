@@ -1,4 +1,4 @@
-"""Runs of one model as arrays: from columns of values through the compiled loop to columns of what is kept.
+"""Batches of runs of one model as arrays: from columns of values through the compiled loop to columns of results.
 
 No object is made for a run. What the arrays cannot tell (a start that is not admissible, an edge that is due, a run
 that could not go on) is left to runs that are looked at one by one.
@@ -32,7 +32,7 @@ from surfacechem.solve.run import Model, Run
 from surfacechem.tolerances import CROSSED, EPS, MICROMETRE, PICOMETRE
 
 MOST = 4096, 1024
-"""Steps and events of a run for which there is room at most: what has more is looked at by itself."""
+"""Largest numbers of steps and events of a run for which there is room: what has more is looked at by itself."""
 
 PILOTS = 16
 """Runs of a batch that tell how much happens in the others."""
@@ -242,7 +242,9 @@ class ArrayRuns:
         return ends, np.asarray(self.shape / self.shape[-1]) * ends[:, None]
 
     def guards(self, rows: Array) -> tuple[Array, Mask]:
-        """Largest accounts and guards before the start, as a first arc has them, and which starts no edge is due at."""
+        """Largest accounts and guards before the start, as a first arc has them, and whether each start has no edge
+        due.
+        """
         model, count = self.model, len(rows)
         program, jumper = model.program, model.jumper
         if jumper is None or program.margins is None:
@@ -295,7 +297,7 @@ class ArrayRuns:
         return clear, columns | self._event_columns(found)
 
     def _verdicts(self, found: Ends, last: Array) -> tuple[Any, Any, Mask]:
-        """Codes of status and reason, and which runs they are known of without a look at each."""
+        """Codes of status and reason, and whether those of each run are known without a look at it."""
         model, batch = self.model, found.batch
         outcome = batch.counts[:, END]
         ended, stopped = outcome == Status.FINISHED, outcome == Status.EVENT

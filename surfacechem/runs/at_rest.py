@@ -1,4 +1,4 @@
-"""Runs until nothing changes any more: `until: steady`."""
+"""Runs to a steady state: `until: steady`."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ than a double resolves beside one.
 """
 
 AFTER = 10.0
-"""So many times as long as it takes to come to rest, a state is at rest."""
+"""Least ratio of the time looked at to the time to come to rest, with which a state counts as at rest."""
 
 SHORTER = (1e6, 1e4, 1e2, 1.0)
 """Times [s] for which rest is looked for where roundings of a fast surface, summed over years, hide it: its sites do
@@ -35,7 +35,7 @@ class UnrestError(InputError):
 
 
 def refuse_histories(system: System) -> None:
-    """InputError where no steady state can be."""
+    """Raise InputError where no steady state can be."""
     moving = [item.name for item in system.named if depends(system.expand(item.expression), system.t)]
     if moving:
         raise InputError(f"{moving[0]} changes in time, so there is no steady state: give it one value.", path=PATH)

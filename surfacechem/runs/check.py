@@ -32,7 +32,7 @@ LONG = 2.0
 
 @dataclass(frozen=True)
 class Group:
-    """A number that tells how a scene will behave."""
+    """A dimensionless number or a time scale that tells how a scene will behave."""
 
     name: str
     value: float
@@ -94,7 +94,7 @@ def rates(start: Start) -> NDArray[np.complex128]:
 
 
 def groups(model: Model, scene: Scene, values: Mapping[str, float], start: Start | None, end: float) -> list[Group]:
-    """The numbers of a scene, as far as its parameters and its consistent initial state tell them."""
+    """Dimensionless numbers and time scales of a scene, as far as parameters and consistent initial state tell them."""
     found = [*_bond_energy(scene), *_activation(scene, values)]
     if start is not None:
         found += _affinity(model.system, scene, start)

@@ -51,7 +51,7 @@ EXTREMES = {
     "max": (np.fmax, "at most, over outputs, steps and jumps"),
     "min": (np.fmin, "at least, over outputs, steps and jumps"),
 }
-"""Extremes of a run: what the names of their columns end with, what finds them, and words."""
+"""Extremes of a run: suffix of the names of their columns, function that finds them, and words."""
 
 REACHED = "reaches "
 """Prefix of the names of margins that tell when a quantity reaches a value."""

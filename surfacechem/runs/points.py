@@ -39,7 +39,7 @@ from surfacechem.tolerances import ROUNDING, TINY
 Points = Mapping[str, ArrayLike]
 
 TRIALS = 50
-"""Steps of Newton's method at most; what is linear, as all rates are, takes one."""
+"""Largest number of Newton's steps; what is linear, as all rates are, takes one."""
 
 POINT = ("point",)
 LEVEL = ".level"

@@ -1,4 +1,4 @@
-"""A run again from its own file: the case and the mechanism that the dataset carries, with the recorded solver."""
+"""Repetition of a run from its own file: the case and mechanism that the dataset carries, with the recorded solver."""
 
 from __future__ import annotations
 
@@ -85,13 +85,13 @@ def read(path: str | Path) -> Record:
 
 @dataclass(frozen=True)
 class Kept:
-    """A sweep again of whose runs a part is kept."""
+    """A repeated sweep of whose runs a part is kept."""
 
     data: xarray.Dataset
 
     @classmethod
     def of(cls, record: Record, case: cases.Case) -> Kept:
-        """A sweep again that has kept what its case says, in one file."""
+        """A repeated sweep that has kept what its case says, in one file."""
         try:
             plan = recorded_plan(record.attribute("sweep", str))
             changes = dict(json.loads(record.attribute("changes", str)))
@@ -148,7 +148,7 @@ def run_again(record: Record, allow_code: bool = False) -> Solution | SweepSolut
 
 
 def _departures(record: Record) -> Mapping[str, Any]:
-    """In which way the run was not that of its case."""
+    """Settings in which the run was not that of its case."""
     if "departures" not in record.attributes:
         return {}
     try:

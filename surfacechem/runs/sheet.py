@@ -36,7 +36,7 @@ class Sheet:
 
 
 def counted(count: int, what: str) -> str:
-    """So many of what a noun names.
+    """A number with its noun, in the plural if need be.
 
     >>> counted(1, "run"), counted(61, "run")
     ('1 run', '61 runs')

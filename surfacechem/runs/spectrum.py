@@ -1,4 +1,4 @@
-r"""Force spectra: at which value of a growing load bonds break, from the run itself.
+r"""Force spectra: the value of a growing load at which bonds break, from the run itself.
 
 Along a run in which a prescribed variable x grows, the survival is :math:`S=\phi/\phi_i` and the density of ruptures
 :math:`-dS/dx`. The median is where S crosses one half, the mode where the density is largest, and both are located as
@@ -25,7 +25,7 @@ from surfacechem.solve.run import Trajectory
 from surfacechem.tolerances import FEWEST
 
 INTACT = FEWEST**0.5
-"""With more survivors at the end, 1e-6, the mean is not known: what is left then is less than half of the decades to
+"""Largest survival at the end, 1e-6, at which the mean is known: what is left then is less than half of the decades to
 FEWEST, at which a run has ruptured and ends.
 """
 

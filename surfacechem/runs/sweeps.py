@@ -1,4 +1,4 @@
-"""Sweeps: a grid of parameter values, the runs over it, how far each is from the truth, and all of it as a dataset."""
+"""Sweeps: a grid of parameter values, the runs over it, the error of each, and all of it as a dataset."""
 
 from __future__ import annotations
 
@@ -185,13 +185,13 @@ class SweepAccuracy:
 
     @property
     def unknown(self) -> str:
-        """Of how many runs the error is not known, and why; '' where of none."""
+        """Number of runs of which the error is not known, and the reason, in words; '' where of none."""
         count = len(self.errors) - len(self.known)
         return unknown_in(count, self.why) if count else ""
 
 
 def unknown_in(count: int, why: str) -> str:
-    """Of so many runs the error is not known, and why.
+    """Words for the number of runs of which the error is not known, and the reason.
 
     >>> unknown_in(2, "unknown: the run ended at its start")
     'unknown in 2 runs: the run ended at its start'
