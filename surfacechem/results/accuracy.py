@@ -97,7 +97,7 @@ class Accuracy:
 
     error: float
     source: str
-    """Words: the exact solution's name, the second run and its tolerance, or the balances."""
+    """The exact solution's name, the second run and its tolerance, or the balances, in words."""
     variables: Mapping[str, float] = field(default_factory=dict)
     exact: Mapping[str, Any] = field(default_factory=dict)
     """Exact values at the output times, by variable, where an exact solution was named."""
@@ -138,6 +138,6 @@ class CellErrors:
         return replace(other, variables=total, converged=self.converged and other.converged)
 
     def beside(self, other: CellErrors) -> CellErrors:
-        """The same of two kinds, with the words for both."""
+        """Errors of two kinds together, with the words for both."""
         kinds = [found.source for found in (other, self) if found.variables]
         return replace(self.added_to(other), source=", ".join(kinds), in_noise=self.in_noise or other.in_noise)

@@ -1,4 +1,4 @@
-"""Energy, entropy and sites along a run, against what the ledger says they should be.
+"""Audit of energy, entropy and sites along a run, against the ledger.
 
 The equations satisfy both laws of thermodynamics as they stand, so the residuals measure the integration. A law that
 dissipates less than nothing shows in ``least``.
@@ -66,7 +66,7 @@ class Audit:
     least: Mapping[str, float]
     """Least entropy production of each dissipative law over all steps and outputs [W/(m^2 K)]."""
     losses: Callable[[], tuple[Mapping[str, float], float]]
-    """Finds what is destroyed, which takes time where surroundings are asked for rates."""
+    """Function for what is destroyed, which takes time where surroundings are asked for rates."""
 
     @cached_property
     def _lost(self) -> tuple[Mapping[str, float], float]:
@@ -74,14 +74,14 @@ class Audit:
 
     @property
     def destroyed(self) -> Mapping[str, float]:
-        """Part of what each dissipative law turns over that it destroys, beyond rounding; nothing where that is less
-        than the last digit of the total.
+        """Fraction of its turnover that each dissipative law destroys, beyond rounding; nothing where that is less than
+        the last digit of the total.
         """
         return self._lost[0]
 
     @property
     def destroyed_together(self) -> float:
-        """The same of all laws together."""
+        """Fraction of their turnover that all laws together destroy."""
         return self._lost[1]
 
     @property

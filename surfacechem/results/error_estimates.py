@@ -49,7 +49,7 @@ LOOKS = 400
 """Times at which an exact solution is evaluated at most."""
 
 MOMENTS = 10.0 ** np.arange(-15, 1)
-"""Parts of a run in which one state may drive another."""
+"""Fractions of a run in which one state may drive another."""
 
 ENERGY, ENTROPY = "J/m^2", "J/(m^2 K)"
 """Units of accounts that belong together."""
@@ -59,7 +59,7 @@ EVENTS = "event times"
 
 
 def check_way(way: str) -> None:
-    """InputError for what is none of the WAYS."""
+    """Raise InputError for what is none of the WAYS."""
     if way not in WAYS:
         raise InputError(f"no source '{way}' of an error.{suggestion(way, WAYS)}", Place(path="--error"))
 
@@ -334,7 +334,7 @@ def _cubic(places: Sequence[float], rows: Array, wanted: Sequence[float]) -> Arr
 
 
 def beside_jumps(times: Array, first: Trajectory, second: Trajectory) -> Mask:
-    """At which times two runs with the same events have made the same jumps; those of the events are compared apart.
+    """Whether two runs with the same events have made the same jumps at each time; times of events are compared apart.
 
     One of them may have made another at the end, where rounding decides whether it still happens.
     """
@@ -480,7 +480,7 @@ def _driven(trajectory: Trajectory) -> Array:
 
 
 def difference(found: Mapping[str, Array], expected: Mapping[str, Array]) -> str:
-    """In which events two runs differ, in words; empty where they have the same. Kinks do not count.
+    """Difference of the events of two runs, in words; empty where they have the same. Kinks do not count.
 
     >>> difference({"slip": [0.1]}, {"slip": [0.1, 0.2], "stop": [0.3]})
     'other events: 2 slip instead of 1, 1 stop instead of 0'

@@ -1,4 +1,4 @@
-"""From a scene to its exact solution: parameters read off the scene, and a check that it solves the scene's equations.
+"""Exact solution of a scene: parameters read off the scene, and a check that it solves the scene's equations.
 
 An exact solution that is named for a scene it does not belong to is refused: it must start where the scene starts and
 satisfy the assembled equations.

@@ -64,7 +64,7 @@ TABLES = (CSV, PARQUET)
 """Suffixes of files that hold a dataset as a table."""
 
 COORDINATES = "coordinates"
-"""The global attribute that names what is no variable but a coordinate, though no dimension is called like it."""
+"""Global attribute that names auxiliary coordinates: coordinates that no dimension is called like."""
 
 WRITTEN = (*SUFFIXES, *TABLES)
 """Suffixes of files to which a run is written."""
@@ -304,7 +304,7 @@ def reading(path: Path, read: Callable[[], R]) -> R:
 
 
 def _try_elsewhere(path: Path, seconds: float) -> None:
-    """OSError where a process that reads the file dies of it, or takes longer than some seconds.
+    """Raise OSError where a process that reads the file dies of it, or takes longer than some seconds.
 
     In a damaged file HDF5 may go on without end, and nothing but the end of its process stops it: a thread would keep
     its locks, and crash the process that ends with it.

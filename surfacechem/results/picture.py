@@ -1,4 +1,4 @@
-"""Outputs that follow a run: of all states that are known, those without which its picture would not be true.
+"""Choice of outputs that follow a run: of all known states those without which its picture would not be true.
 
 Known are the ends of steps, both sides of events and breakpoints, the times at which runs are compared, and what the
 stepper adds inside steps that are too long for a straight line. The picture is true where straight lines between

@@ -218,7 +218,7 @@ class Solution(Results):
         return {"reaction": " and ".join(found) or "isothermic"}
 
     def _departures(self) -> dict[str, str]:
-        """In which way the run was not that of its case, for running it again."""
+        """Settings in which the run was not that of its case, for running it again."""
         run = self.trajectory.run
         departures: dict[str, object] = {"changes": dict(self.changes)} if self.changes else {}
         if self.case_run is not None:

@@ -1,4 +1,4 @@
-"""Cells across bodies: how many, how wide, and the error that they leave.
+"""Cells across bodies: their number, their widths, and the discretisation error.
 
 Heat that begins to enter through a face has reached the depth sqrt(alpha t) a time t later. An error of cells can only
 be told from other cells where both resolve that layer: cells far wider than it agree on almost nothing having happened.
@@ -36,7 +36,7 @@ PER_FOLD = 8
 """Cells at first in which the distance from a face grows by e: errors are some 0.4 % of a rise in temperature then."""
 
 THINNEST = 2.0**-30
-"""Part of a body below which its layer is an atom's; the width of a cell at the far side has six digits there."""
+"""Fraction of a body below which its layer is an atom's; the width of a cell at the far side has six digits there."""
 
 SPARE, FASTEST = 3.0, 16.0
 """Part of the accuracy that temperatures use up, as heat fluxes are differences of them and err by more, and the most
@@ -56,7 +56,9 @@ RATIO = 2.0
 """Ratio of the times at which the errors of cells are told behind something sudden."""
 
 ORDER, LEAST_ORDER = 4.0, 2.0
-"""By how much half of the cells err more: at second order, and at first, below which nothing converges."""
+"""Ratio of errors with half of the cells to those with all: at second order, and at first, below which nothing
+converges.
+"""
 
 
 def divided(scene: Scene) -> bool:
@@ -126,7 +128,7 @@ def begun(system: System, end: float) -> Array:
 
 
 def unresolved(system: System, end: float, t: Array) -> NDArray[np.bool_]:
-    """At which of these times something sudden has just begun that cells do not resolve yet; at none without cells."""
+    """Whether at each time something sudden has just begun that cells do not resolve yet; at none without cells."""
     if not system.profiles:
         return np.zeros(len(t), bool)
     starts = begun(system, end)
@@ -274,7 +276,7 @@ def differences(better: Trajectory, worse: Trajectory) -> dict[str, float]:
 
 def missed(scene: Scene, errors: CellErrors, found: Accuracy | None = None) -> tuple[str, ...]:
     """Words for errors that are not known, for an accuracy that the most cells do not reach, or that a given number of
-    cells does not.
+    cells misses.
     """
     if not errors.converged:
         return (f"{UNKNOWN}. Let outputs begin later after what is sudden, or say `after`, or give more of them",)

@@ -191,7 +191,7 @@ class Store:
 
     @contextmanager
     def writing(self) -> Iterator[None]:
-        """OutputError where the disk does not take what is written."""
+        """Raise OutputError where the disk does not take what is written."""
         try:
             yield
         except OSError as error:
