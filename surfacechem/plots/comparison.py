@@ -27,12 +27,12 @@ DASHES = ("-", "--", ":", "-.")
 """Lines of the variables of a panel, whose colours say of which dataset they are."""
 
 WORDS = ("title", "description", "source", "reference")
-"""Keys of a case that say nothing about its scene."""
+"""Keys of a case that do not describe its scene."""
 
 LONG_NUMBER = re.compile(r"\b\d\.?\d{7,}(?:e[+-]?\d+)?|\b\d+\.\d{7,}(?:e[+-]?\d+)?")
 
 LONG = 40
-"""Letters of a label that does not leave room for another beside it."""
+"""Length of a label [letters] that does not leave room for another beside it."""
 
 MOST_DIFFERENCES = 4
 """Parameters that a legend names; of more the titles or the files tell more."""

@@ -18,7 +18,7 @@ from surfacechem.scene import Body, Mounting, Scene
 
 BODY, MEDIUM, HEAT, SPRING, GIVEN = "#e8eaee", "#f6d8a8", "#c0392b", "#33475b", "#1f6f4a"
 WIDTH, HEIGHT, GAP = 2.7, 0.95, 0.26
-"""Of the drawing [inch]: width and height of a body, and the height of the interface between the two."""
+"""Dimensions of the drawing [inch]: width and height of a body, and the height of the interface between the two."""
 
 BESIDE, OVER, LINE = 1.6, 0.5, 0.145
 """Room [inch] beside the bodies for heat paths, over them for springs and far sides, and of a line of text."""
@@ -26,7 +26,7 @@ BESIDE, OVER, LINE = 1.6, 0.5, 0.145
 SMALL = 7.5
 COILS = 5
 LETTERS = 44
-"""Of a line below the drawing."""
+"""Letters of a line below the drawing."""
 
 HEAT_TO = {"Q_1": 0, "Q_2": 1, "Q_c": None}
 """Heat that a case supplies, and the number of the body that receives it; None for the interface."""

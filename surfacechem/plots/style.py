@@ -1,4 +1,4 @@
-"""The style of all figures: colours, symbols and units as text, headings, and datasets that are fit to be drawn."""
+"""Style of all figures: colours, symbols and units as text, headings, and checks of datasets to be drawn."""
 
 from __future__ import annotations
 
@@ -114,7 +114,7 @@ def panels(width: float, height: float, rows: int = 1, columns: int = 1, **shari
 
 @contextmanager
 def narrow() -> Iterator[None]:
-    """Figures are narrow meanwhile, for a page that a phone shows."""
+    """Draw narrow figures meanwhile, for a page that a phone shows."""
     usual = WIDEST.set(PHONE)
     try:
         yield
@@ -160,7 +160,7 @@ def in_celsius(dataset: xarray.Dataset) -> xarray.Dataset:
 def check(
     dataset: xarray.Dataset, numbers: Mapping[str, tuple[str, ...]], texts: Mapping[str, tuple[str, ...]] | None = None
 ) -> None:
-    """InputError where variables that are drawn are missing, or not what surfacechem writes: numbers in double
+    """Raise InputError where variables that are drawn are missing, or not what surfacechem writes: numbers in double
     precision, or texts, over these dimensions.
     """
     for name, dimensions in {**numbers, **(texts or {})}.items():
