@@ -51,7 +51,7 @@ log = logging.getLogger(__name__)
 SCALES = "linear", "log"
 
 HIDDEN = 1 / 200
-"""Part of its range by which a curve has to differ from another to be seen beside it."""
+"""Fraction of its range by which a curve has to differ from another to be seen beside it."""
 
 EXACT: Mapping[str, Any] = {"color": "0.8", "linewidth": 4.5, "zorder": 1}
 """Style of exact curves."""

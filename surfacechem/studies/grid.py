@@ -48,7 +48,7 @@ class Cell:
     stepping: list[float] = field(default_factory=list, kw_only=True)
     """Parts of the run times inside a library's own steps; NaN for a method that does everything itself."""
     again: Callable[[], Trajectory] | None = field(default=None, kw_only=True, repr=False)
-    """Runs it once more."""
+    """Function that runs it once more."""
     solver: str = field(default="", kw_only=True)
     value: float = field(default=math.nan, kw_only=True)
     """The value at which it was run; with the solver, its place in the grid."""
@@ -118,8 +118,8 @@ def _time_again(cell: Cell) -> None:
 def check_options(
     solvers: Sequence[str], tolerances: Sequence[float], rounds: int, bounds: tuple[int, int], options: Sequence[str]
 ) -> None:
-    """InputError for a solver that there is not, a tolerance that no solver takes, rounds out of bounds, and for none
-    of the first two; ``options`` names the three.
+    """Raise InputError for a solver that there is not, a tolerance that no solver takes, rounds out of bounds, and for
+    none of the first two; ``options`` names the three.
     """
     refuse_unknown(solvers, names, "no solver '{}'", Place(path=options[0]))
     for rtol in tolerances:

@@ -136,13 +136,13 @@ class Curves:
         return formula(**{name: self._known[name] for name in reads(formula)})
 
     def _log_rate(self, labels: Iterable[str], change: Mapping[str, int | float]) -> Expression:
-        """Over the amount of the bond that the reaction makes or breaks."""
+        """Logarithm of a rate over the amount of the bond that the reaction makes or breaks."""
         laws = (self.laws[label] for label in labels)
         total = log_sum([self._call(law.bind(_symbols(law)).log_forward) for law in laws])
         return total - log(min(self._amounts[name] for name in change))
 
     def _log_equilibrium(self, change: Mapping[str, int | float], paired: bool) -> Expression:
-        """With the work of a prescribed force on reactions that undo each other."""
+        """Logarithm of the equilibrium constant, with the work of a prescribed force on reactions that are undone."""
         total: Expression = 0
         for name, nu in change.items():
             total += nu * derivative(self._psi, self._coverages[name]) / self._amounts[name]
