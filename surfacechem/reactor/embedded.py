@@ -1,5 +1,5 @@
 """A scene whose surroundings are given while it runs: assembled, compiled and evaluated for a reactor of a network, and
-what it went through as the solution that a run hands back.
+its history as the solution that a run hands back.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ FOREVER = 1e300
 NONE: Mapping[str, Callable[[float], float]] = {}
 
 GLOBAL = 100
-"""By how much the error of a state may exceed the tolerance of a step."""
+"""Ratio by which the error of a state may exceed the tolerance of a step."""
 
 DIFFERENCE = 8 * SQRT_EPS
 """A few of the steps by which Cantera's integrator differentiates, which bounds must not take for the solution."""
@@ -49,11 +49,11 @@ class Beside:
 
     reactor: Any
     held: HeldPhase
-    """The same at the temperature of the surface."""
+    """Its phase, held at the temperature of the surface."""
     places: NDArray[np.int64]
-    """Of its pressure and mole fractions among the parameters."""
+    """Indices of its pressure and mole fractions among the parameters."""
     species: NDArray[np.int64]
-    """Those which reactions make."""
+    """Indices of the species which reactions make."""
     accounts: NDArray[np.int64]
     """Indices of the variables that hold the amount of each."""
 
@@ -75,7 +75,7 @@ class Beside:
 
 
 class Moments:
-    """The instants of a scene whose arcs something else integrates: what is due, where in a step, and what follows."""
+    """Events of a scene whose arcs something else integrates: what is due, where in a step, and what follows."""
 
     def __init__(self, model: Model, problem: Problem, evaluation: Evaluation) -> None:
         assert model.jumper is not None
@@ -92,7 +92,7 @@ class Moments:
         return self.instant.jumps
 
     def until(self, goal: float, rtol: float) -> None:
-        """The time that is integrated next, and how closely; what is brief is so against it."""
+        """Set the time that is integrated next, and the tolerance; what is brief is so against it."""
         self.instant.end, self.instant.rtol = goal, GLOBAL * rtol
 
     def begin_piece(self, parameters: Array) -> None:
@@ -137,7 +137,7 @@ class Moments:
         return self._taken(self.instant.resolve(point) if point is not None else None, before)
 
     def _taken(self, point: Point | None, before: Array) -> Array | None:
-        """Go on from a point; what the ledger has gained since."""
+        """Go on from a point; returns what the ledger has gained since."""
         if point is None:
             return None
         self.evaluation.parameters[:] = point.parameters
@@ -193,7 +193,7 @@ class EmbeddedScene:
         self.moments = Moments(self.model, self.problem, self.evaluation) if self.model.jumper else None
         self._terminal = np.array([margin.terminal for margin in self.model.margins], dtype=bool)
         self.places = {parameter.path: j for j, parameter in enumerate(system.parameters)}
-        """Places of the parameters, by path."""
+        """Indices of the parameters, by path."""
         self.states = tuple(system.states[j].name for j in self.evaluation.free)
         self.beside = [self._beside(scene.interface.engine, *item) for item in (neighbours or {}).items()]
         """The reactors beside the surface."""
@@ -246,7 +246,7 @@ class EmbeddedScene:
         return [edge.name for edge in system.edges if depends(system.expand(edge.guard), symbol)]
 
     def put(self, t: float, x: Array) -> bool:
-        """Go to a time and variables, under the loads of that time; whether a state was found."""
+        """Go to a time and variables, under the loads of that time; returns whether a state was found."""
         for path, function in self.loads.items():
             self.evaluation.parameters[self.places[path]] = float(function(t))
         return self.evaluation.put(t, x[: len(self.states)])

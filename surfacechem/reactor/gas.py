@@ -19,7 +19,7 @@ REFUSED: list[Any] = []
 
 
 def refuse(connector: Any, message: str) -> NoReturn:
-    """InputError for a connector while Cantera makes it, which then carries nothing between the reactors it joins."""
+    """Raise InputError for a connector that Cantera makes, which then carries nothing between its reactors."""
     REFUSED.append(connector)
     if isinstance(connector, cantera.FlowDevice):
         connector.device_coefficient = 0.0

@@ -22,10 +22,10 @@ GROWTH = 1e4
 """Largest ratio of a step of CVODE to the one before: after the first step this, later 10."""
 
 STEPS_OF_A_RESIDUAL = 10
-"""Steps between two looks at whether anything changes still, as in Cantera."""
+"""Steps between two tests of whether anything changes still, as in Cantera."""
 
 LONGEST = 1.0
-"""Time that counts as what is integrated where no end is given [s]."""
+"""Length of the integration that is assumed where no end is given [s]."""
 
 
 class ReactorNet(cantera.ReactorNet):
@@ -276,7 +276,9 @@ class ReactorNet(cantera.ReactorNet):
             self.reinitialize()
 
     def _refuse_strangers(self) -> None:
-        """A reactor in the place of a body, or behind a wall on one, changes only if it is in the network."""
+        """Refuse reactors in the place of a body, or behind a wall on one, that are not in the network and so never
+        change.
+        """
         for interface in self.interfaces:
             others = [(f"stands for the body {body}", reactor) for body, reactor in interface.bodies.items()]
             others += [(f"is the neighbour {name}", reactor) for name, reactor in interface.neighbours.items()]
@@ -331,7 +333,7 @@ class ReactorNet(cantera.ReactorNet):
 
 
 def _number(reactors: Sequence[Any]) -> None:
-    """Give names that occur again a number."""
+    """Number the names that occur more than once."""
     counts = Counter[str]()
     for reactor in reactors:
         name = reactor.name

@@ -21,14 +21,15 @@ from surfacechem.solve.contract import Array, Margin
 from surfacechem.tolerances import NEGLIGIBLE
 
 FIRST = NEGLIGIBLE**3
-"""First look ahead after a start, as part of what is integrated: the integrator starts with shorter steps still."""
+"""Time of the first look after a start, as part of what is integrated: the integrator starts with shorter steps still.
+"""
 
 SHORTEST, AHEAD = 1e4, 4.0
 """The shortest first look and all later ones, in roundings of the time."""
 
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(6)
-"""Gauss's quadrature from -1 to 1."""
+"""Nodes and weights of Gauss's quadrature from -1 to 1."""
 
 PANELS_OF_A_PERIOD = 8
 
@@ -56,7 +57,7 @@ class Watch:
         self._steps: list[DenseStep] = []
 
     def restart(self) -> None:
-        """The integrator starts anew from here."""
+        """Start anew, as the integrator does."""
         self.started, self.known, self.event = False, -np.inf, None
 
     def ahead(self, goal: float) -> float:
