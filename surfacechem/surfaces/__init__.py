@@ -1,1 +1,1 @@
-"""Two curved surfaces: where they are nearest, what their points do to each other, and the force that follows."""
+"""Two curved surfaces: their nearest places, the interaction of their points, and the resultant force."""

@@ -1,4 +1,4 @@
-"""A function of the approach from its values and slopes at a few approaches: an energy with its force, for instance.
+"""Fits of a function of the approach to values and slopes at a few approaches: an energy with its force, for instance.
 
 Between two approaches the slope is a polynomial through Chebyshev's points, of which twice as many hold those before;
 where more of them do not help the piece is halved. Source: Trefethen (2013), Approximation Theory and Approximation
@@ -37,7 +37,7 @@ SHORTEST = 2.0**-26
 MOST_PIECES = 200
 
 BETWEEN = (-0.97, -0.52, 0.14, 0.71, 0.97)
-"""Places on a piece at which it is seen what a polynomial misses, beside its ends."""
+"""Places on a piece, beside its ends, at which the error of a polynomial is seen."""
 
 logger = logging.getLogger(__name__)
 
@@ -47,7 +47,9 @@ Samples = Callable[[float], tuple[float, float, float]]
 
 @dataclass(frozen=True)
 class ApproachPiece:
-    """Between two approaches the force as a polynomial of x, -1 to 1; where ``powers`` the slope of ln E over ln d."""
+    """Piece of the force as a polynomial of x, -1 to 1, between two approaches; where ``powers`` of the slope of ln E
+    over ln d.
+    """
 
     low: float
     high: float
@@ -92,7 +94,7 @@ class ApproachEnergy:
 
     @property
     def numbers(self) -> list[Any]:
-        """All that it is made of, to be kept in a file."""
+        """All numbers that determine it, to be kept in a file."""
         return [[astuple(piece) for piece in self.pieces], self.force, self.factor, self.error]
 
     @classmethod
@@ -223,7 +225,7 @@ def value_at(sample: Samples, d: float, powers: bool) -> float:
 
 
 def polynomial(sample: Sampled, a: float, b: float, powers: bool, rtol: float, least: float) -> Array | None:
-    """Coefficients of what is fitted between two approaches; None where a higher degree gains too little."""
+    """Coefficients of the polynomial fitted between two approaches; None where a higher degree gains too little."""
 
     def value(x: float) -> float:
         return value_at(sample, approach_at(x, a, b, powers), powers)

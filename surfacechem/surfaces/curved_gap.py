@@ -107,7 +107,7 @@ def between_flats(law: PairEnergy) -> Density:
 
 
 def bends(laws: Iterable[Potential | HeatTransfer]) -> list[float]:
-    """Gaps at which laws bend or are narrow, and zero."""
+    """Gaps at which laws have kinks or are narrow, and zero."""
     found = {0.0}
     for law in laws:
         for places in (law.kinks.get(GAP, ()), law.peaks.get(GAP, ())):
@@ -214,7 +214,7 @@ def over_gap(
 
 
 def _check_end(patches: Patches, rules: Rules, sizes: Array) -> None:
-    """InputError where what is integrated over an endless surface does not fall off on the way to its far end."""
+    """Raise InputError where what is integrated over an endless surface does not fall off on the way to its far end."""
     low, high = np.isinf(np.transpose(patches.surface.shape.span))
     last = (high & (patches.high == patches.high.max(axis=0))) | (low & (patches.low == patches.low.min(axis=0)))
     if not last.any():

@@ -21,7 +21,7 @@ from surfacechem.surfaces.shapes import Sphere
 from surfacechem.tolerances import NEGLIGIBLE, TINY
 
 LEFT_OUT = 0.01
-"""Part of the accuracy that is far away of one surface, and not summed."""
+"""Truncation error of a sum as a fraction of the accuracy: what is far away of one surface is not summed."""
 
 SOUGHT = 4
 """Points that are looked at for one on a ray, as bends are sought along it."""

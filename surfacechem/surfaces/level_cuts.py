@@ -1,5 +1,5 @@
-"""Patches that are cut where the gap passes a level at which a law bends, and where the nearest point comes to an edge
-of the other surface, so that rules stay accurate on both sides.
+"""Patches cut where the gap passes a level at which a law has a kink, and where the nearest point comes to an edge of
+the other surface, so that rules stay accurate on both sides.
 
 Source: Saye (2015), doi 10.1137/140966290: along the direction in which the gap changes most its level is found on each
 line of nodes; the other direction is cut where the level leaves the patch.
@@ -53,7 +53,7 @@ class LevelPatches(Patches):
     level: Levels
     along: Levels
     share: Array
-    """Part of each below the level times that above."""
+    """Fraction of each below the level times that above."""
     crossed: NDArray[np.bool_]
     """Whether an edge divides each in another way."""
     leaves: Array
@@ -121,7 +121,7 @@ class LevelPatches(Patches):
         return super().most(order) * (2 * PARTS if self.along[0] >= 0 else 1)
 
     def cost(self, order: int) -> int:
-        """Those of the searches for the level on each line of nodes."""
+        """Cost of the searches for the level on each line of nodes."""
         return 0 if self.along[0] < 0 else len(self) * PARTS * order * ROOTS * self.other.search
 
     def _across(self, j: int, order: int) -> tuple[Array, Array]:

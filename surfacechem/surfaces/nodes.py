@@ -1,4 +1,4 @@
-"""Sums over the inner of two surfaces: nodes that gather around the nearest point.
+"""Sums over the inner of two surfaces: quadrature nodes that gather around the nearest point.
 
 Around the foot of a point at the distance h the parameters are x = h sinh t. In t the distance has no feature narrower
 than pi/2 whatever h is, so that Gauss's rule on pieces of a fixed length converges geometrically for any gap; the

@@ -12,7 +12,7 @@ from surfacechem.expressions import Expression, positive, where
 
 
 class InversePower(PairEnergy):
-    r"""A power of the distance; the sum of two of them is a potential of Mie.
+    r"""A power of the distance; the sum of two of them is a Mie potential.
 
     .. math:: \psi = \psi_0 (r_0 / r)^m
 
@@ -90,7 +90,7 @@ class PenaltyPair(PairEnergy):
 
 
 class PairTable(PairEnergy):
-    r"""A law of distance of one's own, as a table.
+    r"""A law of distance given by a table.
 
     .. math:: \psi = \text{cubics through } (r_i, \psi_i), \quad 0 \text{ beyond the last}
 

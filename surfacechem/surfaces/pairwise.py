@@ -169,7 +169,7 @@ def _pushes(x: Array, inner: Surface, laws: Sequence[PairEnergy], rtol: float, b
 
 
 def check_finite(lower: Surface, upper: Surface) -> None:
-    """InputError where two surfaces without end run along each other, so that their energy has no end either."""
+    """Raise InputError where two surfaces without end run along each other, so that their energy has no end either."""
     shapes = [surface.shape for surface in (lower, upper)]
     endless = [[not shape.about_axis and not np.all(np.isfinite(ends)) for ends in shape.span] for shape in shapes]
     # What has no end in both directions shares one with anything that has none in one.
@@ -179,7 +179,7 @@ def check_finite(lower: Surface, upper: Surface) -> None:
 
 
 def _check_decay(law: PairEnergy, size: float, rtol: float) -> None:
-    """InputError where a law falls off slower than it says, or so slowly that no reach is far enough."""
+    """Raise InputError where a law falls off slower than it says, or so slowly that no reach is far enough."""
     if math.isfinite(law.cutoff):
         return
     near, far = np.abs(kernel(law)(size * REMOTE)[:, 0])
@@ -212,7 +212,7 @@ def _reach(lower: Surface, upper: Surface, extent: Extent, rtol: float) -> float
 
 
 def _check_energy(lower: Surface, upper: Surface, law: PairEnergy) -> None:
-    """InputError where two surfaces without end separate so slowly that their energy has no end."""
+    """Raise InputError where two surfaces without end separate so slowly that their energy has no end."""
     shapes = [surface.shape for surface in (lower, upper)]
     turned = [shape for shape in shapes if shape.about_axis and not np.all(np.isfinite(shape.span))]
     endless = turned and not any(np.all(np.isfinite(shape.span)) for shape in shapes)

@@ -154,7 +154,7 @@ class Patches:
         return replace(self, high=high).joined(replace(self, low=low))
 
     def joined(self, *others: Self) -> Self:
-        """These and others."""
+        """These patches and others."""
         parts: dict[str, Any] = {
             name: np.concatenate([getattr(part, name) for part in (self, *others)]) for name in self.arrays
         }
@@ -255,7 +255,7 @@ class Budget:
         self.refuse_beyond(self.spent)
 
     def refuse_beyond(self, ahead: float) -> None:
-        """OutOfReachError where that is too much."""
+        """Raise OutOfReachError where that is too much."""
         if self.whole(ahead) > MOST_POINTS:
             text = f"the accuracy {self.rtol:.2g} of an integral over the surfaces is out of reach"
             what = f"{self.integrals} of them take" if self.integrals > 1 else "it takes"
@@ -316,7 +316,7 @@ class Known:
     stuck: NDArray[np.bool_]
 
     def but(self, gone: NDArray[np.bool_], others: Known) -> Known:
-        """These without some, and others."""
+        """The results without those of some patches, and with others."""
         kept = {
             item.name: np.concatenate([getattr(self, item.name)[~gone], getattr(others, item.name)])
             for item in fields(self)[1:]

@@ -32,7 +32,7 @@ from surfacechem.surfaces.projection import Array, Surface
 from surfacechem.tolerances import ATOM, FLOOR, NEGLIGIBLE, NOISE, ROUNDING, SQRT_EPS
 
 KNOWN: dict[Fingerprint, tuple[ApproachEnergy, ...]] = {}
-"""Curves that have been integrated, by what they are the curves of."""
+"""Curves that have been integrated, by the fingerprint of their laws and surfaces."""
 
 log = logging.getLogger(__name__)
 
@@ -226,7 +226,7 @@ class CurvedSurfaces(Potential):
         return [*found, fitted(of_gap, *self.approach, rtol, cuts, floor, spent)]
 
     def _refuse_jumps(self) -> None:
-        """InputError where the energy of a law jumps, so that no force is its slope."""
+        """Raise InputError where the energy of a law jumps, so that no force is its slope."""
         least, largest = self.approach
         far = largest + length(*self.surfaces(largest))
         beyond = np.geomspace(abs(largest) or far * NEGLIGIBLE, far, LOOKS)
@@ -257,7 +257,7 @@ class CurvedSurfaces(Potential):
         return whole
 
     def repulsion(self) -> Expression:
-        """None that could be told from the attraction."""
+        """Repulsion; none that could be told from the attraction."""
         return 0.0
 
     def contact(self, d: float, pairs: bool = True, budget: Budget | None = None) -> Contact:

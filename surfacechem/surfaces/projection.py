@@ -26,7 +26,7 @@ from surfacechem.tolerances import DIGITS, GONE, SAME, TINY, ULPS
 Array = NDArray[np.float64]
 
 NEWTONS = 100
-"""Steps after which a search ends; some ten are the rule."""
+"""Steps of Newton's method after which a search ends; some ten are the rule."""
 
 HALVINGS = 16
 """Times that a step is halved at most."""
@@ -41,7 +41,7 @@ FIRST, SECOND, THIRD = 3, 6, 10
 """Numbers of derivatives up to an order: x; x_u, x_v; x_uu, x_uv, x_vv; and four of third order."""
 
 AREA = 0
-"""Asks for points and areas per parameters alone."""
+"""Argument that asks for points and areas per parameters alone."""
 
 
 @lru_cache(maxsize=64)

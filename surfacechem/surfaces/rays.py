@@ -1,4 +1,4 @@
-"""Sums over a surface of laws that bend or end: along rays from the nearest point, cut at distances of bends.
+"""Sums over a surface of laws with kinks or a cutoff: along rays from the nearest point, cut at these distances.
 
 The rays go to the edges of the surface, or to where a law ends at the latest, in parameters that have no pole. On the
 way out nodes gather at the start as in :mod:`surfacechem.surfaces.nodes`, and along edges at the nearest point.
