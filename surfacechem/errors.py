@@ -10,16 +10,16 @@ from dataclasses import dataclass, field
 from typing import Self
 
 LINES, NEAR = 240, 6
-"""Characters of names that a message lists all, some two lines, and how many it lists of more: the nearest."""
+"""Total length of names [characters] up to which a message lists all, some two lines; of more so many, the nearest."""
 
 LAWS, PATHS = "`surfacechem laws`", "`surfacechem equations CASE`"
 """Commands, as messages name them, that list all laws, and all paths of parameters of a case."""
 
 LONGEST = 2000
-"""Characters of a message: more is not read."""
+"""Largest length of a message [characters]: more is not read."""
 
 LIKE = 0.6
-"""Part of two names that is the same, above which one is a guess for the other: a choice, that of `difflib`."""
+"""Similarity of two names above which one is a guess for the other: a choice, that of `difflib`."""
 
 SUFFIX = re.compile(r"\.(ya?ml|nc|csv)$")
 
@@ -110,7 +110,7 @@ def suggestion(name: str, known: Iterable[str], listed_by: str = "") -> str:
 def refuse_unknown(
     names: Iterable[str], known: Collection[str], message: str, place: Place | None = None, listed_by: str = ""
 ) -> None:
-    """InputError for the first name that is none of the known ones; it stands where the message has {}.
+    """Raise InputError for the first name that is none of the known ones; it stands where the message has {}.
 
     >>> refuse_unknown(["k", "mu_s"], ["k", "mu"], "no parameter '{}'")
     Traceback (most recent call last):

@@ -411,7 +411,7 @@ def sinh_exp(x: Expression, exponent: Expression) -> Expression:
 
 
 def _half(x: Expression, exponent: Expression) -> Expression:
-    """The same for x >= 0."""
+    """sinh(x) exp(exponent) for x >= 0."""
     return -0.5 * expm1(-2 * x) * exp(x + exponent)
 
 

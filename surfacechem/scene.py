@@ -77,7 +77,7 @@ class Conduction(Law):
 
     @property
     def points(self) -> tuple[float, ...]:
-        """Ends of the cells from the contact to the far side, as parts of the thickness."""
+        """Edges of the cells from the contact to the far side, as fractions of the thickness."""
         if self.layer:
             return grids.layered(self.cells, self.layer, both=self.far is not None)
         return grids.points(self.cells, self.grading)
@@ -192,13 +192,13 @@ class Electrode:
     start: float
     """Its potential at the start [V]."""
     capacitance: float
-    """[F/m^2]."""
+    """Capacitance [F/m^2]."""
     current: Load | None = None
     """Electric current into it from outside [A/m^2]; none without one."""
 
 
 class Engine(Protocol):
-    """Something outside that gives parameters of the scene while it runs, from values of its variables."""
+    """External evaluator that gives parameters of the scene while it runs, from values of its variables."""
 
     @property
     def reads(self) -> tuple[str, ...]:

@@ -15,8 +15,8 @@ ULPS = 2 * EPS
 """Error of one term of a formula, 4.4e-16: library functions are right to one unit in the last place, not to half."""
 
 DIGITS = 4 * EPS
-"""Numbers that are equal but for the order of a few operations, 8.9e-16: eight of them, at half an EPS each. Also the
-closest bracket that Brent's method accepts.
+"""Relative difference of numbers that are equal but for the order of a few operations, 8.9e-16: eight of them, at half
+an EPS each. Also the closest bracket that Brent's method accepts.
 """
 
 NOISE = 16 * EPS
@@ -35,8 +35,8 @@ has at most some 1e7 of them.
 """
 
 CROSSED = 512 * EPS
-"""Guards below this part of their magnitude, and times closer than this part of them, are one, 1.1e-13: SOLVED of the
-step onto an event, and eight times that for what is added up between two looks at it.
+"""Relative size below which guards are zero and times the same, 1.1e-13: SOLVED of the step onto an event, and eight
+times that for what is added up between two looks at it.
 """
 
 SQRT_EPS = EPS**0.5
@@ -51,18 +51,18 @@ QUARTER_EPS = EPS**0.25
 """Step of a second difference, 1.2e-4, which divides the rounding by the square of the step."""
 
 NEGLIGIBLE = 1e-3
-"""Part of a whole that changes no decision: step sizes and iterations are known to a few per cent at best."""
+"""Fraction of a whole that changes no decision: step sizes and iterations are known to a few per cent at best."""
 
 TINY = float_info.min / EPS
 """Least size of a divisor, 1e-292: what is smaller by a factor EPS is still a normal number."""
 
 SHALLOW = 1e-10
-"""Part of a run, or of the largest value of a guard, that is too brief or too shallow to tell at loose tolerances: ten
-times the tolerance of a run that asks for none.
+"""Fraction of a run, or of the largest value of a guard, that is too brief or too shallow to tell at loose tolerances:
+ten times the tolerance of a run that asks for none.
 """
 
 PICTURE = 1e-3
-"""Part of its range by which a straight line between two outputs may miss a quantity: a pixel of a large figure."""
+"""Largest error of a line between two outputs, relative to the range of a quantity: a pixel of a large figure."""
 
 FINER = 8
 """The stepper follows the states so many times closer, as quantities that depend on them may bend more."""
@@ -71,17 +71,17 @@ UNRESOLVED = 100.0
 """Tolerances of a value, or roundings, below which a change may be an error of the run: smooth runs err by less."""
 
 MOMENT = 1e-12
-"""Part of the time that has passed that no run resolves, in which nothing that stops is followed any more: ROUNDING of
-what is summed along it, to the next power of ten.
+"""Fraction of the time that has passed that no run resolves, in which nothing that stops is followed any more: ROUNDING
+of what is summed along it, to the next power of ten.
 """
 
 SOON = 1e-9
-"""Part of the time that has passed within which nothing of interest happens: a thousand times MOMENT, which a clock
+"""Fraction of the time that has passed within which nothing of interest happens: a thousand times MOMENT, which a clock
 tells apart, and far below what any output does.
 """
 
 BRIEF = 1e-6
-"""Part of a run that counts as brief: a thousand times SOON, so that steps may still follow what happens in it."""
+"""Fraction of a run that counts as brief: a thousand times SOON, so that steps may still follow what happens in it."""
 
 NOTHING = 1e-9
 """Amount of a variable, in its SI unit, that means nothing: a billionth of an area or of a fraction, a nanopascal, a
@@ -122,8 +122,8 @@ ATOM = SOLVED * MICROMETRE
 """Gap [m] that counts as none, 1.4e-20: what a search leaves of a micrometre, far below any atom."""
 
 NONE_OF_SCALE = 1e-6
-"""Part of its scale that is no more of a state, times rtol: the default absolute tolerance. Scales are those of the
-largest values in use, and states matter over some six decades below them.
+"""Default absolute tolerance of a state: this fraction of its scale, times rtol. Scales are those of the largest values
+in use, and states matter over some six decades below them.
 """
 
 DEFAULT_RTOL = 1e-11
@@ -131,8 +131,8 @@ DEFAULT_RTOL = 1e-11
 """
 
 GONE = 1e-30
-"""A margin that has shrunk to this part of its largest value is closed at any speed: the square of SQRT_EPS * SHALLOW,
-below what any rounding or tolerance leaves of it.
+"""Fraction of its largest value at which a margin that has shrunk is closed at any speed: the square of SQRT_EPS *
+SHALLOW, below what any rounding or tolerance leaves of it.
 """
 
 TIGHTEST = 1e-13
@@ -158,15 +158,17 @@ condition of their vectors, 1e5 at most in scaled rows.
 """
 
 SAME = 1e-9
-"""Numbers of a scene and of an exact solution that are the same: cases are written with nine digits and converted."""
+"""Relative difference up to which numbers of a scene and of an exact solution are equal: cases are written with nine
+digits and converted.
+"""
 
 MISMATCH = 1e-6
-"""Part of an equation by which an exact solution may miss it: differences in time keep seven digits near events, where
-they are worst. Scenes that differ in more than their sixth digit are told apart.
+"""Relative residual of an equation with which an exact solution still satisfies it: differences in time keep seven
+digits near events, where they are worst. Scenes that differ in more than their sixth digit are told apart.
 """
 
 STILL = 1e-14
-"""Part of the tractions that cancel in a balance of sliding that counts as none: SOLVED, rounded down."""
+"""Fraction of the tractions that cancel in a balance of sliding that counts as none: SOLVED, rounded down."""
 
 INSIDE = 1e-15
 """Distance from a bound, in parts of the range, at which a law that has no rate at the bound itself is asked: about
@@ -174,13 +176,13 @@ DIGITS, the nearest that a fraction is told from one. An equilibrium that lies n
 """
 
 CREEP = 1e-25
-"""Velocity [m/s] that counts where friction remembers: at rest it creeps, by tens of decades slower than it slides."""
+"""Least velocity [m/s] that counts where friction has a state: it creeps at rest, tens of decades below sliding."""
 
 INSTANT = 1e-100
-"""Time [s] that is none: a rate at the cap of an exponent, 1e130 times its prefactor, is over within it."""
+"""Time [s] that counts as zero: a rate at the cap of an exponent, 1e130 times its prefactor, is over within it."""
 
 DRIFT = 100.0
-"""Traction out of balance that the integration explains, relative to its parts and in units of the tolerance."""
+"""Unbalanced traction that the integration explains, relative to its parts and in units of the tolerance."""
 
 MOST_DRIFT = 0.1
 """The same relative to its parts, however loose the tolerance: of what cancels to less than that the sign is known."""
