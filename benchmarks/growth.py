@@ -81,7 +81,7 @@ def of_mechanism(text: Callable[[int], str]) -> Callable[[int], Simulation]:
 
 
 def costs(load: Callable[[int], Simulation], size: int) -> dict[str, float]:
-    """Of getting a scene ready, and of its steps alone, once it is."""
+    """Costs of getting a scene ready, and of its steps alone, once it is."""
     fresh = load(size)
     begun = time.process_time()
     fresh.model  # noqa: B018
@@ -89,19 +89,19 @@ def costs(load: Callable[[int], Simulation], size: int) -> dict[str, float]:
 
 
 def steps(simulation: Simulation) -> dict[str, float]:
-    """Of a run in compiled code."""
+    """Cost of the steps of a run in compiled code."""
     model, run = simulation.model, simulation.case.run
     model.solve(run)
     return {"steps": least(lambda: model.solve(run))}
 
 
 def shown(simulation: Simulation) -> dict[str, float]:
-    """Of the steps, and of a run with its error, its audit and its dataset."""
+    """Costs of the steps, and of a run with its error, its audit and its dataset."""
     return steps(simulation) | {"run and dataset": least(lambda: simulation.run().dataset)}
 
 
 def stored(size: int) -> dict[str, float]:
-    """Of so many runs in a store."""
+    """Costs of so many runs in a store."""
     simulation = surfacechem.load("exothermic", ["sweep.keep={last: [T, phi]}"])
     plan = simulation.plan({"interface.potential.bond-energy.K_0": np.linspace(1.0, 300.0, size)})
 

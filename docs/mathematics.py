@@ -35,7 +35,7 @@ def on_page_content(content: str, page: Any, **_: Any) -> str:
 
 
 def on_post_page(output: str, page: Any, **_: Any) -> str:
-    """A page reads without a network."""
+    """Warn of a page that loads something from a network, or has a formula that is not drawn."""
     if found := FETCHED.search(output):
         LOG.warning("%s loads %s", page.file.src_path, output[found.start() : found.end() + 60])
     if "arithmatex" in output:
