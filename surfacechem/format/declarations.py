@@ -238,7 +238,7 @@ class ListOf(Content):
 
     @property
     def words(self) -> str:  # type: ignore[override]
-        """Of what it is a list."""
+        """Description of the entries."""
         return f"list of {self.content.words}" if self.content.words else "list"
 
     def read(self, tree: Tree, name: str, context: Context) -> tuple[Any, ...]:
