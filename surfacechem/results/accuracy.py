@@ -124,7 +124,7 @@ class CellErrors:
     in_noise: bool = False
     """Whether the tolerance of the run hides what more cells would change."""
     source: str = "and one with half of the cells"
-    """Source of the errors, in words after those for the errors of the tolerance."""
+    """Source of the errors, in words that follow those for the errors of the tolerance."""
 
     @property
     def largest(self) -> float:

@@ -34,8 +34,7 @@ UNRESOLVED = 1e-2
 """An exchange of which rounding may be this part, or more, is not resolved."""
 
 SLACK = 10.0
-"""So many tolerances of what a law turns over, and of the states on which its production depends, are error of the
-integration."""
+"""Error of the integration, in tolerances of a law's turnover and of the states on which its production depends."""
 
 
 @dataclass(frozen=True)
@@ -250,7 +249,7 @@ def _losses(trajectory: Trajectory, least: Mapping[str, float], stored: float) -
 
 
 def _destroyed(trajectory: Trajectory, laws: list[str], stored: float) -> float:
-    """Part of the entropy that laws turn over together that they destroy, by the ledger or at the ends of steps.
+    """Fraction of the entropy that laws turn over together that they destroy, by the ledger or at the ends of steps.
 
     Nothing where it is less than the last digit of the total, which then is the same with it and without.
     """

@@ -73,8 +73,8 @@ def quantity_columns(
 
 
 def coverage_columns(system: System, columns: Iterable[Column]) -> list[Column]:
-    """Of these columns those that are coverages, along the names that species have in the mechanism, which names of
-    variables cannot be.
+    """Columns of coverages among these, along the names that species have in the mechanism, which names of variables
+    cannot be.
     """
     species = {state.name: state.quantity.species for state in system.states if state.quantity.species}
     found = {column.name: column for column in columns if column.name in species}
@@ -106,7 +106,7 @@ def profile_columns(trajectory: Trajectory) -> list[Column]:
 
 
 def _above(module: str) -> Any:
-    """A module of a room above, by name: what draws results imports them, and they cannot import it."""
+    """A module of a room above, by name, imported late: what draws results imports them, and they cannot import it."""
     return import_module(f"surfacechem.{module}")
 
 

@@ -559,7 +559,7 @@ def rounding_of_time(trajectory: Trajectory) -> float:
 
 
 def reasons(problem: Problem, run: Run, moves: bool) -> list[tuple[str, str, str]]:
-    """Settings chosen for a run, whose gap moves by a balance or does not, and the reasons, a row each."""
+    """Settings chosen for a run, whose gap ``moves`` by a balance or does not, and the reasons, a row each."""
     part = f"a hundredth of the accuracy {asked(run):.0e}, as errors of smooth runs are below 100 rtol"
     if run.rtol == TIGHTEST:
         part = f"for the accuracy {asked(run):.0e}; below this is rounding"

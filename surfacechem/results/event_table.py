@@ -42,7 +42,7 @@ class EventRow:
     after: Array
     jump: Jump | None = None
     released: float = 0.0
-    """Energy turned into heat, entropy produced and what the second law says to it: nothing where nothing jumps."""
+    """Energy turned into heat, entropy produced and verdict of the second law: nothing where nothing jumps."""
     entropy: float = 0.0
     verdict: str = ""
 

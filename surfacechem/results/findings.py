@@ -133,7 +133,7 @@ def cautioned(system: System, rows: NDArray[np.float64]) -> list[str]:
 
 
 def _inaccurate(trajectory: Trajectory, found: Accuracy | None) -> list[str]:
-    """An error well beyond what was asked for, or so large that the result is none."""
+    """Warning of an error well beyond what was asked for, or so large that there is no result."""
     if found is not None and math.isnan(found.error) and trajectory.status == "finished":
         return [f"the error is not known: {found.source.partition(': ')[2]}"]
     if found is None or not found.error > (LARGE if found.asked is None else WITHIN * found.asked):

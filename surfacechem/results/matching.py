@@ -39,7 +39,7 @@ much, a power p of the time left 1/(2^p - 1) times as much: 2.4 times for a root
 smaller jump is taken for a change, and what is beyond it counts as an error."""
 
 EDGE = 0.01
-"""Part of a stretch near its ends in which nothing is tested: a run knows the times of its events only so well."""
+"""Fraction of a stretch near its ends in which nothing is tested: a run knows the times of its events only so well."""
 
 BRIEF = 8 * SQRT_EPS
 """Part of the time so far below which an arc is too short for differences in time: their steps are STEP of it, 1e-11 of

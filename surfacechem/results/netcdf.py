@@ -326,6 +326,6 @@ def _trial(path: Path) -> subprocess.Popen[bytes]:
 
 
 def begin_reading(path: Path) -> None:
-    """Begin to see whether a file that is read soon can be, beside what is done until then."""
+    """Begin to test whether a file that is read soon is readable, beside what is done until then."""
     if path.is_file():
         _BEGUN[path] = _trial(path)

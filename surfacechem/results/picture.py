@@ -27,7 +27,7 @@ TWICE = 2
 """Outputs that many runs share for one that the closest of them has."""
 
 BENDS, CLOSER, ROUNDS = 100, 16, 2
-"""Between how many known states a run is known closer at most, in how many parts of it, and how often in turn."""
+"""Largest number of known states between which a run is refined, into how many parts, and how often in turn."""
 
 
 def _two_sided(t: Array) -> tuple[Array, Mask]:
@@ -73,8 +73,8 @@ def needed(t: Array, values: Array, allowed: Array, kept: Mask) -> Mask:
 
 
 def _missed(ways: Sequence[Array], values: Array, left: Index, rows: Index, right: Index) -> Array:
-    """By how much lines from one row to another miss rows between them at worst, the one way or the other: over time or
-    its logarithm; ``values`` has shape (quantities, times).
+    """Largest error of lines from one row to another at rows between them, the one way or the other: over time or its
+    logarithm; ``values`` has shape (quantities, times).
     """
     start, missed = values.take(left, axis=1), np.zeros(len(rows))
     rise, risen = values.take(right, axis=1) - start, values.take(rows, axis=1) - start

@@ -50,15 +50,13 @@ TRIALS = 6
 """Grids after which a search for an accuracy ends; two or three are the rule."""
 
 SOON = 200
-"""Part of a run that has passed when cells resolve what began at once, where nothing says when."""
+"""Number of parts of a run of which one has passed when cells resolve what began at once, where nothing says when."""
 
 RATIO = 2.0
 """Ratio of the times at which the errors of cells are told behind something sudden."""
 
 ORDER, LEAST_ORDER = 4.0, 2.0
-"""Ratio of errors with half of the cells to those with all: at second order, and at first, below which nothing
-converges.
-"""
+"""Ratio of errors with half of the cells to those with all: of second order, and of first, the least that converges."""
 
 
 def divided(scene: Scene) -> bool:
