@@ -1,1 +1,1 @@
-"""A case that runs, once or over a grid of parameters, and what is told about it before and after."""
+"""Runs of a case, once or over a grid of parameters, and summaries before and after them."""

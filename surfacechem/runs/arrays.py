@@ -35,7 +35,7 @@ MOST = 4096, 1024
 """Largest numbers of steps and events of a run for which there is room: what has more is looked at by itself."""
 
 PILOTS = 16
-"""Runs of a batch that tell how much happens in the others."""
+"""Runs of a batch by which the number of steps and events of the others is estimated."""
 
 TRIED = 100
 """Runs of a plan that are tried for one that is admissible, whose problem the others share."""
@@ -174,7 +174,7 @@ class ArrayRuns:
     # -- from values to arrays ----------------------------------------------------------------------------------------
 
     def solve(self, values: Mapping[str, Array]) -> tuple[Mask, Columns]:
-        """Solve runs with these values: whether the arrays tell each, and the columns of those that they tell."""
+        """Solve runs with these values: whether the result of each is certain, and the columns of those that are."""
         table, y0 = self.starts(values)
         rows = np.concatenate([np.zeros((len(y0), 1)), y0, np.zeros_like(y0), table[:, 0]], axis=1)
         peaks, quiet = self.guards(rows)
@@ -242,9 +242,7 @@ class ArrayRuns:
         return ends, np.asarray(self.shape / self.shape[-1]) * ends[:, None]
 
     def guards(self, rows: Array) -> tuple[Array, Mask]:
-        """Largest accounts and guards before the start, as a first arc has them, and whether each start has no edge
-        due.
-        """
+        """Largest accounts and guards before the start, as a first arc has them, and whether no edge is due in each."""
         model, count = self.model, len(rows)
         program, jumper = model.program, model.jumper
         if jumper is None or program.margins is None:
@@ -269,7 +267,7 @@ class ArrayRuns:
     # -- from arrays to columns ---------------------------------------------------------------------------------------
 
     def _columns(self, found: Ends) -> tuple[Mask, Columns]:
-        """Whether the arrays tell each run, and the columns of those that they tell."""
+        """Whether the result of each run is certain, and the columns of those of which it is."""
         batch, n = found.batch, self.n
         counts, count = batch.counts, len(batch.counts)
         end, every = batch.ends, np.arange(count)
@@ -438,7 +436,7 @@ class ArrayRuns:
         return {**columns, "site_error": sites}
 
     def _rounded(self, rows: Array) -> Array:
-        """By how much the last bit of a state changes each total at most, shape (rows, 2)."""
+        """Largest change of each total by the last bit of a state, shape (rows, 2)."""
         totals, worst, moved = self.totals(rows), np.zeros((len(rows), len(TOTALS))), rows.copy()
         for j in range(1, 1 + self.n):
             moved[:, j] *= 1 + EPS
@@ -475,14 +473,14 @@ class ArrayRuns:
 
 
 class JumpingRuns(ArrayRuns):
-    """Runs of a plan that arrays tell with their jumps."""
+    """Runs of a plan with their jumps as arrays."""
 
     jumps = True
     room: Room = 0, 16, 0, 0
     """Steps and events for which a run has room; as many as the runs before have needed."""
 
     def guards(self, rows: Array) -> tuple[Array, Mask]:
-        """Nothing has been seen, and edges may be due."""
+        """Accounts and guards where nothing has been seen; edges may be due in all runs."""
         return self.unseen, np.ones(len(rows), dtype=bool)
 
     def _solved(self, problem: Problem, y0: Array, table: Array, *others: Array) -> Ends:

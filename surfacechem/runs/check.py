@@ -264,7 +264,7 @@ class Lumping:
 
     @property
     def left(self) -> float:
-        """Part of a difference within the body that is left at the end, its face held."""
+        """Fraction of a difference within the body that is left at the end, its face held."""
         return math.exp(-(math.pi**2) * self.fourier / 4)
 
     def rows(self) -> Iterator[tuple[str, float, str]]:

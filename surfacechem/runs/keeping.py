@@ -45,7 +45,7 @@ ENDS = {
 """Columns on the end of every run, with their meaning; only the time has a unit, seconds."""
 
 BALANCES = tuple(f"{kind}_error" for kind in ("energy", "entropy", "site"))
-"""Those of them that are errors of balances."""
+"""Columns of ENDS that are errors of balances."""
 
 EXTREMES = {
     "max": (np.fmax, "at most, over outputs, steps and jumps"),

@@ -24,7 +24,7 @@ TRIALS = 20
 """Draws of parameters and variables; a choice."""
 
 INSIDE, ROOM = (0.1, 0.9), 600.0
-"""Parts of a range that are drawn from, and twice the temperature [K] of a room."""
+"""Fractions of a range that are drawn from, and twice the temperature [K] of a room."""
 
 READABLE = {*VARIABLES, "x", "T", "N_c", "M", "u", "r"}
 """Names that formulas may read in every scene, beside temperatures and coverages by name."""

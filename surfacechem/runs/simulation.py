@@ -224,7 +224,7 @@ class Simulation:
         return self.evaluated(points).dataset
 
     def evaluated(self, points: Points | None = None) -> PointResults:
-        """The same, ready to be written."""
+        """Quantities of the scene at given states, ready to be written."""
         from surfacechem.runs.points import evaluation
 
         return evaluation(self.evaluator, points or {}, **self._origin({}))
@@ -315,7 +315,7 @@ class Simulation:
         return self.case.reference.fixed if departs else self.case.unused
 
     def _with(self, scene: Scene) -> Simulation:
-        """The same with the cells of another scene, assembled and compiled once for each choice of them."""
+        """The simulation with the cells of another scene, assembled and compiled once for each choice of them."""
         key = spatial.grid(scene)
         # Shared by all simulations of the case, so that a search for an accuracy compiles each grid once.
         if key not in self._grids:
