@@ -51,7 +51,7 @@ def draw_below(axes: Sequence[Axes], dataset: xarray.Dataset) -> None:
 
 
 def draw(axes: Sequence[Axes], dataset: xarray.Dataset) -> None:
-    """The same on axes of a figure, one below the other."""
+    """Draw the panels on axes of a figure, one below the other."""
     # Each has an axis of its own, whose words stand apart from the panel below.
     engine: Any = axes[0].figure.get_layout_engine()
     engine.set(h_pad=APART)

@@ -47,7 +47,7 @@ BAND = (5.0, 50.0, 95.0)
 """Percentiles of a distribution that are drawn."""
 
 SEEN = 0.99
-"""Part of the largest value of a variable that an output has to come to; less is told."""
+"""Fraction of the largest value of a variable that an output has to come to; less is told."""
 
 
 def figure(dataset: xarray.Dataset, plan: Plan, axes: Sequence[str], variables: Sequence[str] | None = None) -> Figure:
@@ -71,7 +71,7 @@ def chosen(dataset: xarray.Dataset, axes: Sequence[str], variables: Sequence[str
 
 
 def differing(dataset: xarray.Dataset, axes: Sequence[str], known: Sequence[str]) -> list[str]:
-    """Of the numbers of each run those that differ from run to run: of phases and temperatures, then of events."""
+    """Numbers of each run that differ from run to run: of phases and temperatures, else of events."""
     found = sorted(known, key=lambda name: next(k for k, rank in enumerate(RANKS) if re.fullmatch(rank, name)))
     ends = [name for name in found if dataset[name].ndim == len(axes) and "error" not in name and name not in COUNTED]
     shown = _apart(dataset, [name for name in ends if varies(fair(dataset, name))])

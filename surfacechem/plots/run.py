@@ -205,7 +205,7 @@ def curves(dataset: xarray.Dataset, over: str = "time") -> list[str]:
 
 
 def of_kind(dataset: xarray.Dataset, names: Sequence[str], units: str, pattern: str) -> list[str]:
-    """Those of the names that a panel of the usual figure shows; modes are shown as bands, exact values dashed."""
+    """Names that a panel of the usual figure shows; modes are shown as bands, exact values dashed."""
     fitting = [name for name in names if re.fullmatch(units, unit(dataset[name])) and re.fullmatch(pattern, name)]
     return [name for name in fitting if not (name.endswith("_exact") or style.is_mode(dataset[name]))]
 

@@ -26,7 +26,7 @@ def load_of(dataset: xarray.Dataset) -> str:
 MARKERS = "osD"
 
 EARLY = 0.01
-"""Part of the shortest lifetime in which next to nothing happens."""
+"""Fraction of the shortest lifetime in which next to nothing happens."""
 
 HEIGHT, LINE = 2.3, 1.2
 """Height of a panel [inch], and width of a curve over the load in points."""

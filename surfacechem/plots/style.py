@@ -71,7 +71,7 @@ NOTE: Any = {"fontsize": 8, "color": "#555555"}
 """Style of the title of a figure, and of a note above its panels."""
 
 LETTERS, TITLE_LETTERS = 16, 9.5
-"""Of a line of facts above the panels, and of the title and the words below an axis, in an inch."""
+"""Letters in an inch: of a line of facts above the panels, and of the title and the words below an axis."""
 
 READS_WELL = (1e-2, 1e4)
 """Sizes of numbers that are read without counting zeros."""
@@ -173,7 +173,7 @@ def check(
 
 
 def spread(count: int, most: int) -> list[int]:
-    """Of the numbers below a count at most so many, evenly spread over all of them.
+    """At most so many of the numbers below a count, evenly spread over all of them.
 
     >>> spread(100, 4), spread(3, 7)
     ([0, 33, 66, 99], [0, 1, 2])
@@ -197,7 +197,7 @@ def place(dataset: xarray.Dataset) -> Place | None:
 
 
 def headings(plot: Figure, ax: Axes, dataset: xarray.Dataset, above: float = 0.0, more: str = "") -> None:
-    """Title, how it ended, error, solver and what ``more`` there is to say, so many points above the axes."""
+    """Write title, end, error, solver and what ``more`` there is to say, so many points above the axes."""
     attributes = dataset.attrs
     title = wrap(str(attributes.get("title", "")), int(TITLE_LETTERS * plot.get_figwidth())) or [""]
     plot.suptitle("\n".join(title), **TITLE)
