@@ -46,7 +46,7 @@ class Cell:
     seconds: list[float] = field(default_factory=list, kw_only=True)
     """Run times; of a failed solve, the time that it took to fail."""
     stepping: list[float] = field(default_factory=list, kw_only=True)
-    """Parts of the run times inside a library's own steps; NaN for a method that does everything itself."""
+    """Fractions of the run times inside a library's own steps; NaN for a method that does everything itself."""
     again: Callable[[], Trajectory] | None = field(default=None, kw_only=True, repr=False)
     """Function that runs it once more."""
     solver: str = field(default="", kw_only=True)

@@ -42,7 +42,7 @@ class Typeset(str):
     """LaTeX that a page typesets; as text it is what it is."""
 
     def __html__(self) -> str:
-        """For templates, which would escape a text."""
+        """The formula as it is, for templates, which would escape a text."""
         return mathml(self)
 
 

@@ -181,7 +181,7 @@ class Study:
     kind: str
     title: str
     arguments: Sequence[str]
-    """Those of the command line."""
+    """Arguments of the command line."""
     axes: Mapping[str, Sequence[Any]]
     """The items along each dimension."""
     variables: Sequence[Variable]

@@ -24,7 +24,7 @@ from surfacechem.solve.run import Model, Run
 from surfacechem.tolerances import CBRT_EPS, EPS, NEGLIGIBLE, PICTURE, ROUNDING, SHALLOW, TINY
 
 LONGER, ATTEMPTS = 10.0, 16
-"""By how much longer the next attempt runs that has not reached the steady state, and how many there are."""
+"""Factor by which the next attempt is longer where the steady state was not reached, and number of attempts."""
 
 TRACE = EPS**2
 """Coverage [1] below which a change is no longer one in proportion: the rounding of a rounding."""
@@ -40,7 +40,7 @@ class SteadyState:
 
     title: str
     time: float
-    """Of a run that has come there [s]."""
+    """Time of a run that has come there [s]."""
     coverages: Mapping[str, float]
     states: Mapping[str, float]
     """All others, such as temperatures and potentials, by name."""
@@ -48,9 +48,9 @@ class SteadyState:
     control: Mapping[str, Mapping[str, float]]
     barriers: Mapping[str, float]
     equations: Mapping[str, str]
-    """Of the reactions."""
+    """Equations of the reactions."""
     units: Mapping[str, str]
-    """Of the rates, and of those states."""
+    """Units of the rates, and of those states."""
 
     def __str__(self) -> str:
         """Tables of coverages, rates and control."""
@@ -176,7 +176,7 @@ class _Rest:
 
     @property
     def units(self) -> dict[str, str]:
-        """Of the quantities that were asked for, and of all other states."""
+        """Units of the quantities that were asked for, and of all other states."""
         asked = (self.model.system.outputs[j].quantity for j in self.wanted.values())
         return {quantity.name: quantity.unit for quantity in (*asked, *self.quantities) if not quantity.species}
 

@@ -270,7 +270,7 @@ def numerical(subject: Subject, variables: Sequence[str]) -> Truth:
 
 
 def _apart(a: Truth, b: Truth) -> float:
-    """By how much two methods differ at most; infinite where they come to other ends or events."""
+    """Largest difference of two methods; infinite where they come to other ends or events."""
     if a.status != b.status or difference(a.events, b.events) or len(a.times) != len(b.times):
         return math.inf
     return float(np.nan_to_num(a.errors(b.values, b.events).worst("max", "event"), nan=math.inf))
