@@ -93,7 +93,7 @@ class InterfaceReactor(HeldReactor):
     ) -> None:
         super().__init__(self.surface, name=name)  # Cantera's own part was made in __new__
         self._walls: list[Any] = []
-        """Those which have its area."""
+        """Walls which have its area."""
         self.area = area
         self.bodies, self.neighbours = dict(bodies or {}), dict(neighbours or {})
         self.ports: dict[str, Port] = {}
@@ -388,7 +388,7 @@ class InterfaceReactor(HeldReactor):
         return heard.tobytes()
 
     def _paths(self) -> Iterator[int]:
-        """Places among the scene's parameters of what the network gives, in the order of ``_listen``."""
+        """Indices among the scene's parameters of what the network gives, in the order of ``_listen``."""
         names = [f"T_{suffix_of(self.scene.case.scene, name)}" for name in self.bodies]
         names += [port.heat_name for port in self.ports.values()]
         paths = [f"loading.{name}.level" for name in names]

@@ -21,8 +21,7 @@ from surfacechem.solve.contract import Array, Margin
 from surfacechem.tolerances import NEGLIGIBLE
 
 FIRST = NEGLIGIBLE**3
-"""Time of the first look after a start, as part of what is integrated: the integrator starts with shorter steps still.
-"""
+"""Time of the first look after a start, as part of what is integrated: the integrator begins with shorter steps."""
 
 SHORTEST, AHEAD = 1e4, 4.0
 """The shortest first look and all later ones, in roundings of the time."""
