@@ -32,7 +32,7 @@ ENOUGH, FEWEST = 8, 9
 """Degree from which it is told whether a higher one is worth it, and the places that a piece takes beside its end."""
 
 SHORTEST = 2.0**-26
-"""Part of the range of approaches below which no piece is divided; at a kink of the force its error does not count."""
+"""Fraction of the range of approaches below which no piece is divided; at a kink of the force errors do not count."""
 
 MOST_PIECES = 200
 
@@ -47,8 +47,8 @@ Samples = Callable[[float], tuple[float, float, float]]
 
 @dataclass(frozen=True)
 class ApproachPiece:
-    """Piece of the force as a polynomial of x, -1 to 1, between two approaches; where ``powers`` of the slope of ln E
-    over ln d.
+    """Piece between two approaches: the force as a polynomial of x, -1 to 1; with ``powers`` the slope of ln E over ln
+    d.
     """
 
     low: float
@@ -105,7 +105,7 @@ class ApproachEnergy:
         return cls(tuple(made), *rest)
 
     def erring(self, sign: float = 1.0) -> ApproachEnergy:
-        """The same, larger by its error, or smaller where the sign is negative."""
+        """The energy, larger by its error, or smaller where the sign is negative."""
         return replace(self, factor=self.factor * (1 + sign * self.error))
 
     def energy(self, d: Expression) -> Expression:

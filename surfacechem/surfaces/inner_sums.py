@@ -103,7 +103,7 @@ def inner_sums(
 def _sums_of(
     surface: Surface, x: Array, near: Projection, laws: Sequence[PairEnergy], extent: Extent, level: int, rtol: float
 ) -> tuple[list[Sums], int]:
-    """The same for laws of one extent."""
+    """Sums over the inner surface of laws of one extent."""
     # Of what lies beyond, a part of size (h / reach)^(decay - 2) of all is missed.
     farther = (rtol * LEFT_OUT) ** (-1 / (extent.decay - 2))
     if not is_round(surface.shape):

@@ -70,11 +70,11 @@ class LevelPatches(Patches):
         return self.along
 
     def halved(self) -> Self:
-        """Their halves, each with the level it has itself."""
+        """Halves of the patches, each with the level it has itself."""
         return super().halved().marked().left()
 
     def marked(self) -> Self:
-        """With the level and its direction as they now are."""
+        """Patches with the level and its direction as they now are."""
         u, v = (self.low[:, k, None] + (self.high - self.low)[:, k, None] * SAMPLES for k in range(2))
         x, near = self.seen(*np.broadcast_arrays(u[:, :, None], v[:, None, :]))
         heights = self.heights(near)
@@ -132,7 +132,7 @@ class LevelPatches(Patches):
         return gauss(np.sort(edges, axis=1), order)
 
     def left(self) -> Self:
-        """With the places where their levels leave them."""
+        """Patches with the places where their levels leave them."""
         leaves = self.leaves.copy()
         for k in range(2):
             chosen = self.along == k
@@ -144,7 +144,7 @@ class LevelPatches(Patches):
         return replace(self, leaves=leaves)
 
     def divided(self, k: int) -> Self:
-        """The same where nothing changes across a direction: divided at the levels once for all."""
+        """Patches divided at their levels once for all, where nothing changes across a direction."""
         passed, rest = self[self.along == k], self[self.along != k]
         return rest.joined(passed.cut(k, passed.crossing(k, passed.low[:, 1 - k])))
 

@@ -106,7 +106,7 @@ class PairTable(PairEnergy):
     energies: Sequence[float] = option("energies of a pair there, the last of them zero [J]")
 
     def __post_init__(self) -> None:
-        """Check that the table is one."""
+        """Check that the distances and energies are a table."""
         super().__post_init__()
         r, psi = self.distances, self.energies
         if len(r) != len(psi) or len(r) < 3:
@@ -126,7 +126,7 @@ class PairTable(PairEnergy):
 
     @property
     def kinks(self) -> Mapping[str, Sequence[float]]:
-        """Between its points it is smooth."""
+        """The distances of the table, between which it is smooth."""
         return {"r": tuple(self.distances)}
 
     @cached_property

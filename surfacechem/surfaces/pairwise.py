@@ -150,7 +150,7 @@ def pair_traction(
 
 
 def lots(count: int, inner: Surface) -> list[slice]:
-    """Parts of so many points that are summed together."""
+    """Slices of so many points that are summed together."""
     together = count if is_round(inner.shape) else POINTS
     return [slice(begin, begin + together) for begin in range(0, count, together)]
 

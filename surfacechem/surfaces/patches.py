@@ -50,7 +50,7 @@ TOGETHER = 400_000
 """Pairs of points that are looked at together."""
 
 SHALLOWEST = 2.0**-20
-"""Part of the size of a surface below which a gap is one of contact."""
+"""Fraction of the size of a surface below which a gap is one of contact."""
 
 Levels = NDArray[np.int_]
 """Index of the order that each patch has."""
@@ -86,7 +86,7 @@ class Patches:
         return ENOUGH if any(self.alike) else 1
 
     def __getitem__(self, chosen: NDArray[Any] | slice) -> Self:
-        """Some of them."""
+        """Some of the patches."""
         return replace(self, **{name: getattr(self, name)[chosen] for name in self.arrays})
 
     def __len__(self) -> int:
@@ -242,7 +242,7 @@ class Budget:
     """Cost of integrals, at least so many together, in pairs of points; OutOfReachError before it is too much."""
 
     def __init__(self, rtol: float) -> None:
-        """For an accuracy that messages name."""
+        """Begin a budget for an accuracy that messages name."""
         self.rtol, self.integrals, self.done, self.spent = rtol, 1, 0, 0.0
 
     def whole(self, ahead: float) -> float:
@@ -250,7 +250,7 @@ class Budget:
         return ahead * max(1.0, self.integrals / max(self.done + 1, FIRST_FEW))
 
     def take(self, points: int) -> None:
-        """So many pairs of points are next; OutOfReachError where they are too many."""
+        """Count so many pairs of points that are next; OutOfReachError where they are too many."""
         self.spent += points
         self.refuse_beyond(self.spent)
 
@@ -268,7 +268,7 @@ class Rules:
     """Values of an integrand over patches by rules of some orders; InputError before they take too long."""
 
     def __init__(self, integrand: Integrand, search: int, budget: Budget) -> None:
-        """With the points that a projection to the other surface costs, and what they may take."""
+        """Take the points that a projection to the other surface costs, and the budget."""
         self.integrand, self.search, self.budget, self.points = integrand, search, budget, 0
         self.each: dict[int, float] = {}  # pairs of points of one outer point, by the level inside
 
@@ -283,7 +283,7 @@ class Rules:
         return np.array([found[k] for k in range(len(levels))])
 
     def _of_order(self, patches: Patches, order: int, inside: int) -> Array:
-        """The same by one rule."""
+        """Integrals (n, ...) over each patch by one rule."""
         found, begin = [], 0
         while begin < len(patches):
             # One patch at first, as nobody knows yet how many pairs its points have.

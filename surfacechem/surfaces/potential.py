@@ -108,13 +108,13 @@ class CurvedSurfaces(Potential):
         return "`surface.approach`"
 
     def of_run(self, values: Mapping[str, float]) -> Self:
-        """The same with the numbers of the pair laws that a run has, by path."""
+        """The surfaces with the numbers of the pair laws that a run has, by path."""
         paths = [{name: f"{law.path}.{name}" for name, _ in law.specs()} for law in self.pairs]
         own = [{name: values[path] for name, path in each.items() if path in values} for each in paths]
         return replace(self, pairs=tuple(law.given(each) for law, each in zip(self.pairs, own, strict=True)))
 
     def thinned(self, stretch: float) -> Self:
-        """The same where the area has grown by a stretch since densities were what is given; shapes are as given."""
+        """The surfaces with densities reduced by the stretch of the area; shapes are as given."""
         if stretch == 1:
             return self
         own = [{name: getattr(law, name) / stretch for name in ("n_1", "n_2")} for law in self.pairs]
@@ -125,12 +125,12 @@ class CurvedSurfaces(Potential):
         return Surface(self.shapes[0]), Surface(self.shapes[1], True, d)
 
     def with_parts(self, bind: Callable[[Law, str, str], Any]) -> Self:
-        """The same with the parameters of the pair laws as symbols; those of the gap are in its integrals."""
+        """The surfaces with the parameters of the pair laws as symbols; those of the gap are in its integrals."""
         bound = tuple(bind(law, f"surface.pair.{law.name()}", "") for law in self.pairs)
         return self.bind({"pairs": bound, "curves": self.curves, "strongest": self.strongest})
 
     def outline(self) -> Self:
-        """The same with energies that are straight lines."""
+        """The surfaces with energies that are straight lines, in place of integrals."""
         line = straight(*self.approach)
         curves = tuple(line for law in self.pairs for _ in self.parts(law)), line if self.gap_laws else None
         return self.bind({"curves": curves, "strongest": self.approach[0]})
@@ -142,7 +142,7 @@ class CurvedSurfaces(Potential):
         return max(curve.error for curve in (*curves, *([over_the_gap] if over_the_gap else [])))
 
     def erring(self) -> Self:
-        """The same where all that repels is too strong by its error, and all that attracts too weak."""
+        """The surfaces where all that repels is too strong by its error, and all that attracts too weak."""
         curves, over_the_gap = self.curves
         signs = [math.copysign(1.0, factor) for law in self.pairs for factor, _ in self.parts(law)]
         found = tuple(curve.erring(sign * curve.factor) for curve, sign in zip(curves, signs, strict=True))
@@ -186,7 +186,7 @@ class CurvedSurfaces(Potential):
         return curves[: len(parts)], next(iter(curves[len(parts) :]), None)
 
     def integrated(self, parts: Sequence[PairEnergy]) -> list[ApproachEnergy]:
-        """Those energies from their integrals."""
+        """Energies over the approach of some parts from their integrals."""
         self._refuse_jumps()
         if self.heat_laws:
             # A conductance that has no end is refused before any force is integrated.
@@ -368,7 +368,7 @@ class CurvedConductance(HeatTransfer):
         return self.pair.called
 
     def outline(self) -> Self:
-        """The same with a conductance that is a straight line."""
+        """The law with a conductance that is a straight line, in place of integrals."""
         return self.bind({"curve": straight(*self.pair.approach)})
 
     @property
@@ -377,7 +377,7 @@ class CurvedConductance(HeatTransfer):
         return self.curve.error
 
     def erring(self) -> Self:
-        """The same, larger by its error."""
+        """The law, larger by its error."""
         return self.bind({"curve": self.curve.erring()})
 
     @cached_property

@@ -38,13 +38,13 @@ class Rays:
     area: Array
 
     def chosen(self, which: Indices) -> Rays:
-        """Some of them, each as often as it is asked for."""
+        """Some of the rays, each as often as it is asked for."""
         parts = {name: getattr(self, name)[which] for name in ("owner", "start", "end", "area")}
         return replace(self, **parts)
 
     @property
     def scale(self) -> Array:
-        """Parts of the rays (k,) that are as long as the gap."""
+        """Fractions of the rays (k,) that are as long as the gap."""
         ends = np.linalg.norm(self.at(np.ones(len(self.owner)))[0] - self.at(np.zeros(len(self.owner)))[0], axis=-1)
         return np.asarray(self.gaps[self.owner] / np.maximum(ends, TINY))
 

@@ -33,12 +33,12 @@ and those of all cells at most.
 """
 
 OWN = 0.6
-"""Part of the way from one of these places to the next within which it is the one beside the nearest point: half, and
-what Newton's step may be wrong by.
+"""Fraction of the way from one of these places to the next within which it is the one beside the nearest point: half,
+and what Newton's step may be wrong by.
 """
 
 OVERSHOOT = 0.1
-"""Part of the range of heights by which a spline through them may be above the highest, as summits lie between."""
+"""Fraction of the range of heights by which a spline through them may be above the highest, as summits lie between."""
 
 
 def _leads_nowhere_else(
@@ -59,7 +59,7 @@ def _leads_nowhere_else(
 
 
 def _half(extent: float | None) -> tuple[float, float]:
-    """From minus to plus half of an extent, which may be infinite."""
+    """Interval from minus to plus half of an extent, which may be infinite."""
     half = math.inf if extent is None else extent / 2
     return -half, half
 
@@ -86,11 +86,11 @@ class Plane(Shape):
 
     @property
     def span(self) -> Span:
-        """The rectangle."""
+        """Parameters of the rectangle."""
         return _half(self.length), _half(self.width)
 
     def foot(self, x: Array) -> Array:
-        """Below the point, or on the edge."""
+        """Parameters of the nearest point: below the point, or on the edge."""
         low, high = np.transpose(self.span)
         return np.asarray(np.clip(x[..., :2], low, high))
 
@@ -109,7 +109,7 @@ class Sphere(Shape):
     about_axis = True
     closed = (False, True)
     bulge: ClassVar[int] = 1
-    """One where the centre is in the body, minus one where it is outside."""
+    """Sign of the bulge: 1 where the centre is in the body, -1 where it is outside."""
 
     R: float = parameter("m", "radius", above=0, varies=False)
 
@@ -119,11 +119,11 @@ class Sphere(Shape):
 
     @property
     def span(self) -> Span:
-        """All of it."""
+        """Angles of the whole sphere."""
         return (0.0, math.pi), ROUND
 
     def foot(self, x: Array) -> Array:
-        """Along the radius, or on the edge."""
+        """Parameters of the nearest point: along the radius, or on the edge."""
         # The direction from the centre, counted from the apex.
         up = self.R + self.bulge * x[..., 2]
         angles = np.arctan2(np.hypot(x[..., 0], x[..., 1]), up), np.arctan2(x[..., 1], x[..., 0])
@@ -145,7 +145,7 @@ class Cap(Sphere):
 
     @property
     def span(self) -> Span:
-        """Up to the edge."""
+        """Angles up to the edge."""
         return (0.0, self.angle), ROUND
 
 
@@ -189,11 +189,11 @@ class Cylinder(Shape):
 
     @property
     def span(self) -> Span:
-        """All around."""
+        """Length, and angles all around."""
         return _half(self.length), ROUND
 
     def foot(self, x: Array) -> Array:
-        """Along the radius, or on the edge."""
+        """Parameters of the nearest point: along the radius, or on the edge."""
         return np.stack([np.clip(x[..., 0], *_half(self.length)), np.arctan2(x[..., 1], x[..., 2] + self.R)], axis=-1)
 
 
@@ -207,11 +207,11 @@ class Turned(Shape):
 
     @property
     def span(self) -> Span:
-        """Up to the edge."""
+        """Distances up to the edge, and angles all around."""
         return (0.0, math.inf if self.radius is None else self.radius), ROUND
 
     def starts(self, x: Array) -> tuple[Indices, Array]:
-        """At the angle of the points about the axis and at the opposite one."""
+        """Starts of the search at the angle of the points about the axis and at the opposite one."""
         angle, radius = np.arctan2(x[:, 1], x[:, 0]), np.hypot(x[:, 0], x[:, 1])
         starts = np.stack([radius, angle, radius, angle + math.pi], axis=-1).reshape(-1, 2)
         return np.repeat(np.arange(len(x)), 2), starts
@@ -239,7 +239,7 @@ class Disc(Turned):
         return u * cos(v), u * sin(v), 0 * u
 
     def foot(self, x: Array) -> Array:
-        """Below the point, or on the edge."""
+        """Parameters of the nearest point: below the point, or on the edge."""
         at = np.stack([np.hypot(x[..., 0], x[..., 1]), np.arctan2(x[..., 1], x[..., 0])], axis=-1)
         return np.asarray(np.clip(at, *np.transpose(self.span)))
 
@@ -285,7 +285,7 @@ class Cone(Turned):
         return u * cos(v), u * sin(v), -u * math.tan(self.slope)
 
     def foot(self, x: Array) -> Array:
-        """On the line of its side that is below the point, or on the tip or the edge."""
+        """Parameters of the nearest point: on the line of its side below the point, or on the tip or the edge."""
         along = np.hypot(x[..., 0], x[..., 1]) * math.cos(self.slope) - x[..., 2] * math.sin(self.slope)
         at = np.stack([along * math.cos(self.slope), np.arctan2(x[..., 1], x[..., 0])], axis=-1)
         return np.asarray(np.clip(at, *np.transpose(self.span)))
@@ -317,11 +317,11 @@ class Torus(Shape):
 
     @property
     def span(self) -> Span:
-        """All of it."""
+        """Angles of the whole torus."""
         return ROUND, ROUND
 
     def foot(self, x: Array) -> Array:
-        """Along the radius of the tube."""
+        """Parameters of the nearest point: along the radius of the tube."""
         out = np.hypot(x[..., 0], x[..., 1]) - self.hole - self.r
         return np.stack([np.arctan2(out, x[..., 2] + self.r), np.arctan2(x[..., 1], x[..., 0])], axis=-1)
 
@@ -445,7 +445,7 @@ class Heights(Shape):
 
     @property
     def span(self) -> Span:
-        """The grid."""
+        """Range of the grid."""
         return (float(self.x[0]), float(self.x[-1])), (float(self.y[0]), float(self.y[-1]))
 
     @property
@@ -476,8 +476,8 @@ class Heights(Shape):
         return places, np.stack(slopes, axis=-1), KDTree(places.reshape(-1, 3)), growth
 
     def starts(self, x: Array) -> tuple[Indices, Array]:
-        """Of the places beside which the nearest point may be, those that no neighbour is nearer than, and those from
-        which Newton's method leads to none of them.
+        """Starts of the search: of the places beside which the nearest point may be, those that no neighbour is nearer
+        than, and those from which Newton's method leads to none of them.
         """
         places, slopes, tree, (a, b) = self.nodes
         d = tree.query(x)[0]
@@ -496,7 +496,7 @@ class Heights(Shape):
         return which[least], places[i, j, :2][least]
 
     def derivatives(self, u: Array, v: Array, count: int) -> Array:
-        """Those of the spline."""
+        """Points and derivatives of the spline."""
         orders = [(i - j, j) for i in range(4) for j in range(i + 1)][:count]
         found = np.zeros((len(orders), *np.shape(u), 3))
         found[0, ..., 0], found[0, ..., 1], found[1, ..., 0], found[2, ..., 1] = u, v, 1.0, 1.0
