@@ -133,7 +133,7 @@ def nearest(name: str, known: Iterable[str]) -> str:
 
 
 def likeness(name: str, other: str) -> tuple[float, float]:
-    """Part of two names that is the same, without what the names of files end with, then with it.
+    """Similarity of two names, without the suffixes of files, then with them.
 
     A name that has the words of the other among its own is nearer than its spelling says.
     """

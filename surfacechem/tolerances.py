@@ -1,7 +1,7 @@
 """Thresholds within which two numbers are equal, which every room shares, each with its derivation.
 
-What decides whether a number is zero is one of these times the size of what it is made of, a tolerance of the run
-(rtol, atol), or what the clock resolves. Nothing else is imported here, so that compiled code may freeze the values.
+A number counts as zero below one of these times the size of what it is made of, a tolerance of the run (rtol, atol),
+or what the clock resolves. Nothing else is imported here, so that compiled code may freeze the values.
 
 Source: Higham (2002), Accuracy and Stability of Numerical Algorithms, 2nd ed., chapters 1 to 3.
 """
@@ -185,4 +185,4 @@ DRIFT = 100.0
 """Unbalanced traction that the integration explains, relative to its parts and in units of the tolerance."""
 
 MOST_DRIFT = 0.1
-"""The same relative to its parts, however loose the tolerance: of what cancels to less than that the sign is known."""
+"""Largest such traction relative to its parts, at any tolerance: of what cancels to less the sign is known."""
