@@ -64,7 +64,7 @@ class ByHand(ct.ExtensibleRate):
 
 
 def surface(size: int, kind: str) -> LoadedInterface:
-    """So many bonds that break at such a rate."""
+    """A surface with so many bonds that break at such a rate."""
     names = [f"B{i}" for i in range(size)]
     entry = "- {{equation: {} => A, rate-constant: {{A: 1e3, b: 0.5, Ea: 10 kJ/mol}}{}}}"
     species = (f"- {{name: {name}, composition: {{H: 1}}, thermo: {{model: constant-cp}}}}" for name in ("A", *names))

@@ -41,7 +41,7 @@ reactions:
 
 
 def chain(size: int) -> str:
-    """So many species, each of which turns into the next and back."""
+    """A mechanism of so many species, each of which turns into the next and back."""
     names = [f"A{i}" for i in range(size)]
     return CHAIN.format(
         names=", ".join(names),

@@ -41,7 +41,7 @@ def states(count: int) -> list[Any]:
 
 @cache
 def equations() -> dict[str, Equations]:
-    """Of each problem; of the slider in stick and in slip."""
+    """Equations of each problem; of the slider in stick and in slip."""
     c, k, t0, _, tau = PARAMETERS.tolist()
     T_1, phi = states(2)
     growth = (1 - phi) / tau
