@@ -29,15 +29,15 @@ from surfacechem.studies.regimes import regimes
 from surfacechem.studies.stability import stability
 
 PLACES = {
-    "capacity": "bodies.NAME.capacity, with its parameters beside it",
+    "capacity": "`bodies.NAME.capacity`, with its parameters beside it",
     "potential": "interface.potential",
     "bonding": "interface.bonding",
     "friction": "interface.friction",
     "heat": "heat",
     "growth": "interface.medium.growth",
-    "property": "interface.medium, under the name of the property",
+    "property": "`interface.medium`, under the name of the property",
     "loading": "loading.NAME",
-    "shape": "surface, under the name of a body",
+    "shape": "`surface.bodies`, under the name of a body",
     "pair": "surface.pair",
     "factor": "the list `times` of a parameter that varies",
 }
@@ -141,9 +141,9 @@ def _title(family: str) -> str:
 
 
 def _members(family: str) -> Iterator[tuple[type[Law], type[Law]]]:
-    module = f"surfacechem.laws.{family}"
+    home = module(family).__name__
     for contract in FAMILIES:
-        yield from ((contract, law) for law in laws(contract).values() if law.__module__ == module)
+        yield from ((contract, law) for law in laws(contract).values() if law.__module__ == home)
 
 
 def laws_index() -> str:

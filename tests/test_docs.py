@@ -152,6 +152,14 @@ def test_a_law_is_known_once_its_class_is_in_the_file(tmp_path):
         assert expected in done.stdout
 
 
+def test_every_law_has_its_place_on_a_page(monkeypatch):
+    monkeypatch.syspath_prepend(ROOT / "docs")
+    hooks = importlib.import_module("hooks")
+    for family in hooks.families():
+        assert f"]({family}.md#" in hooks.laws_index()
+        assert "| parameter | " in hooks.family_page(family)
+
+
 def test_links_of_the_readme_exist():
     links = re.findall(r"\]\(([^)#:]+)\)", (ROOT / "README.md").read_text(encoding="utf-8"))
     assert links
