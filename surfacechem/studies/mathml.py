@@ -22,9 +22,25 @@ WORDS = re.compile(r"\\mathrm\{([^{}]{2,})\}")
 
 TAG = re.compile(r"<math [^>]*>")
 
+LINES = re.compile(r"\\(begin|end)\{aligned\}")
+"""Lines below each other, by the name that the converter knows."""
+
+BIG = re.compile(r"\\[bB]igg?(?:[lr]?)(\\[{}]|\\[lr]angle|[][()])")
+"""Brackets of a given size, which here have that of what they enclose."""
+
+OPENING = ("(", "[", r"\{", r"\langle")
+
+FUNCTION = re.compile(r"<m([io])>([a-z]{2,})</m\1>(?=((?:<mrow>)?<mo [^>]*>(?:&#x00028;|\[|&#x0007B;))?)")
+"""The name of a function, and the bracket that may follow it."""
+
+THIN = "0.167em"
+NAMED = f'<mo form="prefix" lspace="{THIN}" rspace="{{1}}">{{0}}</mo>'
+"""A function is set off from what stands before it and, without a bracket, from what it is of."""
+
 SPACING = {
     "<mo>&#x02202;</mo>": "<mi>&#x02202;</mi>",  # a partial derivative is no binary operator
     "<mo>&#x0002F;</mo>": '<mo lspace="0" rspace="0">&#x0002F;</mo>',
+    '<mo stretchy="false">&#x0007C;</mo>': '<mo stretchy="false" lspace="0" rspace="0">&#x0007C;</mo>',
     'width="negativethinmathspace"': 'width="-0.167em"',
 }
 
@@ -51,7 +67,9 @@ def mathml(latex: str, *, display: bool = False) -> str:
     from latex2mathml.converter import convert
 
     words = WORDS.sub(lambda m: rf"\text{{{m[1].replace(chr(92) + ',', ' ')}}}", latex)
-    found: str = convert(words.strip())
+    lines = LINES.sub(r"\\\1{split}", words)
+    sized = BIG.sub(lambda m: rf"\{'left' if m[1] in OPENING else 'right'}{m[1]}", lines)
+    found: str = FUNCTION.sub(lambda m: NAMED.format(m[2], "0" if m[3] else THIN), convert(sized.strip()))
     for given, better in SPACING.items():
         found = found.replace(given, better)
     return TAG.sub('<math displaystyle="true">' if display else "<math>", found, count=1)
@@ -82,7 +100,8 @@ def _width(element: Element) -> float:
     if tag in ("mi", "mn", "mtext", "ms"):
         return LETTER * len(element.text or "")
     if tag == "mo":
-        return BRACKET if element.get("fence") else OPERATOR
+        name = LETTER * len(element.text or "") + MARGIN
+        return BRACKET if element.get("fence") else max(name, OPERATOR)
     if tag == "mfrac":
         return max(parts) + MARGIN
     if tag in ("msub", "msup", "msubsup", "munder", "mover", "munderover"):
