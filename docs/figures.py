@@ -114,6 +114,7 @@ def press() -> Figure:
     pressure = left.twinx()
     pressure.plot(run.time, run.p / 1e3, color="0.6", linestyle="--")
     pressure.set_ylabel("pressure [kPa]", color="0.4")
+    figure.get_layout_engine().set(wspace=0.08)
     _temperatures(right, run, "T_1", "T_2")
     return figure
 
@@ -133,7 +134,7 @@ def sudden_contact() -> Figure:
     right.semilogx(run.time[1:], run["T"][1:], color=BLUE)
     right.semilogx(run.time[1:], run["T_exact"][1:], color="0.4", linestyle="--", linewidth=0.8)
     right.set_xlabel("time [s]")
-    right.set_ylabel("contact [K]")
+    right.set_ylabel("temperature of the contact [K]")
     return figure
 
 
@@ -146,7 +147,7 @@ def closing_gap() -> Figure:
     for channel, colour, label in (("film", BLUE, "gas"), ("radiation", RED, "radiation")):
         ax.loglog(run.g_n * 1e6, run[f"q_1_{channel}"] / difference, color=colour, label=label)
     ax.loglog(run.g_n * 1e6, run.k_m / run.g_n, color="0.6", linestyle="--", linewidth=0.8, label="$k_m/g_n$")
-    ax.set(xlabel="gap [um]", ylabel="conductance [W/(m$^2$ K)]")
+    ax.set(xlabel="gap [\N{GREEK SMALL LETTER MU}m]", ylabel="conductance [W/(m$^2$ K)]")
     ax.legend()
     return figure
 

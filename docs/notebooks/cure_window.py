@@ -49,7 +49,7 @@ window = surfacechem.load(
 runs = (
     window.stream(window.plan(), Path(tempfile.mkdtemp()) / "window.zarr").run().dataset
 )
-plots.figure(runs, ["time_to_phi", "T_max"])
+plots.figure(runs, ["time_to_phi", "T_max"], celsius=True)
 
 # %% [markdown]
 # White is where 80 % are not reached in half an hour. What is both in time and cool enough is the window:

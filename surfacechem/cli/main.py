@@ -73,7 +73,7 @@ def main(
 @app.command(epilog=EXIT_CODES)
 def run(
     case: CaseName,
-    output: Annotated[Path | None, written_to("netCDF file; default <case name>.nc.")] = None,
+    output: Annotated[Path | None, written_to(".nc, .csv or .parquet; default <case name>.nc.")] = None,
     changes: Changes = None,
     solver: SolverName = None,
     rtol: Tolerance = None,
@@ -109,7 +109,7 @@ def run(
 def sweep(
     case: CaseName,
     output: Annotated[
-        Path | None, written_to("netCDF file, or NAME.zarr for a store of any size; default <case name>-sweep.nc.")
+        Path | None, written_to(".nc, .csv, .parquet, or .zarr for any size; default <case name>-sweep.nc.")
     ] = None,
     over: Annotated[
         list[str] | None,

@@ -27,8 +27,6 @@ MOST_POINTS = 2**20
 
 MOST_PANELS = 3
 
-TIME_UNIT = "s"
-
 COUNTED = ("steps", "destroys_entropy")
 """Variables on the solver or the laws, not on what happens."""
 
@@ -119,10 +117,8 @@ def fair(dataset: xarray.Dataset, name: str) -> Array:
 
 
 def quantity_label(values: xarray.DataArray) -> str:
-    """Name and unit of a variable."""
-    name = str(values.name)
-    words = name.replace("_", " ") if unit(values) == TIME_UNIT else symbol(name)
-    return f"{words} [{unit_text(unit(values))}]"
+    """What a variable is, and its unit."""
+    return f"{style.quantity_words(values)} [{unit_text(unit(values))}]"
 
 
 def maps(dataset: xarray.Dataset, plan: Plan, axes: Sequence[str], names: Sequence[str]) -> Figure:
@@ -171,7 +167,7 @@ def curves(dataset: xarray.Dataset, axes: Sequence[str], names: Sequence[str], a
             values = dataset[name].values.reshape(count, -1)[members]
             for line, run, k in zip(values, x, members, strict=True):
                 ax.plot(run, line, drawstyle=style.drawn_as(dataset[name]), **looks(dataset, axes, k))
-            style.label(ax.yaxis, symbol(name), unit(dataset[name]), values)
+            style.label(ax.yaxis, style.quantity_words(dataset[name]), unit(dataset[name]), values)
             style.legend(ax)
         style.label(grid[-1, 0].xaxis, "Time" if against in (None, "time") else symbol(against), unit(over), x)
         many = RUN not in axes and count > style.MOST_CURVES

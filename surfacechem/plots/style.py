@@ -295,6 +295,15 @@ def variable_words(values: xarray.DataArray) -> str:
     return f"{meaning(values)} {symbol(str(values.name))}"
 
 
+def quantity_words(values: xarray.DataArray) -> str:
+    """The symbol of a variable; of a time to a value or an event, its words."""
+    name = str(values.name)
+    if not name.startswith("time_"):
+        return symbol(name)
+    words = str(values.attrs.get("long_name", name)) if name.startswith("time_to_") else name.replace("_", " ")
+    return words[:1].upper() + words[1:]
+
+
 def is_mode(values: xarray.DataArray) -> bool:
     """True for a mode of the automaton, as the long name of a variable says."""
     return str(values.attrs.get("long_name", "")).startswith("mode (")

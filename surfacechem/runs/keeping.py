@@ -168,7 +168,8 @@ def described(system: System, keep: Keep) -> dict[str, tuple[str, str, str]]:
             text = f"{q[state].long_name} before the event {name}"
             found[f"{state}_at_{variable(name)}"] = ("float64", q[state].unit, text)
     for name, value in (keep.reach or {}).items():
-        found[f"time_to_{name}"] = ("float64", "s", f"time at which {name} first reaches {value:g} {q[name].unit}")
+        text = f"{value:g} {q[name].unit}".removesuffix(" 1")
+        found[f"time_to_{name}"] = ("float64", "s", f"time to {name} = {text}")
     return found
 
 

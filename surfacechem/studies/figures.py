@@ -182,7 +182,7 @@ class Picture:
     def caption(self) -> str:
         """Title, source, and largest distance from the exact curves."""
         known = [curve.distance for curve in self.curves if curve.exact is not None]
-        far = [f"Largest distance from the exact curve: {max(known):.0e} of its range."] if known else []
+        far = [f"Largest distance from the exact curve: {max(known):.0g} of its range."] if known else []
         return " ".join([f"{self.section.title}.", *([f"{self.section.source}."] if self.section.source else []), *far])
 
     def draw(self) -> Plot:
