@@ -440,7 +440,7 @@ def made_ratios() -> str:
     heading = ("", *(f"{case} 10<sup>-{int(error[3:])}</sup>" for case, error in wanted))
 
     def cell(value: str | None) -> str:
-        return "" if value is None else "not reached" if value == "nan" else f"{float(value):.2g}"
+        return "" if value is None else "not reached" if value == "nan" else f"{float(f'{float(value):.2g}'):g}"
 
     return table(heading, [(name, *(cell(found.get((name, *key))) for key in wanted)) for name in names])
 
@@ -459,7 +459,7 @@ def made_growth() -> str:
                 cells.append("")
                 continue
             (small, before), (large, seconds) = found[-2:]
-            power = math.log(seconds / before) / math.log(large / small)
+            power = round(math.log(seconds / before) / math.log(large / small), 1) + 0.0  # no negative zero
             cells.append(f"{seconds:.2g} s at {large:,.0f}, power {power:.1f}")
         shown.append((name, *cells))
     return table(("", *costs), shown)

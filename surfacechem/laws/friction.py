@@ -88,7 +88,7 @@ class Stribeck(UnderPressure, Friction):
     .. math:: t_t = \left[ \mu_k + (\mu_s - \mu_k) e^{-|v / v_s|^\delta} \right] p\,\mathrm{sgn}(v) + c_v v
 
     Source: Armstrong-Hélouvry, Dupont & Canudas de Wit (1994), doi 10.1016/0005-1098(94)90209-7; named in Sauer, Duong
-    & Mandadapu (2021), remark r:512. Any v; p >= 0. Dissipates :math:`t_t v \ge 0`. Where the traction falls with
+    & Mandadapu (2021), remark 5.12. Any v; p >= 0. Dissipates :math:`t_t v \ge 0`. Where the traction falls with
     velocity faster than a damper resists, steady sliding is unstable.
 
     >>> round(Stribeck(mu_s=0.6, mu_k=0.4, v_s=1e-3).traction(p=1e5, v=1e-3, direction=1.0), 6)

@@ -220,7 +220,7 @@ class ElectrostaticFlatFlat(Attraction):
 
     Charges of one sign repel. The traction does not fall with the gap as long as that is small against the flats.
     Source: Coulomb's law summed over two planes (Jackson, Classical Electrodynamics, 1999, ch. 1); Sauer, Duong &
-    Mandadapu (2021), remark r:59. Fixed charges; any g_n. Per current area, of charge densities on the reference area.
+    Mandadapu (2021), remark 5.9. Fixed charges; any g_n. Per current area, of charge densities on the reference area.
 
     >>> round(ElectrostaticFlatFlat(s_1=1e-4, s_2=-2e-4).energy(g_n=1e-6), 8)
     0.00112941
