@@ -103,11 +103,12 @@ def distance(mine, theirs):
 
 for name, mine in values.items():
     print(
-        f"{name:12} [{truth[name].units:8}]  {distance(mine, truth[name].values):.1e}"
+        f"{name:17} [{truth[name].units:9}]  {distance(mine, truth[name].values):.1e}"
     )
 for (of, by), mine in tangent.items():
     slope = truth[f"{of}_by_{by}"]
-    print(f"d{of}/d{by:5} [{slope.units:10}]  {distance(mine, slope.values):.1e}")
+    name = f"d{of}/d{by}"
+    print(f"{name:17} [{slope.units:9}]  {distance(mine, slope.values):.1e}")
 
 # %% [markdown]
 # What the element leaves out of its tangent is zero in truth, too: a derivative that is not in the dataset is one that

@@ -120,7 +120,8 @@ for ax, (name, run) in zip(axes, runs.items(), strict=True):
         assert error.max() < 1e-8
     ax.set(title=name, xlabel="time [s]")
     ax.grid(alpha=0.25)
-    ax.legend(frameon=False)
+    ax.legend(loc="lower center", ncols=3)
+    ax.set_ylim(bottom=1e-19)
 # %% [markdown]
 # Both cases run at the default tolerance. The files say what was found against the package's own exact solutions, and
 # how well the balances close:
