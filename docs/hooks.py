@@ -114,7 +114,8 @@ def markdown(docstring: str) -> str:
 
 def _formula(match: re.Match[str]) -> str:
     lines = "\n".join(line.strip() for line in match[1].strip().splitlines())
-    body = f"\\begin{{gathered}}\n{lines}\n\\end{{gathered}}" if "\\\\" in lines else lines
+    rows = lines.replace("\\\\\n", "\\\\\n&")
+    body = f"\\begin{{aligned}}\n&{rows}\n\\end{{aligned}}" if rows != lines else lines
     return f"\n$$\n{body}\n$$\n\n"
 
 
@@ -174,7 +175,7 @@ def law_section(law: type[Law]) -> str:
     parts += [table(("parameter", "unit", "meaning", "range", "if not given"), rows)] if rows else []
     meanings = {name: quantity.long_name for name, quantity in VARIABLES.items()} | {"N_c": "nominal site density"}
     found = [f"{meanings[name]} `{name}`" for name in reads(getattr(law, law.formula)) if name in meanings]
-    parts += [f"Reads: {', '.join(found)}."] if found else []
+    parts += [f"Reads: {', '.join(found)}."] if found and law.contract != "shape" else []  # u and v are its own
     parts += [f"Per {law.per} area."] if issubclass(law, Potential) else []
     return "\n\n".join(parts)
 

@@ -107,8 +107,10 @@ def precision(
     ----------
     cases
         Names or files of cases.
-    solvers, tolerances
-        Names of solvers, and relative tolerances.
+    solvers
+        Names of solvers.
+    tolerances
+        Relative tolerances.
     variables
         States or named quantities whose errors count, the states if none are given.
     repeat

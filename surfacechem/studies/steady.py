@@ -78,8 +78,10 @@ def steady(source: Source, of: Sequence[str] = (), overrides: Overrides = ()) ->
 
     Parameters
     ----------
-    source, overrides
+    source
         As for :func:`surfacechem.load`. Nothing may change in time but the state.
+    overrides
+        As for :func:`surfacechem.load`.
     of
         Names of quantities, ``production_CO2`` for instance; all productions in neighbours if not given.
 
