@@ -34,6 +34,7 @@ PLACES = {
     "bonding": "interface.bonding",
     "friction": "interface.friction",
     "heat": "heat",
+    "limit": "interface.limits",
     "growth": "interface.medium.growth",
     "property": "`interface.medium`, under the name of the property",
     "loading": "loading.NAME",
@@ -189,7 +190,7 @@ def _default(kind: Any, name: str) -> str:
     default = next(item.default for item in dataclasses.fields(kind) if item.name == name)
     if default is dataclasses.MISSING:
         return "required"
-    if default is None:
+    if default in (None, ""):
         return ""
     return f"{default:g}" if isinstance(default, float) else f"`{default}`"
 
