@@ -36,6 +36,8 @@ Heat = Callable[[Array], Array]
 BALANCED = ROUNDING
 """Tractions out of balance that count as none, relative to their parts: those of a run hold its rounding."""
 
+NO_BALANCE = "there is no gap at which the tractions are in equilibrium at the start"
+
 POLISH = 3
 """Newton steps that take the drift of an integration out of the gaps: each doubles the digits."""
 

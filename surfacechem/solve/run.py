@@ -24,7 +24,7 @@ from surfacechem.solve import segments as pieces
 from surfacechem.solve.choice import EXPLICIT, method
 from surfacechem.solve.contract import Array, Index, Margin, Mask, Problem, Result, Solver, States, Status, among
 from surfacechem.solve.diagnose import ROUNDED, are_led_back, cause
-from surfacechem.solve.equilibria import Equilibria, Point
+from surfacechem.solve.equilibria import NO_BALANCE, Equilibria, Point
 from surfacechem.solve.hybrid import Flow, Hybrid, carried, solve_together, without_stall
 from surfacechem.solve.jumps import Jump, Jumper
 from surfacechem.solve.radau.solver import consistent, output_rates
@@ -445,8 +445,7 @@ class Model:
         """The states with their gaps in equilibrium, and the parameters of all segments with the modes found there."""
         settled = self.equilibria.settle(Point(0.0, y, np.zeros_like(y), parameters[0].copy()))
         if settled is None:
-            message = "there is no gap at which the tractions are in equilibrium at the start."
-            raise InputError(message, path="mechanics")
+            raise InputError(f"{NO_BALANCE}.", path="mechanics")
         return settled.y, np.where(settled.parameters != parameters[0], settled.parameters, parameters)
 
     @cached_property

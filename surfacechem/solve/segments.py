@@ -65,6 +65,12 @@ def start_modes(system: System, parameters: Array, values: Mapping[str, float]) 
         initial |= dict(zip(symbols, parameters[0].tolist(), strict=True)) | {system.t: 0}
         for mode in started:
             parameters[:, symbols.index(mode.symbol)] = float(system.expand(mode.start).subs(initial))
+    start_registers(system, parameters, values)
+
+
+def start_registers(system: System, parameters: Array, values: Mapping[str, float]) -> None:
+    """Registers that follow from the initial state."""
+    symbols = [p.symbol for p in system.parameters]
     for register in system.registers:
         if register.given is not None:
             parameters[:, symbols.index(register.symbol)] = register.given(values)
