@@ -7,7 +7,7 @@ from the balances there is solved for: the rates of what evolves, the values of 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -27,13 +27,16 @@ from surfacechem.expressions import derivative
 from surfacechem.format.csvtable import CSVText
 from surfacechem.laws.loading import Hold
 from surfacechem.model.assemble import assemble
+from surfacechem.model.automaton import Equilibrium
 from surfacechem.model.system import Named, System
 from surfacechem.quantities import Quantity
 from surfacechem.results.dataset import DATASET_NAMES, Results
 from surfacechem.results.netcdf import Column, versions
 from surfacechem.scene import Scene
 from surfacechem.solve.contract import Array
+from surfacechem.solve.equilibria import NO_BALANCE, Equilibria, Point
 from surfacechem.solve.run import values_of
+from surfacechem.solve.segments import start_registers
 from surfacechem.tolerances import ROUNDING, TINY
 
 Points = Mapping[str, ArrayLike]
@@ -106,8 +109,11 @@ class Argument:
 
     column: int
     quantity: Quantity
+    path: str
     is_log: bool = False
     """Whether the argument is its logarithm."""
+    is_made: bool = False
+    """Whether the argument is made of it, and of other values at the start."""
 
     def values(self, table: Array) -> Array:
         """Its values, from the arguments."""
@@ -128,29 +134,33 @@ class Evaluator:
             message = "rates of the mechanism come from Cantera itself, which gives no derivatives."
             raise InputError(message, path="interface.mechanism")
         n = len(system.states)
+        self.first = self._begun({})
+        """Arguments of compiled functions at the start of the case."""
         self.given, self.parameters = _states(system) | _histories(system), _parameters(system)
-        # What is solved for: rates of what evolves, values of what is algebraic.
+        balances = _balances(system, self.quasi_static)
+        # What is solved for: rates of what evolves, values of what is algebraic or in equilibrium.
         self.unknown = [1 + j if state.algebraic else 1 + n + j for j, state in enumerate(system.states)]
-        self.rows = [*_rates(system), *(item for item in system.outputs if item.name not in self.given)]
+        self.unknown += [1 + system.state_columns[name] for name in balances]
+        self.rows = [*_rates(system, balances), *(item for item in system.outputs if item.name not in self.given)]
         self.rows += _capacities(system, scene, self.given)
         # Whether a state is stable is not asked of a point.
         self.margins = [margin for margin, _ in system.limits if not margin.stability]
         by = sorted({*self.unknown, *(item.column for item in self.given.values())})
-        expressions = [*system.rows.values(), *(row.expression for row in self.rows)]
+        expressions = [*system.rows.values(), *balances.values(), *(row.expression for row in self.rows)]
         self.slopes = Slopes(system, expressions, by, [margin.masked for margin in self.margins])
         self.modes = [mode for mode in system.modes if mode.start is not None]
 
     def at(self, points: Points) -> tuple[list[Column], list[Column], list[str]]:
         """Columns of what is given, what follows and the derivatives; why laws do not hold, by point."""
         table, asked = self._table(points)
-        # The balances that hold are those of what the points do not give.
-        sought = np.flatnonzero(~np.isin(self.unknown, [item.column for item in asked.values()])).tolist()
+        lost = self._settle(table, asked)
+        sought = self._sought(asked)
         unknown = [self.unknown[i] for i in sought]
         # All that may be given, in one order, but for what is solved for.
         own = {name: item for name, item in self.given.items() if item.column not in unknown}
         values, slopes, margins = self._solved(table, sought, unknown)
         shown = {i: row.quantity for i, row in enumerate(self.rows, start=len(self.unknown)) if row.name not in own}
-        found = [_column(item.quantity, item.values(table)) for item in (own | asked).values()]
+        found = [_column(x.quantity, x.values(table)) for x in (own | asked).values() if not x.is_made]
         found += [_column(quantity, values[:, i]) for i, quantity in shown.items()]
         by = [item.column for item in own.values()]
         total, there = self.slopes.total(slopes, [*shown], by, sought, unknown)
@@ -162,30 +172,87 @@ class Evaluator:
         # The first margin that is closed; behind all of them stands that none is.
         closed = np.column_stack([~(margins > 0), np.ones(len(margins), dtype=bool)])
         reasons = np.array([*(margin.reason for margin in self.margins), ""])
-        return found, derivatives, reasons[closed.argmax(axis=1)].tolist()
+        return found, derivatives, np.where(lost, NO_BALANCE, reasons[closed.argmax(axis=1)]).tolist()
 
     def _table(self, points: Points) -> tuple[Array, dict[str, Argument]]:
         """The arguments of compiled functions at each point, and what the points give."""
-        known, system = self.given | self.parameters, self.system
+        asked, columns = self._given(points)
+        table = np.tile(self.first, (len(columns), 1))
+        if any(item.is_made for item in asked):
+            paths = [item.path for item in asked]
+            possible = np.where([item.is_log for item in asked] & (columns <= 0), np.nan, columns)
+            table[:] = [self._begun(dict(zip(paths, row, strict=True))) for row in possible]
+        for item, x in zip(asked, columns.T, strict=True):
+            if not item.is_made:
+                item.put(table, x)
+        # A point has no past: bodies that overlap are in contact, what slides slides.
+        if self.modes:
+            table[:, [self.system.inputs.index(mode.symbol) for mode in self.modes]] = self._start(table)
+        return table, {item.quantity.name: item for item in asked}
+
+    def _given(self, points: Points) -> tuple[list[Argument], Array]:
+        """What the points give, and its values, shape (points, arguments)."""
+        known = self.names | self.parameters
         for name in points:
             if name not in known:
                 raise InputError(f"points cannot give '{name}'.{suggestion(name, known)}")
         given = {name: _numbers(name, value, known[name].quantity.unit) for name, value in points.items()}
+        first = {known[name].column: name for name in reversed(given)}
+        for name in given:
+            if first[known[name].column] != name:
+                raise InputError(f"points give {first[known[name].column]} or {name}, not both.")
         try:
-            columns = dict(zip(given, np.broadcast_arrays(*given.values()), strict=True))
+            columns = np.broadcast_arrays(*given.values())
         except ValueError:
             sizes = ", ".join(f"{len(x)} of {name}" for name, x in given.items())
             raise InputError(f"points need as many values of everything: there are {sizes}.") from None
-        values = values_of(system)
+        return [known[name] for name in given], np.array(columns).T if given else np.zeros((1, 0))
+
+    def _begun(self, changes: Mapping[str, float]) -> Array:
+        """Arguments at the start of a run with some values changed, by path."""
+        system = self.system
+        values = {**values_of(system), **changes}
+        parameters = np.array([[values[parameter.path] for parameter in system.parameters]])
+        start_registers(system, parameters, values)
         states = [state.from_given(values) for state in system.states]
-        first = [0.0, *states, *np.zeros(len(states)), *(values[p.path] for p in system.parameters)]
-        table = np.tile(np.array(first), (len(next(iter(columns.values()), [0])), 1))
-        for name, x in columns.items():
-            known[name].put(table, x)
-        # A point has no past: bodies that overlap are in contact, what slides slides.
-        if self.modes:
-            table[:, [system.inputs.index(mode.symbol) for mode in self.modes]] = self._start(table)
-        return table, {name: known[name] for name in columns}
+        return np.array([0.0, *states, *np.zeros(len(states)), *parameters[0]])
+
+    def _sought(self, asked: Mapping[str, Argument]) -> list[int]:
+        """The balances that hold, by number: those of what the points do not give, nor take along."""
+        led = [name for item in self.quasi_static if item.state in asked for name in item.along]
+        known = [item.column for item in (*asked.values(), *(self.given[name] for name in led))]
+        return np.flatnonzero(~np.isin(self.unknown, known)).tolist()
+
+    def _settle(self, table: Array, asked: Collection[str]) -> NDArray[np.bool_]:
+        """Let gaps that points do not give find their equilibrium, as at the start of a run; whether there is none."""
+        lost = np.zeros(len(table), dtype=bool)
+        free = [item for item in self.quasi_static if item.state not in asked]
+        moves = [{name: far for name, far in item.along.items() if name not in asked} for item in free]
+        items = tuple(replace(item, along=along) for item, along in zip(free, moves, strict=True))
+        equilibria = Equilibria(replace(self.system, equilibria=items))
+        gaps = [1 + self.system.state_columns[item.state] for item in items]
+        for k, row in enumerate(table if items else ()):
+            settled = equilibria.settle(Point.of(row.copy(), len(self.system.states)))
+            lost[k] = settled is None
+            row[gaps] = np.nan
+            row[:] = row if settled is None else settled.inputs()
+        return lost
+
+    @cached_property
+    def names(self) -> dict[str, Argument]:
+        """What points may give by name, by that of the dataset too."""
+        found = dict(self.given)
+        for column, state in enumerate(self.system.states, start=1):
+            if state.given and state.given.state:
+                quantity = state.given.quantity
+                found[quantity.name] = Argument(column, quantity, state.path, is_made=True)
+        return found | {DATASET_NAMES.get(name, name): item for name, item in found.items()}
+
+    @cached_property
+    def quasi_static(self) -> list[Equilibrium]:
+        """The gaps in equilibrium that nothing holds at the start."""
+        items, start = self.system.equilibria, Point.of(self.first, len(self.system.states))
+        return [items[k] for k in Equilibria(self.system).free(start)] if items else []
 
     @cached_property
     def _start(self) -> Function:
@@ -255,31 +322,41 @@ def _states(system: System) -> dict[str, Argument]:
     found = []
     for column, state in enumerate(system.states, start=1):
         is_log = state.given is not None and state.given.state is None
-        found.append(Argument(column, state.given.quantity if state.given and is_log else state.quantity, is_log))
+        quantity = state.given.quantity if state.given and is_log else state.quantity
+        found.append(Argument(column, quantity, state.path, is_log))
     inside = system.inside
     return {item.quantity.name: item for item in found if item.quantity.name not in inside}
 
 
 def _histories(system: System) -> dict[str, Argument]:
     """Prescribed variables, which are parameters where they are held."""
-    levels = {p.symbol for p in system.parameters if p.path.endswith(LEVEL)}
-    held_at = [item for item in system.named if item.expression in levels]
-    return {item.name: Argument(system.inputs.index(item.expression), item.quantity) for item in held_at}
+    levels = {p.symbol: p.path for p in system.parameters if p.path.endswith(LEVEL)}
+    held_at = [(item.quantity, item.expression) for item in system.named if item.expression in levels]
+    return {q.name: Argument(system.inputs.index(symbol), q, levels[symbol]) for q, symbol in held_at}
 
 
 def _parameters(system: System) -> dict[str, Argument]:
     """Parameters of laws by path."""
     own = [p for p in system.parameters if p.changeable and not p.path.endswith(LEVEL)]
     quantities = [Quantity(re.sub(r"\W+", "_", p.path).strip("_"), p.spec.unit, p.spec.text) for p in own]
-    return {p.path: Argument(system.inputs.index(p.symbol), q) for p, q in zip(own, quantities, strict=True)}
+    return {p.path: Argument(system.inputs.index(p.symbol), q, p.path) for p, q in zip(own, quantities, strict=True)}
 
 
-def _rates(system: System) -> Iterator[Named]:
-    """Rates of what evolves and values of what is algebraic."""
+def _balances(system: System, gaps: Sequence[Equilibrium]) -> dict[str, Any]:
+    """What is zero in equilibrium, by state: the balance of each gap, and of what moves along that it does."""
+    found = {item.state: system.expand(item.residual) for item in gaps}
+    moved = {state.name: state.symbol - state.initial for state in system.states}
+    for item in gaps:
+        found |= {name: moved[name] - system.expand(far) * moved[item.state] for name, far in item.along.items()}
+    return found
+
+
+def _rates(system: System, balances: Collection[str]) -> Iterator[Named]:
+    """Rates of what evolves and values of what is algebraic or in equilibrium."""
     for state in system.states:
-        if state.algebraic:
+        if state.algebraic or state.name in balances:
             yield Named(state.quantity, state.symbol)
-        elif state.name not in system.inside:
+        if not state.algebraic and state.name not in system.inside:
             text = f"rate of change of the {state.quantity.long_name}"
             yield Named(Quantity(f"d{state.name}_dt", quotient(state.quantity.unit, "s"), text), state.dot)
 
@@ -312,7 +389,8 @@ def _numbers(name: str, value: ArrayLike, unit: str) -> Array:
 
 def _solve(matrix: Array, right: Array) -> Array:
     """Solutions of many systems; not a number where a matrix is singular."""
-    singular = np.linalg.slogdet(matrix)[0] == 0  # NumPy would refuse all for the sake of one
+    with np.errstate(invalid="ignore"):  # where no gap was found there are no numbers
+        singular = np.linalg.slogdet(matrix)[0] == 0  # NumPy would refuse all for the sake of one
     return np.asarray(np.linalg.solve(np.where(singular[:, None, None], np.nan, matrix), right))
 
 
@@ -338,11 +416,11 @@ def read_points(path: Path, evaluator: Evaluator) -> dict[str, list[float]]:
         raise InputError("there is no such file of points.", Place(str(path)))
     text = CSVText(Tree(document.read(path, str(path)), Place(str(path))), quoted=True)
     for name, _ in text.columns:
-        if name not in evaluator.given:
-            raise text.error(text.heading[0], f"points cannot give '{name}'.{suggestion(name, evaluator.given)}")
+        if name not in evaluator.names:
+            raise text.error(text.heading[0], f"points cannot give '{name}'.{suggestion(name, evaluator.names)}")
     if not text.rows:
         raise text.error(text.heading[0], "there is no row of values below these names.")
-    return {name: text.column(name, evaluator.given[name].quantity.unit, name) for name, _ in text.columns}
+    return {name: text.column(name, evaluator.names[name].quantity.unit, name) for name, _ in text.columns}
 
 
 def evaluation(evaluator: Evaluator, points: Points, **origin: Any) -> PointResults:

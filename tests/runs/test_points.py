@@ -33,11 +33,26 @@ loading: {g_n: -1 nm, v: 1 mm/s, phi: 0.5}
 run: {until: 1 s}
 """
 
+STUCK = """
+bodies: {lower: {temperature: 300 K}, upper: {temperature: 300 K}}
+interface: {potential: [tangential-stiffness: {E_t: 1e13 Pa/m}], friction: [coulomb: {mu: 0.5}]}
+mechanics: {tangential: {k: 1e13 Pa/m}}
+loading: {p: 1 MPa, w_t: 10 nm}
+"""
+HUNG = """
+bodies: {lower: {temperature: 300 K}, upper: {temperature: 300 K}}
+interface: {potential: [exponential-cohesive-zone: {t_max: 1 MPa, g_0: 10 nm, E_n: 1e15 Pa/m}]}
+loading: {F_n: 0.2 MPa}
+initial: {g_n: 0.2 nm}
+"""
+
 POINTS = {
     "element": {"g_n": -2e-9, "phi": 0.3, "v": 2e-3},
     "three-temperatures-no-capacity": {},
     "dna-adhesive": {"theta_bond_s": 0.4, "theta_free_s": 0.5, "T_1": 305.0, "T_2": 330.0},
     "generalised-bonding-sliding": {"phi": 0.4, "T": 310.0},
+    "cohesive-cycles": {"w_n": 3e-8},
+    "held": {"w_t": 2e-8},
 }
 
 
@@ -71,7 +86,8 @@ def test_a_prescribed_contact_gives_what_its_formulas_say(element):
 @pytest.mark.parametrize("name", POINTS)
 def test_derivatives_are_those_of_the_values(name, element):
     """Central differences of fourth order agree, to the rounding of the values."""
-    simulation, at = element if name == "element" else surfacechem.load(name), POINTS[name]
+    own = {"element": element, "held": name == "held" and surfacechem.load(STUCK)}
+    simulation, at = own.get(name) or surfacechem.load(name), POINTS[name]
     first = simulation.evaluate(at)
     given = [key for key in simulation.evaluator.given if key in first and np.any(first[key])]
     for key in given:
@@ -106,6 +122,58 @@ def test_what_is_algebraic_is_solved_for_unless_it_is_given():
     assert float(given["q_1"][0]) == pytest.approx(float(solved["q_1"][0]), rel=1e-12)
     through = given["q_1_by_T_1"] + given["q_1_by_T_c"] * solved["T_c_by_T_1"]
     assert float(through[0]) == pytest.approx(float(solved["q_1_by_T_1"][0]), rel=1e-12)
+
+
+def test_a_gap_without_inertia_is_in_balance_unless_it_is_given():
+    simulation, w = surfacechem.load("cohesive-pull-off"), np.array([2e-8, 4e-8])
+    found = simulation.evaluate({"w_n": w})
+    assert found["g_n"].values == pytest.approx([0.76383023e-9, 1.66558e-9], rel=1e-5)
+    assert found["t_n"].values == pytest.approx(1e13 * (w - found["g_n"].values), rel=1e-12)
+    assert "t_n_by_g_n" not in found
+    given = simulation.evaluate({"w_n": w, "g_n": found["g_n"].values})
+    assert given["t_n"].values == pytest.approx(found["t_n"].values, rel=1e-12)
+    through = 1e13 * given["t_n_by_g_n"] / (1e13 + given["t_n_by_g_n"])
+    assert found["t_n_by_w_n"].values == pytest.approx(through.values, rel=1e-12)
+
+
+@pytest.mark.parametrize("name", ["cohesive-cycles", "snap-in", "sticky-sphere", "van-der-waals-sphere"])
+def test_the_point_at_the_start_is_that_of_a_run(name):
+    simulation = surfacechem.load(name, ["run.until=1 ms"])
+    start, run = simulation.evaluate(), simulation.run().dataset
+    for quantity in ("g_n", "t_n", "E_total"):
+        assert float(start[quantity][0]) == pytest.approx(float(run[quantity][0]), rel=1e-9)
+
+
+def test_what_a_dead_load_hangs_from_bears_it_or_there_is_no_balance():
+    found = surfacechem.load(HUNG).evaluate({"F_n": [2e5, 11e5]})
+    assert float(found["t_n"][0]) == pytest.approx(2e5, rel=1e-12)
+    assert found["admissible"].values.tolist() == [1, 0]
+    assert str(found["reason"].values[1]).startswith("there is no gap at which the tractions are in equilibrium")
+    assert np.isnan(found["g_n"][1])
+    assert float(found["F_n"][1]) == 11e5
+
+
+@pytest.mark.parametrize(("given", "gaps"), [({}, (5, 5)), ({"u_t": 2e-9}, (2, 0)), ({"g_t": 2e-9}, (8, 2))])
+def test_what_sticks_follows_the_displacement_that_is_found(given, gaps):
+    found = surfacechem.load(STUCK).evaluate(given)
+    assert [1e9 * float(found[name][0]) for name in ("u_t", "g_t")] == pytest.approx(gaps, rel=1e-12)
+
+
+def test_sliding_in_the_plane_has_the_direction_that_a_case_or_a_point_gives():
+    simulation = surfacechem.load("anisotropic-slide")
+    expected = {"v": 1.0, "v_2": 1.5, "t_t": 3328.20117735, "t_t2": 14976.9052981, "D_anisotropic_coulomb": 25793.5591}
+    found, turned = simulation.evaluate(), simulation.evaluate({"v_2": [-1.5, 0.0], "v": [1.0, 2.0]})
+    assert {name: float(found[name][0]) for name in expected} == pytest.approx(expected, rel=1e-9)
+    assert turned["t_t2"].values == pytest.approx([-14976.9052981, 0], rel=1e-9)
+    assert turned["v"].values == pytest.approx([1, 2], rel=1e-12)
+
+
+def test_names_are_those_of_the_results_too():
+    simulation = surfacechem.load("three-temperatures")
+    told = simulation.evaluate({"Q_ext_c": 200})
+    assert told.identical(simulation.evaluate({"Q_c": told["Q_ext_c"].values}))
+    with pytest.raises(InputError, match="points give Q_c or Q_ext_c, not both"):
+        simulation.evaluate({"Q_c": 1, "Q_ext_c": 1})
 
 
 def test_a_point_is_the_scene_with_these_values(element, tmp_path):
