@@ -171,13 +171,16 @@ def at_states(dataset: xarray.Dataset, variables: Sequence[str] | None, against:
         raise InputError("a figure needs states that differ.", style.place(dataset))
     over = against or differing[0]
     names = variables or _usual_at_states(dataset, [name for name in differing if name != over])
+    refused = dataset["admissible"].values == 0
     with style.panels(6.4, 0.7 + 1.9 * len(names), len(names), sharex=True) as (plot, grid):
         order = np.argsort(dataset[over].values, kind="stable")
         for ax, name in zip(grid[:, 0], names, strict=True):
-            ax.plot(dataset[over].values[order], dataset[name].values[order], "o-", markersize=3)
-            style.label(ax.yaxis, symbol(name), unit(dataset[name]), dataset[name].values)
+            values = np.where(refused, np.nan, dataset[name].values)
+            ax.plot(dataset[over].values[order], values[order], "o-", markersize=3)
+            style.label(ax.yaxis, symbol(name), unit(dataset[name]), values)
+        style.mark(grid[:, 0].tolist(), dataset[over].values[refused], "refused")
         style.label_variable(grid[-1, 0].xaxis, dataset[over])
-        style.headings(plot, grid[0, 0], dataset)
+        style.headings(plot, grid[0, 0], dataset, more=f"{refused.sum()} refused" if refused.any() else "")
     return plot
 
 

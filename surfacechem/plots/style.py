@@ -221,8 +221,8 @@ def headings(plot: Figure, ax: Axes, dataset: xarray.Dataset, above: float = 0.0
     ax.set_title("\n".join(lines), loc="left", pad=6 + above, **NOTE)
 
 
-LOST = ("failed", "refused")
-"""Statuses of runs whose last values are no ends."""
+LOST = {"failed": "x", "refused": "d"}
+"""Statuses of runs whose last values are no ends, and what marks them."""
 
 
 def _ends(dataset: xarray.Dataset) -> str:
@@ -243,12 +243,17 @@ def lost(dataset: xarray.Dataset, *words: str) -> NDArray[np.bool_]:
 def mark_lost(axes: Sequence[Axes], dataset: xarray.Dataset) -> None:
     """Marks on the axis of what is swept where runs have no ends, so that it reaches as far as the sweep."""
     x = dataset[str(dataset["status"].dims[0])].values
-    for word, marker in zip(LOST, "xd", strict=True):
-        where = lost(dataset, word).reshape(len(x), -1).any(axis=1)
-        for k, ax in enumerate(axes if where.any() else ()):
-            look: Any = {"color": "0.4", "markerfacecolor": "white", "clip_on": False, "zorder": 3}
-            across, label = ax.get_xaxis_transform(), "_" if k else word
-            ax.plot(x[where], np.zeros(where.sum()), marker, markersize=5, transform=across, label=label, **look)
+    for word in LOST:
+        mark(axes, x[lost(dataset, word).reshape(len(x), -1).any(axis=1)], word)
+
+
+def mark(axes: Sequence[Axes], x: NDArray[np.float64], word: str) -> None:
+    """Marks of one of these words on the axis, with a legend, where there are any."""
+    for k, ax in enumerate(axes if len(x) else ()):
+        look: Any = {"color": "0.4", "markerfacecolor": "white", "clip_on": False, "zorder": 3}
+        across, label = ax.get_xaxis_transform(), "_" if k else word
+        ax.plot(x, np.zeros(len(x)), LOST[word], markersize=5, transform=across, label=label, **look)
+        legend(ax)
 
 
 MARKER, FREE = 3.5, 2

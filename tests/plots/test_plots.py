@@ -262,6 +262,16 @@ def test_tractions_are_drawn_over_what_the_states_differ_in():
         figure(case.evaluate())
 
 
+def test_states_at_which_a_law_does_not_hold_are_marks_and_no_data():
+    bonded = CONTACT | {"interface": {"potential": [{"bond-stiffness": {"E_b": "2 MPa/um", "E_n": "50 MPa/um"}}]}}
+    case = surfacechem.load(bonded | {"loading": {"g_n": "2 nm", "phi": 0.5}})
+    plot = figure(case.evaluate({"phi": [0.2, 1.5, 0.8, 3.0]}))
+    line, marks = plot.axes[0].get_lines()
+    assert line.get_ydata() == pytest.approx([800, 3200, np.nan, np.nan], nan_ok=True)
+    assert (marks.get_label(), marks.get_xdata().tolist()) == ("refused", [1.5, 3.0])
+    assert any("2 refused" in text.get_text() for text in plot.findobj(matplotlib.text.Text))
+
+
 def test_events_at_one_time_are_all_counted():
     plot = figure(surfacechem.run("bouncing-plate").dataset)
     said = [text.get_text() for text in plot.findobj(matplotlib.text.Text)]
