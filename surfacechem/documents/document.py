@@ -278,7 +278,7 @@ class _Builder:
         place, before, kind = self._place(event), self.count, type(event).__name__
         self.count += 1
         if self.count > self.most:
-            remedy = "A long table belongs into a CSV file: `table: {file: NAME.csv}`."
+            remedy = "Tables belong into CSV files, `table: {file: NAME.csv}`; of outputs give a number, `outputs: N`."
             raise InputError(f"more than {self.most} values. {remedy}", place)
         if depth > DEEPEST:
             raise InputError(f"nested deeper than {DEEPEST} levels.", place)

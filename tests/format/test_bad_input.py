@@ -209,6 +209,7 @@ BOMB = "a: &a [1, 1, 1, 1, 1, 1, 1, 1, 1]\n" + "".join(
         (b"x" * (document.CASE.largest + 1), "{}: larger than 1000000 bytes."),
         (b"[" * 100_000, "{}:1: nested deeper than 24 levels."),
         (b"a: [" + b"1, " * (document.CASE.most + 1) + b"]", "{}:1: more than 20000 values."),
+        (b"run: {times: [" + b"1, " * (document.CASE.most + 1) + b"]}", "; of outputs give a number, `outputs: N`."),
         (BOMB.encode(), "aliases repeat more than 20000 values."),
         (b"%YAML 1.9\n---\na: 1", "{}: not YAML: version minor part"),
     ],
