@@ -160,6 +160,15 @@ def test_every_law_has_its_place_on_a_page(monkeypatch):
         assert "| parameter | " in hooks.family_page(family)
 
 
+def test_pages_tell_of_every_mode_and_of_what_a_check_of_laws_ends_with():
+    dataset, commands = ((ROOT / "docs" / f"{name}.md").read_text() for name in ("dataset", "command-line"))
+    sources = "".join(path.read_text() for path in (ROOT / "surfacechem" / "model").rglob("*.py"))
+    for name in ("H_events", "H_events_entropy", *re.findall(r'\bMode\("(\w+)"', sources)):
+        assert f"`{name}`" in dataset, name
+    assert "`laws --check`" in commands
+    assert "laws --check" in CliRunner().invoke(app, ["laws", "--help"]).stdout
+
+
 def test_links_of_the_readme_exist():
     links = re.findall(r"\]\(([^)#:]+)\)", (ROOT / "README.md").read_text(encoding="utf-8"))
     assert links

@@ -36,7 +36,7 @@ DIFFERENT, BAD_INPUT, UNWRITTEN, SIGNALLED = 1, 2, 5, 128
 
 CODES = {
     0: "finished",
-    DIFFERENT: "rerun: the new values are not bit for bit those of the file",
+    DIFFERENT: "rerun: the new values are not bit for bit those of the file; laws --check: a law fails",
     BAD_INPUT: "bad input; nothing was computed",
     3: "physics stopped the run (of a sweep, every run) or refuses a point; what was reached is written, and why",
     4: "the run failed numerically; what it reached is written",
