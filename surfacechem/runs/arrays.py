@@ -377,7 +377,7 @@ class ArrayRuns:
         """
         batch, program, width = found.batch, self.model.program, self.model.program.n_inputs
         y, ydot = slice(1, 1 + self.n), slice(1 + self.n, 1 + 2 * self.n)
-        # Where runs end at their edges there are no jumps, and steps are recorded where something is looked for in them.
+        # Without room for jumps or steps where runs end at their edges, or nothing is looked for along them.
         rows, records = (
             table if table.shape[1] else np.empty((len(table), 0, 2 * width)) for table in (batch.jumps, batch.records)
         )
