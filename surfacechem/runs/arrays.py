@@ -28,7 +28,7 @@ from surfacechem.solve.diagnose import are_led_back
 from surfacechem.solve.lanes.lane_batch import solve_batch
 from surfacechem.solve.radau.solver import Room, consistent, rates_at, solve_arrays
 from surfacechem.solve.radau.stepper import ARCS, END, EVENTS, FIRST_COUNTER, JUMPS, OUTPUTS, RECORDS
-from surfacechem.solve.run import Model, Run
+from surfacechem.solve.run import Leaps, Model, Run
 from surfacechem.tolerances import CROSSED, EPS, MICROMETRE, PICOMETRE
 
 MOST = 4096, 1024
@@ -361,22 +361,17 @@ class ArrayRuns:
         steps = batch.records[step_owner, m]
         inputs = found.inputs(step_owner, steps[:, 0], steps[:, 1 : 1 + n], steps[:, 1 + n : 1 + 2 * n])
         parts = [(owner, outputs), (step_owner, self._values(inputs)[0])]
-        leap_owner, t, (_, after) = self._leaps(found)
-        # Where one leap follows another at the same time, nothing lasts between them.
-        goes_on = (np.diff(leap_owner, append=-1) != 0) | (np.diff(t, append=np.inf) > 0)
-        parts.append((leap_owner[goes_on], after[0][goes_on]))
+        leaps = self._leaps(found)
+        parts.append((leaps.owner[leaps.lasts], np.column_stack([leaps.after[name][leaps.lasts] for name in names])))
         columns: Columns = {}
         for which, chosen, best in (("max", self.keep.max, np.fmax), ("min", self.keep.min, np.fmin)):
             extreme = best.reduce([of_each(best, runs, table, len(clear)) for runs, table in parts])
             columns |= {f"{name}_{which}": extreme[:, names.index(name)] for name in chosen}
         return columns
 
-    def _leaps(self, found: Ends) -> tuple[Index, Array, tuple[Values, Values]]:
-        """Runs and times of their jumps and of the breakpoints of loads that they have passed between these, in order;
-        the values right before each and right after it.
-        """
-        batch, program, width = found.batch, self.model.program, self.model.program.n_inputs
-        y, ydot = slice(1, 1 + self.n), slice(1 + self.n, 1 + 2 * self.n)
+    def _leaps(self, found: Ends) -> Leaps:
+        """Jumps of the runs, and the breakpoints of loads between these that they have passed."""
+        batch, n, width = found.batch, self.n, self.model.program.n_inputs
         # Without room for jumps or steps where runs end at their edges, or nothing is looked for along them.
         rows, records = (
             table if table.shape[1] else np.empty((len(table), 0, 2 * width)) for table in (batch.jumps, batch.records)
@@ -387,16 +382,10 @@ class ArrayRuns:
         of, m = np.nonzero(taken & np.isin(times, self.breaks) & (times < batch.ends[:, :1]))
         calm = ~np.isin(of + 1j * times[of, m], owner + 1j * before[:, 0])
         of, steps = of[calm], records[of[calm], m[calm]]
-        known = of, steps[:, 0], steps[:, y], steps[:, ydot]
+        known = of, steps[:, 0], steps[:, 1 : 1 + n], steps[:, 1 + n : 1 + 2 * n]
         before = np.concatenate((before, found.inputs(*known)))
         after = np.concatenate((after, found.inputs(*known, after=True)))
-        owner = np.concatenate((owner, of))
-        order = np.lexsort((before[:, 0], owner))
-        owner, before, after = owner[order], before[order], after[order]
-        if len(owner):  # rates and algebraic variables are still those before
-            point = consistent(program, after[:, 0], after[:, y], 0.0, after[:, 1 + 2 * self.n :])
-            after[:, y], after[:, ydot] = point.y, point.ydot
-        return owner, before[:, 0], (self._values(before), self._values(after))
+        return Leaps.of(self.model, np.concatenate((owner, of)), before, after)
 
     @cached_property
     def totals(self) -> Function:
@@ -462,10 +451,10 @@ class ArrayRuns:
             for state in keep.at_events if name in keep.events else ():
                 columns[f"{state}_at_{variable(name)}"] = rows[:, 2 + self.model.system.state_columns[state]]
         if keep.reach:
-            owner, t, (before, after) = self._leaps(found)
+            leaps = self._leaps(found)
             for name, level in keep.reach.items():
-                first = np.full(len(happened), np.inf)
-                np.minimum.at(first, owner, np.where(crossed(before[1][name], after[1][name], level), t, np.inf))
+                first, leapt = np.full(len(happened), np.inf), crossed(leaps.before[name], leaps.after[name], level)
+                np.minimum.at(first, leaps.owner[leapt], leaps.t[leapt])
                 columns[f"time_to_{name}"] = np.fmin(
                     columns[f"time_to_{name}"], np.where(first < np.inf, first, np.nan)
                 )

@@ -112,13 +112,31 @@ class Run:
 
 
 class Leaps(NamedTuple):
-    """Moments at which quantities may leap, in order of time, with states and named quantities on both sides."""
+    """Moments at which quantities may leap, run by run and in order of time: jumps, and breakpoints of loads."""
 
+    owner: Index
+    """The run of each."""
     t: Array
     before: dict[str, Array]
+    """States and named quantities right before."""
     after: dict[str, Array]
+    """The same right after."""
     lasts: Mask
-    """Those that no other one follows at the same time, so that the run goes on from there."""
+    """Those that no other one follows at the same time."""
+
+    @classmethod
+    def of(cls, model: Model, owner: Index, before: Array, after: Array) -> Leaps:
+        """Those of runs of a model with these arguments of compiled functions on both sides, a row each."""
+        order, n = np.lexsort((before[:, 0], owner)), len(model.system.states)
+        owner, before, after = owner[order], before[order], after[order]
+        t, y, ydot = before[:, 0], slice(1, 1 + n), slice(1 + n, 1 + 2 * n)
+        if len(t):  # rates and algebraic variables are still those before
+            found = consistent(model.program, t, after[:, y], 0.0, after[:, 1 + 2 * n :])
+            after[found.valid, y], after[found.valid, ydot] = found.y[found.valid], found.ydot[found.valid]
+        names = [*(state.name for state in model.system.states), *model.system.output_columns]
+        sides = [np.hstack((rows[:, y], model.named(rows.copy()))).T for rows in (before, after)]
+        lasts = (np.diff(owner, append=-1) != 0) | (np.diff(t, append=np.inf) > 0)
+        return cls(owner, t, dict(zip(names, sides[0], strict=True)), dict(zip(names, sides[1], strict=True)), lasts)
 
 
 @dataclass(frozen=True)
@@ -227,33 +245,17 @@ class Trajectory:
 
     @cached_property
     def leaps(self) -> Leaps:
-        """Jumps, and the breakpoints of loads between them that the run has passed."""
-        model, result, n = self.model, self.result, len(self.model.system.states)
-        t, stops = np.array([jump.t for jump in self.jumps]), np.array([jump.stops for jump in self.jumps], bool)
-        before = np.array([jump.before.inputs() for jump in self.jumps]).reshape(-1, model.program.n_inputs)
-        after = np.array([jump.after.inputs() for jump in self.jumps]).reshape(before.shape)
-        if (steps := result.steps) is not None:
-            breaks = np.isin(steps.t, result.problem.segments[1:-1]) & ~np.isin(steps.t, t) & (steps.t < result.t)
-            at, y, ydot, segment = (
-                steps.t[breaks],
-                steps.y[breaks],
-                steps.ydot[breaks],
-                result.segments_at(steps.t[breaks]),
-            )
-            before = np.concatenate((before, model.inputs(result, at, y, ydot, segment)))
-            after = np.concatenate((after, model.inputs(result, at, y, ydot, segment + 1)))
-            t, stops = np.concatenate((t, at)), np.concatenate((stops, np.zeros(len(at), bool)))
-        if len(t):  # rates and algebraic variables are still those before
-            found = consistent(model.program, after[:, 0], after[:, 1 : 1 + n], 0.0, after[:, 1 + 2 * n :])
-            after[found.valid, 1 : 1 + 2 * n] = np.hstack((found.y, found.ydot))[found.valid]
-        order = np.argsort(t, kind="stable")
-        names = [*(state.name for state in model.system.states), *model.system.output_columns]
-        sides = [
-            dict(zip(names, np.hstack((rows[:, 1 : 1 + n], model.named(rows.copy()))).T, strict=True))
-            for rows in (before[order], after[order])
-        ]
-        lasts = (np.diff(t[order], append=np.inf) > 0) & ~stops[order]
-        return Leaps(t[order], sides[0], sides[1], lasts)
+        """Jumps from which the run goes on, and the breakpoints of loads between jumps that it has passed."""
+        model, result, steps = self.model, self.result, self.result.steps
+        sides = [(jump.before.inputs(), jump.after.inputs()) for jump in self.jumps if not jump.stops]
+        before, after = np.array(sides).reshape(-1, 2, model.program.n_inputs).swapaxes(0, 1)
+        if steps is not None:
+            at = np.isin(steps.t, result.problem.segments[1:-1]) & (steps.t < result.t)
+            at &= ~np.isin(steps.t, [jump.t for jump in self.jumps])
+            known, segment = (steps.t[at], steps.y[at], steps.ydot[at]), result.segments_at(steps.t[at])
+            before = np.concatenate((before, model.inputs(result, *known, segment)))
+            after = np.concatenate((after, model.inputs(result, *known, segment + 1)))
+        return Leaps.of(model, np.zeros(len(before), np.int64), before, after)
 
     @cached_property
     def within_bounds(self) -> dict[str, Array]:
