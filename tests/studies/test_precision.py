@@ -79,7 +79,7 @@ def test_errors_fall_with_the_tolerance_and_the_worst_variable_counts(data):
 
 
 def test_the_error_is_that_of_the_run(data):
-    """It is the largest of the same one, at the steps of another run: three points of a step miss an eighth of a wave."""
+    """It is the largest of the same one, at the steps of another run; three points miss an eighth of a wave."""
     simulation = surfacechem.load("exothermic")
     alone = simulation.run(run=replace(simulation.case.run, rtol=1e-7)).accuracy.variables
     ours = data["variable_error_max"].sel({"case": "exothermic", "solver": "radau", "tolerance": 1e-7})
