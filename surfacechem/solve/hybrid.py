@@ -178,17 +178,19 @@ class Hybrid:
             index = self.jumper.folds.reached(point, self.problem.rtol)
         if index >= 0:
             reached = self.jumper.folds.in_time(index, point, end)
-            self._show_until(reached)
+            self._show_until(reached, end)
             return self.instant.apply(index, reached, point)
         beyond = self._beyond(arc, point) if lost and not self._is_limited(arc) else None
         if beyond is None:
             self.instant.status = arc.status
         return beyond
 
-    def _show_until(self, reached: Point) -> None:
-        """Give the outputs on the last of the way to a fold, which no integration comes to, the state of the fold."""
+    def _show_until(self, reached: Point, end: float) -> None:
+        """Give the outputs on the last of the way to a fold, which no integration comes to, the state of the fold; so
+        that of an ``end`` which time cannot tell from an event, behind which no arc may follow.
+        """
         times = self.problem.times[self._written :]
-        times = times[times < reached.t]
+        times = times[times <= reached.t] if reached.t >= end else times[times < reached.t]
         if len(times):
             arc, count = self.arcs[-1], (len(times), 1)
             outputs = np.concatenate([arc.result.outputs, np.tile(reached.y, count)])

@@ -131,17 +131,24 @@ def _record(w: Any, records: Any, counts: Any) -> None:
 
 
 @compiled
+def _write_up_to(w: Any, i: int, end: float) -> None:
+    """The outputs up to this time of the arc that are not written yet, all with the state of now."""
+    counts, times = w.counts[i], w.times[row_of(w.times, i)]
+    while counts[OUTPUTS] < times.shape[0] and times[counts[OUTPUTS]] - w.origin <= end:
+        write_now(w, w.outputs[i, counts[OUTPUTS]])
+        counts[OUTPUTS] += 1
+
+
+@compiled
 def _start(w: Any, i: int) -> int:
     """Begin anew at the current state, with the tables begun where it is the first one."""
     outcome = restart(w)
     if outcome != GOOD:
         return outcome
-    counts, times, outputs = w.counts[i], w.times[row_of(w.times, i)], w.outputs[i]
+    counts = w.counts[i]
     start_margins(w)
     clear(w.fired)
-    while counts[OUTPUTS] < times.shape[0] and times[counts[OUTPUTS]] - w.origin <= w.base:
-        write_now(w, outputs[counts[OUTPUTS]])
-        counts[OUTPUTS] += 1
+    _write_up_to(w, i, w.base)
     if counts[RECORDS] == 0:
         _record(w, w.records[i], counts)
     elif w.picture > 0.0 and w.tau == 0.0:
@@ -379,11 +386,13 @@ def _run_arc(w: Any, i: int, end: float, goes_on: bool) -> int:
         status = _run_segment(w, i, w.arc_end, goes_on)
     if w.counts[i, ARCS] <= w.arcs.shape[1]:
         w.arcs[i, w.counts[i, ARCS] - 1, 1] = w.base + w.tau
+    w.moment[0] = end if status == GOOD else min(_now(w), end)
+    if status == EVENT and w.moment[0] == end:
+        _write_up_to(w, i, w.shown)  # time cannot tell it from the end, behind which no arc may follow
     for m in range(w.n_ledger):
         w.booked[m] += w.q[m]
     keep_largest(w.booked, w.exchanged)
     clear(w.q)
-    w.moment[0] = end if status == GOOD else min(_now(w), end)
     copy(w.y, w.moment[1:])
     for j in range(w.n):
         w.least[j], w.largest[j] = min(w.least[j], w.y[j]), max(w.largest[j], w.y[j])
