@@ -23,8 +23,9 @@ from solver_problems import (
 from surfacechem.compile.program import compile_program
 from surfacechem.solve import names, solver
 from surfacechem.solve.contract import Margin, Problem, Status
+from surfacechem.solve.radau import solver as radau_solver
 from surfacechem.solve.radau.solver import Dop853, Radau, consistent, output_rates
-from surfacechem.solve.radau.stepper import END, ROWS
+from surfacechem.solve.radau.stepper import END, FIRST_COUNTER, ROWS
 from surfacechem.solve.radau.tables import (
     COLLOCATION,
     DEFECT,
@@ -234,6 +235,23 @@ def test_steps_and_seconds_are_limited() -> None:
     assert radau.solve(problem(case, [1.0, 0.0], [0.0, 1e9], 1e-10, max_steps=50)).status == Status.MAX_STEPS
     endless = problem(case, [1.0, 0.0], [0.0, 1e12], 1e-10, max_steps=10**12, max_seconds=0.05)
     assert radau.solve(endless).status == Status.STOPPED
+
+
+def test_a_run_that_the_clock_has_ended_is_repeated_once_to_keep_its_steps(monkeypatch) -> None:
+    repeated = []
+
+    def counting(*given):
+        batch = run_one(*given)
+        repeated.append(batch.counts[0, FIRST_COUNTER])
+        return batch
+
+    run_one = radau_solver._run_one
+    monkeypatch.setattr(radau_solver, "_run_one", counting)
+    limits = {"max_steps": 10**12, "max_seconds": 0.1}
+    result = radau.solve(problem(oscillator(), [1.0, 0.0], [0.0, 1e12], 1e-10, record_steps=True, **limits))
+    assert result.status == Status.STOPPED
+    assert len(repeated) == 2
+    assert repeated[0] == repeated[1] == result.counters.steps == len(result.steps.t) - 1
 
 
 def test_batch_is_deterministic_and_equals_single_runs() -> None:

@@ -241,10 +241,16 @@ def _solved(problems: Sequence[Problem]) -> list[Result]:
 
 def _whole(problem: Problem, batch: Any, i: int) -> Result:
     """The result of a run of a batch; where its tables were too short it is repeated with the sizes it turned out to
-    need, which a limit in seconds may change.
+    need: as far again where a limit in seconds has ended it, whatever the clock says then.
     """
+    repeated, stopped = problem, False
     while True:
         counts: list[int] = batch.counts[i].tolist()
+        if counts[END] == Status.STOPPED:
+            trials = counts[FIRST_COUNTER] + counts[FIRST_COUNTER + 1]
+            repeated, stopped = replace(problem, max_seconds=None, max_steps=trials), True
+        elif stopped and counts[END] == Status.MAX_STEPS:
+            counts[END] = Status.STOPPED
         steps, events, inside, jumps = needed = (
             counts[RECORDS] * problem.record_steps,
             counts[EVENTS],
@@ -254,7 +260,7 @@ def _whole(problem: Problem, batch: Any, i: int) -> Result:
         fits = steps <= batch.records.shape[1] and events <= batch.events.shape[1] and inside <= batch.inside.shape[1]
         if fits and jumps <= batch.jumps.shape[1]:
             return _result(problem, batch, i, counts)
-        batch, i = _run_one(problem, needed), 0
+        batch, i = _run_one(repeated, needed), 0
 
 
 def _result(problem: Problem, batch: Any, i: int, counts: Sequence[int]) -> Result:
