@@ -1,6 +1,7 @@
 """Steps of eight runs at once: the results of one run at a time, whatever company a run has."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import case_runs
 import narrow_scenes
@@ -11,6 +12,7 @@ from solver_problems import exothermic_problem
 
 import surfacechem
 from surfacechem.solve.lanes import lane_batch
+from surfacechem.solve.radau import stepper
 from surfacechem.solve.radau.solver import solve_arrays
 from surfacechem.solve.radau.stepper import END, EVENTS, FIRST_COUNTER, OUTPUTS
 
@@ -93,6 +95,21 @@ def test_runs_are_those_of_one_at_a_time(name, others, left):
     for i, reached in enumerate(wanted.counts[:, OUTPUTS]):
         apart = found.outputs[i, :reached, n:] - wanted.outputs[i, :reached, n:]
         assert np.all(np.abs(apart) <= 1e-5 * turned)
+
+
+@pytest.mark.parametrize("name", ["exothermic", "three-temperatures"])
+@pytest.mark.parametrize("way", [lane_batch.solve_batch, solve_arrays])
+def test_runs_read_nothing_that_others_have_left_in_their_memory(name, way, monkeypatch):
+    simulation = case_runs.load(name)
+    problem = problem_of(simulation)
+    columns = columns_of(simulation, problem)
+    fresh = way(problem, *columns)
+    no_numbers = SimpleNamespace(**{**vars(np), "zeros": lambda words, kind: np.full(words, -1, kind)})
+    for module in (stepper, lane_batch):
+        monkeypatch.setattr(module, "np", no_numbers)
+    used = way(problem, *columns)
+    assert used.ends.tobytes() == fresh.ends.tobytes()
+    assert used.counts.tobytes() == fresh.counts.tobytes()
 
 
 def test_accounts_of_no_group_shorten_no_step(left):

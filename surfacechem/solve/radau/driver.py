@@ -307,6 +307,7 @@ def _forget(w: Any, i: int) -> None:
             w.order[m, 3, 0] = -1  # that of another run counts for nothing
     clear(w.q)
     clear(w.ydot)
+    clear(w.noise)
     w.explicit, w.stiff_steps, w.h_refused = w.explicitly, 0, 0.0
     w.first_event, w.steps_before, w.rejected_before = w.counts[i, EVENTS], w.steps, w.rejected
 
@@ -490,7 +491,7 @@ def _run(w: Any, i: int) -> None:
     """One run, from its initial state to its end."""
     counts, end, segments = w.counts[i], w.ends[i], w.segments[row_of(w.segments, i)]
     w.steps = w.rejected = w.residuals = w.jacobians = w.factorizations = w.iterations = 0
-    w.origin, w.base, w.tau = 0.0, segments[0], 0.0
+    w.origin, w.base, w.tau, w.h_factored = 0.0, segments[0], 0.0, 0.0
     clear(w.booked)
     copy(w.y0[i], w.y)
     status = _run_arcs(w, i) if w.clocks.shape[0] > 0 else _run_segments(w, i)
