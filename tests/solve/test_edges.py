@@ -113,25 +113,24 @@ def test_a_random_scene_goes_along_its_edges_as_arc_by_arc_or_is_left_to_that(se
     assert len(compiled.jumps) == CARRIED.get(seed, len(by_arcs.jumps))
 
 
-def test_explicit_steps_go_along_edges_too(monkeypatch):
-    simulation = case_runs.load("stick-slip")
-    assert_same(*both(monkeypatch, simulation.model, replace(simulation.case.run, solver="dop853")))
-
-
-def test_what_has_no_room_is_solved_once_more(monkeypatch):
-    simulation = case_runs.load("stick-slip")
-    whole = simulation.model.solve(simulation.case.run)
+def test_explicit_steps_go_along_edges_too_and_what_has_no_room_is_solved_once_more(monkeypatch):
+    model, run = (simulation := case_runs.load("stick-slip")).model, simulation.case.run
+    assert_same(*both(monkeypatch, model, replace(run, solver="dop853")))
+    whole = model.solve(run)
     monkeypatch.setattr(radau, "EVENT_ROWS", 1)
     monkeypatch.setattr(radau, "STEP_ROWS", 10)
-    assert_same(simulation.model.solve(simulation.case.run), whole)
+    assert_same(model.solve(run), whole)
 
 
-def test_steps_that_run_out_between_jumps_end_the_run_there():
-    simulation = case_runs.load("bouncing-plate")
-    ended = simulation.model.solve(replace(simulation.case.run, max_steps=50))
+def test_runs_end_where_steps_run_out_between_jumps_and_with_an_output_at_a_jump(monkeypatch):
+    model, run = (simulation := case_runs.load("bouncing-plate")).model, simulation.case.run
+    whole, ended = model.solve(run), model.solve(replace(run, max_steps=50))
     assert ended.result.status is Status.MAX_STEPS
     assert ended.result.counters.steps == 50
-    assert ended.jumps[-1].t < ended.result.t < simulation.model.solve(simulation.case.run).result.t
+    assert ended.jumps[-1].t < ended.result.t < whole.result.t
+    for end in [jump.t for jump in whole.jumps if jump.t > 0][::4]:
+        for each in both(monkeypatch, model, replace(run, times=(0.0, end))):
+            assert each.result.times.tolist() == [0.0, end]
 
 
 @zoo.each("moving")

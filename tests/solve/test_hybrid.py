@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 
-import case_runs
 import numpy as np
 import pytest
 import tables_mechanics as scenes
@@ -19,7 +18,6 @@ from surfacechem.laws.friction import Coulomb
 from surfacechem.laws.loading import Hold, Ramp, Table
 from surfacechem.runs.simulation import Simulation
 from surfacechem.scene import Body, Interface, Mounting, Scene
-from surfacechem.solve.radau.solver import Radau
 
 COLD = Body("lower", Hold(level=300.0)), Body("upper", Hold(level=300.0))
 
@@ -118,18 +116,6 @@ def test_a_mass_bounces_hundreds_of_times():
     assert len(trajectory.jumps) > 200
     energy = {float(0.5 * jump.before.y[1] ** 2) for jump in trajectory.jumps}
     np.testing.assert_allclose(sorted(energy), 10.0 * 1e-3, rtol=1e-8)
-
-
-@pytest.mark.parametrize("crosses", [True, False])
-def test_a_run_that_ends_with_an_impact_has_all_its_outputs(crosses, monkeypatch):
-    """Each impact is that of an arc in its own time, whose last digits the time of the run does not tell."""
-    monkeypatch.setattr(Radau, "crosses_edges", crosses)
-    case = case_runs.load("bouncing-plate")
-    impacts = [jump.t for jump in case.model.solve(case.case.run).jumps if jump.t > 0]
-    for end in impacts[:: len(impacts) // 20]:
-        ended = case.model.solve(replace(case.case.run, times=(0.0, 0.5 * end, end)))
-        assert (ended.status, ended.result.times[-1]) == ("finished", end)
-        assert ended.outputs.shape[0] == 3
 
 
 def swung(friction, V, end, rtol):

@@ -31,14 +31,11 @@ and those with guards that start at zero."""
 LAWS = ".bonding", "potential", "friction"
 
 
-def problem_of(simulation, rtol=1e-9):
+def arrays_of(simulation, runs=RUNS):
+    """A problem, and columns of runs whose laws differ by a thousandth."""
     model = simulation.model
-    run = replace(simulation.case.run, solver="dop853", rtol=rtol)
-    return replace(model.problem(run, model.values({})), explicit=True, picture=0.0, record_steps=True)
-
-
-def columns_of(simulation, problem, runs=RUNS):
-    """Runs whose laws differ by a thousandth."""
+    run = replace(simulation.case.run, solver="dop853", rtol=1e-9)
+    problem = replace(model.problem(run, model.values({})), explicit=True, picture=0.0, record_steps=True)
     system, program = simulation.model.system, problem.program
     held = {item.symbol for item in (*system.modes, *system.registers)}
     free = [each.symbol not in held and any(part in each.path for part in LAWS) for each in system.parameters]
@@ -48,7 +45,7 @@ def columns_of(simulation, problem, runs=RUNS):
     y0 = np.repeat(problem.y0[None], runs, axis=0)
     peaks = np.zeros((1, program.n_ledger + program.n_margins))
     times = np.linspace(0, problem.segments[-1], 7)[None]
-    return y0, table, np.array([problem.spacing]), peaks, problem.segments[None], times
+    return problem, (y0, table, np.array([problem.spacing]), peaks, problem.segments[None], times)
 
 
 @pytest.fixture
@@ -81,9 +78,7 @@ def assert_alike(found, wanted, n, tolerance):
 
 @pytest.mark.parametrize(("name", "others"), CASES)
 def test_runs_are_those_of_one_at_a_time(name, others, left):
-    simulation = case_runs.load(name)
-    problem = problem_of(simulation)
-    columns = columns_of(simulation, problem)
+    problem, columns = arrays_of(case_runs.load(name))
     found = lane_batch.solve_batch(problem, *columns)
     assert left[0] == others
     wanted = solve_arrays(problem, *columns)
@@ -97,26 +92,9 @@ def test_runs_are_those_of_one_at_a_time(name, others, left):
         assert np.all(np.abs(apart) <= 1e-5 * turned)
 
 
-@pytest.mark.parametrize("name", ["exothermic", "three-temperatures"])
-@pytest.mark.parametrize("way", [lane_batch.solve_batch, solve_arrays])
-def test_runs_read_nothing_that_others_have_left_in_their_memory(name, way, monkeypatch):
-    simulation = case_runs.load(name)
-    problem = problem_of(simulation)
-    columns = columns_of(simulation, problem)
-    fresh = way(problem, *columns)
-    no_numbers = SimpleNamespace(**{**vars(np), "zeros": lambda words, kind: np.full(words, -1, kind)})
-    for module in (stepper, lane_batch):
-        monkeypatch.setattr(module, "np", no_numbers)
-    used = way(problem, *columns)
-    assert used.ends.tobytes() == fresh.ends.tobytes()
-    assert used.counts.tobytes() == fresh.counts.tobytes()
-
-
 def test_accounts_of_no_group_shorten_no_step(left):
     """What is integrated but not balanced, as amounts that are made, is not held against its polynomial."""
-    simulation = case_runs.load("exothermic")
-    problem = problem_of(simulation)
-    columns = columns_of(simulation, problem)
+    problem, columns = arrays_of(case_runs.load("exothermic"))
     accounted = lane_batch.solve_batch(problem, *columns)
     free = replace(problem, program=replace(problem.program, groups=(-1,) * problem.program.n_ledger))
     found = lane_batch.solve_batch(free, *columns)
@@ -135,12 +113,13 @@ def test_runs_without_guards(left):
     assert_alike(found, solve_arrays(problem, *columns), 2, 1e-7)
 
 
-@pytest.mark.parametrize("name", ["exothermic", "shared-load-rupture", "closing-film"])
-def test_company_and_order_change_nothing(name):
-    simulation = case_runs.load(name)
-    problem = problem_of(simulation)
-    y0, table, *others = columns_of(simulation, problem, 21)
+@pytest.mark.parametrize("name", ["exothermic", "shared-load-rupture", "closing-film", "three-temperatures"])
+def test_company_order_and_what_is_left_in_the_memory_change_nothing(name, monkeypatch):
+    problem, (y0, table, *others) = arrays_of(case_runs.load(name), 21)
     whole = lane_batch.solve_batch(problem, y0, table, *others)
+    used = SimpleNamespace(**{**vars(np), "zeros": lambda words, kind: np.full(words, -1, kind)})
+    for module in (stepper, lane_batch):
+        monkeypatch.setattr(module, "np", used)
     order = np.random.default_rng(1).permutation(21)
     for some in (order, np.array([7]), np.arange(3)):
         part = lane_batch.solve_batch(problem, y0[some], table[some], *others)
@@ -156,8 +135,7 @@ def test_what_is_narrow_is_seen(seed, left):
     simulation = surfacechem.load(scene.text)
     if simulation.model.program.lanes is None or simulation.model.jumper is not None:
         pytest.skip("not for these steps")
-    problem = problem_of(simulation)
-    columns = columns_of(simulation, problem, 1)
+    problem, columns = arrays_of(simulation, 1)
     y = lane_batch.solve_batch(problem, *columns).ends[0, 1 : 1 + problem.program.n]
     wanted = solve_arrays(problem, *columns).ends[0, 1 : 1 + problem.program.n]
     assert y == pytest.approx(wanted, rel=1e-6, abs=1e-9)

@@ -40,9 +40,9 @@ class Evaluation:
         self._margins = _Code(program.margins, self.inputs)
 
     @cached_property
-    def _search(self) -> stepper.Repeated:
+    def _search(self) -> Callable[[], None]:
         ends, table = self.inputs[: 2 * self.program.n + 1][None], self.parameters[None, None]
-        return stepper.Repeated(search_batch(self.program, ends, table, self._counts))
+        return stepper.repeated(search_batch(self.program, ends, table, self._counts))
 
     def put(self, t: float, differential: Array) -> bool:
         """Go to a state; whether derivatives and algebraic variables were found there."""
@@ -129,7 +129,7 @@ class Evaluations:
         else:
             ends, counts = rows[:, : 1 + 2 * n].copy(), np.zeros((len(rows), COLUMNS), np.int64)
             table = np.ascontiguousarray(rows[:, None, 1 + 2 * n :])
-            stepper.run(search_batch(program, ends, table, counts), 0, len(rows))
+            stepper.run(search_batch(program, ends, table, counts))
             rows[:, : 1 + 2 * n], found = ends, counts[:, END] == 0
         if not found.all():
             states[~found] = ydot[~found] = np.nan

@@ -1,6 +1,5 @@
 """Runs of one model through the steps of eight at once, and one at a time where these steps are not for them."""
 
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -32,13 +31,8 @@ def solve_batch(problem: Problem, *columns: Array, room: Room | None = None) -> 
 
 def run(batch: Any) -> None:
     """The runs of a batch, eight at once, with a memory of their own: threads may do so at the same time."""
-    memory = np.zeros(_words(tuple(batch.sizes.tolist())), np.int64)
-    LOOP.load()(0, len(batch.counts), memory, tuple(batch))
-
-
-@lru_cache(maxsize=64)
-def _words(sizes: tuple[int, ...]) -> int:
-    return stepper.words_of(dict(zip(SIZES, sizes, strict=True)), MEMORY)
+    words = stepper.words_of(dict(zip(SIZES, batch.sizes.tolist(), strict=True)), MEMORY)
+    LOOP.load()(0, len(batch.counts), np.zeros(words, np.int64), tuple(batch))
 
 
 def _sources() -> list[Path]:

@@ -132,7 +132,9 @@ def _record(w: Any, records: Any, counts: Any) -> None:
 
 @compiled
 def _write_up_to(w: Any, i: int, end: float) -> None:
-    """The outputs up to this time of the arc that are not written yet, all with the state of now."""
+    """The outputs up to this time of the arc that are not written yet, all with the state of now: at the start of a
+    segment, and where time cannot tell an event from its end, behind which no arc may follow.
+    """
     counts, times = w.counts[i], w.times[row_of(w.times, i)]
     while counts[OUTPUTS] < times.shape[0] and times[counts[OUTPUTS]] - w.origin <= end:
         write_now(w, w.outputs[i, counts[OUTPUTS]])
@@ -389,7 +391,7 @@ def _run_arc(w: Any, i: int, end: float, goes_on: bool) -> int:
         w.arcs[i, w.counts[i, ARCS] - 1, 1] = w.base + w.tau
     w.moment[0] = end if status == GOOD else min(_now(w), end)
     if status == EVENT and w.moment[0] == end:
-        _write_up_to(w, i, w.shown)  # time cannot tell it from the end, behind which no arc may follow
+        _write_up_to(w, i, w.shown)
     for m in range(w.n_ledger):
         w.booked[m] += w.q[m]
     keep_largest(w.booked, w.exchanged)

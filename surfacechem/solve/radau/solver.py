@@ -147,12 +147,12 @@ def _run_one(problem: Problem, room: Room | None = None) -> Any:
     columns = y0, parameters, np.array((problem.spacing,)), np.array((problem.max_steps,)), _peaks(problem)[None]
     batch = batch_of(problem, (*columns, segments, times), room)
     if problem.max_seconds is None:
-        stepper.run(batch, 0, 1)
+        stepper.run(batch)
         return batch
     timer = threading.Timer(problem.max_seconds, batch.counts[:, STOP].fill, args=(1,))
     timer.start()
     try:
-        stepper.run(batch, 0, 1)
+        stepper.run(batch)
     finally:
         timer.cancel()
     return batch
@@ -235,7 +235,7 @@ def _solved(problems: Sequence[Problem]) -> list[Result]:
     times = shared([np.pad(each.times, (0, most - len(each.times)), constant_values=np.inf) for each in problems])
     segments = shared([each.segments for each in problems])
     batch = batch_of(problems[0], (y0, parameters, spacing, max_steps, peaks, segments, times))
-    stepper.run(batch, 0, len(problems))
+    stepper.run(batch)
     return [_whole(problem, batch, i) for i, problem in enumerate(problems)]
 
 
@@ -251,14 +251,9 @@ def _whole(problem: Problem, batch: Any, i: int) -> Result:
             repeated, stopped = replace(problem, max_seconds=None, max_steps=trials), True
         elif stopped and counts[END] == Status.MAX_STEPS:
             counts[END] = Status.STOPPED
-        steps, events, inside, jumps = needed = (
-            counts[RECORDS] * problem.record_steps,
-            counts[EVENTS],
-            counts[INSIDE],
-            counts[JUMPS],
-        )
-        fits = steps <= batch.records.shape[1] and events <= batch.events.shape[1] and inside <= batch.inside.shape[1]
-        if fits and jumps <= batch.jumps.shape[1]:
+        needed = counts[RECORDS] * problem.record_steps, counts[EVENTS], counts[INSIDE], counts[JUMPS]
+        tables = batch.records, batch.events, batch.inside, batch.jumps
+        if all(rows <= table.shape[1] for rows, table in zip(needed, tables, strict=True)):
             return _result(problem, batch, i, counts)
         batch, i = _run_one(repeated, needed), 0
 
@@ -315,7 +310,7 @@ def solve_arrays(problem: Problem, *columns: Array, room: Room | None = None) ->
     """
     y0, parameters, spacing, *others = map(np.ascontiguousarray, columns)
     batch = batch_of(problem, (y0, parameters, spacing, np.array((problem.max_steps,)), *others), room)
-    stepper.run(batch, 0, len(y0))
+    stepper.run(batch)
     return batch
 
 
@@ -364,7 +359,7 @@ def consistent(program: Program, t: ArrayLike, y: ArrayLike, ydot: ArrayLike, pa
         filled = program.filled(np.concatenate([ends, rows], axis=1))
         table = np.ascontiguousarray(filled[:, None, 1 + 2 * n :])
     counts = np.zeros((len(ends), COLUMNS), np.int64)
-    stepper.run(search_batch(program, ends, table, counts), 0, len(ends))
+    stepper.run(search_batch(program, ends, table, counts))
     valid = (counts[:, END] == 0).reshape(shape[:-1])
     return Consistent(ends[:, 1 : 1 + n].reshape(shape), ends[:, 1 + n :].reshape(shape), valid)
 

@@ -6,8 +6,8 @@ Importing this module imports neither Numba nor the kernel.
 import math
 import threading
 from collections import namedtuple
-from collections.abc import Mapping, Sequence
-from functools import lru_cache
+from collections.abc import Callable, Mapping, Sequence
+from functools import lru_cache, partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -312,19 +312,12 @@ LOOP = Loop(sources(), "surfacechem.solve.radau.driver", "run_batch")
 """Runs step by step, or states to be made consistent."""
 
 
-def run(batch: Any, first: int, last: int) -> None:
-    """Run some of a batch with a memory of their own: threads may do so with different runs at the same time."""
+def repeated(batch: Any) -> Callable[[], None]:
+    """Runs a batch at each call, again and again in one memory: each time it takes its rows as they are then."""
     memory = np.zeros(_words_of(tuple(batch.sizes.tolist())), np.int64)
-    LOOP.load()(first, last, memory, tuple(batch))
+    return partial(LOOP.load(), 0, len(batch.ends), memory, tuple(batch))
 
 
-class Repeated:
-    """Runs the same batch again and again in one memory: each time it takes its rows as they are then."""
-
-    def __init__(self, batch: Any) -> None:
-        memory = np.zeros(_words_of(tuple(batch.sizes.tolist())), np.int64)
-        self._arguments = 0, len(batch.ends), memory, tuple(batch)
-        self._kernel = LOOP.load()
-
-    def __call__(self) -> None:
-        self._kernel(*self._arguments)
+def run(batch: Any) -> None:
+    """Run a batch in a memory of its own: threads may run others at the same time."""
+    repeated(batch)()
