@@ -189,11 +189,8 @@ def closer(trajectory: Trajectory, known: bool = False) -> Run:
 
 
 def _second(trajectory: Trajectory, known: bool = False) -> Trajectory:
-    """The closer run.
-
-    Its loads differ in the last digit: where a result depends on that, two runs of the same numbers would agree.
-    """
-    return trajectory.model.solve_values(closer(trajectory, known), trajectory.values, nudged=True)
+    """The closer run."""
+    return trajectory.model.solve_values(closer(trajectory, known), trajectory.values)
 
 
 def against_tighter(trajectory: Trajectory) -> Accuracy:

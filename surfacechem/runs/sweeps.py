@@ -246,7 +246,7 @@ def _estimated(done: SweepSolution, second: SweepSolution, cells: Sequence[CellE
 def _second(done: SweepSolution, threads: int | None) -> SweepSolution:
     """The runs at another tolerance, as that of a single run."""
     pairs = [(closer(run), run.values) for run in done.runs]
-    runs = done.model.solve_all(pairs, threads or os.cpu_count() or 1, nudged=True)
+    runs = done.model.solve_all(pairs, threads or os.cpu_count() or 1)
     return replace(done, run=done.run.second(second_tolerance(done.run.rtol)), runs=runs)
 
 

@@ -78,6 +78,10 @@ class Run:
     """Whether it ends where nothing changes any more; the times are then those of a run of any length."""
     rest: float | None = None
     """When it comes to rest [s], where that was found before."""
+    nudged: bool = False
+    """Whether loads differ in their last digits: where a result depends on these, two runs of the same numbers would
+    agree.
+    """
     samples: float = SAMPLES
     """Parts of the run in each of which its steps are held against the equations at least once."""
 
@@ -108,7 +112,8 @@ class Run:
         """
         atol = None if self.atol is None else self.atol * rtol / self.rtol
         used = OWN if self.solver == EXPLICIT else self.solver
-        return replace(self, rtol=rtol, atol=atol, solver=used, samples=CLOSER * self.samples, **others)
+        nudged = not self.nudged
+        return replace(self, rtol=rtol, atol=atol, solver=used, nudged=nudged, samples=CLOSER * self.samples, **others)
 
 
 class Leaps(NamedTuple):
@@ -404,11 +409,10 @@ class Model:
         """What tells when given variables pass what is narrow."""
         return Passing(self.system)
 
-    def problem(self, run: Run, values: Mapping[str, float], *, passing: bool = True, nudged: bool = False) -> Problem:
+    def problem(self, run: Run, values: Mapping[str, float], *, passing: bool = True) -> Problem:
         """The initial value problem; InputError where the initial state is not admissible.
 
-        ``passing`` ends pieces where given variables pass what is narrow, too; ``nudged`` loads differ in their last
-        digit.
+        ``passing`` ends pieces where given variables pass what is narrow, too.
         """
         system, end = self.system, run.times[-1]
         segments = pieces.segments(system, end, values)
@@ -419,7 +423,7 @@ class Model:
         pieces.start_modes(system, parameters, values)
         y = np.array([state.from_given(values) for state in system.states])
         self._limits.check(y, parameters[0])
-        if nudged:
+        if run.nudged:
             pieces.nudge(system, parameters)
         if system.equilibria:
             y, parameters = self._settled(y, parameters)
@@ -501,18 +505,14 @@ class Model:
     def _with_method(self, run: Run, problem: Problem) -> Run:
         return replace(run, solver=method(problem, self.system.moves)[0]) if run.solver == AUTO else run
 
-    def solve_values(self, run: Run, values: Mapping[str, float], *, nudged: bool = False) -> Trajectory:
-        """Run with every value given, whatever bounds they need; under loads that are nudged by their last digit if so
-        wished.
-        """
-        return self.solve_all([(run, values)], nudged=nudged)[0]
+    def solve_values(self, run: Run, values: Mapping[str, float]) -> Trajectory:
+        """Run with every value given, whatever bounds they need."""
+        return self.solve_all([(run, values)])[0]
 
-    def solve_all(
-        self, runs: Sequence[tuple[Run, Mapping[str, float]]], threads: int = 1, *, nudged: bool = False
-    ) -> list[Trajectory]:
+    def solve_all(self, runs: Sequence[tuple[Run, Mapping[str, float]]], threads: int = 1) -> list[Trajectory]:
         """Runs that differ in values and output times, together in the compiled loop."""
         before = PREPARING.seconds
-        problems = [self.problem(*pair, nudged=nudged) for pair in runs]
+        problems = [self.problem(*pair) for pair in runs]
         run = self._with_method(runs[0][0], problems[0])
         used = solver(run.solver)
         if self.program.filler is not None and run.solver not in ASKING:

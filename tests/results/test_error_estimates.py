@@ -3,6 +3,7 @@
 import math
 from dataclasses import replace
 
+import mpmath
 import numpy as np
 import pytest
 from typer.testing import CliRunner
@@ -315,3 +316,42 @@ def test_a_flux_that_the_tolerance_does_not_resolve_has_its_error():
     text += "heat: [conductance: {between: [a, b], h: 1e6}]\nloading: {Q_1: 1 W/m^2}\ninitial: {T_1: 300, T_2: 300}\n"
     solution = surfacechem.run(f"{text}run: {{until: 1 s, rtol: 1e-6}}")
     assert "q_12" in solution.accuracy.everywhere
+
+
+PLATE = """
+bodies: {a: {temperature: 300 K}, b: {temperature: 300 K}}
+interface: {temperature: 300 K}
+mechanics: {normal: {m: 1 kg/m^2, e: 0.95}}
+loading: {F_n: {harmonic: {mean: -10 Pa, amplitude: 14 Pa, frequency: 1 Hz}}}
+initial: {g_n: 0.3 m, v_n: 0}
+run: {until: %d s}
+"""
+
+
+def shaken_plate(end):
+    """Gap of the plate by flights in 40 digits, each to its impact."""
+    with mpmath.workdps(40):
+        w, lift = 2 * mpmath.pi, 14 / (2 * mpmath.pi)
+        t, g, v, e = mpmath.mpf(0), mpmath.mpf(0.3), mpmath.mpf(0), mpmath.mpf(0.95)
+
+        def flown(at):
+            s = at - t
+            height = g + (v + lift * mpmath.cos(w * t)) * s - 5 * s**2
+            return height - lift / w * (mpmath.sin(w * at) - mpmath.sin(w * t))
+
+        while True:
+            times = np.linspace(float(t), end, int(1000 * (end - float(t))) + 2)[1:]
+            below = next((k for k, at in enumerate(times) if k and flown(mpmath.mpf(at)) <= 0), None)
+            if below is None:
+                return float(flown(mpmath.mpf(end)))
+            hit = mpmath.findroot(flown, (times[below - 1], times[below]), solver="anderson")
+            fallen = v - 10 * (hit - t) - lift * (mpmath.cos(w * hit) - mpmath.cos(w * t))
+            t, g, v = hit, mpmath.mpf(0), -e * fallen
+
+
+@pytest.mark.parametrize(("end", "asked"), [(22, ""), (34, ", accuracy: 1e-8")])
+def test_impacts_that_magnify_rounding_are_known_to(end, asked):
+    """Both runs round the times of the first impacts alike, and each of 10 to 18 doubles what is left of that."""
+    solution = surfacechem.load((PLATE % end).replace(" s}", f" s{asked}}}")).run()
+    error = abs(solution.dataset["g_n"].values[-1] / shaken_plate(end) - 1)
+    assert 1e-8 < error < 2 * solution.accuracy.error < 20 * error
