@@ -147,6 +147,9 @@ LAST = 3e-14
 LOOSEST = 1e-3
 """Loosest tolerance that is chosen for a run: NEGLIGIBLE. With more a method does not have its order."""
 
+MOST = 0.1
+"""Loosest tolerance that may be asked for: with more a run has no digit."""
+
 FLOOR = 1e-9
 """Fraction of the whole that replaces a smaller value where its error is made relative: of the run for times of events,
 of their largest for exact answers. The same as NOTHING.

@@ -213,14 +213,13 @@ def loaded(case: str, changes: Sequence[str] | None) -> Simulation:
 
 def chosen(simulation: Simulation, solver: str | None, rtol: float | None, accuracy: float | None = None) -> Run:
     """Run settings of the case, changed by the command line; a tolerance given there replaces an automatic choice."""
-    from surfacechem.results.accuracy import first_tolerance
+    from surfacechem.results.accuracy import check_tolerance, first_tolerance
     from surfacechem.solve import AUTO, names
     from surfacechem.solve.run import OWN
-    from surfacechem.tolerances import TIGHTEST
 
     refuse_unknown([] if solver is None else [solver], (AUTO, *names), "no solver '{}'", Place(path="--solver"))
-    if rtol is not None and not TIGHTEST <= rtol <= 0.1:  # what is tighter is rounding
-        raise InputError(f"{rtol:g} is outside its range: >= {TIGHTEST:g} and <= 0.1.", Place(path="--rtol"))
+    if rtol is not None:
+        check_tolerance(rtol, "--rtol")
     if accuracy is not None and not 0 < accuracy <= 1:
         raise InputError(f"{accuracy:g} is outside its range: > 0 and <= 1.", Place(path="--accuracy"))
     if rtol is not None and (accuracy is not None or solver == AUTO):

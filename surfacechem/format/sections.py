@@ -61,7 +61,7 @@ from surfacechem.model.components.mounting import TRACTIONS
 from surfacechem.quantities import VARIABLES
 from surfacechem.scene import MOST_CELLS, Conduction, Mounting
 from surfacechem.solve.run import OWN
-from surfacechem.tolerances import DEFAULT_RTOL, FLOOR, TIGHTEST
+from surfacechem.tolerances import DEFAULT_RTOL, FLOOR, MOST, TIGHTEST
 
 BODY_NAME = r"[A-Za-z][A-Za-z0-9_-]*"
 
@@ -414,7 +414,7 @@ class RunSection(Section):
         "1",
         f"relative tolerance of each step, instead of `accuracy`; {DEFAULT_RTOL:g} if neither is given",
         at_least=TIGHTEST,
-        at_most=0.1,
+        at_most=MOST,
     )
     atol: float | None = quantity(
         "1", "absolute tolerance in parts of the scale of each state; 1e-6 `rtol` if not given", above=0, at_most=1

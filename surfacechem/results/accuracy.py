@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from surfacechem.tolerances import LAST, LOOSEST, TIGHTEST
+from surfacechem.errors import InputError, Place
+from surfacechem.tolerances import LAST, LOOSEST, MOST, TIGHTEST
 
 Array = NDArray[np.float64]
 
@@ -30,6 +31,12 @@ AT_START = "the run ended at its start"
 
 STILL = "nothing evolves, and no work is done"
 """Reason why two runs at different tolerances tell nothing."""
+
+
+def check_tolerance(rtol: float, option: str) -> None:
+    """InputError for a relative tolerance that no run is asked for: what is tighter is rounding."""
+    if not TIGHTEST <= rtol <= MOST:
+        raise InputError(f"{rtol:g} is outside its range: >= {TIGHTEST:g} and <= {MOST:g}.", Place(path=option))
 
 
 def first_tolerance(accuracy: float) -> float:

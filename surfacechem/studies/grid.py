@@ -16,6 +16,7 @@ from typing import TypeVar
 import numpy as np
 
 from surfacechem.errors import InputError, Place, refuse_unknown
+from surfacechem.results.accuracy import check_tolerance
 from surfacechem.solve import names, solver
 from surfacechem.solve.contract import Counters
 from surfacechem.solve.run import Trajectory
@@ -27,9 +28,6 @@ BRIEF, LEAST_REPEATS, MOST_REPEATS = 0.05, 3, 20
 
 # A solver at one value is not timed again once it has taken this long [s].
 BUDGET = 1.0
-
-# Relative tolerance above which no solver is asked.
-LOOSEST = 0.1
 
 # Errors with which libraries end that cannot even say how a run failed.
 FAULTS = (ArithmeticError, RuntimeError, ValueError)
@@ -123,8 +121,7 @@ def check_options(
     """
     refuse_unknown(solvers, names, "no solver '{}'", Place(path=options[0]))
     for rtol in tolerances:
-        if not 0 < rtol <= LOOSEST:
-            raise InputError(f"{rtol:g} is outside its range: > 0 and <= {LOOSEST:g}.", Place(path=options[1]))
+        check_tolerance(rtol, options[1])
     for given, option in zip((solvers, tolerances), options, strict=False):
         if not given:
             raise InputError("at least one is needed.", Place(path=option))
