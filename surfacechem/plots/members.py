@@ -63,9 +63,14 @@ def figure(dataset: xarray.Dataset, plan: Plan, axes: Sequence[str], variables: 
 
 def chosen(dataset: xarray.Dataset, axes: Sequence[str], variables: Sequence[str] | None) -> list[str]:
     """The variables that are drawn: those asked for, else those of the ends that differ from run to run."""
-    known = [str(n) for n, x in dataset.data_vars.items() if x.dtype.kind == "f" and x.dims[: len(axes)] == tuple(axes)]
+    known = numbers(dataset, axes)
     refuse_unknown(variables or (), known, "no variable '{}' in the sweep", style.place(dataset))
     return list(dict.fromkeys(variables)) if variables else differing(dataset, axes, known)
+
+
+def numbers(dataset: xarray.Dataset, axes: Sequence[str]) -> list[str]:
+    """Names of the numbers that each run has, not only those that are checked, at its end or along it."""
+    return [str(n) for n, x in dataset.data_vars.items() if x.dtype.kind == "f" and x.dims[: len(axes)] == tuple(axes)]
 
 
 def differing(dataset: xarray.Dataset, axes: Sequence[str], known: Sequence[str]) -> list[str]:

@@ -75,9 +75,9 @@ def axes_of(dataset: xarray.Dataset) -> list[str]:
 
 
 def _numbers(dataset: xarray.Dataset) -> list[str]:
-    """Names of the numbers that each run has at its end or along it; coverages also have names of their own."""
+    """Names of the numbers that curves over what is swept show; coverages also have names of their own."""
     lists = {"event", "species"}
-    return [str(n) for n, v in dataset.data_vars.items() if v.dtype.kind == "f" and lists.isdisjoint(v.dims)]
+    return [name for name in members.numbers(dataset, axes_of(dataset)) if lists.isdisjoint(dataset[name].dims)]
 
 
 def groups(dataset: xarray.Dataset, variables: Sequence[str] | None) -> list[Panel]:

@@ -128,6 +128,20 @@ def test_a_store_over_one_parameter_shows_what_depends_on_it(until, names, tmp_p
             assert ax.get_legend() is None
 
 
+def test_what_is_stored_of_the_runs_that_are_checked_alone_is_in_no_curve(tmp_path):
+    """More runs than the hundred hardest, whose numbers have a dimension of their own."""
+    over = {"initial.T": {"from": 280, "to": 310, "points": 101}}
+    simulation = surfacechem.load("exothermic", {"sweep": {"checked": 3, "keep": {"last": ["T"]}, "over": over}})
+    stream = simulation.stream(simulation.plan(), tmp_path / "o.zarr")
+    stream.run()
+    stream.check()
+    with stream.store.dataset as data:
+        assert data.sizes["hardest"] == 100
+        assert [ax.get_ylabel() for ax in plots.figure(data).axes] == ["$T_{\\mathrm{last}}$ [K]"]
+        with pytest.raises(InputError, match="no variable 'hardest_error' in the sweep"):
+            plots.figure(data, ["hardest_error"])
+
+
 def test_effects_of_three_parameters_of_a_grid(tmp_path):
     over = {K_0: [100.0, 200.0, 300.0], "initial.T": [290.0, 310.0], C_R: [5e15, 7e15]}
     path = stored(tmp_path, over=over, keep={"last": ["T"]})
