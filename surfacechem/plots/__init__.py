@@ -49,8 +49,7 @@ def figure(
     InputError
         Where a file is no dataset of surfacechem, or has no variable of a name.
     """
-    if isinstance(variables, str):
-        raise InputError(f"variables are a list of names, not '{variables}'; a figure is written by its savefig.")
+    _check_choice(variables, against)
     several = [data] if isinstance(data, str | Path) or not isinstance(data, Sequence) else data
     datasets = [opened(each) for each in several]
     if celsius:
@@ -76,3 +75,11 @@ def figure(
     if "time" not in dataset and "point" in dataset.dims:
         return run.at_states(dataset, variables, against)
     return run.figure(dataset, variables, against)
+
+
+def _check_choice(variables: Sequence[str] | None, against: str | None) -> None:
+    """InputError where variables are no list, or none that could be drawn over another."""
+    if isinstance(variables, str):
+        raise InputError(f"variables are a list of names, not '{variables}'; a figure is written by its savefig.")
+    if variables and {*variables} == {against}:
+        raise InputError(f"{against} is the axis: name other variables, or leave `against` out.")

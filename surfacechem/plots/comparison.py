@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Sequence
 from itertools import cycle
@@ -18,10 +17,12 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from surfacechem.documents import document
+from surfacechem.documents.overrides import parameter_path
 from surfacechem.errors import InputError
 from surfacechem.plots import members, run, style, sweep
 from surfacechem.plots.run import Panel
 from surfacechem.plots.style import COLOURS, symbol, unit
+from surfacechem.results.dataset import changes_of
 
 DASHES = ("-", "--", ":", "-.")
 """Lines of the variables of a panel, whose colours say of which dataset they are."""
@@ -71,10 +72,11 @@ def _content(
         raise InputError("a figure takes runs or sweeps, not both.")
     if not any(sweeps):
         return against or "time", _united([run.panels(each, variables, against) for each in datasets])
-    axes = {tuple(sweep.axes_of(each)) for each in datasets}
-    if len(axes) > 1 or len(min(axes)) > 1:
-        raise InputError("sweeps share a figure only if they are over the same parameter.")
-    return min(axes)[0], _united([sweep.groups(each, variables) for each in datasets])
+    axes = [*dict.fromkeys(tuple(sweep.axes_of(each)) for each in datasets)]
+    if len(axes) > 1 or len(axes[0]) > 1:
+        given = ", and over ".join(" by ".join(names) for names in axes)
+        raise InputError(f"sweeps share a figure where all are over one parameter, the same; these are over {given}.")
+    return axes[0][0], _united([sweep.groups(each, variables) for each in datasets])
 
 
 def colours_of(count: int) -> list[str]:
@@ -125,8 +127,9 @@ def _settings(dataset: xarray.Dataset) -> dict[str, str]:
         else:
             found[tree.place.path] = str(tree.value)
     # A run from Python may differ from its case, which the dataset says apart.
-    changes = json.loads(str(attributes.get("departures", "{}"))).get("changes", {})
-    found |= {path: f"{value:g}" for path, value in changes.items()}
+    for path, (value, si) in changes_of(attributes).items():
+        text, size = style.prefixed(si, np.array([value]))
+        found[parameter_path(path, found)] = f"{value / size:g} {text}".removesuffix(" 1").rstrip()
     found |= {name: str(attributes[name]) for name in ("solver", "rtol") if name in attributes}
     return {path: _brief(value) for path, value in found.items() if path.partition(".")[0] not in WORDS}
 

@@ -147,6 +147,9 @@ def portraits(dataset: xarray.Dataset, axes: Sequence[str], variables: Sequence[
     inner = [str(dim) for name in series for dim in dataset[name].dims if dim not in axes]
     known = [*series, *dict.fromkeys(inner)]
     asked = (*(variables or ()), against)
+    if single := next(filter((dataset.variables.keys() - known).__contains__, asked), ""):
+        message = f"{single} does not go along the runs. Leave `against` out: the figure is over what is swept."
+        raise InputError(message, style.place(dataset))
     refuse_unknown(asked, known, "no variable '{}' along the runs of the sweep", style.place(dataset))
     usual = [name for _, *kind in KINDS[:2] for name in of_kind(dataset, series, *kind)]
     moving = [name for name in usual if name != against and varies(fair(dataset, name))]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -42,6 +43,20 @@ DATASET_NAMES = {
     "W_t2": "work_t2",
 }
 """Names that differ in the dataset, where no two may be the same but for their case."""
+
+
+def changes_of(attributes: Mapping[str, Any]) -> dict[str, tuple[float, str]]:
+    """What a run has changed of its case, as its dataset says: values in SI by path, each with its unit.
+
+    >>> changes_of({"departures": '{"changes": {"initial.T": 280.0}, "units": {"initial.T": "K"}}'})
+    {'initial.T': (280.0, 'K')}
+    """
+    try:
+        found = json.loads(str(attributes.get("departures", "{}")))
+        units = found.get("units", {})
+        return {path: (float(x), str(units.get(path, ""))) for path, x in found.get("changes", {}).items()}
+    except (AttributeError, TypeError, ValueError, RecursionError):
+        raise InputError("the attribute 'departures' says no changes of a case.") from None
 
 
 def quantities(system: System) -> dict[str, Quantity]:
@@ -133,6 +148,12 @@ class Results(ABC):
     @abstractmethod
     def attributes(self) -> Mapping[str, str | float | int]:
         """Global attributes: scalars and strings only."""
+
+    def _changed(self, system: System) -> dict[str, object]:
+        """What `departures` says of the changes; nothing where there are none."""
+        units = system.changeable
+        told = {"changes": dict(self.changes), "units": {path: units[path] for path in self.changes}}
+        return told if self.changes else {}
 
     def _origin(self, made: str, how: str) -> dict[str, str | float | int]:
         """Attributes that say where the dataset is from; it is ``made``, or evaluated."""

@@ -220,7 +220,7 @@ class Solution(Results):
     def _departures(self) -> dict[str, str]:
         """Settings in which the run was not that of its case, for running it again."""
         run = self.trajectory.run
-        departures: dict[str, object] = {"changes": dict(self.changes)} if self.changes else {}
+        departures = self._changed(self.trajectory.model.system)
         if self.case_run is not None:
             now, usual = ({name: getattr(r, name) for name in RECORDED} for r in (run, self.case_run))
             departures |= {name: value for name, value in now.items() if value != usual[name]}

@@ -30,6 +30,7 @@ A = TypeVar("A")
 
 DEPARTURES: Mapping[str, tuple[type, ...]] = {
     "changes": (dict,),
+    "units": (dict,),
     "times": (list,),
     "picture": (float, type(None)),
     "atol": (float, int, type(None)),

@@ -507,12 +507,11 @@ class SweepSolution(Results):
             worst = float(np.max(self.accuracy.known)) if len(self.accuracy.known) else np.nan
             source = "; ".join(filter(None, (self.accuracy.source, self.accuracy.unknown)))
             error = {"error": worst, "error_source": source}
-        departures = {"departures": json.dumps({"changes": dict(self.changes)})} if self.changes else {}
         return {
             **self._origin("made", f"with {self.run.solver} at rtol {self.run.rtol:g}"),
             "sweep": self.plan.record,
             COORDINATES: " ".join(self.parameters),
-            **departures,
+            **({"departures": json.dumps(self._changed(self.system))} if self.changes else {}),
             "status": self.status,
             "reason": self.ends,
             "regime": self.system.regime,

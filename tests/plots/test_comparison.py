@@ -32,7 +32,7 @@ def entries(legend):
 
 def test_runs_have_colours_and_variables_have_dashes(runs):
     plot = figure(runs)
-    assert entries(plot.legends[0]) == ["$T_{1}$ = 500 K", "$T_{1}$ = 450"]
+    assert entries(plot.legends[0]) == ["$T_{1}$ = 500 K", "$T_{1}$ = 450 K"]
     lines = [line for line in plot.axes[0].get_lines() if len(line.get_xdata())]
     assert [(line.get_color(), line.get_linestyle()) for line in lines] == [
         (colour, dash) for colour in COLOURS[:2] for dash in ["-", "--"]
@@ -49,8 +49,18 @@ def test_sweeps_over_the_same_parameter_are_compared(sweeps, runs):
     (ax,) = figure(sweeps, ["T_1"]).axes
     assert [line.get_ydata()[1] for line in ax.get_lines()] == [each["T_1"].values[1, -1] for each in sweeps]
     assert labels(sweeps) == ["until = 200 s", "until = 10 s"]
+    several = sweeps[0].expand_dims(mu=[0.1, 0.2], axis=1)
+    with pytest.raises(InputError, match="all are over one parameter, the same; these are over initial_T_1 by mu"):
+        figure([several, several])
     with pytest.raises(InputError, match="takes runs or sweeps, not both"):
         figure([sweeps[0], runs[0]])
+
+
+def test_changes_made_in_python_have_units_and_the_names_of_the_case():
+    case = surfacechem.load("sliding-dry")
+    changed = case.run({"loading.p": 2e5, "interface.friction.coulomb.mu": 0.6})
+    names = labels([case.run().dataset, changed.dataset])
+    assert names == ["$\\mu$ = 0.3, $p$ = 100 kPa", "$\\mu$ = 0.6, $p$ = 200 kPa"]
 
 
 def test_datasets_that_differ_in_all_are_named_by_title_or_file(runs, tmp_path):

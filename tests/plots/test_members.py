@@ -98,8 +98,14 @@ def test_each_run_of_a_sweep_over_a_variable_or_time():
     assert np.array_equal(ax.lines[1].get_data(), [sweep["phi"].values[1], sweep["T"].values[1]])
     assert [text.get_text() for text in ax.get_legend().get_texts()] == [f"$K_{{0}}$ = {K} J m⁻²" for K in (200, 300)]
     assert plots.figure(sweep, against="time").axes[-1].get_xlabel() == "Time [s]"
-    with pytest.raises(InputError, match="no variable 'T_last' along the runs"):
-        plots.figure(sweep, ["T_last"], "phi")
+    with pytest.raises(InputError, match="no variable 'T_lst' along the runs"):
+        plots.figure(sweep, ["T_lst"], "phi")
+
+
+def test_a_number_of_each_run_is_no_curve_of_it(drawn, grid):
+    for data, names, against, single in ((drawn, ["T_last"], "K_0", "T_last"), (grid, ["T"], "K_0", "K_0")):
+        with pytest.raises(InputError, match=f"{single} does not go along the runs. Leave `against` out"):
+            plots.figure(data, names, against)
 
 
 def test_what_is_briefer_than_the_outputs_of_a_sweep_is_told():

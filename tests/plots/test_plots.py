@@ -245,6 +245,11 @@ CONTACT = {
 }
 
 
+def test_a_variable_over_itself_is_no_figure():
+    with pytest.raises(InputError, match="T_1 is the axis: name other variables, or leave `against` out"):
+        figure(dataset(), ["T_1"], "T_1")
+
+
 def test_tractions_are_drawn_over_what_the_states_differ_in():
     case = surfacechem.load(CONTACT)
     data = case.evaluate({"g_n": [2e-9, -4e-9, -2e-9]})
