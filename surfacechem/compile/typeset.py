@@ -95,9 +95,12 @@ class Statement(NamedTuple):
 
 
 def equations(system: System) -> tuple[list[Equation], dict[str, str]]:
-    """The balances of a scene and the quantities that they read; and the LaTeX of its parameters, by their paths."""
+    """The balances of a scene and the quantities that they read; and the LaTeX of its parameters, and of what is given
+    at the start, by their paths.
+    """
     printer = Paper(_names(system))
     symbols = {p.path: printer.text(p.symbol) for p in system.parameters}
+    symbols |= {s.path: printer.text(symengine.Symbol(s.at_start[0].name)) for s in system.states}
     return [printer.equation(line) for line in lines(system)], symbols
 
 

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import html
 import inspect
-import json
 import logging
 import re
 import shlex
 from base64 import b64encode
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
@@ -22,10 +22,11 @@ from surfacechem import format as cases
 from surfacechem.compile.typeset import Equation, equations
 from surfacechem.contracts.terms import Law
 from surfacechem.errors import InputError, Place
+from surfacechem.format.plans import recorded_plan
 from surfacechem.model.system import System
 from surfacechem.plots import drawing, figure, opened, save
 from surfacechem.results import spatial
-from surfacechem.results.dataset import Results
+from surfacechem.results.dataset import Results, changes_of
 from surfacechem.results.solution import Solution
 from surfacechem.runs.check import laws_of
 from surfacechem.runs.listing import FORMULA, plain, source
@@ -33,6 +34,8 @@ from surfacechem.runs.sheet import Sheet
 from surfacechem.runs.simulation import Simulation
 from surfacechem.runs.summaries import REGIMES, duration, points_summary, run_summary, surface_rows, sweep_summary
 from surfacechem.runs.sweeps import SweepSolution
+from surfacechem.scene import Scene
+from surfacechem.solve.run import values_of
 from surfacechem.studies.mathml import Typeset
 from surfacechem.studies.report import Page, PageSection, PageTable
 
@@ -59,20 +62,23 @@ def page(data: xarray.Dataset | str | Path) -> Page:
     if "case" not in dataset.attrs or "status" not in dataset.attrs:
         raise InputError("this is no dataset of a run or of a sweep.", place)
     attributes, omissions = dataset.attrs, []
+    items = [(f"{path} = {value:g}", unit) for path, (value, unit) in changes_of(attributes).items()]
+    told = ", ".join(text if unit in ("", "1") else f"{text} {unit}" for text, unit in items)
+    changed = [f"Numbers differ from those of the case, which was changed in Python: {told}."] if told else []
     command, again = _again(data, attributes)
     told = attributes.get("warnings", "none")
     warnings = [] if told == "none" else [f"Warning: {text}." for text in told.split("; ")]
-    sections = [PageSection("What happened", [_ending(attributes), *warnings], figure=True)]
+    sections = [PageSection("What happened", [_ending(attributes), *changed, *warnings], figure=True)]
     try:
         if not attributes["case"]:
             raise InputError("the scene was built in Python, and the dataset holds no case.")
         case = cases.load_text(attributes["case"], mechanism_text=attributes.get("mechanism"))
-        sections += [*_scene(case), *_events(dataset), _balances(attributes), *_precision(case, attributes)]
+        sections += [*_scene(case, attributes), *_events(dataset), _balances(attributes), *_precision(case, attributes)]
     except InputError as error:  # code that the dataset carries is not run to draw it
         sections += [*_events(dataset), _balances(attributes)]
         omissions.append(f"The scene and its equations: {error.message}")
     untitled = dataset.assign_attrs(title="")  # the page has the title above
-    told_again = [again, *([f"$ {command}"] if command else [])]
+    told_again = [again, *([f"$ {command}"] if command else []), *changed]
     sections.append(PageSection("How to run it again", told_again, code=attributes["case"], details=True))
     return Page(attributes.get("title", "untitled"), command, sections, omissions, lambda: figure(untitled))
 
@@ -85,7 +91,7 @@ def _again(data: xarray.Dataset | str | Path, attributes: Mapping[str, Any]) -> 
         command = f"surfacechem rerun {shlex.quote(Path(data).name)}"
         return command, "The dataset holds the case, the mechanism and the settings of the run."
     if "sweep" in attributes:
-        changes = json.loads(attributes.get("departures", "{}")).get("changes", {})
+        changes = _values(attributes)
         again = f'load("case.yaml").sweep_plan(recorded_plan({attributes["sweep"]!r}), {changes})'
         return "", f"In Python, with the case below: {again}; recorded_plan is in surfacechem.format.plans."
     needed = "The command needs the case below as case.yaml, and beside it the files that it names"
@@ -133,31 +139,54 @@ def _ending(attributes: Any) -> str:
     return text
 
 
-def _scene(case: cases.Case) -> Iterator[PageSection]:
-    """The scene in words, as a drawing, and as equations."""
-    system = case.system()
+def _values(attributes: Mapping[str, Any]) -> dict[str, float]:
+    """What a run has changed of its case, in SI, by path."""
+    return {path: value for path, (value, _) in changes_of(attributes).items()}
+
+
+def _as_run(case: cases.Case, changes: Mapping[str, float]) -> Scene:
+    """The scene of a case with those changes of a run that a case can say."""
+    for path, value in changes.items():
+        with suppress(InputError):
+            case = cases.load_text(case.text, mechanism_text=case.mechanism_text, overrides={path: value})
+    return case.scene
+
+
+def _scene(case: cases.Case, attributes: Mapping[str, Any]) -> Iterator[PageSection]:
+    """The scene of a run in words, as a drawing, and as equations."""
+    system, scene = case.system(), _as_run(case, _values(attributes))
     regime = f"{system.regime}: {REGIMES.get(system.regime, '')}"
     rows = [(role.variable, role.role, role.by) for role in system.roles if role.role != "internal"]
     words = [text for text in (case.description, case.source and f"Source: {case.source}", regime) if text]
     variables = PageTable(("variable", "role", "by"), rows, "Variables")
-    tables, acting = [variables], laws_of(case.scene)
-    surface: Any = case.scene.surface
+    tables, acting = [variables], laws_of(scene)
+    surface: Any = scene.surface
     if surface is not None:
-        tables.append(PageTable(("body or law", "kind", "numbers"), surface_rows(case.scene), "Surfaces"))
+        tables.append(PageTable(("body or law", "kind", "numbers"), surface_rows(scene), "Surfaces"))
         acting += [*surface.pairs, *surface.gap_laws, *surface.heat_laws]
     stated = list(dict.fromkeys(law for kind in acting for law in _stated(type(kind))))
-    yield PageSection("The scene", words, tables, drawings=[lambda: drawing.figure(case.scene)])
+    yield PageSection("The scene", words, tables, drawings=[lambda: drawing.figure(scene)])
     yield PageSection("Laws", equations=stated)
-    if spatial.divided(case.scene):  # equations of many cells read alike
+    if spatial.divided(scene):  # equations of many cells read alike
         system = replace(case, scene=spatial.few(case.scene)).system()
     lines, symbols = equations(system)
-    numbers = [
-        (Typeset(symbols[p.path]), f"{p.at(0.0):.6g}", p.spec.unit, f"{p.spec.text} ({p.path})")
-        for p in system.parameters
-        if p.path in system.changeable and p.path in symbols
+    yield PageSection("Equations", tables=[_numbers(system, symbols, attributes)], equations=lines, details=True)
+
+
+def _numbers(system: System, symbols: Mapping[str, str], attributes: Mapping[str, Any]) -> PageTable:
+    """Parameters and initial values of a run, with those of its case where they differ, and which of them are swept."""
+    own, changes, units = values_of(system), _values(attributes), system.changeable
+    values = {path: f"{value:.6g}" for path, value in values_of(system, changes).items()}
+    values |= dict.fromkeys(recorded_plan(attributes["sweep"]).paths if "sweep" in attributes else (), "swept")
+    texts = {p.path: p.spec.text for p in system.parameters if p.path in units}
+    evolved = [state for state in system.states if not (state.algebraic or state.name in system.inside)]
+    texts |= {state.path: f"{state.at_start[0].long_name} at the start" for state in evolved}
+    notes = {path: f"; {own[path]:.6g} in the case" for path, value in changes.items() if value != own[path]}
+    rows = [
+        (Typeset(symbols[path]), values[path], units[path], f"{text} ({path}){notes.get(path, '')}")
+        for path, text in texts.items()
     ]
-    table = PageTable(("symbol", "value", "unit", "meaning"), numbers, "Numbers")
-    yield PageSection("Equations", tables=[table], equations=lines, details=True)
+    return PageTable(("symbol", "value", "unit", "meaning"), rows, "Numbers")
 
 
 def equation_sheet(system: System, title: str) -> Sheet:

@@ -100,9 +100,35 @@ def test_rates_that_cantera_gives_are_no_numbers_of_the_scene():
     assert not [row for row in numbers if row[3].startswith("net rate, evaluated by Cantera")]
 
 
+def numbers_of(page):
+    (rows,) = (table.rows for part in page.sections for table in part.tables if table.caption == "Numbers")
+    return {row[3].partition("(")[2].partition(")")[0]: row[1:] for row in rows}
+
+
+@pytest.mark.parametrize("written", [False, True])
+def test_numbers_are_those_of_the_run_and_say_where_they_are_not_those_of_the_case(written, tmp_path):
+    solution = surfacechem.load("sliding-dry").run({"interface.friction.coulomb.mu": 0.9, "initial.T": 280})
+    page = run_report.page(solution.write(tmp_path / "d.nc") if written else solution.dataset)
+    value, unit, meaning = numbers_of(page)["interface.friction.coulomb.mu"]
+    assert (value, unit, meaning.endswith("; 0.3 in the case")) == ("0.9", "1", True)
+    assert numbers_of(page)["initial.T"][:2] == ("280", "K")
+    told = "changed in Python: interface.friction.coulomb.mu = 0.9, initial.T = 280 K."
+    assert [part.title for part in page.sections if told in " ".join(part.paragraphs)] == [
+        "What happened",
+        "How to run it again",
+    ]
+
+
+def test_a_temperature_that_was_changed_is_that_of_the_drawing():
+    page = run_report.page(surfacechem.load("reservoir-exchange").run({"bodies.reservoir.temperature": 350}).dataset)
+    (drawing,) = (draw() for part in page.sections for draw in part.drawings)
+    assert "350 K, given" in [text.get_text().split("\n")[0] for text in drawing.axes[0].texts]
+
+
 def test_the_report_of_a_sweep_made_in_python_says_how_python_makes_it_again(tmp_path, monkeypatch):
     names = {"load": surfacechem.load, "recorded_plan": recorded_plan}
     dataset = surfacechem.load("exothermic").sweep({"initial.phi": [0.1, 0.2]}, changes={"initial.T": 290.0}).dataset
+    assert [numbers_of(run_report.page(dataset))[path][0] for path in ("initial.phi", "initial.T")] == ["swept", "290"]
     monkeypatch.chdir(tmp_path)
     Path("case.yaml").write_text(dataset.attrs["case"], encoding="utf-8")
     (told,) = re.findall(r"case below: (.*); recorded_plan", html.unescape(run_report.page(dataset).html()))
