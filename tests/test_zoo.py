@@ -22,7 +22,7 @@ from surfacechem.compile.program import compile_function, compile_program
 from surfacechem.expressions import derivative, magnitude
 from surfacechem.format import names
 from surfacechem.format.plans import Axis, Plan
-from surfacechem.runs.keeping import EXTREMES, extreme
+from surfacechem.runs.keeping import EXTREMES, SINGLE, at_end, extreme
 from surfacechem.tolerances import ULPS
 
 ROOT = Path(__file__).parents[1]
@@ -261,9 +261,12 @@ def test_a_case_is_the_same_as_a_sweep_of_one(name):
     one = {c.name: c.values[0] for c in swept.columns if c.dimensions[0] == axis != c.name}
     alone = solution.attributes | {c.name: c.values for c in solution.columns}
     alone |= {"steps": alone["count_steps"], "destroys_entropy": alone["entropy_violations"] != "none"}
+    ends = at_end(solution.trajectory)
     for state in simulation.system.rows.keys() - simulation.system.inside:
         alone |= {f"{state}_{which}": extreme(solution.trajectory, state, which) for which in EXTREMES}
-    left = {"entropy_destroyed", *(name for name in one.keys() - alone.keys() if name.endswith(("_max", "_min")))}
+        alone[f"{state}_last"] = ends[state]
+    single = tuple(f"_{which}" for which in SINGLE)
+    left = {"entropy_destroyed", *(name for name in one.keys() - alone.keys() if name.endswith(single))}
     if simulation.case.reference and simulation.case.reference.options:
         left |= {"error"}  # an exact solution with values of its own is of the case alone
     told = {"status", "reason", "energy_error", "site_error", "error", *simulation.system.rows}

@@ -106,12 +106,20 @@ def with_ends(dataset: xarray.Dataset, axes: Sequence[str]) -> xarray.Dataset:
 
 
 def final(dataset: xarray.Dataset, name: str) -> Array:
-    """The last value that each run reached; nan where it failed or was refused."""
-    values: Array = dataset[name].values
+    """The value at the end of each run, or at the last output before where that is all there is; nan where it failed or
+    was refused.
+    """
+    ended = f"{name}_last"
+    values: Array = dataset[ended if ended in dataset else name].values
     if values.ndim > dataset["status"].ndim:
         last = values.shape[-1] - 1 - np.argmax(np.isfinite(values)[..., ::-1], axis=-1)
         values = np.take_along_axis(values, last[..., None], axis=-1)[..., 0]
     return np.where(style.lost(dataset, *style.LOST), np.nan, values)
+
+
+def knows_ends(dataset: xarray.Dataset, names: Sequence[str]) -> bool:
+    """Whether the last values are those at the ends of all runs, none of which has stopped after its last output."""
+    return all(f"{name}_last" in dataset for name in names) or not style.lost(dataset, style.STOPPED).any()
 
 
 def fair(dataset: xarray.Dataset, name: str) -> Array:

@@ -221,8 +221,11 @@ def headings(plot: Figure, ax: Axes, dataset: xarray.Dataset, above: float = 0.0
     ax.set_title("\n".join(lines), loc="left", pad=6 + above, **NOTE)
 
 
-LOST = {"failed": "x", "refused": "d"}
-"""Statuses of runs whose last values are no ends, and what marks them."""
+LOST, STOPPED = ("failed", "refused"), "stopped"
+"""Statuses of runs whose last values are no ends, and of those that ended before the others."""
+
+MARKS = dict(zip((*LOST, STOPPED), "xds", strict=True))
+"""What marks them."""
 
 
 def _ends(dataset: xarray.Dataset) -> str:
@@ -241,10 +244,14 @@ def lost(dataset: xarray.Dataset, *words: str) -> NDArray[np.bool_]:
 
 
 def mark_lost(axes: Sequence[Axes], dataset: xarray.Dataset) -> None:
-    """Marks on the axis of what is swept where runs have no ends, so that it reaches as far as the sweep."""
+    """Marks on the axis of what is swept where runs have no ends, so that it reaches as far as the sweep, and where
+    some have stopped before the others.
+    """
     x = dataset[str(dataset["status"].dims[0])].values
-    for word in LOST:
-        mark(axes, x[lost(dataset, word).reshape(len(x), -1).any(axis=1)], word)
+    for word in MARKS:
+        found = lost(dataset, word)
+        where = found & ~(found.all() and word == STOPPED)
+        mark(axes, x[where.reshape(len(x), -1).any(axis=1)], word)
 
 
 def mark(axes: Sequence[Axes], x: NDArray[np.float64], word: str) -> None:
@@ -252,7 +259,7 @@ def mark(axes: Sequence[Axes], x: NDArray[np.float64], word: str) -> None:
     for k, ax in enumerate(axes if len(x) else ()):
         look: Any = {"color": "0.4", "markerfacecolor": "white", "clip_on": False, "zorder": 3}
         across, label = ax.get_xaxis_transform(), "_" if k else word
-        ax.plot(x, np.zeros(len(x)), LOST[word], markersize=5, transform=across, label=label, **look)
+        ax.plot(x, np.zeros(len(x)), MARKS[word], markersize=5, transform=across, label=label, **look)
         legend(ax)
 
 

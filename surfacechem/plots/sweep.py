@@ -112,5 +112,6 @@ def _draw_final(ax: Axes, dataset: xarray.Dataset, names: Sequence[str]) -> None
             look: Any = {"linestyle": "none"} if style.is_mode(dataset[name]) else {}
             marker = style.marker(ax, 0 if look else len(x))
             ax.plot(x, values, marker=marker, markersize=style.MARKER, label=words, **look)
-    said = f"{'Final ' * at_end}{style.quantity_words(dataset[names[0]])}" if len(names) == 1 else "Final value"
+    which = ("Final " if members.knows_ends(dataset, names) else "Last output ") if at_end else ""
+    said = f"{which}{style.quantity_words(dataset[names[0]]) if len(names) == 1 else 'value'}"
     style.label(ax.yaxis, said, unit(dataset[names[0]]), np.stack(list(ends.values())))

@@ -53,6 +53,9 @@ EXTREMES = {
 }
 """Extremes of a run: suffix of the names of their columns, function that finds them, and words."""
 
+SINGLE = {"last": "at the end of the run", **{which: words for which, (_, words) in EXTREMES.items()}}
+"""Numbers of each run and quantity, by what the names of their columns end with, in words."""
+
 REACHED = "reaches "
 """Prefix of the names of margins that tell when a quantity reaches a value."""
 
@@ -158,8 +161,7 @@ def described(system: System, keep: Keep) -> dict[str, tuple[str, str, str]]:
         if name != "destroys_entropy"  # of the runs that are checked alone
         and (keep.balances or name not in BALANCES)
     }
-    words = {"last": "at the end of the run", **{which: word for which, (_, word) in EXTREMES.items()}}
-    for which, word in words.items():
+    for which, word in SINGLE.items():
         for name in getattr(keep, which):
             found[f"{name}_{which}"] = ("float64", q[name].unit, f"{q[name].long_name} {word}")
     for name in keep.events:
@@ -171,6 +173,16 @@ def described(system: System, keep: Keep) -> dict[str, tuple[str, str, str]]:
         text = f"{value:g} {q[name].unit}".removesuffix(" 1")
         found[f"time_to_{name}"] = ("float64", "s", f"time to {name} = {text}")
     return found
+
+
+def at_end(run: Trajectory) -> dict[str, float]:
+    """States and named quantities at the end of a run, whether that is an output or not, by name."""
+    result, model = run.result, run.model
+    names = [state.name for state in model.system.states] + [*model.system.output_columns]
+    t, y, ydot = np.array([result.t]), result.y[None], result.ydot[None]
+    if result.status is Status.FINISHED:  # at outputs rates are those of the equations, too
+        ydot = rates_at(model.program, t, y, result.problem.parameters[-1:])
+    return dict(zip(names, [*result.y, *model.evaluate(result, t, y, ydot)[0]], strict=True))
 
 
 def extreme(run: Trajectory, name: str, which: str) -> float:
@@ -216,13 +228,7 @@ class RunByRun:
         result, keep = run.result, self.keep
         row = end_of(run) | {"status": STATUSES.index(run.status), "reason": self._code(run.reason)}
         row |= balances_of(run, books) if books else {}
-        names = [state.name for state in self.model.system.states] + [*self.model.system.output_columns]
-        t, y, ydot = np.array([result.t]), result.y[None], result.ydot[None]
-        if result.status is Status.FINISHED:  # at outputs rates are those of the equations, too
-            ydot = rates_at(self.model.program, t, y, result.problem.parameters[-1:])
-        last = (
-            dict(zip(names, [*result.y, *self.model.evaluate(result, t, y, ydot)[0]], strict=True)) if keep.last else {}
-        )
+        last = at_end(run) if keep.last else {}
         row |= {f"{name}_last": last[name] for name in keep.last}
         row |= {f"{name}_{which}": extreme(run, name, which) for which in EXTREMES for name in getattr(keep, which)}
         reached = len(result.times)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import logging
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cache, cached_property, partial
 from typing import Any
@@ -29,7 +29,7 @@ from surfacechem.results.matching import exact_values, match
 from surfacechem.results.netcdf import COORDINATES, Column, versions
 from surfacechem.results.picture import shared
 from surfacechem.runs import spectrum
-from surfacechem.runs.keeping import ENDS, EXTREMES, balances_of, end_of, extreme
+from surfacechem.runs.keeping import ENDS, EXTREMES, SINGLE, at_end, balances_of, end_of, extreme
 from surfacechem.runs.sheet import counted
 from surfacechem.runs.spectrum import Lifetime, Statistics
 from surfacechem.solve.run import Model, Run, Trajectory
@@ -428,7 +428,7 @@ class SweepSolution(Results):
         species = coverage_columns(self.system, along.values())
         columns = [*self._coordinates(load), *along.values(), *species, *self._of_runs()]
         columns += event_columns(self.runs, shape)
-        columns += self._extremes() if load is None else []
+        columns += self._single() if load is None else []
         for which in self.told:
             name, unit, text = self._statistic(which)
             found = [getattr(statistics, which) for statistics in self.statistics]
@@ -445,18 +445,15 @@ class SweepSolution(Results):
         load = quantities(self.system)[self.plan.load]
         return f"{self.plan.load}_{which}", load.unit, f"{STATISTICS[which]} {load.long_name} at rupture"
 
-    def _extremes(self) -> list[Column]:
-        """The largest and the smallest values of each run, which may lie between the times that all share."""
-        return [
-            self._of_each(
-                f"{DATASET_NAMES.get(name, name)}_{which}",
-                [extreme(run, name, which) for run in self.runs],
-                quantity.unit,
-                f"{quantity.long_name} {words}",
-            )
-            for name, quantity in quantities(self.system).items()
-            for which, (_, words) in EXTREMES.items()
-        ]
+    def _single(self) -> Iterator[Column]:
+        """The last, the largest and the smallest values of each run, which may lie between the times that all share."""
+        ends = [at_end(run) for run in self.runs]
+        for name, q in quantities(self.system).items():
+            found = {which: [extreme(run, name, which) for run in self.runs] for which in EXTREMES}
+            found["last"] = [end[name] for end in ends]
+            for which, words in SINGLE.items():
+                own = f"{DATASET_NAMES.get(name, name)}_{which}"
+                yield self._of_each(own, found[which], q.unit, f"{q.long_name} {words}")
 
     def _lifetime(self, columns: Sequence[Column]) -> Column:
         """Lifetimes over the load, which grows at the same speed all along each run."""

@@ -210,6 +210,23 @@ def test_runs_that_failed_or_were_refused_are_told_and_in_no_line(whole, tmp_pat
     assert (failed.get_xdata().tolist(), failed.get_label()) == ([100, 300], "failed")
 
 
+def test_ends_are_those_of_the_runs_also_where_they_stop_between_outputs(tmp_path):
+    over = {"loading.Q_1": [-100.0, -50.0, -20.0]}
+    case = surfacechem.load("cooling-to-zero", {"run.outputs": 5, "sweep": {"over": over, "keep": {"series": ["T"]}}})
+    swept = case.sweep().dataset
+    assert swept["T_last"].values[:2] == pytest.approx(0.0, abs=1e-3)
+    assert swept["T_last"].values[2] == swept["T"].values[2, -1]
+    ax = plots.figure(swept).axes[0]
+    ends, stopped = ax.lines
+    assert ends.get_ydata().tolist() == swept["T_last"].values.tolist()
+    assert (stopped.get_xdata().tolist(), stopped.get_label()) == ([-100, -50], "stopped")
+    assert ax.get_ylabel() == "Final $T$ [K]"
+    # A store of series alone does not know its ends.
+    with case.stream(case.plan(), tmp_path / "o.zarr").run().dataset as data:
+        ax = plots.figure(data).axes[0]
+        assert (ax.get_ylabel(), ax.lines[0].get_ydata()[0]) == ("Last output $T$ [K]", data["T"].values[0, 1])
+
+
 def test_an_axis_reaches_as_far_as_a_sweep_whose_runs_are_refused(tmp_path):
     over = {"interface.potential.bond-energy.K_2": [300.0, 500.0, 700.0]}
     simulation = surfacechem.load("endothermic", {"reference": None, "sweep": {"checked": 0, "over": over}})
