@@ -434,7 +434,8 @@ class Simulation:
     ) -> SweepSolution:
         """Run over values of parameters in one call of the compiled loop; nothing is compiled twice.
 
-        What is not given is that of the section ``sweep`` of the case.
+        What is not given is that of the section ``sweep`` of the case, but for ``keep``: all of every run is kept.
+        :meth:`stream` keeps what the section says.
 
         Parameters
         ----------
@@ -492,7 +493,8 @@ class Simulation:
             of_cells = errors or [chosen._cell_errors(run) for run in done]
             return [found.beside(chosen._law_errors(run)) for found, run in zip(of_cells, done, strict=True)]
 
-        judge = partial(sweeps.accuracy, chosen.case, threads=threads, cells=added)
+        unchecked = self.case.sweep is not None and self.case.sweep.checked == 0
+        judge = None if unchecked else partial(sweeps.accuracy, chosen.case, threads=threads, cells=added)
         return sweeps.SweepSolution(model, plan, taken, done, judge, **chosen._origin(values))
 
     def stream(

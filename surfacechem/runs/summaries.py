@@ -168,14 +168,14 @@ def sweep_summary(solution: SweepSolution, written: Path | None, details: bool =
 
 def sweep_details(solution: SweepSolution) -> dict[str, Rows]:
     """Table of the end of each run of a sweep, or of the first ones, with their parameters."""
-    errors = solution.accuracy.errors if solution.accuracy else np.full(len(solution.runs), np.nan)
+    errors = [f"error {error:.2g}" for error in solution.accuracy.errors] if solution.accuracy else [""] * MOST_RUNS
     shown = range(min(len(solution.runs), MOST_RUNS))
     points = solution.plan.at(np.arange(len(shown)))
     rows = [
         (
             ", ".join(f"{name} = {points[path][k]:g}" for name, path in solution.parameters.items()),
             solution.runs[k].status,
-            f"error {errors[k]:.2g}",
+            errors[k],
             solution.runs[k].reason,
         )
         for k in shown

@@ -152,6 +152,18 @@ def test_errors_against_an_exact_solution_of_each_run(bonding):
         assert data.attrs[name] == data[name].values.max() < 1e-8
 
 
+def test_no_errors_are_found_where_no_runs_are_checked(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    section = "sweep={over: {initial.T: [290, 300]}, checked: 0}"
+    done = CliRunner().invoke(app, ["sweep", "exothermic", "--set", section, "-v", "-o", "s.nc"])
+    assert done.exit_code == 0, done.output
+    assert "error" not in done.stdout
+    swept = surfacechem.load("exothermic", [section]).sweep(changes={"interface.potential.bond-energy.K_2": 0.1})
+    assert swept.accuracy is None
+    assert "error" not in swept.dataset
+    assert rerun.differences(rerun.read("s.nc"), rerun.run_again(rerun.read("s.nc"))) == []
+
+
 def test_a_sweep_can_be_run_again_from_its_file(spectrum, tmp_path):
     record = rerun.read(spectrum.write(tmp_path / "spectrum.nc"))
     assert rerun.differences(record, rerun.run_again(record)) == []
