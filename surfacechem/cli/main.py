@@ -83,7 +83,7 @@ def run(
         Option(
             "--error",
             help="Where the error is from: auto (the exact solution, else a second run), estimate (a second run at a "
-            "tighter tolerance), balances (no second run).",
+            "tighter tolerance), balances (no second run; not with an accuracy).",
         ),
     ] = "auto",
     talk: Talk = None,

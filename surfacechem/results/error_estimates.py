@@ -17,7 +17,7 @@ from functools import partial
 import numpy as np
 
 from surfacechem.contracts.terms import Law
-from surfacechem.errors import InputError, Place, suggestion
+from surfacechem.errors import InputError, Place, refuse_unknown
 from surfacechem.results.accuracy import (
     AT_START,
     MARGIN,
@@ -32,6 +32,7 @@ from surfacechem.results.audit import audit
 from surfacechem.results.dataset import profile_values
 from surfacechem.results.event_table import KINK, SIDE, event_times
 from surfacechem.scene import Scene
+from surfacechem.solve import AUTO
 from surfacechem.solve.choice import method
 from surfacechem.solve.contract import Array, Mask, Problem, States
 from surfacechem.solve.run import Run, Trajectory
@@ -58,10 +59,12 @@ EVENTS = "event times"
 """Name of the times of events among the compared variables."""
 
 
-def check_way(way: str) -> None:
-    """Raise InputError for what is none of the WAYS."""
-    if way not in WAYS:
-        raise InputError(f"no source '{way}' of an error.{suggestion(way, WAYS)}", Place(path="--error"))
+def check_way(way: str, run: Run) -> None:
+    """Raise InputError for what is none of the WAYS, and where it leaves out what verifies the accuracy of a run."""
+    refuse_unknown([way], WAYS, "no source '{}' of an error", Place(path="--error"))
+    if way == "balances" and run.solver == AUTO:
+        text = f"the accuracy {asked(run):g} is verified by a second run, which `balances` leaves out"
+        raise InputError(f"{text}: give a tolerance, `rtol`, instead of it, or another source.", Place(path="--error"))
 
 
 def accuracy(

@@ -242,7 +242,8 @@ class Simulation:
             Other output times, solver and tolerances than the case's.
         error
             Where the error of the run is from, once it is asked for: "auto", the exact solution of the case if there is
-            one, else a second run at a tighter tolerance; "estimate", always a second run; "balances", no second run.
+            one, else a second run at a tighter tolerance; "estimate", always a second run; "balances", no second run,
+            where no accuracy is asked for that it would verify.
 
         Returns
         -------
@@ -254,8 +255,8 @@ class Simulation:
         InputError
             Where there is no parameter of a path, or a value is outside its range.
         """
-        check_way(error)  # before anything is computed
         settings = run or self.case.run
+        check_way(error, settings)  # before anything is computed
         if self.case.scene.surface is not None:
             self.case.refuse_nothing()
         freed, values = self._ready(changes or {})

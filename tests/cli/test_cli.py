@@ -130,6 +130,10 @@ class TestRun:
         (["run", "bonding.yaml", "--solver", "radua"], "no solver 'radua'. Did you mean 'radau'?"),
         (["run", "bonding.yaml", "--rtol", "2"], "--rtol: 2 is outside its range"),
         (["run", "bonding.yaml", "--rtol", "1e-20"], "--rtol: 1e-20 is outside its range: >= 1e-13"),
+        (
+            ["run", "bonding.yaml", "--accuracy", "1e-6", "--error", "balances"],
+            "--error: the accuracy 1e-06 is verified by a second run, which `balances` leaves out: give a tolerance",
+        ),
         (["run", "bonding.yaml", "--set", "initial.T=-1 K"], "outside its range"),
         (["run", "bonding.yaml", "--set", "initial.T=3 m"], "initial.T"),
         (["run", "bonding.yaml", "-o", "no/folder/x.nc"], "no/folder/x.nc: cannot be written"),

@@ -35,7 +35,7 @@ def compare(interface, solution, within):
 
 @pytest.mark.parametrize("name", CASES)
 def test_events_and_states_of_the_compiled_path(name):
-    solution = surfacechem.load(name, ["run.outputs=41"]).run(error="balances")
+    solution = surfacechem.load(name, ["run.outputs=41"]).run()
     interface, net = network(name)
     for t in solution.dataset["time"].values[1:]:
         net.advance(float(t))
@@ -44,7 +44,7 @@ def test_events_and_states_of_the_compiled_path(name):
 
 def test_the_books_hold_what_jumps_release():
     name = "debonding"
-    solution = surfacechem.load(name).run(error="balances")
+    solution = surfacechem.load(name).run()
     interface, net = network(name)
     net.advance(solution.trajectory.run.times[-1])
     history, data = interface.dataset, solution.dataset

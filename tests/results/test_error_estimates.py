@@ -68,6 +68,8 @@ def test_the_summary_says_where_the_error_is_from(way, words, tmp_path):
 
 
 def test_another_source_is_refused_before_anything_is_computed():
+    with pytest.raises(InputError, match="the accuracy 1e-09 is verified by a second run, which `balances` leaves out"):
+        surfacechem.load("debonding").run(error="balances")
     with pytest.raises(InputError, match=r"no source 'estimte' of an error\. Did you mean 'estimate'\?"):
         surfacechem.load("exothermic").run(error="estimte")
 

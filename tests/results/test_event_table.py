@@ -52,7 +52,7 @@ def bends():
 
 @pytest.fixture(scope="module")
 def cooling():
-    return surfacechem.load("debonding-cooling").run(error="balances").trajectory.jumps[0]
+    return surfacechem.load("debonding-cooling").run().trajectory.jumps[0]
 
 
 def test_no_number_is_missing_where_nothing_jumps(bends):
