@@ -100,7 +100,7 @@ def equations(system: System) -> tuple[list[Equation], dict[str, str]]:
     """
     printer = Paper(_names(system))
     symbols = {p.path: printer.text(p.symbol) for p in system.parameters}
-    symbols |= {s.path: printer.text(symengine.Symbol(s.at_start[0].name)) for s in system.states}
+    symbols |= {s.path: printer.text(symengine.Symbol(s.at_start[0].name)) for s in reversed(system.states)}
     return [printer.equation(line) for line in lines(system)], symbols
 
 

@@ -5,6 +5,7 @@ import json
 import re
 import shutil
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -14,6 +15,7 @@ import surfacechem
 from surfacechem.compile.typeset import equations
 from surfacechem.errors import InputError
 from surfacechem.format.plans import recorded_plan
+from surfacechem.results import spatial
 from surfacechem.studies import mathml, run_report
 
 BROWSER = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
@@ -117,6 +119,12 @@ def test_numbers_are_those_of_the_run_and_say_where_they_are_not_those_of_the_ca
         "What happened",
         "How to run it again",
     ]
+
+
+def test_a_temperature_at_the_start_that_cells_share_has_the_name_of_the_surface():
+    case = surfacechem.load("epoxy-cure-thick").case
+    symbols = equations(replace(case, scene=spatial.few(case.scene)).system())[1]
+    assert [symbols[path] for path in ("initial.T", "initial.T_2")] == ["T", "T_2"]
 
 
 def test_a_temperature_that_was_changed_is_that_of_the_drawing():
