@@ -1,1 +1,1 @@
-"""A scene becomes equations: components, constraints and balances, assembled into one system of symbolic rows."""
+"""Symbolic equations of a scene, assembled from components, constraints and balances into one system of rows."""

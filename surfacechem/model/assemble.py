@@ -1,4 +1,4 @@
-"""From a scene to its system: phase by phase its components state what they add; the balances follow from all of it.
+"""Assembly of a scene into a system: components state their parts phase by phase, and the balances follow from these.
 
 A component is a module in one of the folders beside this one. Its functions named like the phases take what has been
 stated so far and yield records: nodes, bonds and energies, powers, states, margins, constraints, notes, warnings.
@@ -28,7 +28,7 @@ OF_SURFACE = "surface"
 """Start of the paths of parameters that are per area in every scene."""
 
 PHASES = ("variables", "energies", "laws"), ("rows", "jumps", "stages"), ("outputs",)
-"""What components state first, and what from all powers, and when all is known that a run may show.
+"""Phases of the assembly: those before the powers are added up, those before the totals, and that of the outputs.
 
 Roles of variables, states and modes; the free energy with tractions and forces; laws, with the powers that they pass on
 and the balances of bonds and tractions; the balances of energy; what jumps, and what that takes with it; the ends of
@@ -53,7 +53,7 @@ ORDER = (
     "mounting",
     "envelope",
 )
-"""Components that build on those before them, or are printed behind them; all others follow by name."""
+"""Order of components that build on, or are printed behind, those before them; all others follow by name."""
 
 
 def _bonds(scene: Scene) -> object:
@@ -69,7 +69,7 @@ ASKED_FOR: dict[str, Callable[[Scene], object]] = {
     "medium": lambda scene: scene.interface.medium,
     **dict.fromkeys(("chemistry", "pairs", "bound", "envelope"), _bonds),
 }
-"""Components that have no part in a scene, and are not imported, unless something there asks for them."""
+"""Condition on the scene for each optional component, which is imported only if it holds."""
 
 
 @cache
@@ -108,17 +108,17 @@ def assemble(scene: Scene) -> System:
 
 
 def outline(scene: Scene) -> Scene:
-    """The same scene with laws that cost nothing, for checks of all else."""
+    """The scene with cheap stand-ins for its laws, for checks of all else."""
     return _with_laws(scene, lambda law: law.outline())
 
 
 def erring(scene: Scene) -> Scene:
-    """The same scene with laws that are wrong by the error of the numbers that they compute for themselves."""
+    """The scene with laws perturbed by the error of the numbers that they compute for themselves."""
     return _with_laws(scene, lambda law: law.erring())
 
 
 def _with_laws(scene: Scene, change: Callable[[Any], Any]) -> Scene:
-    """The same scene with other potentials and heat paths."""
+    """The scene with ``change`` applied to its potentials and heat paths."""
     potentials = tuple(map(change, scene.interface.potentials))
     interface = replace(scene.interface, potentials=potentials)
     return replace(scene, interface=interface, heat=tuple(map(change, scene.heat)))
@@ -139,7 +139,7 @@ def _built(scene: Scene) -> Build:
 
 
 def _close(build: Build) -> None:
-    """What must hold for the whole, and what of it takes part in events."""
+    """Add what needs the whole scene: margins of varying parameters, the start of stretches, checks and warnings."""
     build.varying_margins()
     refuse_idle_initial_values(build)
     if build.edges or any(state.finest for state in build.states) or stands_for_velocity(build):
@@ -153,7 +153,7 @@ def _close(build: Build) -> None:
 
 
 def _system(build: Build) -> System:
-    """All that was stated, as one frozen graph."""
+    """The frozen system of all that was stated."""
     far_fields, sinks = build.motion.far_fields, ledger.sinks(build)
     return System(
         t=build.t,
@@ -185,7 +185,7 @@ def _system(build: Build) -> System:
 
 
 def _of_pair(system: System) -> System:
-    """The same where what is per area elsewhere is that of a pair of bodies: other units, other words."""
+    """The system of a pair of bodies: quantities per area elsewhere are totals here, in their units and words."""
 
     def renamed(item: Quantity) -> Quantity:
         unit, words = WHOLE.get(item.unit, item.unit), item.long_name

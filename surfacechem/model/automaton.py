@@ -1,4 +1,4 @@
-"""The automaton of a scene: modes, the edges along which they change, and where gaps and energy go then."""
+"""The hybrid automaton of a scene: modes, edges with guards and reset maps, equilibria of gaps, and sinks of heat."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ SLIP = "mode.slip"
 """Path of the mode that says whether the interface sticks or slides, and in which direction."""
 
 INTERFACE = "interface"
-"""Who makes heat in a jump, where it is not the support of an axis."""
+"""Key of the heat that the interface makes in a jump, beside those of the supports of the axes."""
 
 FOLD = 1e-7
 """Tangent stiffness, relative to its parts, at which a quasi-static gap counts as having lost its equilibrium."""
 
 RESTS = "run.rebounds_rest_at"
-"""Path of the time at which rebounds rest that follow each other faster than time can tell."""
+"""Path of the time at which rebounds too close for time to resolve come to rest (end of a Zeno sequence)."""
 
 
 When = Mapping[Any, Collection[int]]
-"""Values of modes, by their symbols, in which something is in play; in any value of the others."""
+"""Values of modes, by their symbols, in which something is active; the other modes may have any value."""
 
 
 def masked(guard: Expression, when: When) -> Expression:
-    """A guard where it is in play, else 1."""
+    """The guard in the modes in which it is active, else 1."""
     for mode, values in when.items():
         guard = where(symengine.Mul(*((mode - value) ** 2 for value in values)) > 0, 1, guard)
     return guard
@@ -46,11 +46,11 @@ class Mode:
     name: str
     initial: float
     words: Mapping[float, str]
-    """What each value means."""
+    """Meaning of each value."""
     start: Expression | None = None
     """The value at the start as it follows from the initial state, where it does."""
     waits: Mapping[float, str] = field(default_factory=dict)
-    """Until when a value holds, in words, where it is meant to be left."""
+    """Condition that ends a value, in words, for values that are meant to be left."""
 
     @property
     def symbol(self) -> Any:
@@ -86,7 +86,7 @@ class Fold:
     tangent: Expression
     """Zero at the fold, positive before it."""
     falls: tuple[Expression, ...]
-    """How fast the stiffness falls along each gap; it tells which way they run."""
+    """Fall of the stiffness along each gap, which gives the direction of the snap-through."""
     stiffness: tuple[tuple[Expression, ...], ...]
     """Fall of the driving traction of each gap along each gap, relative to the stiffness of the former."""
     warming: tuple[Mapping[str, Expression], ...]
@@ -109,12 +109,12 @@ class Edge:
     reset: Mapping[Any, Expression] = field(default_factory=dict)
     equilibrates: bool = False
     heat: str = "joint"
-    """Who makes heat of what it releases before gaps move: 'joint', what supports the bodies along the normal; 'local',
-    the interface. Then each gap that moves is damped by its own support, and what slides makes the heat of friction. In
-    a 'snap' the interface, which has given way, makes it all.
+    """Part that turns into heat what is released before gaps move: 'joint', the support of the bodies along the normal;
+    'local', the interface. Then each gap that moves is damped by its own support, and sliding makes the heat of
+    friction. In a 'snap' the interface, which has given way, makes it all.
     """
     fold: Fold | None = None
-    """What makes it a fold, where it is one."""
+    """The fold that it is, if any."""
     passes: bool = False
     """Whether nothing happens to the interface: a stage of the loading ends."""
     strict: bool = False
@@ -126,18 +126,18 @@ class Edge:
     returns: Expression | None = None
     """Time in which it may happen again [s], zero where that is open: its guard begins anew at an exact zero."""
     violation: str = "warn"
-    """What to do where the jump would destroy entropy: refuse, warn or accept."""
+    """Response to a jump that would destroy entropy: refuse, warn or accept."""
     when: When = field(default_factory=dict)
-    """Modes in which it is in play."""
+    """Modes in which it is active."""
 
     @property
     def is_impact(self) -> bool:
-        """Whether it takes no time in which pressures are infinite, so that it can follow itself ever faster."""
+        """Whether it is an impact, instantaneous at infinite pressure, which may recur ever faster (Zeno behaviour)."""
         return self.returns is not None
 
     @property
     def masked(self) -> Expression:
-        """The guard while it is in play, else 1, as one expression to be read or printed."""
+        """The guard while it is active, else 1, as one expression to be read or printed."""
         return masked(self.guard, self.when)
 
 
@@ -150,9 +150,9 @@ class Constraint:
     registers: tuple[Register, ...] = ()
     edges: tuple[Edge, ...] = ()
     active: Expression = 1
-    """One while the balance of what it holds governs, zero while the constraint does."""
+    """One while the balance of the constrained variable governs, zero while the constraint does."""
     reaction: Expression = 0
-    """What it bears while it holds [Pa]."""
+    """Reaction traction while it holds [Pa]."""
     at_once: bool = False
     """Whether its edges come before those of others that are due at the same moment."""
     beside: Callable[[Edge], Mapping[Any, Expression]] = lambda edge: {}

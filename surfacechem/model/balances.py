@@ -94,12 +94,12 @@ def elastic_energy(k: Any, w: Any, g: Any) -> Any:
 
 
 def internal_energy(F: Expression, T: Expression) -> Expression:
-    """U = F - T F_T, term by term: what is in proportion to T has no energy, whatever the size of its derivatives."""
+    """Internal energy U = F - T F_T, term by term, so that terms in proportion to T cancel exactly."""
     return symengine.Add(*(term - T * derivative(term, T) for term in _terms(F)))
 
 
 def _terms(F: Expression) -> Sequence[Expression]:
-    """What is added up."""
+    """Terms of a sum; any other expression is its only term."""
     whole = symengine.sympify(F)
     return whole.args if whole.is_Add else (whole,)
 
@@ -177,7 +177,7 @@ class Rows(dict[str, Expression]):
         self[name] = _dot(name) - rate
 
     def momentum(self, name: str, force: Expression, mass: Expression, moves: Expression = 1) -> None:
-        """Mass times acceleration is the force; what is held keeps its velocity."""
+        """Newton's law, mass times acceleration = force; what is held keeps its velocity."""
         self[name] = _dot(name) - moves * force / mass
 
     def momentum_of(self, name: str, inertia: Expression, force: Expression, moves: Expression) -> None:
@@ -188,7 +188,7 @@ class Rows(dict[str, Expression]):
     def equilibrium(
         self, name: str, driving_rate: Expression, moves: Expression = 1, held: Expression | None = None
     ) -> None:
-        """What drives stays zero, so its rate is zero; ``held`` is the row where a constraint holds it."""
+        """Equilibrium, differentiated once: the driving traction stays zero. ``held`` is the row under a constraint."""
         self[name] = -moves * driving_rate + (0 if held is None else (1 - moves) * held)
 
     def switched(self, name: str, moves: Expression, balance: Expression, held: Expression) -> None:

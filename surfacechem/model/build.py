@@ -28,7 +28,7 @@ BOTH = "interface", "each body"
 """Ends of the paths that bring heat into both bodies alike."""
 
 STARTS = {"g_n": "Give `g_n` under `initial`: a gap that finds its equilibrium begins its search there, else at zero."}
-"""What to do where a variable that finds its own value has none at the start."""
+"""Advice on a missing initial value of a variable that finds its own equilibrium, by variable."""
 
 NAMED = ("M", *(f"{x}_{k}" for x in "SUq" for k in ("1", "2", "c", "m", "t")))
 """Names of quantities that a parameter might have too: a law's M, or the second of two that are called q."""
@@ -36,14 +36,14 @@ NAMED = ("M", *(f"{x}_{k}" for x in "SUq" for k in ("1", "2", "c", "m", "t")))
 
 @dataclass
 class Motion:
-    """What lets the gap and the interface move, of the normal and of the tangential motion."""
+    """State of the assembly that concerns the normal and the tangential motion: mountings, tractions and rates."""
 
     far_fields: dict[str, Any] = field(default_factory=dict)
     """Mountings with their symbols, by direction."""
     drives: dict[str, Expression] = field(default_factory=dict)
     """Rates of the variables that a programme moves."""
     slips: tuple[Any, ...] = ()
-    """What determines the tangential motion in each direction in which it moves by a balance."""
+    """Formulation of the tangential motion in each direction in which it moves by a balance."""
     slides_by: dict[str, Any] = field(default_factory=dict)
     """The variables that the balances of tangential tractions determine, where sliding has no inertia, by velocity."""
     creeping: Any = None
@@ -59,12 +59,12 @@ class Motion:
 
 
 Record = Thermal | Bond | Energy | HeatPath | State | Account | Margin | Constraint | Equilibrium | Power | Note | str
-"""What components state; a string is a warning."""
+"""Records that components state; a string is a warning."""
 
 
 @dataclass(eq=False)
 class Build:
-    """What has been stated so far, and what components ask for when they state more."""
+    """All that components have stated so far, with the queries and methods by which they state more."""
 
     scene: Scene
     parameters: Parameters = field(init=False)
@@ -93,9 +93,9 @@ class Build:
     loads: dict[str, Load] = field(default_factory=dict)
     """Histories that are in use, by variable."""
     constraints: list[Constraint] = field(default_factory=list)
-    """All that must not be passed, as it was stated."""
+    """Constraints as they were stated."""
     balanced: list[Equilibrium] = field(default_factory=list)
-    """What has its equilibrium at all times, as it was stated."""
+    """Quasi-static gaps as they were stated."""
     motion: Motion = field(default_factory=Motion)
     notes: list[Note] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
@@ -151,7 +151,7 @@ class Build:
 
     @property
     def equilibria(self) -> list[Equilibrium]:
-        """What has its equilibrium at all times; an elastic gap that slides finds its place before what pulls at it."""
+        """Quasi-static gaps; an elastic gap that slides finds its equilibrium before the displacement that pulls it."""
         return sorted(self.balanced, key=lambda item: item.slides)
 
     def energy_row(self, node: Node) -> Expression:
@@ -205,7 +205,7 @@ class Build:
         return self.slope_of(name)
 
     def refuse_foreign(self, F: Expression, own: set[Any], law: Law) -> None:
-        """A free energy depends on what its balance accounts for, and on constants."""
+        """InputError where a free energy depends on more than constants and what its balance accounts for."""
         moving = {str(state.symbol) for state in self.states} | {node.name for node in self.thermal.nodes.values()}
         moving |= {item.name for item in self.named if item.name in self.loads and self.slope_of(item.name) != 0}
         moving -= {name for name, load in self.loads.items() if self.slope_of(name) == 0 and not load.jumps()}
@@ -324,7 +324,7 @@ class Build:
             self.notes.append(Range(str(self.variables.get(name, law)), low, high, law.title))
 
     def law_margins(self, law: Law, own: Mapping[str, Expression], met: Collection[str] = ()) -> None:
-        """What must stay positive for a law to hold, but for the bounds that are ``met`` by what it is given."""
+        """Add the margins of a law's domain, except for the bounds that are ``met`` by what it is given."""
         ends = f"where the law {law.name()} ends"
         for name in law.positive:
             sought = name in self.motion.gap_rates and name not in self.scene.initial
@@ -351,11 +351,11 @@ class Build:
                 self.margins.append(Margin(f"{name} <= {high:g}", high + slack - value, reason, domain=True))
 
     def _read(self, law: Law, name: str, own: Mapping[str, Expression]) -> Expression:
-        """What a law reads by a name: its own, or the scene's."""
+        """The expression that a law reads by a name: its own, else the scene's."""
         return own[name] if name in own else self.variables.get(name, law)
 
     def _narrow_places(self, law: Law, own: Mapping[str, Expression], met: Collection[str]) -> None:
-        """Steps end where a law bends, and where it has a peak that a step might pass over."""
+        """Add margins that end steps at the kinks of a law, and at peaks that a step might pass over."""
         for name, bend in law.kinks.items():
             if name not in law.least or name in met:  # else the law ends there
                 reason = f"{law.name()} bends at this {name}"
@@ -382,7 +382,7 @@ class Build:
         self.margins += [replace(item, terminal=False, peak=True) for item in found if item.expression not in known]
 
     def varying_margins(self) -> None:
-        """Parameters stay in their range as they vary; what may be zero may be so by rounding."""
+        """Add margins that keep varying parameters in their range; one that may be zero may be below by rounding."""
         found = []
         for law, name, spec, value in self.variables.varying:
             slack = NOTHING * abs(getattr(law, name).value)

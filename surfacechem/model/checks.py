@@ -1,4 +1,4 @@
-"""What must hold before a run starts, and whether heat paths across a gap are what they should be at touch.
+"""Checks before a run starts, and of the conductances of heat paths across a gap on both sides of touch.
 
 Source: Sauer, Duong & Mandadapu (2021), section on heat transfer: the sum of gas and radiation may exceed the contact.
 """
@@ -75,7 +75,7 @@ def _at_touch(ends: str, h: Expression) -> Iterator[str]:
 
 
 def refuse_idle_initial_values(build: Build) -> None:
-    """An initial value belongs to something that evolves."""
+    """InputError where an initial value belongs to nothing that evolves."""
     states = {state.start or state.at_start[0].name for state in build.states}
     for name in build.scene.initial:
         if name in states:
@@ -96,7 +96,7 @@ def refuse_idle_initial_values(build: Build) -> None:
 
 
 class StartLimits:
-    """The limits of a system as they are held against a start."""
+    """Check of a start against the limits of a system."""
 
     def __init__(self, system: System) -> None:
         states = [None if state.algebraic else state.symbol for state in system.states]

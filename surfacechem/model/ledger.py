@@ -1,4 +1,4 @@
-"""What follows from the powers that the parts of a scene state: accounts, flows into the nodes, and heat fluxes.
+"""Ledger of the powers that the parts of a scene state: accounts, flows into the nodes, and heat fluxes.
 
 Beside them stand the totals that the ledger must explain, who takes the heat of a jump, and the regime in words.
 """
@@ -29,7 +29,7 @@ GEOMETRY = (*GAPS, "J_c")
 
 @dataclass(frozen=True)
 class Passage:
-    """What passes from one place to another [W/m^2]; where the interface stores no heat it passes on to the bodies."""
+    """Energy flow between two places [W/m^2]; an interface that stores no heat passes it on to the bodies."""
 
     source: str
     target: str
@@ -38,7 +38,7 @@ class Passage:
 
 
 def passages(build: Build) -> Iterator[Passage]:
-    """Where the powers of a scene arrive."""
+    """Energy flows from source to target of all powers of a scene."""
     for power in build.powers:
         targets = power.target if isinstance(power.target, Mapping) else {power.target: symengine.Integer(1)}
         if INTERFACE in targets and INTERFACE not in build.thermal.node_of and power.kind != WORK:
@@ -51,14 +51,14 @@ def passages(build: Build) -> Iterator[Passage]:
 
 
 def take(build: Build, record: Record) -> None:
-    """Keep what a component states; a power with its accounts, but for what dissipates, before all of it is known."""
+    """Keep a record that a component states; a power with its accounts, those of dissipation excepted until later."""
     build.add(record)
     if isinstance(record, Power) and record.kind != DISSIPATION:
         _account(build, record)
 
 
 def flows(build: Build) -> None:
-    """What flows into each node, from all powers and the work of tractions; what is dissipated gets its accounts."""
+    """Add the flows into each node, from all powers and the work of tractions, and the accounts of dissipation."""
     build.rates = _rates(build)
     # Tractions do work on the interface: from outside where the gap is prescribed, else from the bodies.
     for name in GEOMETRY:
@@ -84,7 +84,7 @@ def flows(build: Build) -> None:
 
 
 def _rates(build: Build) -> dict[Any, Expression]:
-    """Time derivatives of what the free energy of the interface depends on beside temperature."""
+    """Time derivatives of the variables of the interface's free energy other than temperature."""
     rates: dict[Any, Expression] = {bond.symbol: bond.dot for bond in build.bonding.values()}
     for name in (*GEOMETRY, "phi"):
         x = symengine.Symbol(name)
@@ -95,7 +95,7 @@ def _rates(build: Build) -> dict[Any, Expression]:
 
 
 def _account(build: Build, power: Power) -> None:
-    """State the accounts of a power: what it supplies, or what it dissipates, and the entropy that it produces."""
+    """Add the accounts of a power: its supply or dissipation, and its entropy production."""
     label, produced = power.label, power.entropy
     text = power.text or label.replace("_", " ")
     if power.kind == DISSIPATION:
@@ -243,7 +243,7 @@ def _heat_into(build: Build, body: Body, flows: list[Passage]) -> tuple[dict[str
 
 
 def sinks(build: Build) -> dict[str, tuple[Sink, ...]]:
-    """Who takes the heat of a jump: of the interface, and of the support of each axis; by the routes of the flow."""
+    """Sinks of the heat of jumps, that of the interface and of the support of each axis, by the routes of the flow."""
     if not build.edges:
         return {}
     # Accounts that only jumps change.

@@ -1,4 +1,4 @@
-"""What the phases of the assembly hand on: temperatures, bonding variables and the free energy of the interface."""
+"""Records that the phases of the assembly pass on: temperatures, bonding variables and the interface's free energy."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Slab:
 
 @dataclass(frozen=True)
 class Thermal:
-    """Temperature nodes by name, whose they are, and the bodies that are divided into cells."""
+    """Temperature nodes by name, the members that they belong to, and the bodies that are divided into cells."""
 
     nodes: Mapping[str, Node]
     members: Mapping[str, str]
@@ -70,7 +70,7 @@ class Thermal:
 
     @cached_property
     def prescribed(self) -> list[Node]:
-        """The nodes at the contact whose temperature is."""
+        """The nodes at the contact whose temperature is prescribed."""
         return [node for node in self.nodes.values() if node.prescribed]
 
     @cached_property
@@ -92,7 +92,7 @@ class Thermal:
         return dict(zip((body, *(node.name for node in slab.behind)), grids.shares(slab.points), strict=True))
 
     def with_energy(self, member: str, F: Expression) -> Thermal:
-        """The same with the free energy of a member [J/m^2]."""
+        """A copy with the free energy of a member [J/m^2]."""
         node = self.node_of[member]
         changed = replace(node, energies={**node.energies, member: F})
         return replace(self, nodes={**self.nodes, node.name: changed})

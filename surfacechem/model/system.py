@@ -23,16 +23,16 @@ from surfacechem.scene import Engine
 Array = NDArray[np.float64]
 
 STABLE = "stable "
-"""How the names of margins begin that tell a stable state from an unstable one."""
+"""Prefix of the names of margins that tell a stable state from an unstable one."""
 
 START = "run.t_start"
 """Path of the time at which a stretch between events starts; within it time counts from there."""
 
 STAND_IN = "no_state"
-"""Name of the state, always zero, of a scene in which all is prescribed: what steps along a run takes at least one."""
+"""Name of the state, always zero, of a scene in which all is prescribed, since solvers need at least one."""
 
 TOLERANCE = "run.rtol"
-"""Path of the relative tolerance of a run, where what follows each other without end has to end."""
+"""Path of the relative tolerance of a run, at which endless sequences of events are cut off."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Given:
-    """What a case gives at the start for a state that stands for it: as a rule one that is its logarithm."""
+    """Initial value of the quantity that a state stands for, which is as a rule its logarithm."""
 
     quantity: Quantity
     value: float
@@ -78,11 +78,11 @@ class State:
     scale: float
     algebraic: bool = False
     start: str = ""
-    """Whose initial value it takes, where not its own."""
+    """Name of the variable whose initial value it takes, where not its own."""
     finest: float | None = None
     """Size below which it counts as none, relative to the absolute tolerance; its scale, where not given."""
     given: Given | None = None
-    """What is given in its place, where it stands for that."""
+    """The initial value given of the quantity that it stands for, if any."""
     is_temperature: bool = False
 
     @cached_property
@@ -102,16 +102,16 @@ class State:
 
     @cached_property
     def path(self) -> str:
-        """Path of its initial value, or of what is given in its place."""
+        """Path of its initial value, or of the quantity given in its place."""
         return f"initial.{self.given.quantity.name if self.given else self.start or self.name}"
 
     @property
     def at_start(self) -> tuple[Quantity, float]:
-        """What is given at the start, and its value."""
+        """The quantity given at the start, and its value."""
         return (self.given.quantity, self.given.value) if self.given else (self.quantity, self.initial)
 
     def from_given(self, values: Mapping[str, float]) -> float:
-        """Its initial value, from what is given by path."""
+        """Its initial value, from given values by path."""
         if self.given is None:
             return values[self.path]
         return self.given.state(values) if self.given.state else math.log(values[self.path])
@@ -162,11 +162,11 @@ class Margin:
     reason: str
     terminal: bool = True
     remedy: str = ""
-    """What to change where it is closed from the start."""
+    """Advice on what to change where it is closed from the start."""
     path: str = ""
-    """What of a case it belongs to."""
+    """Path of the entry of a case that it belongs to."""
     stability: str = ""
-    """The state that it tells to be stable, where it does."""
+    """The state whose stability it tells, if any."""
     peak: bool = False
     """Whether a step has to end here and no more, so that it does not pass over a peak; it is no event of the scene."""
     domain: bool = False
@@ -176,19 +176,19 @@ class Margin:
     bound: tuple[str, float] | None = None
     """The state whose bound it is, and the bound."""
     when: When = field(default_factory=dict)
-    """Modes in which it is in play."""
+    """Modes in which it is active."""
     at_start: bool = False
     """Whether it holds ever after if it holds at the start."""
 
     @property
     def masked(self) -> Expression:
-        """The expression while it is in play, else 1, as one expression to be read or printed."""
+        """The expression while the margin is active, else 1, as one expression to be read or printed."""
         return masked(self.expression, self.when)
 
 
 @dataclass(frozen=True)
 class Range:
-    """Where a law is not an extrapolation: a variable between two values."""
+    """Range of validity of a law in one variable, beyond which it is an extrapolation."""
 
     variable: str
     low: float
@@ -210,7 +210,7 @@ class Pair:
 
 @dataclass(frozen=True)
 class Pace:
-    """A time in which something moves by itself, and what to do where it is too short for a run."""
+    """Characteristic time of a free motion, with advice where it is too short for a run."""
 
     text: str
     time: Expression
@@ -227,7 +227,7 @@ class Outside:
 
 @dataclass(frozen=True)
 class Role:
-    """What a variable is in this scene: evolved, algebraic, prescribed, constant, derived or merged."""
+    """Role of a variable in this scene: evolved, algebraic, prescribed, constant, derived or merged."""
 
     variable: str
     role: str
@@ -244,7 +244,7 @@ class Capped:
 
 @dataclass(frozen=True)
 class Caution:
-    """What a reader has to know where an expression falls below zero, at the start or along a run."""
+    """Warning to be given where an expression falls below zero, at the start or along a run."""
 
     expression: Expression
     text: str
@@ -279,7 +279,7 @@ class Profile:
 
 @dataclass(frozen=True)
 class Conductor:
-    """A body that says how it conducts: what it takes to judge whether it may be one lump."""
+    """Data of a body with a conductivity, to judge whether it may be one lump."""
 
     number: int
     body: str
@@ -287,9 +287,9 @@ class Conductor:
     resistance: Expression
     """L / k [m^2 K/W]."""
     capacity: Expression
-    """Of the whole body [J/(m^2 K)]."""
+    """Heat capacity of the whole body [J/(m^2 K)]."""
     conductance: Expression | None
-    """Of all paths at the contact [W/(m^2 K)]; None in perfect contact."""
+    """Conductance of all paths at the contact [W/(m^2 K)]; None in perfect contact."""
 
 
 Note = Range | Capped | Pair | Pace | Caution | Profile | Conductor
@@ -299,7 +299,7 @@ N = TypeVar("N", bound=Note)
 
 @dataclass(frozen=True)
 class System:
-    """States, equations and everything that is read off them.
+    """The assembled system: states, equations and everything that is derived from them.
 
     The equations are G(t, y, dy/dt; p) = 0, linear in dy/dt; ``rows`` names them. ``energy`` and ``entropy`` are the
     totals whose changes the ledger must explain.
@@ -323,7 +323,7 @@ class System:
     edges: tuple[Edge, ...] = ()
     equilibria: tuple[Equilibrium, ...] = ()
     sinks: Mapping[str, tuple[Sink, ...]] = field(default_factory=dict)
-    """Who takes the heat of a jump, by what makes it: the interface, or the support of an axis."""
+    """Sinks of the heat of a jump, by its origin: the interface, or the support of an axis."""
     follows: Mapping[str, Expression] = field(default_factory=dict)
     """New values of states that follow the normal gap where it jumps, by name."""
     given: Mapping[str, Expression] = field(default_factory=dict)
@@ -332,7 +332,7 @@ class System:
     """Stiffness [Pa/m], displacement [m] and traction [Pa] of the far field, and the gap [m], by the account of the
     work."""
     notes: tuple[Note, ...] = ()
-    """What is watched along a run, and told where it matters; no equation depends on it."""
+    """Notes on what is watched along a run and reported where it matters; no equation depends on them."""
     conductances: Mapping[tuple[str, str], Sequence[Expression]] = field(default_factory=dict)
     """Conductances in parallel between two ends [W/(m^2 K)]."""
     outside: Outside | None = None
@@ -342,7 +342,7 @@ class System:
     """Parameters of laws that are left at their defaults, by path: numbers in the equations, which no run may change
     unless they are assembled with another value."""
     origin: partial[System] | None = None
-    """What makes it anew, to the last bit: a pickle keeps this and no expressions."""
+    """Call that assembles it anew, to the last bit: a pickle keeps this and no expressions."""
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Expressions are not pickled but made again, in the same order."""
@@ -387,7 +387,7 @@ class System:
 
     @cached_property
     def inside(self) -> frozenset[str]:
-        """Names of the states inside bodies, which the profiles show together, and of one that stands for none."""
+        """Names of the states inside bodies, which the profiles show together, and of the dummy state."""
         return frozenset([STAND_IN, *(name for profile in self.profiles for name in profile.states)])
 
     @cached_property
@@ -402,7 +402,7 @@ class System:
         return not self.states and not any(depends(item.expression, self.t) for item in self.named)
 
     def with_state(self) -> System:
-        """The same with a state that stands for none where it has none."""
+        """The system, with a dummy state where it has none."""
         if self.states:
             return self
         state = State(Quantity(STAND_IN, "1", "stands for states"), 0.0, 1.0)
@@ -414,7 +414,7 @@ class System:
         return tuple(item.name.removeprefix("R_") for item in self.named if item.quantity.tag == "e:R")
 
     def with_multipliers(self) -> System:
-        """The same with a factor on each reaction rate, ``multiplier.LABEL``, one unless it is changed."""
+        """The system with a factor on each reaction rate, ``multiplier.LABEL``, one unless it is changed."""
         factors = {
             f"R_{label}": Parameter(
                 symengine.Symbol(f"multiplier_{label}"), f"multiplier.{label}", Spec("1", "factor on a rate"), 1.0
@@ -470,7 +470,7 @@ class System:
         return {str(parameter.symbol): parameter.path for parameter in self.parameters}
 
     def reason(self, margin: Margin, inputs: Array) -> str:
-        """Why a margin closed, at the arguments of compiled functions there."""
+        """Reason why a margin closed, in words, at the arguments of compiled functions there."""
         if margin.below is None:
             return margin.reason
         sign, other = margin.below
@@ -499,7 +499,7 @@ class System:
 
     @cached_property
     def sliding(self) -> NDArray[np.bool_]:
-        """Which states are velocities without inertia, shape (states,)."""
+        """Mask of the states that are velocities without inertia, shape (states,)."""
         return np.array([state.algebraic and state.name in VELOCITIES for state in self.states], dtype=bool)
 
     @property
@@ -527,12 +527,12 @@ class System:
         return [[(columns[mode], values) for mode, values in item.when.items()] for item in items]
 
     def in_play(self, parameters: Array) -> tuple[bool, ...]:
-        """Which guards are in play in the modes among the parameters: the moving margins, then the edges."""
+        """Flags of the guards that are active in the modes among the parameters: the moving margins, then the edges."""
         return tuple(all(parameters[j] in values for j, values in when) for when in self._when)
 
     @property
     def rules(self) -> list[tuple[int, int, float]]:
-        """The same as rows (guard, parameter, value): each of its parameters has to have one of its values."""
+        """Modes of active guards as rows (guard, parameter, value): each parameter has to have one of its values."""
         return [(k, j, value) for k, when in enumerate(self._when) for j, values in when for value in values]
 
     @property
@@ -547,12 +547,12 @@ class System:
 
     @property
     def searches(self) -> bool:
-        """Whether what follows at an edge is searched for: the equilibrium of a gap, or what loads that jump do."""
+        """Whether the state after an edge needs a search: for the equilibrium of a gap, or the effect of load jumps."""
         return bool(self.equilibria) or any(edge.times for edge in self.edges)
 
     @property
     def jump_energy(self) -> Expression:
-        """What a jump conserves: the total energy less the work that far-field tractions do in it [J/m^2].
+        """Energy that a jump conserves: the total energy less the work that far-field tractions do in it [J/m^2].
 
         Heat contents that depend on temperatures alone are left out: the jump of the rest is what they take up.
         """

@@ -61,7 +61,7 @@ class Parameters:
         self._taken = {*VARIABLES, *reserved}
         self._paths: set[str] = set()
         self._numbers: dict[str, int] = {}
-        """Up to which number names and paths that need one are taken."""
+        """Largest number in use, by the names and paths that need one."""
 
     def add(
         self, name: str, path: str, spec: Spec, value: float, load: Load | None = None, field: str = ""
@@ -97,7 +97,7 @@ class Parameters:
 
 
 class Variables:
-    """What formulas may read. A definition is made when it is first read, so what nobody reads is not there."""
+    """Variables that formulas may read. A definition is made when it is first read; one that nobody reads is not."""
 
     def __init__(self, parameters: Parameters) -> None:
         self.parameters = parameters
@@ -163,7 +163,7 @@ class Variables:
         return formula(**{name: own[name] if name in own else self.get(name, law) for name in names})
 
     def bind(self, law: L, path: str, suffix: str = "", unit: str = "") -> L:
-        """The law with every numeric parameter replaced by its symbol, times its factors where it varies.
+        """Bind a law: replace every numeric parameter by its symbol, times its factors where it varies.
 
         ``path`` is where a law that was built in Python would stand in a case file, ``unit`` what "[x]" stands for.
         """
@@ -179,14 +179,14 @@ class Variables:
         return law.bind(values)
 
     def shared(self, law: L, path: str, suffix: str = "") -> L:
-        """A law that several ask for, bound once."""
+        """Bind a law that several ask for once, and return it."""
         if law not in self._bound:
             self._bound[law] = self.bind(law, path, suffix)
         found: L = self._bound[law]
         return found
 
     def _parameter(self, law: Law, name: str, spec: Spec, suffix: str) -> Expression:
-        """The symbol of a parameter as the formula sees it: where the surface stretches, not always what is given."""
+        """The symbol of a parameter as the formula sees it, scaled by the area stretch where that applies."""
         symbol = self._symbol(law, name, spec, suffix)
         if spec.stretch and symbol is not None and self.has("J_c"):
             return symbol * self.get("J_c", law) ** spec.stretch

@@ -1,1 +1,1 @@
-"""What a scene is made of: temperatures, bonds, gaps, heat paths, loads."""
+"""Components of a scene: temperatures, bonds, gaps, heat paths, loads."""

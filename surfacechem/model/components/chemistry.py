@@ -31,7 +31,7 @@ NEIGHBOURS = "H_neighbours"
 """Account of the enthalpy that reactions take from neighbours."""
 
 MARGIN = 4
-"""How much faster than bonds count as ruptured they may still break."""
+"""Factor by which bonds may break faster than the rate at which they count as ruptured."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class Reaction:
     account: str
     """Label of the dissipation: of two one-way reactions one always runs uphill, and only their sum counts."""
     load: Expression
-    """What a prescribed force adds to the affinity [J]."""
+    """Contribution of a prescribed force to the affinity [J]."""
     rate: Expression = 0
     """Net rate per current area [1/(m^2 s)]."""
 
@@ -160,7 +160,7 @@ def _with_rates(build: Build, found: Sequence[Reaction]) -> list[Reaction]:
 
 
 def _across_an_open_gap(build: Build, law: RateLaw, rate: Expression) -> Iterator[Caution]:
-    """Tell where bonds form across an open gap at a rate that does not feel it."""
+    """Caution for a law that forms bonds across an open gap at a rate that does not depend on it."""
     bonds = {"phi", *build.interface.bonds}
     formed = sum(n for x, n in law.stoichiometry().items() if x in bonds)
     if not formed or not build.variables.has("g_n") or law_reads(law, "bonded"):
@@ -201,7 +201,7 @@ def _loaded(build: Build, rates: Mapping[str, Expression]) -> list[str]:
 
 
 def _resolved(build: Build, laws: Mapping[str, RateLaw], rates: Mapping[str, Expression], label: str) -> Expression:
-    """A rate under load that relaxes no faster than time resolves, both ways alike: faster is at once in any case.
+    """Scale a rate under load, both ways alike, so that it relaxes no faster than time resolves: at once in any case.
 
     It stays far faster than all else that changes the same species, so that what they share out does not depend on it.
     """
@@ -220,7 +220,7 @@ def _resolved(build: Build, laws: Mapping[str, RateLaw], rates: Mapping[str, Exp
 
 
 def _relaxation(build: Build, names: Iterable[str], law: RateLaw, rate: Expression) -> Expression:
-    """How fast a law brings back the variables of these names that it changes [1/s]."""
+    """Relaxation rate that a law gives the variables of these names [1/s]."""
     changes = ((build.bonding[name], nu) for name, nu in law.stoichiometry().items() if name in names)
     return sum((-nu * derivative(rate, bond.symbol) / bond.density for bond, nu in changes), symengine.Integer(0))
 
@@ -253,7 +253,7 @@ def _beside(build: Build) -> Iterator[Margin]:
 
 
 def _made(build: Build, found: Sequence[Reaction]) -> Iterator[Account]:
-    """What reactions make in neighbours: each species per area, and the electric current into each phase."""
+    """Production of reactions in neighbours: each species per area, and the electric current into each phase."""
     engine, made = build.interface.engine, dict[str, Expression]()
     for item in found:
         for species, nu in item.law.made.items():

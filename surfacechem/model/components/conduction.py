@@ -44,7 +44,7 @@ def variables(build: Build) -> Iterator[Power | Thermal]:
 
 
 def _check(build: Build, body: Body, law: Conduction) -> None:
-    """A body that conducts stores heat, and one with a far side has cells."""
+    """InputError where a body that conducts stores no heat, or one with a far side has no cells."""
     if body.energy is None:
         raise InputError(f"{body.name} conducts heat but stores none: give it a heat capacity C.", law.place)
     for path in build.scene.heat:
@@ -143,7 +143,7 @@ def outputs(build: Build) -> Iterator[State | Profile | Conductor]:
 
 
 def _conductor(build: Build, number: int, body: Body, law: Conduction) -> Conductor:
-    """What it takes to judge whether a body may be one lump."""
+    """Data to judge whether a body may be one lump."""
     node, ends = build.thermal.node_of[body.name], build.conductances
     F = node.energies[body.name] / build.thermal.volume(body.name)[body.name]
     paths = [h for pair, several in ends.items() if body.name in pair or pair == BOTH for h in several]

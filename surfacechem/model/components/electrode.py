@@ -1,4 +1,4 @@
-r"""Phases beside the surface that hold charge: their potential follows from it.
+r"""Electrodes: phases beside the surface whose potential follows from the charge that they hold.
 
 The charge :math:`c\,\varphi` of a double layer per area changes by the current of the reactions, :math:`i`, and by the
 current from outside, :math:`j`: :math:`c\,\dot\varphi=i+j`. Both bring the work :math:`\varphi\,(i+j)`, which is
@@ -21,10 +21,10 @@ from surfacechem.quantities import Quantity
 from surfacechem.scene import Electrode
 
 ELECTRODE = "electrode"
-"""The place where the work of charge arrives."""
+"""Place to which the work of charge goes."""
 
 THERMAL = 0.025
-"""What a potential has to differ by to matter [V]: k_B T over an elementary charge at room temperature."""
+"""Scale of a potential [V]: the thermal voltage, k_B T over an elementary charge, at room temperature."""
 
 
 def variables(build: Build) -> Iterator[State]:
@@ -36,7 +36,7 @@ def variables(build: Build) -> Iterator[State]:
 
 
 def laws(build: Build) -> Iterator[Power]:
-    """How charge changes potentials, and the work that it brings."""
+    """Charging of capacitances by currents, and the work of the charge."""
     for electrode in _electrodes(build):
         name, title, V = electrode.phase, electrode.title, symengine.Symbol(electrode.potential.name)
         spec = Spec("F/m^2", "capacitance", above=0)

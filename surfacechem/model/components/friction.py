@@ -1,4 +1,4 @@
-"""Friction: what it resists sliding with and dissipates, and the variables that a law evolves by itself.
+"""Friction: sliding tractions, their dissipation, and the internal variables of a law.
 
 Such a variable, as the age of a contact, is evolved as its logarithm.
 """
@@ -23,7 +23,7 @@ from surfacechem.quantities import VARIABLES, Quantity
 
 
 def laws(build: Build) -> Iterator[Power | State | Margin]:
-    """Sliding tractions and what they dissipate; their power comes from outside."""
+    """Sliding tractions and their dissipation; their power comes from outside."""
     rubs, total = build.energy.rubs, symengine.Integer(0)
     resisting: dict[str, Expression] = {}
     if build.interface.frictions:
@@ -61,7 +61,7 @@ def laws(build: Build) -> Iterator[Power | State | Margin]:
 
 
 def _magnitude(build: Build, tractions: Mapping[str, Expression]) -> Expression:
-    """Of the traction with these components along the interface."""
+    """Magnitude of the traction with these components along the interface."""
     along, *across = tractions.values()
     return build.name(VARIABLES["t_s"], sqrt(along**2 + across[0] ** 2) if across else absolute(along))
 

@@ -62,7 +62,7 @@ def variables(build: Build) -> Iterator[Constraint | Margin | State]:
 
 
 def _refuse_restitution(mount: Held, meets: bool) -> None:
-    """Only a mass that meets a rigid contact rebounds by a coefficient."""
+    """Raise InputError: a coefficient of restitution needs a mass that meets a rigid contact."""
     why = "a law of the scene ends as the gap closes" if mount.inertial else "nothing with a mass hits anything"
     if mount.inertial and not meets:
         why = "the potential of the gap bears the bodies, and its stiffness and the dampers say how they rebound"
@@ -91,13 +91,13 @@ def _moving(build: Build, mount: Held) -> Iterator[State]:
 
 
 def _bonded(build: Build) -> Expression:
-    """What is above zero where bonds hold a rigid interface."""
+    """Expression above zero where bonds hold a rigid interface."""
     bonds = bonds_left(build)
     return symengine.Integer(bool(build.interface.limits)) if bonds is None else bonds
 
 
 def _carry(build: Build, traction: Expression) -> None:
-    """What a rigid contact carries, for the laws that read it."""
+    """Define the traction of a rigid contact and its pressure for laws that read them."""
 
     def t_n() -> Expression:
         build.areal(Quantity("t_n", "Pa", "normal traction on body 1", tag="e:cons_tc"), traction)

@@ -1,4 +1,4 @@
-r"""Heat paths between temperature nodes and external heat: what flows, and the entropy it produces.
+r"""Heat paths between temperature nodes and external heat: fluxes and their entropy production.
 
 A path with the closure `mean` heats both bodies alike. Its driving force is the temperature of the interface over the
 harmonic mean of the bodies, so that the production of both fluxes is a square,
@@ -60,7 +60,7 @@ def _external(build: Build) -> Iterator[Power]:
 
 
 def takers(build: Build) -> dict[str, Expression]:
-    """Who takes the heat that the interface makes in no time, and which part of it.
+    """Shares of the places that take the heat that the interface makes at an instant.
 
     The interface itself, the ends of its heat without a medium, or, where it stores none, the ends of its paths: its
     temperature rises until these carry off all of it, in proportion to their conductances.
@@ -182,7 +182,7 @@ def _path_name(build: Build, a: str, b: str) -> str:
 
 
 def _ends(law: HeatTransfer | None) -> Place:
-    """Where a case names the ends of a heat path."""
+    """Place in a case that names the ends of a heat path."""
     return Place(path=f"{law.path}.between" if law else "heat")
 
 

@@ -78,7 +78,7 @@ def variables(build: Build) -> Iterator[Bond | Margin]:
 
 
 def _amount(build: Build, variable: BondingVariable) -> Expression:
-    """What a bonding variable amounts to where it is one [1/m^2]; species of a surface go with its sites."""
+    """Amount of a bonding variable at the value one [1/m^2]; species of a surface go with its sites."""
     if not variable.species or build.interface.sites is None:
         spec = Spec("1/m^2", "site density", above=0)
         return build.constant(f"N_{variable.name}", f"interface.{variable.name}.density", spec, variable.density)
@@ -88,7 +88,7 @@ def _amount(build: Build, variable: BondingVariable) -> Expression:
 
 
 def _covered(build: Build) -> Iterator[Margin]:
-    """The coverages of a surface sum to one at the start, and then always."""
+    """Margins of the sum of the coverages of a surface, which is one at the start and so always."""
     coverages = [build.bonding[variable.name].symbol for variable in build.interface.variables if variable.species]
     if not coverages:
         return

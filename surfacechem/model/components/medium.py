@@ -121,7 +121,7 @@ ENERGY = "capacity_m"
 """Heat capacity per volume over T; minus its double integral is the free energy."""
 
 REACHES = (math.inf, 2.0, 1.1)
-"""Properties are fitted as far as the fluid goes; so many times the temperatures of a case where that fails."""
+"""Widths of a fit in temperatures of a case, tried in this order; the first is the whole range of the fluid."""
 
 REMEDY = "give `interface.medium.temperatures` that the run will reach"
 
@@ -220,7 +220,7 @@ class FluidFit:
         raise AssertionError
 
     def _end_there(self, ends: Sequence[Expression], fit: Sequence[Piece]) -> None:
-        """A run ends where a fit does; most properties have the same range."""
+        """Add margins that end a run where a fit ends; most properties have the same range."""
         low, high = fit[0].low, fit[-1].high
         if (low, high) in self.ranges:
             return
@@ -238,7 +238,7 @@ class FluidFit:
 
 
 def _joints(pieces: Sequence[Piece], T_start: float) -> list[tuple[float, float]]:
-    """What each piece of the energy needs beside its double integral, to be smooth and zero with its slope there."""
+    """Constant and slope that each piece adds to its double integral: smooth, and zero with its slope at T_start."""
     found = [(0.0, 0.0)]
     for left, right in pairwise(pieces):
         (f, df), (g, dg) = _integrals(left, left.high), _integrals(right, left.high)

@@ -1,4 +1,4 @@
-"""How the far field holds a direction of the gap: springs, masses, dampers and their energies; loads that jump.
+"""Mounting of a direction of the gap on the far field: springs, masses, dampers, their energies; loads that jump.
 
 A gap without inertia or damper moves at once to where the tractions balance again as a load jumps. A far-field
 displacement that jumps does its work on the spring before the gap moves, a far-field traction does it on the way. What
@@ -140,7 +140,7 @@ class FarField:
 
     @property
     def gap(self) -> symengine.Symbol:
-        """What the far field pulls at."""
+        """The gap that the far field pulls at."""
         return symengine.Symbol(GAPS[self.mount.axis])
 
     @property

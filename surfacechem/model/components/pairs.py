@@ -1,4 +1,4 @@
-r"""One-way laws that undo each other: what they depart from equilibrium by, and the work of a prescribed force.
+r"""Opposed one-way laws: their departure from detailed balance, and the work of a prescribed force.
 
 A force f that a scene prescribes is a dead load. Two reactions that undo each other keep detailed balance under it if
 :math:`k_f/k_r` grows like :math:`e^{f(x_f-x_r)/k_BT}` with the work on the way from one state to the other, between
@@ -91,7 +91,7 @@ def opposed(laws: Mapping[str, RateLaw]) -> list[Opposed]:
 
 
 def departure(build: Build, group: Opposed, mu: Mapping[str, Expression]) -> Iterator[Pair]:
-    """What the rates of one-way laws lack to balance where the affinity vanishes; rates from outside are not known."""
+    """Departure of one-way rates from detailed balance at zero affinity; none for rates evaluated outside."""
     if any(law.log_rate is None for law in (*group.forward.values(), *group.backward.values())):
         return
     forward, backward = (
@@ -103,7 +103,7 @@ def departure(build: Build, group: Opposed, mu: Mapping[str, Expression]) -> Ite
 
 
 def own_departure(build: Build, label: str, law: RateLaw, affinity: Expression) -> Iterator[Pair]:
-    """The same for a law that states its rates both ways, where the potential knows of the reaction at all."""
+    """Departure from detailed balance of a law that states both its rates, if the potential depends on the reaction."""
     known = any(depends(build.psi, build.bonding[name].symbol) for name in law.stoichiometry())
     if law.log_ratio is not None and known:
         yield _departure(build, label, law.title, build.variables.call(law, law.log_ratio), affinity)
@@ -173,7 +173,7 @@ def by_affinity(law: RateLaw) -> bool:
 
 
 def lengths(laws: Mapping[str, RateLaw], pairs: Sequence[Opposed]) -> dict[str, Expression]:
-    """How far a bond of each species lets a load down [m], up to what no pair tells; empty where no pair feels it."""
+    """Displacement of the load as a bond of each species forms [m], as far as pairs tell; empty where none feels it."""
     known = [pair.told for pair in pairs if pair.told is not None]
     known += [(law.stoichiometry(), law.length) for law in laws.values() if law.length is not None]
     names = list(dict.fromkeys(name for change, _ in known for name in change))

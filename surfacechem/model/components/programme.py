@@ -1,4 +1,4 @@
-"""Staged loading: variables that move at the rates of the present stage, and what ends a stage."""
+"""Staged loading: variables that move at the rates of the present stage, and the events that end stages."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def variables(build: Build) -> Iterator[Constraint]:
 
 
 def _awaited(stage: Stage) -> str:
-    """What ends a stage, in words; nothing where it has no end."""
+    """Condition that ends a stage, in words; empty where it has no end."""
     if stage.variable:
         return f"{stage.variable} {'rises' if stage.rising else 'falls'} to {stage.value:g}"
     if stage.duration is not None:
@@ -83,7 +83,7 @@ def stages(build: Build) -> Iterator[Constraint]:
             edges.append(Edge(f"end of {item.name}", guard, reason, modes, passes=True, when={STAGE: (i,)}))
 
     def advancing(edge: Edge) -> dict[Expression, Expression]:
-        """What a stage waits for moves the programme on by itself."""
+        """New stage and its start time along an edge that stages wait for."""
         modes: dict[Expression, Expression] = {}
         for i, item in waiting:
             if edge.name.startswith(item.event) and not edge.passes:
@@ -95,7 +95,7 @@ def stages(build: Build) -> Iterator[Constraint]:
 
 
 def _refuse_unknown_event(build: Build, i: int, item: Stage) -> None:
-    """A stage may wait for an edge of the interface, or for the end of a stage before it."""
+    """InputError unless a stage waits for an edge of the interface, or for the end of a stage before it."""
     before = [f"end of {stage.name}" for stage in build.scene.programme[:i] if not stage.event]
     known = [*(edge.name for edge in build.edges), *before]
     if not any(name.startswith(item.event) for name in known):
@@ -104,7 +104,7 @@ def _refuse_unknown_event(build: Build, i: int, item: Stage) -> None:
 
 
 def _left(build: Build, item: Stage) -> Expression:
-    """What is left of a stage: of its time, or of the way of a variable to its value."""
+    """Guard of the end of a stage: its time left, or the distance of a variable from its end value."""
     path = f"programme.{item.name}"
     if item.duration is not None:
         spec = Spec("s", f"length of the stage {item.name}", above=0)
@@ -117,7 +117,7 @@ def _left(build: Build, item: Stage) -> Expression:
 
 
 def _variable(build: Build, item: Stage) -> Expression:
-    """What a stage waits for: a temperature, a variable or a named quantity."""
+    """Variable that a stage waits for: a temperature, a variable or a named quantity."""
     if item.variable in build.thermal.nodes:
         return build.thermal.nodes[item.variable].T
     if build.variables.has(item.variable):

@@ -46,7 +46,7 @@ def variables(build: Build) -> Iterator[Constraint]:
 
 
 def _check(build: Build, law: RateLaw, phi: Expression, g_n: Expression, peak: Expression) -> tuple[Margin, ...]:
-    """The envelope falls after it rose, from the traction that complete bonding bears there."""
+    """Check that the envelope falls from its peak, where it equals the traction of complete bonding."""
     t_max, g_f = law.t_max, law.g_f  # type: ignore[attr-defined]
     start, end, strength = build.at_start(peak), build.at_start(g_f), build.at_start(t_max)
     what = f"{law.name()}: t_max / E_b = {start:g} m, where complete bonding begins to break,"
@@ -79,7 +79,7 @@ def _check(build: Build, law: RateLaw, phi: Expression, g_n: Expression, peak: E
 def softening(
     build: Build, law: RateLaw, forming: Expression, free: Expression
 ) -> tuple[list[Constraint | Margin], Expression]:
-    """What starts and ends the loss of bonds, and the rate of a bound law with an envelope, where others form bonds."""
+    """Edges that start and end softening, and the rate of a bound law with an envelope, where others form bonds."""
     phi, g_n, n_c = (build.variables.get(name, law) for name in ("phi", "g_n", "n_c"))
     left = build.variables.call(law, law.envelope)
     peak = law.peak()  # type: ignore[attr-defined]
@@ -117,7 +117,7 @@ def softening(
     modes = (replace(DEBONDING, start=where(left < 0, -1.0, 0.0)),)
 
     def apart(edge: Edge) -> dict[Expression, Expression]:
-        """What lets the normal gap jump takes bonds off their envelope, or leaves them where they reach it anew."""
+        """New mode along an edge at which the normal gap jumps: bonds leave their envelope until they reach it anew."""
         return {MODE: where(MODE > 0, 0, MODE)} if edge.equilibrates and MODE not in edge.modes else {}
 
     stated: list[Constraint | Margin] = [*agrees, within, Constraint(modes, edges=tuple(edges), beside=apart)]

@@ -1,4 +1,4 @@
-r"""Mechanical folds: where gaps that are in equilibrium together lose it.
+r"""Mechanical folds (snap-through): loss of the joint equilibrium of quasi-static gaps.
 
 With the driving traction :math:`r_i` of each gap :math:`g_i` that has neither mass nor damper, the stiffness is
 :math:`A_{ij} = -\partial r_i/\partial g_j`, of which gaps that share a potential have off-diagonal parts: shear softens
@@ -30,7 +30,7 @@ Matrix = Sequence[Sequence[Expression]]
 
 
 def jumps(build: Build) -> Iterator[Constraint]:
-    """The edge where the gaps in equilibrium lose it, and what tells which way they run."""
+    """The edge at which quasi-static gaps lose their equilibrium, and the direction in which they snap."""
     gaps = build.equilibria
     if not gaps:
         return
@@ -69,7 +69,7 @@ def _tangent(gaps: Sequence[Equilibrium], residuals: Sequence[Expression], rises
 
 
 def _relative(build: Build, A: Matrix) -> tuple[tuple[Expression, ...], ...]:
-    """The stiffness of each gap in parts of what it is compared with, where it is not held."""
+    """Stiffness matrix over the reference stiffness of each gap that is not held."""
     sizes = [gap.active * _size(build, gap, A[i][i]) + 1 - gap.active for i, gap in enumerate(build.equilibria)]
     return tuple(tuple(entry / size for entry in row) for row, size in zip(A, sizes, strict=True))
 
@@ -120,7 +120,7 @@ def _felt(build: Build, residuals: Sequence[Expression]) -> list[Node]:
 
 
 def _size(build: Build, gap: Equilibrium, own: Expression) -> Expression:
-    """What the stiffness of a gap is compared with [Pa/m]."""
+    """Reference stiffness of a gap, to which its own is related [Pa/m]."""
     far, g = build.motion.far_fields.get(gap.axis), symengine.Symbol(gap.state)
     if far is not None and far.k != 0:
         return far.k + absolute(far.k - own)
@@ -136,7 +136,7 @@ def _size(build: Build, gap: Equilibrium, own: Expression) -> Expression:
 
 
 def determinant(A: Matrix) -> Expression:
-    """By the first row; there are three gaps at most.
+    """Determinant, expanded by the first row; there are three gaps at most.
 
     >>> determinant([[2, 1, 0], [1, 3, 0], [5, 5, 4]])
     20

@@ -31,7 +31,7 @@ LOOSE = Register("loose", "whether the gaps have yet to follow a local jump")
 
 
 def variables(build: Build) -> None:
-    """Whether the interface is bonded, for the potentials that ask; what nothing limits stays as it starts."""
+    """Define the mode of bonding for potentials that read it; an interface without limits stays as it starts."""
 
     def bonded() -> Expression:
         start = next((mode.start for mode in build.constraint("closed").modes), None)

@@ -96,7 +96,7 @@ def _closing(touch: Edge) -> Constraint:
 
 
 def impacts(build: Build) -> Iterator[Constraint]:
-    """How a gap that moves closes: where it has a mass by an impact, after which the bodies rebound or rest."""
+    """Closing of a gap that moves: with a mass by an impact, after which the bodies rebound or rest."""
     closed = build.mode("closed")
     if closed is None or "g_n" not in build.motion.gap_rates:
         return
@@ -128,7 +128,7 @@ def impacts(build: Build) -> Iterator[Constraint]:
 def _rests(
     build: Build, far: FarField, speed: Expression, pressing: Expression
 ) -> tuple[Expression, dict[Expression, Expression]]:
-    """One where the bodies do not rebound, else zero; and what this remembers."""
+    """Indicator, one where the bodies do not rebound, else zero; and new values of the registers that it reads."""
     if far.e == 0:
         return ONE, {}
     tolerance = build.constant("tolerance", TOLERANCE, Spec("1", "relative tolerance of the run"), 0.0, internal=True)
@@ -143,7 +143,7 @@ def _rests(
 
 
 def jumps(build: Build) -> Iterator[str]:
-    """Warn of what reads the pressure and would do something in an impact, where that is infinite for no time."""
+    """Warn of laws and conductances that would act at the pressure of an impact, infinite for an instant."""
     if LANDED not in build.registers:
         return
     found = [law.name() for law in build.interface.reactions if law_reads(law, "p") or law_reads(law, "t_n")]

@@ -1,4 +1,4 @@
-"""What determines the tangential motion of a scene, in each direction, and what friction resists it with.
+"""Formulation of the tangential motion of a scene in each direction, and the tractions of friction.
 
 A direction moves by a balance of its own: inertial, overdamped or quasi-static, and sticking exactly or elastically. In
 the plane a law that is the same in all directions resists along the unit vector of sliding, by its traction at the
@@ -45,7 +45,7 @@ PLACE = Place(path="mechanics.tangential")
 
 @dataclass(frozen=True)
 class Formulation:
-    """What determines the tangential motion of a scene."""
+    """Formulation of the tangential motion of a scene in one direction."""
 
     d: Direction
     mount: Held | None
@@ -85,7 +85,7 @@ class Formulation:
 
 
 def formulations(build: Build) -> tuple[Formulation, ...]:
-    """What determines the motion in each direction in which the scene moves by a balance."""
+    """Formulations of the motion in each direction in which the scene moves by a balance."""
     mount = held(build, "t")
     elastic = bool(in_series(build)) and not driven(build, "g_t")
     across = held_across(build, mount) if mount is not None else None
@@ -124,7 +124,7 @@ def _formulation(build: Build, d: Direction, mount: Held | None, elastic: bool) 
 
 
 def growth(slope: Expression) -> Expression:
-    """What says that friction grows with velocity, from how fast it does: a slope may be infinite at rest."""
+    """Stability measure of friction's slope with velocity: ln(1 + slope) if positive, as it may be infinite at rest."""
     return where(slope > 0, log(1 + where(slope > 0, slope, 0)), slope)
 
 
@@ -139,7 +139,7 @@ def _sheared(build: Build) -> list[Potential]:
 
 
 def arrangement(law: Potential) -> str:
-    """How a potential acts with friction."""
+    """Arrangement of a potential with friction, in series or in parallel."""
     return law.shear if isinstance(law, TangentialPotential) else "series"
 
 
@@ -243,7 +243,7 @@ def resistance(
 
 
 def _refuse_one_component(law: Friction) -> None:
-    """A law of one component of the velocity would know the axes."""
+    """InputError where a law reads one component of the velocity, since it would depend on the axes."""
     if law.internal:
         raise InputError(f"{law.name()} remembers sliding along one direction, and this scene has two.", law.place)
     for name, value in law.varying.items():

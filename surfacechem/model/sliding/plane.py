@@ -53,14 +53,14 @@ error. The turn is accurate to a part of one radian, not of itself.
 
 @dataclass(frozen=True)
 class Side:
-    """One of the two directions: what pulls, what resists sliding, and what sticking bears."""
+    """Tractions in one of the two directions: the pull, the resistance to sliding, and the limit of sticking."""
 
     d: Direction
     far: FarField
     u: Expression
     rate: Expression
     t_a: Expression
-    """Traction of what stands beside friction."""
+    """Traction that acts beside friction."""
     resisted: Expression
     limit: Expression
 
@@ -161,7 +161,7 @@ def motion(build: Build, kinds: Sequence[Formulation]) -> Iterator[Record]:
 
 
 def _inertial(build: Build, sides: Sequence[Side], largest: Expression) -> Expression:
-    """Newton's law along and across the direction of sliding; returns what is zero where sliding stops."""
+    """Newton's law along and across the direction of sliding; returns the guard that is zero where sliding stops."""
     turn, m = symengine.Symbol("dturn_dt"), sides[0].far.m
     (x, y), (c, s) = (side.driving for side in sides), _unit_vector()
     along, across = c * x + s * y, c * y - s * x
@@ -173,7 +173,7 @@ def _inertial(build: Build, sides: Sequence[Side], largest: Expression) -> Expre
 
 
 def _steady(build: Build, sides: Sequence[Side], largest: Expression) -> tuple[Expression, Expression]:
-    r"""Balances without inertia; returns what is zero where sliding stops, and by how much they grow with the speed.
+    r"""Balances without inertia; returns the guard that is zero where sliding stops, and their slope with the speed.
 
     What resists sliding in the direction n is the vector :math:`(a n_x, b n_y)`, whose half axes a and b grow with the
     speed. Its balance with the pull :math:`\mathbf P`, along n and across it, is
@@ -260,7 +260,7 @@ def _power_series(terms: Sequence[Expression]) -> Expression:
 
 
 def _resistance(build: Build, side: Side) -> Expression:
-    """What resists sliding along one of the directions alone [Pa]."""
+    """Resistance to sliding along one of the directions alone [Pa]."""
     own = BEGAN[side.d is ACROSS]
     sliding = {b: symengine.Integer(b == own) for b in BEGAN} | {TURNED: NONE, SLIP: symengine.Integer(1)}
     return build.expanded(side.resisted).subs(sliding) + (side.far.c_b + side.far.c_g) * SPEED

@@ -125,7 +125,7 @@ def _states(build: Build, kind: Formulation) -> Iterator[Constraint]:
 
 
 def _sliding_velocity(build: Build, kind: Formulation) -> Expression:
-    """What the displacement moves faster than an elastic gap gives way, where it does not stick."""
+    """Sliding velocity: rate of the displacement less that of the elastic gap; zero while it sticks."""
     if not kind.slides:
         return NONE
     if build.variables.has("v_t"):
@@ -193,7 +193,7 @@ def _motion(build: Build, kind: Formulation) -> Iterator[Record]:
 def _friction(
     build: Build, kind: Formulation, needed: Expression, t_f: Expression, v: Expression, in_proportion: bool
 ) -> Constraint:
-    """The set-valued law: what sticking bears and has to bear, and what is zero where sliding stops."""
+    """The set-valued law, by the reserve of sticking (limit less need) and a guard that is zero where sliding stops."""
     stops, still, slack = [], v, NONE
     if kind.slides_inertially:
         still = symengine.Symbol(_velocity_state(build, kind))
@@ -298,7 +298,7 @@ def _elastic_rows(
 def _sliding_row(
     build: Build, kind: Formulation, slides: Expression, driving: Expression
 ) -> Generator[Margin, None, bool]:
-    """A velocity without inertia follows from the tractions, and is stable while what resists it grows with it.
+    """Row of a velocity without inertia, from the tractions; sliding is stable while the resistance grows with it.
 
     Returns whether it is in proportion to them.
     """
