@@ -16,10 +16,10 @@ from surfacechem.errors import suggestion
 from surfacechem.solve.contract import Solver
 
 AUTO = "auto"
-"""The method is chosen for the scene, and the tolerance from the accuracy that is asked for."""
+"""Name by which the method is chosen for the scene, and the tolerance from the accuracy that is asked for."""
 
 ASKING = ("cantera",)
-"""Solvers that call Python for their right-hand sides, and so can ask something outside for rates."""
+"""Solvers that call Python for their right-hand sides, and so can use rates evaluated outside."""
 
 
 _ADAPTERS: dict[str, str] = {}

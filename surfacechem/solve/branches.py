@@ -24,7 +24,7 @@ FIRST, GROWTH, MARCH = NOTHING, 1.02, 2400
 """First step of the search for the next equilibrium, relative to the gap, its growth, and the number of steps."""
 
 REACH = FIRST * (GROWTH ** (MARCH - 1) - 1) / (GROWTH - 1)
-"""How far a search goes, relative to the gap."""
+"""Reach of a search, relative to the gap."""
 
 
 def march(driving: Curve, start: float, direction: float, noise: Curve) -> float | None:
@@ -57,7 +57,7 @@ def push_ahead(driving: Curve, start: float, direction: float, least: Curve, *, 
 
 
 def zero_ahead(curve: Curve, start: float, direction: float, sign: float, noise: Curve | None = None) -> float | None:
-    """The first zero in a direction of what has a sign before it; it may start with the other one within rounding."""
+    """First zero in a direction of a function of known sign before it, which at the start may be wrong by rounding."""
     gaps = steps_ahead(start, direction)
     values = sign * curve(gaps)
     least = 0.0 if noise is None else noise(gaps)
@@ -107,7 +107,7 @@ def stiffness(driving: Field, scale: Array, at: Array) -> Array:
 
 
 def unstable_way(change: Array) -> Array | None:
-    """The way along which what is out of balance grows the fastest, its largest part 1; None where it falls."""
+    """Direction in which an imbalance grows the fastest, its largest part 1; None where all decay (stable)."""
     growth, ways = np.linalg.eig(change)
     fastest = int(np.argmax(growth.real))
     if not growth[fastest].real > 0:

@@ -1,4 +1,4 @@
-"""The method that suits a scene, and why, where the choice is left to us."""
+"""Automatic choice of the solution method for a scene, with the reason in words."""
 
 import numpy as np
 
@@ -31,7 +31,7 @@ def method(problem: Problem, moves: bool) -> tuple[str, str]:
 
 
 def _why_implicit(problem: Problem) -> str:
-    """Why steps have to be implicit; nothing where they can be explicit."""
+    """Reason why steps have to be implicit, in words; empty where they can be explicit."""
     program = problem.program
     if any(program.algebraic):
         return "some states are algebraic"

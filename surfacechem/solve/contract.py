@@ -1,4 +1,4 @@
-"""What a solver is given and what it hands back.
+"""Interface of the solvers: problems and results.
 
 A problem is a fully implicit system of index one, G(t, y, ydot; p) = 0, linear in ydot, over segments with their own
 parameters. Time breakpoints end a step; margins that cross zero stop the run or end a step; a ledger of quadratures
@@ -24,7 +24,7 @@ Index = NDArray[np.int64]
 
 
 class Status(IntEnum):
-    """How a run ended."""
+    """Outcome of a run."""
 
     FINISHED = 0
     EVENT = 1
@@ -36,7 +36,7 @@ class Status(IntEnum):
     STOPPED = 7
     FAILED = 8
     LEFT = 9
-    """Not told here: something that is looked for in another way."""
+    """Undecided here: the case is left to other code, which carries the run on."""
 
     @property
     def success(self) -> bool:
@@ -73,7 +73,7 @@ temperature, far away each halves it, so that these are 18 decades.
 
 @dataclass(frozen=True)
 class Margin:
-    """What happens where a margin crosses zero; direction -1 is falling, +1 rising, 0 both.
+    """Event function type: the action at a zero crossing of a margin; direction -1 is falling, +1 rising, 0 both.
 
     A margin that has just fired fires again only after it has left zero. A limit, terminal and falling, that is zero
     or below at a start fires at once where it falls, with the state of the start, and not where it rises; one that
@@ -91,12 +91,12 @@ class Margin:
 
     @classmethod
     def stop(cls) -> "Margin":
-        """The run ends where the margin falls to zero."""
+        """A terminal event: the run ends where the margin falls to zero."""
         return cls(terminal=True)
 
     @classmethod
     def bear(cls) -> "Margin":
-        """The run ends where the margin falls below zero."""
+        """A terminal event: the run ends where the margin falls below zero."""
         return cls(terminal=True, strict=True)
 
     @classmethod
@@ -112,17 +112,17 @@ class Margin:
 
 @dataclass(frozen=True, kw_only=True)
 class EdgeTables:
-    """What the compiled loop reads of the edges of a system, along which it then carries runs by itself."""
+    """Tables of the edges of a system, by which the compiled loop carries runs along them by itself."""
 
     sizes: Index
-    """Numbers of what is looked at before and after a jump, of what is asked of all nodes, and of what is reset."""
+    """Numbers of values in the books of a jump, of values of all nodes, and of the variables that resets write."""
     code: Index
     """A row (code, user data) for magnitudes and rates of guards, books, nodes, times of return and each reset; zero
     where it has not been compiled yet."""
     edges: Index
-    """A row (measured state, who takes the heat, refuses, place among those that return) for each edge."""
+    """A row (measured state, taker of the heat, refuses, place among those that return) for each edge."""
     when: Index
-    """Rows (guard, parameter, value): a guard is in play where each of its parameters has one of its values."""
+    """Rows (guard, parameter, value): a guard is active where each of its parameters has one of its values."""
     held: Index
     """Parameters that change along edges."""
     clocks: Index
@@ -157,7 +157,7 @@ NO_EDGES = EdgeTables(
     accounts=integers([], 0, 2),
     least_peaks=np.zeros(0),
 )
-"""Runs end at the edges."""
+"""Empty tables: runs end at the edges."""
 
 
 @dataclass(frozen=True)
@@ -179,13 +179,13 @@ class Problem:
     max_seconds: float | None = None
     record_steps: bool = False
     exchanged: Array | None = None
-    """What each quadrature amounted to at most before, where the problem continues another."""
+    """Largest amount of each quadrature so far, where the problem continues another."""
     seen: Array | None = None
-    """How large each margin was at most before, where the problem continues another."""
+    """Largest size of each margin so far, where the problem continues another."""
     spacing: float = np.inf
     """Longest time [s] of a step that is left without a look at the equations: what is briefer may be passed over."""
     in_play: tuple[bool, ...] | None = None
-    """Which margins are in play in the modes that hold throughout; None where all are. The others may be anything."""
+    """Flags of the margins that are active in the modes, constant here; None where all are. Others may be anything."""
     picture: float = 0.0
     """Part of its range by which a straight line may miss a state between two that are known; 0 where none are added
     to the outputs and the ends of steps."""
@@ -214,7 +214,7 @@ class Problem:
 
 
 def among(t: Array, times: Array) -> Mask:
-    """Which of some times are among others, which are in order.
+    """Mask of the times that are among others, which are in order.
 
     >>> among(np.array([3.0, 1.0, 2.5]), np.array([1.0, 2.0, 3.0])).tolist()
     [True, True, False]
@@ -225,7 +225,7 @@ def among(t: Array, times: Array) -> Mask:
 
 
 class Counters(NamedTuple):
-    """What a run cost."""
+    """Counts of the work of a run."""
 
     steps: int = 0
     rejected: int = 0
@@ -264,7 +264,7 @@ class Events(Points):
 
 
 class Course(NamedTuple):
-    """How the compiled loop has gone along edges."""
+    """Arcs and jumps of a run that the compiled loop has carried along edges."""
 
     arcs: Array
     """Of each arc its start, its length, how many steps, outputs and states inside steps there were before, and its
@@ -299,9 +299,9 @@ class Result:
     segment: Index | None = None
     """Segment of each output, where their times do not tell."""
     inside: States | None = None
-    """What a picture needs inside steps and at the start of segments."""
+    """States inside steps and at the start of segments that a picture needs."""
     course: Course | None = None
-    """How it has gone along edges, where the method carries them out."""
+    """Arcs and jumps, where the method carries out edges."""
     known: States | None = None
     """All states that are known, where the result is of several arcs and a picture is wanted."""
 

@@ -1,4 +1,4 @@
-"""Why a run could not go on: which margin closes there, which state runs away, or which motion is far too fast."""
+"""Diagnosis of a run that could not go on: a margin that closes, a state that runs away, or too fast a motion."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ FEW, SHARP = 100.0, ROUNDING
 
 
 def paces(system: System, values: Mapping[str, float]) -> list[tuple[Pace, float]]:
-    """Times in which the gaps move by themselves [s], the shortest first."""
+    """Characteristic times of free motions of the gaps [s], the shortest first."""
     point = {parameter.symbol: values[parameter.path] for parameter in system.parameters}
     found = [(pace, float(system.expand(pace.time).subs(point))) for pace in system.noted(Pace)]
     return sorted(found, key=lambda item: item[1])
 
 
 def too_fast(system: System, result: Result, values: Mapping[str, float]) -> str:
-    """What is too short to be followed, and what to do, where that is why a run could not go on."""
+    """Motion too fast to be followed, with advice, in words; empty where that is not why a run could not go on."""
     end = float(result.problem.segments[-1])
     shortest = {Status.MAX_STEPS: FEW * end / result.problem.max_steps, Status.STEP_UNDERFLOW: SHARP * result.t}
     for pace, time in paces(system, values):
@@ -86,7 +86,7 @@ def cause(
 
 
 def _spent(result: Result) -> str:
-    """How many steps a run may take where it has taken all of them, and how many of these it was not free to choose."""
+    """Budget of steps of a run that has used it up, and how many of them it was not free to choose; else empty."""
     if result.status is not Status.MAX_STEPS:
         return ""
     problem = result.problem

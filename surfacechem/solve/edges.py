@@ -42,15 +42,15 @@ from surfacechem.solve.radau.work import (
 from surfacechem.tolerances import BRIEF, CROSSED, DIGITS, DRIFT, MOST_DRIFT, ROUNDING, SOLVED, ULPS
 
 NONE, UNKNOWN = -1, -2
-"""Instead of the edge that is due: there is none; it has to be looked at by itself."""
+"""Codes in place of the index of the edge that is due: none is; undecided, so that an instant has to look."""
 
 OPEN, CLOSED, NEAR = range(3)
-"""How the guard of an edge stands."""
+"""States of the guard of an edge."""
 
 
 @compiled
 def find_playing(w: Any) -> None:
-    """Which guards are in play in the modes of the moment."""
+    """Mark the guards that are active in the modes of the moment."""
     for m in range(w.n_margins):
         w.playing[m] = 1
     k, rules = 0, w.when.shape[0]
@@ -152,7 +152,7 @@ def resolve(w: Any, i: int, end: float) -> bool:
 
 @compiled
 def _look(w: Any, row: Any, books: Any) -> None:
-    """What is looked at in a jump; a magnitude that is no number there, as at a bound, says nothing."""
+    """Evaluate the books of a jump; a magnitude that is no number there, as at a bound, counts as zero."""
     evaluate_at(w, BOOKS, row, books)
     for k in range(books.shape[0] - 2, books.shape[0]):
         if not abs(books[k]) < np.inf:
@@ -192,7 +192,7 @@ def _warm(w: Any, taker: int, made: float) -> tuple[float, float]:
 
 @compiled
 def _book(w: Any, made: float, gain: float, heat: float, entropy: float) -> None:
-    """What the jump adds to the accounts."""
+    """Add the amounts of the jump to the accounts."""
     for m in range(w.n_ledger):
         kind, place = w.accounts[m, 0], w.accounts[m, 1]
         if kind == BONDS:

@@ -31,7 +31,7 @@ from surfacechem.solve.contract import Array
 from surfacechem.tolerances import ATOM, DRIFT, MOST_DRIFT, NANOMETRE, NEGLIGIBLE, PICOMETRE, ROUNDING, SOLVED, SOON
 
 Heat = Callable[[Array], Array]
-"""Inputs with the temperatures that a jump to them gives."""
+"""Function from inputs to inputs with the temperatures that a jump to them gives."""
 
 BALANCED = ROUNDING
 """Tractions out of balance that count as none, relative to their parts: those of a run hold its rounding."""
@@ -67,7 +67,7 @@ class Point:
 
 
 def compiled(system: System, expressions: Iterable[Expression]) -> Function:
-    """Machine code of expressions of a system, of its inputs."""
+    """Compile expressions of a system as a function of its inputs."""
     return compile_function(system.inputs, [system.expand(item) for item in expressions])
 
 
@@ -98,7 +98,7 @@ class Free:
 
     which: Indices
     columns: Array
-    """The state that is each gap."""
+    """Columns of the states that are the gaps."""
     moves: Array
     """Change of the states with each, shape (gaps, states)."""
     driving: Field
@@ -258,7 +258,7 @@ class Equilibria:
         return self.moved(point, self._arrived(there.inputs()[None], jumps=True))
 
     def _released(self, point: Point, heat: Heat | None, lost: Lost | None) -> Point | None:
-        """Where what is not held comes to rest, from an equilibrium that is lost or from tractions out of balance."""
+        """Point at which the free gaps come to rest after a lost equilibrium, or from tractions out of balance."""
         free = self.free(point)
         if len(free) > 1:
             return self._damped(point, heat, lost)
@@ -293,7 +293,7 @@ class Equilibria:
         return march(driving, start, 0.0, noise) if now > 0 else start
 
     def _damped(self, point: Point, heat: Heat | None, lost: Lost | None) -> Point | None:
-        """Where several gaps come to rest together."""
+        """Point at which several gaps come to rest together, by damped motion."""
         free = self._free(point, heat)
         begins = np.zeros(len(free.which))
         if lost is not None:
@@ -401,7 +401,7 @@ class Folds:
 
     @cached_property
     def _shapes(self) -> dict[int, Function]:
-        """How the tangent falls along each gap, how each gap warms the states, and the stiffness, row after row."""
+        """Functions for the fall of the tangent along each gap, the warming of states by each, and the stiffness."""
         found = {}
         for index, fold in self.items.items():
             warming = [rise.get(name, 0) for rise in fold.warming for name in self.equilibria.states]
@@ -420,8 +420,8 @@ class Folds:
         return compiled(self.system, found)
 
     def _shape(self, index: int, point: Point) -> tuple[Array, Way, Array]:
-        """How the tangent of a fold falls along each gap, the way that is lost, and what moves along it with what it
-        warms.
+        """Fall of the tangent of a fold along each gap, the way that is lost, and the change of the states along it,
+        warming included.
         """
         n = len(self.equilibria.items)
         values = np.atleast_1d(self._shapes[index](point.inputs()))

@@ -1,4 +1,4 @@
-"""Runs of a system with edges: flow until one is due, carry it out, flow on.
+"""Hybrid runs of a system with edges: integrate until one is due, carry it out, go on.
 
 Within an arc the modes are constant and any solver of the contract integrates; where the guard of an edge reaches zero
 the arc ends, the instant carries out what is due, and the next arc starts from there.
@@ -39,7 +39,7 @@ from surfacechem.tolerances import ATOM, BRIEF, DIGITS, NOISE, ULPS
 
 Found = TypeVar("Found")
 Flow = Generator[Problem, Result, Found]
-"""What asks for the solution of one problem after another."""
+"""Generator that yields one problem after another to be solved, and receives the results."""
 
 LOST = (Status.STEP_UNDERFLOW, Status.SINGULAR, Status.NO_CONSISTENT_STATE)
 """Ways in which a solver ends where a quasi-static equilibrium is lost."""
@@ -52,7 +52,7 @@ SEEN, AGAIN = 100.0, 3
 
 
 def solve_together(flows: Sequence[Flow[Found]], method: Solver, threads: int = 1) -> list[Found]:
-    """What the flows return; the problems that they ask for at one time are solved in one batch."""
+    """Run flows to their ends and return their values; problems that they yield at one time are solved in one batch."""
     found: dict[int, Found] = {}
     results: dict[int, Any] = dict.fromkeys(range(len(flows)))
     while results:
@@ -86,7 +86,7 @@ def without_stall(problem: Problem, velocities: NDArray[np.bool_]) -> Flow[Resul
 
 
 def rounding(result: Result) -> Array:
-    """What rounding of the equations' terms leaves uncertain of each unknown at the end of a run, shape (states,)."""
+    """Uncertainty of each unknown at the end of a run by rounding of the equations' terms, shape (states,)."""
     problem, n = result.problem, len(result.y)
     inputs = np.concatenate(([result.t], result.y, result.ydot, problem.parameters[-1]))
     both = problem.program.derivatives(problem.program.filled(inputs))
@@ -132,7 +132,7 @@ class Hybrid:
         self._steps = self._written = 0
         """Steps taken and outputs written."""
         self._gaps = np.array([state.name in GAPS for state in system.states])
-        """Which of the states are gaps."""
+        """Mask of the states that are gaps."""
         self._start = next(j for j, p in enumerate(system.parameters) if p.path == START)
         """Column of the time at which a stretch starts."""
         self._renewed = 0
@@ -201,7 +201,7 @@ class Hybrid:
             self._written += len(times)
 
     def _beyond(self, arc: Arc, point: Point) -> Point | None:
-        """Where a solver that was lost may go on."""
+        """Point from which a run may go on after a solver has failed; None where there is none."""
         # At a gap of zero stiffness may jump, and Newton's method stalls: on with the point on the other side.
         closing = self._gaps & (np.abs(point.y) < ATOM) & (point.y * point.ydot < 0)
         if closing.any():
@@ -358,7 +358,7 @@ def merged(problem: Problem, arcs: Sequence[Arc], status: Status, end: float, le
 
 
 def _known(arcs: Sequence[Arc]) -> States | None:
-    """What is known of the arcs, in the time and ledger of the run, where a picture is wanted."""
+    """All known states of the arcs, in the time and ledger of the run, where a picture is wanted."""
     if not arcs[0].result.problem.picture:
         return None
     found = [arc.result.scattered()[:3] for arc in arcs]

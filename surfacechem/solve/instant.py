@@ -1,4 +1,4 @@
-"""What happens at one moment: which edges are due, in which order, until none is.
+"""Events at one moment: the edges that are due are carried out in order until none is.
 
 Nothing here integrates and no clock runs: a hybrid run and a network of reactors own an instant each, and tell it where
 the flow between has led. What is due is carried out edge by edge; the ledger gains what each of them books.
@@ -26,7 +26,7 @@ REACHED = SOLVED
 NO_PUSH = "nothing pushes it off where it rests; with a mass or a damper any disturbance would"
 
 MANY = 1000
-"""Rebounds of a run from which on they are what its steps were used for."""
+"""Number of rebounds above which they explain that a run has used up its steps."""
 
 ENDLESS = (
     "the number of steps allowed was used up by rebounds; with a smaller coefficient of restitution they would end"
@@ -77,7 +77,7 @@ class Rebounds:
         return any(result.margins[j] < -PICOMETRE and j not in ended for j in found)
 
     def _aloft(self, start: float) -> float:
-        """Time [s] for which what has just rebounded stays away."""
+        """Time [s] until the guard that has just rebounded returns to zero."""
         since, time = self.last
         return time if since == start else 0.0
 
@@ -117,12 +117,12 @@ class Instant:
         """Time [s] at which the peaks of the states were last forgotten."""
         self.status = Status.FINISHED
         self.reason = ""
-        """Why the run ends here, in words, where it does."""
+        """Reason why the run ends here, in words, where it does."""
 
     # -- what is seen of the guards -------------------------------------------------------------------------------
 
     def in_play(self, point: Point) -> Mask:
-        """Which guards are in play in the modes of a point."""
+        """Mask of the guards that are active in the modes of a point."""
         return np.array(self.system.in_play(point.parameters), dtype=bool)
 
     def see(self, y: Array) -> None:

@@ -1,4 +1,4 @@
-r"""Who takes the heat that a jump makes, and how warm that makes them; of loads that jump along their way.
+r"""Sinks of the heat of a jump and their temperatures; for load jumps integrated along the path of the loads.
 
 Loads that jump are the limit of a fast ramp. Friction without a rate follows them at every moment: what jumps goes
 along straight lines of the loads, from part 0 before the step to part 1 after it. Along the way x of what slides each
@@ -80,7 +80,7 @@ class JumpHeat:
 
     @cached_property
     def passed(self) -> Mask:
-        """Which nodes pass on what they take."""
+        """Mask of the nodes that pass on the heat that they take."""
         return np.array([node.prescribed for node in self.nodes.values()], dtype=bool)
 
     def given(self, rows: Array, made: Array, shares: Array | None) -> tuple[Array, Array, Array]:
@@ -322,7 +322,7 @@ class LoadPath:
         return self.equilibria.settle_near(stuck, warm, span) or stuck
 
     def _way(self, start: Point, after: Point) -> tuple[int, Way, float]:
-        """Which gap slides, the way of its sliding by itself, and how far it goes along that."""
+        """Index of the gap that slides, its way when sliding by itself, and the distance along that."""
         ways = self.equilibria.ways(self.equilibria.with_slip(after, 0.0))
         j = next(j for j, e in enumerate(self.equilibria.items) if e.slides)
         along = [ways[j], *(way for way in ways if way is not ways[j] and 1 + way.column in self.moved)]

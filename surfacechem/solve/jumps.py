@@ -50,12 +50,12 @@ adds a digit or more where they converge at all."""
 
 @dataclass(frozen=True)
 class Slack:
-    """What is not known of an edge at its moment."""
+    """Uncertainty of an edge at its moment."""
 
     noise: float = 0.0
     """Rounding of its guard."""
     drift: float = 0.0
-    """How far the integration may have carried its guard."""
+    """Drift of its guard that the integration may have caused."""
     balanced: float = BALANCED
     """Part of the tractions by which the integration leaves them out of balance."""
     rtol: float = 0.0
@@ -64,7 +64,7 @@ class Slack:
 
 @dataclass(frozen=True)
 class Jump:
-    """What happened along an edge."""
+    """Record of a jump along an edge."""
 
     t: float
     edge: Edge
@@ -80,7 +80,7 @@ class Jump:
     work: Mapping[str, float] = field(default_factory=dict)
     """Work of the far-field tractions [J/m^2], by account."""
     obstacle: str = ""
-    """Why it is impossible, where it is."""
+    """Reason why it is impossible, where it is."""
     heat_out: float = 0.0
     """Heat passed to prescribed temperatures [J/m^2]."""
     entropy_out: float = 0.0
@@ -111,7 +111,7 @@ class Release:
     edge: Edge
     start: Point
     energy: float
-    """What the jump conserves, before it and at its start [J/m^2]."""
+    """Energy that the jump conserves, before it; ``level`` is that at its start [J/m^2]."""
     level: float
     fold: Lost | None
     slack: Slack
@@ -178,7 +178,7 @@ class Jumper:
 
     @cached_property
     def _totals(self) -> Function:
-        """What a jump conserves, the total entropy, and the potentials of the far-field tractions; then the magnitudes
+        """Energy that a jump conserves, total entropy, and potentials of the far-field tractions; then the magnitudes
         of the first two. It takes longer to call than to compute.
         """
         system = self.system
@@ -186,8 +186,8 @@ class Jumper:
         return compiled(system, [*totals, *system.given.values(), *(magnitude(system.expand(x)) for x in totals)])
 
     def _books(self, rows: Array) -> Array:
-        """The same at arguments of compiled functions; a magnitude that is no number there, as at a bound, says
-        nothing.
+        """Totals at arguments of compiled functions; a magnitude that is no number there, as at a bound, counts as
+        zero.
         """
         found = self._totals(rows)
         found[..., -2:] = np.where(np.isfinite(found[..., -2:]), found[..., -2:], 0.0)
@@ -195,7 +195,7 @@ class Jumper:
 
     @cached_property
     def _energy(self) -> Function:
-        """What a jump conserves, by itself: a search asks for it at many rows."""
+        """Energy that a jump conserves, by itself: a search asks for it at many rows."""
         return compiled(self.system, [self.system.jump_energy])
 
     @cached_property
@@ -209,7 +209,7 @@ class Jumper:
 
     @cached_property
     def _ends(self) -> list[tuple[str, Function]]:
-        """Why laws end where gaps in equilibrium move, and the limits at which they do."""
+        """Limits at which laws end as quasi-static gaps move, each behind its reason."""
         moved = {e.state for e in self.system.equilibria}
         gaps = {state.symbol for state in self.system.states if state.name in moved}
         ends = [m for m in self.system.margins if m.domain and self.system.expand(m.expression).free_symbols & gaps]
@@ -237,7 +237,7 @@ class Jumper:
 
     @property
     def edge_tables(self) -> EdgeTables:
-        """What the compiled loop reads of the edges; with what only jumps need once these are expected."""
+        """Tables of the edges for the compiled loop; with what only jumps need once these are expected."""
         with _ONE_THREAD:
             self._tables = self._tables or self._edge_tables()
             return self._tables
@@ -283,7 +283,7 @@ class Jumper:
 
     @cached_property
     def _accounts(self) -> list[tuple[int, int]]:
-        """How jumps are booked on each account: its kind, and its place among states or books."""
+        """Booking of jumps on each account: its kind, and its place among states or books."""
         given, found = list(self.system.given), []
         sums = {"dissipation": RELEASED, "entropy production": PRODUCED, "energy supply": HEAT_OUT}
         for account in self.system.ledger:
@@ -297,7 +297,7 @@ class Jumper:
         return found
 
     def booked(self, jump: Jump) -> Array:
-        """What a jump adds to the accounts of the ledger."""
+        """Amounts that a jump adds to the accounts of the ledger."""
         changes = jump.after.y - jump.before.y
         sums = {
             RELEASED: jump.released,
@@ -429,7 +429,7 @@ class Jumper:
         return books, dict(zip(accounts, lift.tolist(), strict=True))
 
     def _equilibrated(self, release: Release) -> tuple[Point, Array | None]:
-        """Where the gaps come to rest, and the shares of the heat of friction where its way decides them."""
+        """Point at which the gaps come to rest, and the shares of friction's heat where its path decides them."""
         shares: Array | None = None
         for _ in range(ROUNDS):
             after = self._kept(release, self._rested(release, shares))
@@ -461,7 +461,7 @@ class Jumper:
         return self.equilibria.with_slip(replace(after, parameters=release.start.parameters), sliding)
 
     def _rested(self, release: Release, shares: Array | None) -> Point | None:
-        """Where the gaps come to rest. What slides may go on, or sticks: friction never pulls it back."""
+        """Point at which the gaps come to rest. Sliding goes on or sticks: friction never pulls it back."""
 
         def heat(rows: Array) -> Array:
             return self._heat.warmed(rows, self._made(rows, release), shares)

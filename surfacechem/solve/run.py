@@ -53,12 +53,12 @@ COLDER = 0.95 ** np.arange(1, 40)
 """Parts of the first guess of a temperature that are tried where that leads to an unstable one."""
 
 STATE, POSITIVE = Spec("", "initial value"), Spec("", "initial value", above=0)
-"""Initial values need only be finite here, and have a logarithm where that is the state; margins say the rest."""
+"""Ranges of initial values: finite, and positive where the logarithm is the state; margins check the rest."""
 
 
 @dataclass(frozen=True)
 class Run:
-    """How a scene is run: output times [s], tolerances, method, budgets."""
+    """Settings of a run: output times [s], tolerances, method, budgets."""
 
     times: Sequence[float]
     rtol: float = DEFAULT_RTOL
@@ -77,7 +77,7 @@ class Run:
     steady: bool = False
     """Whether it ends where nothing changes any more; the times are then those of a run of any length."""
     rest: float | None = None
-    """When it comes to rest [s], where that was found before."""
+    """Time at which it comes to rest [s], where that was found before."""
     nudged: bool = False
     """Whether loads differ in their last digits: where a result depends on these, two runs of the same numbers would
     agree.
@@ -182,7 +182,7 @@ class Trajectory:
 
     @property
     def some(self) -> Trajectory:
-        """The trajectory with so many of its outputs as tell how large rounding is."""
+        """The trajectory with a sample of its outputs, enough to tell how large rounding is."""
         count = len(self.result.times)
         return self.picked(np.arange(0, count, max(count // SAMPLED, 1)))
 
@@ -264,7 +264,7 @@ class Trajectory:
 
     @cached_property
     def within_bounds(self) -> dict[str, Array]:
-        """The same where rounding has carried no bonds below none."""
+        """As :attr:`everywhere`, with bonds that rounding has carried below none set to none."""
         result, steps = self.result, self.result.steps
         bonds = {account.law for account in self.model.system.ledger if account.kind == "bonds"}
         least = np.array([0.0 if state.name in bonds else -np.inf for state in self.model.system.states])
@@ -329,7 +329,7 @@ def stable_start(system: System, program: Program, y: Array, parameters: Array) 
 
 
 def _are_stable(system: System, program: Program, y: Array, parameters: Array) -> NDArray[np.bool_]:
-    """Which first guesses lead to states in which all limits of stability are open."""
+    """Mask of the first guesses that lead to states in which all limits of stability are open."""
     playing = system.in_play(parameters)
     checks = [i for i, m in enumerate(system.moving_margins) if m.stability and playing[i]]
     if not checks or program.margins is None:
@@ -406,7 +406,7 @@ class Model:
 
     @cached_property
     def passing(self) -> Passing:
-        """What tells when given variables pass what is narrow."""
+        """Search for the times at which prescribed variables pass narrow places."""
         return Passing(self.system)
 
     def problem(self, run: Run, values: Mapping[str, float], *, passing: bool = True) -> Problem:
@@ -464,7 +464,7 @@ class Model:
 
     @cached_property
     def _guards(self) -> tuple[Margin, ...]:
-        """How a solver meets the zeros of limits, and behind them of the guards of edges."""
+        """Event types for the zeros of limits, and behind them of the guards of edges."""
         limits = (
             Margin.peak() if m.peak else replace(Margin.stop(), domain=m.domain) if m.terminal else Margin.restart()
             for m in self.margins
@@ -562,7 +562,7 @@ class Model:
         return result, tuple(jumps), (word, f"{reason} at t = {result.t:.9g} s") if reason else None
 
     def verdict(self, run: Run, result: Result, values: Mapping[str, float]) -> tuple[str, str]:
-        """How a run ended, and why, in words."""
+        """Outcome of a run and its reason, in words."""
         where = f"t = {result.t:.9g} s"
         if result.status is Status.FINISHED:
             return (

@@ -25,7 +25,7 @@ PARTS_OF_A_PERIOD, MOST_PARTS = 8.17, 20_000
 which it is left to the steps."""
 
 STRAY, LARGEST_SLACK = 1e3, NEGLIGIBLE
-"""How far bonding may stray beyond its bounds between two points of a step, in tolerances, and at most."""
+"""Slack of bonding beyond its bounds between two points of a step, in tolerances, and at most."""
 
 
 def segments(system: System, end: float, values: Mapping[str, float]) -> Array:
@@ -90,11 +90,11 @@ ENOUGH = 10
 """Parts of periods for each step allowed: two a period end a step, so that the steps are used up before the parts."""
 
 HALVINGS = 64
-"""What takes any part of a run to the last bit of its time."""
+"""Bisections that take any part of a run to the last bit of its time."""
 
 
 class Passing:
-    """The places of a system that time alone leads past."""
+    """Search for the times at which prescribed variables, by time alone, pass narrow places of a system."""
 
     def __init__(self, system: System) -> None:
         turns, places = _narrow(system)
@@ -151,7 +151,7 @@ class Passing:
         return np.unique(np.concatenate([turning, passed]))
 
     def _zeros(self, low: Array, high: Array, values: Array, which: slice) -> Array:
-        """Where functions change sign between these times, the first time beyond."""
+        """Times at which functions change sign between these times, the first time beyond each change."""
         assert self._function is not None
         function = self._function
 
@@ -170,8 +170,8 @@ class Passing:
 
 
 def _narrow(system: System) -> tuple[list[Expression], list[Expression]]:
-    """What depends on time alone and changes its sign where something is narrow: the slopes of the histories that turn
-    inside functions, other than sums, products and whole powers; and what conditions compare, with the peaks of laws.
+    """Expressions in time alone that change sign at narrow places: slopes of histories that turn inside functions other
+    than sums, products and whole powers; and differences that conditions compare, with the peaks of laws.
     """
     bent, compared, t = set(), set(), system.t
     for member in _members(system):
@@ -193,7 +193,7 @@ def _of_time(system: System, expressions: Sequence[Expression]) -> list[Expressi
 
 
 def _members(system: System) -> list[Expression]:
-    """What is integrated, and the named quantities that it is made of."""
+    """Expressions that are integrated, and the named quantities in them."""
     integrated = [symengine.sympify(row) for row in (*system.rows.values(), *(item.rate for item in system.ledger))]
     named = [symengine.sympify(expression) for _, expression in needed(_definitions(system), integrated)]
     return integrated + named

@@ -6,7 +6,7 @@ from surfacechem.tolerances import DIGITS, TINY
 
 
 def zero(value: Callable[[float], float], ends: tuple[float, float], at_ends: tuple[float, float]) -> float:
-    """Where a function of one variable changes its sign, to the last digits of the place.
+    """Zero of a function of one variable by bracketing, to the last digits of the place.
 
     Each step is by inverse quadratic interpolation where that is monotone, else by half.
 

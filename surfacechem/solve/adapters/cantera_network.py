@@ -30,7 +30,7 @@ LONGEST = 0.1
 """Part of a stretch that a step may take: Cantera cannot be told to end a step at an event."""
 
 FACTORIALS = np.cumprod(np.maximum(np.arange(13.0), 1.0))
-"""Up to the highest order of CVODES."""
+"""Factorials up to the highest order of CVODES."""
 
 CONTENTS = """
 phases:
@@ -140,7 +140,7 @@ class HeldReactor(cantera.ExtensibleReactor):
         raise NotImplementedError
 
     def attempt(self, evaluate: Callable[[float], Array], t: float) -> Array:
-        """What Cantera asks for at a time [s]; an error is raised again whenever it asks for more."""
+        """Evaluate for Cantera at a time [s]; an error is raised again at every later call."""
         if self.error is not None:
             raise self._failure(self.error)
         try:
@@ -152,7 +152,7 @@ class HeldReactor(cantera.ExtensibleReactor):
             raise self._failure(error) from None
 
     def _failure(self, error: Exception) -> Exception:
-        """What Cantera is told: a new exception each time, whose traceback holds nothing."""
+        """Exception for Cantera, a new one each time, whose traceback holds nothing."""
         return cantera.CanteraError(f"{type(error).__name__}: {error}")
 
     # -- Cantera 3.2's hooks ---------------------------------------------------------------------------------------

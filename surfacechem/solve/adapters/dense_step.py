@@ -36,7 +36,7 @@ class DenseStep:
 
 @dataclass(frozen=True)
 class Steps:
-    """Steps one after another, each made where it is asked for.
+    """Consecutive steps, each made on demand.
 
     ``times`` are the start of the first and the ends of all; ``inside`` [step, node, variable] are the variables at
     NODES but the first, where they are known.
@@ -48,11 +48,11 @@ class Steps:
 
     @classmethod
     def of(cls, steps: Sequence[DenseStep]) -> "Steps":
-        """Those of a list."""
+        """The steps of a list."""
         return cls(np.array([steps[0].start, *(step.end for step in steps)]), steps.__getitem__)
 
     def since(self, first: int) -> Callable[[int], DenseStep]:
-        """Those from one of them on."""
+        """The steps from one of them on."""
         return lambda k: self.step(first + k)
 
     def at_nodes(self, times: Array) -> Array:
@@ -89,14 +89,14 @@ class Guards:
     def of(
         cls, kinds: Sequence[Margin], values: Callable[[float, Array], Array], seen: Array | None = None
     ) -> "Guards":
-        """Those of a problem, which may have been ``seen`` as large as this before."""
+        """The guards of a problem, with the largest sizes ``seen`` before, if any."""
         directions = np.array([float(kind.direction) for kind in kinds])
         strict = np.array([kind.strict for kind in kinds], dtype=bool)
         limits = np.array([kind.terminal and kind.direction <= 0 for kind in kinds], dtype=bool)
         return cls(values, directions, strict, limits, np.zeros(len(kinds)) if seen is None else seen.copy())
 
     def start(self, now: Array, fired: Iterable[int] = ()) -> None:
-        """Begin on the sides of these values, but for what has just fired."""
+        """Set the sides of zero from these values; guards that have just fired have none."""
         self.largest = np.fmax(self.largest, np.abs(now))
         self.sides = np.sign(now)
         self.sides[list(fired)] = 0.0
@@ -105,7 +105,7 @@ class Guards:
         self.due[list(fired)] = False
 
     def follow(self, now: Array) -> None:
-        """Go on to these values, across none of which a guard has fired."""
+        """Update sides and sizes with these values, on the way to which no guard has fired."""
         self.largest = np.fmax(self.largest, np.abs(now))
         left = np.abs(now) > np.where((self.sides != 0.0) & ~self.strict, 0.0, NOISE * self.largest)
         self.sides = np.where(left, np.sign(now), self.sides)
@@ -113,16 +113,16 @@ class Guards:
         self.now = now
 
     def _change_of_due(self, now: Array) -> Array:
-        """By how much these values differ from the last where a guard is due; others may be infinite."""
+        """Change of the values of the guards that are due since the last; others may be infinite."""
         return np.subtract(now, self.now, out=np.zeros_like(now), where=self.due)
 
     def crossed(self, now: Array) -> NDArray[np.bool_]:
-        """Which of these values lie across zero in a direction that counts; strict ones by more than their rounding."""
+        """Mask of values that lie across zero in a direction that counts; strict ones by more than their rounding."""
         across = np.where(self.strict, now < -NOISE * self.largest, now * self.sides <= 0.0)
         return across & (self.sides != 0.0) & (self.sides * self.directions <= 0.0)
 
     def fallen(self, now: Array) -> NDArray[np.bool_]:
-        """Which guards are due and have fallen to these values."""
+        """Mask of the guards that are due and have fallen to these values."""
         return self.due & (self._change_of_due(now) < -NOISE * self.largest)
 
     def far(self, values: Array, active: NDArray[np.bool_]) -> int:
@@ -220,8 +220,8 @@ def _zero(value: Callable[[float], float], low: float, high: float) -> float:
 
 
 def _may_dip(guards: Guards, times: Array, values: Array) -> NDArray[np.bool_]:
-    """Where the middle one of three values [time, guard] in a row is the lowest, by so little above zero that a smooth
-    guard may reach it: a row for each three.
+    """Mask of three values in a row [time, guard] whose middle one is the lowest, so little above zero that a smooth
+    guard may reach it; a row for each three.
     """
     heights, steps = guards.sides * values, np.diff(times)[:, None]
     before, middle, after = heights[:-2], heights[1:-1], heights[2:]
@@ -262,7 +262,7 @@ NODES = np.array([0.0, 0.11747233803526766, 0.35738424175967742, 0.6426157582403
 HERMITE = np.linalg.inv(
     [[power.deriv(k)(x) for power in map(np.polynomial.Polynomial, np.identity(6))] for x in (-1, 0) for k in range(3)]
 )
-"""From values, slopes and second derivatives at -1 and at 0 to the coefficients of their polynomial."""
+"""Matrix from values, slopes and second derivatives at -1 and at 0 to the coefficients of their polynomial."""
 
 DERIVATIVES = np.tile(np.arange(3.0), 2)
 """Their orders."""
@@ -295,14 +295,14 @@ def on_step(end: float, size: float, rows: Array, t: Any) -> Array:
 
 
 TO_POWERS = np.linalg.inv(np.vander(NODES, increasing=True)) / np.arange(1.0, len(NODES) + 1)[:, None]
-"""From values at the nodes to the coefficients of the integral of their polynomial."""
+"""Matrix from values at the nodes to the coefficients of the integral of their polynomial."""
 
 WEIGHTS = 1 / (30 * np.polynomial.Legendre.basis(5)(2 * NODES - 1) ** 2)
-"""Of the values at the nodes in that integral over the whole step."""
+"""Quadrature weights of the values at the nodes over the whole step."""
 
 
 def gained_at(part: float, rates: Array) -> Array:
-    """What the ledger gains up to a part of a step, over the length of the step, from its rates at the nodes.
+    """Gain of the ledger up to a part of a step, over the length of the step, from its rates at the nodes.
 
     Quadratures stay outside the library: it would have to count them in its error norm to integrate them well, and a
     state at rest, which needs no steps, may do work all the same.

@@ -182,7 +182,7 @@ class _Along:
         return np.vstack((one.start, one.rows[0]))
 
     def integral(self, sizes: Array) -> Array:
-        """Of these rates over steps of these sizes."""
+        """Integral of these rates over steps of these sizes."""
         return sizes[:, None] * (WEIGHTS[1:] @ self.rows + WEIGHTS[0] * self.starts())
 
 
@@ -236,7 +236,7 @@ class _Run:
         self.stepping = 0.0
         """Time inside the library's steps [s]."""
         self.aim: float | None = None
-        """Where an event is expected that the library's step has passed over: the next steps end there."""
+        """Expected time of an event that the library's step has passed over: the next steps end there."""
 
     def enter(self, parameters: Array) -> None:
         """Begin a segment."""
@@ -371,7 +371,7 @@ class _Run:
             self.outputs.append(row)
 
     def _gained(self, step: DenseStep, start: float, end: float, quadrature: Array) -> Array:
-        """What the ledger gains in a part of a step as the library integrates it; entropy by quadrature all the same,
+        """Gain of the ledger in a part of a step as the library integrates it; entropy by quadrature all the same,
         whose production the library does not resolve.
         """
         assert step.ledger is not None
@@ -415,7 +415,7 @@ class _Run:
             raise StepError("the first step is longer than the layer it starts in")
 
     def _adds_up(self, inside: _Inside, factor: float) -> NDArray[np.bool_]:
-        """In which steps the rates add up to the increment, to so many tolerances; a step that is tested at its end
+        """Mask of steps whose rates add up to the increment, to so many tolerances; a step that is tested at its end
         alone passes over a peak on the way.
         """
         ends, starts = inside.y.ends, inside.y.starts()
@@ -424,7 +424,7 @@ class _Run:
         return np.asarray(np.all((missed <= factor * sizes)[:, self.view.differential], axis=1))
 
     def result(self, status: Status) -> Result:
-        """What the contract asks for."""
+        """The result of the run under the contract."""
         problem, program = self.problem, self.problem.program
         n, q = program.n, program.n_ledger
 

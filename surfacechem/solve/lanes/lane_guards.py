@@ -44,7 +44,7 @@ def start_margins(w: Any, fresh: Any) -> None:
 
 @compiled
 def _crosses(w: Any, m: int) -> Any:
-    """Where a guard is across zero from its side, in a direction that counts; a strict one by more than noise."""
+    """Mask of lanes whose guard m is across zero in a direction that counts; a strict one by more than noise."""
     value, side, direction = lanes(w.margin[m]), lanes(w.side[m]), w.kinds[m, 1]
     least = NOISE * lanes(w.margin_largest[m]) if w.kinds[m, 3] == 1 else same(0.0)
     falls = (side > 0.5) & (value <= 0.0 - least)
@@ -58,7 +58,7 @@ def _crosses(w: Any, m: int) -> Any:
 
 @compiled
 def _dips(w: Any, m: int, a: float, b: float, c: float) -> Any:
-    """Where a guard has a lowest point between three points that may be zero though it is not across it at any."""
+    """Mask of lanes whose guard m has a minimum between three points that may reach zero though none is across it."""
     side = lanes(w.side[m])
     at_a, at_b = side * lanes(w.margin_earlier[m]), side * lanes(w.margin_before[m])
     at_c = side * lanes(w.margin[m])
@@ -77,7 +77,7 @@ def _put_margins(w: Any) -> None:
 
 @compiled
 def may_meet(w: Any, good: Any) -> Any:
-    """Where guards have to be looked at closely: one is at zero at a quarter of the step, or no farther from it than
+    """Mask of lanes whose guards need a close look: one is at zero at a quarter of the step, or no farther from it than
     twice what it bends by from a quarter to the next. Between two points a parabola dips by an eighth of that. States
     inside are those of the cubic polynomial, whose error is small beside the bend that it has itself.
     """
@@ -159,7 +159,7 @@ def _nearest_inside(w: Any, x: Any) -> Any:
 
 @compiled
 def _locate(w: Any, met: Any) -> None:
-    """Where guards are met, on the polynomial, and their slope there (Illinois: Dowell & Jarratt 1971, BIT 11)."""
+    """Locate guards' zeros on the polynomial, and their slope there (Illinois: Dowell & Jarratt 1971, BIT 11)."""
     low, high = lanes(w.low), lanes(w.high)
     at_low, at_high = _nearest_inside(w, low), _nearest_inside(w, high)
     # At the very start of a step nothing is across zero.

@@ -89,7 +89,7 @@ def _leave(w: Any, lane: int) -> None:
 
 @compiled
 def _give_up(w: Any, lane: int) -> None:
-    """Leave the run of a lane to other steps."""
+    """Leave the run of a lane to the loop over single runs."""
     w.counts[w.run[lane], END] = LEFT
     _leave(w, lane)
 
@@ -298,7 +298,7 @@ def _go_on(w: Any, lane: int) -> None:
 
 @compiled
 def _conclude(w: Any, lane: int) -> None:
-    """What becomes of the step of a lane: repeated, shorter or onto a guard; taken."""
+    """Decide on the step of a lane: repeat it, shorter or onto a guard, or take it."""
     h = w.h[lane]
     if w.again[lane] > 0.5 and w.norm[lane] > FALLS * w.norm_tried[lane] * (h / w.h_tried[lane]) ** 8:
         # The error of a step that is repeated has not fallen with its size: it is noise, or stiffness.

@@ -172,7 +172,7 @@ def propose(w: Any) -> None:
 
 @compiled
 def find_stiff(w: Any) -> None:
-    """Which steps are long beside the fastest rate, as the rates of the last two stages tell."""
+    """Mark steps that are stiff, long beside the fastest rate, which the rates of the last two stages tell."""
     largest, fastest, speed, change = same(0.0), same(0.0), same(0.0), same(0.0)
     for m in range(w.n):
         end, unit = lanes(w.k[END_STAGE, m]), 1.0 / lanes(w.weight[m])
@@ -230,7 +230,7 @@ def put_end(w: Any) -> None:
 
 @compiled
 def _prepare_looks(w: Any) -> None:
-    """How far the rate of each column may be from the slope of its polynomial, and the coefficients of that slope."""
+    """Set the allowed defect of each column's rate from the slope of its polynomial, and that slope's coefficients."""
     h = lanes(w.h)
     for m in range(w.n):
         size = larger(absolute(lanes(w.y[m])), absolute(lanes(w.y_new[m])))
@@ -252,7 +252,7 @@ def _prepare_looks(w: Any) -> None:
 
 @compiled
 def _agrees(w: Any, x: Any) -> Any:
-    """Where the equations at the fraction x of the step, and the rates of the ledger, are close to the polynomials."""
+    """Mask of lanes in which equations and ledger rates at the fraction x of the step are close to the polynomials."""
     put_inside(w, x)
     evaluate(w, RATES, w.rates)
     agrees = x >= 0.0

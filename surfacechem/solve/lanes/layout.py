@@ -1,4 +1,4 @@
-"""What eight runs at once work on: names, types and shapes of the arrays behind the record of the compiled loop.
+"""Memory layout of eight runs at once: names, types and shapes of the arrays behind the record of the compiled loop.
 
 Nothing of Numba is imported here.
 """

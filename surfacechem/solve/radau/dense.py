@@ -121,8 +121,8 @@ def put_scanned(w: Any, h: float, i: int) -> None:
 
 @compiled
 def finish_step(w: Any, h: float) -> None:
-    """What interpolation inside the step needs beyond the stages: the leading error of the polynomial, from the error
-    estimate, and the quadratures of the ledger.
+    """Complete the step for interpolation: the leading error of the polynomial, from the error estimate, and the
+    quadratures of the ledger.
     """
     for m in range(w.n):
         w.correction[m] = 0.0 if w.explicit != 0 else GAMMA[w.member] * w.error[m]

@@ -301,7 +301,7 @@ def _run_segment(w: Any, i: int, end: float, goes_on: bool) -> int:
 
 @compiled
 def _forget(w: Any, i: int) -> None:
-    """Begin without a past, as a run or an arc does."""
+    """Reset the history of steps, as at the start of a run or an arc."""
     clear(w.fired)
     w.member = w.last_member = w.tries = w.calm = w.fresh = w.refused = 0
     if w.core >= LARGE:
@@ -361,7 +361,7 @@ def _begin_arc(w: Any, i: int) -> None:
 
 @compiled
 def _see_guards(w: Any, aloft: float) -> None:
-    """How large the guards have been: what has rebounded has never been away, for all that its rounding tells."""
+    """Start the largest sizes of the guards; that of one that has just rebounded is zero until it returns."""
     copy(w.magnitude, w.margin_largest)
     first = w.n_margins - w.edges.shape[0]
     for e in range(w.edges.shape[0]):

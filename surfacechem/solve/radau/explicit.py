@@ -35,11 +35,11 @@ FELT, FOLLOWED = 0.1, 0.1
 rates change in a step where nothing follows the fastest any more.
 """
 PATIENT = 15
-"""Such steps after which the run goes on implicitly; two others take back one of them."""
+"""Number of stiff steps after which the run goes on implicitly; two others take back one of them."""
 
 FALLS = 3.0
-"""How many times more than the step tells an error may be that falls as it should; more is noise, of which implicit
-steps know how much there is, or a formula that changes.
+"""Largest ratio of the error of a repeated step to the one expected of its size; more is noise, which implicit steps
+measure, or a formula that changes.
 """
 
 DENSEST = 2

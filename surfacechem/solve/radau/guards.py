@@ -207,7 +207,7 @@ def _vertex(a: float, b: float, c: float, at_a: float, at_b: float, at_c: float)
 
 @compiled
 def _reaches(w: Any, h: float, m: int, a: float, b: float, c: float) -> float:
-    """Where a margin is across zero, or touches it, around a lowest point near b; -1 where it is not.
+    """Point near b at which a margin with a minimum there is across zero, or touches it; -1 where it does not.
 
     By parabolas, and by a tenth of the larger part where these make no progress, as close as the value of a minimum
     tells its place (after Brent 1973, Algorithms for Minimization without Derivatives, chapter 5).
@@ -383,7 +383,7 @@ def _step_onto(w: Any, size: float) -> float:
 
 @compiled
 def _resolution(w: Any, size: float) -> float:
-    """What time resolves at the end of a step: half the spacing of doubles there."""
+    """Resolution of time at the end of a step: half the spacing of doubles there."""
     return float(0.5 * EPS * (abs(w.base + w.tau) + size))
 
 

@@ -127,7 +127,7 @@ def _exchange(a: Any, k: int, p: int, q: int, rows: Any, counts: Any) -> None:
 
 @compiled
 def _eliminate_entries(a: Any, k: int, p: int, below: int, counts: Any) -> None:
-    """What _eliminate does, entry by entry, and count those that are left; rows k and p have been exchanged."""
+    """As _eliminate, entry by entry, and count those that are left; rows k and p have been exchanged."""
     n, found = a.shape[0], 0
     inverse = 1.0 / a[k, k]
     a[k, k] = inverse

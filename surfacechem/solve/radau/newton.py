@@ -60,7 +60,7 @@ REACH = 30.0
 """The longest step, in units of the one before, that its polynomial is continued to."""
 
 STIFFER = 3.0
-"""How much larger than at the start of the step the foreseen derivatives may be."""
+"""Largest ratio of the foreseen derivatives to those at the start of the step."""
 
 SLOWEST_KNOWN = 0.02
 """Contraction never assumed better than this: a component that converges at once hides a slower one behind its first

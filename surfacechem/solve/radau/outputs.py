@@ -147,7 +147,7 @@ def _write_inside(w: Any, times: Any, outputs: Any, first: int, last: int, h: fl
 
 @compiled
 def _add_booked(w: Any, rows: Any, first: int, last: int) -> None:
-    """What was booked before the arc, in rows of states and ledgers."""
+    """Add the ledger booked before the arc to rows of states and ledgers."""
     for i in range(first, last):
         for m in range(w.n_ledger):
             rows[i, w.n + m] += w.booked[m]

@@ -1,4 +1,4 @@
-"""What rounding errors of the residual do to the solution of one step.
+"""Effect of rounding errors of the residual on the solution of one step.
 
 Where large terms of an equation cancel, the residual is known only to the rounding of those terms, and no correction
 or error estimate can be smaller than its image under the inverse Newton matrix. The floor is found when a step is

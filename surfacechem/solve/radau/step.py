@@ -77,7 +77,7 @@ def preferred_member(rtol: float) -> int:
 
 @compiled
 def loosening(rtol: float) -> float:
-    """How much larger the low-order estimate may be than the tolerance."""
+    """Factor by which the low-order error estimate may exceed the tolerance."""
     # The estimate has about half the order of the method: beside the true error it is the larger the tighter the run.
     return float(min(max(rtol, SOLVED), 0.1) ** -0.25)
 

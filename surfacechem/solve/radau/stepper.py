@@ -82,7 +82,7 @@ BATCH: dict[str, tuple[Any, int]] = {
 
 _named: Any = namedtuple
 Batch: Any = _named("Batch", BATCH)
-"""What a batch of runs reads, and the rows that it writes."""
+"""Inputs of a batch of runs, and the rows that it writes."""
 
 END, OUTPUTS, EVENTS, RECORDS, INSIDE, FIRST_COUNTER, STOP, ARCS, JUMPS, COLUMNS = 0, 1, 2, 3, 4, 5, 11, 12, 13, 14
 """Columns of the table of counts: status, outputs written, events, recorded steps, states inside steps; then six
@@ -264,7 +264,7 @@ class Loop:
 
     @property
     def folder(self) -> Path:
-        """Where its code is kept, from the start if the wheel carries any that fits."""
+        """Folder of its compiled code, filled from the wheel if that carries any that fits."""
         folder = kernel_folder(self._sources)
         fill(folder, self._sources)
         return folder

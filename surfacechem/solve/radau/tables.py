@@ -104,7 +104,7 @@ def _defect(nodes: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _probe(nodes: NDArray[np.float64]) -> np.float64:
-    """Where the interpolation error x prod_i (x - c_i) is largest."""
+    """Point at which the interpolation error x prod_i (x - c_i) is largest."""
     x = np.linspace(0.0, 1.0, 1001)
     return np.float64(x[np.argmax(np.abs(x * np.prod(x[:, None] - nodes, axis=1)))])
 
