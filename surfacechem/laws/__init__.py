@@ -48,7 +48,7 @@ FAMILIES: dict[type[Law], tuple[str, ...]] = {
 
 
 ELSEWHERE = {name: f"surfacechem.surfaces.{name}" for name in ("shapes", "pair_laws")}
-"""Modules of other rooms."""
+"""Modules of laws in other packages, by family."""
 
 
 def module(family: str) -> ModuleType:
@@ -150,7 +150,7 @@ def in_module(found: ModuleType) -> list[type[Law]]:
 
 @contextmanager
 def known(own: Sequence[type[Law]]) -> Iterator[None]:
-    """Laws that count while a case is read, and in no other case."""
+    """Context in which laws of a case are known: while it is read, and in no other case."""
     token = _of_the_case.set(tuple(own))
     try:
         yield

@@ -1,8 +1,8 @@
 """Bonds under load: Bell, Dembo spring, two pathways, Dudko-Hummer-Szabo, attachment across a gap.
 
-What load does to a rate coefficient is one formula each, for bonding laws and mechanisms alike: ``log_on`` of formation
-and ``log_off`` of rupture. It is stated as its logarithm: a rate is one exponential of a sum, and a factor of e^1000 is
-no infinity. A law lists in ``rate_types`` what mechanisms may use of it.
+The effect of load on a rate coefficient is one formula each, for bonding laws and mechanisms alike: ``log_on`` of
+formation and ``log_off`` of rupture. It is stated as its logarithm: a rate is one exponential of a sum, and a factor of
+e^1000 is no infinity. A law lists in ``rate_types`` what mechanisms may use of it.
 """
 
 from __future__ import annotations
@@ -29,19 +29,19 @@ from surfacechem.tolerances import FRACTION_FLOOR
 
 
 class StatedBothWays(RateLaw):
-    """Bonds that form and break at coefficients of their own; subclasses state what load does to each."""
+    """Bonds with rate coefficients of formation and of rupture; subclasses state the effect of load on each."""
 
     keeps_range = True
     off: ClassVar[str] = "k_off"
     """Parameter that is the rate of rupture at no force."""
 
     def log_on(self, f: Expression, T_c: Expression) -> Expression:
-        """Logarithm of what the force does to formation: nothing."""
+        """Logarithm of the factor of the force on formation: zero, no effect."""
         return 0
 
     @abstractmethod
     def log_off(self, f: Expression, T_c: Expression) -> Expression:
-        """Logarithm of what the force does to rupture."""
+        """Logarithm of the factor of the force on rupture."""
 
     def rate(self, phi: Expression, n_c: Expression, f: Expression, T_c: Expression) -> Expression:
         """Net rate [1/(m^2 s)]."""
@@ -90,12 +90,12 @@ class Bell(StatedBothWays):
 
     @property
     def length(self) -> Expression | None:
-        """What the two distances to the transition state differ by, where bonds form too."""
+        """Difference of the two distances to the transition state, where bonds form too."""
         # Bonds that never form do no work on forming.
         return None if self.log_ratio is None else self.x_on - self.x_off
 
     def log_on(self, f: Expression, T_c: Expression) -> Expression:
-        """Logarithm of what the force does to formation: its work on the way to the transition state."""
+        """Logarithm of the factor of the force on formation: its work on the way to the transition state."""
         return f * self.x_on / (BOLTZMANN * T_c)
 
     def log_off(self, f: Expression, T_c: Expression) -> Expression:
@@ -141,7 +141,7 @@ class ReversibleBell(RateLaw):
 
     @property
     def length(self) -> Expression | None:
-        """What the two distances to the transition state differ by, where both are given."""
+        """Difference of the two distances to the transition state, where both are given."""
         return None if self.x_on is None else self.x_on - self.x_off
 
     def rate(self, phi: Expression, n_c: Expression, f: Expression, T_c: Expression, mu: Expression) -> Expression:
@@ -177,7 +177,7 @@ class DemboSpring(StatedBothWays):
 
     @property
     def peaks(self) -> Mapping[str, Expression]:
-        """A spring that forms unstretched."""
+        """Zero force, at which formation, of an unstretched spring, has its peak."""
         return {} if self.log_ratio is None else {"f": 0.0}
 
     def log_on(self, f: Expression, T_c: Expression) -> Expression:

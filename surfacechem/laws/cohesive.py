@@ -169,7 +169,7 @@ class AdhesionLoss(RateLaw):
 
     @property
     def kinks(self) -> Mapping[str, Expression]:
-        """Where loss ends."""
+        """Zero chemical potential, at which loss ends."""
         return {"mu": 0.0}
 
     def rate(self, mu: Expression, n_c: Expression, N_c: Expression) -> Expression:

@@ -97,7 +97,7 @@ class CooperMikicYovanovich(UnderPressure, HeatTransfer):
 
     @property
     def ranges(self) -> Mapping[str, tuple[float, float]]:
-        """Where the correlation was fitted."""
+        """Range in which the correlation was fitted."""
         # A hardness that varies is taken at its reference value: a range is a hint, no law.
         hardness = self.at_reference().H
         return {"p": (1e-6 * hardness, 2.3e-2 * hardness)}
@@ -129,7 +129,7 @@ class MikicElastic(UnderPressure, HeatTransfer):
 
     @property
     def ranges(self) -> Mapping[str, tuple[float, float]]:
-        """Where the correlation was fitted."""
+        """Range in which the correlation was fitted."""
         law = self.at_reference()
         hardness = law.E * law.m / math.sqrt(2)
         return {"p": (1e-5 * hardness, 2e-2 * hardness)}
@@ -167,7 +167,7 @@ class SongYovanovich(UnderPressure, HeatTransfer):
 
     @property
     def ranges(self) -> Mapping[str, tuple[float, float]]:
-        """Where the correlation was fitted."""
+        """Range in which the correlation was fitted."""
         law = self.at_reference()
         size = law.c_1 * law.indent**law.c_2
         exponent = 1 + 0.071 * law.c_2

@@ -1,4 +1,4 @@
-"""How a parameter varies with one variable: linear, proportional, polynomial, power, exponential, Arrhenius."""
+"""Variation of a parameter with one variable: linear, proportional, polynomial, power, exponential, Arrhenius."""
 
 from __future__ import annotations
 

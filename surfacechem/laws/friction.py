@@ -172,7 +172,7 @@ SLOWEST = 1e-300
 
 
 class RateAndState(UnderPressure, Friction):
-    """What both forms share: the traction, regularised at rest."""
+    """Traction of both forms of rate-and-state friction, regularised at rest."""
 
     nonnegative = ("p",)
     internal: ClassVar[Mapping[str, str]] = {"ln_theta": "theta"}
@@ -188,7 +188,7 @@ class RateAndState(UnderPressure, Friction):
         return self.driven(p, self.drive(v, ln_theta))
 
     def driven(self, p: Expression, drive: Expression) -> Expression:
-        """Tangential traction [Pa] by how many times it is that of the direct effect."""
+        """Tangential traction [Pa] from its value in units of the direct effect, a p."""
         return self.a * p * drive
 
     def drive(self, v: Expression, ln_theta: Expression) -> Expression:

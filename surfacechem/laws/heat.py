@@ -86,7 +86,7 @@ class GapConductance(HeatTransfer):
 
     @property
     def peaks(self) -> Mapping[str, float]:
-        """Touch, which the contact spots let go of within little."""
+        """Touch, beyond which the contact spots let go within a short distance."""
         return {"g_n": 0.0}
 
     def channels(self) -> Mapping[str, Callable[..., Expression]]:
@@ -143,7 +143,7 @@ class GasGap(HeatTransfer):
 
     @property
     def positive(self) -> tuple[str, ...]:  # type: ignore[override]
-        """A gap without roughness and jumps conducts without bound as it closes."""
+        """The gap, where neither roughness nor temperature jumps bound its conductance as it closes."""
         return () if self.M or self.Y else ("g_n",)
 
     def conductance(self, g_n: Expression) -> Expression:
@@ -168,7 +168,7 @@ class ConductanceTable(HeatTransfer):
     extrapolation: Literal["hold", "linear", "refuse"] = option("beyond the ends of the table", default="hold")
 
     def __post_init__(self) -> None:
-        """The points are finite, increasing, not negative and at least two."""
+        """Check that the points are finite, increasing, not negative and at least two."""
         super().__post_init__()
         at, values, of = self._at, self.conductances, self.points
         if len(at) != len(values) or len(at) < 2:

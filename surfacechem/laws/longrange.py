@@ -148,7 +148,7 @@ class Attraction(Potential):
         """Free energy [J/m^2]."""
 
     def repulsion(self) -> Expression:
-        """None."""
+        """Energy of the repulsion: zero."""
         return 0.0
 
 
@@ -261,7 +261,7 @@ class ElectrostaticSpherePlane(Attraction):
 
 
 def _outside(g_n: Expression) -> Expression:
-    """The gap where the formula for open gaps is looked at; of floats both branches are."""
+    """The gap, of floats at least zero, since both branches of a conditional formula are evaluated for them."""
     return g_n if is_symbolic(g_n) else max(g_n, 0.0)
 
 
