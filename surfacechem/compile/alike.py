@@ -33,14 +33,14 @@ if TYPE_CHECKING:
 
 _WORD: Any = ir.IntType(64)
 _HEAD = 5
-"""Words before those of the loops: results, and of the rest how many, code, user data and the table of its places."""
+"""Header words before those of the loops: results; of the rest its number, code, user data and table of places."""
 _OF_LOOP = 5
-"""Words of a loop: cases, and the tables of what all read, of what each reads, of its numbers and of its place."""
+"""Words of a loop: cases, and the tables of shared inputs, of own inputs, of numbers and of places."""
 
 
 @dataclass(frozen=True)
 class Form:
-    """Functions of what all of a loop read, of what each reads, and of its numbers."""
+    """Functions of the inputs that all cases of a loop share, of the own inputs of each, and of its numbers."""
 
     expressions: tuple[Any, ...]
     shared: tuple[Any, ...]
@@ -70,7 +70,7 @@ class FormLoop:
         return len(self.places) // len(self.form.expressions)
 
     def tables(self, inputs: Mapping[Any, int]) -> tuple[NDArray[Any], ...]:
-        """What all read, and by vectors of cases what each reads, its numbers and its places."""
+        """Places of the shared inputs, and by vectors of cases the own inputs, the numbers and the places of each."""
         vectors = -(-self.count // LANES)
 
         def by_vectors(values: Sequence[Any], kind: type) -> NDArray[Any]:
@@ -94,12 +94,12 @@ class FormLoop:
 
 
 Found = tuple[str, tuple[int, ...], tuple[float, ...]]
-"""A form as text, and what stands in it from left to right: places of inputs, and numbers."""
+"""A form as text, and its contents from left to right: places of inputs, and numbers."""
 
 
 @lru_cache(maxsize=2)  # all functions of a scene share them
 class _Forms:
-    """The forms of expressions: which they share, and what each puts into its form."""
+    """The forms of expressions, with the inputs and numbers of each expression in its form."""
 
     def __init__(self, inputs: tuple[Any, ...], own: frozenset[Any]) -> None:
         self.places = {symbol: place for place, symbol in enumerate(inputs) if symbol in own}
@@ -122,7 +122,7 @@ class _Forms:
         return found
 
     def _whole(self, part: Any) -> Found:
-        """The form of what is no sum or product: its numbers belong to it."""
+        """The form of a part that is no sum or product: its numbers belong to it."""
         own = self._own(part)
         form = part.xreplace({x: symengine.Symbol(f"x {k}") for k, x in enumerate(own)})
         numbers = [float(number).hex() for number in form.atoms(symengine.RealDouble)]
@@ -132,7 +132,7 @@ class _Forms:
         return sorted((x for x in part.free_symbols if x in self.places), key=self.places.__getitem__)
 
     def form(self, part: Any) -> Form:
-        """The function that a part and those that are alike are."""
+        """The function that a part and its like have in common."""
         own: dict[Any, Any] = {}
         numbers: list[Any] = []
 
@@ -157,7 +157,7 @@ _IN_ANY_ORDER = "Add", "Mul"
 def loops_of(
     inputs: Sequence[Any], expressions: Sequence[Any], own: Collection[Any]
 ) -> tuple[list[FormLoop], list[Any]]:
-    """The loops over parts that are alike but for what is their ``own``, and the rest of each expression.
+    """The loops over parts that differ in their ``own`` inputs and in numbers only, and the rest of each expression.
 
     >>> x = symengine.symbols("x0:20")
     >>> k = symengine.Symbol("k")
@@ -264,7 +264,7 @@ class _Loops:
             self.builder.store(NUMBER(0.0), self._entry(self.out, i))
 
     def rest(self) -> None:
-        """Call the code of what is in no loop."""
+        """Call the code of the part that is in no loop."""
         b = self.builder
         count, address, user, places = map(self._word, range(1, _HEAD))
         with b.if_then(b.icmp_signed(">", count, _WORD(0))):

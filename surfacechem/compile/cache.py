@@ -30,16 +30,16 @@ from surfacechem.documents import cache_folder
 from surfacechem.documents.cache_folder import cache_root, keep_file, make_folder, sealed, unsealed
 
 FILE = "kernel.numba"
-"""File of what Numba loads; others of the folder that begin with `kernel.` hold the same code in other forms."""
+"""File that Numba loads; others of the folder that begin with `kernel.` hold the same code in other forms."""
 
 
 SHIPPED = Path(__file__).with_name("shipped")
-"""Where a wheel carries code that was compiled when it was built."""
+"""Folder in which a wheel carries code that was compiled when it was built."""
 
 V3 = ("x86-64-v3", ("avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe"))
 PLATFORMS = {"x86_64": V3, "amd64": V3}
-"""By the name of a machine for what processors such code is, and the instruction sets that these have; of others it is
-for all.
+"""Target processors of such code, by the name of a machine, with the instruction sets that they need; on other
+machines it is generic.
 """
 
 
@@ -57,17 +57,17 @@ def processor() -> str:
 
 
 def kernel_folder(sources: Sequence[Path]) -> Path:
-    """Where code compiled from these sources, here, is kept."""
+    """Folder for code compiled from these sources on this machine."""
     return cache_root() / f"kernel-{_mark(sources, sys.version, processor())}"
 
 
 def shipped_folder(sources: Sequence[Path], place: Path) -> Path:
-    """Where in a place a wheel carries code compiled from these sources for this platform."""
+    """Folder in a place for a wheel's code compiled from these sources for this platform."""
     return place / _mark(sources, sys.implementation.cache_tag)
 
 
 def _mark(sources: Sequence[Path], *where: str) -> str:
-    """A digest of what compiled code follows from."""
+    """A digest of all that compiled code depends on."""
     digest = hashlib.sha256()
     for text in (version("numba"), version("llvmlite"), platform.machine(), *where):
         digest.update(text.encode())
@@ -109,7 +109,7 @@ def ship(sources: Sequence[Path], place: Path, load: Callable[[], object]) -> No
 
 
 def code_file(origins: Iterable[str]) -> Path:
-    """Where machine code of expressions that follows from these texts, here, is kept."""
+    """File for the machine code of expressions that follows from these texts on this machine."""
     libraries = map(_version, ("symengine", "llvmlite"))
     digest = hashlib.sha256("\n".join((*libraries, platform.machine(), processor(), *origins)).encode())
     return cache_root() / "code" / digest.hexdigest()[:32]
@@ -121,7 +121,7 @@ def is_filled(folder: Path) -> bool:
 
 
 def _content(folder: Path) -> bytes | None:
-    """What Numba loads; None where it, or what has been made together with it, is damaged: all is then made anew."""
+    """Content of the file that Numba loads; None where it, or one made with it, is damaged: all is then made anew."""
     try:
         contents = {path.name: unsealed(path.read_bytes()) for path in folder.glob("kernel.*")}
     except OSError:
@@ -130,20 +130,20 @@ def _content(folder: Path) -> bytes | None:
 
 
 def untrusted(folder: Path) -> str | None:
-    """Why code in this folder could be another user's; None where it cannot be, or the folder is not there."""
+    """Reason why code in this folder could be another user's; None where it cannot be, or the folder is not there."""
     inside = (Path(place, name) for place, folders, files in os.walk(folder) for name in (*folders, *files))
     return cache_folder.untrusted((folder, *inside))
 
 
 class _Kept:
-    """Where a function of Numba's looks for its machine code and puts it: one file, wherever the sources are."""
+    """Cache in which Numba looks up and keeps the machine code of a function: one file, wherever the sources are."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.cache_path = str(folder)
 
     def load_overload(self, _signature: Any, context: Any) -> Any:
-        """What has been compiled for a processor like this one or, by a wheel, for all; None where nothing is sound."""
+        """Load code compiled for a processor like this one or, by a wheel, for all; None where none is sound."""
         from numba.core.compiler import CompileResult
 
         content = _content(self.folder)
@@ -180,7 +180,7 @@ def _warn(folder: Path, problem: str) -> None:
 
 
 def _changes(parts: Collection[str]) -> list[tuple[Any, str, Any]]:
-    """Whose attributes are what while Numba compiles a kernel of these parts, in half the usual time."""
+    """Patches (object, attribute, value) with which Numba compiles a kernel of these parts in half the usual time."""
     import numba
     from numba.core import llvm_bindings
     from numba.core.codegen import JITCodeLibrary, JITCPUCodegen

@@ -34,7 +34,7 @@ UNUSED = (
     "numba_runtime_build_excinfo_struct",
     "numba_unpickle",
 )
-"""What only the entry from Python calls, which is not used here: in its place stands what ends the process."""
+"""Symbols that only the entry from Python calls, which is unused here: they are bound to code that ends the process."""
 
 LONGEST = 60.0
 """Time [s] after which a process that loads the code has failed."""
@@ -81,7 +81,7 @@ def load(folder: Path) -> Callable[..., None] | None:
 
 
 def engine(code: bytes, unused: Sequence[str] = ()) -> Any:
-    """An engine that holds machine code; what it names and does not use ends the process."""
+    """An engine that holds machine code; symbols that it names and does not use end the process."""
     import llvmlite.binding as llvm
 
     llvm.initialize_native_target()

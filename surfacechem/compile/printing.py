@@ -34,7 +34,7 @@ WIDTH = 100
 
 @dataclass(frozen=True)
 class Row:
-    """A line of a printed function: a local name, its expression and what it is."""
+    """A line of a printed function: a local name, its expression and its meaning."""
 
     name: str
     expression: Expression
@@ -44,7 +44,7 @@ class Row:
 RELATIONS = (symengine.LessThan, symengine.StrictLessThan, symengine.Equality, symengine.Unequality)
 
 APART = "condition of "
-"""How the names begin of symbols that stand for what is printed by itself."""
+"""Prefix of the names of symbols that stand for terms printed by themselves."""
 
 
 def _apart(expression: Expression) -> tuple[Any, dict[str, Any]]:

@@ -71,11 +71,11 @@ class Function:
 
 @dataclass(frozen=True)
 class Filler:
-    """Fills parameters of inputs with what something outside says of the values that it reads there."""
+    """Fills parameters of inputs with results of an external function of the values that it reads there."""
 
     reads: Function
     positions: NDArray[np.int64]
-    """Of the parameters in the inputs."""
+    """Positions of the parameters in the inputs."""
     evaluate: Callable[[Sequence[float]], NDArray[np.float64]]
 
     def __call__(self, inputs: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -159,7 +159,7 @@ class Program:
 
     @cached_property
     def tables(self) -> tuple[NDArray[Any], ...]:
-        """What the stepper reads of a program: its sizes (states, accounts, margins, inputs; in the core, chains, cells
+        """Tables of a program for the stepper: its sizes (states, accounts, margins, inputs; in the core, chains, cells
         of chains; nothing of edges); a row (code, user data) for residual, jacobian, ledger, margins and rates, zero
         where absent; which states are algebraic; a row (first, end, anchor) for each chain; the places of the
         derivatives that are formed; the group of each quadrature, -1 where it is in none.
@@ -188,7 +188,7 @@ class Program:
 
     @cached_property
     def lane_tables(self) -> tuple[NDArray[Any], ...]:
-        """What steps of eight cases at once read of a program: its sizes (states, accounts, margins, inputs, columns
+        """Tables of a program for steps of eight cases at once: its sizes (states, accounts, margins, inputs, columns
         that are integrated); else as the other tables.
         """
         assert self.lanes is not None
@@ -269,7 +269,7 @@ def _looped(inputs: Sequence[Any], loops: Sequence["FormLoop"], rest: Sequence[A
 
 @dataclass(frozen=True)
 class _Derivatives:
-    """What a Jacobian without chains is made from: to load its code, what it is differentiated from is enough."""
+    """Lazy entries of a Jacobian without chains: to load its code, the expressions to differentiate are enough."""
 
     residual: tuple[Any, ...]
     variables: tuple[Any, ...]
@@ -311,7 +311,7 @@ def _machine_code(
 
 @lru_cache(maxsize=8)
 def _mark_of(inputs: tuple[Any, ...]) -> str:
-    """What stands for inputs, which all functions of a scene share."""
+    """Digest of the inputs, which all functions of a scene share."""
     return hashlib.sha256("\n".join(written(inputs)).encode()).hexdigest()
 
 
@@ -579,7 +579,7 @@ def solved_rates(residual: Sequence[Any], rates: Sequence[Any]) -> list[Any] | N
 
 
 def needed(named: Named, expressions: Sequence[Any]) -> Named:
-    """Of what is named that which the expressions contain, or what they contain in turn.
+    """The named symbols that the expressions contain, directly or through others.
 
     >>> a, b, c, x = symengine.symbols("a b c x")
     >>> needed([(a, 2 * x), (b, a**2), (c, b)], [b])

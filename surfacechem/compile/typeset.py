@@ -50,7 +50,7 @@ CONSTANTS = {
 FACTORS = [symengine.Rational(*parts) for parts in ((1, 1), (2, 1), (4, 1), (8, 1), (1, 2), (1, 4), (3, 2), (2, 3))]
 
 COMBINATIONS = 12
-"""Of modes, up to which each has its line."""
+"""Number of combinations of modes up to which each has its line."""
 
 LONG = 300
 """Letters of LaTeX that do not fit into a line."""
@@ -65,7 +65,7 @@ TABULATED = 12
 """Numbers in a piecewise expression from which on it is a table rather than a formula."""
 
 TABLE = "table over "
-"""How the names begin of symbols that stand for a table."""
+"""Prefix of the names of symbols that stand for a table."""
 
 HALF = symengine.Rational(1, 2)
 
@@ -79,9 +79,9 @@ class Equation(NamedTuple):
     left: str
     pieces: Sequence[str]
     text: str
-    """What it is."""
+    """Its meaning, in words."""
     when: str
-    """In which modes it holds, where not in all."""
+    """Modes in which it holds, where not in all."""
 
 
 class Statement(NamedTuple):
@@ -159,7 +159,7 @@ def _names(system: System) -> dict[str, str]:
 
 
 def readable(expression: Expression) -> Expression:
-    """The expression without its guards: what it is wherever none of them is in play."""
+    """The expression without its numerical guards: its form wherever none of them acts."""
     whole = symengine.sympify(expression)
     if isinstance(whole, symengine.Piecewise):
         return _unguarded([*map(readable, whole.args[::2])], [*map(readable, whole.args[1::2])])
@@ -199,7 +199,7 @@ def _unguarded(values: Sequence[Any], conditions: Sequence[Any]) -> Expression:
 
 
 def _either(first: Any, other: Any, low: Any, high: Any) -> Expression | None:
-    """What is ``first`` for low < high and else ``other``, where it has a plain form."""
+    """Plain form of a choice, ``first`` for low < high and else ``other``; None where it has none."""
     if {first, other} == {low, high}:
         return symengine.Min(low, high) if first == low else symengine.Max(low, high)
     if (first, other, high) == (-low, low, 0) or (first, other, low) == (high, -high, 0):
@@ -250,7 +250,7 @@ def _balance(system: System, name: str, row: Expression) -> Iterator[Statement]:
 
 
 def _definition(system: System, item: Named) -> Iterator[Statement]:
-    """What a named quantity is, unless it is a mode, which is no more than its own name."""
+    """Definition of a named quantity, unless it is a mode, which is no more than its own name."""
     if str(item.expression) == item.name:
         return
     text = f"{item.quantity.long_name} [{item.quantity.unit}]"

@@ -140,7 +140,7 @@ class Code:
         return self.known[expression]
 
     def _first(self, part: Any) -> Sequence[Any]:
-        """What is formed before a part: all it is made of, but what only some cases may need of a choice."""
+        """Parts that are formed before a part: its arguments, but for those of a choice that only some cases need."""
         parts = self._parts(part)
         return parts[1:2] if type(part).__name__ == "Piecewise" and self._costs(part) else parts
 
@@ -183,7 +183,7 @@ class Code:
         return self.builder.select(holds, first, other)
 
     def _where_any(self, mask: Any, made: Callable[[], Any]) -> Any:
-        """What is made in code that is jumped over where the mask holds for no case."""
+        """A value made in code that is jumped over where the mask holds for no case."""
         bits = ir.IntType(LANES)
         needed = self.builder.icmp_unsigned("!=", self.builder.bitcast(mask, bits), bits(0))
         before = self.builder.block
@@ -271,7 +271,7 @@ _OWN: dict[str, Callable[[Any, Any, Any], Any]] = {
     **dict.fromkeys(("And", "Or"), Code._joined),
     **dict.fromkeys(("Max", "Min"), Code._extreme),
 }
-"""What makes the vectors of a node of the graph, by its kind."""
+"""Method that forms the vectors of a node of the graph, by its kind."""
 _TRIGONOMETRIC = "sin", "cos", "tan", "asin", "acos", "atan"
 _HYPERBOLIC = "sinh", "cosh", "tanh", "asinh", "acosh", "atanh"
 _LIBRARY = {name: name for name in (*_TRIGONOMETRIC, *_HYPERBOLIC, "erf", "erfc")} | {"Abs": "fabs"}
@@ -340,7 +340,7 @@ _ROUNDER = 1.5 * 2.0**52
 have no vector instruction that makes a word of a number, or shifts one with its sign.
 """
 _LARGEST, _LEAST = 709.782712893384, -745.2
-"""Where exp overflows, and where it is nothing."""
+"""Arguments at which exp overflows, and at which it underflows to zero."""
 _EXP = [1.0 / factorial(k) for k in range(2, 14)]
 """Taylor's series without its first two terms: below half of the logarithm of 2 the next one is 4e-18."""
 
