@@ -1,1 +1,1 @@
-"""What laws state, what they may read, and the bodies, cells and media that they speak of."""
+"""Contracts of laws: what they state and may read; with the bodies, cells and media that they refer to."""

@@ -47,7 +47,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Spec:
-    """What a parameter is: unit ("[x]" stands for the unit of the loaded quantity), meaning and allowed range.
+    """Specification of a parameter: unit ("[x]" stands for that of the loaded quantity), meaning and allowed range.
 
     ``stretch`` is the power of the area stretch J_c with which the formula sees what is given: -1 where that is a
     density per reference area of what stays with the material, and the formula reads one per current area.
@@ -134,7 +134,7 @@ class Law(ABC):
     """Variables that must not fall below zero, or below what :attr:`least` states."""
 
     place: Place | None = field(default=None, repr=False)
-    """Where the law stands in its case file; None for laws built in Python."""
+    """Place of the law in its case file; None for laws built in Python."""
 
     def __init_subclass__(cls, **keywords: Any) -> None:
         super().__init_subclass__(**keywords)
@@ -205,7 +205,7 @@ class Law(ABC):
 
     @property
     def called(self) -> str:
-        """What a run says whose range it left."""
+        """Name of the law in messages of runs that left its range."""
         return f"the law {self.name()}"
 
     @classmethod
@@ -230,11 +230,11 @@ class Law(ABC):
 
     @property
     def factors(self) -> list[Factor]:
-        """The factors by which they do."""
+        """The factors of its parameters that depend on variables."""
         return [factor for value in self.varying.values() for factor in value.factors]
 
     def at_reference(self) -> Self:
-        """The same with what varies as it is at the reference state."""
+        """The law with its varying parameters at their values at the reference state."""
         return self.bind({name: value.value for name, value in self.varying.items()})
 
     def refine(self, name: str, spec: Spec) -> Spec:
@@ -253,7 +253,7 @@ class Law(ABC):
         return self
 
     def outline(self) -> Self:
-        """The same without what is costly to compute, so that all else can be checked before."""
+        """A cheap stand-in for a law that is costly to compute, so that all else can be checked before."""
         return self
 
     @property
@@ -262,7 +262,7 @@ class Law(ABC):
         return 0.0
 
     def erring(self) -> Self:
-        """The same law, wrong by that error."""
+        """The law perturbed by its :attr:`error`."""
         return self
 
     def given(self, numbers: Mapping[str, float]) -> Self:
@@ -294,13 +294,13 @@ def reads(formula: Callable[..., Expression]) -> tuple[str, ...]:
 
 
 def optional(formula: Callable[..., Expression]) -> frozenset[str]:
-    """Those of them that a scene need not have: the arguments with a default."""
+    """The quantities read that a scene need not have: the arguments with a default."""
     arguments = inspect.signature(formula).parameters.values()
     return frozenset(item.name for item in arguments if item.default is not inspect.Parameter.empty)
 
 
 class Factor(Law):
-    """How a parameter varies with one variable; multiplies the parameter's value."""
+    """A factor of a parameter's value that varies with one variable."""
 
     contract = "factor"
     formula = "factor"
@@ -387,15 +387,15 @@ class Friction(Law):
     limit: ClassVar[Callable[..., Expression]]
     """Magnitude of the traction that sticking bears [Pa]; absent where a law does not stick."""
     drive: ClassVar[Callable[..., Expression]]
-    """What sliding at a velocity takes, as one number that may stand for the velocity; absent where that serves."""
+    """Measure of the traction at a velocity, a variable that may replace the velocity; absent where that serves."""
     velocity: ClassVar[Callable[..., Expression] | None] = None
-    """Its inverse [m/s]."""
+    """Inverse of :attr:`drive` [m/s]."""
     driven: ClassVar[Callable[..., Expression]]
-    """Traction by that number [Pa]."""
+    """Traction at a value of :attr:`drive` [Pa]."""
     transverse: ClassVar[Callable[..., Expression] | None] = None
     """Traction across v, along the interface [Pa]; None where a law is the same in all directions."""
     transverse_limit: ClassVar[Callable[..., Expression]]
-    """What sticking bears across v alone [Pa], half an axis of an ellipse; absent where a law has no ``transverse``."""
+    """Limit of sticking across v alone [Pa], half an axis of an ellipse; absent where a law has no ``transverse``."""
     evolution: ClassVar[Callable[..., Mapping[str, Expression]]]
     """Rates of the law's own variables [1/s]; absent where it has none."""
 
@@ -407,7 +407,7 @@ class Friction(Law):
 
 @dataclass(frozen=True)
 class RateType:
-    """A rate type of mechanisms: what a law makes of an Arrhenius coefficient."""
+    """A rate type of mechanisms by which a law modifies an Arrhenius coefficient."""
 
     name: str
     """Name in a mechanism."""
@@ -421,7 +421,7 @@ class RateType:
     renamed: Mapping[str, str] = field(default_factory=dict)
     """Parameters that every reaction gives, by names of its own, each with that in the law."""
     ratios: Mapping[str, str] = field(default_factory=dict)
-    """The same for rate constants, which count in the Arrhenius coefficient."""
+    """Rate constants given as ratios to the Arrhenius coefficient, by names of the reaction, each with that in the law."""
     distance: str = ""
     """Parameter of the law whose work against the force per bond is the whole factor, if it is."""
 
@@ -436,7 +436,7 @@ class RateLaw(Law):
     """Whether its form keeps phi between zero and one, or below phi_max where it reads the partners n_1 and n_2; what
     any other law carries to a bound is held there."""
     rate_types: ClassVar[tuple[RateType, ...]] = ()
-    """What mechanisms may use of it."""
+    """Rate types of mechanisms that it offers."""
     rate: ClassVar[Callable[..., Expression]]
     envelope: ClassVar[Callable[..., Expression] | None] = None
     """Largest fraction of bonds that an opening leaves, for a law by which bonds break gradually."""
@@ -475,12 +475,12 @@ class RateLaw(Law):
 
     @property
     def length(self) -> Expression | None:
-        """How far a bond that the law forms lets a load down [m]; None where the law runs one way or does not say."""
+        """Displacement of the load as the law forms a bond [m]; None where the law runs one way or does not say."""
         return None
 
     @property
     def lacks_length(self) -> bool:
-        """Whether the rate feels a force that the affinity, from which its reverse follows, does not know."""
+        """Whether the rate depends on a force that is missing in the affinity, from which its reverse follows."""
         return self.balanced and self.length is None and "f" in reads(self.statement)
 
     @property
@@ -514,7 +514,7 @@ class HeatTransfer(Law):
     contract = "heat"
     formula = "conductance"
     channel: ClassVar[str] = "conduction"
-    """What carries the heat, for the names of fluxes."""
+    """Mechanism of heat transfer, for the names of fluxes."""
 
     between: tuple[str, str] = option("the two ends: body names, 'interface' or 'surroundings'")
     closure: Literal["direct", "medium", "mean"] = option(
@@ -647,8 +647,8 @@ class Shape(Law):
     foot: ClassVar[Callable[..., Any] | None] = None
     """Parameters (..., 2) of the nearest point of each of the points (..., 3), where there is a closed form."""
     starts: ClassVar[Callable[..., tuple[Any, Any]]]
-    """Where there is none, which of the points (n, 3) searches for the nearest point are for (m,), in their order and
-    one or more for each, and the parameters (m, 2) from which they begin."""
+    """Without a closed form, starts of searches for the nearest point: indices (m,) of the points (n, 3), in order and
+    one or more for each, and the parameters (m, 2) from which the searches begin."""
     derivatives: ClassVar[Callable[..., Any] | None] = None
     """So many derivatives (count, ..., 3) where they are no formulas: 1, u, v, uu, uv, vv, uuu, uuv, uvv, vvv."""
 
@@ -702,5 +702,5 @@ class Fluid(ABC):
 
     @property
     def remark(self) -> str:
-        """What its user should know before its properties are fitted; empty if nothing."""
+        """Remark for the user before its properties are fitted; empty if there is none."""
         return ""

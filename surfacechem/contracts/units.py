@@ -249,11 +249,11 @@ WHOLE = {
     "1/m^2": "1",
     "1/(m^2 s)": "1/s",
 }
-"""Units of what is per area, and of the same for a whole pair of bodies."""
+"""Units of quantities per area, each with that of the total for a pair of bodies."""
 
 
 def needed(unit: str) -> str:
-    """What a unit measures, in words: ``a length [m]``."""
+    """The dimension that a unit measures, in words: ``a length [m]``."""
     exact = next((words for words, known in WORDS.items() if known == unit), None)
     words = exact or _words().get(_unit(unit).dimensionality)
     measured = f"{words} [{unit}]" if words else f"a quantity in {unit}"
