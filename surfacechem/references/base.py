@@ -31,8 +31,8 @@ Quantities: TypeAlias = Mapping[str, Array | float]
 
 
 def read(**readings: str) -> dict[str, tuple[str, str]]:
-    """How parameters are read off a scene: by which reading of the :class:`SceneView`, and what it is called there,
-    with a minus sign before that where its sign is the other one.
+    """Table for reading parameters off a scene: for each the reading of the :class:`SceneView` and its name there,
+    with a minus sign before that where its sign is reversed.
 
     >>> read(friction="mu", initial="p phi_i=phi", temperature="T_i")["phi_i"]
     ('initial', 'phi')
@@ -56,7 +56,7 @@ class Reference(ABC):
     """True if it solves for bodies without cells: a scene then meets it but for the error of its cells, and
     `from_scene` alone tells whether it is the scene's."""
     told: ClassVar[Mapping[str, tuple[str, str]]] = {}
-    """How its parameters are read off a scene, those of its bases among them."""
+    """Readings of its parameters from a scene, those of its bases among them."""
     statistics: ClassVar[tuple[str, ...]] = ()
     """Names of its properties that a sweep tells of each run."""
 

@@ -35,7 +35,7 @@ class SceneView:
         return dict(zip(self._system.output_columns, self.run.outputs[0].tolist(), strict=True))
 
     def read(self, reading: str, name: str) -> float | None:
-        """What one of the readings below tells, of a name if it asks for one; a minus sign before it turns the sign."""
+        """Value of one of the readings below, of a name if it needs one; a minus sign before that reverses the sign."""
         found = getattr(self, reading)
         told: float | None = found(name.removeprefix("-")) if callable(found) else found
         return -told if told is not None and name.startswith("-") else told

@@ -74,7 +74,7 @@ class SphereOnSpring(Reference):
 
     @property
     def end_time(self) -> float:
-        """When it is back where it started [s]."""
+        """Time [s] at which it is back at its start."""
         return 2 * (self.w_i - self.w_turn) / self.speed
 
     def displacement(self, g: Array) -> tuple[Array, Array]:
@@ -107,7 +107,7 @@ class SphereOnSpring(Reference):
 
     # The slope falls and rises once, so that it passes -k once on either side of its lowest value.
     def _fold(self, low: float, high: float, sign: float) -> float:
-        """Where the slope of the force is that of the spring, by halving."""
+        """Approach [m] at which the slope of the force is minus the spring's stiffness, by bisection."""
         for _ in range(200):
             middle = (low + high) / 2
             held = sign * (float(self.slope(np.array([middle]))[0]) + self.k)
