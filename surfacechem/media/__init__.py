@@ -1,1 +1,1 @@
-"""Substances between the bodies whose properties other packages know."""
+"""Substances between the bodies, with properties from other packages."""

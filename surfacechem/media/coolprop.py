@@ -94,7 +94,7 @@ class CoolPropFluid(Fluid):
 
     @property
     def remark(self) -> str:
-        """What a mixture costs that neither boils nor condenses at its pressure, so that no phase is known."""
+        """Remark on the cost of a mixture that neither boils nor condenses at its pressure: no phase is known."""
         if len(self.name.split("&")) == 1 or any(_limits(self)[2:]):
             return ""
         return (
@@ -103,7 +103,7 @@ class CoolPropFluid(Fluid):
         )
 
     def beside_critical(self) -> str:
-        """What to do where the critical pressure is so near that properties are not smooth; empty where it is not."""
+        """Advice where the critical pressure is so near that properties are not smooth; empty where it is not."""
         try:
             critical = float(_coolprop().PropsSI("Pcrit", self.name))
         except ValueError:  # a mixture, or a liquid that has none
@@ -135,8 +135,8 @@ class CoolPropFluid(Fluid):
         return found
 
     def _given(self, T: Array) -> str:
-        """How CoolProp is told of temperatures: of a mixture, which boils and condenses at two of them, with the phase,
-        for which it looks a hundred times longer than for a property.
+        """CoolProp's key of temperatures: of a mixture, which boils and condenses at two of them, with the phase, for
+        which it searches a hundred times longer than for a property.
         """
         boils, condenses = _limits(self)[2:]
         if boils == condenses:
@@ -156,7 +156,7 @@ class CoolPropFluid(Fluid):
         return [low, high, boils, condenses]
 
     def _end(self, phase: str, inside: float, outside: float) -> float | None:
-        """Where a phase ends, from a temperature inside it on; None where it is none there."""
+        """Temperature [K] at which a phase ends, by bisection from one inside it; None where that is another phase."""
         state = partial(_coolprop().PhaseSI, "T")
         if state(inside, "P", self.pressure, self.name) != phase:
             return None
@@ -215,5 +215,5 @@ def _coolprop() -> Any:
 
 
 def _reason(error: ValueError) -> str:
-    """What CoolProp says, without the call that it repeats."""
+    """CoolProp's error message, without the call that it repeats."""
     return re.sub(r"\s*:? *PropsSI\(.*", "", str(error), flags=re.DOTALL).strip().rstrip(".") + "."
