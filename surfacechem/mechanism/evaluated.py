@@ -38,7 +38,7 @@ FARADAY = CHARGE * MOLECULAR
 """Charge of a kmol of elementary charges [C/kmol]."""
 
 SUM_TOLERANCE = 1e-6
-"""How far mole fractions may miss one."""
+"""Tolerance of the sum of mole fractions, which is one."""
 
 
 @dataclass(frozen=True)
@@ -46,22 +46,22 @@ class Neighbour:
     """The state in which a phase beside the surface is held: histories, a constant being one."""
 
     pressure: Load | None = None
-    """[Pa]; None where it is not given."""
+    """Pressure [Pa]; None where it is not given."""
     composition: Mapping[str, Load] = field(default_factory=dict)
     """Mole fractions."""
     rest: str = ""
-    """The species whose mole fraction is what the others leave; none where they sum to one."""
+    """The species whose mole fraction is one less those of the others; none where these sum to one."""
     electric_potential: Load | None = None
-    """Against the surface [V]; None where it is zero."""
+    """Electric potential against the surface [V]; None where it is zero."""
     capacitance: float | None = None
-    """Where the potential follows from charge, and is a number at the start [F/m^2]."""
+    """Capacitance [F/m^2], if any: the potential then follows from charge, and is a number at the start."""
     current: Load | None = None
     """Electric current into the phase from outside [A/m^2]."""
     place: Place | None = None
 
     @property
     def potential_at_start(self) -> float:
-        """[V]."""
+        """Electric potential at the start [V]."""
         return self.electric_potential.at_start() if self.electric_potential else 0.0
 
 
@@ -83,7 +83,7 @@ def hold(surface: Any, given: Mapping[str, Neighbour] | None, place: Place | Non
 
 
 def _problem(phase: Any, state: Neighbour) -> str:
-    """What is wrong with the state of a phase; nothing where it can be held so."""
+    """Error in the state of a phase, in words; empty where it can be held so."""
     name, known, given = phase.name, phase.species_names, [*state.composition, *([state.rest] if state.rest else [])]
     pressureless = phase.thermo_model in GASES and state.pressure is None
     if pressureless or (len(known) > 1 and not given):
@@ -102,7 +102,7 @@ def _problem(phase: Any, state: Neighbour) -> str:
 
 
 def _misheld(name: str, state: Neighbour) -> str:
-    """What is wrong with the charge of a phase; nothing where it holds none, or some."""
+    """Error in the charge data of a phase, in words; empty where there is none."""
     if state.capacitance is None:
         need = f"the current into the neighbour {name} needs a `capacitance`, else its potential is given."
         return "" if state.current is None else need
@@ -116,7 +116,7 @@ def _misheld(name: str, state: Neighbour) -> str:
 
 
 def uneven(name: str, parts: Mapping[str, float], rest: bool) -> str:
-    """What is wrong with mole fractions in a phase, all of them or all but a ``rest``; nothing where they are some."""
+    """Error in the mole fractions of a phase, all or all but a ``rest``, in words; empty where there is none."""
     for species, part in parts.items():
         if not 0 <= part <= 1:
             return f"the mole fraction {species} = {part:g} in the neighbour {name} is outside its range: 0 to 1."
@@ -151,7 +151,7 @@ class HeldPhase:
         self.states = (*((p,) if self._pressed else ()), *((V,) if self._charged else ()), *x)
         self._fractions = [*names.values()]
         self.enthalpies = np.zeros(phase.n_species)
-        """Of its species where it was put last [J/kmol]."""
+        """Partial molar enthalpies of its species where it was put last [J/kmol]."""
         self._parts: Sequence[float] = [math.nan]
         self._all = np.zeros(phase.n_species)
 
@@ -182,7 +182,7 @@ class HeldPhase:
         self.phase.TPX = T, pressure, self._all
 
     def limits(self, values: Mapping[str, Expression]) -> Iterator[tuple[str, Expression, str]]:
-        """What of the histories, by name, must stay positive, with its name and the reason where it does not."""
+        """Margins on histories, given by name: a name, an expression that must stay positive, the reason if it fails."""
         name, parts = self.phase.name, [values[q.name] for q, _ in self.histories if q.name in self._fractions]
         if self._pressed:
             yield f"pressure of {name} > 0", values[f"p_{word(name)}"], f"the pressure of {name} reached zero"
@@ -301,10 +301,10 @@ class SurfaceEngine:
         self._energies = np.empty(0)
         self._lay_out()
         self._brought: list[tuple[int, float, Sequence[float]]] = [(0, math.nan, ())]
-        """Who has brought the surface where, as several may share it."""
+        """Engine, temperature and states to which the surface was brought last, as several engines may share it."""
 
     def beside(self, neighbours: Mapping[str, Neighbour]) -> SurfaceEngine:
-        """The same with other pressures and compositions of neighbours; InputError where no reaction has such a one."""
+        """A copy with other pressures and compositions of neighbours; InputError where no reaction has such a one."""
         known = {held.phase.name: held for held in self.held}
         refuse_unknown(neighbours, known, f"no reaction of the surface {self.surface.name} has a neighbour '{{}}'")
         for name, state in neighbours.items():
@@ -322,7 +322,7 @@ class SurfaceEngine:
         return made
 
     def _lay_out(self) -> None:
-        """Where the neighbours read their states, and write their energies."""
+        """Allot the slices from which neighbours read their states, and arrays to which they write their energies."""
         self._both, self._parts = np.empty((2, len(self._taken))), list[tuple[HeldPhase, slice, Array]]()
         first = species = 0
         for held in self.held:
@@ -351,7 +351,7 @@ class SurfaceEngine:
         return (*self._own, *(quantity.name for held in self.held for quantity in held.states))
 
     def limits(self, values: Mapping[str, Expression]) -> Iterator[tuple[str, Expression, str]]:
-        """What of the histories, by name, must stay positive, with its name and the reason where it does not."""
+        """Margins on histories, given by name: a name, an expression that must stay positive, the reason if it fails."""
         for held in self.held:
             yield from held.limits(values)
 

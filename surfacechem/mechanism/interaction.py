@@ -48,7 +48,7 @@ class EnergyCurve:
 
     @classmethod
     def polynomial(cls, coefficients: Sequence[float]) -> EnergyCurve:
-        """From the coefficients of the first power and up."""
+        """A polynomial from the coefficients of the first power and up."""
         return cls(((0.0, (0.0, *coefficients)),) if any(coefficients) else ())
 
     @classmethod
@@ -99,7 +99,7 @@ def _power_sum(coefficients: Sequence[float], theta: Expression) -> Expression:
 
 @dataclass(frozen=True)
 class Interaction:
-    """How the enthalpy [J/mol] and entropy [J/(mol K)] of a species depend on one coverage."""
+    """Dependence of the enthalpy [J/mol] and entropy [J/(mol K)] of a species on one coverage."""
 
     on: str
     """The species."""
@@ -164,7 +164,7 @@ TOGETHER = (
 
 
 def interactions(source: Source, entry: Any, variables: Mapping[str, str]) -> tuple[Interaction, ...]:
-    """How the thermo of a species depends on coverages, whose names ``variables`` gives by species."""
+    """Dependences of a species' thermo on coverages, whose names ``variables`` gives by species."""
     found = []
     for name, node in (entry.get(KEY) or {}).items():
         read = partial(_numbers, source, entry, node)

@@ -1,4 +1,4 @@
-"""What a mechanism file may hold. Cantera ignores what it does not know; here it is an error with its line.
+"""Valid keys of a mechanism file. Cantera ignores what it does not know; here it is an error with its line.
 
 The keys of entries stand in :mod:`surfacechem.mechanism.source`. Below are those inside them, what Cantera knows and
 the compiled path does not, with the way out, and entries whose bare number Cantera would misread. :class:`Check` holds
@@ -55,9 +55,9 @@ CHARGED: Mapping[str, tuple[str, ...]] = {"beta": (), "exchange-current-density-
 """Keys of reactions that carry charge from one phase to another."""
 
 LEAVE = "With `solver: cantera` under `run` Cantera evaluates it."
-"""The way out for what is not lowered."""
+"""Advice for reactions that are not lowered."""
 NEEDS = f"the compiled path knows surface species only. {LEAVE[:-1]}, with the neighbours held as the case says."
-"""The way out for what needs phases beside the surface."""
+"""Advice for entries that need phases beside the surface."""
 STICKS = f"a sticking reaction needs a gas: {NEEDS}"
 CHARGES = f"charge transfer needs a neighbour at an electric potential: {NEEDS}"
 OF_GASES = "third bodies belong to gases; remove it."
@@ -76,11 +76,11 @@ REMEDIES = {
     "equation-of-state": "a surface species has no volume; remove it.",
     "critical-parameters": "a surface species has no critical point; remove it.",
 }
-"""Keys that are not for here, with the way out."""
+"""Keys that are not supported, each with advice."""
 MODELS = {"edge": "a contact line has rates per length, and a scene has an area; write the reactions on a surface."}
-"""Phase models that are not plain surfaces, with the way out."""
+"""Phase models that are not plain surfaces, each with advice."""
 NEIGHBOURLY = {"sticking": f"a sticking reaction needs a gas beside the surface: {NEEDS}", "electrochemical": CHARGES}
-"""Rate types, by how they begin, of surfaces with neighbours, with the way out."""
+"""Rate types of surfaces with neighbours, by prefix, each with advice."""
 PRESSURE = ("three-body", "falloff", "chemically-activated", "pressure-dependent-Arrhenius", "Chebyshev")
 """Rate types of gases."""
 
@@ -107,7 +107,7 @@ def has_neighbours(phase: Any) -> bool:
 
 
 def _needs_neighbour(kind: str) -> str:
-    """Why a rate type needs a neighbour, and the way out; empty where it needs none."""
+    """Reason why a rate type needs a neighbour, with advice; empty where it needs none."""
     plain = kind.removeprefix("interface-")
     return next((text for start, text in NEIGHBOURLY.items() if plain.startswith(start)), "")
 
@@ -119,7 +119,7 @@ def _is_foreign(entry: Any) -> bool:
 
 
 def is_evaluated(entry: Any, names: Iterable[str], beside: bool) -> bool:
-    """Whether only Cantera can say how fast a reaction is; ``beside`` tells whether the surface has neighbours.
+    """Whether only Cantera can evaluate a reaction's rate; ``beside`` tells whether the surface has neighbours.
 
     ``names`` are the species of the surface.
     """
@@ -141,7 +141,7 @@ def chosen(declared: Any, available: Iterable[str]) -> list[str]:
 
 
 class Check:
-    """A phase of a mechanism, held against what it may hold.
+    """Check of a phase of a mechanism against its valid keys and values.
 
     :meth:`run` raises InputError at the first entry that means nothing, means something else, or cannot be lowered.
     With ``evaluate`` reactions of other types are left to Cantera.
@@ -206,7 +206,7 @@ class Check:
             self._dependence(entry)
 
     def _composition(self, entries: list[Any]) -> None:
-        """Elements are those that the phase declares, else those that there are."""
+        """Check that elements are those that the phase declares, else those that exist."""
         import cantera
 
         declared = [str(element.get("symbol")) for element in self.source.data.get("elements") or []]
@@ -239,7 +239,7 @@ class Check:
                 raise source.error(message, bond, key)
 
     def _dependence(self, entry: Any) -> None:
-        """Thermo that depends on coverages is what Cantera takes it for."""
+        """Check that thermo that depends on coverages means what Cantera reads."""
         dependences, error = entry.get(KEY), self.source.error
         title = f"species {entry.get('name')}: {KEY}"
         if dependences is None:
@@ -254,7 +254,7 @@ class Check:
             self._curve(entry, node, f"{title}: {name}")
 
     def _curve(self, entry: Any, node: Any, title: str) -> None:
-        """How thermo depends on one coverage: the keys of its model, those that need each other, and their units."""
+        """Check a dependence of thermo on one coverage: keys of its model, those that need each other, their units."""
         error, model = self.source.error, str(node.get("model"))
         refuse_unknown([model], CURVES, f"{title}: no model '{{}}'", self.source.place(node, "model"))
         self._keys(node, ("model", "units", *CURVES[model], *CAPACITY), title)
@@ -277,7 +277,7 @@ class Check:
                 raise error(f"{title}: {first} needs `{needed}` too.", node, first)
 
     def _reaction(self, entry: Any) -> None:
-        """A reaction that is lowered."""
+        """Check a reaction that is lowered."""
         title, error = f"reaction {entry.get('equation')}", self.source.error
         own = {kind: {*law.keys, *law.own_keys()} for kind, law in kinds().items()}
         self._keys(entry, {*REACTION}.union(*own.values()), title)
@@ -326,7 +326,7 @@ class Check:
         raise self.source.error(f"{title}: rate type '{kind}'{problem}", entry, "type")
 
     def _evaluated(self, entry: Any) -> None:
-        """What Cantera would ignore in a reaction that it evaluates; what another extension reads is its own affair."""
+        """Refuse what Cantera would ignore in a reaction that it evaluates, but for keys of other extensions."""
         title = f"reaction {entry['equation']}"
         law = kind_of(str(entry.get("type", "Arrhenius")))
         if law is not None and not law.native:
@@ -378,7 +378,7 @@ class Check:
                         self._numbers(terms, ("E",), title, entry)
 
     def _keys(self, node: Any, known: Iterable[str], title: str, place: Place | None = None) -> None:
-        """Every key of a mapping is known."""
+        """Check that every key of a mapping is known."""
         if not isinstance(node, Mapping):
             raise InputError(f"{title} is not a mapping: {node!r}.", place or Place(self.source.file))
         allowed = set(known)
@@ -389,7 +389,7 @@ class Check:
                 raise self.source.error(f"{title}: unknown key '{key}'.{suggestion(str(key), allowed)}", node, key)
 
     def _among(self, node: Any, known: Collection[str], problem: str, hint: bool = True) -> None:
-        """Every key of what may be a mapping is known; a ``hint`` is the nearest of those that are."""
+        """Check that every key of what may be a mapping is known; a ``hint`` is the nearest of those that are."""
         for name in node if isinstance(node, Mapping) else ():
             if name not in known:
                 guess = suggestion(str(name), known) if hint else ""

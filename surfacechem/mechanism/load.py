@@ -28,10 +28,10 @@ from surfacechem.quantities import MOLECULAR
 from surfacechem.scene import BondingVariable, Engine, Sites
 
 REACTIONS = "interface.mechanism.reactions"
-"""Where a case gives other numbers of reactions than the mechanism."""
+"""Path at which a case gives other numbers of reactions than the mechanism."""
 
 SUM_TOLERANCE = 1e-9
-"""How far initial coverages may miss one."""
+"""Tolerance of the sum of initial coverages, which is one."""
 
 
 @dataclass(frozen=True)
@@ -53,9 +53,9 @@ class Mechanism:
     temperatures: tuple[float, float]
     """Range in which the thermo of every species holds [K]."""
     engine: Engine | None = None
-    """What evaluates the rates that are not lowered."""
+    """Engine that evaluates the rates that are not lowered, if any."""
     remarks: tuple[str, ...] = ()
-    """What is odd about the file, though not wrong."""
+    """Remarks on what is odd in the file, though not wrong."""
 
     def coverages(self, given: Mapping[str, float], place: Place | None = None) -> dict[str, float]:
         """Initial values from coverages by species; those not given are zero, and all must sum to one."""
@@ -265,7 +265,7 @@ def _reaction(
 
 
 def _outside(whole: Mapping[str, float], own: Mapping[str, str]) -> dict[str, float]:
-    """What of a change belongs to no species of the surface."""
+    """Part of a change that belongs to no species of the surface."""
     return {name: nu for name, nu in whole.items() if name not in own}
 
 

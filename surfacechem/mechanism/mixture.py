@@ -30,7 +30,7 @@ class Formula:
 
 
 SPECIES = "interface.mechanism.species"
-"""Where a case gives other numbers of species than the mechanism."""
+"""Path at which a case gives other numbers of species than the mechanism."""
 
 
 class Spring(Law):
@@ -69,11 +69,11 @@ class Species:
 
     @property
     def path(self) -> str:
-        """Where a case gives its numbers."""
+        """Path at which a case gives its numbers."""
         return f"{SPECIES}.{self.name}"
 
     def bound(self, bind: Bind) -> Species:
-        """The same with symbols for the parameters of its thermo and its spring."""
+        """The species with symbols for the parameters of its thermo and its spring."""
         if self.fixed:
             return self
         end = self.variable.removeprefix("theta")
@@ -111,7 +111,7 @@ class IdealMixture(Potential):
     temperatures: tuple[float, float] = option("range of the species' thermodynamic data [K]")
 
     def with_parts(self, bind: Bind) -> Self:
-        """With symbols for the parameters of its species."""
+        """The mixture with symbols for the parameters of its species."""
         return self.bind({"species": tuple(item.bound(bind) for item in self.species)})
 
     @property

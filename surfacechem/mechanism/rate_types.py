@@ -52,7 +52,7 @@ class LoadedReaction(LawReaction):
 
     @property
     def log_factor(self) -> Callable[..., Expression]:
-        """Logarithm of what the load does to the coefficient."""
+        """Logarithm of the factor of the load on the coefficient."""
         factor: Callable[..., Expression] = getattr(self.stated, self.rate_type.method)
         return factor
 
@@ -74,7 +74,7 @@ class LoadedReaction(LawReaction):
 
     @property
     def distance(self) -> Expression | None:
-        """That to the transition state, under a force that is not the bond's own."""
+        """Distance to the transition state, under a force that is not the bond's own."""
         known = self.rate_type.distance and self.load == "f"
         return vars(self.stated)[self.rate_type.distance] if known else None
 
@@ -97,7 +97,7 @@ class AffinityReaction(LawReaction):
     """
 
     def __post_init__(self) -> None:
-        """The equation says that it runs both ways."""
+        """Check that the equation is reversible."""
         super().__post_init__()
         # A net rate is one function; taken one way only it would run on against the affinity.
         if not self.reversible:
@@ -135,7 +135,7 @@ class CureReaction(LawReaction):
     """A reaction that its own product catalyses: one species turns into another."""
 
     def __post_init__(self) -> None:
-        """One species turns into another."""
+        """Check that one species turns into another."""
         super().__post_init__()
         if set(self.orders.values()) != {1.0} or set(self.products.values()) != {1.0} or len(self.change) != 2:
             message = f"reaction {self.equation}: Kamal-Sourour is for one species that turns into another, `a => b`."
@@ -153,7 +153,7 @@ class CureReaction(LawReaction):
         return log_sum([super().log_coefficient(values), log(law.A_2) + catalysis]) + self._order(values)
 
     def _order(self, values: Mapping[str, Expression]) -> Expression:
-        """What the coefficient lacks as mass action is of first order."""
+        """Logarithm of theta^(n - 1), by which the order n differs from that of mass action, one."""
         (reactant,), n = self.orders, self.stated.n
         theta = values[reactant]
         return (n - 1) * where(n < 1, log(floored(theta, GONE)), log_fraction(theta))

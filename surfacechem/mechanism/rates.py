@@ -33,7 +33,7 @@ time by 4e-16 of it at least, and with it a coverage that is used up within that
 
 @dataclass(frozen=True)
 class CoverageTerm:
-    """How a rate depends on one coverage: factor 10^(a theta) theta^m exp(-E(theta) / R T), E a polynomial [J/mol]."""
+    """Factor of a rate by one coverage: 10^(a theta) theta^m exp(-E(theta) / R T), E a polynomial [J/mol]."""
 
     variable: str
     a: float = 0.0
@@ -142,7 +142,7 @@ class InterfaceArrhenius(MechanismReaction):
         }
 
     def with_parts(self, bind: Bind) -> Self:
-        """With symbols for the parameters of the species that take part."""
+        """The reaction with symbols for the parameters of the species that take part."""
         return self.bind({"species": tuple(item.bound(bind) for item in self.species)})
 
     def refine(self, name: str, spec: Spec) -> Spec:

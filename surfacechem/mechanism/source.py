@@ -1,4 +1,4 @@
-"""The text of a mechanism file with the line of every entry, what of it belongs to a phase, and its own numbers.
+"""The text of a mechanism file with the line of every entry, the entries of a phase, and numbers that Cantera ignores.
 
 Numbers that Cantera reads are converted by Cantera; those of this package only, such as the length of a bond, here.
 """
@@ -19,20 +19,20 @@ from surfacechem.errors import InputError, Place, refuse_unknown, suggestion
 from surfacechem.quantities import AVOGADRO, KILO
 
 LIMITS = Limits(largest=10_000_000, most=200_000)
-"""A mechanism may be that of a large gas beside the surface."""
+"""Limits of size of a mechanism, which may be that of a large gas beside the surface."""
 
 ARROWS = ("<=>", "=>", "=")
-"""What stands between the sides of an equation; only the second is one way."""
+"""Arrows between the sides of an equation; only the second is one way."""
 
 DEPENDENT = "coverage-dependent-surface"
 SURFACES = ("ideal-surface", DEPENDENT)
 """Phase models that are lowered; only in the second thermo depends on coverages."""
 
 WRITER = "YamlWriter"
-"""How Cantera signs the files that it writes."""
+"""Generator name by which Cantera signs the files that it writes."""
 
 CANTERA_UNITS = {"length": "m", "quantity": "kmol", "energy": "J", "activation-energy": "J/kmol"}
-"""What numbers in such a file count in where it does not say otherwise."""
+"""Units of numbers in such a file where it does not say otherwise."""
 
 ENERGY = ("activation-energy", "quantity")
 OWN = {

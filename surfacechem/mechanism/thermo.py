@@ -148,7 +148,7 @@ class StandardGibbs:
 
     pieces: tuple[ThermoRange, ...]
     shift: float = 0.0
-    """What is added to it for each kelvin, by a standard state of another coverage than one."""
+    """Constant added per kelvin, for a standard state of another coverage than one."""
 
     def __call__(self, T: Expression) -> Expression:
         """Value [K] at T [K]."""
