@@ -421,7 +421,7 @@ class RateType:
     renamed: Mapping[str, str] = field(default_factory=dict)
     """Parameters that every reaction gives, by names of its own, each with that in the law."""
     ratios: Mapping[str, str] = field(default_factory=dict)
-    """Rate constants given as ratios to the Arrhenius coefficient, by names of the reaction, each with that in the law."""
+    """Rate constants, as ratios to the Arrhenius coefficient, by names of the reaction, each with that in the law."""
     distance: str = ""
     """Parameter of the law whose work against the force per bond is the whole factor, if it is."""
 
