@@ -87,9 +87,9 @@ class Build:
     ledger: list[Account] = field(default_factory=list)
     margins: list[Margin] = field(default_factory=list)
     powers: list[Power] = field(default_factory=list)
-    """All that passes energy on, from which the ledger and the balances of energy follow."""
+    """Powers between places, from which the ledger and the balances of energy follow."""
     stored: list[Expression] = field(default_factory=list)
-    """Energies of what has no temperature, such as springs and charges."""
+    """Energies without a temperature, such as those of springs and charges."""
     loads: dict[str, Load] = field(default_factory=dict)
     """Histories that are in use, by variable."""
     constraints: list[Constraint] = field(default_factory=list)
@@ -102,7 +102,7 @@ class Build:
     used_names: set[str] = field(default_factory=set)
 
     def __post_init__(self) -> None:
-        """Names that are taken."""
+        """Create parameters and variables, with the names of nodes, capacities and bonds reserved."""
         custom = [body.temperature for body in self.scene.bodies if isinstance(body.temperature, str)]
         capacities = [f"C_{node}" for node in (*custom, self.interface.temperature) if isinstance(node, str)]
         bonds = [variable.name for variable in self.interface.variables]

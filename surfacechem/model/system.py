@@ -132,7 +132,7 @@ class Named:
 
 
 def definitions(named: Sequence[Named]) -> dict[Any, Expression]:
-    """Every name with its expression, in which there are no others of these names."""
+    """Named expressions by name, expanded so that none contains another of these names."""
     result: dict[Any, Expression] = {}
     for item in named:
         result[symengine.Symbol(item.name)] = without(item.expression, result)
@@ -155,7 +155,7 @@ class Account:
 
 @dataclass(frozen=True)
 class Margin:
-    """Something that must stay positive. Where it crosses zero the run ends, or restarts if it is only a kink."""
+    """An event function that must stay positive. At its zero the run ends, or restarts if it is only a kink."""
 
     name: str
     expression: Expression
@@ -269,7 +269,7 @@ class Profile:
     far: str = ""
     """Name of the temperature at the far side where it is given."""
     after: float | None = None
-    """Time after something sudden from which on the cells are to resolve it, where the scene says so."""
+    """Time after a sudden change from which on the cells have to resolve it, where the scene gives it."""
 
     @property
     def name(self) -> str:

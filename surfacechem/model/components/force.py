@@ -46,7 +46,7 @@ def energies(build: Build) -> None:
 
 
 def _shared(build: Build) -> Expression:
-    """Tension over the bonds that carry it, whose number ends a run where they cannot."""
+    """Define the force per bond: the tension over the bonds that carry it; a margin ends a step as its sign changes."""
     t_n, n_c, phi = (build.variables.get(x, "the force per bond", "interface") for x in ("t_n", "n_c", "phi"))
     build.add(Margin("t_n", t_n, "the load on the bonds changes its sign", terminal=False))
     carrying = where(phi > FEWEST, phi, FEWEST)

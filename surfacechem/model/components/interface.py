@@ -223,14 +223,14 @@ def energies(build: Build) -> Iterator[Constraint | Energy | Margin | Thermal]:
 def _contact_pressure(
     build: Build, stored: Mapping[Potential, Expression], bounds: Mapping[Potential, Potential]
 ) -> None:
-    """A potential that may pull bodies that touch says what part of it the contact bears."""
+    """Define the contact pressure, from the repulsive part of potentials that may also pull bodies that touch."""
     borne = [
         stored[law] if b.repulsion is None else _per_reference_area(build, b, b.repulsion) for law, b in bounds.items()
     ]
     sides = {} if build.mode("side") is None else BY_SIDE
 
     def contact() -> Expression:
-        """Sum of what each potential presses, per current area."""
+        """Sum of the pressures of the potentials, per current area."""
         pressed = (positive(-derivative(symengine.sympify(F).xreplace(sides), GAP)) for F in borne)
         return build.name(VARIABLES["p_contact"], symengine.Add(*pressed) / build.stretch)
 
@@ -266,7 +266,7 @@ def _energies(
 
 
 def _net_pressure(build: Build) -> None:
-    """Warn of laws that take the attraction of a potential for relief of the contact; where that takes all of it what
+    """Warn of laws for which the attraction of a potential relieves the contact; where that takes all of it what
     presses friction ends, and a step does.
 
     A law with an adhesive strength of its own has it back.
@@ -302,7 +302,7 @@ def _per_reference_area(
 
 
 def _in_sides(build: Build, given: Expression) -> tuple[Expression, list[Constraint | Margin]]:
-    """Laws that change at touch do so in a mode, so that every step is smooth and touch and release are located."""
+    """Replace conditions on touch by a mode, so that every step is smooth and touch and release are located."""
     psi = symengine.sympify(given).xreplace(BY_SIDE)
     if not depends(psi, SIDE):
         return given, []

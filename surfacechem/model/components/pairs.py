@@ -168,7 +168,7 @@ def _hold_at_zero(build: Build, law: RateLaw) -> None:
 
 
 def by_affinity(law: RateLaw) -> bool:
-    """Whether a law goes by an affinity that the work of a force is part of."""
+    """Whether a law's rate depends on an affinity that includes the work of a force."""
     return law.length is not None or "mu" in reads(law.statement)
 
 

@@ -1,4 +1,4 @@
-"""Temperatures: who carries which, the energies of the bodies, the balances of energy and what must hold for them."""
+"""Temperatures: nodes and their members, the energies of the bodies, the balances of energy and their margins."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ CAPACITY_REMEDY = (
 
 
 def variables(build: Build) -> Iterator[Thermal]:
-    """Nodes: who carries which temperature, and which are prescribed; then with the free energies of the bodies."""
+    """Temperature nodes with their members, prescribed or not; then with the free energies of the bodies."""
     scene = build.scene
     if scene.T_0 is not None:
         spec = Spec("K", "reference temperature", above=0)
@@ -172,7 +172,7 @@ def _guess(build: Build, node: Node) -> float:
 
 
 def _fold_margin(build: Build, node: Node, row: Expression) -> Margin:
-    """An algebraic temperature is stable while heat leaves faster than it is produced as it rises."""
+    """Stability margin of an algebraic temperature: heat has to leave faster than it is produced as it rises."""
     explicit = {bond.dot: bond.dot - build.rows[name] for name, bond in build.bonding.items()}
     slope = _with_velocity(build, build.expanded(row.subs(explicit)), node.T)
     if slope == 0:

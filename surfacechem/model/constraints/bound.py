@@ -59,7 +59,7 @@ def bound(build: Build, rate: Expression) -> Constraint:
         ]
 
     def breaking(edge: Edge) -> dict[Expression, Expression]:
-        """Bonds that break at once free the bonding state from a bound that held it."""
+        """New mode along an edge at which bonds break at once: a bound that held the bonding state lets it go."""
         return {held: symengine.Integer(0)} if PHI in edge.reset and held not in edge.modes else {}
 
     return Constraint((mode,), edges=tuple(edges), active=1 - held**2, beside=breaking)

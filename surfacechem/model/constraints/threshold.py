@@ -55,7 +55,7 @@ def bonds_left(build: Build) -> Expression | None:
 
 
 def laws(build: Build) -> Iterator[Constraint]:
-    """Bonds break where the traction passes a limit; where the strength is theirs they hold again as the gap closes."""
+    """Edges at which bonds break as the traction passes a limit; if the strength is theirs, they rejoin at touch."""
     closed, heals = build.mode("closed"), []
     for law in build.interface.limits:
         if not build.variables.has("t_n"):

@@ -73,7 +73,7 @@ def contact(pull: Expression, bonded: Expression, gap: Any = None, velocity: Any
 
 
 def laws(build: Build) -> Iterator[Constraint]:
-    """A rigid contact opens under tension where no bonds hold it; where the gap follows at once it closes as well."""
+    """Edges of a rigid contact: it opens under tension without bonds; a gap that follows at once closes it, too."""
     closed, limits = build.mode("closed"), build.interface.limits
     if closed is None:
         return

@@ -257,7 +257,7 @@ def _balance(
 
 
 def _sticks(build: Build, limit: Expression, needed: Expression) -> Iterator[Margin | Constraint]:
-    """A traction that nothing else carries may not exceed what sticking bears, with its bonds or once they have broken.
+    """Limit of sticking under a traction that nothing else carries, with bonds or once they have broken.
 
     Where it bears more without them they break, and it sticks on.
     """
