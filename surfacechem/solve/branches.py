@@ -152,7 +152,7 @@ def come_to_rest(driving: Field, scale: Array, onward: Array, begins: Array) -> 
 
 
 def _resisted(pushes: Array, onward: Array) -> Array:
-    """Driving tractions of what moves: what slides does so in one direction."""
+    """Driving tractions with friction: a gap that slides is driven in one direction only."""
     return np.where(onward != 0, onward * np.maximum(onward * pushes, 0.0), pushes)
 
 

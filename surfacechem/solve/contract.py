@@ -201,7 +201,7 @@ class Problem:
     """The edges along which the method itself goes on, if it can."""
 
     def __post_init__(self) -> None:
-        """Compiled code takes these sizes on trust."""
+        """Check the sizes of arrays, which compiled code does not."""
         n, counts = self.program.n, (self.program.n_parameters, self.program.n_margins)
         given = self.y0.shape, self.atol.shape, self.parameters.shape, len(self.margins)
         if given != ((n,), (n,), (len(self.segments) - 1, counts[0]), counts[1]):

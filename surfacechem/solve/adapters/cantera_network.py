@@ -55,7 +55,7 @@ MULTIPLIERS_ONLY = (
 
 
 class Contents(cantera.Interface):
-    """A Cantera surface whose reactions have multipliers; its state is nobody's, and refused where it is asked for."""
+    """A Cantera surface whose reactions have multipliers; it has no state, and refuses access to one."""
 
     def __setattr__(self, name: str, value: object) -> None:
         """Refuse what would be ignored; private names are Cantera's own."""
@@ -116,12 +116,12 @@ class HeldReactor(cantera.ExtensibleReactor):
     names: tuple[str, ...]
     error: Exception | None = None
     switches: Mapping[str, tuple[bool, str]]
-    """Those of Cantera's reactors that stand as they are: whether they are on, and what else does as one may want."""
+    """Switches of Cantera's reactors that are fixed: whether they are on, and the alternative to them, in words."""
     asked: float = 0.0
     """Time of the last evaluation [s]: after a step of the integrator, its end."""
 
     def __new__(cls, surface: Any, *_: Any, name: str = "(none)") -> Self:
-        """Keep the surface itself, which Cantera does not: a clone would have lost what Python knows of it."""
+        """Keep the surface itself, where Cantera takes a clone, which would lose the Python attributes."""
         made = super().__new__(cls, surface, clone=False, name=name)  # type: ignore[call-arg]
         made.surface = surface
         return made
@@ -172,7 +172,7 @@ class HeldReactor(cantera.ExtensibleReactor):
         self.put(np.array(y))
 
     def replace_update_connected(self, _pressure: bool) -> None:
-        """Nothing of the contents is read by others."""
+        """Do nothing: other reactors read nothing of the contents."""
 
     def replace_eval(self, t: float, _lhs: Any, rhs: Any) -> None:  # its left side is one
         self.asked = t

@@ -15,7 +15,7 @@ from surfacechem.solve.radau.work import RESIDUAL, clear, compiled, evaluate, se
 from surfacechem.tolerances import NEGLIGIBLE, ULPS
 
 DIFFERENCE = np.array([1.0, -5.0, 10.0, -10.0, 5.0, -1.0]) / np.sqrt(252.0)
-"""A fifth difference of values with independent errors has their size."""
+"""Coefficients of a fifth difference, scaled so that it has the size of independent errors of the values."""
 
 WINDOWS, NEAR = 3, NEGLIGIBLE
 """Differences that are taken, and how far apart their times are as parts of a step."""

@@ -272,7 +272,7 @@ def first_size(w: Any, span: float) -> float:
 
 
 INVALID, OLD, CURRENT = range(3)
-"""Whether the Jacobian in the workspace was taken nowhere, at an earlier state, or at the current one."""
+"""States of the Jacobian in the workspace: taken nowhere, at an earlier state, or at the current one."""
 
 SLOW, SLOW_REJECTED = 0.8, 0.3
 """Contraction of Newton's method at which a lower order serves better, after an accepted and a rejected step."""

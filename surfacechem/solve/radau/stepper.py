@@ -299,7 +299,7 @@ class Loop:
 
 
 def _signature() -> Any:
-    """Of a compiled loop: the first run and the one behind the last, memory, and the batch."""
+    """Argument types of a compiled loop: the first run and the one behind the last, memory, and the batch."""
     from numba import from_dtype, types
 
     numba_types: Any = types
@@ -309,7 +309,7 @@ def _signature() -> Any:
 
 
 LOOP = Loop(sources(), "surfacechem.solve.radau.driver", "run_batch")
-"""Runs step by step, or states to be made consistent."""
+"""The compiled loop over runs, or over states to be made consistent."""
 
 
 def repeated(batch: Any) -> Callable[[], None]:

@@ -20,7 +20,7 @@ from surfacechem.solve.radau.stepper import SCAN_POINTS
 STAGES = (3, 5, 7)
 
 EDGE = 1e-6
-"""The slopes of margins at both ends of a step are seen at this distance."""
+"""Distance, as a part of the step, of the points beside its ends that show the slopes of margins there."""
 FINEST = (2e-5, 3e-12)
 """Relative tolerances above which 3 and 5 stages reach an error soonest, measured on Robertson's and other problems."""
 COARSE = 3e-6
