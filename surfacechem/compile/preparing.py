@@ -1,4 +1,4 @@
-"""Time that a run spends on getting ready: code compiled and libraries loaded when they are first needed.
+"""Preparation time of a run: code compiled and libraries loaded when they are first needed.
 
 It is no run time. What is slow once is done inside ``PREPARING``, as a block or as a decorator.
 

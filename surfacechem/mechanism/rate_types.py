@@ -64,12 +64,12 @@ class LoadedReaction(LawReaction):
 
     @property
     def ranges(self) -> Mapping[str, tuple[float, float]]:
-        """Those of the law."""
+        """Ranges of the law."""
         return {self.load if name == "f" else name: limits for name, limits in self.stated.ranges.items()}
 
     @property
     def peaks(self) -> Mapping[str, Expression | Sequence[Expression]]:
-        """Those of the law."""
+        """Peaks of the law."""
         return {self.load if name == "f" else name: top for name, top in self.stated.peaks.items()}
 
     @property
