@@ -73,7 +73,7 @@ temperature, far away each halves it, so that these are 18 decades.
 
 @dataclass(frozen=True)
 class Margin:
-    """Event function type: the action at a zero crossing of a margin; direction -1 is falling, +1 rising, 0 both.
+    """Type of an event: the action at a zero crossing of a margin; direction -1 is falling, +1 rising, 0 both.
 
     A margin that has just fired fires again only after it has left zero. A limit, terminal and falling, that is zero
     or below at a start fires at once where it falls, with the state of the start, and not where it rises; one that

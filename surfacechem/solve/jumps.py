@@ -529,7 +529,7 @@ class Jumper:
         return makers.index(axis if axis in makers and edge.heat != "snap" else INTERFACE)
 
     def _first_maker(self, edge: Edge) -> int:
-        """Column of the part that makes heat of the energy released before gaps move; the last, of friction, if local."""
+        """Column of the part that makes heat of what is released before gaps move; the last, of friction, if local."""
         return -1 if edge.heat == "local" else self._maker(edge, "n" if edge.heat == "joint" else INTERFACE)
 
     def _heated(self, point: Point, release: Release, shares: Array | None) -> tuple[Point, float, float, float]:

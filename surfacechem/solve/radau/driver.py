@@ -361,7 +361,7 @@ def _begin_arc(w: Any, i: int) -> None:
 
 @compiled
 def _see_guards(w: Any, aloft: float) -> None:
-    """Start the largest sizes of the guards; that of one that has just rebounded is zero until it returns."""
+    """Start the largest sizes of the guards; after a rebound those that return count as zero, to their rounding."""
     copy(w.magnitude, w.margin_largest)
     first = w.n_margins - w.edges.shape[0]
     for e in range(w.edges.shape[0]):
