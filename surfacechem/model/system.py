@@ -61,7 +61,7 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Given:
-    """Initial value of the quantity that a state stands for, which is as a rule its logarithm."""
+    """Initial value of a quantity, given in place of that of a state, which is as a rule the quantity's logarithm."""
 
     quantity: Quantity
     value: float

@@ -125,7 +125,7 @@ def softening(
 
 
 def _tear(build: Build, phi: Expression, left: Expression) -> list[Edge]:
-    """Edge at which a quasi-static gap tears open (snap-through), its mounting being softer than the traction falls."""
+    """Edge at which a quasi-static gap tears open at once, its mounting being softer than the fall of the traction."""
     mount = held(build, "n")
     if mount is None or not mount.quasi_static or "g_n" not in build.motion.gap_rates:
         return []

@@ -30,7 +30,7 @@ Matrix = Sequence[Sequence[Expression]]
 
 
 def jumps(build: Build) -> Iterator[Constraint]:
-    """The edge at which quasi-static gaps lose their equilibrium, and the direction in which they snap."""
+    """The edge at which quasi-static gaps lose their equilibrium, with the data that give the direction of the snap."""
     gaps = build.equilibria
     if not gaps:
         return
