@@ -48,7 +48,7 @@ FAMILIES: dict[type[Law], tuple[str, ...]] = {
 
 
 ELSEWHERE = {name: f"surfacechem.surfaces.{name}" for name in ("shapes", "pair_laws")}
-"""Modules of laws in other packages, by family."""
+"""Modules of laws in other subpackages, by family."""
 
 
 def module(family: str) -> ModuleType:
