@@ -36,7 +36,7 @@ MARGIN = 4
 
 @dataclass(frozen=True)
 class Reaction:
-    """A law with symbols for its parameters and its affinity, and what its heat is booked with."""
+    """A law with symbols for its parameters, its affinity and the account of its dissipation."""
 
     label: str
     law: RateLaw

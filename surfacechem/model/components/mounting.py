@@ -178,7 +178,7 @@ class FarField:
         return []
 
     def takers(self, build: Build) -> dict[str, Expression]:
-        """Places in the bodies, and which part of what the support dissipates each takes."""
+        """Shares of places in the bodies in the dissipation of the support."""
         shares = zip((body.name for body in build.scene.bodies), (self.beta_1, 1 - self.beta_1), strict=True)
         return {place: share * part for body, share in shares for place, part in build.thermal.volume(body).items()}
 
