@@ -36,7 +36,7 @@ MISSED = "the method has not seen the gap close; radau does, or a tighter tolera
 
 
 class Rebounds:
-    """Edges whose guard leaves an exact zero and may soon be back, ever lower and sooner.
+    """Rebounds: edges whose guard leaves an exact zero and may soon return, ever lower and sooner (Zeno behaviour).
 
     How large the guard has been before is no measure of its rounding then, and a first step must not pass the return.
     ``first`` is the index of the first edge among the guards.

@@ -86,7 +86,7 @@ class Run:
     """Parts of the run in each of which its steps are held against the equations at least once."""
 
     def __post_init__(self) -> None:
-        """Output times start at zero, where the initial values hold, and increase; tolerances have a meaning."""
+        """Check that output times start at zero, where the initial values hold, and increase; and the tolerances."""
         if len(self.times) < 2 or self.times[0] != 0 or any(map(operator.le, self.times[1:], self.times)):
             raise InputError("output times must start at 0 and increase from each to the next, at least two.")
         if not (0 < self.rtol < 1 and 0 <= (self.atol or 0.0) < np.inf):
