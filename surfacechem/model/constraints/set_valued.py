@@ -76,7 +76,7 @@ def breaks_bonds(build: Build) -> dict[Expression, Expression]:
 
 
 def friction_impulse(build: Build, impulse: Expression) -> Iterator[Constraint]:
-    """Impulse of friction: loss of sliding velocity of a mass by the ``impulse`` of the pressure [Pa s] in an impact."""
+    """Friction impulse: loss of sliding velocity of a mass by the ``impulse`` of the pressure [Pa s] in an impact."""
     laws = [law for law in build.interface.frictions if law_reads(law, "p")]
     sliding = [slip for slip in build.motion.slips if slip.slides_inertially]
     if not (laws and sliding):
