@@ -514,7 +514,7 @@ class HeatTransfer(Law):
     contract = "heat"
     formula = "conductance"
     channel: ClassVar[str] = "conduction"
-    """Mechanism of heat transfer, for the names of fluxes."""
+    """Kind of heat transfer, for the names of fluxes."""
 
     between: tuple[str, str] = option("the two ends: body names, 'interface' or 'surroundings'")
     closure: Literal["direct", "medium", "mean"] = option(

@@ -182,7 +182,7 @@ class HeldPhase:
         self.phase.TPX = T, pressure, self._all
 
     def limits(self, values: Mapping[str, Expression]) -> Iterator[tuple[str, Expression, str]]:
-        """Margins on histories, given by name: its name, an expression to stay positive, and the reason if it fails."""
+        """Margins on the histories (by name): a name, an expression to stay positive, and the reason if it fails."""
         name, parts = self.phase.name, [values[q.name] for q, _ in self.histories if q.name in self._fractions]
         if self._pressed:
             yield f"pressure of {name} > 0", values[f"p_{word(name)}"], f"the pressure of {name} reached zero"
@@ -351,7 +351,7 @@ class SurfaceEngine:
         return (*self._own, *(quantity.name for held in self.held for quantity in held.states))
 
     def limits(self, values: Mapping[str, Expression]) -> Iterator[tuple[str, Expression, str]]:
-        """Margins on histories, given by name: its name, an expression to stay positive, and the reason if it fails."""
+        """Margins on the histories (by name): a name, an expression to stay positive, and the reason if it fails."""
         for held in self.held:
             yield from held.limits(values)
 
