@@ -189,14 +189,14 @@ def cycles(curves: Curves) -> list[ReactionCycle]:
     steps: list[Step] = [*(label for label in curves.laws if label not in paired), *curves.pairs]
     changes = [curves.laws[step].change if isinstance(step, str) else step.change for step in steps]
     found = []
-    for row in _null_space(changes):
+    for row in null_space(changes):
         taken = [(step, times) for step, times in zip(steps, row, strict=True) if times]
         if any(isinstance(step, Opposed) or not curves.laws[step].reversible for step, _ in taken):
             found.append(ReactionCycle(taken))
     return found
 
 
-def _null_space(changes: Sequence[Mapping[str, float]]) -> list[list[int]]:
+def null_space(changes: Sequence[Mapping[str, float]]) -> list[list[int]]:
     """Integer combinations of changes that are none, one for each change that depends on those before it."""
     from sympy import Matrix  # type: ignore[import-untyped]  # slow to import
 

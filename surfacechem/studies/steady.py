@@ -18,9 +18,11 @@ from surfacechem.quantities import GAS_CONSTANT, Quantity
 from surfacechem.runs.at_rest import refuse_histories
 from surfacechem.runs.sheet import Rows, Sheet
 from surfacechem.runs.simulation import load
+from surfacechem.scene import Interface
 from surfacechem.solve.adapters.evaluation import Evaluation
 from surfacechem.solve.contract import Array
 from surfacechem.solve.run import Model, Run
+from surfacechem.studies.mechanism_rates import null_space
 from surfacechem.tolerances import CBRT_EPS, EPS, NEGLIGIBLE, PICTURE, ROUNDING, SHALLOW, TINY
 
 LONGER, ATTEMPTS = 10.0, 16
@@ -101,7 +103,7 @@ def steady(source: Source, of: Sequence[str] = (), overrides: Overrides = ()) ->
     refuse_histories(system)
     if system.in_stretches:
         raise InputError("the scene has jumps, so that a steady state is not the root of one set of equations.")
-    rest = _Rest(Model(system), simulation.case.run, _wanted(system, of))
+    rest = _Rest(Model(system), simulation.case.run, _wanted(system, of), _conserved(simulation.case.scene.interface))
     if not of:
         rest.drop_small()
     rates, held = rest.outputs(rest.x), _held(system, rest.values)
@@ -136,6 +138,17 @@ def _wanted(system: System, of: Sequence[str]) -> dict[str, int]:
     return {name: names.index(name) for name in wanted}
 
 
+def _conserved(interface: Interface) -> list[dict[str, float]]:
+    """What no reaction changes, each as weights of coverages: the sites of each kind, a species that only watches."""
+    changes = [law.stoichiometry() for law in interface.reactions]
+    coverages = {variable.name: variable.density for variable in interface.variables}
+    own = [{str(j): nu for j, change in enumerate(changes) if (nu := change.get(name))} for name in coverages]
+    return [
+        {name: weight * density for (name, density), weight in zip(coverages.items(), weights, strict=True) if weight}
+        for weights in null_space(own)
+    ]
+
+
 HELD = re.compile(r"(bodies\..+|interface)\.temperature\.level|loading\.T\w*\.level")
 """Parameters that are temperatures of bodies and interface."""
 
@@ -151,7 +164,9 @@ def _held(system: System, values: Mapping[str, float]) -> list[str]:
 class _Rest:
     """The equations at their steady state, with multipliers and temperatures that may change."""
 
-    def __init__(self, model: Model, run: Run, wanted: dict[str, int]) -> None:
+    def __init__(
+        self, model: Model, run: Run, wanted: dict[str, int], conserved: Sequence[Mapping[str, float]]
+    ) -> None:
         self.model, self.values, self.wanted = model, model.values(), wanted
         self._place = {parameter.path: j for j, parameter in enumerate(model.system.parameters)}
         self.time = run.times[-1]
@@ -163,7 +178,8 @@ class _Rest:
             self.evaluation = Evaluation(problem.program, reached.result.y, problem.parameters[-1])
             states = [model.system.states[j] for j in self.evaluation.free]
             self.quantities = [state.quantity for state in states]
-            self._sites = np.array([[bool(quantity.species) for quantity in self.quantities]], dtype=float)
+            kept = [[weights.get(quantity.name, 0.0) for quantity in self.quantities] for weights in conserved]
+            self._conserved = np.reshape(kept, (-1, len(states)))
             found = self._root(start := reached.result.y[self.evaluation.free])
             if found is not None and np.all(np.abs(found - start) <= NEGLIGIBLE * np.abs(found) + run.rtol):
                 self.x, self.largest = found, np.abs(reached.outputs).max(axis=0)
@@ -214,7 +230,7 @@ class _Rest:
         return np.asarray((out_up - out_down) / (2 * CBRT_EPS) + following)
 
     def _root(self, x: Array) -> Array | None:
-        """The steady state near x, by Newton's method among states of the same sites; None where there is none."""
+        """The steady state near x, by Newton's method among states that conserve the same; None where there is none."""
         for _ in range(20):
             step = self._solve(self._slopes(x), -self.rates(x), x)
             x = x + step
@@ -234,9 +250,11 @@ class _Rest:
         return np.array(columns).T
 
     def _solve(self, slopes: Array, right: Array, x: Array) -> Array:
-        """The change of the state that changes the rates by so much and keeps the sites."""
+        """The change of the state that changes the rates by so much and keeps what is conserved."""
         sizes = np.abs(x) + TRACE
-        matrix = np.vstack((slopes, self._sites * sizes))
+        matrix = np.vstack((slopes, self._conserved * sizes))
         rows = np.maximum(np.abs(matrix).max(axis=1), TINY)
-        found, *_ = np.linalg.lstsq(matrix / rows[:, None], np.append(right, 0.0) / rows, rcond=None)
+        found, *_ = np.linalg.lstsq(
+            matrix / rows[:, None], np.append(right, np.zeros(len(self._conserved))) / rows, rcond=None
+        )
         return np.asarray(found * sizes)

@@ -89,6 +89,39 @@ def test_an_apparent_barrier_is_the_change_with_temperature(found):
     assert f"apparent barrier {exact / 1e3:.4g} kJ/mol" in str(found)
 
 
+CYCLE = """
+units: {length: m, quantity: mol, activation-energy: kJ/mol}
+phases:
+- {name: s, thermo: ideal-surface, kinetics: surface, species: [a(s), b(s), x(s)], site-density: 2e-5 mol/m^2}
+species:
+- {name: a(s), composition: {}, thermo: {model: constant-cp}}
+- {name: b(s), composition: {}, thermo: {model: constant-cp}}
+- {name: x(s), composition: {}, thermo: {model: constant-cp}}
+reactions:
+- {equation: a(s) => b(s), rate-constant: {A: 1e5 1/s, b: 0, Ea: 20}}
+- {equation: b(s) + x(s) => a(s) + x(s), rate-constant: {A: 1e11 m^2/mol/s, b: 0, Ea: 40}}
+"""
+TURNING = """
+bodies: {lower: {temperature: 500 K}, upper: {temperature: 500 K}}
+interface: {temperature: 500 K, mechanism: cycle.yaml}
+initial: {coverages: {a(s): 0.7, x(s): 0.3}}
+run: {until: 1 s}
+"""
+
+
+def test_a_spectator_keeps_its_coverage(tmp_path):
+    """Two steps in turn: each controls as much as the other's part of the resistance to both, 1/k over the sum."""
+    (tmp_path / "cycle.yaml").write_text(CYCLE)
+    (tmp_path / "case.yaml").write_text(TURNING)
+    found = steady(tmp_path / "case.yaml", of=["R_R1"])
+    RT = 8.31446261815324 * 500.0
+    k = np.array([1e5 * np.exp(-20e3 / RT), 1e11 * 2e-5 * 0.3 * np.exp(-40e3 / RT)])
+    exact = k[::-1] / k.sum()
+    assert [*found.control["R_R1"].values()] == pytest.approx(exact, rel=1e-7)
+    assert found.barriers["R_R1"] == pytest.approx(exact @ [20e3, 40e3], rel=1e-7)
+    assert found.coverages["x(s)"] == pytest.approx(0.3, rel=1e-12)
+
+
 @pytest.mark.parametrize(
     ("case", "of", "message"),
     [
