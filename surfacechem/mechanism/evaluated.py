@@ -290,7 +290,8 @@ class SurfaceEngine:
         open_ones = [i for i, law in enumerate(reactions) if isinstance(law, NeighbourReaction)]
         energies = [f"{reactions[i].path}.{name}" for name in ("enthalpy", "gibbs") for i in open_ones]
         self.gives = (*(f"{reactions[i].path}.value" for i in self.positions), *energies)
-        beside = surface.adjacent.items() if open_ones else ()
+        # Rates may read a neighbour that no reaction takes from, by an order.
+        beside = surface.adjacent.items() if len(self.positions) else ()
         self.held = [HeldPhase(phase, neighbours.get(name, Neighbour())) for name, phase in beside]
         self.names = identifiers(dict.fromkeys(name for law in reactions for name in law.made), "")
         first, own = species[0], [item.variable for item in species]

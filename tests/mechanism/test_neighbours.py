@@ -17,7 +17,7 @@ import surfacechem
 from surfacechem.documents.shipped import mechanisms
 from surfacechem.errors import InputError
 from surfacechem.mechanism.mixture import word
-from surfacechem.reactor import InterfaceReactor, ReactorNet
+from surfacechem.reactor import InterfaceReactor, ReactingGas, ReactorNet
 from surfacechem.runs import rerun
 
 pytestmark = pytest.mark.around
@@ -413,3 +413,76 @@ def test_the_charge_of_a_sweep_of_the_potential_is_the_integral_of_its_current()
         currents.append(-anode.get_net_production_rates(electrons)[0] * ct.faraday)
     assert min(currents) < 0 < max(currents)
     np.testing.assert_allclose(data["i_electron"], currents, rtol=1e-8, atol=1e-9 * np.abs(currents).max())
+
+
+SMALL = """
+units: {length: m, quantity: mol, activation-energy: kJ/mol}
+phases:
+- name: surf
+  thermo: ideal-surface
+  kinetics: surface
+  adjacent-phases: [gas]
+  elements: [C, O, N]
+  species: [a(s), CO(s)]
+  site-density: 2e-5 mol/m^2
+- name: gas
+  thermo: ideal-gas
+  elements: [C, O, N]
+  species: [{gri30.yaml/species: [CO, O2, N2]}]
+- name: gas2
+  thermo: ideal-gas
+  elements: [C, O, N]
+  species: [{gri30.yaml/species: [N2, CO]}]
+species:
+- {name: a(s), composition: {}, thermo: {model: constant-cp}}
+- {name: CO(s), composition: {C: 1, O: 1}, thermo: {model: constant-cp, h0: -220 kJ/mol, s0: 80 J/mol/K}}
+reactions:
+- {equation: CO + a(s) <=> CO(s), rate-constant: {A: 1e3 m^3/mol/s, b: 0, Ea: 5}}
+"""
+SMALL_CASE = """
+bodies: {lower: {temperature: 600 K}, upper: {temperature: 600 K}}
+interface:
+  temperature: 600 K
+  mechanism:
+    file: small.yaml
+    phase: surf
+    neighbours: {gas: {pressure: 1 bar, composition: {CO: 0.01, O2: 0.2}, rest: N2}}
+initial: {coverages: {a(s): 0.6, CO(s): 0.4}}
+run: {until: 1 us, solver: cantera}
+"""
+
+
+def small(folder: Path, changes: dict[str, str]) -> Path:
+    """A case with a small mechanism, and with changes of either text."""
+    text, case = SMALL, SMALL_CASE
+    for old, new in changes.items():
+        assert old in text + case
+        text, case = text.replace(old, new), case.replace(old, new)
+    (folder / "small.yaml").write_text(text)
+    (folder / "case.yaml").write_text(case)
+    return folder / "case.yaml"
+
+
+def small_alone(folder: Path, T: float = 600, p: float = 1e5, x: str = "CO:0.01, O2:0.2, N2:0.79") -> ct.Interface:
+    surface = ct.Interface(str(folder / "small.yaml"), "surf")
+    surface.adjacent["gas"].TPX, surface.TP = (T, p, x), (T, p)
+    surface.coverages = [0.6, 0.4]
+    return surface
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "last"),
+    [
+        ("1 bar", "{ramp: {start: 1 bar, rate: 1e11 Pa/s}}", {"p": 2e5}),
+        ("O2: 0.2", "O2: {ramp: {start: 0.2, rate: 2e5 1/s}}", {"x": "CO:0.01, O2:0.4, N2:0.59"}),
+    ],
+)
+def test_a_neighbour_that_a_rate_reads_only_by_an_order_is_held_too(old, new, last, tmp_path):
+    reaction = """{equation: CO(s) => a(s), rate-constant: {A: 1e-2, b: 0, Ea: 5}, orders: {O2: 0.5},
+  nonreactant-orders: true}"""
+    changes = {SMALL.partition("reactions:\n- ")[2]: reaction, "{C: 1, O: 1}": "{}"}
+    data = surfacechem.run(small(tmp_path, {**changes, old: new})).dataset
+    for k, state in ((0, {}), (-1, last)):
+        surface = small_alone(tmp_path, **state)
+        surface.set_unnormalized_coverages(coverages(data, surface)[k])
+        assert float(data["R_R1"][k]) == pytest.approx(surface.net_rates_of_progress[0] * 1e3 * AVOGADRO, rel=1e-9)
