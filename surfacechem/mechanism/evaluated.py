@@ -208,16 +208,22 @@ class HeldPhase:
             both += self.charges * self.phase.electric_potential
 
 
+def places(surface: Any, phase: Any) -> range:
+    """Where Cantera has the species of a phase among those of the kinetics, some of which may have the same name."""
+    first = surface.kinetics_species_index(0, surface.phase_index(phase.name))
+    return range(first, first + phase.n_species)
+
+
 def lacking(surface: Any) -> tuple[str, ...]:
     """Species that a neighbour does not hold, though reactions give them to it."""
     back = np.array([reaction.reversible for reaction in surface.reactions()], dtype=bool)
     made = surface.product_stoich_coeffs.sum(axis=1) + surface.reactant_stoich_coeffs[:, back].sum(axis=1)
     there = (
-        (name, part)
+        item
         for phase in surface.adjacent.values()
-        for name, part in zip(phase.species_names, phase.X, strict=True)
+        for item in zip(phase.species_names, phase.X, places(surface, phase), strict=True)
     )
-    found = [name for name, part in there if part == 0 and made[surface.kinetics_species_index(name)] > 0]
+    found = [name for name, part, place in there if part == 0 and made[place] > 0]
     names = ", ".join(found[:6]) + (f" and {len(found) - 6} more" if len(found) > 6 else "")
     text = (
         f"the neighbours hold no {names}, which reactions make: what they release is diluted without end, and its "
@@ -268,8 +274,8 @@ class NeighbourReaction(EvaluatedReaction):
 
 def taken(surface: Any, phases: Sequence[Any]) -> Any:
     """Amount of each species of these phases, one after another, that each reaction takes: a row for a reaction."""
-    places = [surface.kinetics_species_index(name) for phase in phases for name in phase.species_names]
-    return np.asarray(surface.reactant_stoich_coeffs - surface.product_stoich_coeffs)[places].T
+    rows = [place for phase in phases for place in places(surface, phase)]
+    return np.asarray(surface.reactant_stoich_coeffs - surface.product_stoich_coeffs)[rows].T
 
 
 class SurfaceEngine:
@@ -334,7 +340,15 @@ class SurfaceEngine:
     @property
     def charges(self) -> dict[str, dict[str, float]]:
         """Charge [C] of a molecule of each species that reactions make in neighbours and that has any, by phase."""
-        return {word(held.phase.name): held.charged(self.names) for held in self.held}
+        return {word(held.phase.name): held.charged(self.made_in(held.phase)) for held in self.held}
+
+    def made_in(self, phase: Any) -> dict[str, str]:
+        """Those ``names`` that mean species of this neighbour: of several by one name an equation means the first."""
+        index, there = (
+            self.surface.kinetics_species_index,
+            zip(phase.species_names, places(self.surface, phase), strict=True),
+        )
+        return {x: self.names[x] for x, i in there if x in self.names and index(x) == i}
 
     @property
     def histories(self) -> tuple[tuple[Quantity, Load], ...]:

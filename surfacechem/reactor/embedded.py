@@ -200,13 +200,13 @@ class EmbeddedScene:
 
     def _beside(self, engine: Any, name: str, reactor: Any) -> Beside:
         held = next(held for held in engine.held if held.phase.name == name)
-        made = {name: f"made_{engine.names[name]}" for name in held.phase.species_names if name in engine.names}
+        made = {species: f"made_{part}" for species, part in engine.made_in(held.phase).items()}
         return Beside(
             reactor=reactor,
             held=held,
             places=np.array([self.places[f"loading.{quantity.name}.level"] for quantity, _ in held.taken_over]),
-            species=np.array([held.phase.species_index(species) for species in made]),
-            accounts=np.array([len(self.states) + self.accounts.index(account) for account in made.values()]),
+            species=np.array([held.phase.species_index(species) for species in made], dtype=np.int64),
+            accounts=np.array([len(self.states) + self.accounts.index(name) for name in made.values()], dtype=np.int64),
         )
 
     def start(self) -> Array:

@@ -486,3 +486,28 @@ def test_a_neighbour_that_a_rate_reads_only_by_an_order_is_held_too(old, new, la
         surface = small_alone(tmp_path, **state)
         surface.set_unnormalized_coverages(coverages(data, surface)[k])
         assert float(data["R_R1"][k]) == pytest.approx(surface.net_rates_of_progress[0] * 1e3 * AVOGADRO, rel=1e-9)
+
+
+@pytest.mark.parametrize("beside", ["[gas, gas2]", "[gas2, gas]", "[gas]"])
+def test_phases_may_hold_species_of_one_name(beside, tmp_path):
+    """What an equation names is on the surface, else in the first phase that has it; it counts there, once."""
+    both = {"rest: N2}": "rest: N2}, gas2: {pressure: 2 bar, composition: {CO: 0.5}, rest: N2}"}
+    alike = {"CO(s)": "O2"}
+    data = surfacechem.run(small(tmp_path, {"[gas]": beside, **(both if "gas2" in beside else alike)})).dataset
+    surface = small_alone(tmp_path)
+    if "gas2" in beside:
+        surface.adjacent["gas2"].TPX = 600, 2e5, "CO:0.5, N2:0.5"
+    rates, made = surface.net_rates_of_progress, [(x, surface.get_net_production_rates(x)) for x in surface.adjacent]
+    taken = -sum(rate @ surface.adjacent[name].partial_molar_enthalpies for name, rate in made)
+    assert float(data["q_n"][0]) == pytest.approx(taken, rel=1e-9)
+    assert float(data["sigma_R1"][0]) == pytest.approx(-rates[0] * surface.delta_gibbs[0] / 600, rel=1e-9)
+    # In a network the gas that the equation means loses it, and no other does.
+    gases = {}
+    for name, phase in surface.adjacent.items():
+        gases[name] = ReactingGas(phase, clone=True, volume=1e-6, energy="off")
+    before = {name: gas.mass for name, gas in gases.items()}
+    net = ReactorNet([*gases.values(), InterfaceReactor(tmp_path / "case.yaml", area=1e-3, neighbours=gases)])
+    net.rtol, net.atol = 1e-9, 1e-18
+    net.advance(1e-6)
+    changed = [name for name, gas in gases.items() if abs(gas.mass / before[name] - 1) > 1e-9]
+    assert changed == [beside.strip("[]").split(", ")[0]]
