@@ -344,11 +344,9 @@ class SurfaceEngine:
 
     def made_in(self, phase: Any) -> dict[str, str]:
         """Those ``names`` that mean species of this neighbour: of several by one name an equation means the first."""
-        index, there = (
-            self.surface.kinetics_species_index,
-            zip(phase.species_names, places(self.surface, phase), strict=True),
-        )
-        return {x: self.names[x] for x, i in there if x in self.names and index(x) == i}
+        meant = self.surface.kinetics_species_index
+        there = zip(phase.species_names, places(self.surface, phase), strict=True)
+        return {name: self.names[name] for name, i in there if name in self.names and meant(name) == i}
 
     @property
     def histories(self) -> tuple[tuple[Quantity, Load], ...]:

@@ -44,6 +44,8 @@ UNITS = _words("length mass time quantity current temperature pressure energy ac
 """Dimensions for which a file may say what a bare number means."""
 
 ARRHENIUS = ("A", "b", "Ea")
+MASEL = ("A", "b", "Ea0", "w")
+"""Keys of a rate coefficient by Blowers and Masel, which Cantera evaluates."""
 STICKING: Mapping[str, tuple[str, ...]] = {
     "sticking-coefficient": ARRHENIUS,
     "Motz-Wise": (),
@@ -112,10 +114,16 @@ def _needs_neighbour(kind: str) -> str:
     return next((text for start, text in NEIGHBOURLY.items() if plain.startswith(start)), "")
 
 
+def _is_masel(kind: str) -> bool:
+    """Whether a rate type has the coefficient of Blowers and Masel."""
+    return kind.endswith("Blowers-Masel")
+
+
 def _is_foreign(entry: Any) -> bool:
-    """Whether a reaction is of a type that is not known here, but may be one of Cantera's or of another extension."""
+    """Whether a reaction is of a type that is not known here, but may be one of another extension."""
     kind = str(entry.get("type", "Arrhenius"))
-    return "equation" in entry and kind_of(kind) is None and kind not in PRESSURE and not _needs_neighbour(kind)
+    known = kind_of(kind) or kind in PRESSURE or _is_masel(kind) or _needs_neighbour(kind)
+    return "equation" in entry and not known
 
 
 def is_evaluated(entry: Any, names: Iterable[str], beside: bool) -> bool:
@@ -127,8 +135,8 @@ def is_evaluated(entry: Any, names: Iterable[str], beside: bool) -> bool:
         return False
     reactants, products, _ = sides(str(entry["equation"]))
     outside = beside and not {*reactants, *products, *(entry.get("orders") or {})} <= set(names)
-    special = any(key in entry for key in (*STICKING, *CHARGED))
-    return outside or special or _is_foreign(entry) or bool(_needs_neighbour(str(entry.get("type", ""))))
+    special, kind = any(key in entry for key in (*STICKING, *CHARGED)), str(entry.get("type", ""))
+    return outside or special or _is_foreign(entry) or _is_masel(kind) or bool(_needs_neighbour(kind))
 
 
 def chosen(declared: Any, available: Iterable[str]) -> list[str]:
@@ -335,7 +343,9 @@ class Check:
             raise self.source.error(message, entry, "type")
         # Another extension has keys of its own.
         if not _is_foreign(entry):
-            inner = {**InterfaceArrhenius.keys, **STICKING, **CHARGED}
+            inner: dict[str, tuple[str, ...]] = {**InterfaceArrhenius.keys, **STICKING, **CHARGED}
+            if _is_masel(str(entry.get("type"))):
+                inner |= dict.fromkeys(("rate-constant", "sticking-coefficient"), MASEL)
             self._keys(entry, {*REACTION, *inner}, title)
             self._inside(entry, inner, self.names, title)
         self._equation(entry, [] if self.beside else self.names, title)

@@ -511,3 +511,40 @@ def test_phases_may_hold_species_of_one_name(beside, tmp_path):
     net.advance(1e-6)
     changed = [name for name, gas in gases.items() if abs(gas.mass / before[name] - 1) > 1e-9]
     assert changed == [beside.strip("[]").split(", ")[0]]
+
+
+CONSTANT = "rate-constant: {A: 1e3 m^3/mol/s, b: 0, Ea: 5}"
+MASEL = "type: Blowers-Masel, rate-constant: {A: 1e3 m^3/mol/s, b: 0, Ea0: 5, w: 400}"
+STUCK = "sticking-coefficient: {A: 0.3, b: 0, Ea: 5}"
+
+
+@pytest.mark.parametrize(
+    ("rate", "message"),
+    [
+        (f"{MASEL}, coverage-dependancies: {{}}", "'coverage-dependancies'. Did you mean 'coverage-dependencies'?"),
+        (f"{MASEL}, ordres: {{}}", "unknown key 'ordres'. Did you mean 'orders'?"),
+        (MASEL.replace("w:", "W:"), "rate-constant: unknown key 'W'"),
+        (MASEL.replace("Ea0:", "Ea:"), "rate-constant: unknown key 'Ea'. Did you mean 'Ea0'?"),
+    ],
+)
+def test_rates_that_cantera_evaluates_are_checked(rate, message, tmp_path):
+    with pytest.raises(InputError) as caught:
+        surfacechem.load(small(tmp_path, {CONSTANT: rate}))
+    assert message in str(caught.value)
+    assert "small.yaml:23: reaction CO + a(s) <=> CO(s): " in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "rate",
+    [
+        MASEL,
+        MASEL.replace("type: B", "type: sticking-B").replace(
+            "rate-constant: {A: 1e3 m^3/mol/s", "sticking-coefficient: {A: 0.3"
+        ),
+    ],
+)
+def test_rates_that_cantera_evaluates_are_its_own(rate, tmp_path):
+    data = surfacechem.run(small(tmp_path, {CONSTANT: rate})).dataset
+    assert float(data["R_R1"][0]) == pytest.approx(
+        small_alone(tmp_path).net_rates_of_progress[0] * 1e3 * AVOGADRO, rel=1e-9
+    )
