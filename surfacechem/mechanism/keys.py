@@ -90,8 +90,7 @@ AMOUNT = ("quantity",)
 BARE = {
     "site-density": (AMOUNT, "kmol/m^2", "1e-9 mol/m^2"),
     "A": (AMOUNT, "powers of m^2/kmol", "1e8 m^2/mol/s"),
-    "Ea": (ENERGY, "J/kmol", "50 kJ/mol"),
-    "E": (ENERGY, "J/kmol", "50 kJ/mol"),
+    **dict.fromkeys(("Ea", "Ea0", "w", "E"), (ENERGY, "J/kmol", "50 kJ/mol")),
     "h0": (AMOUNT, "J/kmol", "-10 kJ/mol"),
     "s0": (AMOUNT, "J/(kmol K)", "50 J/mol/K"),
     "cp0": (AMOUNT, "J/(kmol K)", "30 J/mol/K"),
@@ -314,10 +313,16 @@ class Check:
             raise error(f"{title} has no `rate-constant: {{A, b, Ea}}`.", entry)
         if leading(rate.get("A")) < 0:
             raise error(f"{title}: 'A' is negative: {REMEDIES['negative-A']}", rate, "A")
+        self._coefficients(entry, title)
+
+    def _coefficients(self, entry: Any, title: str) -> None:
+        """The numbers of a rate coefficient, and of a sticking coefficient, are not bare."""
         orders = {**sides(str(entry["equation"]))[0], **(entry.get("orders") or {})}
-        # Of first order A is a frequency, in 1/s whatever the units.
-        first = sum(map(leading, orders.values())) == 1
-        self._numbers(rate, ("Ea",) if first else ("A", "Ea"), title, entry)
+        # Of first order A is a frequency, in 1/s whatever the units; one that sticks is a probability. Others are currents.
+        plain = sum(map(leading, orders.values())) == 1 or bool(entry.get("exchange-current-density-formulation"))
+        for key, pure in (("rate-constant", plain), ("sticking-coefficient", True)):
+            if isinstance(rate := entry.get(key), Mapping):
+                self._numbers(rate, MASEL[2:] + ARRHENIUS[2 if pure else 0 :], title, entry)
 
     def _rate_type(self, entry: Any, title: str) -> type[InterfaceArrhenius]:
         """The rate type, which Cantera writes with or without its prefix; a plain rate needs none."""
@@ -348,6 +353,7 @@ class Check:
                 inner |= dict.fromkeys(("rate-constant", "sticking-coefficient"), MASEL)
             self._keys(entry, {*REACTION, *inner}, title)
             self._inside(entry, inner, self.names, title)
+            self._coefficients(entry, title)
         self._equation(entry, [] if self.beside else self.names, title)
 
     def _equation(self, entry: Any, known: list[str], title: str) -> list[str]:

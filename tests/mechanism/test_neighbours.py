@@ -548,3 +548,21 @@ def test_rates_that_cantera_evaluates_are_its_own(rate, tmp_path):
     assert float(data["R_R1"][0]) == pytest.approx(
         small_alone(tmp_path).net_rates_of_progress[0] * 1e3 * AVOGADRO, rel=1e-9
     )
+
+
+@pytest.mark.parametrize(
+    ("rate", "message"),
+    [
+        (CONSTANT.replace(" m^3/mol/s", ""), "A: 1000 without a unit counts in"),
+        (CONSTANT, "Ea: 5 without a unit counts in J/kmol"),
+        (STUCK, "Ea: 5 without a unit counts in J/kmol"),
+        (MASEL, "Ea0: 5 without a unit counts in J/kmol"),
+        (MASEL.replace("Ea0: 5", "Ea0: 5 kJ/mol"), "w: 400 without a unit counts in J/kmol"),
+    ],
+)
+def test_numbers_of_rates_with_neighbours_need_a_unit_too(rate, message, tmp_path):
+    units = "units: {length: m, quantity: mol, activation-energy: kJ/mol}"
+    with pytest.raises(InputError) as caught:
+        surfacechem.load(small(tmp_path, {CONSTANT: rate, units: "units: {length: m}"}))
+    assert message in str(caught.value)
+    assert "small.yaml:23: reaction CO + a(s) <=> CO(s): " in str(caught.value)
