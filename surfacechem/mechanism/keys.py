@@ -23,6 +23,7 @@ from surfacechem.mechanism.source import (
     SPECIES,
     SURFACES,
     Source,
+    converted,
     leading,
     sides,
     unitless,
@@ -87,10 +88,12 @@ PRESSURE = ("three-body", "falloff", "chemically-activated", "pressure-dependent
 """Rate types of gases."""
 
 AMOUNT = ("quantity",)
+ENERGIES = ("Ea", "Ea0", "w", "E")
+"""Energies of rates."""
 BARE = {
     "site-density": (AMOUNT, "kmol/m^2", "1e-9 mol/m^2"),
     "A": (AMOUNT, "powers of m^2/kmol", "1e8 m^2/mol/s"),
-    **dict.fromkeys(("Ea", "Ea0", "w", "E"), (ENERGY, "J/kmol", "50 kJ/mol")),
+    **dict.fromkeys(ENERGIES, (ENERGY, "J/kmol", "50 kJ/mol")),
     "h0": (AMOUNT, "J/kmol", "-10 kJ/mol"),
     "s0": (AMOUNT, "J/(kmol K)", "50 J/mol/K"),
     "cp0": (AMOUNT, "J/(kmol K)", "30 J/mol/K"),
@@ -318,7 +321,7 @@ class Check:
     def _coefficients(self, entry: Any, title: str) -> None:
         """The numbers of a rate coefficient, and of a sticking coefficient, are not bare."""
         orders = {**sides(str(entry["equation"]))[0], **(entry.get("orders") or {})}
-        # Of first order A is a frequency, in 1/s whatever the units; one that sticks is a probability. Others are currents.
+        # Of first order A is a frequency, in 1/s whatever the units; it may be a current, or a chance to stick.
         plain = sum(map(leading, orders.values())) == 1 or bool(entry.get("exchange-current-density-formulation"))
         for key, pure in (("rate-constant", plain), ("sticking-coefficient", True)):
             if isinstance(rate := entry.get(key), Mapping):
@@ -442,5 +445,21 @@ class Check:
                     f"{number:g} without a unit counts in {unit}. Write it with its unit, such as "
                     f"`{key}: {example}`, or say at the top `units: {{quantity: mol, activation-energy: kJ/mol}}`."
                 )
+            elif key in ENERGIES:
+                problem = self._energy(value, entry)
             if problem:
                 raise self.source.error(f"{title}: {key}: {problem}", node, key)
+
+    def _energy(self, value: Any, entry: Any) -> str:
+        """What is wrong with an energy of a rate, or with one of several; what is none Cantera refuses itself."""
+        import cantera
+
+        units = cantera.UnitSystem(self.source.defaults(entry))
+        for one in value if isinstance(value, list) else [value]:
+            try:
+                converted(units, one, "J/mol")
+            except InputError as error:
+                return error.message
+            except (cantera.CanteraError, TypeError, ValueError):
+                continue
+        return ""

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import MISSING, fields
 from difflib import get_close_matches
 from functools import lru_cache
+from math import inf
 from typing import Any
 
 from surfacechem.contracts.terms import Law, Spec
@@ -43,8 +44,12 @@ OWN = {
 }
 """Units of numbers that Cantera does not read: what in `units` gives a bare one a meaning, and an example."""
 
-LONGEST = 1e-5
-"""Lengths [m] above this are not those of molecules, not even of tethers."""
+MOST = {
+    "m": (1e-5, "a length", "0.4 nm"),
+    "J": (1e7 / AVOGADRO, "an energy", "50 kJ/mol"),
+    "J/mol": (1e7, "an energy", "50 kJ/mol"),
+}
+"""What no molecule has, not even a tether: the largest number in a unit, and an example of one that is meant."""
 
 NUMBER, NAME, MAPPING, LIST = (int, float), (str, int, float), (dict,), (list,)
 
@@ -330,22 +335,25 @@ def unitless(value: Any, given: Mapping[str, Any], wanted: Iterable[str]) -> flo
 
 def converted(units: Any, value: str | float, unit: str) -> float:
     """A number in an SI unit; energies may be per molecule or per mole, as Cantera's activation energies."""
-    import cantera
-
     if unit == "1":
         return float(value)
+    number = _energy(units, value, unit) if unit in ("J", "J/mol") else float(units.convert_to(value, unit))
+    # What was meant in nanometres, or per mole, is not caught by its unit.
+    largest, what, example = MOST.get(unit, (inf, "", ""))
+    if abs(number) > largest:
+        raise InputError(f"{value} is {what} of {number:g} {unit}, which no bond has; write it as `{example}`.")
+    return number
+
+
+def _energy(units: Any, value: str | float, unit: str) -> float:
+    import cantera
+
     if unit == "J" and isinstance(value, str):
         try:
             return float(units.convert_to(value, "J"))
         except cantera.CanteraError:
             pass  # an energy per amount
-    if unit in ("J", "J/mol"):
-        return float(units.convert_activation_energy_to(value, "J/kmol")) / (KILO * (AVOGADRO if unit == "J" else 1))
-    number = float(units.convert_to(value, unit))
-    # A number in metres that was meant in nanometres is not caught by its unit.
-    if unit == "m" and abs(number) > LONGEST:
-        raise InputError(f"{value} is a length of {number:g} m, which no bond has; write it as `0.4 nm`.")
-    return number
+    return float(units.convert_activation_energy_to(value, "J/kmol")) / (KILO * (AVOGADRO if unit == "J" else 1))
 
 
 def _shown(value: Any) -> str:

@@ -116,6 +116,16 @@ REFUSED = {
     "an enthalpy that overflows": ("h0: -172.3808 kJ", "h0: -1.8e305 kJ", "species AB(s): thermo: h0 must be finite"),
     "a temperature that is empty": ("T0: 298.15 K", "T0: ''", "'' is no temperature above zero in kelvin"),
     "a temperature that is no number": ("T0: 298.15 K", "T0: .inf K", "no temperature above zero in kelvin"),
+    "a barrier per molecule": (
+        "b: 0, Ea: 0}",
+        "b: 0, Ea: 5 kJ}",
+        "Ea: 5 kJ is an energy of 3.01107e+27 J/mol, which no",
+    ),
+    "a dependence per molecule": (
+        "b: 0, Ea: 0}",
+        "b: 0, Ea: 0}\n  coverage-dependencies: {A(s): {a: 0, m: 0, E: [1, 5 kJ]}}",
+        "E: 5 kJ is an energy of 3.01107e+27 J/mol, which no bond has; write it as `50 kJ/mol`",
+    ),
     "a site density that underflows": ("site-density: 1.0e-4", "site-density: 1e-323", "Site density must be positive"),
 }
 
@@ -176,6 +186,7 @@ LOADED = """\
         ("  type: Bell\n", "", "'x-beta' is no key of interface-Arrhenius; it belongs to interface-Bell, "),
         ("0.4 nm", "0.4", "x-beta: 0.4 has no unit, and `units` says nothing about it; write it in m, such as"),
         ("0.4 nm", "0.4 pN", "x-beta = 0.4 pN is not a quantity in m"),
+        ("type: Bell", "type: Dudko-Hummer-Szabo\n  barrier: 5 kJ", "barrier: 5 kJ is an energy of 5000 J, which no"),
         ("type: Bell", "type: Dudko-Hummer-Szabo", "a rate of type Dudko-Hummer-Szabo needs `barrier`"),
     ],
 )

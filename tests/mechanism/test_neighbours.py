@@ -524,6 +524,8 @@ STUCK = "sticking-coefficient: {A: 0.3, b: 0, Ea: 5}"
         (f"{MASEL}, coverage-dependancies: {{}}", "'coverage-dependancies'. Did you mean 'coverage-dependencies'?"),
         (f"{MASEL}, ordres: {{}}", "unknown key 'ordres'. Did you mean 'orders'?"),
         (MASEL.replace("w:", "W:"), "rate-constant: unknown key 'W'"),
+        (CONSTANT.replace("Ea: 5", "Ea: 5 kJ"), "Ea: 5 kJ is an energy of 3.01107e+27 J/mol, which no bond has; write"),
+        (STUCK.replace("Ea: 5", "Ea: 5 kJ"), "Ea: 5 kJ is an energy of 3.01107e+27 J/mol, which no bond has"),
         (MASEL.replace("Ea0:", "Ea:"), "rate-constant: unknown key 'Ea'. Did you mean 'Ea0'?"),
     ],
 )
