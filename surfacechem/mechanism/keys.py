@@ -200,6 +200,24 @@ class Check:
             message = "the phase has no `site-density`. Give one, for instance `site-density: 1e-9 mol/cm^2`."
             raise error(message, phase)
         self._numbers(phase, ("site-density",), title)
+        if self.beside:
+            self._neighbours(phase, ())
+
+    def _neighbours(self, phase: Any, before: tuple[str, ...]) -> None:
+        """No phase is its own neighbour, nor that of its neighbours: Cantera would go round without end."""
+        phases, path = (
+            {str(entry.get("name")): entry for entry in self.source.phases},
+            (*before, str(phase.get("name"))),
+        )
+        declared = phase.get("adjacent-phases") or ()
+        own = [item for item in declared if not isinstance(item, Mapping) or isinstance(item.get("phases"), list)]
+        for name in chosen(own, ()):
+            if name in path:
+                whose = "itself" if name == path[-1] else f"{name}, whose neighbour it is"
+                message = f"phase {path[-1]}: adjacent-phases: the phase names {whose}; remove that."
+                raise self.source.error(message, phase, "adjacent-phases")
+            if name in phases:
+                self._neighbours(phases[name], path)
 
     def _all_species(self, entries: list[Any]) -> None:
         """Every species; those of neighbours are Cantera's affair, but one without a name may be a misspelt one."""
@@ -454,7 +472,8 @@ class Check:
         """What is wrong with an energy of a rate, or with one of several; what is none Cantera refuses itself."""
         import cantera
 
-        units = cantera.UnitSystem(self.source.defaults(entry))
+        declared: Any = self.source.defaults(entry)
+        units = cantera.UnitSystem(declared)
         for one in value if isinstance(value, list) else [value]:
             try:
                 converted(units, one, "J/mol")

@@ -568,3 +568,22 @@ def test_numbers_of_rates_with_neighbours_need_a_unit_too(rate, message, tmp_pat
         surfacechem.load(small(tmp_path, {CONSTANT: rate, units: "units: {length: m}"}))
     assert message in str(caught.value)
     assert "small.yaml:23: reaction CO + a(s) <=> CO(s): " in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"[gas]": "[gas, surf]"}, ":7: phase surf: adjacent-phases: the phase names itself; remove that."),
+        ({"[gas]": "[{phases: [surf]}]"}, ":7: phase surf: adjacent-phases: the phase names itself"),
+        (
+            {"- name: gas\n": "- name: gas\n  adjacent-phases: [surf]\n"},
+            "phase gas: adjacent-phases: the phase names surf, whose neighbour it is",
+        ),
+    ],
+)
+def test_phases_that_name_each_other_are_refused(changes, message, tmp_path):
+    """Cantera calls itself until the stack ends, and the process with it."""
+    case = small(tmp_path, changes)
+    with pytest.raises(InputError) as caught:
+        surfacechem.load(case)
+    assert message in str(caught.value)
