@@ -51,7 +51,7 @@ class Mechanism:
     """Name of the coverage of each species."""
     phase: str
     temperatures: tuple[float, float]
-    """Range in which the thermo of every species holds [K]."""
+    """Range in which the thermo of every species holds, those of neighbours included [K]."""
     engine: Engine | None = None
     """Engine that evaluates the rates that are not lowered, if any."""
     remarks: tuple[str, ...] = ()
@@ -101,11 +101,12 @@ def load_mechanism(
     density = surface.site_density * MOLECULAR
     # A bond that takes two sites can form half as often, so that phi is the coverage of bonds in either case.
     possible = density / min((item.sites for item in chosen), default=1.0)
-    temperatures = (float(surface.min_temp), float(surface.max_temp))
-    mixture_place = source.place(entry, path="interface.mechanism")
-    mixture = IdealMixture(species=species, temperatures=temperatures, place=mixture_place)
     reactions = tuple(_reaction(source, f"R{i}", *one, species) for i, one in enumerate(kept, start=1))
     engine = SurfaceEngine(surface, species, reactions, neighbours or {})
+    phases = (surface, *(held.phase for held in engine.held))
+    temperatures = max(float(phase.min_temp) for phase in phases), min(float(phase.max_temp) for phase in phases)
+    mixture_place = source.place(entry, path="interface.mechanism")
+    mixture = IdealMixture(species=species, temperatures=temperatures, place=mixture_place)
     return Mechanism(
         potentials=(mixture,),
         reactions=reactions,

@@ -587,3 +587,10 @@ def test_phases_that_name_each_other_are_refused(changes, message, tmp_path):
     with pytest.raises(InputError) as caught:
         surfacechem.load(case)
     assert message in str(caught.value)
+
+
+def test_a_temperature_out_of_the_range_of_a_gas_is_told(tmp_path):
+    """The surface's own species hold anywhere, the data of the gas above 300 K."""
+    cold, warm = (surfacechem.run(small(tmp_path, {"600 K": T})).dataset for T in ("250 K", "310 K"))
+    assert "T_c ran from 250 to 250, its range is 300 to 3500" in cold.attrs["warnings"]
+    assert "extrapolation" not in warm.attrs["warnings"]
