@@ -128,6 +128,14 @@ def _replaced(body: Body, reactor: Any) -> Body:
     return replace(body, temperature=Hold(level=float(reactor.T)))
 
 
+class Through(cantera.Wall):
+    """A wall between reactors, through which an interface gives them heat or moves."""
+
+    def __init__(self, left: Any, right: Any, *, interface: Any, **options: Any) -> None:
+        super().__init__(left, right, **options)
+        self.interface = interface
+
+
 class StandIn(cantera.Reservoir):
     """A reservoir that stands for a body: it takes heat through walls, and nothing else."""
 

@@ -33,8 +33,8 @@ class Receiver:
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
-        self.sources: list[Callable[[float], tuple[Array, float]]] = []
-        """Amounts of species [kmol/s] and enthalpy [W] that come in at a time [s]."""
+        self.sources: list[tuple[Any, Callable[[float], tuple[Array, float]]]] = []
+        """Interfaces, and the amounts of species [kmol/s] and enthalpy [W] that come in from each at a time [s]."""
 
 
 class Gas(Receiver):
@@ -54,7 +54,7 @@ class Gas(Receiver):
     def after_eval(self, t: float, _lhs: Any, rhs: Any) -> None:
         """Called by Cantera after its own balances of mass, energy and species, which this adds to."""
         rates, first, phase = np.asarray(rhs), self.temperature + 1, self.phase  # type: ignore[attr-defined]
-        for source in self.sources:
+        for _, source in self.sources:
             amounts, enthalpy = source(t)
             masses = amounts * self.weights
             total = float(amounts @ self.weights)
@@ -168,5 +168,5 @@ class ReactingSolid(Receiver, HeldReactor):
         self.phase.TPX = None, None, x
 
     def rates(self, t: float) -> Array:
-        made = sum((source(t)[0] for source in self.sources), np.zeros(len(self.x)))
+        made = sum((source(t)[0] for _, source in self.sources), np.zeros(len(self.x)))
         return np.asarray(made / self.whole)

@@ -9,7 +9,6 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn, Self
 
-import cantera
 import numpy as np
 
 from surfacechem import format as cases
@@ -17,7 +16,7 @@ from surfacechem.contracts.terms import Spec
 from surfacechem.contracts.units import parse
 from surfacechem.errors import InputError
 from surfacechem.format import Case
-from surfacechem.reactor.coupling import Port, function_of, node_of, suffix_of
+from surfacechem.reactor.coupling import Port, Through, function_of, node_of, suffix_of
 from surfacechem.reactor.embedded import EmbeddedScene, EndError, History
 from surfacechem.reactor.gas import Receiver, refuse
 from surfacechem.runs.simulation import Simulation
@@ -98,6 +97,8 @@ class InterfaceReactor(HeldReactor):
         self.bodies, self.neighbours = dict(bodies or {}), dict(neighbours or {})
         self.ports: dict[str, Port] = {}
         self.loads: dict[str, Callable[[float], float]] = {}
+        self.pressing: tuple[Any, ...] = ()
+        """Reactors on both sides of the wall that moves as the gap does."""
         self.passes_breakpoints = False
         """Whether the network looks after breakpoints."""
         self.t = 0.0
@@ -109,13 +110,15 @@ class InterfaceReactor(HeldReactor):
         """Whether a wall is made that carries heat between a body and the reactor in its place."""
         self._varied = False
         """Whether Cantera varies multipliers while it asks for rates."""
+        self._put, self._told = False, 0.0
+        """Whether variables were put since others asked for rates, and the time at which they did [s]."""
         self.evaluations, self.seconds = 0, 0.0
         self._take_up(self.scene)
         for body, reactor in self.bodies.items():
             self._connect(reactor, body)
         for k, neighbour in enumerate(self.neighbours.values()):
             if isinstance(neighbour, Receiver):
-                neighbour.sources.append(partial(self._given, k))
+                neighbour.sources.append((self, partial(self._given, k)))
 
     def __repr__(self) -> str:
         """Title and states in a line."""
@@ -156,13 +159,13 @@ class InterfaceReactor(HeldReactor):
     def _connect(self, reactor: Any, body: str) -> None:
         """Connect a reactor by a wall through which it loses the heat that keeps the body at its temperature."""
         self._connecting = True
-        heat = lambda t: -float(self.attempt(self._rates, t)[self._accounts[body]])  # noqa: E731
-        self._walls.append(cantera.Wall(self, reactor, A=self.area, Q=heat))
+        heat = lambda t: -float(self._rates_for_others(t)[self._accounts[body]])  # noqa: E731
+        self._walls.append(Through(self, reactor, interface=self, A=self.area, Q=heat))
         self._connecting = False
 
     def _given(self, k: int, t: float) -> tuple[Array, float]:
         """Amounts of species [kmol/s] that reactions give to a neighbour at a time [s], and their enthalpy [W]."""
-        return self.scene.beside[k].given(self.attempt(self._rates, t), self.area)
+        return self.scene.beside[k].given(self._rates_for_others(t), self.area)
 
     def _add_wall(self, wall: Any) -> None:
         """Called by Cantera where a wall is made on this reactor itself, which is two bodies and what is between."""
@@ -300,10 +303,10 @@ class InterfaceReactor(HeldReactor):
                 f"{read[0]} depends on the load of the gap, which a reactor gives at the ends of steps. Prescribe F_n."
             )
         self._take_up(scene)
-        self.loads["F_n"] = push
+        self.loads["F_n"], self.pressing = push, (gas, outside)
         gap = scene.states.index("g_n")
-        rate = lambda t: float(self.attempt(self._rates, t)[gap])  # noqa: E731
-        self._walls.append(cantera.Wall(gas, outside, A=self.area, velocity=rate))
+        rate = lambda t: float(self._rates_for_others(t)[gap])  # noqa: E731
+        self._walls.append(Through(gas, outside, interface=self, A=self.area, velocity=rate))
 
     def _refuse_late(self, what: str) -> None:
         if self.evaluations:
@@ -321,7 +324,7 @@ class InterfaceReactor(HeldReactor):
         return np.asarray(self.x / self.unit)
 
     def put(self, x: Array) -> None:
-        self.x, self._current, self._dated = x * self.unit, False, False
+        self.x, self._current, self._dated, self._put = x * self.unit, False, False, True
         for port in self.ports.values():
             port.warm(float(self.x[self.scene.states.index(port.node)]))
 
@@ -362,6 +365,21 @@ class InterfaceReactor(HeldReactor):
             raise self.error or BackOffError(stop) from None
         self._last, self._asked, self._current = (t, self.x, rates), asked, True
         return rates
+
+    def _rates_for_others(self, t: float) -> Array:
+        """Rates for a reactor in the network, which puts variables before each evaluation if this one is in it, too."""
+        if not self._put and t != self._told:
+            raise InputError(self.left_out("a reactor"))
+        self._put, self._told = False, t
+        return self.attempt(self._rates, t)
+
+    def left_out(self, partner: str) -> str:
+        """What to say of a network that has a partner of the interface, but not the interface."""
+        return (
+            f"the interface {self.name} to which {partner} is connected is not in the network, so what it gives and "
+            "takes would never change: give it to the network too. Where another interface has replaced it, make the "
+            "reactor anew with that."
+        )
 
     def _stopped(self, reason: str) -> InterfaceStopped:
         """The end of the scene here, which is also kept where Cantera loses it."""

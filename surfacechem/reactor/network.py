@@ -12,6 +12,7 @@ import cantera
 import numpy as np
 
 from surfacechem.errors import InputError
+from surfacechem.reactor.coupling import Through
 from surfacechem.reactor.interface import InterfaceReactor
 from surfacechem.reactor.watch import AHEAD, Watch
 from surfacechem.solve.adapters.cantera_network import HeldReactor, last_step
@@ -264,8 +265,9 @@ class ReactorNet(cantera.ReactorNet):
         return [interface.heard(float(self.time)) for interface in self.interfaces]
 
     def _begin(self) -> None:
-        self._fresh, self._started = False, self.time
         self._refuse_strangers()
+        self._refuse_left_out()
+        self._fresh, self._started = False, self.time
         for interface in self.interfaces:
             interface.begin_piece(self.time, self.rtol)
             if interface.scene.moments:
@@ -282,6 +284,7 @@ class ReactorNet(cantera.ReactorNet):
         for interface in self.interfaces:
             others = [(f"stands for the body {body}", reactor) for body, reactor in interface.bodies.items()]
             others += [(f"is the neighbour {name}", reactor) for name, reactor in interface.neighbours.items()]
+            others += [("presses on the gap", reactor) for reactor in interface.pressing]
             for name, port in interface.ports.items():
                 others += [(f"has a wall to {name}", reactor) for reactor in port.others()]
             for role, reactor in others:
@@ -290,6 +293,15 @@ class ReactorNet(cantera.ReactorNet):
                         f"the reactor that {role} of {interface.name} is not in the network, so it "
                         "would never change: give it to ReactorNet too, or let it be a Reservoir."
                     )
+
+    def _refuse_left_out(self) -> None:
+        """Refuse reactors whose interfaces are not in the network, and would give and take what they did at first."""
+        for reactor in self.reactors:
+            connected = [interface for interface, _ in getattr(reactor, "sources", ())]
+            connected += [wall.interface for wall in reactor.walls if isinstance(wall, Through)]
+            for interface in connected:
+                if all(item is not interface for item in self.interfaces):
+                    raise InputError(interface.left_out(reactor.name))
 
     def _arrive(self, t: float) -> None:
         pieces = [interface for interface in self.interfaces if t in interface.scene.breakpoints]

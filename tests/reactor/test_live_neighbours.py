@@ -194,6 +194,23 @@ def test_a_gas_that_is_not_in_the_network():
         InterfaceReactor("exothermic", neighbours={"gas": fuel()})
 
 
+@pytest.mark.parametrize(("kind", "error"), [(ReactorNet, InputError), (ct.ReactorNet, ct.CanteraError)])
+@pytest.mark.parametrize("ran", [False, True])
+def test_an_interface_that_is_not_in_the_network(kind, error, ran):
+    """Nor is it when another one has replaced it; it would give at the rates of the start. It may be given later."""
+    gas = fuel(energy="off")
+    first = InterfaceReactor(HELD, neighbours={"gas": gas}, area=AREA, name="first")
+    if ran:
+        kind([gas, first]).advance(1e-9)
+    second = InterfaceReactor(HELD, neighbours={"gas": gas}, area=AREA, name="second")
+    for reactors in ([gas, second], [second, gas], [gas]):
+        net = kind(reactors)
+        for _ in range(2):
+            with pytest.raises(error, match=r"the interface first to which .* is not in the network, so what it gives"):
+                net.advance(1e-3)
+    kind([gas, first, second]).advance(1e-9)
+
+
 ELECTRODE = """
 bodies: {particle: {temperature: 300 K}, cell: {temperature: 300 K}}
 interface:
@@ -261,6 +278,14 @@ def test_particles_of_one_phase_have_each_their_own():
     assert (small.x[0] - 0.1) > 5 * (large.x[0] - 0.1) > 0
     assert small.name == "solid_2"
     assert ReactingSolid(phase, mass=1.0, clone=False).phase is phase
+
+
+def test_a_particle_takes_nothing_from_a_cell_that_is_not_in_the_network():
+    _, solid = graphite(0.1, mass="20 g")
+    cells = [InterfaceReactor(ELECTRODE, neighbours={"anode": solid}, name=name) for name in "ab"]
+    for kind, error in ((ReactorNet, InputError), (ct.ReactorNet, ct.CanteraError)):
+        with pytest.raises(error, match=r"the interface a to which .* is not in the network"):
+            kind([solid, cells[1]]).advance(1.0)
 
 
 @pytest.mark.parametrize(

@@ -363,6 +363,24 @@ def test_a_chamber_that_is_not_in_the_network():
     assert held["T_1"] == pytest.approx(300.0, rel=1e-9)
 
 
+@pytest.mark.parametrize(("kind", "error"), [(ReactorNet, InputError), (ct.ReactorNet, ct.CanteraError)])
+def test_an_interface_that_is_not_in_the_network(kind, error):
+    """A chamber, and a gas that presses, would go on at the rates of the start."""
+    chamber, gas = (stirred(300.0, volume=1.0) for _ in range(2))
+    room = ct.Reservoir(gas.phase, clone=True)
+    lost = InterfaceReactor(PLATE, bodies={"chamber": chamber})
+    pressed = InterfaceReactor(PISTON, area=0.01)
+    pressed.press(gas, room)
+    for interface, reactor in ((lost, chamber), (pressed, gas)):
+        with pytest.raises(error, match=r"the interface interface to which .* is not in the network"):
+            kind([reactor]).advance(1.0)
+        kind([reactor, interface]).advance(0.1)
+    pressed = InterfaceReactor(PISTON, area=0.01)
+    pressed.press(gas, room)
+    with pytest.raises(InputError, match="the reactor that presses on the gap of interface is not in the network"):
+        ReactorNet([pressed]).advance(1.0)
+
+
 PLATE = """
 bodies:
   plate: {temperature: T_1, C: 2 kJ/m^2/K, capacity: constant}
