@@ -29,6 +29,12 @@ LONGEST = 1.0
 """Length of the integration that is assumed where no end is given [s]."""
 
 
+SWITCHES = ("energy_enabled", "chemistry_enabled")
+OF_FLOWS = ("device_coefficient", "time_function", "pressure_function")
+OF_WALLS = ("area", "heat_transfer_coeff", "emissivity", "expansion_rate_coeff", "heat_flux", "velocity")
+"""What of reactors and connectors is set, functions by their present values."""
+
+
 class ReactorNet(cantera.ReactorNet):
     """Cantera's ReactorNet for networks with interfaces.
 
@@ -49,7 +55,7 @@ class ReactorNet(cantera.ReactorNet):
         self._fresh = True
         self._started = -np.inf
         self._around: list[object] = []
-        """Quantities on which the interfaces depend beside their variables, at the present time."""
+        """Quantities on which rates depend beside the variables, at the present time."""
         super().__init__(reactors)
         self.interfaces += [reactor for reactor in reactors if isinstance(reactor, InterfaceReactor)]
         _number([reactor for reactor in reactors if isinstance(reactor, HeldReactor)])
@@ -78,6 +84,10 @@ class ReactorNet(cantera.ReactorNet):
         InterfaceStopped
             Where a scene ends, with the reason.
         """
+        self._take_up()
+        return self._advance(t, apply_limit)
+
+    def _advance(self, t: float, apply_limit: bool = True) -> float:
         while True:
             goal = min([t, *self._breakpoints()])
             with self._guarded():
@@ -174,12 +184,13 @@ class ReactorNet(cantera.ReactorNet):
         InterfaceStopped
             Where a scene ends, with the reason.
         """
+        self._take_up()
         following = self._breakpoints()
         if self._watch.interfaces:
             return self._watched_step(following)
         growth = GROWTH if self._steps < 2 else 10.0
         if following and (self._steps == 0 or self.time + growth * self._last_step >= following[0]):
-            return self.advance(following[0])
+            return self._advance(following[0])
         before = self.time
         with self._guarded():
             super().step()
@@ -245,24 +256,39 @@ class ReactorNet(cantera.ReactorNet):
         """To the end of the integrator's next step, or the event or breakpoint in it."""
         watch, ahead = self._watch, min(following, default=np.inf)
         if self._there(ahead):
-            return self.advance(ahead)
+            return self._advance(ahead)
         if self.time >= watch.known:
             with self._guarded():
                 self._look(min(ahead, self.time + LONGEST))
         event = watch.event
-        return self.advance(min(ahead, watch.known if event is None else event.t))
+        return self._advance(min(ahead, watch.known if event is None else event.t))
 
-    def _breakpoints(self) -> list[float]:
-        """Breakpoints ahead, in order."""
+    def _take_up(self) -> None:
+        """Begin, or begin anew where a script has changed anything since."""
         if self._fresh:
             self._begin()
         elif self._surroundings() != self._around:  # the integrator has been beyond this time, with what was before
             self._anew(f"what a script has changed at t = {self.time:g} s")
             self._around = self._surroundings()
+
+    def _breakpoints(self) -> list[float]:
+        """Breakpoints ahead, in order."""
         return sorted({b for interface in self.interfaces for b in interface.scene.breakpoints if b > self.time})
 
     def _surroundings(self) -> list[object]:
-        return [interface.heard(float(self.time)) for interface in self.interfaces]
+        """What a script may change: states, switches, rates and connectors of reactors, and reservoirs behind these."""
+        own = [reactor for reactor in self.reactors if not isinstance(reactor, HeldReactor)]
+        flows = [device for reactor in own for device in (*reactor.inlets, *reactor.outlets)]
+        walls = [wall for reactor in own for wall in reactor.walls if not isinstance(wall, Through)]
+        sides = [(device.upstream, device.downstream) for device in flows]
+        sides += [(wall.left_reactor, wall.right_reactor) for wall in walls]
+        inside = {id(reactor) for reactor in self.reactors}
+        found: list[object] = [end.phase.state.tobytes() for pair in sides for end in pair if id(end) not in inside]
+        for reactor in own:  # last, since reactors may share a phase, which shall have the state of one that runs
+            found += [reactor.phase.state.tobytes(), reactor.volume, _rate_constants(reactor)]
+            found += [_values(reactor, SWITCHES), *(_values(surface, ("area",)) for surface in reactor.surfaces)]
+        found += [_values(device, OF_FLOWS) for device in flows] + [_values(wall, OF_WALLS) for wall in walls]
+        return found + [interface.heard(float(self.time)) for interface in self.interfaces]
 
     def _begin(self) -> None:
         self._refuse_strangers()
@@ -342,6 +368,17 @@ class ReactorNet(cantera.ReactorNet):
         finally:
             for interface in self.interfaces:
                 interface.passes_breakpoints = False
+
+
+def _values(item: Any, names: Sequence[str]) -> list[object]:
+    return [getattr(item, name) for name in names]
+
+
+def _rate_constants(reactor: Any) -> bytes:
+    """Those of the reactions in it, which tell of their multipliers."""
+    if not reactor.chemistry_enabled or not getattr(reactor.phase, "n_reactions", 0):
+        return b""
+    return bytes(reactor.phase.forward_rate_constants.tobytes())
 
 
 def _number(reactors: Sequence[Any]) -> None:

@@ -235,6 +235,43 @@ def stirred(temperature, **options):
     return ct.IdealGasReactor(gas, clone=True, **options)
 
 
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda at: setattr(at["feed"], "mass_flow_rate", 1e-4),
+        lambda at: setattr(at["feed"], "mass_flow_rate", lambda t: 1e-6 * t),
+        lambda at: setattr(at["wall"], "heat_transfer_coeff", 1e3),
+        lambda at: setattr(at["wall"], "area", 10.0),
+        lambda at: setattr(at["wall"], "heat_flux", 1.0),
+        lambda at: (setattr(at["source"].phase, "TPX", (500.0, ct.one_atm, "O2: 1")), at["source"].syncState()),
+        lambda at: (setattr(at["oven"].phase, "TP", (500.0, ct.one_atm)), at["oven"].syncState()),
+        lambda at: (at["wall"].__setattr__("area", 10.0), setattr(at["gas"], "energy_enabled", False)),
+    ],
+)
+def test_what_a_script_changes_around_a_gas_takes_effect_at_once(change):
+    """As after ``reinitialize``; without a change nothing starts anew."""
+    found = []
+    for anew in (False, True):
+        gas = stirred(300.0, volume=1e-5)
+        source, oven, outside = (ct.Reservoir(stirred(T).phase, clone=True) for T in (300.0, 400.0, 300.0))
+        feed = ct.MassFlowController(source, gas, mdot=1e-7)
+        ct.PressureController(gas, outside, primary=feed, K=1e-7)
+        wall = ct.Wall(gas, oven, A=1e-4, U=1.0)
+        net = ReactorNet([gas, InterfaceReactor("exothermic")])
+        net.advance(200.0)
+        steps = net.solver_stats["steps"]
+        net.advance(200.1)
+        assert net.solver_stats["steps"] >= steps
+        before = gas.phase.T, *gas.phase["N2", "O2"].X
+        change({"gas": gas, "source": source, "oven": oven, "feed": feed, "wall": wall})
+        if anew:
+            net.reinitialize()
+        net.advance(201.0)
+        found.append((gas.phase.T, *gas.phase["N2", "O2"].X))
+    assert found[0] == pytest.approx(found[1], rel=1e-8)
+    assert found[0] != pytest.approx(before, rel=1e-5) or not gas.energy_enabled
+
+
 def energy(gas):
     return gas.mass * gas.phase.int_energy_mass
 
