@@ -315,11 +315,6 @@ class SurfaceEngine:
         known = {held.phase.name: held for held in self.held}
         refuse_unknown(neighbours, known, f"no reaction of the surface {self.surface.name} has a neighbour '{{}}'")
         for name, state in neighbours.items():
-            own = known[name].phase.species_names
-            if state.composition and list(state.composition) != own:
-                raise InputError(
-                    f"the reactor of the neighbour {name} has other species than the mechanism: {', '.join(own)}."
-                )
             given = known[name].given
             electric = {key: getattr(given, key) for key in ("electric_potential", "capacitance", "current")}
             known[name] = HeldPhase(known[name].phase, replace(state, **electric))

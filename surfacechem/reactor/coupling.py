@@ -7,11 +7,13 @@ is then the reactor's, and what flows into it the reactor receives.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
+from math import isclose
 from typing import Any
 
 import cantera
+import numpy as np
 
 from surfacechem.contracts.terms import Load
 from surfacechem.contracts.units import parse
@@ -22,9 +24,16 @@ from surfacechem.model.components.interface import LOADABLE
 from surfacechem.quantities import VARIABLES
 from surfacechem.reactor.gas import Receiver, refuse
 from surfacechem.scene import Body, Scene
+from surfacechem.tolerances import ROUNDING
 
 FORCES = ("Pa", "N", "W/m^2")
 """Units of loads that do work or heat at their present value, whatever their rate."""
+
+PROBES = (300.0, 1500.0)
+"""Temperatures [K] at which the thermo of species is compared: polynomials change at 1000 K."""
+
+TERMS = 100.0
+"""Size of the terms that enthalpies and entropies are sums of, in their units of the gas constant."""
 
 STAND_IN = """
 phases:
@@ -97,8 +106,42 @@ def with_neighbours(scene: Scene, reactors: Mapping[str, Any]) -> Scene:
         if not isinstance(reactor, Receiver | cantera.Reservoir):
             kinds = "a ReactingGas or a ReactingSolid"
             raise InputError(f"the neighbour {name} must be {kinds}, as {type(reactor).__name__} takes nothing.")
+    for name, own in engine.surface.adjacent.items():
+        if name in reactors:
+            _refuse_other(name, own, reactors[name].phase)
     states = {name: _state(reactor.phase) for name, reactor in reactors.items()}
     return replace(scene, interface=replace(scene.interface, engine=engine.beside(states)))
+
+
+def _refuse_other(name: str, own: Any, given: Any) -> None:
+    """Refuse a phase that is another one than the neighbour of the mechanism: what is exchanged would not add up."""
+    if own.species_names != given.species_names:
+        names = ", ".join(own.species_names)
+        raise InputError(f"the reactor of the neighbour {name} has other species than the mechanism: {names}.")
+    for ours, theirs in zip(own.species(), given.species(), strict=True):
+        for what, same in _sameness(ours, theirs):
+            if not same:
+                raise InputError(
+                    f"{ours.name} in the reactor of the neighbour {name} has another {what} than in the mechanism, so "
+                    "atoms or energy would be lost: give the reactor the phase of the mechanism's file."
+                )
+
+
+def _sameness(ours: Any, theirs: Any) -> Iterator[tuple[str, bool]]:
+    """Properties of a species, and whether two of one name agree in them."""
+    yield "composition", ours.composition == theirs.composition
+    yield "weight", isclose(ours.molecular_weight, theirs.molecular_weight, rel_tol=ROUNDING)
+    both = ours.thermo, theirs.thermo
+    if None in both:
+        return
+    low, high = max(each.min_temp for each in both), min(each.max_temp for each in both)
+    for T in np.clip(PROBES, low, high).tolist():
+        for what, function, unit in (
+            ("enthalpy", "h", cantera.gas_constant * T),
+            ("entropy", "s", cantera.gas_constant),
+        ):
+            found = [getattr(each, function)(T) for each in both]
+            yield f"{what} at {T:g} K", isclose(*found, rel_tol=ROUNDING, abs_tol=ROUNDING * TERMS * unit)
 
 
 def _state(phase: Any) -> Neighbour:

@@ -1,5 +1,7 @@
 """Gases of a network beside a surface: what reactions take they lose, and the books of both close."""
 
+from pathlib import Path
+
 import cantera as ct
 import numpy as np
 import pytest
@@ -184,6 +186,56 @@ def test_an_area_that_changes_while_the_network_runs(stepwise):
 def test_what_is_no_neighbour(neighbours, message):
     with pytest.raises(InputError, match=message):
         InterfaceReactor(WARM, neighbours={name: make() for name, make in neighbours.items()})
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("h0: -241.8", "h0: -241.9", "steam in the reactor of the neighbour gas has another enthalpy at 300 K than in"),
+        ("s0: 188.8", "s0: 188.9", "steam in .* another entropy at 300 K"),
+        ("cp0: 33.6", "cp0: 33.7", "steam in .* another enthalpy at 1500 K"),
+        ("H: 2, O: 1", "D: 2, O: 1", "steam in .* another composition"),
+        ("molar: 0", "molar: 1", ""),
+    ],
+)
+def test_a_gas_of_other_atoms_or_thermo_under_the_same_names(old, new, message, tmp_path, monkeypatch):
+    """What it receives would not be what the surface gives."""
+    phases = "\n".join(
+        (
+            "units: {quantity: mol, energy: kJ}",
+            "phases:",
+            "- {name: gas, thermo: ideal-gas, species: [steam, rest], state: {T: 300 K, P: 1 atm, X: {rest: 1}}}",
+            "- {name: wall, thermo: ideal-surface, species: [free(s), wet(s)], kinetics: surface, reactions: all,",
+            "   adjacent-phases: [gas], site-density: 1e-5 mol/m^2, state: {T: 300 K, coverages: {free(s): 1}}}",
+            "species:",
+            "- {name: steam, composition: {H: 2, O: 1},",
+            "   thermo: {model: constant-cp, T0: 300, h0: -241.8, s0: 188.8 J/mol/K, cp0: 33.6 J/mol/K}} # molar: 0",
+            "- {name: rest, composition: {Ar: 1}, thermo: {model: constant-cp}}",
+            "- {name: free(s), composition: {}, thermo: {model: constant-cp}}",
+            "- {name: wet(s), composition: {H: 2, O: 1}, thermo: {model: constant-cp, h0: -300}}",
+            "reactions: [{equation: steam + free(s) => wet(s), rate-constant: {A: 1 m^3/mol/s, b: 0, Ea: 0}}]",
+        )
+    )
+    monkeypatch.chdir(tmp_path)
+    Path("phases.yaml").write_text(phases)
+    assert old in phases
+    gas = ReactingGas(ct.Solution(yaml=phases.replace(old, new), name="gas"), clone=True)
+    case = """
+bodies: {a: {temperature: 300 K}, b: {temperature: 300 K}}
+interface:
+  temperature: 300 K
+  mechanism:
+    file: phases.yaml
+    phase: wall
+    neighbours: {gas: {pressure: 1 atm, composition: {steam: 0.5}, rest: rest}}
+initial: {coverages: {free(s): 1}}
+run: {until: 1 s, solver: cantera}
+"""
+    if message:
+        with pytest.raises(InputError, match=message):
+            InterfaceReactor(case, neighbours={"gas": gas})
+    else:
+        InterfaceReactor(case, neighbours={"gas": gas})
 
 
 def test_a_gas_that_is_not_in_the_network():
