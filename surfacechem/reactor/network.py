@@ -83,8 +83,12 @@ class ReactorNet(cantera.ReactorNet):
         ------
         InterfaceStopped
             Where a scene ends, with the reason.
+        cantera.CanteraError
+            For a time that is past.
         """
         self._take_up()
+        if self.time - t > AHEAD * np.spacing(abs(self.time)):
+            raise cantera.CanteraError(f"Cannot integrate backwards in time: {t:.17g} s < {self.time:.17g} s.")
         return self._advance(t, apply_limit)
 
     def _advance(self, t: float, apply_limit: bool = True) -> float:
