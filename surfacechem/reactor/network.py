@@ -286,7 +286,7 @@ class ReactorNet(cantera.ReactorNet):
         walls = [wall for reactor in own for wall in reactor.walls if not isinstance(wall, Through)]
         sides = [(device.upstream, device.downstream) for device in flows]
         sides += [(wall.left_reactor, wall.right_reactor) for wall in walls]
-        inside = {id(reactor) for reactor in self.reactors}
+        inside = {id(None), *(id(reactor) for reactor in self.reactors)}  # a connector that was refused lacks a side
         found: list[object] = [end.phase.state.tobytes() for pair in sides for end in pair if id(end) not in inside]
         for reactor in own:  # last, since reactors may share a phase, which shall have the state of one that runs
             found += [reactor.phase.state.tobytes(), reactor.volume, _rate_constants(reactor)]
