@@ -133,6 +133,33 @@ def test_runs_end_where_steps_run_out_between_jumps_and_with_an_output_at_a_jump
             assert each.result.times.tolist() == [0.0, end]
 
 
+BESIDE_A_CORNER = """
+bodies: {a: {temperature: 300 K}, b: {temperature: 300 K}}
+interface:
+  temperature: 300 K
+  friction: [stribeck: {mu_s: 0.6, mu_k: 0.3, v_s: 1 um/s, delta: 1, c_v: 1e11}]
+mechanics: {tangential: {k: 1e12, c_b: 1e11}}
+loading:
+  p: {table: {times: [0, 1, 2, 4], values: [0.36 MPa, 0.18 MPa, 0.09 MPa, 0.09 MPa]}}
+  w_t: {table: {times: [0, 1, 2, 4], values: [1 um, -1 um, -0.5 um, 0.5 um]}}
+run: {until: 1.2 s}
+"""
+MU_K = "interface.friction.stribeck.mu_k"
+
+
+def test_outputs_beside_a_corner_are_on_their_own_sides_where_the_time_of_an_arc_cannot_tell_them(monkeypatch):
+    simulation = case_runs.load(BESIDE_A_CORNER)
+    beside = [np.nextafter(1.0, 0.0), 1.0, np.nextafter(1.0, 2.0)]
+    run = replace(simulation.case.run, times=(0.0, *beside, 1.2), picture=None, looks=0.0)
+    pairs = [both(monkeypatch, simulation.model, run, {MU_K: 0.3 + part / 500}) for part in range(8)]
+    for each in (run for pair in pairs for run in pair):
+        before, at, after = each.everywhere["v"][1:4]
+        assert before == pytest.approx(at, rel=1e-9)
+        assert after > 0.5 * at  # the damper leaps with the far field
+    starts = [compiled.jumps[2].t for compiled, _ in pairs]
+    assert any(beside[0] - start == beside[1] - start for start in starts)
+
+
 @zoo.each("moving")
 def test_guards_are_in_play_by_the_rules_of_the_compiled_loop(member):
     system = member.system

@@ -11,7 +11,7 @@ from surfacechem.solve.radau.dense import finish_step, hold_rates, ledger_norm
 from surfacechem.solve.radau.guards import AT_START, find_event, keep_sides, mark_at_end, restore_sides, start_margins
 from surfacechem.solve.radau.linear import LARGE
 from surfacechem.solve.radau.newton import stage_count
-from surfacechem.solve.radau.outputs import write_now, write_outputs, write_picture
+from surfacechem.solve.radau.outputs import is_within, write_now, write_outputs, write_picture
 from surfacechem.solve.radau.step import (
     BRIEF,
     GOOD,
@@ -136,7 +136,7 @@ def _write_up_to(w: Any, i: int, end: float) -> None:
     segment, and where time cannot tell an event from its end, behind which no arc may follow.
     """
     counts, times = w.counts[i], w.times[row_of(w.times, i)]
-    while counts[OUTPUTS] < times.shape[0] and times[counts[OUTPUTS]] - w.origin <= end:
+    while counts[OUTPUTS] < times.shape[0] and is_within(w, times[counts[OUTPUTS]], end):
         write_now(w, w.outputs[i, counts[OUTPUTS]])
         counts[OUTPUTS] += 1
 
@@ -235,7 +235,7 @@ def _accept(w: Any, i: int, size: float, end: float, goes_on: bool) -> None:
     whole = size == (end - w.base) - w.tau or reached >= end
     times = w.times[row_of(w.times, i)]
     # Outputs at the end of an arc are those up to the end of what the arc is in.
-    shown = w.shown if whole and end == w.arc_end else end if whole else reached
+    shown = w.shown - w.origin if whole and end == w.arc_end else end if whole else reached
     counts[OUTPUTS] = write_outputs(w, times, w.outputs[i], counts[OUTPUTS], size, shown)
     if w.picture > 0.0:
         counts[INSIDE] = write_picture(w, w.inside_times[i], w.inside[i], counts[INSIDE], size)
@@ -379,7 +379,7 @@ def _run_arc(w: Any, i: int, end: float, goes_on: bool) -> int:
     _see_guards(w, aloft)
     # Not to a breakpoint that no load has, as a formula there is that of what follows.
     last = end if w.loads_change else max(end - DIGITS * end, 0.5 * (w.origin + end))
-    w.arc_end, w.shown, w.base = last - w.origin, end - w.origin, 0.0
+    w.arc_end, w.shown, w.base = last - w.origin, end, 0.0
     status = GOOD
     if 0.0 < ALOFT * aloft < FITTED * w.arc_end:
         # What returns so soon that a step might miss it has a piece of its own.
@@ -391,7 +391,7 @@ def _run_arc(w: Any, i: int, end: float, goes_on: bool) -> int:
         w.arcs[i, w.counts[i, ARCS] - 1, 1] = w.base + w.tau
     w.moment[0] = end if status == GOOD else min(_now(w), end)
     if status == EVENT and w.moment[0] == end:
-        _write_up_to(w, i, w.shown)
+        _write_up_to(w, i, w.shown - w.origin)
     for m in range(w.n_ledger):
         w.booked[m] += w.q[m]
     keep_largest(w.booked, w.exchanged)

@@ -162,6 +162,12 @@ def write_now(w: Any, row: Any) -> None:
 
 
 @compiled
+def is_within(w: Any, t: float, end: float) -> bool:
+    """Whether an output is up to this time of the arc, and not behind its segment, which may round to its end."""
+    return bool(t - w.origin <= end and t <= w.shown)
+
+
+@compiled
 def write_outputs(w: Any, times: Any, outputs: Any, first: int, h: float, end: float) -> int:
     """Outputs up to the end of the step, which lies at this time of the arc; returns how many the run has now."""
     last = first
@@ -169,7 +175,7 @@ def write_outputs(w: Any, times: Any, outputs: Any, first: int, h: float, end: f
         last += 1
     if last > first:
         _write_inside(w, times, outputs, first, last, h, w.origin)
-    if last < times.shape[0] and times[last] - w.origin == end:
+    while last < times.shape[0] and is_within(w, times[last], end):  # several where the time of the arc rounds
         end_of_step(w, h, outputs[last], w.trial_dot, outputs[last, w.n :])
         last += 1
     _add_booked(w, outputs, first, last)

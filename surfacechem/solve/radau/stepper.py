@@ -119,7 +119,7 @@ NUMBERS: dict[str, type] = {
     # Whether steps are explicit now; twice the number of those that were stiff.
     **dict.fromkeys(("explicit", "stiff_steps"), int),
     # Where edges are carried out: the time at which the arc began and that of the last rebound, with how long it stays
-    # away; where the arc ends at the latest, and up to where it has outputs, in its own time. The first event of the
+    # away; where the arc ends at the latest, in its own time, and up to where it has outputs. The first event of the
     # arc, and the steps taken and rejected before it; whether loads change at the end of the segment.
     **dict.fromkeys(("origin", "rebounded", "aloft", "arc_end", "shown"), float),
     **dict.fromkeys(("first_event", "steps_before", "rejected_before", "loads_change"), int),
