@@ -191,6 +191,17 @@ def _warm(w: Any, taker: int, made: float) -> tuple[float, float]:
 
 
 @compiled
+def _coldest(w: Any) -> float:
+    """Temperature before the jump of the coldest node that may take its heat."""
+    found, nodes = np.inf, w.nodes.shape[0]
+    if nodes > 0:
+        evaluate_at(w, NODES, w.moment, w.nodal)
+        for k in range(nodes):
+            found = min(found, w.nodal[k * (w.nodal.shape[0] // nodes)])
+    return float(found)
+
+
+@compiled
 def _book(w: Any, made: float, gain: float, heat: float, entropy: float) -> None:
     """Add the amounts of the jump to the accounts."""
     for m in range(w.n_ledger):
@@ -266,7 +277,7 @@ def jump(w: Any, i: int, e: int) -> bool:
     _look(w, w.nudged, nudged)
     gain = now[1] - before[1] + entropy
     small = ROUNDING * max(abs(before[1]), abs(now[1]), abs(entropy)) + DIGITS * before[-1] + abs(nudged[1] - before[1])
-    admissible = gain >= -small
+    admissible = gain >= -small or gain >= -small - abs(nudged[0] - before[0]) / _coldest(w)
     if not finite(w.after) or (w.edges[e, REFUSES] == 1 and not admissible):
         return False
     _write_event(w, i, e)

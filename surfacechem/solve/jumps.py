@@ -563,7 +563,8 @@ class Jumper:
     ) -> tuple[Array, Mask, dict[str, Array]]:
         """Entropy that jumps between these rows produce, whether the second law admits it, and the work done in them.
 
-        What does not count: rounding, and what the ``noise`` of the state that a guard measures makes.
+        What does not count: rounding, and what the ``noise`` of the state that a guard measures makes of entropy and of
+        energy, as heat of the coldest that may take it.
         """
         nudged = before.copy()
         if edge.measure:
@@ -572,4 +573,6 @@ class Jumper:
         gain = now[:, 1] - books[:, 1] + entropy_out
         small = ROUNDING * np.maximum(np.maximum(np.abs(books[:, 1]), np.abs(now[:, 1])), np.abs(entropy_out))
         small += DIGITS * still[:, -1] + np.abs(moved[:, 1] - still[:, 1])
+        if self._heat.nodes:
+            small += np.abs(moved[:, 0] - still[:, 0]) / self._heat.at(before)[0].min(axis=1)
         return gain, gain >= -small, dict(zip(self.system.given, (now[:, 2:-2] - books[:, 2:-2]).T, strict=True))

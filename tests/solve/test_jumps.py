@@ -155,3 +155,20 @@ def test_together_the_springs_pay():
 def test_an_interface_without_heat_of_its_own_cannot_pay():
     with pytest.raises(InputError, match="the interface pays, but here it has no heat of its own"):
         run(interface="  potential:", heat="", initial="")
+
+
+PRESSED = """
+bodies: {a: {temperature: 300 K}, b: {temperature: 300 K}}
+interface: {temperature: 300 K, potential: [penalty: {E_n: 1 GPa/m}], friction: [coulomb: {mu: 0.5}]}
+mechanics: {normal: {k: 1 GPa/m}, tangential: {k: 1 GPa/m}}
+programme: [press: {w_n: -SPEED, until: {p: 1 MPa}}, shear: {w_t: 1 mm/s, for: 0.1 s}]
+initial: {w_n: 1 mm, g_n: 1 mm, w_t: 0}
+run: {until: 20 s}
+"""
+
+
+@pytest.mark.parametrize("speed", ["1 mm/s", "0.7 mm/s", "0.3 mm/s"])
+def test_a_touch_within_the_rounding_of_its_gap_destroys_no_entropy(speed):
+    trajectory = Simulation(load_text(PRESSED.replace("SPEED", speed))).run().trajectory
+    assert [jump.edge.name for jump in trajectory.jumps][:2] == ["touch", "end of press"]
+    assert {jump.verdict for jump in trajectory.jumps} == {"admissible"}
