@@ -307,7 +307,17 @@ def test_friction_that_falls_as_soon_as_sliding_begins_has_no_velocity(delta):
     found = surfacechem.run(STRIBECK.replace("DELTA", str(delta)).replace("MU_S", "0.7"))
     assert found.status == "stopped"
     assert "no steady sliding velocity" in found.reason
+    assert "more viscous resistance would give one, so would a mass at" in found.reason
     assert found.trajectory.result.t == pytest.approx(0.7, rel=1e-5)
+
+
+def test_a_mass_beside_an_elastic_gap_is_not_asked_for():
+    """It is given: elastic sticking takes it from the velocity of sliding."""
+    friction = "stribeck: {mu_s: 0.7, mu_k: 0.5, v_s: 1 mm/s, delta: 0.3}"
+    drive = "{p: 1 MPa, w_t: {ramp: {start: 0 mm, rate: 1 mm/s}}}"
+    found = on_an_elastic_gap(drive, friction, ["mechanics={tangential: {m: 5e3 kg/m^2, k: 1 MPa/mm}}"])
+    assert found.status == "stopped"
+    assert "so would a mass if sticking were exact, without an elastic gap g_t at" in found.reason
 
 
 @pytest.mark.parametrize("more", [[], ["interface.potential=[{tangential-stiffness: {E_t: 1 MPa/um}}]"]])

@@ -37,7 +37,7 @@ REST = {"v": NONE, "v_2": NONE, "direction": ONE, "direction_2": ONE}
 
 UNSTABLE = (
     "no steady sliding velocity: nothing resists it, or friction falls faster with velocity than anything else "
-    "resists; a mass or a viscous resistance would give one"
+    "resists; more viscous resistance would give one, so would a mass"
 )
 
 PLACE = Place(path="mechanics.tangential")
@@ -69,6 +69,11 @@ class Formulation:
     def slides_inertially(self) -> bool:
         """Whether the velocity of sliding itself has inertia."""
         return self.inertial and not self.elastic
+
+    @property
+    def unstable(self) -> str:
+        """Why nothing tells the velocity of sliding, where nothing does, and what would."""
+        return f"{UNSTABLE} if sticking were exact, without an elastic gap g_t" if self.elastic else UNSTABLE
 
     @property
     def in_equilibrium(self) -> bool:

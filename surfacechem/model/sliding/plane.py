@@ -33,7 +33,7 @@ from surfacechem.model.automaton import NONE, Constraint, Mode, Register
 from surfacechem.model.build import Build, Record
 from surfacechem.model.components.mounting import ACROSS, LENGTH, Direction, FarField, far_field
 from surfacechem.model.constraints.set_valued import SLIP, breaks_bonds, set_valued
-from surfacechem.model.sliding.formulation import PLACE, UNSTABLE, Formulation, evolve, growth, name_traction
+from surfacechem.model.sliding.formulation import PLACE, Formulation, evolve, growth, name_traction
 from surfacechem.model.system import STABLE, Given, Margin
 from surfacechem.quantities import VARIABLES
 from surfacechem.tolerances import MOMENT, PICOMETRE, ROUNDING, SQRT_EPS, STILL, TINY
@@ -145,7 +145,7 @@ def motion(build: Build, kinds: Sequence[Formulation]) -> Iterator[Record]:
             yield Margin("friction in both directions", ratio, reason, remedy=remedy)
         # The slope at rest is that of the speeds to come.
         ahead = growth(slope.subs({SPEED: SPEED + TINY}))
-        yield Margin(f"{STABLE}speed", ahead, UNSTABLE, when={SLIP: (1,)}, stability="speed")
+        yield Margin(f"{STABLE}speed", ahead, kinds[0].unstable, when={SLIP: (1,)}, stability="speed")
     pull = _scaled(sides, largest)
     # Sliding begins where the pull points; what nothing holds back begins in the direction of its drive.
     drive = [build.total_derivative(side.far.force(NONE, NONE) - side.t_a) for side in sides]

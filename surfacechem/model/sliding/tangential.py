@@ -25,7 +25,6 @@ from surfacechem.model.constraints.set_valued import SLIP, breaks_bonds, set_val
 from surfacechem.model.sliding import plane, rate_and_state
 from surfacechem.model.sliding.formulation import (
     PLACE,
-    UNSTABLE,
     Formulation,
     directions,
     displacement,
@@ -325,7 +324,7 @@ def _sliding_row(
         )
     if kind.sticks and not in_proportion:  # the slope at rest is that of the velocities to come
         slope = growth(slope.subs({v: v + SLIP * TINY}))
-    yield Margin(f"{STABLE}{v}", slope, UNSTABLE, when=_while_sliding(kind), stability=str(v))
+    yield Margin(f"{STABLE}{v}", slope, kind.unstable, when=_while_sliding(kind), stability=str(v))
     return in_proportion
 
 
