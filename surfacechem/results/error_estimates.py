@@ -80,8 +80,8 @@ def accuracy(
     ``cells`` finds the errors of the cells across bodies, which a second run at another tolerance does not see;
     ``estimate`` is that of a second run, where there was one.
     """
-    if not len(trajectory.result.times):
-        return unknown("the run ended at its start")
+    if ended_at_start(trajectory):
+        return unknown(AT_START)
     if way == "balances":
         if len(trajectory.result.times) < 2:
             return unknown("the run ended before its second output")
@@ -99,6 +99,12 @@ def accuracy(
             unused = f"; the exact solution {exact[0]} does not apply to this scene: {error.message}"
     estimate = with_cells(estimate or against_tighter(trajectory), cells())
     return replace(estimate, source=f"{estimate.source}{unused}")
+
+
+def ended_at_start(trajectory: Trajectory) -> bool:
+    """Whether a run has not gone on from its start: no method has had a part in what is known of it."""
+    result = trajectory.result
+    return not len(result.times) or (trajectory.status == "stopped" and result.t == 0)
 
 
 def inexact(scene: Scene) -> list[Law]:
@@ -204,7 +210,7 @@ def against_tighter(trajectory: Trajectory) -> Accuracy:
 def estimated(trajectory: Trajectory, second: Trajectory) -> Accuracy:
     """Errors of states and of the times of events as a second run at another tolerance tells them."""
     other = second.run.rtol
-    if not len(trajectory.result.times):
+    if ended_at_start(trajectory):
         return unknown(AT_START)
     if trajectory.status == "failed" and len(trajectory.result.times) < 2:
         return unknown(f"the run failed: {trajectory.reason}")
@@ -542,7 +548,7 @@ def compared(first: Trajectory, second: Trajectory) -> Accuracy:
     if others and first.run.rtol > TIGHTEST:  # there rounding decides of events that change nothing
         return Accuracy(math.inf, f"{source}, which had {others}")
     if not errors:
-        return unknown("the run ended at its start")
+        return unknown(AT_START)
     return Accuracy(stated(errors), source, errors, named=partial(of_named, first.looked, second))
 
 

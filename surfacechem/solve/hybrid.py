@@ -35,6 +35,7 @@ from surfacechem.solve.contract import (
 from surfacechem.solve.equilibria import Point
 from surfacechem.solve.instant import ENDLESS, MANY, MISSED, REACHED, Instant
 from surfacechem.solve.jumps import Jump, Jumper
+from surfacechem.solve.radau.solver import consistent
 from surfacechem.tolerances import ATOM, BRIEF, DIGITS, NOISE, ULPS
 
 Found = TypeVar("Found")
@@ -326,6 +327,21 @@ def unbegun(problem: Problem, status: Status, end: float, ledger: Array) -> Resu
     events = Events(none, states, states, lines, index=np.empty(0, np.int64))
     begun = (problem.y0, np.zeros(n), ledger)
     return Result(problem, status, end, *begun, none, none, states, lines, events, Counters(), stepping=0.0)
+
+
+def begun(problem: Problem, result: Result) -> Result:
+    """The result with its start as output where it ended there with none, if the equations hold at the start: the state
+    before anything jumps.
+    """
+    if len(result.times) or not len(problem.times) or result.t > problem.times[0]:
+        return result
+    at, y, parameters = problem.times[:1], problem.y0, problem.parameters[0]
+    start = consistent(problem.program, float(at[0]), y, np.zeros_like(y), parameters)
+    if not start.valid:
+        return result
+    ledger = np.zeros((1, problem.program.n_ledger))
+    shown = replace(result, problem=problem, times=at, outputs=start.y[None], ledger_outputs=ledger)
+    return replace(shown, segment=None, inside=None, known=None)
 
 
 def merged(problem: Problem, arcs: Sequence[Arc], status: Status, end: float, ledger: Array) -> Result:

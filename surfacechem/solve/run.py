@@ -25,7 +25,7 @@ from surfacechem.solve.choice import EXPLICIT, method
 from surfacechem.solve.contract import Array, Index, Margin, Mask, Problem, Result, Solver, States, Status, among
 from surfacechem.solve.diagnose import ROUNDED, are_led_back, cause
 from surfacechem.solve.equilibria import NO_BALANCE, Equilibria, Point
-from surfacechem.solve.hybrid import Flow, Hybrid, carried, solve_together, without_stall
+from surfacechem.solve.hybrid import Flow, Hybrid, begun, carried, solve_together, without_stall
 from surfacechem.solve.jumps import Jump, Jumper
 from surfacechem.solve.radau.solver import consistent, output_rates
 from surfacechem.solve.segments import Passing
@@ -541,9 +541,9 @@ class Model:
         seconds = (time.perf_counter() - start - compiling) / len(items)
         self.compile_seconds += compiling
         done = []
-        for (run, values, _), (result, jumps, ended) in zip(items, ends, strict=True):
+        for (run, values, problem), (result, jumps, ended) in zip(items, ends, strict=True):
             status, reason = ended or self.verdict(run, result, values)
-            done.append(Trajectory(self, run, result, values, status, reason, seconds, jumps))
+            done.append(Trajectory(self, run, begun(problem, result), values, status, reason, seconds, jumps))
         return done
 
     def _flow(self, problem: Problem, crosses: bool) -> Flow[tuple[Result, tuple[Jump, ...], tuple[str, str] | None]]:

@@ -311,6 +311,17 @@ def test_friction_that_falls_as_soon_as_sliding_begins_has_no_velocity(delta):
     assert found.trajectory.result.t == pytest.approx(0.7, rel=1e-5)
 
 
+def test_a_run_that_ends_at_its_start_has_the_state_there(tmp_path):
+    text = STRIBECK.replace("DELTA", "0.7").replace("MU_S", "0.7").replace(", c_b: 1e3 Pa s/m", "")
+    found = surfacechem.run(text, "loading.w_t=-1 mm")
+    assert "no steady sliding velocity" in found.reason
+    assert found.dataset["time"].values.tolist() == [0.0]
+    last = [float(found.dataset[name][-1]) for name in ("u_t", "v", "E_spring_t", "T_1")]
+    assert last == pytest.approx([0.0, 0.0, 500.0, 300.0])
+    assert found.accuracy.source == "unknown: the run ended at its start"
+    assert found.write(tmp_path / "start.nc").exists()
+
+
 def test_a_mass_beside_an_elastic_gap_is_not_asked_for():
     """It is given: elastic sticking takes it from the velocity of sliding."""
     friction = "stribeck: {mu_s: 0.7, mu_k: 0.5, v_s: 1 mm/s, delta: 0.3}"
