@@ -29,13 +29,29 @@ from surfacechem.results.matching import exact_values, match
 from surfacechem.results.netcdf import COORDINATES, Column, versions
 from surfacechem.results.picture import shared
 from surfacechem.runs import spectrum
-from surfacechem.runs.keeping import ENDS, EXTREMES, SINGLE, at_end, balances_of, end_of, extreme
+from surfacechem.runs.keeping import (
+    ENDS,
+    EXTREMES,
+    SINGLE,
+    at_end,
+    balances_of,
+    described,
+    end_of,
+    extreme,
+    keep_of,
+)
 from surfacechem.runs.sheet import counted
 from surfacechem.runs.spectrum import Lifetime, Statistics
 from surfacechem.solve.run import Model, Run, Trajectory
 from surfacechem.tolerances import EPS
 
 Rupture = Statistics | Lifetime
+
+OWN_NAMES = ("time", RUN, "species", "coverage", "error", "entropy_destroyed", "lifetime")
+"""Names of dimensions and columns of sweeps that are no quantities."""
+
+BEGINNINGS = ("event", "checked", "hardest")
+"""Beginnings of the names of dimensions and columns of events, and of runs that are checked."""
 
 MOST_FOLLOWED = 64
 """Runs that the output times of a sweep follow; of more so many, evenly spread over them."""
@@ -287,13 +303,23 @@ def _of_statistics(found: Rupture, exact: references.Reference | Rupture) -> flo
 
 def parameter_names(system: System, plan: Plan) -> dict[str, str]:
     """Paths of the swept parameters by their names in the dataset: the last parts of a path that are no other's."""
-    taken = {*quantities(system), *system.inside, "time", RUN}
+    taken = _column_names(system)
     found: dict[str, str] = {}
     for path in plan.paths:
         parts = name_parts(path)
         names = ["_".join(parts[-k:]) for k in range(1, len(parts) + 1)]
-        found[next((name for name in names if name not in taken | set(found)), f"{names[-1]}_swept")] = path
+        free = (name for name in names if name not in taken | set(found) and not name.startswith(BEGINNINGS))
+        found[next(free, f"{names[-1]}_swept")] = path
     return found
+
+
+def _column_names(system: System) -> set[str]:
+    """Names that columns of a file or a store of a sweep may have, and its dimensions, beside those of BEGINNINGS."""
+    kept, shown = keep_of(None, system), {DATASET_NAMES.get(name, name) for name in quantities(system)}
+    stored = described(system, replace(kept, at_events=kept.last, reach=dict.fromkeys(kept.last, 0.0)))
+    more = [f"{name}_{which}" for name in shown for which in (*EXTREMES, *STATISTICS, "before", "after")]
+    exact = [f"{name}_exact" for name in (*more, "lifetime")]
+    return {*kept.last, *shown, *system.inside, *stored, *ENDS, *more, *exact, *OWN_NAMES}
 
 
 def dimensions(plan: Plan, names: Mapping[str, str]) -> dict[str, int]:

@@ -1,6 +1,7 @@
 """Sweeps: many runs of one compiled model, force spectra against the exact formulas, refusals."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from surfacechem.references import get
 from surfacechem.runs import rerun
 from surfacechem.runs.checking import check
 from surfacechem.runs.summaries import sweep_summary
+from surfacechem.runs.sweeps import parameter_names
 from surfacechem.solve import run as integrate
 from surfacechem.solve.radau.solver import Radau
 
@@ -397,6 +399,42 @@ def test_species_of_a_sweep_have_the_names_of_the_mechanism():
     data = surfacechem.load("dna-adhesive").sweep({"T_0": [298.0, 299.0]}).dataset
     assert data["coverage"].dims == ("T_0", "time", "species")
     np.testing.assert_array_equal(data["coverage"].sel(species="bond(s)"), data["theta_bond_s"])
+
+
+CUT_OFF = """
+T_0: 300 K
+bodies: {a: {temperature: T, C: 10 J/m^2/K}, b: {temperature: T, C: 10 J/m^2/K}}
+interface:
+  temperature: T
+  potential: [penalty: {E_n: 1e13 Pa/m}]
+  friction: [mohr-coulomb: {mu: 0.5, t_n_max: 0.2 MPa, c: 0.1 MPa}]
+mechanics: {normal: {k: 1e12 Pa/m}}
+loading: {w_n: {ramp: {start: -1 um, rate: 0.1 um/s}}, v: 1 um/s}
+initial: {T: 300 K}
+run: {until: 1 s}
+"""
+
+
+def test_a_parameter_that_is_called_like_an_extreme_is_told_from_it(tmp_path):
+    case = surfacechem.load(CUT_OFF)
+    swept = case.sweep({"interface.friction.mohr-coulomb.t_n_max": ["0.1 MPa", "0.2 MPa"]})
+    stored = case.stream(swept.plan, tmp_path / "s.zarr").run().dataset
+    for data in (swept.dataset, stored, xarray.load_dataset(swept.write(tmp_path / "s.nc"))):
+        assert data["mohr_coulomb_t_n_max"].values.tolist() == [1e5, 2e5]
+        assert data["t_n_max"].dims == ("mohr_coulomb_t_n_max",)
+        np.testing.assert_allclose(data["t_n_max"], -8.1818e5, rtol=1e-4)
+
+
+@pytest.mark.parametrize("name", ["force-spectroscopy", "stick-slip-debonding", "dna-adhesive"])
+def test_no_parameter_is_called_like_a_column(name, tmp_path, spectrum):
+    case = surfacechem.load(name)
+    swept = spectrum if name == "force-spectroscopy" else case.sweep({"T_0": [298.0, 299.0]})
+    stored = case.stream(swept.plan, tmp_path / "s.zarr").run().dataset
+    names = {str(each) for data in (swept.dataset, stored) for each in (*data.variables, *data.dims)}
+    names -= set(swept.parameters)
+    found = parameter_names(swept.system, SimpleNamespace(paths=[f"law.{each}" for each in names]))
+    assert len(found) == len(names) > 50
+    assert names.isdisjoint(found)
 
 
 def test_a_sweep_that_misses_the_accuracy_that_was_asked_for_says_so():
