@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from surfacechem.errors import InputError, OutputError, Place, SurfacechemError, nearest
+from surfacechem.errors import InputError, OutputError, Place, PlacedError, nearest
 
 if TYPE_CHECKING:
     import xarray
@@ -184,7 +184,7 @@ def _reason(path: Path, error: OSError) -> str:
 
 
 def save(target: Path, columns: Sequence[Column], attributes: Mapping[str, str | float | int]) -> None:
-    """A netCDF file, whole or not at all; OutputError says where the data is kept where there is no room for it."""
+    """A netCDF file, whole or not at all; OutputError says where the data is kept where it cannot be written."""
     try:
         with replacing(target) as temporary:
             write_netcdf(temporary, columns, attributes)
@@ -193,8 +193,8 @@ def save(target: Path, columns: Sequence[Column], attributes: Mapping[str, str |
         try:
             with replacing(kept) as temporary:
                 write_netcdf(temporary, columns, attributes)
-        except SurfacechemError:
-            raise OutputError(f"{error.message} There is no room in {kept.parent} either.", error.place) from None
+        except PlacedError as second:
+            raise OutputError(f"{error.message} In {kept.parent} it {second.message}", error.place) from None
         raise OutputError(
             f"{error.message} The results are kept in {kept}; move them from there.", error.place
         ) from None

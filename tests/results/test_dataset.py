@@ -13,7 +13,7 @@ from case_runs import solved
 import surfacechem
 from surfacechem.errors import InputError, OutputError
 from surfacechem.format import names
-from surfacechem.results.netcdf import Column, cf_unit, replacing, write_netcdf
+from surfacechem.results.netcdf import Column, cf_unit, replacing, save, write_netcdf
 
 pytestmark = pytest.mark.around
 
@@ -156,9 +156,15 @@ def test_what_has_no_room_is_kept_elsewhere(solution, tmp_path, monkeypatch):
 def test_where_there_is_no_room_at_all_nothing_stays_behind(solution, tmp_path, monkeypatch):
     monkeypatch.setattr("surfacechem.results.netcdf.write_netcdf", full_disk(tmp_path))
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    with pytest.raises(OutputError, match="There is no room in"):
+    with pytest.raises(OutputError, match=f"device. In {tmp_path} it cannot be written: No space left on device.$"):
         solution.write(tmp_path / "out.nc")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_what_no_file_can_hold_is_not_for_want_of_room(tmp_path):
+    twice = [Column("T", ("time",), np.zeros(3), "K", "temperature")] * 2
+    with pytest.raises(OutputError, match=r"cannot be written: .*name in use.* it cannot be written: .*name in use"):
+        save(tmp_path / "out.nc", twice, {})
 
 
 def test_only_errors_of_writing_are_told_as_such(tmp_path):
