@@ -15,7 +15,8 @@ import numpy as np
 from surfacechem import format as cases
 from surfacechem.contracts.units import parse
 from surfacechem.documents.document import ORIGIN, from_plain
-from surfacechem.documents.overrides import parameter_path
+from surfacechem.documents.document import parse as parse_document
+from surfacechem.documents.overrides import apply, parameter_path
 from surfacechem.errors import PATHS, InputError, Place, suggestion
 from surfacechem.format import Case, Overrides, Source
 from surfacechem.model.assemble import erring
@@ -619,6 +620,24 @@ class Simulation:
         units = self._units
         changes = {parameter_path(path, units): value for path, value in changes.items()}
         unknown = next((path for path in changes if path not in units), None)
+        if unknown is not None and self._is_key(unknown, changes[unknown]):
+            remedy = "give it to `load`, or to `surfacechem.run`, beside the case"
+            raise InputError(f"'{unknown}' is a key of the case, and no parameter that its runs may change: {remedy}.")
         if unknown is not None:
             raise InputError(f"no parameter '{unknown}' to change.{suggestion(unknown, self.system.changeable, PATHS)}")
         return {path: parse(value, units[path], name=path) for path, value in changes.items()}
+
+    def _is_key(self, path: str, value: float | str) -> bool:
+        """Whether a path is that of a key of the case, be its value a wrong one; initial values are parameters."""
+        case = self.case
+        if not case.text or path.startswith("initial."):
+            return False
+        try:
+            apply(parse_document(case.text), {path: value})
+        except InputError:
+            return False  # there is nothing whose key it would be
+        try:
+            cases.load_text(case.text, case.name, mechanism_text=case.mechanism_text, overrides={path: value})
+        except InputError as error:
+            return error.place is not None and error.place.path == path
+        return True
