@@ -103,10 +103,8 @@ def load_mechanism(
     possible = density / min((item.sites for item in chosen), default=1.0)
     reactions = tuple(_reaction(source, f"R{i}", *one, species) for i, one in enumerate(kept, start=1))
     engine = SurfaceEngine(surface, species, reactions, neighbours or {})
-    phases = (surface, *(held.phase for held in engine.held))
-    temperatures = max(float(phase.min_temp) for phase in phases), min(float(phase.max_temp) for phase in phases)
     mixture_place = source.place(entry, path="interface.mechanism")
-    mixture = IdealMixture(species=species, temperatures=temperatures, place=mixture_place)
+    mixture = IdealMixture(species=species, temperatures=engine.temperatures, place=mixture_place)
     return Mechanism(
         potentials=(mixture,),
         reactions=reactions,
@@ -118,7 +116,7 @@ def load_mechanism(
         text=source.text,
         species={item.name: item.variable for item in species},
         phase=str(entry["name"]),
-        temperatures=temperatures,
+        temperatures=engine.temperatures,
         engine=engine if engine.gives else None,
         remarks=(*said, *odd),
     )

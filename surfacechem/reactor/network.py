@@ -282,16 +282,12 @@ class ReactorNet(cantera.ReactorNet):
     def _surroundings(self) -> list[object]:
         """What a script may change: states, switches, rates and connectors of reactors, and reservoirs behind these."""
         own = [reactor for reactor in self.reactors if not isinstance(reactor, HeldReactor)]
-        flows = [device for reactor in own for device in (*reactor.inlets, *reactor.outlets)]
-        walls = [wall for reactor in own for wall in reactor.walls if not isinstance(wall, Through)]
-        sides = [(device.upstream, device.downstream) for device in flows]
-        sides += [(wall.left_reactor, wall.right_reactor) for wall in walls]
-        inside = {id(None), *(id(reactor) for reactor in self.reactors)}  # a connector that was refused lacks a side
-        found: list[object] = [end.phase.state.tobytes() for pair in sides for end in pair if id(end) not in inside]
-        for reactor in own:  # last, since reactors may share a phase, which shall have the state of one that runs
-            found += [reactor.phase.state.tobytes(), reactor.volume, _rate_constants(reactor)]
-            found += [_values(reactor, SWITCHES), *(_values(surface, ("area",)) for surface in reactor.surfaces)]
-        found += [_values(device, OF_FLOWS) for device in flows] + [_values(wall, OF_WALLS) for wall in walls]
+        connectors = [connector for reactor in own for connector in _connectors(reactor)]
+        inside = {id(None), *map(id, self.reactors)}  # a connector that was refused lacks a side
+        ends = [end for _, sides in connectors for end in sides if id(end) not in inside]
+        found: list[object] = [end.phase.state.tobytes() for end in ends]
+        # Reactors last: they may share a phase, which shall have the state of one that runs.
+        found += [*map(_settings, own), *(values for values, _ in connectors)]
         return found + [interface.heard(float(self.time)) for interface in self.interfaces]
 
     def _begin(self) -> None:
@@ -378,11 +374,20 @@ def _values(item: Any, names: Sequence[str]) -> list[object]:
     return [getattr(item, name) for name in names]
 
 
-def _rate_constants(reactor: Any) -> bytes:
-    """Those of the reactions in it, which tell of their multipliers."""
-    if not reactor.chemistry_enabled or not getattr(reactor.phase, "n_reactions", 0):
-        return b""
-    return bytes(reactor.phase.forward_rate_constants.tobytes())
+def _connectors(reactor: Any) -> list[tuple[list[object], tuple[Any, Any]]]:
+    """Settings of the flow devices and walls of a reactor, each with the two reactors that it connects."""
+    flows, walls = (*reactor.inlets, *reactor.outlets), (w for w in reactor.walls if not isinstance(w, Through))
+    found = [(_values(flow, OF_FLOWS), (flow.upstream, flow.downstream)) for flow in flows]
+    return found + [(_values(wall, OF_WALLS), (wall.left_reactor, wall.right_reactor)) for wall in walls]
+
+
+def _settings(reactor: Any) -> list[object]:
+    """State, switches, areas of surfaces and rate constants of a reactor, which tell of their multipliers."""
+    phase = reactor.phase
+    state = [phase.state.tobytes(), reactor.volume, *_values(reactor, SWITCHES)]
+    reacts = reactor.chemistry_enabled and getattr(phase, "n_reactions", 0)
+    constants = phase.forward_rate_constants.tobytes() if reacts else b""
+    return [*state, constants, *(surface.area for surface in reactor.surfaces)]
 
 
 def _number(reactors: Sequence[Any]) -> None:

@@ -202,6 +202,12 @@ def _coldest(w: Any) -> float:
 
 
 @compiled
+def _is_admissible(w: Any, gain: float, small: float, heat: float) -> bool:
+    """Whether a jump gains entropy but for what is small, and for what so much heat may be uncertain."""
+    return bool(gain >= -small or gain >= -small - heat / _coldest(w))
+
+
+@compiled
 def _book(w: Any, made: float, gain: float, heat: float, entropy: float) -> None:
     """Add the amounts of the jump to the accounts."""
     for m in range(w.n_ledger):
@@ -277,7 +283,7 @@ def jump(w: Any, i: int, e: int) -> bool:
     _look(w, w.nudged, nudged)
     gain = now[1] - before[1] + entropy
     small = ROUNDING * max(abs(before[1]), abs(now[1]), abs(entropy)) + DIGITS * before[-1] + abs(nudged[1] - before[1])
-    admissible = gain >= -small or gain >= -small - abs(nudged[0] - before[0]) / _coldest(w)
+    admissible = _is_admissible(w, gain, small, abs(nudged[0] - before[0]))
     if not finite(w.after) or (w.edges[e, REFUSES] == 1 and not admissible):
         return False
     _write_event(w, i, e)
