@@ -18,7 +18,7 @@ from surfacechem.compile.program import Function, compile_function, needed
 from surfacechem.expressions import Expression, derivative
 from surfacechem.model.system import TOLERANCE, System
 from surfacechem.solve.contract import Array
-from surfacechem.tolerances import CROSSED, NEGLIGIBLE, NOISE
+from surfacechem.tolerances import CROSSED, DIGITS, NEGLIGIBLE
 
 PARTS_OF_A_PERIOD, MOST_PARTS = 8.17, 20_000
 """Parts into which the period of a load is cut, so many that no cut falls on a reversal, and the number of them above
@@ -52,11 +52,11 @@ def segment_parameters(system: System, starts: Array, rtol: float, values: Mappi
 
 
 def nudge(system: System, parameters: Array) -> None:
-    """Change the numbers of histories by the rounding of a formula, one up, the next down: a last digit may be lost
-    where a state has that rounding already, at an impact for instance. Times that pieces count from stay.
+    """Change the numbers of histories by a few roundings, one up, the next down: a last digit may be lost where a state
+    is rounded, at an impact for instance. Times that pieces count from stay.
     """
     loads = [j for j, p in enumerate(system.parameters) if p.path.startswith("loading.") and p.field != "origin"]
-    parameters[:, loads] *= 1 + NOISE * (-1.0) ** np.arange(len(loads))
+    parameters[:, loads] *= 1 + DIGITS * (-1.0) ** np.arange(len(loads))
 
 
 def start_modes(system: System, parameters: Array, values: Mapping[str, float]) -> None:

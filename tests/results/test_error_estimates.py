@@ -353,7 +353,7 @@ def shaken_plate(end):
 
 @pytest.mark.parametrize(("end", "asked"), [(22, ""), (34, ", accuracy: 1e-8")])
 def test_impacts_that_magnify_rounding_are_known_to(end, asked):
-    """Both runs round the times of the first impacts alike, and each of 10 to 18 doubles what is left of that."""
+    """Two runs of the same numbers round the times of the first impacts alike, and what follows magnifies that."""
     solution = surfacechem.load((PLATE % end).replace(" s}", f" s{asked}}}")).run()
     error = abs(solution.dataset["g_n"].values[-1] / shaken_plate(end) - 1)
-    assert 1e-8 < error < 2 * solution.accuracy.error < 20 * error
+    assert 1e-8 < error < 4 * solution.accuracy.error < 40 * error  # the difference of two random sums
