@@ -11,6 +11,7 @@ from collections.abc import Collection, Iterable, Mapping
 from typing import Any
 
 from surfacechem.errors import InputError, Place, refuse_unknown, suggestion
+from surfacechem.mechanism.evaluated import GASES
 from surfacechem.mechanism.interaction import CAPACITY, COEFFICIENTS, CURVES, KEY, TOGETHER
 from surfacechem.mechanism.rate_types import kind_of, kinds, names
 from surfacechem.mechanism.rates import InterfaceArrhenius
@@ -80,11 +81,17 @@ REMEDIES = {
     "critical-parameters": "a surface species has no critical point; remove it.",
 }
 """Keys that are not supported, each with advice."""
-MODELS = {"edge": "a contact line has rates per length, and a scene has an area; write the reactions on a surface."}
+MODELS = {
+    "edge": "a contact line has rates per length, and a scene has an area; write the reactions on a surface.",
+    **dict.fromkeys(GASES, f"this is a gas and no surface. A surface may have it beside it: {NEEDS}"),
+}
 """Phase models that are not plain surfaces, each with advice."""
 NEIGHBOURLY = {"sticking": f"a sticking reaction needs a gas beside the surface: {NEEDS}", "electrochemical": CHARGES}
 """Rate types of surfaces with neighbours, by prefix, each with advice."""
-PRESSURE = ("three-body", "falloff", "chemically-activated", "pressure-dependent-Arrhenius", "Chebyshev")
+PRESSURE = (
+    *("three-body", "falloff", "chemically-activated"),
+    *("pressure-dependent-Arrhenius", "Chebyshev", "linear-Burke"),
+)
 """Rate types of gases."""
 
 AMOUNT = ("quantity",)
@@ -124,7 +131,7 @@ def _is_masel(kind: str) -> bool:
 def _is_foreign(entry: Any) -> bool:
     """Whether a reaction is of a type that is not known here, but may be one of another extension."""
     kind = str(entry.get("type", "Arrhenius"))
-    known = kind_of(kind) or kind in PRESSURE or _is_masel(kind) or _needs_neighbour(kind)
+    known = kind_of(kind) or _is_masel(kind) or _needs_neighbour(kind)
     return "equation" in entry and not known
 
 
@@ -179,6 +186,9 @@ class Check:
             self._numbers(state, ("T",), "state")
             self._among(state.get("coverages"), self.names, "state: coverages: no species")
         for entry in source.reactions(phase):
+            if (kind := str(entry.get("type"))) in PRESSURE:
+                problem = f"rate type '{kind}' depends on pressure, which belongs to gases; give a `rate-constant`."
+                raise source.error(f"reaction {entry.get('equation')}: {problem}", entry, "type")
             if self.evaluate and is_evaluated(entry, self.names, self.beside):
                 self._evaluated(entry)
             else:
@@ -349,9 +359,7 @@ class Check:
         """The rate type, which Cantera writes with or without its prefix; a plain rate needs none."""
         kind = str(entry.get("type", "Arrhenius"))
         law = kind_of(kind)
-        if kind in PRESSURE:
-            problem = " depends on pressure, which belongs to gases; give a `rate-constant`."
-        elif reason := _needs_neighbour(kind):
+        if reason := _needs_neighbour(kind):
             problem = f": {reason}"
         elif law is None:
             problem = f" is not lowered.{suggestion(kind, names())} {LEAVE}"

@@ -91,7 +91,17 @@ REFUSED = {
     "a unit that is none": ("{length: m,", "{length: furlong,", "'furlong' is no unit"),
     "a third body": ("A(s) + B(s) <=> AB(s)", "A(s) + B(s) + M <=> AB(s) + M", "third bodies belong to gases"),
     "a falloff reaction": ("A(s) + B(s) <=> AB(s)", "A(s) + B(s) (+M) <=> AB(s) (+M)", "third bodies"),
-    "a rate that depends on pressure": ("  rate-constant:", "  type: falloff\n  rate-constant:", "belongs to gases"),
+    "a rate that depends on pressure": (
+        "  rate-constant:",
+        "  type: falloff\n  low-P-rate-constant: {A: 1 1/s, b: 0, Ea: 0}\n  high-P-rate-constant:",
+        "rate type 'falloff' depends on pressure, which belongs to gases",
+    ),
+    "a rate between pressures": (
+        "  rate-constant: {A: 5.13e8 m^2/mol/s, b: 0, Ea: 0}",
+        "  type: pressure-dependent-Arrhenius\n  rate-constants: []",
+        "rate type 'pressure-dependent-Arrhenius' depends on pressure, which belongs to gases",
+    ),
+    "a gas": ("thermo: ideal-surface", "thermo: ideal-gas", "this is a gas and no surface"),
     "efficiencies": ("  rate-constant:", "  efficiencies: {A(s): 2}\n  rate-constant:", "third bodies"),
     "an arrow that is none": ("A(s) + B(s) <=> AB(s)", "A(s) + B(s) -> AB(s)", "two sides"),
     "a reaction of nothing": ("A(s) + B(s) <=> AB(s)", "A(s) + B(s) <=> B(s) + A(s)", "nothing changes"),

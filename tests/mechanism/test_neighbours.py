@@ -523,6 +523,10 @@ STUCK = "sticking-coefficient: {A: 0.3, b: 0, Ea: 5}"
     [
         (f"{MASEL}, coverage-dependancies: {{}}", "'coverage-dependancies'. Did you mean 'coverage-dependencies'?"),
         (f"{MASEL}, ordres: {{}}", "unknown key 'ordres'. Did you mean 'orders'?"),
+        (
+            "type: falloff, low-P-rate-constant: {A: 1}",
+            "rate type 'falloff' depends on pressure, which belongs to gases",
+        ),
         (MASEL.replace("w:", "W:"), "rate-constant: unknown key 'W'"),
         (CONSTANT.replace("Ea: 5", "Ea: 5 kJ"), "Ea: 5 kJ is an energy of 3.01107e+27 J/mol, which no bond has; write"),
         (STUCK.replace("Ea: 5", "Ea: 5 kJ"), "Ea: 5 kJ is an energy of 3.01107e+27 J/mol, which no bond has"),
