@@ -37,6 +37,9 @@ CHARGE = float(ELECTRON_VOLT)
 FARADAY = CHARGE * MOLECULAR
 """Charge of a kmol of elementary charges [C/kmol]."""
 
+NEARLY_NONE = 1e-200
+"""Pressure [Pa] below which none is seen: Cantera takes the logarithm of it."""
+
 SUM_TOLERANCE = 1e-6
 """Tolerance of the sum of mole fractions, which is one."""
 
@@ -168,7 +171,8 @@ class HeldPhase:
 
     def put(self, T: float, values: Sequence[float]) -> None:
         """Go to a temperature [K] and to values of the histories."""
-        pressure = values[0] if self._pressed else self.pressure
+        # Beyond the end of a falling pressure rates stay finite, or no step could reach that end.
+        pressure = max(values[0], NEARLY_NONE) if self._pressed else self.pressure
         if self._charged:
             self.phase.electric_potential = values[self._pressed]
         if not len(self.species) and self.rest is None:

@@ -598,3 +598,10 @@ def test_a_temperature_out_of_the_range_of_a_gas_is_told(tmp_path):
     cold, warm = (surfacechem.run(small(tmp_path, {"600 K": T})).dataset for T in ("250 K", "310 K"))
     assert "T_c ran from 250 to 250, its range is 300 to 3500" in cold.attrs["warnings"]
     assert "extrapolation" not in warm.attrs["warnings"]
+
+
+def test_a_pressure_that_falls_to_zero_ends_the_run_there(tmp_path):
+    changes = {"1 bar": "{ramp: {start: 1 Pa, rate: -1000 Pa/s}}", "1 us": "2 ms"}
+    solution = surfacechem.run(small(tmp_path, changes))
+    assert (solution.status, solution.trajectory.result.t) == ("stopped", pytest.approx(1e-3, rel=1e-12))
+    assert "the pressure of gas reached zero" in solution.reason
