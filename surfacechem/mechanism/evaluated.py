@@ -337,6 +337,12 @@ class SurfaceEngine:
             first, species = last, end
 
     @property
+    def temperatures(self) -> tuple[float, float]:
+        """Range in which the thermo of the surface and of its neighbours holds [K]."""
+        phases = [self.surface, *(held.phase for held in self.held)]
+        return max(float(phase.min_temp) for phase in phases), min(float(phase.max_temp) for phase in phases)
+
+    @property
     def charges(self) -> dict[str, dict[str, float]]:
         """Charge [C] of a molecule of each species that reactions make in neighbours and that has any, by phase."""
         return {word(held.phase.name): held.charged(self.made_in(held.phase)) for held in self.held}
