@@ -421,6 +421,8 @@ class Check:
                     if isinstance(terms, Mapping):
                         self._keys(terms, allowed, f"{title}: {KEY}: {name}")
                         self._numbers(terms, ("E",), title, entry)
+                    elif isinstance(terms, list):  # Cantera's other way to write them
+                        self._numbers(dict(zip(allowed, terms, strict=False)), ("E",), title, entry, (node, name))
 
     def _keys(self, node: Any, known: Iterable[str], title: str, place: Place | None = None) -> None:
         """Check that every key of a mapping is known."""
@@ -457,8 +459,13 @@ class Check:
             except cantera.CanteraError:
                 raise error(f"units: {key}: '{unit}' is no unit of it that Cantera knows.", given, key) from None
 
-    def _numbers(self, node: Any, keys: Iterable[str], title: str, entry: Any = None) -> None:
-        """Numbers of a mapping, if they are there, are what Cantera takes them for: in kelvin, positive, not bare."""
+    def _numbers(
+        self, node: Any, keys: Iterable[str], title: str, entry: Any = None, at: tuple[Any, str] | None = None
+    ) -> None:
+        """Numbers of a mapping, if they are there, are what Cantera takes them for: in kelvin, positive, not bare.
+
+        Errors are ``at`` an entry of another one where the mapping is not in the file.
+        """
         for key in filter(node.__contains__, keys):
             value, (wanted, unit, example), problem = node[key], BARE.get(key, ((), "", "")), ""
             celsius = isinstance(value, str) and value.split()[-1:] != ["K"]
@@ -474,7 +481,7 @@ class Check:
             elif key in ENERGIES:
                 problem = self._energy(value, entry)
             if problem:
-                raise self.source.error(f"{title}: {key}: {problem}", node, key)
+                raise self.source.error(f"{title}: {key}: {problem}", *(at or (node, key)))
 
     def _energy(self, value: Any, entry: Any) -> str:
         """What is wrong with an energy of a rate, or with one of several; what is none Cantera refuses itself."""

@@ -136,6 +136,11 @@ REFUSED = {
         "b: 0, Ea: 0}\n  coverage-dependencies: {A(s): {a: 0, m: 0, E: [1, 5 kJ]}}",
         "E: 5 kJ is an energy of 3.01107e+27 J/mol, which no bond has; write it as `50 kJ/mol`",
     ),
+    "a dependence per molecule in a list": (
+        "b: 0, Ea: 0}",
+        "b: 0, Ea: 0}\n  coverage-dependencies: {A(s): [0, 0, 5 kJ]}",
+        "E: 5 kJ is an energy of 3.01107e+27 J/mol, which no bond has; write it as `50 kJ/mol`",
+    ),
     "a site density that underflows": ("site-density: 1.0e-4", "site-density: 1e-323", "Site density must be positive"),
 }
 
@@ -163,6 +168,11 @@ def test_refused(what, tmp_path):
     ("old", "new", "words"),
     [
         ("5.13e8 m^2/mol/s", "5.13e8", "A(s) + B(s) <=> AB(s): A: 5.13e+08 without a unit counts in powers of"),
+        (
+            "  rate-constant:",
+            "  coverage-dependencies: {A(s): [0, 0, 50]}\n  rate-constant:",
+            "E: 50 without a unit counts in J/kmol. Write it with its unit, such as `E: 50 kJ/mol`",
+        ),
         ("Ea: 0", "Ea: 50", "Ea: 50 without a unit counts in J/kmol. Write it with its unit, such as `Ea: 50 kJ/mol`"),
         ("1.0e-4 mol/m^2", "1.0e-4", "phase film: site-density: 0.0001 without a unit counts in kmol/m^2"),
         ("h0: -172.3808 kJ/mol", "h0: -172.3808", "species AB(s): h0: -172.381 without a unit counts in J/kmol"),
