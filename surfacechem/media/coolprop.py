@@ -74,7 +74,8 @@ class CoolPropFluid(Fluid):
         if boils is not None and boils > T:
             return FluidRange(low, boils * (1 - BESIDE), end, f"{self.title} boils")
         if condenses is not None and condenses < T:
-            return FluidRange(condenses * (1 + BESIDE), high, f"{self.title} condenses", end)
+            dew = condenses * (1 + BESIDE)
+            return FluidRange(max(dew, low), high, f"{self.title} condenses" if dew > low else end, end)
         if boils is not None:
             raise InputError(f"{self.title} is a mixture of liquid and vapour at {T:g} K.")
         return FluidRange(low, high, end, end)
@@ -104,11 +105,8 @@ class CoolPropFluid(Fluid):
 
     def beside_critical(self) -> str:
         """Advice where the critical pressure is so near that properties are not smooth; empty where it is not."""
-        try:
-            critical = float(_coolprop().PropsSI("Pcrit", self.name))
-        except ValueError:  # a mixture, or a liquid that has none
-            return ""
-        if abs(self.pressure / critical - 1) > CRITICAL:
+        critical = self._told("Pcrit")
+        if critical is None or abs(self.pressure / critical - 1) > CRITICAL:
             return ""
         return (
             f" The critical pressure is {critical:.6g} Pa; within a tenth of it CoolProp's properties jump from "
@@ -147,13 +145,37 @@ class CoolPropFluid(Fluid):
 
     def limits(self) -> list[float | None]:
         """Least and largest temperature [K] of the properties, those of boiling and of condensing if it does."""
-        low, high, boils, condenses = self._call("Tmin"), self._call("Tmax"), self._saturation(0), self._saturation(1)
+        low, high, boils, condenses = self._least(), self._call("Tmax"), self._saturation(0), self._saturation(1)
         # Of mixtures near their critical point CoolProp finds but one of them.
         if boils is not None and condenses is None:
             condenses = self._end("gas", high, boils)
         elif condenses is not None and boils is None:
             boils = self._end("liquid", low, condenses)
         return [low, high, boils, condenses]
+
+    def _least(self) -> float:
+        """Least temperature at which it has properties: where it freezes, or CoolProp's own."""
+        low, freezes = self._call("Tmin"), self._told("T_freeze") or self._melts()
+        if freezes is not None and freezes * (1 + BESIDE) > low:
+            return freezes * (1 + BESIDE)
+        triple = self._told("p_triple")
+        # The lowest of the temperatures is that of a liquid, too, which vapour of a lower pressure does not reach.
+        return low * (1 + BESIDE) if triple is not None and self.pressure < triple else low
+
+    def _melts(self) -> float | None:
+        """Temperature at which it melts; None where CoolProp has no such line, or not at this pressure."""
+        coolprop = _coolprop()
+        try:
+            return float(coolprop.AbstractState("?", self.name).melting_line(coolprop.iT, coolprop.iP, self.pressure))
+        except ValueError:  # also of mixtures
+            return None
+
+    def _told(self, letters: str) -> float | None:
+        """What CoolProp tells of the fluid in any state; None where it is not known."""
+        try:
+            return float(_coolprop().PropsSI(letters, self.name))
+        except ValueError:
+            return None
 
     def _end(self, phase: str, inside: float, outside: float) -> float | None:
         """Temperature [K] at which a phase ends, by bisection from one inside it; None where that is another phase."""

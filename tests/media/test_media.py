@@ -251,6 +251,45 @@ def test_a_run_may_reach_any_temperature_at_which_the_fluid_stays_what_it_is():
     assert values["eta_m"] == pytest.approx(exact, rel=BOUND)
 
 
+@pytest.mark.parametrize(
+    ("fluid", "p", "T", "low"),
+    [
+        ("Water", 100.0, 300.0, 273.16),  # as vapour, which does not come to the triple point
+        ("Argon", 5e4, 90.0, 83.806),
+        ("INCOMP::MEG-50%", 1e5, 239.0, 237.15558),
+        ("CO2", 8e8, 340.0, 327.67310),
+        ("Methane", 5e8, 200.0, 186.58077),
+        ("Nitrogen", 101325.0, 64.0, 63.17055),
+        ("R134a", 1e5, 200.0, 169.85),
+    ],
+)
+def test_properties_end_where_the_fluid_freezes(fluid, p, T, low):
+    found = CoolPropFluid(fluid, p)
+    span = found.range(T)
+    assert span.low == pytest.approx(low, rel=1.1e-5)
+    for quantity in ("eta_m", "rho_m"):
+        assert off(found, quantity, np.linspace(span.low, T, 7), span.low, min(2 * T, span.high)) < BOUND
+
+
+def test_a_film_of_thin_vapour():
+    """Below the triple pressure, at rest between walls of two temperatures."""
+    found = case.load_text(
+        """
+bodies: {lower: {temperature: T_1, C: 500 J/m^2/K}, upper: {temperature: T_2, C: 500 J/m^2/K}}
+T_0: 300
+interface: {temperature: T_c, medium: {fluid: Water, pressure: 100 Pa, thickness: 10 um}, friction: [film-shear]}
+heat: [film: {between: [lower, upper], closure: medium}]
+loading: {v: 1 mm/s}
+initial: {T_1: 300, T_2: 301}
+run: {until: 1}
+"""
+    )
+    values = computed(Model(assemble(found.scene)).solve(Run(times=[0.0, 1e-3])))
+    assert values["eta_m"][0] == pytest.approx(
+        CoolPropFluid("Water", 100.0).values("eta_m", values["T_c"])[0], rel=BOUND
+    )
+
+
 def test_an_algebraic_temperature_far_from_its_guess_is_found():
     scene = lubricated(medium("Nitrogen", thickness=5e-4), v=870.0, capacity=False)
     trajectory = solved(scene, 0.0, 1.0)
@@ -289,6 +328,18 @@ def test_a_liquid_that_boils_at_one_wall_is_told(T_1, told):
     [
         ("Propyne", 5e5, 300.0, "Propyne at 500000 Pa: Viscosity model is not available for this fluid"),
         ("Water", 1e5, 250.0, "Water at 100000 Pa has no properties at 250 K: CoolProp's range is 273.16 to 2000 K"),
+        (
+            "Methane",
+            5e8,
+            200.0,
+            r"the conductivity of Methane .* The case is at 200 K, and needs it from 186.6 to 220 K",
+        ),
+        (
+            "INCOMP::MEG-50%",
+            1e5,
+            237.0,
+            r"INCOMP::MEG-50% at .* no properties at 237 K: .* range is 237.158 to 373.15 K",
+        ),
         ("Watr", 1e5, 300.0, "CoolProp knows no fluid 'Watr'. Did you mean 'Water'?"),
     ],
 )

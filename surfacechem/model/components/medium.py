@@ -208,9 +208,10 @@ class FluidFit:
             low, high = max(min(self.known) / reach, span.low), min(max(self.known) * reach, span.high)
             try:
                 found = self.fluid.fit(quantity, low, high, target)
-            except InputError:
+            except InputError as error:
                 if target == ROUGH:
-                    raise
+                    asked = f"The case is at {self.start:g} K, and needs it from {low:.4g} to {high:.4g} K."
+                    raise InputError(f"{error.message} {asked}", error.place) from None
                 continue
             if target == ROUGH:
                 named = VARIABLES[quantity].long_name if quantity in VARIABLES else "heat capacity of the medium"
