@@ -8,6 +8,7 @@ from __future__ import annotations
 import difflib
 import re
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache, partial
 from importlib.metadata import version
@@ -155,20 +156,14 @@ class CoolPropFluid(Fluid):
 
     def _least(self) -> float:
         """Least temperature at which it has properties: where it freezes, or CoolProp's own."""
-        low, freezes = self._call("Tmin"), self._told("T_freeze") or self._melts()
-        if freezes is not None and freezes * (1 + BESIDE) > low:
+        coolprop, low, freezes = _coolprop(), self._call("Tmin"), self._told("T_freeze") or 0.0
+        with suppress(ValueError):  # of mixtures, of what has no such line, and beside its ends
+            melting = coolprop.AbstractState("?", self.name).melting_line
+            freezes = float(melting(coolprop.iT, coolprop.iP, self.pressure))
+        if freezes * (1 + BESIDE) > low:
             return freezes * (1 + BESIDE)
-        triple = self._told("p_triple")
         # The lowest of the temperatures is that of a liquid, too, which vapour of a lower pressure does not reach.
-        return low * (1 + BESIDE) if triple is not None and self.pressure < triple else low
-
-    def _melts(self) -> float | None:
-        """Temperature at which it melts; None where CoolProp has no such line, or not at this pressure."""
-        coolprop = _coolprop()
-        try:
-            return float(coolprop.AbstractState("?", self.name).melting_line(coolprop.iT, coolprop.iP, self.pressure))
-        except ValueError:  # also of mixtures
-            return None
+        return low * (1 + BESIDE) if self.pressure < (self._told("p_triple") or 0.0) else low
 
     def _told(self, letters: str) -> float | None:
         """What CoolProp tells of the fluid in any state; None where it is not known."""
