@@ -354,12 +354,6 @@ class SurfaceEngine:
         return {name: self.names[name] for name, i in there if name in self.names and meant(name) == i}
 
     @property
-    def temperatures(self) -> tuple[float, float]:
-        """Range [K] of the thermo of the surface and of its neighbours."""
-        phases = [self.surface, *(held.phase for held in self.held)]
-        return max(float(phase.min_temp) for phase in phases), min(float(phase.max_temp) for phase in phases)
-
-    @property
     def histories(self) -> tuple[tuple[Quantity, Load], ...]:
         """Histories of the neighbours."""
         return tuple(item for held in self.held for item in held.histories)

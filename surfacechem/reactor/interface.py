@@ -373,6 +373,18 @@ class InterfaceReactor(HeldReactor):
         self._put, self._told = False, t
         return self.attempt(self._rates, t)
 
+    def others(self) -> Iterator[tuple[str, Any]]:
+        """Reactors beside it or behind a wall on one of its bodies, and what each does."""
+        for body, reactor in self.bodies.items():
+            yield f"stands for the body {body}", reactor
+        for name, reactor in self.neighbours.items():
+            yield f"is the neighbour {name}", reactor
+        for reactor in self.pressing:
+            yield "presses on the gap", reactor
+        for name, port in self.ports.items():
+            for reactor in port.others():
+                yield f"has a wall to {name}", reactor
+
     def left_out(self, partner: str) -> str:
         """What to say of a network that has a partner of the interface, but not the interface."""
         return (

@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import cached_property
+from itertools import chain
 from typing import Any
 
 import cantera
@@ -29,10 +30,14 @@ LONGEST = 1.0
 """Length of the integration that is assumed where no end is given [s]."""
 
 
-SWITCHES = ("energy_enabled", "chemistry_enabled")
-OF_FLOWS = ("device_coefficient", "time_function", "pressure_function")
-OF_WALLS = ("area", "heat_transfer_coeff", "emissivity", "expansion_rate_coeff", "heat_flux", "velocity")
-"""What of reactors and connectors is set, functions by their present values."""
+SETTINGS = (
+    *("energy_enabled", "chemistry_enabled", "device_coefficient", "time_function", "pressure_function"),
+    *("area", "heat_transfer_coeff", "emissivity", "expansion_rate_coeff", "heat_flux", "velocity"),
+)
+"""What of reactors and of what connects them is set, functions by their present values."""
+
+ENDS = ("upstream", "downstream", "left_reactor", "right_reactor")
+"""Reactors and reservoirs on the sides of what connects them."""
 
 
 class ReactorNet(cantera.ReactorNet):
@@ -282,17 +287,17 @@ class ReactorNet(cantera.ReactorNet):
     def _surroundings(self) -> list[object]:
         """What a script may change: states, switches, rates and connectors of reactors, and reservoirs behind these."""
         own = [reactor for reactor in self.reactors if not isinstance(reactor, HeldReactor)]
-        connectors = [connector for reactor in own for connector in _connectors(reactor)]
-        inside = {id(None), *map(id, self.reactors)}  # a connector that was refused lacks a side
-        ends = [end for _, sides in connectors for end in sides if id(end) not in inside]
-        found: list[object] = [end.phase.state.tobytes() for end in ends]
-        # Reactors last: they may share a phase, which shall have the state of one that runs.
-        found += [*map(_settings, own), *(values for values, _ in connectors)]
-        return found + [interface.heard(float(self.time)) for interface in self.interfaces]
+        joined = [(*each.inlets, *each.outlets, *each.walls, *each.surfaces) for each in own]
+        around = [item for item in chain(*joined) if not isinstance(item, Through)]
+        ends = [getattr(item, end, None) for item in around for end in ENDS]  # one that was refused lacks a side
+        # First, since reactors may share a phase, which shall have the state of one that runs.
+        outside = [end.phase.state.tobytes() for end in ends if end is not None and end not in self.reactors]
+        settings = [getattr(item, name, None) for item in (*own, *around) for name in SETTINGS]
+        heard = [interface.heard(float(self.time)) for interface in self.interfaces]
+        return [*outside, *map(_contents, own), *settings, *heard]
 
     def _begin(self) -> None:
         self._refuse_strangers()
-        self._refuse_left_out()
         self._fresh, self._started = False, self.time
         for interface in self.interfaces:
             interface.begin_piece(self.time, self.rtol)
@@ -304,30 +309,20 @@ class ReactorNet(cantera.ReactorNet):
             self.reinitialize()
 
     def _refuse_strangers(self) -> None:
-        """Refuse reactors in the place of a body, or behind a wall on one, that are not in the network and so never
-        change.
-        """
-        for interface in self.interfaces:
-            others = [(f"stands for the body {body}", reactor) for body, reactor in interface.bodies.items()]
-            others += [(f"is the neighbour {name}", reactor) for name, reactor in interface.neighbours.items()]
-            others += [("presses on the gap", reactor) for reactor in interface.pressing]
-            for name, port in interface.ports.items():
-                others += [(f"has a wall to {name}", reactor) for reactor in port.others()]
-            for role, reactor in others:
-                if not isinstance(reactor, cantera.Reservoir) and all(item is not reactor for item in self.reactors):
-                    raise InputError(
-                        f"the reactor that {role} of {interface.name} is not in the network, so it "
-                        "would never change: give it to ReactorNet too, or let it be a Reservoir."
-                    )
-
-    def _refuse_left_out(self) -> None:
-        """Refuse reactors whose interfaces are not in the network, and would give and take what they did at first."""
+        """Refuse reactors whose interfaces are not in the network, and interfaces whose reactors are not in it."""
         for reactor in self.reactors:
             connected = [interface for interface, _ in getattr(reactor, "sources", ())]
             connected += [wall.interface for wall in reactor.walls if isinstance(wall, Through)]
             for interface in connected:
-                if all(item is not interface for item in self.interfaces):
+                if interface not in self.interfaces:
                     raise InputError(interface.left_out(reactor.name))
+        for interface in self.interfaces:
+            for role, reactor in interface.others():
+                if not isinstance(reactor, cantera.Reservoir) and reactor not in self.reactors:
+                    raise InputError(
+                        f"the reactor that {role} of {interface.name} is not in the network, so it "
+                        "would never change: give it to ReactorNet too, or let it be a Reservoir."
+                    )
 
     def _arrive(self, t: float) -> None:
         pieces = [interface for interface in self.interfaces if t in interface.scene.breakpoints]
@@ -370,24 +365,11 @@ class ReactorNet(cantera.ReactorNet):
                 interface.passes_breakpoints = False
 
 
-def _values(item: Any, names: Sequence[str]) -> list[object]:
-    return [getattr(item, name) for name in names]
-
-
-def _connectors(reactor: Any) -> list[tuple[list[object], tuple[Any, Any]]]:
-    """Settings of the flow devices and walls of a reactor, each with the two reactors that it connects."""
-    flows, walls = (*reactor.inlets, *reactor.outlets), (w for w in reactor.walls if not isinstance(w, Through))
-    found = [(_values(flow, OF_FLOWS), (flow.upstream, flow.downstream)) for flow in flows]
-    return found + [(_values(wall, OF_WALLS), (wall.left_reactor, wall.right_reactor)) for wall in walls]
-
-
-def _settings(reactor: Any) -> list[object]:
-    """State, switches, areas of surfaces and rate constants of a reactor, which tell of their multipliers."""
+def _contents(reactor: Any) -> tuple[bytes, float, bytes]:
+    """State and volume of a reactor, and the rate constants of its reactions, which tell of their multipliers."""
     phase = reactor.phase
-    state = [phase.state.tobytes(), reactor.volume, *_values(reactor, SWITCHES)]
     reacts = reactor.chemistry_enabled and getattr(phase, "n_reactions", 0)
-    constants = phase.forward_rate_constants.tobytes() if reacts else b""
-    return [*state, constants, *(surface.area for surface in reactor.surfaces)]
+    return phase.state.tobytes(), reactor.volume, phase.forward_rate_constants.tobytes() if reacts else b""
 
 
 def _number(reactors: Sequence[Any]) -> None:
