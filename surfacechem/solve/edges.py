@@ -204,7 +204,7 @@ def _coldest(w: Any) -> float:
 @compiled
 def _is_admissible(w: Any, gain: float, small: float, heat: float) -> bool:
     """Whether a jump gains entropy but for what is small, and for what so much heat may be uncertain."""
-    return bool(gain >= -small or gain >= -small - heat / _coldest(w))
+    return bool(gain >= -small - heat / _coldest(w))
 
 
 @compiled
