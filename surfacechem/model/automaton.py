@@ -175,6 +175,8 @@ class Equilibrium:
     """Zero in modes in which it is held."""
     slides: int = 0
     """Direction in which the interface slides where it opens, 1 or -1; 0 where it is balanced in any mode."""
+    bears: Expression = 1
+    """What sticking bears where it slides; none holds it, and it moves either way."""
 
     @property
     def axis(self) -> str:

@@ -133,6 +133,11 @@ class Equilibria:
         return compiled(self.system, (item for row in rows for item in row))
 
     @cached_property
+    def _bears(self) -> Function:
+        """What sticking bears, for each gap."""
+        return compiled(self.system, (e.bears for e in self.items))
+
+    @cached_property
     def _tangents(self) -> Function:
         """For each gap the driving traction, its slope along what moves, and the rate at which loads change it."""
         symbols, found = {state.name: state.symbol for state in self.system.states}, []
@@ -351,9 +356,15 @@ class Equilibria:
     # -- sliding --------------------------------------------------------------------------------------------------
 
     def _onward(self, point: Point) -> Array:
-        """Direction in which each gap moves as the interface slides on; zero for what may move in both."""
+        """Direction in which each gap moves as the interface slides on; zero for what may move in both.
+
+        So may what slides where sticking bears nothing.
+        """
         slip = 0.0 if self.slip is None else point.parameters[self.slip]
-        return np.array([slip * e.slides for e in self.items])
+        if not slip:
+            return np.zeros(len(self.items))
+        directions: Array = slip * np.array([e.slides for e in self.items])
+        return np.where(self._bears(point.inputs()) > 0, directions, 0.0)
 
     def onward_along(self, point: Point, way: Way) -> float:
         """Direction of a way in which the interface slides on; zero where nothing slides along it."""
@@ -366,8 +377,10 @@ class Equilibria:
             parameters[self.slip] = slip
         return replace(point, parameters=parameters)
 
-    def is_pushed_back(self, point: Point, drift: float, heat: Heat | None = None) -> bool:
-        """Whether the tractions would pull what slides back, by more than the ``drift`` of their balance."""
+    def is_pushed_back(self, point: Point, drift: float, noise: float = 0.0, heat: Heat | None = None) -> bool:
+        """Whether the tractions would pull what slides back, by more than the ``drift`` of their balance, relative to
+        its parts, and than ``noise`` [Pa].
+        """
         onward = self._onward(point)
         if not onward.any():
             return False
@@ -376,7 +389,7 @@ class Equilibria:
         residual, slope = self._tangents(inputs)[3 * j : 3 * j + 2]
         size = self._balance(inputs)[2 * j + 1]
         # Where nothing elastic holds it, it cannot stick.
-        return bool(slope < 0 and onward[j] * residual < -drift * size)
+        return bool(slope < 0 and onward[j] * residual < -max(drift * size, noise))
 
 
 def _warmed(rows: Array, heat: Heat | None) -> Array:

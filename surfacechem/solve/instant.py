@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from surfacechem.model.automaton import RESTS
+from surfacechem.model.automaton import RESTS, SLIP
 from surfacechem.model.system import System
 from surfacechem.solve.contract import ALOFT, AT_ONCE, FITTED, Array, Mask, Problem, Result, Status
 from surfacechem.solve.equilibria import BALANCED, Point, drift_of
@@ -102,6 +102,10 @@ class Instant:
         self.booked = np.zeros(problem.program.n_ledger)
         """Ledger now."""
         self.rebounds = Rebounds(jumper, first)
+        slip = {p.symbol for p in system.parameters if p.path == SLIP}
+        ends = [any(edge.when.get(mode) == (0,) for mode in slip) for edge in system.edges]
+        self._sticking = first + np.flatnonzero(ends)
+        """Which of the guards end sticking."""
         self.jumps: list[Jump] = []
         self.limits: list[int] = []
         """Limits that were reached together with the last edge."""
@@ -240,11 +244,20 @@ class Instant:
         read = [self.system.expand(m.expression).free_symbols for m in self.system.moving_margins[: self.first]]
         return {i for i, symbols in enumerate(read) if symbols & found}
 
+    def _borne(self, index: int, point: Point) -> float:
+        """Rounding of what sticking bears beyond what it has to [Pa], on both sides of an edge."""
+        if not (len(self._sticking) and self.system.edges[index].equilibrates):
+            return 0.0
+        parameters = point.parameters.copy()
+        parameters[self.jumper.mode_columns] = self.jumper.modes_after(index, point)
+        both = [self.sizes(at)[self._sticking] for at in (replace(point, parameters=parameters), point)]
+        return CROSSED * float(np.max(both))
+
     def apply(self, index: int, point: Point, last: Point | None = None) -> Point | None:
         """Carry out an edge and book it; None where the run ends with it."""
         largest, drift = float(self.sizes(point)[self.first + index]), drift_of(self.rtol)
         balanced = BALANCED if self.system.edges[index].times else drift
-        slack = Slack(CROSSED * largest, drift * largest, balanced, self.rtol)
+        slack = Slack(CROSSED * largest, drift * largest, balanced, self._borne(index, point), self.rtol)
         step = self.step if self.step is not None and self.step.before.t == point.t else None
         before = self.jumps[-1].t if self.jumps else self.start
         begun, length, reached = self.flowed

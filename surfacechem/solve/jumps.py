@@ -58,6 +58,8 @@ class Slack:
     """Drift of its guard that the integration may have caused."""
     balanced: float = BALANCED
     """Part of the tractions by which the integration leaves them out of balance."""
+    borne: float = 0.0
+    """Rounding of what sticking bears beyond what it has to [Pa]."""
     rtol: float = 0.0
     """Relative tolerance of the run, for what is found along the way of a jump."""
 
@@ -376,7 +378,8 @@ class Jumper:
             after, released, heat_out, entropy_out = self._heated(rest, release, shares)
         except ImpossibleError as obstacle:
             return replace(jump, obstacle=str(obstacle))
-        if edge.equilibrates and self.equilibria.is_pushed_back(after, slack.balanced):  # friction pulls nothing back
+        # Friction pulls nothing back.
+        if edge.equilibrates and self.equilibria.is_pushed_back(after, slack.balanced, slack.borne):
             after = self.equilibria.with_slip(after, 0.0)
         gain, admissible, done = self._judged(
             edge, before.inputs()[None], after.inputs()[None], books[None], np.array([slack.noise]), entropy_out
@@ -475,7 +478,7 @@ class Jumper:
         if trial is None:
             return None
         onward = found.with_slip(trial, slip)
-        if found.is_pushed_back(onward, release.slack.balanced, heat):
+        if found.is_pushed_back(onward, release.slack.balanced, release.slack.borne, heat):
             return trial
         # Where sticking keeps the equilibrium it is sliding that is lost.
         return found.settle(onward, heat, release.slack.balanced, lost=fold if stuck is None else None)

@@ -230,6 +230,7 @@ class FarField:
         held: Expression | None = None,
         along: Mapping[str, Expression] | None = None,
         slides: int = 0,
+        bears: Expression = 1,
     ) -> Iterator[Equilibrium]:
         """Rows of the gap, which moves against ``tractions`` [Pa] by Newton's law, by its dampers, or in equilibrium.
 
@@ -251,7 +252,7 @@ class FarField:
             residual = symengine.Add(self.force(self.gap, symengine.Integer(0)), *resisted)
             rows.equilibrium(name, build.total_derivative(residual), active, held)
             size = self.size(self.gap) + symengine.Add(*(absolute(part) for part in tractions))
-            yield Equilibrium(name, active * residual, size, along or {}, active, slides)
+            yield Equilibrium(name, active * residual, size, along or {}, active, slides, bears)
 
 
 def far_field(build: Build, mount: Held) -> FarField:

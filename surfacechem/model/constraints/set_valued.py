@@ -6,6 +6,10 @@ At rest it is any up to the limit L, while sliding it is L against the velocity,
 slip is -1, 0 or 1 along a line; in the plane it is 0 or 1, beside registers of the direction in which sliding began.
 Its edges: the traction that sticking needs passes the limit, the velocity returns to zero.
 
+A limit of zero leaves :math:`t = 0` at any velocity: sticking and sliding are the same there, and the direction of
+sliding has no meaning. What slides without inertia goes on as it is, and stops where the limit begins to grow against
+it.
+
 In an impact the same law holds for impulses. A mass m that meets a rigid contact with the velocity v and leaves it with
 :math:`-e\,v` gives the pressure the impulse :math:`J = (1+e)\,m|v|`, and what slides with a mass m_t of its own loses
 :math:`\mu J / m_t` of its velocity, and no more than that. What slides without a mass, or behind a tangential spring of

@@ -205,8 +205,12 @@ def _friction(
         size = absolute(needed) if kind.elastic or far is None else far.size(far.gap)
         beside = absolute(derivative(build.psi, symengine.Symbol("u_t")))
         slack = STILL * (size + absolute(t_f) + beside)
+    limit = _limit(build, kind)
     back = {s: build.expanded(s * still + slack).subs({SLIP: s}) for s in (1, -1)}
-    limit = build.motion.stick_limits["t"] * (1 if kind.elastic else build.energy.rubs)
+    if not (kind.slides_inertially or kind.rate_dependent):
+        # Where nothing is borne, nor begins to be, one direction of sliding is as good as the other: none ends.
+        grows = build.total_derivative(limit)
+        back = {s: where(limit > 0, at, where(grows > 0, at, absolute(at))) for s, at in back.items()}
     # Beyond touch the law of a contact may go on to negative pressure; nothing gives way there that is not pulled.
     bears = {s: where(limit > 0, limit, 0) - s * needed for s in (1, -1)}
     # Without inertia the traction is at its limit as sliding stops, and rounding must not start it again.
@@ -215,6 +219,11 @@ def _friction(
     # What moves at once finds its equilibrium; all else follows the bonds that break, and their heat.
     equilibrates = bool(breaks) or not (kind.slides_inertially or kind.rate_dependent)
     return set_valued(bears, back, {}, {SLIP: onward}, breaks, end, equilibrates=equilibrates)
+
+
+def _limit(build: Build, kind: Formulation) -> Expression:
+    """What sticking bears [Pa], per area on which friction acts where the interface is elastic."""
+    return build.motion.stick_limits.get("t", NONE) * (1 if kind.elastic else build.energy.rubs)
 
 
 def _velocity_state(build: Build, kind: Formulation) -> str:
@@ -250,8 +259,8 @@ def _balance(
             raise InputError(message, PLACE)
         yield from _sticks(build, limit, far.force(u, NONE) - t_a - carried)
     else:
-        stiffness = far.k if far.k != 0 else 1
-        yield from far.balance(build, rate, tractions, active=slides, held=stiffness * du, slides=1)
+        stiffness, bears = far.k if far.k != 0 else 1, _limit(build, kind)
+        yield from far.balance(build, rate, tractions, active=slides, held=stiffness * du, slides=1, bears=bears)
     return False
 
 
@@ -286,7 +295,7 @@ def _elastic_rows(
     build.rows.equilibrium("g_t", build.total_derivative(residual), slides, dg - rate)
     size = absolute(t_e) + absolute(t_f)
     # Opposed to the displacement behind it: the elastic gap grows by what does not slide.
-    yield Equilibrium("g_t", slides * residual, size, active=slides, slides=-1)
+    yield Equilibrium("g_t", slides * residual, size, active=slides, slides=-1, bears=_limit(build, kind))
     stiffness = derivative(t_e, symengine.Symbol("g_t"))
     if stiffness.free_symbols & {bond.symbol for bond in build.bonding.values()}:
         reason = "nothing carries the friction of the sliding interface: its tangential stiffness went with its bonds"
