@@ -304,7 +304,6 @@ class ReactorNet(cantera.ReactorNet):
             if interface.scene.moments:
                 interface.jump(self.time)
             interface.record(self.time)
-        self._around = self._surroundings()
         if self._watch.interfaces:
             self.reinitialize()
 
