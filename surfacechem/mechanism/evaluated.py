@@ -25,6 +25,7 @@ from surfacechem.mechanism.mixture import Formula, Species, identifiers, word
 from surfacechem.mechanism.rates import MechanismReaction
 from surfacechem.quantities import MOLECULAR, Quantity
 from surfacechem.scene import Electrode
+from surfacechem.tolerances import TINY
 
 Array = NDArray[np.float64]
 
@@ -36,9 +37,6 @@ CHARGE = float(ELECTRON_VOLT)
 
 FARADAY = CHARGE * MOLECULAR
 """Charge of a kmol of elementary charges [C/kmol]."""
-
-NEARLY_NONE = 1e-200
-"""Pressure [Pa] below which none is seen: Cantera takes the logarithm of it."""
 
 SUM_TOLERANCE = 1e-6
 """Tolerance of the sum of mole fractions, which is one."""
@@ -172,7 +170,7 @@ class HeldPhase:
     def put(self, T: float, values: Sequence[float]) -> None:
         """Go to a temperature [K] and to values of the histories."""
         # Beyond the end of a falling pressure rates stay finite, or no step could reach that end.
-        pressure = max(values[0], NEARLY_NONE) if self._pressed else self.pressure
+        pressure = max(values[0], TINY) if self._pressed else self.pressure
         if self._charged:
             self.phase.electric_potential = values[self._pressed]
         if not len(self.species) and self.rest is None:
@@ -212,8 +210,8 @@ class HeldPhase:
             both += self.charges * self.phase.electric_potential
 
 
-def places(surface: Any, phase: Any) -> range:
-    """Where Cantera has the species of a phase among those of the kinetics, some of which may have the same name."""
+def indices(surface: Any, phase: Any) -> range:
+    """Indices of the species of a phase among those of the kinetics, some of which may have the same name."""
     first = surface.kinetics_species_index(0, surface.phase_index(phase.name))
     return range(first, first + phase.n_species)
 
@@ -225,9 +223,9 @@ def lacking(surface: Any) -> tuple[str, ...]:
     there = (
         item
         for phase in surface.adjacent.values()
-        for item in zip(phase.species_names, phase.X, places(surface, phase), strict=True)
+        for item in zip(phase.species_names, phase.X, indices(surface, phase), strict=True)
     )
-    found = [name for name, part, place in there if part == 0 and made[place] > 0]
+    found = [name for name, part, index in there if part == 0 and made[index] > 0]
     names = ", ".join(found[:6]) + (f" and {len(found) - 6} more" if len(found) > 6 else "")
     text = (
         f"the neighbours hold no {names}, which reactions make: what they release is diluted without end, and its "
@@ -278,7 +276,7 @@ class NeighbourReaction(EvaluatedReaction):
 
 def taken(surface: Any, phases: Sequence[Any]) -> Any:
     """Amount of each species of these phases, one after another, that each reaction takes: a row for a reaction."""
-    rows = [place for phase in phases for place in places(surface, phase)]
+    rows = [index for phase in phases for index in indices(surface, phase)]
     return np.asarray(surface.reactant_stoich_coeffs - surface.product_stoich_coeffs)[rows].T
 
 
@@ -350,7 +348,7 @@ class SurfaceEngine:
     def made_in(self, phase: Any) -> dict[str, str]:
         """Those ``names`` that mean species of this neighbour: of several by one name an equation means the first."""
         meant = self.surface.kinetics_species_index
-        there = zip(phase.species_names, places(self.surface, phase), strict=True)
+        there = zip(phase.species_names, indices(self.surface, phase), strict=True)
         return {name: self.names[name] for name, i in there if name in self.names and meant(name) == i}
 
     @property

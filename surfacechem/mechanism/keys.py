@@ -88,10 +88,7 @@ MODELS = {
 """Phase models that are not plain surfaces, each with advice."""
 NEIGHBOURLY = {"sticking": f"a sticking reaction needs a gas beside the surface: {NEEDS}", "electrochemical": CHARGES}
 """Rate types of surfaces with neighbours, by prefix, each with advice."""
-PRESSURE = (
-    *("three-body", "falloff", "chemically-activated"),
-    *("pressure-dependent-Arrhenius", "Chebyshev", "linear-Burke"),
-)
+PRESSURE = _words("three-body falloff chemically-activated pressure-dependent-Arrhenius Chebyshev linear-Burke")
 """Rate types of gases."""
 
 AMOUNT = ("quantity",)
@@ -214,11 +211,9 @@ class Check:
             self._neighbours(phase, ())
 
     def _neighbours(self, phase: Any, before: tuple[str, ...]) -> None:
-        """No phase is its own neighbour, nor that of its neighbours: Cantera would go round without end."""
-        phases, path = (
-            {str(entry.get("name")): entry for entry in self.source.phases},
-            (*before, str(phase.get("name"))),
-        )
+        """Refuse a phase that is its own neighbour, or that of a neighbour: Cantera would recurse without end."""
+        phases = {str(entry.get("name")): entry for entry in self.source.phases}
+        path = (*before, str(phase.get("name")))
         declared = phase.get("adjacent-phases") or ()
         own = [item for item in declared if not isinstance(item, Mapping) or isinstance(item.get("phases"), list)]
         for name in chosen(own, ()):
@@ -484,7 +479,7 @@ class Check:
                 raise self.source.error(f"{title}: {key}: {problem}", *(at or (node, key)))
 
     def _energy(self, value: Any, entry: Any) -> str:
-        """What is wrong with an energy of a rate, or with one of several; what is none Cantera refuses itself."""
+        """Defect of an energy of a rate, or of one of several, in words; texts that are none Cantera refuses itself."""
         import cantera
 
         declared: Any = self.source.defaults(entry)

@@ -49,7 +49,7 @@ MOST = {
     "J": (1e7 / AVOGADRO, "an energy", "50 kJ/mol"),
     "J/mol": (1e7, "an energy", "50 kJ/mol"),
 }
-"""What no molecule has, not even a tether: the largest number in a unit, and an example of one that is meant."""
+"""Largest numbers that a molecule may have, even a tether, by unit, each with its kind and an example."""
 
 NUMBER, NAME, MAPPING, LIST = (int, float), (str, int, float), (dict,), (list,)
 

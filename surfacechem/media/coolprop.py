@@ -166,7 +166,7 @@ class CoolPropFluid(Fluid):
         return low * (1 + BESIDE) if self.pressure < (self._told("p_triple") or 0.0) else low
 
     def _told(self, letters: str) -> float | None:
-        """What CoolProp tells of the fluid in any state; None where it is not known."""
+        """A constant of the fluid from CoolProp; None where it is not known."""
         try:
             return float(_coolprop().PropsSI(letters, self.name))
         except ValueError:

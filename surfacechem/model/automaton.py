@@ -176,7 +176,7 @@ class Equilibrium:
     slides: int = 0
     """Direction in which the interface slides where it opens, 1 or -1; 0 where it is balanced in any mode."""
     bears: Expression = 1
-    """What sticking bears where it slides; none holds it, and it moves either way."""
+    """Friction limit [Pa] of the interface that slides; where it is zero the gap moves either way in a jump."""
 
     @property
     def axis(self) -> str:

@@ -130,7 +130,7 @@ def fair(dataset: xarray.Dataset, name: str) -> Array:
 
 
 def quantity_label(values: xarray.DataArray) -> str:
-    """What a variable is, and its unit."""
+    """Symbol or words of a variable, and its unit."""
     return f"{style.quantity_words(values)} [{unit_text(unit(values))}]"
 
 

@@ -225,7 +225,7 @@ LOST, STOPPED = ("failed", "refused"), "stopped"
 """Statuses of runs whose last values are no ends, and of those that ended before the others."""
 
 MARKS = dict(zip((*LOST, STOPPED), "xds", strict=True))
-"""What marks them."""
+"""Their markers."""
 
 
 def _ends(dataset: xarray.Dataset) -> str:

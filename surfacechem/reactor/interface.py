@@ -386,7 +386,7 @@ class InterfaceReactor(HeldReactor):
                 yield f"has a wall to {name}", reactor
 
     def left_out(self, partner: str) -> str:
-        """What to say of a network that has a partner of the interface, but not the interface."""
+        """Message about a network that has a partner of the interface, but not the interface."""
         return (
             f"the interface {self.name} to which {partner} is connected is not in the network, so what it gives and "
             "takes would never change: give it to the network too. Where another interface has replaced it, make the "

@@ -34,10 +34,10 @@ SETTINGS = (
     *("energy_enabled", "chemistry_enabled", "device_coefficient", "time_function", "pressure_function"),
     *("area", "heat_transfer_coeff", "emissivity", "expansion_rate_coeff", "heat_flux", "velocity"),
 )
-"""What of reactors and of what connects them is set, functions by their present values."""
+"""Settings of reactors and of their connectors, functions by their present values."""
 
 ENDS = ("upstream", "downstream", "left_reactor", "right_reactor")
-"""Reactors and reservoirs on the sides of what connects them."""
+"""Attributes of connectors that name the reactor or reservoir on a side."""
 
 
 class ReactorNet(cantera.ReactorNet):
@@ -285,7 +285,7 @@ class ReactorNet(cantera.ReactorNet):
         return sorted({b for interface in self.interfaces for b in interface.scene.breakpoints if b > self.time})
 
     def _surroundings(self) -> list[object]:
-        """What a script may change: states, switches, rates and connectors of reactors, and reservoirs behind these."""
+        """Settings and states that a script may change: of reactors, connectors, and reservoirs behind these."""
         own = [reactor for reactor in self.reactors if not isinstance(reactor, HeldReactor)]
         joined = [(*each.inlets, *each.outlets, *each.walls, *each.surfaces) for each in own]
         around = [item for item in chain(*joined) if not isinstance(item, Through)]

@@ -34,7 +34,7 @@ STILL = "nothing evolves, and no work is done"
 
 
 def check_tolerance(rtol: float, option: str) -> None:
-    """InputError for a relative tolerance that no run is asked for: what is tighter is rounding."""
+    """Raise InputError for a relative tolerance out of the range of runs: what is tighter is rounding."""
     if not TIGHTEST <= rtol <= MOST:
         raise InputError(f"{rtol:g} is outside its range: >= {TIGHTEST:g} and <= {MOST:g}.", Place(path=option))
 

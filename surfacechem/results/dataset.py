@@ -46,7 +46,7 @@ DATASET_NAMES = {
 
 
 def changes_of(attributes: Mapping[str, Any]) -> dict[str, tuple[float, str]]:
-    """What a run has changed of its case, as its dataset says: values in SI by path, each with its unit.
+    """Changes of a run to its case, from its attributes: values in SI by path, each with its unit.
 
     >>> changes_of({"departures": '{"changes": {"initial.T": 280.0}, "units": {"initial.T": "K"}}'})
     {'initial.T': (280.0, 'K')}
@@ -150,7 +150,7 @@ class Results(ABC):
         """Global attributes: scalars and strings only."""
 
     def _changed(self, system: System) -> dict[str, object]:
-        """What `departures` says of the changes; nothing where there are none."""
+        """Entries of `departures` for the changes; none where there are none."""
         units = system.changeable
         told = {"changes": dict(self.changes), "units": {path: units[path] for path in self.changes}}
         return told if self.changes else {}

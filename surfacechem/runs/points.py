@@ -191,7 +191,7 @@ class Evaluator:
         return table, {item.quantity.name: item for item in asked}
 
     def _given(self, points: Points) -> tuple[list[Argument], Array]:
-        """What the points give, and its values, shape (points, arguments)."""
+        """Arguments that the points give, and their values, shape (points, arguments)."""
         known = self.names | self.parameters
         for name in points:
             if name not in known:
@@ -240,7 +240,7 @@ class Evaluator:
 
     @cached_property
     def names(self) -> dict[str, Argument]:
-        """What points may give by name, by that of the dataset too."""
+        """Arguments that points may give by name, by that of the dataset too."""
         found = dict(self.given)
         for column, state in enumerate(self.system.states, start=1):
             if state.given and state.given.state:
@@ -343,7 +343,7 @@ def _parameters(system: System) -> dict[str, Argument]:
 
 
 def _balances(system: System, gaps: Sequence[Equilibrium]) -> dict[str, Any]:
-    """What is zero in equilibrium, by state: the balance of each gap, and of what moves along that it does."""
+    """Residuals of equilibrium by state: the balance of each gap, and the motion of what follows it."""
     found = {item.state: system.expand(item.residual) for item in gaps}
     moved = {state.name: state.symbol - state.initial for state in system.states}
     for item in gaps:

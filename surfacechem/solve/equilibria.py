@@ -134,7 +134,7 @@ class Equilibria:
 
     @cached_property
     def _bears(self) -> Function:
-        """What sticking bears, for each gap."""
+        """Friction limit for each gap [Pa]."""
         return compiled(self.system, (e.bears for e in self.items))
 
     @cached_property

@@ -105,7 +105,7 @@ class Instant:
         slip = {p.symbol for p in system.parameters if p.path == SLIP}
         ends = [any(edge.when.get(mode) == (0,) for mode in slip) for edge in system.edges]
         self._sticking = first + np.flatnonzero(ends)
-        """Which of the guards end sticking."""
+        """Indices of the guards that end sticking."""
         self.jumps: list[Jump] = []
         self.limits: list[int] = []
         """Limits that were reached together with the last edge."""
@@ -245,7 +245,7 @@ class Instant:
         return {i for i, symbols in enumerate(read) if symbols & found}
 
     def _borne(self, index: int, point: Point) -> float:
-        """Rounding of what sticking bears beyond what it has to [Pa], on both sides of an edge."""
+        """Rounding of the margin of sticking [Pa], on both sides of an edge."""
         if not (len(self._sticking) and self.system.edges[index].equilibrates):
             return 0.0
         parameters = point.parameters.copy()

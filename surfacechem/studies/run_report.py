@@ -140,7 +140,7 @@ def _ending(attributes: Any) -> str:
 
 
 def _values(attributes: Mapping[str, Any]) -> dict[str, float]:
-    """What a run has changed of its case, in SI, by path."""
+    """Changes of a run to its case, in SI, by path."""
     return {path: value for path, (value, _) in changes_of(attributes).items()}
 
 

@@ -139,7 +139,7 @@ def _wanted(system: System, of: Sequence[str]) -> dict[str, int]:
 
 
 def _conserved(interface: Interface) -> list[dict[str, float]]:
-    """What no reaction changes, each as weights of coverages: the sites of each kind, a species that only watches."""
+    """Conserved sums of coverages, each by its weights: the sites of each kind, a spectator species."""
     changes = [law.stoichiometry() for law in interface.reactions]
     coverages = {variable.name: variable.density for variable in interface.variables}
     own = [{str(j): nu for j, change in enumerate(changes) if (nu := change.get(name))} for name in coverages]

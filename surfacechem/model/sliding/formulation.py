@@ -72,7 +72,7 @@ class Formulation:
 
     @property
     def unstable(self) -> str:
-        """Why nothing tells the velocity of sliding, where nothing does, and what would."""
+        """Reason for which no steady sliding velocity exists, with the remedy that fits."""
         return f"{UNSTABLE} if sticking were exact, without an elastic gap g_t" if self.elastic else UNSTABLE
 
     @property

@@ -222,7 +222,7 @@ def _friction(
 
 
 def _limit(build: Build, kind: Formulation) -> Expression:
-    """What sticking bears [Pa], per area on which friction acts where the interface is elastic."""
+    """Friction limit of sticking [Pa], per area on which friction acts where the interface is elastic."""
     return build.motion.stick_limits.get("t", NONE) * (1 if kind.elastic else build.energy.rubs)
 
 
