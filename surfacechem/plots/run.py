@@ -123,6 +123,7 @@ def figure(dataset: xarray.Dataset, variables: Sequence[str] | None = None, agai
         return _across(dataset, variables)
     if variables and set(variables) <= set(curved.FIELDS) and curved.carries(dataset):
         return curved.figure(dataset)
+    against = None if against == "time" else against
     shown = panels(dataset, variables, against)
     usual = not variables and against is None
     balances = usual and _balances_err(dataset)

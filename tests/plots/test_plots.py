@@ -117,6 +117,7 @@ def test_another_axis_than_time():
     assert ax.get_xlabel() == r"Phi $\phi$ [1]"
     assert ax.get_lines()[0].get_xdata()[-1] == pytest.approx(1 - np.exp(-2.0))
     assert all("residual" not in title for title in titles(figure(dataset(), against="phi")))
+    assert titles(figure(dataset(), against="time")) == titles(figure(dataset()))
 
 
 def test_time_axis_is_logarithmic_where_times_span_decades():
