@@ -619,7 +619,7 @@ class SweepSection(Section):
     )
     checked: int | str = key(
         Whole(0, word=ALL),
-        "runs of a store whose error is found, spread over the plan, and 100 of the hardest; with 0 no errors of any sweep",
+        "runs of a store whose error is found, spread over the plan, and 100 of the hardest; 0 finds none in any sweep",
         1000,
     )
     keep: KeepSection | None = key(
