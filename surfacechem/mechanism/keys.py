@@ -83,7 +83,7 @@ REMEDIES = {
 """Keys that are not supported, each with advice."""
 MODELS = {
     "edge": "a contact line has rates per length, and a scene has an area; write the reactions on a surface.",
-    **dict.fromkeys(GASES, f"this is a gas and no surface. A surface may have it beside it: {NEEDS}"),
+    **dict.fromkeys(GASES, "this is a gas and no surface. Name the phase that is one; the gas may be its neighbour."),
 }
 """Phase models that are not plain surfaces, each with advice."""
 NEIGHBOURLY = {"sticking": f"a sticking reaction needs a gas beside the surface: {NEEDS}", "electrochemical": CHARGES}
