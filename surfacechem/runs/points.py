@@ -23,7 +23,7 @@ from surfacechem.contracts.units import parse, quotient
 from surfacechem.documents import document
 from surfacechem.documents.document import Tree
 from surfacechem.errors import InputError, Place, suggestion
-from surfacechem.expressions import derivative
+from surfacechem.expressions import derivative, magnitude
 from surfacechem.format.csvtable import CSVText
 from surfacechem.laws.loading import Hold
 from surfacechem.model.assemble import assemble
@@ -37,7 +37,7 @@ from surfacechem.solve.contract import Array
 from surfacechem.solve.equilibria import NO_BALANCE, Equilibria, Point
 from surfacechem.solve.run import values_of
 from surfacechem.solve.segments import start_registers
-from surfacechem.tolerances import ROUNDING, TINY
+from surfacechem.tolerances import CROSSED, ROUNDING, TINY
 
 Points = Mapping[str, ArrayLike]
 
@@ -45,6 +45,7 @@ TRIALS = 50
 """Largest number of Newton's steps; what is linear, as all rates are, takes one."""
 
 POINT = ("point",)
+UNSOLVED = "the equations have no solution with these values"
 LEVEL = ".level"
 """Suffix of the paths of the values at which histories are held."""
 
@@ -121,8 +122,8 @@ class Argument:
 
     def put(self, table: Array, values: Array) -> None:
         """Make these its values; of what has no logarithm the argument is no number, so that no law holds there."""
-        with np.errstate(divide="ignore", invalid="ignore"):
-            table[:, self.column] = np.log(values) if self.is_log else values
+        with np.errstate(invalid="ignore"):
+            table[:, self.column] = np.log(np.where(values > 0, values, np.nan)) if self.is_log else values
 
 
 class Evaluator:
@@ -144,10 +145,13 @@ class Evaluator:
         self.rows = [*_rates(system, balances), *(item for item in system.outputs if item.name not in self.given)]
         self.rows += _capacities(system, scene, self.given)
         # Whether a state is stable is not asked of a point.
-        self.margins = [margin for margin, _ in system.limits if not margin.stability]
+        self.limits = [margin for margin, _ in system.limits if not margin.stability]
+        self.edges = [edge for edge in system.edges if not (edge.passes or edge.fold)]
         by = sorted({*self.unknown, *(item.column for item in self.given.values())})
         expressions = [*system.rows.values(), *balances.values(), *(row.expression for row in self.rows)]
-        self.slopes = Slopes(system, expressions, by, [margin.masked for margin in self.margins])
+        margins = [each.masked for each in (*self.limits, *self.edges)]
+        margins += [magnitude(edge.guard) for edge in self.edges]
+        self.slopes = Slopes(system, expressions, by, margins)
         self.modes = [mode for mode in system.modes if mode.start is not None]
 
     def at(self, points: Points) -> tuple[list[Column], list[Column], list[str]]:
@@ -169,9 +173,11 @@ class Evaluator:
             # The argument of what is a logarithm is ln x, whose derivative by x is 1/x.
             per = 1 / item.values(table) if item.is_log else 1.0
             derivatives += _by(item.quantity, [*shown.values()], total[:, :, k].T * per, there[:, k])
-        # The first margin that is closed; behind all of them stands that none is.
-        closed = np.column_stack([~(margins > 0), np.ones(len(margins), dtype=bool)])
-        reasons = np.array([*(margin.reason for margin in self.margins), ""])
+        limits, guards, sizes = np.split(margins, np.cumsum([len(self.limits), len(self.edges)]), axis=1)
+        # The first limit that is reached, or edge that is due; behind all of them stands that none is.
+        unsolved, due = np.isnan(table).any(axis=1), guards < -CROSSED * np.nan_to_num(sizes)
+        closed = np.column_stack([unsolved, ~(limits > 0), due, np.ones(len(margins), dtype=bool)])
+        reasons = np.array([UNSOLVED, *(each.reason for each in (*self.limits, *self.edges)), ""])
         return found, derivatives, np.where(lost, NO_BALANCE, reasons[closed.argmax(axis=1)]).tolist()
 
     def _table(self, points: Points) -> tuple[Array, dict[str, Argument]]:
@@ -314,7 +320,8 @@ class Slopes:
         # Which unknowns follow an argument through others: what is zero for every scene of this form is left out.
         for _ in unknown:
             reached = reached | (among @ reached)
-        return direct - through @ _solve(inner, outer), there | (passes @ reached)
+        with np.errstate(invalid="ignore"):  # where nothing is found there are no derivatives
+            return direct - through @ _solve(inner, outer), there | (passes @ reached)
 
 
 def _states(system: System) -> dict[str, Argument]:

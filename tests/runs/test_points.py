@@ -199,6 +199,20 @@ def test_points_where_a_law_does_not_hold_say_so(tmp_path):
     assert found["reason"].values[1].startswith("g_n reached zero, where the law viscous")
 
 
+@pytest.mark.parametrize(
+    ("name", "given", "reason"),
+    [
+        ("stick-slip", {"u_t": [0.6e-3, -0.61e-3]}, "sticking gives way and the interface slides forward"),
+        ("pulled-at-an-angle", {"w_t": [0.4e-3, 0.41e-3]}, "sticking gives way and the interface slides"),
+        ("rate-and-state-stick-slip", {"theta": [1.0, 0.0]}, "the equations have no solution with these values"),
+    ],
+)
+def test_no_run_could_rest_at_a_point_that_is_not_admissible(name, given, reason):
+    found = surfacechem.load(name).evaluate(given)
+    assert found["admissible"].values.tolist() == [1, 0]
+    assert str(found["reason"].values[1]) == reason
+
+
 def test_points_come_from_a_table_with_units(element, tmp_path):
     path = tmp_path / "points.csv"
     path.write_text("g_n [nm], T_c [degC], phi\n-1, 20, 0.5\n2, 30, 1\n")
