@@ -393,7 +393,8 @@ class System:
     @cached_property
     def of_cells(self) -> frozenset[Any]:
         """States inside bodies and their rates, as symbols: each belongs to one cell."""
-        states = (state for state in self.states if state.name in self.inside - {STAND_IN})
+        cells = self.inside - {STAND_IN}
+        states = (state for state in self.states if state.name in cells)
         return frozenset(symbol for state in states for symbol in (state.symbol, state.dot))
 
     @property
