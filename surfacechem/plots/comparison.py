@@ -24,15 +24,15 @@ from surfacechem.plots.run import Panel
 from surfacechem.plots.style import COLOURS, symbol, unit
 from surfacechem.results.dataset import changes_of
 
-DASHES = ("-", "--", ":", "-.")
+LINE_STYLES = ("-", "--", ":", "-.")
 """Lines of the variables of a panel, whose colours say of which dataset they are."""
 
-WORDS = ("title", "description", "source", "reference")
+TEXT_KEYS = ("title", "description", "source", "reference")
 """Keys of a case that do not describe its scene."""
 
 LONG_NUMBER = re.compile(r"\b\d\.?\d{7,}(?:e[+-]?\d+)?|\b\d+\.\d{7,}(?:e[+-]?\d+)?")
 
-LONG = 40
+LONG_LABEL = 40
 """Length of a label [letters] that does not leave room for another beside it."""
 
 MOST_DIFFERENCES = 4
@@ -43,11 +43,11 @@ def figure(
     datasets: Sequence[xarray.Dataset], variables: Sequence[str] | None = None, against: str | None = None
 ) -> Figure:
     """The figure of several datasets, all of runs or all of sweeps over the same parameter."""
-    over, panels = _content(datasets, variables, against)
+    over, panels = _axis_and_panels(datasets, variables, against)
     if not panels:
         raise InputError("there is nothing to plot: none of the variables varies.")
     shown = [over, *(name for panel in panels for name in panel.names)]
-    names, colours = _told(datasets, shown), colours_of(len(datasets))
+    names, colours = _labels_with_coincidences(datasets, shown), colours_of(len(datasets))
     starts = [run.first_shown(dataset, panels) for dataset in datasets] if over == "time" else []
     # What needs decades is lost on a linear axis; what does not can be read on both.
     begin = min((start for start in starts if start is not None), default=None)
@@ -56,14 +56,14 @@ def figure(
             _draw(ax, datasets, panel, over, colours, begin)
         _label_axis(grid[:, 0].tolist(), datasets, over, begin)
         handles = [Line2D([], [], color=colour, label=name) for colour, name in zip(colours, names, strict=True)]
-        plot.legend(handles=handles, loc="outside lower left", ncols=1 if len(max(names, key=len)) > LONG else 2)
+        plot.legend(handles=handles, loc="outside lower left", ncols=1 if len(max(names, key=len)) > LONG_LABEL else 2)
         titles = {str(dataset.attrs.get("title", "")) for dataset in datasets}
         title = titles.pop() if len(titles) == 1 else f"{len(datasets)} datasets"
-        plot.suptitle(title, **style.TITLE)
+        plot.suptitle(title, **style.TITLE_STYLE)
     return plot
 
 
-def _content(
+def _axis_and_panels(
     datasets: Sequence[xarray.Dataset], variables: Sequence[str] | None, against: str | None
 ) -> tuple[str, list[Panel]]:
     """Variable along the axis, and the panels."""
@@ -71,12 +71,12 @@ def _content(
     if any("study" in dataset.attrs for dataset in datasets) or any(sweeps) != all(sweeps):
         raise InputError("a figure takes runs or sweeps, not both.")
     if not any(sweeps):
-        return against or "time", _united([run.panels(each, variables, against) for each in datasets])
+        return against or "time", _merge_panels([run.panels(each, variables, against) for each in datasets])
     axes = [*dict.fromkeys(tuple(sweep.axes_of(each)) for each in datasets)]
     if len(axes) > 1 or len(axes[0]) > 1:
         given = ", and over ".join(" by ".join(names) for names in axes)
         raise InputError(f"sweeps share a figure where all are over one parameter, the same; these are over {given}.")
-    return axes[0][0], _united([sweep.groups(each, variables) for each in datasets])
+    return axes[0][0], _merge_panels([sweep.panels(each, variables) for each in datasets])
 
 
 def colours_of(count: int) -> list[str]:
@@ -99,14 +99,14 @@ def labels(datasets: Sequence[xarray.Dataset]) -> list[str]:
     texts = [str(dataset.attrs.get("title", "")) for dataset in datasets]
     # More differences than fit into a legend are those of two different cases, whose titles tell them apart.
     if 0 < len(paths) <= MOST_DIFFERENCES:
-        names = _short(paths)
+        names = _short_labels(paths)
         texts = [", ".join(f"{name} = {each.get(path, 'not given')}" for path, name in names.items()) for each in known]
     # Datasets that still have the same name are told apart by their files.
     files = [Path(str(d.encoding.get("source", f"dataset {k}"))).stem for k, d in enumerate(datasets, 1)]
     return [text if texts.count(text) == 1 else file for text, file in zip(texts, files, strict=True)]
 
 
-def _short(paths: Sequence[str]) -> dict[str, str]:
+def _short_labels(paths: Sequence[str]) -> dict[str, str]:
     """The last words of paths, as many as tell them apart, or the symbol for them."""
     last = [path.rpartition(".")[2] for path in paths]
     return {
@@ -131,19 +131,19 @@ def _settings(dataset: xarray.Dataset) -> dict[str, str]:
         text, size = style.prefixed(si, np.array([value]))
         found[parameter_path(path, found)] = f"{value / size:g} {text}".removesuffix(" 1").rstrip()
     found |= {name: str(attributes[name]) for name in ("solver", "rtol") if name in attributes}
-    return {path: _brief(value) for path, value in found.items() if path.partition(".")[0] not in WORDS}
+    return {path: _short_number(value) for path, value in found.items() if path.partition(".")[0] not in TEXT_KEYS}
 
 
-def _brief(text: str) -> str:
+def _short_number(text: str) -> str:
     """A number, with its unit if it has one, in as many digits as a legend needs.
 
-    >>> _brief("6.6666666666666667e15 1/J/s"), _brief("radau"), _brief("-0.1 MPa")
+    >>> _short_number("6.6666666666666667e15 1/J/s"), _short_number("radau"), _short_number("-0.1 MPa")
     ('6.66667e+15 1/J/s', 'radau', '−0.1 MPa')
     """
     return style.minus(LONG_NUMBER.sub(lambda m: f"{float(m[0]):.6g}", text))
 
 
-def _united(found: Sequence[Sequence[Panel]]) -> list[Panel]:
+def _merge_panels(found: Sequence[Sequence[Panel]]) -> list[Panel]:
     """Panels of all datasets, those with the same title and unit as one."""
     names: dict[tuple[str, str], dict[str, None]] = {}
     for panel in (panel for each in found for panel in each):
@@ -151,7 +151,7 @@ def _united(found: Sequence[Sequence[Panel]]) -> list[Panel]:
     return [Panel(*key, list(several)) for key, several in names.items()]
 
 
-def _told(datasets: Sequence[xarray.Dataset], shown: Sequence[str]) -> list[str]:
+def _labels_with_coincidences(datasets: Sequence[xarray.Dataset], shown: Sequence[str]) -> list[str]:
     """The labels of datasets, which say where a curve is below another one and so not seen."""
     names = labels(datasets)
     twins = [next(k for k, other in enumerate(datasets) if _coincide(other, each, shown)) for each in datasets]
@@ -173,18 +173,18 @@ def _draw(
     """The variables of a panel, each in its kind of line, of all datasets that have them."""
     drawn = []
     for dataset, colour in zip(datasets, colours, strict=False):
-        for name, dash in zip(panel.names, cycle(DASHES), strict=False):
+        for name, dash in zip(panel.names, cycle(LINE_STYLES), strict=False):
             if name in dataset:
-                values = members.final(dataset, name) if "sweep" in dataset.attrs else dataset[name].values
+                values = members.final_values(dataset, name) if "sweep" in dataset.attrs else dataset[name].values
                 drawn.append(values if begin is None else values[dataset[over].values >= begin])
                 points = "sweep" in dataset.attrs or len(values) < 3
-                look: Any = {"marker": style.marker(ax, len(values)), "markersize": style.MARKER} if points else {}
+                look: Any = {"marker": style.marker(ax, len(values)), "markersize": style.MARKER_SIZE} if points else {}
                 look["drawstyle"] = style.drawn_as(dataset[name])
                 ax.plot(dataset[over].values, values, color=colour, linestyle=dash, linewidth=1.3, **look)
     words = panel.title or ", ".join(map(symbol, panel.names[:2]))
     style.label(ax.yaxis, words, panel.unit, np.concatenate(drawn))
     several = panel.names if len(panel.names) > 1 else ()
-    for name, dash in zip(several, cycle(DASHES), strict=False):
+    for name, dash in zip(several, cycle(LINE_STYLES), strict=False):
         ax.plot([], [], color="black", linestyle=dash, linewidth=1.3, label=symbol(name))
     style.legend(ax)
 

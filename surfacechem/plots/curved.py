@@ -22,10 +22,10 @@ FIELDS = ("gap", "traction")
 ROWS, HEIGHT = 3, 2.3
 """Panels, and the height of each [inch]."""
 
-APART = 0.08
+PANEL_SPACING = 0.08
 """Space above and below each [inch]: twice the usual."""
 
-BEYOND = 1.5
+PROFILE_REACH = 1.5
 """So much farther than the traction is felt the surfaces are drawn."""
 
 
@@ -37,7 +37,7 @@ def figure(dataset: xarray.Dataset) -> Figure:
     return plot
 
 
-def carries(dataset: xarray.Dataset) -> bool:
+def has_surfaces(dataset: xarray.Dataset) -> bool:
     """Whether a run is one of two curved surfaces, with their fields."""
     return {*FIELDS, "opposite_z", "approach", "force"} <= set(dataset)
 
@@ -54,9 +54,9 @@ def draw(axes: Sequence[Axes], dataset: xarray.Dataset) -> None:
     """Draw the panels on axes of a figure, one below the other."""
     # Each has an axis of its own, whose words stand apart from the panel below.
     engine: Any = axes[0].figure.get_layout_engine()
-    engine.set(h_pad=APART)
-    even, (along, at) = _around(dataset), _section(dataset)
-    reach = _reach(dataset, along, at)
+    engine.set(h_pad=PANEL_SPACING)
+    even, (along, at) = _is_axisymmetric(dataset), _section(dataset)
+    reach = _traction_radius(dataset, along, at)
     _draw_profiles(axes[0], dataset, even, along, at, reach)
     if even:
         _draw_tractions(axes[1], dataset, along, at, reach)
@@ -65,13 +65,13 @@ def draw(axes: Sequence[Axes], dataset: xarray.Dataset) -> None:
     _draw_force(axes[2], dataset)
 
 
-def _around(dataset: xarray.Dataset) -> bool:
+def _is_axisymmetric(dataset: xarray.Dataset) -> bool:
     """Whether nothing changes about the axis."""
     gap = dataset["gap"].values
     return bool(np.ptp(gap, axis=2).max() <= SQRT_EPS * np.abs(gap).max())
 
 
-def _facing(dataset: xarray.Dataset) -> NDArray[np.bool_]:
+def _is_facing(dataset: xarray.Dataset) -> NDArray[np.bool_]:
     """Whether each point is on the side that is nearest: seen from above a closed body covers itself."""
     from scipy.ndimage import label
 
@@ -87,8 +87,8 @@ def _section(dataset: xarray.Dataset) -> tuple[Array, Any]:
     """Distances along a section through the nearest point [m], and which of the points it is."""
     column = int(np.unravel_index(np.argmin(dataset["gap"].values[0]), dataset["gap"].shape[1:])[1])
     x, y = (dataset[f"surface_{axis}"].values for axis in "xy")
-    rows = np.flatnonzero(_facing(dataset)[:, column])
-    if _around(dataset):
+    rows = np.flatnonzero(_is_facing(dataset)[:, column])
+    if _is_axisymmetric(dataset):
         return np.hypot(x, y)[rows, column], (rows, column)
     columns, last = np.full(len(rows), column), x.shape[1] - 1
     if max(np.ptp(ends[:, [0, -1]], axis=1).max() for ends in (x, y)) <= SQRT_EPS * np.ptp(x):
@@ -98,21 +98,21 @@ def _section(dataset: xarray.Dataset) -> tuple[Array, Any]:
     return x[at] if np.ptp(x[at]) > np.ptp(y[at]) else y[at], at
 
 
-def _reach(dataset: xarray.Dataset, along: Array, at: Any) -> float:
+def _traction_radius(dataset: xarray.Dataset, along: Array, at: Any) -> float:
     """Distance to which the traction is felt [m]."""
     size = np.abs(dataset["traction"].values[:, *at]).max(axis=0)
     # Bodies are much larger than what acts between them, of which nothing would be seen at their size.
     felt = np.abs(along[size > NEGLIGIBLE * size.max()])
     whole = float(np.abs(along).max())
-    return min(BEYOND * float(felt.max(initial=0.0)), whole) or whole
+    return min(PROFILE_REACH * float(felt.max(initial=0.0)), whole) or whole
 
 
-def _chosen(dataset: xarray.Dataset) -> Iterator[tuple[int, Any, str]]:
+def _drawn_times(dataset: xarray.Dataset) -> Iterator[tuple[int, Any, str]]:
     """Times that are drawn, with colour and words: the least and the largest approach and some between."""
     approach = dataset["approach"].values
     # Runs linger where little changes: approaches are spread by their rank, not by time.
     order = np.argsort(approach)
-    for k in order[style.spread(len(order), 4)].tolist():
+    for k in order[style.evenly_spread(len(order), 4)].tolist():
         share = float(np.mean(approach < approach[k]))
         text, size = style.prefixed("m", approach)
         yield k, matplotlib.colormaps["viridis"](share * 0.9), f"$g_n$ = {approach[k] / size:.3g} {text}"
@@ -124,7 +124,7 @@ def _draw_profiles(ax: Axes, dataset: xarray.Dataset, even: bool, along: Array, 
     for sign in signs:
         ax.plot(sign * along, dataset["surface_z"].values[at], color="black", label="body 1" if sign > 0 else "_")
     heights = [dataset["surface_z"].values[at][np.abs(along) <= reach]]
-    for k, colour, label in _chosen(dataset):
+    for k, colour, label in _drawn_times(dataset):
         x, y, z = (dataset[f"opposite_{axis}"].values[k][at] for axis in "xyz")
         across = np.hypot(x, y) if even else x if np.ptp(x) > np.ptp(y) else y
         for sign in signs:
@@ -143,7 +143,7 @@ def _draw_tractions(ax: Axes, dataset: xarray.Dataset, along: Array, at: Any, re
     """Traction over the distance from the axis at several approaches."""
     shown = np.abs(along) <= reach
     values = dataset["traction"].values[:, *at]
-    for k, colour, _ in _chosen(dataset):
+    for k, colour, _ in _drawn_times(dataset):
         ax.plot(along[shown], values[k][shown], color=colour)
         ax.plot(-along[shown], values[k][shown], color=colour)
     ax.set_xlim(-reach, reach)
@@ -153,7 +153,7 @@ def _draw_tractions(ax: Axes, dataset: xarray.Dataset, along: Array, at: Any, re
 
 def _draw_field(ax: Axes, dataset: xarray.Dataset) -> None:
     """Traction over the surface where it is the largest."""
-    facing = _facing(dataset)
+    facing = _is_facing(dataset)
     seen: Any = np.ix_(facing.any(axis=1), facing.any(axis=0))
     values = dataset["traction"].values[:, *seen]
     k = int(np.argmax(np.abs(values).max(axis=(1, 2))))
@@ -169,7 +169,7 @@ def _draw_field(ax: Axes, dataset: xarray.Dataset) -> None:
     # What is drawn is the square around all that is felt, or what there is of the surface in it.
     felt = np.abs(values[k]) >= NEGLIGIBLE * np.abs(values[k]).max()
     ends = [(float(part[felt].min()), float(part[felt].max())) for part in (x, y)]
-    half = BEYOND / 2 * max(b - a for a, b in ends)
+    half = PROFILE_REACH / 2 * max(b - a for a, b in ends)
     shown = [
         np.clip([(a + b) / 2 - half, (a + b) / 2 + half], part.min(), part.max())
         for part, (a, b) in zip((x, y), ends, strict=True)

@@ -23,21 +23,21 @@ WIDTH, HEIGHT, GAP = 2.7, 0.95, 0.26
 BESIDE, OVER, LINE = 1.6, 0.5, 0.145
 """Room [inch] beside the bodies for heat paths, over them for springs and far sides, and of a line of text."""
 
-SMALL = 7.5
+FONT_SIZE = 7.5
 COILS = 5
-LETTERS = 44
+MOST_LETTERS = 44
 """Letters of a line below the drawing."""
 
-HEAT_TO = {"Q_1": 0, "Q_2": 1, "Q_c": None}
+HEATED_BODY = {"Q_1": 0, "Q_2": 1, "Q_c": None}
 """Heat that a case supplies, and the number of the body that receives it; None for the interface."""
 
 
 def figure(scene: Scene) -> Figure:
     """The drawing; body 1 is the lower one."""
-    below = _given(scene)
+    below = _facts(scene)
     left = BESIDE if scene.heat else 0.1
-    right = 0.85 if scene.tangential or any(name in scene.loading for name in HEAT_TO) else 0.1
-    over = [scene.normal is not None or _far(scene.bodies[1]), _far(scene.bodies[0])]
+    right = 0.85 if scene.tangential or any(name in scene.loading for name in HEATED_BODY) else 0.1
+    over = [scene.normal is not None or _has_far_heat_path(scene.bodies[1]), _has_far_heat_path(scene.bodies[0])]
     low, high = -HEIGHT - over[1] * OVER - LINE * len(below) - 0.15, GAP + HEIGHT + over[0] * OVER + 0.15
     with matplotlib.rc_context(style.STYLE):
         drawing = Figure(figsize=(left + WIDTH + right, high - low))
@@ -58,7 +58,9 @@ def figure(scene: Scene) -> Figure:
             middle = GAP + HEIGHT / 2
             _spring(axes, scene.tangential, (WIDTH, middle), (WIDTH + 0.65, middle))
         for k, line in enumerate(below):
-            axes.text(0.0, low + LINE * (len(below) - 0.5 - k) + 0.05, line, va="center", fontsize=SMALL, color=GIVEN)
+            axes.text(
+                0.0, low + LINE * (len(below) - 0.5 - k) + 0.05, line, va="center", fontsize=FONT_SIZE, color=GIVEN
+            )
         return drawing
 
 
@@ -78,7 +80,7 @@ def _body(axes: Axes, body: Body, bottom: float) -> None:
     lines += [f"conducts, {body.conduction.cells or 'as one lump:'} cells"] if body.conduction else []
     middle = bottom + HEIGHT / 2
     axes.text(WIDTH / 2, middle + 0.26, body.name, ha="center", va="center", weight="bold", fontsize=9)
-    axes.text(WIDTH / 2, middle + 0.12, "\n".join(lines), ha="center", va="top", fontsize=SMALL, linespacing=1.35)
+    axes.text(WIDTH / 2, middle + 0.12, "\n".join(lines), ha="center", va="top", fontsize=FONT_SIZE, linespacing=1.35)
 
 
 def _interface(axes: Axes, scene: Scene) -> None:
@@ -86,7 +88,7 @@ def _interface(axes: Axes, scene: Scene) -> None:
     axes.add_patch(Rectangle((0, 0), WIDTH, GAP, facecolor=MEDIUM, edgecolor=SPRING, hatch="..", alpha=0.6))
     axes.text(
         WIDTH / 2, GAP / 2, f"interface: {_temperature(interface.temperature)}", ha="center", va="center",
-        fontsize=SMALL, bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.5},
+        fontsize=FONT_SIZE, bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.5},
     )  # fmt: skip
 
 
@@ -115,15 +117,15 @@ def _heat(axes: Axes, scene: Scene) -> None:
             x = -0.12 - 0.2 * inside.index(between)
             _arrow(axes, (x, low), (x, high))
             at = -0.2 - 0.2 * (len(inside) - 1), (low + high) / 2 + 0.1
-        axes.text(*at, "\n".join(words), color=HEAT, ha="right", va="center", fontsize=SMALL)
-    for name in HEAT_TO.keys() & scene.loading.keys():
-        k = HEAT_TO[name]
+        axes.text(*at, "\n".join(words), color=HEAT, ha="right", va="center", fontsize=FONT_SIZE)
+    for name in HEATED_BODY.keys() & scene.loading.keys():
+        k = HEATED_BODY[name]
         level = GAP / 2 if k is None else levels[k]
         _arrow(axes, (WIDTH + 0.45, level), (WIDTH, level), "->")
         axes.text(WIDTH + 0.5, level, symbol(name), color=HEAT, va="center", fontsize=9)
 
 
-def _far(body: Body) -> bool:
+def _has_far_heat_path(body: Body) -> bool:
     """Whether heat passes the far side of a body."""
     return body.conduction is not None and body.conduction.far is not None
 
@@ -137,7 +139,7 @@ def _far_side(axes: Axes, body: Body, edge: float, way: int) -> None:
     text = f"far side: {body.conduction.far.at_start():g} K"
     if not body.conduction.held:
         text += f"\nthrough {body.conduction.h_far:g} W/(m² K)"
-    axes.text(WIDTH / 2 + 0.1, edge + way * 0.2, text, color=HEAT, va="center", fontsize=SMALL)
+    axes.text(WIDTH / 2 + 0.1, edge + way * 0.2, text, color=HEAT, va="center", fontsize=FONT_SIZE)
 
 
 def _spring(axes: Axes, mounting: Mounting, start: tuple[float, float], end: tuple[float, float]) -> None:
@@ -153,10 +155,10 @@ def _spring(axes: Axes, mounting: Mounting, start: tuple[float, float], end: tup
     # Beside a spring that stands upright there is room for its words, over one that lies.
     above = end[0] == start[0]
     place = (end[0] + 0.32, end[1] - 0.1) if above else (start[0] + 0.05, end[1] + 0.33)
-    axes.text(*place, text, va="center", fontsize=SMALL, color=SPRING)
+    axes.text(*place, text, va="center", fontsize=FONT_SIZE, color=SPRING)
 
 
-def _given(scene: Scene) -> list[str]:
+def _facts(scene: Scene) -> list[str]:
     """Lines about what acts in the interface, and what is given."""
     interface = scene.interface
     rows: list[tuple[str, Sequence[str]]] = [
@@ -167,11 +169,11 @@ def _given(scene: Scene) -> list[str]:
         ("given", [symbol(name) for name in scene.loading]),
         ("stages", [stage.name for stage in scene.programme]),
     ]
-    return [line for word, names in rows if names for line in _filled(word, names)]
+    return [line for word, names in rows if names for line in _wrapped(word, names)]
 
 
-def _filled(word: str, names: Sequence[str]) -> list[str]:
+def _wrapped(word: str, names: Sequence[str]) -> list[str]:
     """A word and names in lines; four of them, since reactions of a mechanism may be many."""
     unique = list(dict.fromkeys(names))
     text = f"{word}: {', '.join(unique[:4])}" + (f" and {len(unique) - 4} more" if len(unique) > 4 else "")
-    return [text] if "$" in text else wrap(text, LETTERS, subsequent_indent="    ")
+    return [text] if "$" in text else wrap(text, MOST_LETTERS, subsequent_indent="    ")

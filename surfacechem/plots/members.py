@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from surfacechem.errors import InputError, refuse_unknown
 from surfacechem.format.plans import RUN, Plan, name_parts
 from surfacechem.plots import style
-from surfacechem.plots.run import KINDS, of_kind
+from surfacechem.plots.run import PANELS, of_kind
 from surfacechem.plots.style import COLOURS, Array, symbol, unit, unit_text, varies
 
 MOST_MEMBERS = 100
@@ -27,10 +27,10 @@ MOST_POINTS = 2**20
 
 MOST_PANELS = 3
 
-COUNTED = ("steps", "destroys_entropy")
+DIAGNOSTICS = ("steps", "destroys_entropy")
 """Variables on the solver or the laws, not on what happens."""
 
-RANKS = (
+NAME_ORDER = (
     *(r"lifetime", r"(phi|theta).*_last", r"T.*_max", r"(phi|T).*(?<!_m..)"),
     *(r"time_to.*", r"time.*", r".*(?<!_m..)", r".*"),
 )
@@ -38,74 +38,76 @@ RANKS = (
 ends, other extremes.
 """
 
-BINS, PARTS = 40, 12
+BINS, PARAMETER_BINS = 40, 12
 """Bars of a distribution, and parts of the range of a parameter in each of which the effect is shown."""
 
-BAND = (5.0, 50.0, 95.0)
+PERCENTILES = (5.0, 50.0, 95.0)
 """Percentiles of a distribution that are drawn."""
 
-SEEN = 0.99
+SEEN_PART = 0.99
 """Fraction of the largest value of a variable that an output has to come to; less is told."""
 
 
 def figure(dataset: xarray.Dataset, plan: Plan, axes: Sequence[str], variables: Sequence[str] | None = None) -> Figure:
     """The figure of a grid of two parameters, of a sample, or of more parameters."""
-    dataset = with_ends(dataset, axes)
+    dataset = with_final_bonds(dataset, axes)
     parameters = [str(name) for name, x in dataset.coords.items() if len(x.dims) == 1 and x.dims[0] in axes]
     names = chosen(dataset, axes, variables)
     if dataset[names[0]].ndim > len(axes):
         return curves(dataset, axes, names)
     if len(axes) == 2 and RUN not in axes:
-        return maps(dataset, plan, axes, names)
+        return heat_maps(dataset, plan, axes, names)
     parameters.sort(key=lambda name: [*plan.paths, ""].index(path_of(name, plan)))
     return effects(dataset, plan, axes, parameters, names)
 
 
 def chosen(dataset: xarray.Dataset, axes: Sequence[str], variables: Sequence[str] | None) -> list[str]:
     """The variables that are drawn: those asked for, else those of the ends that differ from run to run."""
-    known = numbers(dataset, axes)
-    refuse_unknown(variables or (), known, "no variable '{}' in the sweep", style.place(dataset))
-    return list(dict.fromkeys(variables)) if variables else differing(dataset, axes, known)
+    known = number_names(dataset, axes)
+    refuse_unknown(variables or (), known, "no variable '{}' in the sweep", style.place_of(dataset))
+    return list(dict.fromkeys(variables)) if variables else varying_numbers(dataset, axes, known)
 
 
-def numbers(dataset: xarray.Dataset, axes: Sequence[str]) -> list[str]:
+def number_names(dataset: xarray.Dataset, axes: Sequence[str]) -> list[str]:
     """Names of the numbers that each run has, not only those that are checked, at its end or along it."""
     return [str(n) for n, x in dataset.data_vars.items() if x.dtype.kind == "f" and x.dims[: len(axes)] == tuple(axes)]
 
 
-def differing(dataset: xarray.Dataset, axes: Sequence[str], known: Sequence[str]) -> list[str]:
+def varying_numbers(dataset: xarray.Dataset, axes: Sequence[str], known: Sequence[str]) -> list[str]:
     """Numbers of each run that differ from run to run: of phases and temperatures, else of events."""
-    found = sorted(known, key=lambda name: next(k for k, rank in enumerate(RANKS) if re.fullmatch(rank, name)))
-    ends = [name for name in found if dataset[name].ndim == len(axes) and "error" not in name and name not in COUNTED]
-    shown = _apart(dataset, [name for name in ends if varies(fair(dataset, name))])
-    telling = [name for name in shown if any(re.fullmatch(rank, name) for rank in RANKS[:-1])]
+    found = sorted(known, key=lambda name: next(k for k, rank in enumerate(NAME_ORDER) if re.fullmatch(rank, name)))
+    ends = [
+        name for name in found if dataset[name].ndim == len(axes) and "error" not in name and name not in DIAGNOSTICS
+    ]
+    shown = _distinct(dataset, [name for name in ends if varies(subsample(dataset, name))])
+    telling = [name for name in shown if any(re.fullmatch(rank, name) for rank in NAME_ORDER[:-1])]
     return (telling or shown or ["time_reached"])[:MOST_PANELS]
 
 
-def _apart(dataset: xarray.Dataset, names: Sequence[str]) -> list[str]:
+def _distinct(dataset: xarray.Dataset, names: Sequence[str]) -> list[str]:
     """The names without those of equal values: what is largest at the end tells no more than the end."""
     shown: list[str] = []
     for name in names:
-        values = fair(dataset, name)
-        shown += [] if any(np.array_equal(values, fair(dataset, n), equal_nan=True) for n in shown) else [name]
+        values = subsample(dataset, name)
+        shown += [] if any(np.array_equal(values, subsample(dataset, n), equal_nan=True) for n in shown) else [name]
     return shown
 
 
-def with_ends(dataset: xarray.Dataset, axes: Sequence[str]) -> xarray.Dataset:
+def with_final_bonds(dataset: xarray.Dataset, axes: Sequence[str]) -> xarray.Dataset:
     """The dataset with bonds at the end of each run, or where neither they nor temperatures vary with what else varies
     at the end; as it is where it holds such numbers already.
     """
-    series = [name for name in along(dataset, axes) if name in dataset.data_vars]
+    series = [name for name in series_names(dataset, axes) if name in dataset.data_vars]
     if not series or any(str(name).endswith("_last") for name in dataset):
         return dataset
-    temperatures, bonds = (of_kind(dataset, series, *kind) for _, *kind in KINDS[:2])
-    moving = [name for name in (*bonds, *temperatures) if varies(fair(dataset, name))]
+    temperatures, bonds = (of_kind(dataset, series, *kind) for _, *kind in PANELS[:2])
+    moving = [name for name in (*bonds, *temperatures) if varies(subsample(dataset, name))]
     last = [name for name in series if not name.endswith(("_exact", "_residual"))] if not moving else bonds
-    ends = {f"{n}_last": xarray.Variable(axes, final(dataset, n), dataset[n].attrs) for n in last}
+    ends = {f"{n}_last": xarray.Variable(axes, final_values(dataset, n), dataset[n].attrs) for n in last}
     return dataset.assign(ends)
 
 
-def final(dataset: xarray.Dataset, name: str) -> Array:
+def final_values(dataset: xarray.Dataset, name: str) -> Array:
     """The value at the end of each run, or at the last output before where that is all there is; nan where it failed or
     was refused.
     """
@@ -114,18 +116,18 @@ def final(dataset: xarray.Dataset, name: str) -> Array:
     if values.ndim > dataset["status"].ndim:
         last = values.shape[-1] - 1 - np.argmax(np.isfinite(values)[..., ::-1], axis=-1)
         values = np.take_along_axis(values, last[..., None], axis=-1)[..., 0]
-    return np.where(style.lost(dataset, *style.LOST), np.nan, values)
+    return np.where(style.has_no_end(dataset, *style.WITHOUT_END), np.nan, values)
 
 
-def knows_ends(dataset: xarray.Dataset, names: Sequence[str]) -> bool:
+def ends_are_known(dataset: xarray.Dataset, names: Sequence[str]) -> bool:
     """Whether the last values are those at the ends of all runs, none of which has stopped after its last output."""
-    return all(f"{name}_last" in dataset for name in names) or not style.lost(dataset, style.STOPPED).any()
+    return all(f"{name}_last" in dataset for name in names) or not style.has_no_end(dataset, style.STOPPED).any()
 
 
-def fair(dataset: xarray.Dataset, name: str) -> Array:
+def subsample(dataset: xarray.Dataset, name: str) -> Array:
     """Values of a variable, of a fair part of the runs where they are many."""
     series = dataset[name].ndim > dataset["status"].ndim
-    values = (dataset[name].values if series else final(dataset, name)).ravel()
+    values = (dataset[name].values if series else final_values(dataset, name)).ravel()
     return np.asarray(values[:: -(-values.size // MOST_POINTS)], dtype=float)
 
 
@@ -134,12 +136,12 @@ def quantity_label(values: xarray.DataArray) -> str:
     return f"{style.quantity_words(values)} [{unit_text(unit(values))}]"
 
 
-def maps(dataset: xarray.Dataset, plan: Plan, axes: Sequence[str], names: Sequence[str]) -> Figure:
+def heat_maps(dataset: xarray.Dataset, plan: Plan, axes: Sequence[str], names: Sequence[str]) -> Figure:
     """Colours over two parameters, a map for each variable; white where a run has no value."""
     x, y = (dataset[name] for name in axes)
     with style.panels(5.6, 0.6 + 3.3 * len(names), len(names), sharex=True) as (plot, grid):
         for ax, name in zip(grid[:, 0], names, strict=True):
-            values = np.ma.masked_invalid(final(dataset, name))
+            values = np.ma.masked_invalid(final_values(dataset, name))
             image = ax.pcolormesh(x.values, y.values, values.T, shading="nearest", cmap="viridis", rasterized=True)
             plot.colorbar(image, ax=ax, label=quantity_label(dataset[name]))
             style.draw_parameter(ax.yaxis, y, plan.axes[1].logarithmic)
@@ -148,25 +150,25 @@ def maps(dataset: xarray.Dataset, plan: Plan, axes: Sequence[str], names: Sequen
     return plot
 
 
-def portraits(dataset: xarray.Dataset, axes: Sequence[str], variables: Sequence[str] | None, against: str) -> Figure:
+def trajectories(dataset: xarray.Dataset, axes: Sequence[str], variables: Sequence[str] | None, against: str) -> Figure:
     """Each run of a sweep over one of its variables, or over time."""
-    series = along(dataset, axes)
+    series = series_names(dataset, axes)
     # Along the runs there is time, or where a load ends them, the load.
     inner = [str(dim) for name in series for dim in dataset[name].dims if dim not in axes]
     known = [*series, *dict.fromkeys(inner)]
     asked = (*(variables or ()), against)
     if single := next(filter((dataset.variables.keys() - known).__contains__, asked), ""):
         message = f"{single} does not go along the runs. Leave `against` out: the figure is over what is swept."
-        raise InputError(message, style.place(dataset))
-    refuse_unknown(asked, known, "no variable '{}' along the runs of the sweep", style.place(dataset))
-    usual = [name for _, *kind in KINDS[:2] for name in of_kind(dataset, series, *kind)]
-    moving = [name for name in usual if name != against and varies(fair(dataset, name))]
+        raise InputError(message, style.place_of(dataset))
+    refuse_unknown(asked, known, "no variable '{}' along the runs of the sweep", style.place_of(dataset))
+    usual = [name for _, *kind in PANELS[:2] for name in of_kind(dataset, series, *kind)]
+    moving = [name for name in usual if name != against and varies(subsample(dataset, name))]
     if not (names := list(dict.fromkeys(variables or moving[:MOST_PANELS]))):
         raise InputError(f"neither bonds nor temperatures change: name variables to show over {against}.")
     return curves(dataset, axes, names, against)
 
 
-def along(dataset: xarray.Dataset, axes: Sequence[str]) -> list[str]:
+def series_names(dataset: xarray.Dataset, axes: Sequence[str]) -> list[str]:
     """Numbers along the runs of a sweep."""
     many = [str(n) for n, x in dataset.variables.items() if x.dtype.kind == "f" and x.ndim == len(axes) + 1]
     return [name for name in many if "event" not in dataset[name].dims]
@@ -175,14 +177,14 @@ def along(dataset: xarray.Dataset, axes: Sequence[str]) -> list[str]:
 def curves(dataset: xarray.Dataset, axes: Sequence[str], names: Sequence[str], against: str | None = None) -> Figure:
     """Series of all runs, or of a fair part of them, which the figure says; over ``against`` instead of time."""
     count = int(np.prod([dataset.sizes[name] for name in axes]))
-    members = style.spread(count, MOST_MEMBERS)
+    members = style.evenly_spread(count, MOST_MEMBERS)
     over = dataset[against or str(dataset[names[0]].dims[-1])]
     x = np.broadcast_to(over.values, dataset[names[0]].shape).reshape(count, -1)[members]
     with style.panels(6.4, 0.9 + 2.2 * len(names), len(names), sharex=True) as (plot, grid):
         for ax, name in zip(grid[:, 0], names, strict=True):
             values = dataset[name].values.reshape(count, -1)[members]
             for line, run, k in zip(values, x, members, strict=True):
-                ax.plot(run, line, drawstyle=style.drawn_as(dataset[name]), **looks(dataset, axes, k))
+                ax.plot(run, line, drawstyle=style.drawn_as(dataset[name]), **line_style(dataset, axes, k))
             style.label(ax.yaxis, style.quantity_words(dataset[name]), unit(dataset[name]), values)
             style.legend(ax)
         style.label(grid[-1, 0].xaxis, "Time" if against in (None, "time") else symbol(against), unit(over), x)
@@ -193,17 +195,17 @@ def curves(dataset: xarray.Dataset, axes: Sequence[str], names: Sequence[str], a
             style.label(bar.ax.yaxis, style.parameter_words(parameter), unit(parameter), parameter.values)
         others = ", ".join(style.parameter_words(dataset[name]) for name in axes[1:]) if many else ""
         told = [f"curves of one colour differ in {others}"] if others else []
-        told += filter(None, (_between_outputs(dataset, name) for name in names))
+        told += filter(None, (_peaks_between_outputs(dataset, name) for name in names))
         told += [f"{len(members)} of {count} runs"] if len(members) < count else []
         style.headings(plot, grid[0, 0], dataset, more="   ".join(told))
     return plot
 
 
-def _between_outputs(dataset: xarray.Dataset, name: str) -> str:
+def _peaks_between_outputs(dataset: xarray.Dataset, name: str) -> str:
     """The largest magnitude of a variable where no output of any run comes near it, as of a slip that is brief."""
     ends = [dataset[key].values for key in (f"{name}_max", f"{name}_min") if key in dataset]
     reached, shown = max(map(style.largest, ends), default=0.0), style.largest(dataset[name].values)
-    if shown >= SEEN * reached:
+    if shown >= SEEN_PART * reached:
         return ""
     text, size = style.prefixed(unit(dataset[name]), np.array([reached]))
     return style.minus(f"between outputs, {symbol(name)} reaches {reached / size:.3g} {text}")
@@ -216,7 +218,7 @@ def colours(dataset: xarray.Dataset, axes: Sequence[str]) -> ScalarMappable:
     return ScalarMappable(scale(values.min(), values.max()), "viridis")
 
 
-def looks(dataset: xarray.Dataset, axes: Sequence[str], member: int) -> dict[str, Any]:
+def line_style(dataset: xarray.Dataset, axes: Sequence[str], member: int) -> dict[str, Any]:
     """Style of the curve of a run: a colour that tells its parameter where there is one, a legend where few are."""
     shape = dataset["status"].shape
     if RUN not in axes and np.prod(shape) <= style.MOST_CURVES:
@@ -241,7 +243,7 @@ def effects(
     ) as (plot, grid):
         for row, name in zip(grid, names, strict=True):
             whole = dataset[name]
-            values = fair(dataset, name)
+            values = subsample(dataset, name)
             distribution(row[0], values)
             row[0].set_ylabel(quantity_label(whole))
             for ax, parameter in zip(row[1:], parameters, strict=True):
@@ -268,7 +270,7 @@ def distribution(ax: Axes, values: Array) -> None:
     known = values[np.isfinite(values)]
     if len(known):
         ax.hist(known, bins=BINS, orientation="horizontal", color=COLOURS[0], alpha=0.6)
-        for level, width in zip(np.percentile(known, BAND), (0.8, 1.6, 0.8), strict=True):
+        for level, width in zip(np.percentile(known, PERCENTILES), (0.8, 1.6, 0.8), strict=True):
             ax.axhline(level, color="black", linewidth=width)
 
 
@@ -278,12 +280,12 @@ def effect(ax: Axes, over: Array, values: Array) -> None:
     over, values = over[known], values[known]
     if not len(over):
         return
-    if len(places := np.unique(over)) > PARTS:
-        ends = np.unique(np.quantile(over, np.linspace(0, 1, PARTS + 1)))
+    if len(places := np.unique(over)) > PARAMETER_BINS:
+        ends = np.unique(np.quantile(over, np.linspace(0, 1, PARAMETER_BINS + 1)))
         part = np.clip(np.searchsorted(ends, over, side="right") - 1, 0, len(ends) - 2)
         places = np.array([np.median(over[part == k]) for k in range(len(ends) - 1)])
     else:
         part = np.searchsorted(places, over)
-    low, middle, high = np.array([np.percentile(values[part == k], BAND) for k in range(len(places))]).T
+    low, middle, high = np.array([np.percentile(values[part == k], PERCENTILES) for k in range(len(places))]).T
     ax.fill_between(places, low, high, color=COLOURS[1], alpha=0.25, linewidth=0)
     ax.plot(places, middle, color=COLOURS[1], marker="o", markersize=2.5)

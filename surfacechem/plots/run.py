@@ -25,7 +25,7 @@ from surfacechem.plots.style import Array, meaning, symbol, unit, varies
 from surfacechem.tolerances import EPS, ROUNDING
 
 # Panels of the usual figure: title, and patterns of the unit and of the names.
-KINDS: tuple[tuple[str, str, str], ...] = (
+PANELS: tuple[tuple[str, str, str], ...] = (
     ("Temperature", "K|degC", r".*"),
     ("Bonding", "1", r"(?!formed_|departure_|x_|.*_residual$|J_c$|n_c$|gamma_m$|ln_theta$|drive$).*"),
     ("Mole fraction", "1", r"x_\w+"),
@@ -50,31 +50,32 @@ KINDS: tuple[tuple[str, str, str], ...] = (
 RESIDUALS = {"energy_residual": "energy_error", "entropy_residual": "entropy_error", "site_residual": "site_error"}
 
 # Residuals below this, which is far below the last digit of what is balanced, are drawn as this.
-LEAST = EPS / 256
+LEAST_DRAWN = EPS / 256
 
 # Residuals whose largest is below this are rounding of the last digit, and need no panel.
-CLOSED = 4 * EPS
+ROUNDED_RESIDUAL = 4 * EPS
 
 # Dashes of exact solutions, far enough from each other that the colour of a run below them is seen.
-EXACT = (0, (3, 5))
+DASHES = (0, (3, 5))
 
 # Times that span more than this go on a logarithmic axis, unless they are evenly spaced.
-DECADES = 1e3
+LOG_AXIS_RATIO = 1e3
 
 # Part of the run that is too short to be seen on a linear axis, and the part of its range by which a quantity has to
-# change within it to be shown on a logarithmic one; what comes before SHOWN of the run is left out of that.
-FLUX = "W m-2"
-
-EARLY, MUCH, SHOWN = 1 / 200, 0.3, 1 / 1e7
+# change within it to be shown on a logarithmic one; what comes before LOG_AXIS_PART of the run is left out of that.
+EARLY_PART, EARLY_CHANGE, LOG_AXIS_PART = 1 / 200, 0.3, 1 / 1e7
 
 # So many events in the last decade of the time, most of all, would be crowded on a logarithmic axis.
-CROWD = 3
+MOST_IN_LAST_DECADE = 3
 
-# A flux that is so many times larger before EARLY than after it would be a spike and a line at zero.
-SUDDEN = 20.0
+# Unit of heat fluxes.
+FLUX = "W m-2"
+
+# A flux that is so many times larger before EARLY_PART than after it would be a spike and a line at zero.
+SPIKE_RATIO = 20.0
 
 # A title of so many letters does not fit beside a panel; one of fewer does not with its unit in one line.
-TOO_LONG, ONE_LINE = 24, 14
+MOST_TITLE_LETTERS, ONE_LINE_LETTERS = 24, 14
 
 # Names of the temperatures across bodies, functions of time and place.
 PROFILE = re.compile("profile_[12]")
@@ -83,26 +84,26 @@ PROFILE = re.compile("profile_[12]")
 PROFILE_TIMES = 6
 
 # Part of the width of a panel in which lines of events are one line.
-CLOSE = 1 / 120
+EVENT_SPACING = 1 / 120
 
 # Up to this many events have their names written above them; above so many lines nothing could be told from them.
-FEW, MANY = 8, 60
+MOST_NAMED_EVENTS, MOST_EVENT_LINES = 8, 60
 
 # Lines of events whose names repeat, those of the most frequent name first.
-KIND_LINES = ("dotted", "dashed", "dashdot")
+EVENT_LINE_STYLES = ("dotted", "dashed", "dashdot")
 
 # Rows of names above the first panel; width of a letter and of the space beside panels [inch], space between two names
 # in widths of the panel, and height of a row in points.
-LANES, LETTER, BESIDE, BETWEEN, LANE = 3, 0.06, 1.7, 0.02, 9.0
+NAME_ROWS, LETTER_WIDTH, SIDE_WIDTH, NAME_SPACING, NAME_ROW_HEIGHT = 3, 0.06, 1.7, 0.02, 9.0
 
 # Curves of a panel that have colours of their own: the largest; more would not be told apart.
-COLOURED = len(style.COLOURS) - 1
+MOST_COLOURED = len(style.COLOURS) - 1
 
 # Names in a label of curves that coincide.
 MOST_NAMES = 3
 
 # Units of what is shown of given states if nothing is asked for, tractions and heat fluxes, and how many panels.
-AT_STATES, MOST_AT_STATES = ("Pa", "W m-2", "N", "W"), 4
+UNITS_AT_STATES, MOST_PANELS_AT_STATES = ("Pa", "W m-2", "N", "W"), 4
 
 
 @dataclass(frozen=True)
@@ -116,12 +117,12 @@ class Panel:
 
 def figure(dataset: xarray.Dataset, variables: Sequence[str] | None = None, against: str | None = None) -> Figure:
     """The figure of a run; ``variables`` are shown instead of the usual choice, over ``against`` instead of time."""
-    style.check(dataset, {"time": ("time",)})
+    style.check_variables(dataset, {"time": ("time",)})
     if not np.isfinite(dataset["time"].values).all():
-        raise InputError("time does not hold finite numbers.", style.place(dataset))
+        raise InputError("time does not hold finite numbers.", style.place_of(dataset))
     if variables and any(map(PROFILE.fullmatch, variables)):
         return _across(dataset, variables)
-    if variables and set(variables) <= set(curved.FIELDS) and curved.carries(dataset):
+    if variables and set(variables) <= set(curved.FIELDS) and curved.has_surfaces(dataset):
         return curved.figure(dataset)
     against = None if against == "time" else against
     shown = panels(dataset, variables, against)
@@ -129,14 +130,14 @@ def figure(dataset: xarray.Dataset, variables: Sequence[str] | None = None, agai
     balances = usual and _balances_err(dataset)
     if len(shown) + balances == 0 or dataset.sizes["time"] == 0:
         raise InputError("there is nothing to plot: the dataset holds no output times or none of its variables varies.")
-    below = curved.ROWS if usual and curved.carries(dataset) else 0
+    below = curved.ROWS if usual and curved.has_surfaces(dataset) else 0
     return _stacked(dataset, shown, against, balances, below)
 
 
 def _balances_err(dataset: xarray.Dataset) -> bool:
     """Whether a balance closes to less than the last digit, or it is not known how far it does."""
-    largest = [style.number(dataset, error) for name, error in RESIDUALS.items() if name in dataset]
-    return any(error is None or not error < CLOSED for error in largest)
+    largest = [style.attribute(dataset, error) for name, error in RESIDUALS.items() if name in dataset]
+    return any(error is None or not error < ROUNDED_RESIDUAL for error in largest)
 
 
 def _stacked(
@@ -165,11 +166,11 @@ def at_states(dataset: xarray.Dataset, variables: Sequence[str] | None, against:
     """
     known = curves(dataset, "point")
     asked = [*(variables or ()), *filter(None, [against])]
-    refuse_unknown(asked, known, "no variable '{}' at the states", style.place(dataset))
+    refuse_unknown(asked, known, "no variable '{}' at the states", style.place_of(dataset))
     # Quantities, no derivatives, that are not the same at all states.
     differing = [name for name in known if len(np.unique(dataset[name].values)) > 1 and "_by_" not in name]
     if not differing:
-        raise InputError("a figure needs states that differ.", style.place(dataset))
+        raise InputError("a figure needs states that differ.", style.place_of(dataset))
     over = against or differing[0]
     names = variables or _usual_at_states(dataset, [name for name in differing if name != over])
     refused = dataset["admissible"].values == 0
@@ -187,7 +188,7 @@ def at_states(dataset: xarray.Dataset, variables: Sequence[str] | None, against:
 
 def _usual_at_states(dataset: xarray.Dataset, names: Sequence[str]) -> Sequence[str]:
     """Tractions and heat fluxes among these, or where there are none the first."""
-    return ([name for name in names if unit(dataset[name]) in AT_STATES] or names)[:MOST_AT_STATES]
+    return ([name for name in names if unit(dataset[name]) in UNITS_AT_STATES] or names)[:MOST_PANELS_AT_STATES]
 
 
 def first_shown(dataset: xarray.Dataset, panels: Sequence[Panel]) -> float | None:
@@ -195,12 +196,12 @@ def first_shown(dataset: xarray.Dataset, panels: Sequence[Panel]) -> float | Non
     times = dataset["time"].values
     # Fluxes and powers follow from what changes: where they start is no reason for another axis.
     names = [name for panel in panels if panel.unit != FLUX for name in panel.names if name in dataset]
-    moments = np.array([t for t, _ in _moments(dataset)])
+    moments = np.array([t for t, _ in _event_times(dataset)])
     late = int(np.sum(moments > times[-1] / 10))
-    crowded = late >= CROWD and 2 * late > len(moments) and not logarithmic(times)
-    if crowded or not logarithmic(times, [dataset[name].values for name in names]):
+    crowded = late >= MOST_IN_LAST_DECADE and 2 * late > len(moments) and not wants_log_axis(times)
+    if crowded or not wants_log_axis(times, [dataset[name].values for name in names]):
         return None
-    return float(max(times[times > 0][0], SHOWN * times[-1]))
+    return float(max(times[times > 0][0], LOG_AXIS_PART * times[-1]))
 
 
 def curves(dataset: xarray.Dataset, over: str = "time") -> list[str]:
@@ -218,7 +219,7 @@ def panels(dataset: xarray.Dataset, variables: Sequence[str] | None, against: st
     """Panels of the variables by unit, or of all that vary by kind, without the variable that is their axis."""
     known = curves(dataset)
     asked = (*(variables or ()), *filter(None, [against]))
-    refuse_unknown(asked, known, "no variable '{}' over time in the dataset", style.place(dataset))
+    refuse_unknown(asked, known, "no variable '{}' over time in the dataset", style.place_of(dataset))
     found = _by_unit(dataset, list(dict.fromkeys(variables))) if variables else _by_kind(dataset, known)
     found = [replace(panel, names=[name for name in panel.names if name != against]) for panel in found]
     return [panel for panel in found if panel.names]
@@ -229,13 +230,13 @@ def _by_unit(dataset: xarray.Dataset, names: Sequence[str]) -> list[Panel]:
     for wanted in dict.fromkeys(unit(dataset[name]) for name in names):
         group = [name for name in names if unit(dataset[name]) == wanted]
         title = meaning(dataset[group[0]]) if len(group) == 1 else ""
-        panels.append(Panel(title if len(title) < TOO_LONG else "", wanted, group))
+        panels.append(Panel(title if len(title) < MOST_TITLE_LETTERS else "", wanted, group))
     return panels
 
 
 def _by_kind(dataset: xarray.Dataset, known: Sequence[str]) -> list[Panel]:
     panels = []
-    for title, units, pattern in KINDS:
+    for title, units, pattern in PANELS:
         names = of_kind(dataset, known, units, pattern)
         if title == "Heat flux" and {"q_1", "q_2"} & set(names):
             names = [name for name in names if name in ("q_1", "q_2")]
@@ -256,7 +257,7 @@ def _across(dataset: xarray.Dataset, names: Sequence[str]) -> Figure:
     for name in names:
         if not PROFILE.fullmatch(name) or name not in dataset:
             raise InputError(f"{name} goes over time, a profile over places; show them in figures of their own.")
-    shown = style.spread(dataset.sizes["time"], PROFILE_TIMES)
+    shown = style.evenly_spread(dataset.sizes["time"], PROFILE_TIMES)
     shown_unit = style.unit_text(unit(dataset[names[0]]))
     with style.panels(6.4, 3.4) as (plot, ((ax,),)):
         for j, i in enumerate(shown):
@@ -279,9 +280,9 @@ def _draw(ax: Axes, dataset: xarray.Dataset, panel: Panel, over: str, first: flo
     start = first or 0.0
     if first is None and over == "time" and panel.unit == FLUX:
         start = _show_behind_spike(ax, dataset, panel)
-    drawn = _drawn(dataset, panel, t >= start if start else slice(None))
+    drawn = _finite_values(dataset, panel, t >= start if start else slice(None))
     words = panel.title or ", ".join(map(symbol, panel.names[:MOST_NAMES]))
-    style.label(ax.yaxis, words, panel.unit, drawn, between=" " if len(panel.title) < ONE_LINE else "\n")
+    style.label(ax.yaxis, words, panel.unit, drawn, between=" " if len(panel.title) < ONE_LINE_LETTERS else "\n")
     if len(drawn) and not varies(drawn):  # a line, not rounding blown up to the panel's height
         middle = float(drawn.mean())
         ax.set_ylim(middle - 0.05 * abs(middle or 1.0), middle + 0.05 * abs(middle or 1.0))
@@ -292,10 +293,10 @@ def _draw_exact(ax: Axes, dataset: xarray.Dataset, panel: Panel, t: Array) -> No
     """The exact curves that the dataset has of those of a panel."""
     exact = [f"{name}_exact" for name in panel.names if f"{name}_exact" in curves(dataset)]
     for k, name in enumerate(exact):
-        ax.plot(t, dataset[name].values, linestyle=EXACT, color="black", linewidth=0.9, label="_" if k else "exact")
+        ax.plot(t, dataset[name].values, linestyle=DASHES, color="black", linewidth=0.9, label="_" if k else "exact")
 
 
-def _drawn(dataset: xarray.Dataset, panel: Panel, rows: Any = slice(None)) -> Array:
+def _finite_values(dataset: xarray.Dataset, panel: Panel, rows: Any = slice(None)) -> Array:
     """Finite values that a panel shows, at some of its points."""
     values = np.concatenate([dataset[name].values[rows] for name in panel.names])
     return np.asarray(values[np.isfinite(values)])
@@ -306,9 +307,9 @@ def _show_behind_spike(ax: Axes, dataset: xarray.Dataset, panel: Panel) -> float
     size of the spike; returns that time, 0 where all is seen.
     """
     t = dataset["time"].values
-    start = float(EARLY * t[-1])
-    whole, late = _drawn(dataset, panel), _drawn(dataset, panel, t >= start)
-    if not (late.size and np.ptp(whole) > SUDDEN * np.ptp(late) > 0):
+    start = float(EARLY_PART * t[-1])
+    whole, late = _finite_values(dataset, panel), _finite_values(dataset, panel, t >= start)
+    if not (late.size and np.ptp(whole) > SPIKE_RATIO * np.ptp(late) > 0):
         return 0.0
     margin, largest = 0.1 * np.ptp(late), style.largest(whole)
     ax.set_ylim(late.min() - margin, late.max() + margin)
@@ -320,12 +321,12 @@ def _show_behind_spike(ax: Axes, dataset: xarray.Dataset, panel: Panel) -> float
 
 def _draw_curves(ax: Axes, dataset: xarray.Dataset, panel: Panel, t: Array) -> None:
     """The curves of a panel; where they are many, the largest in colours and the rest in grey."""
-    groups, marker = merged(dataset, panel.names), "o" if len(t) == 1 else ""
+    groups, marker = group_coinciding(dataset, panel.names), "o" if len(t) == 1 else ""
     rest: list[list[str]] = []
     if len(groups) > len(style.COLOURS):
         # A trace gas beside a full surface is nothing to be told by its colour.
         groups.sort(key=lambda names: -style.largest(dataset[names[0]].values))
-        groups, rest = groups[:COLOURED], groups[COLOURED:]
+        groups, rest = groups[:MOST_COLOURED], groups[MOST_COLOURED:]
     for names in groups:
         label = " = ".join([*map(symbol, names[:MOST_NAMES]), *(["..."] if len(names) > MOST_NAMES else [])])
         look = style.drawn_as(dataset[names[0]])
@@ -335,7 +336,7 @@ def _draw_curves(ax: Axes, dataset: xarray.Dataset, panel: Panel, t: Array) -> N
         ax.plot(t, dataset[names[0]].values, label=label, marker=marker, color="0.75", linewidth=0.8, zorder=1)
 
 
-def merged(dataset: xarray.Dataset, names: Sequence[str]) -> list[list[str]]:
+def group_coinciding(dataset: xarray.Dataset, names: Sequence[str]) -> list[list[str]]:
     """The names in groups whose curves coincide, so that none hides another."""
     groups: list[list[str]] = []
     for name in names:
@@ -352,13 +353,13 @@ def _draw_balances(ax: Axes, dataset: xarray.Dataset) -> None:
     """Residuals relative to what their attributes state as the largest relative value."""
     known = curves(dataset)
     for name in (name for name in RESIDUALS if name in known):
-        relative, largest = np.abs(dataset[name].values), style.number(dataset, RESIDUALS[name])
+        relative, largest = np.abs(dataset[name].values), style.attribute(dataset, RESIDUALS[name])
         worst = float(np.max(relative, initial=0.0))
         relative = relative / worst * largest if worst > 0 and largest is not None else relative
-        ax.plot(dataset["time"].values, np.maximum(relative, LEAST), label=name.partition("_")[0], linewidth=1.2)
-    style.logarithmic(ax.yaxis)
+        ax.plot(dataset["time"].values, np.maximum(relative, LEAST_DRAWN), label=name.partition("_")[0], linewidth=1.2)
+    style.make_logarithmic(ax.yaxis)
     low, high = ax.get_ylim()
-    ax.set(ylim=(min(low, LEAST), max(high, ROUNDING)), ylabel="Balance residual [1]")
+    ax.set(ylim=(min(low, LEAST_DRAWN), max(high, ROUNDING)), ylabel="Balance residual [1]")
     style.legend(ax)
 
 
@@ -369,16 +370,16 @@ def _draw_axis(
     bands of modes and lines at events; returns how many points names need above the panels, and the events that have
     none there.
     """
-    times, moments = dataset["time"].values, _moments(dataset)
+    times, moments = dataset["time"].values, _event_times(dataset)
     if against:
         style.label_variable(axes[-1].xaxis, dataset[against])
-        return 0.0, _counted([name for _, name in _named(moments)], {})
+        return 0.0, _most_frequent([name for _, name in _named_events(moments)], {})
     label_time(axes, times, "s", first)
     stages = _draw_bands(axes, dataset) if len(times) > 1 else []
     width = float(axes[0].figure.bbox.width / axes[0].figure.dpi)
-    below = _write(axes[0], width, stages, 0)
+    below = _write_rows(axes[0], width, stages, 0)
     rows, more = _draw_events(axes, width, moments, below)
-    return LANE * (below + rows), more
+    return NAME_ROW_HEIGHT * (below + rows), more
 
 
 def label_time(axes: Sequence[Axes], times: Array, unit: str, first: float | None) -> None:
@@ -395,25 +396,25 @@ def label_time(axes: Sequence[Axes], times: Array, unit: str, first: float | Non
         if ax.get_yscale() == "linear" and varies(seen):
             margin = 0.05 * np.ptp(seen)
             ax.set_ylim(seen.min() - margin, seen.max() + margin)
-        style.logarithmic(ax.xaxis)
+        style.make_logarithmic(ax.xaxis)
         ax.set_xlim(first, float(times.max()))
 
 
-def _moments(dataset: xarray.Dataset) -> list[tuple[float, str]]:
+def _event_times(dataset: xarray.Dataset) -> list[tuple[float, str]]:
     """Times of the events and what they are called: by name, or by reason where the name is the variable that passes
     zero.
     """
     if "event_time" not in dataset:
         return []
     named = {name: ("event",) for name in ("event_name", "event_reason") if name in dataset}
-    style.check(dataset, {"event_time": ("event",)}, named)
+    style.check_variables(dataset, {"event_time": ("event",)}, named)
     texts = [dataset[name].values.astype(str).tolist() for name in named] or [[""] * dataset.sizes["event"]]
     quantities = [name for name in curves(dataset) if not style.is_mode(dataset[name])]
     events = zip(dataset["event_time"].values.tolist(), texts[0], texts[-1], strict=True)
     return [(t, why if name.partition(" ")[0] in quantities else name) for t, name, why in events]
 
 
-def _named(moments: Sequence[tuple[float, str]]) -> list[tuple[float, str]]:
+def _named_events(moments: Sequence[tuple[float, str]]) -> list[tuple[float, str]]:
     """Times and names of the events that have one; ends of stages show as bands."""
     return [(t, name) for t, name in moments if name and not name.startswith("end of ")]
 
@@ -424,28 +425,28 @@ def _draw_events(
     """Thin vertical lines at the events, one for those that follow each other closely; returns the rows of names above
     the panels, and the events that have none there.
     """
-    named = _named(moments)
-    places = _places(axes[0], named)
-    if len(places) > MANY:
-        return 0, _counted([name for _, name in named], {})
+    named = _named_events(moments)
+    places = _merge_close_events(axes[0], named)
+    if len(places) > MOST_EVENT_LINES:
+        return 0, _most_frequent([name for _, name in named], {})
     names = Counter(text for _, text in places)
     repeat = 1 < len(names) < names.total()
-    lines = dict(zip([name for name, _ in names.most_common()], KIND_LINES, strict=False)) if repeat else {}
-    ends = _places(axes[0], [(t, "") for t, _ in moments if t not in dict(named)])
+    lines = dict(zip([name for name, _ in names.most_common()], EVENT_LINE_STYLES, strict=False)) if repeat else {}
+    ends = _merge_close_events(axes[0], [(t, "") for t, _ in moments if t not in dict(named)])
     for (moment, text), ax in product([*places, *ends], axes):
-        ax.axvline(moment, color="black", linewidth=0.6, linestyle=lines.get(text, KIND_LINES[0]))
+        ax.axvline(moment, color="black", linewidth=0.6, linestyle=lines.get(text, EVENT_LINE_STYLES[0]))
     if len(names) == 1 and len(places) > 1:
-        return _numbered(axes[0], width, places, below)
-    rows = _write(axes[0], width, places, below) if len(places) <= FEW else 0
-    return rows, "" if rows else _counted([name for _, name in named], lines)
+        return _draw_event_names(axes[0], width, places, below)
+    rows = _write_rows(axes[0], width, places, below) if len(places) <= MOST_NAMED_EVENTS else 0
+    return rows, "" if rows else _most_frequent([name for _, name in named], lines)
 
 
-def _places(ax: Axes, events: Sequence[tuple[float, str]]) -> list[tuple[float, str]]:
+def _merge_close_events(ax: Axes, events: Sequence[tuple[float, str]]) -> list[tuple[float, str]]:
     """Times and names of events, those that a figure cannot tell apart as one: a slip, and the stop that ends it."""
     found: list[tuple[float, list[str]]] = []
     last = -np.inf
-    for t, at, name in _across_panel(ax, events):
-        if at - last > CLOSE:
+    for t, at, name in _positions_across_panel(ax, events):
+        if at - last > EVENT_SPACING:
             found.append((t, []))
             last = at
         if name not in found[-1][1]:
@@ -453,7 +454,7 @@ def _places(ax: Axes, events: Sequence[tuple[float, str]]) -> list[tuple[float, 
     return [(t, " and ".join(names)) for t, names in found]
 
 
-def _across_panel(ax: Axes, items: Sequence[tuple[float, str]]) -> list[tuple[float, float, str]]:
+def _positions_across_panel(ax: Axes, items: Sequence[tuple[float, str]]) -> list[tuple[float, float, str]]:
     """Values of x with their texts in order, and where each lies, from 0 at the left to 1 at the right of a panel."""
     ax.get_xlim()  # limits that follow from what is drawn are not known before
     items = sorted(items)
@@ -462,16 +463,16 @@ def _across_panel(ax: Axes, items: Sequence[tuple[float, str]]) -> list[tuple[fl
     return [(x, place, text) for (x, text), place in zip(items, places, strict=True)]
 
 
-def _numbered(ax: Axes, width: float, places: Sequence[tuple[float, str]], below: int) -> tuple[int, str]:
+def _draw_event_names(ax: Axes, width: float, places: Sequence[tuple[float, str]], below: int) -> tuple[int, str]:
     """Names above the panels where they fit beside each other, else numbers, and the name that all of them have."""
     text = places[0][1]
-    if rows := _write(ax, width, places, below, lanes=1):
+    if rows := _write_rows(ax, width, places, below, lanes=1):
         return rows, ""
-    rows = _write(ax, width, [(t, str(k)) for k, (t, _) in enumerate(places, 1)], below, lanes=1)
+    rows = _write_rows(ax, width, [(t, str(k)) for k, (t, _) in enumerate(places, 1)], below, lanes=1)
     return rows, f"1 to {len(places)}: {text}" if rows else f"{len(places)} {text}"
 
 
-def _counted(names: Sequence[str], lines: Mapping[str, str]) -> str:
+def _most_frequent(names: Sequence[str], lines: Mapping[str, str]) -> str:
     """Counts of the most frequent events, and their kinds of lines, in words."""
     counts = Counter(names).most_common(MOST_NAMES)
     kinds = {name: f" ({line})" for name, line in lines.items()}
@@ -485,16 +486,16 @@ def _draw_bands(axes: Sequence[Axes], dataset: xarray.Dataset) -> list[tuple[flo
     modes = [name for name in curves(dataset) if style.is_mode(dataset[name])]
     staged, named = "stage" in modes, []
     for name in ["stage"] if staged else modes:
-        spans = _spans(dataset, name)
+        spans = _mode_spans(dataset, name)
         shaded = [span for span in spans if (span[2] % 2 if staged else span[2] != spans[0][2])]
-        for (start, end, _), ax in product(shaded if len(shaded) <= MANY else (), axes):
+        for (start, end, _), ax in product(shaded if len(shaded) <= MOST_EVENT_LINES else (), axes):
             ax.axvspan(start, end, color="black", alpha=0.05, linewidth=0)
         words = dict(re.findall(r"(-?\d+): ([^,)]+)", str(dataset[name].attrs["long_name"])))
         named += [((start + end) / 2, words.get(f"{value:.0f}", "")) for start, end, value in spans if staged]
     return named
 
 
-def _spans(dataset: xarray.Dataset, name: str) -> list[tuple[float, float, float]]:
+def _mode_spans(dataset: xarray.Dataset, name: str) -> list[tuple[float, float, float]]:
     """Start, end and value of a mode between events; what lies between two outputs is too short to be seen."""
     times, values = dataset["time"].values, dataset[name].values.astype(float)
     known = dataset["event_time"].values if "event_time" in dataset else np.empty(0)
@@ -506,23 +507,23 @@ def _spans(dataset: xarray.Dataset, name: str) -> list[tuple[float, float, float
     return list(zip(edges, [*edges[1:], float(times[-1])], values[[0, *changes]].tolist(), strict=True))
 
 
-def _write(ax: Axes, width: float, items: Sequence[tuple[float, str]], below: int, lanes: int = LANES) -> int:
+def _write_rows(ax: Axes, width: float, items: Sequence[tuple[float, str]], below: int, lanes: int = NAME_ROWS) -> int:
     """Small words above a panel, each over its time, in as many rows as they need so that none is on another; returns
     how many. Nothing is written where there is no room for all.
     """
     placed: list[tuple[float, int, str]] = []
     ends = [0.0] * lanes
-    letter = LETTER / (width - BESIDE)
-    for _, at, text in _across_panel(ax, items):
+    letter = LETTER_WIDTH / (width - SIDE_WIDTH)
+    for _, at, text in _positions_across_panel(ax, items):
         half = letter * len(text) / 2
         middle = min(max(at, half), 1 - half)
         lane = next((k for k, end in enumerate(ends) if middle - half >= end), None)
         if lane is None:
             return 0
-        ends[lane] = middle + half + BETWEEN
+        ends[lane] = middle + half + NAME_SPACING
         placed.append((middle, lane, text))
     for middle, lane, text in placed:
-        above = (0, LANE * (below + lane) + 2)
+        above = (0, NAME_ROW_HEIGHT * (below + lane) + 2)
         ax.annotate(
             text, (middle, 1.0), above, "axes fraction", "offset points", ha="center", va="bottom", fontsize=7,
             color="#555555",
@@ -530,23 +531,23 @@ def _write(ax: Axes, width: float, items: Sequence[tuple[float, str]], below: in
     return 1 + max((lane for _, lane, _ in placed), default=-1)
 
 
-def logarithmic(times: Array, quantities: Sequence[Array] = ()) -> bool:
+def wants_log_axis(times: Array, quantities: Sequence[Array] = ()) -> bool:
     """True for times that want a logarithmic axis: they have a ratio, or span decades and much happens in so small a
     part of them that nobody would see it.
 
     >>> t = np.append(0.0, np.logspace(-6, 2, 50))
-    >>> logarithmic(t), logarithmic(np.linspace(0, 5, 100_001))
+    >>> wants_log_axis(t), wants_log_axis(np.linspace(0, 5, 100_001))
     (True, False)
     >>> t = np.append(t, np.linspace(1, 90, 10))
-    >>> logarithmic(np.sort(t), [np.exp(-np.sort(t))]), logarithmic(np.sort(t), [np.exp(-1000 * np.sort(t))])
+    >>> wants_log_axis(np.sort(t), [np.exp(-np.sort(t))]), wants_log_axis(np.sort(t), [np.exp(-1000 * np.sort(t))])
     (False, True)
     """
     after = times[times > 0]
-    if len(after) < 2 or after[-1] / after[0] <= DECADES:
+    if len(after) < 2 or after[-1] / after[0] <= LOG_AXIS_RATIO:
         return False
     ratios = after[1:] / after[:-1]
     if np.ptp(ratios) < style.FLAT * ratios[0]:
         return True
     # What jumps as the run starts, such as the direction of friction, needs no decades.
-    early = (times > 0) & (times <= EARLY * times[-1])
-    return any(np.ptp(values[early]) > MUCH * np.ptp(values) for values in quantities if varies(values))
+    early = (times > 0) & (times <= EARLY_PART * times[-1])
+    return any(np.ptp(values[early]) > EARLY_CHANGE * np.ptp(values) for values in quantities if varies(values))

@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 
 from surfacechem.format.plans import STATISTICS
 from surfacechem.plots import style
-from surfacechem.plots.members import final
-from surfacechem.plots.run import logarithmic
+from surfacechem.plots.members import final_values
+from surfacechem.plots.run import wants_log_axis
 from surfacechem.plots.style import COLOURS, MOST_CURVES, Array, symbol, unit
 
 
@@ -25,13 +25,13 @@ def load_of(dataset: xarray.Dataset) -> str:
 
 MARKERS = "osD"
 
-EARLY = 0.01
+NEGLIGIBLE_LIFETIME = 0.01
 """Fraction of the shortest lifetime in which next to nothing happens."""
 
-HEIGHT, LINE = 2.3, 1.2
+PANEL_HEIGHT, LINE_WIDTH = 2.3, 1.2
 """Height of a panel [inch], and width of a curve over the load in points."""
 
-DENSE = 30
+MOST_LARGE_MARKERS = 30
 """Points from which on large ones would hide each other."""
 
 
@@ -42,7 +42,7 @@ def figure(dataset: xarray.Dataset, load: str, variables: Sequence[str] | None =
     series = (f"density_{load}", "lifetime")
     held = all(name in dataset and load in dataset[name].dims for name in series)  # what runs were at each load, too
     names = variables or ("", *(series if held else ()))
-    with style.panels(6.4, 0.7 + HEIGHT * len(names), len(names)) as (plot, grid):
+    with style.panels(6.4, 0.7 + PANEL_HEIGHT * len(names), len(names)) as (plot, grid):
         for ax, name in zip(grid[:, 0], names, strict=True):
             if name:
                 _draw_series(ax, dataset, load, name)
@@ -57,13 +57,13 @@ def figure(dataset: xarray.Dataset, load: str, variables: Sequence[str] | None =
     return plot
 
 
-def _members(dataset: xarray.Dataset, load: str) -> list[tuple[tuple[int, ...], str]]:
+def _sample_members(dataset: xarray.Dataset, load: str) -> list[tuple[tuple[int, ...], str]]:
     """Places of some runs, evenly spread over those whose most probable load is inside the range, with their names."""
     modes = dataset[f"{load}_mode"].values
     # At slow loads most bonds break before there is any load, and their peak at zero would dwarf all others.
     inside = np.argwhere(modes > dataset[load].values[0])
     places = inside if len(inside) else np.argwhere(np.isfinite(modes))
-    chosen = places[style.spread(len(places), MOST_CURVES)]
+    chosen = places[style.evenly_spread(len(places), MOST_CURVES)]
     return [(tuple(at), style.member_name(dataset, at)) for at in chosen.tolist()]
 
 
@@ -71,24 +71,24 @@ def _draw_over(
     ax: Axes, dataset: xarray.Dataset, load: str, values: Array, scale: Callable[[Array], Array] = np.asarray
 ) -> None:
     """Values of some runs over the load, as one curve where theirs coincide on this scale."""
-    members = _members(dataset, load)
+    members = _sample_members(dataset, load)
     notes = [f"{len(members)} of {dataset['status'].size} runs"] if len(members) < dataset["status"].size else []
     shown = np.array([values[place] for place, _ in members])
     if len(members) > 1 and _coincide(scale(shown)):
-        ax.plot(dataset[load].values, np.fmin.reduce(shown), color="black", linewidth=LINE)
+        ax.plot(dataset[load].values, np.fmin.reduce(shown), color="black", linewidth=LINE_WIDTH)
         notes.append("their curves coincide" if notes else "the curves of all runs coincide")
     else:
         for (place, label), colour in zip(members, COLOURS, strict=False):
-            ax.plot(dataset[load].values, values[place], color=colour, linewidth=LINE, label=label)
+            ax.plot(dataset[load].values, values[place], color=colour, linewidth=LINE_WIDTH, label=label)
     style.label_variable(ax.xaxis, dataset[load])
-    ax.set_title(", ".join(notes), loc="right", **style.NOTE)
+    ax.set_title(", ".join(notes), loc="right", **style.NOTE_STYLE)
 
 
 def _coincide(curves: Array) -> bool:
     """Whether curves are nowhere farther from each other than their line is wide, where they are known."""
     low, high = np.fmin.reduce(curves), np.fmax.reduce(curves)
     apart, range_ = np.fmax.reduce(high - low), np.fmax.reduce(high) - np.fmin.reduce(low)
-    return bool(apart * 72 * HEIGHT <= LINE * range_)
+    return bool(apart * 72 * PANEL_HEIGHT <= LINE_WIDTH * range_)
 
 
 def _draw_series(ax: Axes, dataset: xarray.Dataset, load: str, name: str) -> None:
@@ -101,7 +101,7 @@ def _draw_series(ax: Axes, dataset: xarray.Dataset, load: str, name: str) -> Non
     elif name == "lifetime":
         _draw_over(ax, dataset, load, values, np.log)
         ax.set_ylabel(rf"Lifetime $\tau$({symbol(load)}) [s]")
-        style.logarithmic(ax.yaxis)
+        style.make_logarithmic(ax.yaxis)
     else:
         _draw_over(ax, dataset, load, values)
         style.label(ax.yaxis, symbol(name), unit(dataset[name]), values)
@@ -111,22 +111,22 @@ def _draw_spectrum(ax: Axes, dataset: xarray.Dataset, load: str) -> None:
     """Most probable, median and mean load at rupture, the exact ones as lines."""
     mean = dataset[f"{load}_mean"]
     text, size = style.prefixed(unit(mean), mean.values)
-    _draw_told(ax, dataset, {f"{load}_{which}": word for which, word in STATISTICS.items()}, size)
+    _draw_statistics(ax, dataset, {f"{load}_{which}": word for which, word in STATISTICS.items()}, size)
     ax.set_ylabel(f"{symbol(load)} at rupture [{text}]")
 
 
-def _draw_told(ax: Axes, dataset: xarray.Dataset, told: Mapping[str, str], size: float) -> None:
+def _draw_statistics(ax: Axes, dataset: xarray.Dataset, told: Mapping[str, str], size: float) -> None:
     """Draw the results of each run over what is swept, by name with its label in the legend, in a colour for each or
     for each value of a second parameter; exact values as lines.
     """
     parameter = dataset[str(dataset["status"].dims[0])]
     style.draw_parameter(ax.xaxis, parameter)
-    x, large = parameter.values, 3.5 if len(parameter) < DENSE else 2.0
-    seconds = [label for _, label in style.by_second(dataset, dataset[next(iter(told))].values)]
+    x, large = parameter.values, 3.5 if len(parameter) < MOST_LARGE_MARKERS else 2.0
+    seconds = [label for _, label in style.curves_by_second(dataset, dataset[next(iter(told))].values)]
     for k, (name, marker) in enumerate(zip(told, MARKERS, strict=False)):
         for look, end in ((marker, ""), ("-", "_exact")):
             if name + end in dataset:
-                for j, (values, _) in enumerate(style.by_second(dataset, final(dataset, name + end))):
+                for j, (values, _) in enumerate(style.curves_by_second(dataset, final_values(dataset, name + end))):
                     colour = COLOURS[j if len(seconds) > 1 else k]
                     ax.plot(x, values / size, look, color=colour, markersize=large, linewidth=0.9, label="_")
     for label, colour in zip(seconds if len(seconds) > 1 else (), COLOURS, strict=False):
@@ -140,9 +140,9 @@ def lifetimes(dataset: xarray.Dataset) -> Figure:
     """The lifetime over what is swept, the exact one as a line, and the survival over time of some of the runs."""
     with style.panels(6.4, 5.3, 2) as (plot, grid):
         above, below = grid[:, 0]
-        _draw_told(above, dataset, {"lifetime": "runs"}, 1.0)
+        _draw_statistics(above, dataset, {"lifetime": "runs"}, 1.0)
         above.set_ylabel(r"Lifetime $\tau$ [s]")
-        style.logarithmic(above.yaxis)
+        style.make_logarithmic(above.yaxis)
         _draw_survival(below, dataset)
         for ax in (above, below):
             style.legend(ax)
@@ -153,16 +153,16 @@ def lifetimes(dataset: xarray.Dataset) -> Figure:
 def _draw_survival(ax: Axes, dataset: xarray.Dataset) -> None:
     """Bonds that are left over time, of runs evenly spread over those whose lifetime is known."""
     known = np.argwhere(np.isfinite(dataset["lifetime"].values))
-    chosen = style.spread(len(known), MOST_CURVES)
+    chosen = style.evenly_spread(len(known), MOST_CURVES)
     times, survival = dataset["time"].values, dataset["survival"].values
     for place, colour in zip(known[chosen], COLOURS, strict=False):
         # Where all have broken a run has ended.
         values = np.nan_to_num(survival[tuple(place)])
         ax.plot(times, values, color=colour, label=style.member_name(dataset, place))
     lifetimes = np.sort(dataset["lifetime"].values[tuple(known.T)])
-    if logarithmic(times) or style.over_decades(lifetimes):
-        style.logarithmic(ax.xaxis)
-        begin = max(times[times > 0][0], EARLY * lifetimes[0])
+    if wants_log_axis(times) or style.over_decades(lifetimes):
+        style.make_logarithmic(ax.xaxis)
+        begin = max(times[times > 0][0], NEGLIGIBLE_LIFETIME * lifetimes[0])
         ax.set_xlim(begin, dataset["time_reached"].values.max())
     else:
         ax.set(xlim=(0, dataset["time_reached"].values.max()))

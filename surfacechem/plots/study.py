@@ -27,7 +27,7 @@ def figure(dataset: xarray.Dataset) -> Figure:
 # -- run time against error --------------------------------------------------------------------------------------------
 
 # Variables that name what lies along a dimension; CF allows coordinate variables of numbers only.
-LABELS = {"case": "case_name", "solver": "solver_name", "variable": "variable_name"}
+LABEL_VARIABLES = {"case": "case_name", "solver": "solver_name", "variable": "variable_name"}
 
 # Variables on x, with their labels.
 ERRORS = {
@@ -36,20 +36,20 @@ ERRORS = {
     "energy_error": "energy residual",
 }
 
-POINT, CASE = ("case", "solver", "tolerance"), ("case",)
-NUMBERS = {
+POINT_DIMENSIONS, CASE_DIMENSIONS = ("case", "solver", "tolerance"), ("case",)
+NUMBER_DIMENSIONS = {
     "tolerance": ("tolerance",),
-    **dict.fromkeys((*ERRORS, "run_seconds", "run_seconds_median", "stepping_seconds"), POINT),
-    **dict.fromkeys(("uncertainty_max", "uncertainty_event"), CASE),
+    **dict.fromkeys((*ERRORS, "run_seconds", "run_seconds_median", "stepping_seconds"), POINT_DIMENSIONS),
+    **dict.fromkeys(("uncertainty_max", "uncertainty_event"), CASE_DIMENSIONS),
 }
 # Variables that are read, with their dimensions.
-TEXTS = {"status": POINT, **{name: (dimension,) for dimension, name in LABELS.items()}}
+TEXT_DIMENSIONS = {"status": POINT_DIMENSIONS, **{name: (dimension,) for dimension, name in LABEL_VARIABLES.items()}}
 
 # Errors below this are drawn as this: below the last digit, so that an error of zero has a place on a logarithmic axis
 # of its own.
-SMALLEST = EPS / 16
+ERROR_FLOOR = EPS / 16
 
-BELOW, INSIDE = "below the uncertainty of the reference", "inside the library's own steps"
+BELOW, STEPPING = "below the uncertainty of the reference", "inside the library's own steps"
 
 
 def precision(dataset: xarray.Dataset) -> Figure:
@@ -59,23 +59,23 @@ def precision(dataset: xarray.Dataset) -> Figure:
     an adapter adds for events and outputs. Hollow marks in the shaded region are below the uncertainty of the
     reference; crosses at the right edge are failed solves, at the time that they took to fail.
     """
-    style.check(dataset, NUMBERS, TEXTS)
+    style.check_variables(dataset, NUMBER_DIMENSIONS, TEXT_DIMENSIONS)
     drawn = [name for name in ERRORS if bool((dataset[name] > 0).any())] or ["energy_error"]
     rows, looks = dataset.sizes["case"], list(zip(cycle(COLOURS), "osD^vPX" * dataset.sizes["solver"], strict=False))
     with style.panels(0.6 + 3.2 * len(drawn), 0.7 + 2.6 * rows, rows, len(drawn), sharey="row") as (plot, grid):
         for i in range(rows):
             case = dataset.isel(case=i)
             for ax, name in zip(grid[i], drawn, strict=True):
-                style.logarithmic(ax.xaxis, ax.yaxis)
+                style.make_logarithmic(ax.xaxis, ax.yaxis)
                 for axis in (ax.xaxis, ax.yaxis):
                     axis.set_minor_formatter(NullFormatter())  # labels within a decade would overlap
                 limit = float(case[name.replace("error_", "uncertainty_")]) if name.startswith("error_") else np.nan
                 for k in range(dataset.sizes["solver"]):
                     _draw_solver(ax, case.isel(solver=k), name, limit, *looks[k])
                 if np.isfinite(limit):
-                    ax.axvspan(SMALLEST, max(limit, SMALLEST), color="0.5", alpha=0.12, linewidth=0)
+                    ax.axvspan(ERROR_FLOOR, max(limit, ERROR_FLOOR), color="0.5", alpha=0.12, linewidth=0)
                     finite = case[name].values[np.isfinite(case[name].values)]
-                    ax.set_xlim(left=max(min([limit, *finite]) / 3, SMALLEST / 2))
+                    ax.set_xlim(left=max(min([limit, *finite]) / 3, ERROR_FLOOR / 2))
                 ax.set_xlabel(ERRORS[name] if i == rows - 1 else "")
             grid[i, 0].set_ylabel("run time [s]")
             grid[i, 0].set_title(str(case["case_name"].values), loc="left")
@@ -84,7 +84,7 @@ def precision(dataset: xarray.Dataset) -> Figure:
 
 
 def _draw_solver(ax: Axes, cells: xarray.Dataset, name: str, limit: float, colour: str, marker: str) -> None:
-    x, y = np.maximum(cells[name].values, SMALLEST), cells["run_seconds"].values
+    x, y = np.maximum(cells[name].values, ERROR_FLOOR), cells["run_seconds"].values
     shown = np.isfinite(x) & np.isfinite(y) & ((cells[name].values > 0) | np.isfinite(limit))
     ax.plot(x[shown], y[shown], color=colour, linewidth=1.0)
     inside = cells["stepping_seconds"].values
@@ -108,7 +108,7 @@ def _legend(dataset: xarray.Dataset, looks: list[tuple[str, str]]) -> list[Line2
         handles.append(Line2D([], [], color=colour, marker=marker, markersize=4.5, linewidth=1.0, label=label))
     below = (dataset[f"error_{kind}"] < dataset[f"uncertainty_{kind}"] for kind in ("max", "event"))
     marks: list[tuple[bool, str, dict[str, Any]]] = [
-        (bool(np.isfinite(dataset["stepping_seconds"]).any()), INSIDE, {"linestyle": "--", "linewidth": 0.8}),
+        (bool(np.isfinite(dataset["stepping_seconds"]).any()), STEPPING, {"linestyle": "--", "linewidth": 0.8}),
         (bool((status == "failed").any()), "failed", {"marker": "x", "linestyle": "none"}),
         (any(bool(b.any()) for b in below), BELOW, {"marker": "o", "markerfacecolor": "white", "linestyle": "none"}),
     ]
@@ -118,12 +118,12 @@ def _legend(dataset: xarray.Dataset, looks: list[tuple[str, str]]) -> list[Line2
 # -- digits kept -------------------------------------------------------------------------------------------------------
 
 # Marks of the outcomes that are not a plain solution.
-MARKS = {"refused": "R", "failed": "×", "wrong": "!", "sensitive": "~"}
+OUTCOME_MARKS = {"refused": "R", "failed": "×", "wrong": "!", "sensitive": "~"}
 
 # Colours of the outcomes whose digits say nothing.
-NO_ANSWER = {"failed": "0.75", "wrong": "#d62728", "sensitive": "#f0c36d"}
+OUTCOME_COLOURS = {"failed": "0.75", "wrong": "#d62728", "sensitive": "#f0c36d"}
 
-MEANING = {
+OUTCOMES = {
     "refused": "ended for the right reason",
     "failed": "failed, and said so",
     "wrong": "wrong",
@@ -131,7 +131,7 @@ MEANING = {
 }
 
 # Digits above which the colour of a cell is dark.
-DARK = 8.0
+DARK_DIGITS = 8.0
 
 
 def stability(dataset: xarray.Dataset) -> Figure:
@@ -140,7 +140,7 @@ def stability(dataset: xarray.Dataset) -> Figure:
     """
     cell = ("regime", "decade", "solver")
     numbers = {"decade": ("decade",), "possible": cell[:2], "digits": cell}
-    style.check(dataset, numbers, {"regime": ("regime",), "solver": ("solver",), "outcome": cell})
+    style.check_variables(dataset, numbers, {"regime": ("regime",), "solver": ("solver",), "outcome": cell})
     height, width, count = (dataset.sizes[name] for name in cell)
     size = 2.2 + 0.23 * width * (count + 1), 1.3 + 0.26 * height
     with style.panels(*size, 1, count + 1, sharey=True) as (plot, (axes,)):
@@ -149,11 +149,11 @@ def stability(dataset: xarray.Dataset) -> Figure:
             digits = (dataset["digits"].values[:, :, j - 1] if j else dataset["possible"].values).copy()
             outcomes = dataset["outcome"].values[:, :, j - 1].astype(str)
             for i, k in np.argwhere(np.isfinite(digits)) if j else ():
-                dark = outcomes[i, k] not in NO_ANSWER and digits[i, k] > DARK
+                dark = outcomes[i, k] not in OUTCOME_COLOURS and digits[i, k] > DARK_DIGITS
                 how: Any = {"ha": "center", "va": "center", "fontsize": 7, "color": "white" if dark else "black"}
-                ax.text(k, i, MARKS.get(outcomes[i, k], ""), **how)
-                if outcomes[i, k] in NO_ANSWER:
-                    colour = NO_ANSWER[outcomes[i, k]]
+                ax.text(k, i, OUTCOME_MARKS.get(outcomes[i, k], ""), **how)
+                if outcomes[i, k] in OUTCOME_COLOURS:
+                    colour = OUTCOME_COLOURS[outcomes[i, k]]
                     ax.add_patch(Rectangle((k - 0.5, i - 0.5), 1.0, 1.0, facecolor=colour, edgecolor="none"))
                     digits[i, k] = np.nan
             image = ax.imshow(digits, norm=Normalize(0.0, 14.0), cmap="YlGnBu", aspect="auto")
@@ -166,7 +166,7 @@ def stability(dataset: xarray.Dataset) -> Figure:
         axes[(count + 1) // 2].set_xlabel("towards the extreme →")
         plot.colorbar(image, ax=list(axes), label="digits", fraction=0.03, pad=0.01)
         nothing: Any = {"facecolor": "none", "edgecolor": "none"}
-        handles = [Patch(label=f"{MARKS[name]}  {text}", **nothing) for name, text in MEANING.items()]
+        handles = [Patch(label=f"{OUTCOME_MARKS[name]}  {text}", **nothing) for name, text in OUTCOMES.items()]
         columns = min(4, max(1, int(size[0] / 1.9)))  # the longest of the texts takes 1.9 inches
         look: Any = {"ncols": columns, "handlelength": 0, "frameon": False, "fontsize": 8}
         plot.legend(handles=handles, loc="outside lower center", **look)

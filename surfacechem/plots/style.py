@@ -23,6 +23,7 @@ from matplotlib.rcsetup import cycler
 from matplotlib.ticker import Formatter, LogFormatterSciNotation, LogLocator
 from numpy.typing import NDArray
 
+from surfacechem.contracts.si_units import ZERO_CELSIUS
 from surfacechem.errors import InputError, Place
 from surfacechem.quantities import SUPERSCRIPTS, VARIABLES, raised
 from surfacechem.results.netcdf import read_netcdf, reading, replacing
@@ -56,40 +57,37 @@ FLAT = 1000 * ROUNDING
 
 # Units that take a prefix, and the largest values between which they need none.
 TAKES_PREFIX = ("J", "N", "Pa", "W", "m", "s")
-PLAIN = (0.1, 1e3)
-
-FREEZING = 273.15
-"""Zero degrees Celsius [K]."""
+WITHOUT_PREFIX = (0.1, 1e3)
 
 PREFIXES = {-5: "f", -4: "p", -3: "n", -2: "µ", -1: "m", 0: "", 1: "k", 2: "M", 3: "G", 4: "T"}
 
 GREEK = ("alpha", "beta", "epsilon", "eta", "kappa", "lambda", "mu", "phi", "rho", "sigma", "tau", "theta")
 
 
-TITLE: Any = {"x": 0.01, "ha": "left", "fontsize": 11, "fontweight": "bold"}
-NOTE: Any = {"fontsize": 8, "color": "#555555"}
+TITLE_STYLE: Any = {"x": 0.01, "ha": "left", "fontsize": 11, "fontweight": "bold"}
+NOTE_STYLE: Any = {"fontsize": 8, "color": "#555555"}
 """Style of the title of a figure, and of a note above its panels."""
 
-LETTERS, TITLE_LETTERS = 16, 9.5
+LETTERS_PER_INCH, TITLE_PER_INCH = 16, 9.5
 """Letters in an inch: of a line of facts above the panels, and of the title and the words below an axis."""
 
-READS_WELL = (1e-2, 1e4)
+READABLE_SIZES = (1e-2, 1e4)
 """Sizes of numbers that are read without counting zeros."""
 
 POWERS = (-4, 5)
 """Powers of ten of the largest values of an axis, between which its ticks need none."""
 
-MOST_DECADES = 1e5
+MOST_TICKED_RATIO = 1e5
 """Largest over smallest value of a logarithmic axis that has ticks inside its decades."""
 
 MOST_CURVES = 7
 """Values of a parameter that are drawn as curves of their own: as many as there are colours."""
 
 
-WIDEST = ContextVar("widest", default=6.4)
+COLUMN_WIDTH = ContextVar("widest", default=6.4)
 """Width of a figure of one column [inch]."""
 
-PHONE = 4.4
+PHONE_WIDTH = 4.4
 """Width [inch] at which letters can be read on a phone."""
 
 
@@ -105,7 +103,7 @@ class Plot(Figure):
 @contextmanager
 def panels(width: float, height: float, rows: int = 1, columns: int = 1, **sharing: Any) -> Iterator[tuple[Plot, Any]]:
     """A figure of this size [inch] and its axes, shape (rows, columns), in the style of this package meanwhile."""
-    width = min(width, WIDEST.get()) if columns == 1 else width
+    width = min(width, COLUMN_WIDTH.get()) if columns == 1 else width
     with matplotlib.rc_context(STYLE):
         plot = Plot(figsize=(width, height), layout="constrained")
         FigureCanvasAgg(plot)
@@ -115,11 +113,11 @@ def panels(width: float, height: float, rows: int = 1, columns: int = 1, **shari
 @contextmanager
 def narrow() -> Iterator[None]:
     """Draw narrow figures meanwhile, for a page that a phone shows."""
-    usual = WIDEST.set(PHONE)
+    usual = COLUMN_WIDTH.set(PHONE_WIDTH)
     try:
         yield
     finally:
-        WIDEST.reset(usual)
+        COLUMN_WIDTH.reset(usual)
 
 
 def save(plot: Figure, target: Any, kind: str) -> None:
@@ -153,11 +151,11 @@ def in_celsius(dataset: xarray.Dataset) -> xarray.Dataset:
     found = dataset.assign_coords()  # a copy that shares all else
     for name, values in dataset.variables.items():
         if values.attrs.get("units") == "K":
-            found[name] = (values.dims, values.values - FREEZING, {**values.attrs, "units": "degC"})
+            found[name] = (values.dims, values.values - float(ZERO_CELSIUS), {**values.attrs, "units": "degC"})
     return found
 
 
-def check(
+def check_variables(
     dataset: xarray.Dataset, numbers: Mapping[str, tuple[str, ...]], texts: Mapping[str, tuple[str, ...]] | None = None
 ) -> None:
     """Raise InputError where variables that are drawn are missing, or not what surfacechem writes: numbers in double
@@ -165,32 +163,32 @@ def check(
     """
     for name, dimensions in {**numbers, **(texts or {})}.items():
         if name not in dataset.variables:
-            raise InputError(f"has no variable '{name}', as datasets of surfacechem have.", place(dataset))
+            raise InputError(f"has no variable '{name}', as datasets of surfacechem have.", place_of(dataset))
         if dataset[name].dims != dimensions:
-            raise InputError(f"{name} does not go over {' and '.join(dimensions)}.", place(dataset))
+            raise InputError(f"{name} does not go over {' and '.join(dimensions)}.", place_of(dataset))
         if name in numbers and dataset[name].dtype.kind != "f":
-            raise InputError(f"{name} does not hold numbers in double precision.", place(dataset))
+            raise InputError(f"{name} does not hold numbers in double precision.", place_of(dataset))
 
 
-def spread(count: int, most: int) -> list[int]:
+def evenly_spread(count: int, most: int) -> list[int]:
     """At most so many of the numbers below a count, evenly spread over all of them.
 
-    >>> spread(100, 4), spread(3, 7)
+    >>> evenly_spread(100, 4), evenly_spread(3, 7)
     ([0, 33, 66, 99], [0, 1, 2])
     """
     chosen: list[int] = np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(int)).tolist()
     return chosen
 
 
-def number(dataset: xarray.Dataset, name: str) -> float | None:
+def attribute(dataset: xarray.Dataset, name: str) -> float | None:
     """The value of a global attribute; None where there is none."""
     value = dataset.attrs.get(name)
     if value is not None and not isinstance(value, (float, int, np.number)):
-        raise InputError(f"the attribute '{name}' is no number.", place(dataset))
+        raise InputError(f"the attribute '{name}' is no number.", place_of(dataset))
     return None if value is None else float(value)
 
 
-def place(dataset: xarray.Dataset) -> Place | None:
+def place_of(dataset: xarray.Dataset) -> Place | None:
     """The file of a dataset."""
     source = dataset.encoding.get("source")
     return Place(str(source)) if source else None
@@ -199,32 +197,32 @@ def place(dataset: xarray.Dataset) -> Place | None:
 def headings(plot: Figure, ax: Axes, dataset: xarray.Dataset, above: float = 0.0, more: str = "") -> None:
     """Write title, end, error, solver and what ``more`` there is to say, so many points above the axes."""
     attributes = dataset.attrs
-    title = wrap(str(attributes.get("title", "")), int(TITLE_LETTERS * plot.get_figwidth())) or [""]
-    plot.suptitle("\n".join(title), **TITLE)
+    title = wrap(str(attributes.get("title", "")), int(TITLE_PER_INCH * plot.get_figwidth())) or [""]
+    plot.suptitle("\n".join(title), **TITLE_STYLE)
     facts = [str(attributes.get("reason", "")) or _ends(dataset)]
-    if (error := number(dataset, "error")) is not None:
+    if (error := attribute(dataset, "error")) is not None:
         exact = str(attributes.get("error_source", "")).startswith("exact")
         exact = exact or any(str(name).endswith("_exact") for name in dataset)
         kind = "exact solution" if exact else "estimate"
         facts.append("error unknown" if np.isnan(error) else f"error {error:.1e} ({kind})")
-    if "solver" in attributes and (rtol := number(dataset, "rtol")) is not None:
+    if "solver" in attributes and (rtol := attribute(dataset, "rtol")) is not None:
         facts.append(f"{attributes['solver']}, rtol {rtol:g}")
     if "time" in dataset.sizes and dataset.sizes.get("event", 0) > dataset.sizes["time"]:
         facts.append(f"{dataset.sizes['event']} events between {dataset.sizes['time']} outputs")
     place = ax.get_subplotspec()
     columns = place.get_gridspec().ncols if place else 1
     # Where there are columns, the middle of a line over the first one has to be within it, or the others make room.
-    room = int(LETTERS * (plot.get_figwidth() - 0.8) * min(1.0, 2 / columns))
-    lines = _packed([*facts, more], room)
+    room = int(LETTERS_PER_INCH * (plot.get_figwidth() - 0.8) * min(1.0, 2 / columns))
+    lines = _filled_lines([*facts, more], room)
     more_lines = above + 10 * (len(lines) - 1) + 14 * (len(title) - 1)
     plot.set_figheight(plot.get_figheight() + more_lines / 72)  # the panels keep their height
-    ax.set_title("\n".join(lines), loc="left", pad=6 + above, **NOTE)
+    ax.set_title("\n".join(lines), loc="left", pad=6 + above, **NOTE_STYLE)
 
 
-LOST, STOPPED = ("failed", "refused"), "stopped"
+WITHOUT_END, STOPPED = ("failed", "refused"), "stopped"
 """Statuses of runs whose last values are no ends, and of those that ended before the others."""
 
-MARKS = dict(zip((*LOST, STOPPED), "xds", strict=True))
+STATUS_MARKERS = dict(zip((*WITHOUT_END, STOPPED), "xds", strict=True))
 """Their markers."""
 
 
@@ -236,20 +234,20 @@ def _ends(dataset: xarray.Dataset) -> str:
     return ", ".join(f"{count} {word}" for word, count in counts.items() if count)
 
 
-def lost(dataset: xarray.Dataset, *words: str) -> NDArray[np.bool_]:
+def has_no_end(dataset: xarray.Dataset, *words: str) -> NDArray[np.bool_]:
     """Whether each run of a sweep ended in one of these ways, which a store has as codes."""
     status = dataset["status"]
     codes = str(status.attrs.get("flag_meanings", "")).split()
     return np.isin(status.values, [codes.index(word) if codes else word for word in words])
 
 
-def mark_lost(axes: Sequence[Axes], dataset: xarray.Dataset) -> None:
+def mark_without_end(axes: Sequence[Axes], dataset: xarray.Dataset) -> None:
     """Marks on the axis of what is swept where runs have no ends, so that it reaches as far as the sweep, and where
     some have stopped before the others.
     """
     x = dataset[str(dataset["status"].dims[0])].values
-    for word in MARKS:
-        found = lost(dataset, word)
+    for word in STATUS_MARKERS:
+        found = has_no_end(dataset, word)
         where = found & ~(found.all() and word == STOPPED)
         mark(axes, x[where.reshape(len(x), -1).any(axis=1)], word)
 
@@ -259,11 +257,11 @@ def mark(axes: Sequence[Axes], x: NDArray[np.float64], word: str) -> None:
     for k, ax in enumerate(axes if len(x) else ()):
         look: Any = {"color": "0.4", "markerfacecolor": "white", "clip_on": False, "zorder": 3}
         across, label = ax.get_xaxis_transform(), "_" if k else word
-        ax.plot(x, np.zeros(len(x)), MARKS[word], markersize=5, transform=across, label=label, **look)
+        ax.plot(x, np.zeros(len(x)), STATUS_MARKERS[word], markersize=5, transform=across, label=label, **look)
         legend(ax)
 
 
-MARKER, FREE = 3.5, 2
+MARKER_SIZE, MARKER_SPACING = 3.5, 2
 """Diameter of the markers of runs in points, and how many of them have to fit between two."""
 
 
@@ -271,10 +269,10 @@ def marker(ax: Axes, count: int) -> str:
     """Marker of points so few across a figure that their line would pass for a curve known everywhere; else ''."""
     whole = ax.get_figure(root=True)
     assert whole is not None
-    return "o" if count * MARKER * (1 + FREE) <= 72 * whole.get_figwidth() else ""
+    return "o" if count * MARKER_SIZE * (1 + MARKER_SPACING) <= 72 * whole.get_figwidth() else ""
 
 
-def _packed(facts: Sequence[str], room: int) -> list[str]:
+def _filled_lines(facts: Sequence[str], room: int) -> list[str]:
     """Facts in lines of so many letters; only one that is longer than a line is broken itself."""
     lines: list[str] = []
     for fact in filter(None, facts):
@@ -364,7 +362,7 @@ def prefixed(unit: str, values: Array) -> tuple[str, float]:
     (('MPa', 1000000.0), ('nm s⁻¹', 1e-09), ('K', 1.0))
     """
     size = largest(values)
-    if unit.partition(" ")[0] not in TAKES_PREFIX or size == 0 or PLAIN[0] <= size < PLAIN[1]:
+    if unit.partition(" ")[0] not in TAKES_PREFIX or size == 0 or WITHOUT_PREFIX[0] <= size < WITHOUT_PREFIX[1]:
         return unit_text(unit), 1.0
     most = 0 if unit == "s" else max(PREFIXES)
     thousands = min(max(math.floor(math.log10(size) / 3), min(PREFIXES)), most)
@@ -397,17 +395,17 @@ def draw_parameter(axis: XAxis | YAxis, values: xarray.DataArray, decades: bool 
     assert place is not None
     rows, columns = place.get_gridspec().get_geometry()
     room = whole.get_figwidth() / columns if isinstance(axis, XAxis) else whole.get_figheight() / rows
-    lines = wrap(parameter_words(values), int(TITLE_LETTERS * room), break_on_hyphens=False, break_long_words=False)
+    lines = wrap(parameter_words(values), int(TITLE_PER_INCH * room), break_on_hyphens=False, break_long_words=False)
     words = "\n".join(lines)
     if not (over_decades(values.values) if decades is None else decades):
         label(axis, words, unit(values), values.values)
         return
-    text, size = prefixed(unit(values), _middle(values.values))
+    text, size = prefixed(unit(values), _middle_of_decades(values.values))
     axis.set_label_text(f"{words} [{text}]")
-    logarithmic(axis, size=size)
+    make_logarithmic(axis, size=size)
 
 
-def _middle(values: Array) -> Array:
+def _middle_of_decades(values: Array) -> Array:
     """The middle of decades, which a prefix has to suit: at their upper end, nobody reads 100 pN/s in nN/s."""
     sizes = np.abs(values[np.isfinite(values) & (values != 0)])
     return np.sqrt(sizes.min(keepdims=True) * sizes.max(keepdims=True)) if len(sizes) else np.zeros(1)
@@ -454,17 +452,17 @@ def parameter_name(name: str) -> str:
     return symbol(name) if len(head) == 1 or head in GREEK else name.replace("_", " ")
 
 
-def valued(values: xarray.DataArray, place: int) -> str:
+def value_label(values: xarray.DataArray, place: int) -> str:
     """A value of a swept parameter with its name and unit, whose prefix is that of all values where these read well in
     it.
 
     >>> rates = xarray.DataArray([0, -1e-10, 2e-9], name="rate", attrs={"units": "N s-1"})
-    >>> [valued(rates, k) for k in range(3)]
+    >>> [value_label(rates, k) for k in range(3)]
     ['rate = 0 pN s⁻¹', 'rate = −100 pN s⁻¹', 'rate = 2000 pN s⁻¹']
     """
     value = values.values[place]
-    text, size = prefixed(unit(values), _middle(values.values))
-    if value and not READS_WELL[0] <= np.abs(value) / size < READS_WELL[1]:
+    text, size = prefixed(unit(values), _middle_of_decades(values.values))
+    if value and not READABLE_SIZES[0] <= np.abs(value) / size < READABLE_SIZES[1]:
         text, size = prefixed(unit(values), values.values[place : place + 1])
     return minus(f"{parameter_name(str(values.name))} = {value / size:.4g} {'' if text == '1' else text}".rstrip())
 
@@ -480,17 +478,17 @@ def minus(text: str) -> str:
 
 def member_name(dataset: xarray.Dataset, place: Sequence[int]) -> str:
     """The parameters of a run of a sweep, by its place along each of them."""
-    return ", ".join(valued(dataset[str(name)], k) for name, k in zip(dataset["status"].dims, place, strict=True))
+    return ", ".join(value_label(dataset[str(name)], k) for name, k in zip(dataset["status"].dims, place, strict=True))
 
 
-def by_second(dataset: xarray.Dataset, values: Array) -> list[tuple[Array, str]]:
+def curves_by_second(dataset: xarray.Dataset, values: Array) -> list[tuple[Array, str]]:
     """Values of a sweep over the first parameter, a curve for each value of the second, or for some of many."""
     if values.ndim == 1:
         return [(values, "")]
     second = dataset[str(dataset["status"].dims[1])]
-    chosen = spread(values.shape[1], MOST_CURVES)
+    chosen = evenly_spread(values.shape[1], MOST_CURVES)
     left = f" ({len(chosen)} of {values.shape[1]})" if len(chosen) < values.shape[1] else ""
-    return [(values[:, j], valued(second, j) + (left if j == chosen[-1] else "")) for j in chosen]
+    return [(values[:, j], value_label(second, j) + (left if j == chosen[-1] else "")) for j in chosen]
 
 
 class _Powers(LogFormatterSciNotation):
@@ -509,10 +507,10 @@ class _FewDecades(LogLocator):
     """Ticks inside decades, where these are few; each tick takes as long to draw as a curve."""
 
     def tick_values(self, vmin: float, vmax: float) -> Any:
-        return super().tick_values(vmin, vmax) if vmax <= MOST_DECADES * vmin else np.empty(0)
+        return super().tick_values(vmin, vmax) if vmax <= MOST_TICKED_RATIO * vmin else np.empty(0)
 
 
-def logarithmic(*axes: XAxis | YAxis, size: float = 1.0) -> None:
+def make_logarithmic(*axes: XAxis | YAxis, size: float = 1.0) -> None:
     """Make axes logarithmic, with labels of ticks in a unit of this size."""
     for axis in axes:
         axis.axes.set(**{f"{axis.axis_name}scale": "log"})

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from surfacechem.errors import InputError, refuse_unknown
 from surfacechem.format.plans import RUN, Plan, recorded_plan
 from surfacechem.plots import members, rupture, style
-from surfacechem.plots.run import KINDS, Panel, of_kind
+from surfacechem.plots.run import PANELS, Panel, of_kind
 from surfacechem.plots.style import MOST_CURVES, symbol, unit, varies
 
 # Parameters of a grid that are drawn.
@@ -24,26 +24,26 @@ def figure(dataset: xarray.Dataset, variables: Sequence[str] | None = None, agai
     """The figure of a sweep: the load at rupture, else final values; each run over ``against`` where that is given."""
     plan, axes = plan_of(dataset), axes_of(dataset)
     if against:
-        return members.portraits(dataset, axes, variables, against)
-    if are_many(dataset, axes):
+        return members.trajectories(dataset, axes, variables, against)
+    if hides_runs(dataset, axes):
         return members.figure(dataset, plan, axes, variables)
-    style.check(dataset, {"time_reached": tuple(axes), **{name: (name,) for name in axes}})
-    shown, load = groups(dataset, variables), rupture.load_of(dataset)
+    style.check_variables(dataset, {"time_reached": tuple(axes), **{name: (name,) for name in axes}})
+    shown, load = panels(dataset, variables), rupture.load_of(dataset)
     chosen = [name for panel in shown for name in panel.names]
     if load and (not variables or all(load in dataset[name].dims for name in chosen)):
         return rupture.figure(dataset, load, variables)
     if not variables and "lifetime" in dataset and dataset["lifetime"].dims == tuple(axes):
         return rupture.lifetimes(dataset)
-    return _finals(dataset, axes[0], shown)
+    return _final_values(dataset, axes[0], shown)
 
 
-def _finals(dataset: xarray.Dataset, axis: str, shown: Sequence[Panel]) -> Figure:
+def _final_values(dataset: xarray.Dataset, axis: str, shown: Sequence[Panel]) -> Figure:
     """Values at the ends of the runs over the first parameter, in panels."""
     height = 0.9 + (2.8 if len(shown) == 1 else 1.7) * len(shown)
     with style.panels(6.4, height, len(shown), sharex=True) as (plot, grid):
         for ax, panel in zip(grid[:, 0], shown, strict=True):
             _draw_final(ax, dataset, panel.names)
-        style.mark_lost(grid[:, 0].tolist(), dataset)
+        style.mark_without_end(grid[:, 0].tolist(), dataset)
         for ax in grid[:, 0]:
             style.legend(ax)
         style.draw_parameter(grid[-1, 0].xaxis, dataset[axis])
@@ -54,15 +54,15 @@ def _finals(dataset: xarray.Dataset, axis: str, shown: Sequence[Panel]) -> Figur
 def plan_of(dataset: xarray.Dataset) -> Plan:
     """Plan of the sweep that a dataset records; InputError where it does not hold its parameters."""
     axes = axes_of(dataset)
-    style.check(dataset, {}, {"status": tuple(axes)})
+    style.check_variables(dataset, {}, {"status": tuple(axes)})
     plan = recorded_plan(dataset.attrs["sweep"])
     known = all(name in dataset.coords for name in axes) and 1 <= len(axes) <= MOST_DRAWN
-    if not known and not are_many(dataset, axes):
+    if not known and not hides_runs(dataset, axes):
         raise InputError("the dataset does not hold the parameters of a sweep.")
     return plan
 
 
-def are_many(dataset: xarray.Dataset, axes: Sequence[str]) -> bool:
+def hides_runs(dataset: xarray.Dataset, axes: Sequence[str]) -> bool:
     """Whether curves over the first parameter, one for each value of another, do not show the runs."""
     spectral = any(str(name).endswith("_mode") for name in dataset)
     curves = len(axes) == MOST_DRAWN and dataset.sizes[axes[1]] > MOST_CURVES
@@ -77,16 +77,16 @@ def axes_of(dataset: xarray.Dataset) -> list[str]:
 def _numbers(dataset: xarray.Dataset) -> list[str]:
     """Names of the numbers that curves over what is swept show; coverages also have names of their own."""
     lists = {"event", "species"}
-    return [name for name in members.numbers(dataset, axes_of(dataset)) if lists.isdisjoint(dataset[name].dims)]
+    return [name for name in members.number_names(dataset, axes_of(dataset)) if lists.isdisjoint(dataset[name].dims)]
 
 
-def groups(dataset: xarray.Dataset, variables: Sequence[str] | None) -> list[Panel]:
+def panels(dataset: xarray.Dataset, variables: Sequence[str] | None) -> list[Panel]:
     """Panels of the variables, else of the most probable load at rupture, else of what depends on the sweep."""
     known, load = _numbers(dataset), rupture.load_of(dataset)
-    refuse_unknown(variables or (), known, "no variable '{}' in the sweep", style.place(dataset))
+    refuse_unknown(variables or (), known, "no variable '{}' in the sweep", style.place_of(dataset))
     names = [[name] for name in dict.fromkeys(variables or ())] or ([[f"{load}_mode"]] if load else _dependent(dataset))
     # A store may have numbers of each run alone.
-    names = names or [[name] for name in members.differing(dataset, axes_of(dataset), known)]
+    names = names or [[name] for name in members.varying_numbers(dataset, axes_of(dataset), known)]
     return [Panel("", unit(dataset[group[0]]), group) for group in names]
 
 
@@ -94,8 +94,8 @@ def _dependent(dataset: xarray.Dataset) -> list[list[str]]:
     """Temperatures and bonds whose final values depend on what is swept; each alone where that has several axes."""
     axes, found = axes_of(dataset), []
     along = [name for name in _numbers(dataset) if dataset[name].ndim > len(axes)]
-    for _, *kind in KINDS[:2]:
-        names = [name for name in of_kind(dataset, along, *kind) if varies(members.final(dataset, name).ravel())]
+    for _, *kind in PANELS[:2]:
+        names = [name for name in of_kind(dataset, along, *kind) if varies(members.final_values(dataset, name).ravel())]
         found += [[name] for name in names] if len(axes) > 1 else [names] if names else []
     return found
 
@@ -103,15 +103,15 @@ def _dependent(dataset: xarray.Dataset) -> list[list[str]]:
 def _draw_final(ax: Axes, dataset: xarray.Dataset, names: Sequence[str]) -> None:
     """Values at the end of each run."""
     x = dataset[axes_of(dataset)[0]].values
-    ends = {name: members.final(dataset, name) for name in names}
+    ends = {name: members.final_values(dataset, name) for name in names}
     at_end = any(dataset[name].ndim > len(axes_of(dataset)) for name in names)
     for name, end in ends.items():
         own = symbol(name) if at_end or len(names) > 1 else ""  # what a number of each run is its axis says
-        for values, label in style.by_second(dataset, end):
+        for values, label in style.curves_by_second(dataset, end):
             words = label or own if len(names) == 1 else f"{own} {label}".strip()
             look: Any = {"linestyle": "none"} if style.is_mode(dataset[name]) else {}
             marker = style.marker(ax, 0 if look else len(x))
-            ax.plot(x, values, marker=marker, markersize=style.MARKER, label=words, **look)
-    which = ("Final " if members.knows_ends(dataset, names) else "Last output ") if at_end else ""
+            ax.plot(x, values, marker=marker, markersize=style.MARKER_SIZE, label=words, **look)
+    which = ("Final " if members.ends_are_known(dataset, names) else "Last output ") if at_end else ""
     said = f"{which}{style.quantity_words(dataset[names[0]]) if len(names) == 1 else 'value'}"
     style.label(ax.yaxis, said, unit(dataset[names[0]]), np.stack(list(ends.values())))

@@ -193,7 +193,7 @@ def remarks(curves: Curves) -> Iterator[str]:
 
 def figure(curves: Curves, temperatures: Span, forces: Span) -> Figure:
     """Rates (left) and equilibrium constants (right), over temperature and in a second row over force."""
-    from surfacechem.plots.style import COLOURS, NOTE, TITLE, panels
+    from surfacechem.plots.style import COLOURS, NOTE_STYLE, TITLE_STYLE, panels
 
     shown, T, f = reference(temperatures), temperatures.values(POINTS), forces.values(POINTS)
     rows = [(T, T, np.zeros(1), "Temperature [K]")]
@@ -213,8 +213,8 @@ def figure(curves: Curves, temperatures: Span, forces: Span) -> Figure:
             rates.set(xlabel=label, ylabel="log$_{10}$ Rate per bond [1/s]")
             constants.set(xlabel=label, ylabel="log$_{10}$ K [1]")
         if curves.loaded:
-            axes[1][0].set_title(f"at {shown:g} K", loc="left", **NOTE)
+            axes[1][0].set_title(f"at {shown:g} K", loc="left", **NOTE_STYLE)
         handles, labels = axes[0][0].get_legend_handles_labels()
         plot.legend(handles, labels, loc="outside lower center", ncols=min(len(labels), 3))
-        plot.suptitle(f"Phase {curves.mechanism.phase}", **TITLE)
+        plot.suptitle(f"Phase {curves.mechanism.phase}", **TITLE_STYLE)
     return plot

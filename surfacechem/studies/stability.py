@@ -27,7 +27,7 @@ from scipy.optimize import Bounds, differential_evolution
 from surfacechem import format as cases
 from surfacechem.errors import InputError
 from surfacechem.format import Case
-from surfacechem.plots.study import MARKS, NO_ANSWER
+from surfacechem.plots.study import OUTCOME_COLOURS, OUTCOME_MARKS
 from surfacechem.results.accuracy import largest_errors, relative_errors
 from surfacechem.results.error_estimates import computed
 from surfacechem.solve import names as known_solvers
@@ -102,7 +102,7 @@ class Attempt(Cell):
         >>> Attempt("solved", "in T", 9.87).text, Attempt("failed", "stiff", 0.0).text
         ('9.9', '×')
         """
-        mark = MARKS.get(self.outcome, "")
+        mark = OUTCOME_MARKS.get(self.outcome, "")
         return mark if self.outcome == FAILED else f"{mark} {self.digits:.1f}".strip()
 
 
@@ -436,7 +436,7 @@ def _details(row: MatrixRow, headings: Sequence[str], rtol: float) -> PageTable:
         first, *_ = cells = [cell for cell in row.cells.values() if cell.value == value]
         texts = (row.regime.label(value), *_condition_texts(first.condition, rtol), *(cell.text for cell in cells))
         lines.append((*texts, str(first.counters.steps), first.reason))
-        marked += [i] if any(cell.outcome in NO_ANSWER for cell in cells) else []
+        marked += [i] if any(cell.outcome in OUTCOME_COLOURS for cell in cells) else []
     of_first = (f"steps of {first.solver}", f"{first.solver}: where, or why")
     return PageTable((row.regime.symbol, *headings, *of_first), lines, row.regime.title, marked)
 
@@ -444,8 +444,8 @@ def _details(row: MatrixRow, headings: Sequence[str], rtol: float) -> PageTable:
 def _kept(cells: Sequence[Attempt]) -> str:
     """The least digits of all answers, and how many cells failed or are wrong."""
     outcomes = [cell.outcome for cell in cells]
-    answers = [cell.digits for cell in cells if cell.outcome not in NO_ANSWER]
-    counts = [f"{outcomes.count(word)} {word}" for word in NO_ANSWER if word in outcomes]
+    answers = [cell.digits for cell in cells if cell.outcome not in OUTCOME_COLOURS]
+    counts = [f"{outcomes.count(word)} {word}" for word in OUTCOME_COLOURS if word in outcomes]
     return ", ".join([f"{min(answers):.1f}" if answers else "none", *counts])
 
 

@@ -10,7 +10,7 @@ import xarray
 import surfacechem
 from surfacechem.errors import InputError
 from surfacechem.plots import figure, save
-from surfacechem.plots.run import logarithmic, merged
+from surfacechem.plots.run import group_coinciding, wants_log_axis
 
 pytestmark = pytest.mark.around
 
@@ -70,7 +70,7 @@ def test_panels_of_the_usual_figure():
     assert plot.axes[-1].get_yscale() == "log"
     (residual,) = plot.axes[-1].get_lines()
     assert np.max(residual.get_ydata()) == pytest.approx(1e-12)  # relative, as the attribute states
-    assert merged(dataset(), ("q_1", "q_2", "q_12")) == [["q_1", "q_2"], ["q_12"]]
+    assert group_coinciding(dataset(), ("q_1", "q_2", "q_12")) == [["q_1", "q_2"], ["q_12"]]
 
 
 def test_sliding_is_no_gap_and_logarithms_are_no_bonds():
@@ -122,7 +122,7 @@ def test_another_axis_than_time():
 
 def test_time_axis_is_logarithmic_where_times_span_decades():
     spread = np.concatenate([[0.0], np.logspace(-5, 1, 61)])
-    assert logarithmic(spread)
+    assert wants_log_axis(spread)
     assert figure(dataset(spread)).axes[0].get_xscale() == "log"
     assert figure(dataset(np.linspace(0, 1, 5001))).axes[0].get_xscale() == "linear"
 

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 import surfacechem
 from surfacechem.cli.main import app
-from surfacechem.plots.study import LABELS, figure
+from surfacechem.plots.study import LABEL_VARIABLES, figure
 from surfacechem.results.accuracy import relative_errors
 from surfacechem.solve.adapters import sundials
 from surfacechem.studies import precision
@@ -56,7 +56,7 @@ def written(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def data(study):
-    return study.dataset.set_index(LABELS)
+    return study.dataset.set_index(LABEL_VARIABLES)
 
 
 def subject_of(name, *overrides):
@@ -88,7 +88,7 @@ def test_the_error_is_that_of_the_run(data):
 
 
 def test_a_named_quantity_without_an_exact_value_is_held_against_two_methods(data):
-    found = run("exothermic", ["radau"], [1e-4, 1e-7], ["T", "S_total"]).dataset.set_index(LABELS)
+    found = run("exothermic", ["radau"], [1e-4, 1e-7], ["T", "S_total"]).dataset.set_index(LABEL_VARIABLES)
     assert str(found["reference"].values[0]).startswith("exact solution exothermic-bonding; S_total: ")
     errors = found["variable_error_max"].sel(variable="S_total").values.ravel()
     assert errors[1] < errors[0] < 1e-4
@@ -264,7 +264,7 @@ def test_opens_plainly_over_case_solver_and_tolerance(written):
         xarray.testing.assert_identical(opened.load(), study.dataset)
         assert opened["error_max"].dims == ("case", "solver", "tolerance")
         assert list(opened["case_name"].values) == ["exothermic", "sliding-dry"]
-        by_name = opened.set_index(LABELS)
+        by_name = opened.set_index(LABEL_VARIABLES)
         assert np.isnan(by_name["variable_error_max"].sel(case="sliding-dry", variable="phi")).all()
         assert all(item.attrs["units"] and item.attrs["long_name"] for item in opened.variables.values())
 
