@@ -57,7 +57,7 @@ class PerfectContact(Reference):
     C_c: float = parameter("J/(m^2 K)", "heat capacity of the interface at T_0", default=0.0, at_least=0)
     T_0: float = parameter("K", "reference temperature", above=0)
 
-    told = read(constant="C_1 C_2 C_c T_0")
+    readings = read(constant="C_1 C_2 C_c T_0")
 
     @cached_property
     def C(self) -> float:
@@ -79,7 +79,7 @@ class UniformBody(Reference):
     T_0: float = parameter("K", "reference temperature", above=0)
     T_i: float = parameter("K", "initial temperature", above=0)
 
-    told = read(constant="T_0", capacity="C", temperature="T_i")
+    readings = read(constant="T_0", capacity="C", temperature="T_i")
 
     def heated(self, heat: Array) -> Array:
         """Temperature [K] after a supply of heat [J/m^2]."""
@@ -91,4 +91,4 @@ class FrictionallyHeated(UniformBody):
 
     D_0: float = parameter("W/m^2", "dissipation at T_0", at_least=0)
 
-    told = read(heating_at_T_0="D_0")
+    readings = read(heating_at_T_0="D_0")

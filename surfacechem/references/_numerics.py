@@ -20,19 +20,19 @@ from numpy.typing import NDArray
 from surfacechem.references.base import Array
 from surfacechem.tolerances import DIGITS, SQRT_EPS
 
-ITERATIONS = 400
+MOST_ITERATIONS = 400
 """At most: halving alone takes 52 to the last digit, and one for each factor of two between the ends of a bracket."""
 
-POINTS = 18
+GAUSS_POINTS = 18
 """Gauss points of a panel: a singularity a panel's length away leaves an error of 5.8^-36 = 3e-28."""
 
-HALVINGS = 800
+END_HALVINGS = 800
 """Panels towards each end: the smallest is 2^-801 of the path."""
 
-SOON = 1e-300
+LEAST_TIME = 1e-300
 """Times [s] below this count as zero."""
 
-NEAR = 60
+INNER_HALVINGS = 60
 """Halvings towards a point inside; below 2^-60 of the span it is no longer resolved."""
 
 Rate = Callable[[Array, Array], Array]
@@ -57,7 +57,7 @@ def increasing_root(
     """
     x = low if start is None else np.clip(start, low, high)
     before, settled = np.zeros_like(x), np.zeros(np.shape(x), dtype=bool)
-    for _ in range(ITERATIONS):
+    for _ in range(MOST_ITERATIONS):
         value, slope = function(x)
         error = value - target
         low, high = np.where(error <= 0.0, x, low), np.where(error >= 0.0, x, high)
@@ -86,7 +86,7 @@ def short_integral(function: Callable[[Array], Array], upper: Array) -> Array:
     return np.asarray(0.5 * upper * (function(0.5 * np.multiply.outer(upper, 1.0 + nodes)) @ weights))
 
 
-class Separable:
+class AutonomousODE:
     """An autonomous equation of one variable: times along a path of given length, by quadrature, and their inverse.
 
     The variable runs from a start to an end that it may reach or only approach. It is known by its distances from both,
@@ -96,13 +96,13 @@ class Separable:
 
     def __init__(self, rate: Rate, length: float, hard: Sequence[float] = ()) -> None:
         self.rate, self.length = rate, length
-        self.nodes, self.weights = gauss(POINTS)
+        self.nodes, self.weights = gauss(GAUSS_POINTS)
         half = 0.5 * length
-        steps = half * 0.5 ** np.arange(1.0, NEAR)
+        steps = half * 0.5 ** np.arange(1.0, INNER_HALVINGS)
         edges = []
         for found in ([x for x in hard if x < half], [length - x for x in hard if x >= half]):
             near = [x + step for x in found for step in (*-steps, 0.0, *steps)]
-            points = np.array([0.0, *half * 0.5 ** np.arange(HALVINGS + 1.0), *near])
+            points = np.array([0.0, *half * 0.5 ** np.arange(END_HALVINGS + 1.0), *near])
             edges.append(np.unique(points[(points >= 0.0) & (points <= half)]))
         early, late = edges
         # Distances of a panel are from the nearer end: from the start in the first half, from the end in the second.
@@ -128,7 +128,7 @@ class Separable:
 
     def position(self, t: Array) -> tuple[Array, Array]:
         """Distances from the start and from the end at the times t."""
-        t = np.where(t < SOON, 0.0, t)
+        t = np.where(t < LEAST_TIME, 0.0, t)
         j = np.clip(np.searchsorted(self.times, t, side="right") - 1, 0, len(self.first) - 1)
         start, stop, from_end = self.first[j], self.last[j], self.from_end[j]
 
@@ -152,7 +152,7 @@ SERIES_TERMS = 22
 """Of the second difference for arguments within [-1, 0]; those left out begin with 23 / 24! = 4e-23."""
 
 ASYMPTOTIC_TERMS = 38
-FAR, FAR_EI = 50.0, 40.0
+ASYMPTOTIC_EN, ASYMPTOTIC_EI = 50.0, 40.0
 """Arguments of E_n and Ei from which on asymptotic series reach rounding before they diverge: 38! / 40^38 = 7e-17."""
 
 
@@ -211,7 +211,7 @@ def scaled_expint(n: int, x: Array) -> Array:
     """
     from scipy.special import expn
 
-    return _pieced(x, FAR, lambda near: np.exp(near) * expn(n, near), lambda far: _asymptotic(n, far))
+    return _by_range(x, ASYMPTOTIC_EN, lambda near: np.exp(near) * expn(n, near), lambda far: _asymptotic(n, far))
 
 
 def scaled_Ei(x: Array) -> Array:
@@ -223,10 +223,10 @@ def scaled_Ei(x: Array) -> Array:
     from scipy.special import expi
 
     # Ei(x) = -E_1(-x)
-    return _pieced(x, FAR_EI, lambda near: np.exp(-near) * expi(near), lambda far: -_asymptotic(1, -far))
+    return _by_range(x, ASYMPTOTIC_EI, lambda near: np.exp(-near) * expi(near), lambda far: -_asymptotic(1, -far))
 
 
-def _pieced(x: Array, edge: float, near: Callable[[Array], Array], far: Callable[[Array], Array]) -> Array:
+def _by_range(x: Array, edge: float, near: Callable[[Array], Array], far: Callable[[Array], Array]) -> Array:
     """Two formulas, below an edge and from there on, each evaluated where it holds alone."""
     x = np.asarray(x)
     found, below = np.empty(x.shape), x < edge

@@ -37,7 +37,7 @@ class AdiabaticArrhenius(Reference):
     T_i: float = parameter("K", "initial temperature", above=0)
     delta_T: float = parameter("K", "adiabatic temperature rise of the complete reaction", above=0)
 
-    told = read(reaction="A E_a", temperature="T_i", adiabatic_rise="delta_T")
+    readings = read(reaction="A E_a", temperature="T_i", adiabatic_rise="delta_T")
 
     @property
     def initial_rate(self) -> float:

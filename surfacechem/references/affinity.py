@@ -30,7 +30,7 @@ class LinearAffinitySolution(Reference):
     phi_eq: float = parameter("1", "equilibrium bonding state", at_least=0, at_most=1)
     phi_i: float = parameter("1", "initial bonding state", default=0.0, at_least=0, at_most=1)
 
-    told = read(constant="n_c=N_c", reaction="c_r", potential="phi_eq K_c=K_0", initial="phi_i=phi")
+    readings = read(constant="n_c=N_c", reaction="c_r", potential="phi_eq K_c=K_0", initial="phi_i=phi")
 
     def quantities(self, t: Array) -> Quantities:
         relaxation, distance = self.c_r * self.K_c / self.n_c, self.phi_eq - self.phi_i
@@ -69,7 +69,9 @@ class ExponentialAffinitySolution(Reference):
     phi_eq: float = parameter("1", "equilibrium bonding state", default=1.0)
     phi_i: float = parameter("1", "initial bonding state", default=0.0, at_least=0, at_most=1)
 
-    told = read(constant="n_c=N_c", reaction="C_r", potential="phi_eq K_c=K_0", initial="phi_i=phi", temperature="T")
+    readings = read(
+        constant="n_c=N_c", reaction="C_r", potential="phi_eq K_c=K_0", initial="phi_i=phi", temperature="T"
+    )
 
     def quantities(self, t: Array) -> Quantities:
         steepness = self.K_c / (self.n_c * BOLTZMANN * self.T)  # affinity in k_B T per distance of phi from equilibrium

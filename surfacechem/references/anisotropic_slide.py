@@ -11,7 +11,7 @@ from surfacechem.references._bodies import UniformBody
 from surfacechem.references.base import Array, Quantities, read
 from surfacechem.tolerances import DIGITS
 
-NEWTON = 100
+NEWTON_STEPS = 100
 """Steps to the velocity at a time; each but the first few doubles the digits."""
 
 
@@ -41,7 +41,7 @@ class AnisotropicSlide(UniformBody):
     v_i: float = parameter("m/s", "initial velocity", above=0)
     v_2_i: float = parameter("m/s", "initial velocity across it")
 
-    told = read(tangential="m", friction="mu_1 mu_2", initial="p v_i=v v_2_i=v_2")
+    readings = read(tangential="m", friction="mu_1 mu_2", initial="p v_i=v v_2_i=v_2")
 
     @property
     def stop_time(self) -> float:
@@ -61,7 +61,7 @@ class AnisotropicSlide(UniformBody):
         ratio, slope, deceleration = self.mu_2 / self.mu_1, self.v_2_i / self.v_i, self.mu_1 * self.p / self.m
         # Velocity along the first axis relative to the initial one, by Newton's method from above.
         left, x = np.maximum(self.stop_time - t, 0) * deceleration / self.v_i, np.ones_like(t)
-        for _ in range(NEWTON):
+        for _ in range(NEWTON_STEPS):
             change = (self._integral(1.0, x) - left) / np.sqrt(1 + slope**2 * x ** (2 * (ratio - 1)))
             x = np.where(left > 0, np.maximum(x - change, 0), 0)
             if np.all(np.abs(change) <= DIGITS * x):

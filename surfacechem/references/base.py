@@ -37,13 +37,13 @@ def read(**readings: str) -> dict[str, tuple[str, str]]:
     >>> read(friction="mu", initial="p phi_i=phi", temperature="T_i")["phi_i"]
     ('initial', 'phi')
     """
-    told = {}
+    found = {}
     for reading, names in readings.items():
         assert hasattr(SceneView, reading), reading
         for name in names.split():
             ours, _, theirs = name.partition("=")
-            told[ours] = (reading, theirs or ours)
-    return told
+            found[ours] = (reading, theirs or ours)
+    return found
 
 
 @dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(parameter,))
@@ -55,14 +55,14 @@ class Reference(ABC):
     continuous: ClassVar[bool] = False
     """True if it solves for bodies without cells: a scene then meets it but for the error of its cells, and
     `from_scene` alone tells whether it is the scene's."""
-    told: ClassVar[Mapping[str, tuple[str, str]]] = {}
+    readings: ClassVar[Mapping[str, tuple[str, str]]] = {}
     """Readings of its parameters from a scene, those of its bases among them."""
     statistics: ClassVar[tuple[str, ...]] = ()
     """Names of its properties that a sweep tells of each run."""
 
     def __init_subclass__(cls, **keywords: Any) -> None:
         super().__init_subclass__(**keywords)
-        cls.told = {name: how for kind in cls.__mro__[::-1] for name, how in vars(kind).get("told", {}).items()}
+        cls.readings = {name: how for kind in cls.__mro__[::-1] for name, how in vars(kind).get("readings", {}).items()}
         cls.name = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "-", cls.__name__.removesuffix("Solution")).lower()
         dataclass(frozen=True, kw_only=True)(cls)
 
@@ -77,7 +77,7 @@ class Reference(ABC):
 
         That it is the scene's is then tested on the scene's equations. What takes several readings is added here.
         """
-        return {name: scene.read(*how) for name, how in cls.told.items()}
+        return {name: scene.read(*how) for name, how in cls.readings.items()}
 
     @property
     def end_time(self) -> float:

@@ -22,7 +22,7 @@ class BellBond(Reference):
     T: float = parameter("K", "temperature", above=0)
     phi_i: float = parameter("1", "initial bonding state", default=1.0, above=0, at_most=1)
 
-    told = read(reaction="k_off x_off", initial="phi_i=phi", temperature="T")
+    readings = read(reaction="k_off x_off", initial="phi_i=phi", temperature="T")
 
     @property
     def force_scale(self) -> float:
@@ -47,7 +47,7 @@ class BellConstantForce(BellBond):
 
     f: float = parameter("N", "force per bond")
 
-    told = read(initial="f")
+    readings = read(initial="f")
     statistics = ("lifetime",)
 
     @property
@@ -90,7 +90,7 @@ class BellRamp(BellBond):
 
     rate: float = parameter("N/s", "loading rate", above=0)
 
-    told = read(ramp="rate=f")
+    readings = read(ramp="rate=f")
     statistics = ("mode", "median", "mean")
 
     @property

@@ -54,7 +54,7 @@ class Bonding(PerfectContact):
     tau: float = parameter("s", "relaxation time of bonding", above=0)
     D: float = parameter("W/m^2", "friction power, traction times sliding velocity", default=0.0, at_least=0)
 
-    told = read(
+    readings = read(
         potential="K_0 K_1 K_2", initial="phi_i=phi", temperature="T_i", relaxation_time="tau", friction_power="D"
     )
 
@@ -127,7 +127,7 @@ class ExothermicBonding(PerfectContact):
     K_0: float = parameter("J/m^2", "bond energy density", at_least=0)
     tau: float = parameter("s", "relaxation time of bonding", above=0)
 
-    told = read(potential="K_0", relaxation_time="tau")
+    readings = read(potential="K_0", relaxation_time="tau")
 
     def quantities(self, t: Array) -> Quantities:
         kappa = self.K_0 / (self.T_0 * self.C)
@@ -160,7 +160,7 @@ class EndothermicBonding(PerfectContact):
     K_2: float = parameter("J/m^2", "bond energy density at T_0", at_least=0)
     tau: float = parameter("s", "relaxation time of bonding", above=0)
 
-    told = read(potential="K_2", relaxation_time="tau")
+    readings = read(potential="K_2", relaxation_time="tau")
 
     def __post_init__(self) -> None:
         """Refuse what has no positive heat capacity to begin with."""
@@ -197,7 +197,7 @@ class BimolecularBonding(Reference):
     n_c: float = parameter("1/m^2", "density of reference sites", above=0)
     phi_i: float = parameter("1", "initial bonding state", default=0.0, at_least=0)
 
-    told = read(reaction="k_f k_r", initial="phi_i=phi")
+    readings = read(reaction="k_f k_r", initial="phi_i=phi")
 
     @classmethod
     def from_scene(cls, scene: SceneView) -> Parameters:
@@ -247,7 +247,7 @@ class FrictionIgnitedBonding(Reference):
     D: float = parameter("W/m^2", "friction power", above=0)
     phi_i: float = parameter("1", "initial bonding state", default=0.0, at_least=0, at_most=1)
 
-    told = read(reaction="A E_a", initial="phi_i=phi", temperature="T_i", capacity="C", friction_power="D")
+    readings = read(reaction="A E_a", initial="phi_i=phi", temperature="T_i", capacity="C", friction_power="D")
 
     def quantities(self, t: Array) -> Quantities:
         heating, T_E = self.D / self.C, self.E_a / GAS_CONSTANT

@@ -32,7 +32,7 @@ class BouncingBody(UniformBody):
     g_n_i: float = parameter("m", "initial gap", at_least=0)
     v_n_i: float = parameter("m/s", "initial opening velocity")
 
-    told = read(normal="m e", initial="F_n g_n_i=g_n v_n_i=v_n")
+    readings = read(normal="m e", initial="F_n g_n_i=g_n v_n_i=v_n")
 
     @property
     def _fall(self) -> tuple[float, float]:

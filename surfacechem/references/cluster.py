@@ -10,7 +10,7 @@ import numpy as np
 
 from surfacechem.contracts.terms import parameter
 from surfacechem.errors import InputError
-from surfacechem.references._numerics import Separable, increasing_root, remainder, scaled_expint, short_integral
+from surfacechem.references._numerics import AutonomousODE, increasing_root, remainder, scaled_expint, short_integral
 from surfacechem.references.base import Array, Quantities, read
 from surfacechem.references.bell import BellBond
 
@@ -24,7 +24,7 @@ class Cluster(BellBond):
     n_c: float = parameter("1/m^2", "density of bonding sites", above=0)
     t_n: float = parameter("Pa", "tensile traction", above=0)
 
-    told = read(constant="n_c=N_c", initial="t_n")
+    readings = read(constant="n_c=N_c", initial="t_n")
 
     @property
     def load(self) -> float:
@@ -141,7 +141,7 @@ class RebindingCluster(Cluster):
 
     k_on: float = parameter("1/s", "rate at which free sites bond", above=0)
 
-    told = read(reaction="k_on")
+    readings = read(reaction="k_on")
 
     @property
     def critical_load(self) -> float:
@@ -211,7 +211,7 @@ class RebindingCluster(Cluster):
         return float(increasing_root(distance, target, np.zeros(1), top)[0])
 
     @cached_property
-    def _path(self) -> Separable:
+    def _path(self) -> AutonomousODE:
         """The way from the start to rupture or to the steady state, in units of 1/k_off."""
         scale, critical = math.exp(1.0 + self.critical_load), self._about(0.0)
         if self.breaks:
@@ -222,14 +222,14 @@ class RebindingCluster(Cluster):
                 delta = np.where(gone < left, self.phi_i - self.critical_state - gone, left - self.critical_state)
                 return scale * critical.rate(delta, left)
 
-            return Separable(rupture, self.phi_i, [x for x in [self.phi_i - self.critical_state] if x > 0.0])
+            return AutonomousODE(rupture, self.phi_i, [x for x in [self.phi_i - self.critical_state] if x > 0.0])
         end, steady = self._about(self._above_critical), self.steady_state
         side = math.copysign(1.0, self.phi_i - steady)
 
         def relaxing(_: Array, left: Array) -> Array:
             return side * scale * end.rate(side * left, steady + side * left)
 
-        return Separable(relaxing, abs(self.phi_i - steady))
+        return AutonomousODE(relaxing, abs(self.phi_i - steady))
 
     def quantities(self, t: Array) -> Quantities:
         if not self.breaks and self.phi_i == self.steady_state:

@@ -28,14 +28,14 @@ Complex: TypeAlias = NDArray[Any]
 NODES = 24
 """Points on the contour: each gains a factor of 3.9, until rounding is reached."""
 
-HELD = 1e300
+HELD_CONDUCTANCE = 1e300
 """Conductance at a far side that is held at a temperature."""
 
 
-def inverted(image: Callable[[Complex], Complex], t: Array) -> Array:
+def inverse_laplace(image: Callable[[Complex], Complex], t: Array) -> Array:
     """The function of times t > 0 whose Laplace transform is ``image``, which may have more axes beside those of t.
 
-    >>> bool(abs(inverted(lambda s: 1 / (s + 2), np.array([0.5]))[0] - np.exp(-1)) < 1e-12)
+    >>> bool(abs(inverse_laplace(lambda s: 1 / (s + 2), np.array([0.5]))[0] - np.exp(-1)) < 1e-12)
     True
     """
     angle = (2 * np.arange(NODES // 2) + 1) * np.pi / NODES
@@ -112,7 +112,7 @@ class ConductingSlabs(Reference):
     T_far_2: float = parameter("K", "temperature beyond the far side of body 2", default=0.0, at_least=0)
     R: float = parameter("m^2 K/W", "resistance of the contact; 0: perfect", default=0.0, at_least=0)
 
-    told = read(
+    readings = read(
         constant="C_1 C_2 thickness_1 thickness_2 conductivity_1 conductivity_2 h_far_1 h_far_2",
         initial="T_1 T_2 T_far_1 T_far_2",
     )
@@ -121,13 +121,13 @@ class ConductingSlabs(Reference):
     def from_scene(cls, scene: SceneView) -> Parameters:
         for reason in _beside_conduction(scene.scene):
             raise InputError(f"it holds for conduction between two bodies alone, and {reason}.")
-        told, h = dict(super().from_scene(scene)), scene.total_conductance
-        told["R"] = 1.0 / h if h else None
+        values, h = dict(super().from_scene(scene)), scene.total_conductance
+        values["R"] = 1.0 / h if h else None
         for k in "12":  # what starts from a profile has no temperature at the contact of its own
-            told[f"T_{k}"] = scene.run.values.get(f"initial.profile_{k}", told[f"T_{k}"])
-            if told[f"T_far_{k}"] is not None and told[f"h_far_{k}"] is None:
-                told[f"h_far_{k}"] = HELD
-        return told
+            values[f"T_{k}"] = scene.run.values.get(f"initial.profile_{k}", values[f"T_{k}"])
+            if values[f"T_far_{k}"] is not None and values[f"h_far_{k}"] is None:
+                values[f"h_far_{k}"] = HELD_CONDUCTANCE
+        return values
 
     @property
     def bodies(self) -> tuple[ConductingSlab, ConductingSlab]:
@@ -150,7 +150,7 @@ class ConductingSlabs(Reference):
         if not self.R:
             return {"T_1": T_1, "T_2": T_2, "T": T_1}
         q = np.full(t.size, (self.T_1 - self.T_2) / self.R)
-        q[t > 0] = inverted(self._flux, t[t > 0])
+        q[t > 0] = inverse_laplace(self._flux, t[t > 0])
         return {"T_1": T_1, "T_2": T_2, "q_1": -q, "q_2": q}
 
     def profile(self, number: int, x: Array, t: Array) -> Array:
@@ -162,7 +162,7 @@ class ConductingSlabs(Reference):
             heated, unheated = body.answer(s, x)
             return unheated + sign * self._flux(s) * heated
 
-        values[t > 0] += inverted(rise, t[t > 0, None])
+        values[t > 0] += inverse_laplace(rise, t[t > 0, None])
         return values
 
 
@@ -180,10 +180,10 @@ def _beside_conduction(scene: Scene) -> Iterator[str]:
         if path.name() != "conductance" or set(path.between) != bodies or path.varying:
             yield f"the heat path {path.name()} is no constant one between the bodies"
     for body in scene.bodies:
-        yield from _varying(body)
+        yield from _not_constant(body)
 
 
-def _varying(body: Body) -> Iterator[str]:
+def _not_constant(body: Body) -> Iterator[str]:
     """The contents of a body that are not constant, in words."""
     energy, conduction = body.energy, body.conduction
     if energy is not None and (energy.name() != "constant" or energy.varying):

@@ -25,7 +25,7 @@ class CoolingToZero(UniformBody):
 
     Q: float = parameter("W/m^2", "heat extracted", above=0)
 
-    told = read(heat_supply="Q=-Q")
+    readings = read(heat_supply="Q=-Q")
 
     @property
     def end_time(self) -> float:

@@ -29,7 +29,7 @@ class CoulombStop(UniformBody):
     p: float = parameter("Pa", "contact pressure", above=0)
     v_i: float = parameter("m/s", "initial velocity", at_least=0)
 
-    told = read(tangential="m", friction="mu", initial="p v_i=v")
+    readings = read(tangential="m", friction="mu", initial="p v_i=v")
 
     @property
     def stop_time(self) -> float:

@@ -36,7 +36,7 @@ class SuddenDebonding(UniformBody):
     k: float = parameter("Pa/m", "stiffness of the bodies", above=0)
     compliance: float = parameter("m/Pa", "compliance 1/E_n of the bonded interface", default=0.0, at_least=0)
 
-    told = read(potential="K_0", initial="phi_i=phi", normal="k")
+    readings = read(potential="K_0", initial="phi_i=phi", normal="k")
 
     @classmethod
     def from_scene(cls, scene: SceneView) -> Parameters:
@@ -97,7 +97,7 @@ class PulledToDebonding(SuddenDebonding):
 
     w_dot: float = parameter("m/s", "speed of the far field", above=0)
 
-    told = read(ramp="w_dot=w_n")
+    readings = read(ramp="w_dot=w_n")
 
     @property
     def debonding_time(self) -> float:
@@ -146,7 +146,7 @@ class BilinearDebonding(Reference):
     g_1: float = parameter("m", "gap at which it is first closed again", at_least=0)
     speed: float = parameter("m/s", "speed of the gap", above=0)
 
-    told = read(reaction="t_max E_b g_f", potential="H_r")
+    readings = read(reaction="t_max E_b g_f", potential="H_r")
 
     def __post_init__(self) -> None:
         """Refuse a line that does not fall."""

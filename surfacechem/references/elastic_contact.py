@@ -27,7 +27,7 @@ class ElasticContact(Reference):
     w_i: float = parameter("m", "initial far-field displacement")
     w_dot: float = parameter("m/s", "speed of the far field", default=0.0)
 
-    told = read(normal="k", potential="E_n", initial="w_i=w_n", ramp="w_dot=w_n")
+    readings = read(normal="k", potential="E_n", initial="w_i=w_n", ramp="w_dot=w_n")
 
     def quantities(self, t: Array) -> Quantities:
         w = self.w_i + self.w_dot * t

@@ -45,7 +45,7 @@ class PairExchange(Reference):
     T_1: float = parameter("K", "initial temperature of body 1", above=0)
     T_2: float = parameter("K", "initial temperature of body 2", above=0)
 
-    told = read(constant="C_1 C_2 T_0", initial="T_1 T_2", total_conductance="h")
+    readings = read(constant="C_1 C_2 T_0", initial="T_1 T_2", total_conductance="h")
 
     @property
     def equilibrium_temperature(self) -> float:
@@ -105,7 +105,7 @@ class ReservoirExchange(UniformBody):
     h: float = parameter("W/(m^2 K)", "conductance to the reservoir", at_least=0)
     T_a: float = parameter("K", "temperature of the reservoir", above=0)
 
-    told = read(total_conductance="h", surroundings_temperature="T_a")
+    readings = read(total_conductance="h", surroundings_temperature="T_a")
 
     def quantities(self, t: Array) -> Quantities:
         relative, distance = self.T_i / self.T_a, self.T_a - self.T_i

@@ -31,7 +31,7 @@ class ThinningFilm(FrictionallyHeated):
 
     beta: float = parameter("1/K", "decay of the viscosity per kelvin", at_least=0)
 
-    told = read(friction="beta")
+    readings = read(friction="beta")
 
     def quantities(self, t: Array) -> Quantities:
         initial = self.D_0 * np.exp(-self.beta * (self.T_i - self.T_0))
@@ -70,7 +70,7 @@ class ClosingFilm(UniformBody):
     g_i: float = parameter("m", "initial gap", above=0)
     a: float = parameter("m/s", "closing speed", above=0)
 
-    told = read(friction="eta", initial="v g_i=g_n", ramp="a=-g_n")
+    readings = read(friction="eta", initial="v g_i=g_n", ramp="a=-g_n")
 
     @property
     def end_time(self) -> float:

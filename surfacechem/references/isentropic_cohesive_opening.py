@@ -31,7 +31,7 @@ class IsentropicCohesiveOpening(UniformBody):
     g_i: float = parameter("m", "initial gap", default=0.0, at_least=0)
     g_dot: float = parameter("m/s", "opening speed", at_least=0)
 
-    told = read(potential="t_max g_0", initial="g_i=g_n", ramp="g_dot=g_n")
+    readings = read(potential="t_max g_0", initial="g_i=g_n", ramp="g_dot=g_n")
 
     @property
     def open_temperature(self) -> float:

@@ -9,7 +9,7 @@ import numpy as np
 from surfacechem.contracts.terms import parameter
 from surfacechem.errors import InputError
 from surfacechem.quantities import GAS_CONSTANT
-from surfacechem.references._numerics import Separable
+from surfacechem.references._numerics import AutonomousODE
 from surfacechem.references.base import Array, Quantities, Reference, read
 
 
@@ -39,7 +39,7 @@ class KamalCureConstantCapacity(Reference):
     delta_T: float = parameter("K", "heat of reaction over the heat capacity at T_0", default=0.0, at_least=0)
     phi_i: float = parameter("1", "initial degree of cure", default=0.0, at_least=0, at_most=1)
 
-    told = read(reaction="A_1 E_1 A_2 E_2 m n", initial="phi_i=phi", temperature="T_i", adiabatic_rise="delta_T")
+    readings = read(reaction="A_1 E_1 A_2 E_2 m n", initial="phi_i=phi", temperature="T_i", adiabatic_rise="delta_T")
 
     def __post_init__(self) -> None:
         """Refuse what cannot start."""
@@ -54,8 +54,8 @@ class KamalCureConstantCapacity(Reference):
         return np.asarray((k_1 + k_2 * (self.phi_i + cured) ** self.m) * left**self.n)
 
     @cached_property
-    def _path(self) -> Separable:
-        return Separable(self.rate, 1.0 - self.phi_i)
+    def _path(self) -> AutonomousODE:
+        return AutonomousODE(self.rate, 1.0 - self.phi_i)
 
     def quantities(self, t: Array) -> Quantities:
         if self.phi_i == 1.0:

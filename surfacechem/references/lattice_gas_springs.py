@@ -38,13 +38,13 @@ class LatticeGasSprings(Reference):
     k_i: float = parameter("1/s", "initial rate of phi over the initial free fraction", default=0.0)
     phi_i: float = parameter("1", "initial bonding state", default=0.0, at_least=0, at_most=1)
 
-    told = read(potential="epsilon k_b", constant="n_c=N_c", temperature="T", initial="g_n phi_i=phi")
+    readings = read(potential="epsilon k_b", constant="n_c=N_c", temperature="T", initial="g_n phi_i=phi")
 
     @classmethod
     def from_scene(cls, scene: SceneView) -> Parameters:
-        told, rate = super().from_scene(scene), scene.bonding_rate
-        phi = told["phi_i"]
-        return {**told, "k_i": None if phi is None or rate is None or phi == 1.0 else rate / (1.0 - phi)}
+        values, rate = super().from_scene(scene), scene.bonding_rate
+        phi = values["phi_i"]
+        return {**values, "k_i": None if phi is None or rate is None or phi == 1.0 else rate / (1.0 - phi)}
 
     def exponent(self, gap: ArrayLike) -> Array:
         """Free energy of a bond in units of k_B T."""

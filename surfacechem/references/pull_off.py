@@ -15,7 +15,7 @@ from surfacechem.references._numerics import gauss, increasing_root
 from surfacechem.references.base import Array, Parameters, Quantities, Reference, SceneView, read
 from surfacechem.references.semenov_fold import log_remainder, scaled_rise
 
-PANEL = 0.25
+PANEL_LENGTH = 0.25
 """Length of a panel in arsinh of the distance from the fold; the poles of 1 / cosh are pi / 2 away, so that
 16 Gauss points leave 25^-32."""
 
@@ -32,14 +32,14 @@ class PullOffFold:
     """Energy [J/m^2] that the jump turns into heat."""
 
 
-class SpringAndZone(Reference):
+class CohesiveZoneOnSpring(Reference):
     """An exponential cohesive zone in series with a spring: its branches, and where they end."""
 
     t_max: float = parameter("Pa", "strength", above=0)
     g_0: float = parameter("m", "gap at the strength", above=0)
     k: float = parameter("Pa/m", "stiffness of the bodies", above=0)
 
-    told = read(potential="t_max g_0", normal="k")
+    readings = read(potential="t_max g_0", normal="k")
 
     @property
     def severity(self) -> float:
@@ -85,7 +85,7 @@ class SpringAndZone(Reference):
         return PullOffFold(g, w, t, after, release)
 
 
-class CohesivePullOff(SpringAndZone):
+class CohesivePullOff(CohesiveZoneOnSpring):
     r"""Elastic bodies, held together by an exponential cohesive zone, are pulled apart at constant speed.
 
     .. math:: k(w-g_n)=t_{max}\frac{g_n}{g_0}e^{1-g_n/g_0},\qquad
@@ -108,7 +108,7 @@ class CohesivePullOff(SpringAndZone):
     w_i: float = parameter("m", "initial far-field displacement", default=0.0, at_least=0)
     w_dot: float = parameter("m/s", "speed of the far field", at_least=0)
 
-    told = read(initial="w_i=w_n", ramp="w_dot=w_n")
+    readings = read(initial="w_i=w_n", ramp="w_dot=w_n")
 
     def __post_init__(self) -> None:
         """Refuse what starts beyond the closed branch."""
@@ -148,7 +148,7 @@ class CohesivePullOffHeating(CohesivePullOff, UniformBody):
         return {**mechanics, "T": self.heated(np.asarray(mechanics["heat"]))}
 
 
-class OverdampedPullOff(SpringAndZone):
+class OverdampedPullOff(CohesiveZoneOnSpring):
     r"""Overdamped opening of a cohesive zone at a far-field displacement a little beyond its fold.
 
     .. math:: c\,\dot g_n=k(w_{off}+\delta w-g_n)-t_n(g_n),\qquad
@@ -230,7 +230,7 @@ class OverdampedPullOff(SpringAndZone):
     def _panels(self) -> tuple[Array, Array]:
         """Edges of panels in arsinh of the distance from the fold, in widths, and the times there [s]."""
         first, last = np.arcsinh((np.array([self.g_i, self.end_gap]) - self.fold.g) / self.width)
-        edges = np.linspace(first, last, 1 + max(1, math.ceil((last - first) / PANEL)))
+        edges = np.linspace(first, last, 1 + max(1, math.ceil((last - first) / PANEL_LENGTH)))
         return edges, np.append(0.0, np.cumsum(self._elapsed(edges[:-1], edges[1:])))
 
     def _elapsed(self, first: Array, last: Array) -> Array:

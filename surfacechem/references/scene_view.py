@@ -37,8 +37,8 @@ class SceneView:
     def read(self, reading: str, name: str) -> float | None:
         """Value of one of the readings below, of a name if it needs one; a minus sign before that reverses the sign."""
         found = getattr(self, reading)
-        told: float | None = found(name.removeprefix("-")) if callable(found) else found
-        return -told if told is not None and name.startswith("-") else told
+        value: float | None = found(name.removeprefix("-")) if callable(found) else found
+        return -value if value is not None and name.startswith("-") else value
 
     # -- laws, loads, supports -----------------------------------------------------------------------------------------
 

@@ -40,7 +40,7 @@ class SemenovFold(Reference):
     D_0: float = parameter("W/m^2", "dissipation at T_0", at_least=0)
 
     # The factor of a law has what decays per kelvin; here what grows is counted.
-    told = read(constant="T_0", total_conductance="H", heating_at_T_0="D_0", friction="beta=-beta")
+    readings = read(constant="T_0", total_conductance="H", heating_at_T_0="D_0", friction="beta=-beta")
 
     def __post_init__(self) -> None:
         """Refuse what has ignited."""

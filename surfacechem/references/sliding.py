@@ -29,7 +29,7 @@ class Sliding(PerfectContact):
     T_i: float = parameter("K", "initial temperature", above=0)
     D: float = parameter("W/m^2", "friction power, traction times sliding velocity", at_least=0)
 
-    told = read(temperature="T_i", friction_power="D")
+    readings = read(temperature="T_i", friction_power="D")
 
     def quantities(self, t: Array) -> Quantities:
         rise = self.model.rise(self.D * t, self.C, self.T_0, self.T_i)

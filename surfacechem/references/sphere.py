@@ -14,13 +14,13 @@ from surfacechem.errors import InputError
 from surfacechem.references._numerics import increasing_root
 from surfacechem.references.base import Array, Parameters, Quantities, Reference, SceneView, read
 
-PLACES = 4001
+SEARCH_POINTS = 4001
 """Approaches among which the steepest attraction is looked for before it is found to rounding."""
 
-SHALLOW, DEEP = 1e-2, 1e3
+LEAST_APPROACH, LARGEST_APPROACH = 1e-2, 1e3
 """Approaches over the range of the interaction between which it is looked for."""
 
-POWERS = {10: 1 / 45, 4: -1 / 3}
+PAIR_POWERS = {10: 1 / 45, 4: -1 / 3}
 """Powers of a pair energy of Lennard-Jones type, eq. e:psi12ex."""
 
 
@@ -44,7 +44,7 @@ class SphereOnSpring(Reference):
     w_turn: float = parameter("m", "displacement at which it turns")
     speed: float = parameter("m/s", "speed both ways", above=0)
 
-    told = read(normal="k", surface="R g_0")
+    readings = read(normal="k", surface="R g_0")
 
     @classmethod
     def from_scene(cls, scene: SceneView) -> Parameters:
@@ -88,7 +88,7 @@ class SphereOnSpring(Reference):
     @property
     def ends(self) -> tuple[float, float]:
         """Approaches far beyond all that is met [m]."""
-        return self.lowest, self.w_i + DEEP * self.g_0
+        return self.lowest, self.w_i + LARGEST_APPROACH * self.g_0
 
     @property
     @abstractmethod
@@ -99,7 +99,7 @@ class SphereOnSpring(Reference):
     def folds(self) -> tuple[float, float]:
         """Approaches [m] at which equilibrium is lost, on opening and on closing."""
         near, far = self.ends
-        places = np.geomspace(SHALLOW * self.g_0, far, PLACES)
+        places = np.geomspace(LEAST_APPROACH * self.g_0, far, SEARCH_POINTS)
         softest = float(places[np.argmin(self.slope(places))])
         if self.slope(np.array([softest]))[0] >= -self.k:
             raise InputError(f"{self.name}: the spring holds it everywhere; there is no jump.")
@@ -159,16 +159,16 @@ class AttractingSphereOnSpring(SphereOnSpring):
     n_2: float = parameter("1/m^2", "density of points on body 2", above=0)
     psi_0: float = parameter("J", "interaction energy of a pair", above=0)
 
-    told = read(surface="n_1 n_2 psi_0")
+    readings = read(surface="n_1 n_2 psi_0")
 
     @property
     def lowest(self) -> float:
         """Well within the repulsion [m]."""
-        return SHALLOW * self.g_0
+        return LEAST_APPROACH * self.g_0
 
     def derivative(self, g: Array, order: int) -> Array:
         whole = np.zeros_like(g)
-        for m, a in POWERS.items():
+        for m, a in PAIR_POWERS.items():
             # In units of the range, so that no power is out of the range of numbers.
             near, far = g / self.g_0, (g + 2 * self.R) / self.g_0
             factor = math.prod(3 - m - k for k in range(order)) / ((m - 2) * (m - 3))
@@ -197,7 +197,7 @@ class CohesiveSphereOnSpring(SphereOnSpring):
     t_max: float = parameter("Pa", "strength", above=0)
     E_n: float = parameter("Pa/m", "contact stiffness in compression", above=0)
 
-    told = read(surface="t_max E_n")
+    readings = read(surface="t_max E_n")
 
     @property
     def lowest(self) -> float:
@@ -252,7 +252,7 @@ class AttractingSphereInCavity(Reference):
 
     T_i: float = parameter("K", "temperature, which stays", above=0)
 
-    told = read(ramp="rate=g_n", initial="g_i=g_n", temperature="T_i", surface="n_1 n_2 psi_0 g_0")
+    readings = read(ramp="rate=g_n", initial="g_i=g_n", temperature="T_i", surface="n_1 n_2 psi_0 g_0")
 
     @classmethod
     def from_scene(cls, scene: SceneView) -> Parameters:
@@ -267,7 +267,7 @@ class AttractingSphereInCavity(Reference):
         g = self.g_i + self.rate * t
         c, whole = self.H - self.R - g, np.zeros_like(g)
         ends = {1: (self.H - self.R, self.H + self.R), -1: (self.H + self.R, self.H - self.R)}
-        for m, a in POWERS.items():
+        for m, a in PAIR_POWERS.items():
             p, terms, slopes = 3 - m, np.zeros_like(g), np.zeros_like(g)
             for sign, (minus, plus) in ends.items():
                 # Lengths in units of the range, as above.

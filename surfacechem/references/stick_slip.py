@@ -15,7 +15,7 @@ from surfacechem.errors import InputError
 from surfacechem.references._numerics import increasing_root
 from surfacechem.references.base import Array, Parameters, Quantities, Reference, SceneView, read
 
-CYCLES = 1_000_000
+MOST_CYCLES = 1_000_000
 """Cycles at most, so that a time far beyond them is refused and not waited for."""
 
 
@@ -70,7 +70,7 @@ class Slider(Reference):
     k: float = parameter("Pa/m", "tangential stiffness", above=0)
     V: float = parameter("m/s", "speed of the spring's end", above=0)
 
-    told = read(tangential="m k", ramp="V=w_t")
+    readings = read(tangential="m k", ramp="V=w_t")
 
 
 class StickSlip(Slider):
@@ -173,13 +173,13 @@ class BondedSlider(Slider):
     mu_ub: float = parameter("1", "static friction coefficient without bonds", above=0)
     mu_k: float = parameter("1", "sliding friction coefficient", at_least=0)
 
-    told = read(initial="p", friction="mu_b mu_ub mu_k=mu")
+    readings = read(initial="p", friction="mu_b mu_ub mu_k=mu")
 
     @classmethod
     def from_scene(cls, scene: SceneView) -> Parameters:
-        told, T, T_0 = super().from_scene(scene), scene.temperature, scene.constant("T_0")
+        values, T, T_0 = super().from_scene(scene), scene.temperature, scene.constant("T_0")
         cooler = T_0 / T if T and T_0 else 1.0  # bonds bear mu_b p T_0 / T
-        return {name: x * cooler if x and name in ("mu_b", "mu_ub") else x for name, x in told.items()}
+        return {name: x * cooler if x and name in ("mu_b", "mu_ub") else x for name, x in values.items()}
 
     def __post_init__(self) -> None:
         """Refuse what sticks less than it slides, and limits so far apart that the contact slips back."""
@@ -198,7 +198,7 @@ class BondedSlider(Slider):
     def quantities(self, t: Array) -> Quantities:
         values = np.zeros((5, len(t)))
         begin, slipped, last, t_k = 0.0, 0.0, float(np.max(t, initial=0.0)), self.mu_k * self.p
-        for cycle in islice(self.cycles(), CYCLES):
+        for cycle in islice(self.cycles(), MOST_CYCLES):
             inside = (t >= begin) & (t < begin + cycle.duration)
             since = t[inside] - begin
             sticks = since < cycle.stick_time
@@ -210,7 +210,7 @@ class BondedSlider(Slider):
             if begin > last:
                 break
         else:
-            raise InputError(f"{self.name}: more than {CYCLES} cycles until t = {last!r} s.")
+            raise InputError(f"{self.name}: more than {MOST_CYCLES} cycles until t = {last!r} s.")
         found = dict(zip(("phi", "v", "u_t", "t_t", "spring_traction"), values, strict=True))
         return {**found, "heat": t_k * found["u_t"]}
 
@@ -266,7 +266,7 @@ class StickSlipRebonding(BondedSlider):
 
     tau: float = parameter("s", "time scale of bonding", above=0)
 
-    told = read(relaxation_time="tau")
+    readings = read(relaxation_time="tau")
 
     @property
     def critical_speed(self) -> float:

@@ -24,7 +24,7 @@ class HeatedMedium(Reference):
     D_1: float = parameter("W/m^2", "decaying part of the source at the start", default=0.0)
     gamma: float = parameter("1/s", "decay rate of the source", default=0.0, at_least=0)
 
-    told = read(constant="C_1 C_2", initial="T_1 T_2", conductance="h_1=1 h_2=2", heating_at_T_0="D_0")
+    readings = read(constant="C_1 C_2", initial="T_1 T_2", conductance="h_1=1 h_2=2", heating_at_T_0="D_0")
 
 
 class ThreeTemperatures(HeatedMedium):
@@ -50,7 +50,7 @@ class ThreeTemperatures(HeatedMedium):
     C_c: float = parameter("J/(m^2 K)", "heat capacity of the medium", above=0)
     T_c: float = parameter("K", "initial temperature of the medium", above=0)
 
-    told = read(constant="C_c", initial="T_c")
+    readings = read(constant="C_c", initial="T_c")
 
     def quantities(self, t: Array) -> Quantities:
         zero, decay, total = np.zeros_like(t), -self.gamma * t, self.C_1 + self.C_2 + self.C_c

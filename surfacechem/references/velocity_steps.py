@@ -29,7 +29,7 @@ class VelocitySteps(Reference):
     t_1: float = parameter("s", "time of the first step", at_least=0)
     t_2: float = parameter("s", "time of the second step", at_least=0)
 
-    told = read(friction="mu_0 a b L v_0", initial="p theta_i=theta v_i=v")
+    readings = read(friction="mu_0 a b L v_0", initial="p theta_i=theta v_i=v")
 
     def __post_init__(self) -> None:
         """Refuse steps in the wrong order."""

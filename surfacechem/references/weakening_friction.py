@@ -55,7 +55,7 @@ class WeakeningFrictionWithLoss(FrictionallyHeated):
     H: float = parameter("W/(m^2 K)", "conductance to the surroundings", above=0)
     T_a: float = parameter("K", "temperature of the surroundings", above=0)
 
-    told = read(total_conductance="H", surroundings_temperature="T_a")
+    readings = read(total_conductance="H", surroundings_temperature="T_a")
 
     @property
     def steady_temperature(self) -> float:
