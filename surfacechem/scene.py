@@ -80,7 +80,7 @@ class Conduction(Law):
         """Edges of the cells from the contact to the far side, as fractions of the thickness."""
         if self.layer:
             return grids.layered(self.cells, self.layer, both=self.far is not None)
-        return grids.points(self.cells, self.grading)
+        return grids.graded(self.cells, self.grading)
 
     @property
     def held(self) -> bool:

@@ -18,21 +18,21 @@ Array = NDArray[np.float64]
 DEGREE = 10
 """Degree of each polynomial."""
 
-MOST = 12
+MOST_PIECES = 12
 """Most pieces of a fit."""
 
-TARGET = 2e-9
+FIT_ACCURACY = 2e-9
 """Largest relative error at the points of verification; between them it is of the same size."""
 
-ROUGH = 1000 * TARGET
-"""The same near a critical point, where published equations of state and their solvers are not smooth to TARGET; far
-below the uncertainty of any property there.
+CRITICAL_ACCURACY = 1000 * FIT_ACCURACY
+"""The same near a critical point, where published equations of state and their solvers are not smooth to FIT_ACCURACY;
+far below the uncertainty of any property there.
 """
 
-CHECKS = 5
+CHECKS_PER_COEFFICIENT = 5
 """Points of verification for each coefficient."""
 
-SHORTEST = 1e-7
+KINK_RESOLUTION = 1e-7
 """Kinks are located to this part of the range."""
 
 
@@ -54,7 +54,7 @@ class Piece:
         return np.asarray(np.polynomial.polynomial.polyval(x, np.array(self.coefficients)))
 
 
-def fit(function: Callable[[Array], Array], low: float, high: float, target: float = TARGET) -> tuple[Piece, ...]:
+def fit(function: Callable[[Array], Array], low: float, high: float, target: float = FIT_ACCURACY) -> tuple[Piece, ...]:
     """The function on low <= T <= high, relative error below a target; NoFitError where that takes too many pieces.
 
     >>> pieces = fit(lambda T: np.exp(600 / T), 280.0, 360.0)
@@ -64,29 +64,29 @@ def fit(function: Callable[[Array], Array], low: float, high: float, target: flo
     pieces: list[Piece] = []
     start = low
     while start < high:
-        if len(pieces) == MOST:
-            raise NoFitError(f"more than {MOST} polynomials would be needed between {low:g} and {high:g} K.")
-        pieces.append(_polynomial(function, start, high, target) or _longest(function, start, high, target))
+        if len(pieces) == MOST_PIECES:
+            raise NoFitError(f"more than {MOST_PIECES} polynomials would be needed between {low:g} and {high:g} K.")
+        pieces.append(_polynomial(function, start, high, target) or _longest_piece(function, start, high, target))
         start = pieces[-1].high
     return tuple(pieces)
 
 
-def _moved(piece: Piece, low: float, high: float) -> Piece:
+def _on_interval(piece: Piece, low: float, high: float) -> Piece:
     """The same polynomial between other ends."""
     width = piece.high - piece.low
     x = np.polynomial.Polynomial([(low + high - piece.low - piece.high) / width, (high - low) / width])
-    return Piece(low, high, _filled(np.polynomial.Polynomial(np.array(piece.coefficients))(x).coef))
+    return Piece(low, high, _padded(np.polynomial.Polynomial(np.array(piece.coefficients))(x).coef))
 
 
-def _filled(powers: ArrayLike) -> tuple[float, ...]:
+def _padded(powers: ArrayLike) -> tuple[float, ...]:
     given = [float(power) for power in np.asarray(powers, dtype=float)]
     return (*given, *[0.0] * (DEGREE + 1 - len(given)))
 
 
-def _longest(function: Callable[[Array], Array], low: float, high: float, target: float) -> Piece:
+def _longest_piece(function: Callable[[Array], Array], low: float, high: float, target: float) -> Piece:
     """The longest piece from low on; it ends just beyond a kink, so that the next one starts on the other side."""
     good, bad, found = low, high, None  # by bisection: a piece that ends before a kink fits, one beyond it does not
-    while bad - good > SHORTEST * (high - low):
+    while bad - good > KINK_RESOLUTION * (high - low):
         middle = (good + bad) / 2
         piece = _polynomial(function, low, middle, target)
         if piece is None:
@@ -95,7 +95,7 @@ def _longest(function: Callable[[Array], Array], low: float, high: float, target
             good, found = middle, piece
     if found is None:
         raise NoFitError(f"it is not smooth at {low:g} K.")
-    return _moved(found, low, bad)
+    return _on_interval(found, low, bad)
 
 
 def _polynomial(function: Callable[[Array], Array], low: float, high: float, target: float) -> Piece | None:
@@ -103,8 +103,8 @@ def _polynomial(function: Callable[[Array], Array], low: float, high: float, tar
     nodes = np.cos(np.pi * (np.arange(DEGREE + 1) + 0.5) / (DEGREE + 1))
     values = function((low + high) / 2 + (high - low) / 2 * nodes)
     powers = chebyshev.cheb2poly(chebyshev.chebfit(nodes, values, DEGREE))
-    piece = Piece(low, high, _filled(powers))
+    piece = Piece(low, high, _padded(powers))
     # Between the nodes, where the error of an interpolation is largest.
-    T = np.linspace(low, high, CHECKS * (DEGREE + 1) + 1)
+    T = np.linspace(low, high, CHECKS_PER_COEFFICIENT * (DEGREE + 1) + 1)
     exact = function(T)
     return piece if bool(np.all(np.abs(piece(T) - exact) <= target * np.abs(exact))) else None

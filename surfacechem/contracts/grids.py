@@ -6,14 +6,14 @@ import math
 from itertools import pairwise
 
 
-def points(cells: int, grading: float = 1.0) -> tuple[float, ...]:
+def graded(cells: int, grading: float = 1.0) -> tuple[float, ...]:
     """Points of so many cells whose width grows from the contact by ``grading`` in all, in equal ratios.
 
     The mapping is smooth and the same for every number of cells, so that halving the cells shows the error.
 
-    >>> points(4)
+    >>> graded(4)
     (0.0, 0.25, 0.5, 0.75, 1.0)
-    >>> [round(point, 12) for point in points(2, grading=9.0)]
+    >>> [round(point, 12) for point in graded(2, grading=9.0)]
     [0.0, 0.25, 1.0]
     """
     if grading == 1.0:
@@ -33,7 +33,7 @@ def layered(cells: int, layer: float, both: bool = False) -> tuple[float, ...]:
     >>> [round(point, 12) for point in layered(2, layer=1 / 8, both=True)]
     [0.0, 0.5, 1.0]
     """
-    s = folds(layer, both)
+    s = e_folds(layer, both)
     if not both:
         return (*(layer * math.expm1(s * i / cells) for i in range(cells)), 1.0)
     ratio = layer / (1 + layer)
@@ -41,15 +41,15 @@ def layered(cells: int, layer: float, both: bool = False) -> tuple[float, ...]:
     return (*near, *(1 - x for x in reversed(near[: (cells + 1) // 2])))
 
 
-def folds(layer: float, both: bool = False) -> float:
+def e_folds(layer: float, both: bool = False) -> float:
     """By how many factors of e the width of the cells grows, and falls again towards a far side that has layers."""
     return math.log1p(1 / layer) * (2 if both else 1)
 
 
-def shares(at: tuple[float, ...]) -> tuple[float, ...]:
+def volume_shares(at: tuple[float, ...]) -> tuple[float, ...]:
     """Part of the volume that belongs to each point: half of the cells on either side.
 
-    >>> shares((0.0, 0.25, 1.0))
+    >>> volume_shares((0.0, 0.25, 1.0))
     (0.125, 0.5, 0.375)
     """
     widths = [b - a for a, b in pairwise(at)]

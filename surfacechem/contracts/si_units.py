@@ -20,13 +20,13 @@ from itertools import chain, repeat
 ZERO_CELSIUS = Decimal("273.15")
 """0 degC in K."""
 
-TOWER = re.compile(r"[\d²³⁰-⁹]\s*\)*\s*(?:\^|\*\*)|(?:\^|\*\*)\s*(?![-+(\d])")
+POWER_TOWER = re.compile(r"[\d²³⁰-⁹]\s*\)*\s*(?:\^|\*\*)|(?:\^|\*\*)\s*(?![-+(\d])")
 """Powers of powers, such as 9^9^9, which would never end, and of numbers."""
 
 _FACTOR = re.compile(r"([^\W\d_]+|%|1)(?:(?:\^|\*\*)([-+]?\d+))?")
 _PRODUCT = re.compile(rf"{_FACTOR.pattern}((\s*\*\s*|\s+){_FACTOR.pattern})*")
 
-_BASES: Mapping[str, Mapping[str, int]] = {
+_BASE_UNITS: Mapping[str, Mapping[str, int]] = {
     "1": {},
     "m": {"m": 1},
     "g": {"g": 1},
@@ -54,7 +54,7 @@ THERMAL_ENERGY = Decimal("1.380649e-23") * Decimal("298.15")
 ELECTRON_VOLT = Decimal("1.602176634e-19")
 """J (exact, SI 2019)."""
 
-_OTHERS: Mapping[str, tuple[Decimal | int, str]] = {
+_DERIVED_UNITS: Mapping[str, tuple[Decimal | int, str]] = {
     "min": (60, "s"),
     "minute": (60, "s"),
     "h": (3600, "s"),
@@ -77,19 +77,19 @@ _OTHERS: Mapping[str, tuple[Decimal | int, str]] = {
 def _table() -> dict[str, tuple[Decimal, Mapping[str, int]]]:
     """Every known name with its factor to the base units, and with its powers of them."""
     found = {}
-    for name, powers in _BASES.items():
+    for name, powers in _BASE_UNITS.items():
         # One newton is a thousand g m/s^2.
         factor = Decimal(1) if name == "g" else _KILOGRAM ** powers.get("g", 0)
         found[name] = (factor, powers)
         if name in _PREFIXED:
             found |= {prefix + name: (factor.scaleb(power), powers) for prefix, power in _PREFIXES.items()}
-    return found | {name: (found[base][0] * number, found[base][1]) for name, (number, base) in _OTHERS.items()}
+    return found | {name: (found[base][0] * number, found[base][1]) for name, (number, base) in _DERIVED_UNITS.items()}
 
 
-TABLE = _table()
+UNITS = _table()
 
 
-class _UnusualError(Exception):
+class _LeftToPintError(Exception):
     """Ends the reading of a text that is left to Pint."""
 
 
@@ -97,19 +97,19 @@ class _UnusualError(Exception):
 def factor(given: str, target: str) -> Decimal | None:
     """The factor from one unit to another; None where either is unusual or where they do not measure the same."""
     try:
-        (ours, powers), (theirs, wanted) = _read(given), _read(target)
-    except _UnusualError:
+        (ours, powers), (theirs, wanted) = _parsed(given), _parsed(target)
+    except _LeftToPintError:
         return None
     return ours / theirs if powers == wanted else None
 
 
-def _read(text: str) -> tuple[Decimal, dict[str, int]]:
+def _parsed(text: str) -> tuple[Decimal, dict[str, int]]:
     """Factor and powers of the base units of a text."""
     value, powers = Decimal(1), Counter[str]()
     for name, power in factors(text):
-        if name not in TABLE:
-            raise _UnusualError
-        number, own = TABLE[name]
+        if name not in UNITS:
+            raise _LeftToPintError
+        number, own = UNITS[name]
         value = value * number**power if power > 0 else value / number**-power
         for base, n in own.items():
             powers[base] += n * power
@@ -122,16 +122,16 @@ def factors(text: str) -> list[tuple[str, int]]:
     >>> factors("W/(m^2 K)")
     [('W', 1), ('m', -2), ('K', -1)]
     """
-    if TOWER.search(text):
-        raise _UnusualError
+    if POWER_TOWER.search(text):
+        raise _LeftToPintError
     found = []
     for sign, side in zip(chain([1], repeat(-1)), text.split("/"), strict=False):
         inside = side.strip()
         if inside[:1] + inside[-1:] == "()":
             inside = inside[1:-1]
         elif sign < 0 and _FACTOR.fullmatch(inside) is None:  # in "J/m^2 K" the eye reads another unit than the rules
-            raise _UnusualError
+            raise _LeftToPintError
         if _PRODUCT.fullmatch(inside) is None:
-            raise _UnusualError
+            raise _LeftToPintError
         found += [(name, sign * int(power or 1)) for name, power in _FACTOR.findall(inside)]
     return found

@@ -252,7 +252,7 @@ class Law(ABC):
         """
         return self
 
-    def outline(self) -> Self:
+    def surrogate(self) -> Self:
         """A cheap stand-in for a law that is costly to compute, so that all else can be checked before."""
         return self
 
@@ -261,7 +261,7 @@ class Law(ABC):
         """Relative error of the numbers that the law computes for itself; zero where it states a formula."""
         return 0.0
 
-    def erring(self) -> Self:
+    def perturbed(self) -> Self:
         """The law perturbed by its :attr:`error`."""
         return self
 

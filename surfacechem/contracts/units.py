@@ -29,10 +29,10 @@ _EXPONENT = re.compile(r"(?:\^|\*\*)\s*\(?\s*[-+]?\s*\d{1,2}(?![\d.])")
 _POWER = re.compile(r"(?<![A-Za-z0-9_µμ])([A-Za-zµμ]+)([-+]\d|[2-4])(?![\w.])")
 """Powers as CF conventions and many papers write them: s-1, W m-2 K-1, um2."""
 
-_LONGEST = 100
+_MOST_CHARACTERS = 100
 """Characters of a quantity; longer texts are no quantities."""
 
-WORDS = {
+DIMENSION_UNITS = {
     "a pure number": "1",
     "an angle": "rad",
     "a length": "m",
@@ -81,7 +81,7 @@ _HINT = ' Write it like "J/(m^2 K)" or "1/um^2".'
 PER_PARTICLE = {"electron_volt", "millielectron_volt", "kiloelectron_volt", "kT"}
 """Energies that are of one particle where a molar one is needed."""
 
-COMMON = (
+SUGGESTED_UNITS = (
     *("K", "degC", "degF", "m", "mm", "um", "nm", "pm", "s", "ms", "us", "ns", "min", "h", "day", "kg", "g", "percent"),
     *("N", "mN", "uN", "nN", "pN", "Pa", "kPa", "MPa", "GPa", "bar", "J", "kJ", "MJ", "mJ", "uJ", "eV", "meV", "kcal"),
     *("W", "kW", "MW", "mW", "mol", "kmol", "rad", "deg", "Hz", "kHz", "meter", "second", "kelvin", "joule", "watt"),
@@ -117,13 +117,13 @@ def _number(value: object, unit: str, name: str, difference: bool) -> float:
     if isinstance(value, Real) and not isinstance(value, bool):
         return _as_float(value)
     if not isinstance(value, str):
-        raise InputError(f"{name} needs {needed(unit)}, got {_kind(value)}.")
+        raise InputError(f"{name} needs {dimension(unit)}, got {_kind(value)}.")
     text = value.strip()
     if _NOT_FINITE.fullmatch(text):
         raise InputError(f"{name} must be finite, got {text}.")
-    found = _QUANTITY.fullmatch(text) if len(text) <= _LONGEST else None
+    found = _QUANTITY.fullmatch(text) if len(text) <= _MOST_CHARACTERS else None
     if found is None:
-        raise InputError(f"{_short(text)} is not a number with a unit; {name} needs {needed(unit)}.")
+        raise InputError(f"{_short(text)} is not a number with a unit; {name} needs {dimension(unit)}.")
     return _converted(found[1], found[2], unit, name, difference) if found[2] else float(found[1])
 
 
@@ -168,12 +168,12 @@ def _by_pint(number: str, given: str, unit: str, name: str, difference: bool) ->
         if difference and source in (registry.degC, registry.degF):
             raise InputError(f"{shown} is a temperature, {name} a difference of temperatures; give it in K.")
         if not source.is_compatible_with(target):
-            raise InputError(f"{shown} is {_described(source)}; {name} needs {needed(unit)}.")
+            raise InputError(f"{shown} is {_described(source)}; {name} needs {dimension(unit)}.")
         if _has_angle(source) and not _has_angle(target):
-            raise InputError(f"{shown} counts an angle; {name} needs {needed(unit)}: cycles per second in Hz, say.")
+            raise InputError(f"{shown} counts an angle; {name} needs {dimension(unit)}: cycles per second in Hz, say.")
         return _as_float(registry.Quantity(Decimal(number), source).m_as(target))
     except TypeError:  # Pint takes no logarithms of decimals
-        raise InputError(f"{shown} is in a logarithmic unit; {name} needs {needed(unit)}.") from None
+        raise InputError(f"{shown} is in a logarithmic unit; {name} needs {dimension(unit)}.") from None
     except ArithmeticError:
         raise InputError(f"{shown} is too large or too small to convert to {unit}.") from None
 
@@ -204,7 +204,7 @@ def _unit(text: str) -> Any:
 
     bare = _EXPONENT.sub("", text)
     numbers = re.findall(r"(?<!\w)[\d.]+", bare)
-    if si_units.TOWER.search(text) or any(number != "1" for number in numbers):
+    if si_units.POWER_TOWER.search(text) or any(number != "1" for number in numbers):
         raise InputError(f"{_short(text)} is not a unit.{_HINT}")
     try:
         unit = _registry().parse_units(f"1{text}" if text.startswith("/") else text)
@@ -213,7 +213,7 @@ def _unit(text: str) -> Any:
     except pint.UndefinedUnitError as error:
         names: Any = error.unit_names
         unknown = names if isinstance(names, str) else names[0]
-        guess = suggestion(unknown, COMMON).partition(" Known")[0]
+        guess = suggestion(unknown, SUGGESTED_UNITS).partition(" Known")[0]
         raise InputError(f"no unit '{unknown}'.{guess or _HINT}") from None
     except Exception:  # its parser is Python's tokenizer, which fails in many ways
         raise InputError(f"{_short(text)} is not a unit.{_HINT}") from None
@@ -236,7 +236,7 @@ def quotient(unit: str, per: str) -> str:
     return "/".join([" ".join(top) or "1", *([below] if below else [])])
 
 
-WHOLE = {
+TOTAL_UNITS = {
     "Pa": "N",
     "Pa/s": "N/s",
     "Pa/m": "N/m",
@@ -252,9 +252,9 @@ WHOLE = {
 """Units of quantities per area, each with that of the total for a pair of bodies."""
 
 
-def needed(unit: str) -> str:
+def dimension(unit: str) -> str:
     """The dimension that a unit measures, in words: ``a length [m]``."""
-    exact = next((words for words, known in WORDS.items() if known == unit), None)
+    exact = next((words for words, known in DIMENSION_UNITS.items() if known == unit), None)
     words = exact or _words().get(_unit(unit).dimensionality)
     measured = f"{words} [{unit}]" if words else f"a quantity in {unit}"
     return measured if unit != "1" else "a pure number"
@@ -268,7 +268,7 @@ def _described(unit: Any) -> str:
 
 @lru_cache(maxsize=1)
 def _words() -> dict[Any, str]:
-    return {_unit(unit).dimensionality: words for words, unit in reversed(WORDS.items())}
+    return {_unit(unit).dimensionality: words for words, unit in reversed(DIMENSION_UNITS.items())}
 
 
 @lru_cache(maxsize=1)

@@ -22,7 +22,7 @@ from surfacechem.errors import InputError, Place, nearest
 from surfacechem.format import csvtable, height_files, own_laws
 from surfacechem.format.reader import ExactSolution, exact_solution_of, read_document, run_of, scene_of
 from surfacechem.format.sections import NOTHING_SWEPT, SweepSection
-from surfacechem.model.assemble import assemble, outline
+from surfacechem.model.assemble import assemble, with_surrogates
 from surfacechem.model.system import System
 from surfacechem.scene import Scene
 from surfacechem.solve.run import Run, refuse_nothing
@@ -60,13 +60,13 @@ class Case:
         return self.own_run
 
     @cached_property
-    def _outline(self) -> System:
-        return assemble(outline(self.scene))
+    def _surrogate_system(self) -> System:
+        return assemble(with_surrogates(self.scene))
 
     def refuse_nothing(self) -> None:
         """Raise InputError where the scene has no state; no integral is made for it."""
         try:
-            refuse_nothing(self._outline, self.file or "CASE")
+            refuse_nothing(self._surrogate_system, self.file or "CASE")
         except InputError as error:
             raise self.located(error) from None
 

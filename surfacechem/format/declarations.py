@@ -28,7 +28,7 @@ from typing import Any, ClassVar, TypeVar
 
 from surfacechem import laws
 from surfacechem.contracts.terms import Factor, Law, Load, Spec, Varying, resolved_unit
-from surfacechem.contracts.units import WHOLE, quotient
+from surfacechem.contracts.units import TOTAL_UNITS, quotient
 from surfacechem.contracts.units import parse as si
 from surfacechem.documents.document import ORIGIN, Tree
 from surfacechem.errors import InputError, Place, placed
@@ -115,7 +115,7 @@ class Number(Content):
             raise tree.error(f"{self.wanted}, not {tree.shown}.")
         spec = self.spec.resolved(context.x)
         if context.whole:
-            spec = replace(spec, unit=WHOLE.get(spec.unit, spec.unit))
+            spec = replace(spec, unit=TOTAL_UNITS.get(spec.unit, spec.unit))
         if not (isinstance(tree.value, dict) and "value" in tree.value):
             return number(tree, spec, name, difference=self.difference)
         if not spec.varies:

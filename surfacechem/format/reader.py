@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from surfacechem import solve as solvers
 from surfacechem.contracts.terms import Law, Load, Property
-from surfacechem.contracts.units import WHOLE
+from surfacechem.contracts.units import TOTAL_UNITS
 from surfacechem.documents.document import Tree
 from surfacechem.errors import InputError, Place, suggestion
 from surfacechem.format.declarations import UNITS, Context, is_name, keys, number, read
@@ -103,7 +103,7 @@ def read_document(tree: Tree, base: str = ".", mechanism_text: str | None = None
     whole = "surface" in top
     if whole:
         _refuse_bonds(interface)
-    units = {name: WHOLE.get(unit, unit) for name, unit in UNITS.items()} if whole else UNITS
+    units = {name: TOTAL_UNITS.get(unit, unit) for name, unit in UNITS.items()} if whole else UNITS
     names = {**units, **dict.fromkeys(temperatures, "K")}
     context = Context(names, temperatures, tuple(bodies) or UNNAMED, whole=whole)
     mechanism = None

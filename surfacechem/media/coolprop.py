@@ -90,7 +90,7 @@ class CoolPropFluid(Fluid):
         """The fluid and its pressure in words."""
         return f"{self.name} at {self.pressure:g} Pa"
 
-    def fit(self, quantity: str, low: float, high: float, target: float = fits.TARGET) -> tuple[fits.Piece, ...]:
+    def fit(self, quantity: str, low: float, high: float, target: float = fits.FIT_ACCURACY) -> tuple[fits.Piece, ...]:
         """A property between two temperatures [K] to a relative accuracy; InputError where CoolProp has none."""
         return _fit(self, quantity, low, high, target)
 

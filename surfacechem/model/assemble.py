@@ -14,7 +14,7 @@ from importlib import import_module
 from typing import Any
 
 from surfacechem.contracts.terms import Spec
-from surfacechem.contracts.units import WHOLE
+from surfacechem.contracts.units import TOTAL_UNITS
 from surfacechem.errors import InputError, Place
 from surfacechem.model import components, constraints, ledger, sliding
 from surfacechem.model.build import Build
@@ -103,18 +103,18 @@ def assemble(scene: Scene) -> System:
     if scene.surface is None:
         return _system(_built(scene))
     # What is wrong with the scene is told before the integrals over its surfaces are made.
-    _built(outline(scene))
+    _built(with_surrogates(scene))
     return _of_pair(_system(_built(scene)))
 
 
-def outline(scene: Scene) -> Scene:
+def with_surrogates(scene: Scene) -> Scene:
     """The scene with cheap stand-ins for its laws, for checks of all else."""
-    return _with_laws(scene, lambda law: law.outline())
+    return _with_laws(scene, lambda law: law.surrogate())
 
 
-def erring(scene: Scene) -> Scene:
+def perturbed(scene: Scene) -> Scene:
     """The scene with laws perturbed by the error of the numbers that they compute for themselves."""
-    return _with_laws(scene, lambda law: law.erring())
+    return _with_laws(scene, lambda law: law.perturbed())
 
 
 def _with_laws(scene: Scene, change: Callable[[Any], Any]) -> Scene:
@@ -188,12 +188,12 @@ def _of_pair(system: System) -> System:
     """The system of a pair of bodies: quantities per area elsewhere are totals here, in their units and words."""
 
     def renamed(item: Quantity) -> Quantity:
-        unit, words = WHOLE.get(item.unit, item.unit), item.long_name
+        unit, words = TOTAL_UNITS.get(item.unit, item.unit), item.long_name
         words = words.replace("traction", "force") if unit != item.unit else words
         return replace(item, unit=unit, long_name=words)
 
     def spec(item: Spec) -> Spec:
-        return replace(item, unit=WHOLE.get(item.unit, item.unit))
+        return replace(item, unit=TOTAL_UNITS.get(item.unit, item.unit))
 
     return replace(
         system,

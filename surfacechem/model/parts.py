@@ -89,7 +89,7 @@ class Thermal:
         if body not in self.slabs:
             return {body: symengine.Integer(1)}
         slab = self.slabs[body]
-        return dict(zip((body, *(node.name for node in slab.behind)), grids.shares(slab.points), strict=True))
+        return dict(zip((body, *(node.name for node in slab.behind)), grids.volume_shares(slab.points), strict=True))
 
     def with_energy(self, member: str, F: Expression) -> Thermal:
         """A copy with the free energy of a member [J/m^2]."""

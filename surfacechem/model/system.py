@@ -14,7 +14,7 @@ import symengine
 from numpy.typing import NDArray
 
 from surfacechem.contracts.terms import Load, Spec
-from surfacechem.contracts.units import WHOLE
+from surfacechem.contracts.units import TOTAL_UNITS
 from surfacechem.expressions import Expression, depends, without
 from surfacechem.model.automaton import Edge, Equilibrium, Mode, Register, Sink, When, masked
 from surfacechem.quantities import GAPS, VELOCITIES, Quantity
@@ -370,7 +370,7 @@ class System:
 
     def unit(self, unit: str) -> str:
         """A unit per area, or that of the same for a pair of bodies."""
-        return WHOLE.get(unit, unit) if self.whole else unit
+        return TOTAL_UNITS.get(unit, unit) if self.whole else unit
 
     @cached_property
     def changeable(self) -> dict[str, str]:

@@ -190,7 +190,7 @@ def suited(scene: Scene, parts: Mapping[str, float], given: bool = False) -> Sce
         if (law.accuracy is None) is not given:
             return law
         layer = min(parts[name], 1 / (law.grading - 1) if law.grading > 2 else 1.0)
-        return replace(law, layer=layer, cells=_cells(PER_FOLD * grids.folds(layer, law.far is not None)))
+        return replace(law, layer=layer, cells=_cells(PER_FOLD * grids.e_folds(layer, law.far is not None)))
 
     return _changed(scene, change)
 
@@ -223,7 +223,7 @@ def refined(scene: Scene, found: CellErrors, parts: Mapping[str, float]) -> Scen
         if name not in laws:
             return law
         both = law.far is not None
-        more = factor * law.cells * grids.folds(now[name], both) / grids.folds(law.layer, both)
+        more = factor * law.cells * grids.e_folds(now[name], both) / grids.e_folds(law.layer, both)
         return replace(law, layer=now[name], cells=_cells(more))
 
     changed = _changed(scene, change)

@@ -15,7 +15,7 @@ from typing import Any
 import symengine
 
 from surfacechem.contracts.terms import Friction, HeatTransfer, Law, Load, RateLaw, reads
-from surfacechem.contracts.units import needed
+from surfacechem.contracts.units import dimension
 from surfacechem.errors import InputError, suggestion
 from surfacechem.quantities import BOLTZMANN, VARIABLES
 from surfacechem.tolerances import NOTHING, TINY
@@ -51,7 +51,7 @@ def problems(law: type[Law]) -> list[str]:
     found += [f"{name} has no meaning: say what it is" for name, spec in law.specs() if not spec.text]
     for name, spec in law.specs():
         try:
-            needed(spec.unit.replace("[x]", "1"))
+            dimension(spec.unit.replace("[x]", "1"))
         except InputError as error:
             found.append(f"{name}: {error.message}")
     read = reads(getattr(law, law.formula))[1:]

@@ -19,7 +19,7 @@ from surfacechem.documents.document import parse as parse_document
 from surfacechem.documents.overrides import apply, parameter_path
 from surfacechem.errors import PATHS, InputError, Place, suggestion
 from surfacechem.format import Case, Overrides, Source
-from surfacechem.model.assemble import erring
+from surfacechem.model.assemble import perturbed
 from surfacechem.model.system import System
 from surfacechem.results import spatial
 from surfacechem.results.accuracy import Accuracy, CellErrors
@@ -404,12 +404,12 @@ class Simulation:
         """Errors of a run from those of the numbers that laws compute for themselves; none where no law has any."""
         if not inexact(self.case.scene):
             return CellErrors()
-        return of_laws(trajectory, self._erring._as_before(trajectory), self.case.scene)
+        return of_laws(trajectory, self._perturbed._as_before(trajectory), self.case.scene)
 
     @cached_property
-    def _erring(self) -> Simulation:
+    def _perturbed(self) -> Simulation:
         """The simulation whose laws are wrong by the errors of the numbers that they compute for themselves."""
-        return Simulation(replace(self.case, scene=erring(self.case.scene)))
+        return Simulation(replace(self.case, scene=perturbed(self.case.scene)))
 
     def _halved(self, trajectory: Trajectory, given: bool = True) -> CellErrors:
         """Errors of the cells from runs with a half and a quarter of them; without ``given`` of those that an accuracy

@@ -104,7 +104,7 @@ class ApproachEnergy:
         made = (ApproachPiece(a, b, tuple(coefficients), *others) for a, b, coefficients, *others in pieces)
         return cls(tuple(made), *rest)
 
-    def erring(self, sign: float = 1.0) -> ApproachEnergy:
+    def perturbed(self, sign: float = 1.0) -> ApproachEnergy:
         """The energy, larger by its error, or smaller where the sign is negative."""
         return replace(self, factor=self.factor * (1 + sign * self.error))
 

@@ -129,7 +129,7 @@ class CurvedSurfaces(Potential):
         bound = tuple(bind(law, f"surface.pair.{law.name()}", "") for law in self.pairs)
         return self.bind({"pairs": bound, "curves": self.curves, "strongest": self.strongest})
 
-    def outline(self) -> Self:
+    def surrogate(self) -> Self:
         """The surfaces with energies that are straight lines, in place of integrals."""
         line = straight(*self.approach)
         curves = tuple(line for law in self.pairs for _ in self.parts(law)), line if self.gap_laws else None
@@ -141,12 +141,12 @@ class CurvedSurfaces(Potential):
         curves, over_the_gap = self.curves
         return max(curve.error for curve in (*curves, *([over_the_gap] if over_the_gap else [])))
 
-    def erring(self) -> Self:
+    def perturbed(self) -> Self:
         """The surfaces where all that repels is too strong by its error, and all that attracts too weak."""
         curves, over_the_gap = self.curves
         signs = [math.copysign(1.0, factor) for law in self.pairs for factor, _ in self.parts(law)]
-        found = tuple(curve.erring(sign * curve.factor) for curve, sign in zip(curves, signs, strict=True))
-        return self.bind({"curves": (found, over_the_gap and over_the_gap.erring()), "strongest": self.strongest})
+        found = tuple(curve.perturbed(sign * curve.factor) for curve, sign in zip(curves, signs, strict=True))
+        return self.bind({"curves": (found, over_the_gap and over_the_gap.perturbed()), "strongest": self.strongest})
 
     @cached_property
     def strongest(self) -> float:
@@ -367,7 +367,7 @@ class CurvedConductance(HeatTransfer):
         """The key of its range."""
         return self.pair.called
 
-    def outline(self) -> Self:
+    def surrogate(self) -> Self:
         """The law with a conductance that is a straight line, in place of integrals."""
         return self.bind({"curve": straight(*self.pair.approach)})
 
@@ -376,9 +376,9 @@ class CurvedConductance(HeatTransfer):
         """Relative error of the conductance, and of its slope."""
         return self.curve.error
 
-    def erring(self) -> Self:
+    def perturbed(self) -> Self:
         """The law, larger by its error."""
-        return self.bind({"curve": self.curve.erring()})
+        return self.bind({"curve": self.curve.perturbed()})
 
     @cached_property
     def curve(self) -> ApproachEnergy:

@@ -104,7 +104,7 @@ def test_a_folder_that_cannot_be_made_costs_nothing_but_time(tmp_path, monkeypat
 def test_a_fit_comes_back_bit_by_bit_and_without_its_library(monkeypatch):
     fluid = coolprop.CoolPropFluid("Nitrogen", 2e5)
     fit, limits = coolprop._fit.__wrapped__, coolprop._limits.__wrapped__
-    found = fit(fluid, "k_m", 290.0, 310.0, fits.TARGET), limits(fluid)
+    found = fit(fluid, "k_m", 290.0, 310.0, fits.FIT_ACCURACY), limits(fluid)
     monkeypatch.setattr(coolprop, "_coolprop", never)
-    assert (fit(fluid, "k_m", 290.0, 310.0, fits.TARGET), limits(fluid)) == found
+    assert (fit(fluid, "k_m", 290.0, 310.0, fits.FIT_ACCURACY), limits(fluid)) == found
     assert cache_folder.unsealed(b"") is None

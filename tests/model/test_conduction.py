@@ -12,7 +12,7 @@ from scipy.special import erfc, erfcx
 
 import surfacechem
 from surfacechem import plots
-from surfacechem.contracts.grids import points
+from surfacechem.contracts.grids import graded
 from surfacechem.errors import InputError
 from surfacechem.format import load_text
 from surfacechem.results import spatial
@@ -174,7 +174,7 @@ def test_profiles_have_their_places_in_the_file(tmp_path):
     run = two(10, "held", grading=4).run()
     with xarray.open_dataset(run.write(tmp_path / "run.nc")) as file:
         assert file.profile_2.dims == ("time", "x_2")
-        np.testing.assert_allclose(file.x_2, 5e-3 * np.array(points(10, 4)), rtol=1e-14)
+        np.testing.assert_allclose(file.x_2, 5e-3 * np.array(graded(10, 4)), rtol=1e-14)
         assert file.profile_2[-1, -1] == 330
         assert np.array_equal(file.profile_1[:, 0], file.T_1)
         assert not any(name.startswith("T_1_x") for name in file)

@@ -57,7 +57,7 @@ def _check(build: Build, body: Body, law: Conduction) -> None:
 
 def _divided(build: Build, thermal: Thermal, number: int, body: Body, law: Conduction) -> tuple[Slab, Thermal]:
     """The body's energy shared among its nodes."""
-    surface, shares = thermal.node_of[body.name], grids.shares(law.points)
+    surface, shares = thermal.node_of[body.name], grids.volume_shares(law.points)
     whole = surface.energies[body.name]
     nodes = dict(thermal.nodes)
     behind = []

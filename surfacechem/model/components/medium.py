@@ -14,7 +14,7 @@ from itertools import pairwise
 import numpy as np
 import symengine
 
-from surfacechem.contracts.fits import ROUGH, TARGET, Piece
+from surfacechem.contracts.fits import CRITICAL_ACCURACY, FIT_ACCURACY, Piece
 from surfacechem.contracts.terms import Fluid, Property, Spec
 from surfacechem.errors import InputError, Place
 from surfacechem.expressions import Expression, log
@@ -204,19 +204,19 @@ class FluidFit:
     def _fit(self, quantity: str) -> tuple[Piece, ...]:
         """The fit over the widest range for which there is one."""
         span = self.fluid.range(self.start)
-        for reach, target in (*((reach, TARGET) for reach in REACHES), (REACHES[-1], ROUGH)):
+        for reach, target in (*((reach, FIT_ACCURACY) for reach in REACHES), (REACHES[-1], CRITICAL_ACCURACY)):
             low, high = max(min(self.known) / reach, span.low), min(max(self.known) * reach, span.high)
             try:
                 found = self.fluid.fit(quantity, low, high, target)
             except InputError as error:
-                if target == ROUGH:
+                if target == CRITICAL_ACCURACY:
                     asked = f"The case is at {self.start:g} K, and needs it from {low:.4g} to {high:.4g} K."
                     raise InputError(f"{error.message} {asked}", error.place) from None
                 continue
-            if target == ROUGH:
+            if target == CRITICAL_ACCURACY:
                 named = VARIABLES[quantity].long_name if quantity in VARIABLES else "heat capacity of the medium"
                 where = f"between {low:.4g} and {high:.4g} K, where {self.fluid.name} at {self.fluid.pressure:g} Pa"
-                self.build.add(f"the {named} is known within {ROUGH:g} only {where} is not smooth.")
+                self.build.add(f"the {named} is known within {CRITICAL_ACCURACY:g} only {where} is not smooth.")
             return found
         raise AssertionError
 
