@@ -27,10 +27,10 @@ import numpy as np
 
 PACKAGE = Path(__file__).parents[1]
 
-OTHERS = stat.S_IWGRP | stat.S_IWOTH
+WRITABLE_BY_OTHERS = stat.S_IWGRP | stat.S_IWOTH
 """Permission of others to write."""
 
-MOST = 4096
+MOST_FILES = 4096
 """Largest number of files of one kind that are kept; at 5 to 100 kB some 100 MB."""
 
 
@@ -95,7 +95,7 @@ def untrusted(paths: Iterable[Path]) -> str | None:
         if found.st_uid not in (os.getuid(), 0):
             return f"{path} belongs to another user"
         shared = path == root and found.st_mode & stat.S_ISVTX  # there others cannot replace what is ours
-        if stat.S_ISLNK(found.st_mode) or (found.st_mode & OTHERS and not shared):
+        if stat.S_ISLNK(found.st_mode) or (found.st_mode & WRITABLE_BY_OTHERS and not shared):
             return f"{path} can be written by other users"
     return None
 
@@ -108,12 +108,12 @@ class Fingerprint:
     """A digest of what things hold; equal only where they hold the same."""
 
     digest: str
-    lasts: bool
+    is_lasting: bool
     """Whether it is the same in every process: laws of one's own may use anything, which nobody can compare."""
 
 
-_SERIAL: WeakKeyDictionary[type, int] = WeakKeyDictionary()
-_NUMBERS = count()
+_CLASS_NUMBERS: WeakKeyDictionary[type, int] = WeakKeyDictionary()
+_COUNTER = count()
 
 
 def fingerprint(*things: Any) -> Fingerprint:
@@ -124,15 +124,15 @@ def fingerprint(*things: Any) -> Fingerprint:
     >>> fingerprint(1.0) == fingerprint("1.0")
     False
     """
-    digest, lasts = hashlib.sha256(), True
+    digest, is_lasting = hashlib.sha256(), True
     for thing in things:
-        for part, lasting in _told(thing):
+        for part, lasting in _parts(thing):
             digest.update(str(len(part)).encode() + b":" + part)
-            lasts = lasts and lasting
-    return Fingerprint(digest.hexdigest(), lasts)
+            is_lasting = is_lasting and lasting
+    return Fingerprint(digest.hexdigest(), is_lasting)
 
 
-def _told(thing: Any) -> Iterator[tuple[bytes, bool]]:
+def _parts(thing: Any) -> Iterator[tuple[bytes, bool]]:
     """All that a thing holds, each with whether it is the same in every process."""
     if isinstance(thing, float):
         yield float(thing).hex().encode(), True
@@ -143,24 +143,24 @@ def _told(thing: Any) -> Iterator[tuple[bytes, bool]]:
     elif isinstance(thing, Mapping):
         yield f"mapping of {len(thing)}".encode(), True
         for item in thing.items():
-            yield from _told(item)
+            yield from _parts(item)
     elif isinstance(thing, Sequence):
         yield f"sequence of {len(thing)}".encode(), True
         for item in thing:
-            yield from _told(item)
+            yield from _parts(item)
     elif is_dataclass(thing) and not isinstance(thing, type):
         yield _code(type(thing))
         for name in (item.name for item in fields(thing) if item.repr):
-            yield from _told((name, getattr(thing, name)))
+            yield from _parts((name, getattr(thing, name)))
     else:  # equal to nothing
-        yield str(next(_NUMBERS)).encode(), False
+        yield str(next(_COUNTER)).encode(), False
 
 
 def _code(kind: type) -> tuple[bytes, bool]:
     """A class by its name and source; one that is not of the package by a number of its own."""
     source = getattr(sys.modules.get(kind.__module__), "__file__", None)
     if source is None or not Path(source).is_relative_to(PACKAGE):
-        return f"{_SERIAL.setdefault(kind, next(_NUMBERS))}".encode(), False
+        return f"{_CLASS_NUMBERS.setdefault(kind, next(_COUNTER))}".encode(), False
     return f"{kind.__module__}.{kind.__qualname__} {source_digest(source)}".encode(), True
 
 
@@ -170,13 +170,13 @@ def source_digest(file: str) -> str:
     return hashlib.sha256(Path(file).read_bytes()).hexdigest()
 
 
-def kept(mark: Fingerprint, code: Iterable[Path], find: Callable[[], Any]) -> Any:
+def cached(mark: Fingerprint, code: Iterable[Path], find: Callable[[], Any]) -> Any:
     """Result of ``find``, made of numbers, texts and lists; read from its file in the cache where that exists.
 
     ``code`` are the files, beside those of the classes in ``mark``, that it follows from; versions of libraries other
     than NumPy, SciPy and SymEngine belong into the mark.
     """
-    if not mark.lasts:
+    if not mark.is_lasting:
         return find()
     sources = sorted(source_digest(str(path)) for path in code)
     libraries = [version(name) for name in ("numpy", "scipy", "symengine")]
@@ -194,14 +194,14 @@ def from_file(path: Path, find: Callable[[], Any], read: Callable[[bytes], Any],
     with suppress(OSError):
         make_folder(folder)
         keep_file(path, sealed(write(found)))
-        _forget(folder)
+        _remove_oldest(folder)
     return found
 
 
-def _forget(folder: Path) -> None:
-    """Remove the older half of more than MOST files in a folder."""
+def _remove_oldest(folder: Path) -> None:
+    """Remove the older half of more than MOST_FILES files in a folder."""
     with os.scandir(folder) as entries:
         files = [entry.path for entry in entries]
-    if len(files) > MOST:
+    if len(files) > MOST_FILES:
         for path in sorted(files, key=os.path.getmtime)[: len(files) // 2]:
             Path(path).unlink(missing_ok=True)

@@ -19,7 +19,7 @@ from typing import Any, cast
 from surfacechem.errors import InputError, Place, suggestion
 
 # Mappings and lists inside each other.
-DEEPEST = 24
+MOST_NESTED = 24
 
 
 @dataclass(frozen=True)
@@ -33,16 +33,16 @@ class Limits:
 
 
 # Of a case; longer tables belong into files of their own.
-CASE = Limits()
+LIMITS = Limits()
 
 # What stands for the file in messages about a value that the user has set from outside the document.
-ORIGIN = "override"
+OVERRIDE = "override"
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9]*([-_][A-Za-z0-9]+)*")
 _INTEGER = re.compile(r"[-+]?[0-9]{1,15}")
 _FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
 _NOT_FINITE = {".inf": "inf", "+.inf": "inf", "-.inf": "-inf", ".nan": "nan"}
-_WORDS = {"": None, "~": None, "null": None, "true": True, "false": False}
+_SCALAR_WORDS = {"": None, "~": None, "null": None, "true": True, "false": False}
 
 
 @dataclass(frozen=True)
@@ -65,10 +65,10 @@ class Tree:
         return InputError(message, self.place)
 
     @property
-    def blamed(self) -> Place:
+    def blamed_place(self) -> Place:
         """Place to blame when it is wrong as a whole: that of an entry set from outside, else its own."""
         entries = self.value.values() if isinstance(self.value, dict) else ()
-        return next((entry.place for entry in entries if entry.place.file == ORIGIN), self.place)
+        return next((entry.place for entry in entries if entry.place.file == OVERRIDE), self.place)
 
     @property
     def shown(self) -> str:
@@ -124,7 +124,7 @@ class Tree:
             yield from child.places()
 
 
-def read(path: Path, name: str = "", limits: Limits = CASE) -> str:
+def read(path: Path, name: str = "", limits: Limits = LIMITS) -> str:
     """The text of a file; ``name`` stands for it in messages."""
     place = Place(name or str(path))
     try:
@@ -157,7 +157,7 @@ def is_file(path: Path) -> bool:
         return False
 
 
-def beside(folder: Path, name: str, place: Place) -> Path | None:
+def file_in(folder: Path, name: str, place: Place) -> Path | None:
     """The file of a name in a folder, None where there is none.
 
     A document may come from elsewhere, so that what it names is read only where it lies beside or below it; a file in
@@ -166,7 +166,7 @@ def beside(folder: Path, name: str, place: Place) -> Path | None:
     path = folder / name
     if not is_file(path):
         return None
-    if place.file != ORIGIN and not path.resolve().is_relative_to(folder.resolve()):
+    if place.file != OVERRIDE and not path.resolve().is_relative_to(folder.resolve()):
         message = (
             f"{name} lies outside the folder of the case. Put it there, or name it yourself: --set {place.path}=..."
         )
@@ -177,7 +177,7 @@ def beside(folder: Path, name: str, place: Place) -> Path | None:
 def named(tree: Tree, base: str | Path, what: str) -> Path:
     """The file in a folder that a value names; InputError, which says ``what`` it should be, where there is none."""
     name = tree.text(what)
-    path = beside(Path(base), name, tree.place)
+    path = file_in(Path(base), name, tree.place)
     if path is None:
         raise tree.error(f"no file {name} beside the case.")
     return path
@@ -192,7 +192,7 @@ def parse(text: str, file: str = "") -> Tree:
     return with_paths(build(text, file))
 
 
-def build(text: str, file: str = "", limits: Limits = CASE) -> Tree:
+def build(text: str, file: str = "", limits: Limits = LIMITS) -> Tree:
     """The tree of a YAML document without paths."""
     if len(text) > limits.largest:
         raise InputError(f"larger than {limits.largest} bytes.", Place(file))
@@ -222,8 +222,8 @@ def scalar(text: str) -> Any:
     (1e+18, 'no', '3 m')
     """
     low = text.lower()
-    if low in _WORDS:
-        return _WORDS[low]
+    if low in _SCALAR_WORDS:
+        return _SCALAR_WORDS[low]
     if _INTEGER.fullmatch(text):
         return int(text)
     if _FLOAT.fullmatch(text):
@@ -280,8 +280,8 @@ class _Builder:
         if self.count > self.most:
             remedy = "Tables belong into CSV files, `table: {file: NAME.csv}`; of outputs give a number, `outputs: N`."
             raise InputError(f"more than {self.most} values. {remedy}", place)
-        if depth > DEEPEST:
-            raise InputError(f"nested deeper than {DEEPEST} levels.", place)
+        if depth > MOST_NESTED:
+            raise InputError(f"nested deeper than {MOST_NESTED} levels.", place)
         if getattr(event, "tag", None) is not None:
             raise InputError(f"a tag ({event.tag}), which is not allowed.", place)
         if kind == "AliasEvent":

@@ -6,17 +6,17 @@ import json
 from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import replace
 
-from surfacechem.documents.document import ORIGIN, Tree, from_plain, labels, parse, with_paths
+from surfacechem.documents.document import OVERRIDE, Tree, from_plain, labels, parse, with_paths
 from surfacechem.errors import InputError, Place, refuse_unknown, suggestion
 
 # Keys of a value that may also stand by itself.
-WRITTEN_OUT = ("level", "value", "rises-to")
+VALUE_KEYS = ("level", "value", "rises-to")
 
 # What removes a key or a law.
-NO_VALUE = (None, "")
+EMPTY_VALUES = (None, "")
 
 # Sections that may be one value, and the key that it is short for.
-WHOLE = {"interface.mechanism": "file"}
+SHORTHAND_KEYS = {"interface.mechanism": "file"}
 
 
 def apply(tree: Tree, overrides: str | Sequence[str] | Mapping[str, object]) -> Tree:
@@ -29,7 +29,7 @@ def apply(tree: Tree, overrides: str | Sequence[str] | Mapping[str, object]) -> 
     {'run': {'until': '7 s'}}
     """
     for path, value in _pairs(overrides):
-        place = Place(ORIGIN, 0, path)
+        place = Place(OVERRIDE, 0, path)
         tree = _set(tree, path.split("."), value, place)
     return with_paths(tree)
 
@@ -43,15 +43,15 @@ def assignments(texts: Sequence[str]) -> dict[str, object]:
     found: dict[str, object] = {}
     for path, tree in _pairs(texts):
         if path in found:
-            raise InputError("it is given twice.", Place(ORIGIN, 0, path))
+            raise InputError("it is given twice.", Place(OVERRIDE, 0, path))
         found[path] = tree.plain()
     return found
 
 
-def written(overrides: str | Sequence[str] | Mapping[str, object]) -> list[str]:
+def as_texts(overrides: str | Sequence[str] | Mapping[str, object]) -> list[str]:
     """Given values as texts "path=value" that give the same values again.
 
-    >>> written({"f": 3e-12, "reference": None, "loading.v": {"level": "3 nm/s"}})
+    >>> as_texts({"f": 3e-12, "reference": None, "loading.v": {"level": "3 nm/s"}})
     ['f=3e-12', 'reference=null', 'loading.v={"level": "3 nm/s"}']
     """
     if not isinstance(overrides, Mapping):
@@ -68,7 +68,7 @@ def parameter_path(path: str, known: Container[str]) -> str:
     ('loading.v.level', 'friction.mu')
     """
     above, _, last = path.rpartition(".")
-    others = [path, f"{path}.level", *([above] if last in WRITTEN_OUT else [])]
+    others = [path, f"{path}.level", *([above] if last in VALUE_KEYS else [])]
     if path.startswith("mechanism."):  # the path in datasets of version 0.1
         others.append(f"interface.mechanism.reactions.{path.removeprefix('mechanism.')}")
     return next((other for other in others if other in known), path)
@@ -76,13 +76,13 @@ def parameter_path(path: str, known: Container[str]) -> str:
 
 def _pairs(overrides: str | Sequence[str] | Mapping[str, object]) -> Iterator[tuple[str, Tree]]:
     given: list[tuple[str, object]] = list(overrides.items()) if isinstance(overrides, Mapping) else []
-    for text in () if isinstance(overrides, Mapping) else written(overrides):
+    for text in () if isinstance(overrides, Mapping) else as_texts(overrides):
         path, equals, after = text.partition("=")
         if not equals or not path.strip():
-            raise InputError(f"'{text}' is not of the form path=value, for example `run.until=5 s`.", Place(ORIGIN))
+            raise InputError(f"'{text}' is not of the form path=value, for example `run.until=5 s`.", Place(OVERRIDE))
         given.append((path.strip(), after))
     for path, value in given:
-        place = Place(ORIGIN, 0, path)
+        place = Place(OVERRIDE, 0, path)
         try:
             plain = parse(value).plain() if isinstance(value, str) and value.strip() else value
         except InputError as error:
@@ -98,8 +98,8 @@ def _set(tree: Tree, keys: Sequence[str], new: Tree, place: Place) -> Tree:
         return replace(tree, value={**tree.value, "value": new}) if varies and bare else new
     if isinstance(tree.value, list):
         return _set_item(tree, keys, new, place)
-    (first, *rest), removes = keys, len(keys) == 1 and new.value in NO_VALUE
-    if not rest and first in WRITTEN_OUT and not (isinstance(tree.value, dict) or removes):
+    (first, *rest), removes = keys, len(keys) == 1 and new.value in EMPTY_VALUES
+    if not rest and first in VALUE_KEYS and not (isinstance(tree.value, dict) or removes):
         return new  # a bare value is, for example, the level of a constant history
     known = _entries(tree, place)
     if not removes:
@@ -112,8 +112,8 @@ def _set(tree: Tree, keys: Sequence[str], new: Tree, place: Place) -> Tree:
 
 def _entries(tree: Tree, place: Place) -> Mapping[str, Tree]:
     """The keys of a mapping, also of one that its only value stands for, or of none."""
-    if isinstance(tree.value, str) and tree.place.path in WHOLE:
-        return {WHOLE[tree.place.path]: tree}
+    if isinstance(tree.value, str) and tree.place.path in SHORTHAND_KEYS:
+        return {SHORTHAND_KEYS[tree.place.path]: tree}
     if tree.value is not None and not isinstance(tree.value, dict):
         raise InputError(f"{tree.place.path or 'the document'} is a value, not a mapping.", place)
     return tree.value or {}
@@ -127,7 +127,7 @@ def _set_item(tree: Tree, keys: Sequence[str], new: Tree, place: Place) -> Tree:
         names = [label for label in known if label]
         raise InputError(f"nothing is called '{keys[0]}' in {tree.place.path}.{suggestion(keys[0], names)}", place)
     index = known.index(wanted)
-    item, changed = tree.value[index], [] if new.value in NO_VALUE else [new]
+    item, changed = tree.value[index], [] if new.value in EMPTY_VALUES else [new]
     if len(keys) > 1:
         whole = item.value if isinstance(item.value, dict) else {item.value: Tree(None, item.place)}
         ((name, inner),) = whole.items()

@@ -30,7 +30,7 @@ from surfacechem import laws
 from surfacechem.contracts.terms import Factor, Law, Load, Spec, Varying, resolved_unit
 from surfacechem.contracts.units import TOTAL_UNITS, quotient
 from surfacechem.contracts.units import parse as si
-from surfacechem.documents.document import ORIGIN, Tree
+from surfacechem.documents.document import OVERRIDE, Tree
 from surfacechem.errors import InputError, Place, placed
 from surfacechem.format import csvtable
 from surfacechem.quantities import INTERNAL, VARIABLES
@@ -563,7 +563,7 @@ class Section:
         at the section where none is given.
         """
         given: list[Tree] = [self.tree.value[name] for name in names if self.has(name)]
-        return min([*given, self.tree][: len(given) or 1], key=lambda tree: tree.place.file != ORIGIN).error(message)
+        return min([*given, self.tree][: len(given) or 1], key=lambda tree: tree.place.file != OVERRIDE).error(message)
 
 
 S = TypeVar("S", bound=Section)
@@ -618,7 +618,7 @@ def read_law(law: type[L], tree: Tree, context: Context) -> L:
     if issubclass(law, Factor):
         of = tree.mapping().get("of", Tree(law_keys(law)["of"].default, tree.place))
         context = replace(context, x=context.units[of.choice("variable", context.units)])
-    with placed(tree.blamed):
+    with placed(tree.blamed_place):
         return law(**_values(law_keys(law), tree, context, law.name()), place=tree.place)
 
 

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from surfacechem.documents.document import ORIGIN, Tree
+from surfacechem.documents.document import OVERRIDE, Tree
 from surfacechem.documents.overrides import parameter_path
 from surfacechem.errors import PATHS, InputError, Place, refuse_unknown
 from surfacechem.format import csvtable
@@ -292,7 +292,7 @@ def plan_of(
         draws = {path: _distribution(path, tree, units[path]) for path, tree in known.items()}
         sample = Sample(draws, drawn.runs, drawn.method, drawn.seed)
     ends = until or section.until
-    trees["sweep.until"] = Tree(None, Place(ORIGIN)) if until else section.tree.value.get("until", section.tree)
+    trees["sweep.until"] = Tree(None, Place(OVERRIDE)) if until else section.tree.value.get("until", section.tree)
     places = {path: replace(tree.place, path="") for path, tree in trees.items()}  # paths are what messages name
     return Plan(axes, next(iter(ends.items())) if ends else None, section.combine != GRID, sample, places)
 

@@ -22,7 +22,7 @@ from surfacechem.mechanism.keys import Check, has_neighbours, is_evaluated
 from surfacechem.mechanism.mixture import IdealMixture, Species, Spring, identifiers, unpaired
 from surfacechem.mechanism.rate_types import kind_of
 from surfacechem.mechanism.rates import plain
-from surfacechem.mechanism.source import LIMITS, Source, own_parameters, sides
+from surfacechem.mechanism.source import MECHANISM_LIMITS, Source, own_parameters, sides
 from surfacechem.mechanism.thermo import lower
 from surfacechem.quantities import MOLECULAR
 from surfacechem.scene import BondingVariable, Engine, Sites
@@ -85,8 +85,8 @@ def load_mechanism(
     if not by its path, ``text`` is what it holds where that is already at hand.
     """
     if text is None:
-        path = find(str(path), Path(), Place(document.ORIGIN))
-        text = document.read(path, name, LIMITS)
+        path = find(str(path), Path(), Place(document.OVERRIDE))
+        text = document.read(path, name, MECHANISM_LIMITS)
     source = Source(name or str(path), text)
     entry = source.phase(phase, place)
     # Before Cantera, which ignores what it does not know.
@@ -124,14 +124,14 @@ def load_mechanism(
 
 def find(name: str, folder: Path, place: Place) -> Path:
     """The mechanism file of that name in a folder, in this package, or where Cantera itself looks."""
-    path = document.beside(folder, name, place) or document.beside(data.mechanisms(), name, place)
+    path = document.file_in(folder, name, place) or document.file_in(data.mechanisms(), name, place)
     if path is not None:
         return path
     import cantera  # slow, hence last
 
     folders = [Path(other) for other in cantera.get_data_directories() if other != "."]
     for other in folders:
-        if (path := document.beside(other, name, place)) is not None:
+        if (path := document.file_in(other, name, place)) is not None:
             return path
     files = ((file, other) for other in (data.mechanisms(), *folders) for file in other.glob("*.yaml"))
     examples = ((file, other) for other in folders for file in other.glob("*/*.yaml"))

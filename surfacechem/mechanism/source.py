@@ -19,7 +19,7 @@ from surfacechem.documents.document import Limits, Tree
 from surfacechem.errors import InputError, Place, refuse_unknown, suggestion
 from surfacechem.quantities import AVOGADRO, KILO
 
-LIMITS = Limits(largest=10_000_000, most=200_000)
+MECHANISM_LIMITS = Limits(largest=10_000_000, most=200_000)
 """Limits of size of a mechanism, which may be that of a large gas beside the surface."""
 
 ARROWS = ("<=>", "=>", "=")
@@ -132,7 +132,7 @@ def _placed(tree: Tree) -> Any:
 
 @lru_cache(maxsize=16)  # runs, sweeps and tables of one mechanism read its file again and again
 def _tree(text: str, file: str) -> Tree:
-    return document.build(text, file, LIMITS)
+    return document.build(text, file, MECHANISM_LIMITS)
 
 
 class Source:

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from surfacechem.contracts import fits
 from surfacechem.contracts.terms import Fluid, FluidRange
-from surfacechem.documents.cache_folder import fingerprint, kept
+from surfacechem.documents.cache_folder import cached, fingerprint
 from surfacechem.errors import InputError
 
 Array = NDArray[np.float64]
@@ -204,7 +204,7 @@ class CoolPropFluid(Fluid):
 @cache
 def _limits(fluid: CoolPropFluid) -> tuple[float, float, float | None, float | None]:
     mark = fingerprint(fluid, "limits", version("CoolProp"))
-    low, high, boils, condenses = kept(mark, [Path(__file__)], fluid.limits)
+    low, high, boils, condenses = cached(mark, [Path(__file__)], fluid.limits)
     return low, high, boils, condenses
 
 
@@ -218,7 +218,7 @@ def _fit(fluid: CoolPropFluid, quantity: str, low: float, high: float, target: f
         return [[piece.low, piece.high, piece.coefficients] for piece in found]
 
     mark = fingerprint(fluid, quantity, low, high, target, version("CoolProp"))
-    found = kept(mark, [Path(fits.__file__)], find)
+    found = cached(mark, [Path(fits.__file__)], find)
     if isinstance(found, str):
         message = f"the {WORDS[quantity]} of {fluid.title} cannot be fitted: {found}"
         raise InputError(message + fluid.beside_critical())

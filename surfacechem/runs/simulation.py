@@ -14,7 +14,7 @@ import numpy as np
 
 from surfacechem import format as cases
 from surfacechem.contracts.units import parse
-from surfacechem.documents.document import ORIGIN, from_plain
+from surfacechem.documents.document import OVERRIDE, from_plain
 from surfacechem.documents.document import parse as parse_document
 from surfacechem.documents.overrides import apply, parameter_path
 from surfacechem.errors import PATHS, InputError, Place, suggestion
@@ -579,11 +579,11 @@ class Simulation:
         given = {"over": None if over is None else lists, "combine": combine, "sample": sample}
         if any(value is not None for value in given.values()):
             said = {name: value for name, value in given.items() if value is not None}
-            section = read_sweep(from_plain(said, Place(ORIGIN, path="sweep")), section)
+            section = read_sweep(from_plain(said, Place(OVERRIDE, path="sweep")), section)
         if section is None:
             message = "a sweep needs `sweep: {over: ...}` in the case, or parameters to sweep over."
             raise InputError(message, path="sweep")
-        ends = None if until is None else read_until(from_plain(dict(until), Place(ORIGIN, path="sweep.until")))
+        ends = None if until is None else read_until(from_plain(dict(until), Place(OVERRIDE, path="sweep.until")))
         return plan_of(section, self._units, ends, arrays)
 
     @cached_property

@@ -312,7 +312,7 @@ def _data(
     """The published data of a curve along the same axes."""
     if (given := section.data) is None:
         return None
-    path = document.beside(folder, given.file, given.tree.place)
+    path = document.file_in(folder, given.file, given.tree.place)
     if path is None:
         raise given.error(f"no file {given.file} beside the list.", "file")
     table = CSVText(Tree(document.read(path), Place(str(path))))

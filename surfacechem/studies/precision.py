@@ -11,7 +11,7 @@ from itertools import count
 from pathlib import Path
 from statistics import median
 
-from surfacechem.documents.overrides import written
+from surfacechem.documents.overrides import as_texts
 from surfacechem.errors import InputError, Place, refuse_unknown
 from surfacechem.results.audit import audit
 from surfacechem.results.error_estimates import computed
@@ -140,7 +140,7 @@ def precision(
     return Study(
         kind="precision",
         title=f"Error against run time: {', '.join(case.name for case in compared)}",
-        arguments=[*map(str, cases), *options, *(word for text in written(overrides) for word in ("--set", text))],
+        arguments=[*map(str, cases), *options, *(word for text in as_texts(overrides) for word in ("--set", text))],
         axes={
             "tolerance": tolerances,
             "case": compared,

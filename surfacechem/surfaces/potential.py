@@ -14,13 +14,12 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import cache, cached_property, partial
-from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
 
 from surfacechem.contracts.terms import HeatTransfer, Law, PairEnergy, Potential, Shape, option
-from surfacechem.documents.cache_folder import Fingerprint, fingerprint, kept
+from surfacechem.documents.cache_folder import PACKAGE, Fingerprint, cached, fingerprint
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, derivative
 from surfacechem.surfaces.approach import ApproachEnergy, fitted, straight
@@ -36,7 +35,6 @@ KNOWN: dict[Fingerprint, tuple[ApproachEnergy, ...]] = {}
 
 log = logging.getLogger(__name__)
 
-PACKAGE = Path(__file__).parents[1]
 CODE = [*(path for room in ("surfaces", "laws", "contracts") for path in sorted((PACKAGE / room).glob("*.py")))]
 CODE += [PACKAGE / f"{name}.py" for name in ("expressions", "quantities", "tolerances")]
 """Source files from which integrals follow: of the laws all that they share, too."""
@@ -179,7 +177,7 @@ class CurvedSurfaces(Potential):
         mark = fingerprint(self.shapes, parts, self.gap_laws, self.approach, self.accuracy)
         if mark not in KNOWN:
             with integrating():
-                found = kept(mark, CODE, lambda: [curve.numbers for curve in self.integrated(parts)])
+                found = cached(mark, CODE, lambda: [curve.numbers for curve in self.integrated(parts)])
             log.info("running")
             KNOWN[mark] = tuple(map(ApproachEnergy.of, found))
         curves = KNOWN[mark]
@@ -292,7 +290,7 @@ class CurvedSurfaces(Potential):
 
         laws = self.pairs, self.gap_laws, self.heat_laws
         return np.transpose(
-            kept(fingerprint(self.shapes, *laws, self.accuracy, self.approach, approaches, stretches), CODE, found)
+            cached(fingerprint(self.shapes, *laws, self.accuracy, self.approach, approaches, stretches), CODE, found)
         )
 
     @cached_property
@@ -400,7 +398,7 @@ class CurvedConductance(HeatTransfer):
 
         if mark not in KNOWN:
             with integrating():
-                KNOWN[mark] = (ApproachEnergy.of(kept(mark, CODE, integrated)),)
+                KNOWN[mark] = (ApproachEnergy.of(cached(mark, CODE, integrated)),)
         return KNOWN[mark][0]
 
     def conductance(self, g_n: Expression) -> Expression:

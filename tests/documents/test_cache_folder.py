@@ -8,7 +8,7 @@ import pytest
 
 from surfacechem.contracts import fits
 from surfacechem.documents import cache_folder
-from surfacechem.documents.cache_folder import fingerprint, kept
+from surfacechem.documents.cache_folder import cached, fingerprint
 from surfacechem.errors import Place
 from surfacechem.laws.contact import NormalStiffness
 from surfacechem.media import coolprop
@@ -50,20 +50,20 @@ def test_laws_are_told_by_what_they_say_and_those_of_ones_own_hold_in_this_proce
     assert fingerprint(law) != fingerprint(NormalStiffness(E_n=2.0))
     own, same_name = law_of_a_notebook(), law_of_a_notebook()
     assert fingerprint(own) == fingerprint(own) != fingerprint(same_name)
-    assert (fingerprint(law).lasts, fingerprint(own).lasts) == (True, False)
+    assert (fingerprint(law).is_lasting, fingerprint(own).is_lasting) == (True, False)
     assert fingerprint(never) != fingerprint(never)
 
 
 def test_numbers_are_found_once(folder):
-    assert kept(fingerprint("x"), [], lambda: NUMBERS) == NUMBERS
-    assert kept(fingerprint("x"), [], never) == NUMBERS
-    assert kept(fingerprint("x"), [Path(__file__)], lambda: 2.0) == 2.0  # by other code
-    assert kept(fingerprint("y"), [], lambda: 3.0) == 3.0
+    assert cached(fingerprint("x"), [], lambda: NUMBERS) == NUMBERS
+    assert cached(fingerprint("x"), [], never) == NUMBERS
+    assert cached(fingerprint("x"), [Path(__file__)], lambda: 2.0) == 2.0  # by other code
+    assert cached(fingerprint("y"), [], lambda: 3.0) == 3.0
     assert len(list(folder.iterdir())) == 3
 
 
 def test_what_nobody_can_compare_is_not_kept(folder):
-    assert kept(fingerprint(law_of_a_notebook()), [], lambda: 1.0) == 1.0
+    assert cached(fingerprint(law_of_a_notebook()), [], lambda: 1.0) == 1.0
     assert not folder.exists()
 
 
@@ -77,27 +77,27 @@ def shared(path):
 
 @pytest.mark.parametrize("harm", [cut, shared])
 def test_what_is_damaged_or_not_ours_is_found_again(folder, harm):
-    kept(fingerprint("x"), [], lambda: 1.0)
+    cached(fingerprint("x"), [], lambda: 1.0)
     (path,) = folder.iterdir()
     harm(path)
-    assert kept(fingerprint("x"), [], lambda: 2.0) == 2.0
-    assert kept(fingerprint("x"), [], never) == 2.0
+    assert cached(fingerprint("x"), [], lambda: 2.0) == 2.0
+    assert cached(fingerprint("x"), [], never) == 2.0
 
 
 def test_of_too_many_files_the_older_half_goes(folder, monkeypatch):
-    monkeypatch.setattr(cache_folder, "MOST", 3)
+    monkeypatch.setattr(cache_folder, "MOST_FILES", 3)
     for age, x in enumerate("abcd"):
-        kept(fingerprint(x), [], lambda x=x: x)
+        cached(fingerprint(x), [], lambda x=x: x)
         for path in folder.iterdir():
             os.utime(path, (path.stat().st_mtime - 60,) * 2)
         assert len(list(folder.iterdir())) == (2 if age == 3 else age + 1)
-    assert [kept(fingerprint(x), [], lambda: "anew") for x in "dcb"] == ["d", "c", "anew"]
+    assert [cached(fingerprint(x), [], lambda: "anew") for x in "dcb"] == ["d", "c", "anew"]
 
 
 def test_a_folder_that_cannot_be_made_costs_nothing_but_time(tmp_path, monkeypatch):
     (tmp_path / "file").write_text("not a folder")
     monkeypatch.setenv("SURFACECHEM_CACHE", str(tmp_path / "file"))
-    assert kept(fingerprint("x"), [], lambda: 1.0) == 1.0
+    assert cached(fingerprint("x"), [], lambda: 1.0) == 1.0
 
 
 @pytest.mark.usefixtures("folder")

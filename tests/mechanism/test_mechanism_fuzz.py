@@ -202,7 +202,7 @@ def test_what_is_no_mechanism_is_refused(name, file):
 
 
 def test_too_many_values_are_refused(file, monkeypatch):
-    monkeypatch.setattr(source, "LIMITS", Limits(largest=10_000, most=1000))
+    monkeypatch.setattr(source, "MECHANISM_LIMITS", Limits(largest=10_000, most=1000))
     file.write_bytes(b"phases: [" + b"1, " * 1000 + b"]")
     with pytest.raises(InputError, match="more than 1000 values"):
         load_mechanism(file)
