@@ -19,7 +19,7 @@ from typing import Any, ClassVar
 import cantera
 import symengine
 
-from surfacechem.compile.program import CODE, compile_function
+from surfacechem.compile.program import C_FUNCTION, compile_function
 from surfacechem.errors import InputError, refuse_unknown, suggestion
 from surfacechem.expressions import EXPONENT_CAP
 from surfacechem.mechanism.rate_types import AffinityReaction, kinds
@@ -206,7 +206,7 @@ class LoadedRate(cantera.ExtensibleRate):
         expression = self.bound.coefficient(symbols, 0.0)
         code = compile_function(list(symbols.values()), [expression])
         arguments, value = (ctypes.c_double * len(symbols))(), (ctypes.c_double * 1)()
-        function = CODE(code.address)
+        function = C_FUNCTION(code.address)
         places = ctypes.addressof(value), ctypes.addressof(arguments), code.user
         self._code = code
         return list(enumerate(symbols))[1:], arguments, value, partial(function, *places)

@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 from surfacechem.compile import vectors
 from surfacechem.compile.cache import code_file
 from surfacechem.compile.objectcode import engine
-from surfacechem.compile.preparing import PREPARING
-from surfacechem.compile.program import CODE
+from surfacechem.compile.preparing import PREPARATION
+from surfacechem.compile.program import C_FUNCTION
 from surfacechem.compile.vectors import LANES, NUMBER, VECTOR, Code, function_body, gathered, object_code
 from surfacechem.documents.cache_folder import from_file, source_digest
 from surfacechem.expressions import derivative, gradient
@@ -32,9 +32,9 @@ if TYPE_CHECKING:
     from surfacechem.compile.program import Function
 
 _WORD: Any = ir.IntType(64)
-_HEAD = 5
+_HEADER_WORDS = 5
 """Header words before those of the loops: results; of the rest its number, code, user data and table of places."""
-_OF_LOOP = 5
+_LOOP_WORDS = 5
 """Words of a loop: cases, and the tables of shared inputs, of own inputs, of numbers and of places."""
 
 
@@ -93,7 +93,7 @@ class FormLoop:
         return FormLoop(replace(self.form, expressions=tuple(by.values())), self.own, self.numbers, found)
 
 
-Found = tuple[str, tuple[int, ...], tuple[float, ...]]
+FormMatch = tuple[str, tuple[int, ...], tuple[float, ...]]
 """A form as text, and its contents from left to right: places of inputs, and numbers."""
 
 
@@ -103,9 +103,9 @@ class _Forms:
 
     def __init__(self, inputs: tuple[Any, ...], own: frozenset[Any]) -> None:
         self.places = {symbol: place for place, symbol in enumerate(inputs) if symbol in own}
-        self._known: dict[Any, Found] = {symbol: ("x", (place,), ()) for symbol, place in self.places.items()}
+        self._known: dict[Any, FormMatch] = {symbol: ("x", (place,), ()) for symbol, place in self.places.items()}
 
-    def of(self, part: Any) -> Found:
+    def of(self, part: Any) -> FormMatch:
         """The form of a part."""
         found = self._known.get(part)
         if found is not None:
@@ -113,7 +113,7 @@ class _Forms:
         kind = type(part).__name__
         if kind == "RealDouble":
             return "c", (), (float(part),)
-        if kind in _IN_ANY_ORDER:
+        if kind in _COMMUTATIVE:
             texts, own, numbers = zip(*sorted(map(self.of, part.args)), strict=True)
             found = f"{kind}({', '.join(texts)})", tuple(chain(*own)), tuple(chain(*numbers))
         else:
@@ -121,7 +121,7 @@ class _Forms:
         self._known[part] = found
         return found
 
-    def _whole(self, part: Any) -> Found:
+    def _whole(self, part: Any) -> FormMatch:
         """The form of a part that is no sum or product: its numbers belong to it."""
         own = self._own(part)
         form = part.xreplace({x: symengine.Symbol(f"x {k}") for k, x in enumerate(own)})
@@ -141,7 +141,7 @@ class _Forms:
             if kind == "RealDouble":
                 numbers.append(symengine.Symbol(f"number {len(numbers)}"))
                 return numbers[-1]
-            if kind in _IN_ANY_ORDER:
+            if kind in _COMMUTATIVE:
                 return (symengine.Add if kind == "Add" else symengine.Mul)(*map(made, sorted(part.args, key=self.of)))
             return part.xreplace({x: own.setdefault(x, symengine.Symbol(f"own {len(own)}")) for x in self._own(part)})
 
@@ -150,7 +150,7 @@ class _Forms:
         return Form((whole,), tuple(shared), tuple(own.values()), tuple(numbers))
 
 
-_IN_ANY_ORDER = "Add", "Mul"
+_COMMUTATIVE = "Add", "Mul"
 """Kinds whose arguments are put in an order that those alike have in common: along the cells."""
 
 
@@ -199,7 +199,7 @@ def _terms(expression: Any) -> Sequence[Any]:
     return args if len(args) > LANES else (expression,)
 
 
-class Alike:
+class LoopCode:
     """The code of loops with the tables that it reads, and the code of the rest."""
 
     def __init__(
@@ -219,7 +219,7 @@ class Alike:
         self._keep = code, left, tables
         self.address = int(self._engine.get_function_address("f"))
         self._n_out = len(rest)
-        self._call: Any = CODE(self.address)
+        self._call: Any = C_FUNCTION(self.address)
 
     def __call__(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """The results of rows of inputs."""
@@ -231,7 +231,7 @@ class Alike:
 
 
 @lru_cache(maxsize=64)
-@PREPARING
+@PREPARATION
 def _code_of(forms: tuple[Form, ...]) -> Any:
     """Code of loops over these forms, and around them that of the rest: ``void f(double *out, const double *inputs,
     void *user)``, whose user data are the words of the table.
@@ -242,7 +242,7 @@ def _code_of(forms: tuple[Form, ...]) -> Any:
         code.nothing()
         code.rest()
         for number, form in enumerate(forms):
-            code.loop(form, _HEAD + _OF_LOOP * number)
+            code.loop(form, _HEADER_WORDS + _LOOP_WORDS * number)
         code.builder.ret_void()
         return object_code(code.builder)
 
@@ -266,7 +266,7 @@ class _Loops:
     def rest(self) -> None:
         """Call the code of the part that is in no loop."""
         b = self.builder
-        count, address, user, places = map(self._word, range(1, _HEAD))
+        count, address, user, places = map(self._word, range(1, _HEADER_WORDS))
         with b.if_then(b.icmp_signed(">", count, _WORD(0))):
             values = b.bitcast(b.alloca(NUMBER, count), self.out.type)
             code = b.inttoptr(address, b.function.ftype.as_pointer())
@@ -277,7 +277,7 @@ class _Loops:
     def loop(self, form: Form, head: int) -> None:
         """Add the values of a form, for as many cases as the words of its loop tell."""
         b = self.builder
-        count, shared, own, numbers, places = (self._word(head + k) for k in range(_OF_LOOP))
+        count, shared, own, numbers, places = (self._word(head + k) for k in range(_LOOP_WORDS))
         known, results = {}, [b.alloca(VECTOR) for _ in form.expressions]
         for k, symbol in enumerate(form.shared):
             known[symbol] = gathered(b, [self._read(self.inputs, self._read(shared, _WORD(k), _WORD))] * LANES)

@@ -29,11 +29,11 @@ from typing import Any
 from surfacechem.documents import cache_folder
 from surfacechem.documents.cache_folder import cache_root, keep_file, make_folder, sealed, unsealed
 
-FILE = "kernel.numba"
+NUMBA_FILE = "kernel.numba"
 """File that Numba loads; others of the folder that begin with `kernel.` hold the same code in other forms."""
 
 
-SHIPPED = Path(__file__).with_name("shipped")
+SHIPPED_FOLDER = Path(__file__).with_name("shipped")
 """Folder in which a wheel carries code that was compiled when it was built."""
 
 V3 = ("x86-64-v3", ("avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe"))
@@ -58,15 +58,15 @@ def processor() -> str:
 
 def kernel_folder(sources: Sequence[Path]) -> Path:
     """Folder for code compiled from these sources on this machine."""
-    return cache_root() / f"kernel-{_mark(sources, sys.version, processor())}"
+    return cache_root() / f"kernel-{_digest(sources, sys.version, processor())}"
 
 
 def shipped_folder(sources: Sequence[Path], place: Path) -> Path:
     """Folder in a place for a wheel's code compiled from these sources for this platform."""
-    return place / _mark(sources, sys.implementation.cache_tag)
+    return place / _digest(sources, sys.implementation.cache_tag)
 
 
-def _mark(sources: Sequence[Path], *where: str) -> str:
+def _digest(sources: Sequence[Path], *where: str) -> str:
     """A digest of all that compiled code depends on."""
     digest = hashlib.sha256()
     for text in (version("numba"), version("llvmlite"), platform.machine(), *where):
@@ -77,15 +77,15 @@ def _mark(sources: Sequence[Path], *where: str) -> str:
     return digest.hexdigest()[:16]
 
 
-def fill(folder: Path, sources: Sequence[Path]) -> None:
+def copy_shipped(folder: Path, sources: Sequence[Path]) -> None:
     """Copy code that a wheel carries into a folder that is not there yet, if it fits and this processor runs it."""
-    if folder.exists() or not SHIPPED.is_dir():  # as in a checkout, where no digest is formed in vain
+    if folder.exists() or not SHIPPED_FOLDER.is_dir():  # as in a checkout, where no digest is formed in vain
         return
     import llvmlite.binding as llvm
 
     _, needed = PLATFORMS.get(platform.machine().lower(), ("", ()))
     # What it is found by comes last.
-    files = sorted(shipped_folder(sources, SHIPPED).glob("kernel.*"), key=lambda path: path.name == FILE)
+    files = sorted(shipped_folder(sources, SHIPPED_FOLDER).glob("kernel.*"), key=lambda path: path.name == NUMBA_FILE)
     if files and {*needed} <= {name for name, has in llvm.get_host_cpu_features().items() if has}:
         with suppress(OSError):  # what cannot be kept is compiled for each process
             make_folder(folder)
@@ -105,7 +105,7 @@ def ship(sources: Sequence[Path], place: Path, load: Callable[[], object]) -> No
     shutil.copytree(made, target)
     content = _content(made)
     assert content is not None
-    keep_file(target / FILE, sealed(numbas.dumps((None, pickle.loads(content)[1]))))
+    keep_file(target / NUMBA_FILE, sealed(numbas.dumps((None, pickle.loads(content)[1]))))
 
 
 def code_file(origins: Iterable[str]) -> Path:
@@ -126,7 +126,7 @@ def _content(folder: Path) -> bytes | None:
         contents = {path.name: unsealed(path.read_bytes()) for path in folder.glob("kernel.*")}
     except OSError:
         return None
-    return None if None in contents.values() else contents.get(FILE)
+    return None if None in contents.values() else contents.get(NUMBA_FILE)
 
 
 def untrusted(folder: Path) -> str | None:
@@ -135,7 +135,7 @@ def untrusted(folder: Path) -> str | None:
     return cache_folder.untrusted((folder, *inside))
 
 
-class _Kept:
+class _KernelCache:
     """Cache in which Numba looks up and keeps the machine code of a function: one file, wherever the sources are."""
 
     def __init__(self, folder: Path) -> None:
@@ -166,7 +166,7 @@ class _Kept:
         data = sealed(numbas.dumps((compiled.codegen.magic_tuple(), compiled._reduce())))
         try:
             make_folder(self.folder)
-            keep_file(self.folder / FILE, data)
+            keep_file(self.folder / NUMBA_FILE, data)
         except OSError as error:
             _warn(self.folder, str(error))
 
@@ -179,7 +179,7 @@ def _warn(folder: Path, problem: str) -> None:
     )
 
 
-def _changes(parts: Collection[str]) -> list[tuple[Any, str, Any]]:
+def _numba_patches(parts: Collection[str]) -> list[tuple[Any, str, Any]]:
     """Patches (object, attribute, value) with which Numba compiles a kernel of these parts in half the usual time."""
     import numba
     from numba.core import llvm_bindings
@@ -238,11 +238,11 @@ def _changes(parts: Collection[str]) -> list[tuple[Any, str, Any]]:
 
 
 @contextmanager
-def _compiling(parts: Collection[str]) -> Iterator[None]:
+def _patched_numba(parts: Collection[str]) -> Iterator[None]:
     """Numba with its changes, which are put back afterwards: they are global and belong to the caller's own functions,
     too.
     """
-    changes = _changes(parts)
+    changes = _numba_patches(parts)
     usual = [getattr(owner, name) for owner, name, _ in changes]
     collecting = gc.isenabled()
     try:
@@ -268,10 +268,10 @@ def compile_kernel(function: Callable[..., None], signature: Any, folder: Path, 
     kernel: Any = numba.njit(nogil=True, error_model="numpy")(function)
     problem = untrusted(folder)
     if problem is None:
-        kernel._cache = _Kept(folder)
+        kernel._cache = _KernelCache(folder)
     else:
         _warn(folder, problem)
-    with global_compiler_lock, _compiling(parts):
+    with global_compiler_lock, _patched_numba(parts):
         kernel.compile(signature)
     kernel.disable_compile()
     return kernel

@@ -22,9 +22,9 @@ import numpy as np
 from surfacechem.compile.cache import untrusted
 from surfacechem.documents.cache_folder import keep_file, sealed, unsealed
 
-FILE = "kernel.object"
+OBJECT_FILE = "kernel.object"
 
-UNUSED = (
+UNUSED_SYMBOLS = (
     "NRT_Free",
     "NRT_MemInfo_call_dtor",
     "NRT_adapt_ndarray_from_python",
@@ -36,10 +36,10 @@ UNUSED = (
 )
 """Symbols that only the entry from Python calls, which is unused here: they are bound to code that ends the process."""
 
-LONGEST = 60.0
+LOADING_TIMEOUT = 60.0
 """Time [s] after which a process that loads the code has failed."""
 
-PROOF = """
+LOADING_TEST = """
 import sys
 from pathlib import Path
 from surfacechem.compile.objectcode import load
@@ -58,12 +58,12 @@ def keep(kernel: Any, folder: Path) -> None:
         return  # the kernel came from the cache, and its code with it
     data = sealed(made.fndesc.llvm_func_name.encode() + b"\n" + code)
     with suppress(OSError, subprocess.SubprocessError), tempfile.TemporaryDirectory(dir=folder) as trial:
-        keep_file(Path(trial) / FILE, data)
+        keep_file(Path(trial) / OBJECT_FILE, data)
         environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
-        command = [sys.executable, "-c", PROOF, trial]
-        done = subprocess.run(command, env=environment, capture_output=True, timeout=LONGEST)
+        command = [sys.executable, "-c", LOADING_TEST, trial]
+        done = subprocess.run(command, env=environment, capture_output=True, timeout=LOADING_TIMEOUT)
         if done.returncode == 0:
-            keep_file(folder / FILE, data)
+            keep_file(folder / OBJECT_FILE, data)
 
 
 def load(folder: Path) -> Callable[..., None] | None:
@@ -71,7 +71,7 @@ def load(folder: Path) -> Callable[..., None] | None:
     if untrusted(folder) is not None:
         return None
     try:
-        content = unsealed((folder / FILE).read_bytes())
+        content = unsealed((folder / OBJECT_FILE).read_bytes())
     except OSError:
         return None
     if content is None:
@@ -101,7 +101,7 @@ class Kernel:
     """Machine code of a function of integers, numbers, contiguous arrays and tuples of these that returns nothing."""
 
     def __init__(self, name: str, code: bytes) -> None:
-        self._engine = engine(code, UNUSED)
+        self._engine = engine(code, UNUSED_SYMBOLS)
         self._address = self._engine.get_function_address(name)
         self._call: Any = None
         self._nothing, self._error = ctypes.c_void_p(), ctypes.c_void_p()

@@ -1,11 +1,11 @@
 """Preparation time of a run: code compiled and libraries loaded when they are first needed.
 
-It is no run time. What is slow once is done inside ``PREPARING``, as a block or as a decorator.
+It is no run time. What is slow once is done inside ``PREPARATION``, as a block or as a decorator.
 
->>> before = PREPARING.seconds
->>> with PREPARING:
+>>> before = PREPARATION.seconds
+>>> with PREPARATION:
 ...     import decimal
->>> PREPARING.seconds > before
+>>> PREPARATION.seconds > before
 True
 """
 
@@ -15,7 +15,7 @@ from contextlib import ContextDecorator
 from types import TracebackType
 
 
-class _Preparing(ContextDecorator, threading.local):
+class _Stopwatch(ContextDecorator, threading.local):
     """A stopwatch of each thread; a block within another counts once."""
 
     seconds = 0.0
@@ -36,4 +36,4 @@ class _Preparing(ContextDecorator, threading.local):
             self.seconds += time.perf_counter() - self._start
 
 
-PREPARING = _Preparing()
+PREPARATION = _Stopwatch()

@@ -28,7 +28,7 @@ from surfacechem.expressions import Expression
 from surfacechem.model.system import Named, Parameter, System
 from surfacechem.quantities import VARIABLES, Quantity
 
-WIDTH = 100
+LINE_WIDTH = 100
 """Printed lines are broken beyond this, where an expression lets them."""
 
 
@@ -43,18 +43,18 @@ class Row:
 
 RELATIONS = (symengine.LessThan, symengine.StrictLessThan, symengine.Equality, symengine.Unequality)
 
-APART = "condition of "
+CONDITION_PREFIX = "condition of "
 """Prefix of the names of symbols that stand for terms printed by themselves."""
 
 
-def _apart(expression: Expression) -> tuple[Any, dict[str, Any]]:
+def _conditions_apart(expression: Expression) -> tuple[Any, dict[str, Any]]:
     """The expression with piecewise terms in its conditions replaced by symbols, and these terms by their symbols.
 
     SymPy brings conditions into a canonical form, which takes it for ever where piecewise terms are in them.
     """
     whole = symengine.sympify(expression)
     inner = {piece for relation in whole.atoms(*RELATIONS) for piece in relation.atoms(symengine.Piecewise)}
-    terms = {f"{APART}{k}": piece for k, piece in enumerate(sorted(inner, key=str))}
+    terms = {f"{CONDITION_PREFIX}{k}": piece for k, piece in enumerate(sorted(inner, key=str))}
     return whole.xreplace({piece: symengine.Symbol(name) for name, piece in terms.items()}), terms
 
 
@@ -75,7 +75,7 @@ class _Printer(Printer):  # type: ignore[misc]
 
     def text(self, expression: Expression) -> str:
         around = self._terms
-        whole, self._terms = _apart(expression)
+        whole, self._terms = _conditions_apart(expression)
         try:
             return str(self.doprint(sympy_form(whole)))
         finally:
@@ -230,7 +230,7 @@ def _function(system: System, printer: _Python, name: str, text: str, rows: Sequ
     for row in rows:
         if str(row.expression) != row.name:
             lines += _assignment(printer, row.name, row.expression, row.text)
-    return "\n".join([*lines, *_broken("    return [", returned, "]"), ""])
+    return "\n".join([*lines, *_broken_line("    return [", returned, "]"), ""])
 
 
 def quantities_read(named: Sequence[Named], expressions: Iterable[Expression]) -> list[Named]:
@@ -250,28 +250,28 @@ def _safe(text: str) -> str:
 
 def _unpacked(names: Sequence[str], source: str) -> list[str]:
     left = f"{names[0]}," if len(names) == 1 else ", ".join(names)
-    bracketed = len(left) > WIDTH or len(names) == 1
-    return _broken("    (", left, f") = {source}") if bracketed else [f"    {left} = {source}"]
+    bracketed = len(left) > LINE_WIDTH or len(names) == 1
+    return _broken_line("    (", left, f") = {source}") if bracketed else [f"    {left} = {source}"]
 
 
 def _assignment(printer: _Python, name: str, expression: Expression, text: str) -> list[str]:
     value = printer.text(expression)
     left = f"    {printer.name(name)} = "
-    lines = [left + value] if len(left + value) <= WIDTH else _broken(left + "(", value, ")")
+    lines = [left + value] if len(left + value) <= LINE_WIDTH else _broken_line(left + "(", value, ")")
     return [f"    # {text}", *lines]
 
 
-def _broken(before: str, text: str, after: str) -> list[str]:
+def _broken_line(before: str, text: str, after: str) -> list[str]:
     """The text between brackets, broken before operators and after commas where it is too long for one line; a product
     that is too long by itself before its functions.
     """
-    if len(before + text + after) <= WIDTH:
+    if len(before + text + after) <= LINE_WIDTH:
         return [before + text + after]
     lines: list[str] = []
     whole = re.split(r" (?=[+-] |if |else )|(?<=,) ", text)
-    factors = [[piece] if len(piece) <= WIDTH else re.split(r"(?<=[^*]\*)(?=math\.)", piece) for piece in whole]
+    factors = [[piece] if len(piece) <= LINE_WIDTH else re.split(r"(?<=[^*]\*)(?=math\.)", piece) for piece in whole]
     for piece in (factor for pieces in factors for factor in pieces):
-        if lines and len(lines[-1]) + len(piece) + 9 <= WIDTH:
+        if lines and len(lines[-1]) + len(piece) + 9 <= LINE_WIDTH:
             lines[-1] += f" {piece}"
         else:
             lines.append(piece)
@@ -280,7 +280,7 @@ def _broken(before: str, text: str, after: str) -> list[str]:
 
 # -- LaTeX ------------------------------------------------------------------------------------------------------------
 
-GREEK = {
+GREEK_LETTERS = {
     *("alpha", "beta", "gamma", "delta", "epsilon", "eta", "theta", "kappa", "lambda", "mu", "nu", "xi"),
     *("pi", "rho", "sigma", "tau", "phi", "psi", "chi", "omega"),
 }
@@ -321,16 +321,16 @@ def symbol(name: str) -> str:
 
 
 def _letters(text: str) -> str:
-    if text in GREEK:
+    if text in GREEK_LETTERS:
         return f"\\{text}"
     return text if len(text) <= 1 else rf"\mathrm{{{text}}}"
 
 
 def _subscript(text: str) -> str:
     parts = text.split("_")
-    if all(len(part) == 1 or part in GREEK or re.fullmatch(r"\w?\d\w?", part) for part in parts):
+    if all(len(part) == 1 or part in GREEK_LETTERS or re.fullmatch(r"\w?\d\w?", part) for part in parts):
         return " ".join(part if re.search(r"\d", part) else _letters(part) for part in parts)
-    if set(parts) & GREEK:
+    if set(parts) & GREEK_LETTERS:
         return SPACE.join(map(_letters, parts))
     return rf"\mathrm{{{SPACE.join(parts)}}}"
 
@@ -366,9 +366,9 @@ def latex(system: System, title: str = "") -> str:
     return "\n".join([f"% {_safe(heading)}", *values, r"\begin{align*}", body, r"\end{align*}", ""])
 
 
-SPECIAL: Mapping[int, str] = {ord(c): f"\\{c}" for c in "_%&#$"}
+LATEX_ESCAPES: Mapping[int, str] = {ord(c): f"\\{c}" for c in "_%&#$"}
 
 
 def _latex_row(printer: Latex, left: str, right: Expression, text: str, in_unit: str) -> str:
-    note = text.translate(SPECIAL) + (f" $[{unit(in_unit)}]$" if in_unit else "")
+    note = text.translate(LATEX_ESCAPES) + (f" $[{unit(in_unit)}]$" if in_unit else "")
     return rf"  {left} &= {printer.text(right)} && \text{{{note}}}"

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from surfacechem import expressions as calculus
 from surfacechem.compile.cache import code_file
-from surfacechem.compile.preparing import PREPARING
+from surfacechem.compile.preparing import PREPARATION
 from surfacechem.documents.cache_folder import from_file, source_digest
 from surfacechem.expressions import derivative, gradient
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from surfacechem.compile.alike import FormLoop
     from surfacechem.compile.vectors import LaneFunction
 
-CODE = ctypes.PYFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
+C_FUNCTION = ctypes.PYFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
 """The C signature of machine code, for calls from Python with addresses."""
 
 
@@ -66,11 +66,11 @@ class Function:
     @cached_property
     def _called(self) -> tuple[Any, Any, Any]:
         """The code as Python calls it by itself, and the types of its inputs and results."""
-        return CODE(self.address), ctypes.c_double * self.n_in, ctypes.c_double * self.n_out
+        return C_FUNCTION(self.address), ctypes.c_double * self.n_in, ctypes.c_double * self.n_out
 
 
 @dataclass(frozen=True)
-class Filler:
+class ExternalInputs:
     """Fills parameters of inputs with results of an external function of the values that it reads there."""
 
     reads: Function
@@ -107,17 +107,17 @@ class Chain:
     anchor: int
 
 
-SPARSE = 400
+SPARSE_FROM = 400
 """Derivatives from which on those that are zero are not formed."""
 
-OPTIMISED = 200
+MOST_OPTIMISED = 200
 """Expressions from which on they are not optimised: that takes ten times as long as to make code of them, for code that
 is faster by a quarter or less.
 """
 
 _ONE_THREAD = threading.RLock()
 
-MANY = 50
+MOST_RATE_STATES = 50
 """States of a network beyond which a second function of its rates takes longer to compile than any run gains by it."""
 
 
@@ -140,7 +140,7 @@ class Program:
     """Functions whose zeros are events."""
     algebraic: tuple[bool, ...]
     """Per state: no equation contains its derivative."""
-    filler: Filler | None = None
+    filler: ExternalInputs | None = None
     chains: tuple[Chain, ...] = ()
     nonzeros: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
     """Places of the derivatives that are formed, in their order; none where all are."""
@@ -260,10 +260,10 @@ def compile_function(
 
 def _looped(inputs: Sequence[Any], loops: Sequence["FormLoop"], rest: Sequence[Any]) -> Function:
     """The code of loops and of what is in none."""
-    from surfacechem.compile.alike import Alike
+    from surfacechem.compile.alike import LoopCode
 
     left = tuple(expression for expression in rest if expression != 0)
-    code = Alike(inputs, loops, rest, _machine_code(tuple(inputs), left) if left else None)
+    code = LoopCode(inputs, loops, rest, _machine_code(tuple(inputs), left) if left else None)
     return Function(code.address, code.table.ctypes.data, len(inputs), len(rest), code)
 
 
@@ -288,39 +288,39 @@ class _Derivatives:
         """All that the entries follow from, as text."""
         names = [part for pair in self.named for part in pair]
         differentiation = map(source_digest, (__file__, calculus.__file__))
-        return [*differentiation, *written((*self.variables, *names, *self.residual))]
+        return [*differentiation, *serialised((*self.variables, *names, *self.residual))]
 
 
 @lru_cache(maxsize=128)  # a scene that is loaded again, or differs in numbers alone, has the same expressions
-@PREPARING
+@PREPARATION
 def _machine_code(
     inputs: tuple[Any, ...], expressions: tuple[Any, ...] | _Derivatives, steps: bool = False
 ) -> Function:
-    opt_level = 3 if steps and len(expressions) < OPTIMISED else 0
+    opt_level = 3 if steps and len(expressions) < MOST_OPTIMISED else 0
 
     def make() -> Any:
         return symengine.Lambdify(list(inputs), list(expressions), backend="llvm", cse=True, opt_level=opt_level)
 
     # Code is loaded in a tenth of the time that it takes to make.
-    origins = expressions.origins() if isinstance(expressions, _Derivatives) else written(expressions)
-    code = from_file(code_file([str(opt_level), _mark_of(inputs), *origins]), make, pickle.loads, pickle.dumps)
+    origins = expressions.origins() if isinstance(expressions, _Derivatives) else serialised(expressions)
+    code = from_file(code_file([str(opt_level), _digest_of(inputs), *origins]), make, pickle.loads, pickle.dumps)
     function, user = code.as_ctypes()
     address = ctypes.cast(function, ctypes.c_void_p).value
     return Function(int(address or 0), int(user.value), len(inputs), len(expressions), code)
 
 
 @lru_cache(maxsize=8)
-def _mark_of(inputs: tuple[Any, ...]) -> str:
+def _digest_of(inputs: tuple[Any, ...]) -> str:
     """Digest of the inputs, which all functions of a scene share."""
-    return hashlib.sha256("\n".join(written(inputs)).encode()).hexdigest()
+    return hashlib.sha256("\n".join(serialised(inputs)).encode()).hexdigest()
 
 
-def written(expressions: Sequence[Any]) -> list[str]:
+def serialised(expressions: Sequence[Any]) -> list[str]:
     """Expressions as they stand, to the last bit and in their order: each part once, by the places of its arguments,
     and last the places of the expressions themselves.
 
     >>> x, y = symengine.symbols("x y")
-    >>> written([x + 0.1, y])
+    >>> serialised([x + 0.1, y])
     ['0x1.999999999999ap-4', 'Symbol x', 'Add [0, 1]', 'Symbol y', '[2, 3]']
     """
     places: dict[Any, int] = {}
@@ -439,7 +439,7 @@ def _slopes(
     """The code of the Jacobian, and the places of the derivatives that it forms where these are not all."""
     named = needed(named, residual)
     wanted, places = tuple(_derivatives(len(residual), ())), np.empty(0, np.int64)
-    if len(wanted) >= SPARSE:
+    if len(wanted) >= SPARSE_FROM:
         wanted, places = _nonzeros(residual, variables, (), named)
     parts = _Derivatives(tuple(residual), tuple(variables), tuple(named), wanted)
     return _machine_code(tuple(inputs), parts, steps=True), places
@@ -464,7 +464,7 @@ def _chained(
 
     core, named, whole = chains[0].first, needed(named, residual), expanded(named, residual)
     others = [symengine.Integer(0)] * core
-    loops, rest = loops_of(inputs, others + whole[core:], own_of_chains(inputs, core, len(residual)))
+    loops, rest = loops_of(inputs, others + whole[core:], cell_inputs(inputs, core, len(residual)))
     wanted, nonzeros = _nonzeros(residual, variables, chains, named)
     places = {(i, 1 + j): place for place, (i, j) in enumerate(wanted)}
     known = {symbol: place for place, symbol in enumerate(inputs)}
@@ -473,7 +473,7 @@ def _chained(
     return _looped(inputs, loops, [*whole[:core], *rest[core:]]), slopes, nonzeros
 
 
-def own_of_chains(inputs: Sequence[Any], core: int, n: int) -> set[Any]:
+def cell_inputs(inputs: Sequence[Any], core: int, n: int) -> set[Any]:
     """Of the inputs those that belong to one cell: its state and rate."""
     return {*inputs[1 + core : 1 + n], *inputs[1 + n + core : 1 + 2 * n]}
 
@@ -486,7 +486,7 @@ def compile_program(
     residual: Sequence[Any],
     ledger: Sequence[Any] = (),
     margins: Sequence[Any] = (),
-    filler: Filler | None = None,
+    filler: ExternalInputs | None = None,
     chains: Sequence[Chain] = (),
     named: Named = (),
 ) -> Program:
@@ -499,7 +499,7 @@ def compile_program(
         raise ValueError(f"{counts}: a system needs as many equations as states, and one derivative a state.")
     inputs = [t, *states, *derivatives, *parameters]
     n, core = len(states), chains[0].first if chains else len(states)
-    own, variables = own_of_chains(inputs, core, n), [*states, *derivatives]
+    own, variables = cell_inputs(inputs, core, n), [*states, *derivatives]
     if chains:
         equations, slopes, nonzeros = _chained(inputs, residual, variables, chains, named)
     else:
@@ -528,7 +528,7 @@ def compile_program(
     )
 
 
-@PREPARING
+@PREPARATION
 def _compiled_rates(
     inputs: Sequence[Any], residual: Sequence[Any], derivatives: Sequence[Any], chains: Sequence[Chain]
 ) -> Function | None:

@@ -22,13 +22,13 @@ from typing import Any, NamedTuple
 import symengine
 import sympy  # type: ignore[import-untyped]
 
-from surfacechem.compile.printing import RELATIONS, SPECIAL, Latex, quantities_read, symbol, sympy_form
+from surfacechem.compile.printing import LATEX_ESCAPES, RELATIONS, Latex, quantities_read, symbol, sympy_form
 from surfacechem.expressions import EXPONENT_CAP, LARGE_EXPONENT, LITERAL, Expression, derivative
 from surfacechem.model.system import Named, Parameter, System
 from surfacechem.quantities import AVOGADRO, BOLTZMANN, GAPS, GAS_CONSTANT, STEFAN_BOLTZMANN
 from surfacechem.tolerances import FEWEST, FRACTION_FLOOR, LEAST_COVERAGE, SAME
 
-CAPS = (EXPONENT_CAP, LARGE_EXPONENT, LITERAL, -30.0)
+EXPONENT_CAPS = (EXPONENT_CAP, LARGE_EXPONENT, LITERAL, -30.0)
 """Exponents below which a formula holds as it stands."""
 
 FLOORS = (FRACTION_FLOOR, FEWEST, LEAST_COVERAGE)
@@ -49,27 +49,27 @@ CONSTANTS = {
 
 FACTORS = [symengine.Rational(*parts) for parts in ((1, 1), (2, 1), (4, 1), (8, 1), (1, 2), (1, 4), (3, 2), (2, 3))]
 
-COMBINATIONS = 12
+MOST_COMBINATIONS = 12
 """Number of combinations of modes up to which each has its line."""
 
-LONG = 300
+LINE_LETTERS = 300
 """Letters of LaTeX that do not fit into a line."""
 
-WIDE = 220
+PHONE_LETTERS = 220
 """Letters of LaTeX of a term that do not fit into the line of a phone."""
 
-SIMPLE = 40
+MOST_SIMPLIFIED = 40
 """Operations of an expression up to which SymPy looks for a shorter form of it."""
 
-TABULATED = 12
+TABLE_NUMBERS = 12
 """Numbers in a piecewise expression from which on it is a table rather than a formula."""
 
-TABLE = "table over "
+TABLE_PREFIX = "table over "
 """Prefix of the names of symbols that stand for a table."""
 
 HALF = symengine.Rational(1, 2)
 
-GOLDEN = 0.6180339887
+GOLDEN_RATIO = 0.6180339887
 """Its multiples fill an interval evenly."""
 
 
@@ -98,15 +98,15 @@ def equations(system: System) -> tuple[list[Equation], dict[str, str]]:
     """The balances of a scene and the quantities that they read; and the LaTeX of its parameters, and of what is given
     at the start, by their paths.
     """
-    printer = Paper(_names(system))
+    printer = PaperPrinter(_names(system))
     symbols = {p.path: printer.text(p.symbol) for p in system.parameters}
     symbols |= {s.path: printer.text(symengine.Symbol(s.at_start[0].name)) for s in reversed(system.states)}
-    return [printer.equation(line) for line in lines(system)], symbols
+    return [printer.equation(line) for line in statements(system)], symbols
 
 
-def lines(system: System) -> list[Statement]:
+def statements(system: System) -> list[Statement]:
     """Every equation of a scene that a reader needs: the balances, then what they read."""
-    levels = _levels(system)
+    levels = _constant_values(system)
     loads = {role.variable for role in system.roles if role.role == "prescribed"}
     # What is given stands by its name wherever another quantity holds its formula.
     given = {
@@ -124,12 +124,12 @@ def lines(system: System) -> list[Statement]:
     return [*rows, *(line for item in reversed(read) for line in _definition(system, item))]
 
 
-def _levels(system: System) -> set[Expression]:
+def _constant_values(system: System) -> set[Expression]:
     """The numbers that are the value of a variable, and no more."""
     return {p.symbol for p in system.parameters if p.path.endswith(".level")}
 
 
-def _outside(parameter: Parameter) -> bool:
+def _is_external(parameter: Parameter) -> bool:
     """Whether a number is a rate that another program evaluates."""
     return parameter.path.startswith("interface.mechanism.reactions.") and parameter.path.endswith(".value")
 
@@ -143,14 +143,14 @@ def _names(system: System) -> dict[str, str]:
             base, _, index = symbol(place[1]).partition("_")
             inside = index.strip("{}") + "," if index else ""
             names[str(p.symbol)] = rf"{base}_{{{inside}\mathrm{{{place[-1]}}}}}"
-    levels = _levels(system)
+    levels = _constant_values(system)
     names |= {str(item.expression): symbol(item.name) for item in system.named if item.expression in levels}
-    names |= {str(p.symbol): rf"\text{{{p.spec.text}}}" for p in system.parameters if _outside(p)}
+    names |= {str(p.symbol): rf"\text{{{p.spec.text}}}" for p in system.parameters if _is_external(p)}
     for item in system.named:
         names[f"{item.name} of a fit"] = rf"{symbol(item.name)}\!\left(T\right)"
     for state in system.states:
         if species := state.quantity.species:  # coverages and site densities
-            index = rf"\mathrm{{{species.translate(SPECIAL)}}}"
+            index = rf"\mathrm{{{species.translate(LATEX_ESCAPES)}}}"
             names |= {state.name: rf"\theta_{{{index}}}", f"N_{state.name}": f"N_{{{index}}}"}
     return names
 
@@ -186,19 +186,19 @@ def _unguarded(values: Sequence[Any], conditions: Sequence[Any]) -> Expression:
     first, condition = values[0], conditions[0]
     if condition == False:  # noqa: E712 - an expression, not a flag
         return _unguarded(values[1:], conditions[1:])
-    if len(values) == 1 or condition == True or _caps(condition):  # noqa: E712
+    if len(values) == 1 or condition == True or _is_cap(condition):  # noqa: E712
         return first
     low, high = condition.args
     if [*values] == [1, -1, 0]:
         return symengine.sign(high)
-    if len(values) == 2 and (plain := _either(first, values[1], low, high)) is not None:
+    if len(values) == 2 and (plain := _without_choice(first, values[1], low, high)) is not None:
         return plain
-    if all(_agree(first, value) for value in values[1:]):
+    if all(_are_equal(first, value) for value in values[1:]):
         return min(values, key=lambda value: len(str(value)))
     return symengine.Piecewise(*zip(values, conditions, strict=True))
 
 
-def _either(first: Any, other: Any, low: Any, high: Any) -> Expression | None:
+def _without_choice(first: Any, other: Any, low: Any, high: Any) -> Expression | None:
     """Plain form of a choice, ``first`` for low < high and else ``other``; None where it has none."""
     if {first, other} == {low, high}:
         return symengine.Min(low, high) if first == low else symengine.Max(low, high)
@@ -211,17 +211,17 @@ def _either(first: Any, other: Any, low: Any, high: Any) -> Expression | None:
     return None
 
 
-def _caps(condition: Any) -> bool:
+def _is_cap(condition: Any) -> bool:
     """Whether a condition keeps an exponent or a logarithm within what numbers hold."""
     low, high = condition.args
-    return (high.is_Number and float(high) in CAPS) or (low.is_Number and float(low) in FLOORS)
+    return (high.is_Number and float(high) in EXPONENT_CAPS) or (low.is_Number and float(low) in FLOORS)
 
 
-def _agree(one: Expression, other: Expression) -> bool:
+def _are_equal(one: Expression, other: Expression) -> bool:
     """Whether two expressions are one in other words, as far as some states tell."""
     symbols = sorted(one.free_symbols | other.free_symbols, key=str)
     for place in range(1, 4):
-        state = {x: 0.3 + math.fmod(place * (k + 1) * GOLDEN, 0.5) for k, x in enumerate(symbols)}
+        state = {x: 0.3 + math.fmod(place * (k + 1) * GOLDEN_RATIO, 0.5) for k, x in enumerate(symbols)}
         first, second = (complex(e.xreplace(state).n()) for e in (one, other))
         if not first or not cmath.isclose(first, second, rel_tol=SAME):
             return False
@@ -231,7 +231,7 @@ def _agree(one: Expression, other: Expression) -> bool:
 # -- an equation a line -----------------------------------------------------------------------------------------------
 
 
-Split = Callable[[Expression], tuple[Expression, Expression]]
+Splitter = Callable[[Expression], tuple[Expression, Expression]]
 
 
 def _balance(system: System, name: str, row: Expression) -> Iterator[Statement]:
@@ -244,7 +244,7 @@ def _balance(system: System, name: str, row: Expression) -> Iterator[Statement]:
             return symengine.Integer(0), expression
         rest = expression.xreplace({state.dot: symengine.Integer(0)})
         slope, rest = (-slope, rest) if _is_negative(slope) else (slope, -rest)
-        return _short(slope) * state.dot, _short(rest)
+        return _shortest(slope) * state.dot, _shortest(rest)
 
     yield from _grouped(system, Named(state.quantity, row), sides, state.quantity.long_name)
 
@@ -254,14 +254,14 @@ def _definition(system: System, item: Named) -> Iterator[Statement]:
     if str(item.expression) == item.name:
         return
     text = f"{item.quantity.long_name} [{item.quantity.unit}]"
-    yield from _grouped(system, item, lambda e: (symengine.Symbol(item.name), _short(e)), text)
+    yield from _grouped(system, item, lambda e: (symengine.Symbol(item.name), _shortest(e)), text)
 
 
-def _grouped(system: System, item: Named, sides: Split, text: str) -> Iterator[Statement]:
+def _grouped(system: System, item: Named, sides: Splitter, text: str) -> Iterator[Statement]:
     """An equation once for every group of modes in which it is the same."""
     expression = item.expression
     modes = [mode for mode in system.modes if mode.symbol in expression.free_symbols]
-    if math.prod(len(mode.words) for mode in modes) > COMBINATIONS:
+    if math.prod(len(mode.words) for mode in modes) > MOST_COMBINATIONS:
         modes = []
     found: dict[tuple[Expression, Expression], list[str]] = {}
     for values in product(*(mode.words for mode in modes)):
@@ -282,8 +282,8 @@ def _plain(name: str, expression: Expression) -> Expression:
 
 def _tabulated(expression: Expression) -> Expression:
     """The expression with a symbol in place of each table of numbers, as interpolations are."""
-    tables = [p for p in expression.atoms(symengine.Piecewise) if len(p.atoms(symengine.Float)) > TABULATED]
-    return expression.xreplace({p: symengine.Symbol(TABLE + str(max(map(str, p.free_symbols)))) for p in tables})
+    tables = [p for p in expression.atoms(symengine.Piecewise) if len(p.atoms(symengine.Float)) > TABLE_NUMBERS]
+    return expression.xreplace({p: symengine.Symbol(TABLE_PREFIX + str(max(map(str, p.free_symbols)))) for p in tables})
 
 
 def _is_negative(expression: Expression) -> bool:
@@ -292,13 +292,13 @@ def _is_negative(expression: Expression) -> bool:
     return bool(sympy_form(expression.xreplace(state)).n() < 0)
 
 
-def _short(expression: Expression) -> Expression:
+def _shortest(expression: Expression) -> Expression:
     """The shortest of an expression, its common factors taken out, and what SymPy makes of it."""
     if {K_B, R} <= expression.free_symbols and not expression.has(symengine.E):
         expression = expression.xreplace({K_B: R / N_A})
     whole = sympy_form(expression)
     forms = [whole, sympy.factor_terms(whole, sign=True)]
-    if not whole.has(sympy.Piecewise, sympy.Float) and sympy.count_ops(whole) <= SIMPLE:
+    if not whole.has(sympy.Piecewise, sympy.Float) and sympy.count_ops(whole) <= MOST_SIMPLIFIED:
         if whole.is_rational_function():
             over, under = sympy.fraction(sympy.cancel(sympy.together(whole)))
             forms += [sympy.expand(whole), *(sympy.collect(over, x, sympy.factor) / under for x in over.free_symbols)]
@@ -307,7 +307,7 @@ def _short(expression: Expression) -> Expression:
     return symengine.sympify(min(forms, key=sympy.count_ops))
 
 
-class Paper(Latex):
+class PaperPrinter(Latex):
     """A printer of formulas for readers: few digits, positive terms first, functions by their usual names."""
 
     def __init__(self, names: Mapping[str, str]) -> None:
@@ -318,7 +318,7 @@ class Paper(Latex):
         """A line as LaTeX, the right side in its terms."""
         right = sympy_form(line.right)
         # A minus before a sum, and a product that is too long for a line, are those of each term.
-        if right.as_coeff_Mul()[1].is_Add or len(self.text(right)) > LONG:
+        if right.as_coeff_Mul()[1].is_Add or len(self.text(right)) > LINE_LETTERS:
             right = sympy.expand_mul(right, deep=False)
         left, pieces = self._broken_product(sympy_form(line.left)), self._broken_sum(right)
         return Equation(left[0], [*left[1:], f"= {pieces[0]}", *pieces[1:]], line.text, line.when)
@@ -333,10 +333,10 @@ class Paper(Latex):
 
     def _broken_product(self, term: Any) -> list[str]:
         """A term in one piece; one that is long in its factors, and those of them that are sums in their terms."""
-        if len(self.text(term)) <= WIDE or not term.is_Mul:
+        if len(self.text(term)) <= PHONE_LETTERS or not term.is_Mul:
             return [self.text(term)]
         factors = term.as_ordered_factors()
-        large = [factor for factor in factors if len(self.text(factor)) > WIDE / 4]
+        large = [factor for factor in factors if len(self.text(factor)) > PHONE_LETTERS / 4]
         rest = sympy.Mul(*(factor for factor in factors if factor not in large))
         # What is divided by stands last.
         large.sort(key=lambda factor: bool((1 / factor).is_Add))
@@ -358,8 +358,8 @@ class Paper(Latex):
         name = str(expression)
         if rate := re.fullmatch(r"d(\w+)_dt", name):
             return self._rate(self.names.get(rate[1]) or symbol(rate[1]))
-        if name.startswith(TABLE):
-            return rf"\mathcal{{F}}\left({symbol(name.removeprefix(TABLE))}\right)"
+        if name.startswith(TABLE_PREFIX):
+            return rf"\mathcal{{F}}\left({symbol(name.removeprefix(TABLE_PREFIX))}\right)"
         latex = self.names.get(name) or str(super()._print_Symbol(expression, style))
         return rf"\left({latex}\right)" if " / " in latex else latex
 

@@ -22,7 +22,7 @@ from llvmlite import binding, ir
 from numpy.typing import NDArray
 
 from surfacechem.compile.objectcode import engine
-from surfacechem.compile.preparing import PREPARING
+from surfacechem.compile.preparing import PREPARATION
 
 LANES = 8
 """Cases of a vector: one of the widest vectors there are, or two of those of most processors, which hide each other's
@@ -34,7 +34,7 @@ _Constant: Any = ir.Constant
 NUMBER = ir.DoubleType()
 VECTOR: Any = ir.VectorType(NUMBER, LANES)
 MASK: Any = ir.VectorType(ir.IntType(1), LANES)
-WORDS: Any = ir.VectorType(ir.IntType(64), LANES)
+INTEGERS: Any = ir.VectorType(ir.IntType(64), LANES)
 _POINTER = ir.IntType(8).as_pointer()
 
 
@@ -63,7 +63,7 @@ class LaneFunction:
         return found
 
 
-@PREPARING
+@PREPARATION
 def compile_lanes(inputs: Sequence[Any], expressions: Sequence[Any]) -> LaneFunction:
     """Compile a vector of expressions of the inputs for eight cases at once.
 
@@ -161,13 +161,13 @@ class Code:
             return self.read(part)
         if part.is_Number or kind in _CONSTANTS:
             return number(float(part))
-        if kind in _TRUTHS:
+        if kind in _BOOLEANS:
             return _Constant(MASK, [int(kind == "BooleanTrue")] * LANES)
         if kind == "Piecewise" and self._costs(part):
             return self._chosen(part.args)
         values = [self.known[each] for each in part.args]
-        if kind in _OWN:
-            return _OWN[kind](self, part, values)
+        if kind in _METHODS:
+            return _METHODS[kind](self, part, values)
         if kind in _LIBRARY:
             return self._by_library(_LIBRARY[kind], values)
         raise NotImplementedError(f"no vector code for {kind}: {part}")
@@ -259,9 +259,9 @@ class Code:
 
 
 _CONSTANTS = {"Pi", "Exp1"}
-_TRUTHS = {"BooleanTrue", "BooleanFalse"}
+_BOOLEANS = {"BooleanTrue", "BooleanFalse"}
 _RELATIONS = {"LessThan": "<=", "StrictLessThan": "<", "Equality": "==", "Unequality": "!="}
-_OWN: dict[str, Callable[[Any, Any, Any], Any]] = {
+_METHODS: dict[str, Callable[[Any, Any, Any], Any]] = {
     "Add": lambda code, _part, values: reduce(code.builder.fadd, values),
     "Mul": Code._product,
     "Pow": Code._power,
@@ -284,7 +284,7 @@ def has_code(expression: Any) -> bool:
     while left:
         part = left.pop()
         kind = type(part).__name__
-        if not (part.is_Symbol or part.is_Number or kind in {*_CONSTANTS, *_TRUTHS, *_OWN, *_LIBRARY}):
+        if not (part.is_Symbol or part.is_Number or kind in {*_CONSTANTS, *_BOOLEANS, *_METHODS, *_LIBRARY}):
             return False
         left += part.args
     return True
@@ -304,7 +304,7 @@ def gathered(builder: Any, values: Iterable[Any]) -> Any:
 
 
 def _whole(value: int) -> Any:
-    return _Constant(WORDS, [value] * LANES)
+    return _Constant(INTEGERS, [value] * LANES)
 
 
 def _bits(value: float) -> int:
@@ -335,11 +335,11 @@ def _polynomial(builder: Any, x: Any, coefficients: Sequence[float]) -> Any:
 _LN2_HIGH = 0.693147180369123816490
 _LN2_LOW = float(Decimal(2).ln() - Decimal(_LN2_HIGH))
 """The logarithm of 2 in two parts, the first with zeros behind, so that its multiples are exact (fdlibm)."""
-_ROUNDER = 1.5 * 2.0**52
+_ROUNDING_SHIFT = 1.5 * 2.0**52
 """Added and taken off again this rounds to a whole number, which stands in the last bits of the sum: many processors
 have no vector instruction that makes a word of a number, or shifts one with its sign.
 """
-_LARGEST, _LEAST = 709.782712893384, -745.2
+_MAX_EXP, _MIN_EXP = 709.782712893384, -745.2
 """Arguments at which exp overflows, and at which it underflows to zero."""
 _EXP = [1.0 / factorial(k) for k in range(2, 14)]
 """Taylor's series without its first two terms: below half of the logarithm of 2 the next one is 4e-18."""
@@ -347,28 +347,30 @@ _EXP = [1.0 / factorial(k) for k in range(2, 14)]
 
 def exp(builder: Any, x: Any) -> Any:
     """Exponential of a vector: 2^k exp(r) with abs(r) at most half of the logarithm of 2 (Cody & Waite)."""
-    inside = builder.select(builder.fcmp_ordered(">", x, number(_LARGEST)), number(_LARGEST), x)
-    inside = builder.select(builder.fcmp_ordered(">=", inside, number(_LEAST)), inside, number(_LEAST))  # no NaN either
-    rounded = builder.fadd(builder.fmul(inside, number(1.4426950408889634)), number(_ROUNDER))
-    whole = builder.fsub(rounded, number(_ROUNDER))
+    inside = builder.select(builder.fcmp_ordered(">", x, number(_MAX_EXP)), number(_MAX_EXP), x)
+    inside = builder.select(
+        builder.fcmp_ordered(">=", inside, number(_MIN_EXP)), inside, number(_MIN_EXP)
+    )  # no NaN either
+    rounded = builder.fadd(builder.fmul(inside, number(1.4426950408889634)), number(_ROUNDING_SHIFT))
+    whole = builder.fsub(rounded, number(_ROUNDING_SHIFT))
     rest = builder.fsub(inside, builder.fmul(whole, number(_LN2_HIGH)))
     rest = builder.fsub(rest, builder.fmul(whole, number(_LN2_LOW)))
     series = builder.fmul(builder.fmul(rest, rest), _polynomial(builder, rest, _EXP))
     found = builder.fadd(number(1.0), builder.fadd(rest, series))
     # In two factors, as the whole power of 2 may lie beyond the range.
-    power = builder.sub(builder.bitcast(rounded, WORDS), _whole(_bits(_ROUNDER)))
+    power = builder.sub(builder.bitcast(rounded, INTEGERS), _whole(_bits(_ROUNDING_SHIFT)))
     half = builder.sub(builder.lshr(builder.add(power, _whole(2048)), _whole(1)), _whole(1024))
     for part in (half, builder.sub(power, half)):
         bits = builder.shl(builder.add(part, _whole(1023)), _whole(52))
         found = builder.fmul(found, builder.bitcast(bits, VECTOR))
-    found = builder.select(builder.fcmp_ordered(">", x, number(_LARGEST)), number(np.inf), found)
+    found = builder.select(builder.fcmp_ordered(">", x, number(_MAX_EXP)), number(np.inf), found)
     return builder.select(builder.fcmp_unordered("uno", x, x), x, found)
 
 
 _LOG_EVEN = [6.666666666666735130e-01, 2.857142874366239149e-01, 1.818357216161805012e-01, 1.479819860511658591e-01]
 _LOG_ODD = [3.999999999940941908e-01, 2.222219843214978396e-01, 1.531383769920937332e-01]
 """Coefficients of the series of log((1 + s) / (1 - s)) / s - 2 in even and odd powers of s^2 (fdlibm, e_log.c)."""
-_ROOT_BITS = 0x3FE6A09E667F3BCD
+_SQRT_HALF_BITS = 0x3FE6A09E667F3BCD
 """The bits of the root of one half."""
 
 
@@ -376,12 +378,12 @@ def log(builder: Any, x: Any) -> Any:
     """Natural logarithm of a vector (fdlibm, e_log.c): x = 2^k (1 + f) with 1 + f between the roots of 1/2 and 2."""
     tiny = builder.fcmp_ordered("<", x, number(2.0**-1022))
     scaled = builder.select(tiny, builder.fmul(x, number(2.0**54)), x)
-    bits = builder.sub(builder.bitcast(scaled, WORDS), _whole(_ROOT_BITS))
+    bits = builder.sub(builder.bitcast(scaled, INTEGERS), _whole(_SQRT_HALF_BITS))
     # k + 1024 is above zero, and a word below 2^52 with the bits of that number is the number 2^52 more.
     counted = builder.lshr(builder.add(bits, _whole(1024 << 52)), _whole(52))
     counted = builder.bitcast(builder.or_(counted, _whole(_bits(2.0**52))), VECTOR)
     power = builder.fsub(counted, builder.select(tiny, number(2.0**52 + 1078.0), number(2.0**52 + 1024.0)))
-    kept = builder.add(builder.and_(bits, _whole(2**52 - 1)), _whole(_ROOT_BITS))
+    kept = builder.add(builder.and_(bits, _whole(2**52 - 1)), _whole(_SQRT_HALF_BITS))
     f = builder.fsub(builder.bitcast(kept, VECTOR), number(1.0))
     s = builder.fdiv(f, builder.fadd(number(2.0), f))
     z = builder.fmul(s, s)

@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from surfacechem.compile.preparing import PREPARING
+from surfacechem.compile.preparing import PREPARATION
 from surfacechem.solve.contract import Array
 from surfacechem.solve.zeros import zero
 from surfacechem.tolerances import CBRT_EPS, DIGITS, NEGLIGIBLE, NOTHING, PICOMETRE
@@ -121,7 +121,7 @@ def come_to_rest(driving: Field, scale: Array, onward: Array, begins: Array) -> 
 
     A gap with a direction other than zero ``onward`` slides: friction resists its motion and pulls nothing back.
     """
-    with PREPARING:
+    with PREPARATION:
         from scipy.integrate import Radau
 
     def velocity(_: float, ways: Array) -> Array:

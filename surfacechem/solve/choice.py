@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from surfacechem.compile.program import MANY, Program
+from surfacechem.compile.program import MOST_RATE_STATES, Program
 from surfacechem.solve import ASKING
 from surfacechem.solve.contract import Problem
 from surfacechem.tolerances import TIGHTEST
@@ -37,7 +37,7 @@ def _why_implicit(problem: Problem) -> str:
         return "some states are algebraic"
     if program.chains:
         return "heat conducted between cells is stiff"
-    if program.n > MANY:
+    if program.n > MOST_RATE_STATES:
         return f"{program.n} states, whose rates would be compiled for it"
     if program.rates is None:
         return "the equations determine their rates together"

@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from surfacechem.compile.preparing import PREPARING
-from surfacechem.compile.program import Chain, Filler, Function, Program, compile_function, compile_program
+from surfacechem.compile.preparing import PREPARATION
+from surfacechem.compile.program import Chain, ExternalInputs, Function, Program, compile_function, compile_program
 from surfacechem.contracts.terms import Spec
 from surfacechem.errors import PATHS, InputError, suggestion
 from surfacechem.model.checks import StartLimits
@@ -352,7 +352,7 @@ class Model:
             paths = [parameter.path for parameter in system.parameters]
             positions = np.array([1 + 2 * n + paths.index(path) for path in outside.engine.gives], dtype=np.int64)
             reads = compile_function(inputs, [system.expand(expression) for expression in outside.reads])
-            filler = Filler(reads, positions, outside.engine)
+            filler = ExternalInputs(reads, positions, outside.engine)
         self.system = system
         self.margins = system.moving_margins
         """The margins that can close on the way; the rest is checked at the start only."""
@@ -511,7 +511,7 @@ class Model:
 
     def solve_all(self, runs: Sequence[tuple[Run, Mapping[str, float]]], threads: int = 1) -> list[Trajectory]:
         """Runs that differ in values and output times, together in the compiled loop."""
-        before = PREPARING.seconds
+        before = PREPARATION.seconds
         problems = [self.problem(*pair) for pair in runs]
         run = self._with_method(runs[0][0], problems[0])
         used = solver(run.solver)
@@ -522,7 +522,7 @@ class Model:
                 path="run.solver",
             )
         used.prepare()
-        self.compile_seconds += PREPARING.seconds - before
+        self.compile_seconds += PREPARATION.seconds - before
         items = [
             (each if each.solver == run.solver else replace(each, solver=run.solver), values, problem)
             for (each, values), problem in zip(runs, problems, strict=True)
@@ -535,9 +535,9 @@ class Model:
         self, used: Solver, items: Sequence[tuple[Run, Mapping[str, float], Problem]], threads: int
     ) -> list[Trajectory]:
         """Runs whose arcs are solved in batches; each has its part of their time."""
-        start, prepared = time.perf_counter(), PREPARING.seconds
+        start, prepared = time.perf_counter(), PREPARATION.seconds
         ends = solve_together([self._flow(problem, used.crosses_edges) for _, _, problem in items], used, threads)
-        compiling = PREPARING.seconds - prepared
+        compiling = PREPARATION.seconds - prepared
         seconds = (time.perf_counter() - start - compiling) / len(items)
         self.compile_seconds += compiling
         done = []

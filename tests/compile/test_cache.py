@@ -158,7 +158,7 @@ def test_a_flipped_bit_is_never_loaded(kept: Path, tmp_path: Path, monkeypatch) 
     monkeypatch.setenv("SURFACECHEM_CACHE", str(tmp_path))
     random, folder = Random(1), tmp_path / kept.name
     files = [path.name for path in kept.glob("kernel.*")]
-    assert kernelcache.FILE in files
+    assert kernelcache.NUMBA_FILE in files
     for file in files:
         content = (kept / file).read_bytes()
         for bit in (0, 8 * len(content) - 1, *(random.randrange(8 * len(content)) for _ in range(20))):
@@ -166,14 +166,14 @@ def test_a_flipped_bit_is_never_loaded(kept: Path, tmp_path: Path, monkeypatch) 
             damaged = bytearray(content)
             damaged[bit // 8] ^= 1 << bit % 8
             (folder / file).write_bytes(damaged)
-            assert file != objectcode.FILE or objectcode.load(folder) is None
+            assert file != objectcode.OBJECT_FILE or objectcode.load(folder) is None
             assert not is_filled(folder)  # so that the next process makes all of it anew
             shutil.rmtree(folder)
 
 
 def test_what_a_wheel_carries_is_taken_where_the_processor_runs_it(kept: Path, tmp_path: Path, monkeypatch) -> None:
     monkeypatch.setenv("SURFACECHEM_CACHE", str(tmp_path))
-    monkeypatch.setattr(kernelcache, "SHIPPED", tmp_path / "wheel")
+    monkeypatch.setattr(kernelcache, "SHIPPED_FOLDER", tmp_path / "wheel")
     shutil.copytree(kept, kernelcache.shipped_folder(stepper.sources(), tmp_path / "wheel"))
     monkeypatch.setitem(kernelcache.PLATFORMS, platform.machine().lower(), ("new", ("instructions to come",)))
     loop = stepper.Loop(stepper.sources(), "none", "none")
@@ -182,7 +182,7 @@ def test_what_a_wheel_carries_is_taken_where_the_processor_runs_it(kept: Path, t
     assert loop.is_compiled
     loop.load_briefly()
     assert loop.load() is not None
-    (loop.folder / kernelcache.FILE).write_bytes(b"damaged")
+    (loop.folder / kernelcache.NUMBA_FILE).write_bytes(b"damaged")
     # What is there is not written over, but made anew.
     assert not stepper.Loop(stepper.sources(), "none", "none").is_compiled
 
@@ -192,7 +192,7 @@ def cut_off(kept: Path, tmp_path: Path) -> Path:
     """A cache whose code for brief processes is cut off."""
     folder = tmp_path / "cache" / kept.name
     shutil.copytree(kept, folder)
-    with (folder / objectcode.FILE).open("r+b") as file:
+    with (folder / objectcode.OBJECT_FILE).open("r+b") as file:
         file.truncate(1000)
     return folder
 
@@ -214,7 +214,7 @@ def test_a_command_runs_where_the_cache_is_damaged(cut_off: Path, tmp_path: Path
     environment = {**os.environ, "SURFACECHEM_CACHE": str(cut_off.parent), "PYTHONPATH": os.pathsep.join(sys.path)}
     command = [sys.executable, "-c", COMMAND, str(tmp_path / "run.nc")]
     subprocess.run(command, env=environment, check=True, timeout=300)
-    assert unsealed((cut_off / objectcode.FILE).read_bytes()) is not None
+    assert unsealed((cut_off / objectcode.OBJECT_FILE).read_bytes()) is not None
 
 
 @pytest.mark.skipif(not hasattr(os, "getuid"), reason="permissions of POSIX")
@@ -222,10 +222,10 @@ def test_a_cache_that_another_user_can_write_to_is_refused(start, tmp_path: Path
     cache = tmp_path / "cache"
     monkeypatch.setenv("SURFACECHEM_CACHE", str(cache))
     (tmp_path / "elsewhere").mkdir(mode=0o755)
-    (tmp_path / "elsewhere" / kernelcache.FILE).touch(mode=0o644)
+    (tmp_path / "elsewhere" / kernelcache.NUMBA_FILE).touch(mode=0o644)
     folder = kernelcache.kernel_folder([tmp_path / "tiny_kernel.py"])
     shutil.copytree(tmp_path / "elsewhere", folder)
-    for path in (cache, folder, folder / kernelcache.FILE):
+    for path in (cache, folder, folder / kernelcache.NUMBA_FILE):
         usual = path.stat().st_mode
         path.chmod(usual | 0o020)
         assert "can be written by other users" in kernelcache.untrusted(folder)

@@ -42,7 +42,7 @@ def test_numba_compiles_on_in_a_process_that_has_loaded_the_code(bare):
 def test_what_is_no_code_is_not_loaded(tmp_path, content):
     (tmp_path / "folder").mkdir(mode=0o755)
     if content is not None:
-        (tmp_path / "folder" / objectcode.FILE).write_bytes(content)
+        (tmp_path / "folder" / objectcode.OBJECT_FILE).write_bytes(content)
     assert objectcode.load(tmp_path / "folder") is None
 
 

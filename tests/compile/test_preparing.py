@@ -6,7 +6,7 @@ import pytest
 
 import surfacechem
 from surfacechem.compile import preparing, program
-from surfacechem.compile.preparing import PREPARING
+from surfacechem.compile.preparing import PREPARATION
 from surfacechem.format.cases import load_text
 from surfacechem.solve.run import Model
 
@@ -14,12 +14,12 @@ from surfacechem.solve.run import Model
 def test_a_block_within_another_counts_once(monkeypatch):
     clock = iter([10.0, 17.0])
     monkeypatch.setattr(preparing, "time", SimpleNamespace(perf_counter=lambda: next(clock)))
-    before = PREPARING.seconds
-    with PREPARING:
-        with PREPARING:
+    before = PREPARATION.seconds
+    with PREPARATION:
+        with PREPARATION:
             pass
-        PREPARING(lambda: None)()
-    assert PREPARING.seconds - before == 7.0
+        PREPARATION(lambda: None)()
+    assert PREPARATION.seconds - before == 7.0
 
 
 RESTING = """

@@ -86,7 +86,7 @@ def test_printed_equations_agree_with_machine_code_and_are_short_enough_to_read(
     text = printing.latex(system).replace("&<", "&=")  # margins are above zero
     for left, right in (("{", "}"), (r"\begin{cases}", r"\end{cases}"), ("&=", "&& ")):
         assert text.count(left) == text.count(right)
-    assert printing.APART not in text
+    assert printing.CONDITION_PREFIX not in text
 
 
 @pytest.mark.parametrize("scene", [scenes.one_sided, scenes.sliding], ids=lambda scene: scene.__name__)

@@ -5,7 +5,7 @@ import pytest
 import symengine
 from case_runs import load
 
-from surfacechem.compile.typeset import CONSTANTS, equations, lines, readable
+from surfacechem.compile.typeset import CONSTANTS, equations, readable, statements
 from surfacechem.expressions import where
 
 pytestmark = pytest.mark.around
@@ -35,7 +35,7 @@ def number(expression, point):
 @pytest.mark.parametrize("name", SHOWN)
 def test_what_is_shown_holds_wherever_no_guard_is_in_play(name):
     system = assembled(name)
-    point, found = a_state(system), lines(system)
+    point, found = a_state(system), statements(system)
     for state, row in system.rows.items():
         sides = [(number(line.left, point), number(line.right, point)) for line in found if line.name == state]
         exact = abs(number(row, point))

@@ -10,7 +10,7 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from surfacechem.compile.program import CODE, Filler, Function, Program
+from surfacechem.compile.program import C_FUNCTION, ExternalInputs, Function, Program
 from surfacechem.solve.contract import Array
 from surfacechem.solve.radau import stepper
 from surfacechem.solve.radau.solver import search_batch
@@ -84,7 +84,7 @@ class Evaluation:
         if whole and self._filler is not None:
             self._fill(self._filler)
 
-    def _fill(self, filler: Filler) -> None:
+    def _fill(self, filler: ExternalInputs) -> None:
         self.inputs[filler.positions] = filler.evaluate(self._reads().tolist())
 
     def restart(self, y: Array) -> None:
@@ -160,7 +160,7 @@ class _Code:
         self.out = np.zeros(function.n_out if function else 0) if out is None else out
         self._call: Callable[[], object] = lambda: None
         if function:
-            self._call = partial(CODE(function.address), self.out.ctypes.data, inputs.ctypes.data, function.user)
+            self._call = partial(C_FUNCTION(function.address), self.out.ctypes.data, inputs.ctypes.data, function.user)
         self._keep = function
 
     def __call__(self) -> Array:

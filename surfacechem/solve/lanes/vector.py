@@ -14,7 +14,7 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic, lower_builtin, models, register_model, type_callable
 
-from surfacechem.compile.vectors import LANES, VECTOR, WORDS, by_vector
+from surfacechem.compile.vectors import INTEGERS, LANES, VECTOR, by_vector
 
 _Constant: Any = ir.Constant
 _intrinsic: Any = intrinsic
@@ -32,7 +32,7 @@ LANE, MASK = _Lanes(name="Lanes"), _Lanes(name="Mask")
 @register_model(_Lanes)
 class _LanesModel(models.PrimitiveModel):
     def __init__(self, manager: Any, kind: Any) -> None:
-        super().__init__(manager, kind, VECTOR if kind is LANE else WORDS)  # type: ignore[no-untyped-call]
+        super().__init__(manager, kind, VECTOR if kind is LANE else INTEGERS)  # type: ignore[no-untyped-call]
 
 
 def _spread(builder: Any, value: Any) -> Any:
@@ -46,7 +46,7 @@ def _holds(builder: Any, mask: Any) -> Any:
     """A mask as bits. Between operations it is eight words of ones or zeros: what processors without registers for bits
     choose by.
     """
-    return builder.icmp_signed("<", mask, _Constant(WORDS, [0] * LANES))
+    return builder.icmp_signed("<", mask, _Constant(INTEGERS, [0] * LANES))
 
 
 def _operation(operation: Any, kind: Any, result: Any, emit: Callable[[Any, Any, Any], Any]) -> None:
@@ -73,7 +73,7 @@ def _arithmetic(name: str) -> Callable[[Any, Any, Any], Any]:
 
 
 def _comparison(sign: str) -> Callable[[Any, Any, Any], Any]:
-    return lambda builder, a, b: builder.sext(builder.fcmp_ordered(sign, a, b), WORDS)
+    return lambda builder, a, b: builder.sext(builder.fcmp_ordered(sign, a, b), INTEGERS)
 
 
 for _operator, _name in (("add", "fadd"), ("sub", "fsub"), ("mul", "fmul"), ("truediv", "fdiv")):
@@ -161,7 +161,7 @@ def absolute(_context: Any, value: Any) -> Any:
     """The sizes of eight numbers."""
 
     def generate(_context: Any, builder: Any, _signature: Any, args: Any) -> Any:
-        sizes = builder.and_(builder.bitcast(args[0], WORDS), _Constant(WORDS, [2**63 - 1] * LANES))
+        sizes = builder.and_(builder.bitcast(args[0], INTEGERS), _Constant(INTEGERS, [2**63 - 1] * LANES))
         return builder.bitcast(sizes, VECTOR)
 
     return LANE(value), generate

@@ -10,7 +10,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from surfacechem.compile.program import MANY, Program
+from surfacechem.compile.program import MOST_RATE_STATES, Program
 from surfacechem.solve.contract import (
     NO_EDGES,
     Array,
@@ -377,6 +377,6 @@ def rates_at(program: Program, t: Array, y: Array, parameters: Array) -> Array:
     """Derivatives of states, shape (rows, n), at times and with parameters of their own."""
     guess = np.zeros_like(y)
     # A formula is there much sooner than the solution of a linear system for each row.
-    if program.filler is None and program.n <= MANY and program.rates is not None:
+    if program.filler is None and program.n <= MOST_RATE_STATES and program.rates is not None:
         return program.rates(np.concatenate([t[:, None], y, guess, parameters], axis=1))
     return consistent(program, t, y, guess, parameters).ydot

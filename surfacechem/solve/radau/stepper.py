@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from surfacechem.compile import objectcode
-from surfacechem.compile.cache import compile_kernel, fill, is_filled, kernel_folder
+from surfacechem.compile.cache import compile_kernel, copy_shipped, is_filled, kernel_folder
 from surfacechem.solve.contract import AT_ONCE
 
 EDGE_TABLES: dict[str, tuple[Any, int]] = {
@@ -266,7 +266,7 @@ class Loop:
     def folder(self) -> Path:
         """Folder of its compiled code, filled from the wheel if that carries any that fits."""
         folder = kernel_folder(self._sources)
-        fill(folder, self._sources)
+        copy_shipped(folder, self._sources)
         return folder
 
     @property
