@@ -28,9 +28,9 @@ AT = "surface_time"
 
 def surface_columns(trajectory: Trajectory, surface: CurvedSurfaces) -> tuple[list[Column], float]:
     """Columns over their own times and over the surface of body 1, and the time that they took [s]."""
-    from surfacechem.surfaces.potential import SPENT, integrating
+    from surfacechem.surfaces.potential import INTEGRATION_TIME, integrating
 
-    before, times = SPENT.seconds, trajectory.result.times
+    before, times = INTEGRATION_TIME.seconds, trajectory.result.times
     chosen = np.unique(np.linspace(0, len(times) - 1, TIMES).round().astype(int))
     columns = [Column(AT, (AT,), times[chosen], "s", "times at which the surfaces are looked at")]
     with integrating():
@@ -40,7 +40,7 @@ def surface_columns(trajectory: Trajectory, surface: CurvedSurfaces) -> tuple[li
         if "J_c" in trajectory.everywhere:
             stretches = trajectory.everywhere["J_c"][: len(times)][chosen]
         columns += [*_totals(surface, approaches, stretches), *_fields(surface, approaches, stretches)]
-    return columns, SPENT.seconds - before
+    return columns, INTEGRATION_TIME.seconds - before
 
 
 def _totals(surface: CurvedSurfaces, approaches: Array, stretches: Array) -> list[Column]:
@@ -74,7 +74,7 @@ def _fields(surface: CurvedSurfaces, approaches: Array, stretches: Array) -> Seq
     """Gap and traction over points of body 1, which gather where body 2 is nearest."""
     from surfacechem.surfaces.pairwise import length
     from surfacechem.surfaces.patches import Budget, outer_patches
-    from surfacechem.surfaces.projection import FIRST
+    from surfacechem.surfaces.projection import FIRST_ORDER
 
     lower, upper = surface.surfaces(float(approaches.min()))
     size = length(lower, upper)
@@ -82,7 +82,7 @@ def _fields(surface: CurvedSurfaces, approaches: Array, stretches: Array) -> Seq
     lower = patches.surface
     counts = [ALONG, AROUND] if patches.alike[1] else [ACROSS, ACROSS]
     at = np.stack(np.meshgrid(*map(patches.line, (0, 1), counts), indexing="ij"), axis=-1)
-    D = lower.derivatives(lower.off_pole(at), FIRST)
+    D = lower.derivatives(lower.off_pole(at), FIRST_ORDER)
     x, normals = D[0], lower.normals(D)
     near = [replace(upper, approach=d).nearest(x) for d in approaches.tolist()]
     gap, opposite = np.array([one.gap for one in near]), np.array([one.point for one in near])

@@ -173,11 +173,11 @@ class Simulation:
         """The assembled equations."""
         if self.case.scene.surface is None:
             return self.case.system()
-        from surfacechem.surfaces.potential import SPENT
+        from surfacechem.surfaces.potential import INTEGRATION_TIME
 
-        before = SPENT.seconds
+        before = INTEGRATION_TIME.seconds
         system = self.case.system()
-        self.integrals_seconds = SPENT.seconds - before
+        self.integrals_seconds = INTEGRATION_TIME.seconds - before
         return system
 
     @cached_property

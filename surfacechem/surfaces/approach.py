@@ -25,18 +25,18 @@ from surfacechem.tolerances import NEGLIGIBLE, TINY
 DEGREES = (2, 4, 8, 16, 32)
 """Degrees of the polynomials in the approach that are tried one after the other."""
 
-CLOSER = 8
+SECOND_FIT_GAIN = 8
 """Factor by which a second fit is tighter, for which the errors of the integrals leave room."""
 
-ENOUGH, FEWEST = 8, 9
+GAIN_DEGREE, PIECE_SAMPLES = 8, 9
 """Degree from which it is told whether a higher one is worth it, and the places that a piece takes beside its end."""
 
-SHORTEST = 2.0**-26
+SHORTEST_PIECE = 2.0**-26
 """Fraction of the range of approaches below which no piece is divided; at a kink of the force errors do not count."""
 
 MOST_PIECES = 200
 
-BETWEEN = (-0.97, -0.52, 0.14, 0.71, 0.97)
+CHECK_PLACES = (-0.97, -0.52, 0.14, 0.71, 0.97)
 """Places on a piece, beside its ends, at which the error of a polynomial is seen."""
 
 logger = logging.getLogger(__name__)
@@ -117,7 +117,7 @@ class ApproachEnergy:
         return self.factor * where(d < first.low, wall, result)
 
 
-class Sampled:
+class CachedSamples:
     """A function of the approach, computed once at each: that is logged, with how many are known to be needed, which
     the ``budget`` is for.
     """
@@ -156,8 +156,8 @@ def fitted(
 
     An energy of one sign at positive approaches is fitted by its logarithm, in which a power is a straight line.
     """
-    sample, inside = Sampled(samples, budget or Budget(rtol)), [cut for cut in cuts if low < cut < high]
-    sample.budget.integrals = (1 + len(inside)) * FEWEST + 1
+    sample, inside = CachedSamples(samples, budget or Budget(rtol)), [cut for cut in cuts if low < cut < high]
+    sample.budget.integrals = (1 + len(inside)) * PIECE_SAMPLES + 1
     first = sample(low)  # what has no force there is refused before anything else is computed
     powers = low > 0 and not inside
     if powers:  # and its energies all above or all below zero, and more than nothing
@@ -165,16 +165,16 @@ def fitted(
         powers = min(energies) > floor[0] or max(energies) < -floor[0]
     least = 0.0 if powers else floor[1]
     # What pieces miss of a slope of ln E adds up along them: then they are made once more, closer.
-    for aim in (rtol, rtol / CLOSER):
+    for aim in (rtol, rtol / SECOND_FIT_GAIN):
         curve = joined(divided(sample, [low, *inside, high], powers, aim, least), *first[:2], powers)
         # Between the places that are looked at it may miss more, hardly twice as much.
-        error = float(2 * missed(curve, sample.at, least) + max(error for _, _, error in sample.at.values()))
+        error = float(2 * largest_error(curve, sample.at, least) + max(error for _, _, error in sample.at.values()))
         if error <= rtol:
             break
     return replace(curve, error=error)
 
 
-def missed(curve: ApproachEnergy, at: Mapping[float, tuple[float, float, float]], least: float) -> float:
+def largest_error(curve: ApproachEnergy, at: Mapping[float, tuple[float, float, float]], least: float) -> float:
     """Largest difference of the slope of a curve from the forces that it is made of, relative to them in each piece, or
     to the ``least`` that counts.
     """
@@ -191,20 +191,20 @@ def missed(curve: ApproachEnergy, at: Mapping[float, tuple[float, float, float]]
 
 
 def divided(
-    sample: Sampled, ends: Sequence[float], powers: bool, rtol: float, least: float
+    sample: CachedSamples, ends: Sequence[float], powers: bool, rtol: float, least: float
 ) -> list[tuple[float, float, Array]]:
     """Pieces that are halved until a polynomial is the force on each; at a kink until they are too short to count."""
     found: list[tuple[float, float, Array]] = []
     waiting = list(pairwise(ends))[::-1]
     while waiting:
-        sample.budget.integrals = len(sample.at) + len(waiting) * FEWEST
+        sample.budget.integrals = len(sample.at) + len(waiting) * PIECE_SAMPLES
         a, b = waiting.pop()
         if len(found) + len(waiting) > MOST_PIECES:
             raise InputError(f"the accuracy {rtol:g} over the approach is out of reach near {a:.4g} m.")
         coefficients = polynomial(sample, a, b, powers, rtol, least)
         if coefficients is not None:
             found.append((a, b, coefficients))
-        elif _extent(a, b, powers) > SHORTEST * _extent(ends[0], ends[-1], powers):
+        elif _extent(a, b, powers) > SHORTEST_PIECE * _extent(ends[0], ends[-1], powers):
             middle = approach_at(0.0, a, b, powers)
             # The lower half is the next, so that pieces are found in order.
             waiting += [(middle, b), (a, middle)]
@@ -224,7 +224,7 @@ def value_at(sample: Samples, d: float, powers: bool) -> float:
     return force * d / energy if powers else force
 
 
-def polynomial(sample: Sampled, a: float, b: float, powers: bool, rtol: float, least: float) -> Array | None:
+def polynomial(sample: CachedSamples, a: float, b: float, powers: bool, rtol: float, least: float) -> Array | None:
     """Coefficients of the polynomial fitted between two approaches; None where a higher degree gains too little."""
 
     def value(x: float) -> float:
@@ -241,10 +241,10 @@ def polynomial(sample: Sampled, a: float, b: float, powers: bool, rtol: float, l
         # What one of half the degree misses is the root of what this one does, as errors fall like a power of it.
         largest = max(float(np.max(np.abs(values))), size)
         off, goal = float(np.max(np.abs(before(nodes) - values))) / largest, rtol * size / largest
-        if off**2 <= goal and all(abs(fit(x) - value(x)) <= rtol * size for x in BETWEEN):
+        if off**2 <= goal and all(abs(fit(x) - value(x)) <= rtol * size for x in CHECK_PLACES):
             found = fit.trim(NEGLIGIBLE * rtol * size).convert(kind=np.polynomial.Polynomial, domain=[-1, 1])
             return np.asarray(found.coef)
-        if degree >= ENOUGH and off ** (2 * DEGREES[-1] / degree) > goal:
+        if degree >= GAIN_DEGREE and off ** (2 * DEGREES[-1] / degree) > goal:
             return None
     return None
 

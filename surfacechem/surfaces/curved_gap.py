@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 
 from surfacechem.contracts.terms import HeatTransfer, PairEnergy, Potential, Varying, optional, reads
 from surfacechem.errors import InputError
-from surfacechem.surfaces.inner_sums import extents, kernel, with_slope
+from surfacechem.surfaces.inner_sums import kernel, laws_by_extent, with_slope
 from surfacechem.surfaces.level_cuts import with_levels
-from surfacechem.surfaces.nodes import gauss
-from surfacechem.surfaces.pairwise import check_finite, length
+from surfacechem.surfaces.nodes import gauss_rule
+from surfacechem.surfaces.pairwise import ENDLESS_REACH, check_finite, length
 from surfacechem.surfaces.patches import Budget, Patches, Rules, integral, outer_patches
-from surfacechem.surfaces.projection import FIRST, NEWTONS, Array, Projection, Surface, cross
+from surfacechem.surfaces.projection import FIRST_ORDER, MOST_NEWTON_STEPS, Array, Projection, Surface, cross
 from surfacechem.surfaces.shapes import Plane
 from surfacechem.tolerances import NEGLIGIBLE, NOISE, PRECISE, SQRT_EPS, TINY
 
@@ -30,13 +30,10 @@ GAP = "g_n"
 Density = Callable[[Array], Array]
 """Energy per area [J/m^2] and traction [Pa], tension positive, (n, 2) for n gaps [m]."""
 
-OF_AREA = NEGLIGIBLE**2
+AREA_ACCURACY = NEGLIGIBLE**2
 """Relative accuracy of the area of contact, which no force follows from, unless less is asked for."""
 
 UP = np.array([0.0, 0.0, 1.0])
-
-FAR = 1e6
-"""Extent of an endless surface over the largest length of the two."""
 
 
 @dataclass(frozen=True)
@@ -87,14 +84,14 @@ def between_flats(law: PairEnergy) -> Density:
             return np.stack([whole, -amount * gaps * psi(gaps)[..., 0]], axis=-1)
 
         return summed
-    ends, last = np.array([bend for extent in extents([law]) for bend in extent.bends]), law.cutoff
+    ends, last = np.array([bend for extent in laws_by_extent([law]) for bend in extent.bends]), law.cutoff
 
     def at(gaps: Array) -> Array:
         # Pieces of r = g exp(t) up to where the law ends or, where it does not, to exp(8) g, cut where it bends.
         g = gaps.reshape(-1, 1)
         most = np.log(np.maximum(last / g, 1)) if math.isfinite(last) else np.full_like(g, 8.0)
         cuts = np.clip(np.log(np.maximum(ends / g, 1)), 0, most)
-        t, w = gauss(np.sort(np.concatenate([most * np.linspace(0, 1, 9), cuts], axis=1), axis=1), 24)
+        t, w = gauss_rule(np.sort(np.concatenate([most * np.linspace(0, 1, 9), cuts], axis=1), axis=1), 24)
         r = g * np.exp(t)
         whole = np.sum(psi(r)[..., 0] * r**2 * w, axis=1)
         if math.isinf(last):
@@ -115,21 +112,21 @@ def bends(laws: Iterable[Potential | HeatTransfer]) -> list[float]:
     return sorted(found)
 
 
-def passages(lower: Surface, upper: Surface, levels: Sequence[float]) -> list[float]:
+def level_approaches(lower: Surface, upper: Surface, levels: Sequence[float]) -> list[float]:
     """Approaches at which the least gap passes levels; for two plates where a corner of one of them does, or where
     edges of both cross, in closed form: there the force over the approach bends. The ``upper`` body is at zero.
     """
     if not all(type(body.shape) is Plane for body in (lower, upper)):
-        return [_met(lower, upper, level) for level in levels]
+        return [_approach_at_level(lower, upper, level) for level in levels]
     size = length(lower, upper)
-    below, above = (_outline(body, size * FAR) for body in (lower, upper))
+    below, above = (_corners(body, size * ENDLESS_REACH) for body in (lower, upper))
     n, m = upper.axes[:, 2], lower.axes[:, 2]
     found = []
     for moved in (above + level * n for level in levels):
         # A corner of one plate over the other, which is an offset of the upper one by the level.
         over, under = (below - moved[0]) @ n / n[2], -moved @ m / m[2]
-        found += over[_within(upper, below - over[:, None] * UP)].tolist()
-        found += under[_within(lower, moved + under[:, None] * UP)].tolist()
+        found += over[_is_on_plate(upper, below - over[:, None] * UP)].tolist()
+        found += under[_is_on_plate(lower, moved + under[:, None] * UP)].tolist()
         for a, b in zip(below, np.roll(below, 1, axis=0), strict=True):
             for c, e in zip(moved, np.roll(moved, 1, axis=0), strict=True):
                 across = np.cross(b - a, e - c)
@@ -141,14 +138,14 @@ def passages(lower: Surface, upper: Surface, levels: Sequence[float]) -> list[fl
     return list(map(float, distinct[np.diff(distinct, prepend=-np.inf) > NOISE * size]))
 
 
-def _met(lower: Surface, upper: Surface, level: float) -> float:
+def _approach_at_level(lower: Surface, upper: Surface, level: float) -> float:
     """The approach at which the least gap is a level, which it is itself where no body is tilted about its highest
     point.
     """
     size = length(lower, upper)
     d, before, step = level, math.nan, math.nan
-    for _ in range(NEWTONS):
-        _, near = outer_patches(lower, replace(upper, approach=d), size, size * FAR, Budget(PRECISE))
+    for _ in range(MOST_NEWTON_STEPS):
+        _, near = outer_patches(lower, replace(upper, approach=d), size, size * ENDLESS_REACH, Budget(PRECISE))
         left = level - float(near.gap[0])
         if abs(left) <= NOISE * size:
             break
@@ -158,13 +155,13 @@ def _met(lower: Surface, upper: Surface, level: float) -> float:
     return d
 
 
-def _outline(plate: Surface, far: float) -> Array:
+def _corners(plate: Surface, far: float) -> Array:
     """Corners (4, 3), one after the other."""
     (a, b), (c, e) = np.nan_to_num(plate.shape.span, posinf=far, neginf=-far)
-    return np.asarray(plate.derivatives(np.array([(a, c), (b, c), (b, e), (a, e)]), FIRST)[0])
+    return np.asarray(plate.derivatives(np.array([(a, c), (b, c), (b, e), (a, e)]), FIRST_ORDER)[0])
 
 
-def _within(plate: Surface, x: Array) -> NDArray[np.bool_]:
+def _is_on_plate(plate: Surface, x: Array) -> NDArray[np.bool_]:
     """Whether each of the points (n, 3) in the plane of a plate is on it."""
     return np.asarray(np.all(np.abs((x @ plate.axes)[:, :2]) <= np.max(plate.shape.span, axis=1) * (1 + NOISE), axis=1))
 
@@ -186,11 +183,11 @@ def over_gap(
     """
     check_finite(lower, upper)
     size, budget = length(lower, upper), budget or Budget(rtol)
-    patches, near = outer_patches(lower, upper, size, size * FAR, budget)
+    patches, near = outer_patches(lower, upper, size, size * ENDLESS_REACH, budget)
     patches = with_levels(patches, upper, levels, NOISE * size, rtol)
 
     def integrand(x: Array, level: int) -> tuple[Array, int]:
-        return counts_at(x, upper.nearest(x), laws, heat), len(x)
+        return integrands(x, upper.nearest(x), laws, heat), len(x)
 
     def sizes(found: Array) -> Array:
         force, moment = (float(np.linalg.norm(found[k])) for k in (slice(1, 4), slice(7, 10)))
@@ -201,7 +198,7 @@ def over_gap(
             *[max(moment, force * size)] * 6,
         ]
         # Where bodies just touch rounding decides what overlaps.
-        area = max(abs(found[13]), SQRT_EPS * size**2) * max(1.0, OF_AREA / rtol)
+        area = max(abs(found[13]), SQRT_EPS * size**2) * max(1.0, AREA_ACCURACY / rtol)
         flow = max(abs(found[14]), TINY)
         return np.array([*parts, area, flow, max(abs(found[15]), flow / size)])
 
@@ -229,7 +226,7 @@ def _check_end(patches: Patches, rules: Rules, sizes: Array) -> None:
             raise InputError(f"{text}, or name the other one first.")
 
 
-def counts_at(x: Array, near: Projection, laws: Sequence[Density], heat: Sequence[Callable[[Array], Array]]) -> Array:
+def integrands(x: Array, near: Projection, laws: Sequence[Density], heat: Sequence[Callable[[Array], Array]]) -> Array:
     """Integrands per area at points (n, 3) of body 1, in the order of :class:`Contact`."""
     count = np.zeros((*near.gap.shape, 16))
     for law in laws:

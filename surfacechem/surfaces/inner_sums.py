@@ -14,30 +14,30 @@ import numpy as np
 from surfacechem.contracts.terms import PairEnergy, Shape
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression
-from surfacechem.surfaces.nodes import Extent, Kernel, Sums, divided, gauss, is_round, order_of, tensor_grid
+from surfacechem.surfaces.nodes import Extent, Kernel, Sums, divided, gauss_rule, is_round, order_of, tensor_grid
 from surfacechem.surfaces.projection import Array, Projection, Surface
 from surfacechem.surfaces.rays import ray_grid
 from surfacechem.surfaces.shapes import Sphere
 from surfacechem.tolerances import NEGLIGIBLE, TINY
 
-LEFT_OUT = 0.01
+TRUNCATION_PART = 0.01
 """Truncation error of a sum as a fraction of the accuracy: what is far away of one surface is not summed."""
 
-SOUGHT = 4
+BEND_SEARCH_COST = 4
 """Points that are looked at for one on a ray, as bends are sought along it."""
 
-CHEBYSHEV, BETWEEN = np.cos(np.pi * (np.arange(24) + 0.5) / 24), np.array([-0.97, -0.52, 0.14, 0.71])
+CHEBYSHEV_NODES, TABLE_CHECKS = np.cos(np.pi * (np.arange(24) + 0.5) / 24), np.array([-0.97, -0.52, 0.14, 0.71])
 """Gaps for a polynomial of their logarithm, and places between them at which it is tried."""
 
-PART = 0.5
+TABLE_LENGTH = 0.5
 """Length of these pieces: over one a sum of r^-10 falls to a fiftieth."""
 
-FALL, NEAR_END = 100.0, 6
+MOST_FALL, END_NODES = 100.0, 6
 """Largest ratio of a sum in a table to its size at the smaller end, so that the error of the larger is a tenth of the
 accuracy of the smaller; and the number of gaps over which that size is taken, as the sum may change its sign.
 """
 
-FEW = 56
+FEWEST_TABULATED = 56
 """Points up to which sums are made one by one where no table is good enough or used again: twice what that takes."""
 
 
@@ -66,7 +66,7 @@ def with_slope(formula: Expression, symbol: Expression) -> Kernel:
     return values
 
 
-def extents(laws: Sequence[PairEnergy]) -> dict[Extent, list[int]]:
+def laws_by_extent(laws: Sequence[PairEnergy]) -> dict[Extent, list[int]]:
     """Numbers of the laws that share nodes, by extent: one for each set of kinks and cutoff, one for all without."""
     found: dict[tuple[float, ...], list[int]] = {}
     for k, law in enumerate(laws):
@@ -93,7 +93,7 @@ def inner_sums(
         raise InputError("the surfaces overlap; a law of pairs of points holds outside only.")
     found: dict[int, Sums] = {}
     pairs = len(x)
-    for extent, which in extents(laws).items():
+    for extent, which in laws_by_extent(laws).items():
         sums, more = _sums_of(surface, x, near, [laws[k] for k in which], extent, level, rtol)
         found |= dict(zip(which, sums, strict=True))
         pairs += more
@@ -105,20 +105,20 @@ def _sums_of(
 ) -> tuple[list[Sums], int]:
     """Sums over the inner surface of laws of one extent."""
     # Of what lies beyond, a part of size (h / reach)^(decay - 2) of all is missed.
-    farther = (rtol * LEFT_OUT) ** (-1 / (extent.decay - 2))
+    farther = (rtol * TRUNCATION_PART) ** (-1 / (extent.decay - 2))
     if not is_round(surface.shape):
         reach = np.minimum(near.gap * farther, extent.cutoff)
         if extent.bends:
             nodes = ray_grid(surface, x, near, reach, extent, level)
-            return [nodes.sums(kernel(law)) for law in laws], SOUGHT * nodes.area.size
+            return [nodes.sums(kernel(law)) for law in laws], BEND_SEARCH_COST * nodes.area.size
         nodes = tensor_grid(surface, x, near, reach, level)
         return [nodes.sums(kernel(law)) for law in laws], nodes.area.size
-    found, pairs = tabulated(RoundSums(surface.shape, tuple(laws), extent, farther, level, rtol), near.gap)
+    found, pairs = tabulated(SumsByGap(surface.shape, tuple(laws), extent, farther, level, rtol), near.gap)
     return [(energy, push[:, None] * near.normal) for energy, push in np.split(found.T, len(laws))], pairs
 
 
 @dataclass(frozen=True)
-class RoundSums:
+class SumsByGap:
     """Sums (n, 2 laws) around the feet of points at gaps (n,) on a shape whose points are all alike, which do not
     depend on where that is: circles up to where laws end or, where they do not, so many times farther than the gap.
     """
@@ -154,7 +154,7 @@ class RoundSums:
         if math.isinf(self.extent.cutoff):
             ends.append(np.minimum(gap * self.farther, last))
         out = np.arcsinh(np.stack(ends[::-1], axis=1) / gap[:, None])
-        t, w = gauss(divided(np.minimum.accumulate(out, axis=1)[:, ::-1], self.level), order_of(self.level))
+        t, w = gauss_rule(divided(np.minimum.accumulate(out, axis=1)[:, ::-1], self.level), order_of(self.level))
         gap = gap[:, None]
         s = gap * np.sinh(t)
         ds = w * np.hypot(gap, s)
@@ -166,22 +166,22 @@ class RoundSums:
 
 
 @lru_cache(maxsize=4096)
-def table(profile: RoundSums, low: float, high: float) -> tuple[Array | None, int]:
+def table(profile: SumsByGap, low: float, high: float) -> tuple[Array | None, int]:
     """Coefficients of Chebyshev's polynomials (24, 2 laws) of a logarithm of the gap between two of them, none where
     they miss what is between, and the number of pairs that they take.
     """
-    at = (low + high) / 2 + (high - low) / 2 * np.concatenate([CHEBYSHEV, BETWEEN])
+    at = (low + high) / 2 + (high - low) / 2 * np.concatenate([CHEBYSHEV_NODES, TABLE_CHECKS])
     known, pairs = profile.at(np.exp(at))
-    fit = np.polynomial.chebyshev.chebfit(CHEBYSHEV, known[: len(CHEBYSHEV)], len(CHEBYSHEV) - 1)
-    missed = np.polynomial.chebyshev.chebval(BETWEEN, fit).T - known[len(CHEBYSHEV) :]
+    fit = np.polynomial.chebyshev.chebfit(CHEBYSHEV_NODES, known[: len(CHEBYSHEV_NODES)], len(CHEBYSHEV_NODES) - 1)
+    missed = np.polynomial.chebyshev.chebval(TABLE_CHECKS, fit).T - known[len(CHEBYSHEV_NODES) :]
     sizes = np.abs(known)
-    ends = [sizes[: len(CHEBYSHEV)][side].max(axis=0) for side in (slice(NEAR_END), slice(-NEAR_END, None))]
+    ends = [sizes[: len(CHEBYSHEV_NODES)][side].max(axis=0) for side in (slice(END_NODES), slice(-END_NODES, None))]
     good = np.all(np.abs(missed) <= profile.rtol * NEGLIGIBLE * sizes.max(axis=0))
-    good &= np.all(sizes.max(axis=0) <= FALL * np.minimum(*ends))
+    good &= np.all(sizes.max(axis=0) <= MOST_FALL * np.minimum(*ends))
     return np.asarray(fit) if good else None, pairs
 
 
-def tabulated(profile: RoundSums, gaps: Array) -> tuple[Array, int]:
+def tabulated(profile: SumsByGap, gaps: Array) -> tuple[Array, int]:
     """A profile (n, k) of many gaps, and the number of pairs that it takes; from tables over pieces of the logarithm of
     the gap, which are the same for all points and approaches, unless it bends.
     """
@@ -193,13 +193,13 @@ def tabulated(profile: RoundSums, gaps: Array) -> tuple[Array, int]:
         inside = [level for level in levels if low < level < high]
         edges = np.unique([*np.linspace(low, high, math.ceil(high - low) + 1), *inside])
     else:
-        edges = PART * np.arange(math.floor(low / PART), math.floor(high / PART) + 2)
+        edges = TABLE_LENGTH * np.arange(math.floor(low / TABLE_LENGTH), math.floor(high / TABLE_LENGTH) + 2)
     home = np.clip(np.searchsorted(edges, at, side="right") - 1, 0, max(len(edges) - 2, 0))
     waiting = [(np.flatnonzero(home == k), edges[k], edges[min(k + 1, len(edges) - 1)]) for k in np.unique(home)]
     pairs, single = 0, [np.empty(0, dtype=int)]
     while waiting:
         which, low, high = waiting.pop()
-        few = len(which) < FEW
+        few = len(which) < FEWEST_TABULATED
         fit, more = table(profile, float(low), float(high)) if not (few and profile.extent.bends) else (None, 0)
         pairs += more
         middle, half = (low + high) / 2, max((high - low) / 2, TINY)

@@ -15,26 +15,26 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from surfacechem.surfaces.nodes import gauss
-from surfacechem.surfaces.patches import ENOUGH, Levels, Patches
-from surfacechem.surfaces.projection import FIRST, Array, Projection, Surface
+from surfacechem.surfaces.nodes import gauss_rule
+from surfacechem.surfaces.patches import FIRST_LEVEL, Levels, Patches
+from surfacechem.surfaces.projection import FIRST_ORDER, Array, Projection, Surface
 
 SAMPLES = np.array([0, 1 / 128, 1 / 4, 1 / 2, 3 / 4, 127 / 128, 1])
 """Places along each side of a patch at which it is seen whether it has a level. Two at either end tell the slope there:
 a height that turns round between two others has passed it with another sign.
 """
 
-SLIGHT, HALVINGS = 0.1, 8
+SLIGHT_CUT, CUT_HALVINGS = 0.1, 8
 """A patch of which a level cuts off less, as part times rest, is halved at first, at most so many times more than it
 takes until its area is the accuracy.
 """
 
-CORNERS = 256
+MOST_CROSSED = 256
 """Patches that an edge crosses beside their level are halved, too, while they are no more: where lines meet, not where
 they run along each other.
 """
 
-PARTS, ROOTS = 3, 10
+SIDE_PARTS, ROOT_SAMPLES = 3, 10
 """Parts of a side on each of which there are lines of nodes, and gaps that are looked at to find a level on a line."""
 
 
@@ -62,7 +62,7 @@ class LevelPatches(Patches):
     @property
     def fewest(self) -> int:
         """Level of the rule that patches begin with: a level may bulge between the lines on which it is found."""
-        return ENOUGH if self.other.search == 1 else super().fewest
+        return FIRST_LEVEL if self.other.search == 1 else super().fewest
 
     @property
     def kinds(self) -> Levels:
@@ -110,7 +110,7 @@ class LevelPatches(Patches):
         across, width = self._across(1 - k, order)
         n, m = across.shape
         each = self[np.repeat(np.arange(n), m)]
-        t, w = gauss(np.stack([each.low[:, k], each.crossing(k, across.ravel()), each.high[:, k]], axis=1), order)
+        t, w = gauss_rule(np.stack([each.low[:, k], each.crossing(k, across.ravel()), each.high[:, k]], axis=1), order)
         there, thickness = self.parameters(1 - k, across, width)
         here, length = (part.reshape(n, m, -1) for part in each.parameters(k, t, w))
         at = (here, np.broadcast_to(there[..., None], here.shape))
@@ -118,18 +118,18 @@ class LevelPatches(Patches):
 
     def most(self, order: int) -> int:
         """Two sides of the level on each line, and parts across them."""
-        return super().most(order) * (2 * PARTS if self.along[0] >= 0 else 1)
+        return super().most(order) * (2 * SIDE_PARTS if self.along[0] >= 0 else 1)
 
     def cost(self, order: int) -> int:
         """Cost of the searches for the level on each line of nodes."""
-        return 0 if self.along[0] < 0 else len(self) * PARTS * order * ROOTS * self.other.search
+        return 0 if self.along[0] < 0 else len(self) * SIDE_PARTS * order * ROOT_SAMPLES * self.other.search
 
     def _across(self, j: int, order: int) -> tuple[Array, Array]:
         """Nodes and weights (n, m) across the direction of the level, cut where it leaves the patch."""
         if self.alike[j]:
             return self.rule(j, order)
         edges = np.column_stack([self.low[:, j], self.leaves, self.high[:, j]])
-        return gauss(np.sort(edges, axis=1), order)
+        return gauss_rule(np.sort(edges, axis=1), order)
 
     def left(self) -> Self:
         """Patches with the places where their levels leave them."""
@@ -164,7 +164,7 @@ class LevelPatches(Patches):
     def seen(self, u: Array, v: Array) -> tuple[Array, Projection]:
         """Points (n, ..., 3) at substituted parameters (n, ...), and what they see of the other surface."""
         at = np.stack([self.parameters(k, t)[0] for k, t in enumerate((u, v))], axis=-1)
-        x = self.surface.derivatives(at, FIRST)[0]
+        x = self.surface.derivatives(at, FIRST_ORDER)[0]
         return x, self.other.nearest(x)
 
     def heights(self, near: Projection) -> Array:
@@ -201,9 +201,9 @@ def with_levels(patches: Patches, other: Surface, levels: Sequence[float], noise
                 break
             found = found.divided(found.alike.index(False)).marked()
         return found
-    for _ in range(HALVINGS - math.floor(math.log2(rtol) / 2)):
-        slight = (found.along >= 0) & (found.share < SLIGHT)
-        if found.crossed.sum() <= CORNERS:
+    for _ in range(CUT_HALVINGS - math.floor(math.log2(rtol) / 2)):
+        slight = (found.along >= 0) & (found.share < SLIGHT_CUT)
+        if found.crossed.sum() <= MOST_CROSSED:
             slight |= found.crossed
         if not slight.any():
             break

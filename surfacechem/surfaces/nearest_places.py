@@ -16,24 +16,24 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from surfacechem.errors import InputError
-from surfacechem.surfaces.projection import FIRST, NEWTONS, POLE, Array, Surface, descended, newton_step
+from surfacechem.surfaces.projection import FIRST_ORDER, MOST_NEWTON_STEPS, POLE, Array, Surface, descended, newton_step
 from surfacechem.surfaces.shapes import Indices
 from surfacechem.tolerances import CBRT_EPS, NOISE, SAME, SQRT_EPS
 
-COARSE, PER_GRAIN = 32, 4
+COARSE_STEPS, STEPS_PER_GRAIN = 32, 4
 """Steps along a surface between places that are looked at, at least, and per grain."""
 
 MOST_PLACES = 5_000_000
 """Places of the finest grid, at most."""
 
-TOGETHER, ANY = 100_000, 200
+PLACES_AT_ONCE, CALL_COST = 100_000, 200
 """Places that are looked at together, and those that take as long as any, however few they are."""
 
 
-ACROSS, SHRINK = 9, 0.6
+ZOOM_PLACES, ZOOM_FACTOR = 9, 0.6
 """Places along each side of a grid around one of least gap, and how much smaller the next is."""
 
-STEEPEST = math.atan(1e3)
+MOST_TURN = math.atan(1e3)
 """Turn [rad] beyond which nearest places of surfaces without end are not sought farther out: a choice."""
 
 
@@ -67,16 +67,16 @@ def near_places(
     for nothing of their own. InputError where there are too many to look at; ``take`` is told before how many points
     take as long as what is looked at.
     """
-    sought = size * (1 + math.tan(min(abs(outer.shape.tilt) + abs(inner.shape.tilt), STEEPEST)))
+    sought = size * (1 + math.tan(min(abs(outer.shape.tilt) + abs(inner.shape.tilt), MOST_TURN)))
     low, high = np.nan_to_num(np.transpose(outer.shape.span), posinf=sought, neginf=-sought)
     grid = np.stack(np.meshgrid(*np.linspace(low, high, 9).T, indexing="ij"), axis=-1)
-    tangents = outer.derivatives(grid, FIRST)[1:]
+    tangents = outer.derivatives(grid, FIRST_ORDER)[1:]
     # Lengths of the surface along its two parameters, at most.
     extents = np.linalg.norm(tangents, axis=-1).max(axis=(1, 2)) * (high - low)
-    wide = min(grain, extents.max() / COARSE * PER_GRAIN)
+    wide = min(grain, extents.max() / COARSE_STEPS * STEPS_PER_GRAIN)
     # A surface without a grain needs no more than the coarsest places.
-    halvings = np.ceil(np.log2(np.maximum(PER_GRAIN * extents / grain / COARSE, 1))).astype(int)
-    steps = np.where(alike, 1, COARSE * 2**halvings)
+    halvings = np.ceil(np.log2(np.maximum(STEPS_PER_GRAIN * extents / grain / COARSE_STEPS, 1))).astype(int)
+    steps = np.where(alike, 1, COARSE_STEPS * 2**halvings)
     if math.prod(int(n) for n in steps) > MOST_PLACES:
         text = f"the {outer.shape.name()} has details of {grain:.3g} m on {extents[0]:.3g} by {extents[1]:.3g} m"
         raise InputError(f"{text}, too many to look at: give it a smaller extent, or fewer and coarser details.")
@@ -85,9 +85,9 @@ def near_places(
         return outer.off_pole(low + (high - low) * np.where(alike, 0.5, nodes / steps))
 
     def gap(at: Array) -> Array:
-        take((len(at) + ANY) * inner.search)
-        parts = np.array_split(at, math.ceil(len(at) / TOGETHER))
-        return np.concatenate([inner.nearest(outer.derivatives(part, FIRST)[0]).gap for part in parts])
+        take((len(at) + CALL_COST) * inner.search)
+        parts = np.array_split(at, math.ceil(len(at) / PLACES_AT_ONCE))
+        return np.concatenate([inner.nearest(outer.derivatives(part, FIRST_ORDER)[0]).gap for part in parts])
 
     gaps = _near_grid(lambda nodes: gap(parameters(nodes)), steps, halvings, extents, wide)
     chosen = _lowest(gaps, outer.shape.closed, NOISE * size)
@@ -97,7 +97,7 @@ def near_places(
         # At a pole no direction leads anywhere: the search begins beside it, where the gap is least.
         chosen, poles = np.concatenate([chosen, [[1, int(np.argmin(gaps[1]))]]]), np.append(poles, False)
     apart, noise = np.where(alike, 0.0, (high - low) / steps), NOISE * size
-    at, gaps = _settled(outer, inner, gap, parameters(chosen), apart, extents.max(), noise)
+    at, gaps = _refined(outer, inner, gap, parameters(chosen), apart, extents.max(), noise)
     # A pole that is not nearer than where this leads is no place of its own.
     kept = ~poles | (gaps < gaps[-1] - noise)
     at, gaps = at[kept], gaps[kept]
@@ -145,7 +145,7 @@ def _lowest(gaps: Array, closed: tuple[bool, bool], noise: float) -> Indices:
     return np.array(found, dtype=int)
 
 
-def _settled(
+def _refined(
     outer: Surface, inner: Surface, gap: Callable[[Array], Array], at: Array, steps: Array, long: float, noise: float
 ) -> tuple[Array, Array]:
     """The places (n, 2) of least gap near some, no step longer than that of the grid, over a ``long`` surface [m], and
@@ -154,7 +154,7 @@ def _settled(
     low, high = outer.bounds
 
     def slope(at: Array) -> tuple[Array, Array]:
-        D = outer.derivatives(at, FIRST)
+        D = outer.derivatives(at, FIRST_ORDER)
         x, tangents = D[0], D[1:]
         found = inner.nearest(x)
         along = found.normal
@@ -184,11 +184,11 @@ def _settled(
     first[((here <= low) & (first > 0)) | ((here >= high) & (first < 0))] = 0.0
     # Along an edge of the other surface, where the gap bends or jumps, there may be no rest for Newton's method.
     if np.abs(first * steps).max() > SQRT_EPS * long:
-        found[nearest], gaps[nearest] = _rolled(gap, here[0], steps, np.array([low, high]))
+        found[nearest], gaps[nearest] = _nelder_mead(gap, here[0], steps, np.array([low, high]))
     return found, gaps
 
 
-def _rolled(gap: Callable[[Array], Array], at: Array, steps: Array, bounds: Array) -> tuple[Array, float]:
+def _nelder_mead(gap: Callable[[Array], Array], at: Array, steps: Array, bounds: Array) -> tuple[Array, float]:
     """The place (2,) of least gap near one by the method of Nelder and Mead, which needs no slope, and on grids that
     shrink around the best so far, as that may come to rest where the gap jumps; and the gap there, which looked at
     again may be that beyond the jump by rounding.
@@ -202,15 +202,15 @@ def _rolled(gap: Callable[[Array], Array], at: Array, steps: Array, bounds: Arra
     options: Any = {"initial_simplex": [at, *corners], "xatol": SQRT_EPS * steps.max(), "fatol": SAME * steps.max()}
     rest = minimize(value, list(at), method="Nelder-Mead", bounds=list(bounds.T), options=options)
     at, least = np.asarray(rest.x), float(rest.fun)
-    around = _mesh([np.linspace(-1, 1, ACROSS)] * 2)
+    around = _mesh([np.linspace(-1, 1, ZOOM_PLACES)] * 2)
     size = 1.0
-    for _ in range(NEWTONS):
+    for _ in range(MOST_NEWTON_STEPS):
         places = np.clip(at + size * steps * around, *bounds)
         gaps = gap(places)
         k = np.argmin(gaps)
         best, least = (places[k], float(gaps[k])) if gaps[k] < least else (at, least)
         # While the best is moving the grid stays as wide.
-        size *= 1.0 if np.max(np.abs(best - at) / np.maximum(steps, POLE)) > size / 2 else SHRINK
+        size *= 1.0 if np.max(np.abs(best - at) / np.maximum(steps, POLE)) > size / 2 else ZOOM_FACTOR
         at = best
     return at, least
 
@@ -220,7 +220,7 @@ def _distinct(outer: Surface, at: Array, gap: Array, near: float) -> NearPlaces:
     from scipy.spatial import KDTree
 
     order = np.argsort(gap, kind="stable")
-    x = outer.derivatives(at[order], FIRST)[0]
+    x = outer.derivatives(at[order], FIRST_ORDER)[0]
     same = KDTree(x).query_pairs(near, output_type="ndarray")
     kept = np.delete(order, same.max(axis=1)) if len(same) else order
     return NearPlaces(at[kept], gap[kept])

@@ -18,16 +18,16 @@ from itertools import pairwise
 import numpy as np
 
 from surfacechem.contracts.terms import Shape
-from surfacechem.surfaces.projection import FIRST, POLE, Array, Projection, Surface
+from surfacechem.surfaces.projection import FIRST_ORDER, POLE, Array, Projection, Surface
 from surfacechem.surfaces.shapes import Cavity, Cylinder, Indices, Plane, Sphere
 
 ORDERS = (4, 6, 9, 13, 18, 25)
 """Points of Gauss's rule on each piece, more and more of them until two in a row agree."""
 
-LAST = len(ORDERS) - 1
+LAST_LEVEL = len(ORDERS) - 1
 """Level of the last of the orders; rules of higher levels inside have pieces that are half as long."""
 
-PIECE = 2.0
+PIECE_LENGTH = 2.0
 """Length of a piece in t."""
 
 Kernel = Callable[[Array], Array]
@@ -92,10 +92,10 @@ _legendre = lru_cache(np.polynomial.legendre.leggauss)
 
 def order_of(level: int) -> int:
     """Points of the rule of a level."""
-    return ORDERS[min(level, LAST)]
+    return ORDERS[min(level, LAST_LEVEL)]
 
 
-def gauss(edges: Array, order: int) -> tuple[Array, Array]:
+def gauss_rule(edges: Array, order: int) -> tuple[Array, Array]:
     """Nodes and weights (n, k) of Gauss's rule on each of the pieces between edges (n, pieces + 1)."""
     x, w = _legendre(order)
     length = np.diff(edges)[..., None]
@@ -104,22 +104,22 @@ def gauss(edges: Array, order: int) -> tuple[Array, Array]:
 
 
 def piece_edges(low: Array, high: Array, grain: Array | float = math.inf, level: int = 0) -> Array:
-    """Edges (n, k) of pieces from parameters ``low`` to ``high`` (n,) around zero, none longer than PIECE, nor than the
-    grain of the surface, in units of the scale of sinh t; shorter ones for a level above the last.
+    """Edges (n, k) of pieces from parameters ``low`` to ``high`` (n,) around zero, none longer than PIECE_LENGTH, nor
+    than the grain of the surface, in units of the scale of sinh t; shorter ones for a level above the last.
     """
     if np.all(np.isinf(grain)):
         return divided(np.stack([low, high], axis=1), level)
-    parts = 2 ** max(level - LAST, 0)
+    parts = 2 ** max(level - LAST_LEVEL, 0)
     return np.concatenate([-_outward(-low, grain, parts)[:, ::-1], _outward(high, grain, parts)[:, 1:]], axis=1)
 
 
 def divided(edges: Array, level: int) -> Array:
-    """Edges (n, k) of pieces between given ones (n, m), none longer than PIECE; shorter ones for a level above the
-    last.
+    """Edges (n, k) of pieces between given ones (n, m), none longer than PIECE_LENGTH; shorter ones for a level above
+    the last.
     """
     found = [edges[:, :1]]
     for low, high in pairwise(edges.T):
-        parts = math.ceil(float(np.max(high - low)) / PIECE) * 2 ** max(level - LAST, 0)
+        parts = math.ceil(float(np.max(high - low)) / PIECE_LENGTH) * 2 ** max(level - LAST_LEVEL, 0)
         found.append(low[:, None] + (high - low)[:, None] * np.arange(1, parts + 1) / max(parts, 1))
     return np.concatenate(found, axis=1)
 
@@ -128,7 +128,7 @@ def _outward(end: Array, grain: Array | float, parts: int) -> Array:
     """Edges of parts of pieces from zero to an end; where that is reached sooner the last pieces are empty."""
     found = [np.zeros_like(end)]
     while np.any(found[-1] < end):
-        wide = np.minimum(found[-1] + PIECE / parts, np.arcsinh(np.sinh(found[-1]) + grain / parts))
+        wide = np.minimum(found[-1] + PIECE_LENGTH / parts, np.arcsinh(np.sinh(found[-1]) + grain / parts))
         found.append(np.minimum(wide, end))
     return np.stack(found, axis=1)
 
@@ -136,7 +136,7 @@ def _outward(end: Array, grain: Array | float, parts: int) -> Array:
 def tensor_grid(surface: Surface, x: Array, found: Projection, reach: Array, level: int) -> Grid:
     """Nodes of a surface around the nearest point for each point (n, 3), up to a reach (n,)."""
     low, high = np.transpose(surface.shape.span)
-    _, x_u, x_v = surface.derivatives(found.at, FIRST)
+    _, x_u, x_v = surface.derivatives(found.at, FIRST_ORDER)
     axes = []
     for k, tangent in enumerate((x_u, x_v)):
         at, size = found.at[:, k], np.maximum(np.linalg.norm(tangent, axis=-1), POLE)
@@ -145,7 +145,7 @@ def tensor_grid(surface: Surface, x: Array, found: Projection, reach: Array, lev
         below, above = np.minimum(at - ends[0], far), np.minimum(ends[1] - at, far)
         grain = surface.shape.grain / size / scale
         edges = piece_edges(-np.arcsinh(below / scale), np.arcsinh(above / scale), grain, level)
-        t, w = gauss(edges, order_of(level))
+        t, w = gauss_rule(edges, order_of(level))
         axes.append((at[:, None] + scale[:, None] * np.sinh(t), w * scale[:, None] * np.cosh(t)))
     (u, du), (v, dv) = axes
     u, v = np.broadcast_arrays(u[:, :, None], v[:, None, :])

@@ -18,28 +18,28 @@ import numpy as np
 
 from surfacechem.contracts.terms import PairEnergy
 from surfacechem.errors import InputError
-from surfacechem.surfaces.inner_sums import LEFT_OUT, extents, inner_sums, kernel
+from surfacechem.surfaces.inner_sums import TRUNCATION_PART, inner_sums, kernel, laws_by_extent
 from surfacechem.surfaces.level_cuts import with_levels
 from surfacechem.surfaces.nearest_places import NearPlaces
-from surfacechem.surfaces.nodes import LAST, Extent, is_round
+from surfacechem.surfaces.nodes import LAST_LEVEL, Extent, is_round
 from surfacechem.surfaces.patches import Budget, Patches, integral, outer_patches
-from surfacechem.surfaces.projection import FIRST, Array, Surface, cross
+from surfacechem.surfaces.projection import FIRST_ORDER, Array, Surface, cross
 from surfacechem.surfaces.shapes import Plane
 from surfacechem.tolerances import ATOM, NEGLIGIBLE, NOISE, PRECISE, TINY, ULPS
 
-REMOTE = np.array([1e3, 2e3])
+DECAY_DISTANCES = np.array([1e3, 2e3])
 """Distances over the size of the surfaces at which it is seen how a law falls off."""
 
 MOST_DECADES = 100
 """Reach over gap, in decades, at most: the largest area is its square."""
 
-FAR = 1e6
-"""Reach over the size of surfaces where a law has an end: over a surface without end it is looked for that far."""
+ENDLESS_REACH = 1e6
+"""Reach over a surface without end, in sizes of the surfaces: so far an end of a law or of a plate is looked for."""
 
-POINTS = 8
+POINTS_AT_ONCE = 8
 """Points at which tractions are summed together where the other surface has no circles."""
 
-COUNT = 7
+INTEGRALS = 7
 """Energy, and three components of force and moment."""
 
 
@@ -79,15 +79,15 @@ def interaction(
     swapped = is_round(lower.shape) and (not is_round(upper.shape) or isinstance(lower.shape, Plane))
     swapped |= not is_round(upper.shape) and lower.shape.grain > upper.shape.grain
     outer, inner = (upper, lower) if swapped else (lower, upper)
-    found_extents, budget = list(extents(laws)), budget or Budget(rtol)
+    found_extents, budget = list(laws_by_extent(laws)), budget or Budget(rtol)
     patches, near = _cut_patches(outer, inner, found_extents, rtol, budget)
     gap = float(near.gap[0])
-    rounded = _rounded(outer.derivatives(near.at[0], FIRST)[0], gap, found_extents, rtol)
+    rounded = _rounding(outer.derivatives(near.at[0], FIRST_ORDER)[0], gap, found_extents, rtol)
     amounts = np.array([law.n_1 * law.n_2 for law in laws])[:, None]
 
     def integrand(x: Array, level: int) -> tuple[Array, int]:
         sums, pairs = inner_sums(inner, x, laws, level, rtol)
-        found = np.empty((len(x), len(laws), COUNT))
+        found = np.empty((len(x), len(laws), INTEGRALS))
         for j, (energy, push) in enumerate(sums):
             found[:, j, 0], found[:, j, 1:4], found[:, j, 4:] = energy, push, cross(x, push)
         return found * amounts, pairs
@@ -122,7 +122,7 @@ def _cut_patches(
     return (with_levels(patches, inner, levels, NOISE * size, rtol) if levels else patches), near
 
 
-def _rounded(x: Array, gap: float, found: Sequence[Extent], rtol: float) -> float:
+def _rounding(x: Array, gap: float, found: Sequence[Extent], rtol: float) -> float:
     """Relative error from rounding of coordinates x at a gap; InputError where an accuracy is out of reach by it."""
     least = NOISE + ULPS * float(np.linalg.norm(x)) / gap
     if least > rtol / 2:
@@ -142,23 +142,23 @@ def pair_traction(
     integral.
     """
     found = np.zeros(len(x))
-    for part in lots(len(x), inner):
-        pushes = _pushes(x[part], inner, laws, rtol, budget)
+    for part in slices_of(len(x), inner):
+        pushes = _forces_per_area(x[part], inner, laws, rtol, budget)
         found[part] = np.einsum("nc,nc->n", pushes, normals[part])
         budget.done += 1
     return found
 
 
-def lots(count: int, inner: Surface) -> list[slice]:
+def slices_of(count: int, inner: Surface) -> list[slice]:
     """Slices of so many points that are summed together."""
-    together = count if is_round(inner.shape) else POINTS
+    together = count if is_round(inner.shape) else POINTS_AT_ONCE
     return [slice(begin, begin + together) for begin in range(0, count, together)]
 
 
-def _pushes(x: Array, inner: Surface, laws: Sequence[PairEnergy], rtol: float, budget: Budget) -> Array:
+def _forces_per_area(x: Array, inner: Surface, laws: Sequence[PairEnergy], rtol: float, budget: Budget) -> Array:
     """Forces per area (n, 3) on points (n, 3), by rules of higher and higher level until two in a row agree."""
     before = None
-    for level in range(1, LAST + 1):
+    for level in range(1, LAST_LEVEL + 1):
         sums, pairs = inner_sums(inner, x, laws, level, rtol)
         budget.take(pairs)
         pushes = np.array([law.n_1 * law.n_2 * push for law, (_, push) in zip(laws, sums, strict=True)])
@@ -182,7 +182,7 @@ def _check_decay(law: PairEnergy, size: float, rtol: float) -> None:
     """Raise InputError where a law falls off slower than it says, or so slowly that no reach is far enough."""
     if math.isfinite(law.cutoff):
         return
-    near, far = np.abs(kernel(law)(size * REMOTE)[:, 0])
+    near, far = np.abs(kernel(law)(size * DECAY_DISTANCES)[:, 0])
     power = math.log2(near / far) if far > 0 else math.inf
     # What falls off faster beside it changes the power by little.
     if power < law.decay - NEGLIGIBLE:
@@ -199,16 +199,16 @@ def _reach(lower: Surface, upper: Surface, extent: Extent, rtol: float) -> float
     """
     size, power = length(lower, upper), extent.decay - 2
     if math.isfinite(extent.cutoff):
-        return FAR * max(size, extent.cutoff)
+        return ENDLESS_REACH * max(size, extent.cutoff)
     shapes = [surface.shape for surface in (lower, upper)]
     rises = max(shape.rises for shape in shapes)
     if not rises or any(np.all(np.isfinite(shape.span)) for shape in shapes):
-        return float(size * (rtol * LEFT_OUT) ** (-1 / power))
+        return float(size * (rtol * TRUNCATION_PART) ** (-1 / power))
     # At the distance u two without end are u^p apart, and flats there have u^(p (2 - m)) of a power m, on u du.
     drop = max(-surface.shape.point(size, 0.0)[2] for surface in (lower, upper) if surface.shape.rises == rises)
     if rises == 1:  # to the side to which they are turned, two that rise alike stay closer
         drop = max(drop - size * math.tan(sum(abs(shape.tilt) for shape in shapes)), TINY)
-    return float(size * max(1.0, size / drop) ** (1 / rises) * (rtol * LEFT_OUT) ** (-1 / (rises * power - 2)))
+    return float(size * max(1.0, size / drop) ** (1 / rises) * (rtol * TRUNCATION_PART) ** (-1 / (rises * power - 2)))
 
 
 def _check_energy(lower: Surface, upper: Surface, law: PairEnergy) -> None:

@@ -21,35 +21,35 @@ from numpy.typing import NDArray
 
 from surfacechem.errors import InputError
 from surfacechem.surfaces.nearest_places import NearPlaces, near_places
-from surfacechem.surfaces.nodes import LAST, ORDERS, alike_along, alike_around, gauss, is_round, piece_edges
-from surfacechem.surfaces.projection import FIRST, POLE, Array, Surface
+from surfacechem.surfaces.nodes import LAST_LEVEL, ORDERS, alike_along, alike_around, gauss_rule, is_round, piece_edges
+from surfacechem.surfaces.projection import FIRST_ORDER, POLE, Array, Surface
 from surfacechem.surfaces.shapes import Disc, Plane
 from surfacechem.tolerances import NEGLIGIBLE
 
-STUCK, ENOUGH = 4.0, 2
+LEAST_GAIN, FIRST_LEVEL = 4.0, 2
 """A rule of a level above enough gains as much at least, or the patch is divided; enough are those below to tell."""
 
-SOONER = NEGLIGIBLE, NEGLIGIBLE**3
+HIGHER_START = NEGLIGIBLE, NEGLIGIBLE**3
 """Accuracies from which on patches in one direction begin with a rule of one more level: their points cost little."""
 
 MOST_POINTS = 200_000_000
 """Pairs of points, of one integral or of all over an approach, after which an accuracy is out of reach: minutes."""
 
-AT_ONCE = 10_000
+RULE_COST = 10_000
 """Pairs of points that take as long as any use of a rule, however few its points are."""
 
-WORTH = 8
+JUDGED_PART = 8
 """Part of the most points, one over this, after which it is seen whether the error of an integral falls fast enough,
 since there were as many times fewer.
 """
 
-FIRST_FEW = 2
+FIRST_INTEGRALS = 2
 """Integrals of an approach that tell what all of them take: the nearest, and one that is farther."""
 
-TOGETHER = 400_000
+PAIRS_AT_ONCE = 400_000
 """Pairs of points that are looked at together."""
 
-SHALLOWEST = 2.0**-20
+CONTACT_GAP = 2.0**-20
 """Fraction of the size of a surface below which a gap is one of contact."""
 
 Levels = NDArray[np.int_]
@@ -83,7 +83,7 @@ class Patches:
     @property
     def fewest(self) -> int:
         """Level of the rule that patches begin with: of few patches two rules may agree where neither is right."""
-        return ENOUGH if any(self.alike) else 1
+        return FIRST_LEVEL if any(self.alike) else 1
 
     def __getitem__(self, chosen: NDArray[Any] | slice) -> Self:
         """Some of the patches."""
@@ -116,7 +116,7 @@ class Patches:
         """Nodes and weights (n, m) along a direction."""
         ends = np.stack([self.low[:, k], self.high[:, k]], axis=1)
         if not self.alike[k]:
-            return gauss(ends, order)
+            return gauss_rule(ends, order)
         middle, half = ends.mean(axis=1)[:, None], np.diff(ends) / 2
         # Across a closed direction what points there cancels, along a length Gauss's rule of two points.
         shift = half / 2 if self.surface.shape.closed[k] else half / math.sqrt(3)
@@ -174,7 +174,7 @@ def outer_patches(
     alike = alike_along(outer, inner), alike_around(outer, inner)
     grain = min(outer.shape.grain, inner.shape.grain)
     near = near_places(outer, inner, size, alike, grain, budget.take)
-    tangents = outer.derivatives(near.at, FIRST)[1:]
+    tangents = outer.derivatives(near.at, FIRST_ORDER)[1:]
     lengths = np.maximum(np.linalg.norm(tangents, axis=-1).T, POLE)
     first, low, high = near.at[0], *np.transpose(outer.shape.span)
     # Bodies that are far apart see each other from as far. A parameter without end is a distance from the axis or along
@@ -188,7 +188,7 @@ def outer_patches(
     )
     at = np.where(closed, first + np.remainder(near.at - first + math.pi, 2 * math.pi) - math.pi, near.at)
     at = np.clip(at, low, high)
-    scales = np.maximum(np.abs(near.gap), size * SHALLOWEST)[:, None] / lengths
+    scales = np.maximum(np.abs(near.gap), size * CONTACT_GAP)[:, None] / lengths
     # Lengths of a direction in which nothing changes are those of the parameter.
     scales = np.where(alike, 1.0, scales)
     rectangles = around_each(at, low, high, lengths[0])
@@ -247,7 +247,7 @@ class Budget:
 
     def whole(self, ahead: float) -> float:
         """Least cost of all integrals, where those that are done and the next one take so much."""
-        return ahead * max(1.0, self.integrals / max(self.done + 1, FIRST_FEW))
+        return ahead * max(1.0, self.integrals / max(self.done + 1, FIRST_INTEGRALS))
 
     def take(self, points: int) -> None:
         """Count so many pairs of points that are next; OutOfReachError where they are too many."""
@@ -287,14 +287,14 @@ class Rules:
         found, begin = [], 0
         while begin < len(patches):
             # One patch at first, as nobody knows yet how many pairs its points have.
-            each = self.each.get(inside, TOGETHER) * patches.most(order)
-            part = patches[begin : begin + max(1, int(TOGETHER / each))]
+            each = self.each.get(inside, PAIRS_AT_ONCE) * patches.most(order)
+            part = patches[begin : begin + max(1, int(PAIRS_AT_ONCE / each))]
             x, area = part.nodes(order)
             values, together = self.integrand(x.reshape(-1, 3), inside)
             points = together + area.size * self.search + part.cost(order)
             found.append(np.einsum("nk...,nk->n...", values.reshape(*area.shape, *values.shape[1:]), area))
             self.points += points
-            self.budget.spent += points + AT_ONCE
+            self.budget.spent += points + RULE_COST
             begin += len(part)
             self.budget.refuse_beyond(self.budget.spent + points / len(part) * (len(patches) - begin))
             self.each[inside] = together / area.size
@@ -302,7 +302,7 @@ class Rules:
 
 
 @dataclass(frozen=True)
-class Known:
+class PatchResults:
     """Results on some patches: levels of the rules over and inside each, values (n, ...), their changes with the last
     rule over it and inside it, and with the one before (n, 2, ...), and whether a higher order gained little.
     """
@@ -315,13 +315,13 @@ class Known:
     within: Array
     stuck: NDArray[np.bool_]
 
-    def but(self, gone: NDArray[np.bool_], others: Known) -> Known:
+    def but(self, gone: NDArray[np.bool_], others: PatchResults) -> PatchResults:
         """The results without those of some patches, and with others."""
         kept = {
             item.name: np.concatenate([getattr(self, item.name)[~gone], getattr(others, item.name)])
             for item in fields(self)[1:]
         }
-        return Known(self.patches[~gone].joined(others.patches), **kept)
+        return PatchResults(self.patches[~gone].joined(others.patches), **kept)
 
 
 def integral(
@@ -339,9 +339,9 @@ def integral(
     A ``nested`` integrand is a sum itself, with an error of its own; each of its points has a projection to the other
     surface that costs as much as ``search`` points. InputError where it takes more than its budget.
     """
-    first = patches.fewest if not any(patches.alike) else ENOUGH + sum(left < goal for goal in SOONER)
+    first = patches.fewest if not any(patches.alike) else FIRST_LEVEL + sum(left < goal for goal in HIGHER_START)
     rules, begin, before = Rules(integrand, search, budget), np.full(len(patches), first), budget.spent
-    known, met = _started(rules, patches, begin, begin, nested), list[tuple[float, float]]()
+    known, met = _start(rules, patches, begin, begin, nested), list[tuple[float, float]]()
     while True:
         whole = known.value.sum(axis=0)
         size = sizes(whole)
@@ -351,37 +351,37 @@ def integral(
             budget.done += 1
             return whole, error, rules.points
         met.append((budget.spent - before, error))
-        if budget.whole(budget.spent) > MOST_POINTS / WORTH and met[-1][0] > WORTH * met[0][0]:
+        if budget.whole(budget.spent) > MOST_POINTS / JUDGED_PART and met[-1][0] > JUDGED_PART * met[0][0]:
             budget.refuse_beyond(before + _expected(met, left))
         rank = np.argsort(over + within)
         worst = np.zeros(len(over), dtype=bool)
         worst[rank[~(np.cumsum((over + within)[rank]) <= left / 2)]] = True
         deeper = worst & (within > over)
-        halved = worst & ~deeper & (known.stuck | (known.level == LAST))
+        halved = worst & ~deeper & (known.stuck | (known.level == LAST_LEVEL))
         raised = worst & ~deeper & ~halved
         for mask, steps in ((deeper, (0, 1)), (raised, (1, 0))):
             if mask.any():
-                _raise(rules, known, mask, steps)
-        known.stuck[raised] = (known.level[raised] > ENOUGH) & (
-            _largest(known.over[raised], size) * STUCK > over[raised]
+                _raise_level(rules, known, mask, steps)
+        known.stuck[raised] = (known.level[raised] > FIRST_LEVEL) & (
+            _largest(known.over[raised], size) * LEAST_GAIN > over[raised]
         )
         if halved.any():
             halves = known.patches[halved].halved()
             # A rule on half of a patch is as good as one of higher order.
             times = len(halves) // int(halved.sum())
             start, inside = np.maximum(known.level[halved] - 1, patches.fewest), known.inside[halved]
-            known = known.but(halved, _started(rules, halves, np.tile(start, times), np.tile(inside, times), nested))
+            known = known.but(halved, _start(rules, halves, np.tile(start, times), np.tile(inside, times), nested))
 
 
 def _expected(met: Sequence[tuple[float, float]], rtol: float) -> float:
     """Points at which the error is that asked for, if it goes on to fall with the power of them with which it did."""
     points, error = met[-1]
-    fewer, before = next(item for item in met[::-1] if item[0] <= points / WORTH or item is met[0])
+    fewer, before = next(item for item in met[::-1] if item[0] <= points / JUDGED_PART or item is met[0])
     gain, more = math.log(max(before / error, 1.0)), math.log(points / fewer) if points > fewer else 1.0
     return points * (error / rtol) ** (more / gain) if gain > NEGLIGIBLE else points
 
 
-def _started(rules: Rules, patches: Patches, level: Levels, inside: Levels, nested: bool) -> Known:
+def _start(rules: Rules, patches: Patches, level: Levels, inside: Levels, nested: bool) -> PatchResults:
     """Results on patches by rules of some levels and of those before."""
     value = rules(patches, level, inside)
     steps = range(1, patches.fewest + 1)
@@ -389,7 +389,7 @@ def _started(rules: Rules, patches: Patches, level: Levels, inside: Levels, nest
     within = np.zeros_like(over)
     if nested:
         within = _changes(value, *(rules(patches, level, inside - k) for k in steps))
-    return Known(patches, level.copy(), inside.copy(), value, over, within, np.zeros(len(level), dtype=bool))
+    return PatchResults(patches, level.copy(), inside.copy(), value, over, within, np.zeros(len(level), dtype=bool))
 
 
 def _changes(value: Array, before: Array, first: Array | None = None) -> Array:
@@ -397,13 +397,13 @@ def _changes(value: Array, before: Array, first: Array | None = None) -> Array:
     return np.stack([value - before, np.zeros_like(before) if first is None else before - first], axis=1)
 
 
-def _raise(rules: Rules, known: Known, mask: NDArray[np.bool_], steps: tuple[int, int]) -> None:
+def _raise_level(rules: Rules, known: PatchResults, mask: NDArray[np.bool_], steps: tuple[int, int]) -> None:
     """Rules of a higher level over, or inside, some patches."""
     known.level[mask] += steps[0]
     known.inside[mask] += steps[1]
     finer = rules(known.patches[mask], known.level[mask], known.inside[mask])
     changes = known.over if steps[0] else known.within
-    if known.patches.fewest == ENOUGH:
+    if known.patches.fewest == FIRST_LEVEL:
         changes[mask, 1] = changes[mask, 0]
     changes[mask, 0] = finer - known.value[mask]
     known.value[mask] = finer
@@ -413,4 +413,4 @@ def _largest(changes: Array, size: Array) -> Array:
     """Errors (n,) of patches, the largest of all entries; what the change before the last says may have been missed."""
     entries = tuple(range(1, changes.ndim - 1))
     last, before = (np.abs(changes[:, k] / size).max(axis=entries, initial=0.0) for k in range(2))
-    return np.asarray(np.maximum(last, before / STUCK))
+    return np.asarray(np.maximum(last, before / LEAST_GAIN))

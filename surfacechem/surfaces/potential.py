@@ -23,30 +23,30 @@ from surfacechem.documents.cache_folder import PACKAGE, Fingerprint, cached, fin
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, derivative
 from surfacechem.surfaces.approach import ApproachEnergy, fitted, straight
-from surfacechem.surfaces.curved_gap import GAP, Contact, bends, between_flats, density, over_gap, passages
-from surfacechem.surfaces.inner_sums import extents, kernel
-from surfacechem.surfaces.pairwise import PairForces, interaction, length, lots, pair_traction
+from surfacechem.surfaces.curved_gap import GAP, Contact, bends, between_flats, density, level_approaches, over_gap
+from surfacechem.surfaces.inner_sums import kernel, laws_by_extent
+from surfacechem.surfaces.pairwise import PairForces, interaction, length, pair_traction, slices_of
 from surfacechem.surfaces.patches import Budget, OutOfReachError
 from surfacechem.surfaces.projection import Array, Surface
 from surfacechem.tolerances import ATOM, FLOOR, NEGLIGIBLE, NOISE, ROUNDING, SQRT_EPS
 
-KNOWN: dict[Fingerprint, tuple[ApproachEnergy, ...]] = {}
+INTEGRATED_CURVES: dict[Fingerprint, tuple[ApproachEnergy, ...]] = {}
 """Curves that have been integrated, by the fingerprint of their laws and surfaces."""
 
 log = logging.getLogger(__name__)
 
-CODE = [*(path for room in ("surfaces", "laws", "contracts") for path in sorted((PACKAGE / room).glob("*.py")))]
-CODE += [PACKAGE / f"{name}.py" for name in ("expressions", "quantities", "tolerances")]
+SOURCES = [*(path for room in ("surfaces", "laws", "contracts") for path in sorted((PACKAGE / room).glob("*.py")))]
+SOURCES += [PACKAGE / f"{name}.py" for name in ("expressions", "quantities", "tolerances")]
 """Source files from which integrals follow: of the laws all that they share, too."""
 
 
-class _Spent(threading.local):
+class _IntegrationTime(threading.local):
     """Time that integrals over surfaces have taken so far, of each thread."""
 
     seconds = 0.0
 
 
-SPENT = _Spent()
+INTEGRATION_TIME = _IntegrationTime()
 
 
 @contextmanager
@@ -56,14 +56,14 @@ def integrating() -> Iterator[None]:
     try:
         yield
     finally:
-        SPENT.seconds += time.perf_counter() - start
+        INTEGRATION_TIME.seconds += time.perf_counter() - start
 
 
-LOOKS = 2000
+JUMP_SAMPLES = 2000
 """Places between which it is seen whether a law jumps."""
 
 
-def jump(law: Callable[[Array], Array], places: Array) -> float | None:
+def first_jump(law: Callable[[Array], Array], places: Array) -> float | None:
     """First jump between increasing places of the energy of a law, the first of its values (n, 2); None without any."""
     a, b = places[:-1], places[1:]
     low, high = law(a)[:, 0], law(b)[:, 0]
@@ -154,7 +154,7 @@ class CurvedSurfaces(Potential):
         g = symengine.Symbol("g_n")
         force = symengine.Lambdify([g], [derivative(self.energy(g), g)])
         low, high = self.approach
-        places = (np.geomspace if low > 0 else np.linspace)(low, high, LOOKS)[1:-1]
+        places = (np.geomspace if low > 0 else np.linspace)(low, high, JUMP_SAMPLES)[1:-1]
         return float(places[np.argmax(force(places[:, None]))])
 
     @property
@@ -175,12 +175,12 @@ class CurvedSurfaces(Potential):
         parts = [part for law in self.pairs for _, part in self.parts(law)]
         # Other numbers of the same surfaces, as in a sweep, have the same integrals.
         mark = fingerprint(self.shapes, parts, self.gap_laws, self.approach, self.accuracy)
-        if mark not in KNOWN:
+        if mark not in INTEGRATED_CURVES:
             with integrating():
-                found = cached(mark, CODE, lambda: [curve.numbers for curve in self.integrated(parts)])
+                found = cached(mark, SOURCES, lambda: [curve.numbers for curve in self.integrated(parts)])
             log.info("running")
-            KNOWN[mark] = tuple(map(ApproachEnergy.of, found))
-        curves = KNOWN[mark]
+            INTEGRATED_CURVES[mark] = tuple(map(ApproachEnergy.of, found))
+        curves = INTEGRATED_CURVES[mark]
         return curves[: len(parts)], next(iter(curves[len(parts) :]), None)
 
     def integrated(self, parts: Sequence[PairEnergy]) -> list[ApproachEnergy]:
@@ -203,12 +203,12 @@ class CurvedSurfaces(Potential):
                     met[d] = interaction(*self.surfaces(d), parts, finer, budget)
             return float(met[d].energy[k]), float(met[d].force_1[k, 2]), met[d].error
 
-        ends = passages(*self.surfaces(0.0), sorted({law.cutoff for law in parts if math.isfinite(law.cutoff)}))
+        ends = level_approaches(*self.surfaces(0.0), sorted({law.cutoff for law in parts if math.isfinite(law.cutoff)}))
         found = [fitted(partial(of_pairs, k), *self.approach, rtol, ends, budget=budget) for k in range(len(parts))]
         if not self.gap_laws:
             return found
         laws, levels = [density(law) for law in self.gap_laws], bends(self.gap_laws)
-        cuts = passages(*self.surfaces(0.0), levels)
+        cuts = level_approaches(*self.surfaces(0.0), levels)
         floor, spent = (0.0, 0.0), Budget(rtol)
 
         @cache
@@ -227,12 +227,12 @@ class CurvedSurfaces(Potential):
         """Raise InputError where the energy of a law jumps, so that no force is its slope."""
         least, largest = self.approach
         far = largest + length(*self.surfaces(largest))
-        beyond = np.geomspace(abs(largest) or far * NEGLIGIBLE, far, LOOKS)
-        gaps = np.concatenate([np.linspace(least, largest, LOOKS)[:-1], beyond])
-        distances = np.geomspace(max(least, far * SQRT_EPS), far, LOOKS)
+        beyond = np.geomspace(abs(largest) or far * NEGLIGIBLE, far, JUMP_SAMPLES)
+        gaps = np.concatenate([np.linspace(least, largest, JUMP_SAMPLES)[:-1], beyond])
+        distances = np.geomspace(max(least, far * SQRT_EPS), far, JUMP_SAMPLES)
         known = [(law, kernel(law), distances, "r") for law in self.pairs]
         for law, energy, places, name in [*known, *((law, density(law), gaps, GAP) for law in self.gap_laws)]:
-            at = jump(energy, places)
+            at = first_jump(energy, places)
             if at is not None:
                 text = f"the energy of {law.name()} jumps at {name} = {at:.6g} m, where it has no force"
                 raise InputError(f"{text}; let it change over a length.", law.place)
@@ -267,7 +267,7 @@ class CurvedSurfaces(Potential):
 
     def _levels(self, pairs: bool, heat: Sequence[HeatTransfer] = ()) -> list[float]:
         """Gaps at which local laws bend: those of pairs do at the distances at which a pair does."""
-        found = [bend for extent in extents(self.pairs) for bend in extent.bends] if pairs else []
+        found = [bend for extent in laws_by_extent(self.pairs) for bend in extent.bends] if pairs else []
         return sorted({*bends((*self.gap_laws, *heat)), *found})
 
     def totals(self, approaches: Array, stretches: Array) -> Array:
@@ -290,7 +290,7 @@ class CurvedSurfaces(Potential):
 
         laws = self.pairs, self.gap_laws, self.heat_laws
         return np.transpose(
-            cached(fingerprint(self.shapes, *laws, self.accuracy, self.approach, approaches, stretches), CODE, found)
+            cached(fingerprint(self.shapes, *laws, self.accuracy, self.approach, approaches, stretches), SOURCES, found)
         )
 
     @cached_property
@@ -320,7 +320,7 @@ class CurvedSurfaces(Potential):
         if not self.pairs or math.isfinite(self.shapes[1].grain):
             return local(pairs=True), False
         budget, summed, rtol = Budget(self.accuracy), [], max(self.accuracy, FLOOR)
-        budget.integrals = len(own) * len(lots(len(x), upper))
+        budget.integrals = len(own) * len(slices_of(len(x), upper))
         try:
             for k, (one, d) in enumerate(zip(own, approaches.tolist(), strict=True)):
                 log.info("fields at output times", extra={"done": k, "total": len(own)})
@@ -393,13 +393,13 @@ class CurvedConductance(HeatTransfer):
 
         def integrated() -> list[Any]:
             # A conductance and its slope are fitted like an energy and its force.
-            cuts = passages(*pair.surfaces(0.0), levels)
+            cuts = level_approaches(*pair.surfaces(0.0), levels)
             return fitted(sample, *pair.approach, pair.accuracy, cuts, budget=budget).numbers
 
-        if mark not in KNOWN:
+        if mark not in INTEGRATED_CURVES:
             with integrating():
-                KNOWN[mark] = (ApproachEnergy.of(cached(mark, CODE, integrated)),)
-        return KNOWN[mark][0]
+                INTEGRATED_CURVES[mark] = (ApproachEnergy.of(cached(mark, SOURCES, integrated)),)
+        return INTEGRATED_CURVES[mark][0]
 
     def conductance(self, g_n: Expression) -> Expression:
         """Conductance [W/K]."""

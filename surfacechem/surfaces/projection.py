@@ -25,22 +25,22 @@ from surfacechem.tolerances import DIGITS, GONE, SAME, TINY, ULPS
 
 Array = NDArray[np.float64]
 
-NEWTONS = 100
+MOST_NEWTON_STEPS = 100
 """Steps of Newton's method after which a search ends; some ten are the rule."""
 
-HALVINGS = 16
+MOST_HALVINGS = 16
 """Times that a step is halved at most."""
 
-SEARCH = 500
+SEARCH_COST = 500
 """Pairs of points that take as long as a projection without a closed form."""
 
 POLE = GONE
 """Parameter at the pole of a surface of revolution, where directions along it have no length."""
 
-FIRST, SECOND, THIRD = 3, 6, 10
+FIRST_ORDER, SECOND_ORDER, THIRD_ORDER = 3, 6, 10
 """Numbers of derivatives up to an order: x; x_u, x_v; x_uu, x_uv, x_vv; and four of third order."""
 
-AREA = 0
+AREA_ALONE = 0
 """Argument that asks for points and areas per parameters alone."""
 
 
@@ -50,14 +50,14 @@ def _compiled(shape: Shape, count: int) -> Callable[[Array], Array]:
     import symengine
 
     u, v = symengine.symbols("u v")
-    orders = [(i - j, j) for i in range(4) for j in range(i + 1)][: count or FIRST]
+    orders = [(i - j, j) for i in range(4) for j in range(i + 1)][: count or FIRST_ORDER]
     formulas: list[Any] = []
     for i, j in orders:
         for part in map(symengine.sympify, shape.point(u, v)):
             for symbol in (*[u] * i, *[v] * j):
                 part = symengine.diff(part, symbol)
             formulas.append(part)
-    if count == AREA:
+    if count == AREA_ALONE:
         across = cross(*np.array(formulas[3:]).reshape(2, 3))
         formulas = [*formulas[:3], symengine.sqrt(sum(part**2 for part in across))]
     compiled: Callable[[Array], Array] = symengine.Lambdify([u, v], formulas, cse=True, backend="llvm")
@@ -88,7 +88,7 @@ class Projection:
         """Whether another point is as near, for each."""
         shape, size = self.surface.shape, np.abs(self.gap)
         x = self.point + self.gap[..., None] * self.direction
-        D = self.surface.derivatives(self.at, SECOND)
+        D = self.surface.derivatives(self.at, SECOND_ORDER)
         found = _degenerate(D, self.normal * _dot(x - self.point, self.normal)[..., None])
         if shape.about_axis:
             # For a point on the axis all around is alike.
@@ -96,7 +96,7 @@ class Projection:
             found |= (np.hypot(own[..., 0], own[..., 1]) < SAME * around) & (around > SAME * size)
         if self.rivals is not None:
             which, places = self.rivals
-            rival, size = self.surface.derivatives(places, FIRST)[0], size.reshape(-1)[which]
+            rival, size = self.surface.derivatives(places, FIRST_ORDER)[0], size.reshape(-1)[which]
             x, nearest = (points.reshape(-1, 3)[which] for points in (x, self.point))
             near = np.linalg.norm(x - rival, axis=-1) <= size * (1 + SAME)
             near &= np.linalg.norm(rival - nearest, axis=-1) > np.sqrt(SAME) * size
@@ -142,7 +142,7 @@ class Surface:
         tilted = np.array([[cs, 0, sn], [0, 1, 0], [-sn, 0, cs]]) @ np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
         return np.asarray(np.diag([1.0, 1.0, -1.0]) @ tilted if self.upper else tilted)
 
-    def derivatives(self, at: Array, count: int = THIRD) -> Array:
+    def derivatives(self, at: Array, count: int = THIRD_ORDER) -> Array:
         """Points and derivatives (count, ..., 3) at parameters (..., 2)."""
         if self.shape.derivatives is not None:
             own = self.shape.derivatives(at[..., 0], at[..., 1], count)
@@ -156,14 +156,14 @@ class Surface:
     @property
     def search(self) -> int:
         """Points that cost about as much as a projection."""
-        return 1 if self.shape.foot is not None else SEARCH
+        return 1 if self.shape.foot is not None else SEARCH_COST
 
     def elements(self, at: Array) -> tuple[Array, Array]:
         """Points (..., 3) and areas per parameters (...)."""
         if self.shape.derivatives is not None:
-            x, x_u, x_v = self.derivatives(at, FIRST)
+            x, x_u, x_v = self.derivatives(at, FIRST_ORDER)
             return x, np.linalg.norm(cross(x_u, x_v), axis=-1)
-        table = _compiled(self.shape, AREA)(np.ascontiguousarray(at)).reshape(*at.shape[:-1], 4)
+        table = _compiled(self.shape, AREA_ALONE)(np.ascontiguousarray(at)).reshape(*at.shape[:-1], 4)
         return table[..., :3] @ self.axes.T + [0.0, 0.0, self.approach], table[..., 3]
 
     def normals(self, derivatives: Array) -> Array:
@@ -182,11 +182,11 @@ class Surface:
             which, starts = self.shape.starts(own.reshape(-1, 3))
             places = x.reshape(-1, 3)[which]
             found = self._search(places, starts)
-            distances = np.linalg.norm(places - self.derivatives(found, FIRST)[0], axis=-1)
+            distances = np.linalg.norm(places - self.derivatives(found, FIRST_ORDER)[0], axis=-1)
             order, rivals = np.lexsort((distances, which)), (which, found)
             at = found[order[np.unique(which[order], return_index=True)[1]]].reshape(*x.shape[:-1], 2)
         at = self.off_pole(at)
-        D = self.derivatives(at, FIRST)
+        D = self.derivatives(at, FIRST_ORDER)
         normal, away = self.normals(D), x - D[0]
         # Beyond an edge the distance is not along the normal, which then tells the side only.
         size = np.linalg.norm(away, axis=-1)
@@ -242,10 +242,10 @@ class Surface:
         low, high = self.bounds
 
         def value(at: Array, which: Indices) -> Array:
-            return np.asarray(np.linalg.norm(places[which] - self.derivatives(at, FIRST)[0], axis=-1))
+            return np.asarray(np.linalg.norm(places[which] - self.derivatives(at, FIRST_ORDER)[0], axis=-1))
 
         def step(at: Array, which: Indices) -> Array:
-            D = self.derivatives(at, SECOND)
+            D = self.derivatives(at, SECOND_ORDER)
             away = places[which] - D[0]
             slope = np.stack([-_dot(away, D[1]), -_dot(away, D[2])], axis=-1)
             metric, hessian = _forms(D, away)
@@ -286,7 +286,7 @@ class Surface:
         found = self.nearest(x)
         if np.any(found.tied):
             raise InputError("two points of the surface are equally near, so that their distance has no rate.")
-        D = self.derivatives(found.at, SECOND)
+        D = self.derivatives(found.at, SECOND_ORDER)
         relative = moves - np.asarray(shift, dtype=float) - cross(spin, x)
         # At a pole, which is next to it alone, what is on the axis is on its normal.
         at = self._moved(found.at, D, found.gap[..., None] * found.direction, relative)
@@ -365,14 +365,14 @@ def descended(
     steps are asked for where the search has not ended.
     """
     found, which = at.copy(), np.arange(len(at))
-    for _ in range(NEWTONS):
+    for _ in range(MOST_NEWTON_STEPS):
         here = found[which]
         now, move, length = value(here, which), step(here, which), np.ones(len(which))
         # Close to the end values agree to rounding, while steps still get shorter.
         most = now + np.maximum(noise, DIGITS * np.abs(now))
         tried = np.clip(here + move, low, high)
         after = value(tried, which)
-        for _ in range(HALVINGS):
+        for _ in range(MOST_HALVINGS):
             worse = after > most
             if not worse.any():
                 break

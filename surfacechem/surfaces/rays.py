@@ -14,12 +14,12 @@ from typing import Any
 
 import numpy as np
 
-from surfacechem.surfaces.nodes import Extent, Grid, divided, gauss, order_of
+from surfacechem.surfaces.nodes import Extent, Grid, divided, gauss_rule, order_of
 from surfacechem.surfaces.projection import POLE, Array, Projection, Surface
 from surfacechem.surfaces.shapes import Indices, Sphere
 from surfacechem.tolerances import TINY
 
-LOOKS = 4
+BEND_SAMPLES = 4
 """Parts of a piece between whose ends it is seen whether the distance passes that of a bend."""
 
 
@@ -86,7 +86,7 @@ def ray_grid(surface: Surface, x: Array, near: Projection, reach: Array, extent:
     rays = Rays(surface, x[seen], gaps, owner, start.reshape(-1, 2), end.reshape(-1, 2), area.ravel())
     rays = rays.chosen(np.flatnonzero(rays.area > 0))
     which, ends = _pieces(rays, extent, level)
-    t, w = gauss(ends, order_of(level))
+    t, w = gauss_rule(ends, order_of(level))
     rays = rays.chosen(which)
     scale = rays.scale[:, None]
     s = scale * np.sinh(t)
@@ -103,7 +103,7 @@ def _pieces(rays: Rays, extent: Extent, level: int) -> tuple[Indices, Array]:
     whole = np.arcsinh(1 / scale)
     edges = divided(np.stack([np.zeros_like(whole), whole], axis=1), level)
     count = edges.shape[1] - 1
-    looks = whole[:, None] * np.arange(count * LOOKS + 1) / (count * LOOKS)
+    looks = whole[:, None] * np.arange(count * BEND_SAMPLES + 1) / (count * BEND_SAMPLES)
     r = rays.distances(scale[:, None] * np.sinh(looks))
     rank, t = [np.repeat(np.arange(len(whole)), count + 1)], [edges.ravel()]
     for bend in extent.bends:
@@ -142,7 +142,7 @@ def _rectangle(surface: Surface, feet: Array, gaps: Array, far: Array, level: in
             # Along a side what is seen from the foot has the length of their distance, or of the gap.
             unit = np.maximum(np.abs(side) * lengths[k], gaps) / lengths[1 - k]
             edges = divided(np.stack([np.arcsinh(end / unit) for end in sides[1 - k]], axis=1), level)
-            t, w = gauss(edges, order_of(level))
+            t, w = gauss_rule(edges, order_of(level))
             along = unit[:, None] * np.sinh(t)
             to = np.broadcast_to(side[:, None], along.shape), along
             ends.append(np.stack(to if k == 0 else to[::-1], axis=-1))
@@ -164,7 +164,7 @@ def _circle(surface: Surface, feet: Array, gaps: Array, far: Array, level: int) 
     left = np.where(beyond, radius, radius - feet[:, 0])
     unit = np.maximum(left, gaps / length) / radius
     end = np.arcsinh(math.pi / unit)
-    t, w = gauss(divided(np.stack([-end, np.zeros_like(end), end], axis=1), level), order_of(level))
+    t, w = gauss_rule(divided(np.stack([-end, np.zeros_like(end), end], axis=1), level), order_of(level))
     turn = angle[:, None] + unit[:, None] * np.sinh(t)
     out = radius[:, None, None] * np.stack([np.cos(turn), np.sin(turn)], axis=-1)
     along = np.stack([-out[..., 1], out[..., 0]], axis=-1)

@@ -23,27 +23,25 @@ Indices = NDArray[np.int_]
 Span = tuple[tuple[float, float], tuple[float, float]]
 Point = tuple[Expression, Expression, Expression]
 
-ROUND = (-math.pi, math.pi)
-STEEPEST = 1.57
+FULL_TURN = (-math.pi, math.pi)
+MAX_SLOPE = 1.57
 """Slope of a cone at most; a needle has no height."""
 
-NODES, PER_CELL, MOST_NODES = 128, 8, 1_000_000
+PER_HALF_WAVE, PER_CELL, MOST_NODES = 128, 8, 1_000_000
 """Places along half a wave, and along each cell of measured heights, among which a search for the nearest point begins,
 and those of all cells at most.
 """
 
-OWN = 0.6
+OWN_PART = 0.6
 """Fraction of the way from one of these places to the next within which it is the one beside the nearest point: half,
 and what Newton's step may be wrong by.
 """
 
-OVERSHOOT = 0.1
+SPLINE_OVERSHOOT = 0.1
 """Fraction of the range of heights by which a spline through them may be above the highest, as summits lie between."""
 
 
-def _leads_nowhere_else(
-    away: Array, slopes: Array, ends: Sequence[NDArray[np.bool_]], widths: Sequence[float]
-) -> Array:
+def _stays_near(away: Array, slopes: Array, ends: Sequence[NDArray[np.bool_]], widths: Sequence[float]) -> Array:
     """Whether Newton's step, from places (n, 3) that points are ``away`` from, stays beside them; at an edge along it.
 
     ``slopes`` (n, 5) are derivatives of the heights: u, v, uu, uv, vv; ``ends`` tell where u and v have none.
@@ -54,8 +52,8 @@ def _leads_nowhere_else(
     G = np.where(ends[1], 1.0, 1 + h_v**2 - up * h_vv)
     along, across = np.where(ends[0], 0.0, x_u + up * h_u), np.where(ends[1], 0.0, x_v + up * h_v)
     det = E * G - F**2
-    stays = np.abs(G * along - F * across) <= OWN * widths[0] * det
-    return np.asarray(stays & (np.abs(E * across - F * along) <= OWN * widths[1] * det) & (E > 0) & (det > 0))
+    stays = np.abs(G * along - F * across) <= OWN_PART * widths[0] * det
+    return np.asarray(stays & (np.abs(E * across - F * along) <= OWN_PART * widths[1] * det) & (E > 0) & (det > 0))
 
 
 def _half(extent: float | None) -> tuple[float, float]:
@@ -120,7 +118,7 @@ class Sphere(Shape):
     @property
     def span(self) -> Span:
         """Angles of the whole sphere."""
-        return (0.0, math.pi), ROUND
+        return (0.0, math.pi), FULL_TURN
 
     def foot(self, x: Array) -> Array:
         """Parameters of the nearest point: along the radius, or on the edge."""
@@ -146,7 +144,7 @@ class Cap(Sphere):
     @property
     def span(self) -> Span:
         """Angles up to the edge."""
-        return (0.0, self.angle), ROUND
+        return (0.0, self.angle), FULL_TURN
 
 
 class Cavity(Cap):
@@ -190,14 +188,14 @@ class Cylinder(Shape):
     @property
     def span(self) -> Span:
         """Length, and angles all around."""
-        return _half(self.length), ROUND
+        return _half(self.length), FULL_TURN
 
     def foot(self, x: Array) -> Array:
         """Parameters of the nearest point: along the radius, or on the edge."""
         return np.stack([np.clip(x[..., 0], *_half(self.length)), np.arctan2(x[..., 1], x[..., 2] + self.R)], axis=-1)
 
 
-class Turned(Shape):
+class SurfaceOfRevolution(Shape):
     """Surface of revolution over the distance u from its axis; without a radius of its edge it has no end."""
 
     about_axis = True
@@ -208,7 +206,7 @@ class Turned(Shape):
     @property
     def span(self) -> Span:
         """Distances up to the edge, and angles all around."""
-        return (0.0, math.inf if self.radius is None else self.radius), ROUND
+        return (0.0, math.inf if self.radius is None else self.radius), FULL_TURN
 
     def starts(self, x: Array) -> tuple[Indices, Array]:
         """Starts of the search at the angle of the points about the axis and at the opposite one."""
@@ -221,7 +219,7 @@ class Turned(Shape):
         """Point at the distance u from the axis and the angle v about it."""
 
 
-class Disc(Turned):
+class Disc(SurfaceOfRevolution):
     r"""Circular disc; without a radius a plane in polar coordinates.
 
     .. math:: x = (u \cos v,\; u \sin v,\; 0)
@@ -244,7 +242,7 @@ class Disc(Turned):
         return np.asarray(np.clip(at, *np.transpose(self.span)))
 
 
-class Paraboloid(Turned):
+class Paraboloid(SurfaceOfRevolution):
     r"""Paraboloid of revolution.
 
     .. math:: x = (u \cos v,\; u \sin v,\; -u^2 / 2R)
@@ -264,7 +262,7 @@ class Paraboloid(Turned):
         return u * cos(v), u * sin(v), -(u**2) / (2 * self.R)
 
 
-class Cone(Turned):
+class Cone(SurfaceOfRevolution):
     r"""Cone, the tip up.
 
     .. math:: x = (u \cos v,\; u \sin v,\; -u \tan\alpha)
@@ -278,7 +276,7 @@ class Cone(Turned):
     radii = ("radius",)
     rises = 1
 
-    slope: float = parameter("rad", "angle between its side and the plane", above=0, at_most=STEEPEST, varies=False)
+    slope: float = parameter("rad", "angle between its side and the plane", above=0, at_most=MAX_SLOPE, varies=False)
 
     def point(self, u: Expression, v: Expression) -> Point:
         """Point at the distance u from the axis and the angle v about it."""
@@ -318,7 +316,7 @@ class Torus(Shape):
     @property
     def span(self) -> Span:
         """Angles of the whole torus."""
-        return ROUND, ROUND
+        return FULL_TURN, FULL_TURN
 
     def foot(self, x: Array) -> Array:
         """Parameters of the nearest point: along the radius of the tube."""
@@ -365,7 +363,7 @@ class Wavy(Plane):
         """Places (along each wave, and height) from a crest to half a wave away."""
         from scipy.spatial import KDTree
 
-        axes = [np.linspace(0, wave / 2, NODES) for wave in self.waves]
+        axes = [np.linspace(0, wave / 2, PER_HALF_WAVE) for wave in self.waves]
         places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(axes))
         heights = self.amplitude * (np.prod(np.cos(2 * math.pi / self.waves * places), axis=-1) - 1)
         return KDTree(np.column_stack([places, heights]))
@@ -427,7 +425,7 @@ class Heights(Shape):
         if not np.all(np.isfinite(self.z)):
             raise InputError("the heights have holes: one of them is not a finite number.")
         between = self.spline(*((np.array(p[1:]) + p[:-1]) / 2 for p in (self.x, self.y)))
-        if between.max() > OVERSHOOT * np.ptp(self.z):
+        if between.max() > SPLINE_OVERSHOOT * np.ptp(self.z):
             text = f"between the places a spline is {between.max():.3g} m above the highest of the heights"
             raise InputError(f"{text}: they change too much from place to place; smooth them, or give more of them.")
 
@@ -492,7 +490,7 @@ class Heights(Shape):
             # At an edge the nearest point may be one that is so along it alone.
             beside = (np.where(end, k, k + offset) for end, k, offset in zip(ends, (i, j), offsets, strict=True))
             least &= distance <= np.linalg.norm(x[which] - places[tuple(beside)], axis=-1)
-        least |= _leads_nowhere_else(away, slopes[i, j], ends, widths)
+        least |= _stays_near(away, slopes[i, j], ends, widths)
         return which[least], places[i, j, :2][least]
 
     def derivatives(self, u: Array, v: Array, count: int) -> Array:

@@ -24,7 +24,7 @@ from surfacechem.results.matching import match
 from surfacechem.runs.summaries import run_summary
 from surfacechem.surfaces import patches, potential
 from surfacechem.surfaces.approach import fitted
-from surfacechem.surfaces.curved_gap import density, over_gap, passages
+from surfacechem.surfaces.curved_gap import density, level_approaches, over_gap
 from surfacechem.surfaces.nearest_places import near_places
 from surfacechem.surfaces.pair_laws import InversePower
 from surfacechem.surfaces.pairwise import interaction
@@ -341,7 +341,7 @@ def test_contact_of_plates_begins_where_a_corner_or_edges_that_cross_come_into_c
     bodies = Surface(lower), Surface(upper, True)
     axes = np.hstack([bodies[0].axes[:, :2], -bodies[1].axes[:, :2]])
     best = linprog(-axes[2], A_eq=axes[:2], b_eq=[0, 0], bounds=[*lower.span, *upper.span])
-    assert passages(*bodies, [0.0])[-1] == pytest.approx(-best.fun, rel=1e-9)
+    assert level_approaches(*bodies, [0.0])[-1] == pytest.approx(-best.fun, rel=1e-9)
     touching = near_places(bodies[0], Surface(upper, True, -best.fun), 6.0, (False, False))
     assert touching.gap[0] == pytest.approx(0, abs=2e-6)
 
@@ -380,14 +380,14 @@ def test_a_force_that_begins_like_a_root_is_held_where_it_is_small():
     [(Torus(hole=1.0, r=0.5, tilt=0.17), 1.5 * math.sin(0.17) + 0.5 * (1 - math.cos(0.17))), (Sphere(R=1.0), 0.0)],
 )
 def test_contact_begins_where_the_least_gap_vanishes(upper, least):
-    found = passages(Surface(Plane()), Surface(upper, True), [0.0, 0.1])
+    found = level_approaches(Surface(Plane()), Surface(upper, True), [0.0, 0.1])
     assert found == pytest.approx([least, least + 0.1], abs=1e-12)
 
 
 def test_bodies_that_just_touch_have_no_area_of_contact():
     """Rounding decides which points of a rim overlap, and takes no patches."""
     lower, upper = Surface(Plane()), Surface(Cone(slope=0.3, radius=1.0, tilt=0.4), True)
-    touching = replace(upper, approach=passages(lower, upper, [0.0])[0])
+    touching = replace(upper, approach=level_approaches(lower, upper, [0.0])[0])
     budget = patches.Budget(1e-5)
     found = over_gap(lower, touching, [density(Penalty(E_n=1.0))], rtol=1e-5, floor=(1e-6, 1e-6), budget=budget)
     assert found.area < 1e-12

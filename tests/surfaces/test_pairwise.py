@@ -101,7 +101,7 @@ def test_both_half_passes_have_one_energy_and_opposite_forces_where_densities_di
         u = (low + high) / 2 + (high - low) / 2 * x
         points, areas = own.elements(np.stack([u, np.zeros_like(u)], axis=-1))
         area = math.pi * (high - low) * w * areas
-        ((energy, push),), _ = inner_sums(other, points, [law], nodes.LAST, 1e-12)
+        ((energy, push),), _ = inner_sums(other, points, [law], nodes.LAST_LEVEL, 1e-12)
         halves.append((law.n_1 * law.n_2 * area @ energy, law.n_1 * law.n_2 * area @ push[:, 2]))
     (energy, force), (same, opposite) = halves
     assert energy == pytest.approx(same, rel=1e-10)

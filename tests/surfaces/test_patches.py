@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import quad
 
 from surfacechem.laws.contact import Penalty
-from surfacechem.surfaces.curved_gap import density, over_gap, passages
+from surfacechem.surfaces.curved_gap import density, level_approaches, over_gap
 from surfacechem.surfaces.nearest_places import near_places
 from surfacechem.surfaces.pair_laws import LennardJonesPair
 from surfacechem.surfaces.pairwise import interaction
@@ -127,7 +127,7 @@ def test_the_least_gap_of_plates_that_are_turned_and_pressed_in_is_that_of_a_cor
     """Beyond the edge of the other plate the gap jumps, so that there is no slope to follow."""
     lower = Surface(Plane(length=2.0, width=1.0, tilt=tilt, turn=0.3))
     plate = Plane(length=1.5, width=1.2, tilt=other, turn=-0.4)
-    upper = Surface(plate, True, passages(lower, Surface(plate, True), [0.0])[-1] - 1e-3)
+    upper = Surface(plate, True, level_approaches(lower, Surface(plate, True), [0.0])[-1] - 1e-3)
     at = np.stack(np.meshgrid(np.linspace(-1, 1, 401), np.linspace(-0.5, 0.5, 401), indexing="ij"), axis=-1)
     seen = upper.nearest(lower.derivatives(at, 3)[0]).gap.min()
     found = near_places(lower, upper, 2.0, (False, False)).gap[0]

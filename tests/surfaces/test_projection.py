@@ -9,7 +9,7 @@ from scipy.spatial import KDTree
 
 from surfacechem.errors import InputError
 from surfacechem.laws import find
-from surfacechem.surfaces.projection import FIRST, Surface
+from surfacechem.surfaces.projection import FIRST_ORDER, Surface
 from surfacechem.surfaces.shapes import (
     Cap,
     Cavity,
@@ -191,5 +191,5 @@ def test_no_place_is_nearer_than_the_nearest_where_edges_cut_waves_off(shape):
     surface, (low, high) = Surface(shape), np.transpose(shape.span)
     grid = np.stack(np.meshgrid(*np.linspace(low, high, 301).T, indexing="ij"), axis=-1)
     points = np.random.default_rng(18).uniform([*1.1 * low, -1.5], [*1.1 * high, 1.5], (2000, 3))
-    dense, _ = KDTree(surface.derivatives(grid, FIRST)[0].reshape(-1, 3)).query(points)
+    dense, _ = KDTree(surface.derivatives(grid, FIRST_ORDER)[0].reshape(-1, 3)).query(points)
     assert np.all(np.abs(surface.nearest(points).gap) <= dense * (1 + 1e-12))
