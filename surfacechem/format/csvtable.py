@@ -13,13 +13,13 @@ from surfacechem.documents.document import Tree
 from surfacechem.errors import InputError, Place, placed, suggestion
 from surfacechem.laws.loading import Table
 
-TEXTS = {
+KEY_MEANINGS = {
     "file": "a CSV file beside the case; its first line is like t [s], w_n [um]",
     "csv": "the text of such a file",
     "column": "the column of the values, if not named after the variable",
 }
-KEYS = tuple(TEXTS)
-HEADING = re.compile(r"(?P<name>[A-Za-z]\w*)(\s*\[(?P<unit>[^\]]+)\])?")
+KEYS = tuple(KEY_MEANINGS)
+COLUMN_HEADING = re.compile(r"(?P<name>[A-Za-z]\w*)(\s*\[(?P<unit>[^\]]+)\])?")
 EXAMPLE = '"t [s], w_n [um]"'
 
 
@@ -85,7 +85,7 @@ class CSVText:
     def _columns(self, quoted: bool) -> list[tuple[str, str]]:
         """Names and units of the columns; a unit may be empty."""
         line, cells = self.heading
-        found = [HEADING.fullmatch(cell) for cell in cells]
+        found = [COLUMN_HEADING.fullmatch(cell) for cell in cells]
         if None in found:
             column = found.index(None)
             which = f"'{cells[column]}'" if quoted else f"of column {column + 1}"

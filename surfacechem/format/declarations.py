@@ -6,7 +6,7 @@ hold follow the reader, the strict checks of keys and values, the JSON Schema an
 >>> from surfacechem.documents.document import parse
 >>> class Oven(Section):
 ...     T: float = quantity("K", "temperature", REQUIRED, above=0)
-...     steps: int = key(Whole(1), "number of steps", 3)
+...     steps: int = key(Integer(1), "number of steps", 3)
 >>> oven = read(Oven, parse("{T: 25 degC}"), Context())
 >>> oven.T, oven.steps
 (298.15, 3)
@@ -44,10 +44,10 @@ QUANTITY = r"^\s*[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?\s*(\S.*)?$"
 REQUIRED = MISSING
 
 # Names of temperatures start with T, so that they never clash with another quantity.
-NODE = re.compile(r"T[A-Za-z0-9_]*")
+NODE_NAME = re.compile(r"T[A-Za-z0-9_]*")
 
 # Entries of a list. Of laws each may be the same again, and names are numbered up to a thousand.
-MOST = 500
+MOST_LAWS = 500
 
 # Parameters that are a change of their variable, so that degrees Celsius have no meaning for them.
 DIFFERENCES = ("amplitude",)
@@ -146,7 +146,7 @@ def number(tree: Tree, spec: Spec, name: str, *, difference: bool = False) -> fl
 
 
 @dataclass(frozen=True)
-class Whole(Content):
+class Integer(Content):
     """A whole number in a range, or the one word that may stand in its place."""
 
     at_least: int
@@ -247,8 +247,8 @@ class ListOf(Content):
         entries = tree.items(law.example if law and not isinstance(tree.value, list) else self.example)
         if self.count is not None and len(entries) != self.count:
             raise tree.error(f"{name} needs {self.count} entries, got {len(entries)}.")
-        if law and len(entries) > MOST:
-            raise entries[MOST].error(f"more than {MOST} laws in a list.")
+        if law and len(entries) > MOST_LAWS:
+            raise entries[MOST_LAWS].error(f"more than {MOST_LAWS} laws in a list.")
         return tuple(self.content.read(entry, f"an entry of {name}", context) for entry in entries)
 
     def schema(self) -> Schema:
@@ -339,7 +339,7 @@ class Temperature(Content):
         value = tree.value
         if not is_name(tree):
             return Prescribed("K", above_zero=True).read(tree, name, context)
-        if not NODE.fullmatch(value) or value == "T_0":
+        if not NODE_NAME.fullmatch(value) or value == "T_0":
             hint = "T_0 is the reference temperature" if value == "T_0" else f"start it with T, for example T_{value}"
             raise tree.error(f"'{value}' cannot name a temperature: {hint}.")
         return str(value)
@@ -425,7 +425,7 @@ class Entries(Content):
 
 
 @dataclass(frozen=True)
-class Shapes(Content):
+class ByShape(Content):
     """Content that is read by its shape: a mapping, a list, or a value."""
 
     value: Content | None = None
@@ -461,7 +461,7 @@ class Shapes(Content):
 
 
 @dataclass(frozen=True)
-class Later(Content):
+class Deferred(Content):
     """Content whose units are known only when the scene is assembled."""
 
     content: Content

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-INSIDE = 2.0**-53
+HALF_SPACING = 2.0**-53
 """Offset of numbers in [0, 1), so that none is zero, where the quantile of a normal distribution is infinite."""
 
-ROUNDS = 6
+FEISTEL_ROUNDS = 6
 """Rounds of a permutation: four make one that cannot be told from a random one, two more cost nothing."""
 
 
@@ -67,7 +67,7 @@ class Normal(Distribution):
     std: float
 
     def at(self, u: Array) -> Array:
-        return self.mean + self.std * _standard(u)
+        return self.mean + self.std * _standard_normal(u)
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ class Lognormal(Distribution):
         return True
 
     def at(self, u: Array) -> Array:
-        return np.asarray(self.median * np.exp(self.sigma * _standard(u)))
+        return np.asarray(self.median * np.exp(self.sigma * _standard_normal(u)))
 
 
 @dataclass(frozen=True)
@@ -96,10 +96,12 @@ class Drawn(Distribution):
         return np.array(self.values)[np.minimum((u * len(self.values)).astype(np.int64), len(self.values) - 1)]
 
 
-KINDS: Mapping[str, Callable[..., Distribution]] = {kind.__name__: kind for kind in (Uniform, Normal, Lognormal, Drawn)}
+DISTRIBUTIONS: Mapping[str, Callable[..., Distribution]] = {
+    kind.__name__: kind for kind in (Uniform, Normal, Lognormal, Drawn)
+}
 
 
-def _standard(u: Array) -> Array:
+def _standard_normal(u: Array) -> Array:
     from scipy.special import ndtri
 
     return np.asarray(ndtri(u))
@@ -119,7 +121,7 @@ class Sample:
         # Columns of one table are one dimension, so that they are taken from the same row.
         sources = list(dict.fromkeys(draw.source or path for path, draw in self.draws.items()))
         own, where = np.unique(index, return_inverse=True)
-        u = METHODS[self.method](own, self.runs, len(sources), self.seed)[where] + INSIDE
+        u = SAMPLERS[self.method](own, self.runs, len(sources), self.seed)[where] + HALF_SPACING
         return {path: draw.at(u[:, sources.index(draw.source or path)]) for path, draw in self.draws.items()}
 
     def of(self, path: str, index: Index) -> Array:
@@ -138,9 +140,9 @@ def recorded_sample(content: Mapping[str, Any]) -> Sample:
     draws = {}
     for path, record in content["draws"].items():
         given = {name: tuple(value) if isinstance(value, list) else value for name, value in record.items()}
-        draws[str(path)] = KINDS[str(given.pop("kind"))](**given)
+        draws[str(path)] = DISTRIBUTIONS[str(given.pop("kind"))](**given)
     runs, seed = int(content["runs"]), int(content["seed"])
-    return Sample(draws, runs, [*METHODS][[*METHODS].index(content["method"])], seed)
+    return Sample(draws, runs, [*SAMPLERS][[*SAMPLERS].index(content["method"])], seed)
 
 
 # -- numbers in [0, 1), a row for each of increasing indices and a column for each of some dimensions ------------------
@@ -188,7 +190,7 @@ def _latin(index: Index, runs: int, dimensions: int, seed: int) -> Array:
     return (places + _random(index, runs, dimensions, seed)) / runs
 
 
-METHODS: Mapping[str, Callable[[Index, int, int, int], Array]] = {
+SAMPLERS: Mapping[str, Callable[[Index, int, int, int], Array]] = {
     "sobol": _sobol,
     "latin-hypercube": _latin,
     "random": _random,
@@ -209,14 +211,14 @@ def permuted(index: Index, count: int, key: int) -> Index:
     while walking.any():
         # Each turn changes one half by a function of the other, which can be undone: so no two numbers meet.
         left, right = x[walking] >> shift, x[walking] & mask
-        for turn in range(ROUNDS):
-            left, right = right, left ^ (mixed(right, key * ROUNDS + turn) & mask)
+        for turn in range(FEISTEL_ROUNDS):
+            left, right = right, left ^ (hashed(right, key * FEISTEL_ROUNDS + turn) & mask)
         x[walking] = left << shift | right
         walking = x >= count
     return x.astype(np.int64)
 
 
-def mixed(x: NDArray[np.uint64], key: int) -> NDArray[np.uint64]:
+def hashed(x: NDArray[np.uint64], key: int) -> NDArray[np.uint64]:
     """Hash of numbers: its bits all depend on all bits of x and the key.
 
     Source: Steele, Lea & Flood (2014), Fast splittable pseudorandom number generators, doi 10.1145/2714064.2660195.

@@ -15,7 +15,7 @@ from surfacechem.errors import InputError, Place
 from surfacechem.format.csvtable import CSVText
 
 AXES = "xyz"
-HOLES = ("", "nan", "na", "inf", "-inf")
+MISSING_HEIGHTS = ("", "nan", "na", "inf", "-inf")
 """Entries of tables of instruments for a height that is missing."""
 
 NETCDF = ".nc"
@@ -48,7 +48,7 @@ def from_csv(content: Tree) -> Numbers:
     """Heights of a table with a row for each place, in any order."""
     table = CSVText(content)
     for line, row in table.rows:
-        if any(cell.lower() in HOLES for cell in row):
+        if any(cell.lower() in MISSING_HEIGHTS for cell in row):
             raise table.error(line, "the heights have a hole: z is no finite number there.")
     x, y, z = (table.column(axis, "m", axis) for axis in AXES)
     heights: dict[tuple[float, float], float] = {}

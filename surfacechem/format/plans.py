@@ -29,8 +29,8 @@ from surfacechem.format.sections import (
     LINEAR,
     MOST_AXES,
     NOTHING_SWEPT,
+    SWEEP_END,
     SWEPT,
-    UNTIL,
     DistributionSection,
     RangeSection,
     SweepSection,
@@ -44,15 +44,15 @@ SURVIVAL = "survival"
 
 STATISTICS = {"mode": "most probable", "median": "median", "mean": "mean"}
 
-INTEGRATED = ("surface.bodies.", "surface.laws.", "surface.heat.", "surface.approach.", "surface.accuracy")
+INTEGRATED_PATHS = ("surface.bodies.", "surface.laws.", "surface.heat.", "surface.approach.", "surface.accuracy")
 """Beginnings of the paths of what is in integrals over surfaces."""
 
-RUN = "run"
+RUN_DIMENSION = "run"
 """The dimension along which several parameters change together."""
 
 
 @dataclass(frozen=True)
-class Spaced:
+class EvenlySpaced:
     """Values from the first to the last, at equal distances or ratios; none of them is kept."""
 
     first: float
@@ -77,7 +77,7 @@ class Spaced:
 
 
 @dataclass(frozen=True)
-class Numbered:
+class LazyArray:
     """Array of values by their numbers, evaluated only where a slice is asked for: of many part by part."""
 
     at: Callable[[Index], Array]
@@ -112,12 +112,12 @@ class Axis:
     """A swept parameter or initial value: its path, its values in SI, and whether they are spaced by ratios."""
 
     path: str
-    values: Sequence[float] | Spaced
+    values: Sequence[float] | EvenlySpaced
     logarithmic: bool = False
 
     def __post_init__(self) -> None:
         """Values are at least one and finite."""
-        ends = self.at(np.array([0, -1]) % len(self)) if isinstance(self.values, Spaced) else self.values
+        ends = self.at(np.array([0, -1]) % len(self)) if isinstance(self.values, EvenlySpaced) else self.values
         if not len(self) or not np.all(np.isfinite(ends)):
             raise InputError(f"{self.path} needs finite values, at least one.", path="sweep")
 
@@ -127,7 +127,7 @@ class Axis:
 
     def at(self, index: Index) -> Array:
         """The values of these numbers."""
-        return self.values.at(index) if isinstance(self.values, Spaced) else self._listed[index]
+        return self.values.at(index) if isinstance(self.values, EvenlySpaced) else self._listed[index]
 
     @cached_property
     def _listed(self) -> Array:
@@ -136,14 +136,14 @@ class Axis:
     @property
     def has_equals(self) -> bool:
         """Whether a value is there twice."""
-        if isinstance(self.values, Spaced):
+        if isinstance(self.values, EvenlySpaced):
             return len(self) > 1 and self.values.first == self.values.last
         return len(set(self.values)) != len(self)
 
     @property
     def record(self) -> dict[str, Any]:
         """Entries from which the axis can be made again."""
-        if isinstance(self.values, Spaced):
+        if isinstance(self.values, EvenlySpaced):
             return {"path": self.path, **vars(self.values)}
         return {"path": self.path, "values": list(self.values), "logarithmic": self.logarithmic}
 
@@ -243,7 +243,7 @@ def recorded_plan(record: object) -> Plan:
         if "values" in content:
             return Axis(str(content["path"]), numbers(content["values"]), logarithmic)
         first, last = numbers((content["first"], content["last"]))
-        return Axis(str(content["path"]), Spaced(first, last, int(content["count"]), logarithmic), logarithmic)
+        return Axis(str(content["path"]), EvenlySpaced(first, last, int(content["count"]), logarithmic), logarithmic)
 
     try:
         content = json.loads(str(record))
@@ -258,7 +258,7 @@ def recorded_plan(record: object) -> Plan:
         raise InputError("the attribute 'sweep' is no plan of a sweep.") from None
 
 
-def numbered(over: Mapping[str, object]) -> tuple[dict[str, object], dict[str, Array]]:
+def split_arrays(over: Mapping[str, object]) -> tuple[dict[str, object], dict[str, Array]]:
     """Values as a case lists them, and apart from these, which are read entry by entry, those that come as arrays of
     numbers, which may be long.
     """
@@ -310,13 +310,13 @@ def read_sweep(tree: Tree, usual: SweepSection | None = None) -> SweepSection:
 
 def read_until(tree: Tree) -> Mapping[str, float]:
     """A prescribed variable and the value at which each run ends."""
-    return UNTIL.read(tree, "until", Context())
+    return SWEEP_END.read(tree, "until", Context())
 
 
 def _known(path: str, tree: Tree, units: Mapping[str, str]) -> str:
     """The path of a parameter; InputError where there is none."""
     path = parameter_path(path, units)
-    if path.startswith(INTEGRATED):
+    if path.startswith(INTEGRATED_PATHS):
         text = "shapes and laws of the gap are in integrals that are made once; give each value a run, by --set."
         raise InputError(f"{path} cannot be swept: {text}", tree.place)
     refuse_unknown([path], units, "no parameter '{}' to sweep", tree.place, PATHS)
@@ -326,19 +326,19 @@ def _known(path: str, tree: Tree, units: Mapping[str, str]) -> str:
 def _axis(path: str, tree: Tree, units: Mapping[str, str], array: Array | None) -> Axis:
     path = _known(path, tree, units)
     if array is not None:
-        return Axis(path, _even(array) or array.tolist())
+        return Axis(path, _as_range(array) or array.tolist())
     values = SWEPT.read(tree, path, Context(x=units[path]))
     if not isinstance(values, RangeSection):
         return Axis(path, list(values))
     logarithmic = _logarithmic(values)
-    return Axis(path, Spaced(values.first, values.last, values.points, logarithmic), logarithmic)
+    return Axis(path, EvenlySpaced(values.first, values.last, values.points, logarithmic), logarithmic)
 
 
-def _even(array: Array) -> Spaced | None:
+def _as_range(array: Array) -> EvenlySpaced | None:
     """Equally spaced values as a range, so that neither a plan nor its record keeps each of them."""
     if not (len(array) and np.isfinite(array).all()):
         return None
-    spaced = Spaced(float(array[0]), float(array[-1]), len(array))
+    spaced = EvenlySpaced(float(array[0]), float(array[-1]), len(array))
     return spaced if np.array_equal(spaced.at(np.arange(len(array))), array) else None
 
 

@@ -18,9 +18,9 @@ from surfacechem.errors import InputError, Place, suggestion
 from surfacechem.format.declarations import UNITS, Context, is_name, keys, number, read
 from surfacechem.format.sections import (
     BODY_NAME,
+    DEFAULT_OUTPUTS,
     LINEAR,
     LUMP,
-    OUTPUTS,
     REFERENCE,
     STEADY,
     BodySection,
@@ -48,7 +48,7 @@ if TYPE_CHECKING:
 
 L = TypeVar("L", bound=Law)
 
-UNNAMED = ("lower", "upper")
+DEFAULT_BODIES = ("lower", "upper")
 SHARED = "T"
 """Names of bodies that a case leaves out, and of the temperature that they share with the interface."""
 
@@ -59,10 +59,10 @@ RESERVED = ("T_a", "T_from", "T_to")
 TAKEN = ("interface", "surroundings", "reference")
 
 # Keys of the interface under which all bonds would be at the least gap of curved surfaces.
-OF_FLATS = ("sites", "bonding", "mechanism", "friction")
+KEYS_OF_FLATS = ("sites", "bonding", "mechanism", "friction")
 
 # Cells of a body before a run has chosen them.
-FIRST_CELLS = 16
+DEFAULT_CELLS = 16
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,7 @@ def read_document(tree: Tree, base: str = ".", mechanism_text: str | None = None
         _refuse_bonds(interface)
     units = {name: TOTAL_UNITS.get(unit, unit) for name, unit in UNITS.items()} if whole else UNITS
     names = {**units, **dict.fromkeys(temperatures, "K")}
-    context = Context(names, temperatures, tuple(bodies) or UNNAMED, whole=whole)
+    context = Context(names, temperatures, tuple(bodies) or DEFAULT_BODIES, whole=whole)
     mechanism = None
     if "mechanism" in interface:
         # Which solver runs decides whether a mechanism may ask Cantera for its rates.
@@ -121,7 +121,7 @@ def read_document(tree: Tree, base: str = ".", mechanism_text: str | None = None
 def _refuse_bonds(interface: Mapping[str, Tree]) -> None:
     """Raise InputError where an interface of bodies with shapes has bonds or friction of its own."""
     # Before numbers are read, whose units would be those of a pair.
-    for name in OF_FLATS:
+    for name in KEYS_OF_FLATS:
         if name in interface:
             text = "is of flats. Over curved surfaces bonds may be in equilibrium with the gap: put the law"
             raise interface[name].error(f"`{name}` {text} equilibrium-bonds under `surface: {{laws: ...}}`.")
@@ -178,7 +178,7 @@ def _bodies(case: Document) -> tuple[Body, Body]:
         message = "the two bodies, of which the first is body 1, for example `bodies: {lower: {...}, upper: {...}}`"
         raise case.tree.error(f"the case needs `bodies`: {message}; or `interface: {{temperature: 300 K}}`.")
     if not case.bodies:
-        return Body(UNNAMED[0], SHARED), Body(UNNAMED[1], SHARED)
+        return Body(DEFAULT_BODIES[0], SHARED), Body(DEFAULT_BODIES[1], SHARED)
     first, second = (_body(*item) for item in case.bodies.items())
     return first, second
 
@@ -189,7 +189,7 @@ def _body(name: str, section: BodySection) -> Body:
     if (given := section.conduction) is None:
         return Body(name, section.temperature, energy)
     chosen = given.cells if isinstance(given.cells, CellAccuracy) else None
-    cells = 0 if given.cells == LUMP else given.cells if isinstance(given.cells, int) else FIRST_CELLS
+    cells = 0 if given.cells == LUMP else given.cells if isinstance(given.cells, int) else DEFAULT_CELLS
     if cells % 2:
         raise given.error(f"cells must be even, so that half of them show the error; got {cells}.", "cells")
     far = given.far if isinstance(given.far, FarSide) else None
@@ -245,7 +245,7 @@ def _surface(case: Document) -> CurvedSurfaces | None:
         return None
     from surfacechem.surfaces.potential import CurvedSurfaces
 
-    first, second = tuple(case.bodies or ()) or UNNAMED
+    first, second = tuple(case.bodies or ()) or DEFAULT_BODIES
     missing = [name for name in (first, second) if name not in section.bodies]
     if missing:
         raise section.error(f"{missing[0]} has no shape: give one to both bodies.", "bodies")
@@ -302,7 +302,7 @@ def _sites(case: Document) -> Sites | None:
     """The density of sites; one per square metre for bonds whose density nothing reads: under a given force, without
     stored energy.
     """
-    section, bodies, sites = case.interface, list(case.bodies or UNNAMED), case.interface.sites
+    section, bodies, sites = case.interface, list(case.bodies or DEFAULT_BODIES), case.interface.sites
     if sites is None:
         alone = section.bonding and not section.potential and not section.has("mechanism")
         return Sites(1.0, 1.0) if alone and "f" in case.loading else None
@@ -547,7 +547,7 @@ def _times(section: RunSection) -> tuple[float, ...]:
 
 def _spaced(section: RunSection, end: float) -> tuple[float, ...]:
     """Output times [s], evenly or by ratios."""
-    count, first = section.outputs or OUTPUTS, section.first
+    count, first = section.outputs or DEFAULT_OUTPUTS, section.first
     if section.spacing == LINEAR:
         if first is not None:
             raise section.error("`first` belongs to `spacing: logarithmic`.", "first", "spacing")

@@ -6,8 +6,8 @@ import json
 
 from surfacechem import laws
 from surfacechem.contracts.terms import BodyEnergy, Law, Load, Shape
-from surfacechem.format.csvtable import TEXTS
-from surfacechem.format.declarations import NODE, QUANTITY, Schema, closed, law_keys, reference, schema_of
+from surfacechem.format.csvtable import KEY_MEANINGS
+from surfacechem.format.declarations import NODE_NAME, QUANTITY, Schema, closed, law_keys, reference, schema_of
 from surfacechem.format.sections import Document
 
 # The parameters of a body's energy stand beside its other keys.
@@ -16,7 +16,7 @@ CONTRACTS = [contract for contract in laws.FAMILIES if contract is not BodyEnerg
 
 def schema() -> Schema:
     """The JSON Schema (draft 2020-12) of a case file."""
-    entries = {name: {"type": "string", "description": meaning} for name, meaning in TEXTS.items()}
+    entries = {name: {"type": "string", "description": meaning} for name, meaning in KEY_MEANINGS.items()}
     # A table from a file, or from its text.
     tables = [closed({name: entries[name], "column": entries["column"]}, [name]) for name in ("file", "csv")]
     definitions: dict[str, Schema] = {
@@ -28,7 +28,7 @@ def schema() -> Schema:
         "temperature": {
             "description": "the name of a temperature (bodies that share one are in perfect contact), a value or a "
             "history",
-            "anyOf": [{"type": "string", "pattern": f"^{NODE.pattern}$"}, reference("history")],
+            "anyOf": [{"type": "string", "pattern": f"^{NODE_NAME.pattern}$"}, reference("history")],
         },
     }
     for contract in CONTRACTS:

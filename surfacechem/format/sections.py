@@ -31,14 +31,16 @@ from surfacechem.contracts.terms import (
 from surfacechem.contracts.units import quotient
 from surfacechem.documents.document import Tree
 from surfacechem.format.declarations import (
-    NODE,
+    NODE_NAME,
     REQUIRED,
     UNITS,
+    ByShape,
     Content,
     Context,
+    Deferred,
     Entries,
+    Integer,
     Key,
-    Later,
     ListOf,
     Nested,
     Number,
@@ -46,10 +48,8 @@ from surfacechem.format.declarations import (
     OneOf,
     Prescribed,
     Section,
-    Shapes,
     Temperature,
     Text,
-    Whole,
     amount,
     key,
     keys,
@@ -75,7 +75,7 @@ STEADY = "steady"
 LINEAR, LOGARITHMIC = SPACINGS = ("linear", "logarithmic")
 GRID = "grid"
 
-OUTPUTS = 201
+DEFAULT_OUTPUTS = 201
 MOST_OUTPUTS = MOST_RUNS = 1_000_000
 
 # Parameters of a grid, and values of one or draws of a sample: of Sobol' points there are no more.
@@ -119,7 +119,7 @@ class ConductionSection(Section):
     thickness: float = key(Number(dict(Conduction.specs())["thickness"]), default=REQUIRED)
     conductivity: Any = key(Number(dict(Conduction.specs())["conductivity"]), default=REQUIRED)
     cells: int | str | CellAccuracy = key(
-        Shapes(Whole(2, MOST_CELLS, step=2, word=LUMP), Nested(CellAccuracy)),
+        ByShape(Integer(2, MOST_CELLS, step=2, word=LUMP), Nested(CellAccuracy)),
         "number of cells, an even one so that half of them show the error, {accuracy: 1e-4}, or lump",
         REQUIRED,
     )
@@ -127,7 +127,7 @@ class ConductionSection(Section):
         "1", "width of the cells at the far side over that at the contact", 1.0, at_least=1 / STEEPEST, at_most=STEEPEST
     )
     far: str | FarSide = key(
-        Shapes(
+        ByShape(
             OneOf("far side", lambda: (INSULATED,)),
             Nested(FarSide),
             wanted="the far side is `insulated`, {temperature: 25 degC}, or {temperature: 25 degC, h: 10 W/m^2/K}",
@@ -174,7 +174,7 @@ class BodySection(Section):
 
 
 def _property(name: str, key_name: str) -> Any:
-    content = Shapes(amount(UNITS[name], above=0), OneLaw(Property))
+    content = ByShape(amount(UNITS[name], above=0), OneLaw(Property))
     return key(content, f"{VARIABLES[name].long_name} [{UNITS[name]}]", name=key_name)
 
 
@@ -228,15 +228,15 @@ class MechanismSection(Section):
         MappingProxyType({}),
     )
     species: Tree | None = key(
-        Later(Entries(others=Entries(others=Shapes(amount("1"), NUMBERS)))), "other numbers of species, by name"
+        Deferred(Entries(others=Entries(others=ByShape(amount("1"), NUMBERS)))), "other numbers of species, by name"
     )
-    reactions: Tree | None = key(Later(Entries(others=NUMBERS)), "other numbers of reactions, the first being `R1`")
+    reactions: Tree | None = key(Deferred(Entries(others=NUMBERS)), "other numbers of reactions, the first being `R1`")
 
 
 DENSITY = amount("1/m^2", "density of bonding sites", above=0)
 SHARE = amount("1", "fraction of heat", at_least=0, at_most=1)
-SIDES = Entries({"reference": Key(Text(), "the body whose sites define phi")}, DENSITY, lambda case: case.bodies)
-SHARES = Entries(others=SHARE, names=lambda case: [*case.bodies, "surroundings"])
+SITES = Entries({"reference": Key(Text(), "the body whose sites define phi")}, DENSITY, lambda case: case.bodies)
+PARTITION = Entries(others=SHARE, names=lambda case: [*case.bodies, "surroundings"])
 
 
 class InterfaceSection(Section):
@@ -246,10 +246,10 @@ class InterfaceSection(Section):
         Temperature(), "a name, a value or a history; left out where there is no medium"
     )
     sites: float | Mapping[str, Any] | None = key(
-        Shapes(DENSITY, SIDES), "density of bonding sites [1/m^2], one value or one for each body"
+        ByShape(DENSITY, SITES), "density of bonding sites [1/m^2], one value or one for each body"
     )
     partition: float | Mapping[str, float] | None = key(
-        Shapes(SHARE, SHARES),
+        ByShape(SHARE, PARTITION),
         "fraction of interface heat into body 1 where there is no medium, 0.5 if not given; or fractions by body and "
         "`surroundings`",
     )
@@ -259,7 +259,7 @@ class InterfaceSection(Section):
     bonding: Sequence[RateLaw] = key(ListOf(OneLaw(RateLaw)), "reactions, whose rates add up", ())
     limits: Sequence[Limit] = key(ListOf(OneLaw(Limit)), "tractions at which the interface gives way at once", ())
     mechanism: str | MechanismSection | None = key(
-        Shapes(Text(), Nested(MechanismSection)), "Cantera surface mechanism, instead of `sites`"
+        ByShape(Text(), Nested(MechanismSection)), "Cantera surface mechanism, instead of `sites`"
     )
 
 
@@ -321,8 +321,8 @@ class Threshold(Section):
     falls_to: float | None = quantity("[x]", "value reached from above", name="falls-to")
 
 
-AWAITED = Entries(
-    others=Shapes(amount("[x]"), Nested(Threshold)),
+THRESHOLDS = Entries(
+    others=ByShape(amount("[x]"), Nested(Threshold)),
     names=lambda case: [*case.units, *TRACTIONS],
     units=dict.fromkeys(TRACTIONS, "Pa"),
     what="variables",
@@ -336,7 +336,7 @@ class StageSection(Section):
 
     duration: float | None = quantity("s", "length of the stage", above=0, name="for")
     until: str | Mapping[str, float | Threshold] | None = key(
-        Shapes(Text(), AWAITED),
+        ByShape(Text(), THRESHOLDS),
         "what ends it: `{variable: value}`, `{variable: {falls-to: value}}`, or the name of an event",
     )
 
@@ -355,7 +355,7 @@ LOADING = Entries(
     _variables(LOADABLE, Prescribed()),
     Prescribed(above_zero=True),
     lambda case: case.temperatures,
-    NODE.pattern,
+    NODE_NAME.pattern,
     what="variables",
     words="histories by variable",
 )
@@ -371,7 +371,7 @@ INITIAL = Entries(
     },
     amount("K", above=0),
     lambda case: case.temperatures,
-    NODE.pattern,
+    NODE_NAME.pattern,
     what="variables",
     by_scene=True,
     words="values by variable",
@@ -394,7 +394,7 @@ class RunSection(Section):
         "end of the run [s], or where nothing changes any more",
     )
     outputs: int | None = key(
-        Whole(
+        Integer(
             *(2, MOST_OUTPUTS),
             wanted="outputs are a number, `outputs: 201`; a list is `times: [1 s, 5 s]`, even ratios are `spacing: "
             "logarithmic` with a `first`",
@@ -423,7 +423,7 @@ class RunSection(Section):
         OneOf("solver", lambda: (solvers.AUTO, *sorted(solvers.names))),
         f"integrator; {OWN} if not given, {solvers.AUTO} with `accuracy` and for sweeps into a store",
     )
-    max_steps: int = key(Whole(1), "most steps", 100_000, name="max-steps")
+    max_steps: int = key(Integer(1), "most steps", 100_000, name="max-steps")
     max_seconds: float | None = quantity("s", "longest run time", above=0, name="max-seconds")
 
 
@@ -453,7 +453,7 @@ def _parameters(*solutions: str) -> Iterator[tuple[str, Spec]]:
 
 
 # An exact solution, by name or with its parameters.
-REFERENCE = Shapes(
+REFERENCE = ByShape(
     EXACT_SOLUTION,
     Nested(ReferenceSection),
     wanted="an exact solution is given by its name, for example `reference: exothermic-bonding`, or as "
@@ -468,19 +468,19 @@ class RangeSection(Section):
 
     first: float = quantity("[x]", "first value", REQUIRED, name="from")
     last: float = quantity("[x]", "last value", REQUIRED, name="to")
-    points: int = key(Whole(1, MOST_POINTS), "number of values, both ends included", REQUIRED)
+    points: int = key(Integer(1, MOST_POINTS), "number of values, both ends included", REQUIRED)
     spacing: str = key(OneOf("spacing", lambda: SPACINGS), "of the values", LINEAR)
 
 
-OVER = "over: {loading.f.ramp.rate: {from: 1 pN/s, to: 1 nN/s, points: 31}}"
+OVER_EXAMPLE = "over: {loading.f.ramp.rate: {from: 1 pN/s, to: 1 nN/s, points: 31}}"
 
 # Values of a swept parameter, in its unit.
-SWEPT = Shapes(items=ListOf(amount("[x]"), "[1, 2, 3]", at_least=1), mapping=Nested(RangeSection))
+SWEPT = ByShape(items=ListOf(amount("[x]"), "[1, 2, 3]", at_least=1), mapping=Nested(RangeSection))
 
 
 def _by_path(content: Content, wanted: str) -> Entries:
     return Entries(
-        others=Later(content),
+        others=Deferred(content),
         pattern=lambda: rf"({'|'.join(keys(Document))})(\.[^.]+)*",
         at_most=MOST_AXES,
         wanted=wanted,
@@ -536,7 +536,7 @@ class DistributionSection(Section):
     table: TableSection | None = key(Nested(TableSection))
 
 
-OF = "of: {interface.potential.bond-energy.K_0: {normal: {mean: 300 J/m^2, std: 30 J/m^2}}}"
+OF_EXAMPLE = "of: {interface.potential.bond-energy.K_0: {normal: {mean: 300 J/m^2, std: 30 J/m^2}}}"
 
 
 class SampleSection(Section):
@@ -545,19 +545,21 @@ class SampleSection(Section):
     called = "a sample"
 
     of: Mapping[str, Tree] = key(
-        _by_path(Nested(DistributionSection), f"a sample needs `of`: distributions of parameters, for example `{OF}`"),
-        f"distributions of parameters by path, for example `{OF}`",
+        _by_path(
+            Nested(DistributionSection), f"a sample needs `of`: distributions of parameters, for example `{OF_EXAMPLE}`"
+        ),
+        f"distributions of parameters by path, for example `{OF_EXAMPLE}`",
         REQUIRED,
     )
-    runs: int = key(Whole(1, MOST_POINTS), "number of draws; of Sobol' points a power of two is best", REQUIRED)
+    runs: int = key(Integer(1, MOST_POINTS), "number of draws; of Sobol' points a power of two is best", REQUIRED)
     method: str = key(
         OneOf("method", lambda: ("sobol", "latin-hypercube", "random")), "how the draws are spread", "sobol"
     )
-    seed: int = key(Whole(0, 2**31), "another number, another sample", 0)
+    seed: int = key(Integer(0, 2**31), "another number, another sample", 0)
 
 
 # A prescribed variable and the value at which each run of a sweep ends, or the survival of bonds.
-UNTIL = Entries(
+SWEEP_END = Entries(
     others=amount("[x]"),
     names=lambda _: {**UNITS, "survival": "1"},
     what="variables",
@@ -567,7 +569,7 @@ UNTIL = Entries(
 
 
 ALL, NONE = "all", "none"
-NAMES = Shapes(OneOf("choice", lambda: (ALL,)), items=ListOf(Text(), "[T, phi]"))
+NAMES = ByShape(OneOf("choice", lambda: (ALL,)), items=ListOf(Text(), "[T, phi]"))
 
 
 class KeepSection(Section):
@@ -595,7 +597,7 @@ class KeepSection(Section):
     )
 
 
-NOTHING_SWEPT = f"a sweep needs `over` or `sample`: values of parameters, for example `{OVER}`."
+NOTHING_SWEPT = f"a sweep needs `over` or `sample`: values of parameters, for example `{OVER_EXAMPLE}`."
 
 
 class SweepSection(Section):
@@ -604,8 +606,8 @@ class SweepSection(Section):
     called = "a sweep"
 
     over: Mapping[str, Tree] = key(
-        _by_path(SWEPT, f"a sweep needs `over`: values of parameters, for example `{OVER}`"),
-        f"values of parameters by path, a list or `{{from, to, points, spacing}}`, for example `{OVER}`",
+        _by_path(SWEPT, f"a sweep needs `over`: values of parameters, for example `{OVER_EXAMPLE}`"),
+        f"values of parameters by path, a list or `{{from, to, points, spacing}}`, for example `{OVER_EXAMPLE}`",
         MappingProxyType({}),
     )
     combine: str = key(
@@ -613,12 +615,12 @@ class SweepSection(Section):
     )
     sample: SampleSection | None = key(Nested(SampleSection))
     until: Mapping[str, float] | None = key(
-        UNTIL,
+        SWEEP_END,
         "a prescribed ramp and the value at which each run ends, instead of `run.until`; or the survival of bonds at "
         "which it ends, for lifetimes",
     )
     checked: int | str = key(
-        Whole(0, word=ALL),
+        Integer(0, word=ALL),
         "runs of a store whose error is found, spread over the plan, and 100 of the hardest; 0 finds none in any sweep",
         1000,
     )
@@ -647,7 +649,7 @@ class Document(Section):
     description: str = key(Text(), "what the case shows", "")
     T_0: float | None = quantity("K", "reference temperature of energies and factors", above=0)
     laws: Sequence[Any] = key(
-        ListOf(Shapes(Text(), mapping=Nested(LawsSection)), "- my_laws.py"),
+        ListOf(ByShape(Text(), mapping=Nested(LawsSection)), "- my_laws.py"),
         "Python files with laws of one's own: names, or `{file, sha256}`",
         (),
     )
@@ -668,5 +670,5 @@ class Document(Section):
     )
     initial: Mapping[str, Any] = key(INITIAL, "initial values of what evolves", MappingProxyType({}))
     run: RunSection | None = key(Nested(RunSection))
-    reference: Tree | None = key(Later(REFERENCE), "an exact solution to compare with")
+    reference: Tree | None = key(Deferred(REFERENCE), "an exact solution to compare with")
     sweep: SweepSection | None = key(Nested(SweepSection))

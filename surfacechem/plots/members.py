@@ -14,7 +14,7 @@ from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 
 from surfacechem.errors import InputError, refuse_unknown
-from surfacechem.format.plans import RUN, Plan, name_parts
+from surfacechem.format.plans import RUN_DIMENSION, Plan, name_parts
 from surfacechem.plots import style
 from surfacechem.plots.run import PANELS, of_kind
 from surfacechem.plots.style import COLOURS, Array, symbol, unit, unit_text, varies
@@ -55,7 +55,7 @@ def figure(dataset: xarray.Dataset, plan: Plan, axes: Sequence[str], variables: 
     names = chosen(dataset, axes, variables)
     if dataset[names[0]].ndim > len(axes):
         return curves(dataset, axes, names)
-    if len(axes) == 2 and RUN not in axes:
+    if len(axes) == 2 and RUN_DIMENSION not in axes:
         return heat_maps(dataset, plan, axes, names)
     parameters.sort(key=lambda name: [*plan.paths, ""].index(path_of(name, plan)))
     return effects(dataset, plan, axes, parameters, names)
@@ -188,7 +188,7 @@ def curves(dataset: xarray.Dataset, axes: Sequence[str], names: Sequence[str], a
             style.label(ax.yaxis, style.quantity_words(dataset[name]), unit(dataset[name]), values)
             style.legend(ax)
         style.label(grid[-1, 0].xaxis, "Time" if against in (None, "time") else symbol(against), unit(over), x)
-        many = RUN not in axes and count > style.MOST_CURVES
+        many = RUN_DIMENSION not in axes and count > style.MOST_CURVES
         if many:
             bar = plot.colorbar(colours(dataset, axes), ax=grid[:, 0].tolist())
             parameter = dataset[axes[0]]
@@ -221,10 +221,10 @@ def colours(dataset: xarray.Dataset, axes: Sequence[str]) -> ScalarMappable:
 def line_style(dataset: xarray.Dataset, axes: Sequence[str], member: int) -> dict[str, Any]:
     """Style of the curve of a run: a colour that tells its parameter where there is one, a legend where few are."""
     shape = dataset["status"].shape
-    if RUN not in axes and np.prod(shape) <= style.MOST_CURVES:
+    if RUN_DIMENSION not in axes and np.prod(shape) <= style.MOST_CURVES:
         place = [int(k) for k in np.unravel_index(member, shape)]
         return {"color": COLOURS[member], "linewidth": 1.3, "label": style.member_name(dataset, place)}
-    if RUN in axes:
+    if RUN_DIMENSION in axes:
         return {"color": COLOURS[0], "linewidth": 0.7, "alpha": 0.35}
     value = dataset[axes[0]].values[np.unravel_index(member, shape)[0]]
     return {"color": colours(dataset, axes).to_rgba(value), "linewidth": 0.9}

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from surfacechem.errors import InputError, refuse_unknown
-from surfacechem.format.plans import RUN, Plan, recorded_plan
+from surfacechem.format.plans import RUN_DIMENSION, Plan, recorded_plan
 from surfacechem.plots import members, rupture, style
 from surfacechem.plots.run import PANELS, Panel, of_kind
 from surfacechem.plots.style import MOST_CURVES, symbol, unit, varies
@@ -66,7 +66,7 @@ def hides_runs(dataset: xarray.Dataset, axes: Sequence[str]) -> bool:
     """Whether curves over the first parameter, one for each value of another, do not show the runs."""
     spectral = any(str(name).endswith("_mode") for name in dataset)
     curves = len(axes) == MOST_DRAWN and dataset.sizes[axes[1]] > MOST_CURVES
-    return not spectral and (RUN in axes or len(axes) > MOST_DRAWN or curves)
+    return not spectral and (RUN_DIMENSION in axes or len(axes) > MOST_DRAWN or curves)
 
 
 def axes_of(dataset: xarray.Dataset) -> list[str]:

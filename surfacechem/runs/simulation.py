@@ -572,10 +572,10 @@ class Simulation:
         InputError
             Where there is no parameter of a path, or nothing to sweep.
         """
-        from surfacechem.format.plans import numbered, plan_of, read_sweep, read_until
+        from surfacechem.format.plans import plan_of, read_sweep, read_until, split_arrays
 
         section = self.case.sweep
-        lists, arrays = numbered(over or {})
+        lists, arrays = split_arrays(over or {})
         given = {"over": None if over is None else lists, "combine": combine, "sample": sample}
         if any(value is not None for value in given.values()):
             said = {name: value for name, value in given.items() if value is not None}

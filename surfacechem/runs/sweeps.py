@@ -17,7 +17,7 @@ from surfacechem import references
 from surfacechem.errors import InputError
 from surfacechem.expressions import derivative
 from surfacechem.format import Case
-from surfacechem.format.plans import RUN, STATISTICS, Numbered, Plan, name_parts
+from surfacechem.format.plans import RUN_DIMENSION, STATISTICS, LazyArray, Plan, name_parts
 from surfacechem.model.system import System
 from surfacechem.references.base import SceneView
 from surfacechem.results.accuracy import AT_START, UNKNOWN, CellErrors, second_tolerance
@@ -47,7 +47,7 @@ from surfacechem.tolerances import EPS
 
 Rupture = Statistics | Lifetime
 
-OWN_NAMES = ("time", RUN, "species", "coverage", "error", "entropy_destroyed", "lifetime")
+OWN_NAMES = ("time", RUN_DIMENSION, "species", "coverage", "error", "entropy_destroyed", "lifetime")
 """Names of dimensions and columns of sweeps that are no quantities."""
 
 BEGINNINGS = ("event", "checked", "hardest")
@@ -324,16 +324,16 @@ def _column_names(system: System) -> set[str]:
 
 def dimensions(plan: Plan, names: Mapping[str, str]) -> dict[str, int]:
     """Sizes of the dimensions of a sweep by name: those of a grid are its parameters."""
-    own = [RUN] if plan.zipped else list(names)[: len(plan.axes)]
-    return dict(zip([*own, *([RUN] if plan.sample else [])], plan.shape, strict=True))
+    own = [RUN_DIMENSION] if plan.zipped else list(names)[: len(plan.axes)]
+    return dict(zip([*own, *([RUN_DIMENSION] if plan.sample else [])], plan.shape, strict=True))
 
 
 def parameter_columns(system: System, plan: Plan, names: Mapping[str, str]) -> list[Column]:
     """The values of the swept parameters, each along its own dimension, formed where they are asked for."""
     columns = []
     sample, drawn = plan.sample, set(plan.sample.draws) if plan.sample else set()
-    values = {axis.path: Numbered(axis.at, len(axis)) for axis in plan.axes}
-    values |= {path: Numbered(partial(sample.of, path), sample.runs) for path in drawn} if sample else {}
+    values = {axis.path: LazyArray(axis.at, len(axis)) for axis in plan.axes}
+    values |= {path: LazyArray(partial(sample.of, path), sample.runs) for path in drawn} if sample else {}
     for name, path in names.items():
         state = next((s for s in system.states if s.path == path), None)
         if state is not None:
@@ -341,7 +341,7 @@ def parameter_columns(system: System, plan: Plan, names: Mapping[str, str]) -> l
         else:
             spec = next(p.spec for p in system.parameters if p.path == path)
             unit, text = spec.unit, f"{spec.text} ({path})"
-        along = RUN if plan.zipped or path in drawn else name
+        along = RUN_DIMENSION if plan.zipped or path in drawn else name
         columns.append(Column(name, (along,), values[path], unit, text))
     return columns
 

@@ -25,8 +25,8 @@ from surfacechem.format.declarations import (
     REQUIRED,
     Content,
     Context,
+    Deferred,
     Entries,
-    Later,
     ListOf,
     Nested,
     OneOf,
@@ -58,7 +58,7 @@ EXACT: Mapping[str, Any] = {"color": "0.8", "linewidth": 4.5, "zorder": 1}
 
 
 def _anything(content: Content) -> Entries:
-    return Entries(others=Later(content), by_scene=True)
+    return Entries(others=Deferred(content), by_scene=True)
 
 
 # -- what stands in a list --------------------------------------------------------------------------------------------
@@ -71,7 +71,7 @@ class AxisSection(Section):
 
     variable: str = key(Text(), "variable of the dataset, or the name of a swept parameter", REQUIRED)
     name: str = key(Text(), "what stands at the axis", REQUIRED)
-    per: Tree | None = key(Later(amount("1")), "quantity that counts as one, in the unit of the variable")
+    per: Tree | None = key(Deferred(amount("1")), "quantity that counts as one, in the unit of the variable")
     scale: str = key(OneOf("scale", lambda: SCALES), "of the axis", "linear")
 
 
@@ -98,7 +98,7 @@ class CurveSection(Section):
     over: Mapping[str, Tree] = key(_anything(SWEPT), "values of a parameter by path: the curve is what runs end at", {})
     until: Mapping[str, Tree] = key(_anything(amount("[x]")), "a ramp and the value at which each run ends", {})
     per: Mapping[str, Tree] = key(
-        Entries({axis: key(Later(amount("1")), name=axis) for axis in "xy"}), "what counts as one for this curve", {}
+        Entries({axis: key(Deferred(amount("1")), name=axis) for axis in "xy"}), "what counts as one for this curve", {}
     )
     exact: Sequence[Sequence[float]] = key(
         ListOf(ListOf(amount("1"), "[0, 1]", count=2), "[[0, 0], [1, 1]]"), "corners of the exact curve", ()

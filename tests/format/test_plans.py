@@ -9,8 +9,8 @@ from scipy import stats
 
 import surfacechem
 from surfacechem.errors import InputError
-from surfacechem.format.draws import METHODS, Lognormal, Normal, Sample, Uniform, permuted
-from surfacechem.format.plans import Axis, Plan, Spaced, recorded_plan
+from surfacechem.format.draws import SAMPLERS, Lognormal, Normal, Sample, Uniform, permuted
+from surfacechem.format.plans import Axis, EvenlySpaced, Plan, recorded_plan
 
 K_0, C_R = "interface.potential.bond-energy.K_0", "interface.bonding.linear-affinity.c_r"
 GIVEN = {"a": Uniform(1.0, 3.0), "b": Normal(-1.0, 2.0), "c": Lognormal(2.0, 0.5), "d": Uniform(1e-3, 10.0, True)}
@@ -30,12 +30,12 @@ def bonding():
 @pytest.mark.parametrize("count", [1, 2, 7, 1000])
 def test_ranges_are_those_of_numpy(count):
     index = np.arange(count)
-    assert np.array_equal(Spaced(0.3, 7.1, count).at(index), np.linspace(0.3, 7.1, count))
-    assert np.array_equal(Spaced(1e-12, 3e-7, count, True).at(index), np.geomspace(1e-12, 3e-7, count))
+    assert np.array_equal(EvenlySpaced(0.3, 7.1, count).at(index), np.linspace(0.3, 7.1, count))
+    assert np.array_equal(EvenlySpaced(1e-12, 3e-7, count, True).at(index), np.geomspace(1e-12, 3e-7, count))
 
 
 def test_a_grid_of_a_billion_is_a_function_of_the_number():
-    axes = [Axis(name, Spaced(0.0, 1.0, 1000)) for name in "abc"]
+    axes = [Axis(name, EvenlySpaced(0.0, 1.0, 1000)) for name in "abc"]
     plan = Plan(axes)
     assert plan.size == 10**9
     found = plan.at(np.array([0, 123_456_789, 10**9 - 1]))
@@ -43,7 +43,7 @@ def test_a_grid_of_a_billion_is_a_function_of_the_number():
         assert found[name].tolist() == [0.0, place / 999, 1.0]
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", SAMPLERS)
 @pytest.mark.parametrize("runs", [1, 10, 4096])
 def test_draws_follow_their_distributions_and_depend_on_seed_and_number_only(method, runs):
     sample = Sample(GIVEN, runs, method, seed=5)

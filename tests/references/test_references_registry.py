@@ -79,7 +79,7 @@ class NewtonCooling(Reference):
     T_i: float = parameter("K", "initial temperature", above=0)
     T_a: float = parameter("K", "temperature of the reservoir", above=0)
 
-    told = read(capacity="C", total_conductance="h", temperature="T_i", surroundings_temperature="T_a")
+    readings = read(capacity="C", total_conductance="h", temperature="T_i", surroundings_temperature="T_a")
 
     def quantities(self, t: Array):
         return {"T": self.T_a + (self.T_i - self.T_a) * np.exp(-self.h * t / self.C)}
