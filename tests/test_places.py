@@ -52,7 +52,7 @@ class Drag(Friction):
 '''
 FACTOR = '''
 
-class Steep(StatedBothWays):
+class Steep(BondRates):
     """Twice the work of the force."""
 
     rate_types = (RateType("steep", "log_off", {"k_off": 1.0}, ("x",)),)

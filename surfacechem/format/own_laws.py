@@ -76,7 +76,7 @@ def read(source: str, name: str, place: Place | None = None) -> Sequence[type[La
             line = error.lineno if isinstance(error, SyntaxError) else (lines or [0])[-1]
             raise InputError(_failure(error), Place(name, line or 0)) from error
         _run[checksum] = module
-    found = laws.in_module(_run[checksum])
+    found = laws.laws_of_module(_run[checksum])
     if not found:
         raise InputError(f"{name} defines no law: a law is a subclass of Friction or of another contract.", place)
     for law in found:

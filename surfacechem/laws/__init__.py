@@ -47,13 +47,13 @@ FAMILIES: dict[type[Law], tuple[str, ...]] = {
 """The modules in which the laws of a contract stand."""
 
 
-ELSEWHERE = {name: f"surfacechem.surfaces.{name}" for name in ("shapes", "pair_laws")}
+OTHER_ROOMS = {name: f"surfacechem.surfaces.{name}" for name in ("shapes", "pair_laws")}
 """Modules of laws in other subpackages, by family."""
 
 
 def module(family: str) -> ModuleType:
     """The module of a family."""
-    return importlib.import_module(ELSEWHERE.get(family, f"{__name__}.{family}"))
+    return importlib.import_module(OTHER_ROOMS.get(family, f"{__name__}.{family}"))
 
 
 def _stated_in(found: ModuleType, contract: type[Law]) -> Iterator[type[Law]]:
@@ -65,7 +65,7 @@ def _stated_in(found: ModuleType, contract: type[Law]) -> Iterator[type[Law]]:
 
 def laws(contract: type[Law]) -> dict[str, type[Law]]:
     """All laws that fulfil a contract, by name."""
-    own = [*_of_packages(), *_registered.values(), *_of_the_case.get()]
+    own = [*_of_installed_packages(), *_registered.values(), *_of_the_case.get()]
     return _shipped(contract) | {law.name(): law for law in own if issubclass(law, contract)}
 
 
@@ -97,7 +97,7 @@ def _found(contract: type[Law], name: str) -> type[Law] | None:
 
 # -- laws of one's own ------------------------------------------------------------------------------------------------
 
-GROUP = "surfacechem.laws"
+ENTRY_POINTS = "surfacechem.laws"
 """Entry points by which packages give their laws: classes, or modules of them."""
 
 _registered: dict[str, type[Law]] = {}
@@ -142,7 +142,7 @@ def check_own(law: type[Law]) -> None:
             )
 
 
-def in_module(found: ModuleType) -> list[type[Law]]:
+def laws_of_module(found: ModuleType) -> list[type[Law]]:
     """The laws that a module defines."""
     own = (value for contract in FAMILIES for value in _stated_in(found, contract))
     return list(dict.fromkeys(own))
@@ -159,15 +159,15 @@ def known(own: Sequence[type[Law]]) -> Iterator[None]:
 
 
 @cache
-def _of_packages() -> tuple[type[Law], ...]:
+def _of_installed_packages() -> tuple[type[Law], ...]:
     """Laws of installed packages, which are imported when a name is none of the package's own, or all are listed."""
     from importlib.metadata import entry_points  # a case that names no such law need not wait for it
 
     found: list[type[Law]] = []
-    for point in entry_points(group=GROUP):
+    for point in entry_points(group=ENTRY_POINTS):
         try:
             given = point.load()
-            own = in_module(given) if isinstance(given, ModuleType) else [given]
+            own = laws_of_module(given) if isinstance(given, ModuleType) else [given]
             for law in own:
                 check_own(law)
         except Exception as error:  # whatever the code of another package does

@@ -28,7 +28,7 @@ from surfacechem.quantities import BOLTZMANN
 from surfacechem.tolerances import FRACTION_FLOOR
 
 
-class StatedBothWays(RateLaw):
+class BondRates(RateLaw):
     """Bonds with rate coefficients of formation and of rupture; subclasses state the effect of load on each."""
 
     keeps_range = True
@@ -69,7 +69,7 @@ class StatedBothWays(RateLaw):
         return on - off + log_fraction(1 - phi) - log_fraction(phi)
 
 
-class Bell(StatedBothWays):
+class Bell(BondRates):
     r"""Slip bond: force speeds up rupture, and slows down or speeds up formation.
 
     .. math:: R = n_c \left[ k_{on} e^{f x_{on} / k_B T_c} (1 - \phi) - k_{off} e^{f x_{off} / k_B T_c}\,\phi \right]
@@ -151,7 +151,7 @@ class ReversibleBell(RateLaw):
         return n_c * scaled_expm1(self.k_off, -mu / (BOLTZMANN * T_c), breaking)
 
 
-class DemboSpring(StatedBothWays):
+class DemboSpring(BondRates):
     r"""Bond spring: slip, ideal or catch bond by how stiff it is in the transition state.
 
     .. math:: R = n_c \left[ k_{on} e^{-\kappa_{ts} f^2 / 2 \kappa^2 k_B T_c} (1 - \phi)
@@ -211,7 +211,7 @@ class DemboSpring(StatedBothWays):
         return softening * f**2 / (2 * self.stiffness**2 * BOLTZMANN * T_c)
 
 
-class TwoPathway(StatedBothWays):
+class TwoPathway(BondRates):
     r"""Catch-slip bond: force closes one way out of the bound state and opens another.
 
     .. math:: R = n_c \left[ k_{on} (1 - \phi)
@@ -252,7 +252,7 @@ class TwoPathway(StatedBothWays):
         return log_sum([work * self.x_slip, log(self.k_catch / self.k_slip) - work * self.x_catch])
 
 
-class DudkoHummerSzabo(StatedBothWays):
+class DudkoHummerSzabo(BondRates):
     r"""Slip bond with a barrier of a given height and shape.
 
     .. math:: R = n_c \left[ k_{on} (1 - \phi) - k_{off}\,s^{1/\nu - 1}

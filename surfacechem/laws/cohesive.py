@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from surfacechem.contracts.terms import Limit, RateLaw, TangentialPotential, parameter
 from surfacechem.expressions import EXPONENT_CAP, Expression, decay, positive, sqrt, where
 
-CLOSED = 1e-16
+CLOSED_GAP = 1e-16
 """Mixed gap over g_0 of a closed zone, whose direction is undefined: its square is far below the rounding of one."""
 
 
@@ -55,7 +55,7 @@ class ExponentialCohesiveZone(TangentialPotential):
         if g_t is None or g_t == 0:
             return where(g_n > 0, -touching * _separated(g_n / self.g_0), contact - touching)
         square = where(g_n > 0, g_n**2, 0) + g_t**2
-        apart = sqrt(square / self.g_0**2 + CLOSED**2)
+        apart = sqrt(square / self.g_0**2 + CLOSED_GAP**2)
         return where(g_n > 0, 0, contact) - touching * _separated(apart)
 
 

@@ -167,7 +167,7 @@ class Viscous(Friction):
         return self.eta * v / g_n
 
 
-SLOWEST = 1e-300
+LEAST_VELOCITY = 1e-300
 """Sliding velocity [m/s] that counts as none in a logarithm."""
 
 
@@ -248,7 +248,7 @@ class RateAndStateSlip(RateAndState):
         """Rate of the logarithm of the age [1/s]."""
         speed = absolute(v)
         # Of a velocity of zero the logarithm would be infinite, and the product with it zero.
-        moving = where(speed > SLOWEST, speed, SLOWEST + 0 * speed)
+        moving = where(speed > LEAST_VELOCITY, speed, LEAST_VELOCITY + 0 * speed)
         return {"ln_theta": -speed / self.L * (log(moving / self.L) + ln_theta)}
 
 

@@ -93,23 +93,23 @@ class GapConductance(HeatTransfer):
         """Contact spots, gas and radiation."""
         return {"spots": self.spots, "gas": self.gas, "radiation": self.radiation}
 
-    def _held(self, g_n: Expression) -> Expression:
+    def _contact_fraction(self, g_n: Expression) -> Expression:
         """Part of the contact that still holds."""
         return exp(-self.C_trans * positive(g_n))
 
     def spots(self, g_n: Expression) -> Expression:
         """Conductance of the contact spots [W/(m^2 K)]."""
         # The three add up to the formula of the whole, so that each is a flux of its own.
-        return self.h_0 * self._held(g_n)
+        return self.h_0 * self._contact_fraction(g_n)
 
     def gas(self, g_n: Expression) -> Expression:
         """Conductance of the gas [W/(m^2 K)]."""
-        return self.k_gas / (positive(g_n) + self.g_0) * (1 - self._held(g_n))
+        return self.k_gas / (positive(g_n) + self.g_0) * (1 - self._contact_fraction(g_n))
 
     def radiation(self, g_n: Expression, T_from: Expression, T_to: Expression) -> Expression:
         """Conductance of the radiation [W/(m^2 K)]."""
         black = STEFAN_BOLTZMANN * (T_from**2 + T_to**2) * (T_from + T_to)
-        return black / (1 / self.epsilon_1 + 1 / self.epsilon_2 - 1) * (1 - self._held(g_n))
+        return black / (1 / self.epsilon_1 + 1 / self.epsilon_2 - 1) * (1 - self._contact_fraction(g_n))
 
     def conductance(self, g_n: Expression, T_from: Expression, T_to: Expression) -> Expression:
         """Conductance [W/(m^2 K)]."""

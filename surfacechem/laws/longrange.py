@@ -17,10 +17,10 @@ from typing import ClassVar
 from surfacechem.contracts.terms import Potential, parameter
 from surfacechem.expressions import Expression, is_symbolic, log, where
 
-WALL = 0.01
+REPULSION_WALL = 0.01
 """Gap over g_0 below which a Lennard-Jones repulsion, then 1e16 times the adhesion energy, goes on as its parabola."""
 
-ATOMIC = 1.65e-10
+CONTACT_DISTANCE = 1.65e-10
 """Distance [m] of surfaces in contact that gives measured surface energies (Israelachvili 2011, ch. 13)."""
 
 
@@ -171,11 +171,11 @@ class VanDerWaalsFlatFlat(Attraction):
     per = "current"
 
     A_H: float = parameter("J", "Hamaker constant", at_least=0)
-    D_0: float = parameter("m", "distance of the outermost atoms in contact", default=ATOMIC, above=0)
+    D_0: float = parameter("m", "distance of the outermost atoms in contact", default=CONTACT_DISTANCE, above=0)
 
     def energy(self, g_n: Expression) -> Expression:
         """Free energy [J/m^2]."""
-        distance = _outside(g_n) + self.D_0
+        distance = _nonnegative_gap(g_n) + self.D_0
         # A constant traction below contact: the energy goes on along its tangent.
         contact = (2 * g_n / self.D_0 - 1) / self.D_0**2
         return self.A_H / (12 * math.pi) * where(g_n > 0, -1 / distance**2, contact)
@@ -200,12 +200,12 @@ class VanDerWaalsSpherePlane(Attraction):
     A_H: float = parameter("J", "Hamaker constant", at_least=0)
     R: float = parameter("m", "radius of the sphere", above=0)
     area: float = parameter("m^2", "reference area", above=0)
-    D_0: float = parameter("m", "distance of the outermost atoms in contact", default=ATOMIC, above=0)
+    D_0: float = parameter("m", "distance of the outermost atoms in contact", default=CONTACT_DISTANCE, above=0)
 
     def energy(self, g_n: Expression) -> Expression:
         """Free energy [J/m^2]."""
         slope = 4 * self.R**3 / (self.D_0**2 * (self.D_0 + 2 * self.R) ** 2)
-        apart, contact = self._shape(_outside(g_n) + self.D_0), self._shape(self.D_0)
+        apart, contact = self._shape(_nonnegative_gap(g_n) + self.D_0), self._shape(self.D_0)
         return self.A_H / (6 * self.area) * where(g_n > 0, apart, contact + slope * g_n)
 
     def _shape(self, h: Expression) -> Expression:
@@ -260,17 +260,20 @@ class ElectrostaticSpherePlane(Attraction):
         return -2 * math.pi * self.R**2 * self.s_1 * self.s_2 / (self.epsilon * self.area) * g_n
 
 
-def _outside(g_n: Expression) -> Expression:
+def _nonnegative_gap(g_n: Expression) -> Expression:
     """The gap, of floats at least zero, since both branches of a conditional formula are evaluated for them."""
     return g_n if is_symbolic(g_n) else max(g_n, 0.0)
 
 
 def _repelling(x: Expression, *terms: tuple[int, int]) -> Expression:
-    """Sum of x^-n / d, continued by its parabola below WALL, where nothing comes but trial states of a solver."""
+    """Sum of x^-n / d, continued by its parabola below REPULSION_WALL, where nothing comes but trial states of a
+    solver.
+    """
     level, slope, curvature = (
-        sum(math.prod(-n - i for i in range(order)) * WALL ** (-n - order) / d for d, n in terms) for order in range(3)
+        sum(math.prod(-n - i for i in range(order)) * REPULSION_WALL ** (-n - order) / d for d, n in terms)
+        for order in range(3)
     )
     # Of floats both branches are evaluated, and the powers of a small gap overflow.
-    inside, beyond = x if is_symbolic(x) else max(x, WALL), x - WALL
+    inside, beyond = x if is_symbolic(x) else max(x, REPULSION_WALL), x - REPULSION_WALL
     powers = sum(inside**-n / d for d, n in terms)
-    return where(x > WALL, powers, level + beyond * (slope + beyond * curvature / 2))
+    return where(x > REPULSION_WALL, powers, level + beyond * (slope + beyond * curvature / 2))

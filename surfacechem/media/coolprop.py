@@ -25,13 +25,13 @@ from surfacechem.errors import InputError
 
 Array = NDArray[np.float64]
 
-BESIDE = 1e-5
+SATURATION_DISTANCE = 1e-5
 """Relative distance from saturation at which properties end."""
 
-CRITICAL = 0.1
+CRITICAL_DISTANCE = 0.1
 """Relative distance from the critical pressure within which properties may have no fit."""
 
-WORDS = {
+PROPERTY_WORDS = {
     "k_m": "conductivity",
     "eta_m": "viscosity",
     "rho_m": "density",
@@ -42,7 +42,7 @@ WORDS = {
 
 Getter = Callable[[str], Array]
 
-COMBINED: Mapping[str, Callable[[Getter, Array], Array]] = {
+PROPERTIES: Mapping[str, Callable[[Getter, Array], Array]] = {
     "k_m": lambda get, _: get("L"),
     "eta_m": lambda get, _: get("V"),
     "rho_m": lambda get, _: get("D"),
@@ -73,9 +73,9 @@ class CoolPropFluid(Fluid):
         end = f"{self.title} has no known properties"
         # Saturation ends the range on the side on which it lies.
         if boils is not None and boils > T:
-            return FluidRange(low, boils * (1 - BESIDE), end, f"{self.title} boils")
+            return FluidRange(low, boils * (1 - SATURATION_DISTANCE), end, f"{self.title} boils")
         if condenses is not None and condenses < T:
-            dew = condenses * (1 + BESIDE)
+            dew = condenses * (1 + SATURATION_DISTANCE)
             return FluidRange(max(dew, low), high, f"{self.title} condenses" if dew > low else end, end)
         if boils is not None:
             raise InputError(f"{self.title} is a mixture of liquid and vapour at {T:g} K.")
@@ -104,10 +104,10 @@ class CoolPropFluid(Fluid):
             "seconds to fit, once on a machine. Give the properties that matter as numbers where that is too long."
         )
 
-    def beside_critical(self) -> str:
+    def critical_remark(self) -> str:
         """Advice where the critical pressure is so near that properties are not smooth; empty where it is not."""
-        critical = self._told("Pcrit")
-        if critical is None or abs(self.pressure / critical - 1) > CRITICAL:
+        critical = self._constant("Pcrit")
+        if critical is None or abs(self.pressure / critical - 1) > CRITICAL_DISTANCE:
             return ""
         return (
             f" The critical pressure is {critical:.6g} Pa; within a tenth of it CoolProp's properties jump from "
@@ -116,7 +116,7 @@ class CoolPropFluid(Fluid):
 
     def values(self, quantity: str, T: Array) -> Array:
         """A property at temperatures [K] as CoolProp has it."""
-        return COMBINED[quantity](lambda letter: self._properties(letter, T), T)
+        return PROPERTIES[quantity](lambda letter: self._properties(letter, T), T)
 
     def _properties(self, letter: str, T: Array) -> Array:
         call, given = _coolprop().PropsSI, self._given(T)
@@ -156,16 +156,16 @@ class CoolPropFluid(Fluid):
 
     def _least(self) -> float:
         """Least temperature at which it has properties: where it freezes, or CoolProp's own."""
-        coolprop, low, freezes = _coolprop(), self._call("Tmin"), self._told("T_freeze") or 0.0
+        coolprop, low, freezes = _coolprop(), self._call("Tmin"), self._constant("T_freeze") or 0.0
         with suppress(ValueError):  # of mixtures, of what has no such line, and beside its ends
             melting = coolprop.AbstractState("?", self.name).melting_line
             freezes = float(melting(coolprop.iT, coolprop.iP, self.pressure))
-        if freezes * (1 + BESIDE) > low:
-            return freezes * (1 + BESIDE)
+        if freezes * (1 + SATURATION_DISTANCE) > low:
+            return freezes * (1 + SATURATION_DISTANCE)
         # The lowest of the temperatures is that of a liquid, too, which vapour of a lower pressure does not reach.
-        return low * (1 + BESIDE) if self.pressure < (self._told("p_triple") or 0.0) else low
+        return low * (1 + SATURATION_DISTANCE) if self.pressure < (self._constant("p_triple") or 0.0) else low
 
-    def _told(self, letters: str) -> float | None:
+    def _constant(self, letters: str) -> float | None:
         """A constant of the fluid from CoolProp; None where it is not known."""
         try:
             return float(_coolprop().PropsSI(letters, self.name))
@@ -177,7 +177,7 @@ class CoolPropFluid(Fluid):
         state = partial(_coolprop().PhaseSI, "T")
         if state(inside, "P", self.pressure, self.name) != phase:
             return None
-        while abs(inside - outside) > BESIDE * inside:
+        while abs(inside - outside) > SATURATION_DISTANCE * inside:
             middle = (inside + outside) / 2
             if state(middle, "P", self.pressure, self.name) == phase:
                 inside = middle
@@ -220,8 +220,8 @@ def _fit(fluid: CoolPropFluid, quantity: str, low: float, high: float, target: f
     mark = fingerprint(fluid, quantity, low, high, target, version("CoolProp"))
     found = cached(mark, [Path(fits.__file__)], find)
     if isinstance(found, str):
-        message = f"the {WORDS[quantity]} of {fluid.title} cannot be fitted: {found}"
-        raise InputError(message + fluid.beside_critical())
+        message = f"the {PROPERTY_WORDS[quantity]} of {fluid.title} cannot be fitted: {found}"
+        raise InputError(message + fluid.critical_remark())
     return tuple(fits.Piece(low, high, tuple(coefficients)) for low, high, coefficients in found)
 
 

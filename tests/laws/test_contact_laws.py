@@ -18,7 +18,7 @@ from surfacechem.laws.bulk import Quadratic
 from surfacechem.laws.cohesive import ExponentialCohesiveZone, XuNeedleman
 from surfacechem.laws.friction import Coulomb, Stribeck
 from surfacechem.laws.loading import Hold
-from surfacechem.laws.longrange import WALL, LennardJonesFlatFlat, VanDerWaalsSpherePlane
+from surfacechem.laws.longrange import REPULSION_WALL, LennardJonesFlatFlat, VanDerWaalsSpherePlane
 from surfacechem.model.assemble import assemble
 from surfacechem.runs.listing import law_table
 from surfacechem.scene import Body, Interface, Scene
@@ -147,7 +147,7 @@ def test_cohesion_that_is_pressed_hard_goes_on_along_its_tangent():
 
 def test_repulsion_of_overlapping_atoms_goes_on_along_its_parabola():
     law = LennardJonesFlatFlat(n_1=2e19, n_2=3e19, psi_0=4e-21, g_0=3e-10)
-    g, wall = symengine.Symbol("g"), mpmath.mpf(WALL) * mpmath.mpf(3e-10)
+    g, wall = symengine.Symbol("g"), mpmath.mpf(REPULSION_WALL) * mpmath.mpf(3e-10)
     value = law.energy(g_n=g)
     slope = derivative(value, g)
     curvature = derivative(slope, g)

@@ -132,9 +132,9 @@ def package(folder, monkeypatch):
     (folder / "slime.yaml").write_text(CASE.replace("laws: [slime.py]", ""))
     monkeypatch.syspath_prepend(site)
     monkeypatch.delitem(sys.modules, "slimes", raising=False)
-    laws._of_packages.cache_clear()
+    laws._of_installed_packages.cache_clear()
     yield site / "slimes.py"
-    laws._of_packages.cache_clear()
+    laws._of_installed_packages.cache_clear()
     sys.modules.pop("slimes", None)
 
 

@@ -17,7 +17,7 @@ from surfacechem.laws.films import Film, FilmCapacity, FilmShear, FilmWear, Rare
 from surfacechem.laws.friction import Viscous
 from surfacechem.laws.loading import Hold
 from surfacechem.laws.media import Roelands, Vogel
-from surfacechem.media.coolprop import COMBINED, CoolPropFluid
+from surfacechem.media.coolprop import PROPERTIES, CoolPropFluid
 from surfacechem.model.assemble import assemble
 from surfacechem.quantities import BOLTZMANN
 from surfacechem.results.audit import audit
@@ -65,7 +65,7 @@ def off(fluid, quantity, T, *asked):
 def test_fits_are_within_their_bound(name, p, low, high):
     fluid = CoolPropFluid(name, p)
     T = np.random.default_rng(7).uniform(low, high, 400)
-    for quantity in COMBINED:
+    for quantity in PROPERTIES:
         if name.startswith("INCOMP") and quantity == "gamma_m":
             continue
         assert fluid.fit(quantity, low, high)[-1].high == high
@@ -86,11 +86,11 @@ def test_what_is_not_smooth_is_refused():
 
 
 def test_beside_a_critical_pressure_a_message_says_what_to_do():
-    told = CoolPropFluid("CarbonDioxide", 74e5).beside_critical()
+    told = CoolPropFluid("CarbonDioxide", 74e5).critical_remark()
     assert "critical pressure is 7.3773e+06 Pa" in told
     assert "as numbers under `interface.medium`" in told
     for other in (CoolPropFluid("CarbonDioxide", 1e7), CoolPropFluid("INCOMP::MEG-50%", 1e5)):
-        assert other.beside_critical() == ""
+        assert other.critical_remark() == ""
 
 
 def test_near_a_critical_point_a_fit_is_as_close_as_it_says():
