@@ -250,7 +250,7 @@ def equations(
     read = cases.load(case, changes or ())
     title = read.title
     # Thousands of equations of cells read alike.
-    if spatial.divided(read.scene):
+    if spatial.is_divided(read.scene):
         read, title = replace(read, scene=spatial.few(read.scene)), f"{title}, written out for {spatial.FEW} cells"
     if form == "text":
         from surfacechem.studies.run_report import equation_sheet
@@ -404,10 +404,10 @@ def plot(
     talk: Talk = None,
 ) -> None:
     """Plot runs over time or a variable, or sweeps over parameters."""
-    from surfacechem.results.netcdf import WRITTEN, begin_reading
+    from surfacechem.results.netcdf import RUN_SUFFIXES, begin_reading
 
     # By its suffix, as a dataset that is missing must not be taken for the name of a case.
-    cases = [source for source in sources if not source.rstrip("/").endswith((*WRITTEN, ".zarr"))]
+    cases = [source for source in sources if not source.rstrip("/").endswith((*RUN_SUFFIXES, ".zarr"))]
     if changes and not cases:
         raise InputError("a dataset is plotted as it is; give a case to change values of.", Place(path="--set"))
     target = output or Path("comparison.png" if len(sources) > 1 else f"{Path(sources[0]).stem}.png")
@@ -463,10 +463,10 @@ def report(
 
     Scene, equations, figures, events, balances, error against run time. It needs no network.
     """
-    from surfacechem.results.netcdf import WRITTEN
+    from surfacechem.results.netcdf import RUN_SUFFIXES
     from surfacechem.studies import run_report
 
-    is_file = source.rstrip("/").endswith((*WRITTEN, ".zarr"))
+    is_file = source.rstrip("/").endswith((*RUN_SUFFIXES, ".zarr"))
     if is_file and changes:
         raise InputError("a dataset is reported as it is; give a case to change values of.", Place(path="--set"))
     target = run_report.report_path(output or f"{Path(source).stem}.html")

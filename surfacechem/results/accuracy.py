@@ -16,20 +16,20 @@ from surfacechem.tolerances import LAST, LOOSEST, MOST, TIGHTEST
 
 Array = NDArray[np.float64]
 
-TIGHTER = 1e-2
+SECOND_RUN_FACTOR = 1e-2
 """Without an exact solution the error is estimated from a second run whose tolerance is lower by this factor."""
 
-MARGIN = 1e-2
+RTOL_PART = 1e-2
 """The tolerance of a step is this part of the accuracy asked for. Over the exact solutions the error of a run is below
 a hundred times its tolerance, but near singular ends.
 """
 
-UNKNOWN = "the error of the cells across bodies does not fall as their number grows"
+CELLS_UNKNOWN = "the error of the cells across bodies does not fall as their number grows"
 """Reason why the error of a run with cells is not known."""
 
 AT_START = "the run ended at its start"
 
-STILL = "nothing evolves, and no work is done"
+NOTHING_EVOLVES = "nothing evolves, and no work is done"
 """Reason why two runs at different tolerances tell nothing."""
 
 
@@ -45,7 +45,7 @@ def first_tolerance(accuracy: float) -> float:
     >>> first_tolerance(1e-8), first_tolerance(1e-20)
     (1e-10, 1e-13)
     """
-    return min(max(accuracy * MARGIN, TIGHTEST), LOOSEST)
+    return min(max(accuracy * RTOL_PART, TIGHTEST), LOOSEST)
 
 
 def second_tolerance(rtol: float) -> float:
@@ -55,7 +55,7 @@ def second_tolerance(rtol: float) -> float:
     (1e-10, 3e-14, 1e-13)
     """
     if rtol > TIGHTEST:
-        return max(rtol * TIGHTER, TIGHTEST)
+        return max(rtol * SECOND_RUN_FACTOR, TIGHTEST)
     return LAST if rtol > LAST else TIGHTEST
 
 

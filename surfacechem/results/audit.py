@@ -22,18 +22,18 @@ from surfacechem.solve.contract import Array, Points
 from surfacechem.solve.run import Trajectory
 from surfacechem.tolerances import EPS, SQRT_EPS
 
-OPEN, FINEST = 1000.0, SQRT_EPS / 16
+OPEN_BALANCE, TIGHTEST_JUDGED = 1000.0, SQRT_EPS / 16
 """Relative residual, in tolerances of the run, above which a balance counts as open: errors of smooth runs stay below a
-hundred tolerances. Tighter runs than FINEST, 9e-10, are judged as this one, since their rounding adds up, too.
+hundred tolerances. Tighter runs than TIGHTEST_JUDGED, 9e-10, are judged as this one, since their rounding adds up, too.
 """
 
-ROUNDINGS = 10
+LAST_DIGITS = 10
 """Number of last digits that add up in a balance, beside one a step."""
 
-UNRESOLVED = 1e-2
+ROUNDED_PART = 1e-2
 """An exchange of which rounding may be this part, or more, is not resolved."""
 
-SLACK = 10.0
+ERROR_MARGIN = 10.0
 """Error of the integration, in tolerances of a law's turnover and of the states on which its production depends."""
 
 
@@ -105,13 +105,13 @@ class Audit:
     @cached_property
     def violations(self) -> tuple[str, ...]:
         """Laws that destroyed entropy beyond the tolerance of the run, or whose production is not a number."""
-        most = SLACK * self.rtol
+        most = ERROR_MARGIN * self.rtol
         return tuple(law for law, low in self.least.items() if not (low >= 0 or self.destroyed[law] <= most))
 
     @property
     def destroys(self) -> bool:
         """Whether a law destroyed entropy, or all of them together did."""
-        return bool(self.violations) or not self.destroyed_together <= SLACK * self.rtol
+        return bool(self.violations) or not self.destroyed_together <= ERROR_MARGIN * self.rtol
 
     @cached_property
     def findings(self) -> tuple[str, ...]:
@@ -123,7 +123,7 @@ class Audit:
         energy = _relative(np.maximum(np.abs(self.energy) - self.energy_rounding, 0), self.energy_scale)
         entropy = _relative(np.maximum(np.abs(self.entropy) - self.entropy_rounding, 0), self.entropy_scale)
         open_balances = (("energy", energy), ("entropy", entropy), ("sites", self.site_error))
-        limit = OPEN * max(self.rtol, FINEST)
+        limit = OPEN_BALANCE * max(self.rtol, TIGHTEST_JUDGED)
         found += [
             f"the balance of {name} is open by {error:.1e}" for name, error in open_balances if not error <= limit
         ]
@@ -139,14 +139,14 @@ def resolved(residual: Array, scale: Any, stored: Any, rounding: Any) -> Any:
     """Relative residual along the last axis, of one run or of many; where what was exchanged is lost in the last digits
     of what is stored, relative to this.
     """
-    unresolved = (np.max(np.abs(residual), axis=-1, initial=0.0) <= rounding) & (UNRESOLVED * scale <= rounding)
+    unresolved = (np.max(np.abs(residual), axis=-1, initial=0.0) <= rounding) & (ROUNDED_PART * scale <= rounding)
     return _relative(residual, np.where(unresolved, np.maximum(scale, stored), scale))
 
 
 TOTALS = ("E_total", ("U_1", "U_2", "U_c")), ("S_total", ("S_1", "S_2", "S_c"))
 """Totals that are balanced, each with its parts."""
 
-BOOKED = (("energy supply",), ("dissipation",)), (("entropy supply", "entropy production"), ())
+ACCOUNT_KINDS = (("energy supply",), ("dissipation",)), (("entropy supply", "entropy production"), ())
 """Kinds of accounts that explain how these change, and of others that tell, too, how much was exchanged."""
 
 
@@ -158,7 +158,7 @@ def residuals(system: System, named: Mapping[str, Array], ledger: Array) -> list
     ledger = ledger - ledger[..., :1, :]
 
     found = []
-    for (total, parts), (supplies, sinks) in zip(TOTALS, BOOKED, strict=True):
+    for (total, parts), (supplies, sinks) in zip(TOTALS, ACCOUNT_KINDS, strict=True):
         residual, *changes = [named[name] - named[name][..., :1] for name in (total, *parts) if name in named]
         own = [accounts(system, ledger, kind) for kind in (*supplies, *sinks)]
         for booked in own[: len(supplies)]:
@@ -186,7 +186,7 @@ def audit(trajectory: Trajectory) -> Audit:
     E, S = (outputs[:, column[name]] for name in ("E_total", "S_total"))
     energy_stored = max(trajectory.roundings["E_total"] / EPS, largest(E))
     entropy_stored = max(trajectory.roundings["S_total"] / EPS, entropy_scale, largest(S))
-    roundings, untimed = ROUNDINGS, 0.0
+    roundings, untimed = LAST_DIGITS, 0.0
     if steps and len(steps.t):
         roundings += len(steps.t)
         if system.energy_has_histories:  # of one that is steep no more is known than within the last digits of time
@@ -198,11 +198,11 @@ def audit(trajectory: Trajectory) -> Audit:
         sites = np.maximum(sites, np.abs(bonds - bonds[:1] - ledger[:, j]))
     rounding = EPS * energy_stored * roundings + untimed
     left = largest(energy)
-    if left > rounding + OPEN * FINEST * energy_scale:
+    if left > rounding + OPEN_BALANCE * TIGHTEST_JUDGED * energy_scale:
         # Tractions of a gap on a spring that nothing pulls are differences of large ones: what they do is an error.
         errors = _exchanged_by_errors(trajectory)
-        if left <= errors and UNRESOLVED * energy_scale <= errors:
-            rounding, energy_stored = errors, max(energy_stored, errors / (SLACK * trajectory.run.rtol))
+        if left <= errors and ROUNDED_PART * energy_scale <= errors:
+            rounding, energy_stored = errors, max(energy_stored, errors / (ERROR_MARGIN * trajectory.run.rtol))
     least = _least(trajectory)
     return Audit(
         energy=energy,
@@ -236,7 +236,7 @@ def _is_past_its_end(trajectory: Trajectory, value: float) -> bool:
     has no value, or is at the same instant as the point before, on either side of the end by rounding.
     """
     steps = trajectory.result.steps
-    at_once = SLACK * trajectory.run.rtol
+    at_once = ERROR_MARGIN * trajectory.run.rtol
     brief = steps is not None and len(steps.t) > 1 and bool(steps.t[-1] - steps.t[-2] <= at_once * steps.t[-1])
     return trajectory.status == "stopped" and (brief or not np.isfinite(value))
 
@@ -262,14 +262,14 @@ def _destroyed(trajectory: Trajectory, laws: list[str], stored: float) -> float:
     booked, lengths = np.diff(ledger[:, columns].sum(axis=1)), np.diff(points.t)
     # The end of a step tells of it, but for the first of an arc: between arcs production may jump.
     seen = rates[1:] * np.where(np.diff(result.segments_at(points.t, points.segment)) > 0, 0.0, lengths)
-    amount, whole = lost(booked, seen)
-    if amount <= SLACK * trajectory.run.rtol * whole:
+    amount, whole = losses_of(booked, seen)
+    if amount <= ERROR_MARGIN * trajectory.run.rtol * whole:
         return 0.0
     digits = EPS * np.abs(ledger).sum(axis=1)
     outputs = [trajectory.model.system.output_columns[f"sigma_{law}"] for law in laws]
     chosen = np.flatnonzero((booked < 0) | (seen < 0))
     for rounded in _rounding_of(trajectory, points, trajectory.model.output_function, outputs, chosen):
-        amount, whole = lost(booked, seen, rounded * lengths + digits[1:] + digits[:-1])
+        amount, whole = losses_of(booked, seen, rounded * lengths + digits[1:] + digits[:-1])
         if amount <= EPS * stored or not whole:
             return 0.0
     return float(amount / whole)
@@ -307,8 +307,8 @@ def _rounding_of(
     segment = None if points.segment is None else points.segment[ends]
     rows = model.inputs(result, points.t[ends], points.y[ends], points.ydot[ends], segment)
     n, part, least = len(model.system.states), np.full(rows.shape[1], EPS), np.zeros(rows.shape[1])
-    part[1 : 1 + 2 * n] = max(EPS, SLACK * trajectory.run.rtol)
-    least[1 : 1 + n] = SLACK * result.problem.atol
+    part[1 : 1 + 2 * n] = max(EPS, ERROR_MARGIN * trajectory.run.rtol)
+    least[1 : 1 + n] = ERROR_MARGIN * result.problem.atol
     filler, filled = model.program.filler, model.program.filled(rows.copy())
     read = filler.reads(rows) if filler else np.empty(0)
     now = function(filled)[:, columns]
@@ -336,11 +336,11 @@ def _rounding_of(
             yield rounding()
 
 
-def lost(booked: Array, seen: Array, rounded: Array | float = 0.0) -> tuple[Any, Any]:
+def losses_of(booked: Array, seen: Array, rounded: Array | float = 0.0) -> tuple[Any, Any]:
     """Amounts destroyed and turned over along the last axis: by the ledger, or at the ends of the steps if that is
     more.
 
-    >>> [float(x) for x in lost(np.array([1.0, -0.25]), np.array([0.75, -0.5]), 0.125)]
+    >>> [float(x) for x in losses_of(np.array([1.0, -0.25]), np.array([0.75, -0.5]), 0.125)]
     [0.375, 1.25]
     """
     amounts = [np.maximum(-produced - rounded, 0.0).sum(axis=-1) for produced in (booked, seen)]

@@ -20,9 +20,9 @@ from surfacechem.contracts.terms import Law
 from surfacechem.errors import InputError, Place, refuse_unknown
 from surfacechem.results.accuracy import (
     AT_START,
-    MARGIN,
-    STILL,
-    UNKNOWN,
+    CELLS_UNKNOWN,
+    NOTHING_EVOLVES,
+    RTOL_PART,
     Accuracy,
     CellErrors,
     largest_errors,
@@ -38,7 +38,7 @@ from surfacechem.solve.contract import Array, Mask, Problem, States
 from surfacechem.solve.run import Run, Trajectory
 from surfacechem.tolerances import BRIEF, EPS, FINER, FLOOR, NEGLIGIBLE, NONE_OF_SCALE, SQRT_EPS, TIGHTEST, UNRESOLVED
 
-EARLIER = "ended earlier"
+ENDED_EARLIER = "ended earlier"
 """Note on a second run that did not come as far."""
 
 WAYS = ("auto", "estimate", "balances")
@@ -46,10 +46,10 @@ WAYS = ("auto", "estimate", "balances")
 costs nothing.
 """
 
-LOOKS = 400
+MOST_TIMES = 400
 """Times at which an exact solution is evaluated at most."""
 
-MOMENTS = 10.0 ** np.arange(-15, 1)
+DRIVING_TIMES = 10.0 ** np.arange(-15, 1)
 """Fractions of a run in which one state may drive another."""
 
 ENERGY, ENTROPY = "J/m^2", "J/(m^2 K)"
@@ -63,7 +63,7 @@ def check_way(way: str, run: Run) -> None:
     """Raise InputError for what is none of the WAYS, and where it leaves out what verifies the accuracy of a run."""
     refuse_unknown([way], WAYS, "no source '{}' of an error", Place(path="--error"))
     if way == "balances" and run.solver == AUTO:
-        text = f"the accuracy {asked(run):g} is verified by a second run, which `balances` leaves out"
+        text = f"the accuracy {asked_accuracy(run):g} is verified by a second run, which `balances` leaves out"
         raise InputError(f"{text}: give a tolerance, `rtol`, instead of it, or another source.", Place(path="--error"))
 
 
@@ -112,10 +112,10 @@ def inexact(scene: Scene) -> list[Law]:
     return [law for law in (*scene.interface.potentials, *scene.heat) if law.error > 0]
 
 
-def of_laws(trajectory: Trajectory, other: Trajectory, scene: Scene) -> CellErrors:
+def law_errors(trajectory: Trajectory, other: Trajectory, scene: Scene) -> CellErrors:
     """Errors of a run from those of the numbers that laws compute, by another run whose laws are wrong by these."""
     also = [name for name in trajectory.model.system.output_columns if name == "t_n" or name.startswith("q_")]
-    errors, note = apart(trajectory, other, also=also)
+    errors, note = state_differences(trajectory, other, also=also)
     if note or trajectory.status != other.status:
         errors[EVENTS] = math.inf
     most = max(law.error for law in inexact(scene))
@@ -182,12 +182,12 @@ def _off_events(trajectory: Trajectory, late: float) -> Mask:
 def fewer(trajectory: Trajectory) -> Trajectory:
     """The run with so few of its outputs that an exact solution is quick; where there are many stay many."""
     times = trajectory.result.times
-    if len(times) <= LOOKS:
+    if len(times) <= MOST_TIMES:
         return trajectory
-    return trajectory.at_times(times[np.linspace(0, len(times) - 1, LOOKS).round().astype(int)])
+    return trajectory.at_times(times[np.linspace(0, len(times) - 1, MOST_TIMES).round().astype(int)])
 
 
-def closer(trajectory: Trajectory, known: bool = False) -> Run:
+def second_settings(trajectory: Trajectory, known: bool = False) -> Run:
     """The run that tells the error of another: at another tolerance, looked at elsewhere and more often, with outputs
     also where the two are compared; ``known`` inside its steps, too, where it may be handed out.
     """
@@ -199,7 +199,7 @@ def closer(trajectory: Trajectory, known: bool = False) -> Run:
 
 def _second(trajectory: Trajectory, known: bool = False) -> Trajectory:
     """The closer run."""
-    return trajectory.model.solve_values(closer(trajectory, known), trajectory.values)
+    return trajectory.model.solve_values(second_settings(trajectory, known), trajectory.values)
 
 
 def against_tighter(trajectory: Trajectory) -> Accuracy:
@@ -216,11 +216,11 @@ def estimated(trajectory: Trajectory, second: Trajectory) -> Accuracy:
         return unknown(f"the run failed: {trajectory.reason}")
     ends_late = second.result.t > trajectory.result.t
     if second.status == "failed" or (second.status == "finished" and second.result.t < trajectory.result.t):
-        fate = "failed later" if ends_late else EARLIER
+        fate = "failed later" if ends_late else ENDED_EARLIER
         return unknown(f"a second run at rtol {other:.0e} {fate}: {second.reason}")
-    errors, note = apart(trajectory.looked, second)
+    errors, note = state_differences(trajectory.looked, second)
     if not errors:
-        return unknown(STILL if len(trajectory.result.times) > 1 else AT_START)
+        return unknown(NOTHING_EVOLVES if len(trajectory.result.times) > 1 else AT_START)
     if note:  # one of the two went another way
         return unknown(f"a second run at rtol {other:.0e}, which had {note}")
     return Accuracy(stated(errors), second_run(second.run), errors, named=partial(of_named, trajectory.looked, second))
@@ -241,7 +241,7 @@ def second_run(run: Run, kind: str = "run") -> str:
     return f"estimate: a second {kind} at rtol {run.rtol:.0e} that resolves 1/{run.samples:.0f} of the time"
 
 
-def apart(
+def state_differences(
     ours: Trajectory, theirs: Trajectory, first: int = 0, also: Collection[str] = ()
 ) -> tuple[dict[str, float], str]:
     """Largest differences of two runs in each state, in named quantities that are ``also`` asked for, and in the times
@@ -255,7 +255,7 @@ def apart(
     times, rows = times[first:], [own[first:] for own in rows]
     errors: dict[str, float] = {}
     if first + len(times) > 1:
-        alike = np.full(len(times), True) if note else beside_jumps(times, ours, theirs)
+        alike = np.full(len(times), True) if note else agree_at_jumps(times, ours, theirs)
         points = [{profile.name: profile.points for profile in run.model.system.profiles} for run in (ours, theirs)]
         values, true = (
             {name: each[own[alike]] for name, each in _compared(run, also).items()}
@@ -282,7 +282,7 @@ def of_named(ours: Trajectory, theirs: Trajectory) -> dict[str, float]:
     times, *rows = np.intersect1d(ours.result.times, theirs.result.times, assume_unique=True, return_indices=True)
     pairs = [pair for name, each in found.items() for pair in zip(each, expected.get(name, ()), strict=False)]
     pairs += [(t, t) for t in ours.result.problem.segments]
-    alike = beside_jumps(times, ours, theirs) & clear_of(times, pairs)
+    alike = agree_at_jumps(times, ours, theirs) & clear_of(times, pairs)
     first, second = (run.picked(own[alike]) for run, own in zip((ours, theirs), rows, strict=True))
     names, true = second.model.system.output_columns, second.outputs
     rounded = UNRESOLVED * np.array(list(second.some.roundings.values()))
@@ -339,7 +339,7 @@ def _cubic(places: Sequence[float], rows: Array, wanted: Sequence[float]) -> Arr
     return np.asarray((rows[:, near] * np.prod(factors, axis=2, where=others)).sum(axis=2))
 
 
-def beside_jumps(times: Array, first: Trajectory, second: Trajectory) -> Mask:
+def agree_at_jumps(times: Array, first: Trajectory, second: Trajectory) -> Mask:
     """Whether two runs with the same events have made the same jumps at each time; times of events are compared apart.
 
     One of them may have made another at the end, where rounding decides whether it still happens.
@@ -361,9 +361,9 @@ def with_cells(estimate: Accuracy, cells: CellErrors) -> Accuracy:
     if not cells.variables:
         return estimate
     if not cells.converged:
-        return replace(estimate, error=math.nan, source=f"unknown: {UNKNOWN}", variables={}, named=dict)
+        return replace(estimate, error=math.nan, source=f"unknown: {CELLS_UNKNOWN}", variables={}, named=dict)
     if math.isnan(estimate.error):
-        if estimate.source != unknown(STILL).source:
+        if estimate.source != unknown(NOTHING_EVOLVES).source:
             return estimate
         # Where nothing evolves there is no other error than that of the laws.
         words = f"estimate: a second run {cells.source.removeprefix('and one ')}"
@@ -477,7 +477,7 @@ def _driven(trajectory: Trajectory) -> Array:
     inputs = trajectory.model.inputs(result, result.times, result.outputs, trajectory.rates, segment)
     by_state, by_rate = program.derivatives(program.filled(inputs))
     others, found = np.abs(result.outputs), np.zeros(program.n)
-    for length in trajectory.run.times[-1] * MOMENTS:
+    for length in trajectory.run.times[-1] * DRIVING_TIMES:
         with suppress(np.linalg.LinAlgError):
             kept = np.linalg.solve(by_rate + length * by_state, by_rate)
             coupled = np.abs(kept) * (1 - np.eye(program.n))
@@ -510,9 +510,9 @@ def event_errors(found: Mapping[str, Array], expected: Mapping[str, Array], end:
     return {EVENTS: float(max(error.max() for error in errors))} if errors else {}
 
 
-def asked(run: Run) -> float:
+def asked_accuracy(run: Run) -> float:
     """The relative accuracy that a run asks for."""
-    return run.accuracy if run.accuracy is not None else run.rtol / MARGIN
+    return run.accuracy if run.accuracy is not None else run.rtol / RTOL_PART
 
 
 def verified(first: Trajectory) -> tuple[Trajectory, Accuracy]:
@@ -521,7 +521,7 @@ def verified(first: Trajectory) -> tuple[Trajectory, Accuracy]:
     The first has a hundredth of the accuracy as its tolerance. Most runs are confirmed by their second, so the cost is
     that of two runs, the second at a hundredth of the tolerance.
     """
-    wanted = asked(first.run)
+    wanted = asked_accuracy(first.run)
     while True:
         last = first.run.rtol <= TIGHTEST  # nothing tighter resolves more
         second = _second(first, known=True)
@@ -544,7 +544,7 @@ def compared(first: Trajectory, second: Trajectory) -> Accuracy:
     source = second_run(second.run)
     if first.status != second.status:
         return Accuracy(math.inf, f"{source}, which {second.status}: {second.reason}")
-    errors, others = apart(first.looked, second)
+    errors, others = state_differences(first.looked, second)
     if others and first.run.rtol > TIGHTEST:  # there rounding decides of events that change nothing
         return Accuracy(math.inf, f"{source}, which had {others}")
     if not errors:
@@ -566,9 +566,9 @@ def rounding_of_time(trajectory: Trajectory) -> float:
 
 def reasons(problem: Problem, run: Run, moves: bool) -> list[tuple[str, str, str]]:
     """Settings chosen for a run, whose gap ``moves`` by a balance or does not, and the reasons, a row each."""
-    part = f"a hundredth of the accuracy {asked(run):.0e}, as errors of smooth runs are below 100 rtol"
+    part = f"a hundredth of the accuracy {asked_accuracy(run):.0e}, as errors of smooth runs are below 100 rtol"
     if run.rtol == TIGHTEST:
-        part = f"for the accuracy {asked(run):.0e}; below this is rounding"
+        part = f"for the accuracy {asked_accuracy(run):.0e}; below this is rounding"
     again = "a second run must agree to the accuracy, else it is verified in turn"
     return [
         ("solver", *method(problem, moves)),

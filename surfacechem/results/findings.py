@@ -26,20 +26,20 @@ from surfacechem.results.audit import Audit, largest
 from surfacechem.solve.run import Trajectory
 from surfacechem.tolerances import EPS, FLOOR, NEGLIGIBLE, ROUNDING
 
-LOST = NEGLIGIBLE / 10
+LOST_FLUX = NEGLIGIBLE / 10
 """A flux that the last bit of a temperature changes by more than this part of the largest flux is no result: of four
 digits none is left that counts.
 """
 
-LARGE, WITHIN = 1e-2, 10
+LARGE_ERROR, MISSED_BY = 1e-2, 10
 """Relative error that is told as a warning, and how many times what was asked for may be missed without one."""
 
-ROUNDED = NEGLIGIBLE
+ROUNDED_DEPARTURE = NEGLIGIBLE
 """Departures below this are rounding of published numbers."""
 
 
 @dataclass(frozen=True)
-class Verdict:
+class BalanceVerdict:
     """Range of ln(k_f/k_r) - ln K(g, T) along a run, and whether they produced entropy all the time."""
 
     title: str
@@ -55,36 +55,36 @@ class Verdict:
     @property
     def consistent(self) -> bool:
         """Whether the rates keep detailed balance, up to rounding of their parameters."""
-        return self.largest <= ROUNDED
+        return self.largest <= ROUNDED_DEPARTURE
 
     def __str__(self) -> str:
         """The verdict in words."""
         entropy = "entropy production stayed positive" if self.dissipates else "it DESTROYED ENTROPY"
-        return f"{self.title}: {said(self.low, self.high)}; {entropy}"
+        return f"{self.title}: {in_words(self.low, self.high)}; {entropy}"
 
 
-def said(low: float, high: float) -> str:
+def in_words(low: float, high: float) -> str:
     """A range of departures in words.
 
-    >>> said(-2.3, 0.0)
+    >>> in_words(-2.3, 0.0)
     'k_f/k_r departs from the equilibrium constant K(g, T) by a factor exp(-2.3) at most'
     """
     worst = low if abs(low) > abs(high) else high
     if not math.isfinite(worst):
         return "one of the two never runs, so that k_f/k_r is not K(g, T)"
-    if abs(worst) <= ROUNDED:
+    if abs(worst) <= ROUNDED_DEPARTURE:
         return f"k_f/k_r is K(g, T) to within {abs(worst):.1e}"
     return f"k_f/k_r departs from the equilibrium constant K(g, T) by a factor exp({worst:.3g}) at most"
 
 
-def verdicts(trajectory: Trajectory, audit: Audit) -> tuple[Verdict, ...]:
+def verdicts(trajectory: Trajectory, audit: Audit) -> tuple[BalanceVerdict, ...]:
     """The verdict on each pair of rates, over all outputs and steps."""
     found = []
     for pair in trajectory.model.system.noted(Pair):
         values = trajectory.everywhere[pair.departure]
         if len(values):  # a run that ends at its start has none
             low, high = float(np.min(values)), float(np.max(values))
-            found.append(Verdict(pair.title, low, high, pair.law not in audit.violations))
+            found.append(BalanceVerdict(pair.title, low, high, pair.law not in audit.violations))
     return tuple(found)
 
 
@@ -99,7 +99,7 @@ def findings(trajectory: Trajectory, accuracy: Accuracy | None) -> list[str]:
     return [
         *_extrapolations(trajectory),
         *_capped_rates(system, rows),
-        *cautioned(system, rows),
+        *active_cautions(system, rows),
         *_lost_fluxes(trajectory),
         *_inaccurate(trajectory, accuracy),
     ]
@@ -121,7 +121,7 @@ def _capped_rates(system: System, rows: NDArray[np.float64]) -> list[str]:
     return found
 
 
-def cautioned(system: System, rows: NDArray[np.float64]) -> list[str]:
+def active_cautions(system: System, rows: NDArray[np.float64]) -> list[str]:
     """The cautions that apply at one of several states, which are the arguments of compiled functions."""
     cautions = system.noted(Caution)
     if not (cautions and len(rows)):
@@ -136,7 +136,7 @@ def _inaccurate(trajectory: Trajectory, found: Accuracy | None) -> list[str]:
     """Warning of an error well beyond what was asked for, or so large that there is no result."""
     if found is not None and math.isnan(found.error) and trajectory.status == "finished":
         return [f"the error is not known: {found.source.partition(': ')[2]}"]
-    if found is None or not found.error > (LARGE if found.asked is None else WITHIN * found.asked):
+    if found is None or not found.error > (LARGE_ERROR if found.asked is None else MISSED_BY * found.asked):
         return []
     wanted = "" if found.asked is None else f", where {found.asked:.0e} was asked"
     worst = max(found.variables, key=lambda name: found.variables[name], default="the result")
@@ -151,7 +151,7 @@ def _lost_fluxes(trajectory: Trajectory) -> list[str]:
     # What rounding alone carries over the whole run counts against the heat that there is, wherever its zero lies.
     content = trajectory.roundings.get("E_total", 0.0) / EPS
     felt = FLOOR * max(largest(everywhere["E_total"]), content)
-    lost = [name for name, size in fluxes.items() if size > LOST * most and size * duration > felt]
+    lost = [name for name, size in fluxes.items() if size > LOST_FLUX * most and size * duration > felt]
     advice = "let the two share one temperature, or use the heat_into variables, which are exact"
     return [f"{', '.join(lost)}: lost to rounding, as the conductance is very large; {advice}"] if lost else []
 

@@ -27,26 +27,26 @@ from surfacechem.tolerances import DIGITS, MISMATCH, QUARTER_EPS, ROUNDING, SAME
 Solution = Callable[[Array], dict[str, Array]]
 """Exact values under the names of the scene, at any times."""
 
-LAST_DIGITS = 2 * DIGITS
+DIFFERENCE_ROUNDING = 2 * DIGITS
 """Last digits of a difference of five values."""
 
-PROBES = 7
+MOST_PROBES = 7
 """Times at which the equations are tested; as many stretches between events, where there are so many."""
 
-STEEPER = 10.0
+JUMP_RATIO = 10.0
 """A solution jumps where it changes by so many times as much as over an equal time before. What is smooth changes as
 much, a power p of the time left 1/(2^p - 1) times as much: 2.4 times for a root. Ten, that of p = 1/7, is a choice; a
 smaller jump is taken for a change, and what is beyond it counts as an error."""
 
-EDGE = 0.01
+END_PART = 0.01
 """Fraction of a stretch near its ends in which nothing is tested: a run knows the times of its events only so well."""
 
-BRIEF = 8 * SQRT_EPS
-"""Part of the time so far below which an arc is too short for differences in time: their steps are STEP of it, 1e-11 of
-the time, of which its last digit is 2e-5.
+SHORTEST_ARC = 8 * SQRT_EPS
+"""Part of the time so far below which an arc is too short for differences in time: their steps are DIFFERENCE_STEP of
+it, 1e-11 of the time, of which its last digit is 2e-5.
 """
 
-STEP = QUARTER_EPS
+DIFFERENCE_STEP = QUARTER_EPS
 """Step of differences in time over five points, in parts of the time that an arc has lasted: truncation is of fourth
 order, 2e-16, and rounding 1e-12.
 """
@@ -77,7 +77,7 @@ def exact_values(
     before_end = times[-1] * (1 - SIDE * np.array([2.0, 4.0]))
     tested = len(times) > 1 and not reference.continuous  # a run that ends at its start meets no equation
     probes, since = _probes(*_edges(run)) if tested else (np.empty(0), np.empty(0))
-    step = STEP * since
+    step = DIFFERENCE_STEP * since
     around = [probes + k * step for k in (-2, -1, 0, 1, 2)]
     # All of it at once, as an exact solution costs by the call.
     every = solution(np.concatenate([times, before_end, *around]))
@@ -120,7 +120,7 @@ def _choose_sides(
     jumped = {
         name: np.array([close])
         for name, (close, far) in ((name, values.tolist()) for name, values in before_end.items())
-        if abs(exact[name][-1] - close) > STEEPER * abs(close - far) + SAME * abs(close)
+        if abs(exact[name][-1] - close) > JUMP_RATIO * abs(close - far) + SAME * abs(close)
     }
     if jumped:
         _take_nearer(exact, jumped, run, times >= times[-1] * (1 - SIDE))
@@ -232,7 +232,7 @@ def _check_equations(near: Mapping[str, Array], run: Trajectory, t: Array, step:
     values = np.array([near[name] for name in names]).reshape(len(names), 5, len(t))
     # Rates by central differences, and how far these are rounding.
     slope = (8 * (values[:, 3] - values[:, 1]) - (values[:, 4] - values[:, 0])) / (12 * step)
-    rounding = (LAST_DIGITS * (np.abs(values[:, 2]) + np.abs(t * slope)) / step).T
+    rounding = (DIFFERENCE_ROUNDING * (np.abs(values[:, 2]) + np.abs(t * slope)) / step).T
     y, ydot = values[:, 2].T, slope.T
     _check_given({name: found[2] for name, found in near.items()}, run, t, y, ydot)
     segment = np.searchsorted(problem.segments[1:-1], t, side="left")
@@ -286,9 +286,9 @@ def _probes(*edges: float) -> tuple[Array, Array]:
     """Times at which the equations are tested, inside the stretches between ``edges``, and how long each has lasted."""
     if len(edges) < 2:
         raise InputError("the run ended before anything could be compared.")
-    long = np.flatnonzero(np.diff(edges) > BRIEF * np.array(edges[1:]))
-    spread = np.linspace(0, len(long) - 1, PROBES).astype(int)
-    chosen = long[np.union1d(spread, np.arange(min(PROBES, len(long))))]
-    parts = np.linspace(EDGE, 1 - EDGE, max(2, PROBES // len(chosen)))
+    long = np.flatnonzero(np.diff(edges) > SHORTEST_ARC * np.array(edges[1:]))
+    spread = np.linspace(0, len(long) - 1, MOST_PROBES).astype(int)
+    chosen = long[np.union1d(spread, np.arange(min(MOST_PROBES, len(long))))]
+    parts = np.linspace(END_PART, 1 - END_PART, max(2, MOST_PROBES // len(chosen)))
     since = np.multiply.outer(np.diff(edges)[chosen], parts)
     return np.ravel(np.array(edges)[chosen, None] + since), np.ravel(since)

@@ -32,16 +32,16 @@ R = TypeVar("R")
 
 CONVENTIONS = "CF-1.11"
 
-PATIENCE = 20.0
+READING_TIMEOUT = 20.0
 """Time [s] that reading a small file may take: in one that is damaged HDF5 may look for something without end."""
 
-_BEGUN: dict[Path, subprocess.Popen[bytes]] = {}
+_BEGUN_READING: dict[Path, subprocess.Popen[bytes]] = {}
 """Processes that try files which are read soon."""
 
-SLOWEST = 1e7
+LEAST_BANDWIDTH = 1e7
 """Bytes per second that a disk gives at the least."""
 
-TRIAL = """
+READING_TEST = """
 import sys
 from contextlib import suppress
 import netCDF4
@@ -66,7 +66,7 @@ TABLES = (CSV, PARQUET)
 COORDINATES = "coordinates"
 """Global attribute that names auxiliary coordinates: coordinates that no dimension is called like."""
 
-WRITTEN = (*SUFFIXES, *TABLES)
+RUN_SUFFIXES = (*SUFFIXES, *TABLES)
 """Suffixes of files to which a run is written."""
 
 
@@ -125,8 +125,8 @@ def dataset_path(path: str | Path) -> Path:
     """
     target = Path(path)
     suffix = target.suffix.lower()
-    if suffix and suffix not in WRITTEN:
-        remedy = f"{', '.join(WRITTEN)}. Give {target.with_suffix('.nc').name}, or a name without suffix."
+    if suffix and suffix not in RUN_SUFFIXES:
+        remedy = f"{', '.join(RUN_SUFFIXES)}. Give {target.with_suffix('.nc').name}, or a name without suffix."
         raise InputError(f"no dataset is written as '{target.suffix}': {remedy}", Place(str(path)))
     if suffix == PARQUET and find_spec("pyarrow") is None:
         message = "Parquet needs PyArrow: `pip install 'surfacechem[parquet]'`. A .csv needs nothing more."
@@ -293,7 +293,7 @@ def reading(path: Path, read: Callable[[], R]) -> R:
         raise InputError(f"is a table of numbers, which is for other programs. {remedy}", Place(str(path)))
     try:
         size = path.stat().st_size
-        _try_elsewhere(path, PATIENCE + size / SLOWEST)
+        _try_elsewhere(path, READING_TIMEOUT + size / LEAST_BANDWIDTH)
         return read()
     except FileNotFoundError:
         beside = [other.name for other in path.parent.glob(f"*{path.suffix}")]  # a sweep has its own name
@@ -309,7 +309,7 @@ def _try_elsewhere(path: Path, seconds: float) -> None:
     In a damaged file HDF5 may go on without end, and nothing but the end of its process stops it: a thread would keep
     its locks, and crash the process that ends with it.
     """
-    with _BEGUN.pop(path, None) or _trial(path) as trial:
+    with _BEGUN_READING.pop(path, None) or _trial(path) as trial:
         try:
             code = trial.wait(timeout=seconds)
         except subprocess.TimeoutExpired:
@@ -321,11 +321,11 @@ def _try_elsewhere(path: Path, seconds: float) -> None:
 
 def _trial(path: Path) -> subprocess.Popen[bytes]:
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
-    command = [sys.executable, "-c", TRIAL, str(path)]
+    command = [sys.executable, "-c", READING_TEST, str(path)]
     return subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
 
 def begin_reading(path: Path) -> None:
     """Begin to test whether a file that is read soon is readable, beside what is done until then."""
     if path.is_file():
-        _BEGUN[path] = _trial(path)
+        _BEGUN_READING[path] = _trial(path)

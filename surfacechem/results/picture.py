@@ -13,20 +13,20 @@ from dataclasses import replace
 
 import numpy as np
 
-from surfacechem.results.spatial import begun, unresolved
+from surfacechem.results.spatial import layer_starts, unresolved
 from surfacechem.solve import solver
 from surfacechem.solve.contract import Array, Index, Mask, States
 from surfacechem.solve.radau.solver import consistent
 from surfacechem.solve.run import Trajectory
 from surfacechem.tolerances import EPS, FINER, UNRESOLVED
 
-LONG = 64
+LONG_INTERVAL = 64
 """Rows between two that are kept of which one in the middle is kept, too, where the line between the two misses any."""
 
-TWICE = 2
+SHARED_DENSITY = 2
 """Outputs that many runs share for one that the closest of them has."""
 
-BENDS, CLOSER, ROUNDS = 100, 16, 2
+MOST_REFINED, REFINEMENT, REFINEMENT_ROUNDS = 100, 16, 2
 """Largest number of known states between which a run is refined, into how many parts, and how often in turn."""
 
 
@@ -44,7 +44,7 @@ def _two_sided(t: Array) -> tuple[Array, Mask]:
     return moved, kept
 
 
-def needed(t: Array, values: Array, allowed: Array, kept: Mask) -> Mask:
+def needed_rows(t: Array, values: Array, allowed: Array, kept: Mask) -> Mask:
     """Rows between which straight lines over time, and over its logarithm, miss no value by more than is allowed.
 
     ``values`` has shape (times, quantities), ``allowed`` is for each quantity; rows that are ``kept`` are among them.
@@ -66,7 +66,7 @@ def needed(t: Array, values: Array, allowed: Array, kept: Mask) -> Mask:
         worst = np.flatnonzero(again & (missed == np.repeat(most, counts)))
         kept[rows[worst[np.diff(left[worst], append=len(t)) > 0]]] = True
         # Where all swings are alike the worst is next to an end each time: halves come to an end, too.
-        middle = (rows == (left + right) // 2) & (right - left > LONG)
+        middle = (rows == (left + right) // 2) & (right - left > LONG_INTERVAL)
         kept[rows[again & middle]] = True
         rows = rows[again & ~kept[rows]]
     return kept
@@ -124,9 +124,9 @@ def _bends(trajectory: Trajectory, allowed: Array, seen: Mask) -> list[States]:
     with np.errstate(invalid="ignore"):  # quantities may be infinite
         apart = np.abs(between.outputs - lines)
     missed = np.divide(apart, allowed, out=np.zeros_like(apart), where=seen).max(axis=1, initial=0.0)
-    rows = np.sort(np.argsort(-missed, kind="stable")[:BENDS])
+    rows = np.sort(np.argsort(-missed, kind="stable")[:MOST_REFINED])
     rows = rows[missed[rows] > 1]
-    bent, parts = left[rows], np.minimum(np.ceil(missed[rows]), CLOSER).astype(int)
+    bent, parts = left[rows], np.minimum(np.ceil(missed[rows]), REFINEMENT).astype(int)
     # No event lies between two outputs.
     calm = replace(problem, record_steps=False, picture=0.0, max_seconds=None, in_play=(False,) * len(problem.margins))
     problems = [
@@ -140,7 +140,7 @@ def _bends(trajectory: Trajectory, allowed: Array, seen: Mask) -> list[States]:
     ]
 
 
-def followed(trajectory: Trajectory) -> Trajectory:
+def pictured(trajectory: Trajectory) -> Trajectory:
     """The trajectory with the outputs that its picture needs, instead of those at which runs are compared."""
     part, rows = trajectory.run.picture, trajectory.result.known or trajectory.result.states()
     if part is None or len(rows.t) < 2:
@@ -148,15 +148,15 @@ def followed(trajectory: Trajectory) -> Trajectory:
     t, sides = _two_sided(rows.t)
     # What cells do not resolve yet is no part of the picture, but for how it begins.
     system, end = trajectory.model.system, trajectory.run.times[-1]
-    sides &= ~unresolved(system, end, t) | np.isin(t, begun(system, end))
-    return _pictured(trajectory, part, _chosen(rows._replace(t=t), sides), ROUNDS)
+    sides &= ~unresolved(system, end, t) | np.isin(t, layer_starts(system, end))
+    return _pictured(trajectory, part, _chosen(rows._replace(t=t), sides), REFINEMENT_ROUNDS)
 
 
-def shared(runs: Sequence[Trajectory], most: int) -> tuple[float, ...]:
+def shared_times(runs: Sequence[Trajectory], most: int) -> tuple[float, ...]:
     """Output times that all runs share: as close to each other everywhere as in the picture of the closest of them, or
     as close as ``most`` are, with what no line may pass over in any of them where there is room for that.
     """
-    pictures = [picture for picture in map(followed, runs) if len(picture.result.times) > 1]  # others end at once
+    pictures = [picture for picture in map(pictured, runs) if len(picture.result.times) > 1]  # others end at once
     own, usual = [picture.result.times for picture in pictures], runs[0].run.times
     every = np.unique(np.concatenate([*own, usual[-1:]]))
     if len(own) < 2:
@@ -167,7 +167,7 @@ def shared(runs: Sequence[Trajectory], most: int) -> tuple[float, ...]:
         each = np.diff(t)[np.searchsorted(t, middles[within], side="right") - 1]
         density[within] = np.maximum(density[within], 1 / each)
     # Two for one, since they are not where each picture has its own.
-    count = np.append(0.0, np.cumsum(TWICE * density * lengths))
+    count = np.append(0.0, np.cumsum(SHARED_DENSITY * density * lengths))
     parts = min(int(np.ceil(count[-1])) + 1, most)
     times = [np.interp(np.linspace(0, count[-1], parts), count, every), every[[0, -1]]]
     marked = np.unique(
@@ -220,4 +220,4 @@ def _pictured(trajectory: Trajectory, part: float, rows: States, rounds: int) ->
         return _pictured(trajectory, part, _chosen(more, np.argsort(more.t, kind="stable")), rounds - 1)
     # Both sides of events are kept.
     kept = _beside(whole) | _edges(quantities[:, seen])
-    return whole.picked(needed(result.times, values[:, seen], allowed[seen], kept))
+    return whole.picked(needed_rows(result.times, values[:, seen], allowed[seen], kept))

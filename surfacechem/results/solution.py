@@ -14,17 +14,17 @@ from surfacechem.results.accuracy import Accuracy
 from surfacechem.results.audit import Audit, audit
 from surfacechem.results.dataset import DATASET_NAMES, Results, coverage_columns, profile_columns, quantity_columns
 from surfacechem.results.event_table import event_columns, event_findings, event_violations, event_waits
-from surfacechem.results.findings import Verdict, findings, verdicts
+from surfacechem.results.findings import BalanceVerdict, findings, verdicts
 from surfacechem.results.netcdf import Column, versions
-from surfacechem.results.picture import followed
+from surfacechem.results.picture import pictured
 from surfacechem.solve import solver
 from surfacechem.solve.contract import Array, Status
 from surfacechem.solve.run import Run, Trajectory
 
-RECORDED = ("times", "picture", "atol", "max_steps")
+RECORDED_SETTINGS = ("times", "picture", "atol", "max_steps")
 """Settings of a run that a dataset records where they are not those of its case; others are attributes."""
 
-CLASSES = {"exothermic": 1, "endothermic": -1}
+REACTION_CLASSES = {"exothermic": 1, "endothermic": -1}
 """Classes of reactions, with the sign of their heat."""
 
 
@@ -94,7 +94,7 @@ class Solution(Results):
     @cached_property
     def shown(self) -> Trajectory:
         """The run with its states at the times of the dataset, which follow it where none were asked for."""
-        return followed(self.trajectory)
+        return pictured(self.trajectory)
 
     @cached_property
     def audit(self) -> Audit:
@@ -102,7 +102,7 @@ class Solution(Results):
         return audit(self.trajectory)
 
     @cached_property
-    def verdicts(self) -> tuple[Verdict, ...]:
+    def verdicts(self) -> tuple[BalanceVerdict, ...]:
         """Whether pairs of one-way reactions keep detailed balance."""
         return verdicts(self.trajectory, self.audit)
 
@@ -214,7 +214,7 @@ class Solution(Results):
         if heat is None:
             return {}
         felt = self.trajectory.run.rtol * float(np.max(np.abs(heat), initial=0.0))
-        found = [name for name, sign in CLASSES.items() if np.any(sign * heat > felt)]
+        found = [name for name, sign in REACTION_CLASSES.items() if np.any(sign * heat > felt)]
         return {"reaction": " and ".join(found) or "isothermic"}
 
     def _departures(self) -> dict[str, str]:
@@ -222,7 +222,7 @@ class Solution(Results):
         run = self.trajectory.run
         departures = self._changed(self.trajectory.model.system)
         if self.case_run is not None:
-            now, usual = ({name: getattr(r, name) for name in RECORDED} for r in (run, self.case_run))
+            now, usual = ({name: getattr(r, name) for name in RECORDED_SETTINGS} for r in (run, self.case_run))
             departures |= {name: value for name, value in now.items() if value != usual[name]}
         if self.error_from != "auto":
             departures["error"] = self.error_from

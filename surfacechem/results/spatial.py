@@ -22,9 +22,9 @@ from numpy.typing import NDArray
 from surfacechem.compile.program import compile_function
 from surfacechem.contracts import grids
 from surfacechem.model.system import Conductor, System
-from surfacechem.results.accuracy import MARGIN, UNKNOWN, Accuracy, CellErrors
-from surfacechem.results.error_estimates import EVENTS, apart
-from surfacechem.results.findings import WITHIN
+from surfacechem.results.accuracy import CELLS_UNKNOWN, RTOL_PART, Accuracy, CellErrors
+from surfacechem.results.error_estimates import EVENTS, state_differences
+from surfacechem.results.findings import MISSED_BY
 from surfacechem.scene import Body, Conduction, Scene
 from surfacechem.solve.contract import Array
 from surfacechem.solve.run import Run, Trajectory
@@ -32,39 +32,39 @@ from surfacechem.tolerances import ROUNDING
 
 FEW = 4
 
-PER_FOLD = 8
+CELLS_PER_E_FOLD = 8
 """Cells at first in which the distance from a face grows by e: errors are some 0.4 % of a rise in temperature then."""
 
-THINNEST = 2.0**-30
+THINNEST_LAYER = 2.0**-30
 """Fraction of a body below which its layer is an atom's; the width of a cell at the far side has six digits there."""
 
-SPARE, FASTEST = 3.0, 16.0
+FLUX_MARGIN, MOST_GROWTH = 3.0, 16.0
 """Part of the accuracy that temperatures use up, as heat fluxes are differences of them and err by more, and the most
 by which cells are multiplied at once."""
 
-MOST_CHOSEN = 1024
+MOST_CHOSEN_CELLS = 1024
 """Cells across a body at most that an accuracy chooses: two bodies of them take a second to get ready, each of the
 several times that errors are looked for."""
 
-TRIALS = 6
+MOST_GRIDS = 6
 """Grids after which a search for an accuracy ends; two or three are the rule."""
 
-SOON = 200
+UNRESOLVED_START = 200
 """Number of parts of a run of which one has passed when cells resolve what began at once, where nothing says when."""
 
-RATIO = 2.0
+TIME_RATIO = 2.0
 """Ratio of the times at which the errors of cells are told behind something sudden."""
 
 ORDER, LEAST_ORDER = 4.0, 2.0
 """Ratio of errors with half of the cells to those with all: of second order, and of first, the least that converges."""
 
 
-def divided(scene: Scene) -> bool:
+def is_divided(scene: Scene) -> bool:
     """Whether a body has cells."""
     return any(True for _ in _laws(scene))
 
 
-def wanted(scene: Scene) -> float | None:
+def asked_cell_accuracy(scene: Scene) -> float | None:
     """The accuracy that cells are chosen by, the tighter of two; None where the scene gives their number."""
     return min((law.accuracy for _, law in _laws(scene) if law.accuracy is not None), default=None)
 
@@ -87,13 +87,13 @@ def tightened(scene: Scene, accuracy: float | None) -> Scene:
     """The scene with cells as accurate as the run is asked to be, where an accuracy chooses them; itself where they
     are.
     """
-    least = wanted(scene)
+    least = asked_cell_accuracy(scene)
     if accuracy is None or least is None or least <= accuracy:
         return scene
     return _changed(scene, lambda _, law: law if law.accuracy is None else replace(law, accuracy=accuracy))
 
 
-def fixed(scene: Scene) -> list[str]:
+def with_given_cells(scene: Scene) -> list[str]:
     """Names of the bodies whose number of cells is given."""
     return [name for name, law in _laws(scene) if law.accuracy is None]
 
@@ -103,7 +103,7 @@ def few(scene: Scene) -> Scene:
     return _changed(scene, lambda _, law: replace(law, cells=min(law.cells, FEW)))
 
 
-def part(scene: Scene, divisor: int, given: bool = True) -> Scene:
+def coarsened(scene: Scene, divisor: int, given: bool = True) -> Scene:
     """The scene with a half or a quarter of its cells; without ``given`` of those that an accuracy chooses only."""
     return _changed(
         scene, lambda _, law: replace(law, cells=law.cells // divisor) if given or law.accuracy is not None else law
@@ -117,10 +117,10 @@ def grid(scene: Scene) -> tuple[object, ...]:
 
 def first_look(system: System, end: float) -> float:
     """Time [s] after something sudden from which on cells are to resolve it, in a run of this length [s]."""
-    return min([p.after for p in system.profiles if p.after is not None], default=end / SOON)
+    return min([p.after for p in system.profiles if p.after is not None], default=end / UNRESOLVED_START)
 
 
-def begun(system: System, end: float) -> Array:
+def layer_starts(system: System, end: float) -> Array:
     """Times [s] at which something sudden may begin a layer: the start, and the breakpoints of loads."""
     return np.unique([0.0, *(t for t in system.breakpoints if 0 < t < end)])
 
@@ -129,7 +129,7 @@ def unresolved(system: System, end: float, t: Array) -> NDArray[np.bool_]:
     """Whether at each time something sudden has just begun that cells do not resolve yet; at none without cells."""
     if not system.profiles:
         return np.zeros(len(t), bool)
-    starts = begun(system, end)
+    starts = layer_starts(system, end)
     since = t - starts[np.searchsorted(starts, t, side="right") - 1]
     # Times and their differences are rounded.
     return np.asarray(since < first_look(system, end) - ROUNDING * t)
@@ -139,10 +139,10 @@ def looked_at(system: System, run: Run) -> Run:
     """The run at the times at which the errors of cells are told, which are the case's and not those of the outputs."""
     end = run.times[-1]
     after = first_look(system, end)
-    times = [end * (i / SOON) for i in range(SOON)]
-    for start in begun(system, end).tolist():
-        doublings = range(max(math.ceil(math.log2(end / (SOON * after))), 0))
-        times += [start + after * RATIO**k for k in doublings]
+    times = [end * (i / UNRESOLVED_START) for i in range(UNRESOLVED_START)]
+    for start in layer_starts(system, end).tolist():
+        doublings = range(max(math.ceil(math.log2(end / (UNRESOLVED_START * after))), 0))
+        times += [start + after * TIME_RATIO**k for k in doublings]
     seen = np.unique([t for t in times if 0 < t < end])
     return replace(run, times=(0.0, *seen[~unresolved(system, end, seen)].tolist(), end), picture=None)
 
@@ -154,7 +154,7 @@ def shortest(system: System, run: Run, values: Mapping[str, float], events: Iter
     What follows within the tolerance is at the same instant.
     """
     events = list(events)
-    starts = np.unique([*begun(system, run.times[-1]), *events])
+    starts = np.unique([*layer_starts(system, run.times[-1]), *events])
     seen = np.unique([*run.times[1:], *(t for t in events if t > 0)])
     since = seen - starts[np.searchsorted(starts, seen) - 1]
     since = since[since > run.rtol * seen]
@@ -175,11 +175,11 @@ def layers(system: System, points: Sequence[Mapping[str, float]], times: Sequenc
         table = np.array([[point[paths[symbol]] for symbol in symbols] for point in points]).reshape(len(points), -1)
         diffusion = compile_function(symbols, [slow])(table)[:, 0]  # time in which heat crosses the body [s]
         part = math.sqrt(float(np.min(np.asarray(times) / diffusion)))
-        found[conductor.body] = 2.0 ** math.floor(math.log2(min(max(part, THINNEST), 1.0)))
+        found[conductor.body] = 2.0 ** math.floor(math.log2(min(max(part, THINNEST_LAYER), 1.0)))
     return found
 
 
-def suited(scene: Scene, parts: Mapping[str, float], given: bool = False) -> Scene:
+def with_resolved_layers(scene: Scene, parts: Mapping[str, float], given: bool = False) -> Scene:
     """The scene with cells that resolve layers of these ``parts`` of the bodies where an accuracy chooses them, or
     where their number is ``given``.
 
@@ -190,14 +190,14 @@ def suited(scene: Scene, parts: Mapping[str, float], given: bool = False) -> Sce
         if (law.accuracy is None) is not given:
             return law
         layer = min(parts[name], 1 / (law.grading - 1) if law.grading > 2 else 1.0)
-        return replace(law, layer=layer, cells=_cells(PER_FOLD * grids.e_folds(layer, law.far is not None)))
+        return replace(law, layer=layer, cells=_cells(CELLS_PER_E_FOLD * grids.e_folds(layer, law.far is not None)))
 
     return _changed(scene, change)
 
 
 def _cells(number: float) -> int:
     """A number of cells that has a half and a quarter."""
-    return min(4 * max(math.ceil(number / 4), 2), MOST_CHOSEN)
+    return min(4 * max(math.ceil(number / 4), 2), MOST_CHOSEN_CELLS)
 
 
 def refined(scene: Scene, found: CellErrors, parts: Mapping[str, float]) -> Scene | None:
@@ -206,16 +206,16 @@ def refined(scene: Scene, found: CellErrors, parts: Mapping[str, float]) -> Scen
 
     Layers that an event has begun since are graded for. Where nothing converges, something is thinner than known.
     """
-    accuracy, laws = wanted(scene), {name: law for name, law in _laws(scene) if law.accuracy is not None}
+    accuracy, laws = asked_cell_accuracy(scene), {name: law for name, law in _laws(scene) if law.accuracy is not None}
     if accuracy is None:
         return None
     factor, thinner = 1.0, 1.0
     if not found.converged:
         factor, thinner = 2.0, 0.25
-    elif found.largest > accuracy / SPARE and not found.in_noise:
+    elif found.largest > accuracy / FLUX_MARGIN and not found.in_noise:
         # Rounded up, and a little more, lest the next estimate be just above what was aimed at.
-        factor = min(math.sqrt(1.1 * SPARE * found.largest / accuracy), FASTEST)
-    now = {name: max(min(parts[name], law.layer * thinner), THINNEST) for name, law in laws.items()}
+        factor = min(math.sqrt(1.1 * FLUX_MARGIN * found.largest / accuracy), MOST_GROWTH)
+    now = {name: max(min(parts[name], law.layer * thinner), THINNEST_LAYER) for name, law in laws.items()}
     if factor == 1.0 and all(now[name] == law.layer for name, law in laws.items()):
         return None
 
@@ -240,16 +240,16 @@ def resolves(scene: Scene, parts: Mapping[str, float]) -> bool:
     return all(law.cells >= 8 and fine(law, parts[name]) for name, law in _laws(scene))
 
 
-def judged(near: Mapping[str, float], far: Mapping[str, float], rtol: float) -> CellErrors:
+def cell_errors(near: Mapping[str, float], far: Mapping[str, float], rtol: float) -> CellErrors:
     """Errors from the differences of a run to one with half of its cells, and of that to one with a quarter.
 
-    >>> judged({"T": 3e-6}, {"T": 1.2e-5}, 1e-11).variables["T"]
+    >>> cell_errors({"T": 3e-6}, {"T": 1.2e-5}, 1e-11).variables["T"]
     1e-06
-    >>> judged({"T": 1e-5}, {"T": 5e-6}, 1e-11).converged
+    >>> cell_errors({"T": 1e-5}, {"T": 5e-6}, 1e-11).converged
     False
     """
     first, second = (max(each.values(), default=0.0) for each in (near, far))
-    in_noise = first <= rtol / MARGIN  # errors of runs are below that
+    in_noise = first <= rtol / RTOL_PART  # errors of runs are below that
     if in_noise:
         return CellErrors(near, in_noise=True)
     factors = {name: min(max(far[name] / d, LEAST_ORDER), ORDER) if d else ORDER for name, d in near.items()}
@@ -257,7 +257,7 @@ def judged(near: Mapping[str, float], far: Mapping[str, float], rtol: float) -> 
     return CellErrors(errors, converged=math.isfinite(second) and second >= LEAST_ORDER * first)
 
 
-def worst(errors: Sequence[CellErrors]) -> CellErrors:
+def worst_errors(errors: Sequence[CellErrors]) -> CellErrors:
     """The errors of that of several runs whose errors are the largest, or are not known."""
     return max(errors, key=lambda found: found.largest if found.converged else math.inf, default=CellErrors())
 
@@ -268,17 +268,17 @@ def differences(better: Trajectory, worse: Trajectory) -> dict[str, float]:
 
     The initial values are given, and none of the cells'.
     """
-    errors, note = apart(worse, better, first=1)
+    errors, note = state_differences(worse, better, first=1)
     return {**errors, EVENTS: math.inf} if note or better.status != worse.status else errors
 
 
-def missed(scene: Scene, errors: CellErrors, found: Accuracy | None = None) -> tuple[str, ...]:
+def unmet_accuracy(scene: Scene, errors: CellErrors, found: Accuracy | None = None) -> tuple[str, ...]:
     """Words for errors that are not known, for an accuracy that the most cells do not reach, or that a given number of
     cells misses.
     """
     if not errors.converged:
-        return (f"{UNKNOWN}. Let outputs begin later after what is sudden, or say `after`, or give more of them",)
-    accuracy, names = wanted(scene), fixed(scene)
+        return (f"{CELLS_UNKNOWN}. Let outputs begin later after what is sudden, or say `after`, or give more of them",)
+    accuracy, names = asked_cell_accuracy(scene), with_given_cells(scene)
     if accuracy is not None and not errors.largest <= accuracy:
         most = max(law.cells for _, law in _laws(scene) if law.accuracy is not None)
         text = (
@@ -286,7 +286,7 @@ def missed(scene: Scene, errors: CellErrors, found: Accuracy | None = None) -> t
             f"{errors.largest:.2g}. Ask for less, or for it to hold `after` a longer time, or give the other body more."
         )
         return (text,)
-    if not names or found is None or found.asked is None or found.error <= WITHIN * found.asked:
+    if not names or found is None or found.asked is None or found.error <= MISSED_BY * found.asked:
         return ()
     text = (
         f"a tolerance does not reduce the error of cells, whose number is given for {' and '.join(names)}: let "

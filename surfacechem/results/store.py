@@ -31,15 +31,15 @@ if TYPE_CHECKING:
     import xarray
 
 SUFFIX = ".zarr"
-MARKS = ".marks"
+MARKS_FOLDER = ".marks"
 
-PART = 2**20
+COORDINATE_PART = 2**20
 """Values of a coordinate that are written at a time."""
 
-MOST_BYTES = 64 * 2**20
+CHUNK_BYTES = 64 * 2**20
 """Size of a chunk of all variables together."""
 
-WORDS = {
+SHARED_ATTRIBUTES = {
     "title": "the title",
     "case": "the case",
     "mechanism": "the mechanism",
@@ -51,7 +51,7 @@ WORDS = {
 }
 """Attributes that two writers of a store must share, and how messages call them."""
 
-NEEDED = (
+ZARR_NEEDED = (
     "stores, and files of a sweep with `keep`, need Zarr, which is not installed: pip install 'surfacechem[sweeps]', "
     "or leave out `keep` and write to a name with .nc."
 )
@@ -94,7 +94,7 @@ class Layout:
             np.dtype(v.kind).itemsize * math.prod(self.sizes[d] for d in v.dimensions[len(self.runs) :])
             for v in self.variables.values()
         )
-        left = max(1, min(self.at_once, MOST_BYTES // bytes_of_run))
+        left = max(1, min(self.at_once, CHUNK_BYTES // bytes_of_run))
         found = []
         for size in reversed(self.shape):
             found.append(min(size, left))
@@ -136,7 +136,7 @@ class Store:
     @property
     def marks(self) -> Path:
         """The folder of the marks."""
-        return self.path / MARKS
+        return self.path / MARKS_FOLDER
 
     def write(self, number: int, columns: Mapping[str, NDArray[Any]]) -> None:
         """Write a chunk, and then its mark."""
@@ -236,7 +236,7 @@ def _zarr() -> Any:
     try:
         import zarr
     except ImportError:
-        raise InputError(NEEDED) from None
+        raise InputError(ZARR_NEEDED) from None
     return zarr
 
 
@@ -274,14 +274,14 @@ def begin(path: Path, layout: Layout, resume: bool) -> Store:
         raise InputError("is there already: --resume goes on with it; or give another name.", place)
     try:
         there = json.loads((path / "zarr.json").read_text())["attributes"]
-        known = (path / MARKS).is_dir() and "sweep" in there
+        known = (path / MARKS_FOLDER).is_dir() and "sweep" in there
     except (OSError, LookupError, TypeError, ValueError):
         known = False
     if not known:
         raise InputError("is no store of a sweep; give another name.", place)
     # As JSON has it, in which the store keeps it.
     ours = json.loads(json.dumps(dict(layout.attributes)))
-    different = [word for name, word in WORDS.items() if there.get(name) != ours.get(name)]
+    different = [word for name, word in SHARED_ATTRIBUTES.items() if there.get(name) != ours.get(name)]
     if different:
         raise InputError(f"belongs to another sweep. Different: {', '.join(different)}.", place)
     return Store(path, layout)
@@ -305,16 +305,16 @@ def _make(path: Path, layout: Layout) -> None:
         made = group.create_array(
             column.name,
             shape=values.shape,
-            chunks=tuple(min(size, PART) for size in values.shape),
+            chunks=tuple(min(size, COORDINATE_PART) for size in values.shape),
             dtype=values.dtype,
             dimension_names=column.dimensions,
             attributes=column.attributes,
         )
-        for first in range(0, values.shape[0], PART):  # of a plan there may be more values than memory
-            made[first : first + PART] = values[first : first + PART]
+        for first in range(0, values.shape[0], COORDINATE_PART):  # of a plan there may be more values than memory
+            made[first : first + COORDINATE_PART] = values[first : first + COORDINATE_PART]
     # Coordinates are written at once, as they follow from the plan.
     with warnings.catch_warnings():
         # Not yet of the standard, and read by what knows it only: without, each array is looked for by itself.
         warnings.simplefilter("ignore")
         zarr.consolidate_metadata(path)
-    (path / MARKS).mkdir()
+    (path / MARKS_FOLDER).mkdir()

@@ -17,13 +17,13 @@ if TYPE_CHECKING:
     from surfacechem.surfaces.potential import CurvedSurfaces
 
 
-TIMES = 9
+MOST_SURFACE_TIMES = 9
 """Output times, evenly spread, at which the surfaces are looked at."""
 
-ALONG, AROUND, ACROSS = 81, 16, 33
+POINTS_ALONG, POINTS_AROUND, POINTS_ACROSS = 81, 16, 33
 """Points of the fields from an axis on and around it; both ways where there is none."""
 
-AT = "surface_time"
+TIME = "surface_time"
 
 
 def surface_columns(trajectory: Trajectory, surface: CurvedSurfaces) -> tuple[list[Column], float]:
@@ -31,8 +31,8 @@ def surface_columns(trajectory: Trajectory, surface: CurvedSurfaces) -> tuple[li
     from surfacechem.surfaces.potential import INTEGRATION_TIME, integrating
 
     before, times = INTEGRATION_TIME.seconds, trajectory.result.times
-    chosen = np.unique(np.linspace(0, len(times) - 1, TIMES).round().astype(int))
-    columns = [Column(AT, (AT,), times[chosen], "s", "times at which the surfaces are looked at")]
+    chosen = np.unique(np.linspace(0, len(times) - 1, MOST_SURFACE_TIMES).round().astype(int))
+    columns = [Column(TIME, (TIME,), times[chosen], "s", "times at which the surfaces are looked at")]
     with integrating():
         surface, gaps = surface.of_run(trajectory.values), trajectory.everywhere["g_n"][: len(times)][chosen]
         # A run may end a rounding beyond the approaches that are known.
@@ -51,22 +51,22 @@ def _totals(surface: CurvedSurfaces, approaches: Array, stretches: Array) -> lis
     columns = []
     if not alike_around(*surface.surfaces(0.0)):
         columns = [
-            Column(f"moment_{axis}", (AT,), moment, "N m", f"moment on body 1 about the {axis} axis")
+            Column(f"moment_{axis}", (TIME,), moment, "N m", f"moment on body 1 about the {axis} axis")
             for axis, moment in (("x", moment_x), ("y", moment_y))
         ]
     columns += [
-        Column("approach", (AT,), approaches, "m", "approach of the surfaces"),
-        Column("force", (AT,), force, "N", "normal force on body 1, tension positive"),
-        Column("gap_least", (AT,), least, "m", "least gap of the surfaces"),
-        Column("gap_places", (AT,), places, "1", "places that are as near"),
-        Column("contact_area", (AT,), area, "m^2", "area of body 1 that touches or overlaps body 2"),
-        Column("contact_radius", (AT,), np.sqrt(area / math.pi), "m", "radius of a circle of the area of contact"),
+        Column("approach", (TIME,), approaches, "m", "approach of the surfaces"),
+        Column("force", (TIME,), force, "N", "normal force on body 1, tension positive"),
+        Column("gap_least", (TIME,), least, "m", "least gap of the surfaces"),
+        Column("gap_places", (TIME,), places, "1", "places that are as near"),
+        Column("contact_area", (TIME,), area, "m^2", "area of body 1 that touches or overlaps body 2"),
+        Column("contact_radius", (TIME,), np.sqrt(area / math.pi), "m", "radius of a circle of the area of contact"),
     ]
     if surface.pairs:
         text = "force of the local law minus the integral"
-        columns.append(Column("local_difference", (AT,), local - force, "N", text))
+        columns.append(Column("local_difference", (TIME,), local - force, "N", text))
     if surface.heat_laws:
-        columns.append(Column("conductance", (AT,), across, "W/K", "heat conductance over the gap"))
+        columns.append(Column("conductance", (TIME,), across, "W/K", "heat conductance over the gap"))
     return columns
 
 
@@ -80,7 +80,7 @@ def _fields(surface: CurvedSurfaces, approaches: Array, stretches: Array) -> Seq
     size = length(lower, upper)
     patches, _ = outer_patches(lower, upper, size, size, Budget(surface.accuracy))
     lower = patches.surface
-    counts = [ALONG, AROUND] if patches.alike[1] else [ACROSS, ACROSS]
+    counts = [POINTS_ALONG, POINTS_AROUND] if patches.alike[1] else [POINTS_ACROSS, POINTS_ACROSS]
     at = np.stack(np.meshgrid(*map(patches.line, (0, 1), counts), indexing="ij"), axis=-1)
     D = lower.derivatives(lower.off_pole(at), FIRST_ORDER)
     x, normals = D[0], lower.normals(D)
@@ -97,13 +97,13 @@ def _fields(surface: CurvedSurfaces, approaches: Array, stretches: Array) -> Seq
         Column(f"surface_{axis}", over, x[..., k], "m", f"{axis} of points of body 1") for k, axis in enumerate("xyz")
     ]
     places += [
-        Column(f"opposite_{axis}", (AT, *over), opposite[..., k], "m", f"{axis} of the nearest point of body 2")
+        Column(f"opposite_{axis}", (TIME, *over), opposite[..., k], "m", f"{axis} of the nearest point of body 2")
         for k, axis in enumerate("xyz")
     ]
     by = "" if summed or not surface.pairs else " by the local law"
     text = f"normal traction on body 1{by}, tension positive"
     return [
         *places,
-        Column("gap", (AT, *over), gap, "m", "gap between the surfaces"),
-        Column("traction", (AT, *over), traction, "Pa", text),
+        Column("gap", (TIME, *over), gap, "m", "gap between the surfaces"),
+        Column("traction", (TIME, *over), traction, "Pa", text),
     ]

@@ -19,7 +19,7 @@ from surfacechem.expressions import derivative, magnitude
 from surfacechem.format.plans import Plan
 from surfacechem.model.system import System
 from surfacechem.quantities import VELOCITIES
-from surfacechem.results.audit import ROUNDINGS, TOTALS, residuals, resolved
+from surfacechem.results.audit import LAST_DIGITS, TOTALS, residuals, resolved
 from surfacechem.runs import spectrum
 from surfacechem.runs.keeping import REACHED, STATUSES, Columns, Keep, crossed, reason_table, variable
 from surfacechem.solve.choice import EXPLICIT, IMPLICIT
@@ -416,7 +416,7 @@ class ArrayRuns:
         for j, (which, (name, _), (residual, scale)) in enumerate(left):
             stored = np.maximum(rounded[:, j] / EPS, np.abs(named[name]).max(axis=1))
             stored = np.maximum(stored, scale) if which == "entropy" else stored
-            rounding = EPS * stored * (ROUNDINGS + batch.counts[:, RECORDS])
+            rounding = EPS * stored * (LAST_DIGITS + batch.counts[:, RECORDS])
             columns[f"{which}_error"] = resolved(residual, scale, stored, rounding)
         sites = np.zeros(len(reached))
         for j in system.account_columns.get("bonds", ()):

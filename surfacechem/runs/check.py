@@ -16,7 +16,7 @@ from surfacechem.model.automaton import INTERFACE
 from surfacechem.model.checks import conductance_warnings
 from surfacechem.model.system import Conductor, System
 from surfacechem.quantities import BOLTZMANN, GAS_CONSTANT
-from surfacechem.results.findings import cautioned
+from surfacechem.results.findings import active_cautions
 from surfacechem.scene import Scene
 from surfacechem.solve.contract import Array, Problem
 from surfacechem.solve.diagnose import paces
@@ -225,7 +225,7 @@ def start_warnings(model: Model, problem: Problem, start: Start | None, end: flo
     """Warnings about the state at the start, and about bodies that should not be one lump."""
     first = np.concatenate([np.zeros(1), problem.y0, np.zeros(len(problem.y0)), problem.parameters[0]])
     lumps = lumpings(model.system, start, end) if start is not None else []
-    return [*cautioned(model.system, first[None]), *(text for body in lumps for text in body.warnings())]
+    return [*active_cautions(model.system, first[None]), *(text for body in lumps for text in body.warnings())]
 
 
 def laws_of(scene: Scene) -> list[Law]:

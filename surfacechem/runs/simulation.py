@@ -23,7 +23,7 @@ from surfacechem.model.assemble import perturbed
 from surfacechem.model.system import System
 from surfacechem.results import spatial
 from surfacechem.results.accuracy import Accuracy, CellErrors
-from surfacechem.results.error_estimates import accuracy, check_way, exact_outputs, inexact, of_laws, verified
+from surfacechem.results.error_estimates import accuracy, check_way, exact_outputs, inexact, law_errors, verified
 from surfacechem.results.event_table import event_times
 from surfacechem.results.solution import Judgement, Solution
 from surfacechem.scene import Scene
@@ -298,7 +298,7 @@ class Simulation:
         found = accuracy(trajectory, case.scene, exact, way, added, estimate)
         if unused and way == "auto":
             found = replace(found, source=f"{found.source}; {unused}")
-        notes = spatial.missed(case.scene, (errors or [CellErrors()])[0], found)
+        notes = spatial.unmet_accuracy(case.scene, (errors or [CellErrors()])[0], found)
         return Judgement(found, exact_outputs(found, exact, case.scene), notes)
 
     def _origin(self, changes: Mapping[str, float]) -> dict[str, Any]:
@@ -332,7 +332,7 @@ class Simulation:
         """
         chosen = self._with(spatial.tightened(self.case.scene, settings.accuracy))
         scene, system = chosen.case.scene, chosen.system
-        if spatial.wanted(scene) is None:
+        if spatial.asked_cell_accuracy(scene) is None:
             return chosen, chosen._solved(settings, values, plan, threads), []
         from surfacechem.runs import sweeps
 
@@ -341,18 +341,18 @@ class Simulation:
         runs = sweeps.settings(system, plan, looked, points) if plan else [looked]
         # Of a sweep all runs have the same cells, those of the run that needs the most.
         times = [spatial.shortest(system, *pair) for pair in zip(runs, points, strict=True)]
-        cells: Scene | None = spatial.suited(scene, spatial.layers(system, points, times))
-        for _ in range(1 + spatial.TRIALS):
+        cells: Scene | None = spatial.with_resolved_layers(scene, spatial.layers(system, points, times))
+        for _ in range(1 + spatial.MOST_GRIDS):
             if cells is None:
                 break
             chosen = self._with(cells)
             done = chosen._solved(looked, values, plan, threads)
             errors = [chosen._halved(run, given=False) for run in done]
-            cells = spatial.refined(cells, spatial.worst(errors), chosen._layers(*done))
+            cells = spatial.refined(cells, spatial.worst_errors(errors), chosen._layers(*done))
         if settings.times != looked.times or settings.picture is not None:
             done = chosen._solved(settings, values, plan, threads)
         # Errors at outputs that are asked for are told at these.
-        known = not spatial.fixed(scene) and (settings.picture is not None or settings.times == looked.times)
+        known = not spatial.with_given_cells(scene) and (settings.picture is not None or settings.times == looked.times)
         return chosen, done, errors if known else []
 
     def _solved(
@@ -386,15 +386,15 @@ class Simulation:
     def _cell_errors(self, trajectory: Trajectory) -> CellErrors:
         """Errors of the cells, by variable; nothing where no body has any."""
         scene = self.case.scene
-        if not spatial.divided(scene):
+        if not spatial.is_divided(scene):
             return CellErrors()
         parts = self._layers(trajectory)
-        if not spatial.fixed(scene):
+        if not spatial.with_given_cells(scene):
             return self._halved(trajectory)
         if spatial.resolves(scene, parts) and (found := self._halved(trajectory)).converged:
             return found
         # Cells wider than a layer agree on almost nothing having happened: only others that resolve it tell the error.
-        other = self._with(spatial.suited(scene, parts, given=True))
+        other = self._with(spatial.with_resolved_layers(scene, parts, given=True))
         held_against = other._as_before(trajectory)
         own = other._halved(held_against)
         found = CellErrors(spatial.differences(held_against, trajectory), source="and one with cells that suit")
@@ -404,7 +404,7 @@ class Simulation:
         """Errors of a run from those of the numbers that laws compute for themselves; none where no law has any."""
         if not inexact(self.case.scene):
             return CellErrors()
-        return of_laws(trajectory, self._perturbed._as_before(trajectory), self.case.scene)
+        return law_errors(trajectory, self._perturbed._as_before(trajectory), self.case.scene)
 
     @cached_property
     def _perturbed(self) -> Simulation:
@@ -415,10 +415,10 @@ class Simulation:
         """Errors of the cells from runs with a half and a quarter of them; without ``given`` of those that an accuracy
         chooses only.
         """
-        coarser = [self._with(spatial.part(self.case.scene, divisor, given)) for divisor in (2, 4)]
+        coarser = [self._with(spatial.coarsened(self.case.scene, divisor, given)) for divisor in (2, 4)]
         runs = [trajectory, *(simulation._as_before(trajectory) for simulation in coarser)]
         near, far = (spatial.differences(*pair) for pair in pairwise(runs))
-        return spatial.judged(near, far, trajectory.run.rtol)
+        return spatial.cell_errors(near, far, trajectory.run.rtol)
 
     def _as_before(self, trajectory: Trajectory) -> Trajectory:
         """A run with other cells again with these, which share its values but for those of the cells."""
@@ -538,7 +538,7 @@ class Simulation:
         freed, values = self._ready(changes or {}, plan)
         if freed is not self:
             return freed.stream(plan, path, values, resume=resume, part=part)
-        if spatial.wanted(self.case.scene) is not None:
+        if spatial.asked_cell_accuracy(self.case.scene) is not None:
             message = "cells that follow from an accuracy need all runs at once; give a number of cells for a store."
             raise InputError(message, path="bodies")
         if plan.until and not plan.load:

@@ -20,7 +20,7 @@ from surfacechem.format.plans import Plan, recorded_plan
 from surfacechem.format.sections import ALL, SweepSection
 from surfacechem.results.dataset import quantities
 from surfacechem.results.netcdf import CONVENTIONS, COORDINATES, Column, cf_unit, versions
-from surfacechem.results.store import MOST_BYTES, Layout, Store, StoredArray, begin, opened, store_path
+from surfacechem.results.store import CHUNK_BYTES, Layout, Store, StoredArray, begin, opened, store_path
 from surfacechem.runs import checking, keeping, sweeps
 from surfacechem.runs.arrays import ArrayRuns, JumpingRuns, quiet, solvable
 from surfacechem.runs.at_rest import UnrestError, refuse_histories, to_rest
@@ -108,7 +108,7 @@ class ChunkRuns:
             return 2**6
         points = len(self.arrays.shape) + (100 if self.arrays.keeps_steps else 0)
         row = 8 * points * (4 * len(system.inputs) + 4 * len(system.outputs) + len(system.ledger))
-        return int(np.clip(MOST_BYTES // (2 * row), 2**6, RUNS_OF_A_PIECE))
+        return int(np.clip(CHUNK_BYTES // (2 * row), 2**6, RUNS_OF_A_PIECE))
 
     def flags(self, name: str) -> dict[str, Any]:
         """Attributes with the meaning of the codes of a variable, where it holds codes."""

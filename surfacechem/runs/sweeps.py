@@ -20,14 +20,14 @@ from surfacechem.format import Case
 from surfacechem.format.plans import RUN_DIMENSION, STATISTICS, LazyArray, Plan, name_parts
 from surfacechem.model.system import System
 from surfacechem.references.base import SceneView
-from surfacechem.results.accuracy import AT_START, UNKNOWN, CellErrors, second_tolerance
+from surfacechem.results.accuracy import AT_START, CELLS_UNKNOWN, CellErrors, second_tolerance
 from surfacechem.results.audit import Audit, audit
 from surfacechem.results.dataset import DATASET_NAMES, Results, coverage_columns, quantities, quantity_columns
-from surfacechem.results.error_estimates import against_exact, closer, estimated, second_run, with_cells
+from surfacechem.results.error_estimates import against_exact, estimated, second_run, second_settings, with_cells
 from surfacechem.results.event_table import entropy_destroyed, event_columns, event_times
 from surfacechem.results.matching import exact_values, match
 from surfacechem.results.netcdf import COORDINATES, Column, versions
-from surfacechem.results.picture import shared
+from surfacechem.results.picture import shared_times
 from surfacechem.runs import spectrum
 from surfacechem.runs.keeping import (
     ENDS,
@@ -120,7 +120,7 @@ def following(model: Model, plan: Plan, run: Run, changes: Mapping[str, float], 
         done = model.solve_all(pairs, threads or os.cpu_count() or 1)
     except InputError:
         return run  # which of the runs are refused is said where all are solved
-    return replace(run, times=shared(done, max(len(run.times), MOST_OUTPUTS // plan.size)))
+    return replace(run, times=shared_times(done, max(len(run.times), MOST_OUTPUTS // plan.size)))
 
 
 def _with_values(
@@ -253,7 +253,7 @@ def _estimated(done: SweepSolution, second: SweepSolution, cells: Sequence[CellE
     if done.statistics:
         pairs = zip(done.statistics, second.statistics, cells, strict=True)
         errors = [_of_statistics(ours, theirs) + found.largest for ours, theirs, found in pairs]
-        return errors, "" if all(found.converged for found in cells) else UNKNOWN
+        return errors, "" if all(found.converged for found in cells) else CELLS_UNKNOWN
     runs = zip(done.runs, second.runs, cells, strict=True)
     found = [with_cells(estimated(ours, theirs), each) for ours, theirs, each in runs]
     return [each.error for each in found], next((each.source for each in found if np.isnan(each.error)), "")
@@ -261,7 +261,7 @@ def _estimated(done: SweepSolution, second: SweepSolution, cells: Sequence[CellE
 
 def _second(done: SweepSolution, threads: int | None) -> SweepSolution:
     """The runs at another tolerance, as that of a single run."""
-    pairs = [(closer(run), run.values) for run in done.runs]
+    pairs = [(second_settings(run), run.values) for run in done.runs]
     runs = done.model.solve_all(pairs, threads or os.cpu_count() or 1)
     return replace(done, run=done.run.second(second_tolerance(done.run.rtol)), runs=runs)
 

@@ -28,7 +28,7 @@ from surfacechem.mechanism.mixture import IdealMixture, Species
 from surfacechem.mechanism.rates import InterfaceArrhenius
 from surfacechem.model.components.pairs import Opposed, lengths, opposed
 from surfacechem.quantities import BOLTZMANN, GAS_CONSTANT
-from surfacechem.results.findings import ROUNDED
+from surfacechem.results.findings import ROUNDED_DEPARTURE
 from surfacechem.solve.contract import Array
 
 # A reaction, by its label, or a pair of one-way reactions.
@@ -218,6 +218,6 @@ def cycle_verdict(cycle: ReactionCycle, curves: Curves, temperatures: Array, for
         return f"nothing stops it, since there is no way back from {', '.join(one_way)}: give each a reverse"
     values = cycle.departure(curves, temperatures, forces)
     worst = float(values.flat[int(np.abs(values).argmax())])
-    if abs(worst) <= ROUNDED:
+    if abs(worst) <= ROUNDED_DEPARTURE:
         return f"the product of k_f/k_r is 1 to within {abs(worst):.1e}"
     return f"INCONSISTENT: the product of k_f/k_r is not 1 but exp({worst:.3g}) at most, which no thermo allows"

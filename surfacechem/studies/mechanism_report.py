@@ -14,7 +14,7 @@ import numpy as np
 from surfacechem.contracts.units import parse
 from surfacechem.errors import InputError, Place
 from surfacechem.mechanism.source import Source
-from surfacechem.results.findings import said
+from surfacechem.results.findings import in_words
 from surfacechem.runs.listing import WIDTH, source
 from surfacechem.runs.sheet import columns
 from surfacechem.solve.contract import Array
@@ -139,7 +139,7 @@ def verdict(curves: Curves, label: str, temperatures: Span, forces: Span) -> str
     values = curves.departure(pair, *_grid(curves, temperatures, forces))
     others = " and ".join(other for other in pair.labels if other != label)
     where = temperatures.text("K") + (f", {forces.text('pN', 1e12)}" if curves.loaded else "")
-    return f"pair with {others}: {said(float(values.min()), float(values.max()))} ({where})"
+    return f"pair with {others}: {in_words(float(values.min()), float(values.max()))} ({where})"
 
 
 def _grid(curves: Curves, temperatures: Span, forces: Span) -> Sequence[Array]:

@@ -167,7 +167,7 @@ def _scene(case: cases.Case, attributes: Mapping[str, Any]) -> Iterator[PageSect
     stated = list(dict.fromkeys(law for kind in acting for law in _stated(type(kind))))
     yield PageSection("The scene", words, tables, drawings=[lambda: drawing.figure(scene)])
     yield PageSection("Laws", equations=stated)
-    if spatial.divided(scene):  # equations of many cells read alike
+    if spatial.is_divided(scene):  # equations of many cells read alike
         system = replace(case, scene=spatial.few(case.scene)).system()
     lines, symbols = equations(system)
     yield PageSection("Equations", tables=[_numbers(system, symbols, attributes)], equations=lines, details=True)

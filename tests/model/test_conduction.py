@@ -17,7 +17,7 @@ from surfacechem.errors import InputError
 from surfacechem.format import load_text
 from surfacechem.results import spatial
 from surfacechem.results.error_estimates import against_tighter, with_cells
-from surfacechem.results.spatial import judged
+from surfacechem.results.spatial import cell_errors
 from surfacechem.runs.simulation import Simulation
 
 TWO = """
@@ -141,7 +141,7 @@ def test_a_joint_jump_heats_the_volume_of_the_bodies():
 
 
 def test_a_search_that_ends_early_states_the_error_of_its_last_cells(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(spatial, "TRIALS", 1)
+    monkeypatch.setattr(spatial, "MOST_GRIDS", 1)
     simulation = Simulation(load_text(two("{accuracy: 1e-3}").case.text.replace("times: [1, 3, 10, 30]", "until: 30")))
     chosen, (trajectory,), errors = simulation._resolved(simulation.case.run, {})
     assert spatial.grid(chosen.case.scene) != spatial.grid(simulation.case.scene)
@@ -163,7 +163,7 @@ def test_a_sweep_takes_the_cells_that_its_runs_need_and_states_what_they_leave()
 
 
 def test_an_accuracy_out_of_reach_is_said(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(spatial, "MOST_CHOSEN", 32)
+    monkeypatch.setattr(spatial, "MOST_CHOSEN_CELLS", 32)
     warnings = two("{accuracy: 1e-9}", perfect=True, exact=False).run().warnings
     assert any("the accuracy 1e-09 of the cells is not reached" in warning for warning in warnings)
 
@@ -337,7 +337,7 @@ def test_outputs_follow_a_run_with_cells_from_where_these_resolve_it():
 
 
 def test_an_error_that_does_not_converge_is_unknown():
-    found = judged({"T_1": 1e-4}, {"T_1": 5e-5}, rtol=1e-11)
+    found = cell_errors({"T_1": 1e-4}, {"T_1": 5e-5}, rtol=1e-11)
     assert not found.converged
     assert np.isnan(found.largest)
     run = two(40).run()

@@ -11,14 +11,14 @@ from typer.testing import CliRunner
 import surfacechem
 from surfacechem.cli.main import app
 from surfacechem.errors import InputError
-from surfacechem.results.accuracy import STILL, CellErrors
+from surfacechem.results.accuracy import NOTHING_EVOLVES, CellErrors
 from surfacechem.results.error_estimates import (
     EVENTS,
     against_tighter,
-    apart,
     estimated,
     event_errors,
     floors,
+    state_differences,
     unknown,
     with_cells,
 )
@@ -42,7 +42,7 @@ def test_what_rounding_leaves_of_an_end_is_compared_with_what_the_exact_solution
 
 def test_where_nothing_evolves_the_error_is_that_of_the_laws():
     laws = CellErrors({"t_n": 1e-9}, source="and one with forces of the surfaces wrong by their error, 1.0e-09")
-    found = with_cells(unknown(STILL), laws)
+    found = with_cells(unknown(NOTHING_EVOLVES), laws)
     assert (found.error, found.variables) == (1e-9, {"t_n": 1e-9})
     assert found.source == "estimate: a second run with forces of the surfaces wrong by their error, 1.0e-09"
     late = unknown("a second run at rtol 1e-13 failed")
@@ -214,7 +214,7 @@ def test_species_that_never_exceed_the_absolute_tolerance_are_no_error():
         replace(trajectory, result=replace(trajectory.result, outputs=trajectory.result.outputs * [part, 1.0]))
         for part in (1e-31, 3e-31)
     )
-    errors, _ = apart(first, second)
+    errors, _ = state_differences(first, second)
     assert errors["phi"] < 1e-24
 
 

@@ -91,7 +91,7 @@ for name in sys.argv[1:]:
 
 @pytest.mark.parametrize("count", [3, pytest.param(1000, marks=pytest.mark.slow)])
 def test_damaged_bytes(files, count, tmp_path, monkeypatch):
-    monkeypatch.setattr(netcdf, "PATIENCE", 5.0)
+    monkeypatch.setattr(netcdf, "READING_TIMEOUT", 5.0)
     random = Random(count)
     names = [str(tmp_path / f"{which}{i}.nc") for which in files for i in range(count)]
     for name, file in zip(names, np.repeat([*files.values()], count), strict=True):

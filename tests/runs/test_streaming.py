@@ -315,7 +315,7 @@ def test_a_damaged_chunk_is_computed_again(whole, tmp_path):
 
 
 def test_coordinates_are_written_in_parts(tmp_path, monkeypatch):
-    monkeypatch.setattr(store, "PART", 7)
+    monkeypatch.setattr(store, "COORDINATE_PART", 7)
     with stored(tmp_path / "o.zarr").dataset as data:
         np.testing.assert_array_equal(data["K_0"], np.linspace(100, 300, 60))
 
