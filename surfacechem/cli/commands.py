@@ -26,13 +26,13 @@ if TYPE_CHECKING:
 
 R = TypeVar("R")
 
-SELDOM = (100_000, 20, 20)
+RARE_COLLECTION = (100_000, 20, 20)
 """Thresholds of Python's garbage collection: objects made between two, and how many of those between larger ones."""
 
 # Exit code of each way in which a run ends.
-STATUS = {"finished": 0, "stopped": 3, "failed": 4}
+STATUS_CODES = {"finished": 0, "stopped": 3, "failed": 4}
 
-DIFFERENT, BAD_INPUT, UNWRITTEN, SIGNALLED = 1, 2, 5, 128
+DIFFERENT, BAD_INPUT, NOT_WRITTEN, SIGNALLED = 1, 2, 5, 128
 
 CODES = {
     0: "finished",
@@ -40,14 +40,14 @@ CODES = {
     BAD_INPUT: "bad input; nothing was computed",
     3: "physics stopped the run (of a sweep, every run) or refuses a point; what was reached is written, and why",
     4: "the run failed numerically; what it reached is written",
-    UNWRITTEN: "the result could not be written",
+    NOT_WRITTEN: "the result could not be written",
     SIGNALLED + 2: "interrupted (128 plus its number for another signal); nothing was written",
 }
 
 
 def exit_codes(own: Mapping[int, str]) -> str:
     """The exit codes of a command for its help: its own, and those that every command has."""
-    every = {code: CODES[code] for code in (BAD_INPUT, UNWRITTEN, SIGNALLED + 2)} | dict(own)
+    every = {code: CODES[code] for code in (BAD_INPUT, NOT_WRITTEN, SIGNALLED + 2)} | dict(own)
     return "\b\nExit codes:\n" + "".join(f"  {code:<4} {every[code]}\n" for code in sorted(every))
 
 
@@ -61,11 +61,11 @@ class SignalledError(BaseException):
     """A signal asks the process to end."""
 
 
-class _TriedError(Exception):
+class _TrialEndError(Exception):
     """Ends the trial of an output."""
 
 
-def _end(number: int, _frame: object) -> None:
+def _raise_signal(number: int, _frame: object) -> None:
     raise SignalledError(number)
 
 
@@ -83,7 +83,7 @@ def _signals_raised() -> Iterator[None]:
     usual = {number: handler for number, handler in usual.items() if handler not in (None, signal.SIG_IGN)}
     try:
         for number in usual:
-            signal.signal(number, _end)
+            signal.signal(number, _raise_signal)
         yield
     finally:
         for number, handler in usual.items():
@@ -94,11 +94,11 @@ def end_by_signal(error: SignalledError, kept: str) -> NoReturn:
     """End the process as a signal asks, with what is left of the work."""
     (number,) = error.args
     word = "interrupted" if number == signal.SIGINT else f"ended by {signal.Signals(number).name}"
-    _tell(f"{word}; {kept}")
+    _print_error(f"{word}; {kept}")
     os._exit(SIGNALLED + number)  # at once: compiled code may run on in another thread, and would be waited for
 
 
-def _tell(message: object) -> None:
+def _print_error(message: object) -> None:
     """Print a line on stderr; where nothing can be written there the exit code says it."""
     with suppress(OSError):
         typer.echo(f"surfacechem: {message}", err=True)
@@ -117,7 +117,7 @@ class Commands(TyperGroup):
         for what imports make is never garbage.
         """
         usual = gc.get_threshold()
-        gc.set_threshold(*SELDOM)
+        gc.set_threshold(*RARE_COLLECTION)
         try:
             return super().main(*arguments, **options)
         finally:
@@ -129,8 +129,8 @@ class Commands(TyperGroup):
             with _signals_raised():
                 return super().invoke(ctx)
         except SurfacechemError as error:
-            _tell(error)
-            raise typer.Exit(UNWRITTEN if isinstance(error, OutputError) else BAD_INPUT) from None
+            _print_error(error)
+            raise typer.Exit(NOT_WRITTEN if isinstance(error, OutputError) else BAD_INPUT) from None
         except SignalledError as error:
             end_by_signal(error, "nothing was written.")
         except BrokenPipeError:
@@ -139,8 +139,8 @@ class Commands(TyperGroup):
             # Every file is written by what says so itself: this is the standard output, which Python would try again.
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             what = f"{error.filename}: cannot be used" if error.filename else "standard output: cannot be written"
-            _tell(f"{what}: {error.strerror or error}.")
-            raise typer.Exit(UNWRITTEN) from None
+            _print_error(f"{what}: {error.strerror or error}.")
+            raise typer.Exit(NOT_WRITTEN) from None
 
 
 def written_to(text: str) -> Any:
@@ -189,11 +189,11 @@ Changes = Annotated[
 SolverName = Annotated[str | None, Option("--solver", help="Solver, instead of that of the case.")]
 SolverNames = Annotated[str | None, Option("--solvers", help="Names of solvers, separated by commas; default: all.")]
 Tolerance = Annotated[float | None, Option("--rtol", help="Relative tolerance, instead of that of the case.")]
-Wanted = Annotated[
+Accuracy = Annotated[
     float | None, Option("--accuracy", help="Relative accuracy to reach; solver and tolerance are chosen for it.")
 ]
 Quiet = Annotated[bool, Option("--quiet", "-q", help="Print nothing unless something is wrong.")]
-Talk = Annotated[
+Verbose = Annotated[
     bool | None,
     Option(
         "--verbose/--quiet",
@@ -204,14 +204,14 @@ Talk = Annotated[
 ]
 
 
-def loaded(case: str, changes: Sequence[str] | None) -> Simulation:
+def load_case(case: str, changes: Sequence[str] | None) -> Simulation:
     """A case with its changes; what runs cases is imported when this is called."""
     from surfacechem.runs.simulation import load
 
     return load(case, changes or ())
 
 
-def chosen(simulation: Simulation, solver: str | None, rtol: float | None, accuracy: float | None = None) -> Run:
+def run_settings(simulation: Simulation, solver: str | None, rtol: float | None, accuracy: float | None = None) -> Run:
     """Run settings of the case, changed by the command line; a tolerance given there replaces an automatic choice."""
     from surfacechem.results.accuracy import check_tolerance, first_tolerance
     from surfacechem.solve import AUTO, names
@@ -254,12 +254,12 @@ def wait_for(work: Callable[[], R], tick: Callable[[], None] = lambda: None) -> 
         pool.shutdown(wait=False)
 
 
-def solved(run: Callable[[], R], talk: bool | None, brief: bool = False, waits: bool = False) -> R:
+def solve(run: Callable[[], R], talk: bool | None, brief: bool = False, waits: bool = False) -> R:
     """The solution, its dataset's columns and audit included, so that what follows only writes; ``talk`` as the command
     line says, ``brief`` where the stepper is called a few times only, ``waits`` where more than it has to be compiled.
     A terminal shows a bar after a while.
     """
-    from surfacechem.cli.terminal import following
+    from surfacechem.cli.terminal import progress_bar
     from surfacechem.solve.radau import stepper
 
     def whole() -> R:
@@ -271,7 +271,7 @@ def solved(run: Callable[[], R], talk: bool | None, brief: bool = False, waits: 
         stepper.LOOP.load_briefly()
     if talk is not False and (waits or not stepper.LOOP.is_compiled):
         typer.echo("compiling the stepper, once on this machine; this takes a minute or less ...", err=True)
-    with following(talk) as bar:
+    with progress_bar(talk) as bar:
         bar.tell("running")
         return wait_for(whole, bar.tick)
 
@@ -286,8 +286,8 @@ def refuse_unwritable(*targets: Path, read: Sequence[str | Path] = ()) -> None:
         if target.exists() and any(Path(source).exists() and target.samefile(source) for source in read):
             raise InputError("is what is read; give another file.", Place(str(target)))
         # As a dataset is written, but for its content.
-        with suppress(_TriedError), replacing(target):
-            raise _TriedError
+        with suppress(_TrialEndError), replacing(target):
+            raise _TrialEndError
 
 
 def check_picture(target: Path) -> None:
@@ -297,14 +297,14 @@ def check_picture(target: Path) -> None:
     refuse_unwritable(target)
 
 
-def listed(text: str | None) -> list[str] | None:
+def split_list(text: str | None) -> list[str] | None:
     """Words with commas between; None where nothing is given."""
     return None if text is None else [part.strip() for part in text.split(",") if part.strip()]
 
 
 def leave_with(status: str, reason: str = "") -> None:
     """End with the exit code of a status, which a reason explains on stderr."""
-    if code := STATUS[status]:
+    if code := STATUS_CODES[status]:
         if reason:
-            _tell(f"{status}: {reason}")
+            _print_error(f"{status}: {reason}")
         raise typer.Exit(code)

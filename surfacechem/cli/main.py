@@ -17,24 +17,24 @@ from surfacechem.cli.commands import (
     EXIT_CODES,
     PRECISION_CODES,
     STABILITY_CODES,
+    Accuracy,
     CaseName,
     Changes,
     Commands,
     Quiet,
     SolverName,
     SolverNames,
-    Talk,
     Tolerance,
-    Wanted,
+    Verbose,
     case_names,
     check_picture,
-    chosen,
     law_names,
     leave_with,
-    listed,
-    loaded,
+    load_case,
     refuse_unwritable,
-    solved,
+    run_settings,
+    solve,
+    split_list,
     written_to,
 )
 from surfacechem.cli.terminal import show, show_page
@@ -77,7 +77,7 @@ def run(
     changes: Changes = None,
     solver: SolverName = None,
     rtol: Tolerance = None,
-    accuracy: Wanted = None,
+    accuracy: Accuracy = None,
     error: Annotated[
         str,
         Option(
@@ -86,17 +86,17 @@ def run(
             "tighter tolerance), balances (no second run; not with an accuracy).",
         ),
     ] = "auto",
-    talk: Talk = None,
+    talk: Verbose = None,
 ) -> None:
     """Run a case, write its dataset and print a summary."""
     from surfacechem.results.netcdf import dataset_path
     from surfacechem.runs.summaries import run_summary
 
-    simulation = loaded(case, changes)
-    settings = chosen(simulation, solver, rtol, accuracy)
+    simulation = load_case(case, changes)
+    settings = run_settings(simulation, solver, rtol, accuracy)
     target = output or Path(f"{simulation.case.name}.nc")
     refuse_unwritable(dataset_path(target), read=[simulation.case.file])
-    solution = solved(lambda: simulation.run(run=settings, error=error), talk, brief=True)
+    solution = solve(lambda: simulation.run(run=settings, error=error), talk, brief=True)
     solution.write(target)  # also of a run that failed: what it reached tells why
     if talk is not False:
         show(run_summary(solution, target, details=talk is True))
@@ -135,7 +135,7 @@ def sweep(
         ),
     ] = None,
     changes: Changes = None,
-    talk: Talk = None,
+    talk: Verbose = None,
 ) -> None:
     """Sweep parameters of a case into one dataset or store.
 
@@ -146,9 +146,9 @@ def sweep(
     from surfacechem.results.netcdf import dataset_path
     from surfacechem.runs.summaries import sweep_summary
 
-    simulation = loaded(case, changes)
+    simulation = load_case(case, changes)
     values, end = assignments(over or ()) or None, assignments([until] if until else ()) or None
-    if stores.asked_for(output, {"--resume": resume, "--part": part, "--cluster": cluster, "--only": only}):
+    if stores.goes_to_store(output, {"--resume": resume, "--part": part, "--cluster": cluster, "--only": only}):
         assert output is not None
         plan = partial(simulation.plan, values, end)
         return stores.write(simulation, plan, output, talk, resume=resume, part=part, cluster=cluster, only=only)
@@ -156,7 +156,7 @@ def sweep(
     refuse_unwritable(target, read=[simulation.case.file])
     if simulation.case.sweep is not None and simulation.case.sweep.keep is not None:
         return stores.write_file(simulation, simulation.plan(values, end), target, talk)
-    solution = solved(lambda: simulation.sweep(values, end), talk)
+    solution = solve(lambda: simulation.sweep(values, end), talk)
     solution.write(target)
     if talk is not False:
         show(sweep_summary(solution, target, details=talk is True))
@@ -169,7 +169,7 @@ def check(
     changes: Changes = None,
     solver: SolverName = None,
     rtol: Tolerance = None,
-    accuracy: Wanted = None,
+    accuracy: Accuracy = None,
 ) -> None:
     """Describe a case in words, without running it."""
     from surfacechem.results.error_estimates import reasons
@@ -177,12 +177,12 @@ def check(
     from surfacechem.runs.summaries import check_summary
     from surfacechem.solve import AUTO
 
-    simulation = loaded(case, changes)
+    simulation = load_case(case, changes)
     system, scene = simulation.system, simulation.case.scene
     if system.rests:
         show(check_summary(simulation.case.title, system, scene, None, [], warnings(system)))
         return
-    settings = chosen(simulation, solver, rtol, accuracy)
+    settings = run_settings(simulation, solver, rtol, accuracy)
     model = simulation.model
     values = model.values()
     try:
@@ -220,7 +220,7 @@ def evaluate(
     from surfacechem.runs.points import read_points
     from surfacechem.runs.summaries import points_summary
 
-    simulation = loaded(case, changes)
+    simulation = load_case(case, changes)
     target = dataset_path(output or f"{simulation.case.name}-points.nc") if points or output else None
     if target:
         refuse_unwritable(target, read=[simulation.case.file, *([points] if points else [])])
@@ -401,7 +401,7 @@ def plot(
     ] = None,
     celsius: Annotated[bool, Option("--celsius", help="Temperatures in degrees Celsius.")] = False,
     changes: Changes = None,
-    talk: Talk = None,
+    talk: Verbose = None,
 ) -> None:
     """Plot runs over time or a variable, or sweeps over parameters."""
     from surfacechem.results.netcdf import RUN_SUFFIXES, begin_reading
@@ -416,9 +416,9 @@ def plot(
         begin_reading(Path(source))
     from surfacechem import plots
 
-    solutions = {case: solved(loaded(case, changes).run, talk, brief=True) for case in cases}
+    solutions = {case: solve(load_case(case, changes).run, talk, brief=True) for case in cases}
     shown = [solutions[source].dataset if source in solutions else source for source in sources]
-    plots.write(plots.figure(shown, listed(variables), against, celsius), target)
+    plots.write(plots.figure(shown, split_list(variables), against, celsius), target)
     if talk is not False:
         typer.echo(str(target))
     for solution in solutions.values():
@@ -430,7 +430,7 @@ def figures(
     name: Annotated[str, Argument(metavar="LIST", help="A list of figures, or a shipped one: paper, published.")],
     output: Annotated[Path, Option("-o", "--output", help="Folder of the figures.")] = Path("figures"),
     suffix: Annotated[str, Option("--format", help="svg, png or pdf.")] = "svg",
-    talk: Talk = None,
+    talk: Verbose = None,
 ) -> None:
     """Run and draw all figures of a list.
 
@@ -445,7 +445,7 @@ def figures(
         raise InputError(f"cannot be made: {error.strerror}.", Place(path=str(output))) from None
     check_picture(output / f"figure.{suffix}")
 
-    for target, caption in solved(lambda: write_all(content, output, suffix), talk):
+    for target, caption in solve(lambda: write_all(content, output, suffix), talk):
         if talk is not False:
             typer.echo(f"{target}\n  {caption}")
 
@@ -457,7 +457,7 @@ def report(
     ],
     output: Annotated[Path | None, written_to("HTML file; default <name>.html.")] = None,
     changes: Changes = None,
-    talk: Talk = None,
+    talk: Verbose = None,
 ) -> None:
     """Write a report about a run or a sweep: one HTML page.
 
@@ -471,8 +471,8 @@ def report(
         raise InputError("a dataset is reported as it is; give a case to change values of.", Place(path="--set"))
     target = run_report.report_path(output or f"{Path(source).stem}.html")
     refuse_unwritable(target)
-    solution = None if is_file else solved(loaded(source, changes).run, talk, brief=True)
-    solved(lambda: run_report.write(solution.dataset if solution else source, target), talk)
+    solution = None if is_file else solve(load_case(source, changes).run, talk, brief=True)
+    solve(lambda: run_report.write(solution.dataset if solution else source, target), talk)
     if talk is not False:
         typer.echo(str(target))
     if solution:
@@ -486,7 +486,7 @@ def rerun(
     allow_code: Annotated[
         bool, Option("--allow-code", help="Execute the laws whose source code the dataset contains; read it first.")
     ] = False,
-    talk: Talk = None,
+    talk: Verbose = None,
 ) -> None:
     """Repeat the run of a dataset and compare bit for bit."""
     from surfacechem.results.netcdf import dataset_path
@@ -495,7 +495,7 @@ def rerun(
     record = again.read(file)
     if output:
         refuse_unwritable(dataset_path(output), read=[file])
-    solution = solved(lambda: again.run_again(record, allow_code), talk, brief=True)
+    solution = solve(lambda: again.run_again(record, allow_code), talk, brief=True)
     if output:
         solution.write(output)
     different = again.differences(record, solution)
@@ -523,7 +523,7 @@ def precision(
         Path | None, written_to("Base name of the .nc, .svg, .png and .html files; default precision.")
     ] = None,
     changes: Changes = None,
-    talk: Talk = None,
+    talk: Verbose = None,
 ) -> None:
     """Measure error against run time of several solvers.
 
@@ -532,13 +532,13 @@ def precision(
     from surfacechem.studies import precision as studies
 
     settings = {
-        "solvers": listed(solvers),
+        "solvers": split_list(solvers),
         "tolerances": None if tolerances is None else _tolerances(tolerances),
-        "variables": listed(variables),
+        "variables": split_list(variables),
         "repeat": repeat,
     }
     study = partial(studies.precision, cases, overrides=changes or ())
-    _conduct(study, settings, output or Path("precision"), talk)
+    _run_study(study, settings, output or Path("precision"), talk)
 
 
 @app.command(epilog=STABILITY_CODES)
@@ -556,7 +556,7 @@ def stability(
     output: Annotated[
         Path | None, written_to("Base name of the .nc, .svg, .png and .html files; default stability.")
     ] = None,
-    talk: Talk = None,
+    talk: Verbose = None,
 ) -> None:
     """Solve difficult regimes with several solvers.
 
@@ -564,19 +564,19 @@ def stability(
     """
     from surfacechem.studies import stability as studies
 
-    settings = {"solvers": listed(solvers), "rtol": rtol, "rounds": search}
+    settings = {"solvers": split_list(solvers), "rtol": rtol, "rounds": search}
     study = partial(studies.stability, *(regimes or ()), quick=quick)
-    _conduct(study, settings, output or Path("stability"), talk)
+    _run_study(study, settings, output or Path("stability"), talk)
 
 
-def _conduct(study: Callable[..., Study], settings: Mapping[str, Any], target: Path, talk: bool | None) -> None:
+def _run_study(study: Callable[..., Study], settings: Mapping[str, Any], target: Path, talk: bool | None) -> None:
     """Run a study, which takes minutes, with those settings that are given; write and print it."""
     from surfacechem.studies.report import targets
 
     files = targets(target).values()
     refuse_unwritable(*files)
     given = {name: value for name, value in settings.items() if value is not None}
-    found = solved(partial(study, **given), talk)
+    found = solve(partial(study, **given), talk)
     found.write(target)
     if talk is not False:
         show_page(found.page)
@@ -593,7 +593,7 @@ def _tolerances(text: str) -> list[float]:
     place = Place(path="--tolerances")
     loose, dots, tight = text.partition("..")
     try:
-        values = [float(part) for part in ((loose, tight) if dots else listed(text) or ())]
+        values = [float(part) for part in ((loose, tight) if dots else split_list(text) or ())]
     except ValueError:
         message = f"'{text}' are no tolerances; give numbers, 1e-4,1e-8, or decades, 1e-4..1e-12."
         raise InputError(message, place) from None

@@ -12,8 +12,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
-from surfacechem.cli.commands import SignalledError, end_by_signal, leave_with, solved
-from surfacechem.cli.terminal import PATIENCE, show
+from surfacechem.cli.commands import SignalledError, end_by_signal, leave_with, solve
+from surfacechem.cli.terminal import BAR_DELAY, show
 from surfacechem.errors import InputError, Place
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 
-def asked_for(output: Path | None, options: dict[str, object]) -> bool:
+def goes_to_store(output: Path | None, options: dict[str, object]) -> bool:
     """Whether a sweep goes into a store; InputError at an option that belongs to one only."""
     if output is not None and output.suffix == ".zarr":
         return True
@@ -52,12 +52,12 @@ def write(
     from surfacechem.runs.summaries import store_summary
 
     numbers = part_of(part)
-    plan, target = repeated(target, only, resume or part is not None) if only else (planned(), target)
+    plan, target = plan_of_runs(target, only, resume or part is not None) if only else (planned(), target)
     with client_at(cluster) as client:
         stream = simulation.stream(plan, target, resume=resume, part=numbers)
         try:
-            store = solved(lambda: stream.run(None, client, counting()), talk, brief=True, waits=stream.chunks.waits)
-            errors = solved(stream.check, talk)
+            store = solve(lambda: stream.run(None, client, progress()), talk, brief=True, waits=stream.chunks.waits)
+            errors = solve(stream.check, talk)
         except SignalledError as error:
             # A chunk without its mark does not count.
             end_by_signal(error, "what is stored is kept: go on with --resume.")
@@ -67,7 +67,7 @@ def write(
     leave_with(status)
 
 
-def repeated(source: Path, status: str, goes_on: bool) -> tuple[Plan, Path]:
+def plan_of_runs(source: Path, status: str, goes_on: bool) -> tuple[Plan, Path]:
     """The plan of the runs of a store that ended in one way, and the store beside it that they go into: a new one, or
     the last where that goes on.
     """
@@ -87,8 +87,8 @@ def write_file(simulation: Simulation, plan: Plan, target: Path, talk: bool | No
 
     with TemporaryDirectory(prefix=f".{target.stem}-", dir=target.parent) as folder:
         stream = simulation.stream(plan, Path(folder) / "sweep.zarr")
-        store = solved(lambda: stream.run(told=counting()), talk, brief=True, waits=stream.chunks.waits)
-        status, sheet = store_summary(stream, store, solved(stream.check, talk), target)
+        store = solve(lambda: stream.run(told=progress()), talk, brief=True, waits=stream.chunks.waits)
+        status, sheet = store_summary(stream, store, solve(stream.check, talk), target)
         with store.dataset as data:
             save_kept(data, target)
     if talk is not False:
@@ -130,13 +130,13 @@ def client_at(address: str | None) -> Iterator[Any]:
         yield client
 
 
-def counting() -> Callable[[Progress], None]:
+def progress() -> Callable[[Progress], None]:
     """Callback that logs the progress of a sweep with its speed."""
     begun = time.monotonic()
 
     def told(now: Progress) -> None:
         # What was there before says nothing about the speed now.
-        rate = (now.done - now.resumed) / max(time.monotonic() - begun, PATIENCE)
+        rate = (now.done - now.resumed) / max(time.monotonic() - begun, BAR_DELAY)
         log.info("%.0f runs/s, %d failed", rate, now.failed, extra={"done": now.done, "total": now.runs})
 
     return told

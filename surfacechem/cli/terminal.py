@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from surfacechem.runs.sheet import Sheet
     from surfacechem.studies.report import Page, PageTable
 
-PATIENCE = 2.0
+BAR_DELAY = 2.0
 """Seconds after which a bar tells how far a command is."""
 
 COLOURS = {"finished": "green", "stopped": "yellow", "failed": "red", "warning": "yellow", "refused": "yellow"}
@@ -115,7 +115,7 @@ def _grid(rows: Iterable[Sequence[Text]], indent: int) -> RenderableType:
     return Padding(grid, (0, 0, 0, indent))
 
 
-class Bar(logging.Handler):
+class ProgressBar(logging.Handler):
     """Progress bar of a command, from the numbers ``done`` and ``total`` of messages that the package logs: on a
     terminal, once it has taken some time; nothing elsewhere.
     """
@@ -139,7 +139,7 @@ class Bar(logging.Handler):
 
     def tick(self) -> None:
         """Draw what was told last."""
-        if not self.wanted or time.monotonic() - self.begun < PATIENCE:
+        if not self.wanted or time.monotonic() - self.begun < BAR_DELAY:
             return
         # Rich is imported now, so that what is over sooner does not wait for it.
         if self.shown is None:
@@ -164,11 +164,11 @@ class Bar(logging.Handler):
 
 
 @contextmanager
-def following(talk: bool | None) -> Iterator[Bar]:
+def progress_bar(talk: bool | None) -> Iterator[ProgressBar]:
     """A bar that shows what the package logs meanwhile; each message with its time as a line on stderr where ``talk``
     is true, and nothing where it is false.
     """
-    bar, logger = Bar(talk), logging.getLogger(LOGGER)
+    bar, logger = ProgressBar(talk), logging.getLogger(LOGGER)
     level = logger.level
     logger.addHandler(bar)
     # Where nobody listens messages are not even put together.

@@ -407,6 +407,6 @@ def test_signals_are_handled_afterwards_as_before(monkeypatch, handler):
     monkeypatch.setattr(signal, "signal", install)
     with commands._signals_raised():
         kept = handler in (None, signal.SIG_IGN)
-        assert handlers[signal.SIGTERM] == (handler if kept else commands._end)
-        assert handlers[signal.SIGINT] == commands._end
+        assert handlers[signal.SIGTERM] == (handler if kept else commands._raise_signal)
+        assert handlers[signal.SIGINT] == commands._raise_signal
     assert handlers == before

@@ -53,12 +53,12 @@ def test_a_bar_shows_what_is_logged_after_a_while(monkeypatch):
     streams = on_terminal(monkeypatch)
     log = logging.getLogger("surfacechem.runs.sweeps")
     for patience, talk, shown in ((1e9, None, False), (0.0, False, False), (0.0, None, True)):
-        monkeypatch.setattr(terminal, "PATIENCE", patience)
-        with terminal.following(talk) as bar:
+        monkeypatch.setattr(terminal, "BAR_DELAY", patience)
+        with terminal.progress_bar(talk) as bar:
             log.info("runs", extra={"done": 3, "total": 12})
             bar.tick()
         assert ("3/12" in streams["stderr"].getvalue()) is shown
-    with terminal.following(talk=True):
+    with terminal.progress_bar(talk=True):
         log.info("runs", extra={"done": 4, "total": 12})
     assert streams["stderr"].getvalue().endswith("s  runs (4/12)\n")
     assert logging.getLogger("surfacechem").handlers == []
