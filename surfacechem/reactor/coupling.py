@@ -26,16 +26,16 @@ from surfacechem.reactor.gas import Receiver, refuse
 from surfacechem.scene import Body, Scene
 from surfacechem.tolerances import ROUNDING
 
-FORCES = ("Pa", "N", "W/m^2")
+LOAD_UNITS = ("Pa", "N", "W/m^2")
 """Units of loads that do work or heat at their present value, whatever their rate."""
 
-PROBES = (300.0, 1500.0)
+THERMO_TEMPERATURES = (300.0, 1500.0)
 """Temperatures [K] at which the thermo of species is compared: polynomials change at 1000 K."""
 
-TERMS = 100.0
+TERM_SIZE = 100.0
 """Size of the terms that enthalpies and entropies are sums of, in their units of the gas constant."""
 
-STAND_IN = """
+RESERVOIR_YAML = """
 phases:
 - {name: body, thermo: ideal-gas, species: [nitrogen], state: {T: 300 K, P: 1 atm}}
 species:
@@ -77,7 +77,7 @@ def with_heat(scene: Scene, names: Iterable[str]) -> Scene:
 
 def with_loads(scene: Scene, values: Mapping[str, float]) -> Scene:
     """The scene with loads whose values are given while it runs, in place of those that the case prescribes."""
-    forces = [name for name in LOADABLE if VARIABLES[name].unit in FORCES]
+    forces = [name for name in LOADABLE if VARIABLES[name].unit in LOAD_UNITS]
     for name in values:
         if name not in forces:
             reason = "" if name not in LOADABLE else " Its rate takes part; prescribe its history under `loading`."
@@ -108,18 +108,18 @@ def with_neighbours(scene: Scene, reactors: Mapping[str, Any]) -> Scene:
             raise InputError(f"the neighbour {name} must be {kinds}, as {type(reactor).__name__} takes nothing.")
     for name, own in engine.surface.adjacent.items():
         if name in reactors:
-            _refuse_other(name, own, reactors[name].phase)
+            _refuse_other_phase(name, own, reactors[name].phase)
     states = {name: _state(reactor.phase) for name, reactor in reactors.items()}
     return replace(scene, interface=replace(scene.interface, engine=engine.beside(states)))
 
 
-def _refuse_other(name: str, own: Any, given: Any) -> None:
+def _refuse_other_phase(name: str, own: Any, given: Any) -> None:
     """Refuse a phase that is another one than the neighbour of the mechanism: what is exchanged would not add up."""
     if own.species_names != given.species_names:
         names = ", ".join(own.species_names)
         raise InputError(f"the reactor of the neighbour {name} has other species than the mechanism: {names}.")
     for ours, theirs in zip(own.species(), given.species(), strict=True):
-        for what, same in _sameness(ours, theirs):
+        for what, same in _agreement(ours, theirs):
             if not same:
                 raise InputError(
                     f"{ours.name} in the reactor of the neighbour {name} has another {what} than in the mechanism, so "
@@ -127,7 +127,7 @@ def _refuse_other(name: str, own: Any, given: Any) -> None:
                 )
 
 
-def _sameness(ours: Any, theirs: Any) -> Iterator[tuple[str, bool]]:
+def _agreement(ours: Any, theirs: Any) -> Iterator[tuple[str, bool]]:
     """Properties of a species, and whether two of one name agree in them."""
     yield "composition", ours.composition == theirs.composition
     yield "weight", isclose(ours.molecular_weight, theirs.molecular_weight, rel_tol=ROUNDING)
@@ -135,13 +135,13 @@ def _sameness(ours: Any, theirs: Any) -> Iterator[tuple[str, bool]]:
     if None in both:
         return
     low, high = max(each.min_temp for each in both), min(each.max_temp for each in both)
-    for T in np.clip(PROBES, low, high).tolist():
+    for T in np.clip(THERMO_TEMPERATURES, low, high).tolist():
         for what, function, unit in (
             ("enthalpy", "h", cantera.gas_constant * T),
             ("entropy", "s", cantera.gas_constant),
         ):
             found = [getattr(each, function)(T) for each in both]
-            yield f"{what} at {T:g} K", isclose(*found, rel_tol=ROUNDING, abs_tol=ROUNDING * TERMS * unit)
+            yield f"{what} at {T:g} K", isclose(*found, rel_tol=ROUNDING, abs_tol=ROUNDING * TERM_SIZE * unit)
 
 
 def _state(phase: Any) -> Neighbour:
@@ -171,7 +171,7 @@ def _replaced(body: Body, reactor: Any) -> Body:
     return replace(body, temperature=Hold(level=float(reactor.T)))
 
 
-class Through(cantera.Wall):
+class HeatWall(cantera.Wall):
     """A wall between reactors, through which an interface gives them heat or moves."""
 
     def __init__(self, left: Any, right: Any, *, interface: Any, **options: Any) -> None:
@@ -179,7 +179,7 @@ class Through(cantera.Wall):
         self.interface = interface
 
 
-class StandIn(cantera.Reservoir):
+class BodyReservoir(cantera.Reservoir):
     """A reservoir that stands for a body: it takes heat through walls, and nothing else."""
 
     def _add_wall(self, wall: Any) -> None:
@@ -201,12 +201,12 @@ class StandIn(cantera.Reservoir):
         refuse(device, f"a flow out of {self.name} has no source: a body stores heat, not mass. Begin it in a reactor.")
 
 
-class Port:
+class BodyPort:
     """A body as a reservoir in the network, with its present temperature and the heat through its walls."""
 
     def __init__(self, name: str, node: str, heat_name: str) -> None:
         self.name, self.node, self.heat_name = name, node, heat_name
-        self.reservoir = StandIn(cantera.Solution(yaml=STAND_IN, name="body"), clone=False, name=name)
+        self.reservoir = BodyReservoir(cantera.Solution(yaml=RESERVOIR_YAML, name="body"), clone=False, name=name)
 
     def warm(self, temperature: float) -> None:
         """Show a temperature [K] to the walls."""

@@ -31,20 +31,20 @@ from surfacechem.solve.jumps import Jump
 from surfacechem.solve.run import Model, Run, Trajectory
 from surfacechem.tolerances import DEFAULT_RTOL, SQRT_EPS, TINY
 
-FOREVER = 1e300
+NO_END = 1e300
 """End of the last piece of time [s]."""
 
 NONE: Mapping[str, Callable[[float], float]] = {}
 
-GLOBAL = 100
+GLOBAL_ERROR = 100
 """Ratio by which the error of a state may exceed the tolerance of a step."""
 
-DIFFERENCE = 8 * SQRT_EPS
+DIFFERENCE_STEPS = 8 * SQRT_EPS
 """A few of the steps by which Cantera's integrator differentiates, which bounds must not take for the solution."""
 
 
 @dataclass(frozen=True)
-class Beside:
+class NeighbourReactor:
     """A reactor beside the surface, as the scene sees it."""
 
     reactor: Any
@@ -74,7 +74,7 @@ class Beside:
         return amounts, float(amounts @ self.held.enthalpies)
 
 
-class Moments:
+class InstantEvents:
     """Events of a scene whose arcs something else integrates: what is due, where in a step, and what follows."""
 
     def __init__(self, model: Model, problem: Problem, evaluation: Evaluation) -> None:
@@ -93,7 +93,7 @@ class Moments:
 
     def until(self, goal: float, rtol: float) -> None:
         """Set the time that is integrated next, and the tolerance; what is brief is so against it."""
-        self.instant.end, self.instant.rtol = goal, GLOBAL * rtol
+        self.instant.end, self.instant.rtol = goal, GLOBAL_ERROR * rtol
 
     def begin_piece(self, parameters: Array) -> None:
         """Go on with the present modes and other parameters."""
@@ -184,13 +184,13 @@ class EmbeddedScene:
             self.reactions = system.reactions
             self.model = Model(system)
             self.values = self.model.values()
-            self.problem = self.model.problem(Run(times=(0.0, FOREVER)), self.values, passing=False)
+            self.problem = self.model.problem(Run(times=(0.0, NO_END)), self.values, passing=False)
         except InputError as error:
             raise case.located(error) from None
         self.evaluation = Evaluation(self.problem.program, self.problem.y0, self.problem.parameters[0])
-        self.moments: Moments | None = None
-        self.begin_piece(0.0, DIFFERENCE)
-        self.moments = Moments(self.model, self.problem, self.evaluation) if self.model.jumper else None
+        self.moments: InstantEvents | None = None
+        self.begin_piece(0.0, DIFFERENCE_STEPS)
+        self.moments = InstantEvents(self.model, self.problem, self.evaluation) if self.model.jumper else None
         self._terminal = np.array([margin.terminal for margin in self.model.margins], dtype=bool)
         self.places = {parameter.path: j for j, parameter in enumerate(system.parameters)}
         """Indices of the parameters, by path."""
@@ -198,10 +198,10 @@ class EmbeddedScene:
         self.beside = [self._beside(scene.interface.engine, *item) for item in (neighbours or {}).items()]
         """The reactors beside the surface."""
 
-    def _beside(self, engine: Any, name: str, reactor: Any) -> Beside:
+    def _beside(self, engine: Any, name: str, reactor: Any) -> NeighbourReactor:
         held = next(held for held in engine.held if held.phase.name == name)
         made = {species: f"made_{part}" for species, part in engine.made_in(held.phase).items()}
-        return Beside(
+        return NeighbourReactor(
             reactor=reactor,
             held=held,
             places=np.array([self.places[f"loading.{quantity.name}.level"] for quantity, _ in held.taken_over]),
@@ -299,7 +299,7 @@ class EmbeddedScene:
 
     def begin_piece(self, t: float, rtol: float) -> None:
         """Go on with the pieces of the histories that hold from time t [s] on; bounds give way to the tolerance."""
-        run = Run(times=(0.0, FOREVER), rtol=max(rtol, DIFFERENCE))
+        run = Run(times=(0.0, NO_END), rtol=max(rtol, DIFFERENCE_STEPS))
         table = self.model.problem(run, self.values, passing=False).parameters
         parameters = table[bisect_right(self.breakpoints, t)]
         if self.moments:

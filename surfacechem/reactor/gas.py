@@ -11,16 +11,16 @@ import numpy as np
 from surfacechem.contracts.terms import Spec
 from surfacechem.contracts.units import parse
 from surfacechem.errors import InputError
-from surfacechem.solve.adapters.cantera_network import HeldReactor
+from surfacechem.solve.adapters.cantera_network import StateVectorReactor
 from surfacechem.solve.contract import Array
 
-REFUSED: list[Any] = []
+REFUSED_CONNECTORS: list[Any] = []
 """Connectors that were refused: Cantera's part of the reactors they join keeps pointing to them."""
 
 
 def refuse(connector: Any, message: str) -> NoReturn:
     """Raise InputError for a connector that Cantera makes, which then carries nothing between its reactors."""
-    REFUSED.append(connector)
+    REFUSED_CONNECTORS.append(connector)
     if isinstance(connector, cantera.FlowDevice):
         connector.device_coefficient = 0.0
     else:
@@ -89,7 +89,7 @@ class ReactingGasAtPressure(Gas, cantera.ExtensibleIdealGasConstPressureReactor)
 MASS = Spec("kg", "mass at the start", above=0)
 
 
-class ReactingSolid(Receiver, HeldReactor):
+class ReactingSolid(Receiver, StateVectorReactor):
     """A solid or a liquid beside the surface of an interface, such as the particle of an electrode or its electrolyte.
 
     ``InterfaceReactor(..., neighbours={name: solid})`` makes it a neighbour. Its amounts change, each a variable in

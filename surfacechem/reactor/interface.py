@@ -16,11 +16,11 @@ from surfacechem.contracts.terms import Spec
 from surfacechem.contracts.units import parse
 from surfacechem.errors import InputError
 from surfacechem.format import Case
-from surfacechem.reactor.coupling import Port, Through, function_of, node_of, suffix_of
+from surfacechem.reactor.coupling import BodyPort, HeatWall, function_of, node_of, suffix_of
 from surfacechem.reactor.embedded import EmbeddedScene, EndError, History
 from surfacechem.reactor.gas import Receiver, refuse
 from surfacechem.runs.simulation import Simulation
-from surfacechem.solve.adapters.cantera_network import LEDGER_UNIT, BackOffError, HeldReactor, contents
+from surfacechem.solve.adapters.cantera_network import LEDGER_UNIT, BackOffError, StateVectorReactor, contents
 from surfacechem.solve.contract import Array
 from surfacechem.tolerances import DIGITS, ROUNDING
 
@@ -34,7 +34,7 @@ class InterfaceStopped(Exception):  # noqa: N818 - physics ends here, nothing we
     """The scene ends here, with the reason in words."""
 
 
-class InterfaceReactor(HeldReactor):
+class InterfaceReactor(StateVectorReactor):
     """An interface between two bodies as a reactor of a Cantera network.
 
     Parameters
@@ -95,7 +95,7 @@ class InterfaceReactor(HeldReactor):
         """Walls which have its area."""
         self.area = area
         self.bodies, self.neighbours = dict(bodies or {}), dict(neighbours or {})
-        self.ports: dict[str, Port] = {}
+        self.ports: dict[str, BodyPort] = {}
         self.loads: dict[str, Callable[[float], float]] = {}
         self.pressing: tuple[Any, ...] = ()
         """Reactors on both sides of the wall that moves as the gap does."""
@@ -160,7 +160,7 @@ class InterfaceReactor(HeldReactor):
         """Connect a reactor by a wall through which it loses the heat that keeps the body at its temperature."""
         self._connecting = True
         heat = lambda t: -float(self._rates_for_others(t)[self._accounts[body]])  # noqa: E731
-        self._walls.append(Through(self, reactor, interface=self, A=self.area, Q=heat))
+        self._walls.append(HeatWall(self, reactor, interface=self, A=self.area, Q=heat))
         self._connecting = False
 
     def _given(self, k: int, t: float) -> tuple[Array, float]:
@@ -240,7 +240,7 @@ class InterfaceReactor(HeldReactor):
             node = node_of(case.scene, name)
             if node not in self.scene.states:
                 raise InputError(f"{node} stores no heat, so a wall cannot give it any. Put the wall on a body.")
-            port = Port(name, node, f"Q_{suffix_of(case.scene, name)}")
+            port = BodyPort(name, node, f"Q_{suffix_of(case.scene, name)}")
             scene = EmbeddedScene(case, self.bodies, [*self.ports, name], self.loads, self.neighbours)
             self.ports[name] = port
             self._take_up(scene)
@@ -306,7 +306,7 @@ class InterfaceReactor(HeldReactor):
         self.loads["F_n"], self.pressing = push, (gas, outside)
         gap = scene.states.index("g_n")
         rate = lambda t: float(self._rates_for_others(t)[gap])  # noqa: E731
-        self._walls.append(Through(gas, outside, interface=self, A=self.area, velocity=rate))
+        self._walls.append(HeatWall(gas, outside, interface=self, A=self.area, velocity=rate))
 
     def _refuse_late(self, what: str) -> None:
         if self.evaluations:

@@ -13,20 +13,20 @@ import cantera
 import numpy as np
 
 from surfacechem.errors import InputError
-from surfacechem.reactor.coupling import Through
+from surfacechem.reactor.coupling import HeatWall
 from surfacechem.reactor.interface import InterfaceReactor
-from surfacechem.reactor.watch import AHEAD, Watch
-from surfacechem.solve.adapters.cantera_network import HeldReactor, last_step
+from surfacechem.reactor.watch import LATER_LOOK, StepWatcher
+from surfacechem.solve.adapters.cantera_network import StateVectorReactor, last_step
 from surfacechem.solve.adapters.dense_step import Guards, first_crossing
 from surfacechem.solve.contract import Array, Counters, Margin
 
-GROWTH = 1e4
+MOST_GROWTH = 1e4
 """Largest ratio of a step of CVODE to the one before: after the first step this, later 10."""
 
 STEPS_OF_A_RESIDUAL = 10
 """Steps between two tests of whether anything changes still, as in Cantera."""
 
-LONGEST = 1.0
+ASSUMED_LENGTH = 1.0
 """Length of the integration that is assumed where no end is given [s]."""
 
 
@@ -36,7 +36,7 @@ SETTINGS = (
 )
 """Settings of reactors and of their connectors, functions by their present values."""
 
-ENDS = ("upstream", "downstream", "left_reactor", "right_reactor")
+SIDES = ("upstream", "downstream", "left_reactor", "right_reactor")
 """Attributes of connectors that name the reactor or reservoir on a side."""
 
 
@@ -63,11 +63,11 @@ class ReactorNet(cantera.ReactorNet):
         """Quantities on which rates depend beside the variables, at the present time."""
         super().__init__(reactors)
         self.interfaces += [reactor for reactor in reactors if isinstance(reactor, InterfaceReactor)]
-        _number([reactor for reactor in reactors if isinstance(reactor, HeldReactor)])
+        _number([reactor for reactor in reactors if isinstance(reactor, StateVectorReactor)])
 
     @cached_property
-    def _watch(self) -> Watch:
-        return Watch(self, self.interfaces)
+    def _watch(self) -> StepWatcher:
+        return StepWatcher(self, self.interfaces)
 
     def advance(self, t: float, apply_limit: bool = True) -> float:
         """Advance to a time, or to where a variable has changed by its advance limit.
@@ -92,7 +92,7 @@ class ReactorNet(cantera.ReactorNet):
             For a time that is past.
         """
         self._take_up()
-        if self.time - t > AHEAD * np.spacing(abs(self.time)):
+        if self.time - t > LATER_LOOK * np.spacing(abs(self.time)):
             raise cantera.CanteraError(f"Cannot integrate backwards in time: {t:.17g} s < {self.time:.17g} s.")
         return self._advance(t, apply_limit)
 
@@ -132,7 +132,7 @@ class ReactorNet(cantera.ReactorNet):
         """Whether a time is reached: where the integration has just started within rounding of it, the clock alone goes
         there, since CVODE takes no step as short.
         """
-        if self.time == self._started and 0 < goal - self.time <= AHEAD * np.spacing(goal):
+        if self.time == self._started and 0 < goal - self.time <= LATER_LOOK * np.spacing(goal):
             self.initial_time = self._started = goal
         return bool(self.time >= goal)
 
@@ -197,7 +197,7 @@ class ReactorNet(cantera.ReactorNet):
         following = self._breakpoints()
         if self._watch.interfaces:
             return self._watched_step(following)
-        growth = GROWTH if self._steps < 2 else 10.0
+        growth = MOST_GROWTH if self._steps < 2 else 10.0
         if following and (self._steps == 0 or self.time + growth * self._last_step >= following[0]):
             return self._advance(following[0])
         before = self.time
@@ -268,7 +268,7 @@ class ReactorNet(cantera.ReactorNet):
             return self._advance(ahead)
         if self.time >= watch.known:
             with self._guarded():
-                self._look(min(ahead, self.time + LONGEST))
+                self._look(min(ahead, self.time + ASSUMED_LENGTH))
         event = watch.event
         return self._advance(min(ahead, watch.known if event is None else event.t))
 
@@ -286,10 +286,10 @@ class ReactorNet(cantera.ReactorNet):
 
     def _surroundings(self) -> list[object]:
         """Settings and states that a script may change: of reactors, connectors, and reservoirs behind these."""
-        own = [reactor for reactor in self.reactors if not isinstance(reactor, HeldReactor)]
+        own = [reactor for reactor in self.reactors if not isinstance(reactor, StateVectorReactor)]
         joined = [(*each.inlets, *each.outlets, *each.walls, *each.surfaces) for each in own]
-        around = [item for item in chain(*joined) if not isinstance(item, Through)]
-        ends = [getattr(item, end, None) for item in around for end in ENDS]  # one that was refused lacks a side
+        around = [item for item in chain(*joined) if not isinstance(item, HeatWall)]
+        ends = [getattr(item, end, None) for item in around for end in SIDES]  # one that was refused lacks a side
         # First, since reactors may share a phase, which shall have the state of one that runs.
         outside = [end.phase.state.tobytes() for end in ends if end is not None and end not in self.reactors]
         settings = [getattr(item, name, None) for item in (*own, *around) for name in SETTINGS]
@@ -311,7 +311,7 @@ class ReactorNet(cantera.ReactorNet):
         """Refuse reactors whose interfaces are not in the network, and interfaces whose reactors are not in it."""
         for reactor in self.reactors:
             connected = [interface for interface, _ in getattr(reactor, "sources", ())]
-            connected += [wall.interface for wall in reactor.walls if isinstance(wall, Through)]
+            connected += [wall.interface for wall in reactor.walls if isinstance(wall, HeatWall)]
             for interface in connected:
                 if interface not in self.interfaces:
                     raise InputError(interface.left_out(reactor.name))

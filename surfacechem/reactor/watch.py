@@ -20,10 +20,10 @@ from surfacechem.solve.adapters.dense_step import DenseStep, Guards, first_cross
 from surfacechem.solve.contract import Array, Margin
 from surfacechem.tolerances import NEGLIGIBLE
 
-FIRST = NEGLIGIBLE**3
+FIRST_LOOK = NEGLIGIBLE**3
 """Time of the first look after a start, as part of what is integrated: the integrator begins with shorter steps."""
 
-SHORTEST, AHEAD = 1e4, 4.0
+SHORTEST_LOOK, LATER_LOOK = 1e4, 4.0
 """The shortest first look and all later ones, in roundings of the time."""
 
 
@@ -34,7 +34,7 @@ PANELS_OF_A_PERIOD = 8
 
 
 @dataclass(frozen=True)
-class Event:
+class InterfaceEvent:
     """A transition of an interface at a time [s]."""
 
     t: float
@@ -42,7 +42,7 @@ class Event:
     index: int
 
 
-class Watch:
+class StepWatcher:
     """Events and dense output of the step that the integrator has taken last."""
 
     def __init__(self, net: Any, interfaces: Sequence[InterfaceReactor]) -> None:
@@ -51,7 +51,7 @@ class Watch:
         self.started = False
         self.known = -np.inf
         """Time up to which the next event is known [s]."""
-        self.event: Event | None = None
+        self.event: InterfaceEvent | None = None
         self._before: list[Array] = []
         self._steps: list[DenseStep] = []
 
@@ -64,9 +64,9 @@ class Watch:
         now = float(self.net.time)
         self._before = [item.scene.transitions(now, item.x) for item in self.interfaces]
         if self.started:
-            return min(goal, now + AHEAD * float(np.spacing(now)))
+            return min(goal, now + LATER_LOOK * float(np.spacing(now)))
         soonest = min(item.scene.moments.soonest() for item in self.interfaces if item.scene.moments)
-        return min(goal, now + max(min(FIRST * (goal - now), soonest / 2), SHORTEST * float(np.spacing(now))))
+        return min(goal, now + max(min(FIRST_LOOK * (goal - now), soonest / 2), SHORTEST_LOOK * float(np.spacing(now))))
 
     def look(self) -> None:
         """Find the first event in the step that the integrator has just taken."""
@@ -83,7 +83,7 @@ class Watch:
                 guards.start(present)
                 t, fired = first_crossing(step, guards, np.isfinite(present), 0.0)
             if fired and (self.event is None or t < self.event.t):
-                self.event = Event(t, item, fired[0])
+                self.event = InterfaceEvent(t, item, fired[0])
 
     def book(self, start: float, end: float) -> None:
         """Integrate the ledgers over a part of the step, which the integrator does not see where nothing else moves.

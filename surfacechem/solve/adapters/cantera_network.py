@@ -97,7 +97,7 @@ class BackOffError(Exception):
 def _switch(name: str) -> property:
     """A switch of Cantera's reactors that cannot be changed, which it would be without effect."""
 
-    def change(self: HeldReactor, on: bool) -> None:
+    def change(self: StateVectorReactor, on: bool) -> None:
         kept, instead = self.switches[name]
         if on != kept:
             raise InputError(f"{name} of {self.name} is always {kept}. {instead}")
@@ -105,7 +105,7 @@ def _switch(name: str) -> property:
     return property(lambda self: self.switches[name][0], change)
 
 
-class HeldReactor(cantera.ExtensibleReactor):
+class StateVectorReactor(cantera.ExtensibleReactor):
     """A reactor whose state and rates are not Cantera's. The only place that knows how Cantera calls its hooks.
 
     Its variables, their number and their rates are what a subclass states. Once they have raised anything but
@@ -188,7 +188,7 @@ class HeldReactor(cantera.ExtensibleReactor):
         return self.names.index(name)
 
 
-class _SystemReactor(HeldReactor):
+class _SystemReactor(StateVectorReactor):
     """The equations of a stretch, in units of their tolerances, and the ledger where rates come from outside.
 
     Published mechanisms have reactions that run both ways far faster than anything changes. What the integrator's
