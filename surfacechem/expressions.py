@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping
 from functools import lru_cache, reduce
 from typing import Any, TypeAlias
 
-from surfacechem.tolerances import FRACTION_FLOOR, NOISE
+from surfacechem.tolerances import FORMULA_EPS, FRACTION_FLOOR
 
 Expression: TypeAlias = Any
 """A float or a SymEngine expression."""
@@ -175,7 +175,7 @@ def magnitude(expression: Expression, sizes: Mapping[Any, Expression] | None = N
             if len(sides) == 2 and isinstance(first, symengine.StrictLessThan | symengine.LessThan):
                 apart = first.args[0] - first.args[1]  # within its rounding that decides on the side
                 sides.insert(0, sides[0] + sides[1])
-                conditions.insert(0, symengine.Le(symengine.Abs(apart), NOISE * bound(apart)))
+                conditions.insert(0, symengine.Le(symengine.Abs(apart), FORMULA_EPS * bound(apart)))
             return symengine.Piecewise(*zip(sides, conditions, strict=True))
         if e.is_Add or e.is_Mul:  # each term or factor errs while the others stand
             return symengine.Add(*(symengine.Abs(_partial(e, i)) * bound(a) for i, a in enumerate(e.args)))

@@ -26,12 +26,12 @@ from surfacechem.compile.printing import LATEX_ESCAPES, RELATIONS, Latex, quanti
 from surfacechem.expressions import EXPONENT_CAP, LARGE_EXPONENT, LITERAL, Expression, derivative
 from surfacechem.model.system import Named, Parameter, System
 from surfacechem.quantities import AVOGADRO, BOLTZMANN, GAPS, GAS_CONSTANT, STEFAN_BOLTZMANN
-from surfacechem.tolerances import FEWEST, FRACTION_FLOOR, LEAST_COVERAGE, SAME
+from surfacechem.tolerances import EQUAL, FRACTION_FLOOR, LEAST_BONDED, LEAST_COVERAGE
 
 EXPONENT_CAPS = (EXPONENT_CAP, LARGE_EXPONENT, LITERAL, -30.0)
 """Exponents below which a formula holds as it stands."""
 
-FLOORS = (FRACTION_FLOOR, FEWEST, LEAST_COVERAGE)
+FLOORS = (FRACTION_FLOOR, LEAST_BONDED, LEAST_COVERAGE)
 """Amounts above which a formula holds as it stands."""
 
 K_B, R, N_A = map(symengine.Symbol, ("Boltzmann constant", "gas constant", "Avogadro constant"))
@@ -173,10 +173,10 @@ def readable(expression: Expression) -> Expression:
 
 def _constant(value: float) -> Expression:
     """A number as a simple multiple of a constant of nature, or as an integer, where it is one."""
-    if value == round(value) and abs(value) < 1 / SAME:
+    if value == round(value) and abs(value) < 1 / EQUAL:
         return symengine.Integer(round(value))
     for (name, (size, _)), power, factor in product(CONSTANTS.items(), (1, -1), FACTORS):
-        if math.isclose(abs(value), float(factor) * size**power, rel_tol=SAME):
+        if math.isclose(abs(value), float(factor) * size**power, rel_tol=EQUAL):
             return (factor if value > 0 else -factor) * name**power
     return symengine.Float(value)
 
@@ -223,7 +223,7 @@ def _are_equal(one: Expression, other: Expression) -> bool:
     for place in range(1, 4):
         state = {x: 0.3 + math.fmod(place * (k + 1) * GOLDEN_RATIO, 0.5) for k, x in enumerate(symbols)}
         first, second = (complex(e.xreplace(state).n()) for e in (one, other))
-        if not first or not cmath.isclose(first, second, rel_tol=SAME):
+        if not first or not cmath.isclose(first, second, rel_tol=EQUAL):
             return False
     return True
 

@@ -39,7 +39,7 @@ from surfacechem.quantities import VARIABLES
 from surfacechem.results.accuracy import first_tolerance
 from surfacechem.scene import Body, Conduction, Interface, Medium, Mounting, Scene, Sites, Stage
 from surfacechem.solve.run import OWN, Run
-from surfacechem.tolerances import DEFAULT_RTOL, NOTHING, PICTURE
+from surfacechem.tolerances import DEFAULT_RTOL, LINE_ERROR, NO_AMOUNT
 
 if TYPE_CHECKING:
     from surfacechem.mechanism import Mechanism
@@ -290,7 +290,7 @@ def _partition(case: Document) -> tuple[float, float]:
         raise section.error("an interface with a temperature divides its heat by itself; remove it.", "partition")
     if not isinstance(shares, Mapping):
         return shares, 0.0
-    if abs(sum(shares.values()) - 1) > NOTHING:  # fractions are written in decimals
+    if abs(sum(shares.values()) - 1) > NO_AMOUNT:  # fractions are written in decimals
         raise section.error(f"the fractions of the heat must add up to 1, not {sum(shares.values()):g}.", "partition")
     if shares.get("surroundings") and case.surroundings is None:
         message = "the surroundings have no temperature. Add `surroundings: {temperature: ...}`."
@@ -518,7 +518,7 @@ def run_of(section: RunSection) -> Run:
         max_steps=section.max_steps,
         max_seconds=section.max_seconds,
         accuracy=section.accuracy,
-        picture=None if any(map(section.has, ("times", "outputs", "spacing", "first"))) else PICTURE,
+        picture=None if any(map(section.has, ("times", "outputs", "spacing", "first"))) else LINE_ERROR,
         steady=section.until == STEADY,
     )
 

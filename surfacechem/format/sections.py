@@ -61,7 +61,7 @@ from surfacechem.model.components.mounting import TRACTIONS
 from surfacechem.quantities import VARIABLES
 from surfacechem.scene import MOST_CELLS, Conduction, Mounting
 from surfacechem.solve.run import OWN
-from surfacechem.tolerances import DEFAULT_RTOL, FLOOR, MOST, TIGHTEST
+from surfacechem.tolerances import DEFAULT_RTOL, ERROR_FLOOR, MAX_RTOL, MIN_RTOL
 
 BODY_NAME = r"[A-Za-z][A-Za-z0-9_-]*"
 
@@ -290,7 +290,9 @@ class SurfaceSection(Section):
     heat: Sequence[HeatTransfer] = key(ListOf(OneLaw(HeatTransfer)), "conductances over the gap, integrated", ())
     approach: ApproachSection = key(Nested(ApproachSection), default=REQUIRED)
     # Three digits more than the default are still above ROUNDING, below which no integral is known.
-    accuracy: float = quantity("1", "relative accuracy of the force", FLOOR, above=FLOOR / 1000, at_most=0.1)
+    accuracy: float = quantity(
+        "1", "relative accuracy of the force", ERROR_FLOOR, above=ERROR_FLOOR / 1000, at_most=0.1
+    )
 
 
 # -- heat, mechanics, loading -----------------------------------------------------------------------------------------
@@ -413,8 +415,8 @@ class RunSection(Section):
     rtol: float | None = quantity(
         "1",
         f"relative tolerance of each step, instead of `accuracy`; {DEFAULT_RTOL:g} if neither is given",
-        at_least=TIGHTEST,
-        at_most=MOST,
+        at_least=MIN_RTOL,
+        at_most=MAX_RTOL,
     )
     atol: float | None = quantity(
         "1", "absolute tolerance in parts of the scale of each state; 1e-6 `rtol` if not given", above=0, at_most=1

@@ -26,12 +26,10 @@ from typing import Any
 from surfacechem.expressions import Expression, log, where
 from surfacechem.mechanism.source import Source
 from surfacechem.quantities import KILO
+from surfacechem.tolerances import EQUAL
 
 REFERENCE = 298.15
 """Temperature [K] at which heat capacities begin to count."""
-
-SAME = 1e-9
-"""Relative difference of numbers that count as the same."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +65,7 @@ class EnergyCurve:
             return 0.0
         slopes = [coefficients[1] for _, coefficients in self.pieces]
         # Straight but for rounding of the numbers, which a file may give with nine digits.
-        size = SAME * max(map(abs, slopes))
+        size = EQUAL * max(map(abs, slopes))
         straight = all(abs(c) <= size for _, coefficients in self.pieces for c in (coefficients[0], *coefficients[2:]))
         return slopes[0] if straight and max(slopes) - min(slopes) <= size else None
 

@@ -26,12 +26,10 @@ from surfacechem.mechanism.source import MECHANISM_LIMITS, Source, own_parameter
 from surfacechem.mechanism.thermo import lower
 from surfacechem.quantities import MOLECULAR
 from surfacechem.scene import BondingVariable, Engine, Sites
+from surfacechem.tolerances import NO_AMOUNT
 
 REACTIONS = "interface.mechanism.reactions"
 """Path at which a case gives other numbers of reactions than the mechanism."""
-
-SUM_TOLERANCE = 1e-9
-"""Tolerance of the sum of initial coverages, which is one."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +59,7 @@ class Mechanism:
         """Initial values from coverages by species; those not given are zero, and all must sum to one."""
         refuse_unknown(given, self.species, "coverages: no species '{}'", place)
         total = sum(given.values())
-        if abs(total - 1) > SUM_TOLERANCE:
+        if abs(total - 1) > NO_AMOUNT:
             raise InputError(f"coverages sum to {total:.12g}, not to 1.", place)
         return {variable: float(given.get(name, 0.0)) for name, variable in self.species.items()}
 

@@ -11,9 +11,10 @@ from typing import Self
 
 from surfacechem.contracts.terms import Law, Potential, option, parameter
 from surfacechem.expressions import Expression, mixing
-from surfacechem.mechanism.interaction import SAME, Interaction
+from surfacechem.mechanism.interaction import Interaction
 from surfacechem.mechanism.thermo import Bind, StandardGibbs
 from surfacechem.quantities import AVOGADRO, BOLTZMANN
+from surfacechem.tolerances import EQUAL
 
 
 class Formula:
@@ -159,7 +160,7 @@ def unpaired(species: Sequence[Species]) -> tuple[str, str] | None:
             return item.name, other.name
         for slope, same in zip(ours, theirs, strict=True):
             x, y = slope / item.sites, same / other.sites
-            if abs(x - y) > SAME * max(abs(x), abs(y)):
+            if abs(x - y) > EQUAL * max(abs(x), abs(y)):
                 return item.name, other.name
     return None
 

@@ -13,7 +13,7 @@ from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, log, log_fraction, log_sum, where
 from surfacechem.laws import laws
 from surfacechem.mechanism.mixture import Formula
-from surfacechem.mechanism.rates import GONE, InterfaceArrhenius, floored, plain
+from surfacechem.mechanism.rates import USED, InterfaceArrhenius, floored, plain
 from surfacechem.quantities import GAS_CONSTANT
 
 PREFIX = "interface-"
@@ -156,7 +156,7 @@ class CureReaction(LawReaction):
         """Logarithm of theta^(n - 1), by which the order n differs from that of mass action, one."""
         (reactant,), n = self.orders, self.stated.n
         theta = values[reactant]
-        return (n - 1) * where(n < 1, log(floored(theta, GONE)), log_fraction(theta))
+        return (n - 1) * where(n < 1, log(floored(theta, USED)), log_fraction(theta))
 
 
 REACTIONS: Mapping[str, type[LawReaction]] = {"net": AffinityReaction, "catalysed": CureReaction}

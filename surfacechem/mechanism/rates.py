@@ -23,7 +23,7 @@ NO_COVERAGES: Mapping[str, Expression] = {}
 COVERAGE_FLOOR = 1e-20
 """Coverages below this count as this where a rate depends on their logarithm, as in Cantera."""
 
-GONE = 1e-14
+USED = 1e-14
 """Coverage below which a reaction of an order below one is complete.
 
 A power has an infinite slope at its end, and the zeroth a step; from here on the rate falls in proportion. A step moves
@@ -257,7 +257,7 @@ class InterfaceArrhenius(MechanismReaction):
             order, theta = orders.get(item.variable, 0), values[item.variable]
             # Below first order the slope is infinite where nothing is left, which no step can follow.
             if order < 1 and way * self.change.get(item.variable, 0) > 0:
-                product *= values[item.concentration] ** plain(order) * theta * floored(theta, GONE) ** plain(order - 1)
+                product *= values[item.concentration] ** plain(order) * theta * floored(theta, USED) ** plain(order - 1)
             elif order:
                 product *= power(values[item.concentration] * theta, plain(order))
         return product

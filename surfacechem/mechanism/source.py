@@ -44,7 +44,7 @@ OWN = {
 }
 """Units of numbers that Cantera does not read: what in `units` gives a bare one a meaning, and an example."""
 
-MOST = {
+LARGEST_NUMBERS = {
     "m": (1e-5, "a length", "0.4 nm"),
     "J": (1e7 / AVOGADRO, "an energy", "50 kJ/mol"),
     "J/mol": (1e7, "an energy", "50 kJ/mol"),
@@ -339,7 +339,7 @@ def converted(units: Any, value: str | float, unit: str) -> float:
         return float(value)
     number = _energy(units, value, unit) if unit in ("J", "J/mol") else float(units.convert_to(value, unit))
     # What was meant in nanometres, or per mole, is not caught by its unit.
-    largest, what, example = MOST.get(unit, (inf, "", ""))
+    largest, what, example = LARGEST_NUMBERS.get(unit, (inf, "", ""))
     if abs(number) > largest:
         raise InputError(f"{value} is {what} of {number:g} {unit}, which no bond has; write it as `{example}`.")
     return number

@@ -21,8 +21,8 @@ from surfacechem.model.system import Account, Margin, Named, Note, Range, Role, 
 from surfacechem.model.variables import Parameters, Variables
 from surfacechem.quantities import Quantity
 from surfacechem.scene import Interface, Scene
-from surfacechem.tolerances import NOTHING
-from surfacechem.tolerances import ROUNDING as DIGITS
+from surfacechem.tolerances import NO_AMOUNT
+from surfacechem.tolerances import RUN_EPS as DIGITS
 
 BOTH = "interface", "each body"
 """Ends of the paths that bring heat into both bodies alike."""
@@ -337,13 +337,13 @@ class Build:
             # The last digits of the terms of a sum change it by so much.
             whole = self.expanded(value)
             rounding = sum((absolute(term) for term in whole.args), symengine.Integer(0)) if whole.is_Add else 0
-            slack = NOTHING + DIGITS * rounding + DIGITS * absolute(least)
+            slack = NO_AMOUNT + DIGITS * rounding + DIGITS * absolute(least)
             reason = f"{name} fell below {least if least != 0 else 'zero'}, {ends}"
             self.margins.append(Margin(f"{name} >= {least}", value - least + slack, reason))
         self._narrow_places(law, own, met)
         for name, (low, high) in law.limits.items():
             value = self.variables.get(name, law)
-            slack = NOTHING * max(abs(end) for end in (low, high) if math.isfinite(end))
+            slack = NO_AMOUNT * max(abs(end) for end in (low, high) if math.isfinite(end))
             reason = f"{name} left the range of {law.called}, {low:g} to {high:g}"
             if math.isfinite(low):
                 self.margins.append(Margin(f"{name} >= {low:g}", value - low + slack, reason, domain=True))
@@ -385,7 +385,7 @@ class Build:
         """Add margins that keep varying parameters in their range; one that may be zero may be below by rounding."""
         found = []
         for law, name, spec, value in self.variables.varying:
-            slack = NOTHING * abs(getattr(law, name).value)
+            slack = NO_AMOUNT * abs(getattr(law, name).value)
             low, why = max(spec.above, spec.at_least), f"{law.title}: {name} left its range ({spec.range}) as it varies"
             if math.isfinite(low):
                 above = value - low + (slack if spec.at_least >= low else 0)

@@ -22,7 +22,7 @@ from matplotlib.figure import Figure
 from surfacechem.errors import InputError, refuse_unknown
 from surfacechem.plots import curved, style
 from surfacechem.plots.style import Array, meaning, symbol, unit, varies
-from surfacechem.tolerances import EPS, ROUNDING
+from surfacechem.tolerances import EPS, RUN_EPS
 
 # Panels of the usual figure: title, and patterns of the unit and of the names.
 PANELS: tuple[tuple[str, str, str], ...] = (
@@ -359,7 +359,7 @@ def _draw_balances(ax: Axes, dataset: xarray.Dataset) -> None:
         ax.plot(dataset["time"].values, np.maximum(relative, LEAST_DRAWN), label=name.partition("_")[0], linewidth=1.2)
     style.make_logarithmic(ax.yaxis)
     low, high = ax.get_ylim()
-    ax.set(ylim=(min(low, LEAST_DRAWN), max(high, ROUNDING)), ylabel="Balance residual [1]")
+    ax.set(ylim=(min(low, LEAST_DRAWN), max(high, RUN_EPS)), ylabel="Balance residual [1]")
     style.legend(ax)
 
 

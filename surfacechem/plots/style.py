@@ -27,7 +27,7 @@ from surfacechem.contracts.si_units import ZERO_CELSIUS
 from surfacechem.errors import InputError, Place
 from surfacechem.quantities import SUPERSCRIPTS, VARIABLES, raised
 from surfacechem.results.netcdf import read_netcdf, reading, replacing
-from surfacechem.tolerances import ROUNDING
+from surfacechem.tolerances import RUN_EPS
 
 Array = NDArray[np.float64]
 
@@ -53,7 +53,7 @@ STYLE: Any = {
 }
 
 # A curve that changes by less than this part of its size, 9e-10, is constant: rounding may be all of it.
-FLAT = 1000 * ROUNDING
+FLAT = 1000 * RUN_EPS
 
 # Units that take a prefix, and the largest values between which they need none.
 TAKES_PREFIX = ("J", "N", "Pa", "W", "m", "s")

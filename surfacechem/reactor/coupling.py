@@ -24,7 +24,7 @@ from surfacechem.model.components.interface import LOADABLE
 from surfacechem.quantities import VARIABLES
 from surfacechem.reactor.gas import Receiver, refuse
 from surfacechem.scene import Body, Scene
-from surfacechem.tolerances import ROUNDING
+from surfacechem.tolerances import RUN_EPS
 
 LOAD_UNITS = ("Pa", "N", "W/m^2")
 """Units of loads that do work or heat at their present value, whatever their rate."""
@@ -130,7 +130,7 @@ def _refuse_other_phase(name: str, own: Any, given: Any) -> None:
 def _agreement(ours: Any, theirs: Any) -> Iterator[tuple[str, bool]]:
     """Properties of a species, and whether two of one name agree in them."""
     yield "composition", ours.composition == theirs.composition
-    yield "weight", isclose(ours.molecular_weight, theirs.molecular_weight, rel_tol=ROUNDING)
+    yield "weight", isclose(ours.molecular_weight, theirs.molecular_weight, rel_tol=RUN_EPS)
     both = ours.thermo, theirs.thermo
     if None in both:
         return
@@ -141,7 +141,7 @@ def _agreement(ours: Any, theirs: Any) -> Iterator[tuple[str, bool]]:
             ("entropy", "s", cantera.gas_constant),
         ):
             found = [getattr(each, function)(T) for each in both]
-            yield f"{what} at {T:g} K", isclose(*found, rel_tol=ROUNDING, abs_tol=ROUNDING * TERM_SIZE * unit)
+            yield f"{what} at {T:g} K", isclose(*found, rel_tol=RUN_EPS, abs_tol=RUN_EPS * TERM_SIZE * unit)
 
 
 def _state(phase: Any) -> Neighbour:

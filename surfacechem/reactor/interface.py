@@ -22,7 +22,7 @@ from surfacechem.reactor.gas import Receiver, refuse
 from surfacechem.runs.simulation import Simulation
 from surfacechem.solve.adapters.cantera_network import LEDGER_UNIT, BackOffError, StateVectorReactor, contents
 from surfacechem.solve.contract import Array
-from surfacechem.tolerances import DIGITS, ROUNDING
+from surfacechem.tolerances import FEW_EPS, RUN_EPS
 
 if TYPE_CHECKING:
     import xarray
@@ -360,7 +360,7 @@ class InterfaceReactor(StateVectorReactor):
             rates = self.scene.rates(t, self.x)
         except EndError as end:
             stop = f"{end} at t = {t:.9g} s"
-            if self._last is None or abs(t - self._last[0]) <= ROUNDING * abs(t):
+            if self._last is None or abs(t - self._last[0]) <= RUN_EPS * abs(t):
                 raise self._stopped(stop) from None
             raise self.error or BackOffError(stop) from None
         self._last, self._asked, self._current = (t, self.x, rates), asked, True
@@ -401,7 +401,7 @@ class InterfaceReactor(StateVectorReactor):
     def _stands_still(self, t: float) -> bool:
         """Whether steps have become as short as the rounding of the time, other than at a start."""
         step = t - self._last[0] if self._last is not None else 0.0
-        return 0 < step <= 2 * DIGITS * t and t - self._restarted > ROUNDING * t
+        return 0 < step <= 2 * FEW_EPS * t and t - self._restarted > RUN_EPS * t
 
     def heard(self, t: float) -> object:
         """All that its rates at a time [s] depend on beside its variables."""

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem.references.base import Array
-from surfacechem.tolerances import DIGITS, SQRT_EPS
+from surfacechem.tolerances import FEW_EPS, SQRT_EPS
 
 MOST_ITERATIONS = 400
 """At most: halving alone takes 52 to the last digit, and one for each factor of two between the ends of a bracket."""
@@ -65,10 +65,10 @@ def increasing_root(
             newton = x - error / slope
         inside = (newton > low) & (newton < high)
         following = np.where(inside, newton, 0.5 * (low + high))
-        reached = np.abs(error) <= DIGITS * np.abs(target)
+        reached = np.abs(error) <= FEW_EPS * np.abs(target)
         step = np.minimum(np.abs(following - x), high - low)
-        last = inside & (step <= SQRT_EPS * np.abs(x)) & (step**3 <= DIGITS * np.abs(x) * before**2)
-        ends = reached | (step <= DIGITS * np.abs(x)) | last
+        last = inside & (step <= SQRT_EPS * np.abs(x)) & (step**3 <= FEW_EPS * np.abs(x) * before**2)
+        ends = reached | (step <= FEW_EPS * np.abs(x)) | last
         x = np.where(settled | (error == 0.0) | (reached & ~inside), x, following)
         before, settled = step, settled | ends
         if settled.all():

@@ -9,7 +9,7 @@ import numpy as np
 from surfacechem.contracts.terms import parameter
 from surfacechem.references._bodies import UniformBody
 from surfacechem.references.base import Array, Quantities, read
-from surfacechem.tolerances import DIGITS
+from surfacechem.tolerances import FEW_EPS
 
 NEWTON_STEPS = 100
 """Steps to the velocity at a time; each but the first few doubles the digits."""
@@ -64,7 +64,7 @@ class AnisotropicSlide(UniformBody):
         for _ in range(NEWTON_STEPS):
             change = (self._integral(1.0, x) - left) / np.sqrt(1 + slope**2 * x ** (2 * (ratio - 1)))
             x = np.where(left > 0, np.maximum(x - change, 0), 0)
-            if np.all(np.abs(change) <= DIGITS * x):
+            if np.all(np.abs(change) <= FEW_EPS * x):
                 break
         v, v_2 = self.v_i * x, self.v_2_i * x**ratio
         path, across = (self._integral(k, np.array(1.0)) - self._integral(k, x) for k in (2.0, 1.0 + ratio))

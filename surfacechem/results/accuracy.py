@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem.errors import InputError, Place
-from surfacechem.tolerances import LAST, LOOSEST, MOST, TIGHTEST
+from surfacechem.tolerances import CONTROL_RTOL, LOOSEST_RTOL, MAX_RTOL, MIN_RTOL
 
 Array = NDArray[np.float64]
 
@@ -35,8 +35,8 @@ NOTHING_EVOLVES = "nothing evolves, and no work is done"
 
 def check_tolerance(rtol: float, option: str) -> None:
     """Raise InputError for a relative tolerance out of the range of runs: what is tighter is rounding."""
-    if not TIGHTEST <= rtol <= MOST:
-        raise InputError(f"{rtol:g} is outside its range: >= {TIGHTEST:g} and <= {MOST:g}.", Place(path=option))
+    if not MIN_RTOL <= rtol <= MAX_RTOL:
+        raise InputError(f"{rtol:g} is outside its range: >= {MIN_RTOL:g} and <= {MAX_RTOL:g}.", Place(path=option))
 
 
 def first_tolerance(accuracy: float) -> float:
@@ -45,7 +45,7 @@ def first_tolerance(accuracy: float) -> float:
     >>> first_tolerance(1e-8), first_tolerance(1e-20)
     (1e-10, 1e-13)
     """
-    return min(max(accuracy * RTOL_PART, TIGHTEST), LOOSEST)
+    return min(max(accuracy * RTOL_PART, MIN_RTOL), LOOSEST_RTOL)
 
 
 def second_tolerance(rtol: float) -> float:
@@ -54,9 +54,9 @@ def second_tolerance(rtol: float) -> float:
     >>> second_tolerance(1e-8), second_tolerance(1e-13), second_tolerance(1e-15)
     (1e-10, 3e-14, 1e-13)
     """
-    if rtol > TIGHTEST:
-        return max(rtol * SECOND_RUN_FACTOR, TIGHTEST)
-    return LAST if rtol > LAST else TIGHTEST
+    if rtol > MIN_RTOL:
+        return max(rtol * SECOND_RUN_FACTOR, MIN_RTOL)
+    return CONTROL_RTOL if rtol > CONTROL_RTOL else MIN_RTOL
 
 
 def relative_errors(values: Array, exact: Array, floor: float | Array) -> Array:

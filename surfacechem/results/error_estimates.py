@@ -36,7 +36,17 @@ from surfacechem.solve import AUTO
 from surfacechem.solve.choice import method
 from surfacechem.solve.contract import Array, Mask, Problem, States
 from surfacechem.solve.run import Run, Trajectory
-from surfacechem.tolerances import BRIEF, EPS, FINER, FLOOR, NEGLIGIBLE, NONE_OF_SCALE, SQRT_EPS, TIGHTEST, UNRESOLVED
+from surfacechem.tolerances import (
+    ATOL_OF_SCALE,
+    BRIEF_PART,
+    EPS,
+    ERROR_FLOOR,
+    FINER_BY,
+    MIN_RTOL,
+    NEGLIGIBLE,
+    RUN_ERROR,
+    SQRT_EPS,
+)
 
 ENDED_EARLIER = "ended earlier"
 """Note on a second run that did not come as far."""
@@ -176,7 +186,7 @@ def _off_events(trajectory: Trajectory, late: float) -> Mask:
     stopped = [result.t] if trajectory.status == "stopped" else []
     moments = np.array([*(jump.t for jump in trajectory.jumps), *stopped])
     away = np.abs(result.times[:, None] - moments)
-    return np.asarray(np.all(away > np.maximum(BRIEF * end, 2 * late * moments), axis=1))
+    return np.asarray(np.all(away > np.maximum(BRIEF_PART * end, 2 * late * moments), axis=1))
 
 
 def fewer(trajectory: Trajectory) -> Trajectory:
@@ -285,7 +295,7 @@ def of_named(ours: Trajectory, theirs: Trajectory) -> dict[str, float]:
     alike = agree_at_jumps(times, ours, theirs) & clear_of(times, pairs)
     first, second = (run.picked(own[alike]) for run, own in zip((ours, theirs), rows, strict=True))
     names, true = second.model.system.output_columns, second.outputs
-    rounded = UNRESOLVED * np.array(list(second.some.roundings.values()))
+    rounded = RUN_ERROR * np.array(list(second.some.roundings.values()))
     size = np.transpose(list(map(sizes(second, named=names).__getitem__, names)))
     with np.errstate(invalid="ignore"):  # what is infinite in both is the same
         missed = np.fmax(np.abs(first.outputs - true) - rounded, 0.0)
@@ -299,9 +309,9 @@ def _squares(rtol: float, trajectory: Trajectory, least: Array) -> list[str]:
     squares, as the energy of a spring at no extension: of such a zero no digit is known, and none is missed.
     """
     changes = rtol * np.maximum(np.abs(trajectory.result.outputs), least)
-    made, by_less = (np.array(list(trajectory.felt(each).values())) for each in (changes, changes / FINER))
+    made, by_less = (np.array(list(trajectory.felt(each).values())) for each in (changes, changes / FINER_BY))
     largest = np.abs(trajectory.outputs).max(axis=0, initial=0.0)
-    squares = (largest <= made) & (2 * FINER * by_less <= made)
+    squares = (largest <= made) & (2 * FINER_BY * by_less <= made)
     return [name for name, is_one in zip(trajectory.model.system.output_columns, squares, strict=True) if is_one]
 
 
@@ -416,7 +426,7 @@ def sizes(trajectory: Trajectory, named: Collection[str] = ()) -> dict[str, Arra
     if len(own) < len(named):
         found |= {name: np.full(len(result.times), size) for name, size in _exchanged_sizes(trajectory).items()}
     end, speed, size = trajectory.run.times[-1], np.abs(trajectory.rates), np.maximum(np.abs(result.outputs), least)
-    most = np.where(size < BRIEF * end * speed, np.inf, size.max(axis=0, initial=0.0))
+    most = np.where(size < BRIEF_PART * end * speed, np.inf, size.max(axis=0, initial=0.0))
     whole = np.fmin(size + result.times[:, None] * speed, most)
     if trajectory.status == "finished":
         whole[-1:] = size[-1:]
@@ -447,7 +457,7 @@ def _exchanged_sizes(trajectory: Trajectory) -> dict[str, float]:
         whole[unit] = max(whole[unit], float(size))
     if (hottest := whole.get("K", 0.0)) > 0 and ENTROPY in whole:
         whole[ENTROPY] = max(whole[ENTROPY], whole.get(ENERGY, 0.0) / hottest)
-    least = [NONE_OF_SCALE * whole[unit] for unit in units]
+    least = [ATOL_OF_SCALE * whole[unit] for unit in units]
     own = np.maximum(sizes, least)[len(system.outputs) :].tolist()
     return dict(zip((account.quantity.name for account in system.ledger), own, strict=True))
 
@@ -464,7 +474,7 @@ def state_floors(trajectory: Trajectory) -> Array:
     if small.any():  # nor is a velocity that the last digit of a load drives
         ends = {0, len(trajectory.result.times) // 2, len(trajectory.result.times) - 1}
         driven = _driven(trajectory.picked(np.array(sorted(ends))))
-        least = np.where(small & (most <= UNRESOLVED * EPS * driven), np.maximum(least, driven), least)
+        least = np.where(small & (most <= RUN_ERROR * EPS * driven), np.maximum(least, driven), least)
     return np.asarray(least)
 
 
@@ -498,12 +508,13 @@ def difference(found: Mapping[str, Array], expected: Mapping[str, Array]) -> str
 
 
 def event_errors(found: Mapping[str, Array], expected: Mapping[str, Array], end: float) -> dict[str, float]:
-    """Largest error of the times of events, each relative to its own time, or to FLOOR of the run if that is more.
+    """Largest error of the times of events, each relative to its own time, or to ERROR_FLOOR of the run if that is
+    more.
 
     Kinks of which one of the two has more are left out; empty where no time is compared.
     """
     errors = [
-        np.abs(found[name] - times) / np.maximum(times, FLOOR * end)
+        np.abs(found[name] - times) / np.maximum(times, ERROR_FLOOR * end)
         for name, times in expected.items()
         if len(times) == len(found.get(name, ())) > 0
     ]
@@ -523,7 +534,7 @@ def verified(first: Trajectory) -> tuple[Trajectory, Accuracy]:
     """
     wanted = asked_accuracy(first.run)
     while True:
-        last = first.run.rtol <= TIGHTEST  # nothing tighter resolves more
+        last = first.run.rtol <= MIN_RTOL  # nothing tighter resolves more
         second = _second(first, known=True)
         found = replace(compared(first, second), asked=wanted)
         if second.status == "failed" or found.error <= wanted:
@@ -545,7 +556,7 @@ def compared(first: Trajectory, second: Trajectory) -> Accuracy:
     if first.status != second.status:
         return Accuracy(math.inf, f"{source}, which {second.status}: {second.reason}")
     errors, others = state_differences(first.looked, second)
-    if others and first.run.rtol > TIGHTEST:  # there rounding decides of events that change nothing
+    if others and first.run.rtol > MIN_RTOL:  # there rounding decides of events that change nothing
         return Accuracy(math.inf, f"{source}, which had {others}")
     if not errors:
         return unknown(AT_START)
@@ -567,7 +578,7 @@ def rounding_of_time(trajectory: Trajectory) -> float:
 def reasons(problem: Problem, run: Run, moves: bool) -> list[tuple[str, str, str]]:
     """Settings chosen for a run, whose gap ``moves`` by a balance or does not, and the reasons, a row each."""
     part = f"a hundredth of the accuracy {asked_accuracy(run):.0e}, as errors of smooth runs are below 100 rtol"
-    if run.rtol == TIGHTEST:
+    if run.rtol == MIN_RTOL:
         part = f"for the accuracy {asked_accuracy(run):.0e}; below this is rounding"
     again = "a second run must agree to the accuracy, else it is verified in turn"
     return [

@@ -14,9 +14,9 @@ from surfacechem.results.netcdf import Column
 from surfacechem.solve.contract import Array
 from surfacechem.solve.jumps import ADMISSIBLE, VIOLATES, Jump
 from surfacechem.solve.run import Trajectory
-from surfacechem.tolerances import NEGLIGIBLE, ROUNDING
+from surfacechem.tolerances import NEGLIGIBLE, RUN_EPS
 
-SIDE = ROUNDING / 8
+SIDE = RUN_EPS / 8
 """Relative distance from a jump at which a time is that of the jump, 1.1e-13: times are summed, too, over some 1e5
 steps, whose roundings add up to a tenth of those of 1e7.
 """
@@ -192,5 +192,5 @@ def event_summary(jumps: Sequence[Jump], exchanged: float, unit: str = "J/m^2") 
     """The transitions of a run in one line; ``exchanged`` is the largest energy that anything exchanged."""
     released = sum(jump.released for jump in jumps)
     verdicts = {jump.verdict for jump in jumps} - {ADMISSIBLE}
-    heat = f"; released {released:.4g} {unit}" if abs(released) > len(jumps) * ROUNDING * exchanged else ""
+    heat = f"; released {released:.4g} {unit}" if abs(released) > len(jumps) * RUN_EPS * exchanged else ""
     return f"{event_counts(jumps)}{heat}; {'all admissible' if not verdicts else ', '.join(sorted(verdicts))}"

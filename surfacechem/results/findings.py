@@ -24,7 +24,7 @@ from surfacechem.model.system import Capped, Caution, Pair, Range, System
 from surfacechem.results.accuracy import Accuracy
 from surfacechem.results.audit import Audit, largest
 from surfacechem.solve.run import Trajectory
-from surfacechem.tolerances import EPS, FLOOR, NEGLIGIBLE, ROUNDING
+from surfacechem.tolerances import EPS, ERROR_FLOOR, NEGLIGIBLE, RUN_EPS
 
 LOST_FLUX = NEGLIGIBLE / 10
 """A flux that the last bit of a temperature changes by more than this part of the largest flux is no result: of four
@@ -129,7 +129,7 @@ def active_cautions(system: System, rows: NDArray[np.float64]) -> list[str]:
     expressions = [system.expand(item.expression) for item in cautions]
     values = symengine.Lambdify(system.inputs, expressions, backend="lambda")(rows).reshape(len(rows), -1)
     least, size = np.nanmin(values, axis=0), np.nanmax(np.abs(values), axis=0)
-    return [item.text for item, x in zip(cautions, least < -ROUNDING * size, strict=True) if x]
+    return [item.text for item, x in zip(cautions, least < -RUN_EPS * size, strict=True) if x]
 
 
 def _inaccurate(trajectory: Trajectory, found: Accuracy | None) -> list[str]:
@@ -150,7 +150,7 @@ def _lost_fluxes(trajectory: Trajectory) -> list[str]:
     most = max((largest(everywhere[name]) for name in fluxes), default=0.0)
     # What rounding alone carries over the whole run counts against the heat that there is, wherever its zero lies.
     content = trajectory.roundings.get("E_total", 0.0) / EPS
-    felt = FLOOR * max(largest(everywhere["E_total"]), content)
+    felt = ERROR_FLOOR * max(largest(everywhere["E_total"]), content)
     lost = [name for name, size in fluxes.items() if size > LOST_FLUX * most and size * duration > felt]
     advice = "let the two share one temperature, or use the heat_into variables, which are exact"
     return [f"{', '.join(lost)}: lost to rounding, as the conductance is very large; {advice}"] if lost else []
@@ -162,7 +162,7 @@ def _extrapolations(trajectory: Trajectory) -> list[str]:
     for limit in trajectory.model.system.noted(Range):
         values = trajectory.everywhere[limit.variable]
         low, high = float(np.min(values, initial=math.inf)), float(np.max(values, initial=-math.inf))
-        rounding = ROUNDING * max(abs(low), abs(high))
+        rounding = RUN_EPS * max(abs(low), abs(high))
         if low < limit.low - rounding or high > limit.high + rounding:
             span = f"{limit.variable} ran from {low:.6g} to {high:.6g}"
             found.append(f"{limit.law} is an extrapolation: {span}, its range is {limit.low:g} to {limit.high:g}")

@@ -22,12 +22,12 @@ from surfacechem.results.event_table import SIDE
 from surfacechem.scene import Scene
 from surfacechem.solve.contract import Array
 from surfacechem.solve.run import Trajectory
-from surfacechem.tolerances import DIGITS, MISMATCH, QUARTER_EPS, ROUNDING, SAME, SQRT_EPS
+from surfacechem.tolerances import EQUAL, EQUATION_MISMATCH, FEW_EPS, QUARTER_EPS, RUN_EPS, SQRT_EPS
 
 Solution = Callable[[Array], dict[str, Array]]
 """Exact values under the names of the scene, at any times."""
 
-DIFFERENCE_ROUNDING = 2 * DIGITS
+DIFFERENCE_ROUNDING = 2 * FEW_EPS
 """Last digits of a difference of five values."""
 
 MOST_PROBES = 7
@@ -120,7 +120,7 @@ def _choose_sides(
     jumped = {
         name: np.array([close])
         for name, (close, far) in ((name, values.tolist()) for name, values in before_end.items())
-        if abs(exact[name][-1] - close) > JUMP_RATIO * abs(close - far) + SAME * abs(close)
+        if abs(exact[name][-1] - close) > JUMP_RATIO * abs(close - far) + EQUAL * abs(close)
     }
     if jumped:
         _take_nearer(exact, jumped, run, times >= times[-1] * (1 - SIDE))
@@ -161,7 +161,7 @@ def match(kind: type[Reference], options: Mapping[str, float], view: SceneView) 
 
 
 def _same(a: float, b: float, scale: float) -> bool:
-    return abs(a - b) <= max(SAME * max(abs(a), abs(b)), ROUNDING * scale)
+    return abs(a - b) <= max(EQUAL * max(abs(a), abs(b)), RUN_EPS * scale)
 
 
 def _solution(reference: Reference, view: SceneView, t: Array) -> dict[str, Array]:
@@ -257,7 +257,7 @@ def _check_equations(near: Mapping[str, Array], run: Trajectory, t: Array, step:
         for part, miss, matrix in zip(parts, misses[:, still], slopes, strict=True):
             if np.all(np.isfinite(miss)) and np.all(np.isfinite(matrix)):
                 part[still] = np.abs(np.linalg.lstsq(matrix, -miss)[0]).max()
-    if parts.max() > MISMATCH:
+    if parts.max() > EQUATION_MISMATCH:
         j, row = np.unravel_index(parts.argmax(), parts.shape)
         equation = list(system.rows)[row]
         raise InputError(f"at t = {t[j]:.3g} s it misses the equation of {equation} by {100 * parts.max():.3g}%.")
@@ -271,7 +271,7 @@ def _check_given(exact: Mapping[str, Array], run: Trajectory, t: Array, y: Array
     named = run.model.evaluate(run.result, t, y, ydot) if given else np.empty(0)
     for name in given:
         theirs, ours = exact[name], named[:, columns[name]]
-        for k in np.flatnonzero(~(np.abs(theirs - ours) <= SAME * np.abs(ours).max()))[:1]:
+        for k in np.flatnonzero(~(np.abs(theirs - ours) <= EQUAL * np.abs(ours).max()))[:1]:
             raise InputError(f"at t = {t[k]:.3g} s its {name} is {theirs[k]:.6g}, the scene's {ours[k]:.6g}.")
 
 

@@ -18,7 +18,7 @@ from surfacechem.solve import solver
 from surfacechem.solve.contract import Array, Index, Mask, States
 from surfacechem.solve.radau.solver import consistent
 from surfacechem.solve.run import Trajectory
-from surfacechem.tolerances import EPS, FINER, UNRESOLVED
+from surfacechem.tolerances import EPS, FINER_BY, RUN_ERROR
 
 LONG_INTERVAL = 64
 """Rows between two that are kept of which one in the middle is kept, too, where the line between the two misses any."""
@@ -26,7 +26,7 @@ LONG_INTERVAL = 64
 SHARED_DENSITY = 2
 """Outputs that many runs share for one that the closest of them has."""
 
-MOST_REFINED, REFINEMENT, REFINEMENT_ROUNDS = 100, 16, 2
+MOST_REFINED, PARTS_REFINED, REFINEMENT_ROUNDS = 100, 16, 2
 """Largest number of known states between which a run is refined, into how many parts, and how often in turn."""
 
 
@@ -126,7 +126,7 @@ def _bends(trajectory: Trajectory, allowed: Array, seen: Mask) -> list[States]:
     missed = np.divide(apart, allowed, out=np.zeros_like(apart), where=seen).max(axis=1, initial=0.0)
     rows = np.sort(np.argsort(-missed, kind="stable")[:MOST_REFINED])
     rows = rows[missed[rows] > 1]
-    bent, parts = left[rows], np.minimum(np.ceil(missed[rows]), REFINEMENT).astype(int)
+    bent, parts = left[rows], np.minimum(np.ceil(missed[rows]), PARTS_REFINED).astype(int)
     # No event lies between two outputs.
     calm = replace(problem, record_steps=False, picture=0.0, max_seconds=None, in_play=(False,) * len(problem.margins))
     problems = [
@@ -208,12 +208,12 @@ def _pictured(trajectory: Trajectory, part: float, rows: States, rounds: int) ->
     quantities = np.hstack([result.outputs, result.ledger_outputs, whole.outputs])
     some, first = whole.some, quantities.shape[1] - whole.outputs.shape[1]
     unknown = some.felt(EPS * np.abs(some.result.outputs) + result.problem.atol)
-    noise = np.pad(UNRESOLVED * np.array([*unknown.values()]), (first, 0))
+    noise = np.pad(RUN_ERROR * np.array([*unknown.values()]), (first, 0))
     # What may be an error is not pictured, and what is early counts for no range.
     values = np.where(np.isfinite(quantities), quantities, 0.0)
     known, rtol = values if early.all() else values[~early], whole.run.rtol
     # The rest of the part is what the states that are known miss of those between them.
-    allowed = (1 - 1 / FINER) * part * np.ptp(known, axis=0) + UNRESOLVED * rtol * np.abs(values).max(axis=0) + noise
+    allowed = (1 - 1 / FINER_BY) * part * np.ptp(known, axis=0) + RUN_ERROR * rtol * np.abs(values).max(axis=0) + noise
     seen = np.ptp(values, axis=0) > allowed
     if rounds and (bends := _bends(whole, allowed[first:], seen[first:])):
         more = States(*map(np.concatenate, zip(rows, *bends, strict=True)))

@@ -28,7 +28,7 @@ from surfacechem.results.findings import MISSED_BY
 from surfacechem.scene import Body, Conduction, Scene
 from surfacechem.solve.contract import Array
 from surfacechem.solve.run import Run, Trajectory
-from surfacechem.tolerances import ROUNDING
+from surfacechem.tolerances import RUN_EPS
 
 FEW = 4
 
@@ -132,7 +132,7 @@ def unresolved(system: System, end: float, t: Array) -> NDArray[np.bool_]:
     starts = layer_starts(system, end)
     since = t - starts[np.searchsorted(starts, t, side="right") - 1]
     # Times and their differences are rounded.
-    return np.asarray(since < first_look(system, end) - ROUNDING * t)
+    return np.asarray(since < first_look(system, end) - RUN_EPS * t)
 
 
 def looked_at(system: System, run: Run) -> Run:

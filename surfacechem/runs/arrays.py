@@ -29,7 +29,7 @@ from surfacechem.solve.lanes.lane_batch import solve_batch
 from surfacechem.solve.radau.solver import Room, consistent, rates_at, solve_arrays
 from surfacechem.solve.radau.stepper import ARCS, END, EVENTS, FIRST_COUNTER, JUMPS, OUTPUTS, RECORDS
 from surfacechem.solve.run import Leaps, Model, Run
-from surfacechem.tolerances import CROSSED, EPS, MICROMETRE, PICOMETRE
+from surfacechem.tolerances import EPS, GUARD_EPS, MICROMETRE, PICOMETRE
 
 MOST = 4096, 1024
 """Largest numbers of steps and events of a run for which there is room: what has more is looked at by itself."""
@@ -228,7 +228,7 @@ class ArrayRuns:
             # What is zero but for rounding is looked at in exact numbers, run by run.
             with np.errstate(all="ignore"):
                 limits, sizes = np.split(self.limits(rows), 2, axis=1)
-                told &= np.all(limits > CROSSED * sizes, axis=1)
+                told &= np.all(limits > GUARD_EPS * sizes, axis=1)
         return told
 
     def ends(self, rows: Array) -> tuple[Array, Array]:
@@ -260,7 +260,7 @@ class ArrayRuns:
             seen = np.concatenate([rows[:, :1], point.y, point.ydot, rows[:, 1 + 2 * self.n :]], axis=1)
         now = program.margins(seen)
         playing = np.array(model.system.in_play(self.problem.parameters[0]))
-        quiet: Mask = np.all(((now > CROSSED * sizes) | ~playing)[:, first:], axis=1)
+        quiet: Mask = np.all(((now > GUARD_EPS * sizes) | ~playing)[:, first:], axis=1)
         sizes[:, self.impacts] = np.maximum(sizes[:, self.impacts], MICROMETRE)
         return np.concatenate([np.zeros((count, program.n_ledger)), sizes], axis=1), quiet
 

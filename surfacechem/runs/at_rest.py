@@ -12,7 +12,7 @@ from surfacechem.expressions import depends
 from surfacechem.model.system import System
 from surfacechem.results.audit import audit
 from surfacechem.solve.run import Model, Run, Trajectory
-from surfacechem.tolerances import NEGLIGIBLE, PICTURE
+from surfacechem.tolerances import LINE_ERROR, NEGLIGIBLE
 
 LONGEST = 1e8
 """Time [s] for which rest is looked for, three years: beyond, step sizes times the rates of a fast surface are more
@@ -64,7 +64,7 @@ def to_rest(model: Model, run: Run, values: Mapping[str, float]) -> Run:
 
 
 def _looked(model: Model, run: Run, values: Mapping[str, float], end: float) -> Trajectory:
-    return model.solve_values(replace(run, times=(0.0, end), picture=PICTURE, accuracy=None), values)
+    return model.solve_values(replace(run, times=(0.0, end), picture=LINE_ERROR, accuracy=None), values)
 
 
 def all_to_rest(model: Model, run: Run, points: Iterable[Mapping[str, float]]) -> list[Run]:

@@ -21,7 +21,7 @@ from surfacechem.scene import Scene
 from surfacechem.solve.contract import Array, Problem
 from surfacechem.solve.diagnose import paces
 from surfacechem.solve.run import Model
-from surfacechem.tolerances import CONSERVED, DIGITS, ROUNDING, TINY
+from surfacechem.tolerances import CONSERVED_RATE, FEW_EPS, RUN_EPS, TINY
 
 SMALL = 0.1
 """Biot number up to which a lump is taken for good: it errs by 3 % then."""
@@ -72,7 +72,7 @@ def consistent_start(model: Model, values: Mapping[str, float]) -> Start | None:
         except np.linalg.LinAlgError:
             return None
         y, ydot = y + np.where(algebraic, change, 0.0), ydot + np.where(algebraic, 0.0, change)
-        if np.all(np.abs(change) <= ROUNDING * np.maximum(np.abs(np.where(algebraic, y, ydot)), TINY)):
+        if np.all(np.abs(change) <= RUN_EPS * np.maximum(np.abs(np.where(algebraic, y, ydot)), TINY)):
             break
     inputs = np.concatenate([[0.0], y, ydot, parameters])
     outputs = dict(zip((item.name for item in system.outputs), model.output_function(inputs).tolist(), strict=True))
@@ -90,7 +90,7 @@ def rates(start: Start) -> NDArray[np.complex128]:
     growth = np.linalg.solve(unknown, -start.K[:, evolves] / scale)[evolves]
     values = np.asarray(np.linalg.eigvals(growth), dtype=np.complex128)
     largest = np.max(np.abs(values), initial=0.0)
-    return np.asarray(values[np.abs(values) > CONSERVED * largest])
+    return np.asarray(values[np.abs(values) > CONSERVED_RATE * largest])
 
 
 def groups(model: Model, scene: Scene, values: Mapping[str, float], start: Start | None, end: float) -> list[Group]:
@@ -301,7 +301,7 @@ def slowest(biot: float) -> float:
     for _ in range(50):
         change = (z * math.sin(z) - biot * math.cos(z)) / (math.sin(z) * (1 + biot) + z * math.cos(z))
         z -= change
-        if abs(change) <= DIGITS * z:
+        if abs(change) <= FEW_EPS * z:
             break
     return z
 

@@ -15,7 +15,7 @@ from surfacechem.results.store import StoredArray
 from surfacechem.runs.keeping import BALANCES, ENDS, STATUSES, Keep, RunByRun
 from surfacechem.runs.sweeps import SweepAccuracy, SweepSolution, unknown_in
 from surfacechem.solve.contract import Index
-from surfacechem.tolerances import FLOOR, TINY, UNRESOLVED
+from surfacechem.tolerances import ERROR_FLOOR, RUN_ERROR, TINY
 
 if TYPE_CHECKING:
     from surfacechem.runs.streaming import Stream
@@ -158,14 +158,14 @@ def _apart(stream: Stream, part: Index, done: SweepSolution) -> Array:
     ends = RunByRun(chunks.model, Keep(last=chunks.keep.last)).columns(done.runs, 0, done.audits)
     stored, largest = chunks.columns(part), np.zeros(len(part))
     names = "time_reached", *(f"{name}_last" for name in chunks.keep.last)
-    least = {name: FLOOR * np.nanmax(np.abs(ends[name]), initial=TINY) for name in names}
+    least = {name: ERROR_FLOOR * np.nanmax(np.abs(ends[name]), initial=TINY) for name in names}
     if chunks.run.steady:
         scales = {f"{state.name}_last": state.scale for state in chunks.model.system.states}
         least = {name: scales[name] for name in scales if name in least}
     rounded = [run.some.roundings for run in done.runs]
     for name, floor in least.items():
         size = np.maximum(np.abs(ends[name]), floor)
-        known = UNRESOLVED * np.array([each.get(name.removesuffix("_last"), 0.0) for each in rounded])
+        known = RUN_ERROR * np.array([each.get(name.removesuffix("_last"), 0.0) for each in rounded])
         apart = np.nan_to_num(np.fmax(np.abs(stored[name] - ends[name]) - known, 0.0) / size)
         apart[np.isnan(stored[name]) != np.isnan(ends[name])] = np.inf
         counts = (name == "time_reached") | (ends["status"] == STATUSES.index("finished"))

@@ -18,7 +18,7 @@ from surfacechem.contracts.terms import Friction, HeatTransfer, Law, Load, RateL
 from surfacechem.contracts.units import dimension
 from surfacechem.errors import InputError, suggestion
 from surfacechem.quantities import BOLTZMANN, VARIABLES
-from surfacechem.tolerances import NOTHING, TINY
+from surfacechem.tolerances import NO_AMOUNT, TINY
 
 TRIALS = 20
 """Draws of parameters and variables; a choice."""
@@ -108,7 +108,7 @@ def _differs(law: Law, values: dict[str, float]) -> str:
     if not isinstance(number, int | float) or not math.isfinite(number):
         return f"its formula gives {number} at {_shown(values)}"
     other = float(symengine.sympify(law.statement(**symbols)).subs({symbols[x]: value for x, value in values.items()}))
-    if abs(other - number) > NOTHING * max(abs(number), TINY):
+    if abs(other - number) > NO_AMOUNT * max(abs(number), TINY):
         return f"floats give {number:.17g}, symbols {other:.17g} at {_shown(values)}: use `surfacechem.expressions`"
     return ""
 

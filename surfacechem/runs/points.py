@@ -37,7 +37,7 @@ from surfacechem.solve.contract import Array
 from surfacechem.solve.equilibria import NO_BALANCE, Equilibria, Point
 from surfacechem.solve.run import values_of
 from surfacechem.solve.segments import start_registers
-from surfacechem.tolerances import CROSSED, ROUNDING, TINY
+from surfacechem.tolerances import GUARD_EPS, RUN_EPS, TINY
 
 Points = Mapping[str, ArrayLike]
 
@@ -175,7 +175,7 @@ class Evaluator:
             derivatives += _by(item.quantity, [*shown.values()], total[:, :, k].T * per, there[:, k])
         limits, guards, sizes = np.split(margins, np.cumsum([len(self.limits), len(self.edges)]), axis=1)
         # The first limit that is reached, or edge that is due; behind all of them stands that none is.
-        unsolved, due = np.isnan(table).any(axis=1), guards < -CROSSED * np.nan_to_num(sizes)
+        unsolved, due = np.isnan(table).any(axis=1), guards < -GUARD_EPS * np.nan_to_num(sizes)
         closed = np.column_stack([unsolved, ~(limits > 0), due, np.ones(len(margins), dtype=bool)])
         reasons = np.array([UNSOLVED, *(each.reason for each in (*self.limits, *self.edges)), ""])
         return found, derivatives, np.where(lost, NO_BALANCE, reasons[closed.argmax(axis=1)]).tolist()
@@ -270,7 +270,7 @@ class Evaluator:
         for _ in range(TRIALS):
             values, slopes, margins = self.slopes(table)
             change = -_solve(self.slopes.block(slopes, rows, unknown), values[:, rows, None])[..., 0]
-            if np.all(np.isnan(change) | (np.abs(change) <= ROUNDING * np.maximum(np.abs(table[:, unknown]), TINY))):
+            if np.all(np.isnan(change) | (np.abs(change) <= RUN_EPS * np.maximum(np.abs(table[:, unknown]), TINY))):
                 break
             table[:, unknown] += change  # all of a row becomes not a number where its balances have no solution
         return values, slopes, margins

@@ -22,11 +22,11 @@ from surfacechem.model.system import Account, Margin, Named, System
 from surfacechem.quantities import Quantity
 from surfacechem.solve.contract import Array
 from surfacechem.solve.run import Trajectory
-from surfacechem.tolerances import FEWEST
+from surfacechem.tolerances import LEAST_BONDED
 
-INTACT = FEWEST**0.5
+INTACT = LEAST_BONDED**0.5
 """Largest survival at the end, 1e-6, at which the mean is known: what is left then is less than half of the decades to
-FEWEST, at which a run has ruptured and ends.
+LEAST_BONDED, at which a run has ruptured and ends.
 """
 
 MEDIAN, MODE = "half of the bonds are broken", "the density of ruptures is stationary"
@@ -95,7 +95,7 @@ def with_rupture(system: System, variable: str) -> System:
         ledger=(*system.ledger, Account(mean, survival * speed, "statistics")),
         margins=(
             *system.margins,
-            Margin("intact", survival - FEWEST, "all bonds broke"),
+            Margin("intact", survival - LEAST_BONDED, "all bonds broke"),
             Margin("median", survival - 0.5, MEDIAN, terminal=False),
             Margin("mode", _total(system, falling), MODE, terminal=False),
         ),

@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 from surfacechem.compile.preparing import PREPARATION
 from surfacechem.solve.contract import Array
 from surfacechem.solve.zeros import zero
-from surfacechem.tolerances import CBRT_EPS, DIGITS, NEGLIGIBLE, NOTHING, PICOMETRE
+from surfacechem.tolerances import CBRT_EPS, FEW_EPS, NEGLIGIBLE, NO_AMOUNT, PICOMETRE
 
 Curve = Callable[[Sequence[float] | Array], Array]
 
-FIRST, GROWTH, MARCH = NOTHING, 1.02, 2400
+FIRST, GROWTH, MARCH = NO_AMOUNT, 1.02, 2400
 """First step of the search for the next equilibrium, relative to the gap, its growth, and the number of steps."""
 
 REACH = FIRST * (GROWTH ** (MARCH - 1) - 1) / (GROWTH - 1)
@@ -188,10 +188,10 @@ def equilibrium(driving: Field, scale: Array, free: Indices, at: Array, least: f
             break
         at, last = at.copy(), size
         at[free] += step
-        if size <= 2 * DIGITS:
+        if size <= 2 * FEW_EPS:
             break
     if last > NEAR * RTOL:
         return None
     # Where nothing bears what is out of balance, Newton's method has no step for it, and that is no rest.
-    borne = np.abs(change) @ scale[free] * max(last, 2 * DIGITS)
+    borne = np.abs(change) @ scale[free] * max(last, 2 * FEW_EPS)
     return at if np.all(np.abs(driving(at[None])[0, free]) <= 2 * borne) else None

@@ -5,7 +5,7 @@ import numpy as np
 from surfacechem.compile.program import MOST_RATE_STATES, Program
 from surfacechem.solve import ASKING
 from surfacechem.solve.contract import Problem
-from surfacechem.tolerances import TIGHTEST
+from surfacechem.tolerances import MIN_RTOL
 
 IMPLICIT, EXPLICIT = "radau", "dop853"
 
@@ -41,7 +41,7 @@ def _why_implicit(problem: Problem) -> str:
         return f"{program.n} states, whose rates would be compiled for it"
     if program.rates is None:
         return "the equations determine their rates together"
-    if problem.rtol <= TIGHTEST:
+    if problem.rtol <= MIN_RTOL:
         return "at this tolerance fewer and longer steps round less"
     end, fastest = float(problem.segments[-1]), fastest_relaxation(program, problem)
     if fastest * end <= STIFF:

@@ -12,9 +12,9 @@ from surfacechem.compile.program import Program
 from surfacechem.model.system import Margin, Pace, State, System
 from surfacechem.solve.contract import REASONS, Array, Points, Result, Status
 from surfacechem.solve.radau.solver import consistent
-from surfacechem.tolerances import GONE, NEGLIGIBLE, NONE_OF_SCALE, ROUNDING, SOLVED, SOON
+from surfacechem.tolerances import ATOL_OF_SCALE, CLOSED_GUARD, IDLE_TIME, NEGLIGIBLE, NEWTON_EPS, RUN_EPS
 
-FEW, SHARP = 100.0, ROUNDING
+FEW, SHARP = 100.0, RUN_EPS
 """Steps in a period, fewer than which follow nothing, and the part of the time that a step can still resolve."""
 
 
@@ -39,7 +39,7 @@ STALLED = NEGLIGIBLE
 """A margin that has shrunk to this part of its largest value, and has less than this part of the time that has passed
 left to close, explains why a run cannot go on."""
 
-RESOLVED = SOLVED
+RESOLVED = NEWTON_EPS
 """Part of the time that has passed within which the last digits of a margin do not tell whether it shrinks."""
 
 BOUNDLESS = 1e12
@@ -131,7 +131,7 @@ def closest_margin(system: System, program: Program, margins: Sequence[Margin], 
     with np.errstate(invalid="ignore", divide="ignore"):
         shrink = seen[-1] / np.fmax.reduce(np.abs(seen), axis=0)
         left = seen[-1] / (seen[before] - seen[-1]) * (t[-1] - t[before])
-    closing = terminal & (seen[-1] < seen[before]) & ((left < STALLED * t[-1]) | (shrink < GONE))
+    closing = terminal & (seen[-1] < seen[before]) & ((left < STALLED * t[-1]) | (shrink < CLOSED_GUARD))
     nearest = int(np.argmin(np.where(closing, shrink, np.inf)))
     return margins[nearest] if closing[nearest] and shrink[nearest] < STALLED else None
 
@@ -158,9 +158,9 @@ def runaway(states: Sequence[State], result: Result) -> str | None:
         j = int(np.argmax(beyond))
         return f"{states[j].name} grows beyond all bounds, to {result.y[j]:.3g} {states[j].quantity.unit}"
     with np.errstate(over="ignore", invalid="ignore"):
-        speed = np.nan_to_num(np.abs(result.ydot) / (np.abs(result.y) + NONE_OF_SCALE * scales))
+        speed = np.nan_to_num(np.abs(result.ydot) / (np.abs(result.y) + ATOL_OF_SCALE * scales))
     j = int(np.argmax(speed))
-    if not (speed[j] * result.t > 1 / SOON and _is_faster(result, j)):
+    if not (speed[j] * result.t > 1 / IDLE_TIME and _is_faster(result, j)):
         return None
     if states[j].given is not None:
         # A velocity without inertia takes the age of the contact with it.

@@ -39,7 +39,7 @@ from surfacechem.solve.radau.work import (
     finite,
     set_inputs,
 )
-from surfacechem.tolerances import BRIEF, CROSSED, DIGITS, DRIFT, MOST_DRIFT, ROUNDING, SOLVED, ULPS
+from surfacechem.tolerances import BRIEF_PART, DRIFT, FEW_EPS, GUARD_EPS, MOST_DRIFT, NEWTON_EPS, RUN_EPS, ULPS
 
 NONE, UNKNOWN = -1, -2
 """Codes in place of the index of the edge that is due: none is; undecided, so that an instant has to look."""
@@ -93,7 +93,7 @@ def _is_beyond(w: Any, first: int) -> bool:
     """Whether a jump has carried the state beyond a limit."""
     beyond = False
     for m in range(first):
-        slack = 0.0 if w.kinds[m, 5] == 1 else CROSSED * w.magnitude[m]
+        slack = 0.0 if w.kinds[m, 5] == 1 else GUARD_EPS * w.magnitude[m]
         beyond = beyond or (w.kinds[m, 0] == 1 and w.playing[m] == 1 and w.margin_probe[m] < -slack)
     return beyond
 
@@ -101,7 +101,7 @@ def _is_beyond(w: Any, first: int) -> bool:
 @compiled
 def _closing(w: Any, m: int) -> int:
     """Whether the guard of an edge is CLOSED, or is zero and NEAR to it; the drift of the integration is not closed."""
-    value, size, small = w.margin_probe[m], w.magnitude[m], CROSSED * w.magnitude[m]
+    value, size, small = w.margin_probe[m], w.magnitude[m], GUARD_EPS * w.magnitude[m]
     if w.playing[m] == 0 or value > small:
         return OPEN
     if value < -max(min(DRIFT * w.rtol, MOST_DRIFT) * size, small):
@@ -136,7 +136,7 @@ def resolve(w: Any, i: int, end: float) -> bool:
     first = w.n_margins - w.edges.shape[0]
     while True:
         t = w.moment[0]
-        if w.jumped[0] >= t - SOLVED * max(t, BRIEF * end):  # chatter, also of arcs that take no time
+        if w.jumped[0] >= t - NEWTON_EPS * max(t, BRIEF_PART * end):  # chatter, also of arcs that take no time
             return False
         find_magnitudes(w)
         find_playing(w)
@@ -257,7 +257,7 @@ def _write_jump(
 def jump(w: Any, i: int, e: int) -> bool:
     """Carry out an edge: reset, share out the heat, judge by the second law, book. False where an instant has to."""
     n, t, taker, measure = w.n, w.moment[0], w.edges[e, TAKER], w.edges[e, MEASURE]
-    rounding = CROSSED * w.magnitude[w.n_margins - w.edges.shape[0] + e]
+    rounding = GUARD_EPS * w.magnitude[w.n_margins - w.edges.shape[0] + e]
     if w.code[BOOKS, 0] == 0:
         return False
     copy(w.moment, w.after)
@@ -272,7 +272,7 @@ def jump(w: Any, i: int, e: int) -> bool:
     made, heat, entropy = before[0] - now[0], 0.0, 0.0
     if not finite(now[:1]):
         return False
-    if abs(made) <= DIGITS * max(now[-2], abs(before[0])):
+    if abs(made) <= FEW_EPS * max(now[-2], abs(before[0])):
         made = 0.0
     else:
         heat, entropy = _warm(w, taker, made)
@@ -282,7 +282,7 @@ def jump(w: Any, i: int, e: int) -> bool:
         w.nudged[1 + measure] += rounding
     _look(w, w.nudged, nudged)
     gain = now[1] - before[1] + entropy
-    small = ROUNDING * max(abs(before[1]), abs(now[1]), abs(entropy)) + DIGITS * before[-1] + abs(nudged[1] - before[1])
+    small = RUN_EPS * max(abs(before[1]), abs(now[1]), abs(entropy)) + FEW_EPS * before[-1] + abs(nudged[1] - before[1])
     admissible = _is_admissible(w, gain, small, abs(nudged[0] - before[0]))
     if not finite(w.after) or (w.edges[e, REFUSES] == 1 and not admissible):
         return False

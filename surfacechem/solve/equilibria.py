@@ -28,12 +28,22 @@ from surfacechem.solve.branches import (
     zero_ahead,
 )
 from surfacechem.solve.contract import Array
-from surfacechem.tolerances import ATOM, DRIFT, MOST_DRIFT, NANOMETRE, NEGLIGIBLE, PICOMETRE, ROUNDING, SOLVED, SOON
+from surfacechem.tolerances import (
+    DRIFT,
+    GAP_EPS,
+    IDLE_TIME,
+    MOST_DRIFT,
+    NANOMETRE,
+    NEGLIGIBLE,
+    NEWTON_EPS,
+    PICOMETRE,
+    RUN_EPS,
+)
 
 Heat = Callable[[Array], Array]
 """Function from inputs to inputs with the temperatures that a jump to them gives."""
 
-BALANCED = ROUNDING
+BALANCED = RUN_EPS
 """Tractions out of balance that count as none, relative to their parts: those of a run hold its rounding."""
 
 NO_BALANCE = "there is no gap at which the tractions are in equilibrium at the start"
@@ -214,7 +224,7 @@ class Equilibria:
 
         def noise(gaps: Sequence[float] | Array) -> Array:
             sizes = np.atleast_2d(self._balance(self.along(point, way, gaps, jumps=jumps)))[:, 1::2]
-            return np.asarray(SOLVED * np.where(pulled, sizes, 0.0) @ np.abs(way.pulls))
+            return np.asarray(NEWTON_EPS * np.where(pulled, sizes, 0.0) @ np.abs(way.pulls))
 
         return driving, noise
 
@@ -277,7 +287,7 @@ class Equilibria:
             gap = self._slid(point, way, onward, driving, noise)
         else:
             gap = march(driving, start, direction, noise)
-            if gap is not None and abs(gap) < ATOM and abs(driving([0.0])) <= noise([0.0]):
+            if gap is not None and abs(gap) < GAP_EPS and abs(driving([0.0])) <= noise([0.0]):
                 gap = 0.0  # laws that end with the gap shall know it
         if gap is None or (onward and gap == start):
             return None if gap is None else point
@@ -293,7 +303,7 @@ class Equilibria:
         now, least = onward * float(driving([start])[0]), float(noise([start])[0])
         beyond = march(lambda gaps: driving(gaps) + onward * least, start, onward, noise) if now > -least else start
         slope = float(np.abs(way.pulls) @ np.abs(self._tangents(point.inputs())[1::3]))
-        if beyond is None or abs(beyond - start) * slope > BALANCED / SOLVED * least:
+        if beyond is None or abs(beyond - start) * slope > BALANCED / NEWTON_EPS * least:
             return beyond
         return march(driving, start, 0.0, noise) if now > 0 else start
 
@@ -314,7 +324,7 @@ class Equilibria:
         if rest is None:
             return None
         y, columns = point.y + rest @ free.moves, free.columns
-        y[columns] = np.where(np.abs(y[columns]) < ATOM, 0.0, y[columns])  # laws that end with the gap shall know it
+        y[columns] = np.where(np.abs(y[columns]) < GAP_EPS, 0.0, y[columns])  # laws that end with the gap shall know it
         return self.moved(point, self._arrived(replace(point, y=y).inputs()[None], jumps=heat is not None))
 
     def _unstable(self, point: Point, heat: Heat | None) -> Lost | None:
@@ -501,4 +511,4 @@ class Folds:
         values = self._approach(replace(lost.point, ydot=beside).inputs())
         push, change = (lost.direction * float(lost.way.pulls @ part) for part in (values[::2], values[1::2]))
         left = -push / change if push < 0 < change else 0.0
-        return replace(point, t=point.t + left) if left < min(SOON * point.t, end - point.t) else point
+        return replace(point, t=point.t + left) if left < min(IDLE_TIME * point.t, end - point.t) else point

@@ -36,7 +36,7 @@ from surfacechem.solve.equilibria import Point
 from surfacechem.solve.instant import ENDLESS, MANY, MISSED, REACHED, Instant
 from surfacechem.solve.jumps import Jump, Jumper
 from surfacechem.solve.radau.solver import consistent
-from surfacechem.tolerances import ATOM, BRIEF, DIGITS, NOISE, ULPS
+from surfacechem.tolerances import BRIEF_PART, FEW_EPS, FORMULA_EPS, GAP_EPS, ULPS
 
 Found = TypeVar("Found")
 Flow = Generator[Problem, Result, Found]
@@ -168,7 +168,7 @@ class Hybrid:
         point = Point(arc.end, arc.result.y, arc.result.ydot, arc.start.parameters)
         if arc.status is Status.FINISHED:
             return point
-        self._renewed = self._renewed + 1 if arc.result.t < BRIEF * self.problem.segments[-1] else 0
+        self._renewed = self._renewed + 1 if arc.result.t < BRIEF_PART * self.problem.segments[-1] else 0
         index, lost = -1, arc.status in LOST
         if arc.status is Status.EVENT:
             events, instant = arc.result.events, self.instant
@@ -204,7 +204,7 @@ class Hybrid:
     def _beyond(self, arc: Arc, point: Point) -> Point | None:
         """Point from which a run may go on after a solver has failed; None where there is none."""
         # At a gap of zero stiffness may jump, and Newton's method stalls: on with the point on the other side.
-        closing = self._gaps & (np.abs(point.y) < ATOM) & (point.y * point.ydot < 0)
+        closing = self._gaps & (np.abs(point.y) < GAP_EPS) & (point.y * point.ydot < 0)
         if closing.any():
             return replace(point, y=np.where(closing, -point.y, point.y))
         # What time could not resolve any more goes on in a time of its own.
@@ -217,7 +217,7 @@ class Hybrid:
         if not count or guards is None:
             return False
         limits = np.array([m.terminal and not m.strict for m in self.problem.margins[:count]], dtype=bool)
-        zero = np.abs(arc.result.margins[:count]) <= NOISE * np.abs(guards(arc.start.inputs())[:count])
+        zero = np.abs(arc.result.margins[:count]) <= FORMULA_EPS * np.abs(guards(arc.start.inputs())[:count])
         return bool(np.any(limits & zero & self.instant.in_play(arc.start)[:count]))
 
     def _last_of(self, start: float, end: float) -> float:
@@ -226,7 +226,7 @@ class Hybrid:
         parameters = self.problem.parameters
         if row >= len(parameters) or not np.array_equal(parameters[row - 1], parameters[row]):
             return end
-        return max(end - DIGITS * end, 0.5 * (start + end))
+        return max(end - FEW_EPS * end, 0.5 * (start + end))
 
     def _flow(self, start: Point, end: float) -> Flow[Arc | None]:
         """Integrate until an edge, a limit or the end of the segment; None where the run ends before or without it."""

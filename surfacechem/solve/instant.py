@@ -18,9 +18,9 @@ from surfacechem.solve.equilibria import BALANCED, Point, drift_of
 from surfacechem.solve.jump_heat import LoadStep
 from surfacechem.solve.jumps import Jump, Jumper, Slack, velocity_scales
 from surfacechem.solve.radau.solver import consistent
-from surfacechem.tolerances import BRIEF, CROSSED, MICROMETRE, PICOMETRE, SOLVED, SOON
+from surfacechem.tolerances import BRIEF_PART, GUARD_EPS, IDLE_TIME, MICROMETRE, NEWTON_EPS, PICOMETRE
 
-REACHED = SOLVED
+REACHED = NEWTON_EPS
 """Part of the time within which two moments are one: a step onto an event solves for its time."""
 
 NO_PUSH = "nothing pushes it off where it rests; with a mass or a damper any disturbance would"
@@ -202,9 +202,9 @@ class Instant:
         that follow each other faster than time can tell have come to rest.
         """
         t, recent = point.t, len(self.jumps) - self._resolved
-        if recent < AT_ONCE or self.jumps[-AT_ONCE].t < t - REACHED * max(t, BRIEF * self.end):
+        if recent < AT_ONCE or self.jumps[-AT_ONCE].t < t - REACHED * max(t, BRIEF_PART * self.end):
             return True
-        if t > self._sharpened + SOON * self.end:
+        if t > self._sharpened + IDLE_TIME * self.end:
             self._sharpened, self._resolved, self.peaks = t, len(self.jumps), self.scales.copy()
             return True
         rests = next((j for j, p in enumerate(self.system.parameters) if p.path == RESTS), None)
@@ -215,7 +215,7 @@ class Instant:
 
     def _due(self, now: Array, playing: Mask, sizes: Array, point: Point) -> int | None:
         """The edge whose guard is closed, or is zero and closing; the drift of the integration is not closed."""
-        small = CROSSED * sizes
+        small = GUARD_EPS * sizes
         closed = playing & (now < -np.maximum(drift_of(self.rtol) * sizes, small))
         near = playing & ~closed & (now <= small) & ~self.strict[self.first :]
         if near.any():
@@ -230,9 +230,9 @@ class Instant:
         """Limits beyond which a jump has carried the state; not what modes say that are left at this moment."""
         # Beyond the end of a law, be it by rounding, what it says has no meaning.
         margins = self.system.moving_margins[: self.first]
-        least = [0.0 if m.domain else -CROSSED * size for m, size in zip(margins, sizes, strict=False)]
+        least = [0.0 if m.domain else -GUARD_EPS * size for m, size in zip(margins, sizes, strict=False)]
         closed = [i for i in range(self.first) if self.terminal[i] and playing[i] and now[i] < least[i]]
-        closed += [i for i in self.limits if playing[i] and now[i] <= CROSSED * sizes[i]]
+        closed += [i for i in self.limits if playing[i] and now[i] <= GUARD_EPS * sizes[i]]
         if not (due and closed):
             return closed
         return [i for i in closed if i not in self._found_anew]
@@ -251,13 +251,13 @@ class Instant:
         parameters = point.parameters.copy()
         parameters[self.jumper.mode_columns] = self.jumper.modes_after(index, point)
         both = [self.sizes(at)[self._sticking] for at in (replace(point, parameters=parameters), point)]
-        return CROSSED * float(np.max(both))
+        return GUARD_EPS * float(np.max(both))
 
     def apply(self, index: int, point: Point, last: Point | None = None) -> Point | None:
         """Carry out an edge and book it; None where the run ends with it."""
         largest, drift = float(self.sizes(point)[self.first + index]), drift_of(self.rtol)
         balanced = BALANCED if self.system.edges[index].times else drift
-        slack = Slack(CROSSED * largest, drift * largest, balanced, self._borne(index, point), self.rtol)
+        slack = Slack(GUARD_EPS * largest, drift * largest, balanced, self._borne(index, point), self.rtol)
         step = self.step if self.step is not None and self.step.before.t == point.t else None
         before = self.jumps[-1].t if self.jumps else self.start
         begun, length, reached = self.flowed

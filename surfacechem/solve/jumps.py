@@ -33,7 +33,7 @@ from surfacechem.solve.radau.stepper import (
     RELEASED,
     WORK,
 )
-from surfacechem.tolerances import ATOM, DIGITS, ROUNDING
+from surfacechem.tolerances import FEW_EPS, GAP_EPS, RUN_EPS
 
 ADMISSIBLE, VIOLATES, IMPOSSIBLE = "admissible", "destroys entropy", "impossible"
 
@@ -347,7 +347,7 @@ class Jumper:
         if not self.system.pulls:
             return False
         old, new = self._far_field(before), self._far_field(point)
-        return not np.allclose(old[[1, 3]], new[[1, 3]], rtol=BALANCED, atol=ATOM)
+        return not np.allclose(old[[1, 3]], new[[1, 3]], rtol=BALANCED, atol=GAP_EPS)
 
     # -- a jump, step by step -------------------------------------------------------------------------------------
 
@@ -490,7 +490,7 @@ class Jumper:
         if step is None or edge.heat == "snap" or slip is None or not after.parameters[slip] or not path.varies:
             return None
         made = float(self._made(after.inputs()[None], release)[0, -1])
-        small = DIGITS * max(float(self._books(after.inputs())[-2]), abs(release.energy))
+        small = FEW_EPS * max(float(self._books(after.inputs())[-2]), abs(release.energy))
         if not made > small:
             return None
         broken = release.energy - release.level if edge.heat == "local" else 0.0
@@ -550,7 +550,7 @@ class Jumper:
         """Inputs with the heat made in their nodes, not a number where they cannot take it; energy released, heat and
         entropy passed to reservoirs. What does not count beside the ``energy`` before is not made.
         """
-        small = DIGITS * np.maximum(self._books(rows)[:, -2], np.abs(energy))
+        small = FEW_EPS * np.maximum(self._books(rows)[:, -2], np.abs(energy))
         made = np.where(np.abs(made) <= small[:, None], 0.0, made)
         released, warmed = made.sum(axis=1), rows.copy()
         heat, entropy = np.zeros(len(rows)), np.zeros(len(rows))
@@ -574,8 +574,8 @@ class Jumper:
             nudged[:, 1 + self.states.index(edge.measure)] += noise
         now, still, moved = self._books(np.concatenate([after, before, nudged])).reshape(3, len(before), -1)
         gain = now[:, 1] - books[:, 1] + entropy_out
-        small = ROUNDING * np.maximum(np.maximum(np.abs(books[:, 1]), np.abs(now[:, 1])), np.abs(entropy_out))
-        small += DIGITS * still[:, -1] + np.abs(moved[:, 1] - still[:, 1])
+        small = RUN_EPS * np.maximum(np.maximum(np.abs(books[:, 1]), np.abs(now[:, 1])), np.abs(entropy_out))
+        small += FEW_EPS * still[:, -1] + np.abs(moved[:, 1] - still[:, 1])
         if self._heat.nodes:
             small += np.abs(moved[:, 0] - still[:, 0]) / self._heat.at(before)[0].min(axis=1)
         return gain, gain >= -small, dict(zip(self.system.given, (now[:, 2:-2] - books[:, 2:-2]).T, strict=True))

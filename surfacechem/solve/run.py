@@ -29,7 +29,7 @@ from surfacechem.solve.hybrid import Flow, Hybrid, begun, carried, solve_togethe
 from surfacechem.solve.jumps import Jump, Jumper
 from surfacechem.solve.radau.solver import consistent, output_rates
 from surfacechem.solve.segments import Passing
-from surfacechem.tolerances import DEFAULT_RTOL, EPS, FINER, NONE_OF_SCALE, PICTURE
+from surfacechem.tolerances import ATOL_OF_SCALE, DEFAULT_RTOL, EPS, FINER_BY, LINE_ERROR
 
 GROUPS = {"energy supply": 0, "dissipation": 0, "heat": 0, "entropy supply": 1, "entropy production": 1, "bonds": 2}
 """Accounts whose quadratures are measured together."""
@@ -71,7 +71,7 @@ class Run:
     picture: float | None = None
     """Part of its range by which straight lines between outputs, which then follow the run, may miss a quantity; the
     outputs are ``times`` where this is None."""
-    looks: float = PICTURE
+    looks: float = LINE_ERROR
     """Part of its range to which states are known inside steps that are too long for a straight line, whatever the
     outputs are; 0 where the ends of steps and the outputs are all that is known."""
     steady: bool = False
@@ -437,12 +437,12 @@ class Model:
             segments=segments,
             parameters=parameters,
             rtol=run.rtol,
-            atol=self._scales * (run.atol if run.atol is not None else NONE_OF_SCALE * run.rtol),
+            atol=self._scales * (run.atol if run.atol is not None else ATOL_OF_SCALE * run.rtol),
             margins=self._guards,
             max_steps=run.max_steps,
             max_seconds=run.max_seconds,
             record_steps=True,
-            picture=(run.picture or run.looks) / FINER,
+            picture=(run.picture or run.looks) / FINER_BY,
             spacing=end / run.samples,
             in_play=system.in_play(parameters[0]),
         )

@@ -18,7 +18,7 @@ from surfacechem.compile.program import Function, compile_function, needed
 from surfacechem.expressions import Expression, derivative
 from surfacechem.model.system import TOLERANCE, System
 from surfacechem.solve.contract import Array
-from surfacechem.tolerances import CROSSED, DIGITS, NEGLIGIBLE
+from surfacechem.tolerances import FEW_EPS, GUARD_EPS, NEGLIGIBLE
 
 PARTS_OF_A_PERIOD, MOST_PARTS = 8.17, 20_000
 """Parts into which the period of a load is cut, so many that no cut falls on a reversal, and the number of them above
@@ -56,7 +56,7 @@ def nudge(system: System, parameters: Array) -> None:
     is rounded, at an impact for instance. Times that pieces count from stay.
     """
     loads = [j for j, p in enumerate(system.parameters) if p.path.startswith("loading.") and p.field != "origin"]
-    parameters[:, loads] *= 1 + DIGITS * (-1.0) ** np.arange(len(loads))
+    parameters[:, loads] *= 1 + FEW_EPS * (-1.0) ** np.arange(len(loads))
 
 
 def start_modes(system: System, parameters: Array, values: Mapping[str, float]) -> None:
@@ -128,8 +128,8 @@ class Passing:
         found = self._found(looked_at.tobytes(), table[:, self._columns].tobytes(), parts)
         beside = np.searchsorted(segments, found)
         gaps = np.minimum(found - segments[beside - 1], segments[beside] - found)
-        found = found[gaps > CROSSED * found]
-        apart = np.diff(found, prepend=0.0) > CROSSED * found
+        found = found[gaps > GUARD_EPS * found]
+        apart = np.diff(found, prepend=0.0) > GUARD_EPS * found
         found = found[apart]
         within = np.searchsorted(segments, found) - 1
         return np.insert(segments, within + 1, found), np.insert(table, within + 1, table[within], axis=0)

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from surfacechem.tolerances import DIGITS, TINY
+from surfacechem.tolerances import FEW_EPS, TINY
 
 
 def zero(value: Callable[[float], float], ends: tuple[float, float], at_ends: tuple[float, float]) -> float:
@@ -39,7 +39,7 @@ def zero(value: Callable[[float], float], ends: tuple[float, float], at_ends: tu
             c, at_c, b, at_b = b, at_b, a, at_a
         a, at_a = x, at_x
         best = b if abs(at_b) < abs(at_a) else a
-        closest = DIGITS * abs(best) + TINY
+        closest = FEW_EPS * abs(best) + TINY
         if at_x == 0.0 or abs(b - a) <= 2 * closest:
             return best
         xi, phi = (a - b) / (c - b), (at_a - at_b) / (at_c - at_b)

@@ -24,7 +24,7 @@ from surfacechem.solve.run import Trajectory
 # Choices: a busy scheduler takes turns of milliseconds; of brief runs over 50 ms some are undisturbed, and the least
 # time counts.
 # Runs briefer than this [s] are repeated within a round up to this time, at least and at most so often.
-BRIEF, LEAST_REPEATS, MOST_REPEATS = 0.05, 3, 20
+BRIEF_RUN, LEAST_REPEATS, MOST_REPEATS = 0.05, 3, 20
 
 # A solver at one value is not timed again once it has taken this long [s].
 BUDGET = 1.0
@@ -103,8 +103,8 @@ def filled(
 def _time_again(cell: Cell) -> None:
     """A round of a cell; one that ends otherwise, where the machine is too busy for its time limit, does not count."""
     spent: list[float] = []
-    most = MOST_REPEATS if min(cell.seconds) <= BRIEF else 1
-    while cell.again and len(spent) < most and (len(spent) < LEAST_REPEATS or sum(spent) <= BRIEF):
+    most = MOST_REPEATS if min(cell.seconds) <= BRIEF_RUN else 1
+    while cell.again and len(spent) < most and (len(spent) < LEAST_REPEATS or sum(spent) <= BRIEF_RUN):
         done = attempt(cell.again, lambda done: Cell(done.status if isinstance(done, Trajectory) else "failed", ""))
         if done.outcome != cell.outcome:
             return

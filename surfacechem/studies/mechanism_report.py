@@ -19,7 +19,7 @@ from surfacechem.runs.listing import WIDTH, source
 from surfacechem.runs.sheet import columns
 from surfacechem.solve.contract import Array
 from surfacechem.studies.mechanism_rates import Curves, cycle_verdict, cycles
-from surfacechem.tolerances import ROUNDING
+from surfacechem.tolerances import RUN_EPS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -126,7 +126,7 @@ def _species(curves: Curves, temperature: float) -> Iterator[tuple[str, ...]]:
 
 def _number(value: float, digits: int = 6) -> str:
     """A difference of numbers of up to a thousand [kJ/mol]; rounding is shown as zero."""
-    return f"{value:.{digits}g}" if abs(value) > 1e3 * ROUNDING else "0"
+    return f"{value:.{digits}g}" if abs(value) > 1e3 * RUN_EPS else "0"
 
 
 def verdict(curves: Curves, label: str, temperatures: Span, forces: Span) -> str:

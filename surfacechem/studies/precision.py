@@ -20,7 +20,7 @@ from surfacechem.runs.simulation import Simulation, load
 from surfacechem.runs.summaries import duration
 from surfacechem.solve import names as known_solvers
 from surfacechem.solve.run import Trajectory
-from surfacechem.studies.grid import BRIEF, BUDGET, Cell, attempt, check_options, filled
+from surfacechem.studies.grid import BRIEF_RUN, BUDGET, Cell, attempt, check_options, filled
 from surfacechem.studies.report import PageSection, PageTable, Study, Variable
 from surfacechem.studies.truth import KINDS, MEANING, TOLERANCES, Errors, Subject, Truth, establish, looked_at
 
@@ -48,8 +48,8 @@ reference and say no more than that. Energy is the largest
 energy residual of the run relative to the energy exchanged; it needs no reference.
 
 Times are of the run alone, with all output times, events and the ledger of the balances, after a first run that warms
-up. Rounds are interleaved over solvers and tolerances; runs below {BRIEF:g} s are repeated within a round, solves that
-have taken {BUDGET:g} s together are not timed again. The least time counts; median and longest show the spread.
+up. Rounds are interleaved over solvers and tolerances; runs below {BRIEF_RUN:g} s are repeated within a round, solves
+that have taken {BUDGET:g} s together are not timed again. The least time counts; median and longest show the spread.
 Compilation is apart.
 
 Libraries are called step by step from Python through the adapters of this package, which look for events within each

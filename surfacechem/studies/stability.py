@@ -36,7 +36,7 @@ from surfacechem.solve.run import OWN, Model, Run, Trajectory
 from surfacechem.studies.grid import Cell, attempt, check_options, filled
 from surfacechem.studies.regimes import Exact, Expectation, Refused, Regime, Stops, Trial, chosen
 from surfacechem.studies.report import PageSection, PageTable, Study, Variable
-from surfacechem.tolerances import EPS, FLOOR
+from surfacechem.tolerances import EPS, ERROR_FLOOR
 
 log = logging.getLogger(__name__)
 
@@ -305,7 +305,7 @@ def condition(problem: Trial, names: Collection[str]) -> float:
 
 def least(values: Array | float) -> float:
     """Size of an exact answer below which its errors are relative to this: a part of its largest value."""
-    return FLOOR * float(np.max(np.abs(values), initial=0.0))
+    return ERROR_FLOOR * float(np.max(np.abs(values), initial=0.0))
 
 
 def _slopes(answer: Callable[[Data], Answer], base: Answer, data: Data, name: str) -> Answer:

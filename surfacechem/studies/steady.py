@@ -23,7 +23,7 @@ from surfacechem.solve.adapters.evaluation import Evaluation
 from surfacechem.solve.contract import Array
 from surfacechem.solve.run import Model, Run
 from surfacechem.studies.mechanism_rates import null_space
-from surfacechem.tolerances import CBRT_EPS, EPS, NEGLIGIBLE, PICTURE, ROUNDING, SHALLOW, TINY
+from surfacechem.tolerances import CBRT_EPS, EPS, LINE_ERROR, LOOSE_RTOL, NEGLIGIBLE, RUN_EPS, TINY
 
 LONGER, ATTEMPTS = 10.0, 16
 """Factor by which the next attempt is longer where the steady state was not reached, and number of attempts."""
@@ -61,7 +61,7 @@ class SteadyState:
         control = [
             (label, equation, *(f"{self.control[name][label]:+.4f}" for name in names))
             for label, equation in self.equations.items()
-            if any(abs(self.control[name][label]) >= PICTURE / 10 for name in names)
+            if any(abs(self.control[name][label]) >= LINE_ERROR / 10 for name in names)
         ]
         tables: dict[str, Rows] = {
             "Coverages": [(name, f"{value:.6g}") for name, value in self.coverages.items()],
@@ -108,7 +108,7 @@ def steady(source: Source, of: Sequence[str] = (), overrides: Overrides = ()) ->
         rest.drop_small()
     rates, held = rest.outputs(rest.x), _held(system, rest.values)
     for (name, j), rate in zip(rest.wanted.items(), rates, strict=True):
-        if abs(rate) <= SHALLOW * rest.largest[j]:
+        if abs(rate) <= LOOSE_RTOL * rest.largest[j]:
             raise InputError(f"{name} is zero at rest, so nothing controls it. Ask for what goes on there.")
     changes = np.array([rest.response([f"multiplier.{label}"]) / rates for label in labels])
     barriers = GAS_CONSTANT * rest.values[held[0]] * rest.response(held) / rates if held else np.empty(0)
@@ -211,7 +211,7 @@ class _Rest:
     def drop_small(self) -> None:
         """Leave out what is not made."""
         sizes = np.abs(self.outputs(self.x))
-        kept = zip(self.wanted.items(), sizes > SHALLOW * sizes.max(), strict=True)
+        kept = zip(self.wanted.items(), sizes > LOOSE_RTOL * sizes.max(), strict=True)
         self.wanted = dict(item for item, made in kept if made)
 
     def response(self, paths: Sequence[str]) -> Array:
@@ -236,7 +236,7 @@ class _Rest:
             x = x + step
             if not np.all(np.isfinite(x)):
                 return None
-            if np.all(np.abs(step) <= ROUNDING * np.abs(x) + TRACE):
+            if np.all(np.abs(step) <= RUN_EPS * np.abs(x) + TRACE):
                 return x
         return None
 

@@ -27,7 +27,7 @@ from surfacechem.solve import ASKING, solver
 from surfacechem.solve.contract import Array
 from surfacechem.solve.run import Model, Trajectory
 from surfacechem.studies.grid import FAULTS
-from surfacechem.tolerances import EPS, SQRT_EPS, TIGHTEST
+from surfacechem.tolerances import EPS, MIN_RTOL, SQRT_EPS
 
 Values = Mapping[str, Array]
 
@@ -198,7 +198,7 @@ class Truth:
 def looked_at(subject: Subject) -> Subject:
     """The subject with outputs where a tight run is looked at; as it is where that comes to nothing."""
     try:
-        found = subject.tight(subject.methods()[0], TIGHTEST)
+        found = subject.tight(subject.methods()[0], MIN_RTOL)
     except InputError:
         return subject
     run, times = subject.case.run, fewer(found.looked).result.times
@@ -214,7 +214,7 @@ def establish(subject: Subject, variables: Sequence[str]) -> Truth:
     reference = subject.case.reference
     if reference is None:
         return numerical(subject, variables)
-    trajectory = subject.tight(subject.methods()[0], TIGHTEST)
+    trajectory = subject.tight(subject.methods()[0], MIN_RTOL)
     result = trajectory.result
     # A second evaluation at times one rounding earlier tells how far rounding moves the exact values.
     nudged = replace(trajectory, result=replace(result, times=result.times * (1 - EPS)))
@@ -264,7 +264,7 @@ def numerical(subject: Subject, variables: Sequence[str]) -> Truth:
         raise InputError(f"{name} has no reference: its methods come to different ends or events.")
     if not largest <= AGREE:
         raise InputError(f"{name} has no reference: the methods that agree best, {methods}, differ by {largest:.1e}.")
-    source = f"{methods}, extrapolated from rtol {TIGHTEST * DECADE:.0e} and {TIGHTEST:.0e}"
+    source = f"{methods}, extrapolated from rtol {MIN_RTOL * DECADE:.0e} and {MIN_RTOL:.0e}"
     apart = first.errors(second.values, second.events)
     return replace(first, source=source, uncertainty=apart.larger(first.uncertainty))
 
@@ -278,7 +278,7 @@ def _apart(a: Truth, b: Truth) -> float:
 
 def _extrapolated(subject: Subject, method: str, variables: Sequence[str]) -> Truth:
     """Values and times of events of one method; uncertain is how far the extrapolation went."""
-    loose, tight = (subject.tight(method, rtol) for rtol in (TIGHTEST * DECADE, TIGHTEST))
+    loose, tight = (subject.tight(method, rtol) for rtol in (MIN_RTOL * DECADE, MIN_RTOL))
     n = min(len(loose.result.times), len(tight.result.times))
     before, after = ({name: computed(run)[name][:n] for name in variables} for run in (loose, tight))
     events, last = event_times(loose), event_times(tight)

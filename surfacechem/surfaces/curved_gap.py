@@ -23,7 +23,7 @@ from surfacechem.surfaces.pairwise import ENDLESS_REACH, check_finite, length
 from surfacechem.surfaces.patches import Budget, Patches, Rules, integral, outer_patches
 from surfacechem.surfaces.projection import FIRST_ORDER, MOST_NEWTON_STEPS, Array, Projection, Surface, cross
 from surfacechem.surfaces.shapes import Plane
-from surfacechem.tolerances import NEGLIGIBLE, NOISE, PRECISE, SQRT_EPS, TINY
+from surfacechem.tolerances import FORMULA_EPS, NEGLIGIBLE, SQRT_EPS, SUM_RTOL, TINY
 
 GAP = "g_n"
 
@@ -130,12 +130,12 @@ def level_approaches(lower: Surface, upper: Surface, levels: Sequence[float]) ->
         for a, b in zip(below, np.roll(below, 1, axis=0), strict=True):
             for c, e in zip(moved, np.roll(moved, 1, axis=0), strict=True):
                 across = np.cross(b - a, e - c)
-                if abs(across[2]) > NOISE * np.linalg.norm(b - a) * np.linalg.norm(e - c):
+                if abs(across[2]) > FORMULA_EPS * np.linalg.norm(b - a) * np.linalg.norm(e - c):
                     d = (a - c) @ across / across[2]
                     s, t = (np.cross(c - a, way)[2] / across[2] for way in (b - a, e - c))
                     found += [float(d)] if 0 <= s <= 1 and 0 <= t <= 1 else []
     distinct = np.unique(found)
-    return list(map(float, distinct[np.diff(distinct, prepend=-np.inf) > NOISE * size]))
+    return list(map(float, distinct[np.diff(distinct, prepend=-np.inf) > FORMULA_EPS * size]))
 
 
 def _approach_at_level(lower: Surface, upper: Surface, level: float) -> float:
@@ -145,9 +145,9 @@ def _approach_at_level(lower: Surface, upper: Surface, level: float) -> float:
     size = length(lower, upper)
     d, before, step = level, math.nan, math.nan
     for _ in range(MOST_NEWTON_STEPS):
-        _, near = outer_patches(lower, replace(upper, approach=d), size, size * ENDLESS_REACH, Budget(PRECISE))
+        _, near = outer_patches(lower, replace(upper, approach=d), size, size * ENDLESS_REACH, Budget(SUM_RTOL))
         left = level - float(near.gap[0])
-        if abs(left) <= NOISE * size:
+        if abs(left) <= FORMULA_EPS * size:
             break
         # The secant; at first as if the gap grew as much as the approach, more than which it cannot.
         step = left * (step / (before - left) if before - left else 1.0) if math.isfinite(before) else left
@@ -163,7 +163,9 @@ def _corners(plate: Surface, far: float) -> Array:
 
 def _is_on_plate(plate: Surface, x: Array) -> NDArray[np.bool_]:
     """Whether each of the points (n, 3) in the plane of a plate is on it."""
-    return np.asarray(np.all(np.abs((x @ plate.axes)[:, :2]) <= np.max(plate.shape.span, axis=1) * (1 + NOISE), axis=1))
+    return np.asarray(
+        np.all(np.abs((x @ plate.axes)[:, :2]) <= np.max(plate.shape.span, axis=1) * (1 + FORMULA_EPS), axis=1)
+    )
 
 
 def over_gap(
@@ -172,7 +174,7 @@ def over_gap(
     laws: Sequence[Density],
     levels: Sequence[float] = (0.0,),
     heat: Sequence[Callable[[Array], Array]] = (),
-    rtol: float = PRECISE,
+    rtol: float = SUM_RTOL,
     floor: tuple[float, float] = (0.0, 0.0),
     budget: Budget | None = None,
 ) -> Contact:
@@ -184,7 +186,7 @@ def over_gap(
     check_finite(lower, upper)
     size, budget = length(lower, upper), budget or Budget(rtol)
     patches, near = outer_patches(lower, upper, size, size * ENDLESS_REACH, budget)
-    patches = with_levels(patches, upper, levels, NOISE * size, rtol)
+    patches = with_levels(patches, upper, levels, FORMULA_EPS * size, rtol)
 
     def integrand(x: Array, level: int) -> tuple[Array, int]:
         return integrands(x, upper.nearest(x), laws, heat), len(x)

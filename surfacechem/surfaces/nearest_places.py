@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from surfacechem.errors import InputError
 from surfacechem.surfaces.projection import FIRST_ORDER, MOST_NEWTON_STEPS, POLE, Array, Surface, descended, newton_step
 from surfacechem.surfaces.shapes import Indices
-from surfacechem.tolerances import CBRT_EPS, NOISE, SAME, SQRT_EPS
+from surfacechem.tolerances import CBRT_EPS, EQUAL, FORMULA_EPS, SQRT_EPS
 
 COARSE_STEPS, STEPS_PER_GRAIN = 32, 4
 """Steps along a surface between places that are looked at, at least, and per grain."""
@@ -49,7 +49,7 @@ class NearPlaces:
     @property
     def count(self) -> int:
         """Number of places that are as near as the nearest."""
-        return int(np.sum(self.gap <= self.gap[0] + SAME * abs(self.gap[0])))
+        return int(np.sum(self.gap <= self.gap[0] + EQUAL * abs(self.gap[0])))
 
 
 def near_places(
@@ -90,13 +90,13 @@ def near_places(
         return np.concatenate([inner.nearest(outer.derivatives(part, FIRST_ORDER)[0]).gap for part in parts])
 
     gaps = _near_grid(lambda nodes: gap(parameters(nodes)), steps, halvings, extents, wide)
-    chosen = _lowest(gaps, outer.shape.closed, NOISE * size)
+    chosen = _lowest(gaps, outer.shape.closed, FORMULA_EPS * size)
     chosen = chosen[gaps[tuple(chosen.T)] <= gaps.min() + wide]
     poles = (chosen[:, 0] == 0) & (outer.shape.about_axis and low[0] == 0 and not alike[1])
     if poles.any():
         # At a pole no direction leads anywhere: the search begins beside it, where the gap is least.
         chosen, poles = np.concatenate([chosen, [[1, int(np.argmin(gaps[1]))]]]), np.append(poles, False)
-    apart, noise = np.where(alike, 0.0, (high - low) / steps), NOISE * size
+    apart, noise = np.where(alike, 0.0, (high - low) / steps), FORMULA_EPS * size
     at, gaps = _refined(outer, inner, gap, parameters(chosen), apart, extents.max(), noise)
     # A pole that is not nearer than where this leads is no place of its own.
     kept = ~poles | (gaps < gaps[-1] - noise)
@@ -159,7 +159,7 @@ def _refined(
         found = inner.nearest(x)
         along = found.normal
         # Beyond an edge the gap grows along the line to it.
-        beyond = np.abs(np.einsum("nc,nc->n", x - found.point, along)) < np.abs(found.gap) * (1 - SAME)
+        beyond = np.abs(np.einsum("nc,nc->n", x - found.point, along)) < np.abs(found.gap) * (1 - EQUAL)
         along[beyond] = (x - found.point)[beyond] / found.gap[beyond, None]
         return np.einsum("nc,knc->nk", along, tangents), tangents
 
@@ -177,7 +177,7 @@ def _refined(
         hessian = long * uu, long * (uv + vu) / 2, long * vv
         return np.clip(newton_step(long * first, hessian, (E, F, G), at <= low, at >= high), -steps, steps)
 
-    found = descended(at, low, high, lambda at, _: gap(at), step, noise, SAME)
+    found = descended(at, low, high, lambda at, _: gap(at), step, noise, EQUAL)
     gaps = gap(found)
     nearest = np.array([np.argmin(gaps)])
     first, here = slope(found[nearest])[0], found[nearest]
@@ -199,7 +199,7 @@ def _nelder_mead(gap: Callable[[Array], Array], at: Array, steps: Array, bounds:
         return float(gap(at[None])[0])
 
     corners = at + np.diag(np.where(at + steps > bounds[1], -steps, steps))
-    options: Any = {"initial_simplex": [at, *corners], "xatol": SQRT_EPS * steps.max(), "fatol": SAME * steps.max()}
+    options: Any = {"initial_simplex": [at, *corners], "xatol": SQRT_EPS * steps.max(), "fatol": EQUAL * steps.max()}
     rest = minimize(value, list(at), method="Nelder-Mead", bounds=list(bounds.T), options=options)
     at, least = np.asarray(rest.x), float(rest.fun)
     around = _mesh([np.linspace(-1, 1, ZOOM_PLACES)] * 2)

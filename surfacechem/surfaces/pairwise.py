@@ -25,7 +25,7 @@ from surfacechem.surfaces.nodes import LAST_LEVEL, Extent, is_round
 from surfacechem.surfaces.patches import Budget, Patches, integral, outer_patches
 from surfacechem.surfaces.projection import FIRST_ORDER, Array, Surface, cross
 from surfacechem.surfaces.shapes import Plane
-from surfacechem.tolerances import ATOM, NEGLIGIBLE, NOISE, PRECISE, TINY, ULPS
+from surfacechem.tolerances import FORMULA_EPS, GAP_EPS, NEGLIGIBLE, SUM_RTOL, TINY, ULPS
 
 DECAY_DISTANCES = np.array([1e3, 2e3])
 """Distances over the size of the surfaces at which it is seen how a law falls off."""
@@ -64,7 +64,7 @@ class PairForces:
 
 
 def interaction(
-    lower: Surface, upper: Surface, laws: Sequence[PairEnergy], rtol: float = PRECISE, budget: Budget | None = None
+    lower: Surface, upper: Surface, laws: Sequence[PairEnergy], rtol: float = SUM_RTOL, budget: Budget | None = None
 ) -> PairForces:
     """The double integrals of some laws over two surfaces; InputError where an accuracy is out of reach, or takes more
     than a ``budget`` that is that of other integrals, too.
@@ -113,24 +113,24 @@ def _cut_patches(
     reach = max(_reach(outer, inner, extent, rtol) for extent in found)
     patches, near = outer_patches(outer, inner, size, reach, budget)
     gap = float(near.gap[0])
-    if not gap > NOISE * size:
+    if not gap > FORMULA_EPS * size:
         text = f"the surfaces overlap or touch, their gap is {gap:.3g} m; a law of pairs of points holds outside only"
-        if gap > ATOM:
+        if gap > GAP_EPS:
             text = f"a gap of {gap:.3g} m is lost in the rounding of bodies of {size:.3g} m; give smaller ones"
         raise InputError(f"{text}.")
     levels = sorted({level for extent in found for level in extent.levels(inner.shape)})
-    return (with_levels(patches, inner, levels, NOISE * size, rtol) if levels else patches), near
+    return (with_levels(patches, inner, levels, FORMULA_EPS * size, rtol) if levels else patches), near
 
 
 def _rounding(x: Array, gap: float, found: Sequence[Extent], rtol: float) -> float:
     """Relative error from rounding of coordinates x at a gap; InputError where an accuracy is out of reach by it."""
-    least = NOISE + ULPS * float(np.linalg.norm(x)) / gap
+    least = FORMULA_EPS + ULPS * float(np.linalg.norm(x)) / gap
     if least > rtol / 2:
         text = f"the accuracy {rtol:.2g} of an integral over the surfaces is out of reach"
         raise InputError(f"{text}: rounding leaves {least:.2g}.")
     # Next to the end of a law there is next to nothing, which the distance to that end tells.
     left = min((extent.cutoff - gap for extent in found if extent.cutoff > gap), default=math.inf)
-    return least + NOISE * gap / left
+    return least + FORMULA_EPS * gap / left
 
 
 def pair_traction(
@@ -173,7 +173,7 @@ def check_finite(lower: Surface, upper: Surface) -> None:
     shapes = [surface.shape for surface in (lower, upper)]
     endless = [[not shape.about_axis and not np.all(np.isfinite(ends)) for ends in shape.span] for shape in shapes]
     # What has no end in both directions shares one with anything that has none in one.
-    parallel = all(endless[0]) or all(endless[1]) or abs(math.sin(shapes[0].turn - shapes[1].turn)) < NOISE
+    parallel = all(endless[0]) or all(endless[1]) or abs(math.sin(shapes[0].turn - shapes[1].turn)) < FORMULA_EPS
     if any(endless[0]) and any(endless[1]) and parallel:
         raise InputError("both surfaces are endless: give one of them a length, so that the force is finite.")
 

@@ -28,7 +28,7 @@ from surfacechem.surfaces.inner_sums import kernel, laws_by_extent
 from surfacechem.surfaces.pairwise import PairForces, interaction, length, pair_traction, slices_of
 from surfacechem.surfaces.patches import Budget, OutOfReachError
 from surfacechem.surfaces.projection import Array, Surface
-from surfacechem.tolerances import ATOM, FLOOR, NEGLIGIBLE, NOISE, ROUNDING, SQRT_EPS
+from surfacechem.tolerances import ERROR_FLOOR, FORMULA_EPS, GAP_EPS, NEGLIGIBLE, RUN_EPS, SQRT_EPS
 
 INTEGRATED_CURVES: dict[Fingerprint, tuple[ApproachEnergy, ...]] = {}
 """Curves that have been integrated, by the fingerprint of their laws and surfaces."""
@@ -69,7 +69,7 @@ def first_jump(law: Callable[[Array], Array], places: Array) -> float | None:
     low, high = law(a)[:, 0], law(b)[:, 0]
     sizes = np.maximum(np.abs(low), np.abs(high))
     # Far out a law may be the rounding of what it is a difference of.
-    least = np.maximum(NEGLIGIBLE * sizes, NOISE * sizes.max())
+    least = np.maximum(NEGLIGIBLE * sizes, FORMULA_EPS * sizes.max())
     while np.any(b - a > SQRT_EPS * (np.abs(a) + np.abs(b))):
         middle = (a + b) / 2
         between = law(middle)[:, 0]
@@ -77,7 +77,7 @@ def first_jump(law: Callable[[Array], Array], places: Array) -> float | None:
         a, low = np.where(lower, a, middle), np.where(lower, low, between)
         b, high = np.where(lower, middle, b), np.where(lower, between, high)
         # A change that is left of next to nothing is one at a place.
-        if np.all(b - a <= ATOM):
+        if np.all(b - a <= GAP_EPS):
             break
     jumps = np.abs(high - low) > least
     return float(a[jumps][0]) if jumps.any() else None
@@ -192,7 +192,7 @@ class CurvedSurfaces(Potential):
                 heat = [density(law) for law in self.heat_laws]
                 over_gap(*self.surfaces(self.approach[0]), [], bends(self.heat_laws), heat, NEGLIGIBLE)
         # Errors of the samples must not look like what a polynomial misses.
-        rtol, finer = self.accuracy, max(self.accuracy / 64, ROUNDING)
+        rtol, finer = self.accuracy, max(self.accuracy / 64, RUN_EPS)
 
         met: dict[float, PairForces] = {}
         budget = Budget(rtol)
@@ -319,7 +319,7 @@ class CurvedSurfaces(Potential):
 
         if not self.pairs or math.isfinite(self.shapes[1].grain):
             return local(pairs=True), False
-        budget, summed, rtol = Budget(self.accuracy), [], max(self.accuracy, FLOOR)
+        budget, summed, rtol = Budget(self.accuracy), [], max(self.accuracy, ERROR_FLOOR)
         budget.integrals = len(own) * len(slices_of(len(x), upper))
         try:
             for k, (one, d) in enumerate(zip(own, approaches.tolist(), strict=True)):
@@ -386,7 +386,7 @@ class CurvedConductance(HeatTransfer):
         budget = Budget(pair.accuracy)
 
         def sample(d: float) -> tuple[float, float, float]:
-            finer = max(pair.accuracy / 64, ROUNDING)
+            finer = max(pair.accuracy / 64, RUN_EPS)
             with pair.at_approach(d):
                 found = over_gap(*pair.surfaces(d), [], levels, [law], finer, budget=budget)
             return found.conductance, found.conductance_slope, found.error

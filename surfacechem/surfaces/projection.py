@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from surfacechem.contracts.terms import Shape
 from surfacechem.errors import InputError
 from surfacechem.surfaces.shapes import Indices, Sphere
-from surfacechem.tolerances import DIGITS, GONE, SAME, TINY, ULPS
+from surfacechem.tolerances import CLOSED_GUARD, EQUAL, FEW_EPS, TINY, ULPS
 
 Array = NDArray[np.float64]
 
@@ -34,7 +34,7 @@ MOST_HALVINGS = 16
 SEARCH_COST = 500
 """Pairs of points that take as long as a projection without a closed form."""
 
-POLE = GONE
+POLE = CLOSED_GUARD
 """Parameter at the pole of a surface of revolution, where directions along it have no length."""
 
 FIRST_ORDER, SECOND_ORDER, THIRD_ORDER = 3, 6, 10
@@ -93,13 +93,13 @@ class Projection:
         if shape.about_axis:
             # For a point on the axis all around is alike.
             own, around = (x - [0.0, 0.0, self.surface.approach]) @ self.surface.axes, np.linalg.norm(D[2], axis=-1)
-            found |= (np.hypot(own[..., 0], own[..., 1]) < SAME * around) & (around > SAME * size)
+            found |= (np.hypot(own[..., 0], own[..., 1]) < EQUAL * around) & (around > EQUAL * size)
         if self.rivals is not None:
             which, places = self.rivals
             rival, size = self.surface.derivatives(places, FIRST_ORDER)[0], size.reshape(-1)[which]
             x, nearest = (points.reshape(-1, 3)[which] for points in (x, self.point))
-            near = np.linalg.norm(x - rival, axis=-1) <= size * (1 + SAME)
-            near &= np.linalg.norm(rival - nearest, axis=-1) > np.sqrt(SAME) * size
+            near = np.linalg.norm(x - rival, axis=-1) <= size * (1 + EQUAL)
+            near &= np.linalg.norm(rival - nearest, axis=-1) > np.sqrt(EQUAL) * size
             found.reshape(-1)[which[near]] = True
         return found
 
@@ -309,7 +309,7 @@ class Surface:
         slopes = np.stack([_dot(away, D[k]) for k in (1, 2)], axis=-1)
         sizes = np.linalg.norm(away, axis=-1)[..., None] * np.moveaxis(np.linalg.norm(D[1:3], axis=-1), 0, -1)
         # Beyond an edge, and at a tip, a point stays there.
-        held = ((at <= low) & (slopes < -SAME * sizes)) | ((at >= high) & (slopes > SAME * sizes))
+        held = ((at <= low) & (slopes < -EQUAL * sizes)) | ((at >= high) & (slopes > EQUAL * sizes))
         held &= ~np.array(self.shape.closed)
         if self.shape.about_axis:
             # Around a tip there is no way.
@@ -342,7 +342,7 @@ def _degenerate(D: Array, away: Array) -> NDArray[np.bool_]:
     # Eigenvalues of the second in terms of the first, 1 - distance * curvature, vanish there.
     area = E * G - F**2
     ratio, trace = (a * c - b**2) / area, (E * c + G * a - 2 * F * b) / area
-    return np.asarray((ratio <= SAME) & (np.abs(ratio) <= SAME * np.maximum(np.abs(trace), 1)))
+    return np.asarray((ratio <= EQUAL) & (np.abs(ratio) <= EQUAL * np.maximum(np.abs(trace), 1)))
 
 
 def _forms(D: Array, away: Array) -> tuple[tuple[Array, Array, Array], tuple[Array, Array, Array]]:
@@ -369,7 +369,7 @@ def descended(
         here = found[which]
         now, move, length = value(here, which), step(here, which), np.ones(len(which))
         # Close to the end values agree to rounding, while steps still get shorter.
-        most = now + np.maximum(noise, DIGITS * np.abs(now))
+        most = now + np.maximum(noise, FEW_EPS * np.abs(now))
         tried = np.clip(here + move, low, high)
         after = value(tried, which)
         for _ in range(MOST_HALVINGS):
@@ -404,7 +404,7 @@ def newton_step(
         np.where(held.any(axis=-1), 0.0, hessian[1]),
         np.where(held[..., 1], G, hessian[2]),
     )
-    convex = (a * c - b**2 > SAME * (E * G - F**2)) & (a > 0)
+    convex = (a * c - b**2 > EQUAL * (E * G - F**2)) & (a > 0)
     a, b, c = (np.where(convex, mine, usual) for mine, usual in ((a, E), (b, F), (c, G)))
     det = np.maximum(a * c - b**2, TINY)
     raised = np.stack([b * slope[..., 1] - c * slope[..., 0], b * slope[..., 0] - a * slope[..., 1]], axis=-1)

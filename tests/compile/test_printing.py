@@ -17,7 +17,7 @@ from surfacechem.compile import printing
 from surfacechem.expressions import magnitude
 from surfacechem.model.assemble import assemble
 from surfacechem.solve.run import Model
-from surfacechem.tolerances import NOISE
+from surfacechem.tolerances import FORMULA_EPS
 
 pytestmark = pytest.mark.around
 
@@ -75,8 +75,8 @@ def test_printed_equations_agree_with_machine_code_and_are_short_enough_to_read(
             if name == "margins":  # what is not in play is printed as open
                 exact = np.where(system.in_play(parameters), exact, 1.0)
             error = np.abs(np.array(getattr(module, name)(t, y, ydot, parameters)) - exact)
-            for i in np.flatnonzero(~(error <= NOISE * np.abs(exact))):
-                assert error[i] <= NOISE * float(magnitude(expressions[i]).subs(point).n(53, real=True)), name
+            for i in np.flatnonzero(~(error <= FORMULA_EPS * np.abs(exact))):
+                assert error[i] <= FORMULA_EPS * float(magnitude(expressions[i]).subs(point).n(53, real=True)), name
         exact = np.concatenate(model.program.derivatives(inputs), axis=1)
         found = np.concatenate(module.jacobian(t, y, ydot, parameters), axis=1)
         assert np.all(np.abs(found - exact) <= 1e-12 * np.max(np.abs(exact), axis=1, keepdims=True))

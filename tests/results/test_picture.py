@@ -9,7 +9,7 @@ from case_runs import load, solved
 import surfacechem
 from surfacechem.results.event_table import events_of
 from surfacechem.results.picture import needed_rows
-from surfacechem.tolerances import PICTURE
+from surfacechem.tolerances import LINE_ERROR
 
 FOLLOWED = ("stick-slip", "press-hold-pull", "dna-adhesive", "debonding")
 """With many jumps, with stages, with two time scales, with one jump."""
@@ -48,7 +48,7 @@ def test_lines_between_outputs_show_the_run(name):
             later = dense.time.values[smooth] >= data.time.values[begun]
             at, known_at = dense.time.values[smooth][later], data.time.values[begun:]
             missed = np.interp(over(at), over(known_at), known[begun:]) - found[later]
-            assert np.abs(missed).max() <= PICTURE * np.ptp(known), shown
+            assert np.abs(missed).max() <= LINE_ERROR * np.ptp(known), shown
 
 
 def test_both_sides_of_every_event_and_the_extremes_of_the_steps_are_outputs():
@@ -95,7 +95,7 @@ def test_what_bends_where_no_state_does_is_shown():
     dense = case.run(run=replace(case.case.run, times=tuple(times), picture=None), error="balances")["q_12_gas"]
     shown = solution["q_12_gas"]
     missed = np.interp(times, shown.time, shown) - dense.values
-    assert np.abs(missed).max() < 2 * PICTURE * np.ptp(dense.values)
+    assert np.abs(missed).max() < 2 * LINE_ERROR * np.ptp(dense.values)
 
 
 def test_the_potential_of_hardly_any_sites_which_is_their_error_needs_no_outputs():

@@ -25,7 +25,7 @@ from surfacechem.model.constraints.envelope import softening
 from surfacechem.model.constraints.unilateral import TOUCHING
 from surfacechem.model.system import Account, Capped, Caution, Margin, Pair
 from surfacechem.quantities import Quantity
-from surfacechem.tolerances import MOMENT
+from surfacechem.tolerances import TIME_EPS
 
 NEIGHBOURS = "H_neighbours"
 """Account of the enthalpy that reactions take from neighbours."""
@@ -214,7 +214,7 @@ def _resolved(build: Build, laws: Mapping[str, RateLaw], rates: Mapping[str, Exp
         return rate
     others = (absolute(_relaxation(build, own, laws[other], rates[other])) for other in laws if other != label)
     quantity = Quantity(f"steps_{label}", "1", f"relaxations of {law.title} within what time resolves")
-    steps = build.name(quantity, relaxation * (build.t * MOMENT / MARGIN), output=False)
+    steps = build.name(quantity, relaxation * (build.t * TIME_EPS / MARGIN), output=False)
     allowed = 1 + sum(others) * (build.t / MARGIN)
     return rate * where(steps > allowed, allowed / steps, 1)
 

@@ -23,7 +23,7 @@ from surfacechem.expressions import Expression, depends, derivative, positive, w
 from surfacechem.model.build import Build
 from surfacechem.model.system import Margin
 from surfacechem.quantities import VARIABLES, Quantity
-from surfacechem.tolerances import FEWEST, INSTANT, MOMENT, NOTHING
+from surfacechem.tolerances import LEAST_BONDED, NO_AMOUNT, TIME_EPS, ZERO_TIME
 
 SHARED = "load shared by all bonds"
 ELASTIC = "bond elasticity"
@@ -49,7 +49,7 @@ def _shared(build: Build) -> Expression:
     """Define the force per bond: the tension over the bonds that carry it; a margin ends a step as its sign changes."""
     t_n, n_c, phi = (build.variables.get(x, "the force per bond", "interface") for x in ("t_n", "n_c", "phi"))
     build.add(Margin("t_n", t_n, "the load on the bonds changes its sign", terminal=False))
-    carrying = where(phi > FEWEST, phi, FEWEST)
+    carrying = where(phi > LEAST_BONDED, phi, LEAST_BONDED)
     return build.name(VARIABLES["f"], positive(t_n) / (n_c * carrying))
 
 
@@ -63,9 +63,9 @@ def laws(build: Build) -> Iterator[Margin]:
         loss = symengine.Add(*losses)
         if loss != 0:
             # Bonds that would be gone within what the clock resolves of the time that has passed have ruptured.
-            left = bonds - MOMENT * (build.t + INSTANT) * loss + NOTHING
+            left = bonds - TIME_EPS * (build.t + ZERO_TIME) * loss + NO_AMOUNT
             # What is left of hardly any bonds cannot be told from rounding.
-            left = where(bonds > FEWEST, left, NOTHING)
+            left = where(bonds > LEAST_BONDED, left, NO_AMOUNT)
             which = f"the bonds {name}" if len(carriers) > 1 else "the bonds"
             yield Margin(f"{name} left", left, f"{which} ruptured", remedy=OVERLOAD, path="interface")
 

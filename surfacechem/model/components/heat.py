@@ -23,7 +23,7 @@ from surfacechem.model.build import BOTH, Build, Record
 from surfacechem.model.parts import HeatPath
 from surfacechem.model.system import Margin
 from surfacechem.quantities import Quantity
-from surfacechem.tolerances import NOTHING
+from surfacechem.tolerances import NO_AMOUNT
 
 
 def laws(build: Build) -> Iterator[Record]:
@@ -44,7 +44,7 @@ def laws(build: Build) -> Iterator[Record]:
     yield from _external(build)
     if build.interface.temperature is None and build.interface.loss:
         reason = "the fractions of the interface's heat add up to more than 1"
-        yield Margin("partition <= 1", build.shares()[build.scene.bodies[1].name] + NOTHING, reason)
+        yield Margin("partition <= 1", build.shares()[build.scene.bodies[1].name] + NO_AMOUNT, reason)
 
 
 def _external(build: Build) -> Iterator[Power]:

@@ -25,7 +25,7 @@ from surfacechem.model.sliding.formulation import arrangement, displacement, in_
 from surfacechem.model.system import Margin, Named, State
 from surfacechem.quantities import VARIABLES, Quantity
 from surfacechem.scene import BondingVariable, Sites
-from surfacechem.tolerances import NOTHING, SLACK
+from surfacechem.tolerances import BOUND_SLACK, NO_AMOUNT
 
 LOGARITHM = "ln_phi"
 
@@ -109,7 +109,7 @@ def _bonded_part(build: Build) -> Expression:
 def _prescribed(build: Build, name: str, load: Load) -> Expression:
     symbol = build.prescribe(VARIABLES[name], load)
     if name == "J_c":
-        build.add(Margin("J_c > 0", symbol - NOTHING, "the area stretch J_c reached zero"))
+        build.add(Margin("J_c > 0", symbol - NO_AMOUNT, "the area stretch J_c reached zero"))
     if name == "phi":
         _bounds(build, "phi", symbol, build.interface.sites.phi_max if build.interface.sites else 1.0)
     return symbol
@@ -172,7 +172,7 @@ def _initial_bonding(build: Build, name: str) -> float:
 def _bounds(build: Build, name: str, symbol: Any, limit: float) -> None:
     if not build.variables.has("slack"):
         spec = Spec("1", "how far rounding may carry a bonding variable beyond its bounds")
-        number = partial(build.constant, "slack", "run.slack", spec, SLACK, internal=True)
+        number = partial(build.constant, "slack", "run.slack", spec, BOUND_SLACK, internal=True)
         build.variables.define("slack", number, "internal", "run")
     slack = build.variables.get("slack", "the bounds")
     spec = Spec("1", f"upper bound of {name}")

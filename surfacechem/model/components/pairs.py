@@ -36,7 +36,7 @@ from surfacechem.model.components.force import SHARED
 from surfacechem.model.components.mounting import driven
 from surfacechem.model.system import Pair
 from surfacechem.quantities import BOLTZMANN, Quantity
-from surfacechem.tolerances import LARGEST_COVERAGE, LEAST_COVERAGE, ROUNDING
+from surfacechem.tolerances import LARGEST_COVERAGE, LEAST_COVERAGE, RUN_EPS
 
 Array = NDArray[np.float64]
 
@@ -180,7 +180,7 @@ def lengths(laws: Mapping[str, RateLaw], pairs: Sequence[Opposed]) -> dict[str, 
     both_ways = [law.stoichiometry() for law in laws.values() if law.balanced and not by_affinity(law)]
     changes = _matrix(names, [change for change, _ in known])
     return {
-        name: sum(float(c) * x for c, (_, x) in zip(row, known, strict=True) if abs(c) > ROUNDING)
+        name: sum(float(c) * x for c, (_, x) in zip(row, known, strict=True) if abs(c) > RUN_EPS)
         for name, row in zip(names, _inverse(changes, _matrix(names, both_ways)), strict=True)
     }
 
@@ -195,7 +195,7 @@ def _inverse(changes: Array, kept: Array) -> Array:
     if not np.any(kept):
         return np.asarray(np.linalg.pinv(changes))
     _, sizes, rows = np.linalg.svd(kept)
-    basis = rows[int(np.sum(sizes > ROUNDING)) :].T
+    basis = rows[int(np.sum(sizes > RUN_EPS)) :].T
     left = changes @ basis
-    left[np.abs(left) < ROUNDING] = 0.0
+    left[np.abs(left) < RUN_EPS] = 0.0
     return np.asarray(basis @ np.linalg.pinv(left)) if basis.size else np.zeros(changes.T.shape)

@@ -18,7 +18,7 @@ from surfacechem.model.constraints.fold import determinant
 from surfacechem.model.parts import Thermal
 from surfacechem.model.system import STABLE, Margin, State
 from surfacechem.quantities import VARIABLES, Quantity
-from surfacechem.tolerances import NOTHING
+from surfacechem.tolerances import NO_AMOUNT
 
 _NEWTON = 20
 """Steps to a temperature from an energy that is close to quadratic."""
@@ -100,7 +100,7 @@ def rows(build: Build) -> Iterator[Power | State | Margin]:
     centre = thermal.members.get(INTERFACE, "")
     build.rows.energies(own_rows, centre if centre in own_rows else next(iter(own_rows), ""))
     for node in (*thermal.free, *thermal.prescribed):
-        yield Margin(f"{node.name} > 0", node.T - NOTHING, f"the temperature {node.name} reached zero")
+        yield Margin(f"{node.name} > 0", node.T - NO_AMOUNT, f"the temperature {node.name} reached zero")
         if node.prescribed:
             if node.energies:
                 build.rate_of(node.name)  # refuses a jump, whose heat would be unknown

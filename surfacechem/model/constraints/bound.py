@@ -24,15 +24,15 @@ from surfacechem.model.automaton import Constraint, Edge, Mode
 from surfacechem.model.build import Build
 from surfacechem.model.components.interface import LOGARITHM
 from surfacechem.quantities import Quantity
-from surfacechem.tolerances import EPS, INSIDE
+from surfacechem.tolerances import BOUND_EPS, EPS
 
 SINGULAR = type(symengine.zoo), type(symengine.nan), type(symengine.oo)
 
 PHI, LIMIT = symengine.symbols("phi phi_max")
 HELD_AT = {-1.0: "held at zero", 0.0: "between its bounds", 1.0: "held at its upper bound"}
 BOUNDS = (
-    (-1, symengine.Integer(0), INSIDE * LIMIT, "unbonded", "no bond is left", "rebond", "bonds form again"),
-    (1, LIMIT, (1 - INSIDE) * LIMIT, "complete", "bonding is complete", "loosen", "bonds begin to break"),
+    (-1, symengine.Integer(0), BOUND_EPS * LIMIT, "unbonded", "no bond is left", "rebond", "bonds form again"),
+    (1, LIMIT, (1 - BOUND_EPS) * LIMIT, "complete", "bonding is complete", "loosen", "bonds begin to break"),
 )
 """Side and value of each bound, the value next to it, names and reasons of the edges to the bound and away from it."""
 
@@ -84,7 +84,7 @@ def _is_singular(whole: Expression, phi: Expression, numbers: Mapping[Any, float
             return True
         if any(x.free_symbols for x in both):
             return False
-        # One rounding: next to a bound, at INSIDE, it is more.
+        # One rounding: next to a bound, at BOUND_EPS, it is more.
         return any(x.atoms(*SINGULAR) for x in both) or abs(float(both[0])) <= 0.5 * EPS * float(both[1])
 
     arguments = (logarithm.args[0].subs({PHI: phi}) for logarithm in whole.atoms(symengine.log))

@@ -26,9 +26,9 @@ from surfacechem.model.build import Build
 from surfacechem.model.components.mounting import far_field, held
 from surfacechem.model.system import Margin
 from surfacechem.quantities import VARIABLES
-from surfacechem.tolerances import NOTHING
+from surfacechem.tolerances import NO_AMOUNT
 
-MATCH = 1e3 * NOTHING
+MATCH = 1e3 * NO_AMOUNT
 """Relative difference of two statements of a strength that rounded input explains: both have six digits."""
 
 WORDS = {-1.0: "is open beyond the reach of bonds", 0.0: "keeps its bonds", 1.0: "loses bonds"}
@@ -51,11 +51,11 @@ def _check(build: Build, law: RateLaw, phi: Expression, g_n: Expression, peak: E
     start, end, strength = build.at_start(peak), build.at_start(g_f), build.at_start(t_max)
     what = f"{law.name()}: t_max / E_b = {start:g} m, where complete bonding begins to break,"
     # Both ends of the fall have to be told apart, and from none.
-    if not start < (1 - NOTHING) * end:
+    if not start < (1 - NO_AMOUNT) * end:
         message = f"is not below g_f = {end:g} m: the traction would have to snap back. Raise g_f, or use a limit."
         raise InputError(f"{what} {message}", law.place)
-    if start < NOTHING * end:
-        raise InputError(f"{what} is less than {NOTHING:g} g_f, too little to be resolved. Lower E_b.", law.place)
+    if start < NO_AMOUNT * end:
+        raise InputError(f"{what} is less than {NO_AMOUNT:g} g_f, too little to be resolved. Lower E_b.", law.place)
     t_n = derivative(build.psi, symengine.Symbol("g_n")).xreplace({g_n: peak, symengine.Symbol("side"): 1})
     bonds = t_n.subs({phi: 1}) - t_n.subs({phi: 0})
     if bonds.has(symengine.zoo):
@@ -93,7 +93,7 @@ def softening(
     breaks = {MODE: ONE} if bound is None else {MODE: ONE, bound: NONE}
     # Where there are no bonds, and none form, none break.
     present = where(phi > 0, left - phi, where(forming * free > 0, left - phi, 1))
-    beyond = where(phi > 0, left - phi + NOTHING, 1)
+    beyond = where(phi > 0, left - phi + NO_AMOUNT, 1)
     keeps, loses, parted = {MODE: (0,)}, {MODE: (1,)}, {MODE: (-1,)}
     remains = where(left < phi, where(left > 0, left, 0), phi)
     if "g_n" in build.motion.gap_rates and not build.variables.has("v_n"):

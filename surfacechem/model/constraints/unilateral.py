@@ -28,17 +28,17 @@ from surfacechem.model.build import Build
 from surfacechem.model.components.mounting import FarField, far_field, held, law_reads
 from surfacechem.model.constraints.set_valued import PRESSURES, friction_impulse
 from surfacechem.model.system import TOLERANCE, Margin
-from surfacechem.tolerances import PICOMETRE, SOLVED
+from surfacechem.tolerances import NEWTON_EPS, PICOMETRE
 
 G, V = symengine.symbols("g_n v_n")
 LANDED = Register("landed", "whether the bodies have met and do not rebound")
 FASTEST = Register("fastest", "speed of the fastest impact [m/s]")
 
-NOTHING, SLOWEST = 0.1, 10 * PICOMETRE
+NO_SPEED, LEAST_SPEED = 0.1, 10 * PICOMETRE
 """Part of the fastest impact, or of the time so far, that counts as none, in units of the relative tolerance; and the
 speed [m/s] that the fastest impact has at least there."""
 
-BRIEF = 8 * SOLVED
+SHORTEST_REBOUND = 8 * NEWTON_EPS
 """Part of the time so far that one rebound must take to be told from none: a few hundred ticks of the clock, so that
 its event is found to a per cent of it."""
 
@@ -134,10 +134,10 @@ def _rests(
     tolerance = build.constant("tolerance", TOLERANCE, Spec("1", "relative tolerance of the run"), 0.0, internal=True)
     swift = where(speed > FASTEST.symbol, speed, FASTEST.symbol)
     rebound = far.e * speed
-    nothing = NOTHING * tolerance
+    nothing = NO_SPEED * tolerance
     # This flight takes 2 rebound / pressing, and all that follow together 1 / (1 - e) times as long.
-    brief = pressing * build.t * ((1 - far.e) * nothing + BRIEF)
-    slow = where(rebound < nothing * (swift + SLOWEST), 1, where(2 * rebound < brief, 1, 0))
+    brief = pressing * build.t * ((1 - far.e) * nothing + SHORTEST_REBOUND)
+    slow = where(rebound < nothing * (swift + LEAST_SPEED), 1, where(2 * rebound < brief, 1, 0))
     at_once = build.constant("rests_at", RESTS, Spec("s", "time at which rebounds rest"), -1.0, internal=True)
     return where(build.t > at_once, slow, 1), {FASTEST.symbol: swift}
 

@@ -31,7 +31,7 @@ from surfacechem.model.components.mounting import (
 from surfacechem.model.constraints.set_valued import SLIP
 from surfacechem.model.system import Caution, Given, State
 from surfacechem.quantities import VARIABLES, Quantity
-from surfacechem.tolerances import CREEP
+from surfacechem.tolerances import LEAST_CREEP
 
 REST = {"v": NONE, "v_2": NONE, "direction": ONE, "direction_2": ONE}
 
@@ -191,7 +191,7 @@ def evolve(
 ) -> Expression:
     """A new state of the motion, and the variable of its name where something says what it is determined by."""
     initial = build.scene.initial.get(name, 0.0) if start is None else start
-    finest = CREEP if name == "v" and any(law.internal for law in build.interface.frictions) else None
+    finest = LEAST_CREEP if name == "v" and any(law.internal for law in build.interface.frictions) else None
     state = State(VARIABLES[name], initial, scale, algebraic, finest=finest, given=given)
     build.add(state)
     if by:

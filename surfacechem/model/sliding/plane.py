@@ -36,13 +36,13 @@ from surfacechem.model.constraints.set_valued import SLIP, breaks_bonds, set_val
 from surfacechem.model.sliding.formulation import PLACE, Formulation, evolve, growth, name_traction
 from surfacechem.model.system import STABLE, Given, Margin
 from surfacechem.quantities import VARIABLES
-from surfacechem.tolerances import MOMENT, PICOMETRE, ROUNDING, SQRT_EPS, STILL, TINY
+from surfacechem.tolerances import PICOMETRE, RUN_EPS, SQRT_EPS, TIME_EPS, TINY, TRACTION_EPS
 
 SPEED, TURNED = symengine.symbols("speed turn")
 BEGAN = symengine.symbols("began began_2")
 WORDS = {0.0: "sticks", 1.0: "slides"}
 
-SLOWEST = PICOMETRE / 1e6
+LEAST_SPEED = PICOMETRE / 1e6
 """Speed [m/s] below which the turn is never resolved, a picometre in twelve days: it keeps the row regular at t = 0."""
 
 SWIFT, RADIAN = 0.1, 1e6
@@ -166,10 +166,10 @@ def _inertial(build: Build, sides: Sequence[Side], largest: Expression) -> Expre
     (x, y), (c, s) = (side.driving for side in sides), _unit_vector()
     along, across = c * x + s * y, c * y - s * x
     # The speed that friction takes away within the rounding of time counts as the least one.
-    least = MOMENT * largest / m * build.t + SLOWEST
+    least = TIME_EPS * largest / m * build.t + LEAST_SPEED
     build.rows.momentum("speed", along, m, SLIP)
     build.rows.switched("turn", SLIP, sqrt(SPEED**2 + least**2) * turn - across / m, turn)
-    return SPEED + STILL / MOMENT * least
+    return SPEED + TRACTION_EPS / TIME_EPS * least
 
 
 def _steady(build: Build, sides: Sequence[Side], largest: Expression) -> tuple[Expression, Expression]:
@@ -188,7 +188,7 @@ def _steady(build: Build, sides: Sequence[Side], largest: Expression) -> tuple[E
     ahead, aside = _turned(pull)
     along, across = ahead - (a + (b - a) * n_y**2), aside - (b - a) * n_x * n_y
     # What rounding leaves of the balance in which sliding begins must not stop it.
-    still = along.subs({SPEED: 0}) + STILL * largest
+    still = along.subs({SPEED: 0}) + TRACTION_EPS * largest
     if a != b:
         rubs = sum((part.subs({SPEED: 0}) for part in sizes), NONE)
         along, across = (where(rubs > 0, *pair) for pair in zip(_elliptic(pull, sizes), (along, across), strict=True))
@@ -271,6 +271,6 @@ def _scaled(sides: Sequence[Side], top: Expression) -> list[Expression]:
     if all(side.limit == top for side in sides):
         return [side.needed for side in sides]
     # What sticking bears along one direction has to be told from none beside the other.
-    least = where(top > 0, ROUNDING * top, 1)
-    known = [where(side.limit > ROUNDING * top, side.limit, least) for side in sides]
+    least = where(top > 0, RUN_EPS * top, 1)
+    known = [where(side.limit > RUN_EPS * top, side.limit, least) for side in sides]
     return [side.needed * where(top > 0, top / limit, 1) for side, limit in zip(sides, known, strict=True)]

@@ -28,7 +28,7 @@ DRIVE = "drive"
 EFFECT = 1e6
 """Scale of the drive of a mass: what its traction is resolved to is a part of the direct effect, not of itself."""
 
-STILL = PICOMETRE / 1e8
+LEAST_INERTIAL = PICOMETRE / 1e8
 """Velocity [m/s] below which a mass only delays creep, a picometre in three years; creep then is as swift whatever its
 velocity, and the row stays regular.
 """
@@ -93,4 +93,4 @@ def stands_for_velocity(build: Build) -> bool:
 
 def inertia(build: Build, m: Expression) -> Expression:
     """Mass times the rate of the velocity [Pa], which counts what is next to none as a little."""
-    return m * build.total_derivative(symengine.Symbol("v") + STILL * symengine.Symbol(DRIVE))
+    return m * build.total_derivative(symengine.Symbol("v") + LEAST_INERTIAL * symengine.Symbol(DRIVE))

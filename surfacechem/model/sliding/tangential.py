@@ -38,7 +38,7 @@ from surfacechem.model.sliding.formulation import (
 from surfacechem.model.sliding.rate_and_state import DRIVE, stands_for_velocity
 from surfacechem.model.system import STABLE, Margin
 from surfacechem.quantities import VARIABLES
-from surfacechem.tolerances import STILL, TINY
+from surfacechem.tolerances import TINY, TRACTION_EPS
 
 WORDS = {-1.0: "slides backward", 0.0: "sticks", 1.0: "slides forward"}
 
@@ -204,7 +204,7 @@ def _friction(
         far = build.motion.far_fields.get(kind.d.axis)
         size = absolute(needed) if kind.elastic or far is None else far.size(far.gap)
         beside = absolute(derivative(build.psi, symengine.Symbol("u_t")))
-        slack = STILL * (size + absolute(t_f) + beside)
+        slack = TRACTION_EPS * (size + absolute(t_f) + beside)
     limit = _limit(build, kind)
     back = {s: build.expanded(s * still + slack).subs({SLIP: s}) for s in (1, -1)}
     if not (kind.slides_inertially or kind.rate_dependent):

@@ -19,7 +19,7 @@ from surfacechem.solve.adapters.dense_step import DenseStep, Steps, at_nodes, he
 from surfacechem.solve.adapters.evaluation import Evaluation
 from surfacechem.solve.adapters.stepping import Method, StepError, SteppingSolver, View
 from surfacechem.solve.contract import Array
-from surfacechem.tolerances import NOISE, TINY
+from surfacechem.tolerances import FORMULA_EPS, TINY
 
 NAMES = ("cantera",)
 
@@ -259,7 +259,7 @@ class _Stretch(Method):
         while len(times) <= most and self.t < self.end and self.failure is None:
             # Cantera knows no time to stop at: a step beyond it would not have felt what is there.
             if self.end - self.t < self.longest:
-                self.net.max_time_step = max(self.end - self.t, NOISE * self.end)
+                self.net.max_time_step = max(self.end - self.t, FORMULA_EPS * self.end)
             try:
                 self.t, row = step(), ends[len(times)]
                 row[0], row[1] = reactor.scaled, derivative(1)

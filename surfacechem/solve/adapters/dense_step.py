@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from surfacechem.solve.contract import Array, Margin
 from surfacechem.solve.zeros import zero
-from surfacechem.tolerances import NOISE, SQRT_EPS
+from surfacechem.tolerances import FORMULA_EPS, SQRT_EPS
 
 POINTS = 16
 """Points of a step at which guards are looked at; zeros in pairs between two of them show in a lowest point."""
@@ -101,15 +101,15 @@ class Guards:
         self.sides = np.sign(now)
         self.sides[list(fired)] = 0.0
         self.now = now
-        self.due = self.limits & np.isfinite(now) & (now <= NOISE * self.largest)
+        self.due = self.limits & np.isfinite(now) & (now <= FORMULA_EPS * self.largest)
         self.due[list(fired)] = False
 
     def follow(self, now: Array) -> None:
         """Update sides and sizes with these values, on the way to which no guard has fired."""
         self.largest = np.fmax(self.largest, np.abs(now))
-        left = np.abs(now) > np.where((self.sides != 0.0) & ~self.strict, 0.0, NOISE * self.largest)
+        left = np.abs(now) > np.where((self.sides != 0.0) & ~self.strict, 0.0, FORMULA_EPS * self.largest)
         self.sides = np.where(left, np.sign(now), self.sides)
-        self.due &= np.abs(self._change_of_due(now)) <= NOISE * self.largest
+        self.due &= np.abs(self._change_of_due(now)) <= FORMULA_EPS * self.largest
         self.now = now
 
     def _change_of_due(self, now: Array) -> Array:
@@ -118,12 +118,12 @@ class Guards:
 
     def crossed(self, now: Array) -> NDArray[np.bool_]:
         """Mask of values that lie across zero in a direction that counts; strict ones by more than their rounding."""
-        across = np.where(self.strict, now < -NOISE * self.largest, now * self.sides <= 0.0)
+        across = np.where(self.strict, now < -FORMULA_EPS * self.largest, now * self.sides <= 0.0)
         return across & (self.sides != 0.0) & (self.sides * self.directions <= 0.0)
 
     def fallen(self, now: Array) -> NDArray[np.bool_]:
         """Mask of the guards that are due and have fallen to these values."""
-        return self.due & (self._change_of_due(now) < -NOISE * self.largest)
+        return self.due & (self._change_of_due(now) < -FORMULA_EPS * self.largest)
 
     def far(self, values: Array, active: NDArray[np.bool_]) -> int:
         """Number of first steps in which no guard changes as much as it is away from zero; all have then followed them.
@@ -160,7 +160,7 @@ class Guards:
         if quiet:
             largest = np.fmax.accumulate(np.fmax(self.largest, np.abs(values)))
             changes = np.diff(np.where(self.due, values, 0.0), axis=0)
-            self.due &= np.all(np.abs(changes) <= NOISE * largest[1:], axis=0)
+            self.due &= np.all(np.abs(changes) <= FORMULA_EPS * largest[1:], axis=0)
             self.largest, self.now = largest[-1], values[-1]
         return quiet
 

@@ -11,7 +11,7 @@ from sksundae.ida import IDA
 from surfacechem.solve.adapters.dense_step import DenseStep
 from surfacechem.solve.adapters.stepping import Method, StepError, SteppingSolver, View
 from surfacechem.solve.contract import Array, Problem
-from surfacechem.tolerances import ROUNDING
+from surfacechem.tolerances import RUN_EPS
 
 NAMES = ("cvode", "ida")
 
@@ -67,7 +67,7 @@ class _Stretch(Method):
         if t >= self.t or since >= self.passed:  # by rounding: asked for what is beyond, the library would step on
             return self.x
         answer = self._call(lambda: self.integrator.step(since, method="normal", tstop=self.length))
-        if not abs(answer.t - since) <= ROUNDING * since:
+        if not abs(answer.t - since) <= RUN_EPS * since:
             raise StepError(f"asked for t = {t}, given t = {self.start + answer.t}")
         return np.array(answer.y)
 

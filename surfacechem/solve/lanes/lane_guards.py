@@ -12,7 +12,7 @@ from surfacechem.solve.lanes.vector import absolute, any_lane, lanes, put, same,
 from surfacechem.solve.radau.explicit import DENSEST
 from surfacechem.solve.radau.tables import SCANNED
 from surfacechem.solve.radau.work import MARGINS, compiled, evaluate
-from surfacechem.tolerances import CBRT_EPS, EPS, NOISE, ROUNDING, SOLVED, TINY
+from surfacechem.tolerances import CBRT_EPS, EPS, FORMULA_EPS, NEWTON_EPS, RUN_EPS, TINY
 
 POINTS = SCANNED[DENSEST]
 """Fractions of a step at which guards are examined."""
@@ -30,7 +30,7 @@ def start_margins(w: Any, fresh: Any) -> None:
         largest = where(fresh, larger(largest, absolute(value)), largest)
         put(w.margin_largest[m], largest)
         put(w.margin_first[m], where(fresh, value, lanes(w.margin_first[m])))
-        clear = (absolute(value) > NOISE * largest) & (lanes(w.fired[m]) < 0.5)
+        clear = (absolute(value) > FORMULA_EPS * largest) & (lanes(w.fired[m]) < 0.5)
         side = where(clear, where(value > 0.0, 1.0, -1.0), 0.0)
         put(w.side[m], where(fresh, side, lanes(w.side[m])))
         if w.kinds[m, 4] == 0:
@@ -46,7 +46,7 @@ def start_margins(w: Any, fresh: Any) -> None:
 def _crosses(w: Any, m: int) -> Any:
     """Mask of lanes whose guard m is across zero in a direction that counts; a strict one by more than noise."""
     value, side, direction = lanes(w.margin[m]), lanes(w.side[m]), w.kinds[m, 1]
-    least = NOISE * lanes(w.margin_largest[m]) if w.kinds[m, 3] == 1 else same(0.0)
+    least = FORMULA_EPS * lanes(w.margin_largest[m]) if w.kinds[m, 3] == 1 else same(0.0)
     falls = (side > 0.5) & (value <= 0.0 - least)
     rises = (side < -0.5) & (value >= least)
     if direction < 0:
@@ -135,7 +135,7 @@ def _scan(w: Any, searched: Any) -> None:
             value, side, largest = lanes(w.margin[m]), lanes(w.side[m]), lanes(w.margin_largest[m])
             largest = where(searched, larger(largest, absolute(value)), largest)
             put(w.margin_largest[m], largest)
-            leaves = searched & (side == 0.0) & (absolute(value) > NOISE * largest)
+            leaves = searched & (side == 0.0) & (absolute(value) > FORMULA_EPS * largest)
             if w.kinds[m, 4] != 0:
                 put(w.side[m], where(leaves, where(value > 0.0, 1.0, -1.0), side))
         earlier, before = before, x
@@ -166,7 +166,7 @@ def _locate(w: Any, met: Any) -> None:
     at_low = where(at_low > 0.0, at_low, TINY)
     kept = same(0.0)
     for iteration in range(60):
-        wide = met & (high - low > SOLVED * high) & (at_high < 0.0)
+        wide = met & (high - low > NEWTON_EPS * high) & (at_high < 0.0)
         if not any_lane(wide):
             break
         x = low + (high - low) * (at_low / (at_low - at_high))
@@ -180,7 +180,7 @@ def _locate(w: Any, met: Any) -> None:
         at_low = where(wide, where(across, half_low * at_low, value), at_low)
         at_high = where(wide, where(across, value, half_high * at_high), at_high)
         low, high = where(wide & ~across, x, low), where(wide & across, x, high)
-    width = CBRT_EPS * larger(high, ROUNDING)
+    width = CBRT_EPS * larger(high, RUN_EPS)
     rise = _nearest_inside(w, high + width) - _nearest_inside(w, high - width)
     put(w.slope, where(met, rise / (2.0 * width * lanes(w.h)), lanes(w.slope)))
     put(w.met, where(met, high, 1.0))

@@ -18,7 +18,7 @@ from surfacechem.solve.lanes.vector import absolute, any_lane, floor, lanes, put
 from surfacechem.solve.radau.dense import FORESEEN, GROUPS, booked
 from surfacechem.solve.radau.explicit import DENSEST, FELT, FOLLOWED, SHARE, STABLE
 from surfacechem.solve.radau.record import StepperRecord
-from surfacechem.solve.radau.step import BRIEF, DECADES, FAR, GROWTH, SAFETY, SHRINK
+from surfacechem.solve.radau.step import DECADES, FAR, GROWTH, LOOK_PART, SAFETY, SHRINK
 from surfacechem.solve.radau.tables import (
     DENSE_FACTORS,
     EXPLICIT,
@@ -29,7 +29,7 @@ from surfacechem.solve.radau.tables import (
     STAGES_OF_DENSE,
 )
 from surfacechem.solve.radau.work import RATES, compiled, evaluate, weighted_sums
-from surfacechem.tolerances import ROUNDING, SHALLOW, TINY
+from surfacechem.tolerances import LOOSE_RTOL, RUN_EPS, TINY
 
 WORK = StepperRecord("LaneWork", SIZES, {"loose": float}, MEMORY)
 END_STAGE = STAGES_OF_DENSE - 1
@@ -129,7 +129,7 @@ def _ledger_norms(w: Any) -> Any:
                 second = larger(second, absolute(lanes(w.fine[w.n + m])))
                 scale = larger(scale, lanes(w.q_scale[m]))
         norm = larger(norm, h * miss * miss / (square_root(miss * miss + 0.01 * second * second) + TINY) / scale)
-    return where(h < SHALLOW * lanes(w.t), 0.0, norm / booked(w.rtol))
+    return where(h < LOOSE_RTOL * lanes(w.t), 0.0, norm / booked(w.rtol))
 
 
 @compiled
@@ -161,7 +161,7 @@ def try_step(w: Any) -> None:
 def propose(w: Any) -> None:
     """The size of the next step by the error of this one (Gustafsson 1994), or of its repetition where it fails."""
     h, h_last, given = lanes(w.h), lanes(w.h_last), lanes(w.norm)
-    norm = larger(where(given < 1e30, given, 1e30), ROUNDING)
+    norm = larger(where(given < 1e30, given, 1e30), RUN_EPS)
     factor = SAFETY / eighth_root(norm)
     passes = norm < 1.0
     predicted = factor * h / h_last * eighth_root(lanes(w.norm_last) / norm)
@@ -284,7 +284,7 @@ def has_points(w: Any, good: Any) -> bool:
     """Whether a step is looked at inside."""
     h, spacing = lanes(w.h), lanes(w.spacing_of)
     beside = lanes(w.begins) + lanes(w.last) + lanes(w.onto) > 0.5
-    return bool(any_lane(good & (h > BRIEF * spacing) & (beside | (h >= spacing))))
+    return bool(any_lane(good & (h > LOOK_PART * spacing) & (beside | (h >= spacing))))
 
 
 @compiled
@@ -294,7 +294,7 @@ def look(w: Any, good: Any) -> None:
     Beside the ends of a segment, and of steps that an event has cut short, there may be something narrow.
     """
     h, spacing = lanes(w.h), lanes(w.spacing_of)
-    looks = good & (h > BRIEF * spacing)
+    looks = good & (h > LOOK_PART * spacing)
     _prepare_looks(w)
     begins, ends = where(looks, lanes(w.begins), 0.0), where(looks, larger(lanes(w.last), lanes(w.onto)), 0.0)
     if any_lane(begins > 0.5):

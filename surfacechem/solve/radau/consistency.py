@@ -12,7 +12,7 @@ import numpy as np
 from surfacechem.solve.radau.linear import factor, fold_chains, solve_real
 from surfacechem.solve.radau.roundoff import spread_noise
 from surfacechem.solve.radau.work import RESIDUAL, any_true, compiled, evaluate, evaluate_jacobian, finite, set_inputs
-from surfacechem.tolerances import DIGITS, NEGLIGIBLE, SQRT_EPS, TINY
+from surfacechem.tolerances import FEW_EPS, NEGLIGIBLE, SQRT_EPS, TINY
 
 CONSISTENT, NO_STATE, SINGULAR_STATE, NOT_FINITE_STATE = range(4)
 LIMIT = 100
@@ -20,7 +20,7 @@ CONVERGING = NEGLIGIBLE * SQRT_EPS
 """Correction after which the next one, in proportion to its square, is below EPS even with a factor of a million."""
 ROUNDED = 8
 """Corrections after which one that rounding explains is believed to be nothing else."""
-SMALLEST_PIVOT = DIGITS
+SMALLEST_PIVOT = FEW_EPS
 """Scaled pivot that is what rounding leaves of zero."""
 
 
@@ -156,7 +156,7 @@ def find_consistent(w: Any) -> int:
         if not finite(delta):
             return SINGULAR_STATE
         # The system is linear in the derivatives: without algebraic variables one correction is exact.
-        if not nonlinear or norm <= DIGITS or norm_last <= CONVERGING:
+        if not nonlinear or norm <= FEW_EPS or norm_last <= CONVERGING:
             _move(w, delta, 1.0)
             return CONSISTENT if _residual(w) else NOT_FINITE_STATE
         if iteration >= ROUNDED and _is_rounding(w, delta):

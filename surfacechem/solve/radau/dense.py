@@ -24,11 +24,11 @@ from surfacechem.solve.radau.tables import (
     START_RATE,
 )
 from surfacechem.solve.radau.work import LEDGER, combine, compiled, copy, evaluate, finite, put
-from surfacechem.tolerances import NEGLIGIBLE, ROUNDING, TINY
+from surfacechem.tolerances import NEGLIGIBLE, RUN_EPS, TINY
 
 GROUPS = 3
 """Accounts that are measured together: energies, entropies, bonds."""
-LOOSER, LEAST = 30.0, ROUNDING
+LOOSER, LEAST = 30.0, RUN_EPS
 """Error of a quadrature in units of the tolerance of the states, and the least there is."""
 FORESEEN = NEGLIGIBLE**2
 """Part of the time to go for which a rate is taken to last, where little was exchanged so far."""

@@ -13,8 +13,8 @@ from surfacechem.solve.radau.linear import LARGE
 from surfacechem.solve.radau.newton import stage_count
 from surfacechem.solve.radau.outputs import is_within, write_now, write_outputs, write_picture
 from surfacechem.solve.radau.step import (
-    BRIEF,
     GOOD,
+    LOOK_PART,
     accept,
     advance,
     first_size,
@@ -47,7 +47,7 @@ from surfacechem.solve.radau.work import (
     put,
     row_of,
 )
-from surfacechem.tolerances import DIGITS, MICROMETRE, NEGLIGIBLE, PICOMETRE, ROUNDING, SHALLOW, SQRT_EPS
+from surfacechem.tolerances import FEW_EPS, LOOSE_RTOL, MICROMETRE, NEGLIGIBLE, PICOMETRE, RUN_EPS, SQRT_EPS
 
 FINISHED = int(Status.FINISHED)
 EVENT = int(Status.EVENT)
@@ -107,9 +107,9 @@ def _write_events(w: Any, events: Any, counts: Any) -> bool:
         k = min(counts[EVENTS], events.shape[0]) - 1
         if w.kinds[m, 0] == 0:
             # A step ends just short of a kink and the next one passes it: that is one event.
-            while k >= w.first_event and now - (events[k, 1] - w.origin) <= ROUNDING * now and events[k, 0] != m:
+            while k >= w.first_event and now - (events[k, 1] - w.origin) <= RUN_EPS * now and events[k, 0] != m:
                 k -= 1
-            if k >= w.first_event and now - (events[k, 1] - w.origin) <= ROUNDING * now:
+            if k >= w.first_event and now - (events[k, 1] - w.origin) <= RUN_EPS * now:
                 continue
         if counts[EVENTS] < events.shape[0]:
             row = events[counts[EVENTS]]
@@ -165,7 +165,7 @@ def _start(w: Any, i: int) -> int:
 @compiled
 def _is_brief(w: Any, h: float) -> bool:
     """Whether a step is too brief for the ledger to shorten it: what ends the run there is told by the states."""
-    return bool(h < SHALLOW * (w.base + w.tau))
+    return bool(h < LOOSE_RTOL * (w.base + w.tau))
 
 
 @compiled
@@ -218,7 +218,7 @@ def _judge(w: Any, h: float, limit: float, left: float, spacing: float) -> tuple
             return AGAIN, limit
         if _is_brief(w, size) and ledger_norm(w, size, left) > 1.0:
             hold_rates(w, size)
-    if size > BRIEF * spacing:
+    if size > LOOK_PART * spacing:
         # Beside the ends of a segment and beside events there may be something narrow.
         seen = unseen(w, size, spacing, left, w.tau == 0.0, size == left or any_true(w.fired))
         if seen < 1.0:
@@ -378,7 +378,7 @@ def _run_arc(w: Any, i: int, end: float, goes_on: bool) -> int:
     _begin_arc(w, i)
     _see_guards(w, aloft)
     # Not to a breakpoint that no load has, as a formula there is that of what follows.
-    last = end if w.loads_change else max(end - DIGITS * end, 0.5 * (w.origin + end))
+    last = end if w.loads_change else max(end - FEW_EPS * end, 0.5 * (w.origin + end))
     w.arc_end, w.shown, w.base = last - w.origin, end, 0.0
     status = GOOD
     if 0.0 < ALOFT * aloft < FITTED * w.arc_end:

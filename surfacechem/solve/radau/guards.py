@@ -15,7 +15,7 @@ from surfacechem.solve.radau.newton import CONVERGED, factor_newton, predict, se
 from surfacechem.solve.radau.step import estimate_error, store_polynomial, too_small
 from surfacechem.solve.radau.tables import EDGE, SCANNED
 from surfacechem.solve.radau.work import MARGINS, any_true, clear, compiled, copy, evaluate, put
-from surfacechem.tolerances import CBRT_EPS, EPS, NOISE, ROUNDING, SHALLOW, SOLVED, SQRT_EPS, TINY
+from surfacechem.tolerances import CBRT_EPS, EPS, FORMULA_EPS, LOOSE_RTOL, NEWTON_EPS, RUN_EPS, SQRT_EPS, TINY
 
 LEAVING, AT_ZERO, BEYOND, RISING, FALLING, OUT_OF_PLAY = 0.0, 2.0, -2.0, 3.0, -3.0, 4.0
 """Sides of zero besides 1 and -1: of a margin that has just fired, of a limit that starts at zero, and beyond it; of
@@ -32,7 +32,7 @@ AT_START, SHORTER = -1.0, -2.0
 @compiled
 def noise(w: Any, m: int) -> float:
     """Size of a margin that is zero for all that can be told: its rounding, in proportion to the largest seen."""
-    return float(NOISE * w.margin_largest[m])
+    return float(FORMULA_EPS * w.margin_largest[m])
 
 
 @compiled
@@ -216,7 +216,7 @@ def _reaches(w: Any, h: float, m: int, a: float, b: float, c: float) -> float:
     touches = is_limit(w, m) and w.kinds[m, 3] == 0
     # A strict one has to pass zero by more than the error of the states, which may be less than the tolerance: at loose
     # tolerances a fixed part counts all the same, since what is brief is shallow, too.
-    shallow = max(min(w.rtol, SHALLOW) * w.margin_largest[m], noise(w, m))
+    shallow = max(min(w.rtol, LOOSE_RTOL) * w.margin_largest[m], noise(w, m))
     least = shallow if w.kinds[m, 3] == 1 else 0.0
     at_a, at_b, at_c = side * _probe(w, h, m, a), side * _probe(w, h, m, b), side * _probe(w, h, m, c)
     for _iteration in range(80):
@@ -318,7 +318,7 @@ def _bracketed(w: Any, h: float, m: int, low: float, high: float) -> float:
         return high
     kept = 0
     for iteration in range(100):
-        if high - low <= SOLVED * high or value_high == 0.0:
+        if high - low <= NEWTON_EPS * high or value_high == 0.0:
             break
         x = low + (high - low) * (value_low / (value_low - value_high))
         # Bisection at times: near a multiple zero the secants creep.
@@ -346,7 +346,7 @@ def _first(w: Any, h: float) -> tuple[int, float]:
         if w.fired[m] != 0:
             x = _bracketed(w, h, m, w.low[m], w.high[m])
             if _probe(w, h, m, x) * w.side[m] <= 0.0:
-                width = CBRT_EPS * max(x, ROUNDING)
+                width = CBRT_EPS * max(x, RUN_EPS)
                 rise = _probe(w, h, m, x + width) - _probe(w, h, m, x - width)
                 w.margin_slope[m] = rise / (2.0 * width)
             if x < earliest:
@@ -450,7 +450,7 @@ def _short_of(w: Any, h: float, m: int, size: float) -> float:
 @compiled
 def _resolved(w: Any, size: float) -> float:
     """Difference of two times that are one for all that can be told."""
-    return float(SOLVED * abs(w.base + w.tau) + ROUNDING * size)
+    return float(NEWTON_EPS * abs(w.base + w.tau) + RUN_EPS * size)
 
 
 @compiled

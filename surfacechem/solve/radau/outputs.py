@@ -24,7 +24,7 @@ from surfacechem.solve.radau.roundoff import MAGNIFIED, find_noise
 from surfacechem.solve.radau.step import defect_inside, store_polynomial
 from surfacechem.solve.radau.tables import PROBE, PROBE_RATE, PROBE_SHAPE, SCANNED
 from surfacechem.solve.radau.work import compiled, copy
-from surfacechem.tolerances import FINER
+from surfacechem.tolerances import FINER_BY
 
 ALLOWED = 2.0
 """Error of the polynomial between its stages, in units of the tolerance."""
@@ -193,7 +193,7 @@ def _parts(w: Any, h: float, growth: float) -> Any:
         x = SCANNED[w.member, i]
         w.decades[i] = np.log1p(growth * x) / np.log1p(growth) if growth > 0.0 else x
         # What is given may be a ramp since the segment began, which bends over the logarithm alone.
-        by_ratio = max(by_ratio, abs(x - w.decades[i]) * h / ((w.tau + h) * FINER))
+        by_ratio = max(by_ratio, abs(x - w.decades[i]) * h / ((w.tau + h) * FINER_BY))
     for m in range(w.n):
         # Of the steps before count their ends, which others know who go on from an arc.
         low = w.least[m] = min(w.least[m], w.y[m])

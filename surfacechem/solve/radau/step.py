@@ -43,7 +43,7 @@ from surfacechem.solve.radau.roundoff import MAGNIFIED, find_noise
 from surfacechem.solve.radau.stepper import STOP
 from surfacechem.solve.radau.tables import FINEST, START_SLOPE
 from surfacechem.solve.radau.work import LEDGER, RESIDUAL, compiled, copy, evaluate, finite, put, row_of, set_inputs
-from surfacechem.tolerances import EPS, NEGLIGIBLE, ROUNDING, SOLVED, SQRT_EPS, TINY, ULPS
+from surfacechem.tolerances import EPS, NEGLIGIBLE, NEWTON_EPS, RUN_EPS, SQRT_EPS, TINY, ULPS
 
 # The first two as in RADAU5 (Hairer & Wanner II, IV.8).
 SAFETY = 0.9
@@ -79,7 +79,7 @@ def preferred_member(rtol: float) -> int:
 def loosening(rtol: float) -> float:
     """Factor by which the low-order error estimate may exceed the tolerance."""
     # The estimate has about half the order of the method: beside the true error it is the larger the tighter the run.
-    return float(min(max(rtol, SOLVED), 0.1) ** -0.25)
+    return float(min(max(rtol, NEWTON_EPS), 0.1) ** -0.25)
 
 
 @compiled
@@ -171,9 +171,9 @@ def next_size(w: Any, h: float, norm: float, h_last: float, norm_last: float) ->
     safety = min(SAFETY, SAFETY * (2.0 * limit + 1.0) / (2.0 * limit + w.tries))
     # The estimate of s stages goes with h^(s+1).
     exponent = 1.0 / (stage_count(k) + 1.0)
-    factor = safety * max(norm, ROUNDING) ** -exponent
+    factor = safety * max(norm, RUN_EPS) ** -exponent
     if h_last > 0.0 and norm < 1.0:
-        factor = min(factor, factor * h / h_last * (norm_last / max(norm, ROUNDING)) ** exponent)
+        factor = min(factor, factor * h / h_last * (norm_last / max(norm, RUN_EPS)) ** exponent)
     return h * min(GROWTH, max(SHRINK, factor))
 
 
@@ -509,7 +509,7 @@ changes the state by so many tolerances.
 DECADES = 10
 """Points at which what lies beside the end of a segment is looked at, each ten times nearer than the one before."""
 
-BRIEF = 1e-2
+LOOK_PART = 1e-2
 """Part of the spacing below which a step is taken to see what is there: a choice that saves the clock. Its stages lie
 closer together than that; what is narrower still is passed over, as it is by a look at each spacing.
 """
