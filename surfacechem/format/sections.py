@@ -289,7 +289,7 @@ class SurfaceSection(Section):
     laws: Sequence[Potential] = key(ListOf(OneLaw(Potential)), "laws of the gap, integrated over it", ())
     heat: Sequence[HeatTransfer] = key(ListOf(OneLaw(HeatTransfer)), "conductances over the gap, integrated", ())
     approach: ApproachSection = key(Nested(ApproachSection), default=REQUIRED)
-    # Three digits more than the default are still above ROUNDING, below which no integral is known.
+    # Three digits more than the default are still above RUN_EPS, below which no integral is known.
     accuracy: float = quantity(
         "1", "relative accuracy of the force", ERROR_FLOOR, above=ERROR_FLOOR / 1000, at_most=0.1
     )

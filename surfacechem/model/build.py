@@ -21,8 +21,7 @@ from surfacechem.model.system import Account, Margin, Named, Note, Range, Role, 
 from surfacechem.model.variables import Parameters, Variables
 from surfacechem.quantities import Quantity
 from surfacechem.scene import Interface, Scene
-from surfacechem.tolerances import NO_AMOUNT
-from surfacechem.tolerances import RUN_EPS as DIGITS
+from surfacechem.tolerances import NO_AMOUNT, RUN_EPS
 
 BOTH = "interface", "each body"
 """Ends of the paths that bring heat into both bodies alike."""
@@ -337,7 +336,7 @@ class Build:
             # The last digits of the terms of a sum change it by so much.
             whole = self.expanded(value)
             rounding = sum((absolute(term) for term in whole.args), symengine.Integer(0)) if whole.is_Add else 0
-            slack = NO_AMOUNT + DIGITS * rounding + DIGITS * absolute(least)
+            slack = NO_AMOUNT + RUN_EPS * rounding + RUN_EPS * absolute(least)
             reason = f"{name} fell below {least if least != 0 else 'zero'}, {ends}"
             self.margins.append(Margin(f"{name} >= {least}", value - least + slack, reason))
         self._narrow_places(law, own, met)
