@@ -149,7 +149,7 @@ class Evaluator:
         self.edges = [edge for edge in system.edges if not (edge.passes or edge.fold)]
         by = sorted({*self.unknown, *(item.column for item in self.given.values())})
         expressions = [*system.rows.values(), *balances.values(), *(row.expression for row in self.rows)]
-        margins = [each.masked for each in (*self.limits, *self.edges)]
+        margins = [limit.masked for limit in self.limits] + [edge.masked for edge in self.edges]
         margins += [magnitude(edge.guard) for edge in self.edges]
         self.slopes = Slopes(system, expressions, by, margins)
         self.modes = [mode for mode in system.modes if mode.start is not None]
@@ -177,7 +177,8 @@ class Evaluator:
         # The first limit that is reached, or edge that is due; behind all of them stands that none is.
         unsolved, due = np.isnan(table).any(axis=1), guards < -GUARD_EPS * np.nan_to_num(sizes)
         closed = np.column_stack([unsolved, ~(limits > 0), due, np.ones(len(margins), dtype=bool)])
-        reasons = np.array([UNSOLVED, *(each.reason for each in (*self.limits, *self.edges)), ""])
+        told = (*(limit.reason for limit in self.limits), *(edge.reason for edge in self.edges))
+        reasons = np.array([UNSOLVED, *told, ""])
         return found, derivatives, np.where(lost, NO_BALANCE, reasons[closed.argmax(axis=1)]).tolist()
 
     def _table(self, points: Points) -> tuple[Array, dict[str, Argument]]:
