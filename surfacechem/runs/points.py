@@ -144,14 +144,10 @@ class Evaluator:
         self.unknown += [1 + system.state_columns[name] for name in balances]
         self.rows = [*_rates(system, balances), *(item for item in system.outputs if item.name not in self.given)]
         self.rows += _capacities(system, scene, self.given)
-        # Whether a state is stable is not asked of a point.
-        self.limits = [margin for margin, _ in system.limits if not margin.stability]
-        self.edges = [edge for edge in system.edges if not (edge.passes or edge.fold)]
+        self.conditions = Conditions(system)
         by = sorted({*self.unknown, *(item.column for item in self.given.values())})
         expressions = [*system.rows.values(), *balances.values(), *(row.expression for row in self.rows)]
-        margins = [limit.masked for limit in self.limits] + [edge.masked for edge in self.edges]
-        margins += [magnitude(edge.guard) for edge in self.edges]
-        self.slopes = Slopes(system, expressions, by, margins)
+        self.slopes = Slopes(system, expressions, by, self.conditions.margins)
         self.modes = [mode for mode in system.modes if mode.start is not None]
 
     def at(self, points: Points) -> tuple[list[Column], list[Column], list[str]]:
@@ -173,13 +169,7 @@ class Evaluator:
             # The argument of what is a logarithm is ln x, whose derivative by x is 1/x.
             per = 1 / item.values(table) if item.is_log else 1.0
             derivatives += _by(item.quantity, [*shown.values()], total[:, :, k].T * per, there[:, k])
-        limits, guards, sizes = np.split(margins, np.cumsum([len(self.limits), len(self.edges)]), axis=1)
-        # The first limit that is reached, or edge that is due; behind all of them stands that none is.
-        unsolved, due = np.isnan(table).any(axis=1), guards < -GUARD_EPS * np.nan_to_num(sizes)
-        closed = np.column_stack([unsolved, ~(limits > 0), due, np.ones(len(margins), dtype=bool)])
-        told = (*(limit.reason for limit in self.limits), *(edge.reason for edge in self.edges))
-        reasons = np.array([UNSOLVED, *told, ""])
-        return found, derivatives, np.where(lost, NO_BALANCE, reasons[closed.argmax(axis=1)]).tolist()
+        return found, derivatives, np.where(lost, NO_BALANCE, self.conditions.reasons(table, margins)).tolist()
 
     def _table(self, points: Points) -> tuple[Array, dict[str, Argument]]:
         """The arguments of compiled functions at each point, and what the points give."""
@@ -275,6 +265,29 @@ class Evaluator:
                 break
             table[:, unknown] += change  # all of a row becomes not a number where its balances have no solution
         return values, slopes, margins
+
+
+class Conditions:
+    """Limits of laws, and edges that a run would take at once; whether a state is stable is not asked of a point."""
+
+    def __init__(self, system: System) -> None:
+        self._limits = [margin for margin, _ in system.limits if not margin.stability]
+        self._edges = [edge for edge in system.edges if not (edge.passes or edge.fold)]
+
+    @property
+    def margins(self) -> list[Any]:
+        """Expressions of the limits, then of the guards, then of the sizes of these."""
+        closed = [limit.masked for limit in self._limits] + [edge.masked for edge in self._edges]
+        return closed + [magnitude(edge.guard) for edge in self._edges]
+
+    def reasons(self, table: Array, margins: Array) -> NDArray[Any]:
+        """Why no run could be at each point with these arguments and margins; empty where one could."""
+        limits, guards, sizes = np.split(margins, np.cumsum([len(self._limits), len(self._edges)]), axis=1)
+        unsolved, due = np.isnan(table).any(axis=1), guards < -GUARD_EPS * np.nan_to_num(sizes)
+        told = [limit.reason for limit in self._limits] + [edge.reason for edge in self._edges]
+        # The first that holds; behind all of them stands that none does.
+        found = np.column_stack([unsolved, ~(limits > 0), due, np.ones(len(table), dtype=bool)])
+        return np.array([UNSOLVED, *told, ""])[found.argmax(axis=1)]
 
 
 FLUXES = ("Pa", "W/m^2", "N", "W")
