@@ -280,14 +280,14 @@ class Conditions:
         closed = [limit.masked for limit in self._limits] + [edge.masked for edge in self._edges]
         return closed + [magnitude(edge.guard) for edge in self._edges]
 
-    def reasons(self, table: Array, margins: Array) -> NDArray[Any]:
+    def reasons(self, table: Array, margins: Array) -> list[str]:
         """Why no run could be at each point with these arguments and margins; empty where one could."""
         limits, guards, sizes = np.split(margins, np.cumsum([len(self._limits), len(self._edges)]), axis=1)
         unsolved, due = np.isnan(table).any(axis=1), guards < -GUARD_EPS * np.nan_to_num(sizes)
         told = [limit.reason for limit in self._limits] + [edge.reason for edge in self._edges]
         # The first that holds; behind all of them stands that none does.
         found = np.column_stack([unsolved, ~(limits > 0), due, np.ones(len(table), dtype=bool)])
-        return np.array([UNSOLVED, *told, ""])[found.argmax(axis=1)]
+        return [(UNSOLVED, *told, "")[first] for first in found.argmax(axis=1)]
 
 
 FLUXES = ("Pa", "W/m^2", "N", "W")
