@@ -262,7 +262,7 @@ def _exponential(factor: Expression) -> tuple[Expression, Expression]:
     node = symengine.sympify(factor)
     rest, exponent = symengine.Integer(1), symengine.Integer(0)
     for part in node.args if node.is_Mul else (node,):
-        if isinstance(part, symengine.Piecewise) and _is_guard(part.args[1]):
+        if isinstance(part, symengine.Piecewise) and part.args[1].args[1:] in ((LITERAL,), (EXPONENT_CAP,)):
             inner, own = _exponential(part.args[0])
             rest, exponent = rest * inner, exponent + own
         elif part.is_Pow and part.args[0] == symengine.E:
@@ -273,10 +273,6 @@ def _exponential(factor: Expression) -> tuple[Expression, Expression]:
         else:
             rest *= part
     return rest, exponent
-
-
-def _is_guard(condition: Any) -> bool:
-    return len(condition.args) == 2 and condition.args[1] in (LITERAL, EXPONENT_CAP)
 
 
 def exponents(expression: Expression) -> list[Expression]:

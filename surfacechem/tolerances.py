@@ -76,13 +76,13 @@ TIME_EPS = 1e-12
 of what is summed along it, to the next power of ten.
 """
 
-IDLE_TIME = 1e-9
+IDLE = 1e-9
 """Fraction of the time that has passed within which nothing of interest happens: a thousand times TIME_EPS, which a
 clock tells apart, and far below what any output does.
 """
 
 BRIEF_PART = 1e-6
-"""Fraction of a run that counts as brief: a thousand times IDLE_TIME, so that steps may still follow what happens in
+"""Fraction of a run that counts as brief: a thousand times IDLE, so that steps may still follow what happens in
 it.
 """
 

@@ -47,17 +47,6 @@ CONDITION_PREFIX = "condition of "
 """Prefix of the names of symbols that stand for terms printed by themselves."""
 
 
-def _conditions_apart(expression: Expression) -> tuple[Any, dict[str, Any]]:
-    """The expression with piecewise terms in its conditions replaced by symbols, and these terms by their symbols.
-
-    SymPy brings conditions into a canonical form, which takes it for ever where piecewise terms are in them.
-    """
-    whole = symengine.sympify(expression)
-    inner = {piece for relation in whole.atoms(*RELATIONS) for piece in relation.atoms(symengine.Piecewise)}
-    terms = {f"{CONDITION_PREFIX}{k}": piece for k, piece in enumerate(sorted(inner, key=str))}
-    return whole.xreplace({piece: symengine.Symbol(name) for name, piece in terms.items()}), terms
-
-
 @lru_cache(maxsize=1000)
 def sympy_form(expression: Expression) -> Any:
     """The same expression in SymPy, with products of sums left as they are: expanded, they would round differently.
@@ -74,10 +63,13 @@ class _Printer(Printer):  # type: ignore[misc]
     _terms: Mapping[str, Any] = {}
 
     def text(self, expression: Expression) -> str:
-        around = self._terms
-        whole, self._terms = _conditions_apart(expression)
+        # SymPy brings conditions into a canonical form, which takes it for ever where piecewise terms are in them.
+        whole, around = symengine.sympify(expression), self._terms
+        inner = {piece for relation in whole.atoms(*RELATIONS) for piece in relation.atoms(symengine.Piecewise)}
+        self._terms = {f"{CONDITION_PREFIX}{k}": piece for k, piece in enumerate(sorted(inner, key=str))}
         try:
-            return str(self.doprint(sympy_form(whole)))
+            named = {piece: symengine.Symbol(name) for name, piece in self._terms.items()}
+            return str(self.doprint(sympy_form(whole.xreplace(named))))
         finally:
             self._terms = around
 

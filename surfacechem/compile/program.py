@@ -303,14 +303,14 @@ def _machine_code(
 
     # Code is loaded in a tenth of the time that it takes to make.
     origins = expressions.origins() if isinstance(expressions, _Derivatives) else serialised(expressions)
-    code = from_file(code_file([str(opt_level), _digest_of(inputs), *origins]), make, pickle.loads, pickle.dumps)
+    code = from_file(code_file([str(opt_level), _digest(inputs), *origins]), make, pickle.loads, pickle.dumps)
     function, user = code.as_ctypes()
     address = ctypes.cast(function, ctypes.c_void_p).value
     return Function(int(address or 0), int(user.value), len(inputs), len(expressions), code)
 
 
 @lru_cache(maxsize=8)
-def _digest_of(inputs: tuple[Any, ...]) -> str:
+def _digest(inputs: tuple[Any, ...]) -> str:
     """Digest of the inputs, which all functions of a scene share."""
     return hashlib.sha256("\n".join(serialised(inputs)).encode()).hexdigest()
 

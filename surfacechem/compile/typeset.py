@@ -24,7 +24,7 @@ import sympy  # type: ignore[import-untyped]
 
 from surfacechem.compile.printing import LATEX_ESCAPES, RELATIONS, Latex, quantities_read, symbol, sympy_form
 from surfacechem.expressions import EXPONENT_CAP, LARGE_EXPONENT, LITERAL, Expression, derivative
-from surfacechem.model.system import Named, Parameter, System
+from surfacechem.model.system import Named, System
 from surfacechem.quantities import AVOGADRO, BOLTZMANN, GAPS, GAS_CONSTANT, STEFAN_BOLTZMANN
 from surfacechem.tolerances import EQUAL, FRACTION_FLOOR, LEAST_BONDED, LEAST_COVERAGE
 
@@ -129,11 +129,6 @@ def _constant_values(system: System) -> set[Expression]:
     return {p.symbol for p in system.parameters if p.path.endswith(".level")}
 
 
-def _is_external(parameter: Parameter) -> bool:
-    """Whether a number is a rate that another program evaluates."""
-    return parameter.path.startswith("interface.mechanism.reactions.") and parameter.path.endswith(".value")
-
-
 def _names(system: System) -> dict[str, str]:
     """LaTeX of symbols that are not named like variables."""
     names = {str(name): latex for name, (_, latex) in CONSTANTS.items()}
@@ -145,7 +140,9 @@ def _names(system: System) -> dict[str, str]:
             names[str(p.symbol)] = rf"{base}_{{{inside}\mathrm{{{place[-1]}}}}}"
     levels = _constant_values(system)
     names |= {str(item.expression): symbol(item.name) for item in system.named if item.expression in levels}
-    names |= {str(p.symbol): rf"\text{{{p.spec.text}}}" for p in system.parameters if _is_external(p)}
+    # Rates that another program evaluates.
+    external = re.compile(r"interface\.mechanism\.reactions\..*\.value")
+    names |= {str(p.symbol): rf"\text{{{p.spec.text}}}" for p in system.parameters if external.fullmatch(p.path)}
     for item in system.named:
         names[f"{item.name} of a fit"] = rf"{symbol(item.name)}\!\left(T\right)"
     for state in system.states:

@@ -348,9 +348,8 @@ _EXP = [1.0 / factorial(k) for k in range(2, 14)]
 def exp(builder: Any, x: Any) -> Any:
     """Exponential of a vector: 2^k exp(r) with abs(r) at most half of the logarithm of 2 (Cody & Waite)."""
     inside = builder.select(builder.fcmp_ordered(">", x, number(_MAX_EXP)), number(_MAX_EXP), x)
-    inside = builder.select(
-        builder.fcmp_ordered(">=", inside, number(_MIN_EXP)), inside, number(_MIN_EXP)
-    )  # no NaN either
+    # No NaN passes either.
+    inside = builder.select(builder.fcmp_ordered(">=", inside, number(_MIN_EXP)), inside, number(_MIN_EXP))
     rounded = builder.fadd(builder.fmul(inside, number(1.4426950408889634)), number(_ROUNDING_SHIFT))
     whole = builder.fsub(rounded, number(_ROUNDING_SHIFT))
     rest = builder.fsub(inside, builder.fmul(whole, number(_LN2_HIGH)))

@@ -66,16 +66,9 @@ def fit(function: Callable[[Array], Array], low: float, high: float, target: flo
     while start < high:
         if len(pieces) == MOST_PIECES:
             raise NoFitError(f"more than {MOST_PIECES} polynomials would be needed between {low:g} and {high:g} K.")
-        pieces.append(_polynomial(function, start, high, target) or _longest_piece(function, start, high, target))
+        pieces.append(_polynomial(function, start, high, target) or _longest(function, start, high, target))
         start = pieces[-1].high
     return tuple(pieces)
-
-
-def _on_interval(piece: Piece, low: float, high: float) -> Piece:
-    """The same polynomial between other ends."""
-    width = piece.high - piece.low
-    x = np.polynomial.Polynomial([(low + high - piece.low - piece.high) / width, (high - low) / width])
-    return Piece(low, high, _padded(np.polynomial.Polynomial(np.array(piece.coefficients))(x).coef))
 
 
 def _padded(powers: ArrayLike) -> tuple[float, ...]:
@@ -83,7 +76,7 @@ def _padded(powers: ArrayLike) -> tuple[float, ...]:
     return (*given, *[0.0] * (DEGREE + 1 - len(given)))
 
 
-def _longest_piece(function: Callable[[Array], Array], low: float, high: float, target: float) -> Piece:
+def _longest(function: Callable[[Array], Array], low: float, high: float, target: float) -> Piece:
     """The longest piece from low on; it ends just beyond a kink, so that the next one starts on the other side."""
     good, bad, found = low, high, None  # by bisection: a piece that ends before a kink fits, one beyond it does not
     while bad - good > KINK_RESOLUTION * (high - low):
@@ -95,7 +88,10 @@ def _longest_piece(function: Callable[[Array], Array], low: float, high: float, 
             good, found = middle, piece
     if found is None:
         raise NoFitError(f"it is not smooth at {low:g} K.")
-    return _on_interval(found, low, bad)
+    # The same polynomial up to there.
+    width = found.high - low
+    x = np.polynomial.Polynomial([(low + bad - found.low - found.high) / width, (bad - low) / width])
+    return Piece(low, bad, _padded(np.polynomial.Polynomial(np.array(found.coefficients))(x).coef))
 
 
 def _polynomial(function: Callable[[Array], Array], low: float, high: float, target: float) -> Piece | None:

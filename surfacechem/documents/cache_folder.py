@@ -194,14 +194,9 @@ def from_file(path: Path, find: Callable[[], Any], read: Callable[[bytes], Any],
     with suppress(OSError):
         make_folder(folder)
         keep_file(path, sealed(write(found)))
-        _remove_oldest(folder)
+        with os.scandir(folder) as entries:
+            files = [entry.path for entry in entries]
+        # Of too many files the older half goes.
+        for old in sorted(files, key=os.path.getmtime)[: len(files) // 2] if len(files) > MOST_FILES else ():
+            Path(old).unlink(missing_ok=True)
     return found
-
-
-def _remove_oldest(folder: Path) -> None:
-    """Remove the older half of more than MOST_FILES files in a folder."""
-    with os.scandir(folder) as entries:
-        files = [entry.path for entry in entries]
-    if len(files) > MOST_FILES:
-        for path in sorted(files, key=os.path.getmtime)[: len(files) // 2]:
-            Path(path).unlink(missing_ok=True)

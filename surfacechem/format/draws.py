@@ -96,9 +96,7 @@ class Drawn(Distribution):
         return np.array(self.values)[np.minimum((u * len(self.values)).astype(np.int64), len(self.values) - 1)]
 
 
-DISTRIBUTIONS: Mapping[str, Callable[..., Distribution]] = {
-    kind.__name__: kind for kind in (Uniform, Normal, Lognormal, Drawn)
-}
+TYPES: Mapping[str, Callable[..., Distribution]] = {kind.__name__: kind for kind in (Uniform, Normal, Lognormal, Drawn)}
 
 
 def _standard_normal(u: Array) -> Array:
@@ -140,7 +138,7 @@ def recorded_sample(content: Mapping[str, Any]) -> Sample:
     draws = {}
     for path, record in content["draws"].items():
         given = {name: tuple(value) if isinstance(value, list) else value for name, value in record.items()}
-        draws[str(path)] = DISTRIBUTIONS[str(given.pop("kind"))](**given)
+        draws[str(path)] = TYPES[str(given.pop("kind"))](**given)
     runs, seed = int(content["runs"]), int(content["seed"])
     return Sample(draws, runs, [*SAMPLERS][[*SAMPLERS].index(content["method"])], seed)
 

@@ -6,7 +6,6 @@ import math
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
-from typing import Any
 
 from surfacechem.contracts.units import parse
 from surfacechem.documents import document
@@ -79,15 +78,11 @@ def from_netcdf(path: Path) -> Numbers:
         raise InputError(f"no netCDF file: {error}.", place) from None
     if not {*AXES} <= {*data.variables} or {*data["z"].dims} != {"x", "y"}:
         raise InputError("heights are a variable z over the coordinates x and y.", place)
-    x, y, z = (_in_metres(data[axis], axis, place) for axis in AXES)
+    metres = {axis: parse(f"1 {data[axis].attrs.get('units', '1')}", "m", place, axis) for axis in AXES}
+    x, y, z = (data[axis].astype(float) * metre for axis, metre in metres.items())
     z = z.transpose("x", "y")
     holes = [(i, j) for i, j in product(range(len(x)), range(len(y))) if not math.isfinite(z.values[i, j])]
     if holes:
         where = f"x = {float(x[holes[0][0]]):g} m, y = {float(y[holes[0][1]]):g} m"
         raise InputError(f"the heights have holes: {len(holes)} of them, the first at {where}.", place)
     return {"x": x.values.tolist(), "y": y.values.tolist(), "z": z.values.ravel().tolist()}
-
-
-def _in_metres(values: Any, axis: str, place: Place) -> Any:
-    """A variable of a file in metres."""
-    return values.astype(float) * parse(f"1 {values.attrs.get('units', '1')}", "m", place, axis)

@@ -474,7 +474,7 @@ class RangeSection(Section):
     spacing: str = key(OneOf("spacing", lambda: SPACINGS), "of the values", LINEAR)
 
 
-OVER_EXAMPLE = "over: {loading.f.ramp.rate: {from: 1 pN/s, to: 1 nN/s, points: 31}}"
+OVER = "over: {loading.f.ramp.rate: {from: 1 pN/s, to: 1 nN/s, points: 31}}"
 
 # Values of a swept parameter, in its unit.
 SWEPT = ByShape(items=ListOf(amount("[x]"), "[1, 2, 3]", at_least=1), mapping=Nested(RangeSection))
@@ -538,7 +538,7 @@ class DistributionSection(Section):
     table: TableSection | None = key(Nested(TableSection))
 
 
-OF_EXAMPLE = "of: {interface.potential.bond-energy.K_0: {normal: {mean: 300 J/m^2, std: 30 J/m^2}}}"
+OF = "of: {interface.potential.bond-energy.K_0: {normal: {mean: 300 J/m^2, std: 30 J/m^2}}}"
 
 
 class SampleSection(Section):
@@ -547,10 +547,8 @@ class SampleSection(Section):
     called = "a sample"
 
     of: Mapping[str, Tree] = key(
-        _by_path(
-            Nested(DistributionSection), f"a sample needs `of`: distributions of parameters, for example `{OF_EXAMPLE}`"
-        ),
-        f"distributions of parameters by path, for example `{OF_EXAMPLE}`",
+        _by_path(Nested(DistributionSection), f"a sample needs `of`: distributions of parameters, for example `{OF}`"),
+        f"distributions of parameters by path, for example `{OF}`",
         REQUIRED,
     )
     runs: int = key(Integer(1, MOST_POINTS), "number of draws; of Sobol' points a power of two is best", REQUIRED)
@@ -599,7 +597,7 @@ class KeepSection(Section):
     )
 
 
-NOTHING_SWEPT = f"a sweep needs `over` or `sample`: values of parameters, for example `{OVER_EXAMPLE}`."
+NOTHING_SWEPT = f"a sweep needs `over` or `sample`: values of parameters, for example `{OVER}`."
 
 
 class SweepSection(Section):
@@ -608,8 +606,8 @@ class SweepSection(Section):
     called = "a sweep"
 
     over: Mapping[str, Tree] = key(
-        _by_path(SWEPT, f"a sweep needs `over`: values of parameters, for example `{OVER_EXAMPLE}`"),
-        f"values of parameters by path, a list or `{{from, to, points, spacing}}`, for example `{OVER_EXAMPLE}`",
+        _by_path(SWEPT, f"a sweep needs `over`: values of parameters, for example `{OVER}`"),
+        f"values of parameters by path, a list or `{{from, to, points, spacing}}`, for example `{OVER}`",
         MappingProxyType({}),
     )
     combine: str = key(

@@ -131,7 +131,7 @@ def _placed(tree: Tree) -> Any:
 
 
 @lru_cache(maxsize=16)  # runs, sweeps and tables of one mechanism read its file again and again
-def _tree(text: str, file: str) -> Tree:
+def _parsed(text: str, file: str) -> Tree:
     return document.build(text, file, MECHANISM_LIMITS)
 
 
@@ -141,7 +141,7 @@ class Source:
     def __init__(self, file: str, text: str) -> None:
         self.file = file
         self.text = text
-        self.data = _placed(_tree(text, file))
+        self.data = _placed(_parsed(text, file))
         if not isinstance(self.data, Mapped):
             raise InputError("a mechanism is a mapping with `phases`, `species` and `reactions`.", Place(file))
         self._check(self.data, FILE)

@@ -43,7 +43,7 @@ def figure(
     datasets: Sequence[xarray.Dataset], variables: Sequence[str] | None = None, against: str | None = None
 ) -> Figure:
     """The figure of several datasets, all of runs or all of sweeps over the same parameter."""
-    over, panels = _axis_and_panels(datasets, variables, against)
+    over, panels = _content(datasets, variables, against)
     if not panels:
         raise InputError("there is nothing to plot: none of the variables varies.")
     shown = [over, *(name for panel in panels for name in panel.names)]
@@ -63,7 +63,7 @@ def figure(
     return plot
 
 
-def _axis_and_panels(
+def _content(
     datasets: Sequence[xarray.Dataset], variables: Sequence[str] | None, against: str | None
 ) -> tuple[str, list[Panel]]:
     """Variable along the axis, and the panels."""
@@ -99,14 +99,14 @@ def labels(datasets: Sequence[xarray.Dataset]) -> list[str]:
     texts = [str(dataset.attrs.get("title", "")) for dataset in datasets]
     # More differences than fit into a legend are those of two different cases, whose titles tell them apart.
     if 0 < len(paths) <= MOST_DIFFERENCES:
-        names = _short_labels(paths)
+        names = _short(paths)
         texts = [", ".join(f"{name} = {each.get(path, 'not given')}" for path, name in names.items()) for each in known]
     # Datasets that still have the same name are told apart by their files.
     files = [Path(str(d.encoding.get("source", f"dataset {k}"))).stem for k, d in enumerate(datasets, 1)]
     return [text if texts.count(text) == 1 else file for text, file in zip(texts, files, strict=True)]
 
 
-def _short_labels(paths: Sequence[str]) -> dict[str, str]:
+def _short(paths: Sequence[str]) -> dict[str, str]:
     """The last words of paths, as many as tell them apart, or the symbol for them."""
     last = [path.rpartition(".")[2] for path in paths]
     return {

@@ -56,7 +56,7 @@ def draw(axes: Sequence[Axes], dataset: xarray.Dataset) -> None:
     engine: Any = axes[0].figure.get_layout_engine()
     engine.set(h_pad=PANEL_SPACING)
     even, (along, at) = _is_axisymmetric(dataset), _section(dataset)
-    reach = _traction_radius(dataset, along, at)
+    reach = _reach(dataset, along, at)
     _draw_profiles(axes[0], dataset, even, along, at, reach)
     if even:
         _draw_tractions(axes[1], dataset, along, at, reach)
@@ -98,7 +98,7 @@ def _section(dataset: xarray.Dataset) -> tuple[Array, Any]:
     return x[at] if np.ptp(x[at]) > np.ptp(y[at]) else y[at], at
 
 
-def _traction_radius(dataset: xarray.Dataset, along: Array, at: Any) -> float:
+def _reach(dataset: xarray.Dataset, along: Array, at: Any) -> float:
     """Distance to which the traction is felt [m]."""
     size = np.abs(dataset["traction"].values[:, *at]).max(axis=0)
     # Bodies are much larger than what acts between them, of which nothing would be seen at their size.

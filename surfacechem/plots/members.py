@@ -27,7 +27,7 @@ MOST_POINTS = 2**20
 
 MOST_PANELS = 3
 
-DIAGNOSTICS = ("steps", "destroys_entropy")
+COUNTED = ("steps", "destroys_entropy")
 """Variables on the solver or the laws, not on what happens."""
 
 NAME_ORDER = (
@@ -76,9 +76,7 @@ def number_names(dataset: xarray.Dataset, axes: Sequence[str]) -> list[str]:
 def varying_numbers(dataset: xarray.Dataset, axes: Sequence[str], known: Sequence[str]) -> list[str]:
     """Numbers of each run that differ from run to run: of phases and temperatures, else of events."""
     found = sorted(known, key=lambda name: next(k for k, rank in enumerate(NAME_ORDER) if re.fullmatch(rank, name)))
-    ends = [
-        name for name in found if dataset[name].ndim == len(axes) and "error" not in name and name not in DIAGNOSTICS
-    ]
+    ends = [name for name in found if dataset[name].ndim == len(axes) and "error" not in name and name not in COUNTED]
     shown = _distinct(dataset, [name for name in ends if varies(subsample(dataset, name))])
     telling = [name for name in shown if any(re.fullmatch(rank, name) for rank in NAME_ORDER[:-1])]
     return (telling or shown or ["time_reached"])[:MOST_PANELS]

@@ -436,7 +436,7 @@ def _draw_events(
     for (moment, text), ax in product([*places, *ends], axes):
         ax.axvline(moment, color="black", linewidth=0.6, linestyle=lines.get(text, EVENT_LINE_STYLES[0]))
     if len(names) == 1 and len(places) > 1:
-        return _draw_event_names(axes[0], width, places, below)
+        return _numbered(axes[0], width, places, below)
     rows = _write_rows(axes[0], width, places, below) if len(places) <= MOST_NAMED_EVENTS else 0
     return rows, "" if rows else _most_frequent([name for _, name in named], lines)
 
@@ -463,7 +463,7 @@ def _positions_across_panel(ax: Axes, items: Sequence[tuple[float, str]]) -> lis
     return [(x, place, text) for (x, text), place in zip(items, places, strict=True)]
 
 
-def _draw_event_names(ax: Axes, width: float, places: Sequence[tuple[float, str]], below: int) -> tuple[int, str]:
+def _numbered(ax: Axes, width: float, places: Sequence[tuple[float, str]], below: int) -> tuple[int, str]:
     """Names above the panels where they fit beside each other, else numbers, and the name that all of them have."""
     text = places[0][1]
     if rows := _write_rows(ax, width, places, below, lanes=1):

@@ -47,7 +47,11 @@ def figure(dataset: xarray.Dataset, load: str, variables: Sequence[str] | None =
             if name:
                 _draw_series(ax, dataset, load, name)
             else:
-                _draw_spectrum(ax, dataset, load)
+                # Most probable, median and mean load at rupture, the exact ones as lines.
+                mean = dataset[f"{load}_mean"]
+                text, size = style.prefixed(unit(mean), mean.values)
+                _draw_statistics(ax, dataset, {f"{load}_{which}": word for which, word in STATISTICS.items()}, size)
+                ax.set_ylabel(f"{symbol(load)} at rupture [{text}]")
             style.legend(ax)
         for ax in grid[2:, 0] if not variables else ():
             ax.sharex(grid[1, 0])
@@ -57,7 +61,7 @@ def figure(dataset: xarray.Dataset, load: str, variables: Sequence[str] | None =
     return plot
 
 
-def _sample_members(dataset: xarray.Dataset, load: str) -> list[tuple[tuple[int, ...], str]]:
+def _members(dataset: xarray.Dataset, load: str) -> list[tuple[tuple[int, ...], str]]:
     """Places of some runs, evenly spread over those whose most probable load is inside the range, with their names."""
     modes = dataset[f"{load}_mode"].values
     # At slow loads most bonds break before there is any load, and their peak at zero would dwarf all others.
@@ -71,7 +75,7 @@ def _draw_over(
     ax: Axes, dataset: xarray.Dataset, load: str, values: Array, scale: Callable[[Array], Array] = np.asarray
 ) -> None:
     """Values of some runs over the load, as one curve where theirs coincide on this scale."""
-    members = _sample_members(dataset, load)
+    members = _members(dataset, load)
     notes = [f"{len(members)} of {dataset['status'].size} runs"] if len(members) < dataset["status"].size else []
     shown = np.array([values[place] for place, _ in members])
     if len(members) > 1 and _coincide(scale(shown)):
@@ -105,14 +109,6 @@ def _draw_series(ax: Axes, dataset: xarray.Dataset, load: str, name: str) -> Non
     else:
         _draw_over(ax, dataset, load, values)
         style.label(ax.yaxis, symbol(name), unit(dataset[name]), values)
-
-
-def _draw_spectrum(ax: Axes, dataset: xarray.Dataset, load: str) -> None:
-    """Most probable, median and mean load at rupture, the exact ones as lines."""
-    mean = dataset[f"{load}_mean"]
-    text, size = style.prefixed(unit(mean), mean.values)
-    _draw_statistics(ax, dataset, {f"{load}_{which}": word for which, word in STATISTICS.items()}, size)
-    ax.set_ylabel(f"{symbol(load)} at rupture [{text}]")
 
 
 def _draw_statistics(ax: Axes, dataset: xarray.Dataset, told: Mapping[str, str], size: float) -> None:

@@ -213,7 +213,7 @@ def headings(plot: Figure, ax: Axes, dataset: xarray.Dataset, above: float = 0.0
     columns = place.get_gridspec().ncols if place else 1
     # Where there are columns, the middle of a line over the first one has to be within it, or the others make room.
     room = int(LETTERS_PER_INCH * (plot.get_figwidth() - 0.8) * min(1.0, 2 / columns))
-    lines = _filled_lines([*facts, more], room)
+    lines = _wrapped([*facts, more], room)
     more_lines = above + 10 * (len(lines) - 1) + 14 * (len(title) - 1)
     plot.set_figheight(plot.get_figheight() + more_lines / 72)  # the panels keep their height
     ax.set_title("\n".join(lines), loc="left", pad=6 + above, **NOTE_STYLE)
@@ -272,7 +272,7 @@ def marker(ax: Axes, count: int) -> str:
     return "o" if count * MARKER_SIZE * (1 + MARKER_SPACING) <= 72 * whole.get_figwidth() else ""
 
 
-def _filled_lines(facts: Sequence[str], room: int) -> list[str]:
+def _wrapped(facts: Sequence[str], room: int) -> list[str]:
     """Facts in lines of so many letters; only one that is longer than a line is broken itself."""
     lines: list[str] = []
     for fact in filter(None, facts):

@@ -176,14 +176,14 @@ def shared_times(runs: Sequence[Trajectory], most: int) -> tuple[float, ...]:
     return tuple(np.unique(np.concatenate([*times, marked if len(marked) <= most else []])).tolist())
 
 
-def _moments(trajectory: Trajectory) -> Array:
+def _event_times(trajectory: Trajectory) -> Array:
     """Times of events."""
     return np.array([*trajectory.result.events.t, *(jump.t for jump in trajectory.jumps)])
 
 
 def _beside(trajectory: Trajectory) -> Mask:
     """Outputs at both sides of events."""
-    t, moments = trajectory.result.times, _moments(trajectory)
+    t, moments = trajectory.result.times, _event_times(trajectory)
     return np.isin(t, moments) | np.isin(np.nextafter(t, np.inf), moments)
 
 
@@ -193,7 +193,7 @@ def _steps(trajectory: Trajectory) -> Array:
     """
     t, breaks = trajectory.result.times, trajectory.result.problem.segments[1:-1]
     breaks = breaks[
-        np.isin(breaks, t) & np.isin(np.nextafter(breaks, -1.0), t) & ~np.isin(breaks, _moments(trajectory))
+        np.isin(breaks, t) & np.isin(np.nextafter(breaks, -1.0), t) & ~np.isin(breaks, _event_times(trajectory))
     ]
     return np.concatenate((breaks, np.nextafter(breaks, np.inf)))
 

@@ -410,7 +410,7 @@ class ArrayRuns:
         named = {name: whole(values[name]) for name in every if name in values}
         outputs = np.asfortranarray(batch.outputs[..., n:])
         ledger = np.where(reached[..., None], outputs, outputs[:, :1])
-        rounded = of_each(np.fmax, owner, self._rounded(rows), len(reached))
+        rounded = of_each(np.fmax, owner, self._rounding(rows), len(reached))
         columns: Columns = {}
         left = zip(("energy", "entropy"), TOTALS, residuals(system, named, ledger), strict=True)
         for j, (which, (name, _), (residual, scale)) in enumerate(left):
@@ -424,7 +424,7 @@ class ArrayRuns:
             sites = np.maximum(sites, np.abs(bonds - bonds[:, :1] - ledger[..., j]).max(axis=1))
         return {**columns, "site_error": sites}
 
-    def _rounded(self, rows: Array) -> Array:
+    def _rounding(self, rows: Array) -> Array:
         """Largest change of each total by the last bit of a state, shape (rows, 2)."""
         totals, worst, moved = self.totals(rows), np.zeros((len(rows), len(TOTALS))), rows.copy()
         for j in range(1, 1 + self.n):

@@ -86,11 +86,11 @@ def law_table(contract: type[Law]) -> str:
     parts = [f"{contract.contract.upper()}: {_first_line(contract)}"]
     for law in laws(contract).values():
         texts = [_first_line(law), *formulas(law), *parameters(law), f"Source: {source(law)}"]
-        parts.append("\n".join([f"  {law.name()}", *map(_filled, texts)]))
+        parts.append("\n".join([f"  {law.name()}", *map(_wrapped, texts)]))
     return "\n\n".join(parts)
 
 
-def _filled(text: str) -> str:
+def _wrapped(text: str) -> str:
     return textwrap.fill(text, WIDTH, initial_indent=" " * 6, subsequent_indent=" " * 10, break_on_hyphens=False)
 
 

@@ -12,7 +12,7 @@ from surfacechem.compile.program import Program
 from surfacechem.model.system import Margin, Pace, State, System
 from surfacechem.solve.contract import REASONS, Array, Points, Result, Status
 from surfacechem.solve.radau.solver import consistent
-from surfacechem.tolerances import ATOL_OF_SCALE, CLOSED_GUARD, IDLE_TIME, NEGLIGIBLE, NEWTON_EPS, RUN_EPS
+from surfacechem.tolerances import ATOL_OF_SCALE, CLOSED_GUARD, IDLE, NEGLIGIBLE, NEWTON_EPS, RUN_EPS
 
 FEW, SHARP = 100.0, RUN_EPS
 """Steps in a period, fewer than which follow nothing, and the part of the time that a step can still resolve."""
@@ -160,7 +160,7 @@ def runaway(states: Sequence[State], result: Result) -> str | None:
     with np.errstate(over="ignore", invalid="ignore"):
         speed = np.nan_to_num(np.abs(result.ydot) / (np.abs(result.y) + ATOL_OF_SCALE * scales))
     j = int(np.argmax(speed))
-    if not (speed[j] * result.t > 1 / IDLE_TIME and _is_faster(result, j)):
+    if not (speed[j] * result.t > 1 / IDLE and _is_faster(result, j)):
         return None
     if states[j].given is not None:
         # A velocity without inertia takes the age of the contact with it.

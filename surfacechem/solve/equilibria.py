@@ -31,7 +31,7 @@ from surfacechem.solve.contract import Array
 from surfacechem.tolerances import (
     DRIFT,
     GAP_EPS,
-    IDLE_TIME,
+    IDLE,
     MOST_DRIFT,
     NANOMETRE,
     NEGLIGIBLE,
@@ -511,4 +511,4 @@ class Folds:
         values = self._approach(replace(lost.point, ydot=beside).inputs())
         push, change = (lost.direction * float(lost.way.pulls @ part) for part in (values[::2], values[1::2]))
         left = -push / change if push < 0 < change else 0.0
-        return replace(point, t=point.t + left) if left < min(IDLE_TIME * point.t, end - point.t) else point
+        return replace(point, t=point.t + left) if left < min(IDLE * point.t, end - point.t) else point

@@ -18,7 +18,7 @@ from surfacechem.solve.equilibria import BALANCED, Point, drift_of
 from surfacechem.solve.jump_heat import LoadStep
 from surfacechem.solve.jumps import Jump, Jumper, Slack, velocity_scales
 from surfacechem.solve.radau.solver import consistent
-from surfacechem.tolerances import BRIEF_PART, GUARD_EPS, IDLE_TIME, MICROMETRE, NEWTON_EPS, PICOMETRE
+from surfacechem.tolerances import BRIEF_PART, GUARD_EPS, IDLE, MICROMETRE, NEWTON_EPS, PICOMETRE
 
 REACHED = NEWTON_EPS
 """Part of the time within which two moments are one: a step onto an event solves for its time."""
@@ -204,7 +204,7 @@ class Instant:
         t, recent = point.t, len(self.jumps) - self._resolved
         if recent < AT_ONCE or self.jumps[-AT_ONCE].t < t - REACHED * max(t, BRIEF_PART * self.end):
             return True
-        if t > self._sharpened + IDLE_TIME * self.end:
+        if t > self._sharpened + IDLE * self.end:
             self._sharpened, self._resolved, self.peaks = t, len(self.jumps), self.scales.copy()
             return True
         rests = next((j for j, p in enumerate(self.system.parameters) if p.path == RESTS), None)

@@ -426,7 +426,7 @@ class Model:
         if run.nudged:
             pieces.nudge(system, parameters)
         if system.equilibria:
-            y, parameters = self._settled(y, parameters)
+            y, parameters = self._equilibrated(y, parameters)
         start = stable_start(system, self.program, y, parameters[0])
         if system.equilibria:  # the gaps given are where the search begins; what it finds has to be admissible, too
             self._limits.check(start, parameters[0])
@@ -447,7 +447,7 @@ class Model:
             in_play=system.in_play(parameters[0]),
         )
 
-    def _settled(self, y: Array, parameters: Array) -> tuple[Array, Array]:
+    def _equilibrated(self, y: Array, parameters: Array) -> tuple[Array, Array]:
         """The states with their gaps in equilibrium, and the parameters of all segments with the modes found there."""
         settled = self.equilibria.settle(Point(0.0, y, np.zeros_like(y), parameters[0].copy()))
         if settled is None:

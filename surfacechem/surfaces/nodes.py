@@ -141,7 +141,7 @@ def tensor_grid(surface: Surface, x: Array, found: Projection, reach: Array, lev
     for k, tangent in enumerate((x_u, x_v)):
         at, size = found.at[:, k], np.maximum(np.linalg.norm(tangent, axis=-1), POLE)
         ends = (at - math.pi, at + math.pi) if surface.shape.closed[k] else (low[k], high[k])
-        scale, far = found.gap / size, _within(surface, k, size, reach + found.gap)
+        scale, far = found.gap / size, _parameter_bound(surface, k, size, reach + found.gap)
         below, above = np.minimum(at - ends[0], far), np.minimum(ends[1] - at, far)
         grain = surface.shape.grain / size / scale
         edges = piece_edges(-np.arcsinh(below / scale), np.arcsinh(above / scale), grain, level)
@@ -153,7 +153,7 @@ def tensor_grid(surface: Surface, x: Array, found: Projection, reach: Array, lev
     return Grid(x, None, points, areas * (du[:, :, None] * dv[:, None, :]).reshape(len(x), -1))
 
 
-def _within(surface: Surface, k: int, tangent: Array, distance: Array) -> Array:
+def _parameter_bound(surface: Surface, k: int, tangent: Array, distance: Array) -> Array:
     """Bound on the difference of parameters along a direction from those of a foot, with the length (n,) of its
     tangent, for points within a distance (n,) of it.
     """

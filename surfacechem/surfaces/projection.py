@@ -289,7 +289,7 @@ class Surface:
         D = self.derivatives(found.at, SECOND_ORDER)
         relative = moves - np.asarray(shift, dtype=float) - cross(spin, x)
         # At a pole, which is next to it alone, what is on the axis is on its normal.
-        at = self._moved(found.at, D, found.gap[..., None] * found.direction, relative)
+        at = self._rates(found.at, D, found.gap[..., None] * found.direction, relative)
         glide = at[..., :1] * D[1] + at[..., 1:] * D[2]
         vector = relative - glide + cross(spin, x - D[0])
         # Weingarten: the normal turns with the second form.
@@ -302,7 +302,7 @@ class Surface:
         normal = -turned / area + cross(spin, found.normal)
         return Rates(at, _dot(relative, found.direction), vector, normal, self.curvature(found.at, at))
 
-    def _moved(self, at: Array, D: Array, away: Array, relative: Array) -> Array:
+    def _rates(self, at: Array, D: Array, away: Array, relative: Array) -> Array:
         """Rates of the parameters of nearest points that others, ``away`` from them, move relative to the surface."""
         low, high = np.transpose(self.shape.span)
         low = low + (POLE if self.shape.about_axis else 0.0)

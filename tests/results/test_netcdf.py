@@ -111,8 +111,8 @@ import sys
 from surfacechem.errors import InputError
 from surfacechem.results import netcdf
 from surfacechem.runs import rerun
-netcdf.PATIENCE = 1.0
-for netcdf.TRIAL in ("while True: pass", "import os; os.abort()", "raise OSError"):
+netcdf.READING_TIMEOUT = 1.0
+for netcdf.READING_TEST in ("while True: pass", "import os; os.abort()", "raise OSError"):
     try:
         rerun.read(sys.argv[1])
     except InputError as error:

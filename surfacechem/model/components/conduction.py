@@ -39,7 +39,7 @@ def variables(build: Build) -> Iterator[Power | Thermal]:
         thermal = replace(thermal, resistances=resistances)
         if law.cells:
             slab, thermal = _divided(build, thermal, number, body, law)
-            yield from _conduct(build, slab, thermal.node_of[body.name], bound)
+            yield from _fluxes(build, slab, thermal.node_of[body.name], bound)
     yield thermal
 
 
@@ -87,7 +87,7 @@ def _far_node(build: Build, number: int, body: Body, law: Conduction) -> Node:
     return Node(name, symengine.Symbol(name), build.slope_of(name), prescribed=True)
 
 
-def _conduct(build: Build, slab: Slab, surface: Node, bound: Conduction) -> Iterator[Power]:
+def _fluxes(build: Build, slab: Slab, surface: Node, bound: Conduction) -> Iterator[Power]:
     """Fluxes from node to node, and through the far side."""
     name = slab.body.name
     conductivity = _conductivity(build, slab, surface.name, bound.conductivity)
