@@ -57,7 +57,7 @@ from surfacechem.format.declarations import (
     quantity,
 )
 from surfacechem.model.components.interface import LOADABLE
-from surfacechem.model.components.mounting import TRACTIONS
+from surfacechem.model.components.mounting import SLIDING_TRACTIONS
 from surfacechem.quantities import VARIABLES
 from surfacechem.scene import MOST_CELLS, Conduction, Mounting
 from surfacechem.solve.run import OWN
@@ -325,8 +325,8 @@ class Threshold(Section):
 
 THRESHOLDS = Entries(
     others=ByShape(amount("[x]"), Nested(Threshold)),
-    names=lambda case: [*case.units, *TRACTIONS],
-    units=dict.fromkeys(TRACTIONS, "Pa"),
+    names=lambda case: [*case.units, *SLIDING_TRACTIONS],
+    units=dict.fromkeys(SLIDING_TRACTIONS, "Pa"),
     what="variables",
     at_most=1,
     wanted="`until` waits for one variable, for example `until: {p: 10 kPa}`",

@@ -20,11 +20,11 @@ from surfacechem.model import components, constraints, ledger, sliding
 from surfacechem.model.build import Build
 from surfacechem.model.checks import refuse_idle_initial_values
 from surfacechem.model.sliding.rate_and_state import stands_for_velocity
-from surfacechem.model.system import START, Outside, System
+from surfacechem.model.system import START, ExternalRates, System
 from surfacechem.quantities import Quantity
 from surfacechem.scene import Scene
 
-OF_SURFACE = "surface"
+AREAL_PATH = "surface"
 """Start of the paths of parameters that are per area in every scene."""
 
 PHASES = ("variables", "energies", "laws"), ("rows", "jumps", "stages"), ("outputs",)
@@ -63,7 +63,7 @@ def _bonds(scene: Scene) -> object:
     return driven or interface.sites or interface.variables or interface.reactions
 
 
-ASKED_FOR: dict[str, Callable[[Scene], object]] = {
+OPTIONAL: dict[str, Callable[[Scene], object]] = {
     "conduction": lambda scene: any(body.conduction for body in scene.bodies),
     "programme": lambda scene: scene.programme,
     "medium": lambda scene: scene.interface.medium,
@@ -127,7 +127,7 @@ def _with_laws(scene: Scene, change: Callable[[Any], Any]) -> Scene:
 def _built(scene: Scene) -> Build:
     """All that the components state of a scene."""
     build = Build(scene)
-    needed = [place for name, place in _places().items() if name not in ASKED_FOR or ASKED_FOR[name](scene)]
+    needed = [place for name, place in _places().items() if name not in OPTIONAL or OPTIONAL[name](scene)]
     found = [import_module(place) for place in needed]
     for phases, follow in zip(PHASES, (ledger.flows, ledger.totals, _close), strict=True):
         for phase in phases:
@@ -201,14 +201,14 @@ def _of_pair(system: System) -> System:
         named=tuple(replace(item, quantity=renamed(item.quantity)) for item in system.named),
         ledger=tuple(replace(item, quantity=renamed(item.quantity)) for item in system.ledger),
         parameters=tuple(
-            item if item.path.startswith(OF_SURFACE) else replace(item, spec=spec(item.spec))
+            item if item.path.startswith(AREAL_PATH) else replace(item, spec=spec(item.spec))
             for item in system.parameters
         ),
         whole=True,
     )
 
 
-def _outside(build: Build) -> Outside | None:
+def _outside(build: Build) -> ExternalRates | None:
     engine = build.interface.engine
     if engine is None:
         return None
@@ -220,4 +220,4 @@ def _outside(build: Build) -> Outside | None:
             "evaluated outside. Give the interface a capacity, or let it share the temperature of a body.",
             Place(path="interface.mechanism"),
         )
-    return Outside(engine, reads)
+    return ExternalRates(engine, reads)

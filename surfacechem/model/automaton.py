@@ -10,21 +10,21 @@ import symengine
 
 from surfacechem.expressions import Expression, where
 
-NONE, ONE = symengine.Integer(0), symengine.Integer(1)
+ZERO, ONE = symengine.Integer(0), symengine.Integer(1)
 
-SIDE = "mode.side"
+SIDE_PATH = "mode.side"
 """Path of the mode that says on which side of touch the gap is."""
 
-SLIP = "mode.slip"
+SLIP_PATH = "mode.slip"
 """Path of the mode that says whether the interface sticks or slides, and in which direction."""
 
 INTERFACE = "interface"
 """Key of the heat that the interface makes in a jump, beside those of the supports of the axes."""
 
-FOLD = 1e-7
+FOLD_STIFFNESS = 1e-7
 """Tangent stiffness, relative to its parts, at which a quasi-static gap counts as having lost its equilibrium."""
 
-RESTS = "run.rebounds_rest_at"
+REST_TIME_PATH = "run.rebounds_rest_at"
 """Path of the time at which rebounds too close for time to resolve come to rest (end of a Zeno sequence)."""
 
 

@@ -23,13 +23,13 @@ from surfacechem.quantities import Quantity
 from surfacechem.scene import Interface, Scene
 from surfacechem.tolerances import NO_AMOUNT, RUN_EPS
 
-BOTH = "interface", "each body"
+BOTH_BODIES = "interface", "each body"
 """Ends of the paths that bring heat into both bodies alike."""
 
 STARTS = {"g_n": "Give `g_n` under `initial`: a gap that finds its equilibrium begins its search there, else at zero."}
 """Advice on a missing initial value of a variable that finds its own equilibrium, by variable."""
 
-NAMED = ("M", *(f"{x}_{k}" for x in "SUq" for k in ("1", "2", "c", "m", "t")))
+TAKEN_NAMES = ("M", *(f"{x}_{k}" for x in "SUq" for k in ("1", "2", "c", "m", "t")))
 """Names of quantities that a parameter might have too: a law's M, or the second of two that are called q."""
 
 
@@ -105,7 +105,7 @@ class Build:
         custom = [body.temperature for body in self.scene.bodies if isinstance(body.temperature, str)]
         capacities = [f"C_{node}" for node in (*custom, self.interface.temperature) if isinstance(node, str)]
         bonds = [variable.name for variable in self.interface.variables]
-        self.parameters = Parameters([*NAMED, *custom, *capacities, *bonds])
+        self.parameters = Parameters([*TAKEN_NAMES, *custom, *capacities, *bonds])
         self.variables = Variables(self.parameters)
 
     @property

@@ -19,7 +19,7 @@ from surfacechem.model.build import Build
 from surfacechem.model.system import Array, System
 from surfacechem.tolerances import CBRT_EPS, EPS
 
-OPENINGS = tuple(10.0 ** (k / 8) for k in range(-80, -16))
+TRIAL_GAPS = tuple(10.0 ** (k / 8) for k in range(-80, -16))
 """Gaps at which a conductance is looked at [m]: 0.1 nm to 10 mm."""
 
 P, G = symengine.symbols("p g_n")
@@ -66,7 +66,7 @@ def _at_touch(ends: str, h: Expression) -> Iterator[str]:
     if at_touch is None or not math.isfinite(at_touch):
         return
     before, after = (_value(h, G, side * EPS) or 0.0 for side in (-1, 1))
-    highest, where = max((_value(h, G, g) or 0.0, g) for g in OPENINGS)
+    highest, where = max((_value(h, G, g) or 0.0, g) for g in TRIAL_GAPS)
     if max(before, after) > (1 + CBRT_EPS) * min(before, after):
         yield f"{ends} jumps at touch, from {before:.6g} to {after:.6g} W/(m^2 K)."
     elif highest > (1 + CBRT_EPS) * before:

@@ -28,7 +28,7 @@ GEOMETRY = (*GAPS, "J_c")
 
 
 @dataclass(frozen=True)
-class Passage:
+class Flow:
     """Energy flow between two places [W/m^2]; an interface that stores no heat passes it on to the bodies."""
 
     source: str
@@ -37,17 +37,17 @@ class Passage:
     channels: Mapping[str, Expression] = field(default_factory=dict)
 
 
-def passages(build: Build) -> Iterator[Passage]:
+def energy_flows(build: Build) -> Iterator[Flow]:
     """Energy flows from source to target of all powers of a scene."""
     for power in build.powers:
         targets = power.target if isinstance(power.target, Mapping) else {power.target: symengine.Integer(1)}
         if INTERFACE in targets and INTERFACE not in build.thermal.node_of and power.kind != WORK:
             channel = {MECHANICS: "friction", INTERFACE: "reaction", OUTSIDE: "external"}[power.source]
             heats = {end: share * power.amount for end, share in build.shares().items()}
-            yield from (Passage(INTERFACE, end, heat, {channel: heat}) for end, heat in heats.items() if heat != 0)
+            yield from (Flow(INTERFACE, end, heat, {channel: heat}) for end, heat in heats.items() if heat != 0)
         else:
             for place, share in targets.items():
-                yield Passage(power.source, place, share * power.amount, power.channels)
+                yield Flow(power.source, place, share * power.amount, power.channels)
 
 
 def take(build: Build, record: Record) -> None:
@@ -73,7 +73,7 @@ def flows(build: Build) -> None:
     for power in build.powers:
         if power.kind == DISSIPATION:
             _account(build, power)
-    for passage in passages(build):
+    for passage in energy_flows(build):
         source, target = build.thermal.places.get(passage.source), build.thermal.places.get(passage.target)
         if source is target:  # what bonds release stays where they are
             continue
@@ -174,7 +174,7 @@ def _enthalpy(build: Build) -> None:
 
 def _fluxes(build: Build) -> None:
     """Heat into each body from the interface, with the accounts of what its balance says of it."""
-    flows = list(passages(build))
+    flows = list(energy_flows(build))
     fluxes = []
     for k, body in enumerate(build.scene.bodies, start=1):
         flux, booked = _flux(build, k, body, flows)
@@ -196,7 +196,7 @@ def _fluxes(build: Build) -> None:
         build.name(Quantity("q_t", "W/m^2", text, tag="e:qt_def"), (q_1 - q_2) / 2)
 
 
-def _flux(build: Build, k: int, body: Body, flows: list[Passage]) -> tuple[Expression, Expression] | tuple[None, None]:
+def _flux(build: Build, k: int, body: Body, flows: list[Flow]) -> tuple[Expression, Expression] | tuple[None, None]:
     """Heat into a body from the interface, and how it is booked.
 
     It is stated by its laws, or recovered from a balance where it has none; of a temperature that evolves the balance
@@ -227,7 +227,7 @@ def _flux(build: Build, k: int, body: Body, flows: list[Passage]) -> tuple[Expre
     return flux, flux
 
 
-def _heat_into(build: Build, body: Body, flows: list[Passage]) -> tuple[dict[str, Expression], Expression]:
+def _heat_into(build: Build, body: Body, flows: list[Flow]) -> tuple[dict[str, Expression], Expression]:
     """Heat into a body from the interface and the other body, by what carries it, and from all other places."""
     near = {INTERFACE, *(other.name for other in build.scene.bodies)}
     channels: dict[str, Expression] = {}

@@ -22,16 +22,16 @@ from surfacechem.scene import Engine
 
 Array = NDArray[np.float64]
 
-STABLE = "stable "
+STABLE_PREFIX = "stable "
 """Prefix of the names of margins that tell a stable state from an unstable one."""
 
 START = "run.t_start"
 """Path of the time at which a stretch between events starts; within it time counts from there."""
 
-STAND_IN = "no_state"
+DUMMY_STATE = "no_state"
 """Name of the state, always zero, of a scene in which all is prescribed, since solvers need at least one."""
 
-TOLERANCE = "run.rtol"
+RTOL_PATH = "run.rtol"
 """Path of the relative tolerance of a run, at which endless sequences of events are cut off."""
 
 
@@ -197,7 +197,7 @@ class Range:
 
 
 @dataclass(frozen=True)
-class Pair:
+class RatePair:
     """Rates forward and backward that are stated apart, held against equilibrium along a run.
 
     ``departure`` names the quantity ln(k_f/k_r) - ln K(g, T), ``law`` the account of the entropy they produce together.
@@ -209,7 +209,7 @@ class Pair:
 
 
 @dataclass(frozen=True)
-class Pace:
+class TimeScale:
     """Characteristic time of a free motion, with advice where it is too short for a run."""
 
     text: str
@@ -218,7 +218,7 @@ class Pace:
 
 
 @dataclass(frozen=True)
-class Outside:
+class ExternalRates:
     """An engine with the expressions of what it reads."""
 
     engine: Engine
@@ -235,7 +235,7 @@ class Role:
 
 
 @dataclass(frozen=True)
-class Capped:
+class CappedLaw:
     """The exponents of a law, in words, above whose cap its exponentials go on along their tangents."""
 
     title: str
@@ -292,7 +292,7 @@ class Conductor:
     """Conductance of all paths at the contact [W/(m^2 K)]; None in perfect contact."""
 
 
-Note = Range | Capped | Pair | Pace | Caution | Profile | Conductor
+Note = Range | CappedLaw | RatePair | TimeScale | Caution | Profile | Conductor
 
 N = TypeVar("N", bound=Note)
 
@@ -335,7 +335,7 @@ class System:
     """Notes on what is watched along a run and reported where it matters; no equation depends on them."""
     conductances: Mapping[tuple[str, str], Sequence[Expression]] = field(default_factory=dict)
     """Conductances in parallel between two ends [W/(m^2 K)]."""
-    outside: Outside | None = None
+    outside: ExternalRates | None = None
     whole: bool = False
     """Whether what is per area elsewhere is that of a pair of bodies."""
     constants: Mapping[str, tuple[Spec, float]] = field(default_factory=dict)
@@ -388,12 +388,12 @@ class System:
     @cached_property
     def inside(self) -> frozenset[str]:
         """Names of the states inside bodies, which the profiles show together, and of the dummy state."""
-        return frozenset([STAND_IN, *(name for profile in self.profiles for name in profile.states)])
+        return frozenset([DUMMY_STATE, *(name for profile in self.profiles for name in profile.states)])
 
     @cached_property
     def of_cells(self) -> frozenset[Any]:
         """States inside bodies and their rates, as symbols: each belongs to one cell."""
-        cells = self.inside - {STAND_IN}
+        cells = self.inside - {DUMMY_STATE}
         states = (state for state in self.states if state.name in cells)
         return frozenset(symbol for state in states for symbol in (state.symbol, state.dot))
 
@@ -406,8 +406,8 @@ class System:
         """The system, with a dummy state where it has none."""
         if self.states:
             return self
-        state = State(Quantity(STAND_IN, "1", "stands for states"), 0.0, 1.0)
-        return replace(self, states=(state,), rows={STAND_IN: state.dot})
+        state = State(Quantity(DUMMY_STATE, "1", "stands for states"), 0.0, 1.0)
+        return replace(self, states=(state,), rows={DUMMY_STATE: state.dot})
 
     @property
     def reactions(self) -> tuple[str, ...]:

@@ -20,7 +20,7 @@ import symengine
 from numpy.typing import NDArray
 
 from surfacechem.expressions import EXPONENT_CAP
-from surfacechem.model.system import Capped, Caution, Pair, Range, System
+from surfacechem.model.system import CappedLaw, Caution, Range, RatePair, System
 from surfacechem.results.accuracy import Accuracy
 from surfacechem.results.audit import Audit, largest
 from surfacechem.solve.run import Trajectory
@@ -80,7 +80,7 @@ def in_words(low: float, high: float) -> str:
 def verdicts(trajectory: Trajectory, audit: Audit) -> tuple[BalanceVerdict, ...]:
     """The verdict on each pair of rates, over all outputs and steps."""
     found = []
-    for pair in trajectory.model.system.noted(Pair):
+    for pair in trajectory.model.system.noted(RatePair):
         values = trajectory.everywhere[pair.departure]
         if len(values):  # a run that ends at its start has none
             low, high = float(np.min(values)), float(np.max(values))
@@ -91,7 +91,7 @@ def verdicts(trajectory: Trajectory, audit: Audit) -> tuple[BalanceVerdict, ...]
 def findings(trajectory: Trajectory, accuracy: Accuracy | None) -> list[str]:
     """Everything but the verdicts, in words."""
     system, rows = trajectory.model.system, np.empty((0, 0))
-    if [*system.noted(Capped), *system.noted(Caution)]:  # arguments of compiled functions at the outputs and steps
+    if [*system.noted(CappedLaw), *system.noted(Caution)]:  # arguments of compiled functions at the outputs and steps
         model, result, steps = trajectory.model, trajectory.result, trajectory.result.steps
         rows = model.inputs(result, result.times, result.outputs, trajectory.rates, result.segment)
         if steps is not None:
@@ -108,7 +108,7 @@ def findings(trajectory: Trajectory, accuracy: Accuracy | None) -> list[str]:
 def _capped_rates(system: System, rows: NDArray[np.float64]) -> list[str]:
     """Laws whose rate was beyond exp(EXPONENT_CAP) at one of several states."""
     found = []
-    for law in system.noted(Capped) if len(rows) else ():
+    for law in system.noted(CappedLaw) if len(rows) else ():
         # Interpreted, since they are needed once.
         exponents = [system.expand(expression) for expression in law.exponents]
         values = symengine.Lambdify(system.inputs, exponents, backend="lambda")(rows)

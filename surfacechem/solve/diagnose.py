@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem.compile.program import Program
-from surfacechem.model.system import Margin, Pace, State, System
+from surfacechem.model.system import Margin, State, System, TimeScale
 from surfacechem.solve.contract import REASONS, Array, Points, Result, Status
 from surfacechem.solve.radau.solver import consistent
 from surfacechem.tolerances import ATOL_OF_SCALE, CLOSED_GUARD, IDLE, NEGLIGIBLE, NEWTON_EPS, RUN_EPS
@@ -18,10 +18,10 @@ FEW, SHARP = 100.0, RUN_EPS
 """Steps in a period, fewer than which follow nothing, and the part of the time that a step can still resolve."""
 
 
-def paces(system: System, values: Mapping[str, float]) -> list[tuple[Pace, float]]:
+def paces(system: System, values: Mapping[str, float]) -> list[tuple[TimeScale, float]]:
     """Characteristic times of free motions of the gaps [s], the shortest first."""
     point = {parameter.symbol: values[parameter.path] for parameter in system.parameters}
-    found = [(pace, float(system.expand(pace.time).subs(point))) for pace in system.noted(Pace)]
+    found = [(pace, float(system.expand(pace.time).subs(point))) for pace in system.noted(TimeScale)]
     return sorted(found, key=lambda item: item[1])
 
 

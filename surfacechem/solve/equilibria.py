@@ -12,7 +12,7 @@ import numpy as np
 
 from surfacechem.compile.program import Function, compile_function
 from surfacechem.expressions import Expression, derivative
-from surfacechem.model.automaton import FOLD, SIDE, SLIP
+from surfacechem.model.automaton import FOLD_STIFFNESS, SIDE_PATH, SLIP_PATH
 from surfacechem.model.system import System
 from surfacechem.solve.branches import (
     KICK,
@@ -124,10 +124,10 @@ class Equilibria:
         self.states = [state.name for state in system.states]
         self.items = system.equilibria
         paths = [parameter.path for parameter in system.parameters]
-        self.slip = paths.index(SLIP) if SLIP in paths and any(e.slides for e in self.items) else None
+        self.slip = paths.index(SLIP_PATH) if SLIP_PATH in paths and any(e.slides for e in self.items) else None
         """Column of the mode of sliding among the parameters, where gaps in equilibrium stick or slide."""
-        sided = SIDE in paths and "g_n" in self.states
-        self._side = 1 + 2 * len(self.states) + paths.index(SIDE) if sided else None
+        sided = SIDE_PATH in paths and "g_n" in self.states
+        self._side = 1 + 2 * len(self.states) + paths.index(SIDE_PATH) if sided else None
         self.followers = [1 + self.states.index(name) for name in system.follows]
         """Columns of the states that follow the normal gap where it jumps, among the inputs."""
 
@@ -482,7 +482,7 @@ class Folds:
     def held_at(self, index: int, lost: Lost) -> Lost | None:
         """The same fold where sticking holds what slides; None where that keeps the equilibrium."""
         point = self.equilibria.with_slip(lost.point, 0.0)
-        if self._tangents[index](point.inputs())[0] > FOLD:
+        if self._tangents[index](point.inputs())[0] > FOLD_STIFFNESS:
             return None
         falls, way, _ = self._shape(index, point)
         return Lost(point, way, float(np.sign(falls @ way.pulls)))

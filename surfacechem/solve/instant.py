@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from surfacechem.model.automaton import RESTS, SLIP
+from surfacechem.model.automaton import REST_TIME_PATH, SLIP_PATH
 from surfacechem.model.system import System
 from surfacechem.solve.contract import ALOFT, AT_ONCE, FITTED, Array, Mask, Problem, Result, Status
 from surfacechem.solve.equilibria import BALANCED, Point, drift_of
@@ -102,7 +102,7 @@ class Instant:
         self.booked = np.zeros(problem.program.n_ledger)
         """Ledger now."""
         self.rebounds = Rebounds(jumper, first)
-        slip = {p.symbol for p in system.parameters if p.path == SLIP}
+        slip = {p.symbol for p in system.parameters if p.path == SLIP_PATH}
         ends = [any(edge.when.get(mode) == (0,) for mode in slip) for edge in system.edges]
         self._sticking = first + np.flatnonzero(ends)
         """Indices of the guards that end sticking."""
@@ -207,7 +207,7 @@ class Instant:
         if t > self._sharpened + IDLE * self.end:
             self._sharpened, self._resolved, self.peaks = t, len(self.jumps), self.scales.copy()
             return True
-        rests = next((j for j, p in enumerate(self.system.parameters) if p.path == RESTS), None)
+        rests = next((j for j, p in enumerate(self.system.parameters) if p.path == REST_TIME_PATH), None)
         if rests is None or self.jumps[-1].edge.returns is None or point.parameters[rests] == t:
             return False
         point.parameters[rests], self._resolved = t, len(self.jumps)

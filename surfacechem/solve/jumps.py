@@ -17,7 +17,7 @@ import symengine
 
 from surfacechem.compile.program import Function, Program, compile_function
 from surfacechem.expressions import derivative, magnitude
-from surfacechem.model.automaton import INTERFACE, RESTS, Edge
+from surfacechem.model.automaton import INTERFACE, REST_TIME_PATH, Edge
 from surfacechem.model.balances import elastic_energy
 from surfacechem.model.system import START, System
 from surfacechem.quantities import VELOCITIES
@@ -133,7 +133,7 @@ class Jumper:
         """Whether jumps are expected, so that what only they need is worth compiling."""
         self._tables: EdgeTables | None = None
         memory = {item.symbol for item in system.memory}
-        kept = [p.symbol in memory or p.path == RESTS for p in system.parameters]
+        kept = [p.symbol in memory or p.path == REST_TIME_PATH for p in system.parameters]
         self.mode_columns = [j for j, keep in enumerate(kept) if keep]
 
     # -- compiled functions of the inputs -------------------------------------------------------------------------

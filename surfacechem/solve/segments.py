@@ -16,7 +16,7 @@ import symengine
 
 from surfacechem.compile.program import Function, compile_function, needed
 from surfacechem.expressions import Expression, derivative
-from surfacechem.model.system import TOLERANCE, System
+from surfacechem.model.system import RTOL_PATH, System
 from surfacechem.solve.contract import Array
 from surfacechem.tolerances import FEW_EPS, GUARD_EPS, NEGLIGIBLE
 
@@ -46,7 +46,7 @@ def segment_parameters(system: System, starts: Array, rtol: float, values: Mappi
             rows[:, j] = [parameter.at(float(start)) for start in starts]
         elif parameter.path == "run.slack":
             rows[:, j] = min(max(values[parameter.path], STRAY * rtol), LARGEST_SLACK)
-        elif parameter.path == TOLERANCE:
+        elif parameter.path == RTOL_PATH:
             rows[:, j] = rtol
     return rows
 

@@ -18,7 +18,7 @@ from surfacechem.expressions import derivative, exp
 from surfacechem.laws.bonding import EquilibriumBonds
 from surfacechem.laws.contact import Penalty
 from surfacechem.laws.longrange import LennardJonesSpherePlane
-from surfacechem.model.system import STAND_IN
+from surfacechem.model.system import DUMMY_STATE
 from surfacechem.references.scene_view import SceneView
 from surfacechem.results.matching import match
 from surfacechem.runs.summaries import run_summary
@@ -101,7 +101,7 @@ def test_a_prescribed_gap_bears_the_force_in_newtons(tmp_path, evolves):
     assert found.t_n.values == pytest.approx(exact, rel=1e-8)
     work = LAW.energy(5e-9) - LAW.energy(1e-9)
     assert found.W_g_n.values[-1] == pytest.approx(-work, rel=1e-8)
-    assert STAND_IN not in found
+    assert DUMMY_STATE not in found
 
 
 @pytest.mark.parametrize("rtol", every(2, [1e-2, 1e-6]))

@@ -17,20 +17,20 @@ from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, absolute, depends, derivative, exponents, terms_of, where
 from surfacechem.model.balances import DISSIPATION, HEAT, INTERFACE, OUTSIDE, WORK, Power
 from surfacechem.model.build import Build
-from surfacechem.model.components.force import SHARED
+from surfacechem.model.components.force import SHARED_LOAD
 from surfacechem.model.components.mounting import law_reads
 from surfacechem.model.components.pairs import Opposed, by_affinity, dead_load, departure, opposed, own_departure
 from surfacechem.model.constraints.bound import bound
 from surfacechem.model.constraints.envelope import softening
-from surfacechem.model.constraints.unilateral import TOUCHING
-from surfacechem.model.system import Account, Capped, Caution, Margin, Pair
+from surfacechem.model.constraints.unilateral import TOUCH_OVERLAP
+from surfacechem.model.system import Account, CappedLaw, Caution, Margin, RatePair
 from surfacechem.quantities import Quantity
 from surfacechem.tolerances import TIME_EPS
 
-NEIGHBOURS = "H_neighbours"
+NEIGHBOUR_HEAT = "H_neighbours"
 """Account of the enthalpy that reactions take from neighbours."""
 
-MARGIN = 4
+RUPTURE_FACTOR = 4
 """Factor by which bonds may break faster than the rate at which they count as ruptured."""
 
 
@@ -50,7 +50,7 @@ class Reaction:
     """Net rate per current area [1/(m^2 s)]."""
 
 
-def laws(build: Build) -> Iterator[Power | Account | Caution | Pair | Margin]:
+def laws(build: Build) -> Iterator[Power | Account | Caution | RatePair | Margin]:
     """Chemical potentials, rates, bond balances and what the reactions dissipate."""
     yield from _beside(build)
     mu = _chemical_potentials(build)
@@ -172,7 +172,7 @@ def _across_an_open_gap(build: Build, law: RateLaw, rate: Expression) -> Iterato
         f"{law.title} forms bonds across an open gap, which it does not read. Where they form in contact only let its "
         "rate fall with the gap, by `gap-attachment` or a factor of g_n"
     )
-    yield Caution(where(g_n > TOUCHING, -formed * rate, 0), text)
+    yield Caution(where(g_n > TOUCH_OVERLAP, -formed * rate, 0), text)
 
 
 def _rate(build: Build, law: RateLaw, affinity: Expression) -> Expression:
@@ -190,7 +190,7 @@ def _rate(build: Build, law: RateLaw, affinity: Expression) -> Expression:
     rate = build.variables.call(law, law.statement, own)
     build.law_margins(law, own)
     if found := exponents(rate):
-        build.add(Capped(law.title, tuple(found)))
+        build.add(CappedLaw(law.title, tuple(found)))
     return rate
 
 
@@ -206,7 +206,7 @@ def _resolved(build: Build, laws: Mapping[str, RateLaw], rates: Mapping[str, Exp
     It stays far faster than all else that changes the same species, so that what they share out does not depend on it.
     """
     law, rate = laws[label], rates[label]
-    if any(role.by == SHARED and build.variables.was_read(role.variable) for role in build.variables.roles):
+    if any(role.by == SHARED_LOAD and build.variables.was_read(role.variable) for role in build.variables.roles):
         return rate  # bonds that share a load rupture, which ends the run before
     own = law.stoichiometry()
     relaxation = _relaxation(build, own, law, rate)
@@ -214,8 +214,8 @@ def _resolved(build: Build, laws: Mapping[str, RateLaw], rates: Mapping[str, Exp
         return rate
     others = (absolute(_relaxation(build, own, laws[other], rates[other])) for other in laws if other != label)
     quantity = Quantity(f"steps_{label}", "1", f"relaxations of {law.title} within what time resolves")
-    steps = build.name(quantity, relaxation * (build.t * TIME_EPS / MARGIN), output=False)
-    allowed = 1 + sum(others) * (build.t / MARGIN)
+    steps = build.name(quantity, relaxation * (build.t * TIME_EPS / RUPTURE_FACTOR), output=False)
+    allowed = 1 + sum(others) * (build.t / RUPTURE_FACTOR)
     return rate * where(steps > allowed, allowed / steps, 1)
 
 
@@ -237,7 +237,7 @@ def _from_neighbours(build: Build, found: Sequence[Reaction]) -> Iterator[Power]
         text = "enthalpy of what reactions take from neighbours"
         power = build.name(Quantity("q_n", "W/m^2", text), symengine.Add(*heat))
         S = symengine.Add(*entropy) / build.variables.get("T_c", "the neighbours")
-        yield Power(HEAT, OUTSIDE, INTERFACE, power, NEIGHBOURS, text, entropy=S)
+        yield Power(HEAT, OUTSIDE, INTERFACE, power, NEIGHBOUR_HEAT, text, entropy=S)
 
 
 def _beside(build: Build) -> Iterator[Margin]:

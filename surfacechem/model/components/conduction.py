@@ -18,7 +18,7 @@ from surfacechem.errors import InputError
 from surfacechem.expressions import Expression
 from surfacechem.model import balances
 from surfacechem.model.balances import HEAT, SURROUNDINGS, Node, Power
-from surfacechem.model.build import BOTH, Build
+from surfacechem.model.build import BOTH_BODIES, Build
 from surfacechem.model.parts import Slab, Thermal
 from surfacechem.model.system import Conductor, Profile, State
 from surfacechem.quantities import Quantity
@@ -146,7 +146,7 @@ def _conductor(build: Build, number: int, body: Body, law: Conduction) -> Conduc
     """Data to judge whether a body may be one lump."""
     node, ends = build.thermal.node_of[body.name], build.conductances
     F = node.energies[body.name] / build.thermal.volume(body.name)[body.name]
-    paths = [h for pair, several in ends.items() if body.name in pair or pair == BOTH for h in several]
+    paths = [h for pair, several in ends.items() if body.name in pair or pair == BOTH_BODIES for h in several]
     alone = sum(other is node for other in build.thermal.node_of.values()) == 1
     resistance, capacity = build.thermal.resistances[body.name], -node.T * balances.second(F, node.T)
     return Conductor(number, body.name, not law.cells, resistance, capacity, symengine.Add(*paths) if alone else None)

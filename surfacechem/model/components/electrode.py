@@ -23,7 +23,7 @@ from surfacechem.scene import Electrode
 ELECTRODE = "electrode"
 """Place to which the work of charge goes."""
 
-THERMAL = 0.025
+THERMAL_VOLTAGE = 0.025
 """Scale of a potential [V]: the thermal voltage, k_B T over an elementary charge, at room temperature."""
 
 
@@ -32,7 +32,7 @@ def variables(build: Build) -> Iterator[State]:
     for electrode in _electrodes(build):
         V = electrode.potential
         build.variables.define(V.name, symengine.Symbol(V.name), "evolved", _path(electrode))
-        yield State(V, electrode.start, THERMAL)
+        yield State(V, electrode.start, THERMAL_VOLTAGE)
 
 
 def laws(build: Build) -> Iterator[Power]:

@@ -25,8 +25,8 @@ from surfacechem.model.system import Margin
 from surfacechem.quantities import VARIABLES, Quantity
 from surfacechem.tolerances import LEAST_BONDED, NO_AMOUNT, TIME_EPS, ZERO_TIME
 
-SHARED = "load shared by all bonds"
-ELASTIC = "bond elasticity"
+SHARED_LOAD = "load shared by all bonds"
+BOND_ELASTICITY = "bond elasticity"
 OVERLOAD = "The load breaks all bonds at once: lower `t_n`, or let it grow from zero."
 
 
@@ -39,10 +39,10 @@ def energies(build: Build) -> None:
         if depends(derivative(build.psi, bond.symbol), g_n):
             quantity = VARIABLES["f"] if name == "phi" else Quantity(f"f_{name}", "N", f"force per bond of {name}")
             stretching = derivative(derivative(build.psi, bond.symbol), g_n) / bond.density
-            build.variables.define(quantity.name, partial(build.name, quantity, stretching), "derived", ELASTIC)
-    elastic = {role.variable for role in build.variables.roles if role.by == ELASTIC}
+            build.variables.define(quantity.name, partial(build.name, quantity, stretching), "derived", BOND_ELASTICITY)
+    elastic = {role.variable for role in build.variables.roles if role.by == BOND_ELASTICITY}
     if build.variables.has("t_n") and "f" not in elastic:
-        build.variables.define("f", partial(_shared, build), "derived", SHARED)
+        build.variables.define("f", partial(_shared, build), "derived", SHARED_LOAD)
 
 
 def _shared(build: Build) -> Expression:
@@ -73,8 +73,8 @@ def laws(build: Build) -> Iterator[Margin]:
 def _carriers(build: Build) -> Iterator[tuple[str, Expression]]:
     """Bonds whose load grows on the rest as they break: those that share one, or hold a gap that gives way."""
     for role in build.variables.roles:
-        if role.by == SHARED and build.variables.was_read(role.variable):
+        if role.by == SHARED_LOAD and build.variables.was_read(role.variable):
             yield "phi", build.variables.get("phi", "the force per bond", "interface")
-        if role.by == ELASTIC and build.variables.was_read(role.variable) and "g_n" in build.motion.gap_rates:
+        if role.by == BOND_ELASTICITY and build.variables.was_read(role.variable) and "g_n" in build.motion.gap_rates:
             name = role.variable.removeprefix("f_") if role.variable != "f" else "phi"
             yield name, build.bonding[name].symbol

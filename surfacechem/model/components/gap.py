@@ -10,23 +10,23 @@ import symengine
 from surfacechem.contracts.terms import Spec
 from surfacechem.errors import InputError, Place
 from surfacechem.expressions import Expression, derivative
-from surfacechem.model.automaton import NONE, Constraint
+from surfacechem.model.automaton import ZERO, Constraint
 from surfacechem.model.build import Build, Record
-from surfacechem.model.components.mounting import LENGTH, Held, far_field, held, law_reads
+from surfacechem.model.components.mounting import LENGTH_SCALE, Support, far_field, law_reads, support
 from surfacechem.model.constraints.threshold import bonds_left
-from surfacechem.model.constraints.unilateral import TOUCHING, closing, contact, impacts
+from surfacechem.model.constraints.unilateral import TOUCH_OVERLAP, closing, contact, impacts
 from surfacechem.model.system import Margin, State
 from surfacechem.quantities import VARIABLES, Quantity
 
 G, V = symengine.symbols("g_n v_n")
 
-SOFT = "Give a potential that lets them, such as `penalty`, or a gap that is not negative."
-OVERLAP = "the bodies overlap, and their contact is rigid"
+RIGID_REMEDY = "Give a potential that lets them, such as `penalty`, or a gap that is not negative."
+OVERLAP_ERROR = "the bodies overlap, and their contact is rigid"
 
 
 def variables(build: Build) -> Iterator[Constraint | Margin | State]:
     """The normal gap, a state where it moves by a balance, and the rigid contact of bodies that no potential bears."""
-    mount = held(build, "n")
+    mount = support(build, "n")
     if mount is None:
         return
     meets = not any(law_reads(law, "g_n") for law in build.interface.potentials)
@@ -38,7 +38,7 @@ def variables(build: Build) -> Iterator[Constraint | Margin | State]:
                 Place(path=mount.by),
             )
         far = far_field(build, mount)
-        closed = contact(far.force(NONE, NONE), _bonded(build))
+        closed = contact(far.force(ZERO, ZERO), _bonded(build))
         opening = closed.active * (far.w + far.F / far.k)
         build.variables.define("g_n", partial(build.name, VARIABLES["g_n"], opening), "algebraic", mount.by)
         yield closed
@@ -48,20 +48,20 @@ def variables(build: Build) -> Iterator[Constraint | Margin | State]:
         # A law that holds for an open gap only ends the run as the gap closes.
         if meets and not any("g_n" in law.positive for law in (*build.interface.frictions, *build.scene.heat)):
             closed = contact(
-                far_field(build, mount).force(NONE, NONE), _bonded(build), G, V if mount.inertial else None
+                far_field(build, mount).force(ZERO, ZERO), _bonded(build), G, V if mount.inertial else None
             )
             yield closed
             if mount.inertial:
                 build.motion.gap_rates["g_n"] = closed.active * V
             initial, spec = build.scene.initial.get("g_n", 0.0), Spec("m", "initial gap")
             first = build.constant("g_n_i", "initial.g_n", spec, initial, internal=False)
-            yield Margin("g_n >= 0", first + TOUCHING, OVERLAP, remedy=SOFT, path="initial.g_n")
+            yield Margin("g_n >= 0", first + TOUCH_OVERLAP, OVERLAP_ERROR, remedy=RIGID_REMEDY, path="initial.g_n")
             _carry(build, closed.reaction)
     if mount.law.e and not (mount.inertial and build.mode("closed") is not None):
         _refuse_restitution(mount, meets)
 
 
-def _refuse_restitution(mount: Held, meets: bool) -> None:
+def _refuse_restitution(mount: Support, meets: bool) -> None:
     """Raise InputError: a coefficient of restitution needs a mass that meets a rigid contact."""
     why = "a law of the scene ends as the gap closes" if mount.inertial else "nothing with a mass hits anything"
     if mount.inertial and not meets:
@@ -69,17 +69,17 @@ def _refuse_restitution(mount: Held, meets: bool) -> None:
     raise InputError(f"the coefficient of restitution e would change nothing: {why}. Leave it out.", mount.law.place)
 
 
-def _moving(build: Build, mount: Held) -> Iterator[State]:
+def _moving(build: Build, mount: Support) -> Iterator[State]:
     """States of a gap that moves by a balance, or the velocity at which dampers let it."""
     dot, rates = symengine.Symbol("dg_n_dt"), build.motion.gap_rates
     initial = build.scene.initial.get("g_n", 0.0) if mount.quasi_static else build.initial("g_n")
     build.variables.define("g_n", G, "evolved", mount.by)
     build.variables.get("g_n", "the mechanics")
-    yield State(VARIABLES["g_n"], initial, LENGTH)
+    yield State(VARIABLES["g_n"], initial, LENGTH_SCALE)
     rates["g_n"] = dot if mount.quasi_static else V
     if mount.inertial:
         build.variables.define("v_n", V, "evolved", mount.by)
-        yield State(VARIABLES["v_n"], build.scene.initial.get("v_n", 0.0), LENGTH)
+        yield State(VARIABLES["v_n"], build.scene.initial.get("v_n", 0.0), LENGTH_SCALE)
     elif mount.damped:
 
         def yielding() -> Expression:
@@ -112,7 +112,7 @@ def _carry(build: Build, traction: Expression) -> None:
 
 def laws(build: Build) -> Iterator[Record]:
     """Balance of the tractions on the gap, the energies of the bodies and what their dampers turn into heat."""
-    mount = held(build, "n")
+    mount = support(build, "n")
     if mount is None:
         return
     g, far = build.variables.get("g_n", "the mechanics", "mechanics"), far_field(build, mount)

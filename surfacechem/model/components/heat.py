@@ -19,7 +19,7 @@ from surfacechem.contracts.terms import HeatTransfer
 from surfacechem.errors import InputError, Place, suggestion
 from surfacechem.expressions import Expression, where
 from surfacechem.model.balances import HEAT, INTERFACE, OUTSIDE, Node, Power
-from surfacechem.model.build import BOTH, Build, Record
+from surfacechem.model.build import BOTH_BODIES, Build, Record
 from surfacechem.model.parts import HeatPath
 from surfacechem.model.system import Margin
 from surfacechem.quantities import Quantity
@@ -38,7 +38,7 @@ def laws(build: Build) -> Iterator[Record]:
                 together[channel] = together.get(channel, symengine.Integer(0)) + h
     for ends, channels in groups.values():
         yield from (HeatPath(ends, h) for h in channels.values())
-        yield from (_into_both(build, channels) if ends == BOTH else _between(build, ends, channels))
+        yield from (_into_both(build, channels) if ends == BOTH_BODIES else _between(build, ends, channels))
     for law in films:
         yield from _through_film(build, law)
     yield from _external(build)
@@ -73,7 +73,7 @@ def takers(build: Build) -> dict[str, Expression]:
     bodies = tuple(body.name for body in build.scene.bodies)
     ways: dict[str, Expression] = {}
     for pair, channels in build.conductances.items():
-        for end in bodies if pair == BOTH else set(pair) - {INTERFACE} if INTERFACE in pair else ():
+        for end in bodies if pair == BOTH_BODIES else set(pair) - {INTERFACE} if INTERFACE in pair else ():
             ways[end] = ways.get(end, 0) + symengine.Add(*(_area(build, pair) * h for h in channels))
     whole = symengine.Add(*ways.values())
     conducts = where(whole > 0, whole, 1)
@@ -146,7 +146,7 @@ def _paths(build: Build, law: HeatTransfer) -> Iterator[tuple[tuple[str, str], d
             if node is not centre:
                 yield ends, {name: 2 * h for name, h in channels.items()}
     else:
-        yield (a, b) if law.closure == "direct" else BOTH, channels
+        yield (a, b) if law.closure == "direct" else BOTH_BODIES, channels
 
 
 def _between(build: Build, ends: tuple[str, str], channels: Mapping[str, Expression]) -> Iterator[Power]:

@@ -19,7 +19,7 @@ from surfacechem.expressions import Expression, depends, derivative, positive, w
 from surfacechem.model.automaton import Constraint, Edge, Mode
 from surfacechem.model.balances import INTERFACE
 from surfacechem.model.build import Build
-from surfacechem.model.components.mounting import held, law_reads
+from surfacechem.model.components.mounting import law_reads, support
 from surfacechem.model.parts import Bond, Energy, Thermal
 from surfacechem.model.sliding.formulation import arrangement, displacement, in_parallel, in_series
 from surfacechem.model.system import Margin, Named, State
@@ -27,7 +27,7 @@ from surfacechem.quantities import VARIABLES, Quantity
 from surfacechem.scene import BondingVariable, Sites
 from surfacechem.tolerances import BOUND_SLACK, NO_AMOUNT
 
-LOGARITHM = "ln_phi"
+LN_PHI = "ln_phi"
 
 LOADABLE = (
     *("phi", "g_n", "g_t", "v", "v_2", "p", "t_n", "f", "J_c", "Q_1", "Q_2", "Q_c"),
@@ -35,7 +35,7 @@ LOADABLE = (
 )
 """Variables that a case may prescribe, beside the temperatures."""
 
-TRACTIONS = (
+GAP_TRACTIONS = (
     ("g_n", "t_n", "normal traction on body 1"),
     ("g_t", "t_e", "elastic tangential traction on body 1"),
     ("u_t", "t_a", "tangential traction on body 1 of what stands beside friction"),
@@ -158,15 +158,15 @@ def _bonding_state(build: Build, quantity: Quantity, density: Expression, limit:
 def _initial_bonding(build: Build, name: str) -> float:
     """Initial value of a bonding variable, from its logarithm where that is given."""
     initial = build.scene.initial
-    if name != "phi" or LOGARITHM not in initial:
+    if name != "phi" or LN_PHI not in initial:
         return build.initial(name)
     if "phi" in initial:
-        message = f"phi has two roles: given by itself and by {LOGARITHM}. Remove one of them."
+        message = f"phi has two roles: given by itself and by {LN_PHI}. Remove one of them."
         raise InputError(message, path="initial.phi")
-    if initial[LOGARITHM] < math.log(math.ulp(0.0)):
-        message = f"{LOGARITHM} = {initial[LOGARITHM]:g} is no bonding state that a number can hold."
-        raise InputError(message, path=f"initial.{LOGARITHM}")
-    return math.exp(initial[LOGARITHM])
+    if initial[LN_PHI] < math.log(math.ulp(0.0)):
+        message = f"{LN_PHI} = {initial[LN_PHI]:g} is no bonding state that a number can hold."
+        raise InputError(message, path=f"initial.{LN_PHI}")
+    return math.exp(initial[LN_PHI])
 
 
 def _bounds(build: Build, name: str, symbol: Any, limit: float) -> None:
@@ -309,7 +309,7 @@ def _in_sides(build: Build, given: Expression) -> tuple[Expression, list[Constra
     if "g_n" not in build.motion.gap_rates:
         return given, [Margin("g_n", GAP, "the given gap closes or opens", terminal=False)]
     # Bodies at no gap are in contact, loaded or not, under a dead load: nothing else holds them there.
-    mount = held(build, "n")
+    mount = support(build, "n")
     rests = mount is not None and mount.quasi_static and not mount.law.k
     start = where(GAP > 0, 1.0, -1.0) if rests else where(GAP < 0, -1.0, 1.0)
     edges = []
@@ -322,7 +322,7 @@ def _in_sides(build: Build, given: Expression) -> tuple[Expression, list[Constra
 
 def _tractions(build: Build, psi: Expression) -> None:
     """Tractions of the elastic gaps; the normal one gives the contact pressure where the potential states it."""
-    for gap, traction, text in TRACTIONS:
+    for gap, traction, text in GAP_TRACTIONS:
         symbol = symengine.Symbol(gap)
         if depends(psi, symbol):
             build.areal(Quantity(traction, "Pa", text, tag="e:cons_tc"), derivative(psi, symbol))
@@ -338,14 +338,14 @@ def _tractions(build: Build, psi: Expression) -> None:
 
 def outputs(build: Build) -> None:
     """Replace the state phi by ln phi: d ln phi / dt is the balance of the bonds per bond."""
-    if "phi" not in build.bonding or LOGARITHM not in build.scene.initial:
+    if "phi" not in build.bonding or LN_PHI not in build.scene.initial:
         return
     bond = build.bonding["phi"]
     if any(bond.symbol in edge.reset for edge in build.edges):
-        message = f"bonds that break at once have no {LOGARITHM}. Give `phi` instead."
-        raise InputError(message, path=f"initial.{LOGARITHM}")
-    state = State(VARIABLES[LOGARITHM], build.scene.initial[LOGARITHM], 1.0)
+        message = f"bonds that break at once have no {LN_PHI}. Give `phi` instead."
+        raise InputError(message, path=f"initial.{LN_PHI}")
+    state = State(VARIABLES[LN_PHI], build.scene.initial[LN_PHI], 1.0)
     phi, rate = Named(VARIABLES["phi"], symengine.exp(state.symbol)), bond.symbol * state.dot
     build.named[:0] = [phi, Named(Quantity(str(bond.dot), "1/s", "rate of change of the bonding state"), rate, False)]
-    build.rows.logarithm("phi", state.symbol, LOGARITHM, build.expanded(build.rows["phi"]))
+    build.rows.logarithm("phi", state.symbol, LN_PHI, build.expanded(build.rows["phi"]))
     build.states[:] = [state if item.symbol == bond.symbol else item for item in build.states]

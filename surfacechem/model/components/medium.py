@@ -26,10 +26,10 @@ from surfacechem.tolerances import NANOMETRE
 
 PATH = "interface.medium"
 
-KEYS = {"k_m": "conductivity", "eta_m": "viscosity", "rho_m": "density", "cp_m": "heat-capacity"}
+PROPERTY_KEYS = {"k_m": "conductivity", "eta_m": "viscosity", "rho_m": "density", "cp_m": "heat-capacity"}
 """Properties that a case may give, and their keys."""
 
-FITTED = (*KEYS, "gamma_m")
+FITTED_KEYS = (*PROPERTY_KEYS, "gamma_m")
 
 
 def variables(build: Build) -> Iterator[State]:
@@ -42,10 +42,10 @@ def variables(build: Build) -> Iterator[State]:
     if found.growth:
         yield State(VARIABLES["d_m"], build.initial("d_m"), NANOMETRE)
     for name, value in found.properties.items():
-        build.variables.define(name, partial(_given, build, name, value), "derived", f"{PATH}.{KEYS[name]}")
+        build.variables.define(name, partial(_given, build, name, value), "derived", f"{PATH}.{PROPERTY_KEYS[name]}")
     fluid = None if found.fluid is None else cache(partial(FluidFit, build, found.fluid))
     if fluid is not None:
-        for name in FITTED:
+        for name in FITTED_KEYS:
             if name not in found.properties:
                 build.variables.define(name, partial(_property, fluid, name), "derived", f"{PATH}.fluid")
     build.variables.define("f_m", partial(_free_energy, build, found, fluid), "derived", PATH)
@@ -88,7 +88,7 @@ def _film(build: Build, found: Medium) -> None:
 
 
 def _given(build: Build, name: str, value: float | Property) -> Expression:
-    path = f"{PATH}.{KEYS[name]}"
+    path = f"{PATH}.{PROPERTY_KEYS[name]}"
     if not isinstance(value, Property):
         return build.constant(name, path, Spec(VARIABLES[name].unit, VARIABLES[name].long_name, above=0), value)
     bound = build.variables.bind(value, f"{path}.{value.name()}")
@@ -117,16 +117,16 @@ def _free_energy(build: Build, found: Medium, fluid: Callable[[], FluidFit] | No
 
 FLUID_PATH = "interface.medium.fluid"
 
-ENERGY = "capacity_m"
+CAPACITY = "capacity_m"
 """Heat capacity per volume over T; minus its double integral is the free energy."""
 
-REACHES = (math.inf, 2.0, 1.1)
+FIT_REACHES = (math.inf, 2.0, 1.1)
 """Widths of a fit in temperatures of a case, tried in this order; the first is the whole range of the fluid."""
 
-REMEDY = "give `interface.medium.temperatures` that the run will reach"
+RANGE_REMEDY = "give `interface.medium.temperatures` that the run will reach"
 
-KELVIN = Spec("K", "where a piece of the fit ends")
-NUMBER = Spec("1", "coefficient of the fit")
+END_SPEC = Spec("K", "where a piece of the fit ends")
+COEFFICIENT_SPEC = Spec("1", "coefficient of the fit")
 
 
 class FluidFit:
@@ -172,13 +172,13 @@ class FluidFit:
 
     def energy(self) -> Expression:
         """Thermal free energy per volume [J/m^3], zero with its slope at the start."""
-        ends, pieces, fit = self._fitted(ENERGY)
+        ends, pieces, fit = self._fitted(CAPACITY)
         branches = []
         for i, ((x, coefficients), joint) in enumerate(zip(pieces, _joints(fit, self.start), strict=True)):
             half = (ends[i + 1] - ends[i]) / 2
             integral = sum(c * x ** (k + 2) / symengine.Integer((k + 1) * (k + 2)) for k, c in enumerate(coefficients))
             constant, slope = (
-                self._number(f"{ENERGY}_{part}_{i}", f"{ENERGY}.{part}[{i}]", value)
+                self._number(f"{CAPACITY}_{part}_{i}", f"{CAPACITY}.{part}[{i}]", value)
                 for part, value in zip(("constant", "slope"), joint, strict=True)
             )
             condition = ends[i + 1] > self.T if i < len(pieces) - 1 else True
@@ -192,7 +192,7 @@ class FluidFit:
         fit = self._fit(quantity)
         keys = [(f"{quantity}_ends_{i}", f"{quantity}.ends[{i}]") for i in range(len(fit) + 1)]
         numbers = (fit[0].low, *(piece.high for piece in fit))
-        ends = [self._number(*key, number, KELVIN) for key, number in zip(keys, numbers, strict=True)]
+        ends = [self._number(*key, number, END_SPEC) for key, number in zip(keys, numbers, strict=True)]
         pieces = []
         for i, (piece, (low, high)) in enumerate(zip(fit, pairwise(ends), strict=True)):
             keys = [(f"{quantity}_{i}_{k}", f"{quantity}[{i}][{k}]") for k in range(len(piece.coefficients))]
@@ -204,7 +204,7 @@ class FluidFit:
     def _fit(self, quantity: str) -> tuple[Piece, ...]:
         """The fit over the widest range for which there is one."""
         span = self.fluid.range(self.start)
-        for reach, target in (*((reach, FIT_ACCURACY) for reach in REACHES), (REACHES[-1], CRITICAL_ACCURACY)):
+        for reach, target in (*((reach, FIT_ACCURACY) for reach in FIT_REACHES), (FIT_REACHES[-1], CRITICAL_ACCURACY)):
             low, high = max(min(self.known) / reach, span.low), min(max(self.known) * reach, span.high)
             try:
                 found = self.fluid.fit(quantity, low, high, target)
@@ -227,14 +227,14 @@ class FluidFit:
             return
         self.ranges.add((low, high))
         span = self.fluid.range(self.start)
-        fitted = f"the properties of {self.fluid.name} are fitted no further ({REMEDY})"
+        fitted = f"the properties of {self.fluid.name} are fitted no further ({RANGE_REMEDY})"
         beyond = span.reason_low if low == span.low else fitted, span.reason_high if high == span.high else fitted
         margins = (self.T - ends[0], low, beyond[0]), (ends[-1] - self.T, high, beyond[1])
         for margin, end, reason in margins:
             name = f"{self.T} within the range of the fluid"
             self.build.add(Margin(name, margin, f"{reason} at {self.T} = {end:.6g} K"))
 
-    def _number(self, symbol: str, key: str, value: float, spec: Spec = NUMBER) -> Expression:
+    def _number(self, symbol: str, key: str, value: float, spec: Spec = COEFFICIENT_SPEC) -> Expression:
         return self.build.constant(symbol, f"{FLUID_PATH}.{key}", spec, value, internal=True)
 
 

@@ -19,17 +19,17 @@ from surfacechem.expressions import Expression, absolute, derivative, sqrt
 from surfacechem.model.automaton import ONE, Constraint, Edge, Equilibrium
 from surfacechem.model.balances import DISSIPATION, INTERFACE, MECHANICS, OUTSIDE, WORK, Power, elastic_energy
 from surfacechem.model.build import Build
-from surfacechem.model.system import Pace
+from surfacechem.model.system import TimeScale
 from surfacechem.quantities import Quantity
 from surfacechem.scene import Mounting
 from surfacechem.tolerances import MICROMETRE
 
-LENGTH = MICROMETRE
+LENGTH_SCALE = MICROMETRE
 """Scale of gaps [m] and of their velocities [m/s]: displacements of a micrometre are rounded at 1e-22 m."""
 
-AXES = {"n": "normal gap", "t": "tangential displacement", "t2": "transverse displacement"}
-GAPS = {"n": "g_n", "t": "u_t", "t2": "u_t2"}
-KEYS = {"n": "normal", "t": "tangential", "t2": "transverse"}
+AXIS_WORDS = {"n": "normal gap", "t": "tangential displacement", "t2": "transverse displacement"}
+GAP_ALONG = {"n": "g_n", "t": "u_t", "t2": "u_t2"}
+SECTIONS = {"n": "normal", "t": "tangential", "t2": "transverse"}
 
 
 @dataclass(frozen=True)
@@ -52,18 +52,18 @@ class Direction:
 ALONG = Direction("t", "v", "direction", "t", "t_t", "tangential traction")
 ACROSS = Direction("t2", "v_2", "direction_2", "t_2", "t_t2", "transverse traction")
 
-TRACTIONS = (ALONG.total, ACROSS.total)
+SLIDING_TRACTIONS = (ALONG.total, ACROSS.total)
 """Tractions along the interface, which a stage may wait for though no law reads them."""
 
 
 @dataclass(frozen=True)
-class Held:
+class Support:
     """The mounting of a direction as the case gives it."""
 
     law: Mounting
     axis: str
     by: str
-    beside: Held | None = None
+    beside: Support | None = None
     """The mounting whose mass this one has, and all else where it is given for both."""
 
     @property
@@ -79,37 +79,37 @@ class Held:
         return not (self.inertial or self.damped)
 
 
-def held(build: Build, axis: str) -> Held | None:
+def support(build: Build, axis: str) -> Support | None:
     """The mounting of a direction; a far-field traction alone is a dead load."""
-    law: Mounting | None = getattr(build.scene, KEYS[axis])
+    law: Mounting | None = getattr(build.scene, SECTIONS[axis])
     force = f"F_{axis}"
     pulls = driven(build, force)
     if law is not None:
         if not (law.k or law.m or law.c_b or law.c_g or pulls):
             raise InputError("the mounting holds nothing: give it a stiffness k, a mass m or a damper.", law.place)
         _refuse_restitution(law, axis)
-        return Held(law, axis, law.path)
+        return Support(law, axis, law.path)
     by = f"loading.{force}" if force in build.scene.loading else "programme"
-    return Held(Mounting(), axis, by) if pulls else None
+    return Support(Mounting(), axis, by) if pulls else None
 
 
 def _refuse_restitution(law: Mounting, axis: str) -> None:
     if axis != "n" and law.e:
-        message = f"bodies rebound along the normal: give the coefficient of restitution e there, not {KEYS[axis]}."
+        message = f"bodies rebound along the normal: give the coefficient of restitution e there, not {SECTIONS[axis]}."
         raise InputError(message, law.place)
 
 
-def held_across(build: Build, along: Held) -> Held | None:
+def transverse_support(build: Build, along: Support) -> Support | None:
     """The mounting across a tangential one where the scene moves there: its own, else the same."""
     law = build.scene.transverse
     if law is not None:
         if law.m:
             raise InputError("a mass is the same in every direction. Give `m` under `tangential`.", law.place)
         _refuse_restitution(law, "t2")
-        return Held(law, "t2", law.path, along)
+        return Support(law, "t2", law.path, along)
     given = any(driven(build, name) or name in build.scene.initial for name in ("w_t2", "F_t2", "u_t2", "v_2"))
     if given or any(friction.transverse is not None for friction in build.interface.frictions):
-        return Held(along.law, "t2", along.by, along)
+        return Support(along.law, "t2", along.by, along)
     return None
 
 
@@ -127,7 +127,7 @@ def law_reads(law: Law, name: str) -> bool:
 class FarField:
     """A mounting with its parameters as symbols, and the histories that drive it."""
 
-    mount: Held
+    mount: Support
     k: Expression
     m: Expression
     c_b: Expression
@@ -141,7 +141,7 @@ class FarField:
     @property
     def gap(self) -> symengine.Symbol:
         """The gap that the far field pulls at."""
-        return symengine.Symbol(GAPS[self.mount.axis])
+        return symengine.Symbol(GAP_ALONG[self.mount.axis])
 
     @property
     def works(self) -> bool:
@@ -165,16 +165,16 @@ class FarField:
         """Size of the tractions that cancel where the far field is in balance [Pa]."""
         return self.k * (absolute(self.w) + absolute(g)) + absolute(self.F)
 
-    def paces(self, text: str) -> list[Pace]:
+    def paces(self, text: str) -> list[TimeScale]:
         """The period of a mass on the stiffness of the bodies, or the relaxation of a damper beside it."""
         if self.k == 0:
             return []
         if self.m != 0:
             remedy = "leave out the mass, so that it follows at once, or end the run sooner"
-            return [Pace(f"period of the {text}", 2 * math.pi * sqrt(self.m / self.k), remedy)]
+            return [TimeScale(f"period of the {text}", 2 * math.pi * sqrt(self.m / self.k), remedy)]
         if self.c_b + self.c_g != 0:
             remedy = "leave out the damper, so that it snaps where it loses its equilibrium"
-            return [Pace(f"relaxation of the {text}", (self.c_b + self.c_g) / self.k, remedy)]
+            return [TimeScale(f"relaxation of the {text}", (self.c_b + self.c_g) / self.k, remedy)]
         return []
 
     def takers(self, build: Build) -> dict[str, Expression]:
@@ -188,7 +188,7 @@ class FarField:
 
     def book(
         self, build: Build, g: Expression, rate: Expression, moves: Expression | None = None
-    ) -> Iterator[Power | Pace]:
+    ) -> Iterator[Power | TimeScale]:
         """Energies of the bodies, work of the far field, heat of the dampers.
 
         Where the rate is what dampers make of the tractions, and so of their rounding, it does its work on how the gap
@@ -196,7 +196,7 @@ class FarField:
         """
         moves = rate if moves is None else moves
         axis = self.mount.axis
-        text = AXES[axis]
+        text = AXIS_WORDS[axis]
         yield from self.paces(text)
         for name, energy, what in (
             ("spring", self.stored(g), "elastic energy of the bodies"),
@@ -234,7 +234,7 @@ class FarField:
     ) -> Iterator[Equilibrium]:
         """Rows of the gap, which moves against ``tractions`` [Pa] by Newton's law, by its dampers, or in equilibrium.
 
-        ``inertia`` [Pa] is that of a ``velocity`` that something else stands for, ``held`` the row while not active.
+        ``inertia`` [Pa] is that of a ``velocity`` that something else stands for, ``support`` the row while not active.
         """
         name, rows = str(self.gap), build.rows
         resisted = [-part for part in tractions]  # no sum within the sum, whose parts cancel others of it
@@ -255,7 +255,7 @@ class FarField:
             yield Equilibrium(name, active * residual, size, along or {}, active, slides, bears)
 
 
-def far_field(build: Build, mount: Held) -> FarField:
+def far_field(build: Build, mount: Support) -> FarField:
     """The mounting with symbols for its parameters; made once."""
     if mount.axis not in build.motion.far_fields:
         law = _bound(build, mount)
@@ -279,14 +279,14 @@ def far_field(build: Build, mount: Held) -> FarField:
     return far
 
 
-def _bound(build: Build, mount: Held) -> Mounting | FarField:
+def _bound(build: Build, mount: Support) -> Mounting | FarField:
     """The parameters of a mounting as symbols; two directions share the mass, or the whole mounting."""
     if mount.beside is None:
-        law = build.variables.bind(mount.law, f"mechanics.{KEYS[mount.axis]}", f"_{mount.axis}")
+        law = build.variables.bind(mount.law, f"mechanics.{SECTIONS[mount.axis]}", f"_{mount.axis}")
         # What makes a gap inertial, overdamped or quasi-static may change, but not vanish.
         dampers = [name for name in ("c_b", "c_g") if getattr(mount.law, name) > 0]
         makes = "m" if mount.inertial else "k" if mount.quasi_static else dampers[0] if len(dampers) == 1 else ""
-        path = f"mechanics.{KEYS[mount.axis]}.{makes}"
+        path = f"mechanics.{SECTIONS[mount.axis]}.{makes}"
         items = build.parameters.items
         for i, item in enumerate(items):
             if item.path == path and item.value > 0:
@@ -295,7 +295,7 @@ def _bound(build: Build, mount: Held) -> Mounting | FarField:
     first = far_field(build, mount.beside)
     if mount.law is mount.beside.law:
         return first
-    law = build.variables.bind(mount.law, f"mechanics.{KEYS[mount.axis]}", f"_{mount.axis}")
+    law = build.variables.bind(mount.law, f"mechanics.{SECTIONS[mount.axis]}", f"_{mount.axis}")
     return replace(first, k=law.k, c_b=law.c_b, c_g=law.c_g, beta_1=law.beta_1)
 
 

@@ -32,9 +32,9 @@ from surfacechem.contracts.terms import Load, RateLaw, reads
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, depends, derivative, log_sum, where
 from surfacechem.model.build import Build
-from surfacechem.model.components.force import SHARED
+from surfacechem.model.components.force import SHARED_LOAD
 from surfacechem.model.components.mounting import driven
-from surfacechem.model.system import Pair
+from surfacechem.model.system import RatePair
 from surfacechem.quantities import BOLTZMANN, Quantity
 from surfacechem.tolerances import LARGEST_COVERAGE, LEAST_COVERAGE, RUN_EPS
 
@@ -90,7 +90,7 @@ def opposed(laws: Mapping[str, RateLaw]) -> list[Opposed]:
     return groups
 
 
-def departure(build: Build, group: Opposed, mu: Mapping[str, Expression]) -> Iterator[Pair]:
+def departure(build: Build, group: Opposed, mu: Mapping[str, Expression]) -> Iterator[RatePair]:
     """Departure of one-way rates from detailed balance at zero affinity; none for rates evaluated outside."""
     if any(law.log_rate is None for law in (*group.forward.values(), *group.backward.values())):
         return
@@ -102,14 +102,14 @@ def departure(build: Build, group: Opposed, mu: Mapping[str, Expression]) -> Ite
     yield _departure(build, group.label, f"{group.title} (pair)", forward - backward, affinity)
 
 
-def own_departure(build: Build, label: str, law: RateLaw, affinity: Expression) -> Iterator[Pair]:
+def own_departure(build: Build, label: str, law: RateLaw, affinity: Expression) -> Iterator[RatePair]:
     """Departure from detailed balance of a law that states both its rates, if the potential depends on the reaction."""
     known = any(depends(build.psi, build.bonding[name].symbol) for name in law.stoichiometry())
     if law.log_ratio is not None and known:
         yield _departure(build, label, law.title, build.variables.call(law, law.log_ratio), affinity)
 
 
-def _departure(build: Build, label: str, title: str, log_ratio: Expression, affinity: Expression) -> Pair:
+def _departure(build: Build, label: str, title: str, log_ratio: Expression, affinity: Expression) -> RatePair:
     T = build.variables.get("T_c", "the equilibrium of a reaction")
     value = build.expanded(log_ratio + affinity / (BOLTZMANN * T))
     inside = {}  # coverages within bounds where their logarithms and those of their complements exist
@@ -118,7 +118,7 @@ def _departure(build: Build, label: str, title: str, log_ratio: Expression, affi
         inside[bond.symbol] = where(bond.symbol > LEAST_COVERAGE, below, LEAST_COVERAGE)
     quantity = Quantity(f"departure_{label}", "1", f"ln(k_f/k_r) - ln K(g, T) of {title}")
     build.name(quantity, value.subs(inside))
-    return Pair(quantity.name, title, label)
+    return RatePair(quantity.name, title, label)
 
 
 def dead_load(build: Build, laws: Mapping[str, RateLaw], pairs: Sequence[Opposed]) -> dict[str, Expression]:
@@ -147,7 +147,7 @@ def dead_load(build: Build, laws: Mapping[str, RateLaw], pairs: Sequence[Opposed
 
 def _is_force_prescribed(build: Build) -> bool:
     """Whether the force per bond is given: by itself, or by a traction of which each bond bears its share."""
-    shares = any(role.variable == "f" and role.by == SHARED for role in build.variables.roles)
+    shares = any(role.variable == "f" and role.by == SHARED_LOAD for role in build.variables.roles)
     return driven(build, "f") or (shares and driven(build, "t_n"))
 
 

@@ -14,7 +14,7 @@ from surfacechem.expressions import Expression, where
 from surfacechem.model.automaton import Constraint, Edge, Mode, Register
 from surfacechem.model.build import Build
 from surfacechem.model.components.interface import LOADABLE
-from surfacechem.model.components.mounting import LENGTH, TRACTIONS
+from surfacechem.model.components.mounting import LENGTH_SCALE, SLIDING_TRACTIONS
 from surfacechem.model.system import State
 from surfacechem.model.variables import unit_of
 from surfacechem.quantities import INTERNAL, VARIABLES
@@ -22,7 +22,7 @@ from surfacechem.scene import Stage
 
 STAGE = symengine.Symbol("stage")
 BEGUN = Register("stage_begun", "time at which the stage began")
-SCALES = {"m": LENGTH, "m/s": LENGTH}
+STATE_SCALES = {"m": LENGTH_SCALE, "m/s": LENGTH_SCALE}
 
 
 def variables(build: Build) -> Iterator[Constraint]:
@@ -59,7 +59,7 @@ def _driven(build: Build, name: str) -> Expression:
             value = build.parameters.add(f"{name}_rate", f"programme.{item.name}.{name}", spec, item.rates[name])
             rate = rate + where(_during(i), value, 0)
     start = build.scene.initial.get(name, 0.0)
-    build.add(State(quantity, start, SCALES.get(quantity.unit, 1.0)))
+    build.add(State(quantity, start, STATE_SCALES.get(quantity.unit, 1.0)))
     build.rows.kinematics(name, rate)
     build.motion.drives[name] = rate
     return symengine.Symbol(name)
@@ -109,7 +109,7 @@ def _left(build: Build, item: Stage) -> Expression:
     if item.duration is not None:
         spec = Spec("s", f"length of the stage {item.name}", above=0)
         return BEGUN.symbol + build.parameters.add("length", f"{path}.for", spec, item.duration) - build.t
-    x, name, traction = _variable(build, item), item.variable, item.variable in TRACTIONS
+    x, name, traction = _variable(build, item), item.variable, item.variable in SLIDING_TRACTIONS
     spec = Spec("Pa" if traction else unit_of(name), f"end of the stage {item.name}")
     path = f"{path}.until.{name}{'' if item.rising else '.falls-to'}"
     end = build.parameters.add(f"{name}_end" if traction else name, path, spec, item.value)

@@ -16,7 +16,7 @@ from surfacechem.model.balances import HEAT, INTERFACE, OUTSIDE, SURROUNDINGS, N
 from surfacechem.model.build import Build
 from surfacechem.model.constraints.fold import determinant
 from surfacechem.model.parts import Thermal
-from surfacechem.model.system import STABLE, Margin, State
+from surfacechem.model.system import STABLE_PREFIX, Margin, State
 from surfacechem.quantities import VARIABLES, Quantity
 from surfacechem.tolerances import NO_AMOUNT
 
@@ -188,7 +188,7 @@ def _fold_margin(build: Build, node: Node, row: Expression) -> Margin:
     if not slope.free_symbols & {state.symbol for state in build.states}:
         reason = f"no heat path determines the temperature {node.name}"
         other = reason
-    return Margin(f"{STABLE}{node.name}", slope, reason, below=(produced, other), stability=node.name)
+    return Margin(f"{STABLE_PREFIX}{node.name}", slope, reason, below=(produced, other), stability=node.name)
 
 
 def _with_velocity(build: Build, heat: Expression, T: Expression) -> Expression:

@@ -22,17 +22,17 @@ from surfacechem.contracts.terms import reads
 from surfacechem.expressions import Expression, magnitude, where
 from surfacechem.model.automaton import Constraint, Edge, Mode
 from surfacechem.model.build import Build
-from surfacechem.model.components.interface import LOGARITHM
+from surfacechem.model.components.interface import LN_PHI
 from surfacechem.quantities import Quantity
 from surfacechem.tolerances import BOUND_EPS, EPS
 
-SINGULAR = type(symengine.zoo), type(symengine.nan), type(symengine.oo)
+NOT_NUMBERS = type(symengine.zoo), type(symengine.nan), type(symengine.oo)
 
-PHI, LIMIT = symengine.symbols("phi phi_max")
-HELD_AT = {-1.0: "held at zero", 0.0: "between its bounds", 1.0: "held at its upper bound"}
+PHI, PHI_MAX = symengine.symbols("phi phi_max")
+BOUND_WORDS = {-1.0: "held at zero", 0.0: "between its bounds", 1.0: "held at its upper bound"}
 BOUNDS = (
-    (-1, symengine.Integer(0), BOUND_EPS * LIMIT, "unbonded", "no bond is left", "rebond", "bonds form again"),
-    (1, LIMIT, (1 - BOUND_EPS) * LIMIT, "complete", "bonding is complete", "loosen", "bonds begin to break"),
+    (-1, symengine.Integer(0), BOUND_EPS * PHI_MAX, "unbonded", "no bond is left", "rebond", "bonds form again"),
+    (1, PHI_MAX, (1 - BOUND_EPS) * PHI_MAX, "complete", "bonding is complete", "loosen", "bonds begin to break"),
 )
 """Side and value of each bound, the value next to it, names and reasons of the edges to the bound and away from it."""
 
@@ -46,7 +46,7 @@ def bound(build: Build, rate: Expression) -> Constraint:
     if not bounds:
         return Constraint()
     sides = {0, *(side for side, *_ in bounds)}
-    mode = Mode("held", 0.0, {side: text for side, text in HELD_AT.items() if side in sides})
+    mode = Mode("held", 0.0, {side: text for side, text in BOUND_WORDS.items() if side in sides})
     held, edges = mode.symbol, []
     for side, at, _, name, reason, back, why in bounds:
         # Where the law points inwards no bound is needed: what rounding has carried beyond comes back by itself.
@@ -68,7 +68,7 @@ def bound(build: Build, rate: Expression) -> Constraint:
 def _may_leave_the_range(build: Build) -> bool:
     """Whether any law but those of an envelope does not keep the bonding state in its range by its form."""
     top = next((item.value for item in build.parameters.items if item.path == "phi_max"), None)
-    if top is None or LOGARITHM in build.scene.initial:
+    if top is None or LN_PHI in build.scene.initial:
         return False
     laws = [law for law in build.interface.reactions if law.envelope is None]
     return not all(law.keeps_range and (top == 1.0 or "n_2" in reads(law.statement)) for law in laws)
@@ -85,10 +85,10 @@ def _is_singular(whole: Expression, phi: Expression, numbers: Mapping[Any, float
         if any(x.free_symbols for x in both):
             return False
         # One rounding: next to a bound, at BOUND_EPS, it is more.
-        return any(x.atoms(*SINGULAR) for x in both) or abs(float(both[0])) <= 0.5 * EPS * float(both[1])
+        return any(x.atoms(*NOT_NUMBERS) for x in both) or abs(float(both[0])) <= 0.5 * EPS * float(both[1])
 
     arguments = (logarithm.args[0].subs({PHI: phi}) for logarithm in whole.atoms(symengine.log))
-    return bool(whole.subs({PHI: phi}).atoms(*SINGULAR)) or any(map(has_none, arguments))
+    return bool(whole.subs({PHI: phi}).atoms(*NOT_NUMBERS)) or any(map(has_none, arguments))
 
 
 def _rate_at(build: Build, rate: Expression, at: Expression, inside: Expression, name: str) -> Expression:

@@ -21,21 +21,21 @@ import symengine
 from surfacechem.contracts.terms import RateLaw
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, absolute, derivative, where
-from surfacechem.model.automaton import NONE, ONE, Constraint, Edge, Mode
+from surfacechem.model.automaton import ONE, ZERO, Constraint, Edge, Mode
 from surfacechem.model.build import Build
-from surfacechem.model.components.mounting import far_field, held
+from surfacechem.model.components.mounting import far_field, support
 from surfacechem.model.system import Margin
 from surfacechem.quantities import VARIABLES
 from surfacechem.tolerances import NO_AMOUNT
 
-MATCH = 1e3 * NO_AMOUNT
+STRENGTH_RTOL = 1e3 * NO_AMOUNT
 """Relative difference of two statements of a strength that rounded input explains: both have six digits."""
 
-WORDS = {-1.0: "is open beyond the reach of bonds", 0.0: "keeps its bonds", 1.0: "loses bonds"}
-DEBONDING = Mode("debonding", 0.0, WORDS)
+DEBONDING_WORDS = {-1.0: "is open beyond the reach of bonds", 0.0: "keeps its bonds", 1.0: "loses bonds"}
+DEBONDING = Mode("debonding", 0.0, DEBONDING_WORDS)
 MODE = DEBONDING.symbol
 
-SAME = "Give `bond-stiffness` and this law the same E_b."
+SAME_STIFFNESS = "Give `bond-stiffness` and this law the same E_b."
 
 
 def variables(build: Build) -> Iterator[Constraint]:
@@ -61,18 +61,18 @@ def _check(build: Build, law: RateLaw, phi: Expression, g_n: Expression, peak: E
     if bonds.has(symengine.zoo):
         return ()  # the potential does not exist without bonds, which then bear nothing of their own
     borne = build.at_start(bonds)
-    if abs(borne - strength) > MATCH * strength:
+    if abs(borne - strength) > STRENGTH_RTOL * strength:
         raise InputError(
             f"{law.name()}: at t_max / E_b = {start:g} m the bonds of the potential bear {borne:g} Pa, "
-            f"not the t_max of {strength:g} Pa. {SAME}",
+            f"not the t_max of {strength:g} Pa. {SAME_STIFFNESS}",
             law.place,
         )
     # What varies, and what a sweep gives, is watched.
     reason = "the bonds of the potential bear another traction than t_max where they begin to break"
-    near = 2 * MATCH - absolute(build.expanded(bonds / t_max) - 1)
+    near = 2 * STRENGTH_RTOL - absolute(build.expanded(bonds / t_max) - 1)
     return (
         Margin("t_max / E_b < g_f", 1 - peak / g_f, "bonds begin to break beyond g_f"),
-        Margin("t_max", near, reason, remedy=SAME, path=law.path),
+        Margin("t_max", near, reason, remedy=SAME_STIFFNESS, path=law.path),
     )
 
 
@@ -90,7 +90,7 @@ def softening(
         rate = rate.subs({symengine.Symbol("dg_n_dt"): build.variables.get("v_n", "the envelope")})
     overshoot = build.name(VARIABLES["overshoot"], forming * free / n_c - rate, output=False)
     lost, bound = {MODE: -ONE}, build.mode("held")
-    breaks = {MODE: ONE} if bound is None else {MODE: ONE, bound: NONE}
+    breaks = {MODE: ONE} if bound is None else {MODE: ONE, bound: ZERO}
     # Where there are no bonds, and none form, none break.
     present = where(phi > 0, left - phi, where(forming * free > 0, left - phi, 1))
     beyond = where(phi > 0, left - phi + NO_AMOUNT, 1)
@@ -104,12 +104,12 @@ def softening(
         # Bonds turn back from the envelope where the gap does: rounding must not take them there again.
         Edge("soften", present, "bonds begin to break as the gap opens", breaks, strict=True, when=keeps),
         *_tear(build, phi, left),
-        Edge("part", left, "the last bonds break", lost, {phi: NONE}, equilibrates=True, heat="snap", when=loses),
-        Edge("unload", overshoot, "bonds do not reach what the gap leaves", {MODE: NONE}, when=loses),
+        Edge("part", left, "the last bonds break", lost, {phi: ZERO}, equilibrates=True, heat="snap", when=loses),
+        Edge("unload", overshoot, "bonds do not reach what the gap leaves", {MODE: ZERO}, when=loses),
     ]
     if forming != 0:
         margin, reason = where(forming > 0, -left, 1), "the gap is closed enough to bond"
-        edges.append(Edge("rejoin", margin, reason, {MODE: NONE}, strict=True, when=parted))
+        edges.append(Edge("rejoin", margin, reason, {MODE: ZERO}, strict=True, when=parted))
     # A run begins with no more bonds than the gap leaves.
     given = where(build.t > 0, 1, where(left > 0, left, 0) - phi + build.variables.get("slack", "the bonds"))
     reason, remedy = "there are more bonds than the gap leaves", "Give fewer bonds under `initial`, or a smaller gap."
@@ -126,11 +126,11 @@ def softening(
 
 def _tear(build: Build, phi: Expression, left: Expression) -> list[Edge]:
     """Edge at which a quasi-static gap tears open at once, its mounting being softer than the fall of the traction."""
-    mount = held(build, "n")
+    mount = support(build, "n")
     if mount is None or not mount.quasi_static or "g_n" not in build.motion.gap_rates:
         return []
     g, k = symengine.Symbol("g_n"), far_field(build, mount).k
     slope = derivative(derivative(build.psi, g).subs({phi: left}), g)
     guard, lost = (k + slope) / (k + absolute(slope)), {MODE: -ONE}
     reason = "the traction falls faster with the gap than the bodies unload: the interface tears open"
-    return [Edge("tear", guard, reason, lost, {phi: NONE}, equilibrates=True, heat="snap", when={MODE: (1,)})]
+    return [Edge("tear", guard, reason, lost, {phi: ZERO}, equilibrates=True, heat="snap", when={MODE: (1,)})]

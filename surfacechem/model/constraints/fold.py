@@ -19,7 +19,7 @@ import symengine
 
 from surfacechem.errors import InputError, Place
 from surfacechem.expressions import Expression, absolute, depends, derivative, where
-from surfacechem.model.automaton import FOLD, Constraint, Edge, Equilibrium, Fold
+from surfacechem.model.automaton import FOLD_STIFFNESS, Constraint, Edge, Equilibrium, Fold
 from surfacechem.model.balances import Node
 from surfacechem.model.build import Build
 
@@ -45,7 +45,7 @@ def jumps(build: Build) -> Iterator[Constraint]:
     falling = tuple(-_along(whole, gap, rise) for gap, rise in zip(gaps, rises, strict=True))
     warming = tuple({str(T): slope for T, slope in rise.items()} for rise in rises)
     # The same zero with sizes up to 1: what is far stiffer at first must not drown what is left later.
-    left = tangent - FOLD
+    left = tangent - FOLD_STIFFNESS
     snap = Edge(
         "snap",
         left / (1 + absolute(left)),

@@ -29,16 +29,16 @@ import symengine
 from surfacechem.contracts.terms import Friction
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, absolute, depends, derivative, sign, where
-from surfacechem.model.automaton import NONE, ONE, Constraint, Edge, Register
+from surfacechem.model.automaton import ONE, ZERO, Constraint, Edge, Register
 from surfacechem.model.build import Build
 from surfacechem.model.components.mounting import far_field, law_reads
 from surfacechem.model.constraints.threshold import broken
 
 SLIP = symengine.Symbol("slip")
 P = symengine.Symbol("p of an impact")
-EXERTED = Register("impulse", "impulse of the pressure that friction has not answered yet [Pa s]")
+IMPULSE = Register("impulse", "impulse of the pressure that friction has not answered yet [Pa s]")
 
-PRESSURES = 1e50, 1e100
+TRIAL_PRESSURES = 1e50, 1e100
 """Pressures [Pa] between which friction has to grow in proportion, as it does at one that is infinite."""
 
 SOFTEN = "Let a potential bear the bodies, such as `penalty`."
@@ -85,16 +85,16 @@ def friction_impulse(build: Build, impulse: Expression) -> Iterator[Constraint]:
     sliding = [slip for slip in build.motion.slips if slip.slides_inertially]
     if not (laws and sliding):
         return
-    v, exerted = symengine.Symbol("speed" if len(sliding) == 2 else "v"), EXERTED.symbol
+    v, exerted = symengine.Symbol("speed" if len(sliding) == 2 else "v"), IMPULSE.symbol
     ratio = build.energy.rubs * symengine.Add(*(_impulse_ratio(build, law, v) for law in laws))
     loss = ratio * exerted / far_field(build, sliding[0].mount).m
-    stops = {} if build.mode("slip") is None else {SLIP: where(loss < absolute(v), SLIP, NONE)}
-    left = {v: where(loss < absolute(v), v - loss * sign(v), NONE)}
+    stops = {} if build.mode("slip") is None else {SLIP: where(loss < absolute(v), SLIP, ZERO)}
+    left = {v: where(loss < absolute(v), v - loss * sign(v), ZERO)}
     due, reason = where(exerted > 0, -1, 1), "friction answers the impact"
-    rub = Edge("rub", due, reason, {exerted: NONE, **stops}, left, heat="local")
-    pressed = {exerted: where(absolute(v) > 0, impulse, NONE)}
+    rub = Edge("rub", due, reason, {exerted: ZERO, **stops}, left, heat="local")
+    pressed = {exerted: where(absolute(v) > 0, impulse, ZERO)}
     # Before the bodies rest: friction answers each impact on its own.
-    yield Constraint((), (EXERTED,), (rub,), at_once=True, beside=lambda edge: pressed if edge.is_impact else {})
+    yield Constraint((), (IMPULSE,), (rub,), at_once=True, beside=lambda edge: pressed if edge.is_impact else {})
 
 
 def _impulse_ratio(build: Build, law: Friction, v: Expression) -> Expression:
@@ -108,7 +108,7 @@ def _impulse_ratio(build: Build, law: Friction, v: Expression) -> Expression:
     bound = build.bound(law)
     traction = build.variables.call(bound, bound.statement, {"p": P, "v": v, "direction": ONE})
     expression = symengine.sympify(traction).subs({symengine.Symbol("p"): P, symengine.Symbol("t_n"): -P})
-    slopes = [derivative(expression, P).subs({P: symengine.RealDouble(p)}) for p in PRESSURES]
+    slopes = [derivative(expression, P).subs({P: symengine.RealDouble(p)}) for p in TRIAL_PRESSURES]
     finite, infinite = (build.at_start(slope) for slope in slopes)
     if finite != infinite:
         raise InputError(

@@ -20,14 +20,14 @@ import symengine
 from surfacechem.contracts.terms import Law, Limit
 from surfacechem.errors import InputError, suggestion
 from surfacechem.expressions import Expression, depends, derivative, where
-from surfacechem.model.automaton import NONE, ONE, Constraint, Edge, Mode, Register
+from surfacechem.model.automaton import ONE, ZERO, Constraint, Edge, Mode, Register
 from surfacechem.model.build import Build
-from surfacechem.model.components.mounting import held, law_reads
+from surfacechem.model.components.mounting import law_reads, support
 
 Stoichiometry = Mapping[str, int | float]
 
 BONDED = Mode("bonded", 1.0, {0.0: "debonded", 1.0: "bonded"})
-LOOSE = Register("loose", "whether the gaps have yet to follow a local jump")
+UNRELAXED = Register("loose", "whether the gaps have yet to follow a local jump")
 
 
 def variables(build: Build) -> None:
@@ -87,7 +87,7 @@ def _limit(build: Build, law: Limit, strength: Expression, closed: Expression | 
         # Closed again, a rigid interface that has debonded bears pressure only.
         strength, when = bonded * strength, {closed: (1,)}
         lost, when = ([bonded], {bonded: (1,), **when}) if local else ([bonded, closed], when)
-    modes, breaks, g = dict.fromkeys(lost, NONE), broken(build, law, law.breaks), symengine.Symbol("g_n")
+    modes, breaks, g = dict.fromkeys(lost, ZERO), broken(build, law, law.breaks), symengine.Symbol("g_n")
     if depends(build.psi, g) and not build.expanded(derivative(build.psi, g)).free_symbols & {*modes, *breaks}:
         names = " and ".join(item.name() for item in build.interface.potentials if law_reads(item, "g_n"))
         raise InputError(
@@ -96,14 +96,14 @@ def _limit(build: Build, law: Limit, strength: Expression, closed: Expression | 
             law.place,
         )
     # Where only the interface pays for a broken bond the gaps move in a jump of their own, in which the bodies do.
-    mount = held(build, "n")
+    mount = support(build, "n")
     normal = mount is not None and mount.quasi_static and "g_n" in build.motion.gap_rates
     follow = local and (normal or any(slip.in_equilibrium for slip in build.motion.slips))
     if follow:
-        modes[LOOSE.symbol] = ONE
-        reason, due = "the gap follows what gave way", {LOOSE.symbol: (1,)}
-        relax = Edge("relax", -ONE, reason, {LOOSE.symbol: NONE}, equilibrates=True, when=due)
-        yield Constraint(registers=(LOOSE,), edges=(relax,), at_once=True)
+        modes[UNRELAXED.symbol] = ONE
+        reason, due = "the gap follows what gave way", {UNRELAXED.symbol: (1,)}
+        relax = Edge("relax", -ONE, reason, {UNRELAXED.symbol: ZERO}, equilibrates=True, when=due)
+        yield Constraint(registers=(UNRELAXED,), edges=(relax,), at_once=True)
     debond = Edge(
         "debond",
         strength - t_n,
@@ -125,7 +125,7 @@ def broken(build: Build, law: Law, named: str = "") -> dict[Expression, Expressi
         if named:
             message = f"{law.name()} breaks '{named}', but the bonds are not species of a mechanism."
             raise InputError(message, law.place)
-        return {bonding["phi"].symbol: NONE} if "phi" in bonding else {}
+        return {bonding["phi"].symbol: ZERO} if "phi" in bonding else {}
     lost = list(bonds)
     if named:  # by its species, or by the variable itself
         texts = {item.name: item.long_name.removeprefix("coverage of ") for item in build.interface.variables}
@@ -140,7 +140,7 @@ def broken(build: Build, law: Law, named: str = "") -> dict[Expression, Expressi
         extent = bonding[name].symbol * bonding[name].density / -nu[name]
         for other, n in nu.items():
             changes[other] = changes.get(other, 0) + n * extent / bonding[other].density
-    return {bonding[x].symbol: NONE if x in lost else bonding[x].symbol + change for x, change in changes.items()}
+    return {bonding[x].symbol: ZERO if x in lost else bonding[x].symbol + change for x, change in changes.items()}
 
 
 def _rupture(build: Build, law: Law, name: str) -> Stoichiometry:

@@ -23,11 +23,11 @@ import symengine
 
 from surfacechem.contracts.terms import Spec
 from surfacechem.expressions import Expression, absolute, derivative, where
-from surfacechem.model.automaton import NONE, ONE, RESTS, Constraint, Edge, Mode, Register
+from surfacechem.model.automaton import ONE, REST_TIME_PATH, ZERO, Constraint, Edge, Mode, Register
 from surfacechem.model.build import Build
-from surfacechem.model.components.mounting import FarField, far_field, held, law_reads
-from surfacechem.model.constraints.set_valued import PRESSURES, friction_impulse
-from surfacechem.model.system import TOLERANCE, Margin
+from surfacechem.model.components.mounting import FarField, far_field, law_reads, support
+from surfacechem.model.constraints.set_valued import TRIAL_PRESSURES, friction_impulse
+from surfacechem.model.system import RTOL_PATH, Margin
 from surfacechem.tolerances import NEWTON_EPS, PICOMETRE
 
 G, V = symengine.symbols("g_n v_n")
@@ -42,20 +42,20 @@ SHORTEST_REBOUND = 8 * NEWTON_EPS
 """Part of the time so far that one rebound must take to be told from none: a few hundred ticks of the clock, so that
 its event is found to a per cent of it."""
 
-HALF = 0.5
-"""Part to which what is conducted per pressure falls, at least, between the ``PRESSURES`` where it is less than in
-proportion."""
+LEAST_PART = 0.5
+"""Part to which what is conducted per pressure falls, at least, between the ``TRIAL_PRESSURES`` where it is less than
+in proportion."""
 
-OVERLAP, OPENING, LEAST = -1.0, PICOMETRE / 1e3, 1e-3
+DEEP_GAP, TOUCH_GAP, NO_PRESSURE = -1.0, PICOMETRE / 1e3, 1e-3
 """Gaps [m] deep in contact and as good as at touch, and a pressure [Pa] that bears nothing at the former. The softest
 contact in use, of 1 Pa/m, has a thousand times as much there; attraction that changes its sign beyond its pole has some
 1e-14 Pa, and bonds that have all but gone leave little more.
 """
 
-TOUCHING = PICOMETRE
+TOUCH_OVERLAP = PICOMETRE
 """Overlap [m] that still is touch: far below the size of an atom, far above the rounding of a gap."""
 
-REMEDY = "Give a potential that does, such as `penalty`."
+CONTACT_REMEDY = "Give a potential that does, such as `penalty`."
 
 
 def contact(pull: Expression, bonded: Expression, gap: Any = None, velocity: Any = None) -> Constraint:
@@ -82,7 +82,7 @@ def laws(build: Build) -> Iterator[Constraint]:
     if not limits or any(law.release == "local" for law in limits):  # else what debonds opens
         # What only touches zero does not part a mass.
         strict, when = any(state.symbol == V for state in build.states), {**debonded, closed: (1,)}
-        opens = Edge("open", -t_n, "the interface opens", {closed: NONE}, equilibrates=True, strict=strict, when=when)
+        opens = Edge("open", -t_n, "the interface opens", {closed: ZERO}, equilibrates=True, strict=strict, when=when)
         yield Constraint(edges=(opens,))
     gap = build.variables.get("g_n", "the rigid interface", "interface")
     if "g_n" not in build.motion.gap_rates:
@@ -100,14 +100,14 @@ def impacts(build: Build) -> Iterator[Constraint]:
     closed = build.mode("closed")
     if closed is None or "g_n" not in build.motion.gap_rates:
         return
-    mount = held(build, "n")
+    mount = support(build, "n")
     assert mount is not None
-    shut, apart = {G: NONE}, {closed: (0,)}
+    shut, apart = {G: ZERO}, {closed: (0,)}
     if not mount.inertial:
         yield _closing(Edge("touch", G, "the gap closes", build.heals, shut, equilibrates=True, when=apart))
         return
     far = far_field(build, mount)
-    speed, pressing = absolute(V), -far.force(NONE, NONE) / far.m
+    speed, pressing = absolute(V), -far.force(ZERO, ZERO) / far.m
     rests, remembered = _rests(build, far, speed, pressing)
     yield from friction_impulse(build, (1 + far.e) * far.m * speed)
     hits = Edge(
@@ -115,11 +115,11 @@ def impacts(build: Build) -> Iterator[Constraint]:
         G,
         "the bodies hit each other",
         {LANDED.symbol: rests, **remembered},
-        {**shut, V: where(rests > 0, NONE, far.e * speed)},
-        returns=where(pressing > 0, 2 * V / pressing, NONE),
+        {**shut, V: where(rests > 0, ZERO, far.e * speed)},
+        returns=where(pressing > 0, 2 * V / pressing, ZERO),
         when=apart,
     )
-    calm, reason = {LANDED.symbol: NONE, **build.heals}, "the bodies rest on each other"
+    calm, reason = {LANDED.symbol: ZERO, **build.heals}, "the bodies rest on each other"
     rest = Edge("rest", -ONE, reason, calm, equilibrates=True, when={LANDED.symbol: (1,)})
     # What follows at the same moment comes before what would slide as long as the contact is open.
     yield Constraint((), (LANDED, FASTEST) if remembered else (LANDED,), (hits, rest), at_once=True)
@@ -131,14 +131,14 @@ def _rests(
     """Indicator, one where the bodies do not rebound, else zero; and new values of the registers that it reads."""
     if far.e == 0:
         return ONE, {}
-    tolerance = build.constant("tolerance", TOLERANCE, Spec("1", "relative tolerance of the run"), 0.0, internal=True)
+    tolerance = build.constant("tolerance", RTOL_PATH, Spec("1", "relative tolerance of the run"), 0.0, internal=True)
     swift = where(speed > FASTEST.symbol, speed, FASTEST.symbol)
     rebound = far.e * speed
     nothing = NO_SPEED * tolerance
     # This flight takes 2 rebound / pressing, and all that follow together 1 / (1 - e) times as long.
     brief = pressing * build.t * ((1 - far.e) * nothing + SHORTEST_REBOUND)
     slow = where(rebound < nothing * (swift + LEAST_SPEED), 1, where(2 * rebound < brief, 1, 0))
-    at_once = build.constant("rests_at", RESTS, Spec("s", "time at which rebounds rest"), -1.0, internal=True)
+    at_once = build.constant("rests_at", REST_TIME_PATH, Spec("s", "time at which rebounds rest"), -1.0, internal=True)
     return where(build.t > at_once, slow, 1), {FASTEST.symbol: swift}
 
 
@@ -152,8 +152,8 @@ def jumps(build: Build) -> Iterator[str]:
     for (a, b), channels in build.conductances.items():
         for h in channels:
             # What grows less than in proportion to the pressure does nothing in no time.
-            at = [build.at_start(h.subs({symengine.Symbol("p"): symengine.RealDouble(p)})) / p for p in PRESSURES]
-            if at[1] > HALF * at[0]:
+            at = [build.at_start(h.subs({symengine.Symbol("p"): symengine.RealDouble(p)})) / p for p in TRIAL_PRESSURES]
+            if at[1] > LEAST_PART * at[0]:
                 found.append(f"the conductance between {a} and {b}")
     if found:
         names = " and ".join(dict.fromkeys(found))
@@ -168,13 +168,13 @@ def closing(build: Build, g: Any) -> Iterator[Margin | str]:
         return
     # What the potentials bear deep in contact, unless it is the same as at touch.
     t_n, side = build.expanded(derivative(build.psi, g)), symengine.Symbol("side")
-    deep = t_n.subs({g: OVERLAP, side: -1})
-    borne = symengine.Integer(0) if deep == t_n.subs({g: OPENING, side: 1}) else -deep
+    deep = t_n.subs({g: DEEP_GAP, side: -1})
+    borne = symengine.Integer(0) if deep == t_n.subs({g: TOUCH_GAP, side: 1}) else -deep
     without_bonds = borne.subs({bond.symbol: 0 for bond in build.bonding.values()})
-    if not build.at_start(without_bonds) <= LEAST:  # nor where a law has no number there
+    if not build.at_start(without_bonds) <= NO_PRESSURE:  # nor where a law has no number there
         return
-    if build.at_start(borne) <= LEAST:
-        yield f"no potential bears the bodies in contact: the run ends if the gap closes. {REMEDY}"
-    margin = where(borne > LEAST, 1, g + TOUCHING) if borne.free_symbols else g + TOUCHING
+    if build.at_start(borne) <= NO_PRESSURE:
+        yield f"no potential bears the bodies in contact: the run ends if the gap closes. {CONTACT_REMEDY}"
+    margin = where(borne > NO_PRESSURE, 1, g + TOUCH_OVERLAP) if borne.free_symbols else g + TOUCH_OVERLAP
     reason = "the gap closed, and no potential bears the bodies in contact"
-    yield Margin("g_n >= 0", margin, reason, remedy=REMEDY, domain=True)
+    yield Margin("g_n >= 0", margin, reason, remedy=CONTACT_REMEDY, domain=True)

@@ -15,25 +15,25 @@ import symengine
 from surfacechem.contracts.terms import Friction, Potential, TangentialPotential, reads
 from surfacechem.errors import InputError, Place
 from surfacechem.expressions import Expression, absolute, depends, derivative, log, sqrt, where
-from surfacechem.model.automaton import NONE, ONE
+from surfacechem.model.automaton import ONE, ZERO
 from surfacechem.model.build import Build
 from surfacechem.model.components.mounting import (
     ACROSS,
     ALONG,
-    LENGTH,
+    LENGTH_SCALE,
     Direction,
-    Held,
+    Support,
     driven,
-    held,
-    held_across,
     law_reads,
+    support,
+    transverse_support,
 )
 from surfacechem.model.constraints.set_valued import SLIP
 from surfacechem.model.system import Caution, Given, State
 from surfacechem.quantities import VARIABLES, Quantity
 from surfacechem.tolerances import LEAST_CREEP
 
-REST = {"v": NONE, "v_2": NONE, "direction": ONE, "direction_2": ONE}
+REST = {"v": ZERO, "v_2": ZERO, "direction": ONE, "direction_2": ONE}
 
 UNSTABLE = (
     "no steady sliding velocity: nothing resists it, or friction falls faster with velocity than anything else "
@@ -48,7 +48,7 @@ class Formulation:
     """Formulation of the tangential motion of a scene in one direction."""
 
     d: Direction
-    mount: Held | None
+    mount: Support | None
     """None where the displacement is prescribed."""
     elastic: bool
     """Whether sticking is elastic: the free energy depends on the elastic gap."""
@@ -91,9 +91,9 @@ class Formulation:
 
 def formulations(build: Build) -> tuple[Formulation, ...]:
     """Formulations of the motion in each direction in which the scene moves by a balance."""
-    mount = held(build, "t")
+    mount = support(build, "t")
     elastic = bool(in_series(build)) and not driven(build, "g_t")
-    across = held_across(build, mount) if mount is not None else None
+    across = transverse_support(build, mount) if mount is not None else None
     if mount is not None and across is not None:
         if elastic:
             raise InputError(
@@ -117,7 +117,7 @@ def formulations(build: Build) -> tuple[Formulation, ...]:
     return (_formulation(build, ALONG, mount, elastic),)
 
 
-def _formulation(build: Build, d: Direction, mount: Held | None, elastic: bool) -> Formulation:
+def _formulation(build: Build, d: Direction, mount: Support | None, elastic: bool) -> Formulation:
     laws = build.interface.frictions
     rate_dependent = any(_feels_velocity(law, d) for law in laws)
     rate_dependent = rate_dependent or (not elastic and mount is not None and mount.damped)
@@ -154,9 +154,9 @@ def in_parallel(build: Build) -> tuple[Potential, ...]:
     What moves in two directions has no elastic gap, so that it is the displacement there without friction as well. A
     gap and a velocity that are prescribed each by itself are no one displacement.
     """
-    mount, frictions = held(build, "t"), bool(build.interface.frictions)
+    mount, frictions = support(build, "t"), bool(build.interface.frictions)
     if mount is not None:
-        beside = not driven(build, "g_t") and (frictions or held_across(build, mount) is not None)
+        beside = not driven(build, "g_t") and (frictions or transverse_support(build, mount) is not None)
     else:
         beside = frictions and not driven(build, "v") and (driven(build, "g_t") or driven(build, "u_t"))
     return tuple(law for law in _sheared(build) if beside and arrangement(law) == "parallel")
@@ -187,7 +187,7 @@ def evolve(
     start: float | None = None,
     given: Given | None = None,
     algebraic: bool = False,
-    scale: float = LENGTH,
+    scale: float = LENGTH_SCALE,
 ) -> Expression:
     """A new state of the motion, and the variable of its name where something says what it is determined by."""
     initial = build.scene.initial.get(name, 0.0) if start is None else start

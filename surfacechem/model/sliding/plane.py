@@ -29,30 +29,30 @@ import symengine
 
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, cos, depends, derivative, norm, sin, sqrt, where
-from surfacechem.model.automaton import NONE, Constraint, Mode, Register
+from surfacechem.model.automaton import ZERO, Constraint, Mode, Register
 from surfacechem.model.build import Build, Record
-from surfacechem.model.components.mounting import ACROSS, LENGTH, Direction, FarField, far_field
+from surfacechem.model.components.mounting import ACROSS, LENGTH_SCALE, Direction, FarField, far_field
 from surfacechem.model.constraints.set_valued import SLIP, breaks_bonds, set_valued
 from surfacechem.model.sliding.formulation import PLACE, Formulation, evolve, growth, name_traction
-from surfacechem.model.system import STABLE, Given, Margin
+from surfacechem.model.system import STABLE_PREFIX, Given, Margin
 from surfacechem.quantities import VARIABLES
 from surfacechem.tolerances import PICOMETRE, RUN_EPS, SQRT_EPS, TIME_EPS, TINY, TRACTION_EPS
 
-SPEED, TURNED = symengine.symbols("speed turn")
+SPEED, TURN = symengine.symbols("speed turn")
 BEGAN = symengine.symbols("began began_2")
-WORDS = {0.0: "sticks", 1.0: "slides"}
+STICK_WORDS = {0.0: "sticks", 1.0: "slides"}
 
 LEAST_SPEED = PICOMETRE / 1e6
 """Speed [m/s] below which the turn is never resolved, a picometre in twelve days: it keeps the row regular at t = 0."""
 
-SWIFT, RADIAN = 0.1, 1e6
+SPEED_SCALE, TURN_SCALE = 0.1, 1e6
 """Scales of the speed [m/s] and of the turn [rad]: what rounding of the pull makes of either as sliding begins is no
 error. The turn is accurate to a part of one radian, not of itself.
 """
 
 
 @dataclass(frozen=True)
-class Side:
+class Component:
     """Tractions in one of the two directions: the pull, the resistance to sliding, and the limit of sticking."""
 
     d: Direction
@@ -67,7 +67,7 @@ class Side:
     @property
     def needed(self) -> Expression:
         """Traction that friction has to bear for the interface to stick."""
-        return self.far.force(self.u, NONE) - self.t_a
+        return self.far.force(self.u, ZERO) - self.t_a
 
     @property
     def driving(self) -> Expression:
@@ -84,7 +84,7 @@ def states(build: Build, kinds: Sequence[Formulation]) -> Iterator[Constraint]:
             "mounting a mass `m`, or a damper `c_b` along both directions.",
             PLACE,
         )
-    mode = Mode("slip", 0.0, WORDS, where(SPEED > 0, 1.0, 0.0) if inertial else None)
+    mode = Mode("slip", 0.0, STICK_WORDS, where(SPEED > 0, 1.0, 0.0) if inertial else None)
     registers = (
         Register(str(b), "component of the direction in which sliding began", first, partial(_began, v))
         for b, first, v in zip(BEGAN, (1.0, 0.0), ("v", "v_2"), strict=True)
@@ -93,14 +93,14 @@ def states(build: Build, kinds: Sequence[Formulation]) -> Iterator[Constraint]:
     build.variables.define("sticking", 1 - SLIP, "mode", "sticks or slides")
     for kind in kinds:
         evolve(build, kind.d.displacement, "mechanics.tangential")
-    by, scale, slow = "balance of the tangential tractions", SWIFT if inertial else LENGTH, not inertial
+    by, scale, slow = "balance of the tangential tractions", SPEED_SCALE if inertial else LENGTH_SCALE, not inertial
     start: dict[str, Any] = {"speed": {}, "turn": {}}
     if inertial:  # both are given by the components of the initial velocity
         along, across = (build.scene.initial.get(v, 0.0) for v in ("v", "v_2"))
         start["speed"] = {"start": math.hypot(along, across), "given": Given(VARIABLES["v"], along, _speed)}
         start["turn"] = {"start": 0.0, "given": Given(VARIABLES["v_2"], across, lambda _: 0.0)}
     evolve(build, "speed", by, algebraic=slow, scale=scale, **start["speed"])
-    evolve(build, "turn", algebraic=slow, scale=RADIAN, **start["turn"])
+    evolve(build, "turn", algebraic=slow, scale=TURN_SCALE, **start["turn"])
     for kind, cosine in zip(kinds, _unit_vector(), strict=True):
         build.variables.define(kind.d.cosine, SLIP * cosine, "evolved" if inertial else "algebraic", "turn")
         velocity = build.name(VARIABLES[kind.d.velocity], SPEED * cosine)
@@ -126,7 +126,7 @@ def motion(build: Build, kinds: Sequence[Formulation]) -> Iterator[Record]:
         d, u, far = kind.d, symengine.Symbol(kind.d.displacement), far_field(build, kind.mount)
         rate, t_a = build.motion.gap_rates[d.displacement], derivative(build.psi, u)
         resisted, limit = (rubs * by[d.axis] for by in (build.motion.sliding_tractions, build.motion.stick_limits))
-        side = Side(d, far, u, rate, t_a, resisted, limit)
+        side = Component(d, far, u, rate, t_a, resisted, limit)
         sides.append(side)
         build.rows.kinematics(d.displacement, rate)
         yield from far.book(build, u, rate)
@@ -145,22 +145,22 @@ def motion(build: Build, kinds: Sequence[Formulation]) -> Iterator[Record]:
             yield Margin("friction in both directions", ratio, reason, remedy=remedy)
         # The slope at rest is that of the speeds to come.
         ahead = growth(slope.subs({SPEED: SPEED + TINY}))
-        yield Margin(f"{STABLE}speed", ahead, kinds[0].unstable, when={SLIP: (1,)}, stability="speed")
+        yield Margin(f"{STABLE_PREFIX}speed", ahead, kinds[0].unstable, when={SLIP: (1,)}, stability="speed")
     pull = _scaled(sides, largest)
     # Sliding begins where the pull points; what nothing holds back begins in the direction of its drive.
-    drive = [build.total_derivative(side.far.force(NONE, NONE) - side.t_a) for side in sides]
+    drive = [build.total_derivative(side.far.force(ZERO, ZERO) - side.t_a) for side in sides]
     size, pace = norm(*pull), norm(*drive)
     led = [where(pace > 0, x / where(pace > 0, pace, 1), began) for began, x in zip(BEGAN, drive, strict=True)]
     aimed = [where(size > 0, x / where(size > 0, size, 1), other) for x, other in zip(pull, led, strict=True)]
     aim, beyond = dict(zip(BEGAN, aimed, strict=True)), largest - size
-    onward, end = {SLIP: NONE}, {TURNED: NONE}
+    onward, end = {SLIP: ZERO}, {TURN: ZERO}
     if kinds[0].inertial:  # it slides on where sticking does not bear what pulls
         onward = {SLIP: where(beyond < 0, 1, 0)} | {b: where(beyond < 0, x, b) for b, x in aim.items()}
-        end = {TURNED: NONE, SPEED: NONE}
-    yield set_valued({1: beyond}, {1: still}, aim, onward, {**breaks_bonds(build), TURNED: NONE}, end)
+        end = {TURN: ZERO, SPEED: ZERO}
+    yield set_valued({1: beyond}, {1: still}, aim, onward, {**breaks_bonds(build), TURN: ZERO}, end)
 
 
-def _inertial(build: Build, sides: Sequence[Side], largest: Expression) -> Expression:
+def _inertial(build: Build, sides: Sequence[Component], largest: Expression) -> Expression:
     """Newton's law along and across the direction of sliding; returns the guard that is zero where sliding stops."""
     turn, m = symengine.Symbol("dturn_dt"), sides[0].far.m
     (x, y), (c, s) = (side.driving for side in sides), _unit_vector()
@@ -172,7 +172,7 @@ def _inertial(build: Build, sides: Sequence[Side], largest: Expression) -> Expre
     return SPEED + TRACTION_EPS / TIME_EPS * least
 
 
-def _steady(build: Build, sides: Sequence[Side], largest: Expression) -> tuple[Expression, Expression]:
+def _steady(build: Build, sides: Sequence[Component], largest: Expression) -> tuple[Expression, Expression]:
     r"""Balances without inertia; returns the guard that is zero where sliding stops, and their slope with the speed.
 
     What resists sliding in the direction n is the vector :math:`(a n_x, b n_y)`, whose half axes a and b grow with the
@@ -190,20 +190,20 @@ def _steady(build: Build, sides: Sequence[Side], largest: Expression) -> tuple[E
     # What rounding leaves of the balance in which sliding begins must not stop it.
     still = along.subs({SPEED: 0}) + TRACTION_EPS * largest
     if a != b:
-        rubs = sum((part.subs({SPEED: 0}) for part in sizes), NONE)
+        rubs = sum((part.subs({SPEED: 0}) for part in sizes), ZERO)
         along, across = (where(rubs > 0, *pair) for pair in zip(_elliptic(pull, sizes), (along, across), strict=True))
     slope = derivative(along, SPEED)
     linear = slope != 0 and not depends(slope, SPEED)
     build.rows.switched("speed", SLIP, -along.subs({SPEED: 0}) / slope - SPEED if linear else along, SPEED)
-    build.rows.switched("turn", SLIP * norm(*pull), across, TURNED)  # what nothing pulls has no direction
-    build.motion.slides_by |= {"speed": SPEED, "turn": TURNED}
+    build.rows.switched("turn", SLIP * norm(*pull), across, TURN)  # what nothing pulls has no direction
+    build.motion.slides_by |= {"speed": SPEED, "turn": TURN}
     return still, -derivative(build.expanded(along), SPEED)
 
 
 def _unit_vector() -> tuple[Expression, Expression]:
     """The direction of sliding: that in which it began, turned. So a straight line stays one to the last digit."""
     x, y = BEGAN
-    return x * cos(TURNED) - y * sin(TURNED), y * cos(TURNED) + x * sin(TURNED)
+    return x * cos(TURN) - y * sin(TURN), y * cos(TURN) + x * sin(TURN)
 
 
 def _turned(pull: Sequence[Expression]) -> tuple[Expression, Expression]:
@@ -211,7 +211,7 @@ def _turned(pull: Sequence[Expression]) -> tuple[Expression, Expression]:
 
     They are taken about the direction in which sliding began: there their terms cancel, and what is left is exact.
     """
-    (x, y), (b, b_2), c, s = pull, BEGAN, cos(TURNED), sin(TURNED)
+    (x, y), (b, b_2), c, s = pull, BEGAN, cos(TURN), sin(TURN)
     ahead, aside = b * x + b_2 * y, b * y - b_2 * x
     return c * ahead + s * aside, c * aside - s * ahead
 
@@ -238,7 +238,7 @@ def _elliptic(pull: Sequence[Expression], sizes: Sequence[Expression]) -> tuple[
     (x, y), (a, b) = pull, sizes
     (a_0, a_1), (b_0, b_1) = ((size.subs({SPEED: 0}), derivative(size, SPEED)) for size in sizes)
     if depends(a_1, SPEED) or depends(b_1, SPEED):
-        (a_0, b_0), (a_1, b_1) = (a, b), (NONE, NONE)  # no polynomial: as it is
+        (a_0, b_0), (a_1, b_1) = (a, b), (ZERO, ZERO)  # no polynomial: as it is
     r_0, r_1, r_2, reach_0 = a_0 * b_0, a_0 * b_1 + a_1 * b_0, a_1 * b_1, norm(x * b_0, y * a_0)
     excess = (
         (reach_0 - r_0) * (reach_0 + r_0),
@@ -259,14 +259,14 @@ def _power_series(terms: Sequence[Expression]) -> Expression:
     return reduce(lambda total, term: total * SPEED + term, reversed(terms))
 
 
-def _resistance(build: Build, side: Side) -> Expression:
+def _resistance(build: Build, side: Component) -> Expression:
     """Resistance to sliding along one of the directions alone [Pa]."""
     own = BEGAN[side.d is ACROSS]
-    sliding = {b: symengine.Integer(b == own) for b in BEGAN} | {TURNED: NONE, SLIP: symengine.Integer(1)}
+    sliding = {b: symengine.Integer(b == own) for b in BEGAN} | {TURN: ZERO, SLIP: symengine.Integer(1)}
     return build.expanded(side.resisted).subs(sliding) + (side.far.c_b + side.far.c_g) * SPEED
 
 
-def _scaled(sides: Sequence[Side], top: Expression) -> list[Expression]:
+def _scaled(sides: Sequence[Component], top: Expression) -> list[Expression]:
     """The pull where the ellipse that sticking bears is stretched to a circle about its larger half axis."""
     if all(side.limit == top for side in sides):
         return [side.needed for side in sides]

@@ -25,7 +25,7 @@ from surfacechem.tolerances import PICOMETRE
 
 DRIVE = "drive"
 
-EFFECT = 1e6
+DRIVE_SCALE = 1e6
 """Scale of the drive of a mass: what its traction is resolved to is a part of the direct effect, not of itself."""
 
 LEAST_INERTIAL = PICOMETRE / 1e8
@@ -62,7 +62,7 @@ def evolve_drive(build: Build, *, inertial: bool) -> Expression | None:
 
     given = Given(VARIABLES["v"], build.scene.initial.get("v", 0.0), at_start)
     by = "mechanics.tangential" if inertial else "balance of the tangential tractions"
-    scale = EFFECT if inertial else 1.0
+    scale = DRIVE_SCALE if inertial else 1.0
     symbol = evolve(build, DRIVE, by, algebraic=not inertial, scale=scale, given=given)
     build.variables.define("v", velocity, "derived", f"{law.path}, from its traction")
     return symbol

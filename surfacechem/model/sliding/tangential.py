@@ -17,10 +17,10 @@ import symengine
 
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, absolute, depends, derivative, norm, sign, where
-from surfacechem.model.automaton import NONE, ONE, Constraint, Edge, Equilibrium, Mode, When
+from surfacechem.model.automaton import ONE, ZERO, Constraint, Edge, Equilibrium, Mode, When
 from surfacechem.model.balances import MECHANICS, OUTSIDE, WORK, Power
 from surfacechem.model.build import Build, Record
-from surfacechem.model.components.mounting import ACROSS, ALONG, KEYS, FarField, far_field
+from surfacechem.model.components.mounting import ACROSS, ALONG, SECTIONS, FarField, far_field
 from surfacechem.model.constraints.set_valued import SLIP, breaks_bonds, set_valued
 from surfacechem.model.sliding import plane, rate_and_state
 from surfacechem.model.sliding.formulation import (
@@ -36,11 +36,11 @@ from surfacechem.model.sliding.formulation import (
     name_traction,
 )
 from surfacechem.model.sliding.rate_and_state import DRIVE, stands_for_velocity
-from surfacechem.model.system import STABLE, Margin
+from surfacechem.model.system import STABLE_PREFIX, Margin
 from surfacechem.quantities import VARIABLES
 from surfacechem.tolerances import TINY, TRACTION_EPS
 
-WORDS = {-1.0: "slides backward", 0.0: "sticks", 1.0: "slides forward"}
+SLIP_WORDS = {-1.0: "slides backward", 0.0: "sticks", 1.0: "slides forward"}
 
 
 def variables(build: Build) -> Iterator[Constraint]:
@@ -99,7 +99,7 @@ def _states(build: Build, kind: Formulation) -> Iterator[Constraint]:
     v, rates, u = kind.d.velocity, build.motion.gap_rates, kind.d.displacement
     alone = len(build.motion.slips) == 1
     if kind.sticks:
-        mode = Mode("slip", 0.0, WORDS, sign(symengine.Symbol("v")) if kind.slides_inertially else None)
+        mode = Mode("slip", 0.0, SLIP_WORDS, sign(symengine.Symbol("v")) if kind.slides_inertially else None)
         yield Constraint((mode,), active=SLIP**2)
         build.variables.define("direction", SLIP, "mode", "sticks or slides")
         build.variables.define("sticking", 1 - SLIP**2, "mode", "sticks or slides")
@@ -126,7 +126,7 @@ def _states(build: Build, kind: Formulation) -> Iterator[Constraint]:
 def _sliding_velocity(build: Build, kind: Formulation) -> Expression:
     """Sliding velocity: rate of the displacement less that of the elastic gap; zero while it sticks."""
     if not kind.slides:
-        return NONE
+        return ZERO
     if build.variables.has("v_t"):
         build.variables.get("v_t", "sliding")
     rates, u = build.motion.gap_rates, kind.d.displacement
@@ -137,7 +137,7 @@ def _sliding_velocity(build: Build, kind: Formulation) -> Expression:
 def _displacement(build: Build, kind: Formulation, alone: bool) -> None:
     """The displacement, and its velocity where that has inertia or follows from dampers."""
     assert kind.mount is not None
-    name, mount, place = kind.d.displacement, kind.mount, f"mechanics.{KEYS[kind.d.axis]}"
+    name, mount, place = kind.d.displacement, kind.mount, f"mechanics.{SECTIONS[kind.d.axis]}"
     u, rates, v = evolve(build, name, place), build.motion.gap_rates, kind.own_velocity
     rates[name] = symengine.Symbol(f"d{name}_dt")
     if kind.inertial:
@@ -164,7 +164,7 @@ def _motion(build: Build, kind: Formulation) -> Iterator[Record]:
     d, u = kind.d, symengine.Symbol(kind.d.displacement)
     v, rate = build.variables.get(d.velocity, "the friction"), build.motion.gap_rates[d.displacement]
     rubs, t_a = build.energy.rubs, derivative(build.psi, u)
-    t_f = build.motion.sliding_tractions.get(d.axis, NONE)
+    t_f = build.motion.sliding_tractions.get(d.axis, ZERO)
     if kind.elastic:
         # Per area on which friction acts, however small that is.
         needed = derivative(build.psi if rubs == 1 else build.energy.rubbed, symengine.Symbol("g_t"))
@@ -172,7 +172,7 @@ def _motion(build: Build, kind: Formulation) -> Iterator[Record]:
     else:
         assert far is not None
         carried = t_f = rubs * t_f
-        held = needed = far.force(u, NONE) - t_a
+        held = needed = far.force(u, ZERO) - t_a
     slides = build.constraint("slip").active if kind.sticks else symengine.Integer(kind.slides)
     in_proportion = False
     if far is None:
@@ -193,7 +193,7 @@ def _friction(
     build: Build, kind: Formulation, needed: Expression, t_f: Expression, v: Expression, in_proportion: bool
 ) -> Constraint:
     """The set-valued law, by the reserve of sticking (limit less need) and a guard that is zero where sliding stops."""
-    stops, still, slack = [], v, NONE
+    stops, still, slack = [], v, ZERO
     if kind.slides_inertially:
         still = symengine.Symbol(_velocity_state(build, kind))
         stops = [still]
@@ -214,8 +214,8 @@ def _friction(
     # Beyond touch the law of a contact may go on to negative pressure; nothing gives way there that is not pulled.
     bears = {s: where(limit > 0, limit, 0) - s * needed for s in (1, -1)}
     # Without inertia the traction is at its limit as sliding stops, and rounding must not start it again.
-    onward = where(absolute(needed) <= limit, 0, sign(needed)) if stops else NONE
-    breaks, end = breaks_bonds(build), dict.fromkeys(stops, NONE)
+    onward = where(absolute(needed) <= limit, 0, sign(needed)) if stops else ZERO
+    breaks, end = breaks_bonds(build), dict.fromkeys(stops, ZERO)
     # What moves at once finds its equilibrium; all else follows the bonds that break, and their heat.
     equilibrates = bool(breaks) or not (kind.slides_inertially or kind.rate_dependent)
     return set_valued(bears, back, {}, {SLIP: onward}, breaks, end, equilibrates=equilibrates)
@@ -223,7 +223,7 @@ def _friction(
 
 def _limit(build: Build, kind: Formulation) -> Expression:
     """Friction limit of sticking [Pa], per area on which friction acts where the interface is elastic."""
-    return build.motion.stick_limits.get("t", NONE) * (1 if kind.elastic else build.energy.rubs)
+    return build.motion.stick_limits.get("t", ZERO) * (1 if kind.elastic else build.energy.rubs)
 
 
 def _velocity_state(build: Build, kind: Formulation) -> str:
@@ -252,12 +252,12 @@ def _balance(
         build.rows.kinematics(name, v)
         return (yield from _sliding_row(build, kind, slides, far.force(u, v) - t_a - carried - far.c_g * v))
     elif kind.dead_load:
-        build.rows.kinematics(name, NONE)
+        build.rows.kinematics(name, ZERO)
         limit = build.motion.stick_limits.get("t")
         if limit is None:
             message = "nothing resists the far-field traction F_t. Give the tangential mounting k, m or a damper."
             raise InputError(message, PLACE)
-        yield from _sticks(build, limit, far.force(u, NONE) - t_a - carried)
+        yield from _sticks(build, limit, far.force(u, ZERO) - t_a - carried)
     else:
         stiffness, bears = far.k if far.k != 0 else 1, _limit(build, kind)
         yield from far.balance(build, rate, tractions, active=slides, held=stiffness * du, slides=1, bears=bears)
@@ -333,7 +333,7 @@ def _sliding_row(
         )
     if kind.sticks and not in_proportion:  # the slope at rest is that of the velocities to come
         slope = growth(slope.subs({v: v + SLIP * TINY}))
-    yield Margin(f"{STABLE}{v}", slope, kind.unstable, when=_while_sliding(kind), stability=str(v))
+    yield Margin(f"{STABLE_PREFIX}{v}", slope, kind.unstable, when=_while_sliding(kind), stability=str(v))
     return in_proportion
 
 
