@@ -269,7 +269,7 @@ def made_mechanisms() -> str:
 
 def made_rate_types() -> str:
     """Every rate type of a mechanism with its own keys, formula and source."""
-    from surfacechem.mechanism.rate_types import PREFIX, kinds
+    from surfacechem.mechanism.rate_types import CANTERA_PREFIX, kinds
 
     rows = []
     for kind, law in sorted(kinds().items()):
@@ -277,7 +277,7 @@ def made_rate_types() -> str:
         own = ", ".join(f"`{key}` [{specs[name].unit}]" for key, name in law.own_keys().items())
         rows.append(
             (
-                f"`{kind.removeprefix(PREFIX)}`",
+                f"`{kind.removeprefix(CANTERA_PREFIX)}`",
                 own or "–",
                 inline(law).partition(" in a mechanism")[0],
                 listing.source(law),

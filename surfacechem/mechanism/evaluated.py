@@ -32,10 +32,10 @@ Array = NDArray[np.float64]
 GASES = frozenset(("ideal-gas", "Redlich-Kwong", "Peng-Robinson", "plasma"))
 """Cantera's models of phases whose pressure matters."""
 
-CHARGE = float(ELECTRON_VOLT)
+ELEMENTARY_CHARGE = float(ELECTRON_VOLT)
 """Elementary charge [C]: what an electron volt is in joules."""
 
-FARADAY = CHARGE * MOLECULAR
+FARADAY = ELEMENTARY_CHARGE * MOLECULAR
 """Charge of a kmol of elementary charges [C/kmol]."""
 
 SUM_TOLERANCE = 1e-6
@@ -80,7 +80,7 @@ def hold(surface: Any, given: Mapping[str, Neighbour] | None, place: Place | Non
             raise InputError(problem, state.place)
         held = HeldPhase(phase, state)
         held.put(phase.T, held.at_start)
-    return lacking(surface)
+    return missing_species(surface)
 
 
 def _problem(phase: Any, state: Neighbour) -> str:
@@ -200,7 +200,7 @@ class HeldPhase:
     def charged(self, names: Iterable[str]) -> dict[str, float]:
         """Charge [C] of a molecule of each of these species that is its own and has any."""
         charges = dict(zip(self.phase.species_names, self.phase.charges.tolist(), strict=True))
-        return {name: CHARGE * charges[name] for name in names if charges.get(name)}
+        return {name: ELEMENTARY_CHARGE * charges[name] for name in names if charges.get(name)}
 
     def energies(self, both: Array) -> None:
         """Set partial molar enthalpies and Gibbs energies of its species [J/kmol], with those of their charges."""
@@ -216,7 +216,7 @@ def indices(surface: Any, phase: Any) -> range:
     return range(first, first + phase.n_species)
 
 
-def lacking(surface: Any) -> tuple[str, ...]:
+def missing_species(surface: Any) -> tuple[str, ...]:
     """Species that a neighbour does not hold, though reactions give them to it."""
     back = np.array([reaction.reversible for reaction in surface.reactions()], dtype=bool)
     made = surface.product_stoich_coeffs.sum(axis=1) + surface.reactant_stoich_coeffs[:, back].sum(axis=1)
@@ -274,7 +274,7 @@ class NeighbourReaction(EvaluatedReaction):
         return Formula((), lambda _: self.enthalpy), Formula((), lambda _: self.gibbs)
 
 
-def taken(surface: Any, phases: Sequence[Any]) -> Any:
+def amounts_taken(surface: Any, phases: Sequence[Any]) -> Any:
     """Amount of each species of these phases, one after another, that each reaction takes: a row for a reaction."""
     rows = [index for phase in phases for index in indices(surface, phase)]
     return np.asarray(surface.reactant_stoich_coeffs - surface.product_stoich_coeffs)[rows].T
@@ -305,7 +305,7 @@ class SurfaceEngine:
         first, own = species[0], [item.variable for item in species]
         self._own = "T_c", first.concentration, *own
         self._sites, self._count = first.sites, len(own)
-        self._taken = taken(surface, [held.phase for held in self.held])[open_ones].T / MOLECULAR
+        self._taken = amounts_taken(surface, [held.phase for held in self.held])[open_ones].T / MOLECULAR
         self._last: tuple[Sequence[float], Array] = (), np.empty(0)
         self._energies = np.empty(0)
         self._lay_out()

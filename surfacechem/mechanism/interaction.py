@@ -28,29 +28,29 @@ from surfacechem.mechanism.source import Source
 from surfacechem.quantities import KILO
 from surfacechem.tolerances import EQUAL
 
-REFERENCE = 298.15
+REFERENCE_T = 298.15
 """Temperature [K] at which heat capacities begin to count."""
 
 
 @dataclass(frozen=True)
-class EnergyCurve:
+class PiecewisePolynomial:
     """A continuous function of one coverage, zero where that is: polynomials from one knot to the next.
 
     ``pieces`` holds for each the coverage at which it begins and its coefficients of the powers of the coverage.
 
-    >>> EnergyCurve.through([0.0, 0.5, 1.0], [0.0, 1.0, 3.0])(0.75), EnergyCurve.polynomial([2.0, 1.0]).integral(1.0)
-    (2.0, 1.3333333333333333)
+    >>> PiecewisePolynomial.through([0.0, 0.5, 1.0], [0.0, 1.0, 3.0])(0.75), PiecewisePolynomial.polynomial([2.0,
+    1.0]).integral(1.0) (2.0, 1.3333333333333333)
     """
 
     pieces: tuple[tuple[float, tuple[float, ...]], ...] = ()
 
     @classmethod
-    def polynomial(cls, coefficients: Sequence[float]) -> EnergyCurve:
+    def polynomial(cls, coefficients: Sequence[float]) -> PiecewisePolynomial:
         """A polynomial from the coefficients of the first power and up."""
         return cls(((0.0, (0.0, *coefficients)),) if any(coefficients) else ())
 
     @classmethod
-    def through(cls, coverages: Sequence[float], values: Sequence[float]) -> EnergyCurve:
+    def through(cls, coverages: Sequence[float], values: Sequence[float]) -> PiecewisePolynomial:
         """Straight lines through points."""
         lines = []
         for x, y, x_2, y_2 in zip(coverages, values, coverages[1:], values[1:], strict=False):
@@ -78,14 +78,14 @@ class EnergyCurve:
         return value
 
     @property
-    def integral(self) -> EnergyCurve:
+    def integral(self) -> PiecewisePolynomial:
         """The curve of its integral from no coverage on."""
         pieces: list[tuple[float, tuple[float, ...]]] = []
         for start, c in self.pieces:
             whole = (0.0, *(value / (power + 1) for power, value in enumerate(c)))
             past = _power_sum(pieces[-1][1], start) if pieces else 0.0
             pieces.append((start, (past - _power_sum(whole, start), *whole[1:])))
-        return EnergyCurve(tuple(pieces))
+        return PiecewisePolynomial(tuple(pieces))
 
 
 def _power_sum(coefficients: Sequence[float], theta: Expression) -> Expression:
@@ -103,8 +103,8 @@ class Interaction:
     """The species."""
     variable: str
     """Name of its coverage."""
-    enthalpy: EnergyCurve = EnergyCurve()
-    entropy: EnergyCurve = EnergyCurve()
+    enthalpy: PiecewisePolynomial = PiecewisePolynomial()
+    entropy: PiecewisePolynomial = PiecewisePolynomial()
     a: float = 0.0
     b: float = 0.0
 
@@ -133,12 +133,12 @@ class Interaction:
         def entropy(t: Expression) -> Expression:
             return log(t) * (self.a * log(t) + 2 * self.b) / 2
 
-        return enthalpy(T) - enthalpy(REFERENCE) - T * (entropy(T) - entropy(REFERENCE))
+        return enthalpy(T) - enthalpy(REFERENCE_T) - T * (entropy(T) - entropy(REFERENCE_T))
 
 
 KEY = "coverage-dependencies"
 
-CURVES = {
+MODEL_KEYS = {
     "linear": ("enthalpy", "entropy"),
     "polynomial": ("enthalpy-coefficients", "entropy-coefficients"),
     "piecewise-linear": (
@@ -149,12 +149,12 @@ CURVES = {
 }
 """Keys of each model."""
 
-CAPACITY = ("heat-capacity-a", "heat-capacity-b")
+CAPACITY_KEYS = ("heat-capacity-a", "heat-capacity-b")
 
 COEFFICIENTS = 4
 """Number of coefficients of a polynomial, as Cantera reads it."""
 
-TOGETHER = (
+PAIRED_KEYS = (
     *(("heat-capacity-a", "heat-capacity-b"), ("enthalpy-coverages", "enthalpies"), ("entropy-coverages", "entropies")),
     *(("enthalpy-low", "enthalpy-high", "enthalpy-change"), ("entropy-low", "entropy-high", "entropy-change")),
 )
@@ -167,7 +167,7 @@ def interactions(source: Source, entry: Any, variables: Mapping[str, str]) -> tu
     for name, node in (entry.get(KEY) or {}).items():
         read = partial(_numbers, source, entry, node)
         h, s = _curve(node, read, "enthalpy", "enthalpies"), _curve(node, read, "entropy", "entropies")
-        a, b = (read(key)[0] if key in node else 0.0 for key in CAPACITY)
+        a, b = (read(key)[0] if key in node else 0.0 for key in CAPACITY_KEYS)
         found.append(Interaction(str(name), variables[str(name)], h, s, a, b))
     return tuple(found)
 
@@ -186,14 +186,14 @@ def _numbers(source: Source, entry: Any, node: Any, key: str) -> list[float]:
     return found
 
 
-def _curve(node: Any, read: Callable[[str], list[float]], kind: str, many: str) -> EnergyCurve:
+def _curve(node: Any, read: Callable[[str], list[float]], kind: str, many: str) -> PiecewisePolynomial:
     """The enthalpy or the entropy over the coverage."""
     for key in (kind, f"{kind}-coefficients"):
         if key in node:
-            return EnergyCurve.polynomial(read(key))
+            return PiecewisePolynomial.polynomial(read(key))
     if many in node:
-        return EnergyCurve.through([float(x) for x in node[f"{kind}-coverages"]], read(many))
+        return PiecewisePolynomial.through([float(x) for x in node[f"{kind}-coverages"]], read(many))
     if f"{kind}-change" in node:
         knot, low, high = float(node[f"{kind}-change"]), read(f"{kind}-low")[0], read(f"{kind}-high")[0]
-        return EnergyCurve.through([0.0, knot, 1.0], [0.0, low * knot, low * knot + (1 - knot) * high])
-    return EnergyCurve()
+        return PiecewisePolynomial.through([0.0, knot, 1.0], [0.0, low * knot, low * knot + (1 - knot) * high])
+    return PiecewisePolynomial()

@@ -1,8 +1,8 @@
 """Valid keys of a mechanism file. Cantera ignores what it does not know; here it is an error with its line.
 
 The keys of entries stand in :mod:`surfacechem.mechanism.source`. Below are those inside them, what Cantera knows and
-the compiled path does not, with the way out, and entries whose bare number Cantera would misread. :class:`Check` holds
-a file against them.
+the compiled path does not, with the way out, and entries whose bare number Cantera would misread. :class:`PhaseCheck`
+holds a file against them.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import Any
 
 from surfacechem.errors import InputError, Place, refuse_unknown, suggestion
 from surfacechem.mechanism.evaluated import GASES
-from surfacechem.mechanism.interaction import CAPACITY, COEFFICIENTS, CURVES, KEY, TOGETHER
+from surfacechem.mechanism.interaction import CAPACITY_KEYS, COEFFICIENTS, KEY, MODEL_KEYS, PAIRED_KEYS
 from surfacechem.mechanism.rate_types import kind_of, kinds, names
 from surfacechem.mechanism.rates import InterfaceArrhenius
 from surfacechem.mechanism.source import (
@@ -32,7 +32,7 @@ from surfacechem.mechanism.source import (
 
 _words = str.split
 
-STATE = _words("T P coverages")
+STATE_KEYS = _words("T P coverages")
 CONSTANT_CP = _words("model T0 h0 s0 cp0 T-min T-max reference-pressure note")
 POLYNOMIAL = _words("model temperature-ranges data reference-pressure note")
 THERMO = {"constant-cp": CONSTANT_CP, "NASA7": POLYNOMIAL, "NASA9": POLYNOMIAL, "Shomate": POLYNOMIAL}
@@ -40,9 +40,9 @@ BOND = {"stiffness": "N/m", "rest-length": "m"}
 """Keys of the elasticity of a bond with their units."""
 WRITTEN_SPECIES, WRITTEN_STATE = {"size", "charge"}, ("X", "Y")
 """Keys that Cantera writes beside those that it documents; the state of a file is not used."""
-BESIDE = {"adjacent-phases", "skip-undeclared-elements", "Motz-Wise"}
+NEIGHBOUR_KEYS = {"adjacent-phases", "skip-undeclared-elements", "Motz-Wise"}
 """Keys of a phase with neighbours; all elements of its species have to be declared in any case."""
-UNITS = _words("length mass time quantity current temperature pressure energy activation-energy")
+UNIT_DIMENSIONS = _words("length mass time quantity current temperature pressure energy activation-energy")
 """Dimensions for which a file may say what a bare number means."""
 
 ARRHENIUS = ("A", "b", "Ea")
@@ -62,39 +62,39 @@ LEAVE = "With `solver: cantera` under `run` Cantera evaluates it."
 """Advice for reactions that are not lowered."""
 NEEDS = f"the compiled path knows surface species only. {LEAVE[:-1]}, with the neighbours held as the case says."
 """Advice for entries that need phases beside the surface."""
-STICKS = f"a sticking reaction needs a gas: {NEEDS}"
+STICKING_ADVICE = f"a sticking reaction needs a gas: {NEEDS}"
 CHARGES = f"charge transfer needs a neighbour at an electric potential: {NEEDS}"
-OF_GASES = "third bodies belong to gases; remove it."
+THIRD_BODY_ADVICE = "third bodies belong to gases; remove it."
 REMEDIES = {
     "adjacent-phases": f"gas and bulk neighbours: {NEEDS}",
     "reference-state-coverage": f"it belongs to `thermo: {DEPENDENT}`.",
-    **dict.fromkeys(STICKING, STICKS),
+    **dict.fromkeys(STICKING, STICKING_ADVICE),
     "Motz-Wise": f"this correction is for sticking reactions, which need a gas: {NEEDS}",
     **dict.fromkeys(CHARGED, CHARGES),
-    "efficiencies": OF_GASES,
-    "default-efficiency": OF_GASES,
-    "explicit-third-body-duplicates": OF_GASES,
+    "efficiencies": THIRD_BODY_ADVICE,
+    "default-efficiency": THIRD_BODY_ADVICE,
+    "explicit-third-body-duplicates": THIRD_BODY_ADVICE,
     "skip-undeclared-elements": "species would vanish without a word; write down their elements instead.",
-    "skip-undeclared-third-bodies": OF_GASES,
+    "skip-undeclared-third-bodies": THIRD_BODY_ADVICE,
     "negative-A": "a negative rate goes on where nothing is left to react; use a positive `A`.",
     "equation-of-state": "a surface species has no volume; remove it.",
     "critical-parameters": "a surface species has no critical point; remove it.",
 }
 """Keys that are not supported, each with advice."""
-MODELS = {
+OTHER_MODELS = {
     "edge": "a contact line has rates per length, and a scene has an area; write the reactions on a surface.",
     **dict.fromkeys(GASES, "this is a gas and no surface. Name the phase that is one; the gas may be its neighbour."),
 }
 """Phase models that are not plain surfaces, each with advice."""
 NEIGHBOURLY = {"sticking": f"a sticking reaction needs a gas beside the surface: {NEEDS}", "electrochemical": CHARGES}
 """Rate types of surfaces with neighbours, by prefix, each with advice."""
-PRESSURE = _words("three-body falloff chemically-activated pressure-dependent-Arrhenius Chebyshev linear-Burke")
+GAS_TYPES = _words("three-body falloff chemically-activated pressure-dependent-Arrhenius Chebyshev linear-Burke")
 """Rate types of gases."""
 
 AMOUNT = ("quantity",)
 ENERGIES = ("Ea", "Ea0", "w", "E")
 """Energies of rates."""
-BARE = {
+BARE_UNITS = {
     "site-density": (AMOUNT, "kmol/m^2", "1e-9 mol/m^2"),
     "A": (AMOUNT, "powers of m^2/kmol", "1e8 m^2/mol/s"),
     **dict.fromkeys(ENERGIES, (ENERGY, "J/kmol", "50 kJ/mol")),
@@ -103,7 +103,7 @@ BARE = {
     "cp0": (AMOUNT, "J/(kmol K)", "30 J/mol/K"),
 }
 """Entries whose bare number Cantera counts per kmol: what in `units` says otherwise, the unit, and an example."""
-KELVIN = ("T", "T0", "T-min", "T-max")
+TEMPERATURE_KEYS = ("T", "T0", "T-min", "T-max")
 """Temperatures; Cantera reads degrees Celsius as kelvin without a word."""
 POSITIVE = ("site-density", "sites")
 """Numbers above zero."""
@@ -154,7 +154,7 @@ def chosen(declared: Any, available: Iterable[str]) -> list[str]:
     return [*(available if whole else plain), *(str(name) for names in named if names != "all" for name in names)]
 
 
-class Check:
+class PhaseCheck:
     """Check of a phase of a mechanism against its valid keys and values.
 
     :meth:`run` raises InputError at the first entry that means nothing, means something else, or cannot be lowered.
@@ -179,11 +179,11 @@ class Check:
         self._all_species(list(source.species(phase)))
         state = phase.get("state")
         if isinstance(state, Mapping):
-            self._keys(state, (*STATE, *(WRITTEN_STATE if source.written else ())), "state")
+            self._keys(state, (*STATE_KEYS, *(WRITTEN_STATE if source.written else ())), "state")
             self._numbers(state, ("T",), "state")
             self._among(state.get("coverages"), self.names, "state: coverages: no species")
         for entry in source.reactions(phase):
-            if (kind := str(entry.get("type"))) in PRESSURE:
+            if (kind := str(entry.get("type"))) in GAS_TYPES:
                 problem = f"rate type '{kind}' depends on pressure, which belongs to gases; give a `rate-constant`."
                 raise source.error(f"reaction {entry.get('equation')}: {problem}", entry, "type")
             if self.evaluate and is_evaluated(entry, self.names, self.beside):
@@ -194,9 +194,9 @@ class Check:
     def _phase(self) -> None:
         phase, error = self.phase, self.source.error
         title, model = f"phase {phase.get('name')}", str(phase.get("thermo"))
-        if model in MODELS:
-            raise error(f"{title}: thermo '{model}' is not lowered: {MODELS[model]}", phase, "thermo")
-        known = set(PHASE) - (set() if self.beside else BESIDE)
+        if model in OTHER_MODELS:
+            raise error(f"{title}: thermo '{model}' is not lowered: {OTHER_MODELS[model]}", phase, "thermo")
+        known = set(PHASE) - (set() if self.beside else NEIGHBOUR_KEYS)
         self._keys(phase, known - (set() if model == DEPENDENT else {"reference-state-coverage"}), title)
         if model not in SURFACES:
             raise error(f"{title}: thermo '{model}' is not lowered: use `ideal-surface`.", phase, "thermo")
@@ -263,7 +263,7 @@ class Check:
             message = f"{title}: thermo model '{model}' is not lowered.{suggestion(model, THERMO)}"
             raise source.error(message, thermo, "model")
         self._keys(thermo, THERMO.get(model, (*CONSTANT_CP, *POLYNOMIAL)), f"{title}: thermo")
-        self._numbers(thermo, (*KELVIN[1:], "h0", "s0", "cp0"), title, entry)
+        self._numbers(thermo, (*TEMPERATURE_KEYS[1:], "h0", "s0", "cp0"), title, entry)
         bond = entry.get("bond", {})
         self._keys(bond, BOND, f"{title}: bond", source.place(entry, "bond"))
         for key, unit in BOND.items():
@@ -289,8 +289,8 @@ class Check:
     def _curve(self, entry: Any, node: Any, title: str) -> None:
         """Check a dependence of thermo on one coverage: keys of its model, those that need each other, their units."""
         error, model = self.source.error, str(node.get("model"))
-        refuse_unknown([model], CURVES, f"{title}: no model '{{}}'", self.source.place(node, "model"))
-        self._keys(node, ("model", "units", *CURVES[model], *CAPACITY), title)
+        refuse_unknown([model], MODEL_KEYS, f"{title}: no model '{{}}'", self.source.place(node, "model"))
+        self._keys(node, ("model", "units", *MODEL_KEYS[model], *CAPACITY_KEYS), title)
         given = {**self.source.defaults(entry), **(node.get("units") or {})}
         for key, value in node.items():
             if key.endswith("-coefficients") and (not isinstance(value, list) or len(value) != COEFFICIENTS):
@@ -303,7 +303,7 @@ class Check:
                     "`units: {energy: eV, quantity: molec}` beside it."
                 )
                 raise error(message, node, key)
-        for group in TOGETHER:
+        for group in PAIRED_KEYS:
             there, missing = set(group) & set(node), set(group) - set(node)
             if there and missing:
                 first, needed = min(there, key=group.index), min(missing, key=group.index)
@@ -445,8 +445,8 @@ class Check:
         if given is None:
             return
         for key, unit in given.items():
-            if key not in UNITS:
-                raise error(f"units: unknown key '{key}'.{suggestion(str(key), UNITS)}", given, key)
+            if key not in UNIT_DIMENSIONS:
+                raise error(f"units: unknown key '{key}'.{suggestion(str(key), UNIT_DIMENSIONS)}", given, key)
             if key == "temperature" and unit != "K":
                 raise error(f"units: temperatures are in K, not in {unit}.", given, key)
             try:
@@ -462,9 +462,9 @@ class Check:
         Errors are ``at`` an entry of another one where the mapping is not in the file.
         """
         for key in filter(node.__contains__, keys):
-            value, (wanted, unit, example), problem = node[key], BARE.get(key, ((), "", "")), ""
+            value, (wanted, unit, example), problem = node[key], BARE_UNITS.get(key, ((), "", "")), ""
             celsius = isinstance(value, str) and value.split()[-1:] != ["K"]
-            if key in KELVIN and value is not None and (celsius or not leading(value) > 0):
+            if key in TEMPERATURE_KEYS and value is not None and (celsius or not leading(value) > 0):
                 problem = f"'{value}' is no temperature above zero in kelvin; write `{key}: 298.15 K`."
             elif key in POSITIVE and not leading(value) > 0:
                 problem = f"{value!r} is no number above zero."

@@ -18,8 +18,8 @@ from surfacechem.documents import shipped as data
 from surfacechem.errors import InputError, Place, refuse_unknown, suggestion
 from surfacechem.mechanism.evaluated import EvaluatedReaction, Neighbour, NeighbourReaction, SurfaceEngine, hold
 from surfacechem.mechanism.interaction import KEY, interactions
-from surfacechem.mechanism.keys import Check, has_neighbours, is_evaluated
-from surfacechem.mechanism.mixture import IdealMixture, Species, Spring, identifiers, unpaired
+from surfacechem.mechanism.keys import PhaseCheck, has_neighbours, is_evaluated
+from surfacechem.mechanism.mixture import BondSpring, IdealMixture, Species, identifiers, unpaired_dependence
 from surfacechem.mechanism.rate_types import kind_of
 from surfacechem.mechanism.rates import plain
 from surfacechem.mechanism.source import MECHANISM_LIMITS, Source, own_parameters, sides
@@ -88,7 +88,7 @@ def load_mechanism(
     source = Source(name or str(path), text)
     entry = source.phase(phase, place)
     # Before Cantera, which ignores what it does not know.
-    Check(source, entry, evaluate).run()
+    PhaseCheck(source, entry, evaluate).run()
     surface, said = _cantera(source, entry)
     odd = hold(surface, neighbours, place)
     kept = _kept(source, entry, surface)
@@ -185,10 +185,10 @@ def _species(surface: Any, source: Source, phase: Any, fixed: bool) -> tuple[Spe
         entry = entries[item.name]
         title, spring = f"species {item.name}", None
         if "bond" in entry:
-            bond, keys = entry["bond"], {name.replace("_", "-"): name for name, _ in Spring.specs()}
+            bond, keys = entry["bond"], {name.replace("_", "-"): name for name, _ in BondSpring.specs()}
             read, place = partial(source.number, entry, bond, title=f"{title}: bond: "), source.place(entry, "bond")
-            own: dict[str, Any] = own_parameters(Spring, keys, bond, f"{title}: bond", read, place)
-            spring = Spring(**own)
+            own: dict[str, Any] = own_parameters(BondSpring, keys, bond, f"{title}: bond", read, place)
+            spring = BondSpring(**own)
         try:
             gibbs = lower(item.thermo)
         except InputError as error:  # a number that Cantera's units take out of range
@@ -198,7 +198,7 @@ def _species(surface: Any, source: Source, phase: Any, fixed: bool) -> tuple[Spe
             gibbs = replace(gibbs, shift=-math.log(float(phase["reference-state-coverage"])))
         around = interactions(source, entry, names)
         result.append(Species(item.name, names[item.name], float(item.size), gibbs, spring, around, fixed))
-    if (odd := unpaired(result)) is not None:
+    if (odd := unpaired_dependence(result)) is not None:
         name, other = odd
         message = (
             f"species {name}: coverage-dependencies: {other}: this belongs to no free energy, so that energy would "

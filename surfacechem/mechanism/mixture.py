@@ -34,7 +34,7 @@ SPECIES = "interface.mechanism.species"
 """Path at which a case gives other numbers of species than the mechanism."""
 
 
-class Spring(Law):
+class BondSpring(Law):
     """Elasticity of a bond across the gap."""
 
     contract = "elasticity"
@@ -46,7 +46,7 @@ class Spring(Law):
     def energy(self, g_n: Expression) -> Expression:
         """Elastic energy [J] of one bond.
 
-        >>> round(Spring(stiffness=1e-3).energy(2e-9), 33)
+        >>> round(BondSpring(stiffness=1e-3).energy(2e-9), 33)
         2e-21
         """
         return self.stiffness * (g_n - self.rest_length) ** 2 / 2
@@ -63,7 +63,7 @@ class Species:
     variable: str
     sites: float
     gibbs: StandardGibbs
-    spring: Spring | None = None
+    spring: BondSpring | None = None
     interactions: tuple[Interaction, ...] = ()
     fixed: bool = False
     """Whether its numbers cannot change, because Cantera uses those of the file."""
@@ -148,7 +148,7 @@ class IdealMixture(Potential):
         return total + around / AVOGADRO if seen else total
 
 
-def unpaired(species: Sequence[Species]) -> tuple[str, str] | None:
+def unpaired_dependence(species: Sequence[Species]) -> tuple[str, str] | None:
     """The first species whose dependence on another belongs to no potential, and that other; None where all do."""
     by_name = {item.name: item for item in species}
     pairs = [(item, x, by_name[x.on]) for item in species for x in item.interactions if x.on != item.name]

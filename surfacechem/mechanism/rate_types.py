@@ -16,7 +16,7 @@ from surfacechem.mechanism.mixture import Formula
 from surfacechem.mechanism.rates import USED, InterfaceArrhenius, floored, plain
 from surfacechem.quantities import GAS_CONSTANT
 
-PREFIX = "interface-"
+CANTERA_PREFIX = "interface-"
 
 
 class LawReaction(InterfaceArrhenius):
@@ -180,7 +180,7 @@ def _made(law: type[RateLaw], rate_type: RateType) -> type[LawReaction]:
         "__doc__": text.partition("\n\n>>>")[0],  # the worked number is that of the law
         "__module__": __name__,
         "__annotations__": dict.fromkeys(own, float),
-        "kind": PREFIX + rate_type.name,
+        "kind": CANTERA_PREFIX + rate_type.name,
         "law": law,
         "rate_type": rate_type,
         "parameters": parameters,
@@ -203,9 +203,9 @@ def kinds() -> dict[str, type[InterfaceArrhenius]]:
 def kind_of(name: str) -> type[InterfaceArrhenius] | None:
     """The rate type that a mechanism calls by that name; Cantera puts the prefix where it is missing."""
     plain_name = "Arrhenius" if name == "elementary" else name
-    return kinds().get(plain_name) or kinds().get(PREFIX + plain_name)
+    return kinds().get(plain_name) or kinds().get(CANTERA_PREFIX + plain_name)
 
 
 def names() -> list[str]:
     """The rate types as a mechanism writes them."""
-    return [kind.removeprefix(PREFIX) for kind in kinds()]
+    return [kind.removeprefix(CANTERA_PREFIX) for kind in kinds()]

@@ -29,14 +29,14 @@ DEPENDENT = "coverage-dependent-surface"
 SURFACES = ("ideal-surface", DEPENDENT)
 """Phase models that are lowered; only in the second thermo depends on coverages."""
 
-WRITER = "YamlWriter"
+YAML_WRITER = "YamlWriter"
 """Generator name by which Cantera signs the files that it writes."""
 
 CANTERA_UNITS = {"length": "m", "quantity": "kmol", "energy": "J", "activation-energy": "J/kmol"}
 """Units of numbers in such a file where it does not say otherwise."""
 
 ENERGY = ("activation-energy", "quantity")
-OWN = {
+OWN_UNITS = {
     "m": (("length",), "0.4 nm"),
     "N/m": (("length",), "1 pN/nm"),
     "J": (ENERGY, "10 kJ/mol"),
@@ -102,7 +102,7 @@ Some are for a kind of file or of phase only, and those of rate types stand with
 :mod:`surfacechem.mechanism.keys`.
 """
 
-KINDS = {dict: "a mapping", list: "a list", str: "a text", float: "a number", bool: "true or false"}
+KIND_WORDS = {dict: "a mapping", list: "a list", str: "a text", float: "a number", bool: "true or false"}
 
 
 class Mapped(dict[str, Any]):
@@ -150,7 +150,7 @@ class Source:
         parts = ((phase, key) for phase in self.phases for key in ("species", "reactions"))
         self.sections = {name for phase, key in parts for name in sections(phase.get(key, "all"), key)}
         """Names of the sections of species and reactions that some phase of the file uses."""
-        self.written = str(self.data.get("generator")) == WRITER
+        self.written = str(self.data.get("generator")) == YAML_WRITER
         """Whether Cantera itself has written the file."""
 
     def place(self, node: Any, key: Any = None, path: str = "") -> Place:
@@ -168,7 +168,7 @@ class Source:
         """A number that Cantera does not read, in its SI unit and range; it has a unit, or the file says which."""
         import cantera
 
-        value, (wanted, example) = node[key], OWN.get(spec.unit, ((), ""))
+        value, (wanted, example) = node[key], OWN_UNITS.get(spec.unit, ((), ""))
         declared: Any = self.defaults(entry)
         if isinstance(value, bool) or not isinstance(value, str | int | float):
             raise self.error(f"{title}{key} must be a number, not {value!r}.", node, key)
@@ -196,7 +196,7 @@ class Source:
             allowed = kinds.get(key)
             # In Python true is a number; in a mechanism it is not.
             if allowed and (not isinstance(value, allowed) or (isinstance(value, bool) and bool not in allowed)):
-                wanted = " or ".join(KINDS[kind] for kind in allowed if kind in KINDS)
+                wanted = " or ".join(KIND_WORDS[kind] for kind in allowed if kind in KIND_WORDS)
                 raise self.error(f"{key}: this must be {wanted}, not {_shown(value)}.", node, key)
 
     def _entry_list(self, name: str, kinds: Kinds) -> list[Any]:
@@ -358,5 +358,5 @@ def _energy(units: Any, value: str | float, unit: str) -> float:
 
 def _shown(value: Any) -> str:
     """A value as it stands in a message."""
-    kind = next((text for kind, text in KINDS.items() if kind in (dict, list) and isinstance(value, kind)), "")
+    kind = next((text for kind, text in KIND_WORDS.items() if kind in (dict, list) and isinstance(value, kind)), "")
     return kind or ("nothing" if value is None else f"'{str(value)[:40]}'")
