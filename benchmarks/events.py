@@ -19,7 +19,7 @@ from solver_problems import problem, solved_as_arrays
 from surfacechem.compile.program import Program, compile_function, compile_program
 from surfacechem.expressions import magnitude
 from surfacechem.solve import solver
-from surfacechem.solve.contract import EdgeTables, Margin, Problem, Status
+from surfacechem.solve.contract import EdgeTables, Guard, Problem, Status
 from surfacechem.solve.radau.stepper import END
 
 RUPTURE = np.array([0.2, 1.0, 4000.0, 1e-9])
@@ -55,7 +55,7 @@ def rupture() -> Program:
 
 def rupture_problem(rtol: float) -> Problem:
     """The cluster until it is broken."""
-    return problem(rupture(), RUPTURE_START, [0.0, 100.0], rtol, parameters=RUPTURE, margins=(Margin.stop(),))
+    return problem(rupture(), RUPTURE_START, [0.0, 100.0], rtol, parameters=RUPTURE, margins=(Guard.stop(),))
 
 
 SLIDER = {"drive": 0.1, "mass": 1.0, "kinetic": 0.5, "bonded": 0.5, "ageing": 2.0}
@@ -199,7 +199,7 @@ def rupture_error() -> Callable[[np.ndarray], float]:
 def slide_ours(name: str, rtol: float) -> Callable[[], np.ndarray]:
     """Times of the events."""
     method, (program, edges) = solver(name), slider()
-    end, margins = float(slider_events(EVENTS + 1)[-2:].mean()), (Margin.stop(), Margin.stop())
+    end, margins = float(slider_events(EVENTS + 1)[-2:].mean()), (Guard.stop(), Guard.stop())
     options = {"margins": margins, "edges": edges, "explicit": name == "dop853"}
     case = problem(program, np.zeros(3), [0.0, end], rtol, parameters=[0.0, 0.0], **options)
 

@@ -7,7 +7,7 @@ import numpy as np
 import symengine as se
 
 from surfacechem.compile.program import Program, compile_program
-from surfacechem.solve.contract import Margin, Problem
+from surfacechem.solve.contract import Guard, Problem
 from surfacechem.solve.radau.solver import solve_arrays
 
 CONDUCTANCE = (1e3, 1e12, 1e20)
@@ -23,7 +23,7 @@ def problem(
     atol=None,
     times=(),
     parameters=(),
-    margins: tuple[Margin, ...] = (),
+    margins: tuple[Guard, ...] = (),
     **options,
 ):
     """A problem of one parameter set, with weights that do not matter by default."""

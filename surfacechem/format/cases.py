@@ -25,7 +25,7 @@ from surfacechem.format.sections import NOTHING_SWEPT, SweepSection
 from surfacechem.model.assemble import assemble, with_surrogates
 from surfacechem.model.system import System
 from surfacechem.scene import Scene
-from surfacechem.solve.run import Run, refuse_nothing
+from surfacechem.solve.run import Run, refuse_static
 
 Overrides = str | Sequence[str] | Mapping[str, object]
 
@@ -66,7 +66,7 @@ class Case:
     def refuse_nothing(self) -> None:
         """Raise InputError where the scene has no state; no integral is made for it."""
         try:
-            refuse_nothing(self._surrogate_system, self.file or "CASE")
+            refuse_static(self._surrogate_system, self.file or "CASE")
         except InputError as error:
             raise self.located(error) from None
 

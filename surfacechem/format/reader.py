@@ -111,7 +111,7 @@ def read_document(tree: Tree, base: str = ".", mechanism_text: str | None = None
         # Which solver runs decides whether a mechanism may ask Cantera for its rates.
         run = run_of(read(RunSection, top["run"], context)) if "run" in top else Run(times=(0.0, 1.0))
         named = keys(InterfaceSection)["mechanism"].content.read(interface["mechanism"], "the mechanism", context)
-        evaluate = run.solver in (solvers.AUTO, *solvers.ASKING)
+        evaluate = run.solver in (solvers.AUTO, *solvers.CALLING_PYTHON)
         mechanism = _mechanism(named, interface["mechanism"], Path(base), mechanism_text, evaluate)
         coverages = (variable.name for variable in mechanism.variables)
         context = replace(context, units={**context.units, **dict.fromkeys(coverages, "1")})

@@ -18,7 +18,7 @@ from surfacechem.reactor.interface import InterfaceReactor
 from surfacechem.reactor.watch import LATER_LOOK, StepWatcher
 from surfacechem.solve.adapters.cantera_network import StateVectorReactor, last_step
 from surfacechem.solve.adapters.dense_step import Guards, first_crossing
-from surfacechem.solve.contract import Array, Counters, Margin
+from surfacechem.solve.contract import Array, Counters, Guard
 
 MOST_GROWTH = 1e4
 """Largest ratio of a step of CVODE to the one before: after the first step this, later 10."""
@@ -150,7 +150,7 @@ class ReactorNet(cantera.ReactorNet):
         if np.any(room(now, np.asarray(self.get_state())) < 0):  # an event has gone beyond it
             return now
         step = last_step(self, now, end, np.ones(len(limits)))
-        guards = Guards.of([Margin.stop()] * int(limited.sum()), room)
+        guards = Guards.of([Guard.stop()] * int(limited.sum()), room)
         guards.start(room(now, step.y(now)))
         return first_crossing(step, guards, np.ones(int(limited.sum()), dtype=bool), 0.0)[0]
 

@@ -17,7 +17,7 @@ import numpy as np
 from surfacechem.reactor.interface import InterfaceReactor
 from surfacechem.solve.adapters.cantera_network import last_step
 from surfacechem.solve.adapters.dense_step import DenseStep, Guards, first_crossing
-from surfacechem.solve.contract import Array, Margin
+from surfacechem.solve.contract import Array, Guard
 from surfacechem.tolerances import NEGLIGIBLE
 
 FIRST_LOOK = NEGLIGIBLE**3
@@ -75,7 +75,7 @@ class StepWatcher:
         self.known = max([now, *(item.asked for item in self.interfaces)])
         self._steps = [self._step_of(item, now) for item in self.interfaces]
         for item, step, before in zip(self.interfaces, self._steps, self._before, strict=True):
-            guards = Guards.of([Margin.stop()] * len(before), item.scene.transitions)
+            guards = Guards.of([Guard.stop()] * len(before), item.scene.transitions)
             guards.start(before)
             present = item.scene.transitions(now, step.y(now))
             t, fired = now, np.flatnonzero(guards.crossed(present)).tolist()

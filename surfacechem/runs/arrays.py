@@ -28,7 +28,7 @@ from surfacechem.solve.diagnose import are_led_back
 from surfacechem.solve.lanes.lane_batch import solve_batch
 from surfacechem.solve.radau.solver import Room, consistent, rates_at, solve_arrays
 from surfacechem.solve.radau.stepper import ARCS, END, EVENTS, FIRST_COUNTER, JUMPS, OUTPUTS, RECORDS
-from surfacechem.solve.run import Leaps, Model, Run
+from surfacechem.solve.run import Discontinuities, Model, Run
 from surfacechem.tolerances import EPS, GUARD_EPS, MICROMETRE, PICOMETRE
 
 MOST = 4096, 1024
@@ -369,7 +369,7 @@ class ArrayRuns:
             columns |= {f"{name}_{which}": extreme[:, names.index(name)] for name in chosen}
         return columns
 
-    def _leaps(self, found: Ends) -> Leaps:
+    def _leaps(self, found: Ends) -> Discontinuities:
         """Jumps of the runs, and the breakpoints of loads between these that they have passed."""
         batch, n, width = found.batch, self.n, self.model.program.n_inputs
         # Without room for jumps or steps where runs end at their edges, or nothing is looked for along them.
@@ -385,7 +385,7 @@ class ArrayRuns:
         known = of, steps[:, 0], steps[:, 1 : 1 + n], steps[:, 1 + n : 1 + 2 * n]
         before = np.concatenate((before, found.inputs(*known)))
         after = np.concatenate((after, found.inputs(*known, after=True)))
-        return Leaps.of(self.model, np.concatenate((owner, of)), before, after)
+        return Discontinuities.of(self.model, np.concatenate((owner, of)), before, after)
 
     @cached_property
     def totals(self) -> Function:

@@ -19,7 +19,7 @@ from surfacechem.quantities import BOLTZMANN, GAS_CONSTANT
 from surfacechem.results.findings import active_cautions
 from surfacechem.scene import Scene
 from surfacechem.solve.contract import Array, Problem
-from surfacechem.solve.diagnose import paces
+from surfacechem.solve.diagnose import time_scales
 from surfacechem.solve.run import Model
 from surfacechem.tolerances import CONSERVED_RATE, FEW_EPS, RUN_EPS, TINY
 
@@ -102,7 +102,7 @@ def groups(model: Model, scene: Scene, values: Mapping[str, float], start: Start
         found += _dissipation(model.system, start, end)
         found += [Group(*row[:2], "1", row[2]) for body in lumpings(model.system, start, end) for row in body.rows()]
         found += _time_scales(start, end)
-        for pace, t in paces(model.system, values):
+        for pace, t in time_scales(model.system, values):
             found.append(Group("t / t_own", end / t, "1", f"length of the run in units of the {pace.text}"))
     return found
 

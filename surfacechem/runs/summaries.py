@@ -13,7 +13,7 @@ import numpy as np
 
 from surfacechem.results.event_table import entropy_destroyed, event_counts, event_summary
 from surfacechem.runs.sheet import Rows, Sheet, counted
-from surfacechem.solve import ASKING, AUTO, OWN
+from surfacechem.solve import AUTO, CALLING_PYTHON, OWN
 from surfacechem.solve.jumps import ADMISSIBLE
 
 if TYPE_CHECKING:
@@ -307,7 +307,7 @@ def _plan(system: System, run: Run | None) -> str:
 
 def _compiled(system: System, run: Run) -> str:
     """Parts of a run that are machine code, and those that are left to Python, in words."""
-    if run.solver in ASKING:
+    if run.solver in CALLING_PYTHON:
         return "the equations; Cantera makes the steps, and asks Python for every right-hand side"
     if run.solver not in (*OWN, AUTO):
         return f"the equations; {run.solver} is called from Python for every step, which looks for events"

@@ -18,7 +18,7 @@ from surfacechem.solve.contract import Solver
 AUTO = "auto"
 """Name by which the method is chosen for the scene, and the tolerance from the accuracy that is asked for."""
 
-ASKING = ("cantera",)
+CALLING_PYTHON = ("cantera",)
 """Solvers that call Python for their right-hand sides, and so can use rates evaluated outside."""
 
 
@@ -31,7 +31,7 @@ for _file in sorted(Path(__file__).with_name("adapters").glob("*.py")):
 OWN = {"radau": "Radau", "dop853": "Dop853"}
 """The methods of this package, and their classes."""
 
-names = (*OWN, *sorted(_ADAPTERS, key=lambda name: name in ASKING))
+names = (*OWN, *sorted(_ADAPTERS, key=lambda name: name in CALLING_PYTHON))
 
 
 @cache

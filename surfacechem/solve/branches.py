@@ -20,10 +20,10 @@ from surfacechem.tolerances import CBRT_EPS, FEW_EPS, NEGLIGIBLE, NO_AMOUNT, PIC
 
 Curve = Callable[[Sequence[float] | Array], Array]
 
-FIRST, GROWTH, MARCH = NO_AMOUNT, 1.02, 2400
+FIRST_STEP, STEP_GROWTH, MOST_STEPS = NO_AMOUNT, 1.02, 2400
 """First step of the search for the next equilibrium, relative to the gap, its growth, and the number of steps."""
 
-REACH = FIRST * (GROWTH ** (MARCH - 1) - 1) / (GROWTH - 1)
+SEARCH_REACH = FIRST_STEP * (STEP_GROWTH ** (MOST_STEPS - 1) - 1) / (STEP_GROWTH - 1)
 """Reach of a search, relative to the gap."""
 
 
@@ -35,13 +35,13 @@ def march(driving: Curve, start: float, direction: float, noise: Curve) -> float
     push = float(np.sign(driving([start])[0]))
     if push == 0.0 and direction == 0.0:
         return start
-    return zero_ahead(driving, start, direction or push, direction or push, noise if direction else None)
+    return next_root(driving, start, direction or push, direction or push, noise if direction else None)
 
 
 def steps_ahead(start: float, direction: float) -> Array:
     """Gaps in ever longer steps from a gap in a direction."""
-    size = FIRST * max(abs(start), PICOMETRE)
-    return np.asarray(start + direction * size * (GROWTH ** np.arange(MARCH) - 1) / (GROWTH - 1))
+    size = FIRST_STEP * max(abs(start), PICOMETRE)
+    return np.asarray(start + direction * size * (STEP_GROWTH ** np.arange(MOST_STEPS) - 1) / (STEP_GROWTH - 1))
 
 
 def push_ahead(driving: Curve, start: float, direction: float, least: Curve, *, lost: bool) -> float | None:
@@ -56,7 +56,7 @@ def push_ahead(driving: Curve, start: float, direction: float, least: Curve, *, 
     return float(gaps[first]) if values[first] > small[first] and not resists else None
 
 
-def zero_ahead(curve: Curve, start: float, direction: float, sign: float, noise: Curve | None = None) -> float | None:
+def next_root(curve: Curve, start: float, direction: float, sign: float, noise: Curve | None = None) -> float | None:
     """First zero in a direction of a function of known sign before it, which at the start may be wrong by rounding."""
     gaps = steps_ahead(start, direction)
     values = sign * curve(gaps)
@@ -83,18 +83,18 @@ Indices = NDArray[np.intp]
 Field = Callable[[Array], Array]
 """Driving tractions at ways of the gaps from where they begin, both of shape (points, gaps)."""
 
-RTOL, BEGINS = 0.1 * NEGLIGIBLE, NEGLIGIBLE
+MOTION_RTOL, START_PART = 0.1 * NEGLIGIBLE, NEGLIGIBLE
 """Tolerance of the motion, relative to the way so far; it begins within this part of its first push."""
 
-STEPS = 20_000
+MOTION_STEPS = 20_000
 """Steps after which motion does not come to rest."""
 
 
-KICK = 10 * CBRT_EPS
+FIRST_PUSH = 10 * CBRT_EPS
 """Part of a gap with which motion begins from an unstable balance at least: the difference taken there does not reach
 back to the balance, where laws may have a kink. Ten times is a choice; motion would also leave from twice."""
 
-NEAR, NEWTON = NEGLIGIBLE, 12
+NEWTON_REACH, NEWTON_STEPS = NEGLIGIBLE, 12
 """Part of the way within which Newton's method takes the last step to rest, and how many steps that may have."""
 
 
@@ -106,7 +106,7 @@ def stiffness(driving: Field, scale: Array, at: Array) -> Array:
     return np.asarray(((ahead - behind) / (2 * CBRT_EPS * scale)[:, None]).T)
 
 
-def unstable_way(change: Array) -> Array | None:
+def unstable_direction(change: Array) -> Array | None:
     """Direction in which an imbalance grows the fastest, its largest part 1; None where all decay (stable)."""
     growth, ways = np.linalg.eig(change)
     fastest = int(np.argmax(growth.real))
@@ -133,20 +133,20 @@ def come_to_rest(driving: Field, scale: Array, onward: Array, begins: Array) -> 
     start = velocity(0.0, begins[:, None])[:, 0]
     if not np.all(np.isfinite(start)):
         return None
-    least = 0.0 if begins.any() else RTOL  # what is close to an unstable balance is not at rest in it
+    least = 0.0 if begins.any() else MOTION_RTOL  # what is close to an unstable balance is not at rest in it
     rest = _at_rest(driving, scale, onward, begins, least)
     if rest is not None:
         return rest
-    finest = BEGINS * (float(np.max(np.abs(begins))) or RTOL * float(scale.min()))
-    options = {"rtol": RTOL, "atol": finest, "first_step": finest / np.max(np.abs(start))}
+    finest = START_PART * (float(np.max(np.abs(begins))) or MOTION_RTOL * float(scale.min()))
+    options = {"rtol": MOTION_RTOL, "atol": finest, "first_step": finest / np.max(np.abs(start))}
     motion = Radau(velocity, 0.0, begins, np.inf, jac=change, vectorized=True, **options)
-    for _ in range(STEPS):
+    for _ in range(MOTION_STEPS):
         with np.errstate(all="ignore"):  # far ahead a trial may see no number
             motion.step()
         rest = _at_rest(driving, scale, onward, motion.y, least)
         if rest is not None or motion.status != "running":
             return rest
-        if np.any(np.abs(motion.y) > REACH * scale):  # nothing bears it
+        if np.any(np.abs(motion.y) > SEARCH_REACH * scale):  # nothing bears it
             return None
     return None
 
@@ -178,10 +178,10 @@ def equilibrium(driving: Field, scale: Array, free: Indices, at: Array, least: f
     if len(free) == 0:
         return at
     change = stiffness(driving, scale, at)[np.ix_(free, free)]
-    if not np.all(np.isfinite(change)) or unstable_way(change) is not None:
+    if not np.all(np.isfinite(change)) or unstable_direction(change) is not None:
         return None
-    reach, last = max(least, NEAR * float(np.max(np.abs(at) / scale))), np.inf
-    for _ in range(NEWTON):
+    reach, last = max(least, NEWTON_REACH * float(np.max(np.abs(at) / scale))), np.inf
+    for _ in range(NEWTON_STEPS):
         step = np.linalg.lstsq(change, -driving(at[None])[0, free], rcond=None)[0]
         size = float(np.max(np.abs(step) / scale[free]))
         if not size <= min(reach, last / 2):
@@ -190,7 +190,7 @@ def equilibrium(driving: Field, scale: Array, free: Indices, at: Array, least: f
         at[free] += step
         if size <= 2 * FEW_EPS:
             break
-    if last > NEAR * RTOL:
+    if last > NEWTON_REACH * MOTION_RTOL:
         return None
     # Where nothing bears what is out of balance, Newton's method has no step for it, and that is no rest.
     borne = np.abs(change) @ scale[free] * max(last, 2 * FEW_EPS)

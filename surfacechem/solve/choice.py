@@ -3,7 +3,7 @@
 import numpy as np
 
 from surfacechem.compile.program import MOST_RATE_STATES, Program
-from surfacechem.solve import ASKING
+from surfacechem.solve import CALLING_PYTHON
 from surfacechem.solve.contract import Problem
 from surfacechem.tolerances import MIN_RTOL
 
@@ -22,7 +22,7 @@ def method(problem: Problem, moves: bool) -> tuple[str, str]:
     """
     program = problem.program
     if program.filler is not None:
-        return ASKING[0], "rates of the mechanism come from Cantera itself, which it can ask"
+        return CALLING_PYTHON[0], "rates of the mechanism come from Cantera itself, which it can ask"
     # The last digit of a gap that touches decides what follows, and implicit steps meet it closer.
     why = _why_implicit(problem) or ("a gap moves, and may touch or stop" if moves else "")
     if why:

@@ -57,22 +57,22 @@ REASONS = {
 }
 
 
-AT_ONCE = 12
+CHATTER = 12
 """Edges at one moment from which on they are chatter."""
 
-ALOFT, FITTED = 1.5, 0.1 * NEGLIGIBLE
+RETURN_FACTOR, FITTED_PART = 1.5, 0.1 * NEGLIGIBLE
 """A time beyond that of the return, in parts of it, and the part of an arc below which the first step is fitted to it:
 what is longer a step meets by itself."""
 
 
-WARMED = 60
+HEAT_STEPS = 60
 """Newton steps in which a body takes on the temperature of its energy at most: where this grows with the square of the
 temperature, far away each halves it, so that these are 18 decades.
 """
 
 
 @dataclass(frozen=True)
-class Margin:
+class Guard:
     """Type of an event: the action at a zero crossing of a margin; direction -1 is falling, +1 rising, 0 both.
 
     A margin that has just fired fires again only after it has left zero. A limit, terminal and falling, that is zero
@@ -90,22 +90,22 @@ class Margin:
     """Whether a law ends there: what it says beyond, be it by rounding, has no meaning."""
 
     @classmethod
-    def stop(cls) -> "Margin":
+    def stop(cls) -> "Guard":
         """A terminal event: the run ends where the margin falls to zero."""
         return cls(terminal=True)
 
     @classmethod
-    def bear(cls) -> "Margin":
+    def bear(cls) -> "Guard":
         """A terminal event: the run ends where the margin falls below zero."""
         return cls(terminal=True, strict=True)
 
     @classmethod
-    def restart(cls, direction: int = 0) -> "Margin":
+    def restart(cls, direction: int = 0) -> "Guard":
         """A kink: a step ends there and the run goes on."""
         return cls(terminal=False, direction=direction)
 
     @classmethod
-    def peak(cls) -> "Margin":
+    def peak(cls) -> "Guard":
         """A narrow peak: a step ends there that is short enough to have seen it."""
         return cls(terminal=False, direction=0, smooth=True)
 
@@ -174,7 +174,7 @@ class Problem:
     """One parameter vector a segment."""
     rtol: float
     atol: Array
-    margins: tuple[Margin, ...] = ()
+    margins: tuple[Guard, ...] = ()
     max_steps: int = 100_000
     max_seconds: float | None = None
     record_steps: bool = False
@@ -263,7 +263,7 @@ class Events(Points):
     index: Index = field(kw_only=True)
 
 
-class Course(NamedTuple):
+class EdgeCourse(NamedTuple):
     """Arcs and jumps of a run that the compiled loop has carried along edges."""
 
     arcs: Array
@@ -300,7 +300,7 @@ class Result:
     """Segment of each output, where their times do not tell."""
     inside: States | None = None
     """States inside steps and at the start of segments that a picture needs."""
-    course: Course | None = None
+    course: EdgeCourse | None = None
     """Arcs and jumps, where the method carries out edges."""
     known: States | None = None
     """All states that are known, where the result is of several arcs and a picture is wanted."""

@@ -14,11 +14,11 @@ from surfacechem.solve.contract import REASONS, Array, Points, Result, Status
 from surfacechem.solve.radau.solver import consistent
 from surfacechem.tolerances import ATOL_OF_SCALE, CLOSED_GUARD, IDLE, NEGLIGIBLE, NEWTON_EPS, RUN_EPS
 
-FEW, SHARP = 100.0, RUN_EPS
+FEWEST, SHARP = 100.0, RUN_EPS
 """Steps in a period, fewer than which follow nothing, and the part of the time that a step can still resolve."""
 
 
-def paces(system: System, values: Mapping[str, float]) -> list[tuple[TimeScale, float]]:
+def time_scales(system: System, values: Mapping[str, float]) -> list[tuple[TimeScale, float]]:
     """Characteristic times of free motions of the gaps [s], the shortest first."""
     point = {parameter.symbol: values[parameter.path] for parameter in system.parameters}
     found = [(pace, float(system.expand(pace.time).subs(point))) for pace in system.noted(TimeScale)]
@@ -28,8 +28,8 @@ def paces(system: System, values: Mapping[str, float]) -> list[tuple[TimeScale, 
 def too_fast(system: System, result: Result, values: Mapping[str, float]) -> str:
     """Motion too fast to be followed, with advice, in words; empty where that is not why a run could not go on."""
     end = float(result.problem.segments[-1])
-    shortest = {Status.MAX_STEPS: FEW * end / result.problem.max_steps, Status.STEP_UNDERFLOW: SHARP * result.t}
-    for pace, time in paces(system, values):
+    shortest = {Status.MAX_STEPS: FEWEST * end / result.problem.max_steps, Status.STEP_UNDERFLOW: SHARP * result.t}
+    for pace, time in time_scales(system, values):
         if time < shortest.get(result.status, 0.0):
             return f": the {pace.text}, {time:.3g} s, is too short for a run of {end:.3g} s; {pace.remedy}"
     return ""
@@ -42,19 +42,19 @@ left to close, explains why a run cannot go on."""
 RESOLVED = NEWTON_EPS
 """Part of the time that has passed within which the last digits of a margin do not tell whether it shrinks."""
 
-BOUNDLESS = 1e12
+RUNAWAY = 1e12
 """Size of a state that runs away, in units of its scale."""
 
-ROUNDED = (
+ROUNDED_BACK = (
     "the rates lead back from it; they are so far apart that the last digits of the fast ones have carried it there"
 )
 
 
-AHEAD = np.ldexp(1.0, np.arange(-4, 3))
+LOOKS_AHEAD = np.ldexp(1.0, np.arange(-4, 3))
 """Parts of the last step by which a look ahead of the end of a run goes."""
 
 
-def cause(
+def termination(
     system: System,
     program: Program,
     margins: Sequence[Margin],
@@ -154,7 +154,7 @@ def runaway(states: Sequence[State], result: Result) -> str | None:
         return None
     scales = np.array([state.scale for state in states])
     beyond = np.abs(result.y) / scales
-    if np.max(beyond) > BOUNDLESS:
+    if np.max(beyond) > RUNAWAY:
         j = int(np.argmax(beyond))
         return f"{states[j].name} grows beyond all bounds, to {result.y[j]:.3g} {states[j].quantity.unit}"
     with np.errstate(over="ignore", invalid="ignore"):
@@ -176,7 +176,7 @@ def beyond_numbers(system: System, result: Result, inputs: Array, named: Callabl
     """
     if result.status is not Status.NOT_FINITE or result.steps is None or len(result.steps.t) < 2:
         return None
-    n, ahead = len(result.y), np.append(0.0, AHEAD) * np.diff(result.steps.t)[-1]
+    n, ahead = len(result.y), np.append(0.0, LOOKS_AHEAD) * np.diff(result.steps.t)[-1]
     rows = np.tile(inputs, (len(ahead), 1))
     rows[:, 0] += ahead
     rows[:, 1 : 1 + n] += ahead[:, None] * result.ydot

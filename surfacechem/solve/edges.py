@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from surfacechem.solve.contract import WARMED
+from surfacechem.solve.contract import HEAT_STEPS
 from surfacechem.solve.radau.consistency import find_consistent
 from surfacechem.solve.radau.stepper import (
     ARCS,
@@ -41,7 +41,7 @@ from surfacechem.solve.radau.work import (
 )
 from surfacechem.tolerances import BRIEF_PART, DRIFT, FEW_EPS, GUARD_EPS, MOST_DRIFT, NEWTON_EPS, RUN_EPS, ULPS
 
-NONE, UNKNOWN = -1, -2
+NONE_DUE, UNDECIDED = -1, -2
 """Codes in place of the index of the edge that is due: none is; undecided, so that an instant has to look."""
 
 OPEN, CLOSED, NEAR = range(3)
@@ -112,19 +112,19 @@ def _closing(w: Any, m: int) -> int:
 @compiled
 def _due(w: Any, first: int) -> int:
     """The edge whose guard is closed, or is zero and closing."""
-    due, near = NONE, False
+    due, near = NONE_DUE, False
     for m in range(first, w.n_margins):
         w.fired[m] = _closing(w, m)
         near = near or w.fired[m] == NEAR
     if near and w.code[GUARD_RATES, 0] == 0:
-        return UNKNOWN
+        return UNDECIDED
     if near:
         evaluate(w, GUARD_RATES, w.margin_slope)
     for m in range(w.n_margins - 1, first - 1, -1):
         closes = w.fired[m] == NEAR and w.margin_slope[m - first] < 0.0
         # What has jumped at this moment must not jump back by rounding.
         if closes and w.jumped[-1] == w.moment[0]:
-            return UNKNOWN
+            return UNDECIDED
         if closes or w.fired[m] == CLOSED:
             due = m - first
     return due
@@ -144,9 +144,9 @@ def resolve(w: Any, i: int, end: float) -> bool:
         if w.jumped[-1] >= 0.0 and _is_beyond(w, first):
             return False
         due = _due(w, first)
-        if due == NONE:
+        if due == NONE_DUE:
             return True
-        if due == UNKNOWN or not jump(w, i, due):
+        if due == UNDECIDED or not jump(w, i, due):
             return False
 
 
@@ -176,7 +176,7 @@ def _warm(w: Any, taker: int, made: float) -> tuple[float, float]:
         if w.nodes[k] < 0:
             heat += taken
             entropy += taken / w.nodal[k * width]
-    for _iteration in range(WARMED):
+    for _iteration in range(HEAT_STEPS):
         moves = False
         for k in range(nodes):
             if w.nodes[k] >= 0:

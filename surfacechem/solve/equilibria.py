@@ -15,17 +15,17 @@ from surfacechem.expressions import Expression, derivative
 from surfacechem.model.automaton import FOLD_STIFFNESS, SIDE_PATH, SLIP_PATH
 from surfacechem.model.system import System
 from surfacechem.solve.branches import (
-    KICK,
+    FIRST_PUSH,
     Curve,
     Field,
     Indices,
     come_to_rest,
     equilibrium,
     march,
+    next_root,
     push_ahead,
     stiffness,
-    unstable_way,
-    zero_ahead,
+    unstable_direction,
 )
 from surfacechem.solve.contract import Array
 from surfacechem.tolerances import (
@@ -48,7 +48,7 @@ BALANCED = RUN_EPS
 
 NO_BALANCE = "there is no gap at which the tractions are in equilibrium at the start"
 
-POLISH = 3
+CORRECTIONS = 3
 """Newton steps that take the drift of an integration out of the gaps: each doubles the digits."""
 
 
@@ -82,7 +82,7 @@ def compiled(system: System, expressions: Iterable[Expression]) -> Function:
 
 
 @dataclass(frozen=True)
-class Way:
+class GapDirection:
     """A direction in the space of the gaps: what moves, the gap that counts the way, and the tractions along it."""
 
     moves: Array
@@ -94,16 +94,16 @@ class Way:
 
 
 @dataclass(frozen=True)
-class Lost:
+class FoldPoint:
     """A fold: the point there, the way in which the gaps are lost, and the direction along it."""
 
     point: Point
-    way: Way
+    way: GapDirection
     direction: float
 
 
 @dataclass(frozen=True)
-class Free:
+class FreeGaps:
     """The gaps of a point that are not held, counted by how far each has moved from there."""
 
     which: Indices
@@ -169,19 +169,19 @@ class Equilibria:
         """Indices of the gaps that are not held."""
         return np.nonzero(self._moving(point.inputs())[:: 1 + len(self.states)])[0]
 
-    def ways(self, point: Point) -> list[Way]:
+    def ways(self, point: Point) -> list[GapDirection]:
         """The way of each gap by itself."""
         moves = self._moving(point.inputs()).reshape(len(self.items), 1 + len(self.states))[:, 1:]
         alone = np.eye(len(self.items))
-        return [Way(moves[j], self.states.index(e.state), alone[j]) for j, e in enumerate(self.items)]
+        return [GapDirection(moves[j], self.states.index(e.state), alone[j]) for j, e in enumerate(self.items)]
 
-    def together(self, point: Point, weights: Array) -> Way:
+    def together(self, point: Point, weights: Array) -> GapDirection:
         """Several gaps that move together, counted by the one that moves the most, whose weight is 1."""
         ways = self.ways(point)
         moves = sum((w * way.moves for w, way in zip(weights, ways, strict=True)), np.zeros(len(self.states)))
-        return Way(moves, ways[int(np.abs(weights).argmax())].column, weights)
+        return GapDirection(moves, ways[int(np.abs(weights).argmax())].column, weights)
 
-    def _free(self, point: Point, heat: Heat | None) -> Free:
+    def _free(self, point: Point, heat: Heat | None) -> FreeGaps:
         which, ways = self.free(point), self.ways(point)
         moves, columns = np.array([ways[j].moves for j in which]), np.array([ways[j].column for j in which])
 
@@ -190,7 +190,7 @@ class Equilibria:
             rows[:, 1 : 1 + len(point.y)] += moved @ moves
             return self.pushes(self._arrived(rows, jumps=heat is not None), heat)[:, which]
 
-        return Free(which, columns, moves, driving, np.maximum(np.abs(point.y[columns]), NANOMETRE))
+        return FreeGaps(which, columns, moves, driving, np.maximum(np.abs(point.y[columns]), NANOMETRE))
 
     def _arrived(self, rows: Array, *, jumps: bool) -> Array:
         """Inputs whose gaps have moved, with the mode of touch that belongs to them; in a jump with what follows."""
@@ -202,7 +202,7 @@ class Equilibria:
             rows[:, self.followers] = self._follow(rows)
         return rows
 
-    def along(self, point: Point, way: Way, gaps: Sequence[float] | Array, *, jumps: bool = False) -> Array:
+    def along(self, point: Point, way: GapDirection, gaps: Sequence[float] | Array, *, jumps: bool = False) -> Array:
         """Inputs with the gaps along a way."""
         rows = np.repeat(point.inputs()[None], len(gaps), axis=0)
         rows[:, 1 : 1 + len(point.y)] += np.outer(np.asarray(gaps) - point.y[way.column], way.moves)
@@ -214,7 +214,7 @@ class Equilibria:
         n = len(point.y)
         return replace(point, y=rows[0, 1 : 1 + n], parameters=rows[0, 1 + 2 * n :])
 
-    def _curves(self, point: Point, way: Way, heat: Heat | None) -> tuple[Curve, Curve]:
+    def _curves(self, point: Point, way: GapDirection, heat: Heat | None) -> tuple[Curve, Curve]:
         """Driving traction along a way and its rounding, as functions of the gap that counts the way."""
         pulled, jumps = way.pulls != 0, heat is not None
 
@@ -240,7 +240,7 @@ class Equilibria:
     # -- equilibrium ----------------------------------------------------------------------------------------------
 
     def settle(
-        self, point: Point, heat: Heat | None = None, balanced: float = BALANCED, lost: Lost | None = None
+        self, point: Point, heat: Heat | None = None, balanced: float = BALANCED, lost: FoldPoint | None = None
     ) -> Point | None:
         """The point with all gaps in equilibrium; each may move the others through pressure, shear and heat.
 
@@ -272,7 +272,7 @@ class Equilibria:
         there = replace(point, y=point.y + way @ free.moves)
         return self.moved(point, self._arrived(there.inputs()[None], jumps=True))
 
-    def _released(self, point: Point, heat: Heat | None, lost: Lost | None) -> Point | None:
+    def _released(self, point: Point, heat: Heat | None, lost: FoldPoint | None) -> Point | None:
         """Point at which the free gaps come to rest after a lost equilibrium, or from tractions out of balance."""
         free = self.free(point)
         if len(free) > 1:
@@ -293,7 +293,7 @@ class Equilibria:
             return None if gap is None else point
         return self.moved(point, self.along(point, way, [gap], jumps=heat is not None))
 
-    def _slid(self, point: Point, way: Way, onward: float, driving: Curve, noise: Curve) -> float | None:
+    def _slid(self, point: Point, way: GapDirection, onward: float, driving: Curve, noise: Curve) -> float | None:
         """The gap at which what slides has come to balance; friction pulls nothing back.
 
         It has begun to slide as the push was above what sticking bears by no less than rounding. Where the stiffness is
@@ -307,7 +307,7 @@ class Equilibria:
             return beyond
         return march(driving, start, 0.0, noise) if now > 0 else start
 
-    def _damped(self, point: Point, heat: Heat | None, lost: Lost | None) -> Point | None:
+    def _damped(self, point: Point, heat: Heat | None, lost: FoldPoint | None) -> Point | None:
         """Point at which several gaps come to rest together, by damped motion."""
         free = self._free(point, heat)
         begins = np.zeros(len(free.which))
@@ -319,7 +319,7 @@ class Equilibria:
                 return None
             way = lost.direction * lost.way.pulls[free.which]
             # What is less drowns in the rounding of the other gaps.
-            begins = way * max(abs(gap - start), KICK / float(np.max(np.abs(way) / free.scale)))
+            begins = way * max(abs(gap - start), FIRST_PUSH / float(np.max(np.abs(way) / free.scale)))
         rest = come_to_rest(free.driving, free.scale, self._onward(point)[free.which], begins)
         if rest is None:
             return None
@@ -327,7 +327,7 @@ class Equilibria:
         y[columns] = np.where(np.abs(y[columns]) < GAP_EPS, 0.0, y[columns])  # laws that end with the gap shall know it
         return self.moved(point, self._arrived(replace(point, y=y).inputs()[None], jumps=heat is not None))
 
-    def _unstable(self, point: Point, heat: Heat | None) -> Lost | None:
+    def _unstable(self, point: Point, heat: Heat | None) -> FoldPoint | None:
         """The way in which gaps run away from a balance, where that is unstable: a fold that is passed already.
 
         Friction that falls with its own heat has no steady sliding on a spring that is softer than this fall. What
@@ -338,7 +338,7 @@ class Equilibria:
         if not pushes[free.which].any():
             return None
         change = stiffness(free.driving, free.scale, np.zeros(len(free.which)))
-        found = unstable_way(change) if np.all(np.isfinite(change)) else None
+        found = unstable_direction(change) if np.all(np.isfinite(change)) else None
         weights = np.zeros(len(onward))
         weights[free.which] = 0.0 if found is None else found
         direction = float(np.sign(weights @ pushes))
@@ -349,11 +349,11 @@ class Equilibria:
         start = float(point.y[way.column])
         left = np.abs(driving([start]))  # the balance was left by no more than the integration explains
         begins = push_ahead(driving, start, direction, lambda gaps: noise(gaps) + left, lost=False)
-        return None if begins is None else Lost(point, way, direction)
+        return None if begins is None else FoldPoint(point, way, direction)
 
     def polished(self, point: Point) -> Point:
         """The point without the drift that integration has left in its gaps."""
-        for _ in range(POLISH if self.items else 0):
+        for _ in range(CORRECTIONS if self.items else 0):
             values = self._tangents(point.inputs())
             y = point.y.copy()
             for way, residual, slope in zip(self.ways(point), values[::3], values[1::3], strict=True):
@@ -376,7 +376,7 @@ class Equilibria:
         directions: Array = slip * np.array([e.slides for e in self.items])
         return np.where(self._bears(point.inputs()) > 0, directions, 0.0)
 
-    def onward_along(self, point: Point, way: Way) -> float:
+    def onward_along(self, point: Point, way: GapDirection) -> float:
         """Direction of a way in which the interface slides on; zero where nothing slides along it."""
         return float(np.sign(self._onward(point) @ way.pulls))
 
@@ -442,7 +442,7 @@ class Folds:
             found += [residual, change]
         return compiled(self.system, found)
 
-    def _shape(self, index: int, point: Point) -> tuple[Array, Way, Array]:
+    def _shape(self, index: int, point: Point) -> tuple[Array, GapDirection, Array]:
         """Fall of the tangent of a fold along each gap, the way that is lost, and the change of the states along it,
         warming included.
         """
@@ -456,7 +456,7 @@ class Folds:
         way = self.equilibria.together(point, weights)
         return falls, way, way.moves + warming.reshape(n, -1).T @ way.pulls
 
-    def at(self, index: int, point: Point) -> Lost | None:
+    def at(self, index: int, point: Point) -> FoldPoint | None:
         """The fold itself, from a point close to it; None where it is out of reach, or the edge is none.
 
         Equilibrium is lost like a square root in time, so that a run ends a little before the fold. Where the stiffness
@@ -474,18 +474,18 @@ class Folds:
         def ahead(gaps: Sequence[float] | Array) -> Array:
             return np.asarray(self._tangents[index](self.equilibria.along(point, there, gaps))).reshape(-1)
 
-        at = zero_ahead(ahead, float(point.y[way.column]), direction, 1.0)
+        at = next_root(ahead, float(point.y[way.column]), direction, 1.0)
         if at is None:
             return None
-        return Lost(self.equilibria.moved(point, self.equilibria.along(point, there, [at])), way, direction)
+        return FoldPoint(self.equilibria.moved(point, self.equilibria.along(point, there, [at])), way, direction)
 
-    def held_at(self, index: int, lost: Lost) -> Lost | None:
+    def held_at(self, index: int, lost: FoldPoint) -> FoldPoint | None:
         """The same fold where sticking holds what slides; None where that keeps the equilibrium."""
         point = self.equilibria.with_slip(lost.point, 0.0)
         if self._tangents[index](point.inputs())[0] > FOLD_STIFFNESS:
             return None
         falls, way, _ = self._shape(index, point)
-        return Lost(point, way, float(np.sign(falls @ way.pulls)))
+        return FoldPoint(point, way, float(np.sign(falls @ way.pulls)))
 
     def reached(self, point: Point, rtol: float) -> int:
         """The fold that is so close to a point that time cannot tell them apart; -1 where none is."""

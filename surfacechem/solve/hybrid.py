@@ -33,7 +33,7 @@ from surfacechem.solve.contract import (
     in_order,
 )
 from surfacechem.solve.equilibria import Point
-from surfacechem.solve.instant import ENDLESS, MANY, MISSED, REACHED, Instant
+from surfacechem.solve.instant import ENDLESS, MANY_REBOUNDS, MISSED_CLOSING, SAME_MOMENT, Instant
 from surfacechem.solve.jumps import Jump, Jumper
 from surfacechem.solve.radau.solver import consistent
 from surfacechem.tolerances import BRIEF_PART, FEW_EPS, FORMULA_EPS, GAP_EPS, ULPS
@@ -42,13 +42,13 @@ Found = TypeVar("Found")
 Flow = Generator[Problem, Result, Found]
 """Generator that yields one problem after another to be solved, and receives the results."""
 
-LOST = (Status.STEP_UNDERFLOW, Status.SINGULAR, Status.NO_CONSISTENT_STATE)
+LOST_STATUSES = (Status.STEP_UNDERFLOW, Status.SINGULAR, Status.NO_CONSISTENT_STATE)
 """Ways in which a solver ends where a quasi-static equilibrium is lost."""
 
-RENEWALS = 4
+MOST_BRIEF_ARCS = 4
 """Number of brief arcs that time could not resolve that may follow each other."""
 
-SEEN, AGAIN = 100.0, 3
+ROUNDINGS, MOST_RAISES = 100.0, 3
 """Tolerance of a sliding velocity in units of its rounding, and how often it is raised."""
 
 
@@ -75,10 +75,10 @@ def without_stall(problem: Problem, velocities: NDArray[np.bool_]) -> Flow[Resul
     run stalls at that, its absolute tolerance is raised to this rounding.
     """
     result = yield problem
-    for _ in range(AGAIN if velocities.any() else 0):
+    for _ in range(MOST_RAISES if velocities.any() else 0):
         if result.status is not Status.STEP_UNDERFLOW:
             break
-        atol = np.where(velocities, np.maximum(problem.atol, SEEN * rounding(result)), problem.atol)
+        atol = np.where(velocities, np.maximum(problem.atol, ROUNDINGS * rounding(result)), problem.atol)
         if not np.all(np.isfinite(atol)) or np.all(atol == problem.atol):
             break
         problem = replace(problem, atol=atol)
@@ -154,7 +154,7 @@ class Hybrid:
             if point is None:
                 break
             last, y, modes = point, point.y, point.parameters[columns]
-        if instant.status is Status.MAX_STEPS and instant.rebounds.count > MANY:
+        if instant.status is Status.MAX_STEPS and instant.rebounds.count > MANY_REBOUNDS:
             instant.status, instant.reason = Status.FAILED, ENDLESS
         reached = self.arcs[-1].end if self.arcs else float(problem.segments[0])
         # A jump may have led beyond the last arc, to the very time of a fold.
@@ -169,7 +169,7 @@ class Hybrid:
         if arc.status is Status.FINISHED:
             return point
         self._renewed = self._renewed + 1 if arc.result.t < BRIEF_PART * self.problem.segments[-1] else 0
-        index, lost = -1, arc.status in LOST
+        index, lost = -1, arc.status in LOST_STATUSES
         if arc.status is Status.EVENT:
             events, instant = arc.result.events, self.instant
             fired = events.index[events.t == events.t[-1]]
@@ -208,7 +208,7 @@ class Hybrid:
         if closing.any():
             return replace(point, y=np.where(closing, -point.y, point.y))
         # What time could not resolve any more goes on in a time of its own.
-        unresolved = arc.status is Status.STEP_UNDERFLOW and arc.result.t > 0 and self._renewed < RENEWALS
+        unresolved = arc.status is Status.STEP_UNDERFLOW and arc.result.t > 0 and self._renewed < MOST_BRIEF_ARCS
         return point if unresolved else None
 
     def _is_limited(self, arc: Arc) -> bool:
@@ -257,7 +257,7 @@ class Hybrid:
         )
         result = yield from without_stall(problem, self.system.sliding)
         reached, status = min(start.t + result.t, end), result.status
-        if status is Status.FINISHED or (status in LOST and end - reached <= REACHED * end):
+        if status is Status.FINISHED or (status in LOST_STATUSES and end - reached <= SAME_MOMENT * end):
             # Where a gap closes at the very end, the last of its digits are rounding of the time.
             reached, status = end, Status.FINISHED
         arc = Arc(result, start, reached, status, times[: len(result.times)], instant.booked)
@@ -272,7 +272,7 @@ class Hybrid:
         self.extremes = np.array([np.minimum(least, seen.min(axis=0)), np.maximum(largest, seen.max(axis=0))])
         instant.see(seen)
         if instant.rebounds.missed(result):
-            instant.status, instant.reason = Status.FAILED, MISSED
+            instant.status, instant.reason = Status.FAILED, MISSED_CLOSING
             return None
         return arc
 
@@ -284,17 +284,17 @@ def carried(problem: Problem, jumper: Jumper) -> Flow[tuple[Result, list[Jump], 
     result = yield replace(problem, edges=jumper.edge_tables)
     if result.status is Status.LEFT and jumper.expect_jumps():
         result = yield replace(problem, edges=jumper.edge_tables)
-    if result.course is None or result.status in (Status.LEFT, *LOST):
+    if result.course is None or result.status in (Status.LEFT, *LOST_STATUSES):
         return None
     start, end = problem.segments[[0, -1]].tolist()
     jumps = jumper.carried_out(*result.course, start, end)
-    result = told(problem, result)
-    if result.status is Status.MAX_STEPS and sum(jump.edge.returns is not None for jump in jumps) > MANY:
+    result = with_arc_segments(problem, result)
+    if result.status is Status.MAX_STEPS and sum(jump.edge.returns is not None for jump in jumps) > MANY_REBOUNDS:
         return replace(result, status=Status.FAILED), jumps, ENDLESS
     return result, jumps, ""
 
 
-def told(problem: Problem, result: Result) -> Result:
+def with_arc_segments(problem: Problem, result: Result) -> Result:
     """A result of the compiled loop with its arcs as segments."""
     assert result.course is not None
     arcs = result.course.arcs

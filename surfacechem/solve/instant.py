@@ -13,26 +13,26 @@ import numpy as np
 
 from surfacechem.model.automaton import REST_TIME_PATH, SLIP_PATH
 from surfacechem.model.system import System
-from surfacechem.solve.contract import ALOFT, AT_ONCE, FITTED, Array, Mask, Problem, Result, Status
+from surfacechem.solve.contract import CHATTER, FITTED_PART, RETURN_FACTOR, Array, Mask, Problem, Result, Status
 from surfacechem.solve.equilibria import BALANCED, Point, drift_of
 from surfacechem.solve.jump_heat import LoadStep
-from surfacechem.solve.jumps import Jump, Jumper, Slack, velocity_scales
+from surfacechem.solve.jumps import EdgeUncertainty, Jump, Jumper, velocity_scales
 from surfacechem.solve.radau.solver import consistent
 from surfacechem.tolerances import BRIEF_PART, GUARD_EPS, IDLE, MICROMETRE, NEWTON_EPS, PICOMETRE
 
-REACHED = NEWTON_EPS
+SAME_MOMENT = NEWTON_EPS
 """Part of the time within which two moments are one: a step onto an event solves for its time."""
 
 NO_PUSH = "nothing pushes it off where it rests; with a mass or a damper any disturbance would"
 
-MANY = 1000
+MANY_REBOUNDS = 1000
 """Number of rebounds above which they explain that a run has used up its steps."""
 
 ENDLESS = (
     "the number of steps allowed was used up by rebounds; with a smaller coefficient of restitution they would end"
 )
 
-MISSED = "the method has not seen the gap close; radau does, or a tighter tolerance"
+MISSED_CLOSING = "the method has not seen the gap close; radau does, or a tighter tolerance"
 
 
 class Rebounds:
@@ -57,8 +57,8 @@ class Rebounds:
 
     def pieces(self, start: float, end: float) -> Array:
         """Pieces of a stretch in its own time: one of its own for what returns so soon that a step might miss it."""
-        soon = ALOFT * self._aloft(start)
-        inside = [soon] if 0 < soon < FITTED * (end - start) else []
+        soon = RETURN_FACTOR * self._aloft(start)
+        inside = [soon] if 0 < soon < FITTED_PART * (end - start) else []
         return np.array([0.0, *inside, end - start])
 
     def seen(self, start: float, sizes: Array) -> Array:
@@ -202,7 +202,7 @@ class Instant:
         that follow each other faster than time can tell have come to rest.
         """
         t, recent = point.t, len(self.jumps) - self._resolved
-        if recent < AT_ONCE or self.jumps[-AT_ONCE].t < t - REACHED * max(t, BRIEF_PART * self.end):
+        if recent < CHATTER or self.jumps[-CHATTER].t < t - SAME_MOMENT * max(t, BRIEF_PART * self.end):
             return True
         if t > self._sharpened + IDLE * self.end:
             self._sharpened, self._resolved, self.peaks = t, len(self.jumps), self.scales.copy()
@@ -221,7 +221,7 @@ class Instant:
         if near.any():
             near &= self.jumper.guard_rates(self.consistent(point).inputs()) < 0
             # Rounding undoes nothing: no edge leads to modes that have been left at this very moment.
-            left = [j.before.parameters[self.jumper.mode_columns] for j in self.jumps[-AT_ONCE:] if j.t == point.t]
+            left = [j.before.parameters[self.jumper.mode_columns] for j in self.jumps[-CHATTER:] if j.t == point.t]
             for j in np.flatnonzero(near).tolist():
                 closed[j] = not any(np.array_equal(self.jumper.modes_after(j, point), modes) for modes in left)
         return int(closed.argmax()) if closed.any() else None
@@ -257,7 +257,7 @@ class Instant:
         """Carry out an edge and book it; None where the run ends with it."""
         largest, drift = float(self.sizes(point)[self.first + index]), drift_of(self.rtol)
         balanced = BALANCED if self.system.edges[index].times else drift
-        slack = Slack(GUARD_EPS * largest, drift * largest, balanced, self._borne(index, point), self.rtol)
+        slack = EdgeUncertainty(GUARD_EPS * largest, drift * largest, balanced, self._borne(index, point), self.rtol)
         step = self.step if self.step is not None and self.step.before.t == point.t else None
         before = self.jumps[-1].t if self.jumps else self.start
         begun, length, reached = self.flowed

@@ -23,8 +23,8 @@ from surfacechem.compile.program import Function
 from surfacechem.expressions import derivative
 from surfacechem.model.automaton import INTERFACE, Sink
 from surfacechem.model.system import System
-from surfacechem.solve.contract import WARMED, Array, Mask
-from surfacechem.solve.equilibria import Equilibria, Heat, Point, Way, compiled
+from surfacechem.solve.contract import HEAT_STEPS, Array, Mask
+from surfacechem.solve.equilibria import Equilibria, GapDirection, Heat, Point, compiled
 from surfacechem.solve.zeros import zero
 from surfacechem.tolerances import ULPS
 
@@ -32,14 +32,14 @@ Moments = Callable[[Array, Array], tuple[Array, Array]]
 """From ways and what each taker has taken up to there, shape (ways, takers): the heat made up to each way, shape
 (ways,), and the shares at these moments, shape (ways, takers)."""
 
-DEGREE = 16
+PANEL_DEGREE = 16
 """Degree of shares and heat on a panel; half of it tells how good that is."""
 
-NARROWEST, PANELS = 2.0**-50, 1000
+NARROWEST, MOST_PANELS = 2.0**-50, 1000
 """Panel within which ways have no more digits: there a step of the shares, as at touch, is as sharp as it can be. Such
 a step takes two panels for each digit. Ten of them are more than there are, and what takes more panels is rounding."""
 
-PICARD, SURE = 50, 0.1
+PICARD_ROUNDS, PICARD_PART = 50, 0.1
 """Rounds in which what a panel takes has to agree with the temperatures that this gives, within a part of what counts;
 a panel in which it does not is halved, which makes the feedback as weak as it has to be."""
 
@@ -111,7 +111,7 @@ class JumpHeat:
         free = list(zip([j for j, s in enumerate(self.nodes.values()) if not s.prescribed], self.free, strict=True))
         rows, left = rows.copy(), np.arange(len(rows))
         # Each row ends where it has converged: what it becomes does not depend on the others.
-        for _ in range(WARMED if free else 0):
+        for _ in range(HEAT_STEPS if free else 0):
             moves = np.zeros(len(left), dtype=bool)
             for j, column in free:
                 T = rows[left, column]
@@ -181,22 +181,22 @@ def shared(moments: Moments, takers: int, small: float, *, feeds_back: bool) -> 
     Panels are halved until the integrals of their polynomials and those of half the degree agree within the heat that
     is ``small``. Shares that add up to one leave no heat out, whatever the panels.
     """
-    (points, integrals), (_, coarse) = _panel(DEGREE), _panel(DEGREE // 2)
+    (points, integrals), (_, coarse) = _panel(PANEL_DEGREE), _panel(PANEL_DEGREE // 2)
     taken, begin, width, panels = np.zeros(takers), 0.0, 1.0, 0
     while begin < 1.0:
         panels += 1
         up_to = np.repeat(taken[None], len(points), axis=0)
-        for _ in range(PICARD if feeds_back else 1):
+        for _ in range(PICARD_ROUNDS if feeds_back else 1):
             made, shares = moments(begin + width * points, up_to)
             last, up_to = up_to, taken + np.einsum("ifg,fk,g->ik", integrals, shares, made)
-            agrees = not feeds_back or np.max(np.abs(up_to - last)) <= SURE * small
+            agrees = not feeds_back or np.max(np.abs(up_to - last)) <= PICARD_PART * small
             if agrees:
                 break
         if not np.all(np.isfinite(up_to)):
             return np.full(takers, np.nan)
         half = np.einsum("fg,fk,g->k", coarse[-1], shares[::2], made[::2])
         close = agrees and np.max(np.abs(up_to[-1] - taken - half)) <= small
-        if close or width <= NARROWEST or panels > PANELS:
+        if close or width <= NARROWEST or panels > MOST_PANELS:
             taken, begin = up_to[-1], begin + width
             width = min(2 * width, 1.0 - begin)
         else:
@@ -321,7 +321,7 @@ class LoadPath:
         stuck = self.equilibria.with_slip(point, 0.0)
         return self.equilibria.settle_near(stuck, warm, span) or stuck
 
-    def _way(self, start: Point, after: Point) -> tuple[int, Way, float]:
+    def _way(self, start: Point, after: Point) -> tuple[int, GapDirection, float]:
         """Index of the gap that slides, its way when sliding by itself, and the distance along that."""
         ways = self.equilibria.ways(self.equilibria.with_slip(after, 0.0))
         j = next(j for j, e in enumerate(self.equilibria.items) if e.slides)

@@ -22,7 +22,7 @@ from surfacechem.model.balances import elastic_energy
 from surfacechem.model.system import START, System
 from surfacechem.quantities import VELOCITIES
 from surfacechem.solve.contract import Array, EdgeTables, Mask, integers
-from surfacechem.solve.equilibria import BALANCED, Equilibria, Folds, Lost, Point, compiled
+from surfacechem.solve.equilibria import BALANCED, Equilibria, FoldPoint, Folds, Point, compiled
 from surfacechem.solve.jump_heat import JumpHeat, LoadPath, LoadStep
 from surfacechem.solve.radau.stepper import (
     BONDS,
@@ -43,13 +43,13 @@ NO_HEAT = "it would take more heat than there is"
 NO_ENERGY = "the energy of the interface is not finite after it"
 NO_SHARES = "where the sliding ends and who takes its heat do not agree; with a damper it would take its time"
 
-ROUNDS = 20
+SHARE_ROUNDS = 20
 """Rounds in which the end of a slip and the shares of its heat have to agree, where the one depends on the other: each
 adds a digit or more where they converge at all."""
 
 
 @dataclass(frozen=True)
-class Slack:
+class EdgeUncertainty:
     """Uncertainty of an edge at its moment."""
 
     noise: float = 0.0
@@ -106,7 +106,7 @@ class ImpossibleError(Exception):
 
 
 @dataclass(frozen=True)
-class Release:
+class PendingJump:
     """A jump on its way: the state as modes and bonds have jumped, before gaps and temperatures follow."""
 
     index: int
@@ -115,8 +115,8 @@ class Release:
     energy: float
     """Energy that the jump conserves, before it; ``level`` is that at its start [J/m^2]."""
     level: float
-    fold: Lost | None
-    slack: Slack
+    fold: FoldPoint | None
+    slack: EdgeUncertainty
     step: LoadStep | None
     """Loads that have jumped at this moment."""
 
@@ -356,7 +356,7 @@ class Jumper:
         index: int,
         before: Point,
         since: float,
-        slack: Slack,
+        slack: EdgeUncertainty,
         last: Point | None = None,
         step: LoadStep | None = None,
     ) -> Jump:
@@ -370,7 +370,7 @@ class Jumper:
         if not np.isfinite(level):
             return replace(jump, obstacle=NO_ENERGY)
         books, lift = self._opened(edge, before, last)
-        release = Release(index, edge, start, float(books[0]), level, fold, slack, step)
+        release = PendingJump(index, edge, start, float(books[0]), level, fold, slack, step)
         if step is not None:
             self._load_path.reach(index, step, before)
         try:
@@ -388,7 +388,7 @@ class Jumper:
         work = lift | {name: lift.get(name, 0.0) + float(more[0]) for name, more in done.items()}
         return Jump(before.t, edge, before, after, released, gained, verdict, since, work, "", heat_out, entropy_out)
 
-    def _reset(self, index: int, before: Point, fold: Lost | None) -> tuple[Point, Point]:
+    def _reset(self, index: int, before: Point, fold: FoldPoint | None) -> tuple[Point, Point]:
         """The point before a jump, and with the modes and states that the edge resets."""
         slip, n = self.equilibria.slip, len(before.y)
         values = self._resets[index](before.inputs())
@@ -431,10 +431,10 @@ class Jumper:
             books[j] = (F_new * g)[accounts.index(name)] if name in accounts else books[j]
         return books, dict(zip(accounts, lift.tolist(), strict=True))
 
-    def _equilibrated(self, release: Release) -> tuple[Point, Array | None]:
+    def _equilibrated(self, release: PendingJump) -> tuple[Point, Array | None]:
         """Point at which the gaps come to rest, and the shares of friction's heat where its path decides them."""
         shares: Array | None = None
-        for _ in range(ROUNDS):
+        for _ in range(SHARE_ROUNDS):
             after = self._kept(release, self._rested(release, shares))
             found = self._path_shares(release, after)
             agreed = found is None or (
@@ -451,7 +451,7 @@ class Jumper:
             raise ImpossibleError(f"{NO_DOMAIN}: {closed[0]}")
         return after, shares
 
-    def _kept(self, release: Release, after: Point | None) -> Point:
+    def _kept(self, release: PendingJump, after: Point | None) -> Point:
         """The end of a jump; with the modes of its edge where what its guard measures has not moved."""
         if after is None:
             raise ImpossibleError(NO_REST)
@@ -463,7 +463,7 @@ class Jumper:
         sliding = 0.0 if slip is None else after.parameters[slip]
         return self.equilibria.with_slip(replace(after, parameters=release.start.parameters), sliding)
 
-    def _rested(self, release: Release, shares: Array | None) -> Point | None:
+    def _rested(self, release: PendingJump, shares: Array | None) -> Point | None:
         """Point at which the gaps come to rest. Sliding goes on or sticks: friction never pulls it back."""
 
         def heat(rows: Array) -> Array:
@@ -483,7 +483,7 @@ class Jumper:
         # Where sticking keeps the equilibrium it is sliding that is lost.
         return found.settle(onward, heat, release.slack.balanced, lost=fold if stuck is None else None)
 
-    def _path_shares(self, release: Release, after: Point) -> Array | None:
+    def _path_shares(self, release: PendingJump, after: Point) -> Array | None:
         """The shares by which the heat of friction is taken along the way of loads that jump, where that matters."""
         step, edge = release.step, release.edge
         slip, path = self.equilibria.slip, self._load_path
@@ -496,7 +496,7 @@ class Jumper:
         broken = release.energy - release.level if edge.heat == "local" else 0.0
         return path.shares(step, release.start, after, broken, release.slack.rtol * made + small)
 
-    def _made(self, rows: Array, release: Release) -> Array:
+    def _made(self, rows: Array, release: PendingJump) -> Array:
         """Heat that a jump to each of the rows makes [J/m^2], by who makes it, shape (rows, makers + 1).
 
         Friction is last, with the bonds that it breaks.
@@ -535,7 +535,7 @@ class Jumper:
         """Column of the part that makes heat of what is released before gaps move; the last, of friction, if local."""
         return -1 if edge.heat == "local" else self._maker(edge, "n" if edge.heat == "joint" else INTERFACE)
 
-    def _heated(self, point: Point, release: Release, shares: Array | None) -> tuple[Point, float, float, float]:
+    def _heated(self, point: Point, release: PendingJump, shares: Array | None) -> tuple[Point, float, float, float]:
         """The point with the heat made in its nodes; energy released, heat and entropy passed to reservoirs."""
         rows = point.inputs()[None]
         heated, *amounts = self._warmed(rows, self._made(rows, release), np.array([release.energy]), shares)

@@ -19,11 +19,11 @@ from surfacechem.contracts.terms import Spec
 from surfacechem.errors import PATHS, InputError, suggestion
 from surfacechem.model.checks import StartLimits
 from surfacechem.model.system import System
-from surfacechem.solve import ASKING, AUTO, solver
+from surfacechem.solve import AUTO, CALLING_PYTHON, solver
 from surfacechem.solve import segments as pieces
 from surfacechem.solve.choice import EXPLICIT, method
-from surfacechem.solve.contract import Array, Index, Margin, Mask, Problem, Result, Solver, States, Status, among
-from surfacechem.solve.diagnose import ROUNDED, are_led_back, cause
+from surfacechem.solve.contract import Array, Guard, Index, Mask, Problem, Result, Solver, States, Status, among
+from surfacechem.solve.diagnose import ROUNDED_BACK, are_led_back, termination
 from surfacechem.solve.equilibria import NO_BALANCE, Equilibria, Point
 from surfacechem.solve.hybrid import Flow, Hybrid, begun, carried, solve_together, without_stall
 from surfacechem.solve.jumps import Jump, Jumper
@@ -34,25 +34,25 @@ from surfacechem.tolerances import ATOL_OF_SCALE, DEFAULT_RTOL, EPS, FINER_BY, L
 GROUPS = {"energy supply": 0, "dissipation": 0, "heat": 0, "entropy supply": 1, "entropy production": 1, "bonds": 2}
 """Accounts whose quadratures are measured together."""
 
-SAMPLES, CLOSER = 60.0, 7.3
+LOOKS_PER_RUN, CLOSER = 60.0, 7.3
 """Looks at the equations in a run, and how many times more in the second one, which must not share its blindness.
 Choices: a look costs an evaluation, and 7.3 is no whole number, so that the looks of the two fall on different times.
 What both miss lasts less than 1/438 of the run, which every estimate says.
 """
 
-AT_ONCE = 10_000
+ROWS_AT_ONCE = 10_000
 """Rows in which named quantities are evaluated together, so that they take some MB."""
 
-SAMPLED = 100
+SAMPLED_OUTPUTS = 100
 """Outputs, about, that tell how large rounding is."""
 
 OWN = "radau"
 """The method of this package."""
 
-COLDER = 0.95 ** np.arange(1, 40)
+COLDER_GUESSES = 0.95 ** np.arange(1, 40)
 """Parts of the first guess of a temperature that are tried where that leads to an unstable one."""
 
-STATE, POSITIVE = Spec("", "initial value"), Spec("", "initial value", above=0)
+STATE_SPEC, POSITIVE_SPEC = Spec("", "initial value"), Spec("", "initial value", above=0)
 """Ranges of initial values: finite, and positive where the logarithm is the state; margins check the rest."""
 
 
@@ -82,7 +82,7 @@ class Run:
     """Whether loads differ in their last digits: where a result depends on these, two runs of the same numbers would
     agree.
     """
-    samples: float = SAMPLES
+    samples: float = LOOKS_PER_RUN
     """Parts of the run in each of which its steps are held against the equations at least once."""
 
     def __post_init__(self) -> None:
@@ -116,7 +116,7 @@ class Run:
         return replace(self, rtol=rtol, atol=atol, solver=used, nudged=nudged, samples=CLOSER * self.samples, **others)
 
 
-class Leaps(NamedTuple):
+class Discontinuities(NamedTuple):
     """Moments at which quantities may leap, run by run and in order of time: jumps, and breakpoints of loads."""
 
     owner: Index
@@ -130,7 +130,7 @@ class Leaps(NamedTuple):
     """Those that no other one follows at the same time."""
 
     @classmethod
-    def of(cls, model: Model, owner: Index, before: Array, after: Array) -> Leaps:
+    def of(cls, model: Model, owner: Index, before: Array, after: Array) -> Discontinuities:
         """Those of runs of a model with these arguments of compiled functions on both sides, a row each."""
         order, n = np.lexsort((before[:, 0], owner)), len(model.system.states)
         owner, before, after = owner[order], before[order], after[order]
@@ -184,7 +184,7 @@ class Trajectory:
     def some(self) -> Trajectory:
         """The trajectory with a sample of its outputs, enough to tell how large rounding is."""
         count = len(self.result.times)
-        return self.picked(np.arange(0, count, max(count // SAMPLED, 1)))
+        return self.picked(np.arange(0, count, max(count // SAMPLED_OUTPUTS, 1)))
 
     @cached_property
     def looked(self) -> Trajectory:
@@ -224,7 +224,7 @@ class Trajectory:
         model, system, times = self.model, self.model.system, self.result.times
         # No flux reads one of the states inside bodies alone but the first, and those are not named.
         own = [j for j, state in enumerate(system.states) if state.name not in system.inside]
-        together = max(1, AT_ONCE // max(len(times), 1))
+        together = max(1, ROWS_AT_ONCE // max(len(times), 1))
         worst = np.zeros(self.outputs.shape[1])
         for some in (own[first : first + together] for first in range(0, len(own), together)):
             rows = np.array([self._inputs] * len(some))
@@ -249,7 +249,7 @@ class Trajectory:
         return dict(zip(names, (*states.T, *named.T), strict=True))
 
     @cached_property
-    def leaps(self) -> Leaps:
+    def leaps(self) -> Discontinuities:
         """Jumps from which the run goes on, and the breakpoints of loads between jumps that it has passed."""
         model, result, steps = self.model, self.result, self.result.steps
         sides = [(jump.before.inputs(), jump.after.inputs()) for jump in self.jumps if not jump.stops]
@@ -260,7 +260,7 @@ class Trajectory:
             known, segment = (steps.t[at], steps.y[at], steps.ydot[at]), result.segments_at(steps.t[at])
             before = np.concatenate((before, model.inputs(result, *known, segment)))
             after = np.concatenate((after, model.inputs(result, *known, segment + 1)))
-        return Leaps.of(model, np.zeros(len(before), np.int64), before, after)
+        return Discontinuities.of(model, np.zeros(len(before), np.int64), before, after)
 
     @cached_property
     def within_bounds(self) -> dict[str, Array]:
@@ -286,7 +286,7 @@ def values_of(system: System, changes: Mapping[str, float] | None = None) -> dic
     values |= {state.path: state.at_start[1] for state in system.states}
     if not changes:
         return values
-    specs = {s.path: POSITIVE if s.given and not s.given.state else STATE for s in system.states}
+    specs = {s.path: POSITIVE_SPEC if s.given and not s.given.state else STATE_SPEC for s in system.states}
     specs |= {parameter.path: parameter.spec for parameter in system.parameters}
     known = system.changeable
     for path, value in changes.items():
@@ -297,7 +297,7 @@ def values_of(system: System, changes: Mapping[str, float] | None = None) -> dic
     return values
 
 
-def refuse_nothing(system: System, case: str = "CASE") -> None:
+def refuse_static(system: System, case: str = "CASE") -> None:
     """InputError where nothing of a scene changes."""
     if system.rests:
         command = f"`surfacechem evaluate {case}` gives its quantities"
@@ -315,7 +315,7 @@ def stable_start(system: System, program: Program, y: Array, parameters: Array) 
     if not guessed.any():
         return y
     if not _are_stable(system, program, y[None], parameters)[0]:
-        tried = np.array([np.where(guessed, part * y, y) for part in COLDER])
+        tried = np.array([np.where(guessed, part * y, y) for part in COLDER_GUESSES])
         stable = _are_stable(system, program, tried, parameters)
         y = tried[int(stable.argmax())] if stable.any() else y
     found = consistent(program, 0.0, y, np.zeros_like(y), parameters)
@@ -343,7 +343,7 @@ class Model:
     """A system with its machine code, made when it is built."""
 
     def __init__(self, system: System) -> None:
-        refuse_nothing(system)
+        refuse_static(system)
         system = system.with_state()
         start = time.perf_counter()
         n, inputs = len(system.states), system.inputs
@@ -424,7 +424,7 @@ class Model:
         y = np.array([state.from_given(values) for state in system.states])
         self._limits.check(y, parameters[0])
         if run.nudged:
-            pieces.nudge(system, parameters)
+            pieces.perturb_histories(system, parameters)
         if system.equilibria:
             y, parameters = self._equilibrated(y, parameters)
         start = stable_start(system, self.program, y, parameters[0])
@@ -463,13 +463,13 @@ class Model:
         return np.array([state.finest or state.scale for state in self.system.states])
 
     @cached_property
-    def _guards(self) -> tuple[Margin, ...]:
+    def _guards(self) -> tuple[Guard, ...]:
         """Event types for the zeros of limits, and behind them of the guards of edges."""
         limits = (
-            Margin.peak() if m.peak else replace(Margin.stop(), domain=m.domain) if m.terminal else Margin.restart()
+            Guard.peak() if m.peak else replace(Guard.stop(), domain=m.domain) if m.terminal else Guard.restart()
             for m in self.margins
         )
-        return (*limits, *(Margin.bear() if edge.strict else Margin.stop() for edge in self.system.edges))
+        return (*limits, *(Guard.bear() if edge.strict else Guard.stop() for edge in self.system.edges))
 
     def solve(self, run: Run, changes: Mapping[str, float] | None = None) -> Trajectory:
         """Run the model.
@@ -515,10 +515,10 @@ class Model:
         problems = [self.problem(*pair) for pair in runs]
         run = self._with_method(runs[0][0], problems[0])
         used = solver(run.solver)
-        if self.program.filler is not None and run.solver not in ASKING:
+        if self.program.filler is not None and run.solver not in CALLING_PYTHON:
             raise InputError(
                 f"rates of the mechanism come from Cantera itself, which the solver {run.solver} cannot ask. Use "
-                f"`solver: {ASKING[0]}` under `run`.",
+                f"`solver: {CALLING_PYTHON[0]}` under `run`.",
                 path="run.solver",
             )
         used.prepare()
@@ -575,9 +575,9 @@ class Model:
             margin, at, y = self.margins[int(result.events.index[-1])], np.array([result.t]), result.y[None]
             inputs = self.inputs(result, at, y, result.ydot[None])
             if are_led_back(self.system, self.program, margin, at, y, inputs[:, 1 + 2 * len(result.y) :])[0]:
-                return "failed", f"{margin.reason} at {where}: {ROUNDED}"
+                return "failed", f"{margin.reason} at {where}: {ROUNDED_BACK}"
             return "stopped", f"{self.system.reason(margin, inputs[0])} at {where}"
-        return cause(self.system, self.program, self.margins, result, values, self.named)
+        return termination(self.system, self.program, self.margins, result, values, self.named)
 
     def evaluate(
         self, result: Result, t: Array, y: Array, ydot: Array, segment: NDArray[np.int64] | None = None

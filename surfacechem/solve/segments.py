@@ -24,7 +24,7 @@ PARTS_OF_A_PERIOD, MOST_PARTS = 8.17, 20_000
 """Parts into which the period of a load is cut, so many that no cut falls on a reversal, and the number of them above
 which it is left to the steps."""
 
-STRAY, LARGEST_SLACK = 1e3, NEGLIGIBLE
+BETWEEN_POINTS, LARGEST_SLACK = 1e3, NEGLIGIBLE
 """Slack of bonding beyond its bounds between two points of a step, in tolerances, and at most."""
 
 
@@ -45,13 +45,13 @@ def segment_parameters(system: System, starts: Array, rtol: float, values: Mappi
         if parameter.load is not None:
             rows[:, j] = [parameter.at(float(start)) for start in starts]
         elif parameter.path == "run.slack":
-            rows[:, j] = min(max(values[parameter.path], STRAY * rtol), LARGEST_SLACK)
+            rows[:, j] = min(max(values[parameter.path], BETWEEN_POINTS * rtol), LARGEST_SLACK)
         elif parameter.path == RTOL_PATH:
             rows[:, j] = rtol
     return rows
 
 
-def nudge(system: System, parameters: Array) -> None:
+def perturb_histories(system: System, parameters: Array) -> None:
     """Change the numbers of histories by a few roundings, one up, the next down: a last digit may be lost where a state
     is rounded, at an impact for instance. Times that pieces count from stay.
     """
@@ -81,15 +81,15 @@ def start_registers(system: System, parameters: Array, values: Mapping[str, floa
 COMPARISONS = (symengine.StrictLessThan, symengine.LessThan)
 """SymEngine turns the others round."""
 
-GRID, LOOKS_IN_A_PERIOD = 64, 8
+TURN_PARTS, LOOKS_IN_A_PERIOD = 64, 8
 """Parts of a run in each of which a given variable is taken to turn at most once, and of the period of one that repeats
 itself, where a sine turns once in four of them. A choice: what turns twice within a part is not found, and more parts
 cost evaluations of what depends on time alone."""
 
-ENOUGH = 10
+PARTS_PER_STEP = 10
 """Parts of periods for each step allowed: two a period end a step, so that the steps are used up before the parts."""
 
-HALVINGS = 64
+BISECTIONS = 64
 """Bisections that take any part of a run to the last bit of its time."""
 
 
@@ -123,8 +123,8 @@ class Passing:
         """
         if self._function is None:
             return segments, table
-        parts = max(GRID / (segments[-1] - segments[0]), LOOKS_IN_A_PERIOD * frequency)
-        looked_at = np.minimum(segments, segments[0] + ENOUGH * max_steps / parts)
+        parts = max(TURN_PARTS / (segments[-1] - segments[0]), LOOKS_IN_A_PERIOD * frequency)
+        looked_at = np.minimum(segments, segments[0] + PARTS_PER_STEP * max_steps / parts)
         found = self._found(looked_at.tobytes(), table[:, self._columns].tobytes(), parts)
         beside = np.searchsorted(segments, found)
         gaps = np.minimum(found - segments[beside - 1], segments[beside] - found)
@@ -162,7 +162,7 @@ class Passing:
         i, j = np.nonzero((before * after < 0) | ((after == 0) & (before != 0)))
         low, high, values, side = low[i], high[i], values[i], before[i, j]
         rows = np.arange(len(i))
-        for _ in range(HALVINGS if len(i) else 0):
+        for _ in range(BISECTIONS if len(i) else 0):
             middle = 0.5 * (low + high)
             ahead = at(middle, values)[rows, j] == side
             low, high = np.where(ahead, middle, low), np.where(ahead, high, middle)

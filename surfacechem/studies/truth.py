@@ -23,7 +23,7 @@ from surfacechem.results.accuracy import errors_over_time
 from surfacechem.results.error_estimates import clear_of, computed, difference, event_errors, fewer, floors, sizes
 from surfacechem.results.event_table import event_times
 from surfacechem.results.matching import exact_values
-from surfacechem.solve import ASKING, solver
+from surfacechem.solve import CALLING_PYTHON, solver
 from surfacechem.solve.contract import Array
 from surfacechem.solve.run import Model, Trajectory
 from surfacechem.studies.grid import FAULTS
@@ -119,7 +119,7 @@ class Subject:
 
     def unable(self, name: str) -> str:
         """The reason for which a solver cannot run this case; empty where it can."""
-        if self.model.program.filler is not None and name not in ASKING:
+        if self.model.program.filler is not None and name not in CALLING_PYTHON:
             return "rates of the mechanism come from Cantera itself, which this solver cannot ask"
         try:
             solver(name)

@@ -26,7 +26,7 @@ from surfacechem.laws.longrange import (
 )
 from surfacechem.model.assemble import assemble
 from surfacechem.scene import Mounting
-from surfacechem.solve.branches import steps_ahead, zero_ahead
+from surfacechem.solve.branches import next_root, steps_ahead
 from surfacechem.solve.run import Model, Run
 
 CLOSED = "the gap closed, and no potential bears the bodies in contact"
@@ -124,8 +124,8 @@ def test_a_pole_is_no_zero(power):
     def pole(gaps):
         return 1.0 / (np.asarray(gaps) + 1.0) ** power
 
-    assert zero_ahead(pole, 1.0, -1.0, 1.0) is None
-    assert zero_ahead(lambda g: np.asarray(g) ** power, 1.0, -1.0, 1.0) == pytest.approx(0.0, abs=1e-12)
+    assert next_root(pole, 1.0, -1.0, 1.0) is None
+    assert next_root(lambda g: np.asarray(g) ** power, 1.0, -1.0, 1.0) == pytest.approx(0.0, abs=1e-12)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -138,7 +138,7 @@ def test_a_zero_is_found_where_a_value_alone_rounds_otherwise_than_among_others(
     def curve(gaps):
         return sign * (np.asarray(gaps) - zero + (rounding if len(gaps) == 1 else 0.0))
 
-    assert zero_ahead(curve, 1.0, -1.0, sign) == pytest.approx(zero, abs=2e-9)
+    assert next_root(curve, 1.0, -1.0, sign) == pytest.approx(zero, abs=2e-9)
 
 
 # -- masses and dampers that meet ------------------------------------------------------------------------------

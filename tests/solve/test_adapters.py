@@ -151,7 +151,7 @@ def test_steps_looked_at_together_are_those_looked_at_one_by_one(solver, monkeyp
     """Events lie before what a library has stepped through already."""
     case = load("debonding", {"run.solver": solver})
     together = case.run().dataset
-    monkeypatch.setattr(stepping, "SEVERAL", 1)
+    monkeypatch.setattr(stepping, "MOST_TOGETHER", 1)
     alone = case.run().dataset
     for name in ("event_time", "time", "phi"):
         np.testing.assert_array_equal(together[name], alone[name])

@@ -21,7 +21,7 @@ from surfacechem.solve.adapters.dense_step import (
     hermite,
     on_step,
 )
-from surfacechem.solve.contract import Margin
+from surfacechem.solve.contract import Guard
 
 GUARDS, DEGREE = 3, 4
 CLOSEST = 2e-3
@@ -53,7 +53,7 @@ def test_the_stepper_finds_the_same(clock, seed):
     rng = np.random.default_rng(seed)
     directions = rng.integers(-1, 2, GUARDS).tolist()
     rows = np.array([polynomial(rng, d) for d in directions])
-    kinds = tuple(Margin(True, d, strict=d == -1 and bool(rng.integers(2))) for d in directions)
+    kinds = tuple(Guard(True, d, strict=d == -1 and bool(rng.integers(2))) for d in directions)
     in_play = tuple(bool(flag) for flag in rng.random(GUARDS) < 0.8)
     case = problem(clock, [0.0], [0.0, 1.0], 1e-9, parameters=rows.ravel(), margins=kinds, in_play=in_play)
     found = solver("radau").solve(case).events
@@ -74,7 +74,7 @@ def test_the_stepper_finds_the_same(clock, seed):
 
 
 def test_what_has_just_fired_has_to_leave_zero_first():
-    guards = Guards.of([Margin.restart()], lambda t, _: np.array([t * (1.0 - t)]))
+    guards = Guards.of([Guard.restart()], lambda t, _: np.array([t * (1.0 - t)]))
     step = DenseStep(0.0, 2.0, lambda _: np.zeros(0))
     guards.start(np.array([1e-20]), fired=[0])
     t, fired = first_crossing(step, guards, np.ones(1, bool), 0.0)
@@ -83,14 +83,14 @@ def test_what_has_just_fired_has_to_leave_zero_first():
 
 
 def test_a_guard_too_small_for_a_parabola_has_no_zero():
-    guards = Guards.of([Margin.stop()], lambda t, _: np.array([5e-324 * (1.0 + abs(t - 0.5) * 100.0)]))
+    guards = Guards.of([Guard.stop()], lambda t, _: np.array([5e-324 * (1.0 + abs(t - 0.5) * 100.0)]))
     guards.start(np.array([5e-324 * 51.0]))
     assert first_crossing(DenseStep(0.0, 1.0, lambda _: np.zeros(0)), guards, np.ones(1, bool), 0.0) == (1.0, [])
 
 
 def test_a_guard_that_jumps_right_after_no_time_is_found_there():
     jump, nothing = 1e-300, np.zeros(0)
-    guards = Guards.of([Margin.stop()], lambda t, _: np.array([1.0 if t < jump else -1e-57]))
+    guards = Guards.of([Guard.stop()], lambda t, _: np.array([1.0 if t < jump else -1e-57]))
     guards.start(np.array([1.0]))
     t, fired = first_crossing(DenseStep(0.0, 1e-15, lambda _: nothing), guards, np.ones(1, bool), 0.0)
     assert fired == [0]
@@ -109,7 +109,7 @@ def test_a_guard_that_jumps_right_after_no_time_is_found_there():
     ],
 )
 def test_guards_far_from_zero_follow_a_step_at_once(values, far):
-    guards, stepwise = (Guards.of([Margin.restart()], lambda *_: np.zeros(1)) for _ in range(2))
+    guards, stepwise = (Guards.of([Guard.restart()], lambda *_: np.zeros(1)) for _ in range(2))
     rows = np.array(values)[:, None]
     for each in (guards, stepwise):
         each.start(rows[0])

@@ -17,7 +17,7 @@ from surfacechem.laws.loading import Harmonic, Hold, Ramp, Table
 from surfacechem.runs.simulation import Simulation
 from surfacechem.scene import Mounting
 from surfacechem.solve import solver
-from surfacechem.solve.contract import Margin, Status
+from surfacechem.solve.contract import Guard, Status
 from surfacechem.solve.radau.solver import Radau
 
 RTOLS, TIGHT = [1e-6, 1e-13], [1e-11, 1e-13]
@@ -229,7 +229,7 @@ def test_a_stage_that_ends_without_pressure_slips_once():
 # -- events at exactly known times: dense sequences, double roots, coincidences, starts at zero, brief dips -----------
 
 radau = Radau()
-STOP = (Margin.stop(),)
+STOP = (Guard.stop(),)
 T, X, V, DX, DV = se.symbols("t x v dx dv")
 
 
@@ -250,7 +250,7 @@ def run(program, y0, end, rtol=1e-10, kinds=STOP, start=0.0):
 @pytest.mark.parametrize("rtol", [1e-3, 1e-12])
 def test_every_crossing_of_a_fast_margin_is_found_in_order(rtol):
     """22 zeros of sin(22 pi t), many of them within one step of x = t."""
-    result = run(clock(se.sin(22 * se.pi * X + 0.5)), [0.0], 1.0, rtol, (Margin.restart(),))
+    result = run(clock(se.sin(22 * se.pi * X + 0.5)), [0.0], 1.0, rtol, (Guard.restart(),))
     exact = (np.arange(1, 23) - 0.5 / np.pi) / 22
     assert result.status == Status.FINISHED
     np.testing.assert_allclose(result.events.t, exact, rtol=1e-14)
@@ -281,21 +281,19 @@ def test_the_first_passage_of_a_limit_is_located(margin, t, exact):
 
 
 def test_a_kink_that_is_touched_is_none():
-    assert run(clock((X - 3.01) ** 2), [0.0], 10.0, kinds=(Margin.restart(),)).status == Status.FINISHED
+    assert run(clock((X - 3.01) ** 2), [0.0], 10.0, kinds=(Guard.restart(),)).status == Status.FINISHED
 
 
 def test_the_earlier_of_a_dip_and_a_crossing_comes_first():
     dip, crossing = (X - 3.01) ** 2 - 1e-8, 3.0102 - X
-    result = run(clock(crossing, dip), [0.0], 10.0, kinds=(Margin.stop(), Margin.stop()))
+    result = run(clock(crossing, dip), [0.0], 10.0, kinds=(Guard.stop(), Guard.stop()))
     assert list(result.events.index) == [1]
     assert result.t == pytest.approx(3.01 - 1e-4, rel=1e-13)
 
 
 def test_coincident_events_have_one_time():
     program = oscillator(X, 3 * X, X * V**2 - 0.0 * T, X - 0.1)
-    result = run(
-        program, [1.0, 0.0], 10.0, 1e-10, (Margin.restart(), Margin.stop(), Margin.restart(), Margin.restart())
-    )
+    result = run(program, [1.0, 0.0], 10.0, 1e-10, (Guard.restart(), Guard.stop(), Guard.restart(), Guard.restart()))
     assert list(result.events.index) == [3, 0, 1, 2]
     assert len(set(result.events.t)) == 2
 

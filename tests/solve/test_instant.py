@@ -23,7 +23,7 @@ from surfacechem.model.assemble import assemble
 from surfacechem.results.audit import audit
 from surfacechem.scene import Body, Interface, Medium, Mounting, Scene
 from surfacechem.solve.equilibria import Point
-from surfacechem.solve.jumps import ADMISSIBLE, IMPOSSIBLE, VIOLATES, Slack
+from surfacechem.solve.jumps import ADMISSIBLE, IMPOSSIBLE, VIOLATES, EdgeUncertainty
 from surfacechem.solve.run import Model
 
 TOLERANCES = [1e-5, 1e-9, 1e-13]
@@ -122,7 +122,7 @@ def test_the_rounding_of_a_bound_destroys_no_entropy(phi, verdict):
     states = [{"phi": phi, "T": 300.0 + K_1 / (2 * C)}[state.name] for state in model.system.states]
     values = np.array([parameter.value for parameter in model.system.parameters], dtype=float)
     point = Point(0.0, np.array(states), np.zeros(len(states)), values)
-    assert model.jumper.make(index, point, 0.0, Slack(noise=1e-13)).verdict == verdict
+    assert model.jumper.make(index, point, 0.0, EdgeUncertainty(noise=1e-13)).verdict == verdict
 
 
 def test_a_gap_on_an_unstable_equilibrium_that_nothing_pushes_from_says_so():

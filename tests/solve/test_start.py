@@ -16,7 +16,7 @@ from surfacechem.model.assemble import assemble
 from surfacechem.results.audit import audit
 from surfacechem.runs.simulation import Simulation
 from surfacechem.scene import Mounting
-from surfacechem.solve.diagnose import paces
+from surfacechem.solve.diagnose import time_scales
 from surfacechem.solve.run import Model
 
 LOADS = {
@@ -101,7 +101,7 @@ def test_dampers_of_the_bodies_and_of_the_gap_relax_together(c_b, c_g):
     mount = Mounting(k=1e13, c_b=c_b, c_g=c_g)
     scene = together([ZONE], (), {"w_n": Ramp(rate=1e-8)}, {"g_n": 0.0}, normal=mount)
     model = Model(assemble(scene))
-    ((pace, time),) = paces(model.system, model.values())
+    ((pace, time),) = time_scales(model.system, model.values())
     assert pace.text == "relaxation of the normal gap"
     assert time == pytest.approx(8e2 / 1e13, rel=1e-14)
 

@@ -22,7 +22,7 @@ from solver_problems import (
 
 from surfacechem.compile.program import compile_program
 from surfacechem.solve import names, solver
-from surfacechem.solve.contract import Margin, Problem, Status
+from surfacechem.solve.contract import Guard, Problem, Status
 from surfacechem.solve.radau import solver as radau_solver
 from surfacechem.solve.radau.solver import Dop853, Radau, consistent, output_rates
 from surfacechem.solve.radau.stepper import END, FIRST_COUNTER, ROWS
@@ -166,7 +166,7 @@ def test_vanishing_capacity_ends_at_zero_temperature() -> None:
     program = compile_program(
         t, [temperature], [rate], [], [2.0 * temperature / 300 * rate + 600.0], margins=[temperature]
     )
-    result = radau.solve(problem(program, [300.0], [0.0, 2.0], 1e-10, margins=(Margin.stop(),)))
+    result = radau.solve(problem(program, [300.0], [0.0, 2.0], 1e-10, margins=(Guard.stop(),)))
     assert result.status in (Status.EVENT, Status.STEP_UNDERFLOW)
     assert result.t == pytest.approx(0.5, rel=1e-9)
     assert abs(result.y[0]) < 1e-2
@@ -196,7 +196,7 @@ def test_segments_change_parameters(name: str) -> None:
 @pytest.mark.parametrize("name", names)
 def test_terminal_event(name: str) -> None:
     result = solver(name).solve(
-        problem(linear_decay(), [1.0], [0.0, 10.0], 1e-9, margins=(Margin.stop(),), times=np.arange(11.0))
+        problem(linear_decay(), [1.0], [0.0, 10.0], 1e-9, margins=(Guard.stop(),), times=np.arange(11.0))
     )
     assert result.status == Status.EVENT
     assert result.t == pytest.approx(np.log(2), rel=1e-6 if name != "radau" else 1e-11)
@@ -212,7 +212,7 @@ def oscillator(*margins):
 
 @pytest.mark.parametrize("name", names)
 def test_margin_zero_at_the_start_does_not_fire(name: str) -> None:
-    case = problem(oscillator(lambda t, x, v: x), [0.0, 1.0], [0.0, 4.0], 1e-8, margins=(Margin.stop(),))
+    case = problem(oscillator(lambda t, x, v: x), [0.0, 1.0], [0.0, 4.0], 1e-8, margins=(Guard.stop(),))
     assert solver(name).solve(case).t == pytest.approx(np.pi, rel=1e-6)
 
 
@@ -222,7 +222,7 @@ def test_kinks_restart(name: str) -> None:
     t, x, v, dx, dv = se.symbols("t x v dx dv")
     sign = se.Piecewise((1.0, x > 0), (-1.0, True))
     program = compile_program(t, [x, v], [dx, dv], [], [dx - v, dv + sign], margins=[x])
-    result = solver(name).solve(problem(program, [1.0, 0.0], [0.0, 9.0], 1e-9, margins=(Margin.restart(),)))
+    result = solver(name).solve(problem(program, [1.0, 0.0], [0.0, 9.0], 1e-9, margins=(Guard.restart(),)))
     assert result.status == Status.FINISHED
     np.testing.assert_allclose(result.events.t, np.sqrt(2) * np.array([1.0, 3.0, 5.0]), rtol=1e-6)
     assert len(result.events.t) == 3
@@ -271,7 +271,7 @@ def test_batch_with_times_of_their_own_and_events() -> None:
     program = compile_program(t, [y], [dy], [k], [dy + k * y], margins=[y - 0.5])
     rates = np.array([1.0, 10.0, 100.0])
     ends = 3.0 / rates
-    given = {"atol": 1e-17, "margins": (Margin.restart(),), "record_steps": True}
+    given = {"atol": 1e-17, "margins": (Guard.restart(),), "record_steps": True}
     part = np.array([0.0, 0.5, 1.0])
     problems = [
         problem(program, [1.0], [0.0, end], 1e-11, parameters=[rate], times=part * end, **given)

@@ -26,7 +26,7 @@ NAMES = ("cantera",)
 LEDGER_UNIT = 1e100
 """Ledgers are counted in this many of their SI units, so that they stay out of the integrator's error norm."""
 
-LONGEST = 0.1
+LONGEST_STEP = 0.1
 """Part of a stretch that a step may take: Cantera cannot be told to end a step at an event."""
 
 FACTORIALS = np.cumprod(np.maximum(np.arange(13.0), 1.0))
@@ -242,7 +242,7 @@ class _Stretch(Method):
         self.net = cantera.ReactorNet([self.reactor])
         self.net.rtol, self.net.atol = view.problem.rtol, 1.0
         self.net.initial_time = t
-        self.longest = min(LONGEST * (end - t), view.problem.spacing)
+        self.longest = min(LONGEST_STEP * (end - t), view.problem.spacing)
         self.t, self.end = t, end
         self.net.max_time_step = self.longest
         self.last: Array | None = None

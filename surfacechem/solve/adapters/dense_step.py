@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from surfacechem.solve.contract import Array, Margin
+from surfacechem.solve.contract import Array, Guard
 from surfacechem.solve.zeros import zero
 from surfacechem.tolerances import FORMULA_EPS, SQRT_EPS
 
-POINTS = 16
+GUARD_POINTS = 16
 """Points of a step at which guards are looked at; zeros in pairs between two of them show in a lowest point."""
 
 
@@ -86,9 +86,7 @@ class Guards:
     due: NDArray[np.bool_] = field(init=False)
 
     @classmethod
-    def of(
-        cls, kinds: Sequence[Margin], values: Callable[[float, Array], Array], seen: Array | None = None
-    ) -> "Guards":
+    def of(cls, kinds: Sequence[Guard], values: Callable[[float, Array], Array], seen: Array | None = None) -> "Guards":
         """The guards of a problem, with the largest sizes ``seen`` before, if any."""
         directions = np.array([float(kind.direction) for kind in kinds])
         strict = np.array([kind.strict for kind in kinds], dtype=bool)
@@ -186,7 +184,7 @@ def first_crossing(
         bottoms = {i: _bottom(one(i), *at_times.tolist()) for i in low}
         return {i: _zero(one(i), points[0][0], x) for i, x in bottoms.items() if guards.crossed(at(x))[i]}
 
-    times = np.unique(np.linspace(step.start, step.end, POINTS + 1))  # fewer in a step of few roundings
+    times = np.unique(np.linspace(step.start, step.end, GUARD_POINTS + 1))  # fewer in a step of few roundings
     if guards.due.any():
         # What begins at zero as a power of time may go either way inside a step, whose end is right.
         soon, late = guards.fallen(at(times[1])), guards.fallen(at(times[-1]))

@@ -17,13 +17,13 @@ from surfacechem.solve.contract import Array, Counters, Events, Points, Problem,
 from surfacechem.solve.radau import stepper
 from surfacechem.tolerances import NEGLIGIBLE, SQRT_EPS, ULPS
 
-ENTROPY = 1
+ENTROPY_GROUP = 1
 """The group of the ledger's lines of entropy."""
 
-MISSED = 100.0
+MISSED_ERROR = 100.0
 """Errors in units of the tolerance beyond which a step has not seen what lies before an event."""
 
-FEW, MORE, SEVERAL = 8, 16, 256
+FIRST_TOGETHER, TOGETHER_GROWTH, MOST_TOGETHER = 8, 16, 256
 """Steps at a time that the equations are looked at together, at first, how many times more each time, and at most. What
 comes after an event has been stepped through for nothing; from 64 to 256 at most make no difference to a run of a
 hundred reactions.
@@ -219,7 +219,7 @@ class _Run:
         self.t, self.y, self.ydot = float(problem.segments[0]), problem.y0, np.zeros(program.n)
         self.ledger, self.ledger_rates = np.zeros(program.n_ledger), np.zeros(program.n_ledger)
         self.margins = np.zeros(0)
-        self.entropic = np.array(program.groups) == ENTROPY
+        self.entropic = np.array(program.groups) == ENTROPY_GROUP
         self.guards = Guards.of(problem.margins, self._guards, problem.seen)
         self.plain = program.plain_margins and not program.algebraic_mask.any()
         """Whether margins read nothing but what a library integrates."""
@@ -290,7 +290,7 @@ class _Run:
     def _to_event(self, method: Method, end: float) -> list[int]:
         """Step until an event, the end or the budget's; returns the margins that fired."""
         # Where algebraic variables are searched from the state before, that is to be close.
-        start, most = self.t, 1 if len(self.view.algebraic) else FEW
+        start, most = self.t, 1 if len(self.view.algebraic) else FIRST_TOGETHER
         while self.t < end and self._over_budget() is None:
             before = time.perf_counter()
             steps = method.several(self._within_budget(most))
@@ -299,7 +299,7 @@ class _Run:
                 raise StepError("the step size fell to zero")
             if self.t == start:
                 self._check_first(steps.step(0), min(float(steps.times[1]), end))
-            most = 1 if len(self.view.algebraic) else min(MORE * most, SEVERAL)
+            most = 1 if len(self.view.algebraic) else min(TOGETHER_GROWTH * most, MOST_TOGETHER)
             inside = self._inside(steps, min(float(steps.times[-1]), end))
             first, count = 0, len(steps.times) - 1
             while first < count:
@@ -321,7 +321,7 @@ class _Run:
         resolution = min(self.problem.rtol, SQRT_EPS) * (within.end - self.t) + ULPS * abs(within.end)
         reached, fired = first_crossing(within, self.guards, self.in_play, resolution)
         inside = self._inside(Steps.of([step]), reached)
-        if fired and self.aim is None and not self._adds_up(inside, MISSED)[0]:
+        if fired and self.aim is None and not self._adds_up(inside, MISSED_ERROR)[0]:
             self.aim = reached
             return []
         self._accept(lambda _: step, inside, fired)

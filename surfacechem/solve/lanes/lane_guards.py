@@ -14,9 +14,9 @@ from surfacechem.solve.radau.tables import SCANNED
 from surfacechem.solve.radau.work import MARGINS, compiled, evaluate
 from surfacechem.tolerances import CBRT_EPS, EPS, FORMULA_EPS, NEWTON_EPS, RUN_EPS, TINY
 
-POINTS = SCANNED[DENSEST]
+SCAN_FRACTIONS = SCANNED[DENSEST]
 """Fractions of a step at which guards are examined."""
-TRIALS = 12
+MOST_SECANTS = 12
 """Steps onto a guard: secants take four, the rounding of the guard some more."""
 
 
@@ -113,8 +113,8 @@ def _scan(w: Any, searched: Any) -> None:
     for m in range(w.n_margins):
         put(w.margin[m], lanes(w.margin_first[m]))
     earlier, before = 0.0, 0.0
-    for i in range(POINTS.shape[0]):
-        x = POINTS[i]
+    for i in range(SCAN_FRACTIONS.shape[0]):
+        x = SCAN_FRACTIONS[i]
         put_inside(w, same(x))
         _put_margins(w)
         found = same(0.0)
@@ -238,7 +238,7 @@ def lands(w: Any, lane: int) -> bool:
     else:
         w.nudge[lane] = 0.0
     w.landing[lane] += 1
-    if w.landing[lane] > TRIALS or slope >= 0.0:
+    if w.landing[lane] > MOST_SECANTS or slope >= 0.0:
         w.unclear[lane] = 1.0
     w.proposed[lane] = min(max(h + change, 0.5 * h), min(2.0 * h, w.longest[lane]))
     return False

@@ -29,8 +29,8 @@ from surfacechem.solve.lanes.lane_step import (
     try_step,
 )
 from surfacechem.solve.lanes.vector import absolute, any_lane, lanes, put, same, where
-from surfacechem.solve.radau.driver import FEWEST, LEAST_NORM
-from surfacechem.solve.radau.explicit import FALLS, PATIENT
+from surfacechem.solve.radau.driver import FEWEST_LOOKS, LEAST_NORM
+from surfacechem.solve.radau.explicit import FALLS, STIFF_STEPS
 from surfacechem.solve.radau.record import laying_out
 from surfacechem.solve.radau.step import loosening
 from surfacechem.solve.radau.stepper import END, EVENTS, FIRST_COUNTER, OUTPUTS, RECORDS
@@ -41,9 +41,9 @@ from surfacechem.tolerances import NEGLIGIBLE, SQRT_EPS, ULPS
 _lay_out = laying_out(WORK)
 
 FINISHED, EVENT, LEFT = int(Status.FINISHED), int(Status.EVENT), int(Status.LEFT)
-HOPELESS = 12
+MOST_HALVINGS = 12
 """Trials of a step in a row after which it is noise or stiffness that they meet: each is a half of the last or less."""
-TOGETHER = 4
+FREE_LANES = 4
 """Free lanes for which new runs begin: a choice. Fewer fill the lanes better, more share what starts and ends cost."""
 
 
@@ -102,7 +102,7 @@ def _enter(w: Any, lane: int) -> None:
     w.t[lane], w.end[lane] = segments[segment], segments[segment + 1]
     for j in range(w.parameters.shape[2]):
         w.inputs[1 + 2 * w.n + j, lane] = w.parameters[i, segment, j]
-    w.spacing_of[lane] = min(spacing, (w.end[lane] - w.t[lane]) / FEWEST)
+    w.spacing_of[lane] = min(spacing, (w.end[lane] - w.t[lane]) / FEWEST_LOOKS)
     w.fresh[lane] = 1.0
 
 
@@ -302,7 +302,7 @@ def _conclude(w: Any, lane: int) -> None:
     h = w.h[lane]
     if w.again[lane] > 0.5 and w.norm[lane] > FALLS * w.norm_tried[lane] * (h / w.h_tried[lane]) ** 8:
         # The error of a step that is repeated has not fallen with its size: it is noise, or stiffness.
-        w.stiff_steps[lane] += PATIENT
+        w.stiff_steps[lane] += STIFF_STEPS
     if not w.norm[lane] < 1.0:
         w.h_tried[lane], w.norm_tried[lane] = h, min(w.norm[lane], 1e30)
         w.proposed[lane], w.again[lane] = w.following[lane], 1.0
@@ -330,7 +330,7 @@ def _continue(w: Any, lane: int) -> None:
     if w.taken[lane] > 0.5:
         _accept(w, lane)
         _go_on(w, lane)
-    doubtful = w.unclear[lane] + (w.failed[lane] > HOPELESS) + (w.stiff_steps[lane] >= 2 * PATIENT) > 0
+    doubtful = w.unclear[lane] + (w.failed[lane] > MOST_HALVINGS) + (w.stiff_steps[lane] >= 2 * STIFF_STEPS) > 0
     spent = w.steps[lane] + w.rejected[lane] >= w.max_steps[row_of(w.max_steps, i)]
     if w.run[lane] >= 0 and (doubtful or spent or not w.proposed[lane] > ULPS * w.t[lane]):
         _give_up(w, lane)
@@ -398,7 +398,7 @@ def run_lanes(first: int, last: int, memory: Any, batch: Any) -> None:
         _leave(w, lane)
     while busy > 0 or following < last:
         # Runs begin together, so that what is done at their starts and ends is done for several at once.
-        begins = busy <= LANES - TOGETHER
+        begins = busy <= LANES - FREE_LANES
         starts, busy = False, 0
         for lane in range(LANES):
             if begins and w.run[lane] < 0 and following < last:

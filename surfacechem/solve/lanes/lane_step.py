@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from surfacechem.compile.vectors import LANES
 from surfacechem.solve.lanes.layout import MEMORY, SIZES
 from surfacechem.solve.lanes.vector import absolute, any_lane, floor, lanes, put, same, square_root, where
-from surfacechem.solve.radau.dense import FORESEEN, GROUPS, booked
-from surfacechem.solve.radau.explicit import DENSEST, FELT, FOLLOWED, SHARE, STABLE
+from surfacechem.solve.radau.dense import FORESEEN_PART, GROUPS, booked
+from surfacechem.solve.radau.explicit import DENSEST, ERROR_PART, FELT, FOLLOWED, STIFF
 from surfacechem.solve.radau.record import StepperRecord
-from surfacechem.solve.radau.step import DECADES, FAR, GROWTH, LOOK_PART, SAFETY, SHRINK
+from surfacechem.solve.radau.step import END_LOOKS, LOOK_PART, MAX_GROWTH, MIN_GROWTH, SAFETY, UNSEEN_ERROR
 from surfacechem.solve.radau.tables import (
     DENSE_FACTORS,
     EXPLICIT,
@@ -119,7 +119,7 @@ def _ledger_norms(w: Any) -> Any:
         for i in range(STAGES_OF_DENSE):
             rate = larger(rate, absolute(lanes(w.k[i, w.n + m])))
         put(w.q_rate[m], rate)
-        put(w.q_scale[m], lanes(w.q_largest[m]) + larger(h, FORESEEN * span) * rate)
+        put(w.q_scale[m], lanes(w.q_largest[m]) + larger(h, FORESEEN_PART * span) * rate)
     norm = same(0.0)
     for group in range(GROUPS):
         miss, second, scale = same(0.0), same(0.0), same(TINY)
@@ -153,7 +153,7 @@ def try_step(w: Any) -> None:
         largest = where(error <= largest, largest, error)
         second = larger(second, absolute(lanes(w.fine[m])) * rate)
     # The estimate of fifth order, made one of seventh by that of third.
-    norm = largest * largest / (SHARE * square_root(largest * largest + 0.01 * second * second + TINY))
+    norm = largest * largest / (ERROR_PART * square_root(largest * largest + 0.01 * second * second + TINY))
     put(w.norm, blank + (larger(norm, _ledger_norms(w)) if w.n_ledger > 0 else norm))
 
 
@@ -166,7 +166,7 @@ def propose(w: Any) -> None:
     passes = norm < 1.0
     predicted = factor * h / h_last * eighth_root(lanes(w.norm_last) / norm)
     factor = where(passes & (h_last > 0.0), smaller(factor, predicted), factor)
-    factor = smaller(larger(factor, SHRINK), GROWTH)
+    factor = smaller(larger(factor, MIN_GROWTH), MAX_GROWTH)
     put(w.following, h * where(passes & (lanes(w.again) > 0.5), smaller(factor, 1.0), factor))
 
 
@@ -185,7 +185,7 @@ def find_stiff(w: Any) -> None:
         speed = larger(speed, absolute(end) * unit)
         change = larger(change, absolute(end - lanes(w.k[0, m])) * unit)
     outrun = (fastest > FELT) & (change < FOLLOWED * fastest * speed)
-    put(w.stiff, where((fastest > STABLE) | outrun, 1.0, 0.0))
+    put(w.stiff, where((fastest > STIFF) | outrun, 1.0, 0.0))
 
 
 @compiled
@@ -234,7 +234,7 @@ def _prepare_looks(w: Any) -> None:
     h = lanes(w.h)
     for m in range(w.n):
         size = larger(absolute(lanes(w.y[m])), absolute(lanes(w.y_new[m])))
-        put(w.allowed[m], FAR * GAMMA[DENSEST] * w.loose * larger(w.rtol * size + w.atol[m], TINY) / h)
+        put(w.allowed[m], UNSEEN_ERROR * GAMMA[DENSEST] * w.loose * larger(w.rtol * size + w.atol[m], TINY) / h)
     for m in range(w.n_ledger):
         put(w.allowed[w.n + m], same(np.inf))  # of what belongs to no group it only has to be a number
     for group in range(GROUPS):
@@ -244,7 +244,7 @@ def _prepare_looks(w: Any) -> None:
                 scale = larger(scale, lanes(w.q_scale[m]))
         for m in range(w.n_ledger):
             if w.groups[m] == group:
-                put(w.allowed[w.n + m], FAR * booked(w.rtol) * scale / h)
+                put(w.allowed[w.n + m], UNSEEN_ERROR * booked(w.rtol) * scale / h)
     for d in range(ORDER):
         for m in range(w.columns):
             put(w.slope_of[d, m], float(d + 1) * lanes(w.polynomial[d, m]))
@@ -299,7 +299,7 @@ def look(w: Any, good: Any) -> None:
     begins, ends = where(looks, lanes(w.begins), 0.0), where(looks, larger(lanes(w.last), lanes(w.onto)), 0.0)
     if any_lane(begins > 0.5):
         # From the narrowest outwards: the first that differs says how short the step has to be.
-        for k in range(DECADES, 0, -1):
+        for k in range(END_LOOKS, 0, -1):
             _miss(w, same(10.0**-k), begins)
     points = where(looks, h / spacing, 0.0)
     i = 0.0
@@ -309,5 +309,5 @@ def look(w: Any, good: Any) -> None:
         _miss(w, (i + 0.5) / larger(most, 1.0), where(most >= i + 1.0, 1.0, 0.0))
         i += 1.0
     if any_lane(ends > 0.5):
-        for k in range(1, DECADES + 1):
+        for k in range(1, END_LOOKS + 1):
             _miss(w, same(1.0 - 10.0**-k), ends)

@@ -28,9 +28,9 @@ from surfacechem.tolerances import NEGLIGIBLE, RUN_EPS, TINY
 
 GROUPS = 3
 """Accounts that are measured together: energies, entropies, bonds."""
-LOOSER, LEAST = 30.0, RUN_EPS
+LEDGER_FACTOR, LEDGER_RTOL = 30.0, RUN_EPS
 """Error of a quadrature in units of the tolerance of the states, and the least there is."""
-FORESEEN = NEGLIGIBLE**2
+FORESEEN_PART = NEGLIGIBLE**2
 """Part of the time to go for which a rate is taken to last, where little was exchanged so far."""
 
 
@@ -184,7 +184,7 @@ def defect_norm(w: Any, defects: Any, h: float, remaining: float) -> float:
             rate = max(rate, miss / h)
         w.q_miss[m], w.q_turned[m], w.q_excused[m] = miss, h * rate, 0.0
         w.q_largest[m] = max(w.q_largest[m], abs(w.q[m]))
-        w.q_scale[m] = w.q_largest[m] + max(h, FORESEEN * remaining) * rate
+        w.q_scale[m] = w.q_largest[m] + max(h, FORESEEN_PART * remaining) * rate
     return _group_norm(w)
 
 
@@ -193,7 +193,7 @@ def booked(rtol: float) -> float:
     """Error of a quadrature that a tolerance of the states allows, relative to what is exchanged; however loose it is,
     the books close to what changes no decision.
     """
-    return float(min(max(LOOSER * rtol, LEAST), NEGLIGIBLE))
+    return float(min(max(LEDGER_FACTOR * rtol, LEDGER_RTOL), NEGLIGIBLE))
 
 
 @compiled

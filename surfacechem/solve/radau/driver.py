@@ -4,12 +4,12 @@ from typing import Any
 
 import numpy as np
 
-from surfacechem.solve.contract import ALOFT, FITTED, Status
+from surfacechem.solve.contract import FITTED_PART, RETURN_FACTOR, Status
 from surfacechem.solve.edges import find_magnitudes, jump, resolve
 from surfacechem.solve.radau.consistency import find_consistent
 from surfacechem.solve.radau.dense import finish_step, hold_rates, ledger_norm
 from surfacechem.solve.radau.guards import AT_START, find_event, keep_sides, mark_at_end, restore_sides, start_margins
-from surfacechem.solve.radau.linear import LARGE
+from surfacechem.solve.radau.linear import LARGE_MATRIX
 from surfacechem.solve.radau.newton import stage_count
 from surfacechem.solve.radau.outputs import is_within, write_now, write_outputs, write_picture
 from surfacechem.solve.radau.step import (
@@ -54,15 +54,15 @@ EVENT = int(Status.EVENT)
 LEFT = int(Status.LEFT)
 
 
-PATIENCE = 40
+MOST_REFUSED = 40
 """Steps that the ledger may refuse beside every second, since the last restart: what it misses may be noise, which must
 not end a run.
 """
-FEWEST = 4
+FEWEST_LOOKS = 4
 """Points of a segment at which its steps are held against the equations, however short it is: a choice. Each costs an
 evaluation in every segment; what lasts less than a fourth of a segment may be missed.
 """
-SINGULAR = 0.5
+SINGULAR_POWER = 0.5
 """Power of the step with which the error of an account falls at least where its rate is singular at the start: that of
 a rate that grows like the inverse root, as of ideal diffusion; that of a logarithm falls with the step itself.
 """
@@ -180,12 +180,12 @@ def _ledger_limit(w: Any, h: float, remaining: float) -> float:
     if w.tau < h < h_refused:  # farther from the start a rate is as smooth as elsewhere
         found = np.log(w.norm_refused / norm) / np.log(h_refused / h)
         # What falls slower still is noise, which no shorter step is rid of.
-        if found >= SINGULAR:
+        if found >= SINGULAR_POWER:
             power, least = min(power, found), 0.01
     limit = h * max(least, 0.9 * max(norm, NEGLIGIBLE) ** (-1.0 / power))
     if norm <= 1.0:
         return max(limit, h)
-    if w.refused > PATIENCE + (w.steps - w.steps_before) // 2:
+    if w.refused > MOST_REFUSED + (w.steps - w.steps_before) // 2:
         return np.inf
     w.refused += 1
     w.h_refused, w.norm_refused = h, norm
@@ -255,7 +255,7 @@ def _run_segment(w: Any, i: int, end: float, goes_on: bool) -> int:
     h, size_last, norm_last, aim = 0.0, 0.0, 1.0, np.inf
     spacing = w.spacing[row_of(w.spacing, i)]
     if spacing < np.inf:
-        spacing = min(spacing, (end - w.base) / FEWEST)
+        spacing = min(spacing, (end - w.base) / FEWEST_LOOKS)
     while end - w.base - w.tau > 0.0:
         if h == 0.0:
             outcome = _start(w, i)
@@ -304,7 +304,7 @@ def _forget(w: Any, i: int) -> None:
     """Reset the history of steps, as at the start of a run or an arc."""
     clear(w.fired)
     w.member = w.last_member = w.tries = w.calm = w.fresh = w.refused = 0
-    if w.core >= LARGE:
+    if w.core >= LARGE_MATRIX:
         for m in range(w.order.shape[0]):
             w.order[m, 3, 0] = -1  # that of another run counts for nothing
     clear(w.q)
@@ -381,9 +381,9 @@ def _run_arc(w: Any, i: int, end: float, goes_on: bool) -> int:
     last = end if w.loads_change else max(end - FEW_EPS * end, 0.5 * (w.origin + end))
     w.arc_end, w.shown, w.base = last - w.origin, end, 0.0
     status = GOOD
-    if 0.0 < ALOFT * aloft < FITTED * w.arc_end:
+    if 0.0 < RETURN_FACTOR * aloft < FITTED_PART * w.arc_end:
         # What returns so soon that a step might miss it has a piece of its own.
-        status = _run_segment(w, i, ALOFT * aloft, True)
+        status = _run_segment(w, i, RETURN_FACTOR * aloft, True)
         w.base, w.tau = w.base + w.tau, 0.0
     if status == GOOD:
         status = _run_segment(w, i, w.arc_end, goes_on)

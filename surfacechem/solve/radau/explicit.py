@@ -22,11 +22,11 @@ from surfacechem.solve.radau.tables import (
 from surfacechem.solve.radau.work import RATES, compiled, copy, evaluate, finite, weighted_sums
 from surfacechem.tolerances import TINY
 
-SHARE = 0.2
+ERROR_PART = 0.2
 """Part of the tolerance that an error of a step may take: what its polynomial, one order lower, adds is about as much
 again as the rest.
 """
-STABLE = 3.0
+STIFF = 3.0
 """Step times the fastest rate that counts as stiff where it lasts: what decays so fast is gone by 1e-19 in fifteen
 steps, and what swings is not resolved. The method is stable up to 6.1, less where rounding limits the steps.
 """
@@ -34,7 +34,7 @@ FELT, FOLLOWED = 0.1, 0.1
 """Step times the fastest rate from which on it limits steps at tight tolerances, too, and the part of that by which the
 rates change in a step where nothing follows the fastest any more.
 """
-PATIENT = 15
+STIFF_STEPS = 15
 """Number of stiff steps after which the run goes on implicitly; two others take back one of them."""
 
 FALLS = 3.0
@@ -73,7 +73,7 @@ def _error_of_step(w: Any, h: float) -> float:
         rate = h / max(w.atol[m] + w.rtol * size, TINY)
         largest, second = max(largest, abs(errors[0, m]) * rate), max(second, abs(errors[4, m]) * rate)
     # The estimate of fifth order, made one of seventh by that of third.
-    return float(largest * largest / (SHARE * np.sqrt(largest * largest + 0.01 * second * second + TINY)))
+    return float(largest * largest / (ERROR_PART * np.sqrt(largest * largest + 0.01 * second * second + TINY)))
 
 
 @compiled
@@ -118,7 +118,7 @@ def step_explicitly(w: Any, h: float, worst: float) -> float:
 def mark_noise(w: Any, norm: float, expected: float) -> None:
     """Count the error of a step that was repeated with another size as a stiff one where it has not fallen with it."""
     if norm > FALLS * expected:
-        w.stiff_steps += PATIENT
+        w.stiff_steps += STIFF_STEPS
 
 
 @compiled
@@ -133,8 +133,8 @@ def is_stiff(w: Any) -> bool:
             largest, fastest = apart * unit, apart / (abs(w.slopes[0, m] - w.slopes[4, m]) + TINY)
         speed, change = max(speed, abs(k[end, m]) * unit), max(change, abs(k[end, m] - k[0, m]) * unit)
     outrun = fastest > FELT and change < FOLLOWED * fastest * speed
-    w.stiff_steps = w.stiff_steps + 2 if fastest > STABLE or outrun else max(w.stiff_steps - 1, 0)
-    return bool(w.stiff_steps >= 2 * PATIENT)
+    w.stiff_steps = w.stiff_steps + 2 if fastest > STIFF or outrun else max(w.stiff_steps - 1, 0)
+    return bool(w.stiff_steps >= 2 * STIFF_STEPS)
 
 
 @compiled

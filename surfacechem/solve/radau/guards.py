@@ -13,7 +13,7 @@ from surfacechem.solve.radau.dense import finish_step, keep_polynomial, put_insi
 from surfacechem.solve.radau.explicit import step_explicitly
 from surfacechem.solve.radau.newton import CONVERGED, factor_newton, predict, set_stage, solve_stages, stage_count
 from surfacechem.solve.radau.step import estimate_error, store_polynomial, too_small
-from surfacechem.solve.radau.tables import EDGE, SCANNED
+from surfacechem.solve.radau.tables import SCAN_EDGE, SCANNED
 from surfacechem.solve.radau.work import MARGINS, any_true, clear, compiled, copy, evaluate, put
 from surfacechem.tolerances import CBRT_EPS, EPS, FORMULA_EPS, LOOSE_RTOL, NEWTON_EPS, RUN_EPS, SQRT_EPS, TINY
 
@@ -22,10 +22,10 @@ LEAVING, AT_ZERO, BEYOND, RISING, FALLING, OUT_OF_PLAY = 0.0, 2.0, -2.0, 3.0, -3
 one that leaves zero in this step; and of one that is not in play in the modes of the run, on which side it stays.
 """
 
-ALIKE = 1e3
+ALIKE_NOISE = 1e3
 """Values of a margin that differ by less, in units of its noise, do not tell which is closer to zero."""
 
-AT_START, SHORTER = -1.0, -2.0
+AT_START, NEEDS_SHORTER = -1.0, -2.0
 """Instead of where margins reach zero: a limit is passed at the start; a shorter step has to tell whether one is."""
 
 
@@ -129,8 +129,8 @@ def _leave(w: Any, m: int, rises: bool, held: float) -> None:
 def _follow_rates(w: Any, h: float) -> None:
     """Sides of limits that start at zero or beyond and leave it as they would at the rate at which the step starts."""
     for j in range(w.n):
-        w.trial[j] = w.y[j] + EDGE * h * w.ydot[j]
-    put(w, EDGE * h, w.trial, w.ydot)
+        w.trial[j] = w.y[j] + SCAN_EDGE * h * w.ydot[j]
+    put(w, SCAN_EDGE * h, w.trial, w.ydot)
     evaluate(w, MARGINS, w.margin_probe)
     for m in range(w.n_margins):
         by_rate, change = w.margin_probe[m] - w.margin_before[m], w.margin[m] - w.margin_before[m]
@@ -262,7 +262,7 @@ def _mark(w: Any, h: float, earlier: float, before: float, x: float) -> float:
         w.low[m], w.high[m] = before, x
         # A limit that goes the wrong way from zero, or from beyond it, has left it by now.
         falls = w.side[m] == FALLING and w.margin[m] < -noise(w, m)
-        if falls and before <= EDGE:
+        if falls and before <= SCAN_EDGE:
             found = AT_START
         elif falls:
             w.high[m] = before
@@ -276,12 +276,12 @@ def _mark(w: Any, h: float, earlier: float, before: float, x: float) -> float:
 @compiled
 def _scan(w: Any, h: float) -> tuple[float, float]:
     """The first interval in which margins reach zero: its start, and its end; in place of that 0 if there is none,
-    AT_START where a limit is passed there, SHORTER where one may be.
+    AT_START where a limit is passed there, NEEDS_SHORTER where one may be.
     """
     # All points at once: one product of tables and stages instead of a polynomial at each.
     scan_step(w)
     if not _sides_are_known(w, h):
-        return 0.0, SHORTER
+        return 0.0, NEEDS_SHORTER
     earlier, before = 0.0, 0.0
     for i in range(4 * w.member + 9):
         x = SCANNED[w.member, i]
@@ -293,11 +293,11 @@ def _scan(w: Any, h: float) -> tuple[float, float]:
             keep_polynomial(w)
             copy(w.margin_before, w.margin_earlier)
             copy(w.margin, w.margin_before)
-            put_inside(w, h, x + EDGE)
+            put_inside(w, h, x + SCAN_EDGE)
             evaluate(w, MARGINS, w.margin)
             for m in range(w.n_margins):
                 if w.fired[m] == 0:
-                    w.fired[m] = _dips(w, h, m, before, x, x + EDGE)
+                    w.fired[m] = _dips(w, h, m, before, x, x + SCAN_EDGE)
         if found != 0.0:
             return before, found
         update_sides(w)
@@ -413,9 +413,9 @@ def _refine(w: Any, h: float, m: int, x: float, worst: float) -> float:
         # What is left after a few attempts is the rounding of the margin itself.
         if crossed and (abs(change) <= resolution * (1 + attempt) or nudge > 0.0 or attempt >= 6):
             return size
-        if abs(value) > 2.0 * closest + ALIKE * noise(w, m):
+        if abs(value) > 2.0 * closest + ALIKE_NOISE * noise(w, m):
             # Where it came closest it is zero, or the polynomial was too coarse to tell.
-            return _onto(w, best, worst) if closest <= ALIKE * noise(w, m) else 0.0
+            return _onto(w, best, worst) if closest <= ALIKE_NOISE * noise(w, m) else 0.0
         if abs(value) < closest:
             best, closest = size, abs(value)
         if not crossed and abs(change) <= resolution:
@@ -463,7 +463,7 @@ def _mark_coincident(w: Any, h: float, size: float, first: int) -> bool:
         value, slope = w.margin[m], w.margin_slope[m]
         close = abs(value) * h <= near * abs(slope) if slope != 0.0 else abs(value) <= noise(w, m)
         across = crosses(w, m)
-        passed = passed or (m != first and across and not close and abs(value) > ALIKE * noise(w, m))
+        passed = passed or (m != first and across and not close and abs(value) > ALIKE_NOISE * noise(w, m))
         w.fired[m] = across or (w.fired[m] != 0 and close)
     return passed
 
@@ -484,7 +484,7 @@ def find_event(w: Any, h: float) -> float:
     none; h if there is none, 0 if the step must be repeated, AT_START if a limit is passed at the start.
     """
     before, end = _scan(w, h)
-    if end == SHORTER:
+    if end == NEEDS_SHORTER:
         restore_sides(w)
         return 0.0
     if end <= 0.0:
@@ -509,7 +509,7 @@ def find_event(w: Any, h: float) -> float:
         w.fired[short] = 1
     # Where a strict margin is not zero at the end, the polynomial has seen what is not there.
     left = w.margin[first] * w.side[first]
-    reached = left <= ALIKE * noise(w, first) + abs(w.margin_slope[first]) * _resolved(w, size) / h
+    reached = left <= ALIKE_NOISE * noise(w, first) + abs(w.margin_slope[first]) * _resolved(w, size) / h
     w.fired[first] = w.kinds[first, 3] == 0 or reached
     if w.fired[first] == 0 and not any_true(w.fired):
         update_sides(w)

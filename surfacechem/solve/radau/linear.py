@@ -11,9 +11,9 @@ is eliminated from its far end, which leaves a correction of one column of the c
 length. Nothing is exchanged within a chain: where heat is conducted between capacities its matrix is diagonally
 dominant.
 
-The core of a large mechanism is sparse, as most species do not take part in each other's reactions. From LARGE rows on
-the column with the fewest entries left is eliminated next, by the row with the fewest among those whose pivot is not
-small, after Markowitz (1957) with the threshold of Duff, Erisman & Reid (1986).
+The core of a large mechanism is sparse, as most species do not take part in each other's reactions. From LARGE_MATRIX
+rows on the column with the fewest entries left is eliminated next, by the row with the fewest among those whose pivot
+is not small, after Markowitz (1957) with the threshold of Duff, Erisman & Reid (1986).
 
 A chain is a row (first, end, anchor) of a table, the anchor -1 where the chain hangs on nothing; its equations are rows
 (inwards, own, outwards) of the bands; the border holds how the core reads the first variable of each chain.
@@ -25,13 +25,13 @@ import numpy as np
 
 from surfacechem.solve.radau.work import compiled
 
-LARGE = 30
+LARGE_MATRIX = 30
 """Rows from which on columns are exchanged, too, and zeros passed over."""
 
-NOT_SMALL = 0.1
+PIVOT_PART = 0.1
 """Part of the largest scaled entry of its column that a pivot may be where that keeps the factors sparse."""
 
-SHRUNK = NOT_SMALL**2
+REPEATED_PIVOT = PIVOT_PART**2
 """The same of a matrix that is factored in the order of one before it."""
 
 
@@ -104,7 +104,7 @@ def _emptiest(a: Any, k: int, columns: Any, rows: Any, counts: Any, threshold: f
     if best * columns[counts[2, q]] > threshold:
         for m in range(found):
             i = counts[4, m]
-            if size_of(a[i, q]) * rows[i] >= NOT_SMALL * best and (p < 0 or counts[0, i] < counts[0, p]):
+            if size_of(a[i, q]) * rows[i] >= PIVOT_PART * best and (p < 0 or counts[0, i] < counts[0, p]):
                 p = i
     return p, q, found
 
@@ -234,7 +234,7 @@ def factor_again(
         for m in range(order[2, i]):
             k = places[i, m]
             multiple = row[k] * a[k, k]
-            if not size_of(multiple) * rows[i] * SHRUNK <= rows[k]:
+            if not size_of(multiple) * rows[i] * REPEATED_PIVOT <= rows[k]:
                 return False
             row[k] = multiple
             pivot = a[k]
@@ -259,7 +259,7 @@ def factor(a: Any, order: Any, places: Any, columns: Any, rows: Any, counts: Any
     n = a.shape[0]
     if not _scale_rows(a, columns, rows[:n]):
         return False
-    if n >= LARGE:
+    if n >= LARGE_MATRIX:
         return bool(_factor_large(a, order, places, columns, rows, counts, threshold))
     for k in range(n):
         p, best = k, -1.0
@@ -304,7 +304,7 @@ def _solve_large(a: Any, order: Any, places: Any, x: Any) -> None:
 def solve(a: Any, order: Any, places: Any, x: Any) -> None:
     """Overwrite the right-hand side by the solution; entries of x beyond the matrix are left alone."""
     n = a.shape[0]
-    if n >= LARGE:
+    if n >= LARGE_MATRIX:
         _solve_large(a, order, places, x)
         return
     # Sums in a local name: in x each term would wait until the one before it is stored.

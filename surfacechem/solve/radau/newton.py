@@ -11,7 +11,7 @@ import numpy as np
 
 from surfacechem.solve.radau.explicit import put_rates
 from surfacechem.solve.radau.linear import (
-    LARGE,
+    LARGE_MATRIX,
     count_entries_of_rows,
     factor,
     factor_again,
@@ -22,7 +22,7 @@ from surfacechem.solve.radau.linear import (
 )
 from surfacechem.solve.radau.roundoff import correction_is_noise
 from surfacechem.solve.radau.tables import (
-    COARSE,
+    COARSE_RTOL,
     FROM_PARTS,
     GAMMA,
     INVERSE,
@@ -47,16 +47,16 @@ from surfacechem.tolerances import EPS, NEGLIGIBLE, TINY
 
 CONVERGED, DIVERGED, NOT_FINITE = range(3)
 
-TIGHT = NEGLIGIBLE
+NEWTON_PART = NEGLIGIBLE
 """Newton error allowed, in units of the tolerance. The order of the method makes steps better than the tolerance, so
 that a looser limit would set the error; and a Jacobian taken where the equations are far stiffer than at the solution
 makes the corrections small before the residual is.
 """
 
-FORESEEN = 1.5
+FORESEEN_GROWTH = 1.5
 """The longest step, in units of the one before, whose middle is foreseen well enough to differentiate there."""
 
-REACH = 30.0
+PREDICTOR_REACH = 30.0
 """The longest step, in units of the one before, that its polynomial is continued to."""
 
 STIFFER = 3.0
@@ -135,7 +135,7 @@ def differentiate_system(w: Any, h: float, foresee: bool) -> bool:
     start.
     """
     _differentiate_at_start(w)
-    if foresee and w.offset == 1.0 and 0.0 < h <= FORESEEN * w.h_last:
+    if foresee and w.offset == 1.0 and 0.0 < h <= FORESEEN_GROWTH * w.h_last:
         known, sizes = w.columns, w.rhs
         _row_sizes(w, known)
         set_stage(w, w.member + 1, h)
@@ -153,7 +153,7 @@ def differentiate_system(w: Any, h: float, foresee: bool) -> bool:
         for i in range(w.core):
             if not finite(w.jacobian[part, i]):
                 return False
-    if w.core >= LARGE:
+    if w.core >= LARGE_MATRIX:
         count_entries_of_rows(w.jacobian, w.entries[5])
     # Chains that are not finite show in their pivots.
     return True
@@ -164,7 +164,7 @@ def _factor_shifted(w: Any, m: int, shift: Any, matrix: Any, border: Any, bands:
     """Factor matrix m, the core of G_y + shift G_ydot, with the chains folded into it."""
     order, places = w.order[m], w.places[m]
     chained = w.links > 0
-    if w.core >= LARGE and not chained:
+    if w.core >= LARGE_MATRIX and not chained:
         entries = w.entries[5]
         if order[3, 0] >= 0 and factor_again(w.jacobian, entries, shift, matrix, order, places, w.pivot, w.delta):
             return True
@@ -201,7 +201,7 @@ def predict(w: Any, h: float) -> None:
     """First guess of the stages from the stored polynomial; no change where there is none, or none that reaches."""
     k, last = w.member, w.last_member
     s, top, z = stage_count(k), stage_count(last), w.z
-    if not h <= REACH * w.h_last:
+    if not h <= PREDICTOR_REACH * w.h_last:
         for i in range(s):
             clear(z[i])
         return
@@ -316,13 +316,13 @@ def solve_stages(w: Any, h: float) -> int:
             ratio = norm / norm_last
             rate = ratio if iteration == 1 else np.sqrt(ratio * rate_last)
             rate_last = ratio
-            if rate >= 0.99 or rate / (1.0 - rate) * norm * rate ** (limit - 1 - iteration) > TIGHT:
+            if rate >= 0.99 or rate / (1.0 - rate) * norm * rate ** (limit - 1 - iteration) > NEWTON_PART:
                 break
             w.theta = rate
             contraction = max(rate / (1.0 - rate), SLOWEST_KNOWN)
         # At loose tolerances one correction alone may hide a layer that its Jacobian has not seen.
-        believed = iteration > 0 or w.rtol < COARSE
-        if (believed and contraction * norm <= TIGHT) or norm <= 8.0 * w.roundoff:
+        believed = iteration > 0 or w.rtol < COARSE_RTOL
+        if (believed and contraction * norm <= NEWTON_PART) or norm <= 8.0 * w.roundoff:
             w.contraction = contraction
             return CONVERGED
         norm_last = max(norm, TINY)

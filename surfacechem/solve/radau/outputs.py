@@ -26,14 +26,14 @@ from surfacechem.solve.radau.tables import PROBE, PROBE_RATE, PROBE_SHAPE, SCANN
 from surfacechem.solve.radau.work import compiled, copy
 from surfacechem.tolerances import FINER_BY
 
-ALLOWED = 2.0
+POLYNOMIAL_ERROR = 2.0
 """Error of the polynomial between its stages, in units of the tolerance."""
 
 MOST_PARTS = 64
 """Parts of a step, equal in time or in its logarithm, between which states are added for a picture at most: a
 polynomial of order 7 needs no more."""
 
-UNSEEN = 1e3
+FLAT_RANGE = 1e3
 """A range of so many tolerances of a state is no picture but its error."""
 
 
@@ -107,10 +107,10 @@ def _polynomial_serves(w: Any, h: float) -> bool:
     keep_polynomial(w)
     # Midway between the stages the polynomial is worst: do the equations hold there?
     defect_inside(w, h, PROBE[w.member])
-    serves = _largest(w, 0.0) <= ALLOWED
+    serves = _largest(w, 0.0) <= POLYNOMIAL_ERROR
     if not serves:
         find_noise(w)
-        serves = _largest(w, MAGNIFIED) <= ALLOWED
+        serves = _largest(w, MAGNIFIED) <= POLYNOMIAL_ERROR
     if w.n_ledger > 0:
         _correct_ledger(w, h)
     return serves
@@ -204,7 +204,7 @@ def _parts(w: Any, h: float, growth: float) -> Any:
             low, high = min(low, w.y[m] + change), max(high, w.y[m] + change)
             missed = max(missed, abs(change - SCANNED[w.member, i] * total))
             beside = max(beside, abs(change - w.decades[i] * total))
-        size = high - low + UNSEEN * w.weight[m]
+        size = high - low + FLAT_RANGE * w.weight[m]
         by_time, by_ratio = max(by_time, missed / size), max(by_ratio, beside / size)
     # What a line misses goes with the square of its length.
     return (

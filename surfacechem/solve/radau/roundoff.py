@@ -9,21 +9,21 @@ from typing import Any
 
 import numpy as np
 
-from surfacechem.solve.radau.linear import LARGE, bound_real, solve_real
+from surfacechem.solve.radau.linear import LARGE_MATRIX, bound_real, solve_real
 from surfacechem.solve.radau.tables import GAMMA
 from surfacechem.solve.radau.work import RESIDUAL, clear, compiled, evaluate, set_inputs
 from surfacechem.tolerances import NEGLIGIBLE, ULPS
 
-DIFFERENCE = np.array([1.0, -5.0, 10.0, -10.0, 5.0, -1.0]) / np.sqrt(252.0)
+FIFTH_DIFFERENCE = np.array([1.0, -5.0, 10.0, -10.0, 5.0, -1.0]) / np.sqrt(252.0)
 """Coefficients of a fifth difference, scaled so that it has the size of independent errors of the values."""
 
-WINDOWS, NEAR = 3, NEGLIGIBLE
+WINDOWS, SPACING = 3, NEGLIGIBLE
 """Differences that are taken, and how far apart their times are as parts of a step."""
 
 MAGNIFIED = 10.0
 """Noise of the estimate, which extrapolates the noise of every stage, in units of that of one residual."""
 
-LARGEST = NEGLIGIBLE**2
+SINGULAR_NOISE = NEGLIGIBLE**2
 """Noise above this part of a variable, and of what it typically is, would mean a singular matrix, not rounding."""
 
 
@@ -38,13 +38,13 @@ def _measure_wobble(w: Any, y: Any, ydot: Any) -> None:
     for row in range(WINDOWS):
         clear(w.wobble_sums[row])
     set_inputs(w, y, ydot)
-    for k in range(WINDOWS + DIFFERENCE.shape[0] - 1):
-        w.inputs[0] = t + k * NEAR * w.h_factored
+    for k in range(WINDOWS + FIFTH_DIFFERENCE.shape[0] - 1):
+        w.inputs[0] = t + k * SPACING * w.h_factored
         evaluate(w, RESIDUAL, w.wobble_now)
         for row in range(WINDOWS):
-            if 0 <= k - row < DIFFERENCE.shape[0]:
+            if 0 <= k - row < FIFTH_DIFFERENCE.shape[0]:
                 for i in range(n):
-                    w.wobble_sums[row, i] += DIFFERENCE[k - row] * w.wobble_now[i]
+                    w.wobble_sums[row, i] += FIFTH_DIFFERENCE[k - row] * w.wobble_now[i]
     for row in range(WINDOWS):
         for i in range(n):
             w.wobble[i] = max(w.wobble[i], abs(w.wobble_sums[row, i]))
@@ -125,7 +125,7 @@ def find_noise(w: Any) -> None:
         for j in range(w.n):
             w.noise[j] = ULPS * abs(w.y[j])
         return
-    if w.core >= LARGE and w.links == 0 and _bounds_serve(w):
+    if w.core >= LARGE_MATRIX and w.links == 0 and _bounds_serve(w):
         return
     spread_noise(w, w.y, w.ydot)
     for j in range(w.n):
@@ -134,7 +134,7 @@ def find_noise(w: Any) -> None:
 
 @compiled
 def _most_noise(w: Any, j: int) -> float:
-    return float(max(LARGEST * w.scale[j], w.atol[j] / w.rtol))
+    return float(max(SINGULAR_NOISE * w.scale[j], w.atol[j] / w.rtol))
 
 
 @compiled

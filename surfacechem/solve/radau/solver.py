@@ -15,10 +15,10 @@ from surfacechem.solve.contract import (
     NO_EDGES,
     Array,
     Counters,
-    Course,
+    EdgeCourse,
     EdgeTables,
     Events,
-    Margin,
+    Guard,
     Points,
     Problem,
     Result,
@@ -52,7 +52,7 @@ _STATUSES = tuple(Status)
 
 
 @lru_cache(maxsize=256)
-def _kinds(margins: tuple[Margin, ...], in_play: tuple[bool, ...] | None = None) -> NDArray[np.int64]:
+def _kinds(margins: tuple[Guard, ...], in_play: tuple[bool, ...] | None = None) -> NDArray[np.int64]:
     playing = in_play or (True,) * len(margins)
     rows = [
         (m.terminal, m.direction, m.smooth, m.strict, plays, m.domain)
@@ -286,7 +286,7 @@ def _result(problem: Problem, batch: Any, i: int, counts: Sequence[int]) -> Resu
         inside=_inside(written(batch.inside_times, INSIDE), written(batch.inside, INSIDE), n)
         if problem.picture
         else None,
-        course=Course(written(batch.arcs, ARCS), written(batch.jumps, JUMPS)) if counts[ARCS] else None,
+        course=EdgeCourse(written(batch.arcs, ARCS), written(batch.jumps, JUMPS)) if counts[ARCS] else None,
     )
 
 

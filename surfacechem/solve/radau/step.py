@@ -41,14 +41,14 @@ from surfacechem.solve.radau.newton import (
 )
 from surfacechem.solve.radau.roundoff import MAGNIFIED, find_noise
 from surfacechem.solve.radau.stepper import STOP
-from surfacechem.solve.radau.tables import FINEST, START_SLOPE
+from surfacechem.solve.radau.tables import MEMBER_RTOLS, START_SLOPE
 from surfacechem.solve.radau.work import LEDGER, RESIDUAL, compiled, copy, evaluate, finite, put, row_of, set_inputs
 from surfacechem.tolerances import EPS, NEGLIGIBLE, NEWTON_EPS, RUN_EPS, SQRT_EPS, TINY, ULPS
 
 # The first two as in RADAU5 (Hairer & Wanner II, IV.8).
 SAFETY = 0.9
-GROWTH = 8.0
-SHRINK = 0.1
+MAX_GROWTH = 8.0
+MIN_GROWTH = 0.1
 CONTRACTING = 0.05
 """Contraction of Newton's method aimed at: where it limits the step, a failure costs more than a smaller step."""
 LEAST_CONVERGENT = 0.5
@@ -72,7 +72,7 @@ def set_weights(w: Any) -> None:
 @compiled
 def preferred_member(rtol: float) -> int:
     """Low order for loose tolerances, high order for tight ones."""
-    return 0 if rtol > FINEST[0] else 1 if rtol > FINEST[1] else 2
+    return 0 if rtol > MEMBER_RTOLS[0] else 1 if rtol > MEMBER_RTOLS[1] else 2
 
 
 @compiled
@@ -174,7 +174,7 @@ def next_size(w: Any, h: float, norm: float, h_last: float, norm_last: float) ->
     factor = safety * max(norm, RUN_EPS) ** -exponent
     if h_last > 0.0 and norm < 1.0:
         factor = min(factor, factor * h / h_last * (norm_last / max(norm, RUN_EPS)) ** exponent)
-    return h * min(GROWTH, max(SHRINK, factor))
+    return h * min(MAX_GROWTH, max(MIN_GROWTH, factor))
 
 
 @compiled
@@ -280,7 +280,7 @@ SLOW, SLOW_REJECTED = 0.8, 0.3
 SINGULAR_TRIALS = 12
 """Sizes that are tried where matrices are singular: the last is 0.37^12 = 7e-6 of the first."""
 
-LASTS = 10.0
+JACOBIAN_GROWTH = 10.0
 """Growth of the step after which a Jacobian is taken anew: where the equations were far stiffer when it was taken, its
 corrections are small whatever is left to correct.
 """
@@ -351,7 +351,7 @@ def _prepare(w: Any, h: float, foresee: bool) -> int:
     """Newton matrices for this step size, kept where they still serve."""
     if w.h_factored == h:
         return GOOD
-    outgrown = w.theta >= NEGLIGIBLE or h > LASTS * w.h_jacobian
+    outgrown = w.theta >= NEGLIGIBLE or h > JACOBIAN_GROWTH * w.h_jacobian
     if w.fresh == INVALID or (w.fresh == OLD and outgrown):
         if not differentiate_system(w, h, foresee):
             return NONFINITE
@@ -500,13 +500,13 @@ def keep_matrices(w: Any, h: float, proposed: float) -> float:
     return proposed
 
 
-FAR = 3.0
+UNSEEN_ERROR = 3.0
 """Errors in units of what a step may have at its start, beyond which it has not seen what is there: between the stages
 the polynomial is somewhat worse than at the ends. A choice: less refuses steps that are right, more passes over what
 changes the state by so many tolerances.
 """
 
-DECADES = 10
+END_LOOKS = 10
 """Points at which what lies beside the end of a segment is looked at, each ten times nearer than the one before."""
 
 LOOK_PART = 1e-2
@@ -522,9 +522,9 @@ def _differs(w: Any, h: float, x: float, remaining: float) -> bool:
     """
     if not defect_inside(w, h, x):
         return True
-    if not error_norm(w, 0.0) <= FAR:
+    if not error_norm(w, 0.0) <= UNSEEN_ERROR:
         find_noise(w)
-        if not error_norm(w, MAGNIFIED) <= FAR:
+        if not error_norm(w, MAGNIFIED) <= UNSEEN_ERROR:
             return True
     if w.n_ledger == 0:
         return False
@@ -532,7 +532,7 @@ def _differs(w: Any, h: float, x: float, remaining: float) -> bool:
     for m in range(w.n_ledger):
         _, slope = change_and_slope(w.member, x, w.q_polynomial[m])
         w.q_probe[m] = h * w.q_probe[m] - slope
-    return bool(not defect_norm(w, w.q_probe, h, remaining) <= FAR and not excused_norm(w, h) <= FAR)
+    return bool(not defect_norm(w, w.q_probe, h, remaining) <= UNSEEN_ERROR and not excused_norm(w, h) <= UNSEEN_ERROR)
 
 
 @compiled
@@ -546,7 +546,7 @@ def unseen(w: Any, h: float, spacing: float, remaining: float, begins: bool, end
         keep_polynomial(w)
     if begins:
         # From the narrowest outwards: the first that differs says how short the step has to be.
-        for k in range(DECADES, 0, -1):
+        for k in range(END_LOOKS, 0, -1):
             if _differs(w, h, 10.0**-k, remaining):
                 return 10.0**-k
     for i in range(points):
@@ -554,7 +554,7 @@ def unseen(w: Any, h: float, spacing: float, remaining: float, begins: bool, end
         if _differs(w, h, x, remaining):
             return x
     if ends:
-        for k in range(1, DECADES + 1):
+        for k in range(1, END_LOOKS + 1):
             if _differs(w, h, 1.0 - 10.0**-k, remaining):
                 return 1.0 - 10.0**-k
     return 1.0

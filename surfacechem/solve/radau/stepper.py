@@ -16,7 +16,7 @@ import numpy as np
 
 from surfacechem.compile import objectcode
 from surfacechem.compile.cache import compile_kernel, copy_shipped, is_filled, kernel_folder
-from surfacechem.solve.contract import AT_ONCE
+from surfacechem.solve.contract import CHATTER
 
 EDGE_TABLES: dict[str, tuple[Any, int]] = {
     "edges": (np.int64, 2),
@@ -204,7 +204,7 @@ MEMORY = {
     **_arrays("magnitude", "n_margins"),
     **_arrays("booked exchanged", "n_ledger"),
     # times of the last jumps, the latest last
-    **_arrays("jumped", AT_ONCE),
+    **_arrays("jumped", CHATTER),
 }
 """Arrays that a trajectory writes to: type and shape."""
 

@@ -19,11 +19,11 @@ from surfacechem.solve.radau.stepper import SCAN_POINTS
 
 STAGES = (3, 5, 7)
 
-EDGE = 1e-6
+SCAN_EDGE = 1e-6
 """Distance, as a part of the step, of the points beside its ends that show the slopes of margins there."""
-FINEST = (2e-5, 3e-12)
+MEMBER_RTOLS = (2e-5, 3e-12)
 """Relative tolerances above which 3 and 5 stages reach an error soonest, measured on Robertson's and other problems."""
-COARSE = 3e-6
+COARSE_RTOL = 3e-6
 """Tolerance above which one Newton correction is not believed: a thinner layer may hide behind its Jacobian."""
 
 _GIVEN = json.loads(Path(__file__).with_name("coefficients.json").read_text(encoding="utf-8"))
@@ -137,7 +137,7 @@ def _probe_shape(nodes: NDArray[np.float64], x: float) -> NDArray[np.float64]:
 def _scanned(k: int) -> NDArray[np.float64]:
     """Fractions of the step, from its start, just inside its end, to its end; more points for higher orders."""
     last = 4 * k + 7
-    inside = [EDGE, *(np.arange(1, last) / last), 1.0 - EDGE, 1.0]
+    inside = [SCAN_EDGE, *(np.arange(1, last) / last), 1.0 - SCAN_EDGE, 1.0]
     return np.pad(inside, (0, SCAN_POINTS - len(inside)), constant_values=1.0)
 
 
