@@ -39,7 +39,7 @@ class Motion:
 
     far_fields: dict[str, Any] = field(default_factory=dict)
     """Mountings with their symbols, by direction."""
-    drives: dict[str, Expression] = field(default_factory=dict)
+    ramp_rates: dict[str, Expression] = field(default_factory=dict)
     """Rates of the variables that a programme moves."""
     slips: tuple[Any, ...] = ()
     """Formulation of the tangential motion in each direction in which it moves by a balance."""
@@ -72,7 +72,7 @@ class Build:
     thermal: Thermal = NO_NODES
     bonding: dict[str, Bond] = field(default_factory=dict)
     energy: Energy = NO_ENERGY
-    heals: Mapping[Expression, Expression] = field(default_factory=dict)
+    reclosing: Mapping[Expression, Expression] = field(default_factory=dict)
     """New values of modes that a rigid contact has as it closes again."""
     rates: dict[Any, Expression] = field(default_factory=dict)
     """Time derivatives of what the interface's free energy depends on beside temperature."""
@@ -188,14 +188,14 @@ class Build:
 
     def slope_of(self, name: str) -> Expression:
         """Time derivative of a prescribed variable between its jumps."""
-        if name in self.motion.drives:
-            return self.motion.drives[name]
+        if name in self.motion.ramp_rates:
+            return self.motion.ramp_rates[name]
         expression = next(item.expression for item in self.named if item.name == name)
         return derivative(expression, self.t)
 
     def rate_of(self, name: str) -> Expression:
         """Time derivative of a prescribed variable that stores energy, which must not jump."""
-        if name not in self.motion.drives and (load := self.loads[name]).jumps():
+        if name not in self.motion.ramp_rates and (load := self.loads[name]).jumps():
             raise InputError(
                 f"{name} stores energy, so it cannot jump (at t = {load.jumps()[0]:g} s): the work would be unknown. "
                 "Give the jump a duration.",

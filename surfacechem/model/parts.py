@@ -111,9 +111,9 @@ class Energy:
     """Free energy of the interface [J/m^2], and how much of it friction acts beside."""
 
     psi: Expression
-    rubs: Expression
+    unbonded: Expression
     """Fraction of the interface on which friction acts, beside adhesion in parallel."""
-    rubbed: Expression
+    unbonded_energy: Expression
     """Energy, per area of that fraction, of the elastic gap that friction slides on [J/m^2]."""
 
 

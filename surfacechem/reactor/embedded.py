@@ -120,7 +120,7 @@ class InstantEvents:
             left = np.where((now > 0) & (rates < 0), -now / rates, np.inf)
         return float(left.min(initial=np.inf))
 
-    def settle(self) -> Array | None:
+    def resolve(self) -> Array | None:
         """Carry out what is due at the state last put: additions to the ledger; None where the scene ends here."""
         before, here, loads = self.instant.booked.copy(), self.here(), self.loads
         begun: Point | None = here
@@ -325,7 +325,7 @@ class EmbeddedScene:
         """
         assert self.moments is not None
         self.put(t, x)
-        booked = self.moments.settle() if index is None else self.moments.fire(index)
+        booked = self.moments.resolve() if index is None else self.moments.fire(index)
         if booked is None:
             raise EndError(self.moments.instant.reason)
         states = self.evaluation.y[self.evaluation.free]

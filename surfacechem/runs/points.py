@@ -229,7 +229,7 @@ class Evaluator:
         equilibria = Equilibria(replace(self.system, equilibria=items))
         gaps = [1 + self.system.state_columns[item.state] for item in items]
         for k, row in enumerate(table if items else ()):
-            settled = equilibria.settle(Point.of(row.copy(), len(self.system.states)))
+            settled = equilibria.equilibrate(Point.of(row.copy(), len(self.system.states)))
             lost[k] = settled is None
             row[gaps] = np.nan
             row[:] = row if settled is None else settled.inputs()

@@ -266,7 +266,7 @@ def jump(w: Any, i: int, e: int) -> bool:
         w.after[1 + j], w.after[1 + n + j] = w.reset[j], 0.0
     for k in range(w.held.shape[0]):
         w.after[1 + 2 * n + w.held[k]] = w.reset[n + k]
-    before, now, nudged = w.books_before, w.books_after, w.books_nudged
+    before, now, varied = w.books_before, w.books_after, w.books_perturbed
     _look(w, w.moment, before)
     _look(w, w.after, now)
     made, heat, entropy = before[0] - now[0], 0.0, 0.0
@@ -277,13 +277,13 @@ def jump(w: Any, i: int, e: int) -> bool:
     else:
         heat, entropy = _warm(w, taker, made)
         _look(w, w.after, now)
-    copy(w.moment, w.nudged)
+    copy(w.moment, w.perturbed)
     if measure >= 0:
-        w.nudged[1 + measure] += rounding
-    _look(w, w.nudged, nudged)
+        w.perturbed[1 + measure] += rounding
+    _look(w, w.perturbed, varied)
     gain = now[1] - before[1] + entropy
-    small = RUN_EPS * max(abs(before[1]), abs(now[1]), abs(entropy)) + FEW_EPS * before[-1] + abs(nudged[1] - before[1])
-    admissible = _is_admissible(w, gain, small, abs(nudged[0] - before[0]))
+    small = RUN_EPS * max(abs(before[1]), abs(now[1]), abs(entropy)) + FEW_EPS * before[-1] + abs(varied[1] - before[1])
+    admissible = _is_admissible(w, gain, small, abs(varied[0] - before[0]))
     if not finite(w.after) or (w.edges[e, REFUSES] == 1 and not admissible):
         return False
     _write_event(w, i, e)
@@ -295,8 +295,8 @@ def jump(w: Any, i: int, e: int) -> bool:
     w.jumped[-1] = t
     if w.edges[e, RETURNS] >= 0:
         evaluate_at(w, TIMES_OF_RETURN, w.after, w.margin_slope)
-        w.rebounded, w.aloft = t, -np.inf
+        w.rebounded, w.flight_time = t, -np.inf
         for k in range(w.edges.shape[0]):
             if w.edges[k, RETURNS] >= 0:
-                w.aloft = max(w.aloft, w.margin_slope[w.edges[k, RETURNS]])
+                w.flight_time = max(w.flight_time, w.margin_slope[w.edges[k, RETURNS]])
     return True

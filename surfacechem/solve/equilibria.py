@@ -239,7 +239,7 @@ class Equilibria:
 
     # -- equilibrium ----------------------------------------------------------------------------------------------
 
-    def settle(
+    def equilibrate(
         self, point: Point, heat: Heat | None = None, balanced: float = BALANCED, lost: FoldPoint | None = None
     ) -> Point | None:
         """The point with all gaps in equilibrium; each may move the others through pressure, shear and heat.
@@ -256,7 +256,7 @@ class Equilibria:
         is_balanced = np.all(np.abs(driving) <= balanced * sizes)
         return self._released(point, heat, self._unstable(point, heat) if is_balanced else None)
 
-    def settle_near(self, point: Point, heat: Heat, span: Array) -> Point | None:
+    def equilibrate_near(self, point: Point, heat: Heat, span: Array) -> Point | None:
         """The point with all gaps in equilibrium, for loads that go from one value to the next little by little.
 
         Newton's method leads there where its first step is no longer than the gaps or their whole ``span``, shape
@@ -268,7 +268,7 @@ class Equilibria:
         n, sizes = len(free.which), np.maximum(free.scale, span[free.columns])
         way = equilibrium(free.driving, sizes, np.arange(n), np.zeros(n), 1.0)
         if way is None:
-            return self.settle(point, heat)
+            return self.equilibrate(point, heat)
         there = replace(point, y=point.y + way @ free.moves)
         return self.moved(point, self._arrived(there.inputs()[None], jumps=True))
 
@@ -351,7 +351,7 @@ class Equilibria:
         begins = push_ahead(driving, start, direction, lambda gaps: noise(gaps) + left, lost=False)
         return None if begins is None else FoldPoint(point, way, direction)
 
-    def polished(self, point: Point) -> Point:
+    def corrected(self, point: Point) -> Point:
         """The point without the drift that integration has left in its gaps."""
         for _ in range(CORRECTIONS if self.items else 0):
             values = self._tangents(point.inputs())

@@ -136,7 +136,7 @@ class Hybrid:
         """Mask of the states that are gaps."""
         self._start = next(j for j, p in enumerate(system.parameters) if p.path == START)
         """Column of the time at which a stretch starts."""
-        self._renewed = 0
+        self._brief_arcs = 0
         """Number of brief arcs in a row that time could not resolve."""
 
     def run(self) -> Flow[Result]:
@@ -168,7 +168,7 @@ class Hybrid:
         point = Point(arc.end, arc.result.y, arc.result.ydot, arc.start.parameters)
         if arc.status is Status.FINISHED:
             return point
-        self._renewed = self._renewed + 1 if arc.result.t < BRIEF_PART * self.problem.segments[-1] else 0
+        self._brief_arcs = self._brief_arcs + 1 if arc.result.t < BRIEF_PART * self.problem.segments[-1] else 0
         index, lost = -1, arc.status in LOST_STATUSES
         if arc.status is Status.EVENT:
             events, instant = arc.result.events, self.instant
@@ -208,7 +208,7 @@ class Hybrid:
         if closing.any():
             return replace(point, y=np.where(closing, -point.y, point.y))
         # What time could not resolve any more goes on in a time of its own.
-        unresolved = arc.status is Status.STEP_UNDERFLOW and arc.result.t > 0 and self._renewed < MOST_BRIEF_ARCS
+        unresolved = arc.status is Status.STEP_UNDERFLOW and arc.result.t > 0 and self._brief_arcs < MOST_BRIEF_ARCS
         return point if unresolved else None
 
     def _is_limited(self, arc: Arc) -> bool:

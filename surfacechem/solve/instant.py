@@ -57,7 +57,7 @@ class Rebounds:
 
     def pieces(self, start: float, end: float) -> Array:
         """Pieces of a stretch in its own time: one of its own for what returns so soon that a step might miss it."""
-        soon = RETURN_FACTOR * self._aloft(start)
+        soon = RETURN_FACTOR * self._flight_time(start)
         inside = [soon] if 0 < soon < FITTED_PART * (end - start) else []
         return np.array([0.0, *inside, end - start])
 
@@ -66,7 +66,7 @@ class Rebounds:
         if not self.margins:
             return sizes
         own = sizes.copy()
-        own[self.margins] = 0.0 if self._aloft(start) else np.maximum(sizes[self.margins], MICROMETRE)
+        own[self.margins] = 0.0 if self._flight_time(start) else np.maximum(sizes[self.margins], MICROMETRE)
         return own
 
     def missed(self, result: Result) -> bool:
@@ -76,7 +76,7 @@ class Rebounds:
         found = [j for j in self.margins if playing is None or playing[j]] if len(result.margins) else []
         return any(result.margins[j] < -PICOMETRE and j not in ended for j in found)
 
-    def _aloft(self, start: float) -> float:
+    def _flight_time(self, start: float) -> float:
         """Time [s] until the guard that has just rebounded returns to zero."""
         since, time = self.last
         return time if since == start else 0.0
@@ -155,11 +155,11 @@ class Instant:
 
     def begin(self, point: Point, before: Point | None) -> Point | None:
         """The start of a load segment, where loads that jump there have moved what is in equilibrium with them."""
-        polished = self.jumper.equilibria.polished
+        corrected = self.jumper.equilibria.corrected
         steps = [index for index, edge in enumerate(self.system.edges) if point.t in edge.times]
         if not steps or before is None:
-            return polished(point)
-        before = polished(before)
+            return corrected(point)
+        before = corrected(before)
         point, self.step = replace(point, y=before.y), LoadStep(before)
         return self.apply(steps[0], point, before) if self.jumper.is_loaded(before, point) else point
 

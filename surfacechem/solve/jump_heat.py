@@ -319,7 +319,7 @@ class LoadPath:
     def _held(self, point: Point, span: Array, warm: Heat = lambda rows: rows) -> Point:
         """The point with all in equilibrium while friction holds; where there is none, as it is."""
         stuck = self.equilibria.with_slip(point, 0.0)
-        return self.equilibria.settle_near(stuck, warm, span) or stuck
+        return self.equilibria.equilibrate_near(stuck, warm, span) or stuck
 
     def _way(self, start: Point, after: Point) -> tuple[int, GapDirection, float]:
         """Index of the gap that slides, its way when sliding by itself, and the distance along that."""

@@ -394,7 +394,7 @@ class Jumper:
         values = self._resets[index](before.inputs())
         if slip is not None and before.parameters[slip] and not values[n + self.mode_columns.index(slip)]:
             # What the integration has left of the balance would look like a push to what sticks from here on.
-            before = self.equilibria.polished(before)
+            before = self.equilibria.corrected(before)
             values = self._resets[index](before.inputs())
         parameters = before.parameters.copy()
         parameters[self.mode_columns] = values[n:]
@@ -472,16 +472,16 @@ class Jumper:
         found, start, fold = self.equilibria, release.start, release.fold
         slip = 0.0 if found.slip is None else start.parameters[found.slip]
         if not slip:
-            return found.settle(start, heat, lost=fold)
+            return found.equilibrate(start, heat, lost=fold)
         stuck = None if fold is None else self.folds.held_at(release.index, fold)
-        trial = found.settle(found.with_slip(start, 0.0), heat, lost=stuck)
+        trial = found.equilibrate(found.with_slip(start, 0.0), heat, lost=stuck)
         if trial is None:
             return None
         onward = found.with_slip(trial, slip)
         if found.is_pushed_back(onward, release.slack.balanced, release.slack.borne, heat):
             return trial
         # Where sticking keeps the equilibrium it is sliding that is lost.
-        return found.settle(onward, heat, release.slack.balanced, lost=fold if stuck is None else None)
+        return found.equilibrate(onward, heat, release.slack.balanced, lost=fold if stuck is None else None)
 
     def _path_shares(self, release: PendingJump, after: Point) -> Array | None:
         """The shares by which the heat of friction is taken along the way of loads that jump, where that matters."""
@@ -569,10 +569,10 @@ class Jumper:
         What does not count: rounding, and what the ``noise`` of the state that a guard measures makes of entropy and of
         energy, as heat of the coldest that may take it.
         """
-        nudged = before.copy()
+        perturbed = before.copy()
         if edge.measure:
-            nudged[:, 1 + self.states.index(edge.measure)] += noise
-        now, still, moved = self._books(np.concatenate([after, before, nudged])).reshape(3, len(before), -1)
+            perturbed[:, 1 + self.states.index(edge.measure)] += noise
+        now, still, moved = self._books(np.concatenate([after, before, perturbed])).reshape(3, len(before), -1)
         gain = now[:, 1] - books[:, 1] + entropy_out
         small = RUN_EPS * np.maximum(np.maximum(np.abs(books[:, 1]), np.abs(now[:, 1])), np.abs(entropy_out))
         small += FEW_EPS * still[:, -1] + np.abs(moved[:, 1] - still[:, 1])

@@ -78,7 +78,7 @@ class Run:
     """Whether it ends where nothing changes any more; the times are then those of a run of any length."""
     rest: float | None = None
     """Time at which it comes to rest [s], where that was found before."""
-    nudged: bool = False
+    perturbed: bool = False
     """Whether loads differ in their last digits: where a result depends on these, two runs of the same numbers would
     agree.
     """
@@ -112,8 +112,8 @@ class Run:
         """
         atol = None if self.atol is None else self.atol * rtol / self.rtol
         used = OWN if self.solver == EXPLICIT else self.solver
-        nudged = not self.nudged
-        return replace(self, rtol=rtol, atol=atol, solver=used, nudged=nudged, samples=CLOSER * self.samples, **others)
+        others |= {"perturbed": not self.perturbed, "samples": CLOSER * self.samples}
+        return replace(self, rtol=rtol, atol=atol, solver=used, **others)
 
 
 class Discontinuities(NamedTuple):
@@ -228,8 +228,8 @@ class Trajectory:
         worst = np.zeros(self.outputs.shape[1])
         for some in (own[first : first + together] for first in range(0, len(own), together)):
             rows = np.array([self._inputs] * len(some))
-            for nudged, j in zip(rows, some, strict=True):
-                nudged[:, 1 + j] += changes[:, j]
+            for perturbed, j in zip(rows, some, strict=True):
+                perturbed[:, 1 + j] += changes[:, j]
             values = model.named(rows.reshape(len(some) * len(times), rows.shape[-1]))
             with np.errstate(invalid="ignore"):  # quantities may be infinite, whatever the last bit is
                 apart = np.abs(values.reshape(len(some), *self.outputs.shape) - self.outputs)
@@ -423,7 +423,7 @@ class Model:
         pieces.start_modes(system, parameters, values)
         y = np.array([state.from_given(values) for state in system.states])
         self._limits.check(y, parameters[0])
-        if run.nudged:
+        if run.perturbed:
             pieces.perturb_histories(system, parameters)
         if system.equilibria:
             y, parameters = self._equilibrated(y, parameters)
@@ -449,7 +449,7 @@ class Model:
 
     def _equilibrated(self, y: Array, parameters: Array) -> tuple[Array, Array]:
         """The states with their gaps in equilibrium, and the parameters of all segments with the modes found there."""
-        settled = self.equilibria.settle(Point(0.0, y, np.zeros_like(y), parameters[0].copy()))
+        settled = self.equilibria.equilibrate(Point(0.0, y, np.zeros_like(y), parameters[0].copy()))
         if settled is None:
             raise InputError(f"{NO_BALANCE}.", path="mechanics")
         return settled.y, np.where(settled.parameters != parameters[0], settled.parameters, parameters)

@@ -71,7 +71,7 @@ Data = Mapping[str, float]
 TIME = "t"
 
 # Relative steps of the data, from 1e-6 to 16 roundings.
-NUDGES = tuple(2.0**-k for k in (20, 24, 28, 32, 36, 40, 44, 48))
+PERTURBATIONS = tuple(2.0**-k for k in (20, 24, 28, 32, 36, 40, 44, 48))
 
 # Relative change of a slope from one step to the next, below which it is one: a choice, as condition numbers are told
 # to one digit. Less would ask for shorter steps, in whose slopes there is more rounding.
@@ -314,7 +314,7 @@ def _slopes(answer: Callable[[Data], Answer], base: Answer, data: Data, name: st
     A step goes the other way where there is no answer.
     """
     before: Answer = {}
-    for step in NUDGES:
+    for step in PERTURBATIONS:
         now: Answer = {}
         for sign in (1.0, -1.0):
             moved = data[name] * (1.0 + sign * step)

@@ -217,10 +217,10 @@ def establish(subject: Subject, variables: Sequence[str]) -> Truth:
     trajectory = subject.tight(subject.methods()[0], MIN_RTOL)
     result = trajectory.result
     # A second evaluation at times one rounding earlier tells how far rounding moves the exact values.
-    nudged = replace(trajectory, result=replace(result, times=result.times * (1 - EPS)))
+    perturbed = replace(trajectory, result=replace(result, times=result.times * (1 - EPS)))
     try:
         exact, moved = (
-            exact_values(reference.name, reference.options, subject.case.scene, run) for run in (trajectory, nudged)
+            exact_values(reference.name, reference.options, subject.case.scene, run) for run in (trajectory, perturbed)
         )
     except InputError as error:
         found = numerical(subject, variables)

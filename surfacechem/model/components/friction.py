@@ -24,7 +24,7 @@ from surfacechem.quantities import VARIABLES, Quantity
 
 def laws(build: Build) -> Iterator[Power | State | Margin]:
     """Sliding tractions and their dissipation; their power comes from outside."""
-    rubs, total = build.energy.rubs, symengine.Integer(0)
+    unbonded, total = build.energy.unbonded, symengine.Integer(0)
     resisting: dict[str, Expression] = {}
     if build.interface.frictions:
         build.variables.define("t_s", lambda: _magnitude(build, resisting), "derived", "interface.friction")
@@ -41,9 +41,9 @@ def laws(build: Build) -> Iterator[Power | State | Margin]:
             quantity = Quantity(f"{d.traction}_{label}", "Pa", f"tangential traction of {law.title}{across}")
             named = build.name(quantity, traction)
             nominal = build.stretch * named
-            resisting[d.axis] = resisting.get(d.axis, 0) + rubs * named
-            power += rubs * nominal * build.variables.get(d.velocity, law)
-            total += rubs * nominal
+            resisting[d.axis] = resisting.get(d.axis, 0) + unbonded * named
+            power += unbonded * nominal * build.variables.get(d.velocity, law)
+            total += unbonded * nominal
             resist(build, d, nominal)
         yield Power(DISSIPATION, MECHANICS, INTERFACE, power, label)
         if not build.motion.slips:

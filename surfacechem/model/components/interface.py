@@ -249,20 +249,20 @@ def _energies(
     found = {law: _per_reference_area(build, b, b.statement, gaps[law]) for law, b in bounds.items()}
     parts: set[Expression] = set()  # several adhesions of the same bonds leave the same part unbonded
     for law in in_parallel(build):
-        if (unbonded := getattr(bounds[law], "unbonded", None)) is not None:
-            parts.add(build.variables.call(bounds[law], unbonded))
+        if (formula := getattr(bounds[law], "unbonded", None)) is not None:
+            parts.add(build.variables.call(bounds[law], formula))
             for friction in (item for item in build.interface.frictions if item.breaks_bonds):
                 build.add(
                     f"{friction.name()} breaks all bonds as sliding starts, and with them the adhesion of {law.name()}."
                 )
-    rubs, rubbed = symengine.Mul(*parts), symengine.Integer(0)
-    if rubs != 1:
+    unbonded, unbonded_energy = symengine.Mul(*parts), symengine.Integer(0)
+    if unbonded != 1:
         g_t = symengine.Symbol("g_t")
         for law in series:
             sheared = found[law] - symengine.sympify(found[law]).subs({g_t: 0})
-            rubbed += sheared
-            found[law] += (rubs - 1) * sheared
-    return found, Energy(symengine.Integer(0), rubs, rubbed)
+            unbonded_energy += sheared
+            found[law] += (unbonded - 1) * sheared
+    return found, Energy(symengine.Integer(0), unbonded, unbonded_energy)
 
 
 def _net_pressure(build: Build) -> None:

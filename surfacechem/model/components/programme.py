@@ -61,7 +61,7 @@ def _driven(build: Build, name: str) -> Expression:
     start = build.scene.initial.get(name, 0.0)
     build.add(State(quantity, start, STATE_SCALES.get(quantity.unit, 1.0)))
     build.rows.kinematics(name, rate)
-    build.motion.drives[name] = rate
+    build.motion.ramp_rates[name] = rate
     return symengine.Symbol(name)
 
 

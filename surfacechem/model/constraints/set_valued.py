@@ -86,7 +86,7 @@ def friction_impulse(build: Build, impulse: Expression) -> Iterator[Constraint]:
     if not (laws and sliding):
         return
     v, exerted = symengine.Symbol("speed" if len(sliding) == 2 else "v"), IMPULSE.symbol
-    ratio = build.energy.rubs * symengine.Add(*(_impulse_ratio(build, law, v) for law in laws))
+    ratio = build.energy.unbonded * symengine.Add(*(_impulse_ratio(build, law, v) for law in laws))
     loss = ratio * exerted / far_field(build, sliding[0].mount).m
     stops = {} if build.mode("slip") is None else {SLIP: where(loss < absolute(v), SLIP, ZERO)}
     left = {v: where(loss < absolute(v), v - loss * sign(v), ZERO)}

@@ -56,7 +56,7 @@ def bonds_left(build: Build) -> Expression | None:
 
 def laws(build: Build) -> Iterator[Constraint]:
     """Edges at which bonds break as the traction passes a limit; if the strength is theirs, they rejoin at touch."""
-    closed, heals = build.mode("closed"), []
+    closed, reclosing = build.mode("closed"), []
     for law in build.interface.limits:
         if not build.variables.has("t_n"):
             message = (
@@ -67,10 +67,10 @@ def laws(build: Build) -> Iterator[Constraint]:
         strength = build.variables.call(bound, bound.statement)
         yield from _limit(build, law, strength, closed)
         felt = build.expanded(strength).free_symbols
-        heals.append(any(symengine.Symbol(name) in felt for name in ("phi", *build.interface.bonds)))
-    again = {build.variables.get("bonded", "the limit"): ONE} if heals and all(heals) else {}
+        reclosing.append(any(symengine.Symbol(name) in felt for name in ("phi", *build.interface.bonds)))
+    again = {build.variables.get("bonded", "the limit"): ONE} if reclosing and all(reclosing) else {}
     if closed is not None:
-        build.heals = {closed: ONE, **again}
+        build.reclosing = {closed: ONE, **again}
     elif again and "g_n" in build.motion.gap_rates:
         # An elastic interface whose strength is that of its bonds can bond again where the gap has closed.
         gap = build.variables.get("g_n", "the limit", "interface")

@@ -86,7 +86,7 @@ def laws(build: Build) -> Iterator[Constraint]:
         yield Constraint(edges=(opens,))
     gap = build.variables.get("g_n", "the rigid interface", "interface")
     if "g_n" not in build.motion.gap_rates:
-        yield _closing(Edge("touch", gap, "the gap closes", build.heals, when={closed: (0,)}))
+        yield _closing(Edge("touch", gap, "the gap closes", build.reclosing, when={closed: (0,)}))
 
 
 def _closing(touch: Edge) -> Constraint:
@@ -104,7 +104,7 @@ def impacts(build: Build) -> Iterator[Constraint]:
     assert mount is not None
     shut, apart = {G: ZERO}, {closed: (0,)}
     if not mount.inertial:
-        yield _closing(Edge("touch", G, "the gap closes", build.heals, shut, equilibrates=True, when=apart))
+        yield _closing(Edge("touch", G, "the gap closes", build.reclosing, shut, equilibrates=True, when=apart))
         return
     far = far_field(build, mount)
     speed, pressing = absolute(V), -far.force(ZERO, ZERO) / far.m
@@ -119,7 +119,7 @@ def impacts(build: Build) -> Iterator[Constraint]:
         returns=where(pressing > 0, 2 * V / pressing, ZERO),
         when=apart,
     )
-    calm, reason = {LANDED.symbol: ZERO, **build.heals}, "the bodies rest on each other"
+    calm, reason = {LANDED.symbol: ZERO, **build.reclosing}, "the bodies rest on each other"
     rest = Edge("rest", -ONE, reason, calm, equilibrates=True, when={LANDED.symbol: (1,)})
     # What follows at the same moment comes before what would slide as long as the contact is open.
     yield Constraint((), (LANDED, FASTEST) if remembered else (LANDED,), (hits, rest), at_once=True)

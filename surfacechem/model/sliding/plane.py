@@ -120,12 +120,12 @@ def _began(v: str, values: Mapping[str, float]) -> float:
 
 def motion(build: Build, kinds: Sequence[Formulation]) -> Iterator[Record]:
     """Balances along and across the direction of sliding, and the edges between sticking and sliding."""
-    sides, rubs = [], build.energy.rubs
+    sides, unbonded = [], build.energy.unbonded
     for kind in kinds:
         assert kind.mount is not None
         d, u, far = kind.d, symengine.Symbol(kind.d.displacement), far_field(build, kind.mount)
         rate, t_a = build.motion.gap_rates[d.displacement], derivative(build.psi, u)
-        resisted, limit = (rubs * by[d.axis] for by in (build.motion.sliding_tractions, build.motion.stick_limits))
+        resisted, limit = (unbonded * by[d.axis] for by in (build.motion.sliding_tractions, build.motion.stick_limits))
         side = Component(d, far, u, rate, t_a, resisted, limit)
         sides.append(side)
         build.rows.kinematics(d.displacement, rate)
@@ -190,8 +190,8 @@ def _steady(build: Build, sides: Sequence[Component], largest: Expression) -> tu
     # What rounding leaves of the balance in which sliding begins must not stop it.
     still = along.subs({SPEED: 0}) + TRACTION_EPS * largest
     if a != b:
-        rubs = sum((part.subs({SPEED: 0}) for part in sizes), ZERO)
-        along, across = (where(rubs > 0, *pair) for pair in zip(_elliptic(pull, sizes), (along, across), strict=True))
+        dry = sum((part.subs({SPEED: 0}) for part in sizes), ZERO)
+        along, across = (where(dry > 0, *pair) for pair in zip(_elliptic(pull, sizes), (along, across), strict=True))
     slope = derivative(along, SPEED)
     linear = slope != 0 and not depends(slope, SPEED)
     build.rows.switched("speed", SLIP, -along.subs({SPEED: 0}) / slope - SPEED if linear else along, SPEED)

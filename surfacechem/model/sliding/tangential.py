@@ -163,15 +163,15 @@ def _motion(build: Build, kind: Formulation) -> Iterator[Record]:
         build.variables.get("v_t", "the mechanics", "mechanics")
     d, u = kind.d, symengine.Symbol(kind.d.displacement)
     v, rate = build.variables.get(d.velocity, "the friction"), build.motion.gap_rates[d.displacement]
-    rubs, t_a = build.energy.rubs, derivative(build.psi, u)
+    unbonded, t_a = build.energy.unbonded, derivative(build.psi, u)
     t_f = build.motion.sliding_tractions.get(d.axis, ZERO)
     if kind.elastic:
         # Per area on which friction acts, however small that is.
-        needed = derivative(build.psi if rubs == 1 else build.energy.rubbed, symengine.Symbol("g_t"))
-        carried = held = rubs * needed
+        needed = derivative(build.psi if unbonded == 1 else build.energy.unbonded_energy, symengine.Symbol("g_t"))
+        carried = held = unbonded * needed
     else:
         assert far is not None
-        carried = t_f = rubs * t_f
+        carried = t_f = unbonded * t_f
         held = needed = far.force(u, ZERO) - t_a
     slides = build.constraint("slip").active if kind.sticks else symengine.Integer(kind.slides)
     in_proportion = False
@@ -223,7 +223,7 @@ def _friction(
 
 def _limit(build: Build, kind: Formulation) -> Expression:
     """Friction limit of sticking [Pa], per area on which friction acts where the interface is elastic."""
-    return build.motion.stick_limits.get("t", ZERO) * (1 if kind.elastic else build.energy.rubs)
+    return build.motion.stick_limits.get("t", ZERO) * (1 if kind.elastic else build.energy.unbonded)
 
 
 def _velocity_state(build: Build, kind: Formulation) -> str:

@@ -360,13 +360,13 @@ def _begin_arc(w: Any, i: int) -> None:
 
 
 @compiled
-def _see_guards(w: Any, aloft: float) -> None:
+def _see_guards(w: Any, flight_time: float) -> None:
     """Start the largest sizes of the guards; after a rebound those that return count as zero, to their rounding."""
     copy(w.magnitude, w.margin_largest)
     first = w.n_margins - w.edges.shape[0]
     for e in range(w.edges.shape[0]):
         if w.edges[e, RETURNS] >= 0:
-            w.margin_largest[first + e] = 0.0 if aloft > 0.0 else max(w.magnitude[first + e], MICROMETRE)
+            w.margin_largest[first + e] = 0.0 if flight_time > 0.0 else max(w.magnitude[first + e], MICROMETRE)
 
 
 @compiled
@@ -374,16 +374,16 @@ def _run_arc(w: Any, i: int, end: float, goes_on: bool) -> int:
     """Flow from the moment until an edge or a limit, or to the end of a segment; GOOD, or the status that ends the arc,
     which is at the new moment.
     """
-    aloft = w.aloft if w.rebounded == w.moment[0] else 0.0
+    flight_time = w.flight_time if w.rebounded == w.moment[0] else 0.0
     _begin_arc(w, i)
-    _see_guards(w, aloft)
+    _see_guards(w, flight_time)
     # Not to a breakpoint that no load has, as a formula there is that of what follows.
     last = end if w.loads_change else max(end - FEW_EPS * end, 0.5 * (w.origin + end))
     w.arc_end, w.shown, w.base = last - w.origin, end, 0.0
     status = GOOD
-    if 0.0 < RETURN_FACTOR * aloft < FITTED_PART * w.arc_end:
+    if 0.0 < RETURN_FACTOR * flight_time < FITTED_PART * w.arc_end:
         # What returns so soon that a step might miss it has a piece of its own.
-        status = _run_segment(w, i, RETURN_FACTOR * aloft, True)
+        status = _run_segment(w, i, RETURN_FACTOR * flight_time, True)
         w.base, w.tau = w.base + w.tau, 0.0
     if status == GOOD:
         status = _run_segment(w, i, w.arc_end, goes_on)
@@ -437,7 +437,7 @@ def _begin_arcs(w: Any, i: int) -> None:
     clear(w.booked)
     clear(w.exchanged)
     copy(w.least_peaks, w.peaks_seen)
-    w.rebounded, w.aloft = -np.inf, 0.0
+    w.rebounded, w.flight_time = -np.inf, 0.0
     for k in range(w.jumped.shape[0]):
         w.jumped[k] = -np.inf
     for j in range(w.n):

@@ -121,7 +121,7 @@ NUMBERS: dict[str, type] = {
     # Where edges are carried out: the time at which the arc began and that of the last rebound, with how long it stays
     # away; where the arc ends at the latest, in its own time, and up to where it has outputs. The first event of the
     # arc, and the steps taken and rejected before it; whether loads change at the end of the segment.
-    **dict.fromkeys(("origin", "rebounded", "aloft", "arc_end", "shown"), float),
+    **dict.fromkeys(("origin", "rebounded", "flight_time", "arc_end", "shown"), float),
     **dict.fromkeys(("first_event", "steps_before", "rejected_before", "loads_change"), int),
 }
 """Numbers of a trajectory that change."""
@@ -197,8 +197,8 @@ MEMORY = {
     # and before it with the measured state moved by its rounding; what is looked at there
     **_arrays("moment", "n_inputs"),
     **_arrays("sized peaks_seen", "n"),
-    **_arrays("after nudged", "n_inputs"),
-    **_arrays("books_before books_after books_nudged", "n_books"),
+    **_arrays("after perturbed", "n_inputs"),
+    **_arrays("books_before books_after books_perturbed", "n_books"),
     **_arrays("nodal targets", "n_nodal"),
     **_arrays("reset", "n_reset"),
     **_arrays("magnitude", "n_margins"),
