@@ -21,7 +21,7 @@ from surfacechem.model.system import System
 from surfacechem.quantities import VELOCITIES
 from surfacechem.results.audit import LAST_DIGITS, TOTALS, residuals, resolved
 from surfacechem.runs import spectrum
-from surfacechem.runs.keeping import REACHED, STATUSES, Columns, Keep, crossed, reason_table, variable
+from surfacechem.runs.keeping import REACHES, STATUSES, Columns, Keep, crossed, reason_table, variable
 from surfacechem.solve.choice import EXPLICIT, IMPLICIT
 from surfacechem.solve.contract import Array, Index, Mask, Problem, Status
 from surfacechem.solve.diagnose import are_led_back
@@ -34,10 +34,10 @@ from surfacechem.tolerances import EPS, GUARD_EPS, MICROMETRE, PICOMETRE
 MOST = 4096, 1024
 """Largest numbers of steps and events of a run for which there is room: what has more is looked at by itself."""
 
-PILOTS = 16
+PILOT_RUNS = 16
 """Runs of a batch by which the number of steps and events of the others is estimated."""
 
-TRIED = 100
+FIRST_RUNS = 100
 """Runs of a plan that are tried for one that is admissible, whose problem the others share."""
 
 
@@ -62,7 +62,7 @@ class Ends:
         return np.concatenate([t[:, None], y, ydot, self.table[owner, segment]], axis=1)
 
 
-def solvable(model: Model, plan: Plan, run: Run, problem: Problem) -> bool:
+def is_array(model: Model, plan: Plan, run: Run, problem: Problem) -> bool:
     """Whether runs of a plan differ in nothing but values of states and parameters: so that arrays tell all."""
     system = model.system
     # A load that ends the runs is one ramp.
@@ -78,7 +78,7 @@ def solvable(model: Model, plan: Plan, run: Run, problem: Problem) -> bool:
     return own and shared and not jumps and _starts_as_given(system, set(plan.paths))
 
 
-def quiet(model: Model, problem: Problem) -> bool:
+def cannot_jump(model: Model, problem: Problem) -> bool:
     """Whether runs may have no jumps: they are of one arc, and begin in the same modes whatever their values are."""
     one_arc = model.jumper is None or len(problem.segments) == 2
     return one_arc and all(mode.start is None for mode in model.system.modes)
@@ -104,7 +104,7 @@ def _starts_as_given(system: System, swept: set[str]) -> bool:
 
 
 class ArrayRuns:
-    """Runs of a plan that :func:`solvable` says are arrays."""
+    """Runs of a plan that :func:`is_array` says are arrays."""
 
     jumps = False
     """Whether runs go on behind their jumps."""
@@ -135,7 +135,7 @@ class ArrayRuns:
     def _first_problem(self, changes: Mapping[str, float]) -> Problem:
         """The problem of the first run that is admissible; InputError where none of the first is."""
         refused = InputError("no run of the plan is admissible.", path="sweep")
-        for number in range(min(self.plan.size, TRIED)):
+        for number in range(min(self.plan.size, FIRST_RUNS)):
             point = {path: float(value[0]) for path, value in self.plan.at(np.array([number])).items()}
             try:
                 return self.model.problem(self.run, self.model.values({**changes, **point}))
@@ -439,7 +439,7 @@ class ArrayRuns:
         named = [margin.name for margin in self.model.margins] + [edge.name for edge in self.model.system.edges]
         columns: Columns = {}
         names = [*((name, f"time_{variable(name)}") for name in keep.events)]
-        names += [(f"{REACHED}{name}", f"time_to_{name}") for name in keep.reach or {}]
+        names += [(f"{REACHES}{name}", f"time_to_{name}") for name in keep.reach or {}]
         happened = np.arange(batch.events.shape[1]) < batch.counts[:, EVENTS, None]
         for name, column in names:
             wanted = [j for j, each in enumerate(named) if each == name]
@@ -479,7 +479,7 @@ class JumpingRuns(ArrayRuns):
         jumper.expect_jumps()
         problem, columns = replace(problem, edges=jumper.edge_tables), (y0, table, *others)
         # A few of them tell for how much the others need room.
-        some = np.arange(0, len(y0), max(len(y0) // PILOTS, 1))
+        some = np.arange(0, len(y0), max(len(y0) // PILOT_RUNS, 1))
         few = [column[some] if len(column) == len(y0) else column for column in columns]
         for given in (few, columns):
             fits = False

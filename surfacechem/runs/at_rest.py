@@ -14,20 +14,20 @@ from surfacechem.results.audit import audit
 from surfacechem.solve.run import Model, Run, Trajectory
 from surfacechem.tolerances import LINE_ERROR, NEGLIGIBLE
 
-LONGEST = 1e8
+HORIZON = 1e8
 """Time [s] for which rest is looked for, three years: beyond, step sizes times the rates of a fast surface are more
 than a double resolves beside one.
 """
 
-AFTER = 10.0
+REST_RATIO = 10.0
 """Least ratio of the time looked at to the time to come to rest, with which a state counts as at rest."""
 
-SHORTER = (1e6, 1e4, 1e2, 1.0)
+SHORTER_TIMES = (1e6, 1e4, 1e2, 1.0)
 """Times [s] for which rest is looked for where roundings of a fast surface, summed over years, hide it: its sites do
 not stay what they are.
 """
 
-PATH = "run.until"
+UNTIL = "run.until"
 
 
 class UnrestError(InputError):
@@ -38,7 +38,7 @@ def refuse_histories(system: System) -> None:
     """Raise InputError where no steady state can be."""
     moving = [item.name for item in system.named if depends(system.expand(item.expression), system.t)]
     if moving:
-        raise InputError(f"{moving[0]} changes in time, so there is no steady state: give it one value.", path=PATH)
+        raise InputError(f"{moving[0]} changes in time, so there is no steady state: give it one value.", path=UNTIL)
 
 
 def to_rest(model: Model, run: Run, values: Mapping[str, float]) -> Run:
@@ -48,19 +48,21 @@ def to_rest(model: Model, run: Run, values: Mapping[str, float]) -> Run:
     """
     refuse_histories(model.system)
     # A shorter look would take slow changes, and those that follow when nothing happened for long, for none.
-    far = _looked(model, run, values, LONGEST)
+    far = _looked(model, run, values, HORIZON)
     if far.status == "stopped":
-        return replace(run, times=_until(run, min(2 * far.result.t, LONGEST) or LONGEST))
+        return replace(run, times=_until(run, min(2 * far.result.t, HORIZON) or HORIZON))
     name = _rest_of(far)[1]
     scales = np.array([state.scale for state in model.system.states])
-    for end in (LONGEST, *(SHORTER if audit(far).site_error > run.rtol else ())):
-        near = far if end == LONGEST else _looked(model, run, values, end)
+    for end in (HORIZON, *(SHORTER_TIMES if audit(far).site_error > run.rtol else ())):
+        near = far if end == HORIZON else _looked(model, run, values, end)
         last, change = _rest_of(near)[0], np.abs(near.result.y - far.result.y)
         # Both end in states that differ slightly, or by a trace of something.
         alike = np.all(change <= NEGLIGIBLE * np.maximum(np.abs(near.result.y), scales))
-        if near.status == "finished" and last * AFTER <= end and alike:
+        if near.status == "finished" and last * REST_RATIO <= end and alike:
             return replace(run, times=_until(run, last), rest=last)
-    raise UnrestError(f"the case did not reach a steady state within {LONGEST:.3g} s: {name} still changes.", path=PATH)
+    raise UnrestError(
+        f"the case did not reach a steady state within {HORIZON:.3g} s: {name} still changes.", path=UNTIL
+    )
 
 
 def _looked(model: Model, run: Run, values: Mapping[str, float], end: float) -> Trajectory:

@@ -23,10 +23,10 @@ from surfacechem.solve.diagnose import time_scales
 from surfacechem.solve.run import Model
 from surfacechem.tolerances import CONSERVED_RATE, FEW_EPS, RUN_EPS, TINY
 
-SMALL = 0.1
+LUMP_BIOT = 0.1
 """Biot number up to which a lump is taken for good: it errs by 3 % then."""
 
-LONG = 2.0
+EVEN_FOURIER = 2.0
 """Fourier number from which on a slab in perfect contact has become even: 1 % of a difference is left."""
 
 
@@ -260,7 +260,7 @@ class Lumping:
         >>> round(Lumping(1, "lower", True, 0.1, 1.0).fast, 4), round(Lumping(1, "lower", True, 1.0, 1.0).fast, 4)
         (0.0336, 0.351)
         """
-        return self.biot / slowest(self.biot) ** 2 - 1
+        return self.biot / first_root(self.biot) ** 2 - 1
 
     @property
     def left(self) -> float:
@@ -279,22 +279,22 @@ class Lumping:
         if not self.is_lump:
             return
         remedy = "Give its `conduction` a number of cells."
-        if math.isfinite(self.biot) and self.biot > SMALL:
+        if math.isfinite(self.biot) and self.biot > LUMP_BIOT:
             yield (
                 f"{self.body} is one lump, but its Biot number is {self.biot:.3g}: cooled by itself it would relax "
                 f"{self.fast:.1%} too fast. {remedy}"
             )
-        if not math.isfinite(self.biot) and self.fourier < LONG:
+        if not math.isfinite(self.biot) and self.fourier < EVEN_FOURIER:
             yield (
                 f"{self.body} is one lump in perfect contact, but the run is short against conduction in it: "
                 f"{self.left:.1%} of a difference within it would be left at the end. {remedy}"
             )
 
 
-def slowest(biot: float) -> float:
+def first_root(biot: float) -> float:
     """The first root of zeta tan(zeta) = Bi.
 
-    >>> round(slowest(1.0), 6), round(slowest(1e-12) ** 2 / 1e-12, 9)
+    >>> round(first_root(1.0), 6), round(first_root(1e-12) ** 2 / 1e-12, 9)
     (0.860334, 1.0)
     """
     z = math.sqrt(biot / (1 + biot / 3)) if biot < 2 else math.pi / 2 * biot / (1 + biot)

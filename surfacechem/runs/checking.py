@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from surfacechem.errors import InputError
 from surfacechem.format.draws import permuted
 from surfacechem.results.store import StoredArray
-from surfacechem.runs.keeping import BALANCES, ENDS, STATUSES, Keep, RunByRun
+from surfacechem.runs.keeping import BALANCES, END_COLUMNS, STATUSES, Keep, RunByRun
 from surfacechem.runs.sweeps import SweepAccuracy, SweepSolution, unknown_in
 from surfacechem.solve.contract import Index
 from surfacechem.tolerances import ERROR_FLOOR, RUN_ERROR, TINY
@@ -22,18 +22,18 @@ if TYPE_CHECKING:
 
 Array = NDArray[Any]
 
-HARDEST = 100
+HARDEST_RUNS = 100
 """Runs with the most steps that are checked beside those of the plan."""
 
-AT_ONCE = 200
+RUNS_AT_ONCE = 200
 """Runs that are checked together, with all of their steps in memory."""
 
-TOLD = (*BALANCES, "destroys_entropy")
+BALANCE_COLUMNS = (*BALANCES, "destroys_entropy")
 
 KEYS = {
     "run": ("int64", "number of the run in the plan, the last dimension fastest; -1 for none"),
     "error": ("float64", "largest relative error of the run"),
-    **{name: ("float64", ENDS[name]) for name in TOLD},
+    **{name: ("float64", END_COLUMNS[name]) for name in BALANCE_COLUMNS},
 }
 """Columns that are stored of a run that is checked: type and meaning."""
 
@@ -60,7 +60,7 @@ class Checked:
 
 def checked_arrays(size: int, count: int) -> tuple[dict[str, int], dict[str, StoredArray]]:
     """Dimensions and arrays of what is checked in a store of so many runs."""
-    sizes = {"checked": min(count, size), "hardest": min(HARDEST, size)} if count else {}
+    sizes = {"checked": min(count, size), "hardest": min(HARDEST_RUNS, size)} if count else {}
     arrays = {
         f"{which}_{key}": StoredArray(kind, (which,), {"units": "1", "long_name": text})
         for which in sizes
@@ -120,7 +120,7 @@ def _hardest(stream: Stream) -> Index:
             np.concatenate([numbers, stream.store.layout.index(number)[went]]),
         )
         # Of equally many steps the first of the plan, so that the choice depends on nothing else.
-        best = np.lexsort((numbers, -steps))[:HARDEST]
+        best = np.lexsort((numbers, -steps))[:HARDEST_RUNS]
         steps, numbers = steps[best], numbers[best]
     return np.sort(numbers)
 
@@ -131,8 +131,8 @@ def _errors(
     """Errors and balances of runs by themselves, some at a time; nothing of one that is not admissible."""
     chunks = stream.chunks
     even = replace(chunks.simulation.case.run, picture=None)  # no outputs are shown
-    for first in range(0, len(index), AT_ONCE):
-        part = index[first : first + AT_ONCE]
+    for first in range(0, len(index), RUNS_AT_ONCE):
+        part = index[first : first + RUNS_AT_ONCE]
         try:
             done = chunks.simulation.sweep_plan(chunks.plan.picked(part), chunks.changes, threads, even)
         except InputError:
@@ -143,7 +143,7 @@ def _errors(
                         yield first + k, single, errors, accuracy
             continue
         assert done.accuracy is not None
-        values = {name: [end[name] for end in done.run_ends] for name in TOLD}
+        values = {name: [end[name] for end in done.run_ends] for name in BALANCE_COLUMNS}
         found = np.maximum(done.accuracy.errors, _apart(stream, part, done))  # an unknown error stays unknown
         yield first, part, {"error": found, **values}, done.accuracy
 

@@ -27,12 +27,12 @@ Columns = dict[str, NDArray[Any]]
 STATUSES = ("finished", "stopped", "failed", "refused")
 """Ends of runs, in the order of their codes; refused is one whose values are not admissible at its start."""
 
-REFUSED, OTHER = "the values are not admissible at the start", "another reason"
+INADMISSIBLE, OTHER_REASON = "the values are not admissible at the start", "another reason"
 
-REST, UNREST = "came to rest", "it does not come to rest"
+CAME_TO_REST, NOT_AT_REST = "came to rest", "it does not come to rest"
 """Reasons for the end of a run until a steady state, and for its failure."""
 
-ENDS = {
+END_COLUMNS = {
     "status": "how the run ended",
     "reason": "why the run ended",
     "time_reached": "time that the run reached",
@@ -45,7 +45,7 @@ ENDS = {
 """Columns on the end of every run, with their meaning; only the time has a unit, seconds."""
 
 BALANCES = tuple(f"{kind}_error" for kind in ("energy", "entropy", "site"))
-"""Columns of ENDS that are errors of balances."""
+"""Columns of END_COLUMNS that are errors of balances."""
 
 EXTREMES = {
     "max": (np.fmax, "at most, over outputs, steps and jumps"),
@@ -53,10 +53,10 @@ EXTREMES = {
 }
 """Extremes of a run: suffix of the names of their columns, function that finds them, and words."""
 
-SINGLE = {"last": "at the end of the run", **{which: words for which, (_, words) in EXTREMES.items()}}
+SINGLE_COLUMNS = {"last": "at the end of the run", **{which: words for which, (_, words) in EXTREMES.items()}}
 """Numbers of each run and quantity, by what the names of their columns end with, in words."""
 
-REACHED = "reaches "
+REACHES = "reaches "
 """Prefix of the names of margins that tell when a quantity reaches a value."""
 
 
@@ -82,13 +82,13 @@ def recorded_keep(record: str) -> Keep:
 
 
 def end_of(run: Trajectory) -> dict[str, Any]:
-    """Entries of ENDS for a run, beside its balances."""
+    """Entries of END_COLUMNS for a run, beside its balances."""
     steps = run.result.counters.steps
     return {"status": run.status, "reason": run.reason, "time_reached": run.result.t, "steps": steps}
 
 
 def balances_of(run: Trajectory, books: Audit) -> dict[str, Any]:
-    """Entries of ENDS for the balances of a run."""
+    """Entries of END_COLUMNS for the balances of a run."""
     destroys = books.destroys or entropy_destroyed(run.jumps) > 0
     return {**{name: getattr(books, name) for name in BALANCES}, "destroys_entropy": destroys}
 
@@ -128,7 +128,7 @@ def reaching(system: System, keep: Keep) -> System:
     margins = []
     for name, value in (keep.reach or {}).items():
         expression = symbols.get(name) or system.find(name).expression
-        margins.append(Margin(f"{REACHED}{name}", expression - value, f"{name} reaches {value:g}", terminal=False))
+        margins.append(Margin(f"{REACHES}{name}", expression - value, f"{name} reaches {value:g}", terminal=False))
     ledger = system.ledger if keep.balances else ()
     return replace(system, margins=(*system.margins, *margins), ledger=ledger)
 
@@ -139,7 +139,7 @@ def reason_table(system: System) -> list[str]:
     ends = [text for margin in margins for text in (margin.reason, *(margin.below or ("", ""))[1:]) if text]
     failures = [text for status, text in REASONS.items() if not status.success]
     edges = [edge.reason for edge in system.edges]
-    return list(dict.fromkeys([REASONS[Status.FINISHED], REFUSED, *ends, *edges, *failures, OTHER]))
+    return list(dict.fromkeys([REASONS[Status.FINISHED], INADMISSIBLE, *ends, *edges, *failures, OTHER_REASON]))
 
 
 def variable(name: str) -> str:
@@ -157,11 +157,11 @@ def described(system: System, keep: Keep) -> dict[str, tuple[str, str, str]]:
     codes = {"status": "int8", "reason": "int16", "steps": "int32"}
     found = {
         name: (codes.get(name, "float64"), "s" if name == "time_reached" else "1", text)
-        for name, text in ENDS.items()
+        for name, text in END_COLUMNS.items()
         if name != "destroys_entropy"  # of the runs that are checked alone
         and (keep.balances or name not in BALANCES)
     }
-    for which, word in SINGLE.items():
+    for which, word in SINGLE_COLUMNS.items():
         for name in getattr(keep, which):
             found[f"{name}_{which}"] = ("float64", q[name].unit, f"{q[name].long_name} {word}")
     for name in keep.events:
@@ -202,7 +202,7 @@ class RunByRun:
 
     def __init__(self, model: Model, keep: Keep, steady: bool = False) -> None:
         self.model, self.keep = model, keep
-        self.reasons = [*reason_table(model.system), *((REST, UNREST) if steady else ())]
+        self.reasons = [*reason_table(model.system), *((CAME_TO_REST, NOT_AT_REST) if steady else ())]
 
     def columns(self, runs: Sequence[Trajectory | str], times: int, audits: Sequence[Audit] = ()) -> Columns:
         """Columns that are kept of runs, with so many output times, audited anew or as given; a run that failed or was
@@ -210,7 +210,7 @@ class RunByRun:
         """
         found = [run for run in runs if not isinstance(run, str)]
         books = iter(audits or map(audit, found) if self.keep.balances else [None] * len(found))
-        codes = {reason: STATUSES.index("refused" if reason == REFUSED else "failed") for reason in self.reasons}
+        codes = {reason: STATUSES.index("refused" if reason == INADMISSIBLE else "failed") for reason in self.reasons}
         rows = [
             {"status": codes[run], "reason": self.reasons.index(run), "steps": 0}
             if isinstance(run, str)
@@ -241,7 +241,7 @@ class RunByRun:
         row: dict[str, float] = {}
         # Events are in order of time, so that the first of a name is the one that counts.
         columns = self.model.system.state_columns
-        reached = {f"{REACHED}{name}": f"time_to_{name}" for name in self.keep.reach or {}}
+        reached = {f"{REACHES}{name}": f"time_to_{name}" for name in self.keep.reach or {}}
         for event in events_of(run) if self.keep.events or reached else ():
             if event.name in reached:
                 row.setdefault(reached[event.name], event.t)
@@ -259,4 +259,4 @@ class RunByRun:
         """The code of a reason, which goes on behind what the table has of it."""
         # Reasons of runs go on with times and numbers, which are no part of the code.
         fitting = [text for text in self.reasons if reason.startswith(text)]
-        return self.reasons.index(max(fitting, key=len, default=OTHER))
+        return self.reasons.index(max(fitting, key=len, default=OTHER_REASON))

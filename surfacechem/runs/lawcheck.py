@@ -20,10 +20,10 @@ from surfacechem.errors import InputError, suggestion
 from surfacechem.quantities import BOLTZMANN, VARIABLES
 from surfacechem.tolerances import NO_AMOUNT, TINY
 
-TRIALS = 20
+DRAWS = 20
 """Draws of parameters and variables; a choice."""
 
-INSIDE, ROOM = (0.1, 0.9), 600.0
+RANGE_PARTS, ROOM = (0.1, 0.9), 600.0
 """Fractions of a range that are drawn from, and twice the temperature [K] of a room."""
 
 READABLE = {*VARIABLES, "x", "T", "N_c", "M", "u", "r"}
@@ -57,7 +57,7 @@ def problems(law: type[Law]) -> list[str]:
     read = reads(getattr(law, law.formula))[1:]
     unknown = [name for name in read if name not in READABLE and not name.startswith(("T", "theta_"))]
     found += [f"it reads '{name}', which no scene has.{suggestion(name, READABLE)}" for name in unknown]
-    return found or [*worked_numbers(law), *tried(law)]
+    return found or [*worked_numbers(law), *first_error(law)]
 
 
 def worked_numbers(law: type[Law]) -> Iterator[str]:
@@ -71,16 +71,16 @@ def worked_numbers(law: type[Law]) -> Iterator[str]:
             yield f"its worked number is another: {' '.join(lines[-4:])}"
 
 
-def tried(law: type[Law]) -> Iterator[str]:
+def first_error(law: type[Law]) -> Iterator[str]:
     """Yield the first error at random parameters and states, if any."""
-    for seed in range(TRIALS):
+    for seed in range(DRAWS):
         draw = random.Random(seed)
         try:
             made = _instance(law, draw)
             # Temperatures about that of a room, all else about one.
             names = reads(made.statement)
-            values = {name: draw.uniform(*INSIDE) * (ROOM if name.startswith("T") else 1.0) for name in names}
-            wrong = _differs(made, values) or against(made, values)
+            values = {name: draw.uniform(*RANGE_PARTS) * (ROOM if name.startswith("T") else 1.0) for name in names}
+            wrong = _differs(made, values) or second_law_violation(made, values)
         except (InputError, ArithmeticError, TypeError, ValueError, RuntimeError) as error:
             wrong = f"its formula fails: {type(error).__name__}: {error}"
         if wrong:
@@ -94,7 +94,7 @@ def _instance(law: type[Law], draw: random.Random) -> Any:
     for name, spec in law.specs():
         low = max(spec.above, spec.at_least)
         start = low if math.isfinite(low) else 0.0
-        values[name] = start + draw.uniform(*INSIDE) * min(1.0, spec.at_most - start)
+        values[name] = start + draw.uniform(*RANGE_PARTS) * min(1.0, spec.at_most - start)
     made = law(**values)
     return made.bind(made.piece(0.5)) if isinstance(made, Load) else made
 
@@ -113,7 +113,7 @@ def _differs(law: Law, values: dict[str, float]) -> str:
     return ""
 
 
-def against(law: Law, values: dict[str, float]) -> str:
+def second_law_violation(law: Law, values: dict[str, float]) -> str:
     """Violation of the second law, by a law that drives what it has to resist; empty where there is none."""
     if isinstance(law, Friction) and "v" in values:
         for v in (0.7, -0.7):

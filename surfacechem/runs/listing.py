@@ -15,14 +15,14 @@ from surfacechem.errors import LAWS, InputError, suggestion
 from surfacechem.laws import FAMILIES, laws
 from surfacechem.runs.sheet import Sheet
 
-WIDTH = 110
+TEXT_WIDTH = 110
 TABLE = """
 alpha α  beta β  delta δ  Delta Δ  eta η  theta θ  kappa κ  lambda λ  mu μ  nu ν  pi π  Pi Π  rho ρ  sigma σ
 Sigma Σ  tau τ  phi φ  psi ψ  Psi Ψ  omega ω  varepsilon ε  epsilon ε  chi χ  gamma γ  xi ξ  ge ≥  le ≤  cdot ·
 times ×  partial ∂  infty ∞  pm ±  to →  int ∫  sum Σ  prod Π  approx ≈  simeq ≃  propto ∝  ll ≪  gg ≫  ne ≠
 langle ⟨  rangle ⟩  ell ℓ  Lambda Λ  Phi Φ
 """
-SIGN = dict(zip(TABLE.split()[::2], TABLE.split()[1::2], strict=True))
+SIGNS = dict(zip(TABLE.split()[::2], TABLE.split()[1::2], strict=True))
 """LaTeX commands with one character; function names keep their letters."""
 
 FUNCTIONS = r"(?:ln|exp|sin|cos|min|max)"
@@ -30,7 +30,7 @@ FUNCTIONS = r"(?:ln|exp|sin|cos|min|max)"
 FORMULA = re.compile(r"\.\. math::((?:.*\n)(?:[ \t]+.*\n?)*)")
 ROLE = re.compile(r":math:`([^`]*)`")
 
-ONE = r"\s*(?:\{\s*(\w)\s*\}|(\w))"
+ACCENTED = r"\s*(?:\{\s*(\w)\s*\}|(\w))"
 """The argument of an accent: one letter, in braces or not."""
 
 
@@ -42,10 +42,10 @@ def plain(latex: str) -> str:
     """
     text = re.sub(r"\\q?quad", "\0", re.sub(r"\\(?:left|right)\b|\\[,!; ]|&", " ", latex))
     text = re.sub(r"(?<=\w)(?=\\)", " ", text)
-    text = re.sub(r"\\([A-Za-z]+)", lambda m: SIGN.get(m[1], m[0]), text)
-    text = re.sub(rf"\\dot{ONE}(_\{{(?:[^{{}}]|\{{[^{{}}]*\}})*\}}|_\w)?", r"d\1\2\3/dt ", text)
-    text = re.sub(rf"\\bar{ONE}", r"\1\2_mean ", text)
-    text = re.sub(rf"\\hat{ONE}", r"\1\2_max ", text)
+    text = re.sub(r"\\([A-Za-z]+)", lambda m: SIGNS.get(m[1], m[0]), text)
+    text = re.sub(rf"\\dot{ACCENTED}(_\{{(?:[^{{}}]|\{{[^{{}}]*\}})*\}}|_\w)?", r"d\1\2\3/dt ", text)
+    text = re.sub(rf"\\bar{ACCENTED}", r"\1\2_mean ", text)
+    text = re.sub(rf"\\hat{ACCENTED}", r"\1\2_max ", text)
     text = re.sub(r"\\(?:text|mathrm|operatorname)\s*\{([^{}]*)\}", r"\1", text)
     text = re.sub(rf"\\({FUNCTIONS})\b\s*(?=\w)", r"\1 ", text)
     text = re.sub(rf"\\({FUNCTIONS})\b", r"\1", text)
@@ -91,7 +91,7 @@ def law_table(contract: type[Law]) -> str:
 
 
 def _wrapped(text: str) -> str:
-    return textwrap.fill(text, WIDTH, initial_indent=" " * 6, subsequent_indent=" " * 10, break_on_hyphens=False)
+    return textwrap.fill(text, TEXT_WIDTH, initial_indent=" " * 6, subsequent_indent=" " * 10, break_on_hyphens=False)
 
 
 def _first_line(kind: type) -> str:
@@ -123,7 +123,7 @@ def source(law: type[Law]) -> str:
 
 def _apart(formula: str) -> str:
     """Formulas in a line, or each in its own where they are too long for one."""
-    several = formula if len(formula) < WIDTH else formula.replace(",  ", ",\n").replace(";  ", ";\n")
+    several = formula if len(formula) < TEXT_WIDTH else formula.replace(",  ", ",\n").replace(";  ", ";\n")
     return textwrap.indent(several, "    ")
 
 

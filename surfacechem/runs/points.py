@@ -41,12 +41,12 @@ from surfacechem.tolerances import GUARD_EPS, RUN_EPS, TINY
 
 Points = Mapping[str, ArrayLike]
 
-TRIALS = 50
+MOST_NEWTON = 50
 """Largest number of Newton's steps; what is linear, as all rates are, takes one."""
 
 POINT = ("point",)
 UNSOLVED = "the equations have no solution with these values"
-LEVEL = ".level"
+LEVEL_SUFFIX = ".level"
 """Suffix of the paths of the values at which histories are held."""
 
 
@@ -83,7 +83,7 @@ class PointResults(Results):
         return {**self._origin("evaluated", f"at {len(self.refused)} points"), "versions": versions()}
 
 
-def held(scene: Scene) -> Scene:
+def with_histories_held(scene: Scene) -> Scene:
     """The scene with every history held at its value at the start."""
 
     def level(load: Any) -> Any:
@@ -130,7 +130,7 @@ class Evaluator:
     """A scene compiled for its values and derivatives at many points."""
 
     def __init__(self, scene: Scene) -> None:
-        self.system = system = assemble(held(scene))
+        self.system = system = assemble(with_histories_held(scene))
         if system.outside is not None:
             message = "rates of the mechanism come from Cantera itself, which gives no derivatives."
             raise InputError(message, path="interface.mechanism")
@@ -258,7 +258,7 @@ class Evaluator:
 
     def _solved(self, table: Array, rows: Sequence[int], unknown: Sequence[int]) -> tuple[Array, Array, Array]:
         """Balances and rows at the points, their derivatives and the margins, where these balances hold."""
-        for _ in range(TRIALS):
+        for _ in range(MOST_NEWTON):
             values, slopes, margins = self.slopes(table)
             change = -_solve(self.slopes.block(slopes, rows, unknown), values[:, rows, None])[..., 0]
             if np.all(np.isnan(change) | (np.abs(change) <= RUN_EPS * np.maximum(np.abs(table[:, unknown]), TINY))):
@@ -290,7 +290,7 @@ class Conditions:
         return [(UNSOLVED, *told, "")[first] for first in found.argmax(axis=1)]
 
 
-FLUXES = ("Pa", "W/m^2", "N", "W")
+FLUX_UNITS = ("Pa", "W/m^2", "N", "W")
 """Units of tractions and heat fluxes, whose derivatives a contact element takes by name, zeros among them."""
 
 
@@ -351,14 +351,14 @@ def _states(system: System) -> dict[str, Argument]:
 
 def _histories(system: System) -> dict[str, Argument]:
     """Prescribed variables, which are parameters where they are held."""
-    levels = {p.symbol: p.path for p in system.parameters if p.path.endswith(LEVEL)}
+    levels = {p.symbol: p.path for p in system.parameters if p.path.endswith(LEVEL_SUFFIX)}
     held_at = [(item.quantity, item.expression) for item in system.named if item.expression in levels]
     return {q.name: Argument(system.inputs.index(symbol), q, levels[symbol]) for q, symbol in held_at}
 
 
 def _parameters(system: System) -> dict[str, Argument]:
     """Parameters of laws by path."""
-    own = [p for p in system.parameters if p.changeable and not p.path.endswith(LEVEL)]
+    own = [p for p in system.parameters if p.changeable and not p.path.endswith(LEVEL_SUFFIX)]
     quantities = [Quantity(re.sub(r"\W+", "_", p.path).strip("_"), p.spec.unit, p.spec.text) for p in own]
     return {p.path: Argument(system.inputs.index(p.symbol), q, p.path) for p, q in zip(own, quantities, strict=True)}
 
@@ -423,7 +423,7 @@ def _column(quantity: Quantity, values: Array) -> Column:
 def _by(x: Quantity, shown: Sequence[Quantity], slopes: Array, there: NDArray[np.bool_]) -> Iterator[Column]:
     """Derivatives of quantities by one, of those that depend on it; of tractions and heat fluxes all of them."""
     for quantity, values, depends in zip(shown, slopes, there, strict=True):
-        if depends or quantity.unit in FLUXES:
+        if depends or quantity.unit in FLUX_UNITS:
             name = "_by_".join(DATASET_NAMES.get(name, name) for name in (quantity.name, x.name))
             # What else the names say is theirs.
             top, bottom = (re.split("[:,(]", q.long_name)[0].strip() for q in (quantity, x))

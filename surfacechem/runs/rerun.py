@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 A = TypeVar("A")
 
 
-DEPARTURES: Mapping[str, tuple[type, ...]] = {
+DEPARTURE_TYPES: Mapping[str, tuple[type, ...]] = {
     "changes": (dict,),
     "units": (dict,),
     "times": (list,),
@@ -85,13 +85,13 @@ def read(path: str | Path) -> Record:
 
 
 @dataclass(frozen=True)
-class Kept:
+class KeptSweep:
     """A repeated sweep of whose runs a part is kept."""
 
     data: xarray.Dataset
 
     @classmethod
-    def of(cls, record: Record, case: cases.Case) -> Kept:
+    def of(cls, record: Record, case: cases.Case) -> KeptSweep:
         """A repeated sweep that has kept what its case says, in one file."""
         try:
             plan = recorded_plan(record.attribute("sweep", str))
@@ -115,7 +115,7 @@ class Kept:
         return save_kept(self.data, dataset_path(path))
 
 
-def run_again(record: Record, allow_code: bool = False) -> Solution | SweepSolution | Kept:
+def run_again(record: Record, allow_code: bool = False) -> Solution | SweepSolution | KeptSweep:
     """The case of a record, run or swept as it was; with ``allow_code`` by laws whose source the record keeps."""
     mechanism = record.attribute("mechanism", str) if "mechanism" in record.attributes else None
     text = record.attribute("case", str)
@@ -124,7 +124,7 @@ def run_again(record: Record, allow_code: bool = False) -> Solution | SweepSolut
     where = f"case in {record.path}"
     case = cases.load_text(text, record.path.stem, record.path.parent, mechanism, file=where, allow_code=allow_code)
     if "keep" in record.attributes:
-        return Kept.of(record, case)
+        return KeptSweep.of(record, case)
     departures = _departures(record)
     solver, rtol = record.attribute("solver", str), record.attribute("rtol", float)
     if solver not in solvers.names:
@@ -156,8 +156,8 @@ def _departures(record: Record) -> Mapping[str, Any]:
         found = json.loads(record.attribute("departures", str))
     except (ValueError, RecursionError):
         raise record.error("the attribute 'departures' is no JSON.") from None
-    if not isinstance(found, dict) or any(not isinstance(found[k], DEPARTURES.get(k, ())) for k in found):
-        raise record.error(f"the attribute 'departures' may hold {', '.join(DEPARTURES)}, each of its kind.")
+    if not isinstance(found, dict) or any(not isinstance(found[k], DEPARTURE_TYPES.get(k, ())) for k in found):
+        raise record.error(f"the attribute 'departures' may hold {', '.join(DEPARTURE_TYPES)}, each of its kind.")
     numbers = [*found.get("times", []), *found.get("changes", {}).values(), found.get("max_steps", 1)]
     numbers += [found["picture"]] if found.get("picture") is not None else []
     if not all(isinstance(value, float | int) and math.isfinite(value) for value in numbers):
@@ -165,7 +165,7 @@ def _departures(record: Record) -> Mapping[str, Any]:
     return found
 
 
-def differences(record: Record, solution: Solution | SweepSolution | Kept) -> list[str]:
+def differences(record: Record, solution: Solution | SweepSolution | KeptSweep) -> list[str]:
     """Names of the variables that are not bit for bit those of the record, or in one of the two only."""
     ours = {column.name: np.asarray(column.values) for column in solution.columns}
     theirs = record.variables

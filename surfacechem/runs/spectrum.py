@@ -29,7 +29,7 @@ INTACT = LEAST_BONDED**0.5
 LEAST_BONDED, at which a run has ruptured and ends.
 """
 
-MEDIAN, MODE = "half of the bonds are broken", "the density of ruptures is stationary"
+MEDIAN_REASON, MODE_REASON = "half of the bonds are broken", "the density of ruptures is stationary"
 
 
 @dataclass(frozen=True)
@@ -96,8 +96,8 @@ def with_rupture(system: System, variable: str) -> System:
         margins=(
             *system.margins,
             Margin("intact", survival - LEAST_BONDED, "all bonds broke"),
-            Margin("median", survival - 0.5, MEDIAN, terminal=False),
-            Margin("mode", _total(system, falling), MODE, terminal=False),
+            Margin("median", survival - 0.5, MEDIAN_REASON, terminal=False),
+            Margin("mode", _total(system, falling), MODE_REASON, terminal=False),
         ),
     )
 
@@ -162,7 +162,7 @@ def statistics(trajectory: Trajectory, variable: str) -> Statistics:
     told = [*(margin.reason for margin in model.margins), *(item.reason for item in model.system.edges)]
     reasons = np.array(told)[result.events.index]
     at = model.evaluate(result, result.events.t, result.events.y, result.events.ydot)
-    halves, peaks = at[reasons == MEDIAN], np.concatenate([trajectory.outputs[:1], at[reasons == MODE]])
+    halves, peaks = at[reasons == MEDIAN_REASON], np.concatenate([trajectory.outputs[:1], at[reasons == MODE_REASON]])
     survivors, integral = _at_end(trajectory, f"mean_{variable}")
     return Statistics(
         mode=float(peaks[np.argmax(peaks[:, density]), column]),

@@ -22,10 +22,10 @@ from surfacechem.results.dataset import quantities
 from surfacechem.results.netcdf import CONVENTIONS, COORDINATES, Column, cf_unit, versions
 from surfacechem.results.store import CHUNK_BYTES, Layout, Store, StoredArray, begin, opened, store_path
 from surfacechem.runs import checking, keeping, sweeps
-from surfacechem.runs.arrays import ArrayRuns, JumpingRuns, quiet, solvable
+from surfacechem.runs.arrays import ArrayRuns, JumpingRuns, cannot_jump, is_array
 from surfacechem.runs.at_rest import UnrestError, refuse_histories, to_rest
 from surfacechem.runs.checking import Checked, checked_arrays
-from surfacechem.runs.keeping import REFUSED, STATUSES, UNREST, Columns, Keep, RunByRun, keep_of, variable
+from surfacechem.runs.keeping import INADMISSIBLE, NOT_AT_REST, STATUSES, Columns, Keep, RunByRun, keep_of, variable
 from surfacechem.solve import AUTO
 from surfacechem.solve.contract import Index
 from surfacechem.solve.lanes import lane_batch
@@ -74,8 +74,8 @@ class ChunkRuns:
         self.run = sweeps.following(self.model, plan, chosen, changes) if keep.series and run is None else chosen
         self.one_by_one = RunByRun(self.model, keep, chosen.steady)
         arrays = ArrayRuns(self.model, plan, self.run, changes, keep)
-        told = solvable(self.model, plan, self.run, arrays.problem)
-        self.ways = [arrays] if told and quiet(self.model, arrays.problem) else []
+        told = is_array(self.model, plan, self.run, arrays.problem)
+        self.ways = [arrays] if told and cannot_jump(self.model, arrays.problem) else []
         if told and self.model.system.edges:
             self.ways.append(JumpingRuns(self.model, plan, self.run, changes, keep))
         """Ways to compute runs as arrays, in the order in which they are tried; the rest is looked at one by one."""
@@ -144,7 +144,7 @@ class ChunkRuns:
             return [*self.model.solve_all(list(zip(runs, full, strict=True)))]
         except InputError as error:
             if len(chosen) == 1:
-                return [UNREST if isinstance(error, UnrestError) else REFUSED]
+                return [NOT_AT_REST if isinstance(error, UnrestError) else INADMISSIBLE]
         return [run for i in chosen.tolist() for run in self._solved(values, np.array([i]))]
 
 

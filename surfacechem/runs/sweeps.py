@@ -30,9 +30,9 @@ from surfacechem.results.netcdf import COORDINATES, Column, versions
 from surfacechem.results.picture import shared_times
 from surfacechem.runs import spectrum
 from surfacechem.runs.keeping import (
-    ENDS,
+    END_COLUMNS,
     EXTREMES,
-    SINGLE,
+    SINGLE_COLUMNS,
     at_end,
     balances_of,
     described,
@@ -47,10 +47,10 @@ from surfacechem.tolerances import EPS
 
 Rupture = Statistics | Lifetime
 
-OWN_NAMES = ("time", RUN_DIMENSION, "species", "coverage", "error", "entropy_destroyed", "lifetime")
+RESERVED_COLUMNS = ("time", RUN_DIMENSION, "species", "coverage", "error", "entropy_destroyed", "lifetime")
 """Names of dimensions and columns of sweeps that are no quantities."""
 
-BEGINNINGS = ("event", "checked", "hardest")
+PREFIXES = ("event", "checked", "hardest")
 """Beginnings of the names of dimensions and columns of events, and of runs that are checked."""
 
 MOST_FOLLOWED = 64
@@ -59,7 +59,7 @@ MOST_FOLLOWED = 64
 MOST_OUTPUTS = 128_000
 """Outputs of all runs of a sweep together, where these need more than even times would be."""
 
-PORTION = 256
+RUNS_AT_A_TIME = 256
 """Runs that are solved at a time; between portions a sweep tells how far it is."""
 
 log = logging.getLogger(__name__)
@@ -98,9 +98,9 @@ def solve(
         runs = all_to_rest(model, runs[0], values)
     pairs = list(zip(runs, values, strict=True))
     done: list[Trajectory] = []
-    for start in range(0, len(pairs), PORTION):
+    for start in range(0, len(pairs), RUNS_AT_A_TIME):
         log.info("runs", extra={"done": start, "total": len(pairs)})
-        portion = pairs[start : start + PORTION]
+        portion = pairs[start : start + RUNS_AT_A_TIME]
         try:
             done += model.solve_all(portion, threads or os.cpu_count() or 1)
         except InputError as error:
@@ -308,18 +308,18 @@ def parameter_names(system: System, plan: Plan) -> dict[str, str]:
     for path in plan.paths:
         parts = name_parts(path)
         names = ["_".join(parts[-k:]) for k in range(1, len(parts) + 1)]
-        free = (name for name in names if name not in taken | set(found) and not name.startswith(BEGINNINGS))
+        free = (name for name in names if name not in taken | set(found) and not name.startswith(PREFIXES))
         found[next(free, f"{names[-1]}_swept")] = path
     return found
 
 
 def _column_names(system: System) -> set[str]:
-    """Names that columns of a file or a store of a sweep may have, and its dimensions, beside those of BEGINNINGS."""
+    """Names that columns of a file or a store of a sweep may have, and its dimensions, beside those of PREFIXES."""
     kept, shown = keep_of(None, system), {DATASET_NAMES.get(name, name) for name in quantities(system)}
     stored = described(system, replace(kept, at_events=kept.last, reach=dict.fromkeys(kept.last, 0.0)))
     more = [f"{name}_{which}" for name in shown for which in (*EXTREMES, *STATISTICS, "before", "after")]
     exact = [f"{name}_exact" for name in (*more, "lifetime")]
-    return {*kept.last, *shown, *system.inside, *stored, *ENDS, *more, *exact, *OWN_NAMES}
+    return {*kept.last, *shown, *system.inside, *stored, *END_COLUMNS, *more, *exact, *RESERVED_COLUMNS}
 
 
 def dimensions(plan: Plan, names: Mapping[str, str]) -> dict[str, int]:
@@ -393,7 +393,7 @@ class SweepSolution(Results):
 
     @cached_property
     def run_ends(self) -> list[dict[str, Any]]:
-        """Entries of ENDS for each run."""
+        """Entries of END_COLUMNS for each run."""
         return [end_of(run) | balances_of(run, books) for run, books in zip(self.runs, self.audits, strict=True)]
 
     def worst(self, balance: str) -> float:
@@ -477,7 +477,7 @@ class SweepSolution(Results):
         for name, q in quantities(self.system).items():
             found = {which: [extreme(run, name, which) for run in self.runs] for which in EXTREMES}
             found["last"] = [end[name] for end in ends]
-            for which, words in SINGLE.items():
+            for which, words in SINGLE_COLUMNS.items():
                 own = f"{DATASET_NAMES.get(name, name)}_{which}"
                 yield self._of_each(own, found[which], q.unit, f"{q.long_name} {words}")
 
@@ -507,7 +507,7 @@ class SweepSolution(Results):
         """Columns on the runs: end, balances, jumps and error."""
         columns = [
             self._of_each(name, [end[name] for end in self.run_ends], "s" if name == "time_reached" else "1", text)
-            for name, text in ENDS.items()
+            for name, text in END_COLUMNS.items()
         ]
         if self.system.edges:
             destroyed = [entropy_destroyed(run.jumps) for run in self.runs]

@@ -15,7 +15,7 @@ from surfacechem.contracts.units import parse
 from surfacechem.errors import InputError, Place
 from surfacechem.mechanism.source import Source
 from surfacechem.results.findings import in_words
-from surfacechem.runs.listing import WIDTH, source
+from surfacechem.runs.listing import TEXT_WIDTH, source
 from surfacechem.runs.sheet import columns
 from surfacechem.solve.contract import Array
 from surfacechem.studies.mechanism_rates import Curves, cycle_verdict, cycles
@@ -78,7 +78,7 @@ def sheet(curves: Curves, temperatures: Span, forces: Span) -> str:
     types = []
     for kind in dict.fromkeys(type(law) for law in curves.laws.values()):
         text = f"{kind.kind}: {source(kind)}".replace("``", "")
-        types += textwrap.wrap(text, WIDTH - 2, subsequent_indent="    ", break_on_hyphens=False)
+        types += textwrap.wrap(text, TEXT_WIDTH - 2, subsequent_indent="    ", break_on_hyphens=False)
     outside = [(law.label, law.equation, f"line {law.place.line}") for law in curves.evaluated if law.place]
     cold, pulled = np.array([shown]), curves.pulled or "a bond"
     sections = {

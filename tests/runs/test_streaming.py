@@ -470,7 +470,7 @@ def test_errors_of_runs_that_are_checked_are_those_of_a_sweep(tmp_path, monkeypa
     assert found.source == swept.dataset.attrs["error_source"]
     steps, hardest = data["steps"].values.ravel(), data["hardest_run"].values
     assert sorted(hardest[hardest >= 0]) == list(range(7))
-    monkeypatch.setattr(checking, "HARDEST", 3)
+    monkeypatch.setattr(checking, "HARDEST_RUNS", 3)
     few = checking._hardest(stream)
     assert sorted(steps[few]) == sorted(np.sort(steps)[-3:])
 
@@ -490,7 +490,7 @@ def test_an_error_that_is_unknown_and_an_end_that_is_no_number_count_for_no_smal
     monkeypatch.setattr(checking, "RunByRun", lambda *_: SimpleNamespace(columns=lambda *_: ends))
     done = SimpleNamespace(
         accuracy=SimpleNamespace(errors=np.array([np.nan, 1e-9, 1e-9, 1e-9]), source="", why=""),
-        run_ends=[dict.fromkeys(checking.TOLD, 0.0)] * 4,
+        run_ends=[dict.fromkeys(checking.BALANCE_COLUMNS, 0.0)] * 4,
         runs=[SimpleNamespace(some=SimpleNamespace(roundings={}))] * 4,
         audits=[],
     )
