@@ -27,7 +27,7 @@ SHORTER_TIMES = (1e6, 1e4, 1e2, 1.0)
 not stay what they are.
 """
 
-UNTIL = "run.until"
+PATH = "run.until"
 
 
 class UnrestError(InputError):
@@ -38,7 +38,7 @@ def refuse_histories(system: System) -> None:
     """Raise InputError where no steady state can be."""
     moving = [item.name for item in system.named if depends(system.expand(item.expression), system.t)]
     if moving:
-        raise InputError(f"{moving[0]} changes in time, so there is no steady state: give it one value.", path=UNTIL)
+        raise InputError(f"{moving[0]} changes in time, so there is no steady state: give it one value.", path=PATH)
 
 
 def to_rest(model: Model, run: Run, values: Mapping[str, float]) -> Run:
@@ -60,9 +60,7 @@ def to_rest(model: Model, run: Run, values: Mapping[str, float]) -> Run:
         alike = np.all(change <= NEGLIGIBLE * np.maximum(np.abs(near.result.y), scales))
         if near.status == "finished" and last * REST_RATIO <= end and alike:
             return replace(run, times=_until(run, last), rest=last)
-    raise UnrestError(
-        f"the case did not reach a steady state within {HORIZON:.3g} s: {name} still changes.", path=UNTIL
-    )
+    raise UnrestError(f"the case did not reach a steady state within {HORIZON:.3g} s: {name} still changes.", path=PATH)
 
 
 def _looked(model: Model, run: Run, values: Mapping[str, float], end: float) -> Trajectory:
