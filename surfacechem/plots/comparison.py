@@ -180,7 +180,7 @@ def _draw(
                 points = "sweep" in dataset.attrs or len(values) < 3
                 look: Any = {"marker": style.marker(ax, len(values)), "markersize": style.MARKER_SIZE} if points else {}
                 look["drawstyle"] = style.drawn_as(dataset[name])
-                ax.plot(dataset[over].values, values, color=colour, linestyle=dash, linewidth=1.3, **look)
+                style.draw_curve(ax, dataset, over, values, color=colour, linestyle=dash, linewidth=1.3, **look)
     words = panel.title or ", ".join(map(symbol, panel.names[:2]))
     style.label(ax.yaxis, words, panel.unit, np.concatenate(drawn))
     several = panel.names if len(panel.names) > 1 else ()

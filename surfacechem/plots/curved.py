@@ -182,13 +182,7 @@ def _draw_field(ax: Axes, dataset: xarray.Dataset) -> None:
 def _draw_force(ax: Axes, dataset: xarray.Dataset) -> None:
     """Force over the approach, and what the local law gives."""
     approach, force = dataset["g_n"].values, dataset["t_n"].values
-    # What jumps on the way passes no force in between.
-    events = dataset["event_time"].values if "event_time" in dataset else np.empty(0)
-    jumps = np.searchsorted(dataset["time"].values, events)
-    for number, part in enumerate(np.split(np.arange(len(force)), jumps)):
-        ax.plot(approach[part], force[part], color="C0", label="_" if number else "force")
-    for number, k in enumerate(jumps):
-        ax.plot(approach[k - 1 : k + 1], force[k - 1 : k + 1], ":", color="0.4", label="_" if number else "jump")
+    style.draw_curve(ax, dataset, "g_n", force, label="force")
     if "local_difference" in dataset:
         local = dataset["force"].values + dataset["local_difference"].values
         ax.plot(dataset["approach"].values, local, "o", color="black", markersize=4, label="local law")

@@ -1,7 +1,7 @@
 """Figures of runs: states, fluxes and balances over time, the exact solution dashed where the dataset has one; and of
 quantities at given states, over what these differ in.
 
-Events are thin lines with their names, stages and modes are bands.
+Events are thin lines with their names, stages and modes are bands; a curve is dotted where it jumps.
 """
 
 from __future__ import annotations
@@ -275,8 +275,7 @@ def _across(dataset: xarray.Dataset, names: Sequence[str]) -> Figure:
 def _draw(ax: Axes, dataset: xarray.Dataset, panel: Panel, over: str, first: float | None) -> None:
     """The curves of a panel, with the unit that suits what is seen of them from ``first`` on."""
     t = dataset[over].values
-    _draw_curves(ax, dataset, panel, t)
-    _draw_exact(ax, dataset, panel, t)
+    _draw_curves(ax, dataset, panel, over)
     start = first or 0.0
     if first is None and over == "time" and panel.unit == FLUX:
         start = _show_behind_spike(ax, dataset, panel)
@@ -287,13 +286,6 @@ def _draw(ax: Axes, dataset: xarray.Dataset, panel: Panel, over: str, first: flo
         middle = float(drawn.mean())
         ax.set_ylim(middle - 0.05 * abs(middle or 1.0), middle + 0.05 * abs(middle or 1.0))
     style.legend(ax)
-
-
-def _draw_exact(ax: Axes, dataset: xarray.Dataset, panel: Panel, t: Array) -> None:
-    """The exact curves that the dataset has of those of a panel."""
-    exact = [f"{name}_exact" for name in panel.names if f"{name}_exact" in curves(dataset)]
-    for k, name in enumerate(exact):
-        ax.plot(t, dataset[name].values, linestyle=DASHES, color="black", linewidth=0.9, label="_" if k else "exact")
 
 
 def _finite_values(dataset: xarray.Dataset, panel: Panel, rows: Any = slice(None)) -> Array:
@@ -319,9 +311,9 @@ def _show_behind_spike(ax: Axes, dataset: xarray.Dataset, panel: Panel) -> float
     return start
 
 
-def _draw_curves(ax: Axes, dataset: xarray.Dataset, panel: Panel, t: Array) -> None:
-    """The curves of a panel; where they are many, the largest in colours and the rest in grey."""
-    groups, marker = group_coinciding(dataset, panel.names), "o" if len(t) == 1 else ""
+def _draw_curves(ax: Axes, dataset: xarray.Dataset, panel: Panel, over: str) -> None:
+    """The curves of a panel, and the exact ones; where they are many, the largest in colours and the rest in grey."""
+    groups, marker = group_coinciding(dataset, panel.names), "o" if dataset.sizes["time"] == 1 else ""
     rest: list[list[str]] = []
     if len(groups) > len(style.COLOURS):
         # A trace gas beside a full surface is nothing to be told by its colour.
@@ -330,10 +322,15 @@ def _draw_curves(ax: Axes, dataset: xarray.Dataset, panel: Panel, t: Array) -> N
     for names in groups:
         label = " = ".join([*map(symbol, names[:MOST_NAMES]), *(["..."] if len(names) > MOST_NAMES else [])])
         look = style.drawn_as(dataset[names[0]])
-        ax.plot(t, dataset[names[0]].values, label=label, marker=marker, drawstyle=look)
+        style.draw_curve(ax, dataset, over, dataset[names[0]].values, label=label, marker=marker, drawstyle=look)
     for k, names in enumerate(rest):
         label = "_" if k else f"{len(rest)} smaller"
-        ax.plot(t, dataset[names[0]].values, label=label, marker=marker, color="0.75", linewidth=0.8, zorder=1)
+        look = {"label": label, "marker": marker, "color": "0.75", "linewidth": 0.8, "zorder": 1}
+        style.draw_curve(ax, dataset, over, dataset[names[0]].values, **look)
+    exact = [f"{name}_exact" for name in panel.names if f"{name}_exact" in curves(dataset)]
+    for k, name in enumerate(exact):
+        look = {"label": "_" if k else "exact", "linestyle": DASHES, "color": "black", "linewidth": 0.9}
+        style.draw_curve(ax, dataset, over, dataset[name].values, **look)
 
 
 def group_coinciding(dataset: xarray.Dataset, names: Sequence[str]) -> list[list[str]]:

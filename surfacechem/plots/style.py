@@ -324,6 +324,19 @@ def drawn_as(values: xarray.DataArray) -> Any:
     return "steps-post" if is_mode(values) else "default"
 
 
+def draw_curve(ax: Axes, dataset: xarray.Dataset, over: str, values: Array, **look: Any) -> None:
+    """Draw values over a variable, dotted from one output to the next where both have the same time: a jump passes no
+    value in between.
+    """
+    x, times = dataset[over].values, dataset[dataset[over].dims[0]].values
+    jumps = 1 + np.flatnonzero(np.abs(np.diff(times)) <= FLAT * np.abs(times[1:]))
+    (line,) = ax.plot(np.insert(x, jumps, np.nan), np.insert(values, jumps, np.nan), **look)
+    if len(jumps):
+        sides = np.full(len(x), np.nan)
+        sides[[*jumps - 1, *jumps]] = values[[*jumps - 1, *jumps]]
+        ax.plot(x, sides, ":", color=line.get_color(), linewidth=0.9, zorder=line.get_zorder() - 0.1)
+
+
 def unit(values: xarray.DataArray) -> str:
     """The unit of a variable in the notation of the CF conventions."""
     return str(values.attrs.get("units", "1"))

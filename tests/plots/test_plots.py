@@ -282,3 +282,11 @@ def test_events_at_one_time_are_all_counted():
     plot = figure(surfacechem.run("bouncing-plate").dataset)
     said = [text.get_text() for text in plot.findobj(matplotlib.text.Text)]
     assert any("78 impact (dotted), rest" in text for text in said)
+
+
+def test_a_jump_is_dotted_from_the_value_before_to_that_after():
+    t = np.array([0.0, 1.0, np.nextafter(1.0, 2.0), 2.0])
+    solid, dotted = figure(dataset(t, p=("Pa", np.array([1.0, 2.0, 5.0, 4.0]))), ["p"], "T_1").axes[0].get_lines()
+    assert solid.get_ydata() == pytest.approx([1, 2, np.nan, 5, 4], nan_ok=True)
+    assert dotted.get_ydata() == pytest.approx([np.nan, 2, 5, np.nan], nan_ok=True)
+    assert dotted.get_linestyle() == ":"
