@@ -359,7 +359,7 @@ def mechanism(
     if output:
         check_picture(output)
     curves = Curves(load_mechanism(Path(file if Path(file).suffix else f"{file}.yaml"), phase, evaluate=True))
-    typer.echo(report.sheet(curves, temperatures, forces))
+    typer.echo(report.mechanism_sheet(curves, temperatures, forces))
     if output:
         from surfacechem import plots
 

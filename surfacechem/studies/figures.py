@@ -50,10 +50,10 @@ log = logging.getLogger(__name__)
 
 SCALES = "linear", "log"
 
-HIDDEN = 1 / 200
+HIDDEN_PART = 1 / 200
 """Fraction of its range by which a curve has to differ from another to be seen beside it."""
 
-EXACT: Mapping[str, Any] = {"color": "0.8", "linewidth": 4.5, "zorder": 1}
+EXACT_STYLE: Mapping[str, Any] = {"color": "0.8", "linewidth": 4.5, "zorder": 1}
 """Style of exact curves."""
 
 
@@ -168,11 +168,11 @@ def _coincide(one: Line, other: Line) -> bool:
     """Whether two curves hide each other."""
     span = float(np.ptp(other.y[np.isfinite(other.y)])) or 1.0
     near = np.interp(one.x, other.x, other.y) - one.y
-    return bool(np.nanmax(np.abs(near)) < HIDDEN * span)
+    return bool(np.nanmax(np.abs(near)) < HIDDEN_PART * span)
 
 
 @dataclass(frozen=True)
-class Picture:
+class ListFigure:
     """A figure of a list with its curves."""
 
     section: FigureSection
@@ -192,7 +192,7 @@ class Picture:
         with panels(5.4, 3.6) as (plot, ((ax,),)):
             for curve in self.curves:
                 if curve.exact is not None:
-                    ax.plot(*curve.exact, **EXACT)  # wide, so that it is seen below what lies on it
+                    ax.plot(*curve.exact, **EXACT_STYLE)  # wide, so that it is seen below what lies on it
             for i, curve in enumerate(self.curves):
                 colour = COLOURS[i % len(COLOURS)]
                 shown = np.where(curve.refused, np.nan, curve.y)
@@ -209,7 +209,7 @@ class Picture:
     def _label(self, ax: Any) -> None:
         x, y = self.section.x, self.section.y
         ax.set(xlabel=x.name, ylabel=y.name, xscale=x.scale, yscale=y.scale)
-        beside = [ax.plot([], [], label="exact", **EXACT)] if self._any("exact") else []
+        beside = [ax.plot([], [], label="exact", **EXACT_STYLE)] if self._any("exact") else []
         beside += [ax.plot([], [], "o", color="0.4", markersize=4, label="published")] if self._any("data") else []
         beside += [ax.plot([], [], ":", color="0.4", label="breaks the second law")] if self._any("refused") else []
         if beside or any(curve.label for curve in self.curves):
@@ -233,11 +233,11 @@ def read_list(name: str) -> ListSection:
     return read(ListSection, document.parse(document.read(path), str(path)), Context())
 
 
-def pictures(content: ListSection) -> Iterator[Picture]:
+def pictures(content: ListSection) -> Iterator[ListFigure]:
     """The figures of a list, one after another, each when its runs are done."""
     for number, section in enumerate(content.figures):
         log.info("%s", section.name, extra={"done": number, "total": len(content.figures)})
-        yield Picture(section, [_curve(section, curve) for curve in section.curves])
+        yield ListFigure(section, [_curve(section, curve) for curve in section.curves])
 
 
 def write_all(content: ListSection, folder: Path, suffix: str) -> list[tuple[Path, str]]:

@@ -27,10 +27,10 @@ from surfacechem.solve.run import Trajectory
 BRIEF_RUN, LEAST_REPEATS, MOST_REPEATS = 0.05, 3, 20
 
 # A solver at one value is not timed again once it has taken this long [s].
-BUDGET = 1.0
+ROUND_SECONDS = 1.0
 
 # Errors with which libraries end that cannot even say how a run failed.
-FAULTS = (ArithmeticError, RuntimeError, ValueError)
+LIBRARY_ERRORS = (ArithmeticError, RuntimeError, ValueError)
 
 
 @dataclass
@@ -71,7 +71,7 @@ def attempt(solve: Callable[[], Trajectory], judge: Callable[[Trajectory | Excep
             warnings.simplefilter("ignore")  # libraries warn of what the status says
             done = solve()
             cell = judge(done)
-    except (*FAULTS, InputError) as error:
+    except (*LIBRARY_ERRORS, InputError) as error:
         return judge(error)
     cell.counters, cell.seconds, cell.stepping = done.result.counters, [done.seconds], [done.result.stepping]
     cell.again = solve
@@ -91,7 +91,7 @@ def filled(
     for number in range(rounds):
         log.info("timed again", extra={"done": number, "total": rounds})
         for cell in cells.values():
-            if cell.outcome in ("finished", "stopped") and sum(cell.seconds) < BUDGET:
+            if cell.outcome in ("finished", "stopped") and sum(cell.seconds) < ROUND_SECONDS:
                 _time_again(cell)
     for (name, value), cell in cells.items():
         cell.solver, cell.value = name, value

@@ -17,24 +17,24 @@ if TYPE_CHECKING:
 
     from surfacechem.compile.typeset import Equation
 
-WORDS = re.compile(r"\\mathrm\{([^{}]{2,})\}")
+UPRIGHT_WORD = re.compile(r"\\mathrm\{([^{}]{2,})\}")
 """Upright words, which are text rather than a product of letters."""
 
-TAG = re.compile(r"<math [^>]*>")
+MATH_TAG = re.compile(r"<math [^>]*>")
 
-LINES = re.compile(r"\\(begin|end)\{aligned\}")
+ALIGNED = re.compile(r"\\(begin|end)\{aligned\}")
 """Lines below each other, by the name that the converter knows."""
 
-BIG = re.compile(r"\\[bB]igg?(?:[lr]?)(\\[{}]|\\[lr]angle|[][()])")
+SIZED_BRACKET = re.compile(r"\\[bB]igg?(?:[lr]?)(\\[{}]|\\[lr]angle|[][()])")
 """Brackets of a given size, which here have that of what they enclose."""
 
-OPENING = ("(", "[", r"\{", r"\langle")
+OPENING_BRACKETS = ("(", "[", r"\{", r"\langle")
 
-FUNCTION = re.compile(r"<m([io])>([a-z]{2,})</m\1>(?=((?:<mrow>)?<mo [^>]*>(?:&#x00028;|\[|&#x0007B;))?)")
+FUNCTION_NAME = re.compile(r"<m([io])>([a-z]{2,})</m\1>(?=((?:<mrow>)?<mo [^>]*>(?:&#x00028;|\[|&#x0007B;))?)")
 """The name of a function, and the bracket that may follow it."""
 
-THIN = "0.167em"
-NAMED = f'<mo form="prefix" lspace="{THIN}" rspace="{{1}}">{{0}}</mo>'
+THIN_SPACE = "0.167em"
+SET_OFF = f'<mo form="prefix" lspace="{THIN_SPACE}" rspace="{{1}}">{{0}}</mo>'
 """A function is set off from what stands before it and, without a bracket, from what it is of."""
 
 SPACING = {
@@ -44,10 +44,10 @@ SPACING = {
     'width="negativethinmathspace"': 'width="-0.167em"',
 }
 
-SCRIPT = 0.75
+SCRIPT_SIZE = 0.75
 """Size of an index or exponent, relative to what it belongs to."""
 
-LETTER, OPERATOR, BRACKET, MARGIN = 0.56, 1.3, 0.4, 0.25
+LETTER_WIDTH, OPERATOR_WIDTH, BRACKET_WIDTH, MARGIN_WIDTH = 0.56, 1.3, 0.4, 0.25
 """Widths of parts of a formula [em], rather too wide than too narrow."""
 
 FONT = Path(__file__).with_name("stix-two-math.woff2")
@@ -66,13 +66,13 @@ def mathml(latex: str, *, display: bool = False) -> str:
     """A formula; fractions in a ``display`` are large."""
     from latex2mathml.converter import convert
 
-    words = WORDS.sub(lambda m: rf"\text{{{m[1].replace(chr(92) + ',', ' ')}}}", latex)
-    lines = LINES.sub(r"\\\1{split}", words)
-    sized = BIG.sub(lambda m: rf"\{'left' if m[1] in OPENING else 'right'}{m[1]}", lines)
-    found: str = FUNCTION.sub(lambda m: NAMED.format(m[2], "0" if m[3] else THIN), convert(sized.strip()))
+    words = UPRIGHT_WORD.sub(lambda m: rf"\text{{{m[1].replace(chr(92) + ',', ' ')}}}", latex)
+    lines = ALIGNED.sub(r"\\\1{split}", words)
+    sized = SIZED_BRACKET.sub(lambda m: rf"\{'left' if m[1] in OPENING_BRACKETS else 'right'}{m[1]}", lines)
+    found: str = FUNCTION_NAME.sub(lambda m: SET_OFF.format(m[2], "0" if m[3] else THIN_SPACE), convert(sized.strip()))
     for given, better in SPACING.items():
         found = found.replace(given, better)
-    return TAG.sub('<math displaystyle="true">' if display else "<math>", found, count=1)
+    return MATH_TAG.sub('<math displaystyle="true">' if display else "<math>", found, count=1)
 
 
 def equation(line: Equation) -> str:
@@ -98,15 +98,15 @@ def _width(element: Element) -> float:
     tag = str(element.tag)
     parts: list[float] = [_width(part) for part in element]
     if tag in ("mi", "mn", "mtext", "ms"):
-        return LETTER * len(element.text or "")
+        return LETTER_WIDTH * len(element.text or "")
     if tag == "mo":
-        name = LETTER * len(element.text or "") + MARGIN
-        return BRACKET if element.get("fence") else max(name, OPERATOR)
+        name = LETTER_WIDTH * len(element.text or "") + MARGIN_WIDTH
+        return BRACKET_WIDTH if element.get("fence") else max(name, OPERATOR_WIDTH)
     if tag == "mfrac":
-        return max(parts) + MARGIN
+        return max(parts) + MARGIN_WIDTH
     if tag in ("msub", "msup", "msubsup", "munder", "mover", "munderover"):
-        return parts[0] + (SCRIPT * max(parts[1:]) if tag.startswith("ms") else 0.0)
+        return parts[0] + (SCRIPT_SIZE * max(parts[1:]) if tag.startswith("ms") else 0.0)
     if tag == "mtable":
-        rows = [[_width(cell) + 2 * MARGIN for cell in row] for row in element]
+        rows = [[_width(cell) + 2 * MARGIN_WIDTH for cell in row] for row in element]
         return sum((max(column) for column in zip(*rows, strict=True)), 0.0)
     return sum(parts)

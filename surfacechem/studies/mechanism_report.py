@@ -26,10 +26,10 @@ if TYPE_CHECKING:
 
 
 # Temperature [K] at which the thermo of the species is shown, where it is in range.
-STANDARD = 298.15
+STANDARD_T = 298.15
 
 # Values of a range that tables and curves show.
-COLUMNS, POINTS = 5, 200
+TABLE_COLUMNS, CURVE_POINTS = 5, 200
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Span:
     low: float
     high: float
 
-    def values(self, number: int = COLUMNS) -> Array:
+    def values(self, number: int = TABLE_COLUMNS) -> Array:
         """Evenly spaced values; one where the ends are the same."""
         return np.linspace(self.low, self.high, number if self.high > self.low else 1)
 
@@ -67,11 +67,11 @@ def span(text: str, unit: str, option: str, above: float = -math.inf) -> Span:
 
 def reference(temperatures: Span) -> float:
     """The one temperature [K] at which a range is shown."""
-    inside = temperatures.low <= STANDARD <= temperatures.high
-    return STANDARD if inside else (temperatures.low + temperatures.high) / 2
+    inside = temperatures.low <= STANDARD_T <= temperatures.high
+    return STANDARD_T if inside else (temperatures.low + temperatures.high) / 2
 
 
-def sheet(curves: Curves, temperatures: Span, forces: Span) -> str:
+def mechanism_sheet(curves: Curves, temperatures: Span, forces: Span) -> str:
     """Everything about a mechanism, one fact a line."""
     shown, grid = reference(temperatures), _grid(curves, temperatures, forces)
     T, f = temperatures.values(), forces.values()
@@ -195,7 +195,7 @@ def figure(curves: Curves, temperatures: Span, forces: Span) -> Figure:
     """Rates (left) and equilibrium constants (right), over temperature and in a second row over force."""
     from surfacechem.plots.style import COLOURS, NOTE_STYLE, TITLE_STYLE, panels
 
-    shown, T, f = reference(temperatures), temperatures.values(POINTS), forces.values(POINTS)
+    shown, T, f = reference(temperatures), temperatures.values(CURVE_POINTS), forces.values(CURVE_POINTS)
     rows = [(T, T, np.zeros(1), "Temperature [K]")]
     rows += [(f * 1e12, np.array([shown]), f, f"Force on {curves.pulled or 'a bond'} [pN]")] if curves.loaded else []
     with panels(7.2, 0.6 + 2.5 * len(rows), len(rows), 2) as (plot, axes):

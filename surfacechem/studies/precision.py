@@ -20,9 +20,9 @@ from surfacechem.runs.simulation import Simulation, load
 from surfacechem.runs.summaries import duration
 from surfacechem.solve import names as known_solvers
 from surfacechem.solve.run import Trajectory
-from surfacechem.studies.grid import BRIEF_RUN, BUDGET, Cell, attempt, check_options, filled
+from surfacechem.studies.grid import BRIEF_RUN, ROUND_SECONDS, Cell, attempt, check_options, filled
 from surfacechem.studies.report import PageSection, PageTable, Study, Variable
-from surfacechem.studies.truth import KINDS, MEANING, TOLERANCES, Errors, Subject, Truth, establish, looked_at
+from surfacechem.studies.truth import MEANING, NORMS, TOLERANCES, Errors, Subject, Truth, establish, looked_at
 
 log = logging.getLogger(__name__)
 
@@ -49,8 +49,8 @@ energy residual of the run relative to the energy exchanged; it needs no referen
 
 Times are of the run alone, with all output times, events and the ledger of the balances, after a first run that warms
 up. Rounds are interleaved over solvers and tolerances; runs below {BRIEF_RUN:g} s are repeated within a round, solves
-that have taken {BUDGET:g} s together are not timed again. The least time counts; median and longest show the spread.
-Compilation is apart.
+that have taken {ROUND_SECONDS:g} s together are not timed again. The least time counts; median and longest show the
+spread. Compilation is apart.
 
 Libraries are called step by step from Python through the adapters of this package, which look for events within each
 step, write the outputs and integrate the ledger of the balances. "In steps" is the part of the time inside the
@@ -74,7 +74,7 @@ class WorkPoint(Cell):
 
 
 @dataclass(frozen=True)
-class Compared:
+class ComparedCase:
     """One case: what it was held against, or why there is nothing, and its points by solver and tolerance."""
 
     subject: Subject
@@ -184,7 +184,7 @@ def subject(simulation: Simulation) -> Subject:
 
 def _compared(
     subject: Subject, wanted: Sequence[str], solvers: Sequence[str], tolerances: Sequence[float], repeat: int
-) -> Compared:
+) -> ComparedCase:
     """A case measured: its states, or those of the wanted variables that it has."""
     name, known = subject.case.name, subject.names
     variables = tuple(name for name in wanted if name in known) or tuple(subject.states)
@@ -205,7 +205,7 @@ def _compared(
         return attempt(partial(subject.solve, solver, rtol), partial(_judged, truth))
 
     points = filled(solvers, {rtol: partial(measured, rtol) for rtol in tolerances}, repeat)
-    return Compared(subject, variables, truth, reference, points)
+    return ComparedCase(subject, variables, truth, reference, points)
 
 
 def _judged(truth: Truth | None, done: Trajectory | Exception) -> WorkPoint:
@@ -236,7 +236,7 @@ def _variables() -> Iterator[Variable]:
     text = "time to compile the equations of the case"
     yield Variable("compile_seconds", ("case",), lambda case: case.subject.model.compile_seconds, "s", text)
     for kind, text in MEANING.items():
-        known, text = partial(Compared.uncertainty, kind=kind), f"uncertainty of the reference: {text}"
+        known, text = partial(ComparedCase.uncertainty, kind=kind), f"uncertainty of the reference: {text}"
         yield Variable(f"uncertainty_{kind}", ("case",), known, "1", text)
     of_point: list[tuple[str, str, str, Callable[[WorkPoint], float | str]]] = [
         ("status", "1", "finished, stopped, failed or omitted", lambda p: p.outcome),
@@ -257,7 +257,7 @@ def _variables() -> Iterator[Variable]:
     ]
     for name, unit, text, read in of_point:
         yield Variable(name, every, lambda case, s, rtol, read=read: read(case.points[s, rtol]), unit, text)
-    for kind in KINDS:
+    for kind in NORMS:
         each = partial(lambda case, s, rtol, name, kind: case.points[s, rtol].error(kind, name), kind=kind)
         yield Variable(f"variable_error_{kind}", (*every, "variable"), each, "1", f"{MEANING[kind]} of each variable")
 
@@ -265,7 +265,7 @@ def _variables() -> Iterator[Variable]:
 # -- the report --------------------------------------------------------------------------------------------------------
 
 
-def _sections(compared: Sequence[Compared]) -> Iterator[PageSection]:
+def _sections(compared: Sequence[ComparedCase]) -> Iterator[PageSection]:
     yield PageSection("Run time against error", figure=True, details=True)
     for case in compared:
         yield from _of_case(case)
@@ -274,10 +274,10 @@ def _sections(compared: Sequence[Compared]) -> Iterator[PageSection]:
         yield PageSection(f"Case {case.name}", [case.subject.case.text], details=True)
 
 
-def _of_case(case: Compared) -> Iterator[PageSection]:
+def _of_case(case: ComparedCase) -> Iterator[PageSection]:
     lines = [f"reference  {case.reference}"]
     if case.truth:
-        uncertain = [f"{kind} {case.uncertainty(kind):.1e}" for kind in KINDS]
+        uncertain = [f"{kind} {case.uncertainty(kind):.1e}" for kind in NORMS]
         uncertain += [f"events {case.uncertainty('event'):.1e}"] * bool(case.truth.events)
         lines.append(f"uncertain  {', '.join(uncertain)}")
     lines.append(f"variables  {', '.join(case.variables)}")
@@ -289,15 +289,15 @@ def _of_case(case: Compared) -> Iterator[PageSection]:
     tables += [PageTable(("failed", "rtol", "why"), failures)] * bool(failures)
     yield PageSection(f"{case.name}: {case.subject.case.title}", lines, tables)
     rows = [
-        (point.solver, f"{point.value:.0e}", name, *(f"{point.error(kind, name):.1e}" for kind in KINDS))
+        (point.solver, f"{point.value:.0e}", name, *(f"{point.error(kind, name):.1e}" for kind in NORMS))
         for point in points
         for name in (case.variables if point.errors else ())
     ]
-    heading, caption = ("solver", "rtol", "variable", "final", "max", "L2"), "; ".join(MEANING[kind] for kind in KINDS)
+    heading, caption = ("solver", "rtol", "variable", "final", "max", "L2"), "; ".join(MEANING[kind] for kind in NORMS)
     yield PageSection(f"{case.name}, variable by variable", tables=[PageTable(heading, rows, caption)], details=True)
 
 
-def _row(point: WorkPoint, case: Compared) -> list[str]:
+def _row(point: WorkPoint, case: ComparedCase) -> list[str]:
     """A line of the table: errors, of which those below the uncertainty of the reference say no more than that."""
     seconds = [f(point.seconds or [math.nan]) for f in (min, median, max)]
     times = ["" if math.isnan(t) else duration(t) for t in (*seconds, min(point.stepping, default=math.nan))]
@@ -310,7 +310,7 @@ def _row(point: WorkPoint, case: Compared) -> list[str]:
     return [point.solver, f"{point.value:.0e}", *errors, *times, *counts]
 
 
-def _omissions(compared: Sequence[Compared]) -> Iterator[str]:
+def _omissions(compared: Sequence[ComparedCase]) -> Iterator[str]:
     """Solvers that cannot run a case, and cases without a reference."""
     points = [(case, point) for case in compared for point in case.points.values() if point.outcome == "omitted"]
     yield from dict.fromkeys(f"{case.name}: {point.solver}: {point.reason}" for case, point in points)

@@ -47,7 +47,7 @@ log = logging.getLogger(__name__)
 MOST_EVENTS = 100
 """Events that a page lists."""
 
-QUICK = 1.0
+QUICK_SECONDS = 1.0
 """Run time [s] up to which a page runs a case again at looser tolerances."""
 
 TOLERANCES = tuple(10.0**-digits for digits in (4, 6, 8, 10))
@@ -230,7 +230,7 @@ def _balances(attributes: Any) -> PageSection:
 def _precision(case: cases.Case, attributes: Any) -> Iterator[PageSection]:
     """Error against run time: the case again at looser tolerances, where that takes little."""
     # What the numbers of the dataset are of is the case itself, or they are not to be compared with.
-    if "sweep" in attributes or "departures" in attributes or attributes["run_seconds"] > QUICK:
+    if "sweep" in attributes or "departures" in attributes or attributes["run_seconds"] > QUICK_SECONDS:
         return
     simulation, rows = Simulation(case), []
     tolerances = [*(tolerance for tolerance in TOLERANCES if tolerance > case.run.rtol), case.run.rtol]

@@ -46,7 +46,7 @@ SOLVED, REFUSED, FAILED, WRONG, SENSITIVE = OUTCOMES = ("solved", "refused", "fa
 
 # Tolerance of every solver, and the steps after which a run has failed. Choices: all of the libraries take this
 # tolerance, and need 60 to 440 steps at it where a regime is mild.
-RTOL, STEPS = 1e-10, 1500
+STUDY_RTOL, STEPS = 1e-10, 1500
 
 # Digits below which a value that is given out as an answer is wrong, and those that a double holds.
 LEAST, MOST = 2.0, 16.0
@@ -54,7 +54,7 @@ LEAST, MOST = 2.0, 16.0
 SOLVERS = (OWN, "dop853", "lsoda", "bdf", "scipy-radau", "cvode", "ida")
 
 # Rounds of a search for a worst corner, and the most that may be asked for.
-ROUNDS, MOST_ROUNDS = 12, 10_000
+SEARCH_ROUNDS, MOST_ROUNDS = 12, 10_000
 
 SEED = 20210301
 # Differential evolution: points kept, length of a difference, share of its coordinates that is taken. Few points, since
@@ -62,20 +62,20 @@ SEED = 20210301
 POPULATION, WEIGHT, CROSSOVER = 8, 0.7, 0.8
 
 # A failure counts as worse than any error, a wrong answer as worse than a failure.
-BADNESS = {FAILED: MOST, WRONG: 2 * MOST}
+PENALTY = {FAILED: MOST, WRONG: 2 * MOST}
 
 Answer = Mapping[str, Array]
 Data = Mapping[str, float]
 
 # The output times among the data.
-TIME = "t"
+TIME_NAME = "t"
 
 # Relative steps of the data, from 1e-6 to 16 roundings.
 PERTURBATIONS = tuple(2.0**-k for k in (20, 24, 28, 32, 36, 40, 44, 48))
 
 # Relative change of a slope from one step to the next, below which it is one: a choice, as condition numbers are told
 # to one digit. Less would ask for shorter steps, in whose slopes there is more rounding.
-STRAIGHT = 0.1
+STRAIGHT_PART = 0.1
 
 MEANING = (
     f"Digits kept are -log10 of the largest relative error; {MOST:g} is rounding. R: ended or refused by physics, for "
@@ -127,9 +127,9 @@ class Corner(NamedTuple):
 def stability(
     *regimes: str,
     solvers: Sequence[str] = SOLVERS,
-    rtol: float = RTOL,
+    rtol: float = STUDY_RTOL,
     quick: bool = False,
-    rounds: int = ROUNDS,
+    rounds: int = SEARCH_ROUNDS,
 ) -> Study:
     """Solve difficult regimes over decades of their parameter and tell the digits that each solver keeps.
 
@@ -160,16 +160,16 @@ def stability(
     check_options(solvers, [rtol], rounds, (0, MOST_ROUNDS), ("--solvers", "--rtol", "--search"))
     rows = []
     for number, regime in enumerate(found):
-        values = few(regime.values) if quick else list(regime.values)
+        values = thinned(regime.values) if quick else list(regime.values)
         done = {"done": number, "total": len(found)}
         log.info("%s: %d values", regime.name, len(values), extra=done)
         runs = {value: prepared(regime.problem(value), rtol) for value in values}
         rows.append(MatrixRow(regime, values, filled(solvers, runs)))
     corners = [worst_corner(regime, rounds, rtol) for regime in found if regime.space] if rounds else []
     options = ["--solvers", ",".join(solvers)] if tuple(solvers) != SOLVERS else []
-    options += ["--rtol", repr(float(rtol))] if rtol != RTOL else []
+    options += ["--rtol", repr(float(rtol))] if rtol != STUDY_RTOL else []
     options += ["--quick"] if quick else []
-    options += ["--search", str(rounds)] if rounds != ROUNDS else []
+    options += ["--search", str(rounds)] if rounds != SEARCH_ROUNDS else []
     return Study(
         kind="stability",
         title="Stability of the solvers in dangerous regimes",
@@ -183,7 +183,7 @@ def stability(
     )
 
 
-def few(values: Sequence[float]) -> list[float]:
+def thinned(values: Sequence[float]) -> list[float]:
     """First, middle and last of the values, and the one before the last."""
     return [values[i] for i in sorted({0, len(values) // 2, len(values) - 2, len(values) - 1})]
 
@@ -191,7 +191,7 @@ def few(values: Sequence[float]) -> list[float]:
 # -- one problem -------------------------------------------------------------------------------------------------------
 
 
-def prepared(problem: Trial, rtol: float = RTOL) -> Callable[[str], Attempt]:
+def prepared(problem: Trial, rtol: float = STUDY_RTOL) -> Callable[[str], Attempt]:
     """Attempts at a problem by solver; it is read and compiled once."""
     try:
         model = Model(read(problem).system())
@@ -243,7 +243,7 @@ def _largest_error(expected: Exact, done: Trajectory) -> tuple[float, str]:
     """The largest relative error of a run, and the variable that has it."""
     compared = {*expected.also, *(state.name for state in done.model.system.states)}
     exact = {name: np.asarray(v) for name, v in expected.values(done.result.times).items() if name in compared}
-    errors = largest_errors(computed(done), exact, {name: least(true) for name, true in exact.items()})
+    errors = largest_errors(computed(done), exact, {name: answer_floor(true) for name, true in exact.items()})
     worst = max(errors, key=lambda name: math.inf if math.isnan(errors[name]) else errors[name])
     return errors[worst], worst
 
@@ -287,12 +287,12 @@ def condition(problem: Trial, names: Collection[str]) -> float:
     again: Callable[..., Any] = expected.again
     data = dict(expected.data)
     if isinstance(expected, Exact):
-        data[TIME] = 1.0
+        data[TIME_NAME] = 1.0
 
     def answer(changed: Mapping[str, float]) -> Answer:
         if isinstance(expected, Stops):
-            return {TIME: np.array([again(changed)])}
-        values: Answer = again({name: changed[name] for name in expected.data}, changed[TIME] * times)
+            return {TIME_NAME: np.array([again(changed)])}
+        values: Answer = again({name: changed[name] for name in expected.data}, changed[TIME_NAME] * times)
         return {name: np.atleast_1d(values[name]) for name in values if name in {*names, *expected.also}}
 
     base = answer(data)
@@ -303,7 +303,7 @@ def condition(problem: Trial, names: Collection[str]) -> float:
     return float(max((slopes.max(initial=0.0) for slopes in total.values()), default=0.0))
 
 
-def least(values: Array | float) -> float:
+def answer_floor(values: Array | float) -> float:
     """Size of an exact answer below which its errors are relative to this: a part of its largest value."""
     return ERROR_FLOOR * float(np.max(np.abs(values), initial=0.0))
 
@@ -320,10 +320,10 @@ def _slopes(answer: Callable[[Data], Answer], base: Answer, data: Data, name: st
             moved = data[name] * (1.0 + sign * step)
             with suppress(InputError):
                 found, done = answer({**data, name: moved}), abs(moved - data[name]) / abs(data[name])
-                now = {key: relative_errors(found[key], base[key], least(base[key])) / done for key in base}
+                now = {key: relative_errors(found[key], base[key], answer_floor(base[key])) / done for key in base}
                 break
         # Long steps see the curvature, short ones rounding: taken is the first slope that the next step confirms.
-        changes = ((np.abs(before[key] - slope), STRAIGHT * slope) for key, slope in now.items())
+        changes = ((np.abs(before[key] - slope), STRAIGHT_PART * slope) for key, slope in now.items())
         if before and now and all(np.max(change, initial=0.0) <= np.max(most, initial=0.0) for change, most in changes):
             return now
         before = now
@@ -333,7 +333,7 @@ def _slopes(answer: Callable[[Data], Answer], base: Answer, data: Data, name: st
 # -- the worst corner --------------------------------------------------------------------------------------------------
 
 
-def worst_corner(regime: Regime, rounds: int = ROUNDS, rtol: float = RTOL, seed: int = SEED) -> Corner:
+def worst_corner(regime: Regime, rounds: int = SEARCH_ROUNDS, rtol: float = STUDY_RTOL, seed: int = SEED) -> Corner:
     """Differential evolution over the regime's space, on decimal logarithms; the same seed gives the same corner.
 
     Source: Storn & Price (1997), Differential evolution, J. Global Optim. 11, 341 (rand/1/bin), as in SciPy.
@@ -349,7 +349,7 @@ def worst_corner(regime: Regime, rounds: int = ROUNDS, rtol: float = RTOL, seed:
             cell = prepared(regime.corner(**point), rtol)(OWN)
         except InputError as error:  # the corner is outside of what the exact solution holds for
             cell = Attempt(REFUSED, error.message, MOST)
-        seen.append((MOST - cell.digits + BADNESS.get(cell.outcome, 0.0), point, cell))
+        seen.append((MOST - cell.digits + PENALTY.get(cell.outcome, 0.0), point, cell))
         return -seen[-1][0]
 
     differential_evolution(
@@ -365,7 +365,7 @@ def worst_corner(regime: Regime, rounds: int = ROUNDS, rtol: float = RTOL, seed:
         rng=random,
     )
     _, point, cell = max(seen, key=lambda found: found[0])
-    return Corner(regime, point, cell, len(seen), sum(cell.outcome in BADNESS for *_, cell in seen))
+    return Corner(regime, point, cell, len(seen), sum(cell.outcome in PENALTY for *_, cell in seen))
 
 
 # -- the dataset and the report ----------------------------------------------------------------------------------------

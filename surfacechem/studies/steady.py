@@ -25,10 +25,10 @@ from surfacechem.solve.run import Model, Run
 from surfacechem.studies.mechanism_rates import null_space
 from surfacechem.tolerances import CBRT_EPS, EPS, LINE_ERROR, LOOSE_RTOL, NEGLIGIBLE, RUN_EPS, TINY
 
-LONGER, ATTEMPTS = 10.0, 16
+LONGER_BY, MOST_ATTEMPTS = 10.0, 16
 """Factor by which the next attempt is longer where the steady state was not reached, and number of attempts."""
 
-TRACE = EPS**2
+TRACE_COVERAGE = EPS**2
 """Coverage [1] below which a change is no longer one in proportion: the rounding of a rounding."""
 
 
@@ -115,7 +115,7 @@ def steady(source: Source, of: Sequence[str] = (), overrides: Overrides = ()) ->
     return SteadyState(
         simulation.case.title,
         rest.time,
-        {q.species: x if x > TRACE else 0.0 for q, x in rest.found if q.species},
+        {q.species: x if x > TRACE_COVERAGE else 0.0 for q, x in rest.found if q.species},
         {q.name: x for q, x in rest.found if not q.species},
         dict(zip(rest.wanted, rates.tolist(), strict=True)),
         {
@@ -149,7 +149,7 @@ def _conserved(interface: Interface) -> list[dict[str, float]]:
     ]
 
 
-HELD = re.compile(r"(bodies\..+|interface)\.temperature\.level|loading\.T\w*\.level")
+HELD_TEMPERATURE = re.compile(r"(bodies\..+|interface)\.temperature\.level|loading\.T\w*\.level")
 """Parameters that are temperatures of bodies and interface."""
 
 
@@ -157,7 +157,7 @@ def _held(system: System, values: Mapping[str, float]) -> list[str]:
     """Parameters that are the temperatures of bodies and interface, where all are held at the same one."""
     if any(state.is_temperature for state in system.states):
         return []
-    paths = [parameter.path for parameter in system.parameters if HELD.fullmatch(parameter.path)]
+    paths = [parameter.path for parameter in system.parameters if HELD_TEMPERATURE.fullmatch(parameter.path)]
     return paths if len({values[path] for path in paths}) == 1 else []
 
 
@@ -170,7 +170,7 @@ class _Rest:
         self.model, self.values, self.wanted = model, model.values(), wanted
         self._place = {parameter.path: j for j, parameter in enumerate(model.system.parameters)}
         self.time = run.times[-1]
-        for _ in range(ATTEMPTS):
+        for _ in range(MOST_ATTEMPTS):
             reached = model.solve(replace(run, times=(0.0, self.time), picture=None))
             if reached.status != "finished":
                 raise InputError(f"the case reaches no steady state: {reached.reason}.")
@@ -184,8 +184,8 @@ class _Rest:
             if found is not None and np.all(np.abs(found - start) <= NEGLIGIBLE * np.abs(found) + run.rtol):
                 self.x, self.largest = found, np.abs(reached.outputs).max(axis=0)
                 return
-            self.time *= LONGER
-        raise InputError(f"the case did not reach a steady state within {self.time / LONGER:.3g} s.")
+            self.time *= LONGER_BY
+        raise InputError(f"the case did not reach a steady state within {self.time / LONGER_BY:.3g} s.")
 
     @property
     def found(self) -> Iterator[tuple[Quantity, float]]:
@@ -225,7 +225,7 @@ class _Rest:
             parameters[columns] = first
         (up, out_up), (down, out_down) = ends
         moved = self._solve(self._slopes(self.x), -(up - down) / (2 * CBRT_EPS), self.x)
-        part = CBRT_EPS / max(float(np.max(np.abs(moved) / (np.abs(self.x) + TRACE))), 1.0)
+        part = CBRT_EPS / max(float(np.max(np.abs(moved) / (np.abs(self.x) + TRACE_COVERAGE))), 1.0)
         following = (self.outputs(self.x + part * moved) - self.outputs(self.x - part * moved)) / (2 * part)
         return np.asarray((out_up - out_down) / (2 * CBRT_EPS) + following)
 
@@ -236,14 +236,14 @@ class _Rest:
             x = x + step
             if not np.all(np.isfinite(x)):
                 return None
-            if np.all(np.abs(step) <= RUN_EPS * np.abs(x) + TRACE):
+            if np.all(np.abs(step) <= RUN_EPS * np.abs(x) + TRACE_COVERAGE):
                 return x
         return None
 
     def _slopes(self, x: Array) -> Array:
         """Derivatives of the rates by the states, in proportion to these."""
         columns = []
-        for j, size in enumerate(np.abs(x) + TRACE):
+        for j, size in enumerate(np.abs(x) + TRACE_COVERAGE):
             step = np.zeros(len(x))
             step[j] = CBRT_EPS * size
             columns.append((self.rates(x + step) - self.rates(x - step)) / (2 * CBRT_EPS))
@@ -251,7 +251,7 @@ class _Rest:
 
     def _solve(self, slopes: Array, right: Array, x: Array) -> Array:
         """The change of the state that changes the rates by so much and keeps what is conserved."""
-        sizes = np.abs(x) + TRACE
+        sizes = np.abs(x) + TRACE_COVERAGE
         matrix = np.vstack((slopes, self._conserved * sizes))
         rows = np.maximum(np.abs(matrix).max(axis=1), TINY)
         found, *_ = np.linalg.lstsq(

@@ -26,33 +26,33 @@ from surfacechem.results.matching import exact_values
 from surfacechem.solve import CALLING_PYTHON, solver
 from surfacechem.solve.contract import Array
 from surfacechem.solve.run import Model, Trajectory
-from surfacechem.studies.grid import FAULTS
+from surfacechem.studies.grid import LIBRARY_ERRORS
 from surfacechem.tolerances import EPS, MIN_RTOL, SQRT_EPS
 
 Values = Mapping[str, Array]
 
 # Different families: collocation twice, by different authors, and multistep. A bug of one is not one of the other.
 # Methods that a reference may be made of, the quicker first; the last only where it is needed.
-METHODS = ("radau", "lsoda", "scipy-radau", "cantera")
+REFERENCE_METHODS = ("radau", "lsoda", "scipy-radau", "cantera")
 
 # Closer tolerances would differ by little more than rounding, others would leave the range where errors follow them.
 # Ratio of the two tolerances from which a method is extrapolated.
-DECADE = 10.0
+TEN = 10.0
 
 # A solve that takes longer than this counts as failed, unless the case allows less; one for a reference may take so
 # long [s]: which methods it is made of must not depend on how busy a machine is.
-MOST_SECONDS, LONGEST = 60.0, 900.0
+MOST_SECONDS, LONGEST_SOLVE = 60.0, 900.0
 
 # Relative tolerances of a study, if none are given.
 TOLERANCES = tuple(10.0**-k for k in (4, 6, 8, 10, 12))
 
 # Methods that differ by more do not agree: a reference must still tell the errors of the loosest tolerance.
-AGREE = TOLERANCES[0] / 100
+AGREEMENT = TOLERANCES[0] / 100
 
 # Two that differ by no more than this need no third.
-CLOSE = DECADE * TOLERANCES[-1]
+REFERENCE_ERROR = TEN * TOLERANCES[-1]
 
-KINDS = ("final", "max", "l2")
+NORMS = ("final", "max", "l2")
 # The kinds of errors; the last is not of variables.
 MEANING = {
     "final": "relative error at the end",
@@ -129,15 +129,15 @@ class Subject:
 
     def methods(self) -> list[str]:
         """Methods for a reference; that of Cantera only where no other can run the case."""
-        able = [name for name in METHODS if not self.unable(name)]
+        able = [name for name in REFERENCE_METHODS if not self.unable(name)]
         return [name for name in able if name != "cantera"] or able
 
     def tight(self, method: str, rtol: float) -> Trajectory:
         """A run for a reference; InputError where it comes to nothing."""
         try:
-            found = self.solve(method, rtol, LONGEST)
+            found = self.solve(method, rtol, LONGEST_SOLVE)
             why = found.reason if found.status == "failed" or len(found.result.times) < 2 else ""
-        except FAULTS as error:
+        except LIBRARY_ERRORS as error:
             why = f"{type(error).__name__}: {error}"
         if why:
             raise InputError(f"{self.case.name} has no reference: {method} at rtol {rtol:.0e}: {why}")
@@ -248,7 +248,7 @@ def numerical(subject: Subject, variables: Sequence[str]) -> Truth:
     found: list[Truth] = []
     failures = []
     for method in subject.methods():
-        if len(found) == 2 and _apart(*found) <= CLOSE:
+        if len(found) == 2 and _apart(*found) <= REFERENCE_ERROR:
             break
         try:
             found.append(_extrapolated(subject, method, variables))
@@ -262,9 +262,9 @@ def numerical(subject: Subject, variables: Sequence[str]) -> Truth:
     methods, largest = f"{first.source} and {second.source}", _apart(first, second)
     if math.isinf(largest):
         raise InputError(f"{name} has no reference: its methods come to different ends or events.")
-    if not largest <= AGREE:
+    if not largest <= AGREEMENT:
         raise InputError(f"{name} has no reference: the methods that agree best, {methods}, differ by {largest:.1e}.")
-    source = f"{methods}, extrapolated from rtol {MIN_RTOL * DECADE:.0e} and {MIN_RTOL:.0e}"
+    source = f"{methods}, extrapolated from rtol {MIN_RTOL * TEN:.0e} and {MIN_RTOL:.0e}"
     apart = first.errors(second.values, second.events)
     return replace(first, source=source, uncertainty=apart.larger(first.uncertainty))
 
@@ -278,7 +278,7 @@ def _apart(a: Truth, b: Truth) -> float:
 
 def _extrapolated(subject: Subject, method: str, variables: Sequence[str]) -> Truth:
     """Values and times of events of one method; uncertain is how far the extrapolation went."""
-    loose, tight = (subject.tight(method, rtol) for rtol in (MIN_RTOL * DECADE, MIN_RTOL))
+    loose, tight = (subject.tight(method, rtol) for rtol in (MIN_RTOL * TEN, MIN_RTOL))
     n = min(len(loose.result.times), len(tight.result.times))
     before, after = ({name: computed(run)[name][:n] for name in variables} for run in (loose, tight))
     events, last = event_times(loose), event_times(tight)
@@ -294,4 +294,4 @@ def _extrapolated(subject: Subject, method: str, variables: Sequence[str]) -> Tr
 
 def _limit(loose: Array, tight: Array) -> Array:
     """Richardson extrapolation of errors in proportion to the tolerance."""
-    return np.asarray(tight + (tight - loose) / (DECADE - 1))
+    return np.asarray(tight + (tight - loose) / (TEN - 1))

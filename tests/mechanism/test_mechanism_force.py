@@ -9,7 +9,7 @@ import surfacechem
 from surfacechem.mechanism import load_mechanism
 from surfacechem.quantities import BOLTZMANN
 from surfacechem.studies.mechanism_rates import Curves
-from surfacechem.studies.mechanism_report import Span, figure, sheet, verdict
+from surfacechem.studies.mechanism_report import Span, figure, mechanism_sheet, verdict
 
 T, K_0, STIFFNESS, REST = 300.0, 10.0, 5e-3, 10e-9
 KT = BOLTZMANN * T
@@ -103,6 +103,6 @@ def test_a_direction_that_is_switched_off_is_shown(file):
     path = file("Bell")
     path.write_text(path.read_text().replace("A: 10.0", "A: 0.0"), encoding="utf-8")
     curves = Curves(load_mechanism(path))
-    text = sheet(curves, Span(T, T), Span(0.0, 4e-11))
+    text = mechanism_sheet(curves, Span(T, T), Span(0.0, 4e-11))
     assert "one of the two never runs" in text
     assert figure(curves, Span(T, T), Span(0.0, 4e-11)).axes

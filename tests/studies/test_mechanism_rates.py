@@ -5,7 +5,7 @@ import pytest
 
 from surfacechem.mechanism import load_mechanism
 from surfacechem.studies.mechanism_rates import Curves, cycle_verdict, cycles
-from surfacechem.studies.mechanism_report import Span, sheet
+from surfacechem.studies.mechanism_report import Span, mechanism_sheet
 
 HEAD = """
 units: {length: m, quantity: mol, activation-energy: kJ/mol}
@@ -57,7 +57,7 @@ def test_rates_that_no_thermo_allows(curves):
     found = curves(PAIRS.replace("LAST", "12.0"))
     (cycle,) = cycles(found)
     np.testing.assert_allclose(np.abs(cycle.departure(found, T, NONE)), np.log(4), rtol=1e-12)
-    text = sheet(found, Span(280.0, 360.0), Span(0.0, 0.0))
+    text = mechanism_sheet(found, Span(280.0, 360.0), Span(0.0, 0.0))
     assert "R1 R2 R3 R4 R5 R6  INCONSISTENT: the product of k_f/k_r is not 1 but exp(1.39)" in text
 
 

@@ -17,7 +17,7 @@ from surfacechem.mechanism import load_mechanism
 from surfacechem.quantities import BOLTZMANN
 from surfacechem.studies import mechanism_report
 from surfacechem.studies.mechanism_rates import Curves
-from surfacechem.studies.mechanism_report import Span, power_of_ten, remarks, sheet, span, verdict
+from surfacechem.studies.mechanism_report import Span, mechanism_sheet, power_of_ten, remarks, span, verdict
 
 pytestmark = pytest.mark.around
 
@@ -104,7 +104,7 @@ def test_numbers_of_random_mechanisms_are_cantera_s(file, text, temperature):
     file.write_text(text, encoding="utf-8")
     mechanism = load_mechanism(file)
     compare(mechanism, temperature)
-    printed = sheet(Curves(mechanism), Span(300.0, 1200.0), F)
+    printed = mechanism_sheet(Curves(mechanism), Span(300.0, 1200.0), F)
     assert not re.search(r"\b(nan|inf)\b", printed)
 
 

@@ -18,7 +18,7 @@ from surfacechem.solve.adapters import sundials
 from surfacechem.studies import precision
 from surfacechem.studies import truth as truths
 from surfacechem.studies.report import LIBRARIES, Study
-from surfacechem.studies.truth import KINDS, Subject, establish, numerical
+from surfacechem.studies.truth import NORMS, Subject, establish, numerical
 
 pytestmark = pytest.mark.around
 
@@ -30,7 +30,7 @@ TIMES = ("seconds", "repetitions")
 def quick_methods(monkeypatch, request):
     """References of the two quicker methods, but in slow tests of all."""
     if "slow" not in request.keywords:
-        monkeypatch.setattr(truths, "METHODS", ("radau", "lsoda"))
+        monkeypatch.setattr(truths, "REFERENCE_METHODS", ("radau", "lsoda"))
 
 
 @pytest.fixture
@@ -69,7 +69,7 @@ def subject_of(name, *overrides):
 def test_errors_fall_with_the_tolerance_and_the_worst_variable_counts(data):
     assert np.all(np.diff(data["energy_error"].values, axis=-1) < 0)
     assert list(data["variable"].values) == ["phi", "T"]
-    for kind in KINDS:
+    for kind in NORMS:
         errors = data[f"error_{kind}"]
         assert np.all(np.diff(errors.values, axis=-1) < 0)
         assert np.all(errors < 1e-2)
@@ -173,7 +173,7 @@ def test_methods_that_do_not_agree_give_no_reference(monkeypatch, tmp_path):
 
 
 def test_a_method_that_fails_is_no_reference(monkeypatch):
-    monkeypatch.setattr(truths, "METHODS", ("radau", "scipy-radau", "lsoda"))
+    monkeypatch.setattr(truths, "REFERENCE_METHODS", ("radau", "scipy-radau", "lsoda"))
     subject = subject_of("exothermic", "reference=")
     original = type(subject.model).solve
 

@@ -16,16 +16,16 @@ from surfacechem.studies.regimes import Exact, Refused, Stops, Trial, regimes
 from surfacechem.studies.stability import (
     FAILED,
     REFUSED,
-    RTOL,
     SENSITIVE,
     SOLVED,
+    STUDY_RTOL,
     WRONG,
     condition,
     digits_left,
-    few,
     prepared,
     read,
     stability,
+    thinned,
     worst_corner,
 )
 from surfacechem.studies.stability import LEAST as LEAST_DIGITS
@@ -46,7 +46,7 @@ SENSITIVE_CELLS = [place for place, outcome in BROKEN.items() if outcome == SENS
 LEAST = {"cold": 2.5, "runaway": 7.0, "film": 6.5, "debonding": 8.5, "fold": 8.5, "endothermic": 8.5}
 """Digits that the regime itself leaves at rtol 1e-10; elsewhere nine and a half."""
 
-CELLS = [(name, value) for name, regime in regimes().items() for value in few(regime.values)]
+CELLS = [(name, value) for name, regime in regimes().items() for value in thinned(regime.values)]
 ALL = [(name, value) for name, regime in regimes().items() for value in regime.values]
 
 
@@ -59,7 +59,7 @@ def assert_kept(name: str, value: float) -> None:
         # No method keeps digits that the last ones of the data do not leave.
         assert cell.digits > min(LEAST.get(name, 9.5), digits_left(cell.condition, np.finfo(float).eps)), cell
     if cell.outcome != FAILED and np.isfinite(cell.condition):
-        assert cell.digits > digits_left(max(cell.condition, 1.0), RTOL) - 0.5, cell
+        assert cell.digits > digits_left(max(cell.condition, 1.0), STUDY_RTOL) - 0.5, cell
 
 
 @pytest.mark.parametrize(("name", "value"), CELLS)
@@ -154,7 +154,7 @@ def test_the_condition_number_knows_no_units(size):
 @pytest.mark.parametrize(("name", "value"), SENSITIVE_CELLS)
 def test_fewer_than_two_digits_are_the_condition_of_the_problem(name, value):
     cell = prepared(regimes()[name].problem(value))("radau")
-    assert digits_left(cell.condition, RTOL) < LEAST_DIGITS
+    assert digits_left(cell.condition, STUDY_RTOL) < LEAST_DIGITS
     tight = prepared(regimes()[name].problem(value), rtol=1e-13)("radau")
     assert tight.digits > digits_left(cell.condition, np.finfo(float).eps) - 0.5  # nothing but rounding is lost then
 

@@ -18,7 +18,7 @@ from surfacechem.references.debonding import SuddenDebonding
 from surfacechem.solve.contract import Array
 from surfacechem.studies.regimes import Exact, Refused, Stops, Trial, regime
 
-LOST = "heat capacity at T was lost"
+CAPACITY_LOST = "heat capacity at T was lost"
 N_C = 1e18
 
 
@@ -41,7 +41,7 @@ def endothermic(value: float) -> Trial:
         "interface.bonding.linear-affinity.c_r": rate,
     }
     if value == 0.0:
-        return Trial("endothermic-kappa-0p99", [5.0], Refused(LOST), changes)
+        return Trial("endothermic-kappa-0p99", [5.0], Refused(CAPACITY_LOST), changes)
     exact = EndothermicBonding(C_1=1.0, C_2=1.0, T_0=256.0, K_2=K_2, tau=1.0)
     return Trial("endothermic-kappa-0p99", np.geomspace(1e-2 * value, 5.0, 25).tolist(), Exact.of(exact), changes)
 
@@ -148,7 +148,7 @@ T, X = 300.0, 4e-10
 FORCE = BOLTZMANN * T / X
 
 # Logarithm of the rate [1/s] beyond which rupture is not resolved in time.
-IMMEDIATE = 230.0
+MOST_IMMEDIATE = 230.0
 
 
 @regime(
@@ -166,7 +166,7 @@ def bell(exponent: float, k_off: float = 0.1) -> Trial:
     force = exponent * FORCE
     exact = BellConstantForce(k_off=k_off, x_off=X, T=T, f=force)
     changes = {"loading.f": force, "interface.bonding.bell.k_off": k_off}
-    span = math.exp(-min(exact.log_rate, IMMEDIATE))
+    span = math.exp(-min(exact.log_rate, MOST_IMMEDIATE))
     times = [span * part for part in (0.01, 0.1, 0.5, 1.0, 3.0)]
     return Trial("bond-constant-force", times, Exact.of(exact), changes)
 

@@ -17,7 +17,7 @@ from surfacechem.studies.regimes import FOLDER, Exact, Stops, Trial, regime
 
 # Least stick over slip that is told from steady sliding, whose events are as close. Also the part of the width of a
 # bottleneck over which its speed is taken: enough for a condition number, which is told to a digit.
-SHORTEST = 1e-5
+SHORTEST_DISTANCE = 1e-5
 
 
 @regime("Film that closes", "gap / initial gap", (1e-1, 1e-3, 1e-6, 1e-9, 1e-12, 1e-14, 0.0))
@@ -49,8 +49,8 @@ def penalty(value: float) -> Trial:
 def chatter(V: float, m: float = 10.0, k: float = 1e8) -> Trial:
     """Stick-slip over nineteen decades of speed: one slip a cycle and none that is not there."""
     exact = StickSlip(t_s=6e4, t_k=4e4, V=V, m=m, k=k)
-    if exact.stick_time < SHORTEST * exact.slip.duration:
-        raise InputError(f"a stick of less than {SHORTEST:g} of a slip is within rounding of steady sliding.")
+    if exact.stick_time < SHORTEST_DISTANCE * exact.slip.duration:
+        raise InputError(f"a stick of less than {SHORTEST_DISTANCE:g} of a slip is within rounding of steady sliding.")
     first = exact.onset_time + exact.slip.duration
     # In the middle of three sticks.
     times = [first + (j + 0.5) * exact.stick_time + j * exact.slip.duration for j in range(3)]
@@ -81,8 +81,8 @@ def fold(value: float) -> Trial:
     exact = OverdampedPullOff(**gap, delta_w=value * OverdampedPullOff(**gap, delta_w=1.0).fold.w)
     gaps = exact.fold.g + exact.width * np.linspace(-3.0, 3.0, 7)
     times = np.array([exact.time(g) for g in gaps])
-    ahead = np.array([exact.time(g) for g in gaps + SHORTEST * exact.width])
-    speeds = SHORTEST * exact.width / (ahead - times)
+    ahead = np.array([exact.time(g) for g in gaps + SHORTEST_DISTANCE * exact.width])
+    speeds = SHORTEST_DISTANCE * exact.width / (ahead - times)
 
     def again(data: Mapping[str, float], t: Array) -> Mapping[str, Array]:
         """Gaps for other data, to first order, from when these are reached; given is the far-field displacement."""

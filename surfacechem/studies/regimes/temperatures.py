@@ -11,7 +11,7 @@ from surfacechem.references.three_temperatures import ThreeTemperatures
 from surfacechem.studies.regimes import FOLDER, Exact, Refused, Stops, Trial, regime
 
 # Cases of a medium that bonds take heat from, and of a film that friction heats.
-MEDIUM, FILM = str(FOLDER / "medium.yaml"), str(FOLDER / "film.yaml")
+MEDIUM_CASE, FILM_CASE = str(FOLDER / "medium.yaml"), str(FOLDER / "film.yaml")
 
 BODIES = {"C_1": 1200.0, "C_2": 500.0, "C_c": 8.0, "h_1": 2500.0, "h_2": 700.0, "D_0": 150.0}
 
@@ -74,16 +74,16 @@ def lost_capacity(value: float) -> Trial:
     """Bonds take 0.8 J/(m^2 K) from a medium of a little more, which settles, or of a little less, which is refused."""
     changes = {"interface.potential.interface-capacity.C_c": 0.8 + value}
     if value < 0:
-        return Trial(MEDIUM, [1.0], Refused("heat capacity at T_c was lost"), changes)
+        return Trial(MEDIUM_CASE, [1.0], Refused("heat capacity at T_c was lost"), changes)
     settled = Exact(
         lambda t: {"T_c": np.where(t < 1.0, 301.0, 300.0)},
         data={"T_1": 300.0, "T_2": 300.0},
         again=lambda data, t: {"T_c": np.full_like(t, (500.0 * data["T_1"] + 300.0 * data["T_2"]) / 800.0)},
     )
-    return Trial(MEDIUM, [1.0], settled, changes)
+    return Trial(MEDIUM_CASE, [1.0], settled, changes)
 
 
-CRITICAL = 50.0 / (math.e * 0.05)
+CRITICAL_HEAT = 50.0 / (math.e * 0.05)
 
 
 @regime(
@@ -95,9 +95,9 @@ def ignition(value: float) -> Trial:
     r"""Heat of a medium without capacity that grows exponentially with its temperature: one half before the fold at
     :math:`H/(e\beta)`, where the temperature is known to the root of rounding, and none beyond.
     """
-    heat = (1.0 - value) * CRITICAL
+    heat = (1.0 - value) * CRITICAL_HEAT
     changes = {"interface.friction.viscous.eta": {"value": heat * 1e-4, "times": [{"exponential": {"beta": -0.05}}]}}
     if value < 0:
-        return Trial(FILM, [1.0], Stops("ignition: no temperature T_c balances the heat", 0.0), changes)
+        return Trial(FILM_CASE, [1.0], Stops("ignition: no temperature T_c balances the heat", 0.0), changes)
     exact = SemenovFold(T_0=300.0, beta=0.05, H=50.0, D_0=heat)
-    return Trial(FILM, [1.0], Exact.of(exact, lambda fold, t: {"T_c": fold.solution(t)["T_c"]}), changes)
+    return Trial(FILM_CASE, [1.0], Exact.of(exact, lambda fold, t: {"T_c": fold.solution(t)["T_c"]}), changes)
