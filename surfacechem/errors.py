@@ -21,7 +21,7 @@ LONGEST = 2000
 LIKE = 0.6
 """Similarity of two names above which one is a guess for the other: a choice, that of `difflib`."""
 
-SUFFIX = re.compile(r"\.(ya?ml|nc|csv)$")
+FILE_SUFFIX = re.compile(r"\.(ya?ml|nc|csv)$")
 
 
 @dataclass(frozen=True)
@@ -137,7 +137,7 @@ def likeness(name: str, other: str) -> tuple[float, float]:
 
     A name that has the words of the other among its own is nearer than its spelling says.
     """
-    one, two = (SUFFIX.sub("", text.lower()) for text in (name[:LONGEST], other))
+    one, two = (FILE_SUFFIX.sub("", text.lower()) for text in (name[:LONGEST], other))
     words = [word for word in re.split(r"[^a-z0-9]+", one) if word]
     inside = bool(words) and all(re.search(rf"(?<![a-z0-9]){word}", two) for word in words)
     same = difflib.SequenceMatcher(None, two, one).ratio()

@@ -28,7 +28,7 @@ from surfacechem.expressions import Expression
 from surfacechem.model.system import Named, Parameter, System
 from surfacechem.quantities import VARIABLES, Quantity
 
-LINE_WIDTH = 100
+CODE_WIDTH = 100
 """Printed lines are broken beyond this, where an expression lets them."""
 
 
@@ -242,14 +242,14 @@ def _safe(text: str) -> str:
 
 def _unpacked(names: Sequence[str], source: str) -> list[str]:
     left = f"{names[0]}," if len(names) == 1 else ", ".join(names)
-    bracketed = len(left) > LINE_WIDTH or len(names) == 1
+    bracketed = len(left) > CODE_WIDTH or len(names) == 1
     return _broken_line("    (", left, f") = {source}") if bracketed else [f"    {left} = {source}"]
 
 
 def _assignment(printer: _Python, name: str, expression: Expression, text: str) -> list[str]:
     value = printer.text(expression)
     left = f"    {printer.name(name)} = "
-    lines = [left + value] if len(left + value) <= LINE_WIDTH else _broken_line(left + "(", value, ")")
+    lines = [left + value] if len(left + value) <= CODE_WIDTH else _broken_line(left + "(", value, ")")
     return [f"    # {text}", *lines]
 
 
@@ -257,13 +257,13 @@ def _broken_line(before: str, text: str, after: str) -> list[str]:
     """The text between brackets, broken before operators and after commas where it is too long for one line; a product
     that is too long by itself before its functions.
     """
-    if len(before + text + after) <= LINE_WIDTH:
+    if len(before + text + after) <= CODE_WIDTH:
         return [before + text + after]
     lines: list[str] = []
     whole = re.split(r" (?=[+-] |if |else )|(?<=,) ", text)
-    factors = [[piece] if len(piece) <= LINE_WIDTH else re.split(r"(?<=[^*]\*)(?=math\.)", piece) for piece in whole]
+    factors = [[piece] if len(piece) <= CODE_WIDTH else re.split(r"(?<=[^*]\*)(?=math\.)", piece) for piece in whole]
     for piece in (factor for pieces in factors for factor in pieces):
-        if lines and len(lines[-1]) + len(piece) + 9 <= LINE_WIDTH:
+        if lines and len(lines[-1]) + len(piece) + 9 <= CODE_WIDTH:
             lines[-1] += f" {piece}"
         else:
             lines.append(piece)

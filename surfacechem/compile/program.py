@@ -140,7 +140,7 @@ class Program:
     """Functions whose zeros are events."""
     algebraic: tuple[bool, ...]
     """Per state: no equation contains its derivative."""
-    filler: ExternalInputs | None = None
+    external: ExternalInputs | None = None
     chains: tuple[Chain, ...] = ()
     nonzeros: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
     """Places of the derivatives that are formed, in their order; none where all are."""
@@ -155,7 +155,7 @@ class Program:
 
     def filled(self, inputs: NDArray[np.float64]) -> NDArray[np.float64]:
         """The inputs, one row or many, with the parameters that come from outside."""
-        return self.filler(inputs) if self.filler else inputs
+        return self.external(inputs) if self.external else inputs
 
     @cached_property
     def tables(self) -> tuple[NDArray[Any], ...]:
@@ -486,7 +486,7 @@ def compile_program(
     residual: Sequence[Any],
     ledger: Sequence[Any] = (),
     margins: Sequence[Any] = (),
-    filler: ExternalInputs | None = None,
+    external: ExternalInputs | None = None,
     chains: Sequence[Chain] = (),
     named: Named = (),
 ) -> Program:
@@ -508,7 +508,7 @@ def compile_program(
     residual, ledger, margins = (expanded(named, rows) for rows in (residual[:core], ledger, margins))
     known = {symbol for row in residual for symbol in row.free_symbols}
     read = {symbol for margin in margins for symbol in margin.free_symbols}
-    outside = {inputs[j] for j in filler.positions} if filler else set()
+    outside = {inputs[j] for j in external.positions} if external else set()
     return Program(
         n=n,
         n_parameters=len(parameters),
@@ -519,7 +519,7 @@ def compile_program(
         ledger=compile_function(inputs, ledger, own, steps=True) if ledger else None,
         margins=compile_function(inputs, margins, own, steps=True) if margins else None,
         algebraic=tuple(rate not in known for rate in derivatives[:core]) + (False,) * (n - core),
-        filler=filler,
+        external=external,
         chains=tuple(chains),
         nonzeros=nonzeros,
         solved=partial(_compiled_rates, inputs, residual, derivatives, chains),

@@ -86,7 +86,7 @@ def _table() -> dict[str, tuple[Decimal, Mapping[str, int]]]:
     return found | {name: (found[base][0] * number, found[base][1]) for name, (number, base) in _DERIVED_UNITS.items()}
 
 
-UNITS = _table()
+KNOWN = _table()
 
 
 class _LeftToPintError(Exception):
@@ -107,9 +107,9 @@ def _parsed(text: str) -> tuple[Decimal, dict[str, int]]:
     """Factor and powers of the base units of a text."""
     value, powers = Decimal(1), Counter[str]()
     for name, power in factors(text):
-        if name not in UNITS:
+        if name not in KNOWN:
             raise _LeftToPintError
-        number, own = UNITS[name]
+        number, own = KNOWN[name]
         value = value * number**power if power > 0 else value / number**-power
         for base, n in own.items():
             powers[base] += n * power

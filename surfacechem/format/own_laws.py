@@ -20,7 +20,7 @@ from surfacechem.documents import document
 from surfacechem.documents.document import Tree
 from surfacechem.errors import InputError, Place, PlacedError
 
-KEYS = ("file", "sha256", "python")
+FILE_KEYS = ("file", "sha256", "python")
 
 _run: dict[str, ModuleType] = {}
 """Modules whose code this process has run, by checksum: it may be asked for again."""
@@ -38,7 +38,7 @@ def embedded(tree: Tree, base: Path, allow_code: bool = False) -> tuple[Tree, li
     entries: list[Tree] = []
     found: list[type[Law]] = []
     for entry in given.items("laws: [my_laws.py]"):
-        fields = {"file": entry} if isinstance(entry.value, str) else entry.mapping(KEYS)
+        fields = {"file": entry} if isinstance(entry.value, str) else entry.mapping(FILE_KEYS)
         if "file" not in fields:
             raise entry.error("a file of laws needs its name, `file: my_laws.py`.")
         name = fields["file"].text("a file of laws")

@@ -65,7 +65,7 @@ NEEDS = f"the compiled path knows surface species only. {LEAVE[:-1]}, with the n
 STICKING_ADVICE = f"a sticking reaction needs a gas: {NEEDS}"
 CHARGES = f"charge transfer needs a neighbour at an electric potential: {NEEDS}"
 THIRD_BODY_ADVICE = "third bodies belong to gases; remove it."
-REMEDIES = {
+KEY_REMEDIES = {
     "adjacent-phases": f"gas and bulk neighbours: {NEEDS}",
     "reference-state-coverage": f"it belongs to `thermo: {DEPENDENT}`.",
     **dict.fromkeys(STICKING, STICKING_ADVICE),
@@ -338,7 +338,7 @@ class PhaseCheck:
         if not isinstance(rate, Mapping):
             raise error(f"{title} has no `rate-constant: {{A, b, Ea}}`.", entry)
         if leading(rate.get("A")) < 0:
-            raise error(f"{title}: 'A' is negative: {REMEDIES['negative-A']}", rate, "A")
+            raise error(f"{title}: 'A' is negative: {KEY_REMEDIES['negative-A']}", rate, "A")
         self._coefficients(entry, title)
 
     def _coefficients(self, entry: Any, title: str) -> None:
@@ -425,8 +425,8 @@ class PhaseCheck:
             raise InputError(f"{title} is not a mapping: {node!r}.", place or Place(self.source.file))
         allowed = set(known)
         for key in node:
-            if key in REMEDIES and key not in allowed:
-                raise self.source.error(f"{title}: '{key}' cannot be used here: {REMEDIES[key]}", node, key)
+            if key in KEY_REMEDIES and key not in allowed:
+                raise self.source.error(f"{title}: '{key}' cannot be used here: {KEY_REMEDIES[key]}", node, key)
             if key not in allowed:
                 raise self.source.error(f"{title}: unknown key '{key}'.{suggestion(str(key), allowed)}", node, key)
 

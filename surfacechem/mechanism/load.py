@@ -28,7 +28,7 @@ from surfacechem.quantities import MOLECULAR
 from surfacechem.scene import BondingVariable, Engine, Sites
 from surfacechem.tolerances import NO_AMOUNT
 
-REACTIONS = "interface.mechanism.reactions"
+REACTIONS_PATH = "interface.mechanism.reactions"
 """Path at which a case gives other numbers of reactions than the mechanism."""
 
 
@@ -236,7 +236,7 @@ def _reaction(
     source: Source, label: str, reaction: Any, entry: Any, outside: bool, species: tuple[Species, ...]
 ) -> RateLaw:
     """The law of a reaction: a formula, or a number that comes from Cantera."""
-    title, place = f"reaction {reaction.equation}", source.place(entry, path=f"{REACTIONS}.{label}")
+    title, place = f"reaction {reaction.equation}", source.place(entry, path=f"{REACTIONS_PATH}.{label}")
     names = dict.fromkeys((*reaction.reactants, *reaction.products))
     change = {name: reaction.products.get(name, 0.0) - reaction.reactants.get(name, 0.0) for name in names}
     whole = {name: plain(nu) for name, nu in change.items() if nu}

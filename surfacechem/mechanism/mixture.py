@@ -30,7 +30,7 @@ class Formula:
         return self.evaluate(values)
 
 
-SPECIES = "interface.mechanism.species"
+SPECIES_PATH = "interface.mechanism.species"
 """Path at which a case gives other numbers of species than the mechanism."""
 
 
@@ -71,7 +71,7 @@ class Species:
     @property
     def path(self) -> str:
         """Path at which a case gives its numbers."""
-        return f"{SPECIES}.{self.name}"
+        return f"{SPECIES_PATH}.{self.name}"
 
     def bound(self, bind: Bind) -> Species:
         """The species with symbols for the parameters of its thermo and its spring."""

@@ -23,7 +23,7 @@ WIDTH, HEIGHT, GAP = 2.7, 0.95, 0.26
 BESIDE, OVER, LINE = 1.6, 0.5, 0.145
 """Room [inch] beside the bodies for heat paths, over them for springs and far sides, and of a line of text."""
 
-FONT = 7.5
+SIZE = 7.5
 COILS = 5
 MOST_LETTERS = 44
 """Letters of a line below the drawing."""
@@ -58,7 +58,7 @@ def figure(scene: Scene) -> Figure:
             middle = GAP + HEIGHT / 2
             _spring(axes, scene.tangential, (WIDTH, middle), (WIDTH + 0.65, middle))
         for k, line in enumerate(below):
-            axes.text(0.0, low + LINE * (len(below) - 0.5 - k) + 0.05, line, va="center", fontsize=FONT, color=GIVEN)
+            axes.text(0.0, low + LINE * (len(below) - 0.5 - k) + 0.05, line, va="center", fontsize=SIZE, color=GIVEN)
         return drawing
 
 
@@ -78,7 +78,7 @@ def _body(axes: Axes, body: Body, bottom: float) -> None:
     lines += [f"conducts, {body.conduction.cells or 'as one lump:'} cells"] if body.conduction else []
     middle = bottom + HEIGHT / 2
     axes.text(WIDTH / 2, middle + 0.26, body.name, ha="center", va="center", weight="bold", fontsize=9)
-    axes.text(WIDTH / 2, middle + 0.12, "\n".join(lines), ha="center", va="top", fontsize=FONT, linespacing=1.35)
+    axes.text(WIDTH / 2, middle + 0.12, "\n".join(lines), ha="center", va="top", fontsize=SIZE, linespacing=1.35)
 
 
 def _interface(axes: Axes, scene: Scene) -> None:
@@ -86,7 +86,7 @@ def _interface(axes: Axes, scene: Scene) -> None:
     axes.add_patch(Rectangle((0, 0), WIDTH, GAP, facecolor=MEDIUM, edgecolor=SPRING, hatch="..", alpha=0.6))
     axes.text(
         WIDTH / 2, GAP / 2, f"interface: {_temperature(interface.temperature)}", ha="center", va="center",
-        fontsize=FONT, bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.5},
+        fontsize=SIZE, bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.5},
     )  # fmt: skip
 
 
@@ -115,7 +115,7 @@ def _heat(axes: Axes, scene: Scene) -> None:
             x = -0.12 - 0.2 * inside.index(between)
             _arrow(axes, (x, low), (x, high))
             at = -0.2 - 0.2 * (len(inside) - 1), (low + high) / 2 + 0.1
-        axes.text(*at, "\n".join(words), color=HEAT, ha="right", va="center", fontsize=FONT)
+        axes.text(*at, "\n".join(words), color=HEAT, ha="right", va="center", fontsize=SIZE)
     for name in HEATED_BODY.keys() & scene.loading.keys():
         k = HEATED_BODY[name]
         level = GAP / 2 if k is None else levels[k]
@@ -137,7 +137,7 @@ def _far_side(axes: Axes, body: Body, edge: float, way: int) -> None:
     text = f"far side: {body.conduction.far.at_start():g} K"
     if not body.conduction.held:
         text += f"\nthrough {body.conduction.h_far:g} W/(m² K)"
-    axes.text(WIDTH / 2 + 0.1, edge + way * 0.2, text, color=HEAT, va="center", fontsize=FONT)
+    axes.text(WIDTH / 2 + 0.1, edge + way * 0.2, text, color=HEAT, va="center", fontsize=SIZE)
 
 
 def _spring(axes: Axes, mounting: Mounting, start: tuple[float, float], end: tuple[float, float]) -> None:
@@ -153,7 +153,7 @@ def _spring(axes: Axes, mounting: Mounting, start: tuple[float, float], end: tup
     # Beside a spring that stands upright there is room for its words, over one that lies.
     above = end[0] == start[0]
     place = (end[0] + 0.32, end[1] - 0.1) if above else (start[0] + 0.05, end[1] + 0.33)
-    axes.text(*place, text, va="center", fontsize=FONT, color=SPRING)
+    axes.text(*place, text, va="center", fontsize=SIZE, color=SPRING)
 
 
 def _given(scene: Scene) -> list[str]:

@@ -94,7 +94,7 @@ EVENT_LINE_STYLES = ("dotted", "dashed", "dashdot")
 
 # Rows of names above the first panel; width of a letter and of the space beside panels [inch], space between two names
 # in widths of the panel, and height of a row in points.
-NAME_ROWS, LETTER_WIDTH, SIDE_WIDTH, NAME_SPACING, NAME_ROW_HEIGHT = 3, 0.06, 1.7, 0.02, 9.0
+NAME_ROWS, LETTER_INCHES, SIDE_WIDTH, NAME_SPACING, NAME_ROW_HEIGHT = 3, 0.06, 1.7, 0.02, 9.0
 
 # Curves of a panel that have colours of their own: the largest; more would not be told apart.
 MOST_COLOURED = len(style.COLOURS) - 1
@@ -510,7 +510,7 @@ def _write_rows(ax: Axes, width: float, items: Sequence[tuple[float, str]], belo
     """
     placed: list[tuple[float, int, str]] = []
     ends = [0.0] * lanes
-    letter = LETTER_WIDTH / (width - SIDE_WIDTH)
+    letter = LETTER_INCHES / (width - SIDE_WIDTH)
     for _, at, text in _positions_across_panel(ax, items):
         half = letter * len(text) / 2
         middle = min(max(at, half), 1 - half)

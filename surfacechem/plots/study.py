@@ -47,7 +47,7 @@ TEXT_DIMENSIONS = {"status": POINT_DIMENSIONS, **{name: (dimension,) for dimensi
 
 # Errors below this are drawn as this: below the last digit, so that an error of zero has a place on a logarithmic axis
 # of its own.
-ERROR_FLOOR = EPS / 16
+LEAST_ERROR = EPS / 16
 
 BELOW, STEPPING = "below the uncertainty of the reference", "inside the library's own steps"
 
@@ -73,9 +73,9 @@ def precision(dataset: xarray.Dataset) -> Figure:
                 for k in range(dataset.sizes["solver"]):
                     _draw_solver(ax, case.isel(solver=k), name, limit, *looks[k])
                 if np.isfinite(limit):
-                    ax.axvspan(ERROR_FLOOR, max(limit, ERROR_FLOOR), color="0.5", alpha=0.12, linewidth=0)
+                    ax.axvspan(LEAST_ERROR, max(limit, LEAST_ERROR), color="0.5", alpha=0.12, linewidth=0)
                     finite = case[name].values[np.isfinite(case[name].values)]
-                    ax.set_xlim(left=max(min([limit, *finite]) / 3, ERROR_FLOOR / 2))
+                    ax.set_xlim(left=max(min([limit, *finite]) / 3, LEAST_ERROR / 2))
                 ax.set_xlabel(ERRORS[name] if i == rows - 1 else "")
             grid[i, 0].set_ylabel("run time [s]")
             grid[i, 0].set_title(str(case["case_name"].values), loc="left")
@@ -84,7 +84,7 @@ def precision(dataset: xarray.Dataset) -> Figure:
 
 
 def _draw_solver(ax: Axes, cells: xarray.Dataset, name: str, limit: float, colour: str, marker: str) -> None:
-    x, y = np.maximum(cells[name].values, ERROR_FLOOR), cells["run_seconds"].values
+    x, y = np.maximum(cells[name].values, LEAST_ERROR), cells["run_seconds"].values
     shown = np.isfinite(x) & np.isfinite(y) & ((cells[name].values > 0) | np.isfinite(limit))
     ax.plot(x[shown], y[shown], color=colour, linewidth=1.0)
     inside = cells["stepping_seconds"].values

@@ -20,7 +20,7 @@ from surfacechem.solve.adapters.cantera_network import StateVectorReactor, last_
 from surfacechem.solve.adapters.dense_step import Guards, first_crossing
 from surfacechem.solve.contract import Array, Counters, Guard
 
-MOST_GROWTH = 1e4
+CVODE_GROWTH = 1e4
 """Largest ratio of a step of CVODE to the one before: after the first step this, later 10."""
 
 STEPS_OF_A_RESIDUAL = 10
@@ -197,7 +197,7 @@ class ReactorNet(cantera.ReactorNet):
         following = self._breakpoints()
         if self._watch.interfaces:
             return self._watched_step(following)
-        growth = MOST_GROWTH if self._steps < 2 else 10.0
+        growth = CVODE_GROWTH if self._steps < 2 else 10.0
         if following and (self._steps == 0 or self.time + growth * self._last_step >= following[0]):
             return self._advance(following[0])
         before = self.time

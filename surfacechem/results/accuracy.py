@@ -27,7 +27,7 @@ a hundred times its tolerance, but near singular ends.
 CELLS_UNKNOWN = "the error of the cells across bodies does not fall as their number grows"
 """Reason why the error of a run with cells is not known."""
 
-AT_START = "the run ended at its start"
+ENDED_AT_START = "the run ended at its start"
 
 NOTHING_EVOLVES = "nothing evolves, and no work is done"
 """Reason why two runs at different tolerances tell nothing."""

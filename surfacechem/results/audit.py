@@ -309,8 +309,8 @@ def _rounding_of(
     n, part, least = len(model.system.states), np.full(rows.shape[1], EPS), np.zeros(rows.shape[1])
     part[1 : 1 + 2 * n] = max(EPS, ERROR_MARGIN * trajectory.run.rtol)
     least[1 : 1 + n] = ERROR_MARGIN * result.problem.atol
-    filler, filled = model.program.filler, model.program.filled(rows.copy())
-    read = filler.reads(rows) if filler else np.empty(0)
+    external, filled = model.program.external, model.program.filled(rows.copy())
+    read = external.reads(rows) if external else np.empty(0)
     now = function(filled)[:, columns]
     found = EPS * np.abs(now)
 
@@ -321,18 +321,18 @@ def _rounding_of(
 
     asking = []
     for j in range(rows.shape[1]):
-        if filler and j in filler.positions:
+        if external and j in external.positions:
             continue
         moved = filled.copy()
         moved[:, j] += part[j] * np.abs(rows[:, j]) + least[j]
-        if filler and not np.array_equal(filler.reads(moved), read):
+        if external and not np.array_equal(external.reads(moved), read):
             asking.append(moved)
         else:
             found += np.nan_to_num(np.abs(function(moved)[:, columns] - now))
     yield rounding()
-    if filler:
+    if external:
         for moved in asking:  # only where it reads another state
-            found += np.nan_to_num(np.abs(function(filler(moved))[:, columns] - now))
+            found += np.nan_to_num(np.abs(function(external(moved))[:, columns] - now))
             yield rounding()
 
 

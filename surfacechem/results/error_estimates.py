@@ -19,8 +19,8 @@ import numpy as np
 from surfacechem.contracts.terms import Law
 from surfacechem.errors import InputError, Place, refuse_unknown
 from surfacechem.results.accuracy import (
-    AT_START,
     CELLS_UNKNOWN,
+    ENDED_AT_START,
     NOTHING_EVOLVES,
     RTOL_PART,
     Accuracy,
@@ -62,7 +62,7 @@ MOST_TIMES = 400
 DRIVING_TIMES = 10.0 ** np.arange(-15, 1)
 """Fractions of a run in which one state may drive another."""
 
-ENERGY, ENTROPY = "J/m^2", "J/(m^2 K)"
+ENERGY_UNIT, ENTROPY_UNIT = "J/m^2", "J/(m^2 K)"
 """Units of accounts that belong together."""
 
 EVENTS = "event times"
@@ -91,7 +91,7 @@ def accuracy(
     ``estimate`` is that of a second run, where there was one.
     """
     if ended_at_start(trajectory):
-        return unknown(AT_START)
+        return unknown(ENDED_AT_START)
     if way == "balances":
         if len(trajectory.result.times) < 2:
             return unknown("the run ended before its second output")
@@ -221,7 +221,7 @@ def estimated(trajectory: Trajectory, second: Trajectory) -> Accuracy:
     """Errors of states and of the times of events as a second run at another tolerance tells them."""
     other = second.run.rtol
     if ended_at_start(trajectory):
-        return unknown(AT_START)
+        return unknown(ENDED_AT_START)
     if trajectory.status == "failed" and len(trajectory.result.times) < 2:
         return unknown(f"the run failed: {trajectory.reason}")
     ends_late = second.result.t > trajectory.result.t
@@ -230,7 +230,7 @@ def estimated(trajectory: Trajectory, second: Trajectory) -> Accuracy:
         return unknown(f"a second run at rtol {other:.0e} {fate}: {second.reason}")
     errors, note = state_differences(trajectory.looked, second)
     if not errors:
-        return unknown(NOTHING_EVOLVES if len(trajectory.result.times) > 1 else AT_START)
+        return unknown(NOTHING_EVOLVES if len(trajectory.result.times) > 1 else ENDED_AT_START)
     if note:  # one of the two went another way
         return unknown(f"a second run at rtol {other:.0e}, which had {note}")
     return Accuracy(stated(errors), second_run(second.run), errors, named=partial(of_named, trajectory.looked, second))
@@ -455,8 +455,8 @@ def _exchanged_sizes(trajectory: Trajectory) -> dict[str, float]:
     sizes, whole = np.abs(values).max(axis=0, initial=0.0), dict.fromkeys(units, 0.0)
     for unit, size in zip(units, sizes, strict=True):
         whole[unit] = max(whole[unit], float(size))
-    if (hottest := whole.get("K", 0.0)) > 0 and ENTROPY in whole:
-        whole[ENTROPY] = max(whole[ENTROPY], whole.get(ENERGY, 0.0) / hottest)
+    if (hottest := whole.get("K", 0.0)) > 0 and ENTROPY_UNIT in whole:
+        whole[ENTROPY_UNIT] = max(whole[ENTROPY_UNIT], whole.get(ENERGY_UNIT, 0.0) / hottest)
     least = [ATOL_OF_SCALE * whole[unit] for unit in units]
     own = np.maximum(sizes, least)[len(system.outputs) :].tolist()
     return dict(zip((account.quantity.name for account in system.ledger), own, strict=True))
@@ -559,7 +559,7 @@ def compared(first: Trajectory, second: Trajectory) -> Accuracy:
     if others and first.run.rtol > MIN_RTOL:  # there rounding decides of events that change nothing
         return Accuracy(math.inf, f"{source}, which had {others}")
     if not errors:
-        return unknown(AT_START)
+        return unknown(ENDED_AT_START)
     return Accuracy(stated(errors), source, errors, named=partial(of_named, first.looked, second))
 
 

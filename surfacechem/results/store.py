@@ -30,7 +30,7 @@ from surfacechem.results.netcdf import Column
 if TYPE_CHECKING:
     import xarray
 
-SUFFIX = ".zarr"
+STORE_SUFFIX = ".zarr"
 MARKS_FOLDER = ".marks"
 
 COORDINATE_PART = 2**20
@@ -257,7 +257,7 @@ def begin(path: Path, layout: Layout, resume: bool) -> Store:
     InputError where there is another, or where it is not asked to ``resume``.
     """
     if not path.exists():
-        temporary = path.with_name(f".surfacechem-{secrets.token_hex(8)}{SUFFIX}")
+        temporary = path.with_name(f".surfacechem-{secrets.token_hex(8)}{STORE_SUFFIX}")
         store = Store(path, layout)
         try:
             with store.writing():

@@ -31,7 +31,7 @@ from surfacechem.solve.radau.stepper import ARCS, END, EVENTS, FIRST_COUNTER, JU
 from surfacechem.solve.run import Discontinuities, Model, Run
 from surfacechem.tolerances import EPS, GUARD_EPS, MICROMETRE, PICOMETRE
 
-MOST = 4096, 1024
+MOST_ROWS = 4096, 1024
 """Largest numbers of steps and events of a run for which there is room: what has more is looked at by itself."""
 
 PILOT_RUNS = 16
@@ -71,7 +71,7 @@ def is_array(model: Model, plan: Plan, run: Run, problem: Problem) -> bool:
         run.solver in (IMPLICIT, EXPLICIT)
         and run.max_seconds is None
         and not run.steady
-        and model.program.filler is None
+        and model.program.external is None
     )
     shared = model.passing.is_empty or not (plan.load or model.passing.reads & set(plan.paths))
     shared = shared and not set(plan.paths) & set(system.cycles)
@@ -486,7 +486,7 @@ class JumpingRuns(ArrayRuns):
             while not fits:
                 room = self.room
                 batch = solve_arrays(problem, *given, room=room)
-                steps, events = np.minimum(batch.counts[:, [RECORDS, EVENTS]].max(axis=0), MOST).tolist()
+                steps, events = np.minimum(batch.counts[:, [RECORDS, EVENTS]].max(axis=0), MOST_ROWS).tolist()
                 needed = steps * self.keeps_steps, events, 0, events * looks
                 fits = all(each <= had for each, had in zip(needed, room, strict=True))
                 if not fits:

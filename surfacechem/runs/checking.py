@@ -30,7 +30,7 @@ RUNS_AT_ONCE = 200
 
 BALANCE_COLUMNS = (*BALANCES, "destroys_entropy")
 
-KEYS = {
+CHECKED_COLUMNS = {
     "run": ("int64", "number of the run in the plan, the last dimension fastest; -1 for none"),
     "error": ("float64", "largest relative error of the run"),
     **{name: ("float64", END_COLUMNS[name]) for name in BALANCE_COLUMNS},
@@ -64,7 +64,7 @@ def checked_arrays(size: int, count: int) -> tuple[dict[str, int], dict[str, Sto
     arrays = {
         f"{which}_{key}": StoredArray(kind, (which,), {"units": "1", "long_name": text})
         for which in sizes
-        for key, (kind, text) in KEYS.items()
+        for key, (kind, text) in CHECKED_COLUMNS.items()
     }
     return sizes, arrays
 
@@ -100,7 +100,7 @@ def _columns(
     stream: Stream, index: Index, size: int, threads: int | None
 ) -> tuple[dict[str, Array], list[SweepAccuracy]]:
     """The arrays of the runs of these numbers, and what is known of the errors."""
-    columns, told = {key: np.full(size, np.nan) for key in KEYS}, []
+    columns, told = {key: np.full(size, np.nan) for key in CHECKED_COLUMNS}, []
     columns["run"] = np.append(index, np.full(size - len(index), -1))
     for first, part, errors, accuracy in _errors(stream, index, threads):
         for key, values in errors.items():

@@ -20,7 +20,7 @@ from surfacechem.format import Case
 from surfacechem.format.plans import RUN_DIMENSION, STATISTICS, LazyArray, Plan, name_parts
 from surfacechem.model.system import System
 from surfacechem.references.base import SceneView
-from surfacechem.results.accuracy import AT_START, CELLS_UNKNOWN, CellErrors, second_tolerance
+from surfacechem.results.accuracy import CELLS_UNKNOWN, ENDED_AT_START, CellErrors, second_tolerance
 from surfacechem.results.audit import Audit, audit
 from surfacechem.results.dataset import DATASET_NAMES, Results, coverage_columns, quantities, quantity_columns
 from surfacechem.results.error_estimates import against_exact, estimated, second_run, second_settings, with_cells
@@ -50,7 +50,7 @@ Rupture = Statistics | Lifetime
 RESERVED_COLUMNS = ("time", RUN_DIMENSION, "species", "coverage", "error", "entropy_destroyed", "lifetime")
 """Names of dimensions and columns of sweeps that are no quantities."""
 
-PREFIXES = ("event", "checked", "hardest")
+COLUMN_PREFIXES = ("event", "checked", "hardest")
 """Beginnings of the names of dimensions and columns of events, and of runs that are checked."""
 
 MOST_FOLLOWED = 64
@@ -274,7 +274,7 @@ def _against_exact(case: Case, done: SweepSolution, name: str, second: Callable[
     begun = [i for i, run in enumerate(done.runs) if len(run.looked.result.times) > 1]
     if not begun:
         raise InputError("all runs ended at their start.")
-    errors, why = np.full(len(done.runs), np.nan), AT_START
+    errors, why = np.full(len(done.runs), np.nan), ENDED_AT_START
     exact = {which: errors.copy() for which in done.told if which in references.get(name).statistics}
     for i in begun:
         run = done.runs[i]
@@ -308,13 +308,15 @@ def parameter_names(system: System, plan: Plan) -> dict[str, str]:
     for path in plan.paths:
         parts = name_parts(path)
         names = ["_".join(parts[-k:]) for k in range(1, len(parts) + 1)]
-        free = (name for name in names if name not in taken | set(found) and not name.startswith(PREFIXES))
+        free = (name for name in names if name not in taken | set(found) and not name.startswith(COLUMN_PREFIXES))
         found[next(free, f"{names[-1]}_swept")] = path
     return found
 
 
 def _column_names(system: System) -> set[str]:
-    """Names that columns of a file or a store of a sweep may have, and its dimensions, beside those of PREFIXES."""
+    """Names that columns of a file or a store of a sweep may have, and its dimensions, beside those of
+    COLUMN_PREFIXES.
+    """
     kept, shown = keep_of(None, system), {DATASET_NAMES.get(name, name) for name in quantities(system)}
     stored = described(system, replace(kept, at_events=kept.last, reach=dict.fromkeys(kept.last, 0.0)))
     more = [f"{name}_{which}" for name in shown for which in (*EXTREMES, *STATISTICS, "before", "after")]

@@ -94,7 +94,7 @@ FIRST_PUSH = 10 * CBRT_EPS
 """Part of a gap with which motion begins from an unstable balance at least: the difference taken there does not reach
 back to the balance, where laws may have a kink. Ten times is a choice; motion would also leave from twice."""
 
-NEWTON_REACH, NEWTON_STEPS = NEGLIGIBLE, 12
+NEWTON_REACH, REST_STEPS = NEGLIGIBLE, 12
 """Part of the way within which Newton's method takes the last step to rest, and how many steps that may have."""
 
 
@@ -181,7 +181,7 @@ def equilibrium(driving: Field, scale: Array, free: Indices, at: Array, least: f
     if not np.all(np.isfinite(change)) or unstable_direction(change) is not None:
         return None
     reach, last = max(least, NEWTON_REACH * float(np.max(np.abs(at) / scale))), np.inf
-    for _ in range(NEWTON_STEPS):
+    for _ in range(REST_STEPS):
         step = np.linalg.lstsq(change, -driving(at[None])[0, free], rcond=None)[0]
         size = float(np.max(np.abs(step) / scale[free]))
         if not size <= min(reach, last / 2):

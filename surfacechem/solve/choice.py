@@ -21,7 +21,7 @@ def method(problem: Problem, moves: bool) -> tuple[str, str]:
     What becomes stiff on the way only is seen there: explicit steps are followed by implicit ones in the same run.
     """
     program = problem.program
-    if program.filler is not None:
+    if program.external is not None:
         return CALLING_PYTHON[0], "rates of the mechanism come from Cantera itself, which it can ask"
     # The last digit of a gap that touches decides what follows, and implicit steps meet it closer.
     why = _why_implicit(problem) or ("a gap moves, and may touch or stop" if moves else "")

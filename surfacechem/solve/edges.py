@@ -41,7 +41,7 @@ from surfacechem.solve.radau.work import (
 )
 from surfacechem.tolerances import BRIEF_PART, DRIFT, FEW_EPS, GUARD_EPS, MOST_DRIFT, NEWTON_EPS, RUN_EPS, ULPS
 
-NONE_DUE, UNDECIDED = -1, -2
+NO_EDGE, UNDECIDED = -1, -2
 """Codes in place of the index of the edge that is due: none is; undecided, so that an instant has to look."""
 
 OPEN, CLOSED, NEAR = range(3)
@@ -112,7 +112,7 @@ def _closing(w: Any, m: int) -> int:
 @compiled
 def _due(w: Any, first: int) -> int:
     """The edge whose guard is closed, or is zero and closing."""
-    due, near = NONE_DUE, False
+    due, near = NO_EDGE, False
     for m in range(first, w.n_margins):
         w.fired[m] = _closing(w, m)
         near = near or w.fired[m] == NEAR
@@ -144,7 +144,7 @@ def resolve(w: Any, i: int, end: float) -> bool:
         if w.jumped[-1] >= 0.0 and _is_beyond(w, first):
             return False
         due = _due(w, first)
-        if due == NONE_DUE:
+        if due == NO_EDGE:
             return True
         if due == UNDECIDED or not jump(w, i, due):
             return False

@@ -35,7 +35,7 @@ Moments = Callable[[Array, Array], tuple[Array, Array]]
 PANEL_DEGREE = 16
 """Degree of shares and heat on a panel; half of it tells how good that is."""
 
-NARROWEST, MOST_PANELS = 2.0**-50, 1000
+NARROWEST, QUADRATURE_PANELS = 2.0**-50, 1000
 """Panel within which ways have no more digits: there a step of the shares, as at touch, is as sharp as it can be. Such
 a step takes two panels for each digit. Ten of them are more than there are, and what takes more panels is rounding."""
 
@@ -196,7 +196,7 @@ def shared(moments: Moments, takers: int, small: float, *, feeds_back: bool) -> 
             return np.full(takers, np.nan)
         half = np.einsum("fg,fk,g->k", coarse[-1], shares[::2], made[::2])
         close = agrees and np.max(np.abs(up_to[-1] - taken - half)) <= small
-        if close or width <= NARROWEST or panels > MOST_PANELS:
+        if close or width <= NARROWEST or panels > QUADRATURE_PANELS:
             taken, begin = up_to[-1], begin + width
             width = min(2 * width, 1.0 - begin)
         else:

@@ -277,7 +277,7 @@ class Trajectory:
     @cached_property
     def outputs(self) -> Array:
         """Named quantities at the output times, shape (times, outputs)."""
-        return self.model.named(self._inputs.copy() if self.model.program.filler else self._inputs)
+        return self.model.named(self._inputs.copy() if self.model.program.external else self._inputs)
 
 
 def values_of(system: System, changes: Mapping[str, float] | None = None) -> dict[str, float]:
@@ -347,12 +347,12 @@ class Model:
         system = system.with_state()
         start = time.perf_counter()
         n, inputs = len(system.states), system.inputs
-        filler, outside = None, system.outside
+        external, outside = None, system.outside
         if outside is not None:
             paths = [parameter.path for parameter in system.parameters]
             positions = np.array([1 + 2 * n + paths.index(path) for path in outside.engine.gives], dtype=np.int64)
             reads = compile_function(inputs, [system.expand(expression) for expression in outside.reads])
-            filler = ExternalInputs(reads, positions, outside.engine)
+            external = ExternalInputs(reads, positions, outside.engine)
         self.system = system
         self.margins = system.moving_margins
         """The margins that can close on the way; the rest is checked at the start only."""
@@ -364,7 +364,7 @@ class Model:
             system.local(list(system.rows.values())),
             system.local([account.rate for account in system.ledger]),
             system.local([m.expression for m in self.margins] + [edge.guard for edge in system.edges]),
-            filler=filler,
+            external=external,
             chains=[Chain(*chain) for chain in system.chains],
             named=list(zip(system.definitions, system.local([item.expression for item in system.named]), strict=True)),
         )
@@ -515,7 +515,7 @@ class Model:
         problems = [self.problem(*pair) for pair in runs]
         run = self._with_method(runs[0][0], problems[0])
         used = solver(run.solver)
-        if self.program.filler is not None and run.solver not in CALLING_PYTHON:
+        if self.program.external is not None and run.solver not in CALLING_PYTHON:
             raise InputError(
                 f"rates of the mechanism come from Cantera itself, which the solver {run.solver} cannot ask. Use "
                 f"`solver: {CALLING_PYTHON[0]}` under `run`.",
@@ -552,7 +552,7 @@ class Model:
         """
         if self.jumper is None:
             return (yield from without_stall(problem, self.system.sliding)), (), None
-        crosses = crosses and not self.system.searches and self.program.filler is None
+        crosses = crosses and not self.system.searches and self.program.external is None
         told = (yield from carried(problem, self.jumper)) if crosses else None
         if told is None:
             hybrid = Hybrid(self.system, self.jumper, problem, len(self.margins))

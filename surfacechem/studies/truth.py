@@ -119,7 +119,7 @@ class Subject:
 
     def unable(self, name: str) -> str:
         """The reason for which a solver cannot run this case; empty where it can."""
-        if self.model.program.filler is not None and name not in CALLING_PYTHON:
+        if self.model.program.external is not None and name not in CALLING_PYTHON:
             return "rates of the mechanism come from Cantera itself, which this solver cannot ask"
         try:
             solver(name)

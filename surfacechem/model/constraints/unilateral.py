@@ -34,7 +34,7 @@ G, V = symengine.symbols("g_n v_n")
 LANDED = Register("landed", "whether the bodies have met and do not rebound")
 FASTEST = Register("fastest", "speed of the fastest impact [m/s]")
 
-NO_SPEED, LEAST_SPEED = 0.1, 10 * PICOMETRE
+NO_SPEED, LEAST_IMPACT = 0.1, 10 * PICOMETRE
 """Part of the fastest impact, or of the time so far, that counts as none, in units of the relative tolerance; and the
 speed [m/s] that the fastest impact has at least there."""
 
@@ -137,7 +137,7 @@ def _rests(
     nothing = NO_SPEED * tolerance
     # This flight takes 2 rebound / pressing, and all that follow together 1 / (1 - e) times as long.
     brief = pressing * build.t * ((1 - far.e) * nothing + SHORTEST_REBOUND)
-    slow = where(rebound < nothing * (swift + LEAST_SPEED), 1, where(2 * rebound < brief, 1, 0))
+    slow = where(rebound < nothing * (swift + LEAST_IMPACT), 1, where(2 * rebound < brief, 1, 0))
     at_once = build.constant("rests_at", REST_TIME_PATH, Spec("s", "time at which rebounds rest"), -1.0, internal=True)
     return where(build.t > at_once, slow, 1), {FASTEST.symbol: swift}
 

@@ -200,7 +200,7 @@ class _SystemReactor(StateVectorReactor):
         self.view = view
         self.evaluation = Evaluation(view.program, view.y, view.parameters)
         self.count = len(x)
-        lines = view.program.n_ledger if view.program.filler else 0
+        lines = view.program.n_ledger if view.program.external else 0
         self.counts = lines > 0
         self.unit = np.concatenate((np.maximum(view.atol, TINY), np.full(lines, LEDGER_UNIT)))
         self.scaled = np.concatenate((x, np.zeros(lines))) / self.unit

@@ -34,8 +34,8 @@ class Evaluation:
         self._nothing = np.zeros(n)
         self._counts = np.zeros((1, COLUMNS), np.int64)
         self._rates = _Code(program.rates, self.inputs, self.ydot) if program.rates else None
-        self._filler = program.filler
-        self._reads = _Code(program.filler.reads if program.filler else None, self.inputs)
+        self._external = program.external
+        self._reads = _Code(program.external.reads if program.external else None, self.inputs)
         self._ledger = _Code(program.ledger, self.inputs)
         self._margins = _Code(program.margins, self.inputs)
 
@@ -60,15 +60,15 @@ class Evaluation:
             self.inputs[0] = t
         if self._rates is not None:
             self.y[:] = differential
-            if self._filler is not None:
-                self._fill(self._filler)
+            if self._external is not None:
+                self._fill(self._external)
             self._rates()
             return True
         self.y[self.free] = differential
         self.y[self.algebraic] = self.guess
         self.ydot[:] = 0.0
-        if self._filler is not None:
-            self._fill(self._filler)
+        if self._external is not None:
+            self._fill(self._external)
         self._counts[:] = 0
         self._search()
         found = bool(self._counts[0, END] == 0)
@@ -81,11 +81,11 @@ class Evaluation:
         self.inputs[0] = t
         self.y[:] = y
         self.ydot[:] = ydot
-        if whole and self._filler is not None:
-            self._fill(self._filler)
+        if whole and self._external is not None:
+            self._fill(self._external)
 
-    def _fill(self, filler: ExternalInputs) -> None:
-        self.inputs[filler.positions] = filler.evaluate(self._reads().tolist())
+    def _fill(self, external: ExternalInputs) -> None:
+        self.inputs[external.positions] = external.evaluate(self._reads().tolist())
 
     def restart(self, y: Array) -> None:
         """Take over a state after a jump; algebraic variables are searched from there."""

@@ -41,7 +41,7 @@ from surfacechem.tolerances import NEGLIGIBLE, SQRT_EPS, ULPS
 _lay_out = laying_out(WORK)
 
 FINISHED, EVENT, LEFT = int(Status.FINISHED), int(Status.EVENT), int(Status.LEFT)
-MOST_HALVINGS = 12
+MOST_TRIALS = 12
 """Trials of a step in a row after which it is noise or stiffness that they meet: each is a half of the last or less."""
 FREE_LANES = 4
 """Free lanes for which new runs begin: a choice. Fewer fill the lanes better, more share what starts and ends cost."""
@@ -330,7 +330,7 @@ def _continue(w: Any, lane: int) -> None:
     if w.taken[lane] > 0.5:
         _accept(w, lane)
         _go_on(w, lane)
-    doubtful = w.unclear[lane] + (w.failed[lane] > MOST_HALVINGS) + (w.stiff_steps[lane] >= 2 * STIFF_STEPS) > 0
+    doubtful = w.unclear[lane] + (w.failed[lane] > MOST_TRIALS) + (w.stiff_steps[lane] >= 2 * STIFF_STEPS) > 0
     spent = w.steps[lane] + w.rejected[lane] >= w.max_steps[row_of(w.max_steps, i)]
     if w.run[lane] >= 0 and (doubtful or spent or not w.proposed[lane] > ULPS * w.t[lane]):
         _give_up(w, lane)

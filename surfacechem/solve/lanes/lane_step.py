@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from surfacechem.compile.vectors import LANES
 from surfacechem.solve.lanes.layout import MEMORY, SIZES
 from surfacechem.solve.lanes.vector import absolute, any_lane, floor, lanes, put, same, square_root, where
-from surfacechem.solve.radau.dense import FORESEEN_PART, GROUPS, booked
-from surfacechem.solve.radau.explicit import DENSEST, ERROR_PART, FELT, FOLLOWED, STIFF
+from surfacechem.solve.radau.dense import FORESEEN_PART, N_GROUPS, booked
+from surfacechem.solve.radau.explicit import DENSEST, ERROR_PART, FELT, FOLLOWED, STIFF_STEP
 from surfacechem.solve.radau.record import StepperRecord
 from surfacechem.solve.radau.step import END_LOOKS, LOOK_PART, MAX_GROWTH, MIN_GROWTH, SAFETY, UNSEEN_ERROR
 from surfacechem.solve.radau.tables import (
@@ -121,7 +121,7 @@ def _ledger_norms(w: Any) -> Any:
         put(w.q_rate[m], rate)
         put(w.q_scale[m], lanes(w.q_largest[m]) + larger(h, FORESEEN_PART * span) * rate)
     norm = same(0.0)
-    for group in range(GROUPS):
+    for group in range(N_GROUPS):
         miss, second, scale = same(0.0), same(0.0), same(TINY)
         for m in range(w.n_ledger):
             if w.groups[m] == group:
@@ -185,7 +185,7 @@ def find_stiff(w: Any) -> None:
         speed = larger(speed, absolute(end) * unit)
         change = larger(change, absolute(end - lanes(w.k[0, m])) * unit)
     outrun = (fastest > FELT) & (change < FOLLOWED * fastest * speed)
-    put(w.stiff, where((fastest > STIFF) | outrun, 1.0, 0.0))
+    put(w.stiff, where((fastest > STIFF_STEP) | outrun, 1.0, 0.0))
 
 
 @compiled
@@ -237,7 +237,7 @@ def _prepare_looks(w: Any) -> None:
         put(w.allowed[m], UNSEEN_ERROR * GAMMA[DENSEST] * w.loose * larger(w.rtol * size + w.atol[m], TINY) / h)
     for m in range(w.n_ledger):
         put(w.allowed[w.n + m], same(np.inf))  # of what belongs to no group it only has to be a number
-    for group in range(GROUPS):
+    for group in range(N_GROUPS):
         scale = same(TINY)
         for m in range(w.n_ledger):
             if w.groups[m] == group:

@@ -26,7 +26,7 @@ from surfacechem.solve.radau.tables import (
 from surfacechem.solve.radau.work import LEDGER, combine, compiled, copy, evaluate, finite, put
 from surfacechem.tolerances import NEGLIGIBLE, RUN_EPS, TINY
 
-GROUPS = 3
+N_GROUPS = 3
 """Accounts that are measured together: energies, entropies, bonds."""
 LEDGER_FACTOR, LEDGER_RTOL = 30.0, RUN_EPS
 """Error of a quadrature in units of the tolerance of the states, and the least there is."""
@@ -201,7 +201,7 @@ def _group_norm(w: Any) -> float:
     """Largest error in units of what is allowed in its group."""
     # Accounts of one kind are added up: what one of them misses counts beside the largest.
     norm, allowed, power = 0.0, booked(w.rtol), 1.0 - 1.0 / stage_count(w.member)
-    for group in range(GROUPS):
+    for group in range(N_GROUPS):
         miss, scale = 0.0, TINY
         for m in range(w.n_ledger):
             if w.groups[m] == group:

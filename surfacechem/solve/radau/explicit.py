@@ -26,7 +26,7 @@ ERROR_PART = 0.2
 """Part of the tolerance that an error of a step may take: what its polynomial, one order lower, adds is about as much
 again as the rest.
 """
-STIFF = 3.0
+STIFF_STEP = 3.0
 """Step times the fastest rate that counts as stiff where it lasts: what decays so fast is gone by 1e-19 in fifteen
 steps, and what swings is not resolved. The method is stable up to 6.1, less where rounding limits the steps.
 """
@@ -133,7 +133,7 @@ def is_stiff(w: Any) -> bool:
             largest, fastest = apart * unit, apart / (abs(w.slopes[0, m] - w.slopes[4, m]) + TINY)
         speed, change = max(speed, abs(k[end, m]) * unit), max(change, abs(k[end, m] - k[0, m]) * unit)
     outrun = fastest > FELT and change < FOLLOWED * fastest * speed
-    w.stiff_steps = w.stiff_steps + 2 if fastest > STIFF or outrun else max(w.stiff_steps - 1, 0)
+    w.stiff_steps = w.stiff_steps + 2 if fastest > STIFF_STEP or outrun else max(w.stiff_steps - 1, 0)
     return bool(w.stiff_steps >= 2 * STIFF_STEPS)
 
 

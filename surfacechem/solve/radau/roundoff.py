@@ -17,7 +17,7 @@ from surfacechem.tolerances import NEGLIGIBLE, ULPS
 FIFTH_DIFFERENCE = np.array([1.0, -5.0, 10.0, -10.0, 5.0, -1.0]) / np.sqrt(252.0)
 """Coefficients of a fifth difference, scaled so that it has the size of independent errors of the values."""
 
-WINDOWS, SPACING = 3, NEGLIGIBLE
+WINDOWS, TIME_SPACING = 3, NEGLIGIBLE
 """Differences that are taken, and how far apart their times are as parts of a step."""
 
 MAGNIFIED = 10.0
@@ -39,7 +39,7 @@ def _measure_wobble(w: Any, y: Any, ydot: Any) -> None:
         clear(w.wobble_sums[row])
     set_inputs(w, y, ydot)
     for k in range(WINDOWS + FIFTH_DIFFERENCE.shape[0] - 1):
-        w.inputs[0] = t + k * SPACING * w.h_factored
+        w.inputs[0] = t + k * TIME_SPACING * w.h_factored
         evaluate(w, RESIDUAL, w.wobble_now)
         for row in range(WINDOWS):
             if 0 <= k - row < FIFTH_DIFFERENCE.shape[0]:

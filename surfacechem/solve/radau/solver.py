@@ -354,7 +354,7 @@ def consistent(program: Program, t: ArrayLike, y: ArrayLike, ydot: ArrayLike, pa
     )
     if len(table) not in (1, len(ends)):
         raise ValueError(f"{len(ends)} states but {len(table)} parameter vectors; one is needed, or one a state.")
-    if program.filler is not None:
+    if program.external is not None:
         rows = np.broadcast_to(table[:, 0], (len(ends), program.n_parameters))
         filled = program.filled(np.concatenate([ends, rows], axis=1))
         table = np.ascontiguousarray(filled[:, None, 1 + 2 * n :])
@@ -377,6 +377,6 @@ def rates_at(program: Program, t: Array, y: Array, parameters: Array) -> Array:
     """Derivatives of states, shape (rows, n), at times and with parameters of their own."""
     guess = np.zeros_like(y)
     # A formula is there much sooner than the solution of a linear system for each row.
-    if program.filler is None and program.n <= MOST_RATE_STATES and program.rates is not None:
+    if program.external is None and program.n <= MOST_RATE_STATES and program.rates is not None:
         return program.rates(np.concatenate([t[:, None], y, guess, parameters], axis=1))
     return consistent(program, t, y, guess, parameters).ydot
