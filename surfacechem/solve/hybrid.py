@@ -160,7 +160,7 @@ class Hybrid:
         # A jump may have led beyond the last arc, to the very time of a fold.
         t = max(reached, instant.jumps[-1].t) if instant.reason and instant.jumps else reached
         if not self.arcs:
-            return unbegun(problem, instant.status, t, instant.booked)
+            return ended_at_start(problem, instant.status, t, instant.booked)
         return merged(problem, self.arcs, instant.status, t, instant.booked)
 
     def _after(self, arc: Arc, end: float) -> Point | None:
@@ -320,7 +320,7 @@ def with_arc_segments(problem: Problem, result: Result) -> Result:
     return replace(result, problem=problem, segment=outputs.segment, steps=steps, known=known)
 
 
-def unbegun(problem: Problem, status: Status, end: float, ledger: Array) -> Result:
+def ended_at_start(problem: Problem, status: Status, end: float, ledger: Array) -> Result:
     """The result of a run that ended with a jump at its start."""
     n, q, none = problem.program.n, problem.program.n_ledger, np.zeros(0)
     states, lines = np.empty((0, n)), np.empty((0, q))
@@ -329,7 +329,7 @@ def unbegun(problem: Problem, status: Status, end: float, ledger: Array) -> Resu
     return Result(problem, status, end, *begun, none, none, states, lines, events, Counters(), stepping=0.0)
 
 
-def begun(problem: Problem, result: Result) -> Result:
+def with_start(problem: Problem, result: Result) -> Result:
     """The result with its start as output where it ended there with none, if the equations hold at the start: the state
     before anything jumps.
     """

@@ -175,7 +175,7 @@ def _panel(degree: int) -> tuple[Array, Array]:
     return points, integrals
 
 
-def shared(moments: Moments, takers: int, small: float, *, feeds_back: bool) -> Array:
+def shared_heat(moments: Moments, takers: int, small: float, *, feeds_back: bool) -> Array:
     """Heat that each of the takers has taken at the end of a way from 0 to 1, shape (takers,).
 
     Panels are halved until the integrals of their polynomials and those of half the degree agree within the heat that
@@ -312,7 +312,7 @@ class LoadPath:
             reached[float(places[-1])] = part
             return np.array([made for made, _ in found]), np.array([share for _, share in found])
 
-        taken = at_once + shared(moments, len(self.heat.nodes), small, feeds_back=self.warms_itself)
+        taken = at_once + shared_heat(moments, len(self.heat.nodes), small, feeds_back=self.warms_itself)
         whole = float(np.sum(taken))
         return taken / whole if whole > 0 else None
 

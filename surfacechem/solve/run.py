@@ -25,7 +25,7 @@ from surfacechem.solve.choice import EXPLICIT, method
 from surfacechem.solve.contract import Array, Guard, Index, Mask, Problem, Result, Solver, States, Status, among
 from surfacechem.solve.diagnose import ROUNDED_BACK, are_led_back, termination
 from surfacechem.solve.equilibria import NO_BALANCE, Equilibria, Point
-from surfacechem.solve.hybrid import Flow, Hybrid, begun, carried, solve_together, without_stall
+from surfacechem.solve.hybrid import Flow, Hybrid, carried, solve_together, with_start, without_stall
 from surfacechem.solve.jumps import Jump, Jumper
 from surfacechem.solve.radau.solver import consistent, output_rates
 from surfacechem.solve.segments import Passing
@@ -305,7 +305,7 @@ def refuse_static(system: System, case: str = "CASE") -> None:
         raise InputError(f"there is nothing to solve: everything is prescribed. {remedy}", path="bodies")
 
 
-def stable_start(system: System, program: Program, y: Array, parameters: Array) -> Array:
+def stable_guess(system: System, program: Program, y: Array, parameters: Array) -> Array:
     """First guesses that lead to a stable state; those given, where they do or where none does.
 
     Heat that grows with temperature meets what leaves twice: in a stable state, and above it in one that any
@@ -427,7 +427,7 @@ class Model:
             pieces.perturb_histories(system, parameters)
         if system.equilibria:
             y, parameters = self._equilibrated(y, parameters)
-        start = stable_start(system, self.program, y, parameters[0])
+        start = stable_guess(system, self.program, y, parameters[0])
         if system.equilibria:  # the gaps given are where the search begins; what it finds has to be admissible, too
             self._limits.check(start, parameters[0])
         return Problem(
@@ -543,7 +543,7 @@ class Model:
         done = []
         for (run, values, problem), (result, jumps, ended) in zip(items, ends, strict=True):
             status, reason = ended or self.verdict(run, result, values)
-            done.append(Trajectory(self, run, begun(problem, result), values, status, reason, seconds, jumps))
+            done.append(Trajectory(self, run, with_start(problem, result), values, status, reason, seconds, jumps))
         return done
 
     def _flow(self, problem: Problem, crosses: bool) -> Flow[tuple[Result, tuple[Jump, ...], tuple[str, str] | None]]:

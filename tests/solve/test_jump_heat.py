@@ -10,7 +10,7 @@ from surfacechem.format import load_text
 from surfacechem.reactor import InterfaceReactor, ReactorNet
 from surfacechem.runs.check import warnings
 from surfacechem.runs.simulation import Simulation
-from surfacechem.solve.jump_heat import shared
+from surfacechem.solve.jump_heat import shared_heat
 
 CASE = """
 T_0: 300 K
@@ -271,7 +271,7 @@ def test_heat_is_shared_along_a_way_within_the_tolerance(feeds_back):
     # The square root of 3, less 1, where it feeds back: (1 + Q) dQ = dH.
     exact = 3**0.5 - 1 if feeds_back else 0.2 * 0.09 + 2 * (0.7 - np.log(2 / 1.3))
     for small in (1e-4, 1e-8, 1e-12):
-        one, other = shared(moments, 2, small, feeds_back=feeds_back)
+        one, other = shared_heat(moments, 2, small, feeds_back=feeds_back)
         assert abs(one - exact) <= small
         assert one + other == pytest.approx(1, rel=1e-13)
 
@@ -340,7 +340,7 @@ def test_check_says_that_the_parts_of_a_support_matter_only_where_it_makes_heat(
 
 
 def test_where_a_way_has_no_numbers_nothing_is_shared():
-    found = shared(lambda ways, _: (ways, np.full((len(ways), 2), np.nan)), 2, 1e-9, feeds_back=False)
+    found = shared_heat(lambda ways, _: (ways, np.full((len(ways), 2), np.nan)), 2, 1e-9, feeds_back=False)
     assert np.all(np.isnan(found))
 
 
