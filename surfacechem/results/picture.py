@@ -209,11 +209,12 @@ def _pictured(trajectory: Trajectory, part: float, rows: States, rounds: int) ->
     some, first = whole.some, quantities.shape[1] - whole.outputs.shape[1]
     unknown = some.felt(EPS * np.abs(some.result.outputs) + result.problem.atol)
     noise = np.pad(RUN_ERROR * np.array([*unknown.values()]), (first, 0))
-    # What may be an error is not pictured, and what is early counts for no range.
+    # What may be an error is not pictured, however loose the tolerance no more of a value than the part, and what is
+    # early counts for no range.
     values = np.where(np.isfinite(quantities), quantities, 0.0)
-    known, rtol = values if early.all() else values[~early], whole.run.rtol
+    known, error = values if early.all() else values[~early], min(UNRESOLVED * whole.run.rtol, part)
     # The rest of the part is what the states that are known miss of those between them.
-    allowed = (1 - 1 / FINER_BY) * part * np.ptp(known, axis=0) + RUN_ERROR * rtol * np.abs(values).max(axis=0) + noise
+    allowed = (1 - 1 / FINER_BY) * part * np.ptp(known, axis=0) + error * np.abs(values).max(axis=0) + noise
     seen = np.ptp(values, axis=0) > allowed
     if rounds and (bends := _bends(whole, allowed[first:], seen[first:])):
         more = States(*map(np.concatenate, zip(rows, *bends, strict=True)))

@@ -51,6 +51,17 @@ def test_lines_between_outputs_show_the_run(name):
             assert np.abs(missed).max() <= LINE_ERROR * np.ptp(known), shown
 
 
+@pytest.mark.parametrize("rtol", [1e-4, 1e-2])
+def test_lines_show_a_run_whose_tolerance_is_coarser_than_they_are(rtol):
+    case = surfacechem.load("exothermic", [f"run.rtol={rtol}"])
+    shown = case.run(error="balances").dataset
+    times = tuple(np.linspace(0.0, case.case.run.times[-1], 1001).tolist())
+    dense = case.run(run=replace(case.case.run, times=times, picture=None), error="balances").dataset
+    for name in ("phi", "T", "q_1"):
+        missed = shown[name].interp(time=dense.time) - dense[name]
+        assert np.abs(missed).max() < 2 * PICTURE * np.ptp(dense[name].values), name
+
+
 def test_both_sides_of_every_event_and_the_extremes_of_the_steps_are_outputs():
     solution = solved("stick-slip")
     data, trajectory = solution.dataset, solution.trajectory
