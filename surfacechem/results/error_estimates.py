@@ -147,15 +147,16 @@ def against_exact(
     """
     from surfacechem.results.matching import exact_values
 
-    # How well cells resolve what has just begun is told at the times that are asked for.
-    seen = trajectory if trajectory.model.system.profiles else fewer(trajectory.looked)
     # Exact solutions have no events to compare with: the times of these come from a second run.
     if late is None and (found := event_times(trajectory)):
         expected = event_times(second or _second(trajectory))
         late = {} if difference(found, expected) else event_errors(found, expected, trajectory.run.times[-1])
     late = dict(late or {})
+    latest = max(late.values(), default=0.0)
+    # How well cells resolve what has just begun is told at the times that are asked for.
+    seen = trajectory if trajectory.model.system.profiles else fewer(trajectory.looked, latest)
     exact = exact_values(name, options, scene, seen, to_the_end=True, side=max([SIDE, *late.values()]))
-    alike = _off_events(seen, max(late.values(), default=0.0))
+    alike = _off_events(seen, latest)
     for values in exact.values():  # where a solution ends with an infinite slope its last moment has none
         alike &= np.isfinite(values.reshape(len(values), -1)).all(axis=1)
     ours, known = computed(seen), sizes(seen, named=exact.keys() - states(seen).keys())
@@ -180,21 +181,28 @@ def exact_outputs(
 
 def _off_events(trajectory: Trajectory, late: float) -> Mask:
     """Whether each output is away from every jump and from the end of what physics stopped, whose times may err by this
-    part of them: near these the side of an exact solution, and its slope, depend on the time.
+    part of them: near these the side of an exact solution, and its slope, depend on the time. Brief is what is so
+    beside the time to the next of them.
     """
     result, end = trajectory.result, trajectory.run.times[-1]
     stopped = [result.t] if trajectory.status == "stopped" else []
-    moments = np.array([*(jump.t for jump in trajectory.jumps), *stopped])
-    away = np.abs(result.times[:, None] - moments)
-    return np.asarray(np.all(away > np.maximum(BRIEF_PART * end, 2 * late * moments), axis=1))
+    moments = np.unique([*(jump.t for jump in trajectory.jumps), *stopped])
+    brief = BRIEF_PART * np.diff(moments, prepend=0.0, append=max([end, *moments[-1:]]))
+    ways = moments - np.maximum(brief[:-1], 2 * late * moments), moments + np.maximum(brief[1:], 2 * late * moments)
+    return clear_of(result.times, np.transpose(ways))
 
 
-def fewer(trajectory: Trajectory) -> Trajectory:
-    """The run with so few of its outputs that an exact solution is quick; where there are many stay many."""
+def fewer(trajectory: Trajectory, late: float = 0.0) -> Trajectory:
+    """The run with so few of its outputs that an exact solution is quick: its ends, and others away from events, whose
+    times may be ``late`` by this part of them.
+    """
     times = trajectory.result.times
     if len(times) <= MOST_TIMES:
         return trajectory
-    return trajectory.at_times(times[np.linspace(0, len(times) - 1, MOST_TIMES).round().astype(int)])
+    away = _off_events(trajectory, late)
+    away[[0, -1]] = True
+    rows = np.flatnonzero(away)
+    return trajectory.at_times(times[np.unique(rows[np.linspace(0, len(rows) - 1, MOST_TIMES).round().astype(int)])])
 
 
 def second_settings(trajectory: Trajectory, known: bool = False) -> Run:
@@ -359,11 +367,16 @@ def agree_at_jumps(times: Array, first: Trajectory, second: Trajectory) -> Mask:
     return clear_of(times, pairs + [(jump.t, jump.t) for jump in (*first.jumps[both:], *second.jumps[both:])])
 
 
-def clear_of(times: Array, pairs: Sequence[tuple[float, float]]) -> Mask:
-    """Whether each time lies between none of these pairs, the times at which two runs have the same event."""
-    ways = np.array(pairs).reshape(-1, 2)
-    early, late = ways.min(axis=1) * (1 - SIDE), ways.max(axis=1) * (1 + SIDE)
-    return np.asarray(np.all((times[:, None] < early) | (times[:, None] > late), axis=1))
+def clear_of(times: Array, pairs: Sequence[tuple[float, float]] | Array) -> Mask:
+    """Whether each time lies between none of these pairs, the times at which two runs have the same event.
+
+    >>> clear_of(np.array([0.5, 1.0, 2.5, 4.0]), [(2.0, 3.0), (1.0, 1.0)]).tolist()
+    [True, False, False, True]
+    """
+    ways = np.sort(np.reshape(pairs, (-1, 2)), axis=1)
+    early, late = ways[np.argsort(ways[:, 0])].T
+    begun = np.searchsorted(early * (1 - SIDE), times, side="right")
+    return np.asarray(times > np.append(-np.inf, np.maximum.accumulate(late * (1 + SIDE)))[begun])
 
 
 def with_cells(estimate: Accuracy, cells: CellErrors) -> Accuracy:

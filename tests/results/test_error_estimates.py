@@ -186,6 +186,13 @@ def test_the_error_of_the_tightest_run_is_not_that_of_a_looser_one():
     assert exact.error / 3 < estimate.error < 3 * exact.error
 
 
+def test_a_run_of_brief_slips_is_compared_with_its_exact_solution_inside_them():
+    case = surfacechem.load("stick-slip", ["run.until=30 s", "mechanics.tangential.m=1e-4 kg/m^2"])
+    exact, estimate = case.run().accuracy, case.run(error="estimate").accuracy
+    for name in ("u_t", "v"):
+        assert estimate.variables[name] / 10 < exact.variables[name] < estimate.variables[name]
+
+
 @pytest.mark.parametrize("part", [1e-6, 1e-12])
 def test_a_film_that_all_but_closes_is_known_to_the_last_digit_of_its_mean(tmp_path, part):
     """Its heat is eta v^2 / sqrt(g^2 - a^2) per second; the last digit of g is a large part of what is left, g - a."""
