@@ -200,25 +200,27 @@ def _steps(trajectory: Trajectory) -> Array:
 
 def _pictured(trajectory: Trajectory, part: float, rows: States, rounds: int) -> Trajectory:
     """The trajectory with those of the rows that its picture needs, and others where it bends between them."""
-    whole = trajectory.at(rows)
-    result = whole.result
-    early = unresolved(whole.model.system, whole.run.times[-1], result.times)
-    # What is shown over time, shape (times, quantities), and what a last bit or the absolute tolerance of a
-    # state makes of it.
-    quantities = np.hstack([result.outputs, result.ledger_outputs, whole.outputs])
-    some, first = whole.some, quantities.shape[1] - whole.outputs.shape[1]
-    unknown = some.felt(EPS * np.abs(some.result.outputs) + result.problem.atol)
-    noise = np.pad(RUN_ERROR * np.array([*unknown.values()]), (first, 0))
-    # What may be an error is not pictured, however loose the tolerance no more of a value than the part, and what is
-    # early counts for no range.
-    values = np.where(np.isfinite(quantities), quantities, 0.0)
-    known, error = values if early.all() else values[~early], min(UNRESOLVED * whole.run.rtol, part)
-    # The rest of the part is what the states that are known miss of those between them.
-    allowed = (1 - 1 / FINER_BY) * part * np.ptp(known, axis=0) + error * np.abs(values).max(axis=0) + noise
-    seen = np.ptp(values, axis=0) > allowed
-    if rounds and (bends := _bends(whole, allowed[first:], seen[first:])):
-        more = States(*map(np.concatenate, zip(rows, *bends, strict=True)))
-        return _pictured(trajectory, part, _chosen(more, np.argsort(more.t, kind="stable")), rounds - 1)
+    while True:
+        whole = trajectory.at(rows)
+        result = whole.result
+        early = unresolved(whole.model.system, whole.run.times[-1], result.times)
+        # What is shown over time, shape (times, quantities), and what a last bit or the absolute tolerance of a
+        # state makes of it.
+        quantities = np.hstack([result.outputs, result.ledger_outputs, whole.outputs])
+        some, first = whole.some, quantities.shape[1] - whole.outputs.shape[1]
+        unknown = some.felt(EPS * np.abs(some.result.outputs) + result.problem.atol)
+        noise = np.pad(RUN_ERROR * np.array([*unknown.values()]), (first, 0))
+        # What may be an error is not pictured, however loose the tolerance no more of a value than the part, and what
+        # is early counts for no range.
+        values = np.where(np.isfinite(quantities), quantities, 0.0)
+        known, error = values if early.all() else values[~early], min(RUN_ERROR * whole.run.rtol, part)
+        # The rest of the part is what the states that are known miss of those between them.
+        allowed = (1 - 1 / FINER_BY) * part * np.ptp(known, axis=0) + error * np.abs(values).max(axis=0) + noise
+        seen = np.ptp(values, axis=0) > allowed
+        if not rounds or not (bends := _bends(whole, allowed[first:], seen[first:])):
+            break
+        more, rounds = States(*map(np.concatenate, zip(rows, *bends, strict=True))), rounds - 1
+        rows = _chosen(more, np.argsort(more.t, kind="stable"))
     # Both sides of events are kept.
     kept = _beside(whole) | _edges(quantities[:, seen])
     return whole.picked(needed_rows(result.times, values[:, seen], allowed[seen], kept))
