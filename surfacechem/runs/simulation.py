@@ -16,7 +16,7 @@ from surfacechem import format as cases
 from surfacechem.contracts.units import parse
 from surfacechem.documents.document import OVERRIDE, from_plain
 from surfacechem.documents.document import parse as parse_document
-from surfacechem.documents.overrides import apply, parameter_path
+from surfacechem.documents.overrides import apply, assignments, parameter_path
 from surfacechem.errors import PATHS, InputError, Place, suggestion
 from surfacechem.format import Case, Overrides, Source
 from surfacechem.model.assemble import perturbed
@@ -220,7 +220,7 @@ class Simulation:
         Raises
         ------
         InputError
-            Where the scene has nothing of a name, or a value is no finite number.
+            Where the scene has nothing of a name, or a value is no finite number or outside its range.
         """
         return self.evaluated(points).dataset
 
@@ -228,17 +228,15 @@ class Simulation:
         """Quantities of the scene at given states, ready to be written."""
         from surfacechem.runs.points import evaluation
 
-        return evaluation(self.evaluator, points or {}, **self._origin({}))
+        return evaluation(self.evaluator, {} if points is None else points, **self._origin({}))
 
-    def run(
-        self, changes: Mapping[str, float | str] | None = None, run: Run | None = None, error: str = "auto"
-    ) -> Solution:
+    def run(self, changes: Overrides | None = None, run: Run | None = None, error: str = "auto") -> Solution:
         """Run with some parameters or initial values changed; nothing is compiled again.
 
         Parameters
         ----------
         changes
-            Values by path: numbers in SI, or texts with a unit.
+            Values by path, numbers in SI or texts with a unit; or texts "path=value".
         run
             Other output times, solver and tolerances than the case's.
         error
@@ -429,7 +427,7 @@ class Simulation:
         self,
         over: Mapping[str, object] | None = None,
         until: Mapping[str, object] | None = None,
-        changes: Mapping[str, float | str] | None = None,
+        changes: Overrides | None = None,
         threads: int | None = None,
         sample: Mapping[str, object] | None = None,
         combine: str | None = None,
@@ -469,7 +467,7 @@ class Simulation:
     def sweep_plan(
         self,
         plan: Plan,
-        changes: Mapping[str, float | str] | None = None,
+        changes: Overrides | None = None,
         threads: int | None = None,
         run: Run | None = None,
     ) -> SweepSolution:
@@ -503,7 +501,7 @@ class Simulation:
         self,
         plan: Plan,
         path: str | Path,
-        changes: Mapping[str, float | str] | None = None,
+        changes: Overrides | None = None,
         *,
         resume: bool = False,
         part: tuple[int, int] = (1, 1),
@@ -592,9 +590,7 @@ class Simulation:
         system = self.system
         return {**{path: spec.unit for path, (spec, _) in system.constants.items()}, **system.changeable}
 
-    def _ready(
-        self, changes: Mapping[str, float | str], plan: Plan | None = None
-    ) -> tuple[Simulation, dict[str, float]]:
+    def _ready(self, changes: Overrides, plan: Plan | None = None) -> tuple[Simulation, dict[str, float]]:
         """The simulation in whose equations stand symbols for the defaults that are swept, or that changes depart from,
         and the changes that it takes: the case with these values, assembled anew; itself where no default is.
         """
@@ -616,9 +612,10 @@ class Simulation:
             self._freed[paths] = Simulation(replace(freed, own_run=case.own_run, file=case.file))
         return self._freed[paths], values
 
-    def _values(self, changes: Mapping[str, float | str]) -> dict[str, float]:
+    def _values(self, changes: Overrides) -> dict[str, float]:
         units = self._units
-        changes = {parameter_path(path, units): value for path, value in changes.items()}
+        given = changes if isinstance(changes, Mapping) else assignments(changes)
+        changes = {parameter_path(path, units): value for path, value in given.items()}
         unknown = next((path for path in changes if path not in units), None)
         if unknown is not None and self._is_key(unknown, changes[unknown]):
             remedy = "give it to `load`, or to `surfacechem.run`, beside the case"
@@ -627,7 +624,7 @@ class Simulation:
             raise InputError(f"no parameter '{unknown}' to change.{suggestion(unknown, self.system.changeable, PATHS)}")
         return {path: parse(value, units[path], name=path) for path, value in changes.items()}
 
-    def _is_key(self, path: str, value: float | str) -> bool:
+    def _is_key(self, path: str, value: object) -> bool:
         """Whether a path is that of a key of the case, be its value a wrong one; initial values are parameters."""
         case = self.case
         if not case.text or path.startswith("initial."):

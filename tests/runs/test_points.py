@@ -1,6 +1,7 @@
 """Quantities at given states: against formulas, against runs, and derivatives against differences."""
 
 import numpy as np
+import pandas
 import pytest
 from typer.testing import CliRunner
 
@@ -238,11 +239,17 @@ def test_points_come_from_a_table_with_units(element, tmp_path):
         ({"g_n": [{}]}, "g_n takes numbers in SI, or texts with a unit."),
         ({"g_n": []}, "g_n takes a list of finite numbers in m."),
         ({"g_n": [1e-9, 2e-9], "v": [1.0, 2.0, 3.0]}, "there are 2 of g_n, 3 of v."),
+        ({"interface.friction.coulomb.mu": [0.3, -0.1]}, "coulomb.mu = -0.1 is outside its range: >= 0"),
     ],
 )
 def test_what_cannot_be_a_point_is_refused(points, message, element):
     with pytest.raises(InputError, match=message.replace("(", r"\(")):
         element.evaluate(points)
+
+
+def test_a_table_of_points_is_one_of_pandas_too(element):
+    points = {"g_n": [-1e-9, 1e-9]}
+    assert element.evaluate(pandas.DataFrame(points)).identical(element.evaluate(points))
 
 
 @pytest.mark.parametrize("changes", [(), "run="])

@@ -51,6 +51,7 @@ def test_a_changed_run_can_be_run_again_from_its_file(simulation, tmp_path):
         ({"run.slack": 10.0}, r"no parameter 'run\.slack' to change"),
         ({"phi_max": 5.0}, r"no parameter 'phi_max' to change"),
         ({"initial.phi": 1.5}, r"at the start phi rose above its bound 1"),
+        (["bodies.lower.C=-1"], r"bodies\.lower\.C = -1 is outside its range: > 0"),
     ],
 )
 def test_a_change_that_makes_no_sense_is_refused(simulation, changes, message):
