@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -92,7 +93,9 @@ def check(stream: Stream, threads: int | None = None) -> Checked | None:
     once = once[numbers >= 0]  # the hardest are filled up with -1 where fewer have not failed
     errors, destroys = both("error")[once], np.nansum(both("destroys_entropy")[once])
     worst = float(np.fmax.reduce(errors, initial=-np.inf))
-    source, why = "; ".join(dict.fromkeys(each.source for each in told)), next((a.why for a in told if a.why), "")
+    # Of what each run has a word of its own for, one is told.
+    why, unused = (next(filter(None, map(attrgetter(name), told)), "") for name in ("why", "unused"))
+    source = "; ".join(filter(None, (*dict.fromkeys(each.method for each in told), unused)))
     return Checked(worst, int(np.isnan(errors).sum()), len(errors), int(destroys), source, why)
 
 

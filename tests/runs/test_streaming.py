@@ -475,6 +475,15 @@ def test_errors_of_runs_that_are_checked_are_those_of_a_sweep(tmp_path, monkeypa
     assert sorted(steps[few]) == sorted(np.sort(steps)[-3:])
 
 
+def test_the_source_of_errors_is_told_once_however_many_runs_are_checked(tmp_path, monkeypatch):
+    monkeypatch.setattr(checking, "AT_ONCE", 2)
+    simulation = case(keep=ENDS, over={"initial.T": {"from": 290, "to": 310, "points": 7}}, checked="all")
+    stream = simulation.stream(simulation.plan(), tmp_path / "o.zarr")
+    stream.run(1)
+    source = check(stream).source
+    assert source.count("estimate: a second sweep") == source.count("does not apply to this scene") == 1
+
+
 def test_what_is_nothing_but_rounding_at_the_end_is_no_error(tmp_path):
     """Heat flows into one body as out of the other, and their mean is the rounding of both."""
     simulation = case("cooling-to-zero", over={"initial.T": [100, 1000]})
@@ -489,7 +498,7 @@ def test_an_error_that_is_unknown_and_an_end_that_is_no_number_count_for_no_smal
     kept = ends | {"T_last": np.array([300.0, np.nan, np.nan, 300.0])}
     monkeypatch.setattr(checking, "RunByRun", lambda *_: SimpleNamespace(columns=lambda *_: ends))
     done = SimpleNamespace(
-        accuracy=SimpleNamespace(errors=np.array([np.nan, 1e-9, 1e-9, 1e-9]), source="", why=""),
+        accuracy=SimpleNamespace(errors=np.array([np.nan, 1e-9, 1e-9, 1e-9]), method="", why="", unused=""),
         run_ends=[dict.fromkeys(checking.BALANCE_COLUMNS, 0.0)] * 4,
         runs=[SimpleNamespace(some=SimpleNamespace(roundings={}))] * 4,
         audits=[],
