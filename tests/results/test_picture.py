@@ -59,7 +59,7 @@ def test_lines_show_a_run_whose_tolerance_is_coarser_than_they_are(rtol):
     dense = case.run(run=replace(case.case.run, times=times, picture=None), error="balances").dataset
     for name in ("phi", "T", "q_1"):
         missed = shown[name].interp(time=dense.time) - dense[name]
-        assert np.abs(missed).max() < 2 * PICTURE * np.ptp(dense[name].values), name
+        assert np.abs(missed).max() < 2 * LINE_ERROR * np.ptp(dense[name].values), name
 
 
 def test_both_sides_of_every_event_and_the_extremes_of_the_steps_are_outputs():
