@@ -476,7 +476,7 @@ def test_errors_of_runs_that_are_checked_are_those_of_a_sweep(tmp_path, monkeypa
 
 
 def test_the_source_of_errors_is_told_once_however_many_runs_are_checked(tmp_path, monkeypatch):
-    monkeypatch.setattr(checking, "AT_ONCE", 2)
+    monkeypatch.setattr(checking, "RUNS_AT_ONCE", 2)
     simulation = case(keep=ENDS, over={"initial.T": {"from": 290, "to": 310, "points": 7}}, checked="all")
     stream = simulation.stream(simulation.plan(), tmp_path / "o.zarr")
     stream.run(1)
