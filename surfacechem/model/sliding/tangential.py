@@ -174,33 +174,33 @@ def _motion(build: Build, kind: Formulation) -> Iterator[Record]:
         carried = t_f = unbonded * t_f
         held = needed = far.force(u, ZERO) - t_a
     slides = build.constraint("slip").active if kind.sticks else symengine.Integer(kind.slides)
-    in_proportion = False
+    slope = None
     if far is None:
         text = "work of the far field on the tangential displacement"
         yield Power(WORK, OUTSIDE, MECHANICS, (carried + t_a) * rate, "W_t", text)
     else:
         derived = rate == symengine.Symbol("v_t") and not kind.inertial
         yield from far.book(build, u, rate, symengine.Symbol("du_t_dt") if derived else None)
-        in_proportion = yield from _balance(build, kind, far, slides, carried, t_a)
+        slope = yield from _balance(build, kind, far, slides, carried, t_a)
     if kind.elastic:
-        in_proportion = yield from _elastic_rows(build, kind, slides, t_f, needed, v)
+        slope = yield from _elastic_rows(build, kind, slides, t_f, needed, v)
     name_traction(build, d, slides, t_a + carried, t_a + held)
     if kind.sticks and not kind.dead_load:
-        yield _friction(build, kind, needed, t_f, v, in_proportion)
+        yield _friction(build, kind, needed, t_f, v, slope)
 
 
 def _friction(
-    build: Build, kind: Formulation, needed: Expression, t_f: Expression, v: Expression, in_proportion: bool
+    build: Build, kind: Formulation, needed: Expression, t_f: Expression, v: Expression, slope: Expression | None
 ) -> Constraint:
     """The set-valued law, by the reserve of sticking (limit less need) and a guard that is zero where sliding stops."""
     stops, still, slack = [], v, ZERO
     if kind.slides_inertially:
         still = symengine.Symbol(_velocity_state(build, kind))
         stops = [still]
-    elif in_proportion and build.motion.creeping is None:
-        # Where tractions give a velocity in proportion it is their balance at rest that is zero where sliding stops:
-        # what is left of this as sliding begins is rounding, which must not stop it.
-        still = build.expanded(needed - t_f).subs({v: 0})
+    elif slope is not None and build.motion.creeping is None:
+        # The tractions give the velocity: it is what they miss their balance at rest by that is zero where sliding
+        # stops, and what is left of this as sliding begins is rounding, which must not stop it.
+        still = slope * v if depends(slope, v) else build.expanded(needed - t_f).subs({v: 0})
         far = build.motion.far_fields.get(kind.d.axis)
         size = absolute(needed) if kind.elastic or far is None else far.size(far.gap)
         beside = absolute(derivative(build.psi, symengine.Symbol("u_t")))
@@ -233,8 +233,8 @@ def _velocity_state(build: Build, kind: Formulation) -> str:
 
 def _balance(
     build: Build, kind: Formulation, far: FarField, slides: Expression, carried: Expression, t_a: Expression
-) -> Generator[Record, None, bool]:
-    """Rows of the displacement and its velocity; returns whether this is in proportion to the tractions."""
+) -> Generator[Record, None, Expression | None]:
+    """Rows of the displacement and its velocity; returns the slope of what resists that, where tractions give it."""
     name = kind.d.displacement
     u, du = symengine.symbols(f"{name} d{name}_dt")
     rate, tractions = build.motion.gap_rates[name], (carried, t_a)
@@ -261,7 +261,7 @@ def _balance(
     else:
         stiffness, bears = far.k if far.k != 0 else 1, _limit(build, kind)
         yield from far.balance(build, rate, tractions, active=slides, held=stiffness * du, slides=1, bears=bears)
-    return False
+    return None
 
 
 def _sticks(build: Build, limit: Expression, needed: Expression) -> Iterator[Margin | Constraint]:
@@ -283,8 +283,8 @@ def _sticks(build: Build, limit: Expression, needed: Expression) -> Iterator[Mar
 
 def _elastic_rows(
     build: Build, kind: Formulation, slides: Expression, t_f: Expression, t_e: Expression, v: Expression
-) -> Generator[Record, None, bool]:
-    """Rows of the elastic gap and of sliding without inertia; returns whether that is in proportion to tractions."""
+) -> Generator[Record, None, Expression | None]:
+    """Rows of the elastic gap and of sliding without inertia; returns the slope of what resists that, as `_balance`."""
     dg, rate = symengine.Symbol("dg_t_dt"), build.motion.gap_rates["u_t"]
     if kind.rate_dependent:
         build.rows.kinematics("g_t", rate - v)
@@ -300,20 +300,19 @@ def _elastic_rows(
     if stiffness.free_symbols & {bond.symbol for bond in build.bonding.values()}:
         reason = "nothing carries the friction of the sliding interface: its tangential stiffness went with its bonds"
         yield Margin("tangential stiffness", where(stiffness > 0, stiffness, -1), reason, when=_while_sliding(kind))
-    return False
+    return None
 
 
 def _sliding_row(
     build: Build, kind: Formulation, slides: Expression, driving: Expression
-) -> Generator[Margin, None, bool]:
+) -> Generator[Margin, None, Expression]:
     """Row of a velocity without inertia, from the tractions; sliding is stable while the resistance grows with it.
 
-    Returns whether it is in proportion to them.
+    Returns the slope with which it does, that at rest as of the velocities to come.
     """
     v = build.motion.slides_by[kind.d.velocity]
     slope, balance = -derivative(build.expanded(driving), v), driving
-    in_proportion = slope != 0 and not depends(slope, v)
-    if in_proportion:
+    if slope != 0 and not depends(slope, v):
         # Solved for the velocity, which is nothing but rounding of the tractions as sliding begins.
         whole = driving if derivative(driving, v) == -slope else build.expanded(driving)
         balance = whole.subs({v: 0}) / slope - v
@@ -323,18 +322,19 @@ def _sliding_row(
     else:
         build.rows.balance(str(v), balance)
     damped = kind.mount is not None and kind.mount.damped and not kind.elastic
+    if kind.sticks:
+        slope = slope.subs({v: v + SLIP * TINY})
     if build.motion.creeping is not None and len(build.interface.frictions) == 1 and damped:
-        return in_proportion  # both friction and damper resist the more, the faster it slides
+        return slope  # both friction and damper resist the more, the faster it slides
     if slope == 0:
         raise InputError(
             "nothing determines the sliding velocity: friction does not depend on it. Give the tangential mounting a "
             "mass or a damper.",
             PLACE,
         )
-    if kind.sticks and not in_proportion:  # the slope at rest is that of the velocities to come
-        slope = growth(slope.subs({v: v + SLIP * TINY}))
-    yield Margin(f"{STABLE_PREFIX}{v}", slope, kind.unstable, when=_while_sliding(kind), stability=str(v))
-    return in_proportion
+    stable = growth(slope) if depends(slope, v) else slope
+    yield Margin(f"{STABLE_PREFIX}{v}", stable, kind.unstable, when=_while_sliding(kind), stability=str(v))
+    return slope
 
 
 def _while_sliding(kind: Formulation) -> When:

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from surfacechem.solve.radau.linear import factor, fold_chains, solve_real
-from surfacechem.solve.radau.roundoff import spread_noise
 from surfacechem.solve.radau.work import RESIDUAL, any_true, compiled, evaluate, evaluate_jacobian, finite, set_inputs
 from surfacechem.tolerances import FEW_EPS, NEGLIGIBLE, SQRT_EPS, TINY
 
@@ -18,8 +17,8 @@ CONSISTENT, NO_STATE, SINGULAR_STATE, NOT_FINITE_STATE = range(4)
 LIMIT = 100
 CONVERGING = NEGLIGIBLE * SQRT_EPS
 """Correction after which the next one, in proportion to its square, is below EPS even with a factor of a million."""
-ROUNDED = 8
-"""Corrections after which one that rounding explains is believed to be nothing else."""
+FAR = 1.0 / NEGLIGIBLE**2
+"""Corrections that tell whether equations are straight: what rounding adds to one is negligible beside so many."""
 SMALLEST_PIVOT = FEW_EPS
 """Scaled pivot that is what rounding leaves of zero."""
 
@@ -132,13 +131,19 @@ def _damped(w: Any, delta: Any) -> bool:
 
 @compiled
 def _is_rounding(w: Any, delta: Any) -> bool:
-    """Whether a correction is no larger than what rounding of the equations makes of it."""
-    spread_noise(w, w.trial, w.trial_dot)
-    largest = 0.0
+    """Whether a correction that does not become smaller is rounding: where the equations are straight far along it
+    nothing else is left of what one correction solves.
+    """
+    following = w.g[1]  # memory that no step is using now
+    _move(w, delta, FAR)
+    straight = _residual(w)
+    _correction(w, following)
+    _move(w, delta, -FAR)
     for j in range(w.n):
         if w.algebraic[j]:
-            largest = max(largest, abs(delta[j]) - 2.0 * w.noise[j])
-    return largest <= 0.0
+            small = NEGLIGIBLE * FAR * (abs(delta[j]) + DIGITS * abs(w.trial[j]))
+            straight = straight and abs(following[j] + (FAR - 1.0) * delta[j]) <= small
+    return bool(straight)
 
 
 @compiled
@@ -149,7 +154,7 @@ def find_consistent(w: Any) -> int:
     delta = w.g[0]
     nonlinear = any_true(w.algebraic)
     norm_last = np.inf
-    for iteration in range(LIMIT):
+    for _iteration in range(LIMIT):
         if not _factor(w):
             return SINGULAR_STATE
         norm = _correction(w, delta)
@@ -159,10 +164,10 @@ def find_consistent(w: Any) -> int:
         if not nonlinear or norm <= FEW_EPS or norm_last <= CONVERGING:
             _move(w, delta, 1.0)
             return CONSISTENT if _residual(w) else NOT_FINITE_STATE
-        if iteration >= ROUNDED and _is_rounding(w, delta):
+        if norm >= norm_last and _is_rounding(w, delta):
             return CONSISTENT
         if not _damped(w, delta):
             # At rounding level the corrections cannot fall any more.
-            return CONSISTENT if norm <= SQRT_EPS else NO_STATE
+            return CONSISTENT if norm <= SQRT_EPS or _is_rounding(w, delta) else NO_STATE
         norm_last = norm
     return NO_STATE
