@@ -29,7 +29,7 @@ from surfacechem.solve.hybrid import Flow, Hybrid, carried, solve_together, with
 from surfacechem.solve.jumps import Jump, Jumper
 from surfacechem.solve.radau.solver import consistent, output_rates
 from surfacechem.solve.segments import Passing
-from surfacechem.tolerances import ATOL_OF_SCALE, DEFAULT_RTOL, EPS, FINER_BY, LINE_ERROR
+from surfacechem.tolerances import DEFAULT_RTOL, EPS, FINER_BY, ATOL_OF_SCALE, LINE_ERROR, SQRT_EPS
 
 GROUPS = {"energy supply": 0, "dissipation": 0, "heat": 0, "entropy supply": 1, "entropy production": 1, "bonds": 2}
 """Accounts whose quadratures are measured together."""
@@ -208,11 +208,20 @@ class Trajectory:
         result = self.result
         return self.model.inputs(result, result.times, result.outputs, output_rates(result), result.segment)
 
-    @property
+    @cached_property
     def rates(self) -> Array:
-        """Time derivatives of the states at the output times, shape (times, states)."""
-        n = len(self.model.system.states)
-        return self._inputs[:, 1 + n : 1 + 2 * n]
+        """Time derivatives of the states at the output times, shape (times, states).
+
+        Those of algebraic ones, which no equation gives, are differences; at the start, where no time has passed, zero.
+        """
+        program, n = self.model.program, len(self.model.system.states)
+        t, y, rates, parameters = np.split(self._inputs, [1, 1 + n, 1 + 2 * n], axis=1)
+        algebraic = program.algebraic_mask & (t > 0)
+        if algebraic.any():
+            passed = SQRT_EPS * t
+            later = consistent(program, (t + passed)[:, 0], y + passed * rates, 0.0, parameters)
+            rates = np.divide(later.y - y, passed, out=rates.copy(), where=algebraic & later.valid[:, None])
+        return rates
 
     @cached_property
     def roundings(self) -> dict[str, float]:

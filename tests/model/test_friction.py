@@ -341,3 +341,25 @@ def test_friction_that_grows_with_velocity_from_rest_on_slides_as_fast_as_is_pul
     # In the end as fast as the far field, by friction of mu_k less a part e^-1 of what it has grown by.
     assert found["v"][-1] == pytest.approx(1e-3, rel=1e-6)
     assert found["t_stribeck"][-1] == pytest.approx(1e6 * (0.5 - 0.1 / np.e), rel=1e-6)
+
+
+TURNING = """
+bodies: {lower: {temperature: 300 K}, upper: {temperature: 300 K}}
+interface:
+  temperature: T_c
+  friction: [{stribeck: {mu_s: 0.7, mu_k: 0.5, v_s: 1 mm/s}}]
+heat: [{conductance: {between: [lower, interface], h: 100 kW/m^2/K}}]
+mechanics: {tangential: {k: 1 MPa/mm, c_b: 3e8 Pa s/m}}
+loading: {p: 1 MPa, w_t: {harmonic: {amplitude: 2 mm, frequency: FREQUENCY}}}
+run: {until: END}
+"""
+
+
+@pytest.mark.parametrize("frequency", [5e-4, 1.0913e-3, 1.42174e-3])
+def test_rounding_of_a_velocity_from_balances_neither_ends_sliding_as_it_begins_nor_hides_how_fast_it_is(frequency):
+    """A damper that resists more than friction falls: as sliding begins the velocity is the rounding of tractions."""
+    found = surfacechem.run(TURNING.replace("FREQUENCY", f"{frequency} Hz").replace("END", f"{1.2 / frequency} s"))
+    assert found.status == "finished"
+    assert found.accuracy.error < 1e-7
+    events = [jump.edge.name for jump in found.trajectory.jumps]
+    assert events == ["slip forward", "stop", "slip backward", "stop", "slip forward"]

@@ -364,3 +364,22 @@ def test_impacts_that_magnify_rounding_are_known_to(end, asked):
     solution = surfacechem.load((PLATE % end).replace(" s}", f" s{asked}}}")).run()
     error = abs(solution.dataset["g_n"].values[-1] / shaken_plate(end) - 1)
     assert 1e-8 < error < 4 * solution.accuracy.error < 40 * error  # the difference of two random sums
+
+
+DAMPED = """
+bodies: {lower: {temperature: 300 K}, upper: {temperature: 300 K}}
+interface: {temperature: 300 K, friction: [coulomb: {mu: 0.5}]}
+mechanics: {tangential: {k: 1 MPa/mm, c_b: 1e9 Pa s/m}}
+loading: {p: 1 MPa, w_t: {ramp: {rate: 1 um/s}}}
+run: {until: 2000 s}
+"""
+
+
+def test_a_velocity_from_a_balance_is_compared_with_how_fast_it_sets_in():
+    found = surfacechem.run(DAMPED)
+    assert found.accuracy.error < 1e-9
+    trajectory, column = found.trajectory, found.trajectory.model.system.state_columns["v"]
+    v, t = trajectory.result.outputs[:, column], trajectory.result.times
+    # As sliding begins at 499 s the velocity goes on to that of the far field within c_b/k, 1 s.
+    expected = np.where((t > 499) & (v > 0), 1e-6 - v, 0.0)
+    assert trajectory.rates[:, column] == pytest.approx(expected, rel=1e-3, abs=1e-10)
