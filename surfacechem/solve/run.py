@@ -29,7 +29,7 @@ from surfacechem.solve.hybrid import Flow, Hybrid, carried, solve_together, with
 from surfacechem.solve.jumps import Jump, Jumper
 from surfacechem.solve.radau.solver import consistent, output_rates
 from surfacechem.solve.segments import Passing
-from surfacechem.tolerances import DEFAULT_RTOL, EPS, FINER_BY, ATOL_OF_SCALE, LINE_ERROR, SQRT_EPS
+from surfacechem.tolerances import ATOL_OF_SCALE, DEFAULT_RTOL, EPS, FINER_BY, LINE_ERROR, SQRT_EPS
 
 GROUPS = {"energy supply": 0, "dissipation": 0, "heat": 0, "entropy supply": 1, "entropy production": 1, "bonds": 2}
 """Accounts whose quadratures are measured together."""

@@ -141,7 +141,7 @@ def _is_rounding(w: Any, delta: Any) -> bool:
     _move(w, delta, -FAR)
     for j in range(w.n):
         if w.algebraic[j]:
-            small = NEGLIGIBLE * FAR * (abs(delta[j]) + DIGITS * abs(w.trial[j]))
+            small = NEGLIGIBLE * FAR * (abs(delta[j]) + FEW_EPS * abs(w.trial[j]))
             straight = straight and abs(following[j] + (FAR - 1.0) * delta[j]) <= small
     return bool(straight)
 
