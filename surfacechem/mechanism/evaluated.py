@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import copy
 import math
+import threading
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -28,6 +29,9 @@ from surfacechem.scene import Electrode
 from surfacechem.tolerances import TINY
 
 Array = NDArray[np.float64]
+
+ASKING = threading.Lock()
+"""Held while Cantera is asked: a surface has one state, which engines and threads share."""
 
 GASES = frozenset(("ideal-gas", "Redlich-Kwong", "Peng-Robinson", "plasma"))
 """Cantera's models of phases whose pressure matters."""
@@ -377,24 +381,26 @@ class SurfaceEngine:
 
         Then the enthalpy and the Gibbs energy [J] that each reaction with neighbours takes from them.
         """
-        # The residual, its outputs and the ledger ask at the same state one after another.
-        if values == self._last[0]:
+        with ASKING:
+            # The residual, its outputs and the ledger ask at the same state one after another.
+            if values != self._last[0]:
+                self._last = values, self._asked(values)
             return self._last[1]
+
+    def _asked(self, values: Sequence[float]) -> Array:
+        """What Cantera gives there; not a number where there is no such state."""
         T, amount, end = values[0], values[1], 2 + self._count
-        if T > 0 and amount > 0:
-            around = id(self), T, values[end:]
-            if around != self._brought[0]:
-                self._bring(T, values[end:])
-                self._brought[0] = around
-            # A stretched surface has fewer sites per area; coverages that a step tries need not sum to one.
-            self.surface.site_density = amount * self._sites / MOLECULAR
-            self.surface.set_unnormalized_coverages(values[2:end])
-            rates = self.surface.net_rates_of_progress.take(self.positions) * MOLECULAR
-            found = np.concatenate((rates, self._energies))
-        else:
-            found = np.full(len(self.gives), math.nan)
-        self._last = values, found
-        return found
+        if not (T > 0 and amount > 0):
+            return np.full(len(self.gives), math.nan)
+        around = id(self), T, values[end:]
+        if around != self._brought[0]:
+            self._bring(T, values[end:])
+            self._brought[0] = around
+        # A stretched surface has fewer sites per area; coverages that a step tries need not sum to one.
+        self.surface.site_density = amount * self._sites / MOLECULAR
+        self.surface.set_unnormalized_coverages(values[2:end])
+        rates = self.surface.net_rates_of_progress.take(self.positions) * MOLECULAR
+        return np.concatenate((rates, self._energies))
 
     def _bring(self, T: float, states: Sequence[float]) -> None:
         """Bring the surface and its neighbours to a temperature [K], and these to their states."""

@@ -1,6 +1,8 @@
 """Mechanisms that are not lowered: Cantera gives the rates while a scene runs, and energy is conserved."""
 
 import dataclasses
+import sys
+from concurrent.futures import ThreadPoolExecutor
 
 import cantera as ct
 import numpy as np
@@ -144,6 +146,22 @@ def test_an_evaluated_mechanism_is_swept_run_by_run(case):
     simulation = surfacechem.load(case(FOREIGN), {"run.until": "3 ms"})
     data = simulation.sweep({"initial.T_2": [330.0, 345.0]}).dataset
     assert data["T_2"].values[1].tobytes() == simulation.run().dataset["T_2"].values.tobytes()
+
+
+def test_the_threads_of_a_sweep_ask_a_surface_in_turn(case):
+    simulation = surfacechem.load(case(FOREIGN), {"run.until": "3 ms"})
+    temperatures, interval = np.linspace(330.0, 360.0, 9), sys.getswitchinterval()
+
+    def end(T):
+        return simulation.run({"initial.T_2": T}, error="balances").trajectory.result.y.tolist()
+
+    alone = [end(T) for T in temperatures]
+    sys.setswitchinterval(1e-6)
+    try:
+        with ThreadPoolExecutor(3) as pool:
+            assert list(pool.map(end, temperatures)) == alone
+    finally:
+        sys.setswitchinterval(interval)
 
 
 def test_an_interface_without_capacity(case):
