@@ -13,7 +13,7 @@ import sys
 import tempfile
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import version
@@ -167,7 +167,8 @@ def replacing(target: Path) -> Iterator[Path]:
             temporary.chmod(replaced)
         temporary.replace(target)
     finally:
-        temporary.unlink(missing_ok=True)
+        with suppress(OSError):  # where a file system is read-only not even a file that is not there is removed
+            temporary.unlink()
 
 
 def _reason(path: Path, error: OSError) -> str:

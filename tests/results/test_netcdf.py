@@ -1,5 +1,7 @@
 """Whatever has happened to a dataset, it is drawn and run again, or refused in one line."""
 
+import errno
+import os
 import subprocess
 import sys
 import warnings
@@ -180,3 +182,16 @@ def test_edited_datasets(files, which, count, tmp_path, monkeypatch):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             is_used_or_refused(tmp_path / f"{i}.nc", again=which != "study" and i % 4 == 0)
+
+
+def test_a_read_only_file_system_is_told_with_the_name_of_the_file(tmp_path, monkeypatch):
+    def refused(*_, **__):
+        raise OSError(errno.EROFS, os.strerror(errno.EROFS))
+
+    monkeypatch.setattr(os, "open", refused)
+    monkeypatch.setattr(Path, "unlink", refused)
+    with (
+        pytest.raises(InputError, match=r"T\.nc: cannot be written: Read-only file system\."),
+        netcdf.replacing(tmp_path / "T.nc"),
+    ):
+        pass
