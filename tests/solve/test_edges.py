@@ -122,6 +122,14 @@ def test_explicit_steps_go_along_edges_too_and_what_has_no_room_is_solved_once_m
     assert_same(model.solve(run), whole)
 
 
+def test_a_run_whose_time_is_up_is_made_again_with_the_steps_that_it_took():
+    """Wherever that was, also behind steps that were rejected; its dataset keeps that number."""
+    model, run = (simulation := case_runs.load("stick-slip")).model, simulation.case.run
+    ended = [model.solve(replace(run, max_steps=count)) for count in range(30, 60)]
+    assert any(each.result.counters.rejected > 0 for each in ended)
+    assert [each.result.counters.steps for each in ended] == [*range(30, 60)]
+
+
 def test_runs_end_where_steps_run_out_between_jumps_and_with_an_output_at_a_jump(monkeypatch):
     model, run = (simulation := case_runs.load("bouncing-plate")).model, simulation.case.run
     whole, ended = model.solve(run), model.solve(replace(run, max_steps=50))

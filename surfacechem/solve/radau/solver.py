@@ -247,8 +247,7 @@ def _whole(problem: Problem, batch: Any, i: int) -> Result:
     while True:
         counts: list[int] = batch.counts[i].tolist()
         if counts[END] == Status.STOPPED:
-            trials = counts[FIRST_COUNTER] + counts[FIRST_COUNTER + 1]
-            repeated, stopped = replace(problem, max_seconds=None, max_steps=trials), True
+            repeated, stopped = replace(problem, max_seconds=None, max_steps=counts[FIRST_COUNTER]), True
         elif stopped and counts[END] == Status.MAX_STEPS:
             counts[END] = Status.STOPPED
         needed = counts[RECORDS] * problem.record_steps, counts[EVENTS], counts[INSIDE], counts[JUMPS]

@@ -377,7 +377,8 @@ def _may_try(w: Any, h: float, i: int) -> int:
     """GOOD, or why run i tries no step of this size."""
     if too_small(w, h):
         return STEP_UNDERFLOW
-    if w.steps + (w.rejected - w.rejected_before) >= w.max_steps[row_of(w.max_steps, i)]:
+    # Steps that are rejected have no part in it, so that a run may be made again with the steps that it took.
+    if max(w.steps, w.rejected - w.rejected_before) >= w.max_steps[row_of(w.max_steps, i)]:
         return MAX_STEPS
     return STOPPED if w.counts[i, STOP] != 0 else GOOD
 
