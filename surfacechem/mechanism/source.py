@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import MISSING, fields
+from dataclasses import MISSING, fields, replace
 from difflib import get_close_matches
 from functools import lru_cache
 from math import inf
@@ -106,21 +106,19 @@ KIND_WORDS = {dict: "a mapping", list: "a list", str: "a text", float: "a number
 
 
 class Mapped(dict[str, Any]):
-    """A mapping of the file, with the place of each key."""
+    """A mapping of the file as plain data, with its tree, which has the places."""
 
     def __init__(self, tree: Tree) -> None:
         super().__init__((key, _placed(child)) for key, child in tree.value.items())
-        self.place = tree.place
-        self.places = {key: child.place for key, child in tree.value.items()}
+        self.tree = tree
 
 
 class Listed(list[Any]):
-    """A list of the file, with the place of each item."""
+    """A list of the file as plain data, with its tree, which has the places."""
 
     def __init__(self, tree: Tree) -> None:
         super().__init__(map(_placed, tree.value))
-        self.place = tree.place
-        self.places = dict(enumerate(item.place for item in tree.value))
+        self.tree = tree
 
 
 def _placed(tree: Tree) -> Any:
@@ -157,8 +155,9 @@ class Source:
         """Place of a mapping or list, or of one of its entries."""
         if not isinstance(node, Mapped | Listed):
             return Place(self.file, 0, path)
-        place = node.places.get(key, node.place)
-        return Place(self.file, place.line, path, place.column)
+        inside = node.tree.value if isinstance(node, Mapped) else dict(enumerate(node.tree.value))
+        # What is missing is missed where the whole stands.
+        return replace(inside.get(key, node.tree).place, path=path)
 
     def error(self, message: str, node: Any, key: Any = None) -> InputError:
         """An error at a mapping or list of the file, or at one of its entries."""
@@ -197,7 +196,7 @@ class Source:
             # In Python true is a number; in a mechanism it is not.
             if allowed and (not isinstance(value, allowed) or (isinstance(value, bool) and bool not in allowed)):
                 wanted = " or ".join(KIND_WORDS[kind] for kind in allowed if kind in KIND_WORDS)
-                raise self.error(f"{key}: this must be {wanted}, not {_shown(value)}.", node, key)
+                raise self.error(f"{key}: this must be {wanted}, not {node.tree.value[key].shown}.", node, key)
 
     def _entry_list(self, name: str, kinds: Kinds) -> list[Any]:
         """The mappings of a section; InputError at what is none."""
@@ -205,10 +204,10 @@ class Source:
         if entries is None:
             return []
         if not isinstance(entries, Listed):
-            raise self.error(f"{name}: this must be a list, not {_shown(entries)}.", self.data, name)
+            raise self.error(f"{name}: this must be a list, not {self.data.tree.value[name].shown}.", self.data, name)
         for i, entry in enumerate(entries):
             if not isinstance(entry, Mapped):
-                raise self.error(f"{name}: an entry is a mapping, not {_shown(entry)}.", entries, i)
+                raise self.error(f"{name}: an entry is a mapping, not {entries.tree.value[i].shown}.", entries, i)
             self._check(entry, kinds)
         return list(entries)
 
@@ -354,9 +353,3 @@ def _energy(units: Any, value: str | float, unit: str) -> float:
         except cantera.CanteraError:
             pass  # an energy per amount
     return float(units.convert_activation_energy_to(value, "J/kmol")) / (KILO * (AVOGADRO if unit == "J" else 1))
-
-
-def _shown(value: Any) -> str:
-    """A value as it stands in a message."""
-    kind = next((text for kind, text in KIND_WORDS.items() if kind in (dict, list) and isinstance(value, kind)), "")
-    return kind or ("nothing" if value is None else f"'{str(value)[:40]}'")
