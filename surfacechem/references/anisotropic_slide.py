@@ -8,11 +8,8 @@ import numpy as np
 
 from surfacechem.contracts.terms import parameter
 from surfacechem.references._bodies import UniformBody
+from surfacechem.references._numerics import increasing_root
 from surfacechem.references.base import Array, Quantities, read
-from surfacechem.tolerances import FEW_EPS
-
-NEWTON_STEPS = 100
-"""Steps to the velocity at a time; each but the first few doubles the digits."""
 
 
 class AnisotropicSlide(UniformBody):
@@ -59,13 +56,13 @@ class AnisotropicSlide(UniformBody):
 
     def quantities(self, t: Array) -> Quantities:
         ratio, slope, deceleration = self.mu_2 / self.mu_1, self.v_2_i / self.v_i, self.mu_1 * self.p / self.m
-        # Velocity along the first axis relative to the initial one, by Newton's method from above.
-        left, x = np.maximum(self.stop_time - t, 0) * deceleration / self.v_i, np.ones_like(t)
-        for _ in range(NEWTON_STEPS):
-            change = (self._integral(1.0, x) - left) / np.sqrt(1 + slope**2 * x ** (2 * (ratio - 1)))
-            x = np.where(left > 0, np.maximum(x - change, 0), 0)
-            if np.all(np.abs(change) <= FEW_EPS * x):
-                break
+        left = np.maximum(self.stop_time - t, 0) * deceleration / self.v_i
+
+        def passed(x: Array) -> tuple[Array, Array]:
+            return self._integral(1.0, x), np.sqrt(1 + slope**2 * x ** (2 * (ratio - 1)))
+
+        # Velocity along the first axis relative to the initial one, which is none from the stop on.
+        x = increasing_root(passed, left, np.zeros_like(t), np.ones_like(t), np.sign(left))
         v, v_2 = self.v_i * x, self.v_2_i * x**ratio
         path, across = (self._integral(k, np.array(1.0)) - self._integral(k, x) for k in (2.0, 1.0 + ratio))
         speed = np.hypot(v, v_2)
