@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from operator import attrgetter
 from typing import Any
 
@@ -104,13 +103,9 @@ def event_columns(runs: Sequence[Trajectory], axes: Mapping[str, int] | None = N
         if state.name not in system.inside:
             q = state.quantity
             for side in ("before", "after"):
-                text = f"{q.long_name} {side}"
-                columns.append(column(f"{q.name}_{side}", q.unit, text, partial(_state, side, k)))
+                text, read = f"{q.long_name} {side}", lambda event, side=side, k=k: float(getattr(event, side)[k])
+                columns.append(column(f"{q.name}_{side}", q.unit, text, read))
     return columns
-
-
-def _state(side: str, k: int, event: EventRow) -> float:
-    return float(getattr(event, side)[k])
 
 
 def event_times(trajectory: Trajectory) -> dict[str, Any]:

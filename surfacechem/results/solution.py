@@ -146,18 +146,14 @@ class Solution(Results):
         for name, values in (exact(trajectory) if exact else {}).items():
             c = computed[name]
             columns.append(Column(f"{name}_exact", c.dimensions, values, c.unit, f"exact {c.long_name}"))
-        columns = self._with_errors(columns)
+        errors = self.accuracy.everywhere if self.accuracy else {}
+        known = {DATASET_NAMES.get(name, name): error for name, error in errors.items()}
+        columns = [replace(column, error=known.get(column.name)) for column in columns]
         columns += event_columns([trajectory])
         if not trajectory.model.system.whole:
             return tuple(columns)
         named = (replace(column, unit=trajectory.model.system.unit(column.unit)) for column in columns)
         return (*named, *self._surface_columns[0])
-
-    def _with_errors(self, columns: list[Column]) -> list[Column]:
-        """The columns with their errors, where these are known."""
-        errors = self.accuracy.everywhere if self.accuracy else {}
-        known = {DATASET_NAMES.get(name, name): error for name, error in errors.items()}
-        return [replace(c, error=known[c.name]) if c.name in known else c for c in columns]
 
     @cached_property
     def _surface_columns(self) -> tuple[list[Column], float]:
