@@ -127,3 +127,36 @@ def raised(text: str) -> str:
     ('J/(m² K)', 'm⁻¹')
     """
     return re.sub(r"\^(-?\d+)", lambda m: m[1].translate(SUPERSCRIPTS), text)
+
+
+GREEK = {
+    *("alpha", "beta", "gamma", "delta", "epsilon", "eta", "theta", "kappa", "lambda", "mu", "nu", "xi"),
+    *("pi", "rho", "sigma", "tau", "phi", "psi", "chi", "omega"),
+}
+"""Letters that names spell out."""
+
+
+def spelled(name: str) -> str:
+    r"""LaTeX of the letters of a name, with its subscript.
+
+    >>> spelled("T_1"), spelled("phi"), spelled("D_coulomb"), spelled("theta_bond_s")
+    ('T_{1}', '\\phi', 'D_{\\mathrm{coulomb}}', '\\theta_{\\mathrm{bond\\,s}}')
+    """
+    head, _, subscript = name.partition("_")
+    return f"{_letters(head)}_{{{_subscript(subscript)}}}" if subscript else _letters(head)
+
+
+def _letters(text: str) -> str:
+    if text in GREEK:
+        return f"\\{text}"
+    return text if len(text) <= 1 else rf"\mathrm{{{text}}}"
+
+
+def _subscript(text: str) -> str:
+    parts = text.split("_")
+    # Indices are letters and numbers, which need no upright word.
+    if all(len(part) == 1 or part in GREEK or re.fullmatch(r"\w?\d\w?", part) for part in parts):
+        return " ".join(part if re.search(r"\d", part) else _letters(part) for part in parts)
+    if set(parts) & GREEK:
+        return r"\,".join(map(_letters, parts))
+    return rf"\mathrm{{{'_'.join(parts)}}}".replace("_", r"\,")

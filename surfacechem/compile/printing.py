@@ -26,7 +26,7 @@ from sympy.printing.pycode import PythonCodePrinter  # type: ignore[import-untyp
 from surfacechem.compile.program import jacobian, needed
 from surfacechem.expressions import Expression
 from surfacechem.model.system import Named, Parameter, System
-from surfacechem.quantities import VARIABLES, Quantity
+from surfacechem.quantities import VARIABLES, Quantity, spelled
 
 CODE_WIDTH = 100
 """Printed lines are broken beyond this, where an expression lets them."""
@@ -272,14 +272,6 @@ def _broken_line(before: str, text: str, after: str) -> list[str]:
 
 # -- LaTeX ------------------------------------------------------------------------------------------------------------
 
-GREEK_LETTERS = {
-    *("alpha", "beta", "gamma", "delta", "epsilon", "eta", "theta", "kappa", "lambda", "mu", "nu", "xi"),
-    *("pi", "rho", "sigma", "tau", "phi", "psi", "chi", "omega"),
-}
-
-
-SPACE = r"\,"
-
 
 class Latex(_Printer, LatexPrinter):  # type: ignore[misc]
     """LaTeX with the symbols of the package."""
@@ -307,24 +299,7 @@ def symbol(name: str) -> str:
         return rf"\dot{{{symbol(rate[1])}}}"
     if name in VARIABLES and VARIABLES[name].latex:
         return VARIABLES[name].latex
-    head, _, subscript = name.partition("_")
-    base = _letters(head)
-    return f"{base}_{{{_subscript(subscript)}}}" if subscript else base
-
-
-def _letters(text: str) -> str:
-    if text in GREEK_LETTERS:
-        return f"\\{text}"
-    return text if len(text) <= 1 else rf"\mathrm{{{text}}}"
-
-
-def _subscript(text: str) -> str:
-    parts = text.split("_")
-    if all(len(part) == 1 or part in GREEK_LETTERS or re.fullmatch(r"\w?\d\w?", part) for part in parts):
-        return " ".join(part if re.search(r"\d", part) else _letters(part) for part in parts)
-    if set(parts) & GREEK_LETTERS:
-        return SPACE.join(map(_letters, parts))
-    return rf"\mathrm{{{SPACE.join(parts)}}}"
+    return spelled(name)
 
 
 def unit(text: str) -> str:
@@ -333,7 +308,7 @@ def unit(text: str) -> str:
     >>> unit("W/(m^2 K)")
     '\\mathrm{W/(m^{2}\\,K)}'
     """
-    return r"\mathrm{" + re.sub(r"\^(-?\d+)", r"^{\1}", text).replace(" ", SPACE) + "}"
+    return r"\mathrm{" + re.sub(r"\^(-?\d+)", r"^{\1}", text).replace(" ", r"\,") + "}"
 
 
 def latex(system: System, title: str = "") -> str:

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from surfacechem.contracts.si_units import ZERO_CELSIUS
 from surfacechem.errors import InputError, Place
-from surfacechem.quantities import SUPERSCRIPTS, VARIABLES, raised
+from surfacechem.quantities import GREEK, SUPERSCRIPTS, VARIABLES, raised, spelled
 from surfacechem.results.netcdf import read_netcdf, reading, replacing
 from surfacechem.tolerances import RUN_EPS
 
@@ -60,9 +60,6 @@ TAKES_PREFIX = ("J", "N", "Pa", "W", "m", "s")
 WITHOUT_PREFIX = (0.1, 1e3)
 
 PREFIXES = {-5: "f", -4: "p", -3: "n", -2: "µ", -1: "m", 0: "", 1: "k", 2: "M", 3: "G", 4: "T"}
-
-GREEK = ("alpha", "beta", "epsilon", "eta", "kappa", "lambda", "mu", "phi", "rho", "sigma", "tau", "theta")
-
 
 TITLE_STYLE: Any = {"x": 0.01, "ha": "left", "fontsize": 11, "fontweight": "bold"}
 NOTE_STYLE: Any = {"fontsize": 8, "color": "#555555"}
@@ -345,18 +342,10 @@ def unit(values: xarray.DataArray) -> str:
 def symbol(name: str) -> str:
     r"""A variable's name in mathematics.
 
-    >>> symbol("T_1"), symbol("phi"), symbol("D_coulomb"), symbol("R_linear_affinity")
-    ('$T_{1}$', '$\\phi$', '$D_{\\mathrm{coulomb}}$', '$R_{\\mathrm{linear\\ affinity}}$')
-    >>> symbol("theta_bond_s")
-    '$\\theta_{\\mathrm{bond\\ s}}$'
+    >>> symbol("T_1"), symbol("phi")
+    ('$T_{1}$', '$\\phi$')
     """
-    head, _, subscript = name.partition("_")
-    base = f"\\{head}" if head in GREEK else (head if len(head) == 1 else rf"\mathrm{{{head}}}")
-    if not subscript:
-        return f"${base}$"
-    words = subscript.replace("_", r"\ ")
-    inside = words if len(words) <= 2 else r"\mathrm{" + words + "}"
-    return f"${base}_{{{inside}}}$"
+    return f"${spelled(name)}$"
 
 
 def unit_text(unit: str) -> str:
