@@ -156,8 +156,8 @@ class Source:
         if not isinstance(node, Mapped | Listed):
             return Place(self.file, 0, path)
         inside = node.tree.value if isinstance(node, Mapped) else dict(enumerate(node.tree.value))
-        # What is missing is missed where the whole stands.
-        return replace(inside.get(key, node.tree).place, path=path)
+        found: Tree = inside.get(key, node.tree)  # what is missing is missed where the whole stands
+        return replace(found.place, path=path)
 
     def error(self, message: str, node: Any, key: Any = None) -> InputError:
         """An error at a mapping or list of the file, or at one of its entries."""

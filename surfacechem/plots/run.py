@@ -275,7 +275,7 @@ def _across(dataset: xarray.Dataset, names: Sequence[str]) -> Figure:
 def _draw(ax: Axes, dataset: xarray.Dataset, panel: Panel, over: str, first: float | None) -> None:
     """The curves of a panel, with the unit that suits what is seen of them from ``first`` on."""
     t = dataset[over].values
-    _draw_curves(ax, dataset, panel, t)
+    _draw_curves(ax, dataset, panel, over)
     start = first or 0.0
     if first is None and over == "time" and panel.unit == FLUX:
         start = _show_behind_spike(ax, dataset, panel)
@@ -311,9 +311,9 @@ def _show_behind_spike(ax: Axes, dataset: xarray.Dataset, panel: Panel) -> float
     return start
 
 
-def _draw_curves(ax: Axes, dataset: xarray.Dataset, panel: Panel, t: Array) -> None:
-    """The curves of a panel, with exact ones dashed; of many the largest in colours and the rest in grey."""
-    groups, marker = group_coinciding(dataset, panel.names), "o" if len(t) == 1 else ""
+def _draw_curves(ax: Axes, dataset: xarray.Dataset, panel: Panel, over: str) -> None:
+    """The curves of a panel, and the exact ones; where they are many, the largest in colours and the rest in grey."""
+    groups, marker = group_coinciding(dataset, panel.names), "o" if dataset.sizes["time"] == 1 else ""
     rest: list[list[str]] = []
     if len(groups) > len(style.COLOURS):
         # A trace gas beside a full surface is nothing to be told by its colour.
@@ -325,10 +325,12 @@ def _draw_curves(ax: Axes, dataset: xarray.Dataset, panel: Panel, t: Array) -> N
         style.draw_curve(ax, dataset, over, dataset[names[0]].values, label=label, marker=marker, drawstyle=look)
     for k, names in enumerate(rest):
         label = "_" if k else f"{len(rest)} smaller"
-        ax.plot(t, dataset[names[0]].values, label=label, marker=marker, color="0.75", linewidth=0.8, zorder=1)
+        look = {"label": label, "marker": marker, "color": "0.75", "linewidth": 0.8, "zorder": 1}
+        style.draw_curve(ax, dataset, over, dataset[names[0]].values, **look)
     exact = [f"{name}_exact" for name in panel.names if f"{name}_exact" in curves(dataset)]
     for k, name in enumerate(exact):
-        ax.plot(t, dataset[name].values, linestyle=DASHES, color="black", linewidth=0.9, label="_" if k else "exact")
+        look = {"label": "_" if k else "exact", "linestyle": DASHES, "color": "black", "linewidth": 0.9}
+        style.draw_curve(ax, dataset, over, dataset[name].values, **look)
 
 
 def group_coinciding(dataset: xarray.Dataset, names: Sequence[str]) -> list[list[str]]:

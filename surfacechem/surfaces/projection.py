@@ -332,6 +332,10 @@ def cross(a: Array, b: Array) -> Array:
     return np.stack([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0], axis=-1)
 
 
+def _metric(D: Array) -> tuple[Array, Array, Array]:
+    return _dot(D[1], D[1]), _dot(D[1], D[2]), _dot(D[2], D[2])
+
+
 def _degenerate(D: Array, away: Array) -> NDArray[np.bool_]:
     """Whether points are where normals meet, so that not one point is nearest but many."""
     (E, F, G), (a, b, c) = _forms(D, away)
@@ -343,7 +347,7 @@ def _degenerate(D: Array, away: Array) -> NDArray[np.bool_]:
 
 def _forms(D: Array, away: Array) -> tuple[tuple[Array, Array, Array], tuple[Array, Array, Array]]:
     """The metric, and the second derivatives of half the squared distance, each uu, uv, vv."""
-    E, F, G = _dot(D[1], D[1]), _dot(D[1], D[2]), _dot(D[2], D[2])
+    E, F, G = _metric(D)
     return (E, F, G), (E - _dot(away, D[3]), F - _dot(away, D[4]), G - _dot(away, D[5]))
 
 
