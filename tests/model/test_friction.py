@@ -311,6 +311,17 @@ def test_friction_that_falls_as_soon_as_sliding_begins_has_no_velocity(delta):
     assert found.trajectory.result.t == pytest.approx(0.7, rel=1e-5)
 
 
+@pytest.mark.parametrize("across", ["", "w_t2: {ramp: {rate: 0.1 mm/s}}, "])
+@pytest.mark.parametrize(("damper", "rate"), [("1e8 Pa s/m", 1), ("1e7 Pa s/m", 3)])
+def test_a_velocity_at_which_friction_falls_faster_than_a_damper_resists_ends_a_run(damper, rate, across):
+    """At a fold of the velocity, however large the damper is in its unit."""
+    case = STRIBECK.replace("DELTA", "2").replace("MU_S", "0.7").replace("1e3 Pa s/m", damper)
+    case = case.replace("p: 1 MPa, ", f"p: 1 MPa, {across}").replace("rate: 1 mm/s}}}", f"rate: {rate} mm/s}}}}}}")
+    found = surfacechem.run(case)
+    assert found.status == "stopped"
+    assert "no steady sliding velocity" in found.reason
+
+
 def test_a_run_that_ends_at_its_start_has_the_state_there(tmp_path):
     text = STRIBECK.replace("DELTA", "0.7").replace("MU_S", "0.7").replace(", c_b: 1e3 Pa s/m", "")
     found = surfacechem.run(text, "loading.w_t=-1 mm")

@@ -128,9 +128,13 @@ def _formulation(build: Build, d: Direction, mount: Support | None, elastic: boo
     return Formulation(d, mount, elastic, sticks, rate_dependent, dead_load, bool(laws) or not elastic)
 
 
-def growth(slope: Expression) -> Expression:
-    """Stability measure of friction's slope with velocity: ln(1 + slope) if positive, as it may be infinite at rest."""
-    return where(slope > 0, log(1 + where(slope > 0, slope, 0)), slope)
+def growth(slope: Expression, damping: Expression) -> Expression:
+    """Stability measure of the slope of what resists sliding, relative to the damping where there is some.
+
+    It is the logarithm of one more if positive, as friction's own slope may be infinite at rest.
+    """
+    ratio = slope / damping if damping != 0 else slope
+    return where(slope > 0, log(1 + where(slope > 0, ratio, 0)), ratio)
 
 
 def _feels_velocity(law: Friction, d: Direction) -> bool:

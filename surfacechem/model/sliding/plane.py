@@ -144,7 +144,7 @@ def motion(build: Build, kinds: Sequence[Formulation]) -> Iterator[Record]:
             remedy = "Give the mounting a mass `m`, or friction along the other direction, too."
             yield Margin("friction in both directions", ratio, reason, remedy=remedy)
         # The slope at rest is that of the speeds to come.
-        ahead = growth(slope.subs({SPEED: SPEED + TINY}))
+        ahead = growth(slope.subs({SPEED: SPEED + TINY}), sum(side.far.c_b + side.far.c_g for side in sides))
         yield Margin(f"{STABLE_PREFIX}speed", ahead, kinds[0].unstable, when={SLIP: (1,)}, stability="speed")
     pull = _scaled(sides, largest)
     # Sliding begins where the pull points; what nothing holds back begins in the direction of its drive.

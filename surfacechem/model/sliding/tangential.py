@@ -332,7 +332,9 @@ def _sliding_row(
             "mass or a damper.",
             PLACE,
         )
-    stable = growth(slope) if depends(slope, v) else slope
+    far = build.motion.far_fields.get(kind.d.axis)
+    damping = far.c_b + far.c_g if far is not None and damped else ZERO
+    stable = growth(slope, damping) if depends(slope, v) else slope
     yield Margin(f"{STABLE_PREFIX}{v}", stable, kind.unstable, when=_while_sliding(kind), stability=str(v))
     return slope
 
