@@ -313,8 +313,8 @@ class SurfaceEngine:
         self._last: tuple[Sequence[float], Array] = (), np.empty(0)
         self._energies = np.empty(0)
         self._lay_out()
-        self._brought: list[tuple[int, float, Sequence[float]]] = [(0, math.nan, ())]
-        """Engine, temperature and states to which the surface was brought last, as several engines may share it."""
+        self._brought: list[tuple[int, float, float, Sequence[float]]] = [(0, math.nan, math.nan, ())]
+        """Engine, temperature, amount and states to which the surface was brought last, as several may share it."""
 
     def beside(self, neighbours: Mapping[str, Neighbour]) -> SurfaceEngine:
         """A copy with other pressures and compositions of neighbours; InputError where no reaction has such a one."""
@@ -390,21 +390,29 @@ class SurfaceEngine:
     def _asked(self, values: Sequence[float]) -> Array:
         """What Cantera gives there; not a number where there is no such state."""
         T, amount, end = values[0], values[1], 2 + self._count
-        if not (T > 0 and amount > 0):
-            return np.full(len(self.gives), math.nan)
-        around = id(self), T, values[end:]
-        if around != self._brought[0]:
-            self._bring(T, values[end:])
-            self._brought[0] = around
-        # A stretched surface has fewer sites per area; coverages that a step tries need not sum to one.
-        self.surface.site_density = amount * self._sites / MOLECULAR
-        self.surface.set_unnormalized_coverages(values[2:end])
-        rates = self.surface.net_rates_of_progress.take(self.positions) * MOLECULAR
-        return np.concatenate((rates, self._energies))
+        if T > 0 and amount > 0:
+            around = id(self), T, amount, values[end:]
+            if around != self._brought[0]:
+                self._bring(T, amount, values[end:])
+                self._brought[0] = around
+            # Coverages that a step tries need not sum to one; a surface whose mass is below zero Cantera does not know.
+            try:
+                self.surface.set_unnormalized_coverages(values[2:end])
+            except RuntimeError:  # a CanteraError
+                self.surface.set_unnormalized_coverages(np.maximum(values[2:end], 0.0))
+            rates = self.surface.net_rates_of_progress.take(self.positions) * MOLECULAR
+            found = np.concatenate((rates, self._energies))
+        else:
+            found = np.full(len(self.gives), math.nan)
+        self._last = values, found
+        return found
 
-    def _bring(self, T: float, states: Sequence[float]) -> None:
-        """Bring the surface and its neighbours to a temperature [K], and these to their states."""
+    def _bring(self, T: float, amount: float, states: Sequence[float]) -> None:
+        """Bring the surface and its neighbours to a temperature [K], an amount of sites, and states of neighbours."""
         self.surface.TP = T, None
+        # A stretched surface has fewer sites per area; their density can be set where the surface has a mass.
+        self.surface.set_unnormalized_coverages(np.ones(self._count))
+        self.surface.site_density = amount * self._sites / MOLECULAR
         for held, read, written in self._parts:
             held.put(T, states[read])
             held.energies(written)

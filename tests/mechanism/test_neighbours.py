@@ -605,3 +605,16 @@ def test_a_pressure_that_falls_to_zero_ends_the_run_there(tmp_path):
     solution = surfacechem.run(small(tmp_path, changes))
     assert (solution.status, solution.trajectory.result.t) == ("stopped", pytest.approx(1e-3, rel=1e-12))
     assert "the pressure of gas reached zero" in solution.reason
+
+
+@pytest.mark.parametrize("A", [1e3, 1e25])
+def test_a_surface_empties_whose_sites_are_made_of_nothing(A, tmp_path):
+    """Where what has a mass is used up, a step tries less than nothing of it: Cantera knows no such surface."""
+    leaves = f"{{equation: CO(s) => CO + a(s), rate-constant: {{A: {A} 1/s, b: 0, Ea: 0}}}}"
+    changes = {SMALL.partition("reactions:\n- ")[2]: leaves, "until: 1 us": f"until: {1e3 / A} s, outputs: 101"}
+    solution = surfacechem.run(small(tmp_path, changes), ["run.rtol=1e-9"])
+    assert solution.status == "finished"
+    exact = 0.4 * np.exp(-A * solution.dataset["time"].values)
+    np.testing.assert_allclose(solution.dataset["theta_CO_s"], exact, atol=1e-7)
+    long = surfacechem.run(small(tmp_path, {**changes, "until: 1 us": "until: 1 s"})).dataset
+    assert float(long["theta_a_s"][-1]) == pytest.approx(1, rel=1e-9)
