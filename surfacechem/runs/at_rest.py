@@ -12,7 +12,7 @@ from surfacechem.expressions import depends
 from surfacechem.model.system import System
 from surfacechem.results.audit import audit
 from surfacechem.solve.run import Model, Run, Trajectory
-from surfacechem.tolerances import LINE_ERROR, NEGLIGIBLE
+from surfacechem.tolerances import NEGLIGIBLE, LINE_ERROR, UNRESOLVED
 
 HORIZON = 1e8
 """Time [s] for which rest is looked for, three years: beyond, step sizes times the rates of a fast surface are more
@@ -23,8 +23,8 @@ REST_RATIO = 10.0
 """Least ratio of the time looked at to the time to come to rest, with which a state counts as at rest."""
 
 SHORTER_TIMES = (1e6, 1e4, 1e2, 1.0)
-"""Times [s] for which rest is looked for where roundings of a fast surface, summed over years, hide it: its sites do
-not stay what they are.
+"""Times [s] for which rest is looked for where errors of a fast surface, summed over years, hide it: its sites do not
+stay what they are.
 """
 
 PATH = "run.until"
@@ -51,16 +51,22 @@ def to_rest(model: Model, run: Run, values: Mapping[str, float]) -> Run:
     far = _looked(model, run, values, HORIZON)
     if far.status == "stopped":
         return replace(run, times=_until(run, min(2 * far.result.t, HORIZON) or HORIZON))
-    name = _rest_of(far)[1]
-    scales = np.array([state.scale for state in model.system.states])
-    for end in (HORIZON, *(SHORTER_TIMES if audit(far).site_error > run.rtol else ())):
+    mover, states = _rest_of(far)[1], model.system.states
+    scales = np.array([state.scale for state in states])
+    sites = [bool(state.quantity.species) for state in states]
+    lost = abs(np.sum((far.result.y - far.result.outputs[0])[sites]))
+    unclear = audit(far).site_error > run.rtol or (
+        lost > run.rtol * abs(far.result.y[mover]) and _rest_of(far, UNRESOLVED)[0] * REST_RATIO <= HORIZON
+    )
+    for end in (HORIZON, *(SHORTER_TIMES if unclear else ())):
         near = far if end == HORIZON else _looked(model, run, values, end)
         last, change = _rest_of(near)[0], np.abs(near.result.y - far.result.y)
         # Both end in states that differ slightly, or by a trace of something.
         alike = np.all(change <= NEGLIGIBLE * np.maximum(np.abs(near.result.y), scales))
         if near.status == "finished" and last * REST_RATIO <= end and alike:
             return replace(run, times=_until(run, last), rest=last)
-    raise UnrestError(f"the case did not reach a steady state within {HORIZON:.3g} s: {name} still changes.", path=PATH)
+    text = f"the case did not reach a steady state within {HORIZON:.3g} s: {states[mover].name} still changes."
+    raise UnrestError(text, path=PATH)
 
 
 def _looked(model: Model, run: Run, values: Mapping[str, float], end: float) -> Trajectory:
@@ -78,13 +84,12 @@ def _until(run: Run, end: float) -> tuple[float, ...]:
     return tuple(end * (t / run.times[-1]) for t in run.times)  # the last of them exactly the end
 
 
-def _rest_of(reached: Trajectory) -> tuple[float, str]:
-    """The first time of a run after which no state leaves the tolerance of its last value, and which state is last."""
+def _rest_of(reached: Trajectory, tolerances: float = 1.0) -> tuple[float, int]:
+    """The first time of a run after which no state is more tolerances away from its last value, and which is last."""
     result = reached.result
     known, problem = result.known or result.states(), result.problem
     evolved = np.flatnonzero(~problem.program.algebraic_mask)
     y, last = known.y[:, evolved], result.y[evolved]
-    away = np.abs(y - last) > problem.rtol * np.abs(last) + problem.atol[evolved]
+    away = np.abs(y - last) > tolerances * (problem.rtol * np.abs(last) + problem.atol[evolved])
     when = np.array([np.flatnonzero(column)[-1] + 1 if column.any() else 1 for column in away.T], dtype=int)
-    last_state = reached.model.system.states[int(evolved[when.argmax()])]
-    return float(known.t[min(int(when.max()), len(known.t) - 1)]), last_state.name
+    return float(known.t[min(int(when.max()), len(known.t) - 1)]), int(evolved[when.argmax()])
