@@ -130,8 +130,8 @@ class Store:
     """A store that is written to."""
 
     path: Path
-    layout: Layout
-    _arrays: dict[str, Any] = field(default_factory=dict)
+    layout: Layout = field(repr=False)
+    _arrays: dict[str, Any] = field(default_factory=dict, repr=False)
 
     @property
     def marks(self) -> Path:

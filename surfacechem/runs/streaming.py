@@ -7,7 +7,7 @@ import os
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -201,9 +201,9 @@ class Progress:
 class Stream:
     """A sweep on its way into a store."""
 
-    chunks: ChunkRuns
+    chunks: ChunkRuns = field(repr=False)
     store: Store
-    job: Job
+    job: Job = field(repr=False)
     part: tuple[int, int] = (1, 1)
 
     @property

@@ -484,6 +484,13 @@ def test_the_source_of_errors_is_told_once_however_many_runs_are_checked(tmp_pat
     assert source.count("estimate: a second sweep") == source.count("does not apply to this scene") == 1
 
 
+def test_a_notebook_shows_where_a_store_is_and_not_all_that_it_is_made_of(tmp_path):
+    simulation = case(keep=ENDS, over={"initial.T": [290, 310]})
+    stream = simulation.stream(simulation.plan(), tmp_path / "o.zarr")
+    assert repr(stream) == f"Stream(store={stream.store}, part=(1, 1))"
+    assert repr(stream.store) == f"Store(path={tmp_path / 'o.zarr'!r})"
+
+
 def test_what_is_nothing_but_rounding_at_the_end_is_no_error(tmp_path):
     """Heat flows into one body as out of the other, and their mean is the rounding of both."""
     simulation = case("cooling-to-zero", over={"initial.T": [100, 1000]})
