@@ -383,29 +383,23 @@ class SurfaceEngine:
         """
         with ASKING:
             # The residual, its outputs and the ledger ask at the same state one after another.
-            if values != self._last[0]:
-                self._last = values, self._asked(values)
-            return self._last[1]
-
-    def _asked(self, values: Sequence[float]) -> Array:
-        """What Cantera gives there; not a number where there is no such state."""
-        T, amount, end = values[0], values[1], 2 + self._count
-        if T > 0 and amount > 0:
-            around = id(self), T, amount, values[end:]
-            if around != self._brought[0]:
-                self._bring(T, amount, values[end:])
-                self._brought[0] = around
-            # Coverages that a step tries need not sum to one; a surface whose mass is below zero Cantera does not know.
-            try:
+            if values == self._last[0]:
+                return self._last[1]
+            T, amount, end = values[0], values[1], 2 + self._count
+            if T > 0 and amount > 0:
+                around = id(self), T, values[end:]
+                if around != self._brought[0]:
+                    self._bring(T, values[end:])
+                    self._brought[0] = around
+                # A stretched surface has fewer sites per area; coverages that a step tries need not sum to one.
+                self.surface.site_density = amount * self._sites / MOLECULAR
                 self.surface.set_unnormalized_coverages(values[2:end])
-            except RuntimeError:  # a CanteraError
-                self.surface.set_unnormalized_coverages(np.maximum(values[2:end], 0.0))
-            rates = self.surface.net_rates_of_progress.take(self.positions) * MOLECULAR
-            found = np.concatenate((rates, self._energies))
-        else:
-            found = np.full(len(self.gives), math.nan)
-        self._last = values, found
-        return found
+                rates = self.surface.net_rates_of_progress.take(self.positions) * MOLECULAR
+                found = np.concatenate((rates, self._energies))
+            else:
+                found = np.full(len(self.gives), math.nan)
+            self._last = values, found
+            return found
 
     def _bring(self, T: float, amount: float, states: Sequence[float]) -> None:
         """Bring the surface and its neighbours to a temperature [K], an amount of sites, and states of neighbours."""

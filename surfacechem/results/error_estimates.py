@@ -185,8 +185,7 @@ def _off_events(trajectory: Trajectory, late: float) -> Mask:
     beside the time to the next of them.
     """
     result, end = trajectory.result, trajectory.run.times[-1]
-    stopped = [result.t] if trajectory.status == "stopped" else []
-    moments = np.unique([*(jump.t for jump in trajectory.jumps), *stopped])
+    moments = np.unique([jump.t for jump in trajectory.jumps] + [result.t] * (trajectory.status == "stopped"))
     brief = BRIEF_PART * np.diff(moments, prepend=0.0, append=max([end, *moments[-1:]]))
     ways = moments - np.maximum(brief[:-1], 2 * late * moments), moments + np.maximum(brief[1:], 2 * late * moments)
     return clear_of(result.times, np.transpose(ways))
@@ -199,9 +198,7 @@ def fewer(trajectory: Trajectory, late: float = 0.0) -> Trajectory:
     times = trajectory.result.times
     if len(times) <= MOST_TIMES:
         return trajectory
-    away = _off_events(trajectory, late)
-    away[[0, -1]] = True
-    rows = np.flatnonzero(away)
+    rows = np.union1d(np.flatnonzero(_off_events(trajectory, late)), [0, len(times) - 1])
     return trajectory.at_times(times[np.unique(rows[np.linspace(0, len(rows) - 1, MOST_TIMES).round().astype(int)])])
 
 
@@ -373,10 +370,9 @@ def clear_of(times: Array, pairs: Sequence[tuple[float, float]] | Array) -> Mask
     >>> clear_of(np.array([0.5, 1.0, 2.5, 4.0]), [(2.0, 3.0), (1.0, 1.0)]).tolist()
     [True, False, False, True]
     """
-    ways = np.sort(np.reshape(pairs, (-1, 2)), axis=1)
-    early, late = ways[np.argsort(ways[:, 0])].T
+    early, late = np.sort(np.sort(np.reshape(pairs, (-1, 2)), axis=1), axis=0).T
     begun = np.searchsorted(early * (1 - SIDE), times, side="right")
-    return np.asarray(times > np.append(-np.inf, np.maximum.accumulate(late * (1 + SIDE)))[begun])
+    return np.asarray(begun == np.searchsorted(late * (1 + SIDE), times))  # as many have ended
 
 
 def with_cells(estimate: Accuracy, cells: CellErrors) -> Accuracy:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -93,10 +92,10 @@ def check(stream: Stream, threads: int | None = None) -> Checked | None:
     once = once[numbers >= 0]  # the hardest are filled up with -1 where fewer have not failed
     errors, destroys = both("error")[once], np.nansum(both("destroys_entropy")[once])
     worst = float(np.fmax.reduce(errors, initial=-np.inf))
-    # Of what each run has a word of its own for, one is told.
-    why, unused = (next(filter(None, map(attrgetter(name), told)), "") for name in ("why", "unused"))
-    source = "; ".join(filter(None, (*dict.fromkeys(each.method for each in told), unused)))
-    return Checked(worst, int(np.isnan(errors).sum()), len(errors), int(destroys), source, why)
+    # One source of each method: why it is no exact solution is said of each run in words of its own.
+    sources = {each.source.partition(";")[0]: each.source for each in sorted(told, key=lambda each: len(each.source))}
+    why = next((each.why for each in told if each.why), "")
+    return Checked(worst, int(np.isnan(errors).sum()), len(errors), int(destroys), "; ".join(sources.values()), why)
 
 
 def _columns(

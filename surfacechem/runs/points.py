@@ -194,9 +194,8 @@ class Evaluator:
             if name not in known:
                 raise InputError(f"points cannot give '{name}'.{suggestion(name, known)}")
         given = {name: _numbers(name, value, known[name].quantity.unit) for name, value in points.items()}
-        for parameter in self.system.parameters:
-            for value in given.get(parameter.path, ()):
-                parameter.spec.check(parameter.path, value)
+        for end in (np.min, np.max):  # ranges are those of a run
+            values_of(self.system, {name: end(x) for name, x in given.items() if name in self.parameters})
         first = {known[name].column: name for name in reversed(given)}
         for name in given:
             if first[known[name].column] != name:

@@ -186,20 +186,13 @@ def settings(system: System, plan: Plan, run: Run, values: Sequence[Mapping[str,
 
 @dataclass(frozen=True)
 class SweepAccuracy:
-    """Largest relative error of each run and the method it is from; exact statistics by name where they are known."""
+    """Largest relative error of each run and where it is from; exact statistics by name where they are known."""
 
     errors: NDArray[np.float64]
-    method: str
+    source: str
     exact: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
     why: str = ""
     """Reason why the error is not known, of one of the runs of which it is not."""
-    unused: str = ""
-    """Reason why they are from no exact solution."""
-
-    @property
-    def source(self) -> str:
-        """Where the errors are from, and why they are from no exact solution."""
-        return "; ".join(filter(None, (self.method, self.unused)))
 
     @property
     def known(self) -> NDArray[np.float64]:
@@ -241,7 +234,7 @@ def accuracy(
     left = cells()
     errors, why = _estimated(done, second(), left)
     source = ", ".join([second_run(second().run, "sweep"), *dict.fromkeys(f.source for f in left if f.variables)])
-    return _held(done, SweepAccuracy(np.array(errors), source, why=why, unused=unused))
+    return _held(done, SweepAccuracy(np.array(errors), "; ".join(filter(None, (source, unused))), why=why))
 
 
 def _held(done: SweepSolution, found: SweepAccuracy) -> SweepAccuracy:
@@ -252,7 +245,7 @@ def _held(done: SweepSolution, found: SweepAccuracy) -> SweepAccuracy:
     if wanted is None or not np.any(found.known > wanted):
         return found
     missed = f"{wanted:.0e} was asked, which takes a tighter `rtol` under `run` here"
-    return replace(found, method=f"{found.method}; {missed}")
+    return replace(found, source=f"{found.source}; {missed}")
 
 
 def _estimated(done: SweepSolution, second: SweepSolution, cells: Sequence[CellErrors]) -> tuple[list[float], str]:

@@ -505,7 +505,7 @@ def test_an_error_that_is_unknown_and_an_end_that_is_no_number_count_for_no_smal
     kept = ends | {"T_last": np.array([300.0, np.nan, np.nan, 300.0])}
     monkeypatch.setattr(checking, "RunByRun", lambda *_: SimpleNamespace(columns=lambda *_: ends))
     done = SimpleNamespace(
-        accuracy=SimpleNamespace(errors=np.array([np.nan, 1e-9, 1e-9, 1e-9]), method="", why="", unused=""),
+        accuracy=SimpleNamespace(errors=np.array([np.nan, 1e-9, 1e-9, 1e-9]), source="", why=""),
         run_ends=[dict.fromkeys(checking.BALANCE_COLUMNS, 0.0)] * 4,
         runs=[SimpleNamespace(some=SimpleNamespace(roundings={}))] * 4,
         audits=[],
