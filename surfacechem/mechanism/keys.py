@@ -427,8 +427,7 @@ class PhaseCheck:
         for key in node:
             if key in KEY_REMEDIES and key not in allowed:
                 raise self.source.error(f"{title}: '{key}' cannot be used here: {KEY_REMEDIES[key]}", node, key)
-            if key not in allowed:
-                raise self.source.error(f"{title}: unknown key '{key}'.{suggestion(str(key), allowed)}", node, key)
+        self._among(node, allowed, f"{title}: unknown key")
 
     def _among(self, node: Any, known: Collection[str], problem: str, hint: bool = True) -> None:
         """Check that every key of what may be a mapping is known; a ``hint`` is the nearest of those that are."""
@@ -444,9 +443,8 @@ class PhaseCheck:
         given, error = node.get("units"), self.source.error
         if given is None:
             return
+        self._among(given, UNITS, "units: unknown key")
         for key, unit in given.items():
-            if key not in UNIT_DIMENSIONS:
-                raise error(f"units: unknown key '{key}'.{suggestion(str(key), UNIT_DIMENSIONS)}", given, key)
             if key == "temperature" and unit != "K":
                 raise error(f"units: temperatures are in K, not in {unit}.", given, key)
             try:

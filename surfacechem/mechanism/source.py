@@ -155,9 +155,9 @@ class Source:
         """Place of a mapping or list, or of one of its entries."""
         if not isinstance(node, Mapped | Listed):
             return Place(self.file, 0, path)
-        inside = node.tree.value if isinstance(node, Mapped) else dict(enumerate(node.tree.value))
-        found: Tree = inside.get(key, node.tree)  # what is missing is missed where the whole stands
-        return replace(found.place, path=path)
+        inside: Mapping[Any, Tree] = node.tree.value if isinstance(node, Mapped) else dict(enumerate(node.tree.value))
+        # What is missing is missed where the whole stands.
+        return replace(inside.get(key, node.tree).place, path=path)
 
     def error(self, message: str, node: Any, key: Any = None) -> InputError:
         """An error at a mapping or list of the file, or at one of its entries."""
