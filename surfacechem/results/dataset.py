@@ -18,9 +18,9 @@ from surfacechem.model.system import Profile, System
 from surfacechem.quantities import Quantity
 from surfacechem.results.netcdf import (
     CONVENTIONS,
-    COORDINATES,
     TABLES,
     Column,
+    as_dataset,
     dataset_path,
     package_version,
     save,
@@ -169,14 +169,7 @@ class Results(ABC):
     @cached_property
     def dataset(self) -> xarray.Dataset:
         """The xarray Dataset."""
-        import xarray
-
-        data = {c.name: (c.dimensions, c.values, c.attributes) for c in self.columns}
-        attributes = dict(self.attributes)
-        said = [*str(attributes.pop(COORDINATES, "")).split(), "time"]
-        names = [c.name for c in self.columns if c.dimensions == (c.name,) or c.name in said]
-        coordinates = {name: data.pop(name) for name in names}
-        return xarray.Dataset(data, coords=coordinates, attrs=attributes)
+        return as_dataset(self.columns, self.attributes)
 
     def __getitem__(self, name: str) -> xarray.DataArray:
         """A variable of the dataset, by its name; InputError where it has none of that name."""

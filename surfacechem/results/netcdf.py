@@ -117,6 +117,17 @@ def versions() -> str:
     return ", ".join(f"{name} {package_version(name)}" for name in ("surfacechem", "numpy", "numba", "symengine"))
 
 
+def as_dataset(columns: Sequence[Column], attributes: Mapping[str, str | float | int]) -> xarray.Dataset:
+    """The xarray Dataset of columns; those along themselves, time, and what an attribute names are coordinates."""
+    import xarray
+
+    data = {c.name: (c.dimensions, c.values, c.attributes) for c in columns}
+    attributes = dict(attributes)
+    said = [*str(attributes.pop(COORDINATES, "")).split(), "time"]
+    names = [c.name for c in columns if c.dimensions == (c.name,) or c.name in said]
+    return xarray.Dataset(data, coords={name: data.pop(name) for name in names}, attrs=attributes)
+
+
 def dataset_path(path: str | Path) -> Path:
     """The path of a file that is to hold a dataset; InputError where its suffix is that of another format.
 

@@ -148,7 +148,6 @@ def precision(
             "variable": list(dict.fromkeys(name for case in compared for name in case.variables)),
         },
         variables=list(_variables()),
-        coordinates=["tolerance"],
         sections=list(_sections(compared)),
         omissions=list(_omissions(compared)),
         settings={"repeat": repeat, "status": status},

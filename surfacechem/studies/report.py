@@ -36,7 +36,7 @@ import numpy as np
 
 from surfacechem.errors import InputError, Place
 from surfacechem.quantities import raised
-from surfacechem.results.netcdf import CONVENTIONS, Column, replacing, save
+from surfacechem.results.netcdf import CONVENTIONS, Column, as_dataset, replacing, save
 from surfacechem.runs.listing import plain
 from surfacechem.runs.sheet import columns
 from surfacechem.studies import mathml
@@ -186,7 +186,6 @@ class Study:
     """The items along each dimension."""
     variables: Sequence[Variable]
     """The variables of the dataset, the coordinates first."""
-    coordinates: Sequence[str]
     sections: Sequence[PageSection]
     omissions: Sequence[str]
     settings: Mapping[str, str | float | int] = field(default_factory=dict)
@@ -236,11 +235,7 @@ class Study:
         and solvers by name; since ``tolerance`` is also an argument of ``sel``, tolerances are asked for by
         ``sel({"tolerance": 1e-8})``.
         """
-        import xarray
-
-        data = {c.name: (c.dimensions, c.values, c.attributes) for c in self.columns}
-        coordinates = {name: data.pop(name) for name in self.coordinates}
-        return xarray.Dataset(data, coords=coordinates, attrs=self.attributes)
+        return as_dataset(self.columns, self.attributes)
 
     def figure(self) -> Figure:
         """The figure of the study, which its dataset alone is enough for.

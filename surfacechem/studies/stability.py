@@ -176,7 +176,6 @@ def stability(
         arguments=[*regimes, *options],
         axes={"regime": rows, "decade": range(max(len(row.values) for row in rows)), "solver": solvers},
         variables=list(_variables(solvers[0])),
-        coordinates=("regime", "decade", "solver"),
         sections=list(_sections(rows, corners, solvers, rtol)),
         omissions=list(_omissions(rows, solvers, searched=rounds > 0)),
         settings={"rtol": rtol},
