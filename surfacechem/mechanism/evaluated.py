@@ -387,13 +387,15 @@ class SurfaceEngine:
                 return self._last[1]
             T, amount, end = values[0], values[1], 2 + self._count
             if T > 0 and amount > 0:
-                around = id(self), T, values[end:]
+                around = id(self), T, amount, values[end:]
                 if around != self._brought[0]:
-                    self._bring(T, values[end:])
+                    self._bring(T, amount, values[end:])
                     self._brought[0] = around
-                # A stretched surface has fewer sites per area; coverages that a step tries need not sum to one.
-                self.surface.site_density = amount * self._sites / MOLECULAR
-                self.surface.set_unnormalized_coverages(values[2:end])
+                # Coverages that a step tries need not sum to one; a mass below zero Cantera does not know.
+                try:
+                    self.surface.set_unnormalized_coverages(values[2:end])
+                except RuntimeError:  # a CanteraError
+                    self.surface.set_unnormalized_coverages(np.maximum(values[2:end], 0.0))
                 rates = self.surface.net_rates_of_progress.take(self.positions) * MOLECULAR
                 found = np.concatenate((rates, self._energies))
             else:

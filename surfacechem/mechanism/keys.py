@@ -443,7 +443,7 @@ class PhaseCheck:
         given, error = node.get("units"), self.source.error
         if given is None:
             return
-        self._among(given, UNITS, "units: unknown key")
+        self._among(given, UNIT_DIMENSIONS, "units: unknown key")
         for key, unit in given.items():
             if key == "temperature" and unit != "K":
                 raise error(f"units: temperatures are in K, not in {unit}.", given, key)

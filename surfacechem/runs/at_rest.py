@@ -12,7 +12,7 @@ from surfacechem.expressions import depends
 from surfacechem.model.system import System
 from surfacechem.results.audit import audit
 from surfacechem.solve.run import Model, Run, Trajectory
-from surfacechem.tolerances import NEGLIGIBLE, LINE_ERROR, UNRESOLVED
+from surfacechem.tolerances import LINE_ERROR, NEGLIGIBLE, RUN_ERROR
 
 HORIZON = 1e8
 """Time [s] for which rest is looked for, three years: beyond, step sizes times the rates of a fast surface are more
@@ -56,7 +56,7 @@ def to_rest(model: Model, run: Run, values: Mapping[str, float]) -> Run:
     sites = [bool(state.quantity.species) for state in states]
     lost = abs(np.sum((far.result.y - far.result.outputs[0])[sites]))
     unclear = audit(far).site_error > run.rtol or (
-        lost > run.rtol * abs(far.result.y[mover]) and _rest_of(far, UNRESOLVED)[0] * REST_RATIO <= HORIZON
+        lost > run.rtol * abs(far.result.y[mover]) and _rest_of(far, RUN_ERROR)[0] * REST_RATIO <= HORIZON
     )
     for end in (HORIZON, *(SHORTER_TIMES if unclear else ())):
         near = far if end == HORIZON else _looked(model, run, values, end)
