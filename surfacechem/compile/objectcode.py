@@ -60,7 +60,7 @@ def keep(kernel: Any, folder: Path) -> None:
     with suppress(OSError, subprocess.SubprocessError), tempfile.TemporaryDirectory(dir=folder) as trial:
         keep_file(Path(trial) / OBJECT_FILE, data)
         environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
-        command = [sys.executable, "-c", LOADING_TEST, trial]
+        command = [sys.executable, "-P", "-c", LOADING_TEST, trial]
         done = subprocess.run(command, env=environment, capture_output=True, timeout=LOADING_TIMEOUT)
         if done.returncode == 0:
             keep_file(folder / OBJECT_FILE, data)

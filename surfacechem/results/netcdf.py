@@ -333,7 +333,7 @@ def _try_elsewhere(path: Path, seconds: float) -> None:
 
 def _trial(path: Path) -> subprocess.Popen[bytes]:
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
-    command = [sys.executable, "-c", READING_TEST, str(path)]
+    command = [sys.executable, "-P", "-c", READING_TEST, str(path)]
     return subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
 

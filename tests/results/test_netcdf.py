@@ -130,6 +130,12 @@ def test_a_process_outlives_what_reading_a_file_does_not(tmp_path):
         assert words in line
 
 
+def test_modules_in_the_folder_of_a_file_are_not_those_that_read_it(files, tmp_path, monkeypatch):
+    (tmp_path / "re.py").write_text("raise SystemExit(3)")
+    monkeypatch.chdir(tmp_path)
+    assert "time" in rerun.read(files["run"]).variables
+
+
 @pytest.mark.parametrize("departures", ['{"atol": NaN}', '{"times": [1, 0]}'])
 def test_settings_that_no_run_has_are_refused_with_the_file(files, tmp_path: Path, departures: str) -> None:
     with xarray.open_dataset(files["run"]) as dataset:
