@@ -174,33 +174,33 @@ def _motion(build: Build, kind: Formulation) -> Iterator[Record]:
         carried = t_f = unbonded * t_f
         held = needed = far.force(u, ZERO) - t_a
     slides = build.constraint("slip").active if kind.sticks else symengine.Integer(kind.slides)
-    slope = None
+    rest = None
     if far is None:
         text = "work of the far field on the tangential displacement"
         yield Power(WORK, OUTSIDE, MECHANICS, (carried + t_a) * rate, "W_t", text)
     else:
         derived = rate == symengine.Symbol("v_t") and not kind.inertial
         yield from far.book(build, u, rate, symengine.Symbol("du_t_dt") if derived else None)
-        slope = yield from _balance(build, kind, far, slides, carried, t_a)
+        rest = yield from _balance(build, kind, far, slides, carried, t_a)
     if kind.elastic:
-        slope = yield from _elastic_rows(build, kind, slides, t_f, needed, v)
+        rest = yield from _elastic_rows(build, kind, slides, t_f, needed, v)
     name_traction(build, d, slides, t_a + carried, t_a + held)
     if kind.sticks and not kind.dead_load:
-        yield _friction(build, kind, needed, t_f, v, slope)
+        yield _friction(build, kind, needed, t_f, v, rest)
 
 
 def _friction(
-    build: Build, kind: Formulation, needed: Expression, t_f: Expression, v: Expression, slope: Expression | None
+    build: Build, kind: Formulation, needed: Expression, t_f: Expression, v: Expression, rest: Expression | None
 ) -> Constraint:
     """The set-valued law, by the reserve of sticking (limit less need) and a guard that is zero where sliding stops."""
     stops, still, slack = [], v, ZERO
     if kind.slides_inertially:
         still = symengine.Symbol(_velocity_state(build, kind))
         stops = [still]
-    elif slope is not None and build.motion.creeping is None:
-        # The tractions give the velocity: it is what they miss their balance at rest by that is zero where sliding
-        # stops, and what is left of this as sliding begins is rounding, which must not stop it.
-        still = slope * v if depends(slope, v) else build.expanded(needed - t_f).subs({v: 0})
+    elif rest is not None and build.motion.creeping is None:
+        # Where tractions give the velocity what is left of their balance at rest as sliding begins is rounding, which
+        # must not stop it.
+        still = rest
         far = build.motion.far_fields.get(kind.d.axis)
         size = absolute(needed) if kind.elastic or far is None else far.size(far.gap)
         beside = absolute(derivative(build.psi, symengine.Symbol("u_t")))
@@ -234,7 +234,7 @@ def _velocity_state(build: Build, kind: Formulation) -> str:
 def _balance(
     build: Build, kind: Formulation, far: FarField, slides: Expression, carried: Expression, t_a: Expression
 ) -> Generator[Record, None, Expression | None]:
-    """Rows of the displacement and its velocity; returns the slope of what resists that, where tractions give it."""
+    """Rows of the displacement and its velocity; returns their balance at rest, where that gives it."""
     name = kind.d.displacement
     u, du = symengine.symbols(f"{name} d{name}_dt")
     rate, tractions = build.motion.gap_rates[name], (carried, t_a)
@@ -250,7 +250,8 @@ def _balance(
     elif kind.rate_dependent:
         v = symengine.Symbol(kind.d.velocity)
         build.rows.kinematics(name, v)
-        return (yield from _sliding_row(build, kind, slides, far.force(u, v) - t_a - carried - far.c_g * v))
+        driving, damping = far.force(u, v) - t_a - carried - far.c_g * v, far.c_b + far.c_g
+        return (yield from _sliding_row(build, kind, slides, driving, damping))
     elif kind.dead_load:
         build.rows.kinematics(name, ZERO)
         limit = build.motion.stick_limits.get("t")
@@ -284,11 +285,11 @@ def _sticks(build: Build, limit: Expression, needed: Expression) -> Iterator[Mar
 def _elastic_rows(
     build: Build, kind: Formulation, slides: Expression, t_f: Expression, t_e: Expression, v: Expression
 ) -> Generator[Record, None, Expression | None]:
-    """Rows of the elastic gap and of sliding without inertia; returns the slope of what resists that, as `_balance`."""
+    """Rows of the elastic gap and of sliding without inertia; returns the balance at rest as `_balance`."""
     dg, rate = symengine.Symbol("dg_t_dt"), build.motion.gap_rates["u_t"]
     if kind.rate_dependent:
         build.rows.kinematics("g_t", rate - v)
-        return (yield from _sliding_row(build, kind, slides, t_e - t_f))
+        return (yield from _sliding_row(build, kind, slides, t_e - t_f, NONE))
     if kind.dead_load:
         yield from _sticks(build, build.motion.stick_limits["t"], t_e)
     residual = t_f - t_e
@@ -304,39 +305,36 @@ def _elastic_rows(
 
 
 def _sliding_row(
-    build: Build, kind: Formulation, slides: Expression, driving: Expression
+    build: Build, kind: Formulation, slides: Expression, driving: Expression, damping: Expression
 ) -> Generator[Margin, None, Expression]:
     """Row of a velocity without inertia, from the tractions; sliding is stable while the resistance grows with it.
 
-    Returns the slope with which it does, that at rest as of the velocities to come.
+    Returns what is zero where it is at rest [Pa]: the balance there, or else the velocity by the slope of that.
     """
     v = build.motion.slides_by[kind.d.velocity]
     slope, balance = -derivative(build.expanded(driving), v), driving
+    # The slope at rest is that of the velocities to come.
+    ahead = slope.subs({v: v + SLIP * TINY}) if kind.sticks else slope
+    rest = ahead * v
     if slope != 0 and not depends(slope, v):
         # Solved for the velocity, which is nothing but rounding of the tractions as sliding begins.
-        whole = driving if derivative(driving, v) == -slope else build.expanded(driving)
-        balance = whole.subs({v: 0}) / slope - v
+        rest = (driving if derivative(driving, v) == -slope else build.expanded(driving)).subs({v: 0})
+        balance = rest / slope - v
     # What sticks may have nothing that resists sliding, as where nothing presses it, and no such balance.
     if kind.sticks:
         build.rows.switched(str(v), slides, balance, v)
     else:
         build.rows.balance(str(v), balance)
-    damped = kind.mount is not None and kind.mount.damped and not kind.elastic
-    if kind.sticks:
-        slope = slope.subs({v: v + SLIP * TINY})
-    if build.motion.creeping is not None and len(build.interface.frictions) == 1 and damped:
-        return slope  # both friction and damper resist the more, the faster it slides
+    if build.motion.creeping is not None and len(build.interface.frictions) == 1 and damping != 0:
+        return rest  # both friction and damper resist the more, the faster it slides
     if slope == 0:
         raise InputError(
             "nothing determines the sliding velocity: friction does not depend on it. Give the tangential mounting a "
             "mass or a damper.",
             PLACE,
         )
-    far = build.motion.far_fields.get(kind.d.axis)
-    damping = far.c_b + far.c_g if far is not None and damped else ZERO
-    stable = growth(slope, damping) if depends(slope, v) else slope
-    yield Margin(f"{STABLE_PREFIX}{v}", stable, kind.unstable, when=_while_sliding(kind), stability=str(v))
-    return slope
+    yield Margin(f"{STABLE_PREFIX}{v}", growth(ahead, damping), kind.unstable, when=_while_sliding(kind), stability=str(v))
+    return rest
 
 
 def _while_sliding(kind: Formulation) -> When:

@@ -134,15 +134,13 @@ def _is_rounding(w: Any, delta: Any) -> bool:
     """Whether a correction that does not become smaller is rounding: where the equations are straight far along it
     nothing else is left of what one correction solves.
     """
-    following = w.g[1]  # memory that no step is using now
     _move(w, delta, FAR)
     straight = _residual(w)
-    _correction(w, following)
+    _correction(w, w.g[1])  # memory that no step is using now
     _move(w, delta, -FAR)
     for j in range(w.n):
-        if w.algebraic[j]:
-            small = NEGLIGIBLE * FAR * (abs(delta[j]) + FEW_EPS * abs(w.trial[j]))
-            straight = straight and abs(following[j] + (FAR - 1.0) * delta[j]) <= small
+        small = NEGLIGIBLE * FAR * (abs(delta[j]) + FEW_EPS * abs(w.trial[j]))
+        straight = straight and (not w.algebraic[j] or abs(w.g[1, j] + (FAR - 1.0) * delta[j]) <= small)
     return bool(straight)
 
 
