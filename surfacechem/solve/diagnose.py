@@ -79,6 +79,8 @@ def termination(
         elif any(state.is_temperature for state in algebraic):
             reason += ": ignition, or sliding that nothing steadies"
         return "stopped", f"{reason} at {where}"
+    if result.status is Status.NO_CONSISTENT_STATE and not np.all(finite := np.isfinite(named(inputs[None])[0])):
+        return "failed", f"{list(system.output_columns)[int(np.argmin(finite))]} is no finite number at {where}"
     ends = filter(None, (runaway(system.states, result), beyond_numbers(system, result, inputs, named)))
     if (end := next(ends, None)) is not None:
         return "stopped", f"{end} near {where}"
