@@ -210,7 +210,8 @@ class InterfaceReactor(StateVectorReactor):
     @property
     def T(self) -> float:
         """Present temperature of the interface [K]; InputError where neither it nor the whole scene has one."""
-        named = ("T_c", "T")
+        node = self.scene.case.scene.interface.temperature
+        named = (node if isinstance(node, str) else "T_c", "T")
         own = [name for name in named if name in (*self.scene.states, *self.scene.output_names)]
         if not own:
             raise InputError(f"the interface of {self.name} has no temperature of its own. Ask for {self.name}['T_1'].")

@@ -513,7 +513,7 @@ def test_overrides_stand_second_as_in_load():
         InterfaceReactor(surfacechem.load("dna-adhesive"), ["initial.T_1=350 K"])
 
 
-@pytest.mark.parametrize(("case", "name"), [("dna-adhesive", "T_c"), ("exothermic", "T")])
+@pytest.mark.parametrize(("case", "name"), [("dna-adhesive", "T_c"), ("exothermic", "T"), ("one-sided-contact", "T_1")])
 def test_the_temperature_is_that_of_the_interface(case, name):
     interface, net = network(case)
     net.advance(0.5)
