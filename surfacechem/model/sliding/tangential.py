@@ -289,7 +289,7 @@ def _elastic_rows(
     dg, rate = symengine.Symbol("dg_t_dt"), build.motion.gap_rates["u_t"]
     if kind.rate_dependent:
         build.rows.kinematics("g_t", rate - v)
-        return (yield from _sliding_row(build, kind, slides, t_e - t_f, NONE))
+        return (yield from _sliding_row(build, kind, slides, t_e - t_f, ZERO))
     if kind.dead_load:
         yield from _sticks(build, build.motion.stick_limits["t"], t_e)
     residual = t_f - t_e
@@ -333,7 +333,9 @@ def _sliding_row(
             "mass or a damper.",
             PLACE,
         )
-    yield Margin(f"{STABLE_PREFIX}{v}", growth(ahead, damping), kind.unstable, when=_while_sliding(kind), stability=str(v))
+    yield Margin(
+        f"{STABLE_PREFIX}{v}", growth(ahead, damping), kind.unstable, when=_while_sliding(kind), stability=str(v)
+    )
     return rest
 
 
