@@ -71,20 +71,24 @@ def termination(
         return "stopped", f"{system.reason(shrunk, inputs)} near {where}"
     algebraic = [state for state in system.states if state.algebraic]
     if result.status in (Status.NO_CONSISTENT_STATE, Status.SINGULAR) and algebraic:
-        names = " and ".join(state.at_start[0].name for state in algebraic)
-        reason = f"no {names} satisfies the balances that have no inertia or capacity"
-        if all(state.is_temperature for state in algebraic):
-            stable = next(margin for margin in system.margins if margin.stability == algebraic[0].name)
-            reason = system.reason(stable, np.nan_to_num(inputs))
-        elif any(state.is_temperature for state in algebraic):
-            reason += ": ignition, or sliding that nothing steadies"
-        return "stopped", f"{reason} at {where}"
+        return "stopped", f"{_unbalanced(system, algebraic, inputs)} at {where}"
     if result.status is Status.NO_CONSISTENT_STATE and not np.all(finite := np.isfinite(named(inputs[None])[0])):
         return "failed", f"{list(system.output_columns)[int(np.argmin(finite))]} is no finite number at {where}"
     ends = filter(None, (runaway(system.states, result), beyond_numbers(system, result, inputs, named)))
     if (end := next(ends, None)) is not None:
         return "stopped", f"{end} near {where}"
     return "failed", f"{REASONS[result.status]} at {where}{_spent(result)}{too_fast(system, result, values)}"
+
+
+def _unbalanced(system: System, algebraic: Sequence[State], inputs: Array) -> str:
+    """Reason why algebraic states have no values that satisfy their balances."""
+    if all(state.is_temperature for state in algebraic):
+        stable = next(margin for margin in system.margins if margin.stability == algebraic[0].name)
+        return system.reason(stable, np.nan_to_num(inputs))
+    names = " and ".join(state.at_start[0].name for state in algebraic)
+    heated = any(state.is_temperature for state in algebraic)
+    more = ": ignition, or sliding that nothing steadies" if heated else ""
+    return f"no {names} satisfies the balances that have no inertia or capacity{more}"
 
 
 def _spent(result: Result) -> str:
