@@ -190,6 +190,8 @@ class Evaluator:
     def _given(self, points: Points) -> tuple[list[Argument], Array]:
         """Arguments that the points give, and their values, shape (points, arguments)."""
         known = self.names | self.parameters
+        if not hasattr(points, "items"):
+            raise InputError("points are values by name, such as {'T': [300, 310]}, or a table of pandas.")
         for name in points:
             if name not in known:
                 raise InputError(f"points cannot give '{name}'.{suggestion(name, known)}")

@@ -232,6 +232,7 @@ def test_points_come_from_a_table_with_units(element, tmp_path):
 @pytest.mark.parametrize(
     ("points", "message"),
     [
+        ([300, 310], "points are values by name"),
         ({"g_m": 1.0}, "points cannot give 'g_m'. Did you mean 'g_n'?"),
         ({"g_n": "1 K"}, "1 K is a temperature; g_n needs a length"),
         ({"g_n": [1.0, np.nan]}, "g_n takes a list of finite numbers in m."),
