@@ -315,11 +315,11 @@ def _sliding_row(
     slope, balance = -derivative(build.expanded(driving), v), driving
     # The slope at rest is that of the velocities to come.
     ahead = slope.subs({v: v + SLIP * TINY}) if kind.sticks else slope
-    rest = ahead * v
+    rest, stable = ahead * v, growth(ahead, damping)
     if slope != 0 and not depends(slope, v):
         # Solved for the velocity, which is nothing but rounding of the tractions as sliding begins.
         rest = (driving if derivative(driving, v) == -slope else build.expanded(driving)).subs({v: 0})
-        balance = rest / slope - v
+        balance, stable = rest / slope - v, slope
     # What sticks may have nothing that resists sliding, as where nothing presses it, and no such balance.
     if kind.sticks:
         build.rows.switched(str(v), slides, balance, v)
@@ -333,9 +333,7 @@ def _sliding_row(
             "mass or a damper.",
             PLACE,
         )
-    yield Margin(
-        f"{STABLE_PREFIX}{v}", growth(ahead, damping), kind.unstable, when=_while_sliding(kind), stability=str(v)
-    )
+    yield Margin(f"{STABLE_PREFIX}{v}", stable, kind.unstable, when=_while_sliding(kind), stability=str(v))
     return rest
 
 
