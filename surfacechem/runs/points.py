@@ -190,8 +190,6 @@ class Evaluator:
     def _given(self, points: Points) -> tuple[list[Argument], Array]:
         """Arguments that the points give, and their values, shape (points, arguments)."""
         known = self.names | self.parameters
-        if not hasattr(points, "items"):
-            raise InputError("points are values by name, such as {'T': [300, 310]}, or a table of pandas.")
         for name in points:
             if name not in known:
                 raise InputError(f"points cannot give '{name}'.{suggestion(name, known)}")
@@ -450,5 +448,9 @@ def read_points(path: Path, evaluator: Evaluator) -> dict[str, list[float]]:
 
 def evaluation(evaluator: Evaluator, points: Points, **origin: Any) -> PointResults:
     """Quantities at points, with where they are from."""
+    try:
+        points = dict(points)
+    except (TypeError, ValueError):
+        raise InputError("points are values by name, such as {'T': [300, 310]}, or a table of pandas.") from None
     values, slopes, refused = evaluator.at(points)
     return PointResults(values=values, slopes=slopes, refused=refused, **origin)
