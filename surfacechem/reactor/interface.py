@@ -211,8 +211,8 @@ class InterfaceReactor(StateVectorReactor):
     def T(self) -> float:
         """Present temperature of the interface [K]; InputError where neither it nor the whole scene has one."""
         node = self.scene.case.scene.interface.temperature
-        named = (node if isinstance(node, str) else "T_c", "T")
-        own = [name for name in named if name in (*self.scene.states, *self.scene.output_names)]
+        known = (*self.scene.states, *self.scene.output_names)
+        own = [name for name in (node if isinstance(node, str) else "T_c", "T") if name in known]
         if not own:
             raise InputError(f"the interface of {self.name} has no temperature of its own. Ask for {self.name}['T_1'].")
         return self[own[0]]

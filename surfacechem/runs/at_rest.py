@@ -52,13 +52,10 @@ def to_rest(model: Model, run: Run, values: Mapping[str, float]) -> Run:
     if far.status == "stopped":
         return replace(run, times=_until(run, min(2 * far.result.t, HORIZON) or HORIZON))
     mover, states = _rest_of(far)[1], model.system.states
-    scales = np.array([state.scale for state in states])
-    sites = [bool(state.quantity.species) for state in states]
-    lost = abs(np.sum((far.result.y - far.result.outputs[0])[sites]))
-    unclear = audit(far).site_error > run.rtol or (
-        lost > run.rtol * abs(far.result.y[mover]) and _rest_of(far, RUN_ERROR)[0] * REST_RATIO <= HORIZON
-    )
-    for end in (HORIZON, *(SHORTER_TIMES if unclear else ())):
+    scales, sites = np.array([(state.scale, bool(state.quantity.species)) for state in states]).T
+    lost = abs(np.sum((far.result.y - far.result.outputs[0]) * sites))
+    drifting = lost > run.rtol * abs(far.result.y[mover]) and _rest_of(far, UNRESOLVED)[0] * REST_RATIO <= HORIZON
+    for end in (HORIZON, *(SHORTER_TIMES if drifting or audit(far).site_error > run.rtol else ())):
         near = far if end == HORIZON else _looked(model, run, values, end)
         last, change = _rest_of(near)[0], np.abs(near.result.y - far.result.y)
         # Both end in states that differ slightly, or by a trace of something.

@@ -71,9 +71,14 @@ def termination(
         return "stopped", f"{system.reason(shrunk, inputs)} near {where}"
     algebraic = [state for state in system.states if state.algebraic]
     if result.status in (Status.NO_CONSISTENT_STATE, Status.SINGULAR) and algebraic:
-        return "stopped", f"{_unbalanced(system, algebraic, inputs)} at {where}"
-    if result.status is Status.NO_CONSISTENT_STATE and not np.all(finite := np.isfinite(named(inputs[None])[0])):
-        return "failed", f"{list(system.output_columns)[int(np.argmin(finite))]} is no finite number at {where}"
+        names = " and ".join(state.at_start[0].name for state in algebraic)
+        reason = f"no {names} satisfies the balances that have no inertia or capacity"
+        if all(state.is_temperature for state in algebraic):
+            stable = next(margin for margin in system.margins if margin.stability == algebraic[0].name)
+            reason = system.reason(stable, np.nan_to_num(inputs))
+        elif any(state.is_temperature for state in algebraic):
+            reason += ": ignition, or sliding that nothing steadies"
+        return "stopped", f"{reason} at {where}"
     ends = filter(None, (runaway(system.states, result), beyond_numbers(system, result, inputs, named)))
     if (end := next(ends, None)) is not None:
         return "stopped", f"{end} near {where}"
@@ -180,6 +185,8 @@ def beyond_numbers(system: System, result: Result, inputs: Array, named: Callabl
     """The named quantity that is the first to have no finite value as states go on as they do, where that is why a run
     could not; of several that from which the others follow.
     """
+    if result.status is Status.NO_CONSISTENT_STATE and not np.all(number := np.isfinite(named(inputs[None])[0])):
+        return f"{list(system.output_columns)[int(np.argmin(number))]} is no finite number"
     if result.status is not Status.NOT_FINITE or result.steps is None or len(result.steps.t) < 2:
         return None
     n, ahead = len(result.y), np.append(0.0, LOOKS_AHEAD) * np.diff(result.steps.t)[-1]
