@@ -54,7 +54,7 @@ def to_rest(model: Model, run: Run, values: Mapping[str, float]) -> Run:
     mover, states = _rest_of(far)[1], model.system.states
     scales, sites = np.array([(state.scale, bool(state.quantity.species)) for state in states]).T
     lost = abs(np.sum((far.result.y - far.result.outputs[0]) * sites))
-    drifting = lost > run.rtol * abs(far.result.y[mover]) and _rest_of(far, UNRESOLVED)[0] * REST_RATIO <= HORIZON
+    drifting = lost > run.rtol * abs(far.result.y[mover]) and _rest_of(far, RUN_ERROR)[0] * REST_RATIO <= HORIZON
     for end in (HORIZON, *(SHORTER_TIMES if drifting or audit(far).site_error > run.rtol else ())):
         near = far if end == HORIZON else _looked(model, run, values, end)
         last, change = _rest_of(near)[0], np.abs(near.result.y - far.result.y)

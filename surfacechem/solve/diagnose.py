@@ -71,14 +71,7 @@ def termination(
         return "stopped", f"{system.reason(shrunk, inputs)} near {where}"
     algebraic = [state for state in system.states if state.algebraic]
     if result.status in (Status.NO_CONSISTENT_STATE, Status.SINGULAR) and algebraic:
-        names = " and ".join(state.at_start[0].name for state in algebraic)
-        reason = f"no {names} satisfies the balances that have no inertia or capacity"
-        if all(state.is_temperature for state in algebraic):
-            stable = next(margin for margin in system.margins if margin.stability == algebraic[0].name)
-            reason = system.reason(stable, np.nan_to_num(inputs))
-        elif any(state.is_temperature for state in algebraic):
-            reason += ": ignition, or sliding that nothing steadies"
-        return "stopped", f"{reason} at {where}"
+        return "stopped", f"{_unbalanced(system, algebraic, inputs)} at {where}"
     ends = filter(None, (runaway(system.states, result), beyond_numbers(system, result, inputs, named)))
     if (end := next(ends, None)) is not None:
         return "stopped", f"{end} near {where}"
