@@ -285,7 +285,12 @@ class OneLaw(Content):
         elif isinstance(tree.value, str) and tree.value:
             law, parameters = tree.value, Tree(None, tree.place)
         else:
-            raise tree.error(f"a law is `name: {{parameters}}`, not {tree.shown}.")
+            given = (
+                f"several: {', '.join(map(str, tree.value))}"
+                if isinstance(tree.value, dict) and tree.value
+                else tree.shown
+            )
+            raise tree.error(f"a law is one entry, `name: {{parameters}}`, not {given}.")
         with placed(tree.place):
             found = laws.find(self.contract, law)
         return read_law(found, parameters, context)

@@ -106,11 +106,11 @@ class Accuracy:
     source: str
     """The exact solution's name, the second run and its tolerance, or the balances, in words."""
     variables: Mapping[str, float] = field(default_factory=dict)
-    exact: Mapping[str, Any] = field(default_factory=dict)
+    exact: Mapping[str, Any] = field(default_factory=dict, compare=False)
     """Exact values at the output times, by variable, where an exact solution was named."""
     asked: float | None = None
     """Accuracy that was asked for, where the tolerance was chosen from it."""
-    named: Callable[[], Mapping[str, float]] = dict
+    named: Callable[[], Mapping[str, float]] = field(default=dict, compare=False)
     """The errors of what follows from the compared variables, by variable, where they are known."""
 
     @cached_property

@@ -58,7 +58,12 @@ MISTAKES = [
     ("upper: {temperature: T,", "upper: {temperature: T_1,", "4: bodies.upper.temperature: 'T_1' is temperature of"),
     ("bodies:", "bodys:", "2: unknown key 'bodys'. Did you mean 'bodies'? Known: T_0, bodies,"),
     ("- bond-energy: {K_0", "- bond-enrgy: {K_0", "9: interface.potential.bond-enrgy: no potential law 'bond-enrgy'. "),
-    ("- bond-energy: {K_0: 300 J/m^2}", "- []", "9: interface.potential[1]: a law is `name: {parameters}`, not a list"),
+    (
+        "- bond-energy: {K_0: 300 J/m^2}",
+        "- []",
+        "9: interface.potential[1]: a law is one entry, `name: {parameters}`, not a list",
+    ),
+    ("- bond-energy: {K_0: 300 J/m^2}", "- {value: 1, times: 2}", "`name: {parameters}`, not several: value, times."),
     ("- bond-energy: {K_0", "bond-energy: {K_0", "8: interface.potential: this must be a list"),
     ("{tau: 0.5 s}", "{}", "13: interface.bonding.relaxation: relaxation needs `tau`: relaxation time [s]."),
     ("relaxation: {tau: 0.5 s}", "relaxation", "13: interface.bonding.relaxation: relaxation needs `tau`"),

@@ -80,6 +80,11 @@ def test_the_balances_are_the_error_where_nothing_else_is_asked_for():
     assert solution.accuracy.error == max(solution.accuracy.variables.values())
 
 
+def test_the_same_run_has_the_same_accuracy():
+    case = surfacechem.load("exothermic")
+    assert case.run().accuracy == case.run().accuracy != case.run(error="estimate").accuracy
+
+
 @pytest.mark.parametrize(("phi", "floor"), [(1.0, 1e-60 / 1e-8), (1e-31, EPS)])
 def test_a_coverage_that_is_never_more_than_rounding_has_no_error(phi, floor):
     """One that decays from something is resolved however small it becomes, where the tolerance says so."""
