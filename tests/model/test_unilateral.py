@@ -8,6 +8,7 @@ from scenes import SITES, bodies, path, together, varying
 from solved import closed, solve
 
 import surfacechem
+from surfacechem.contracts.terms import Friction, parameter
 from surfacechem.errors import InputError
 from surfacechem.laws.bonding import BondEnergy
 from surfacechem.laws.cohesive import TensileStrength
@@ -176,6 +177,23 @@ def test_friction_answers_impacts_by_impulses(e):
     else:
         assert trajectory.end("v") == 0.0
         assert len(rubs) == 4
+
+
+class UnderTraction(Friction):
+    """Dry friction that reads the normal traction."""
+
+    mu: float = parameter("1", "coefficient of friction", at_least=0)
+
+    def traction(self, t_n, direction):
+        return -self.mu * t_n * direction
+
+    def limit(self, t_n):
+        return -self.mu * t_n
+
+
+def test_friction_by_the_normal_traction_is_that_by_the_pressure():
+    one, other = (closed(sliding(0.5, law), 1.0) for law in (Coulomb(mu=MU), UnderTraction(mu=MU)))
+    assert [rub.after.y[3] for rub in one.of("rub")] == [rub.after.y[3] for rub in other.of("rub")]
 
 
 def test_adhesion_and_cohesion_have_no_impulse():

@@ -123,6 +123,11 @@ def law_reads(law: Law, name: str) -> bool:
     return name in reads(law.statement) or any(factor.of == name for factor in law.factors)
 
 
+def feels_pressure(law: Law) -> bool:
+    """Whether a law depends on the normal traction, by this or by the pressure."""
+    return law_reads(law, "p") or law_reads(law, "t_n")
+
+
 @dataclass(frozen=True)
 class FarField:
     """A mounting with its parameters as symbols, and the histories that drive it."""

@@ -31,7 +31,7 @@ from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, absolute, depends, derivative, sign, where
 from surfacechem.model.automaton import ONE, ZERO, Constraint, Edge, Register
 from surfacechem.model.build import Build
-from surfacechem.model.components.mounting import far_field, law_reads
+from surfacechem.model.components.mounting import far_field, feels_pressure
 from surfacechem.model.constraints.threshold import broken
 
 SLIP = symengine.Symbol("slip")
@@ -81,7 +81,7 @@ def breaks_bonds(build: Build) -> dict[Expression, Expression]:
 
 def friction_impulse(build: Build, impulse: Expression) -> Iterator[Constraint]:
     """Friction impulse: loss of sliding velocity of a mass by the ``impulse`` of the pressure [Pa s] in an impact."""
-    laws = [law for law in build.interface.frictions if law_reads(law, "p")]
+    laws = [law for law in build.interface.frictions if feels_pressure(law)]
     sliding = [slip for slip in build.motion.slips if slip.slides_inertially]
     if not (laws and sliding):
         return

@@ -25,12 +25,12 @@ from surfacechem.contracts.terms import Spec
 from surfacechem.expressions import Expression, absolute, derivative, where
 from surfacechem.model.automaton import ONE, REST_TIME_PATH, ZERO, Constraint, Edge, Mode, Register
 from surfacechem.model.build import Build
-from surfacechem.model.components.mounting import FarField, far_field, law_reads, support
+from surfacechem.model.components.mounting import FarField, far_field, feels_pressure, support
 from surfacechem.model.constraints.set_valued import TRIAL_PRESSURES, friction_impulse
 from surfacechem.model.system import RTOL_PATH, Margin
 from surfacechem.tolerances import NEWTON_EPS, PICOMETRE
 
-G, V = symengine.symbols("g_n v_n")
+G, V, PRESSURE, TRACTION = symengine.symbols("g_n v_n p t_n")
 LANDED = Register("landed", "whether the bodies have met and do not rebound")
 FASTEST = Register("fastest", "speed of the fastest impact [m/s]")
 
@@ -146,13 +146,13 @@ def jumps(build: Build) -> Iterator[str]:
     """Warn of laws and conductances that would act at the pressure of an impact, infinite for an instant."""
     if LANDED not in build.registers:
         return
-    found = [law.name() for law in build.interface.reactions if law_reads(law, "p") or law_reads(law, "t_n")]
+    found = [law.name() for law in build.interface.reactions if feels_pressure(law)]
     if not build.motion.slips:  # the velocity of sliding is prescribed, and its drive does the work of friction
-        found += [law.name() for law in build.interface.frictions if law_reads(law, "p")]
+        found += [law.name() for law in build.interface.frictions if feels_pressure(law)]
     for (a, b), channels in build.conductances.items():
         for h in channels:
             # What grows less than in proportion to the pressure does nothing in no time.
-            at = [build.at_start(h.subs({symengine.Symbol("p"): symengine.RealDouble(p)})) / p for p in TRIAL_PRESSURES]
+            at = [build.at_start(h.subs({PRESSURE: p, TRACTION: -p})) / p for p in TRIAL_PRESSURES]
             if at[1] > LEAST_PART * at[0]:
                 found.append(f"the conductance between {a} and {b}")
     if found:
