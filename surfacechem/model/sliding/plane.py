@@ -31,7 +31,7 @@ from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, cos, depends, derivative, norm, sin, sqrt, where
 from surfacechem.model.automaton import ZERO, Constraint, Mode, Register
 from surfacechem.model.build import Build, Record
-from surfacechem.model.components.mounting import ACROSS, LENGTH_SCALE, Direction, FarField, far_field
+from surfacechem.model.components.mounting import ACROSS, Direction, FarField, far_field
 from surfacechem.model.constraints.set_valued import SLIP, breaks_bonds, set_valued
 from surfacechem.model.sliding.formulation import PLACE, Formulation, evolve, growth, name_traction
 from surfacechem.model.system import STABLE_PREFIX, Given, Margin
@@ -45,9 +45,9 @@ STICK_WORDS = {0.0: "sticks", 1.0: "slides"}
 LEAST_SPEED = PICOMETRE / 1e6
 """Speed [m/s] below which the turn is never resolved, a picometre in twelve days: it keeps the row regular at t = 0."""
 
-SPEED_SCALE, TURN_SCALE = 0.1, 1e6
-"""Scales of the speed [m/s] and of the turn [rad]: what rounding of the pull makes of either as sliding begins is no
-error. The turn is accurate to a part of one radian, not of itself.
+TURN_SCALE = 1e6
+"""Scale of the turn [rad]: what rounding of the pull makes of it as sliding begins is no error. It is accurate to a
+part of one radian, not of itself.
 """
 
 
@@ -93,13 +93,13 @@ def states(build: Build, kinds: Sequence[Formulation]) -> Iterator[Constraint]:
     build.variables.define("sticking", 1 - SLIP, "mode", "sticks or slides")
     for kind in kinds:
         evolve(build, kind.d.displacement, "mechanics.tangential")
-    by, scale, slow = "balance of the tangential tractions", SPEED_SCALE if inertial else LENGTH_SCALE, not inertial
+    by, slow = "balance of the tangential tractions", not inertial
     start: dict[str, Any] = {"speed": {}, "turn": {}}
     if inertial:  # both are given by the components of the initial velocity
         along, across = (build.scene.initial.get(v, 0.0) for v in ("v", "v_2"))
         start["speed"] = {"start": math.hypot(along, across), "given": Given(VARIABLES["v"], along, _speed)}
         start["turn"] = {"start": 0.0, "given": Given(VARIABLES["v_2"], across, lambda _: 0.0)}
-    evolve(build, "speed", by, algebraic=slow, scale=scale, **start["speed"])
+    evolve(build, "speed", by, algebraic=slow, **start["speed"])
     evolve(build, "turn", algebraic=slow, scale=TURN_SCALE, **start["turn"])
     for kind, cosine in zip(kinds, _unit_vector(), strict=True):
         build.variables.define(kind.d.cosine, SLIP * cosine, "evolved" if inertial else "algebraic", "turn")
