@@ -39,6 +39,18 @@ def solve(made, times=END):
     return closed(made, times, exact=1e-7, outputs=401)
 
 
+def test_a_damper_bears_what_adhesion_and_what_sticks_leave_of_the_drive():
+    """Half of the interface is bonded; what sticks on the other half is elastic."""
+    k, c, E_t = 1e12, 1e12, 2e11
+    loads, start = {"g_n": Hold(level=-OVERLAP)} | DRIVE, {"phi": 0.5}
+    potentials, loss = [ADHESION, TangentialStiffness(E_t=E_t)], [AdhesionLoss(b=B)]
+    made = together(potentials, DRY, loads, start, loss, sites=SITES, tangential=Mounting(k=k, c_b=c))
+    found = closed(made, 1.0)
+    stiffness = k + C / 4 + E_t / 2
+    steady, slow = k * RATE / stiffness, c / stiffness
+    assert found.end("u_t") == pytest.approx(steady + (RATE - steady) * slow * (1 - math.exp(-1 / slow)), rel=1e-10)
+
+
 # -- Raous, Cangemi & Cocu with friction on the unbonded part: plain models -----------------------------------------
 
 K = 1e12
