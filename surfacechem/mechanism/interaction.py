@@ -38,8 +38,10 @@ class PiecewisePolynomial:
 
     ``pieces`` holds for each the coverage at which it begins and its coefficients of the powers of the coverage.
 
-    >>> PiecewisePolynomial.through([0.0, 0.5, 1.0], [0.0, 1.0, 3.0])(0.75), PiecewisePolynomial.polynomial([2.0,
-    1.0]).integral(1.0) (2.0, 1.3333333333333333)
+    >>> PiecewisePolynomial.through([0.0, 0.5, 1.0], [0.0, 1.0, 3.0])(0.75)
+    2.0
+    >>> PiecewisePolynomial.polynomial([2.0, 1.0]).integral(1.0)
+    1.3333333333333333
     """
 
     pieces: tuple[tuple[float, tuple[float, ...]], ...] = ()
