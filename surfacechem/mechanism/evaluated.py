@@ -310,10 +310,9 @@ class SurfaceEngine:
         self._own = "T_c", first.concentration, *own
         self._sites, self._count = first.sites, len(own)
         self._taken = amounts_taken(surface, [held.phase for held in self.held])[open_ones].T / MOLECULAR
-        self._last: tuple[Sequence[float], Array] = (), np.empty(0)
         self._energies = np.empty(0)
         self._lay_out()
-        self._brought: list[tuple[int, float, float, Sequence[float]]] = [(0, math.nan, math.nan, ())]
+        self._brought: list[tuple[object, ...]] = [()]
         """Engine, temperature, amount and states to which the surface was brought last, as several may share it."""
 
     def beside(self, neighbours: Mapping[str, Neighbour]) -> SurfaceEngine:
@@ -331,6 +330,7 @@ class SurfaceEngine:
 
     def _lay_out(self) -> None:
         """Allot the slices from which neighbours read their states, and arrays to which they write their energies."""
+        self._last: tuple[Sequence[float], Array] = (), np.empty(0)
         self._both, self._parts = np.empty((2, len(self._taken))), list[tuple[HeldPhase, slice, Array]]()
         first = species = 0
         for held in self.held:
@@ -387,8 +387,9 @@ class SurfaceEngine:
                 return self._last[1]
             T, amount, end = values[0], values[1], 2 + self._count
             if T > 0 and amount > 0:
-                around = id(self), T, amount, values[end:]
+                around = self, T, amount, values[end:]
                 if around != self._brought[0]:
+                    self._brought[0] = ()  # nowhere, should Cantera refuse on the way
                     self._bring(T, amount, values[end:])
                     self._brought[0] = around
                 # Coverages that a step tries need not sum to one; a mass below zero Cantera does not know.

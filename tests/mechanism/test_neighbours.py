@@ -2,7 +2,7 @@
 
 import shutil
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import cantera as ct
@@ -16,6 +16,7 @@ from test_mechanism_cantera import FOLDER, SURFACES
 import surfacechem
 from surfacechem.documents.shipped import mechanisms
 from surfacechem.errors import InputError
+from surfacechem.laws.loading import Hold
 from surfacechem.mechanism.mixture import word
 from surfacechem.reactor import InterfaceReactor, ReactingGas, ReactorNet
 from surfacechem.runs import rerun
@@ -486,6 +487,15 @@ def test_a_neighbour_that_a_rate_reads_only_by_an_order_is_held_too(old, new, la
         surface = small_alone(tmp_path, **state)
         surface.set_unnormalized_coverages(coverages(data, surface)[k])
         assert float(data["R_R1"][k]) == pytest.approx(surface.net_rates_of_progress[0] * 1e3 * AVOGADRO, rel=1e-9)
+
+
+def test_engines_that_share_a_surface_read_their_own_neighbours(tmp_path):
+    """The same numbers are of other species."""
+    engine = surfacechem.load(small(tmp_path, {})).case.scene.interface.engine
+    values, swapped = [600.0, 6e18, 0.6, 0.4, 1e5, 0.5, 0.2], {"O2": Hold(level=0.5), "CO": Hold(level=0.2)}
+    rate = engine(values)[0]
+    other = engine.beside({"gas": replace(engine.held[0].given, composition=swapped)})
+    assert other(values)[0] != rate == engine(values)[0]
 
 
 @pytest.mark.parametrize("beside", ["[gas, gas2]", "[gas2, gas]", "[gas]"])
