@@ -1,1 +1,1 @@
-"""Many runs at once: eight cases in the places of a vector, each with its own time, step and end."""
+"""Sweeps in lanes: eight runs in the places of one vector, each with its own time, step size and end."""

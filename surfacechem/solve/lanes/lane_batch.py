@@ -1,4 +1,4 @@
-"""Runs of one model through the steps of eight at once, and one at a time where these steps are not for them."""
+"""Batches of runs of one model: eight at once in lanes, and one at a time where lanes do not apply."""
 
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,9 @@ from surfacechem.solve.radau.stepper import END
 
 
 def solve_batch(problem: Problem, *columns: Array, room: Room | None = None) -> Any:
-    """As :func:`solve_arrays`, eight runs at once where the steps of the problem may be explicit and there is code."""
+    """Solve a batch as :func:`solve_arrays` does, in lanes where the problem may be solved explicitly and has vector
+    code.
+    """
     if not problem.explicit or problem.program.lanes is None:
         return solve_arrays(problem, *columns, room=room)
     y0, parameters, spacing, *others = map(np.ascontiguousarray, columns)
@@ -30,7 +32,7 @@ def solve_batch(problem: Problem, *columns: Array, room: Room | None = None) -> 
 
 
 def run(batch: Any) -> None:
-    """The runs of a batch, eight at once, with a memory of their own: threads may do so at the same time."""
+    """Run a batch in lanes. Each call has its own memory, so several threads may call it at the same time."""
     words = stepper.words_of(dict(zip(SIZES, batch.sizes.tolist(), strict=True)), MEMORY)
     LOOP.load()(0, len(batch.counts), np.zeros(words, np.int64), tuple(batch))
 
@@ -42,4 +44,4 @@ def _sources() -> list[Path]:
 
 
 LOOP = stepper.Loop(_sources(), "surfacechem.solve.lanes.lane_run", "run_lanes", brief=True)
-"""The compiled loop over eight runs at once."""
+"""The compiled loop over lanes."""

@@ -1,6 +1,6 @@
-"""Guards of eight runs at once: which are met in a step, where, and the steps onto them.
+"""Event location for eight runs at once: which guards are crossed in a step, where, and the steps that end there.
 
-A guard that touches zero, or may, is unclear here: its run is left to steps of its own.
+A guard that touches zero, or may do so, is marked as unclear: its run is repeated by the stepper for single runs.
 """
 
 from typing import Any
@@ -15,14 +15,14 @@ from surfacechem.solve.radau.work import MARGINS, compiled, evaluate
 from surfacechem.tolerances import CBRT_EPS, EPS, FORMULA_EPS, NEWTON_EPS, RUN_EPS, TINY
 
 SCAN_FRACTIONS = SCANNED[DENSEST]
-"""Fractions of a step at which guards are examined."""
+"""Fractions of a step at which guards are evaluated."""
 MOST_SECANTS = 12
-"""Steps onto a guard: secants take four, the rounding of the guard some more."""
+"""Most trial steps onto a guard: secant steps take four, the rounding of the guard a few more."""
 
 
 @compiled
 def start_margins(w: Any, fresh: Any) -> None:
-    """Sides of zero of the guards at a start or restart; one that may be zero there is unclear."""
+    """Set the sides of the guards at a start or restart; a guard that may be zero there is unclear."""
     unclear = same(0.0)
     evaluate(w, MARGINS, w.margin)
     for m in range(w.n_margins):
@@ -44,7 +44,7 @@ def start_margins(w: Any, fresh: Any) -> None:
 
 @compiled
 def _crosses(w: Any, m: int) -> Any:
-    """Mask of lanes whose guard m is across zero in a direction that counts; a strict one by more than noise."""
+    """Mask of lanes whose guard m has crossed zero in its direction; a strict guard by more than roundoff."""
     value, side, direction = lanes(w.margin[m]), lanes(w.side[m]), w.kinds[m, 1]
     least = FORMULA_EPS * lanes(w.margin_largest[m]) if w.kinds[m, 3] == 1 else same(0.0)
     falls = (side > 0.5) & (value <= 0.0 - least)
@@ -58,7 +58,9 @@ def _crosses(w: Any, m: int) -> Any:
 
 @compiled
 def _dips(w: Any, m: int, a: float, b: float, c: float) -> Any:
-    """Mask of lanes whose guard m has a minimum between three points that may reach zero though none is across it."""
+    """Mask of lanes whose guard m has a minimum between three points that may touch zero although no point is across
+    it.
+    """
     side = lanes(w.side[m])
     at_a, at_b = side * lanes(w.margin_earlier[m]), side * lanes(w.margin_before[m])
     at_c = side * lanes(w.margin[m])
@@ -68,7 +70,7 @@ def _dips(w: Any, m: int, a: float, b: float, c: float) -> Any:
 
 @compiled
 def _put_margins(w: Any) -> None:
-    """The guards at the inputs, one behind the other."""
+    """Evaluate the guards at the current inputs, and keep the last two evaluations."""
     for m in range(w.n_margins):
         put(w.margin_earlier[m], lanes(w.margin_before[m]))
         put(w.margin_before[m], lanes(w.margin[m]))
@@ -77,9 +79,11 @@ def _put_margins(w: Any) -> None:
 
 @compiled
 def may_meet(w: Any, good: Any) -> Any:
-    """Mask of lanes whose guards need a close look: one is at zero at a quarter of the step, or no farther from it than
-    twice what it bends by from a quarter to the next. Between two points a parabola dips by an eighth of that. States
-    inside are those of the cubic polynomial, whose error is small beside the bend that it has itself.
+    """Mask of lanes whose guards need a scan of the step.
+
+    A guard does if it is at zero at a quarter point of the step, or nearer to zero than twice its second difference
+    over the quarter points: between two points a parabola dips by an eighth of that. States inside the step come from
+    the cubic Hermite polynomial, whose error is small compared with its own second difference.
     """
     if w.n_margins == 0:
         return good & ~good  # nowhere
@@ -109,7 +113,9 @@ def may_meet(w: Any, good: Any) -> Any:
 
 @compiled
 def _scan(w: Any, searched: Any) -> None:
-    """The first interval of each step in which guards are met, and which these are; unclear where one may touch."""
+    """Find the first interval of each step in which guards cross, and which guards; unclear where one may touch
+    zero.
+    """
     for m in range(w.n_margins):
         put(w.margin[m], lanes(w.margin_first[m]))
     earlier, before = 0.0, 0.0
@@ -143,7 +149,7 @@ def _scan(w: Any, searched: Any) -> None:
 
 @compiled
 def _nearest(w: Any) -> Any:
-    """The least of the guards that are met in a step, each counted from its side."""
+    """The least value of the guards that have fired, each counted positive on its own side."""
     least = same(np.inf)
     for m in range(w.n_margins):
         least = where(lanes(w.fired[m]) > 0.5, smaller(least, lanes(w.side[m]) * lanes(w.margin[m])), least)
@@ -159,10 +165,12 @@ def _nearest_inside(w: Any, x: Any) -> Any:
 
 @compiled
 def _locate(w: Any, met: Any) -> None:
-    """Locate guards' zeros on the polynomial, and their slope there (Illinois: Dowell & Jarratt 1971, BIT 11)."""
+    """Locate the zeros of guards on the dense output, and their slopes there (Illinois: Dowell & Jarratt 1971, BIT
+    11).
+    """
     low, high = lanes(w.low), lanes(w.high)
     at_low, at_high = _nearest_inside(w, low), _nearest_inside(w, high)
-    # At the very start of a step nothing is across zero.
+    # No guard is across zero at the very start of a step.
     at_low = where(at_low > 0.0, at_low, TINY)
     kept = same(0.0)
     for iteration in range(60):
@@ -188,8 +196,9 @@ def _locate(w: Any, met: Any) -> None:
 
 @compiled
 def meet(w: Any, good: Any, close: Any) -> None:
-    """Guards in the steps that pass: where they are ``close``, so that there are polynomials, which are met, and where;
-    at the end of a step onto one, how far it is.
+    """Find the guards that are crossed in accepted steps, and where; for a step onto a guard, its value at the end.
+
+    ``close`` is the mask of :func:`may_meet`, whose lanes have dense output.
     """
     landing, whole = good & (lanes(w.onto) > 0.5), good & (lanes(w.onto) < 0.5)
     for m in range(w.n_margins):
@@ -211,7 +220,7 @@ def meet(w: Any, good: Any, close: Any) -> None:
 
 @compiled
 def _kink(w: Any, lane: int) -> bool:
-    """Whether the equations may bend where a guard is met that this lane is about to reach."""
+    """True if the equations may have a kink where a guard fires that this lane is about to reach."""
     found = False
     for m in range(w.n_margins):
         found = found or (w.fired[m, lane] > 0.5 and w.kinds[m, 0] == 0 and w.kinds[m, 2] == 0)
@@ -220,8 +229,11 @@ def _kink(w: Any, lane: int) -> bool:
 
 @compiled
 def lands(w: Any, lane: int) -> bool:
-    """Whether a step onto a guard ends there: across zero by no more than time resolves, and just short of a kink, as
-    beyond it the last stage would feel what begins there. Else the next trial is set; none after too many.
+    """True if a step onto a guard may end where it does; otherwise set the next trial, and mark it unclear after too
+    many.
+
+    It ends across zero by no more than time resolves, or just short of a kink: beyond one the last stage would already
+    feel the other branch.
     """
     h, value, slope = w.h[lane], w.value[lane], w.slope[lane]
     attempt = w.landing[lane] - 1
@@ -232,7 +244,7 @@ def lands(w: Any, lane: int) -> bool:
     if lies and (abs(change) <= resolution * (1 + attempt) or w.nudge[lane] > 0.0 or attempt >= 6):
         return True
     if not lies and abs(change) <= resolution * (1 + attempt):
-        # A zero that time does not resolve is passed by the least that crosses it.
+        # Time does not resolve this zero: cross it by the smallest push that changes the sign.
         w.nudge[lane] = max(2.0 * w.nudge[lane], resolution)
         change = wanted * w.nudge[lane]
     else:

@@ -1,7 +1,7 @@
-"""Whole runs, eight at once, compiled: starts, steps, events, segments and ends.
+"""Whole runs, eight at once, compiled: starts, steps, events, load segments and ends.
 
-Runs that are over give their places to the next. What these steps are not made for (stiffness, guards that touch zero
-or start there, rates that are not finite, noise) is left to the steps of one run at a time, and marked as LEFT.
+A lane whose run has ended takes the next one. Runs that need more (stiffness, guards that touch zero or start there,
+rates that are not finite, noise) end with status LEFT and are repeated by the stepper for single runs.
 """
 
 from typing import Any
@@ -42,14 +42,16 @@ _lay_out = laying_out(WORK)
 
 FINISHED, EVENT, LEFT = int(Status.FINISHED), int(Status.EVENT), int(Status.LEFT)
 MOST_TRIALS = 12
-"""Trials of a step in a row after which it is noise or stiffness that they meet: each is a half of the last or less."""
+"""Rejected trials in a row, each at most half as long as the last, after which the cause is noise or stiffness."""
 FREE_LANES = 4
-"""Free lanes for which new runs begin: a choice. Fewer fill the lanes better, more share what starts and ends cost."""
+"""Number of free lanes at which new runs begin: a choice. A smaller one fills the lanes better, a larger one shares the
+cost of starts and ends among more runs.
+"""
 
 
 @compiled
 def _write_state(w: Any, row: Any, lane: int) -> None:
-    """[t | y | ydot | ledger] at the start of the step of a lane."""
+    """Write [t | y | ydot | ledger] at the start of a lane's step."""
     n = w.n
     row[0] = w.t[lane]
     for m in range(n):
@@ -70,7 +72,7 @@ def _record(w: Any, lane: int) -> None:
 
 @compiled
 def _end(w: Any, lane: int, status: int) -> None:
-    """The end of a run, which leaves its lane free; its guards there are evaluated with those of others that end."""
+    """End a run and free its lane. Its guards are evaluated later, together with those of other runs that end."""
     i = w.run[lane]
     counts = w.counts[i]
     counts[END] = status
@@ -89,14 +91,14 @@ def _leave(w: Any, lane: int) -> None:
 
 @compiled
 def _give_up(w: Any, lane: int) -> None:
-    """Leave the run of a lane to the loop over single runs."""
+    """Free a lane and leave its run to the stepper for single runs."""
     w.counts[w.run[lane], END] = LEFT
     _leave(w, lane)
 
 
 @compiled
 def _enter(w: Any, lane: int) -> None:
-    """The segment of a lane, with its end and its parameters."""
+    """Enter the current load segment of a lane: its end and its parameters."""
     i = w.run[lane]
     segment, segments, spacing = w.segment[lane], w.segments[row_of(w.segments, i)], w.spacing[row_of(w.spacing, i)]
     w.t[lane], w.end[lane] = segments[segment], segments[segment + 1]
@@ -108,7 +110,7 @@ def _enter(w: Any, lane: int) -> None:
 
 @compiled
 def _begin(w: Any, lane: int, i: int) -> None:
-    """Run i in this lane, from its start."""
+    """Begin run i in a lane."""
     w.run[lane] = i
     w.segment[lane] = w.steps[lane] = w.rejected[lane] = w.failed[lane] = w.stiff_steps[lane] = w.landing[lane] = 0
     peaks = w.peaks[row_of(w.peaks, i)]
@@ -125,7 +127,7 @@ def _begin(w: Any, lane: int, i: int) -> None:
 
 @compiled
 def _first_sizes(w: Any) -> Any:
-    """Steps over which the change of the rate, felt by a small trial step, stays within the tolerance (II.4)."""
+    """First step sizes: the change of the rate over a small trial step keeps within the tolerance (II.4)."""
     span, speed, size = lanes(w.end) - lanes(w.t), norm_of(w, w.k[0]) / w.loose, norm_of(w, w.y) / w.loose
     trial = smaller(larger(size * NEGLIGIBLE**2, 1e-2) / speed, span * NEGLIGIBLE)
     put(w.inputs[0], lanes(w.t) + trial)
@@ -143,7 +145,9 @@ def _first_sizes(w: Any) -> Any:
 
 @compiled
 def _start(w: Any) -> None:
-    """Rates, sides of guards and sizes of first steps of the lanes that start or restart; others stay as they are."""
+    """Evaluate rates, sides of guards and first step sizes of the lanes that start or restart; leave others
+    unchanged.
+    """
     fresh = lanes(w.fresh) > 0.5
     put_start(w)
     evaluate(w, RATES, w.rates)
@@ -178,13 +182,15 @@ def _start(w: Any) -> None:
 
 @compiled
 def _choose_sizes(w: Any) -> None:
-    """The step of each lane: what was proposed, up to the end of its segment or to where a step has to end."""
+    """Choose the step of each lane: the proposed size, up to the end of its segment or the time where a step has to
+    end.
+    """
     for lane in range(LANES):
         h = w.proposed[lane]
         left = w.end[lane] - w.t[lane]
         remaining = min(left, w.aim[lane] - w.t[lane])
         if w.landing[lane] == 0:
-            # No tiny last step: two of half the length are better than a whole one and a rest.
+            # No tiny last step: two equal steps are better than a full one and a remainder.
             if h >= remaining * (1.0 - SQRT_EPS):
                 h = remaining
             elif 2.0 * h > remaining:
@@ -203,7 +209,7 @@ def _find_next_output(w: Any, lane: int) -> None:
 
 @compiled
 def _write_outputs(w: Any, lane: int) -> None:
-    """The outputs up to the end of the step."""
+    """Write the outputs up to the end of the step."""
     i, t_new = w.run[lane], w.t_new[lane]
     counts, times, outputs = w.counts[i], w.times[row_of(w.times, i)], w.outputs[i]
     k = counts[OUTPUTS]
@@ -222,7 +228,7 @@ def _write_outputs(w: Any, lane: int) -> None:
 
 @compiled
 def _write_events(w: Any, lane: int) -> bool:
-    """A row for each guard that is met at the state of the lane; whether one of them ends the run."""
+    """Write a row for each guard that fires at the state of the lane; True if one of them is terminal."""
     i = w.run[lane]
     counts, events = w.counts[i], w.events[i]
     nearest, terminal = np.inf, False
@@ -245,13 +251,13 @@ def _write_events(w: Any, lane: int) -> bool:
 
 @compiled
 def _take(w: Any, row: Any, values: Any) -> None:
-    """Put values where steps are taken."""
+    """Store values in the lanes whose steps are accepted."""
     put(row, where(lanes(w.taken) > 0.5, values, lanes(row)))
 
 
 @compiled
 def _move_on(w: Any) -> None:
-    """To the ends of the steps that are taken."""
+    """Move the lanes whose steps are accepted to the ends of these steps."""
     t_new = lanes(w.t_new)
     for m in range(w.columns):
         _take(w, w.y[m], lanes(w.y_new[m]))
@@ -263,7 +269,7 @@ def _move_on(w: Any) -> None:
     _take(w, w.t, t_new)
     for flag in (w.begins, w.again):
         _take(w, flag, same(0.0))
-    # The controller learns nothing more from what is far below the tolerance.
+    # An error far below the tolerance tells the controller nothing more.
     _take(w, w.h_last, lanes(w.h))
     _take(w, w.norm_last, larger(lanes(w.norm), LEAST_NORM))
     _take(w, w.proposed, lanes(w.following))
@@ -272,7 +278,7 @@ def _move_on(w: Any) -> None:
 
 @compiled
 def _accept(w: Any, lane: int) -> None:
-    """Count a step that is taken."""
+    """Count an accepted step."""
     w.steps[lane] += 1
     w.failed[lane] = 0
     stiff = w.stiff[lane] > 0.5
@@ -282,7 +288,7 @@ def _accept(w: Any, lane: int) -> None:
 
 @compiled
 def _go_on(w: Any, lane: int) -> None:
-    """Behind a step: events, the next segment, the end."""
+    """Handle what follows an accepted step: an event, the next segment, or the end."""
     whole = w.t[lane] == w.end[lane]
     if w.landing[lane] > 0:
         w.landing[lane], w.fresh[lane] = 0, 1.0
@@ -298,10 +304,10 @@ def _go_on(w: Any, lane: int) -> None:
 
 @compiled
 def _conclude(w: Any, lane: int) -> None:
-    """Decide on the step of a lane: repeat it, shorter or onto a guard, or take it."""
+    """Decide about a trial step: repeat it, shorter or onto a guard, or accept it."""
     h = w.h[lane]
     if w.again[lane] > 0.5 and w.norm[lane] > FALLS * w.norm_tried[lane] * (h / w.h_tried[lane]) ** 8:
-        # The error of a step that is repeated has not fallen with its size: it is noise, or stiffness.
+        # The error of the repeated step has not fallen with its size: noise, or stiffness.
         w.stiff_steps[lane] += STIFF_STEPS
     if not w.norm[lane] < 1.0:
         w.h_tried[lane], w.norm_tried[lane] = h, min(w.norm[lane], 1e30)
@@ -309,7 +315,7 @@ def _conclude(w: Any, lane: int) -> None:
         w.failed[lane] += 1
         w.rejected[lane] += 1
     elif w.missed[lane] < 1.0:
-        # A step ends there, so that its last stage feels what the others have missed.
+        # End a step there, so that its last stage sees what the other stages have missed.
         w.aim[lane], w.proposed[lane] = w.t[lane] + w.missed[lane] * h, w.missed[lane] * h
         w.failed[lane] += 1
         w.rejected[lane] += 1
@@ -325,7 +331,7 @@ def _conclude(w: Any, lane: int) -> None:
 
 @compiled
 def _continue(w: Any, lane: int) -> None:
-    """Behind the step of a lane; other steps take over where these do not get on."""
+    """Go on after a step, or give the run up where its guards are unclear or explicit steps make no progress."""
     i = w.run[lane]
     if w.taken[lane] > 0.5:
         _accept(w, lane)
@@ -338,7 +344,7 @@ def _continue(w: Any, lane: int) -> None:
 
 @compiled
 def _write_margins(w: Any) -> None:
-    """Guards where runs have ended."""
+    """Write the guards of runs that have just ended."""
     ended = False
     for lane in range(LANES):
         ended = ended or w.over[lane] >= 0
@@ -357,7 +363,7 @@ def _write_margins(w: Any) -> None:
 
 @compiled
 def _step(w: Any) -> None:
-    """A trial step of every lane, and what becomes of each."""
+    """Try one step of every lane, and accept or reject each."""
     _choose_sizes(w)
     put(w.t_new, where(lanes(w.last) > 0.5, lanes(w.end), lanes(w.t) + lanes(w.h)))
     set_weights(w)
@@ -389,7 +395,9 @@ def _step(w: Any) -> None:
 
 
 def run_lanes(first: int, last: int, memory: Any, batch: Any) -> None:
-    """Runs first to last - 1 of a batch. What becomes of one depends neither on those beside it nor on the threads."""
+    """Solve runs first to last - 1 of a batch. The result of a run depends neither on its neighbours nor on the
+    threads.
+    """
     w = _lay_out(batch, memory)
     w.loose = loosening(w.rtol)
     following, busy = first, 0
@@ -397,7 +405,7 @@ def run_lanes(first: int, last: int, memory: Any, batch: Any) -> None:
         w.over[lane] = -1
         _leave(w, lane)
     while busy > 0 or following < last:
-        # Runs begin together, so that what is done at their starts and ends is done for several at once.
+        # Runs begin together, so that several share each evaluation at starts and ends.
         begins = busy <= LANES - FREE_LANES
         starts, busy = False, 0
         for lane in range(LANES):

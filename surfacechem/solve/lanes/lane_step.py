@@ -1,7 +1,7 @@
-"""One explicit step of order 8 for eight runs at once, each with its own time and size: stages, error, polynomial, and
-the looks at the equations inside it.
+"""One explicit step of order 8 of eight runs at once: stages, local error, dense output, and checks against the
+equations between the stages.
 
-The rules are those of the steps of one run, with the accounts of the ledger integrated beside the states.
+The rules are those of the stepper for single runs; here the ledger is integrated as further states.
 
 Source: Hairer, Norsett & Wanner, Solving Ordinary Differential Equations I, sections II.4, II.5 and II.10 (DOP853).
 """
@@ -33,11 +33,13 @@ from surfacechem.tolerances import LOOSE_RTOL, RUN_EPS, TINY
 
 WORK = StepperRecord("LaneWork", SIZES, {"loose": float}, MEMORY)
 END_STAGE = STAGES_OF_DENSE - 1
-"""The last stage of a step, at its end."""
+"""The last stage, at the end of the step."""
 
 
 def _polynomial_table() -> NDArray[np.float64]:
-    """Coefficients of x, x^2, ... in the change over a fraction x of the step, per unit of it, from all its rates."""
+    """Coefficients of x, x^2, ... of the change over a fraction x of the step, per unit of the step, from all stage
+    rates.
+    """
     x = Polynomial([0.0, 1.0])
     table = np.zeros((len(DENSE_FACTORS) + 1, LAST_STAGE + 1))
     for stage in range(LAST_STAGE + 1):
@@ -56,25 +58,25 @@ ORDER = len(DENSE_FACTORS)
 
 @compiled
 def larger(a: Any, b: Any) -> Any:
-    """The larger at each place; the second where one is no number."""
+    """The larger value of each lane; the second where one is NaN."""
     return where(a > b, a, b)
 
 
 @compiled
 def smaller(a: Any, b: Any) -> Any:
-    """The smaller at each place; the second where one is no number."""
+    """The smaller value of each lane; the second where one is NaN."""
     return where(a < b, a, b)
 
 
 @compiled
 def eighth_root(a: Any) -> Any:
-    """The root of order 8, that of the method."""
+    """The eighth root, for step sizes of a method of order 8."""
     return square_root(square_root(square_root(a)))
 
 
 @compiled
 def put_start(w: Any) -> None:
-    """Time and state at the start of the step."""
+    """Set the inputs to time and state at the start of the step."""
     put(w.inputs[0], lanes(w.t))
     for m in range(w.n):
         put(w.inputs[1 + m], lanes(w.y[m]))
@@ -82,24 +84,24 @@ def put_start(w: Any) -> None:
 
 @compiled
 def set_weights(w: Any) -> None:
-    """Weights of the error norm at the start of the step."""
+    """Set the weights of the error norm at the start of the step."""
     for m in range(w.n):
         put(w.weight[m], larger(w.rtol * absolute(lanes(w.y[m])) + w.atol[m], TINY))
 
 
 @compiled
 def norm_of(w: Any, row: Any) -> Any:
-    """The largest of these changes of the states beside their tolerances."""
+    """The maximum norm of changes of the states, relative to their tolerances."""
     norm = same(0.0)
     for m in range(w.n):
         size = absolute(lanes(row[m])) / lanes(w.weight[m])
-        norm = where(size <= norm, norm, size)  # not the larger: what is no number must be seen
+        norm = where(size <= norm, norm, size)  # not larger(): NaN must be seen
     return norm
 
 
 @compiled
 def _evaluate_stage(w: Any, i: int, columns: int, change: Any) -> None:
-    """Rates of a stage, by those of the stages before it, and the changes up to it of the first so many columns."""
+    """Evaluate the rates of stage i, and the weighted sum of the earlier stages for the first ``columns`` columns."""
     h = lanes(w.h)
     _change(i, w.k.ctypes.data, LANES * w.columns, LANES * columns, change.ctypes.data)
     put(w.inputs[0], lanes(w.t) + EXPLICIT_NODES[i] * h)
@@ -110,8 +112,8 @@ def _evaluate_stage(w: Any, i: int, columns: int, change: Any) -> None:
 
 @compiled
 def _ledger_norms(w: Any) -> Any:
-    """Error of the accounts in units of what is allowed: those of one kind beside the largest of them, which turned
-    over so much or soon will.
+    """Error norm of the ledger. Accounts of one kind share a scale: the largest amount exchanged so far, or expected
+    soon.
     """
     h, span = lanes(w.h), lanes(w.end) - lanes(w.t)
     for m in range(w.n_ledger):
@@ -134,7 +136,7 @@ def _ledger_norms(w: Any) -> Any:
 
 @compiled
 def try_step(w: Any) -> None:
-    """All stages of a step of each lane, and the norms of their errors."""
+    """Evaluate all stages of a step of each lane, and the norm of its local error."""
     for i in range(1, END_STAGE):
         _evaluate_stage(w, i, w.n, w.change_before if i == END_STAGE - 1 else w.change)
     _evaluate_stage(w, END_STAGE, w.columns, w.change)
@@ -145,7 +147,7 @@ def try_step(w: Any) -> None:
     blank = same(0.0)
     for m in range(w.columns):
         put(w.y_new[m], lanes(w.y[m]) + h * lanes(w.change[m]))
-        blank = blank + 0.0 * lanes(w.coarse[m])  # no number where an error is none: comparisons lose it
+        blank = blank + 0.0 * lanes(w.coarse[m])  # NaN where an error is NaN, which comparisons would lose
     for m in range(w.n):
         size = larger(absolute(lanes(w.y[m])), absolute(lanes(w.y_new[m])))
         rate = h / larger(w.rtol * size + w.atol[m], TINY)
@@ -159,7 +161,7 @@ def try_step(w: Any) -> None:
 
 @compiled
 def propose(w: Any) -> None:
-    """The size of the next step by the error of this one (Gustafsson 1994), or of its repetition where it fails."""
+    """Propose the size of the next step (Gustafsson 1994), or of the repetition of one that fails."""
     h, h_last, given = lanes(w.h), lanes(w.h_last), lanes(w.norm)
     norm = larger(where(given < 1e30, given, 1e30), RUN_EPS)
     factor = SAFETY / eighth_root(norm)
@@ -172,12 +174,12 @@ def propose(w: Any) -> None:
 
 @compiled
 def find_stiff(w: Any) -> None:
-    """Mark steps that are stiff, long beside the fastest rate, which the rates of the last two stages tell."""
+    """Mark steps that are long compared with the fastest rate, which the rates of the last two stages estimate."""
     largest, fastest, speed, change = same(0.0), same(0.0), same(0.0), same(0.0)
     for m in range(w.n):
         end, unit = lanes(w.k[END_STAGE, m]), 1.0 / lanes(w.weight[m])
         apart = absolute(end - lanes(w.k[END_STAGE - 1, m]))
-        # Of the variable that feels the difference of the two most: slower ones differ by their error alone.
+        # From the variable in which the two differ most: in slower ones they differ by their error alone.
         most = apart * unit > largest
         largest = where(most, apart * unit, largest)
         moved = absolute(lanes(w.change[m]) - lanes(w.change_before[m]))
@@ -199,7 +201,7 @@ def interpolate(w: Any, columns: int) -> None:
 
 @compiled
 def put_inside(w: Any, x: Any) -> None:
-    """Time and state at the fraction x of each step."""
+    """Set the inputs to time and state at the fraction x of each step."""
     h = lanes(w.h)
     put(w.inputs[0], lanes(w.t) + x * h)
     for m in range(w.n):
@@ -211,7 +213,7 @@ def put_inside(w: Any, x: Any) -> None:
 
 @compiled
 def put_roughly(w: Any, x: float) -> None:
-    """The same by the cubic Hermite polynomial of each step, for which it needs no further rates."""
+    """Set the inputs by the cubic Hermite polynomial of each step, which needs no further stages."""
     h = lanes(w.h)
     put(w.inputs[0], lanes(w.t) + x * h)
     for m in range(w.n):
@@ -222,7 +224,7 @@ def put_roughly(w: Any, x: float) -> None:
 
 @compiled
 def put_end(w: Any) -> None:
-    """Time and state at the end of each step."""
+    """Set the inputs to time and state at the end of each step."""
     put(w.inputs[0], lanes(w.t) + lanes(w.h))
     for m in range(w.n):
         put(w.inputs[1 + m], lanes(w.y_new[m]))
@@ -230,13 +232,13 @@ def put_end(w: Any) -> None:
 
 @compiled
 def _prepare_looks(w: Any) -> None:
-    """Set the allowed defect of each column's rate from the slope of its polynomial, and that slope's coefficients."""
+    """Set the allowed defect of the rate of each column, and the coefficients of the slope of the dense output."""
     h = lanes(w.h)
     for m in range(w.n):
         size = larger(absolute(lanes(w.y[m])), absolute(lanes(w.y_new[m])))
         put(w.allowed[m], UNSEEN_ERROR * GAMMA[DENSEST] * w.loose * larger(w.rtol * size + w.atol[m], TINY) / h)
     for m in range(w.n_ledger):
-        put(w.allowed[w.n + m], same(np.inf))  # of what belongs to no group it only has to be a number
+        put(w.allowed[w.n + m], same(np.inf))  # an account without a group only has to be finite
     for group in range(N_GROUPS):
         scale = same(TINY)
         for m in range(w.n_ledger):
@@ -252,7 +254,7 @@ def _prepare_looks(w: Any) -> None:
 
 @compiled
 def _agrees(w: Any, x: Any) -> Any:
-    """Mask of lanes in which equations and ledger rates at the fraction x of the step are close to the polynomials."""
+    """Mask of lanes whose rates at the fraction x of the step agree with the slope of the dense output."""
     put_inside(w, x)
     evaluate(w, RATES, w.rates)
     agrees = x >= 0.0
@@ -261,7 +263,7 @@ def _agrees(w: Any, x: Any) -> Any:
         for d in range(ORDER - 2, -1, -1):
             total = total * x + lanes(w.slope_of[d, m])
         defect, allowed = absolute(lanes(w.rates[m]) - total), lanes(w.allowed[m])
-        close = defect <= allowed  # what is no number is not
+        close = defect <= allowed  # False for NaN
         if m >= w.n and any_lane(~close):
             # The quadrature of a smooth rate is better than its polynomial of order 7, by 6/7 of that power; 3/4 is
             # what products give.
@@ -274,14 +276,14 @@ def _agrees(w: Any, x: Any) -> Any:
 
 @compiled
 def _miss(w: Any, x: Any, looks: Any) -> None:
-    """Keep where the lanes that look there have missed something, if they have not before."""
+    """Store x in the lanes in ``looks`` whose rates first disagree with the dense output there."""
     missed = lanes(w.missed)
     put(w.missed, where((looks > 0.5) & (missed == 1.0) & ~_agrees(w, x), x, missed))
 
 
 @compiled
 def has_points(w: Any, good: Any) -> bool:
-    """Whether a step is looked at inside."""
+    """True if the equations are to be checked somewhere inside a step."""
     h, spacing = lanes(w.h), lanes(w.spacing_of)
     beside = lanes(w.begins) + lanes(w.last) + lanes(w.onto) > 0.5
     return bool(any_lane(good & (h > LOOK_PART * spacing) & (beside | (h >= spacing))))
@@ -289,22 +291,23 @@ def has_points(w: Any, good: Any) -> bool:
 
 @compiled
 def look(w: Any, good: Any) -> None:
-    """The fraction of each step at which it has missed something, one where it has not, as far as the points tell.
+    """Check the equations inside each step; keep the fraction where the dense output first misses them, one if nowhere.
 
-    Beside the ends of a segment, and of steps that an event has cut short, there may be something narrow.
+    Checks are denser next to the ends of a load segment and of a step that an event has cut short: a feature there may
+    be narrow.
     """
     h, spacing = lanes(w.h), lanes(w.spacing_of)
     looks = good & (h > LOOK_PART * spacing)
     _prepare_looks(w)
     begins, ends = where(looks, lanes(w.begins), 0.0), where(looks, larger(lanes(w.last), lanes(w.onto)), 0.0)
     if any_lane(begins > 0.5):
-        # From the narrowest outwards: the first that differs says how short the step has to be.
+        # From the narrowest outwards: the first disagreement tells how short the step has to be.
         for k in range(END_LOOKS, 0, -1):
             _miss(w, same(10.0**-k), begins)
     points = where(looks, h / spacing, 0.0)
     i = 0.0
     while any_lane(points >= i + 1.0):
-        # Of so many whole spacings each has one in its middle.
+        # One check in the middle of each whole spacing.
         most = floor(points)
         _miss(w, (i + 0.5) / larger(most, 1.0), where(most >= i + 1.0, 1.0, 0.0))
         i += 1.0

@@ -1,12 +1,12 @@
-"""Memory layout of eight runs at once: names, types and shapes of the arrays behind the record of the compiled loop.
+"""Memory layout of a block of lanes: names, types and shapes of the arrays behind the record of the compiled loop.
 
-Nothing of Numba is imported here.
+It imports nothing of Numba.
 """
 
 from surfacechem.compile.vectors import LANES
 
 SIZES = ("n", "n_ledger", "n_margins", "n_inputs", "columns")
-"""Sizes of a program, in the order in which it tells them: the columns are what is integrated, states and accounts."""
+"""Sizes of a program, in the order of its table; columns are what is integrated, states and ledger accounts."""
 
 
 def _arrays(names: str, *shape: str | int, kind: type = float) -> dict[str, tuple[type, tuple[str | int, ...]]]:
@@ -14,7 +14,7 @@ def _arrays(names: str, *shape: str | int, kind: type = float) -> dict[str, tupl
 
 
 MEMORY = {
-    # t, y, ydot, parameters: what every function of the program is given
+    # t, y, ydot, parameters: the argument of every function of the program
     **_arrays("inputs", "n_inputs"),
     # states and accounts at the start and at the end of the step, their changes per time at its last two stages, the
     # two estimates of their error, their rates at a point inside and how far they may be from the slopes there

@@ -1,7 +1,7 @@
-"""A number for each of eight cases, as a type of compiled code: arithmetic, comparisons and choices place by place.
+"""A type of compiled code that holds one number of each of eight lanes: arithmetic, comparisons and selection by lane.
 
-Code that is written with these reads as that of one case. ``lanes(row)`` reads eight numbers, ``put(row, values)``
-writes them, ``where(mask, a, b)`` chooses, ``any_lane(mask)`` asks whether a condition holds for any of them.
+Code written with it reads like code for a single run: ``lanes(row)`` loads eight numbers, ``put(row, values)`` stores
+them, ``where(mask, a, b)`` selects, ``any_lane(mask)`` asks whether a condition holds in any lane.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _typed: Any = type_callable
 
 
 class _Lanes(types.Type):
-    """Eight numbers, or eight truths."""
+    """Eight numbers, or eight truth values."""
 
 
 LANE, MASK = _Lanes(name="Lanes"), _Lanes(name="Mask")
@@ -36,21 +36,21 @@ class _LanesModel(models.PrimitiveModel):
 
 
 def _spread(builder: Any, value: Any) -> Any:
-    """A number at every place."""
+    """Broadcast a number to all lanes."""
     nothing, first = _Constant(VECTOR, ir.Undefined), ir.IntType(32)(0)
     single = builder.insert_element(nothing, value, first)
     return builder.shuffle_vector(single, nothing, _Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES))
 
 
 def _holds(builder: Any, mask: Any) -> Any:
-    """A mask as bits. Between operations it is eight words of ones or zeros: what processors without registers for bits
-    choose by.
+    """Convert a mask to bits. Between operations it is eight words of ones or zeros, which processors without mask
+    registers select by.
     """
     return builder.icmp_signed("<", mask, _Constant(INTEGERS, [0] * LANES))
 
 
 def _operation(operation: Any, kind: Any, result: Any, emit: Callable[[Any, Any, Any], Any]) -> None:
-    """Let an operator of two work on vectors of a kind, and on one of them and a number."""
+    """Define a binary operator for two vectors of a kind, and for a vector and a number."""
 
     @_typed(operation)
     def _type(_context: Any) -> Any:
@@ -101,7 +101,7 @@ def _row(context: Any, builder: Any, kind: Any, row: Any) -> Any:
 
 @_intrinsic
 def lanes(_context: Any, row: Any) -> Any:
-    """The eight numbers of a row."""
+    """Load the eight numbers of a row."""
 
     def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         return builder.load(_row(context, builder, signature.args[0], args[0]), align=8)
@@ -111,7 +111,7 @@ def lanes(_context: Any, row: Any) -> Any:
 
 @_intrinsic
 def put(_context: Any, row: Any, values: Any) -> Any:
-    """Write eight numbers into a row; one number stands for eight."""
+    """Store eight numbers in a row; a single number is broadcast."""
 
     def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         value = args[1] if signature.args[1] is LANE else _spread(builder, args[1])
@@ -123,7 +123,7 @@ def put(_context: Any, row: Any, values: Any) -> Any:
 
 @_intrinsic
 def where(_context: Any, mask: Any, a: Any, b: Any) -> Any:
-    """At each place the first value where the mask holds, else the second."""
+    """Select by lane: the first value where the mask holds, else the second."""
 
     def generate(_context: Any, builder: Any, signature: Any, args: Any) -> Any:
         values = [
@@ -137,7 +137,7 @@ def where(_context: Any, mask: Any, a: Any, b: Any) -> Any:
 
 @_intrinsic
 def same(_context: Any, value: Any) -> Any:
-    """One number eight times."""
+    """Broadcast one number to eight lanes."""
 
     def generate(_context: Any, builder: Any, _signature: Any, args: Any) -> Any:
         return _spread(builder, args[0])
@@ -147,7 +147,7 @@ def same(_context: Any, value: Any) -> Any:
 
 @_intrinsic
 def any_lane(_context: Any, mask: Any) -> Any:
-    """Whether the mask holds at any place."""
+    """True if the mask holds in any lane."""
 
     def generate(_context: Any, builder: Any, _signature: Any, args: Any) -> Any:
         bits = ir.IntType(LANES)
@@ -158,7 +158,7 @@ def any_lane(_context: Any, mask: Any) -> Any:
 
 @_intrinsic
 def absolute(_context: Any, value: Any) -> Any:
-    """The sizes of eight numbers."""
+    """Absolute values of eight numbers."""
 
     def generate(_context: Any, builder: Any, _signature: Any, args: Any) -> Any:
         sizes = builder.and_(builder.bitcast(args[0], INTEGERS), _Constant(INTEGERS, [2**63 - 1] * LANES))
@@ -169,7 +169,7 @@ def absolute(_context: Any, value: Any) -> Any:
 
 @_intrinsic
 def floor(_context: Any, value: Any) -> Any:
-    """The largest whole numbers that are not above."""
+    """Round eight numbers down to whole numbers."""
 
     def generate(_context: Any, builder: Any, _signature: Any, args: Any) -> Any:
         return by_vector(builder, "floor", args[0])
@@ -179,7 +179,7 @@ def floor(_context: Any, value: Any) -> Any:
 
 @_intrinsic
 def square_root(_context: Any, value: Any) -> Any:
-    """The square roots of eight numbers."""
+    """Square roots of eight numbers."""
 
     def generate(_context: Any, builder: Any, _signature: Any, args: Any) -> Any:
         return by_vector(builder, "sqrt", args[0])

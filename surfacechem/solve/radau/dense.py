@@ -1,10 +1,10 @@
-"""State, rate and ledger inside a step, and the error of the ledger's quadrature over it.
+"""Dense output of state, rate and ledger inside a step, and the quadrature error of the ledger.
 
 The collocation polynomial has only the order of the stages. The defect of its derivative at the start of the step,
-which is the error estimate, fixes its leading error term; adding that term gains one order at no cost.
+which is the error estimate, determines its leading error term; adding this term gains one order at no cost.
 
-The states choose the steps. Where they hardly feel what an account integrates, such as the work on a gap that is
-moved through a steep traction, the steps may be too long for it; here such a step is found.
+The states choose the step size. Where an account integrates something that hardly affects them, such as the work on a
+gap that is moved through a steep traction, the step may be too long for the account; the norm here finds such steps.
 """
 
 from typing import Any
@@ -27,18 +27,18 @@ from surfacechem.solve.radau.work import LEDGER, combine, compiled, copy, evalua
 from surfacechem.tolerances import NEGLIGIBLE, RUN_EPS, TINY
 
 N_GROUPS = 3
-"""Accounts that are measured together: energies, entropies, bonds."""
+"""Groups of accounts that share a scale: energies, entropies, bonds."""
 LEDGER_FACTOR, LEDGER_RTOL = 30.0, RUN_EPS
-"""Error of a quadrature in units of the tolerance of the states, and the least there is."""
+"""Allowed quadrature error in units of the tolerance of the states, and its least value."""
 FORESEEN_PART = NEGLIGIBLE**2
-"""Part of the time to go for which a rate is taken to last, where little was exchanged so far."""
+"""Part of the remaining time for which a rate is assumed to last, where little has been exchanged so far."""
 
 
 @compiled
 def _newton_form(k: int, values: Any, correction: Any, result: Any) -> None:
-    """Divided differences of the polynomial through 0 and these values at the stages, with its correction."""
+    """Divided differences of the polynomial through 0 and the stage values, including its correction."""
     s = stage_count(k)
-    # Newton's form keeps its digits at the nodes, where sums of powers lose them.
+    # Newton's form is accurate at the nodes, where sums of powers lose digits.
     for m in range(result.shape[0]):
         row = result[m]
         divide(k, values, m, row)
@@ -49,14 +49,14 @@ def _newton_form(k: int, values: Any, correction: Any, result: Any) -> None:
 
 @compiled
 def keep_polynomial(w: Any) -> None:
-    """Newton's form of the polynomials of state and ledger over the step, for outputs and events inside."""
+    """Store the polynomials of state and ledger over the step in Newton's form, for outputs and events inside it."""
     _newton_form(w.member, w.z, w.correction, w.polynomial)
     _newton_form(w.member, w.q_stage, w.q_correction, w.q_polynomial)
 
 
 @compiled
 def interpolate(w: Any, x: float) -> None:
-    """State and ledger at the fraction x of the step."""
+    """Interpolate state and ledger at the fraction x of the step."""
     top = stage_count(w.member) + 1
     for m in range(w.n):
         w.trial[m] = w.y[m] + nested(w.member, top, x, w.polynomial[m])
@@ -66,7 +66,7 @@ def interpolate(w: Any, x: float) -> None:
 
 @compiled
 def change_and_slope(k: int, x: float, row: Any) -> Any:
-    """A polynomial of a step at the fraction x, less its value at the start, and its derivative by x."""
+    """Return the change of a polynomial from the start of the step to the fraction x, and its derivative by x."""
     top = stage_count(k)
     value, slope = row[top], 0.0
     for i in range(top - 1, -1, -1):
@@ -77,7 +77,9 @@ def change_and_slope(k: int, x: float, row: Any) -> Any:
 
 @compiled
 def put_inside(w: Any, h: float, x: float) -> None:
-    """State at the fraction x of the step and the derivative of its polynomial, as trial and as inputs."""
+    """Set trial state and inputs to the dense output at the fraction x of the step, with the derivative of its
+    polynomial.
+    """
     for m in range(w.n):
         change, slope = change_and_slope(w.member, x, w.polynomial[m])
         w.trial[m] = w.y[m] + change
@@ -87,9 +89,7 @@ def put_inside(w: Any, h: float, x: float) -> None:
 
 @compiled
 def probe_ledger(w: Any, h: float) -> None:
-    """Rates of the ledger at the trial state, at the time of the inputs. The state is corrected by its error there
-    first: a fast rate would magnify it.
-    """
+    """Evaluate the ledger rates at the trial state, corrected by its error there, which a fast rate would magnify."""
     n, rate = w.n, GAMMA[w.member] / h
     for j in range(n):
         w.inputs[1 + j] = w.trial[j] + w.error[j]
@@ -99,7 +99,7 @@ def probe_ledger(w: Any, h: float) -> None:
 
 @compiled
 def scan_step(w: Any) -> None:
-    """Change of the state since the start, and its rate times the step, at all points where margins are examined."""
+    """Evaluate the change of the state and its rate times the step at all points where guards are examined."""
     k, n = w.member, w.n
     s = stage_count(k)
     copy(w.correction, w.z[s])  # a row that is free
@@ -110,7 +110,7 @@ def scan_step(w: Any) -> None:
 
 @compiled
 def put_scanned(w: Any, h: float, i: int) -> None:
-    """Inputs at a point where margins are examined."""
+    """Set the inputs to one of the points where guards are examined."""
     n, rate = w.n, 1.0 / h
     inputs, y, change, slope = w.inputs, w.y, w.scanned[i], w.scanned_rates[i]
     inputs[0] = w.base + (w.tau + SCANNED[w.member, i] * h)
@@ -121,8 +121,8 @@ def put_scanned(w: Any, h: float, i: int) -> None:
 
 @compiled
 def finish_step(w: Any, h: float) -> None:
-    """Complete the step for interpolation: the leading error of the polynomial, from the error estimate, and the
-    quadratures of the ledger.
+    """Complete the step for dense output: the leading error term of the polynomial, and the quadratures of the
+    ledger.
     """
     for m in range(w.n):
         w.correction[m] = 0.0 if w.explicit != 0 else GAMMA[w.member] * w.error[m]
@@ -132,7 +132,7 @@ def finish_step(w: Any, h: float) -> None:
 
 @compiled
 def integrate_ledger(w: Any, h: float) -> None:
-    """Quadratures over the step at its stages; row 7 of the rates holds those at the start of the step."""
+    """Integrate the ledger over the step at its stages; row 7 of the rates holds those at the start of the step."""
     k = w.member
     s = stage_count(k)
     for i in range(s):
@@ -152,7 +152,7 @@ def integrate_ledger(w: Any, h: float) -> None:
 
 @compiled
 def hold_rates(w: Any, h: float) -> None:
-    """Quadratures over the step with the rates at its start, where those at its end are singular."""
+    """Integrate the ledger over the step with the rates at its start, where those at its end are singular."""
     k = w.member
     for m in range(w.n_ledger):
         for i in range(stage_count(k)):
@@ -166,11 +166,11 @@ def hold_rates(w: Any, h: float) -> None:
 
 @compiled
 def defect_norm(w: Any, defects: Any, h: float, remaining: float) -> float:
-    """Error of the quadratures over the step in units of what is allowed, from defects of their rates.
+    """Norm of the quadrature error over the step, in units of the allowed one, from defects of the rates.
 
-    It is held against what each account turned over or soon will. The defect of the rate has the order s of the stages,
-    the quadrature 2s - 1: for a smooth rate its error, relative to what the step turns over, is that power of the
-    defect.
+    It is relative to the amount each account has exchanged or soon will. The defect of the rate has the order s of the
+    stages, the quadrature 2s - 1: for a smooth rate its error, relative to the amount exchanged in the step, is that
+    power of the defect.
     """
     largest, rates = w.q_turned, w.rates
     for m in range(w.n_ledger):
@@ -190,16 +190,16 @@ def defect_norm(w: Any, defects: Any, h: float, remaining: float) -> float:
 
 @compiled
 def booked(rtol: float) -> float:
-    """Error of a quadrature that a tolerance of the states allows, relative to what is exchanged; however loose it is,
-    the books close to what changes no decision.
+    """Quadrature error that a tolerance of the states allows, relative to the amount exchanged; bounded, however loose
+    the tolerance, so that the balances close.
     """
     return float(min(max(LEDGER_FACTOR * rtol, LEDGER_RTOL), NEGLIGIBLE))
 
 
 @compiled
 def _group_norm(w: Any) -> float:
-    """Largest error in units of what is allowed in its group."""
-    # Accounts of one kind are added up: what one of them misses counts beside the largest.
+    """Largest quadrature error in units of the allowed error of its group."""
+    # Accounts of one kind are summed: the error of one counts relative to the largest.
     norm, allowed, power = 0.0, booked(w.rtol), 1.0 - 1.0 / stage_count(w.member)
     for group in range(N_GROUPS):
         miss, scale = 0.0, TINY
@@ -216,10 +216,10 @@ def _group_norm(w: Any) -> float:
 
 @compiled
 def excused_norm(w: Any, h: float) -> float:
-    """The error that was found last, without what an error of the states within their tolerance makes of an account."""
+    """The last norm without the part that an error of the states within their tolerance causes in an account."""
     n, last = w.n, stage_count(w.member) - 1
     set_stage(w, last, h)
-    # Unlike changes: what the states may miss must not cancel in their differences.
+    # Unequal changes, so that the errors of two states do not cancel in their difference.
     for j in range(n):
         change = (1 + j % 3) * (1 - 2 * (j % 2)) * w.weight[j]
         w.inputs[1 + j] += change
@@ -232,8 +232,8 @@ def excused_norm(w: Any, h: float) -> float:
 
 @compiled
 def ledger_norm(w: Any, h: float, remaining: float) -> float:
-    """Error of the quadratures over the step in units of what is allowed: nothing where it limits no step, infinite
-    where a rate at the end of the step is.
+    """Norm of the quadrature errors over the step; zero where they limit no step, infinite where a rate at its end
+    is.
     """
     if w.n_ledger == 0:
         return 0.0

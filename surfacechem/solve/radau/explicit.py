@@ -1,7 +1,7 @@
-"""An explicit step of order 8 where the equations give their rates and are not stiff: the pair of Dormand and Prince.
+"""Explicit steps of order 8 for nonstiff equations in explicit form: the pair of Dormand and Prince.
 
-Its polynomial, of order 7, is kept as its values at the nodes of seven implicit stages, which determine it: outputs,
-events and the ledger read it as they read that of an implicit step.
+Their dense output, of order 7, is stored as its values at the nodes of seven implicit stages, which determine it:
+outputs, events and the ledger read it as they read that of an implicit step.
 
 Source: Hairer, Norsett & Wanner, Solving Ordinary Differential Equations I, sections II.5, II.6 and II.10 (DOP853).
 """
@@ -23,27 +23,27 @@ from surfacechem.solve.radau.work import RATES, compiled, copy, evaluate, finite
 from surfacechem.tolerances import TINY
 
 ERROR_PART = 0.2
-"""Part of the tolerance that an error of a step may take: what its polynomial, one order lower, adds is about as much
-again as the rest.
+"""Part of the tolerance allowed for the error of a step: its dense output, of one order less, adds about as much
+again.
 """
 STIFF_STEP = 3.0
-"""Step times the fastest rate that counts as stiff where it lasts: what decays so fast is gone by 1e-19 in fifteen
-steps, and what swings is not resolved. The method is stable up to 6.1, less where rounding limits the steps.
+"""Product of step and fastest rate that counts as stiff if it persists: such a mode decays by 1e-19 in fifteen steps,
+and an oscillation is not resolved. The method is stable up to 6.1, less where roundoff limits the steps.
 """
 FELT, FOLLOWED = 0.1, 0.1
-"""Step times the fastest rate from which on it limits steps at tight tolerances, too, and the part of that by which the
-rates change in a step where nothing follows the fastest any more.
+"""Product of step and fastest rate from which on stability may limit steps at tight tolerances too, and the part of it
+by which the rates change in a step once no state follows the fastest mode any more.
 """
 STIFF_STEPS = 15
-"""Number of stiff steps after which the run goes on implicitly; two others take back one of them."""
+"""Stiff steps after which the run continues implicitly; two that are not stiff cancel one."""
 
 FALLS = 3.0
-"""Largest ratio of the error of a repeated step to the one expected of its size; more is noise, which implicit steps
-measure, or a formula that changes.
+"""Largest ratio of the error of a repeated step to the one expected from its size; a larger one is noise, which
+implicit steps can measure, or a change of formula.
 """
 
 DENSEST = 2
-"""The member of the implicit family whose stages carry the polynomial."""
+"""Member of the implicit family whose stages hold the dense output."""
 
 
 _change = weighted_sums(EXPLICIT)
@@ -53,7 +53,7 @@ _at_nodes = weighted_sums(DENSE)
 
 @compiled
 def _evaluate_stage(w: Any, h: float, i: int, change: Any) -> None:
-    """Rates of a stage, by those of the stages before it."""
+    """Evaluate the rates of stage i from those of the earlier stages."""
     inputs, y, k = w.inputs, w.y, w.k
     _change(i, k.ctypes.data, w.n, w.n, change.ctypes.data)
     inputs[0] = w.base + (w.tau + EXPLICIT_NODES[i] * h)
@@ -64,7 +64,7 @@ def _evaluate_stage(w: Any, h: float, i: int, change: Any) -> None:
 
 @compiled
 def _error_of_step(w: Any, h: float) -> float:
-    """The norm of the local error from the rates of all stages."""
+    """Norm of the local error from the rates of all stages."""
     n, errors, change, largest, second = w.n, w.parts, w.slopes[0], 0.0, 0.0
     _errors(0, w.k.ctypes.data, n, n, errors[0].ctypes.data)
     _errors(1, w.k.ctypes.data, n, n, errors[4].ctypes.data)
@@ -78,7 +78,7 @@ def _error_of_step(w: Any, h: float) -> float:
 
 @compiled
 def _interpolate(w: Any, h: float) -> bool:
-    """Further rates, and the polynomial of the step as the changes at the nodes of the stages; whether they are
+    """Evaluate the further stages and the dense output, as changes at the nodes of the implicit stages; True if
     finite.
     """
     n, z = w.n, w.z
@@ -97,16 +97,17 @@ def _interpolate(w: Any, h: float) -> bool:
 
 @compiled
 def step_explicitly(w: Any, h: float, worst: float) -> float:
-    """The norm of the local error of a step of this size, infinite where it has no rates; with its polynomial where the
-    norm is below the worst. Its rates are those of w.k, in row 12 those at its end.
+    """Return the norm of the local error of a step of this size, infinite where rates are not finite.
+
+    Below ``worst`` it also provides the dense output. The rates are in w.k, those at the end of the step in row 12.
     """
     w.h_factored = h
     copy(w.ydot, w.k[0])
     for i in range(1, STAGES_OF_DENSE):
-        # The last two changes are kept: a vector runs over into the three rows behind its own.
+        # Both of the last two changes are kept: a vector may overwrite the three rows behind its own.
         _evaluate_stage(w, h, i, w.slopes[4 if i == STAGES_OF_DENSE - 2 else 0])
     w.residuals += STAGES_OF_DENSE - 1
-    # The rates of these stages are no part of the error themselves.
+    # The error does not include the rates of these stages.
     for i in range(1, 5):
         if not finite(w.k[i]):
             return np.inf
@@ -116,19 +117,19 @@ def step_explicitly(w: Any, h: float, worst: float) -> float:
 
 @compiled
 def mark_noise(w: Any, norm: float, expected: float) -> None:
-    """Count the error of a step that was repeated with another size as a stiff one where it has not fallen with it."""
+    """Count a repeated step whose error has not fallen with its size as stiff."""
     if norm > FALLS * expected:
         w.stiff_steps += STIFF_STEPS
 
 
 @compiled
 def is_stiff(w: Any) -> bool:
-    """Whether steps are long beside the fastest rate again and again, as the rates of the last two stages tell."""
+    """True if steps have repeatedly been long compared with the fastest rate, which the last two stages estimate."""
     k, largest, fastest, speed, change = w.k, 0.0, 0.0, 0.0, 0.0
     end, last = STAGES_OF_DENSE - 1, STAGES_OF_DENSE - 2
     for m in range(w.n):
         apart, unit = abs(k[end, m] - k[last, m]), 1.0 / w.weight[m]
-        # Of the variable that feels the difference of the two most: slower ones differ by their error alone.
+        # From the variable in which the two differ most: in slower ones they differ by their error alone.
         if apart * unit > largest:
             largest, fastest = apart * unit, apart / (abs(w.slopes[0, m] - w.slopes[4, m]) + TINY)
         speed, change = max(speed, abs(k[end, m]) * unit), max(change, abs(k[end, m] - k[0, m]) * unit)
@@ -139,9 +140,7 @@ def is_stiff(w: Any) -> bool:
 
 @compiled
 def defect_of_rates(w: Any, error: Any) -> bool:
-    """By how much the rates in the inputs miss those of the equations, as an error of the state; whether it is
-    finite.
-    """
+    """Store the defect of the rates in the inputs, as an error of the state, in ``error``; True if finite."""
     evaluate(w, RATES, error)
     w.residuals += 1
     for m in range(w.n):
@@ -151,7 +150,7 @@ def defect_of_rates(w: Any, error: Any) -> bool:
 
 @compiled
 def put_rates(w: Any, known: Any) -> None:
-    """Rates of the equations at the state in the inputs, into these."""
+    """Evaluate the rates at the state in the inputs, and set the inputs to them."""
     n, inputs = w.n, w.inputs
     evaluate(w, RATES, known)
     w.residuals += 1

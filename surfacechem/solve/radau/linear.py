@@ -1,22 +1,21 @@
 """LU decomposition of small dense real or complex matrices, with scaled partial pivoting.
 
-Rows may differ by forty decades (a capacity of 1e-15 beside a conductance of 1e20). A row is therefore judged by its
-largest entry, in units of the columns' typical sizes; the entries themselves are not scaled, so that a row which is a
+Rows may differ by forty decades (a capacity of 1e-15 and a conductance of 1e20). Each row is therefore compared by its
+largest entry in units of the columns' typical sizes; the entries themselves are not scaled, so that a row which is a
 sum stays exact.
 
 Where the last variables form chains, such as the temperatures across a body, the state is [core | chain | chain ...].
-In a chain, numbered from the core outwards, each equation reads its own variable and its two neighbours; the first
-one's inner neighbour is one variable of the core, the anchor. The core reads the first variable of each chain. A chain
-is eliminated from its far end, which leaves a correction of one column of the core, at a cost proportional to its
-length. Nothing is exchanged within a chain: where heat is conducted between capacities its matrix is diagonally
-dominant.
+In a chain, numbered from the core outwards, each equation reads its own variable and its two neighbours; the inner
+neighbour of the first is one variable of the core, the anchor. The core reads the first variable of each chain. A chain
+is eliminated from its far end, which corrects one column of the core, at a cost proportional to its length. Chains are
+not pivoted: where heat is conducted between capacities the matrix is diagonally dominant.
 
-The core of a large mechanism is sparse, as most species do not take part in each other's reactions. From LARGE_MATRIX
-rows on the column with the fewest entries left is eliminated next, by the row with the fewest among those whose pivot
-is not small, after Markowitz (1957) with the threshold of Duff, Erisman & Reid (1986).
+The core of a large mechanism is sparse, since most species take no part in each other's reactions. From LARGE_MATRIX
+rows on, the column with the fewest remaining entries is eliminated next, by the row with the fewest among those whose
+pivot is not small, after Markowitz (1957) with the threshold of Duff, Erisman & Reid (1986).
 
-A chain is a row (first, end, anchor) of a table, the anchor -1 where the chain hangs on nothing; its equations are rows
-(inwards, own, outwards) of the bands; the border holds how the core reads the first variable of each chain.
+A chain is a row (first, end, anchor) of a table, with anchor -1 where the chain has none; its equations are rows
+(inwards, own, outwards) of the bands; the border holds the derivatives of the core by the first variable of each chain.
 """
 
 from typing import Any
@@ -26,29 +25,29 @@ import numpy as np
 from surfacechem.solve.radau.work import compiled
 
 LARGE_MATRIX = 30
-"""Rows from which on columns are exchanged, too, and zeros passed over."""
+"""Number of rows from which on columns are exchanged too, and zeros skipped."""
 
 PIVOT_PART = 0.1
-"""Part of the largest scaled entry of its column that a pivot may be where that keeps the factors sparse."""
+"""Least pivot, relative to the largest scaled entry of its column, that is accepted to keep the factors sparse."""
 
 REPEATED_PIVOT = PIVOT_PART**2
-"""The same of a matrix that is factored in the order of one before it."""
+"""The same for a matrix that is factored in the pivot order of an earlier one."""
 
 
 @compiled
 def size_of(value: Any) -> float:
-    """Size of a real or complex number without a root."""
+    """Return |Re| + |Im| of a number, which needs no square root."""
     return float(abs(value.real) + abs(value.imag))
 
 
 @compiled
 def _scale_rows(a: Any, columns: Any, rows: Any) -> bool:
-    """Scales of the rows in units of the columns' typical sizes; False where a row is of zeros or not finite."""
+    """Compute the scales of the rows, in units of the columns' typical sizes; False if a row is zero or not finite."""
     for i in range(len(rows)):
         largest = 0.0
         for j in range(len(rows)):
             size = size_of(a[i, j]) * columns[j]
-            if size > largest or size != size:  # numbers that are none count, too
+            if size > largest or size != size:  # NaN counts, too
                 largest = size
         if not 0.0 < largest < np.inf:
             return False
@@ -58,8 +57,10 @@ def _scale_rows(a: Any, columns: Any, rows: Any) -> bool:
 
 @compiled
 def _eliminate(a: Any, k: int) -> None:
-    """Take multiples of row k from those below it, and keep them; its pivot becomes the inverse."""
-    # A division less for each right-hand side, of which there are many.
+    """Subtract multiples of row k from the rows below it and store the multipliers; the pivot is replaced by its
+    inverse.
+    """
+    # Saves a division for each of many right-hand sides.
     inverse = 1.0 / a[k, k]
     a[k, k] = inverse
     pivot = a[k, k + 1 :]
@@ -75,7 +76,7 @@ def _eliminate(a: Any, k: int) -> None:
 
 @compiled
 def _count_entries(a: Any, counts: Any) -> None:
-    """Count the entries of each row and column; columns stand where they were."""
+    """Count the entries of each row and column, and reset the column order."""
     n = a.shape[0]
     for i in range(n):
         counts[0, i] = counts[1, i] = 0
@@ -89,8 +90,8 @@ def _count_entries(a: Any, counts: Any) -> None:
 
 @compiled
 def _emptiest(a: Any, k: int, columns: Any, rows: Any, counts: Any, threshold: float) -> tuple[int, int, int]:
-    """Row and column of the next pivot, and the number of entries in it; the row is -1 where no scaled pivot of that
-    column is above the threshold.
+    """Return row and column of the next pivot, and the number of entries in that column; the row is -1 where no scaled
+    pivot of the column exceeds the threshold.
     """
     n, q, best, p, found = a.shape[0], k, 0.0, -1, 0
     for j in range(k + 1, n):
@@ -127,7 +128,7 @@ def _exchange(a: Any, k: int, p: int, q: int, rows: Any, counts: Any) -> None:
 
 @compiled
 def _eliminate_entries(a: Any, k: int, p: int, below: int, counts: Any) -> None:
-    """As _eliminate, entry by entry, and count those that are left; rows k and p have been exchanged."""
+    """Eliminate as _eliminate does, entry by entry, and update the counts; rows k and p have been exchanged."""
     n, found = a.shape[0], 0
     inverse = 1.0 / a[k, k]
     a[k, k] = inverse
@@ -154,8 +155,8 @@ def _eliminate_entries(a: Any, k: int, p: int, below: int, counts: Any) -> None:
 
 @compiled
 def _list_entries(a: Any, order: Any, places: Any, marks: Any) -> None:
-    """List where in each row of the factors there are entries, or would be with other numbers in their places: first
-    those before the diagonal, then those behind.
+    """List the positions of possible nonzeros in each row of the factors: first those left of the diagonal, then those
+    right of it.
     """
     n = a.shape[0]
     for i in range(n):
@@ -176,7 +177,7 @@ def _list_entries(a: Any, order: Any, places: Any, marks: Any) -> None:
 
 @compiled
 def _list_origins(order: Any) -> None:
-    """List where rows and columns of the factors have been, from what they were exchanged with."""
+    """List the original rows and columns of the factors, from the exchanges."""
     n = order.shape[1]
     for k in range(n):
         order[4, k] = order[5, k] = k
@@ -188,7 +189,7 @@ def _list_origins(order: Any) -> None:
 
 @compiled
 def _factor_large(a: Any, order: Any, places: Any, columns: Any, rows: Any, counts: Any, threshold: float) -> bool:
-    order[3, 0] = -1  # until it is whole, no other matrix is to be factored in this order
+    order[3, 0] = -1  # not valid until complete: no other matrix may use this order
     _count_entries(a, counts)
     for k in range(a.shape[0]):
         p, q, below = _emptiest(a, k, columns, rows, counts, threshold)
@@ -204,7 +205,7 @@ def _factor_large(a: Any, order: Any, places: Any, columns: Any, rows: Any, coun
 
 @compiled
 def count_entries_of_rows(derivatives: Any, counts: Any) -> None:
-    """Count what is not zero in each row of G_y and G_ydot together."""
+    """Count the nonzeros of each row of G_y and G_ydot together."""
     for i in range(len(counts)):
         found = 0
         for j in range(len(counts)):
@@ -216,9 +217,9 @@ def count_entries_of_rows(derivatives: Any, counts: Any) -> None:
 def factor_again(
     derivatives: Any, entries: Any, shift: Any, a: Any, order: Any, places: Any, columns: Any, rows: Any
 ) -> bool:
-    """Factor G_y + shift G_ydot in the order in which a large matrix was, row by row and nothing but where its factors
-    have entries; False where this matrix has others, so many of which are in each row, or where a pivot has become
-    small.
+    """Factor G_y + shift G_ydot in the pivot order of an earlier large matrix, touching only the known nonzeros.
+
+    False if the matrix has nonzeros elsewhere, which the counts of its rows tell, or if a pivot has become small.
     """
     for i in range(a.shape[0]):
         row, known, found, largest = a[i], order[3, i], 0, 0.0
@@ -249,12 +250,12 @@ def factor_again(
 
 @compiled
 def factor(a: Any, order: Any, places: Any, columns: Any, rows: Any, counts: Any, threshold: float) -> bool:
-    """Replace a by its factors, the inverse pivots on the diagonal; False if a scaled pivot is not above the
+    """Replace a by its LU factors with the inverse pivots on the diagonal; False if a scaled pivot does not exceed the
     threshold.
 
-    The order is what rows were exchanged with, and columns, and how many entries of a row come before its diagonal, and
-    in all, and where rows and columns have been; the places are where the entries are. Five rows of counts are room to
-    work in.
+    The rows of ``order`` hold: row exchanges, column exchanges, the number of entries of each row left of its diagonal,
+    and in all, and the original rows and columns; ``places`` holds the columns of the entries. ``counts`` is work space
+    of five rows.
     """
     n = a.shape[0]
     if not _scale_rows(a, columns, rows[:n]):
@@ -302,12 +303,12 @@ def _solve_large(a: Any, order: Any, places: Any, x: Any) -> None:
 
 @compiled
 def solve(a: Any, order: Any, places: Any, x: Any) -> None:
-    """Overwrite the right-hand side by the solution; entries of x beyond the matrix are left alone."""
+    """Overwrite a right-hand side by the solution; entries of x beyond the matrix are not touched."""
     n = a.shape[0]
     if n >= LARGE_MATRIX:
         _solve_large(a, order, places, x)
         return
-    # Sums in a local name: in x each term would wait until the one before it is stored.
+    # Sums in a local variable: in x each term would wait for the store of the one before.
     for k in range(n):
         p = order[0, k]
         total = x[p]
@@ -324,9 +325,9 @@ def solve(a: Any, order: Any, places: Any, x: Any) -> None:
 
 @compiled
 def fold_chains(core: Any, border: Any, bands: Any, chains: Any) -> bool:
-    """Eliminate the chains from the core, which is not yet factored; False where a pivot vanishes.
+    """Eliminate the chains from the core, which is not factored yet; False if a pivot vanishes.
 
-    It leaves inverse pivots in the bands, and beside them the factors of the right-hand side.
+    It leaves the inverse pivots in the bands, and next to them the factors for right-hand sides.
     """
     n = core.shape[0]
     for c in range(chains.shape[0]):
@@ -347,7 +348,7 @@ def fold_chains(core: Any, border: Any, bands: Any, chains: Any) -> bool:
 
 @compiled
 def shifted(derivatives: Any, shift: Any, matrix: Any) -> None:
-    """G_y + shift G_ydot."""
+    """Form G_y + shift G_ydot."""
     stiffness, mass = derivatives[0], derivatives[1]
     for i in range(matrix.shape[0]):
         for j in range(matrix.shape[1]):
@@ -364,9 +365,9 @@ def fold_shifted(w: Any, shift: Any, core: Any, border: Any, bands: Any) -> bool
 
 @compiled
 def _solve_chained(chains: Any, core: Any, border: Any, bands: Any, order: Any, places: Any, x: Any) -> None:
-    """Overwrite the right-hand side by the solution with a matrix whose chains are folded into its core."""
+    """Overwrite a right-hand side by the solution of a system whose chains are eliminated from its core."""
     n = core.shape[0]
-    # The right-hand side of the core with the chains eliminated, from their far ends.
+    # Eliminate the chains from the right-hand side, from their far ends.
     for c in range(chains.shape[0]):
         first = chains[c, 0]
         for i in range(chains[c, 1] - 2, first - 1, -1):
@@ -374,7 +375,7 @@ def _solve_chained(chains: Any, core: Any, border: Any, bands: Any, order: Any, 
         for i in range(n):
             x[i] -= border[i, c] * x[first]
     solve(core, order, places, x)
-    # The solution along the chains, from that of the core outwards.
+    # Back-substitute along the chains, from the core outwards.
     for c in range(chains.shape[0]):
         first, anchor = chains[c, 0], chains[c, 2]
         if anchor >= 0:
@@ -386,7 +387,7 @@ def _solve_chained(chains: Any, core: Any, border: Any, bands: Any, order: Any, 
 
 @compiled
 def solve_real(w: Any, x: Any) -> None:
-    """Overwrite the right-hand side by the solution with the real matrix."""
+    """Overwrite a right-hand side by the solution of the real Newton system."""
     if w.links > 0:
         _solve_chained(w.chains, w.real, w.real_border, w.real_bands, w.order[0], w.places[0], x)
     else:
@@ -395,10 +396,10 @@ def solve_real(w: Any, x: Any) -> None:
 
 @compiled
 def bound_real(w: Any, x: Any) -> None:
-    """Overwrite sizes of entries of right-hand sides by bounds of what the real matrix, a large one, makes of them.
+    """Overwrite bounds of a right-hand side by bounds of the solution of the real Newton system, a large one.
 
     Source: Higham (2002), Accuracy and Stability of Numerical Algorithms, section 8.3: with the comparison matrices of
-    the factors, which have the sizes of their entries, nothing cancels.
+    the factors, whose entries are the absolute values, nothing cancels.
     """
     a, order, places = w.real, w.order[0], w.places[0]
     n = a.shape[0]
@@ -420,7 +421,7 @@ def bound_real(w: Any, x: Any) -> None:
 
 @compiled
 def solve_complex(w: Any, pair: int, x: Any) -> None:
-    """Overwrite the right-hand side by the solution with the complex matrix of a pair of eigenvalues."""
+    """Overwrite a right-hand side by the solution of the complex Newton system of one pair of eigenvalues."""
     if w.links > 0:
         border, bands = w.complex_border[pair], w.complex_bands[pair]
         _solve_chained(w.chains, w.complex[pair], border, bands, w.order[1 + pair], w.places[1 + pair], x)

@@ -1,8 +1,7 @@
-"""The nonlinear system of one Radau IIA step, solved for the stage increments Z_i = Y_i - y_n by a simplified Newton
-method.
+"""Simplified Newton iteration for the stage increments Z_i = Y_i - y_n of one Radau IIA step.
 
-Each stage asks G(t_i, y_n + Z_i, (1/h) sum_j (A^-1)_ij Z_j) = 0. In the eigenbasis of A^-1 the Newton matrix falls
-apart into one real and (s-1)/2 complex matrices (lambda/h) G_ydot + G_y of the size of the state.
+Each stage requires G(t_i, y_n + Z_i, (1/h) sum_j (A^-1)_ij Z_j) = 0. In the eigenbasis of A^-1 the Newton matrix splits
+into one real and (s-1)/2 complex matrices (lambda/h) G_ydot + G_y of the size of the state.
 """
 
 from typing import Any
@@ -48,35 +47,34 @@ from surfacechem.tolerances import EPS, NEGLIGIBLE, TINY
 CONVERGED, DIVERGED, NOT_FINITE = range(3)
 
 NEWTON_PART = NEGLIGIBLE
-"""Newton error allowed, in units of the tolerance. The order of the method makes steps better than the tolerance, so
-that a looser limit would set the error; and a Jacobian taken where the equations are far stiffer than at the solution
-makes the corrections small before the residual is.
+"""Newton error allowed, in units of the tolerance. The order of the method makes steps more accurate than the
+tolerance, so a looser limit would dominate the error; and a Jacobian taken where the equations are far stiffer than at
+the solution makes the corrections small before the residual is.
 """
 
 FORESEEN_GROWTH = 1.5
-"""The longest step, in units of the one before, whose middle is foreseen well enough to differentiate there."""
+"""Largest ratio of a step to the one before for which the predictor is good enough to differentiate in mid-step."""
 
 PREDICTOR_REACH = 30.0
-"""The longest step, in units of the one before, that its polynomial is continued to."""
+"""Largest ratio of a step to the one before up to which its polynomial is extrapolated."""
 
 STIFFER = 3.0
-"""Largest ratio of the foreseen derivatives to those at the start of the step."""
+"""Largest accepted ratio of the derivatives at the predicted state to those at the start of the step."""
 
 SLOWEST_KNOWN = 0.02
-"""Contraction never assumed better than this: a component that converges at once hides a slower one behind its first
-correction."""
+"""Least contraction assumed: a component that converges at once hides a slower one behind its first correction."""
 
 
 @compiled
 def stage_count(k: int) -> int:
-    """Stages of member k of the family."""
+    """Number of stages of member k of the family."""
     return 2 * k + 3
 
 
 @compiled
 def divide(k: int, values: Any, m: int, row: Any) -> None:
-    """Newton's form x (row[0] + (x - c_1) (row[1] + ...)) of the polynomial through 0 and column m of these values at
-    the stages.
+    """Newton's form x (row[0] + (x - c_1) (row[1] + ...)) of the polynomial through 0 and the stage values in
+    column m.
     """
     s = stage_count(k)
     for i in range(s):
@@ -88,7 +86,7 @@ def divide(k: int, values: Any, m: int, row: Any) -> None:
 
 @compiled
 def nested(k: int, top: int, x: float, row: Any) -> float:
-    """Value at x of a polynomial in Newton's form whose last coefficient is row[top]."""
+    """Evaluate a polynomial in Newton's form at x; row[top] is its last coefficient."""
     value = row[top]
     for i in range(top - 1, -1, -1):
         value = value * (x - NEWTON_NODES[k, i]) + row[i]
@@ -97,7 +95,7 @@ def nested(k: int, top: int, x: float, row: Any) -> float:
 
 @compiled
 def nested_four(k: int, top: int, x: Any, row: Any) -> tuple[float, float, float, float]:
-    """Values of a polynomial at four points at once, of which none waits for another."""
+    """Evaluate a polynomial at four points at once, in four independent chains of operations."""
     a = b = c = d = row[top]
     for i in range(top - 1, -1, -1):
         node, factor = NEWTON_NODES[k, i], row[i]
@@ -119,8 +117,8 @@ def _differentiate_at_start(w: Any) -> None:
 
 @compiled
 def _row_sizes(w: Any, sizes: Any) -> None:
-    """Size of the equations of the core by their derivatives and the typical sizes of the states; NaN where they or
-    those by the rates are not finite.
+    """Sizes of the core equations, from their derivatives times the typical sizes of the states; NaN where a derivative
+    is not finite.
     """
     for i in range(w.core):
         total = 0.0
@@ -131,8 +129,8 @@ def _row_sizes(w: Any, sizes: Any) -> None:
 
 @compiled
 def differentiate_system(w: Any, h: float, foresee: bool) -> bool:
-    """Evaluate G_y and G_ydot midway through the step where the first guess of its stages foresees that, else at its
-    start.
+    """Evaluate G_y and G_ydot in mid-step if the predictor is good enough there, otherwise at the start; True if
+    finite.
     """
     _differentiate_at_start(w)
     if foresee and w.offset == 1.0 and 0.0 < h <= FORESEEN_GROWTH * w.h_last:
@@ -144,10 +142,10 @@ def differentiate_system(w: Any, h: float, foresee: bool) -> bool:
         _row_sizes(w, sizes)
         stiffer = False
         for i in range(w.core):
-            # Not >: what is not finite is stiffer, too.
+            # Not >: a value that is not finite must count as stiffer.
             stiffer = stiffer or not sizes[i] <= STIFFER * known[i]
         if stiffer:
-            # A step through states that are foreseen wrongly must not pass for one that has converged.
+            # A step from a wrong prediction must not count as converged.
             _differentiate_at_start(w)
     for part in range(2):
         for i in range(w.core):
@@ -155,13 +153,13 @@ def differentiate_system(w: Any, h: float, foresee: bool) -> bool:
                 return False
     if w.core >= LARGE_MATRIX:
         count_entries_of_rows(w.jacobian, w.entries[5])
-    # Chains that are not finite show in their pivots.
+    # Chains that are not finite are found by their pivots.
     return True
 
 
 @compiled
 def _factor_shifted(w: Any, m: int, shift: Any, matrix: Any, border: Any, bands: Any) -> bool:
-    """Factor matrix m, the core of G_y + shift G_ydot, with the chains folded into it."""
+    """Factor matrix m, the core of G_y + shift G_ydot, with the chains eliminated."""
     order, places = w.order[m], w.places[m]
     chained = w.links > 0
     if w.core >= LARGE_MATRIX and not chained:
@@ -169,7 +167,7 @@ def _factor_shifted(w: Any, m: int, shift: Any, matrix: Any, border: Any, bands:
         if order[3, 0] >= 0 and factor_again(w.jacobian, entries, shift, matrix, order, places, w.pivot, w.delta):
             return True
         if m > 0:
-            # The real matrix, which is factored by now, has its entries in the same places.
+            # The real matrix is factored already and has the same pattern.
             for k in range(len(order)):
                 copy(w.order[0, k], order[k])
             for k in range(w.core):
@@ -198,7 +196,9 @@ def factor_newton(w: Any, h: float) -> bool:
 
 @compiled
 def predict(w: Any, h: float) -> None:
-    """First guess of the stages from the stored polynomial; no change where there is none, or none that reaches."""
+    """Predict the stages from the stored polynomial; zero increments where there is none or the step is too long for
+    it.
+    """
     k, last = w.member, w.last_member
     s, top, z = stage_count(k), stage_count(last), w.z
     if not h <= PREDICTOR_REACH * w.h_last:
@@ -216,9 +216,9 @@ def predict(w: Any, h: float) -> None:
 
 @compiled
 def _put_stage(w: Any, i: int, h: float, rate: float) -> None:
-    """Inputs of stage i from its slope."""
+    """Set the inputs to stage i, from its slope."""
     n = w.n
-    # Local names spare the loops a look at the record after each store.
+    # Local names save the loops a reload from the record after each store.
     inputs, z, y, slopes = w.inputs, w.z[i], w.y, w.slopes[i]
     inputs[0] = w.base + (w.tau + NODES[w.member, i] * h)
     for m in range(n):
@@ -228,7 +228,7 @@ def _put_stage(w: Any, i: int, h: float, rate: float) -> None:
 
 @compiled
 def set_stage(w: Any, i: int, h: float) -> None:
-    """Inputs of stage i."""
+    """Set the inputs to stage i."""
     k = w.member
     if w.explicit != 0:
         w.inputs[0] = w.base + (w.tau + NODES[k, i] * h)
@@ -244,7 +244,7 @@ def set_stage(w: Any, i: int, h: float) -> None:
 
 @compiled
 def end_of_step(w: Any, h: float, y: Any, ydot: Any, q: Any) -> None:
-    """State, derivative and ledger at the end of the step, into these vectors."""
+    """Write state, derivative and ledger at the end of the step into these vectors."""
     n, last = w.n, stage_count(w.member) - 1
     set_stage(w, last, h)
     for m in range(n):
@@ -256,12 +256,12 @@ def end_of_step(w: Any, h: float, y: Any, ydot: Any, q: Any) -> None:
 
 @compiled
 def _correct(w: Any) -> float:
-    """One Newton correction of all stages, kept in g; returns its weighted maximum norm."""
+    """Compute one Newton correction of all stages, kept in g; return its weighted maximum norm."""
     k, n = w.member, w.n
     s = stage_count(k)
-    # Local names spare the loops a look at the record after each store.
+    # Local names save the loops a reload from the record after each store.
     parts, pairs, g, z, weight = w.parts, w.pairs, w.g, w.z, w.weight
-    # In the eigenbasis of the inverse collocation matrix the stages come apart (Butcher 1976; Bickart 1977).
+    # The stages decouple in the eigenbasis of the inverse collocation matrix (Butcher 1976; Bickart 1977).
     combine(TO_PARTS[k].ctypes.data, 7, s, s, g.ctypes.data, n, parts.ctypes.data)
     solve_real(w, parts[0])
     for pair in range(k + 1):
@@ -288,13 +288,13 @@ def _correct(w: Any) -> float:
 
 @compiled
 def solve_stages(w: Any, h: float) -> int:
-    """Iterate to the tolerance, or to rounding level where that is coarser; leaves the rate of contraction.
+    """Iterate to the tolerance, or to roundoff where that is larger; store the rate of contraction.
 
-    Source: Hairer & Wanner II, IV.8: the rate of the last steps tells how much is left to correct, and whether the
-    iterations allowed will be enough.
+    Source: Hairer & Wanner II, IV.8: the observed contraction estimates the remaining correction, and whether the
+    allowed iterations will suffice.
     """
     limit = 7 + 2 * w.member
-    # The power takes back some of the trust in a rate that was found on another step.
+    # The power reduces the confidence in a rate that was found on another step.
     contraction = max(w.contraction, EPS) ** 0.8
     k, s, rate_of_time = w.member, stage_count(w.member), 1.0 / h
     norm_last, rate_last = 0.0, 0.0
@@ -320,12 +320,12 @@ def solve_stages(w: Any, h: float) -> int:
                 break
             w.theta = rate
             contraction = max(rate / (1.0 - rate), SLOWEST_KNOWN)
-        # At loose tolerances one correction alone may hide a layer that its Jacobian has not seen.
+        # At loose tolerances a single correction may hide a layer that the Jacobian does not resolve.
         believed = iteration > 0 or w.rtol < COARSE_RTOL
         if (believed and contraction * norm <= NEWTON_PART) or norm <= 8.0 * w.roundoff:
             w.contraction = contraction
             return CONVERGED
         norm_last = max(norm, TINY)
-    # What does not converge any more may be rounding: then its contraction tells nothing.
+    # A stalled iteration may be at roundoff level, where the contraction means nothing.
     w.guessed = 0.0
     return CONVERGED if correction_is_noise(w, s) else DIVERGED

@@ -1,7 +1,7 @@
-"""Effect of rounding errors of the residual on the solution of one step.
+"""Roundoff of the residual and its effect on the solution of one step.
 
-Where large terms of an equation cancel, the residual is known only to the rounding of those terms, and no correction
-or error estimate can be smaller than its image under the inverse Newton matrix. The floor is found when a step is
+Where large terms of an equation cancel, the residual is known only to the roundoff of those terms, and no correction or
+error estimate can be smaller than its image under the inverse Newton matrix. This floor is computed only when a step is
 about to fail, so smooth runs do not pay for it.
 """
 
@@ -18,18 +18,19 @@ FIFTH_DIFFERENCE = np.array([1.0, -5.0, 10.0, -10.0, 5.0, -1.0]) / np.sqrt(252.0
 """Coefficients of a fifth difference, scaled so that it has the size of independent errors of the values."""
 
 WINDOWS, TIME_SPACING = 3, NEGLIGIBLE
-"""Differences that are taken, and how far apart their times are as parts of a step."""
+"""Number of differences, and the spacing of their times as a part of the step."""
 
 MAGNIFIED = 10.0
-"""Noise of the estimate, which extrapolates the noise of every stage, in units of that of one residual."""
+"""Noise of the error estimate, which extrapolates the noise of every stage, in units of the noise of one residual."""
 
 SINGULAR_NOISE = NEGLIGIBLE**2
-"""Noise above this part of a variable, and of what it typically is, would mean a singular matrix, not rounding."""
+"""Noise above this part of a variable and of its typical size would mean a singular matrix, not roundoff."""
 
 
 @compiled
 def _measure_wobble(w: Any, y: Any, ydot: Any) -> None:
-    """Fifth differences of the equations over neighbouring times: smooth ones have none, rounding of their loads does.
+    """Take fifth differences of the equations over neighbouring times: zero for smooth equations, but not for roundoff
+    of their loads.
 
     Source: Hamming (1973), Numerical Methods for Scientists and Engineers, noise by differences.
     """
@@ -53,7 +54,7 @@ def _measure_wobble(w: Any, y: Any, ydot: Any) -> None:
 
 @compiled
 def _rounding_of(w: Any, i: int, y: Any, ydot: Any) -> float:
-    """Rounding errors of an equation of the core."""
+    """Roundoff of one equation of the core."""
     total = 0.0
     for j in range(w.core):
         total += abs(w.jacobian[0, i, j] * y[j]) + abs(w.jacobian[1, i, j] * ydot[j])
@@ -67,7 +68,7 @@ def _rounding_of(w: Any, i: int, y: Any, ydot: Any) -> float:
 
 @compiled
 def spread_noise(w: Any, y: Any, ydot: Any) -> None:
-    """Change of each variable that rounding errors of the residuals at a state can cause, into the noise.
+    """Compute the change of each variable that roundoff of the residuals at a state can cause, into ``noise``.
 
     The terms of an equation are as large as its derivatives times their variables.
     """
@@ -80,7 +81,7 @@ def spread_noise(w: Any, y: Any, ydot: Any) -> None:
         if i < core:
             column[i] = _rounding_of(w, i, y, ydot)
         else:
-            # Heat that enters a chain anywhere raises its temperatures everywhere: nothing cancels in one sum.
+            # Heat entering a chain anywhere raises all its temperatures: nothing cancels in a single sum.
             _chain_noise(w, y, ydot, column)
         solve_real(w, column)
         for j in range(n):
@@ -89,7 +90,7 @@ def spread_noise(w: Any, y: Any, ydot: Any) -> None:
 
 @compiled
 def _chain_noise(w: Any, y: Any, ydot: Any, column: Any) -> None:
-    """Rounding errors of the equations of all chains, into their places in the column."""
+    """Write the roundoff of the equations of all chains into their entries of the column."""
     for c in range(w.links):
         first, end, anchor = w.chains[c, 0], w.chains[c, 1], w.chains[c, 2]
         for i in range(first, end):
@@ -104,8 +105,9 @@ def _chain_noise(w: Any, y: Any, ydot: Any, column: Any) -> None:
 
 @compiled
 def _bounds_serve(w: Any) -> bool:
-    """Put bounds of the noise at the start of a step in its place, from one solution instead of one for each variable;
-    whether what they make of the estimate is negligible beside the tolerance.
+    """Write bounds of the noise at the start of a step, from one solve instead of one for each variable.
+
+    True if their effect on the error estimate is negligible compared with the tolerance.
     """
     _measure_wobble(w, w.y, w.ydot)
     for i in range(w.n):
@@ -120,8 +122,8 @@ def _bounds_serve(w: Any) -> bool:
 
 @compiled
 def find_noise(w: Any) -> None:
-    """Largest change of each variable at the start of the step that rounding errors can cause, into the noise."""
-    if w.explicit != 0:  # nothing is divided by what may be small
+    """Compute the largest change of each variable at the start of the step that roundoff can cause, into ``noise``."""
+    if w.explicit != 0:  # no division by a small number
         for j in range(w.n):
             w.noise[j] = ULPS * abs(w.y[j])
         return
@@ -139,9 +141,9 @@ def _most_noise(w: Any, j: int) -> float:
 
 @compiled
 def correction_is_noise(w: Any, stages: int) -> bool:
-    """Whether Newton's last correction, kept in g, is no larger than the noise, magnified by the method."""
+    """True if Newton's last correction, kept in g, is no larger than the noise, magnified by the method."""
     magnified = 2.0 * GAMMA[w.member]
-    # As a rule it is larger than noise can be, whose search takes as many solutions as there are variables.
+    # Usually it exceeds any possible noise, and finding the noise takes a solve for each variable.
     for i in range(stages):
         for j in range(w.n):
             if w.explicit == 0 and not abs(w.g[i, j]) <= magnified * _most_noise(w, j):

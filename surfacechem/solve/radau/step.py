@@ -1,15 +1,15 @@
-"""One accepted step of the Radau IIA family: its error estimate, the choice of its size and order, the trials until one
-passes, the look between its stages, and the bookkeeping of accepting it.
+"""One accepted step: error estimate, choice of size and order, trials until one passes, and checks against the
+equations between the stages.
 
-The estimate compares the derivative of the collocation polynomial at the start of the step with the true one,
-filtered through the real Newton matrix (Hairer & Wanner II, IV.8). It has order s while the method has order 2s - 1,
-hence the loosened tolerance.
+The estimate compares the derivative of the collocation polynomial at the start of the step with the true one, filtered
+through the real Newton matrix (Hairer & Wanner II, IV.8). It has order s while the method has order 2s - 1, hence the
+loosened tolerance.
 
-A step knows the equations at its stages alone, and so does the estimate of its error: what is over between two of them
-is seen by neither. A step that is longer than the spacing asked for is held against the equations and the ledger at
-further points, so far apart at most. What is narrow lies beside a place where a formula changes, hence at the end of a
-segment: the first and the last step of one are looked at the more closely, the nearer it is. Where the equations have
-nothing in common with its polynomial, a step is too long.
+A step evaluates the equations only at its stages, and so does its error estimate: neither sees a narrow feature between
+two of them. Steps longer than a given spacing are therefore checked: equations and ledger are evaluated at further
+points, at most that far apart. Narrow features lie where a formula changes, hence at the ends of a load segment: its
+first and its last step are checked at points ever closer to these ends. A step whose polynomial disagrees with the
+equations is too long.
 """
 
 from typing import Any
@@ -50,15 +50,15 @@ SAFETY = 0.9
 MAX_GROWTH = 8.0
 MIN_GROWTH = 0.1
 CONTRACTING = 0.05
-"""Contraction of Newton's method aimed at: where it limits the step, a failure costs more than a smaller step."""
+"""Newton contraction aimed at: where it limits the step, a failure costs more than a smaller step."""
 LEAST_CONVERGENT = 0.5
 NOISY = 0.05
-"""Error assumed where the estimate is noise, so that the step grows slowly."""
+"""Error assumed where the estimate is roundoff, so that the step grows slowly."""
 
 
 @compiled
 def set_weights(w: Any) -> None:
-    """Weights of the error norm, the typical sizes for pivoting, and the size of rounding errors in that norm."""
+    """Set the weights of the error norm, the typical sizes for pivoting, and the size of roundoff in that norm."""
     rounding = 0.0
     for j in range(w.n):
         size = abs(w.y[j])
@@ -71,20 +71,20 @@ def set_weights(w: Any) -> None:
 
 @compiled
 def preferred_member(rtol: float) -> int:
-    """Low order for loose tolerances, high order for tight ones."""
+    """Member of the family for a tolerance: low order for loose ones, high order for tight ones."""
     return 0 if rtol > MEMBER_RTOLS[0] else 1 if rtol > MEMBER_RTOLS[1] else 2
 
 
 @compiled
 def loosening(rtol: float) -> float:
     """Factor by which the low-order error estimate may exceed the tolerance."""
-    # The estimate has about half the order of the method: beside the true error it is the larger the tighter the run.
+    # The estimate has about half the order of the method: it exceeds the true error by more the tighter the tolerance.
     return float(min(max(rtol, NEWTON_EPS), 0.1) ** -0.25)
 
 
 @compiled
 def filter_residual(w: Any) -> bool:
-    """Residual at the inputs through the real Newton matrix, an error of the state, into the error; whether it is
+    """Filter the residual at the inputs through the real Newton matrix into ``error``, an error of the state; True if
     finite.
     """
     # Unfiltered, the defect of a stiff component would be as large as its rate (Hairer & Wanner II, IV.8).
@@ -101,16 +101,14 @@ def filter_residual(w: Any) -> bool:
 
 @compiled
 def defect_inside(w: Any, h: float, x: float) -> bool:
-    """By how much the polynomial misses the equations at a fraction of the step, into the error; whether it is
-    finite.
-    """
+    """Store the defect of the polynomial at a fraction of the step in ``error``; True if finite."""
     put_inside(w, h, x)
     return bool(filter_residual(w))
 
 
 @compiled
 def error_norm(w: Any, floor: float) -> float:
-    """Norm of the part of the error above so many times the noise."""
+    """Norm of the error, of which ``floor`` times the noise is not counted."""
     norm = 0.0
     last = stage_count(w.member) - 1
     for j in range(w.n):
@@ -122,9 +120,7 @@ def error_norm(w: Any, floor: float) -> float:
 
 @compiled
 def _defect_at_start(w: Any, h: float, y: Any) -> bool:
-    """By how much the slope of the polynomial at the start of the step misses the equations at a state, into the error;
-    whether it is finite.
-    """
+    """Store the defect of the polynomial's slope at the start of the step in ``error``; True if finite."""
     k = w.member
     for m in range(w.n):
         slope = 0.0
@@ -143,17 +139,17 @@ def estimate_error(w: Any, h: float) -> float:
     norm = error_norm(w, 0.0)
     if norm < NOISY:
         return norm
-    # Only an estimate that counts is worth the search for its noise, which costs eight evaluations.
+    # The noise costs eight evaluations: it is found only where the estimate may reject the step.
     find_noise(w)
     return float(max(error_norm(w, MAGNIFIED), NOISY))
 
 
 @compiled
 def estimate_again(w: Any, h: float) -> float:
-    """The estimate filtered a second time, where a stiff transient made the first one too large."""
+    """Filter the estimate a second time, where a stiff transient made the first one too large."""
     for m in range(w.n):
         w.trial[m] = w.y[m] + w.error[m]
-    # With the slope formed anew: the search for noise has left another among the inputs.
+    # The slope is formed again, since find_noise has overwritten the inputs.
     if not _defect_at_start(w, h, w.trial):
         return np.inf
     return float(max(error_norm(w, MAGNIFIED), NOISY))
@@ -161,10 +157,10 @@ def estimate_again(w: Any, h: float) -> float:
 
 @compiled
 def next_size(w: Any, h: float, norm: float, h_last: float, norm_last: float) -> float:
-    """Gustafsson's predictive controller; h_last = 0 where there is no accepted step before.
+    """Propose a step size by Gustafsson's predictive controller; h_last = 0 where there is no accepted step before.
 
     Source: Gustafsson (1994), Control-theoretic techniques for stepsize selection in implicit Runge-Kutta methods, ACM
-    Trans. Math. Softw. 20; the safety of many iterations from Hairer & Wanner II, IV.8.
+    Trans. Math. Softw. 20; the safety factor for many iterations from Hairer & Wanner II, IV.8.
     """
     k = w.member
     limit = 7 + 2 * k
@@ -179,8 +175,9 @@ def next_size(w: Any, h: float, norm: float, h_last: float, norm_last: float) ->
 
 @compiled
 def convergent_size(w: Any, h: float) -> float:
-    """Step size at which Newton's method will contract as it should, if its contraction is like the square of the
-    step size; any where the first guess was good or rounding ended the iteration: then the contraction tells nothing.
+    """Step size at which Newton's method should contract well, if its contraction goes with the square of the step.
+
+    Infinite where the predictor was good or roundoff ended the iteration, as the contraction then means nothing.
     """
     theta = w.theta if w.guessed > 1.0 else 0.0
     return h * max(LEAST_CONVERGENT, np.sqrt(CONTRACTING / theta)) if theta > 0.0 else np.inf
@@ -188,7 +185,7 @@ def convergent_size(w: Any, h: float) -> float:
 
 @compiled
 def choose_member(w: Any, slowest: float) -> bool:
-    """Lower order where Newton contracts slower than this, back up after a few easy steps; True if the member
+    """Lower the order where Newton contracts slower than ``slowest``, raise it after a few easy steps; True if it
     changed.
 
     Source: Hairer & Wanner (1999), J. Comput. Appl. Math. 111: high order pays while the iteration is easy.
@@ -210,11 +207,11 @@ def choose_member(w: Any, slowest: float) -> bool:
 
 @compiled
 def growing_size(w: Any) -> float:
-    """Step in which what is still below the tolerance, where no error counts, grows no more than e-fold by its own
-    derivative alone.
+    """Step size in which a state below its tolerance, where no error counts, grows at most e-fold by its own
+    derivative.
 
-    The method would damp what grows much faster, and never leave an equilibrium that is unstable. What is nothing and
-    is driven by nothing does not grow.
+    The method damps a state that grows much faster, and would never leave an unstable equilibrium. A state that is
+    exactly zero with zero rate does not grow.
     """
     if w.fresh == INVALID:
         return np.inf
@@ -238,7 +235,7 @@ def _rate_norm(w: Any, rate: Any) -> float:
 
 @compiled
 def first_size(w: Any, span: float) -> float:
-    """Step over which the change of the rate, felt by a small trial step, stays within the tolerance.
+    """First step size: the change of the rate over a small trial step keeps within the tolerance.
 
     Source: Hairer, Norsett & Wanner, Solving Ordinary Differential Equations I, section II.4.
     """
@@ -265,24 +262,24 @@ def first_size(w: Any, span: float) -> float:
     change = _rate_norm(w, w.trial_dot) / speed
     if not change * span > SQRT_EPS * trial:
         return 0.05 * span
-    # Ratios first: a rate of 1e200 over 1e-200 s would overflow.
+    # Divide first: a rate of 1e200 over 1e-200 s would overflow.
     time_scale = trial / change
     exponent = 1.0 / (stage_count(w.member) + 1.0)
     return min(time_scale * min(1.0, (speed * time_scale) ** -exponent), 0.05 * span)
 
 
 INVALID, OLD, CURRENT = range(3)
-"""States of the Jacobian in the workspace: taken nowhere, at an earlier state, or at the current one."""
+"""States of the stored Jacobian: not valid, taken at an earlier state, or taken at the current one."""
 
 SLOW, SLOW_REJECTED = 0.8, 0.3
-"""Contraction of Newton's method at which a lower order serves better, after an accepted and a rejected step."""
+"""Newton contraction from which on a lower order is better, after an accepted and after a rejected step."""
 
 SINGULAR_TRIALS = 12
-"""Sizes that are tried where matrices are singular: the last is 0.37^12 = 7e-6 of the first."""
+"""Step sizes tried where matrices are singular: the last is 0.37^12 = 7e-6 of the first."""
 
 JACOBIAN_GROWTH = 10.0
-"""Growth of the step after which a Jacobian is taken anew: where the equations were far stiffer when it was taken, its
-corrections are small whatever is left to correct.
+"""Growth of the step after which the Jacobian is renewed: one from where the equations were far stiffer makes
+corrections small however large the remaining error is.
 """
 
 GOOD = -1
@@ -296,7 +293,7 @@ STOPPED = int(Status.STOPPED)
 
 @compiled
 def start_explicitly(w: Any) -> bool:
-    """Whether steps are explicit from here on, with the rates of the state if they are."""
+    """Start with explicit steps if allowed and the rates are finite; True if steps are explicit from here on."""
     if w.explicit != 0:
         set_inputs(w, w.y, w.ydot)
         put_rates(w, w.trial_dot)
@@ -310,7 +307,7 @@ def start_explicitly(w: Any) -> bool:
 
 @compiled
 def _go_implicit(w: Any) -> None:
-    """Steps are implicit from here on."""
+    """Switch to implicit steps."""
     w.explicit = 0
     w.h_last = w.h_factored = w.theta = w.guessed = 0.0
     w.contraction = 1.0
@@ -321,7 +318,7 @@ def _go_implicit(w: Any) -> None:
 
 @compiled
 def restart(w: Any) -> int:
-    """Make the state consistent and forget the past; time starts from zero."""
+    """Make the state consistent and reset the history of steps; time is counted from here."""
     w.base += w.tau
     w.tau = w.h_last = w.h_factored = 0.0
     w.contraction = 1.0
@@ -338,7 +335,7 @@ def restart(w: Any) -> int:
             return NO_CONSISTENT if outcome == NO_STATE else SINGULAR if outcome == SINGULAR_STATE else NONFINITE
         copy(w.trial, w.y)
         copy(w.trial_dot, w.ydot)
-    # The rates at the start of the first step; later ones begin with those at the end of the step before.
+    # Rates at the start of the first step; later steps reuse those at the end of the step before.
     if w.n_ledger > 0:
         set_inputs(w, w.y, w.ydot)
         evaluate(w, LEDGER, w.rates[7])
@@ -348,7 +345,7 @@ def restart(w: Any) -> int:
 
 @compiled
 def _prepare(w: Any, h: float, foresee: bool) -> int:
-    """Newton matrices for this step size, kept where they still serve."""
+    """Provide the Newton matrices for this step size, reusing valid ones."""
     if w.h_factored == h:
         return GOOD
     outgrown = w.theta >= NEGLIGIBLE or h > JACOBIAN_GROWTH * w.h_jacobian
@@ -357,7 +354,7 @@ def _prepare(w: Any, h: float, foresee: bool) -> int:
             return NONFINITE
         w.fresh = CURRENT
         w.h_jacobian = h
-    # Factors that fail half-way are none.
+    # Invalid until the factorization succeeds.
     w.h_factored = 0.0
     copy(w.scale, w.pivot)
     if not factor_newton(w, h):
@@ -368,16 +365,16 @@ def _prepare(w: Any, h: float, foresee: bool) -> int:
 
 @compiled
 def too_small(w: Any, h: float) -> bool:
-    """Whether the step no longer moves time."""
+    """True if the step no longer advances time."""
     return not (h > TINY and h > ULPS * w.tau)
 
 
 @compiled
 def _may_try(w: Any, h: float, i: int) -> int:
-    """GOOD, or why run i tries no step of this size."""
+    """Return GOOD, or the reason why run i tries no step of this size."""
     if too_small(w, h):
         return STEP_UNDERFLOW
-    # Steps that are rejected have no part in it, so that a run may be made again with the steps that it took.
+    # Rejected steps are not counted, so that a run can be repeated with the number of steps that it took.
     if max(w.steps, w.rejected - w.rejected_before) >= w.max_steps[row_of(w.max_steps, i)]:
         return MAX_STEPS
     return STOPPED if w.counts[i, STOP] != 0 else GOOD
@@ -405,8 +402,8 @@ def advance_explicitly(w: Any, h: float, i: int, h_last: float, norm_last: float
 
 @compiled
 def advance_implicitly(w: Any, h: float, i: int, size_last: float, norm_last: float) -> tuple[int, float, float, float]:
-    """Shrink h until a step passes; returns outcome, the step taken, its error norm and the next step size."""
-    # The first step after a start, and every one that has been rejected, may be in a transient.
+    """Shrink h until a step passes; return the outcome, the step taken, its error norm and the next step size."""
+    # The first step after a start, and every repeated one, may be in a transient.
     repeated = w.h_last == 0.0
     singular, failed = 0, False
     while True:
@@ -415,7 +412,7 @@ def advance_implicitly(w: Any, h: float, i: int, size_last: float, norm_last: fl
             predict(w, h)
             outcome = _prepare(w, h, not failed)
         if outcome == SINGULAR and singular < SINGULAR_TRIALS:
-            # A matrix may be singular by accident of the step size.
+            # A matrix may be singular for a particular step size.
             singular += 1
             w.fresh = INVALID
             failed = True
@@ -441,7 +438,7 @@ def advance_implicitly(w: Any, h: float, i: int, size_last: float, norm_last: fl
             aged = w.fresh == OLD
             w.fresh = INVALID
             if aged:
-                continue  # with the Jacobian of here, before the step is made shorter
+                continue  # retry with a current Jacobian before shortening the step
         choose_member(w, SLOW_REJECTED)
         repeated = True
         h = smaller
@@ -449,7 +446,7 @@ def advance_implicitly(w: Any, h: float, i: int, size_last: float, norm_last: fl
 
 @compiled
 def advance(w: Any, h: float, i: int, size_last: float, norm_last: float) -> tuple[int, float, float, float]:
-    """As :func:`advance_implicitly`, by explicit steps where these serve."""
+    """As :func:`advance_implicitly`, by explicit steps as long as the equations are not stiff."""
     if w.explicit != 0:
         found = advance_explicitly(w, h, i, size_last, norm_last)
         if found[0] != STEP_UNDERFLOW:
@@ -460,7 +457,7 @@ def advance(w: Any, h: float, i: int, size_last: float, norm_last: float) -> tup
 
 @compiled
 def store_polynomial(w: Any, h: float, offset: float) -> None:
-    """Keep the polynomial of this step for predictions from its end (offset 1) or its start (offset 0)."""
+    """Store the polynomial of this step for predictions from its end (offset 1) or its start (offset 0)."""
     k = w.member
     for i in range(stage_count(k)):
         copy(w.z[i], w.z_last[i])
@@ -487,14 +484,14 @@ def accept(w: Any, h: float) -> None:
 
 @compiled
 def keep_matrices(w: Any, h: float, proposed: float) -> float:
-    """Step size to try next: unchanged where Newton converged so fast that the factors are worth keeping."""
+    """Choose the next step size: unchanged where Newton converged so fast that the factors are worth keeping."""
     if w.fresh == INVALID:
         return proposed
     proposed = min(proposed, convergent_size(w, h))
     if choose_member(w, SLOW):
         w.h_factored = 0.0
     elif w.theta < NEGLIGIBLE and h <= proposed <= 1.2 * h:
-        # A fifth of a step is worth less than new factors (Hairer & Wanner II, IV.8).
+        # A step longer by a fifth is worth less than a new factorization (Hairer & Wanner II, IV.8).
         return h
     if w.theta >= NEGLIGIBLE:
         w.h_factored = 0.0
@@ -502,24 +499,25 @@ def keep_matrices(w: Any, h: float, proposed: float) -> float:
 
 
 UNSEEN_ERROR = 3.0
-"""Errors in units of what a step may have at its start, beyond which it has not seen what is there: between the stages
-the polynomial is somewhat worse than at the ends. A choice: less refuses steps that are right, more passes over what
-changes the state by so many tolerances.
+"""Defect between the stages, in units of the one allowed at the start of a step, beyond which a step is too long.
+
+A choice: the polynomial is somewhat worse between the stages than at the ends. A smaller value rejects good steps, a
+larger one accepts features that change the state by so many tolerances.
 """
 
 END_LOOKS = 10
-"""Points at which what lies beside the end of a segment is looked at, each ten times nearer than the one before."""
+"""Number of checks next to the end of a segment, each ten times closer to it than the one before."""
 
 LOOK_PART = 1e-2
-"""Part of the spacing below which a step is taken to see what is there: a choice that saves the clock. Its stages lie
-closer together than that; what is narrower still is passed over, as it is by a look at each spacing.
+"""Part of the spacing below which a step is not checked: a choice that saves time. Its stages lie closer together than
+the checks; a narrower feature may be missed, as it may between two checks.
 """
 
 
 @compiled
 def _differs(w: Any, h: float, x: float, remaining: float) -> bool:
-    """Whether the equations at a fraction of the step are far from its polynomial, or the rates of the ledger, with the
-    state corrected there, from theirs.
+    """True if the equations, or the rates of the ledger at the corrected state, disagree with the polynomials at a
+    fraction of the step.
     """
     if not defect_inside(w, h, x):
         return True
@@ -538,15 +536,16 @@ def _differs(w: Any, h: float, x: float, remaining: float) -> bool:
 
 @compiled
 def unseen(w: Any, h: float, spacing: float, remaining: float, begins: bool, ends: bool) -> float:
-    """The part of a step at which it has missed something; one where it has not, as far as the points tell.
+    """Return the fraction of a step at which its polynomial first disagrees with the equations; one if nowhere checked.
 
-    It ``begins`` or ``ends`` where something may be narrow.
+    ``begins`` and ``ends`` tell whether the step touches an end of a segment or an event, next to which a feature may
+    be narrow.
     """
     points = int(h / spacing)
     if points > 0 or begins or ends:
         keep_polynomial(w)
     if begins:
-        # From the narrowest outwards: the first that differs says how short the step has to be.
+        # From the narrowest outwards: the first disagreement tells how short the step has to be.
         for k in range(END_LOOKS, 0, -1):
             if _differs(w, h, 10.0**-k, remaining):
                 return 10.0**-k
