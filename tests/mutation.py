@@ -47,7 +47,7 @@ OF_BALANCES = [
 OF_LAWS = [
     ["laws", "tabulated", "contact_laws", "zoo::test_every_expression_keeps_its_approved_value", *OF_CASES],
     ["chemistry", "rate_and_state", "plane", "heat_paths", "media", "segments", "rates", "units", "bad_input"],
-    ["tables_bonds", "tables_mechanics", "zoo::test_a_case_gives_what_it_gave", "references_mechanics"],
+    ["tables_bonds", "tables_mechanics", "zoo::test_a_case_gives_what_it_gave", "references_mechanics", "pulled"],
 ]
 """Files of tests, or one test of a file, by what they notice for what they cost; the first few seconds notice most."""
 
