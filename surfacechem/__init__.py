@@ -26,15 +26,17 @@ if TYPE_CHECKING:
 __all__ = ["Simulation", "load", "precision", "register", "run", "steady", "sweep"]
 
 
-# Modules of those names that are not of simulations; each is imported when it is asked for.
+# Modules of names that are not in runs.simulation; each is imported on first use.
 _ELSEWHERE = {"precision": "studies.precision", "register": "laws", "steady": "studies.steady"}
 
 
 def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        return import_module("importlib.metadata").version(__name__)
     if name not in __all__:
         raise AttributeError(f"module 'surfacechem' has no attribute {name!r}")
     return getattr(import_module(f"surfacechem.{_ELSEWHERE.get(name, 'runs.simulation')}"), name)
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})  # so that a shell completes what is imported when it is asked for
+    return [*__all__, "__version__"]  # a shell completes what a user calls, imported or not

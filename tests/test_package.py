@@ -100,4 +100,5 @@ def test_citation_has_the_version():
 
 
 def test_a_shell_completes_what_is_imported_when_it_is_asked_for():
-    assert set(surfacechem.__all__) <= set(dir(surfacechem))
+    assert {*surfacechem.__all__, "__version__"} == set(dir(surfacechem))
+    assert surfacechem.__version__ == version("surfacechem")
