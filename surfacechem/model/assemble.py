@@ -1,7 +1,8 @@
 """Assembly of a scene into a system: components state their parts phase by phase, and the balances follow from these.
 
-A component is a module in one of the folders beside this one. Its functions named like the phases take what has been
-stated so far and yield records: nodes, bonds and energies, powers, states, margins, constraints, notes, warnings.
+A component is a module of the folders ``components``, ``constraints`` and ``sliding``. Its functions are named after
+the phases. Each reads the build and yields records: nodes, bonds and energies, powers, states, margins, constraints,
+notes, warnings.
 """
 
 from __future__ import annotations
@@ -30,9 +31,10 @@ AREAL_PATH = "surface"
 PHASES = ("variables", "energies", "laws"), ("rows", "jumps", "stages"), ("outputs",)
 """Phases of the assembly: those before the powers are added up, those before the totals, and that of the outputs.
 
-Roles of variables, states and modes; the free energy with tractions and forces; laws, with the powers that they pass on
-and the balances of bonds and tractions; the balances of energy; what jumps, and what that takes with it; the ends of
-stages of the loading, which wait for any of these; what stands behind all other states.
+variables: roles of variables, states and modes. energies: the free energy with tractions and forces. laws: laws with
+their powers, and the balances of bonds and tractions. rows: the balances of energy. jumps: the edges and their reset
+maps. stages: the ends of stages of the loading, which may wait for any of these. outputs: states that come after all
+others.
 """
 
 ORDER = (
@@ -53,11 +55,11 @@ ORDER = (
     "mounting",
     "envelope",
 )
-"""Order of components that build on, or are printed behind, those before them; all others follow by name."""
+"""Order of components that build on, or are printed after, those before them; all others follow by name."""
 
 
 def _bonds(scene: Scene) -> object:
-    """Whether there are bonds, or anything says how many."""
+    """True if the scene has bonds or states their number."""
     interface = scene.interface
     driven = "phi" in scene.loading or any("phi" in stage.rates for stage in scene.programme)
     return driven or interface.sites or interface.variables or interface.reactions
@@ -74,7 +76,7 @@ OPTIONAL: dict[str, Callable[[Scene], object]] = {
 
 @cache
 def _places() -> dict[str, str]:
-    """The module of each component by its file's name."""
+    """Return the module of each component by its file's name."""
     folders = (components, constraints, sliding)
     found = {
         file.name: f"{room.__name__}.{file.name}" for room in folders for file in pkgutil.iter_modules(room.__path__)
@@ -83,7 +85,7 @@ def _places() -> dict[str, str]:
 
 
 def assemble(scene: Scene) -> System:
-    """The equations of a scene.
+    """Assemble the equations of a scene.
 
     Parameters
     ----------
@@ -102,30 +104,31 @@ def assemble(scene: Scene) -> System:
     """
     if scene.surface is None:
         return _system(_built(scene))
-    # What is wrong with the scene is told before the integrals over its surfaces are made.
+    # A quick pass with surrogates reports errors of the scene before the costly integrals over its surfaces are
+    # computed.
     _built(with_surrogates(scene))
     return _of_pair(_system(_built(scene)))
 
 
 def with_surrogates(scene: Scene) -> Scene:
-    """The scene with cheap stand-ins for its laws, for checks of all else."""
+    """Return the scene with cheap surrogates of its laws, for checks of everything else."""
     return _with_laws(scene, lambda law: law.surrogate())
 
 
 def perturbed(scene: Scene) -> Scene:
-    """The scene with laws perturbed by the error of the numbers that they compute for themselves."""
+    """Return the scene with each law perturbed by the error of the numbers that it computes internally."""
     return _with_laws(scene, lambda law: law.perturbed())
 
 
 def _with_laws(scene: Scene, change: Callable[[Any], Any]) -> Scene:
-    """The scene with ``change`` applied to its potentials and heat paths."""
+    """Return the scene with ``change`` applied to its potentials and heat paths."""
     potentials = tuple(map(change, scene.interface.potentials))
     interface = replace(scene.interface, potentials=potentials)
     return replace(scene, interface=interface, heat=tuple(map(change, scene.heat)))
 
 
 def _built(scene: Scene) -> Build:
-    """All that the components state of a scene."""
+    """Return the build with all records of the components of a scene."""
     build = Build(scene)
     needed = [place for name, place in _places().items() if name not in OPTIONAL or OPTIONAL[name](scene)]
     found = [import_module(place) for place in needed]
@@ -139,7 +142,7 @@ def _built(scene: Scene) -> Build:
 
 
 def _close(build: Build) -> None:
-    """Add what needs the whole scene: margins of varying parameters, the start of stretches, checks and warnings."""
+    """Add what needs the whole scene: margins of varying parameters, the start of arcs, checks and warnings."""
     build.varying_margins()
     refuse_idle_initial_values(build)
     if build.edges or any(state.finest for state in build.states) or stands_for_velocity(build):
@@ -153,7 +156,7 @@ def _close(build: Build) -> None:
 
 
 def _system(build: Build) -> System:
-    """The frozen system of all that was stated."""
+    """Return the immutable system of all records."""
     far_fields, sinks = build.motion.far_fields, ledger.sinks(build)
     return System(
         t=build.t,
@@ -185,7 +188,7 @@ def _system(build: Build) -> System:
 
 
 def _of_pair(system: System) -> System:
-    """The system of a pair of bodies: quantities per area elsewhere are totals here, in their units and words."""
+    """Return the system of a pair of bodies: quantities per area become totals, in their units and words."""
 
     def renamed(item: Quantity) -> Quantity:
         unit, words = TOTAL_UNITS.get(item.unit, item.unit), item.long_name

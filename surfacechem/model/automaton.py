@@ -1,4 +1,4 @@
-"""The hybrid automaton of a scene: modes, edges with guards and reset maps, equilibria of gaps, and sinks of heat."""
+"""The hybrid automaton of a scene: modes, edges with guards and reset maps, equilibria of gaps, and heat sinks."""
 
 from __future__ import annotations
 
@@ -13,27 +13,27 @@ from surfacechem.expressions import Expression, where
 ZERO, ONE = symengine.Integer(0), symengine.Integer(1)
 
 SIDE_PATH = "mode.side"
-"""Path of the mode that says on which side of touch the gap is."""
+"""Path of the mode that tells on which side of touch the gap is."""
 
 SLIP_PATH = "mode.slip"
-"""Path of the mode that says whether the interface sticks or slides, and in which direction."""
+"""Path of the mode that tells stick from slip, and the slip direction."""
 
 INTERFACE = "interface"
-"""Key of the heat that the interface makes in a jump, beside those of the supports of the axes."""
+"""Key of the heat that the interface makes in a jump; the supports have the keys of their axes."""
 
 FOLD_STIFFNESS = 1e-7
-"""Tangent stiffness, relative to its parts, at which a quasi-static gap counts as having lost its equilibrium."""
+"""Tangent stiffness, relative to its parts, below which a quasi-static gap has lost its equilibrium (a fold)."""
 
 REST_TIME_PATH = "run.rebounds_rest_at"
 """Path of the time at which rebounds too close for time to resolve come to rest (end of a Zeno sequence)."""
 
 
 When = Mapping[Any, Collection[int]]
-"""Values of modes, by their symbols, in which something is active; the other modes may have any value."""
+"""Values of modes, by their symbols, in which a guard is active; the other modes may have any value."""
 
 
 def masked(guard: Expression, when: When) -> Expression:
-    """The guard in the modes in which it is active, else 1."""
+    """Return the guard in the modes in which it is active, else 1."""
     for mode, values in when.items():
         guard = where(symengine.Mul(*((mode - value) ** 2 for value in values)) > 0, 1, guard)
     return guard
@@ -41,16 +41,16 @@ def masked(guard: Expression, when: When) -> Expression:
 
 @dataclass(frozen=True)
 class Mode:
-    """A discrete variable, such as sticking or sliding; it changes along edges only."""
+    """A discrete variable, such as stick or slip, which changes along edges only."""
 
     name: str
     initial: float
     words: Mapping[float, str]
     """Meaning of each value."""
     start: Expression | None = None
-    """The value at the start as it follows from the initial state, where it does."""
+    """The value at the start if it follows from the initial state."""
     waits: Mapping[float, str] = field(default_factory=dict)
-    """Condition that ends a value, in words, for values that are meant to be left."""
+    """Condition that ends a value, in words, for values that a complete run leaves."""
 
     @property
     def symbol(self) -> Any:
@@ -59,19 +59,19 @@ class Mode:
 
     @property
     def legend(self) -> str:
-        """Its values with their meanings."""
+        """Its values with their meanings, in words."""
         return ", ".join(f"{value:g}: {word}" for value, word in self.words.items())
 
 
 @dataclass(frozen=True)
 class Register:
-    """A number that only edges write: a time, a direction or an impulse that what follows has to remember."""
+    """A number that only edges write and that later arcs and jumps read: a time, a direction or an impulse."""
 
     name: str
     text: str
     initial: float = 0.0
     given: Callable[[Mapping[str, float]], float] | None = None
-    """The value at the start as it follows from what a case gives, by path, where it does."""
+    """The value at the start if it follows from the values of a case, by path."""
 
     @property
     def symbol(self) -> Any:
@@ -81,25 +81,25 @@ class Register:
 
 @dataclass(frozen=True)
 class Fold:
-    """The loss of the equilibrium of the quasi-static gaps."""
+    """A fold: the loss of the equilibrium of the quasi-static gaps."""
 
     tangent: Expression
-    """Zero at the fold, positive before it."""
+    """Tangent stiffness: zero at the fold, positive before it."""
     falls: tuple[Expression, ...]
-    """Fall of the stiffness along each gap, which gives the direction of the snap-through."""
+    """Decrease of the stiffness along each gap, which gives the direction of the snap-through."""
     stiffness: tuple[tuple[Expression, ...], ...]
-    """Fall of the driving traction of each gap along each gap, relative to the stiffness of the former."""
+    """Decrease of the driving traction of each gap along each gap, relative to the stiffness of the former."""
     warming: tuple[Mapping[str, Expression], ...]
-    """Rise of the temperatures that follow each gap, by the heat of its own motion [K/m]."""
+    """Rise of the temperatures that follow each gap, by the heat of its motion [K/m]."""
 
 
 @dataclass(frozen=True)
 class Edge:
     """A guard that must stay positive while the modes are those of ``when``; at its zero, modes and state jump.
 
-    ``modes`` gives new values of modes and registers, ``reset`` those of states, as expressions of the old ones. Then
-    the gaps find their next equilibrium, where the edge ``equilibrates``, and the energy that this releases is ``heat``
-    of the bodies or of the interface.
+    ``modes`` gives new values of modes and registers, ``reset`` those of states, as expressions of the old ones. If the
+    edge ``equilibrates``, the gaps then move to their next equilibrium. The energy released is ``heat`` of the bodies
+    or of the interface.
     """
 
     name: str
@@ -109,44 +109,43 @@ class Edge:
     reset: Mapping[Any, Expression] = field(default_factory=dict)
     equilibrates: bool = False
     heat: str = "joint"
-    """Part that turns into heat what is released before gaps move: 'joint', the support of the bodies along the normal;
-    'local', the interface. Then each gap that moves is damped by its own support, and sliding makes the heat of
-    friction. In a 'snap' the interface, which has given way, makes it all.
-    """
+    """Part that dissipates the energy released before gaps move: 'joint', the support of the bodies along the normal;
+    'local', the interface. After that the support of each gap that moves damps it, and slip makes the heat of friction.
+    In a 'snap' the interface, which has given way, dissipates everything."""
     fold: Fold | None = None
-    """The fold that it is, if any."""
+    """The fold that the edge stands for, if any."""
     passes: bool = False
-    """Whether nothing happens to the interface: a stage of the loading ends."""
+    """True if nothing happens to the interface: a stage of the loading ends."""
     strict: bool = False
-    """Whether its guard has to be passed, not only touched."""
+    """True if the guard has to become negative, not only touch zero."""
     measure: str = ""
-    """The state that its guard measures, where those of other edges measure the same."""
+    """The state that its guard measures, if edges in other modes measure the same state."""
     times: tuple[float, ...] = ()
-    """Times [s] at which it happens, where these are given."""
+    """Prescribed times [s] of the edge, if any."""
     returns: Expression | None = None
-    """Time in which it may happen again [s], zero where that is open: its guard begins anew at an exact zero."""
+    """Time of flight until it may occur again [s], zero if unknown; its guard restarts from an exact zero."""
     violation: str = "warn"
     """Response to a jump that would destroy entropy: refuse, warn or accept."""
     when: When = field(default_factory=dict)
-    """Modes in which it is active."""
+    """Values of the modes in which it is active."""
 
     @property
     def is_impact(self) -> bool:
-        """Whether it is an impact, instantaneous at infinite pressure, which may recur ever faster (Zeno behaviour)."""
+        """True for an impact: an instantaneous impulse, which may recur ever faster (Zeno behaviour)."""
         return self.returns is not None
 
     @property
     def masked(self) -> Expression:
-        """The guard while it is active, else 1, as one expression to be read or printed."""
+        """The guard while it is active, else 1, as one expression for reading and printing."""
         return masked(self.guard, self.when)
 
 
 @dataclass(frozen=True)
 class Constraint:
-    """An inclusion as automaton and balances see it; stated in parts, a mode before the edges that change it."""
+    """An inclusion as the automaton and the balances see it, stated as a whole or in parts, modes before edges."""
 
     modes: tuple[Mode, ...] = ()
-    """Modes, in which it holds or not; one that is stated again is refined."""
+    """Modes that tell whether it holds; a mode that is stated again is refined."""
     registers: tuple[Register, ...] = ()
     edges: tuple[Edge, ...] = ()
     active: Expression = 1
@@ -154,29 +153,30 @@ class Constraint:
     reaction: Expression = 0
     """Reaction traction while it holds [Pa]."""
     at_once: bool = False
-    """Whether its edges come before those of others that are due at the same moment."""
+    """True if its edges precede other edges that are due at the same time."""
     beside: Callable[[Edge], Mapping[Any, Expression]] = lambda edge: {}
     """New values of its modes and registers along an edge of another constraint."""
 
 
 @dataclass(frozen=True)
 class Equilibrium:
-    """A gap without inertia or damping: its balance of tractions, which holds at every time."""
+    """A gap without inertia or damping: its balance of tractions, which holds at all times."""
 
     state: str
     residual: Expression
-    """Traction that drives the gap open, less what resists [Pa]."""
-    # Not the residual's magnitude: in a ramp that counts the rounding of time, which all tractions of a moment share.
+    """Traction that opens the gap, less the resistance [Pa]."""
+    # The running error bound of the residual would not do: in a ramp it counts the rounding of time, which all
+    # tractions at one time share.
     size: Expression
     """Size of the tractions that balance [Pa]."""
     along: Mapping[str, Expression] = field(default_factory=dict)
-    """Gaps that move with it, and how far: elastic sticking follows the displacement."""
+    """Gaps that move with it, and by how much: in elastic sticking the elastic gap follows the displacement."""
     active: Expression = 1
-    """Zero in modes in which it is held."""
+    """Zero in modes in which the gap is held."""
     slides: int = 0
-    """Direction in which the interface slides where it opens, 1 or -1; 0 where it is balanced in any mode."""
+    """Slip direction that opens the gap, 1 or -1; 0 if it is in equilibrium in every mode."""
     bears: Expression = 1
-    """Friction limit [Pa] of the interface that slides; where it is zero the gap moves either way in a jump."""
+    """Friction limit [Pa] during slip; if it is zero, the gap may move either way in a jump."""
 
     @property
     def axis(self) -> str:
@@ -186,7 +186,7 @@ class Equilibrium:
 
 @dataclass(frozen=True)
 class Sink:
-    """A temperature node that takes part of the heat made in a jump; a prescribed one passes it on."""
+    """A temperature node that takes part of the heat of a jump; a prescribed node passes it to the outside."""
 
     node: str
     T: Expression

@@ -1,4 +1,4 @@
-"""The system under construction, and the few ways in which stages add to it."""
+"""The system under construction, and the methods by which components and constraints add to it."""
 
 from __future__ import annotations
 
@@ -24,46 +24,46 @@ from surfacechem.scene import Interface, Scene
 from surfacechem.tolerances import NO_AMOUNT, RUN_EPS
 
 BOTH_BODIES = "interface", "each body"
-"""Ends of the paths that bring heat into both bodies alike."""
+"""Ends of the heat paths that lead into both bodies alike."""
 
 STARTS = {"g_n": "Give `g_n` under `initial`: a gap that finds its equilibrium begins its search there, else at zero."}
-"""Advice on a missing initial value of a variable that finds its own equilibrium, by variable."""
+"""Advice on a missing initial value of a variable that finds its equilibrium, by variable."""
 
 TAKEN_NAMES = ("M", *(f"{x}_{k}" for x in "SUq" for k in ("1", "2", "c", "m", "t")))
-"""Names of quantities that a parameter might have too: a law's M, or the second of two that are called q."""
+"""Names of quantities that a parameter might have too: a law's M, or the second of two parameters called q."""
 
 
 @dataclass
 class Motion:
-    """State of the assembly that concerns the normal and the tangential motion: mountings, tractions and rates."""
+    """Part of the build on normal and tangential motion: mountings, tractions and rates."""
 
     far_fields: dict[str, Any] = field(default_factory=dict)
-    """Mountings with their symbols, by direction."""
+    """Mountings with their symbols, by axis."""
     ramp_rates: dict[str, Expression] = field(default_factory=dict)
     """Rates of the variables that a programme moves."""
     slips: tuple[Any, ...] = ()
-    """Formulation of the tangential motion in each direction in which it moves by a balance."""
+    """Formulation of the tangential motion in each direction that moves by a balance."""
     slides_by: dict[str, Any] = field(default_factory=dict)
-    """The variables that the balances of tangential tractions determine, where sliding has no inertia, by velocity."""
+    """Unknowns of the tangential balances if sliding has no inertia, by velocity."""
     creeping: Any = None
-    """The friction law whose traction is the variable of sliding, where that is not the velocity."""
+    """The friction law whose traction is the unknown of sliding, if the velocity is not."""
     sliding_tractions: dict[str, Expression] = field(default_factory=dict)
-    """Traction that resists sliding along each direction, by axis."""
+    """Traction that resists sliding, by axis."""
     stick_limits: dict[str, Expression] = field(default_factory=dict)
-    """Tangential traction that sticking can bear along each direction, by axis."""
+    """Tangential traction up to which the interface sticks, by axis."""
     follows: dict[Any, Expression] = field(default_factory=dict)
-    """New values of states that follow the normal gap where it jumps."""
+    """Reset map of states that follow the normal gap when it jumps."""
     gap_rates: dict[str, Expression] = field(default_factory=dict)
     """Rates of the gaps that move by a balance."""
 
 
 Record = Thermal | Bond | Energy | HeatPath | State | Account | Margin | Constraint | Equilibrium | Power | Note | str
-"""Records that components state; a string is a warning."""
+"""Records that components yield; a string is a warning."""
 
 
 @dataclass(eq=False)
 class Build:
-    """All that components have stated so far, with the queries and methods by which they state more."""
+    """Everything that components have stated so far, with the queries and methods by which they state more."""
 
     scene: Scene
     parameters: Parameters = field(init=False)
@@ -73,11 +73,11 @@ class Build:
     bonding: dict[str, Bond] = field(default_factory=dict)
     energy: Energy = NO_ENERGY
     reclosing: Mapping[Expression, Expression] = field(default_factory=dict)
-    """New values of modes that a rigid contact has as it closes again."""
+    """New values of modes when a rigid contact closes again."""
     rates: dict[Any, Expression] = field(default_factory=dict)
-    """Time derivatives of what the interface's free energy depends on beside temperature."""
+    """Time derivatives of the variables of the interface's free energy other than temperature."""
     inflow: dict[str, list[Expression]] = field(default_factory=dict)
-    """Heat and mechanical power that flow into each node [W/m^2]."""
+    """Heat and mechanical power into each node [W/m^2]."""
     conductances: dict[tuple[str, str], list[Expression]] = field(default_factory=dict)
     """Conductances in parallel between two ends [W/(m^2 K)]."""
     states: list[State] = field(default_factory=list)
@@ -86,15 +86,15 @@ class Build:
     ledger: list[Account] = field(default_factory=list)
     margins: list[Margin] = field(default_factory=list)
     powers: list[Power] = field(default_factory=list)
-    """Powers between places, from which the ledger and the balances of energy follow."""
+    """Powers between places; the ledger and the balances of energy follow from them."""
     stored: list[Expression] = field(default_factory=list)
     """Energies without a temperature, such as those of springs and charges."""
     loads: dict[str, Load] = field(default_factory=dict)
-    """Histories that are in use, by variable."""
+    """Histories in use, by variable."""
     constraints: list[Constraint] = field(default_factory=list)
-    """Constraints as they were stated."""
+    """Constraints in the order in which they were stated."""
     balanced: list[Equilibrium] = field(default_factory=list)
-    """Quasi-static gaps as they were stated."""
+    """Quasi-static gaps in the order in which they were stated."""
     motion: Motion = field(default_factory=Motion)
     notes: list[Note] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
@@ -120,11 +120,11 @@ class Build:
 
     @property
     def about(self) -> dict[Any, Expression]:
-        """Initial values of the bonding variables, about which capacities are written."""
+        """Initial values of the bonding variables, the points about which capacities are expanded."""
         return {bond.symbol: bond.initial for bond in self.bonding.values()}
 
     def add(self, record: Record) -> None:
-        """Keep what a component states."""
+        """Keep a record of a component."""
         match record:
             case Thermal():
                 self.thermal = record
@@ -135,7 +135,7 @@ class Build:
             case Constraint():
                 self.constrain(record)
             case HeatPath():
-                # Paths between the same two ends act in parallel: one node balance has their sum.
+                # Paths between the same two ends are in parallel: one node balance has their sum.
                 self.conductances.setdefault(record.ends, []).append(record.h)
             case _:
                 lists: dict[type, list[Any]] = {
@@ -150,11 +150,11 @@ class Build:
 
     @property
     def equilibria(self) -> list[Equilibrium]:
-        """Quasi-static gaps; an elastic gap that slides finds its equilibrium before the displacement that pulls it."""
+        """Quasi-static gaps; an elastic gap that slides reaches equilibrium before the displacement that pulls it."""
         return sorted(self.balanced, key=lambda item: item.slides)
 
     def energy_row(self, node: Node) -> Expression:
-        """Energy balance of a node as a residual."""
+        """Return the energy balance of a node as a residual."""
         return balances.node_row(node, self.inflow.get(node.name, ()), self.rates, self.about)
 
     def name(self, quantity: Quantity, expression: Expression, *, output: bool = True) -> Expression:
@@ -163,19 +163,19 @@ class Build:
         return symengine.Symbol(quantity.name)
 
     def store(self, quantity: Quantity, energy: Expression) -> None:
-        """Add an energy [J/m^2] of what has no temperature."""
+        """Add an energy [J/m^2] that has no temperature."""
         self.stored.append(self.name(quantity, energy))
 
     def constant(self, name: str, path: str, spec: Spec, value: float, *, internal: bool = False) -> Expression:
-        """A scene-level number as a run-time parameter."""
+        """Add a scene-level number as a run-time parameter and return its symbol."""
         return self.parameters.constant(name, path, spec, value, internal)
 
     def bound(self, law: Friction) -> Friction:
-        """A friction law with its parameters as symbols, made once."""
+        """Return a friction law with its parameters as symbols; it is bound once."""
         return self.variables.shared(law, f"interface.friction.{law.name()}")
 
     def unique(self, base: str) -> str:
-        """The name, with a number where it is taken."""
+        """Return the name, with a number if it is taken."""
         name = next(n for n in chain((base,), (f"{base}_{i}" for i in count(2))) if n not in self.used_names)
         self.used_names.add(name)
         return name
@@ -187,14 +187,14 @@ class Build:
         return self.name(quantity, self.variables.bind(load, f"loading.{name}", unit=quantity.unit).value(self.t))
 
     def slope_of(self, name: str) -> Expression:
-        """Time derivative of a prescribed variable between its jumps."""
+        """Return the time derivative of a prescribed variable between its jumps."""
         if name in self.motion.ramp_rates:
             return self.motion.ramp_rates[name]
         expression = next(item.expression for item in self.named if item.name == name)
         return derivative(expression, self.t)
 
     def rate_of(self, name: str) -> Expression:
-        """Time derivative of a prescribed variable that stores energy, which must not jump."""
+        """Return the time derivative of a prescribed variable that stores energy; it must not jump."""
         if name not in self.motion.ramp_rates and (load := self.loads[name]).jumps():
             raise InputError(
                 f"{name} stores energy, so it cannot jump (at t = {load.jumps()[0]:g} s): the work would be unknown. "
@@ -204,7 +204,7 @@ class Build:
         return self.slope_of(name)
 
     def refuse_foreign(self, F: Expression, own: set[Any], law: Law) -> None:
-        """InputError where a free energy depends on more than constants and what its balance accounts for."""
+        """Raise InputError if a free energy depends on variables that its balance does not account for."""
         moving = {str(state.symbol) for state in self.states} | {node.name for node in self.thermal.nodes.values()}
         moving |= {item.name for item in self.named if item.name in self.loads and self.slope_of(item.name) != 0}
         moving -= {name for name, load in self.loads.items() if self.slope_of(name) == 0 and not load.jumps()}
@@ -218,7 +218,7 @@ class Build:
             )
 
     def constrain(self, stated: Constraint) -> Constraint:
-        """Keep a constraint; its modes and registers are parameters that only edges change."""
+        """Keep a constraint; its modes and registers become parameters that only edges change."""
         for mode in stated.modes:
             if self.mode(mode.name) is None:
                 spec = Spec("1", " or ".join(f"{value:g}: {word}" for value, word in mode.words.items()))
@@ -231,17 +231,17 @@ class Build:
         return stated
 
     def constraint(self, mode: str) -> Constraint:
-        """The constraint with the mode of that name; one that never holds where the scene has none."""
+        """Return the constraint with the mode of that name; a constraint that never holds if the scene has none."""
         holding = (item for item in self.constraints if any(mode == other.name for other in item.modes))
         return next(holding, Constraint())
 
     def mode(self, name: str) -> Any:
-        """The symbol of a mode, None where the scene has none of that name."""
+        """Return the symbol of a mode, None if the scene has none of that name."""
         return next((mode.symbol for mode in self.constraint(name).modes if mode.name == name), None)
 
     @property
     def modes(self) -> list[Mode]:
-        """The modes of all constraints as they were stated last."""
+        """The modes of all constraints; of a mode stated twice the last statement."""
         return list({mode.name: mode for item in self.constraints for mode in item.modes}.values())
 
     @property
@@ -251,7 +251,7 @@ class Build:
 
     @property
     def edges(self) -> list[Edge]:
-        """The edges of all constraints, each with what it changes of the others; what comes at once is the first."""
+        """The edges of all constraints, each with its resets of the other constraints; those due at once come first."""
         edges = [edge for item in sorted(self.constraints, key=lambda item: not item.at_once) for edge in item.edges]
         for item in self.constraints:
             edges = [replace(edge, modes={**edge.modes, **item.beside(edge)}) for edge in edges]
@@ -259,7 +259,7 @@ class Build:
 
     @property
     def roles(self) -> tuple[Role, ...]:
-        """Roles of the variables; a derived one that nobody reads is not there."""
+        """Roles of the variables; a derived variable that is never read is left out."""
         there = {role.variable for role in self.variables.roles if self.variables.was_read(role.variable)}
         there |= {item.name for item in self.named}
         return tuple(role for role in self.variables.roles if role.role != "derived" or role.variable in there)
@@ -271,22 +271,22 @@ class Build:
 
     @property
     def cycles(self) -> tuple[str, ...]:
-        """Paths of the frequencies of loads that repeat themselves."""
+        """Paths of the frequencies of periodic loads."""
         paths = {name: load.path if load.place else f"loading.{name}" for name, load in self.loads.items()}
         return tuple(f"{paths[name]}.{load.cycle}" for name, load in self.loads.items() if load.cycle)
 
     def at_start(self, expression: Expression) -> float:
-        """Value with the parameters and initial values of the scene, one for what has none; NaN where undefined."""
+        """Return the value at the start, with one for variables without a value; NaN if it is undefined."""
         values = {parameter.symbol: parameter.at(0.0) for parameter in self.parameters.items} | {self.t: 0.0}
         values |= {state.symbol: state.initial for state in self.states}
         try:
             found = self.expanded(expression).subs(values)
             return float(found.subs({x: self.scene.initial.get(str(x), 1.0) for x in found.free_symbols}))
-        except RuntimeError:  # a condition on a number that is undefined
+        except RuntimeError:  # a condition on an undefined number
             return math.nan
 
     def total_derivative(self, expression: Expression) -> Expression:
-        """Time derivative of an expression of the states and of prescribed variables."""
+        """Return the time derivative of an expression of the states and of prescribed variables."""
         expanded = self.expanded(expression)
         rates = {state.symbol: state.dot for state in self.states}
         rates |= {node.T: node.T_dot for node in self.thermal.free}
@@ -294,13 +294,13 @@ class Build:
 
     @property
     def stretch(self) -> Expression:
-        """Area stretch J_c, or one; shapes are those of surfaces as they are, and what is integrated over them too."""
+        """Area stretch J_c; one if there is none, or if curved surfaces are given: these are as deformed already."""
         if self.scene.surface is not None:
             return symengine.Integer(1)
         return self.variables.get("J_c", "the balance") if self.variables.has("J_c") else symengine.Integer(1)
 
     def initial(self, name: str) -> float:
-        """Initial value of a state; InputError where the case gives none."""
+        """Return the initial value of a state; InputError if the case gives none."""
         if name not in self.scene.initial:
             unknown = [other for other, value in self.scene.initial.items() if math.isnan(value)]
             misspelt = f"; '{unknown[0]}' there is no variable" if unknown else ""
@@ -309,7 +309,7 @@ class Build:
         return self.scene.initial[name]
 
     def areal(self, quantity: Quantity, nominal: Expression) -> Expression:
-        """A quantity per current area, and per reference area too where the two differ; returns the nominal one."""
+        """Name a quantity per current area, and per reference area if the two differ; return the nominal one."""
         if self.stretch == 1:
             return self.name(quantity, nominal)
         name, text = f"{quantity.name}_nominal", f"{quantity.long_name} per reference area"
@@ -318,12 +318,12 @@ class Build:
         return symbol
 
     def law_ranges(self, law: Law) -> None:
-        """Ranges of variables that a run watches for a law."""
+        """Add the ranges of variables that a run monitors for a law."""
         for name, (low, high) in law.ranges.items():
             self.notes.append(Range(str(self.variables.get(name, law)), low, high, law.title))
 
     def law_margins(self, law: Law, own: Mapping[str, Expression], met: Collection[str] = ()) -> None:
-        """Add the margins of a law's domain, except for the bounds that are ``met`` by what it is given."""
+        """Add the margins of the domain of a law, except for the bounds in ``met``, which its arguments satisfy."""
         ends = f"where the law {law.name()} ends"
         for name in law.positive:
             sought = name in self.motion.gap_rates and name not in self.scene.initial
@@ -333,7 +333,7 @@ class Build:
             if name in met:
                 continue
             value, least = self._read(law, name, own), law.least.get(name, 0)
-            # The last digits of the terms of a sum change it by so much.
+            # The roundoff of a sum is that of its terms, so the bound gets this slack.
             whole = self.expanded(value)
             rounding = sum((absolute(term) for term in whole.args), symengine.Integer(0)) if whole.is_Add else 0
             slack = NO_AMOUNT + RUN_EPS * rounding + RUN_EPS * absolute(least)
@@ -350,7 +350,7 @@ class Build:
                 self.margins.append(Margin(f"{name} <= {high:g}", high + slack - value, reason, domain=True))
 
     def _read(self, law: Law, name: str, own: Mapping[str, Expression]) -> Expression:
-        """The expression that a law reads by a name: its own, else the scene's."""
+        """Return the expression that a law reads by a name: from its own arguments, else from the scene."""
         return own[name] if name in own else self.variables.get(name, law)
 
     def _narrow_places(self, law: Law, own: Mapping[str, Expression], met: Collection[str]) -> None:
@@ -367,21 +367,22 @@ class Build:
                 self._narrow(law, name, value, tops if isinstance(tops, Sequence) else (tops,))
 
     def _narrow(self, law: Law, name: str, value: Expression, tops: Sequence[Expression]) -> None:
-        """A step ends where a variable passes a narrow place of a law, and where a gap with a mass turns round, which
-        may have come close to one.
+        """Add margins that end a step at peaks and singular ends of a law, and at turning points of a gap with a mass.
+
+        A turning point may lie just short of such a peak, which the step would miss.
         """
         reason, moving = f"{law.name()} is narrow near here", symengine.sympify(self.expanded(value)).free_symbols
         found = [Margin(f"{name} at place {i} of {law.name()}", value - top, reason) for i, top in enumerate(tops, 1)]
         states = {state.symbol for state in self.states}
         for gap, rate in self.motion.gap_rates.items():
-            # Only a velocity that is a state has inertia, or a resistance of its own, and turns round smoothly.
+            # Only a velocity that is a state, by inertia or a resistance to motion, changes its sign smoothly.
             if symengine.Symbol(gap) in moving and symengine.sympify(rate).free_symbols & states:
                 found.append(Margin(f"{gap} turns", rate, reason))
         known = {margin.expression for margin in self.margins}
         self.margins += [replace(item, terminal=False, peak=True) for item in found if item.expression not in known]
 
     def varying_margins(self) -> None:
-        """Add margins that keep varying parameters in their range; one that may be zero may be below by rounding."""
+        """Add margins that keep varying parameters in their range, with slack for roundoff at closed bounds."""
         found = []
         for law, name, spec, value in self.variables.varying:
             slack = NO_AMOUNT * abs(getattr(law, name).value)
@@ -394,7 +395,7 @@ class Build:
         self.margins[:0] = found
 
     def shares(self) -> dict[str, Expression]:
-        """Fractions of the interface's heat that go into the bodies and the surroundings where there is no medium."""
+        """Return the fractions of the interface's heat that enter the bodies and the surroundings without a medium."""
         alpha = self._share("alpha", "interface.partition", self.interface.partition, "body 1")
         first, second = (body.name for body in self.scene.bodies)
         if not self.interface.loss:
@@ -409,9 +410,9 @@ class Build:
         return self.variables.get(path, "the interface", "interface")
 
     def is_named(self, name: str) -> bool:
-        """Whether a named quantity has this name."""
+        """True if a named quantity has this name."""
         return any(item.name == name for item in self.named)
 
     def expanded(self, expression: Expression) -> Expression:
-        """The expression without names of quantities."""
+        """Return the expression with the names of quantities replaced by their definitions."""
         return without(expression, definitions(self.named))

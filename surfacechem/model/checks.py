@@ -1,4 +1,4 @@
-"""Checks before a run starts, and of the conductances of heat paths across a gap on both sides of touch.
+"""Checks before a run: initial values, limits at the start, and conductances of heat paths on both sides of touch.
 
 Source: Sauer, Duong & Mandadapu (2021), section on heat transfer: the sum of gas and radiation may exceed the contact.
 """
@@ -20,13 +20,16 @@ from surfacechem.model.system import Array, System
 from surfacechem.tolerances import CBRT_EPS, EPS
 
 TRIAL_GAPS = tuple(10.0 ** (k / 8) for k in range(-80, -16))
-"""Gaps at which a conductance is looked at [m]: 0.1 nm to 10 mm."""
+"""Trial gaps for the check that a conductance is monotone [m]: 0.1 nm to 10 mm."""
 
 P, G = symengine.symbols("p g_n")
 
 
 def conductance_warnings(system: System) -> Iterator[str]:
-    """Conductances that jump at touch, rise as the gap opens, or hold where nothing touches; numbers at the start."""
+    """Yield warnings on conductances that jump at touch, rise as the gap opens, or do not vanish without contact.
+
+    Everything but the gap and the pressure has its value at the start.
+    """
     point = _numbers_at_start(system)
     gap = system.definitions.get(G)
     moves = {system.t, *(state.symbol for state in system.states)}
@@ -44,7 +47,7 @@ def conductance_warnings(system: System) -> Iterator[str]:
 
 
 def _numbers_at_start(system: System) -> dict[Any, Any]:
-    """Numbers for everything but the gap and the pressure."""
+    """Return numbers for everything but the gap and the pressure."""
     point: dict[Any, Any] = {system.t: 0.0} | {item.symbol: item.at(0.0) for item in system.parameters}
     point |= {state.symbol: state.initial for state in system.states if state.symbol not in (P, G)}
     for item in system.named:
@@ -55,14 +58,14 @@ def _numbers_at_start(system: System) -> dict[Any, Any]:
 
 
 def _value(h: Expression, variable: Any, value: float) -> float | None:
-    """Value of a conductance where the variable has this value; None where it depends on more."""
+    """Return a conductance at this value of the variable; None if it depends on more variables."""
     found = h.subs({variable: value})
     return None if found.free_symbols else float(found)
 
 
 def _at_touch(ends: str, h: Expression) -> Iterator[str]:
     at_touch = _value(h, G, 0.0)
-    # A pole, as of a film of no thickness, is no jump: the law ends there, and says so itself.
+    # A pole, as of a film of zero thickness, is no jump: the law ends there and has a margin for it.
     if at_touch is None or not math.isfinite(at_touch):
         return
     before, after = (_value(h, G, side * EPS) or 0.0 for side in (-1, 1))
@@ -75,7 +78,7 @@ def _at_touch(ends: str, h: Expression) -> Iterator[str]:
 
 
 def refuse_idle_initial_values(build: Build) -> None:
-    """InputError where an initial value belongs to nothing that evolves."""
+    """Raise InputError if an initial value belongs to no variable that evolves."""
     states = {state.start or state.at_start[0].name for state in build.states}
     for name in build.scene.initial:
         if name in states:
@@ -96,7 +99,7 @@ def refuse_idle_initial_values(build: Build) -> None:
 
 
 class StartLimits:
-    """Check of a start against the limits of a system."""
+    """Check of initial values against the limits of a system."""
 
     def __init__(self, system: System) -> None:
         states = [None if state.algebraic else state.symbol for state in system.states]
@@ -109,7 +112,7 @@ class StartLimits:
         numbers = [0.0, *y.tolist(), *parameters.tolist(), 1.0]
         for margin, expression, terms in self._limits:
             number = self._exactly(expression, terms, numbers)
-            # One that needs an algebraic variable or a derivative only the run can find.
+            # A limit that reads an algebraic variable or a derivative is None: only the run can evaluate it.
             if number is not None and not number > 0:
                 remedy = f" {margin.remedy}" if margin.remedy else ""
                 message = f"at the start {margin.reason} ({margin.name} does not hold: {number:.6g}).{remedy}"
@@ -118,8 +121,9 @@ class StartLimits:
     def _exactly(
         self, expression: Expression, terms: Sequence[tuple[int, float]] | None, numbers: Sequence[float]
     ) -> float | None:
-        """Value of an expression without rounding errors, which is not a number where it has none; None where it needs
-        more than is given. Its terms are those of a sum.
+        """Return the value of an expression without roundoff; NaN if undefined, None if a symbol has no number.
+
+        ``terms`` are those of a sum of known symbols and numbers, None for any other expression.
         """
         try:
             if terms is not None:
@@ -127,13 +131,14 @@ class StartLimits:
             known = {x: self._places[x] for x in expression.free_symbols if x in self._places}
             value = expression.subs({x: _exact(numbers[place]) for x, place in known.items()})
             return None if value.free_symbols else float(value)
-        except (RuntimeError, TypeError, ValueError):  # an undefined number, zero over zero for instance
+        except (RuntimeError, TypeError, ValueError):  # undefined, such as zero over zero
             return math.nan
 
 
 def _sum(expression: Expression, places: Mapping[Any, int]) -> list[tuple[int, float]] | None:
-    """Places and factors of the terms of an expression that is a sum of known symbols and numbers alone, as most limits
-    are; a number is its factor times what is last.
+    """Return positions and factors of the terms, if an expression is a sum of known symbols and numbers alone.
+
+    Most limits are. A number is its factor times the last entry, which is one.
     """
     terms = []
     for term in expression.args if isinstance(expression, symengine.Add) else (expression,):
@@ -150,6 +155,6 @@ def _sum(expression: Expression, places: Mapping[Any, int]) -> list[tuple[int, f
 
 @lru_cache(maxsize=1024)
 def _exact(value: float) -> Any:
-    """A double as the rational number it is, so that a vanishing capacity is seen to vanish."""
+    """Return a double as an exact rational number, so that a capacity that vanishes exactly is found to vanish."""
     fraction = Fraction(value)
     return symengine.Integer(fraction.numerator) / symengine.Integer(fraction.denominator)

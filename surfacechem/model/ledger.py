@@ -1,6 +1,6 @@
-"""Ledger of the powers that the parts of a scene state: accounts, flows into the nodes, and heat fluxes.
+"""Ledger of the powers of a scene: accounts, flows into the nodes, and heat fluxes.
 
-Beside them stand the totals that the ledger must explain, who takes the heat of a jump, and the regime in words.
+Also the totals that the ledger must explain, the sinks of the heat of jumps, and the thermal regime in words.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from surfacechem.scene import Body
 
 GAPS = ("g_n", "g_t", "u_t", "u_t2")
 GEOMETRY = (*GAPS, "J_c")
-"""Variables of the free energy that move the surfaces rather than their bonds."""
+"""Variables of the free energy that move the surfaces, not their bonds."""
 
 
 @dataclass(frozen=True)
 class Flow:
-    """Energy flow between two places [W/m^2]; an interface that stores no heat passes it on to the bodies."""
+    """Energy flow between two places [W/m^2]; an interface without heat capacity passes it on to the bodies."""
 
     source: str
     target: str
@@ -38,7 +38,7 @@ class Flow:
 
 
 def energy_flows(build: Build) -> Iterator[Flow]:
-    """Energy flows from source to target of all powers of a scene."""
+    """Yield the energy flows, from source to target, of all powers of a scene."""
     for power in build.powers:
         targets = power.target if isinstance(power.target, Mapping) else {power.target: symengine.Integer(1)}
         if INTERFACE in targets and INTERFACE not in build.thermal.node_of and power.kind != WORK:
@@ -51,7 +51,7 @@ def energy_flows(build: Build) -> Iterator[Flow]:
 
 
 def take(build: Build, record: Record) -> None:
-    """Keep a record that a component states; a power with its accounts, those of dissipation excepted until later."""
+    """Keep a record; of a power also its accounts, except those of dissipation, which follow in `flows`."""
     build.add(record)
     if isinstance(record, Power) and record.kind != DISSIPATION:
         _account(build, record)
@@ -60,7 +60,7 @@ def take(build: Build, record: Record) -> None:
 def flows(build: Build) -> None:
     """Add the flows into each node, from all powers and the work of tractions, and the accounts of dissipation."""
     build.rates = _rates(build)
-    # Tractions do work on the interface: from outside where the gap is prescribed, else from the bodies.
+    # Tractions do work on the interface: from outside if the gap is prescribed, else from the mechanics.
     for name in GEOMETRY:
         x = symengine.Symbol(name)
         work = balances.power(build.psi, x, build.rates[x]) if x in build.rates else 0
@@ -75,7 +75,7 @@ def flows(build: Build) -> None:
             _account(build, power)
     for passage in energy_flows(build):
         source, target = build.thermal.places.get(passage.source), build.thermal.places.get(passage.target)
-        if source is target:  # what bonds release stays where they are
+        if source is target:  # no change, such as heat that bonds release and keep
             continue
         if target is not None:
             build.inflow.setdefault(target.name, []).append(passage.rate)
@@ -84,7 +84,7 @@ def flows(build: Build) -> None:
 
 
 def _rates(build: Build) -> dict[Any, Expression]:
-    """Time derivatives of the variables of the interface's free energy other than temperature."""
+    """Return the time derivatives of the variables of the interface's free energy other than temperature."""
     rates: dict[Any, Expression] = {bond.symbol: bond.dot for bond in build.bonding.values()}
     for name in (*GEOMETRY, "phi"):
         x = symengine.Symbol(name)
@@ -116,20 +116,20 @@ def _account(build: Build, power: Power) -> None:
 
 
 def _stored(build: Build) -> dict[str, list[tuple[Node | None, Expression]]]:
-    """Free energies [J/m^2] by member, each with its node; without one where that has no temperature of its own."""
+    """Return the free energies [J/m^2] by member, each with its node, or None if it has no temperature."""
     stored: dict[str, list[tuple[Node | None, Expression]]] = {}
     inside = [node for slab in build.thermal.slabs.values() for node in slab.inner]
     for node in (*build.thermal.nodes.values(), *inside):
         for member, F in node.energies.items():
             if F != 0:
                 stored.setdefault(member, []).append((node, F))
-    if build.interface.temperature is None and build.psi != 0:  # no medium, and so no temperature of its own
+    if build.interface.temperature is None and build.psi != 0:  # no medium, so no temperature
         stored[INTERFACE] = [(None, build.psi)]
     return stored
 
 
 def totals(build: Build) -> None:
-    """Energies, entropies, the fluxes into the bodies, the heat of reaction, and the modes, as outputs."""
+    """Name energies, entropies, heat fluxes into the bodies, the heat of reaction and the modes as outputs."""
     suffixes = {INTERFACE: "c"} | {body.name: str(k) for k, body in enumerate(build.scene.bodies, start=1)}
     energies, entropies = [], []
     for member, parts in _stored(build).items():
@@ -152,12 +152,12 @@ def totals(build: Build) -> None:
 
 
 def _sum(terms: list[Expression]) -> Expression:
-    """The sum; one term alone as it is, since a sum of one rounds differently."""
+    """Return the sum; a single term unchanged, since a sum of one term rounds differently."""
     return terms[0] if len(terms) == 1 else symengine.Add(*terms)
 
 
 def _enthalpy(build: Build) -> None:
-    """Heat of reaction and contact enthalpy per bonding site, where bonds alone change on the interface."""
+    """Name the heat of reaction and the contact enthalpy per bonding site, if nothing but bonds changes."""
     bonds = {x: rate for x, rate in build.rates.items() if str(x) not in GEOMETRY}
     if not any(depends(build.psi, x) for x in bonds) or any(law.taken is not None for law in build.interface.reactions):
         return
@@ -173,7 +173,7 @@ def _enthalpy(build: Build) -> None:
 
 
 def _fluxes(build: Build) -> None:
-    """Heat into each body from the interface, with the accounts of what its balance says of it."""
+    """Name the heat flux from the interface into each body, and add the account of its balance."""
     flows = list(energy_flows(build))
     fluxes = []
     for k, body in enumerate(build.scene.bodies, start=1):
@@ -197,12 +197,12 @@ def _fluxes(build: Build) -> None:
 
 
 def _flux(build: Build, k: int, body: Body, flows: list[Flow]) -> tuple[Expression, Expression] | tuple[None, None]:
-    """Heat into a body from the interface, and how it is booked.
+    """Return the heat flux from the interface into a body, and the flux that goes to its account.
 
-    It is stated by its laws, or recovered from a balance where it has none; of a temperature that evolves the balance
-    is booked.
+    The laws state the flux; for a body whose node has other members it is recovered from the body's balance. If the
+    temperature evolves, the account gets the flux recovered from the balance.
 
-    Two bodies that share a prescribed temperature leave open which of them the heat goes into.
+    If two bodies share a prescribed temperature, the split of the heat between them is undetermined: None.
     """
     node = build.thermal.node_of[body.name]
     members = build.thermal.members.items()
@@ -228,7 +228,7 @@ def _flux(build: Build, k: int, body: Body, flows: list[Flow]) -> tuple[Expressi
 
 
 def _heat_into(build: Build, body: Body, flows: list[Flow]) -> tuple[dict[str, Expression], Expression]:
-    """Heat into a body from the interface and the other body, by what carries it, and from all other places."""
+    """Return the heat into a body from the interface and the other body, by channel, and the rest of its inflow."""
     near = {INTERFACE, *(other.name for other in build.scene.bodies)}
     channels: dict[str, Expression] = {}
     elsewhere = symengine.Integer(0)
@@ -243,10 +243,10 @@ def _heat_into(build: Build, body: Body, flows: list[Flow]) -> tuple[dict[str, E
 
 
 def sinks(build: Build) -> dict[str, tuple[Sink, ...]]:
-    """Sinks of the heat of jumps, that of the interface and of the support of each axis, by the routes of the flow."""
+    """Return the sinks of the heat of jumps, of the interface and of the supports, along the paths of heat."""
     if not build.edges:
         return {}
-    # Accounts that only jumps change.
+    # Only jumps change these accounts.
     nothing = symengine.Integer(0)
     rows = [
         ("released", "J/m^2", "energy that jumps have turned into heat", "dissipation"),
@@ -261,7 +261,7 @@ def sinks(build: Build) -> dict[str, tuple[Sink, ...]]:
         build.ledger.append(Account(Quantity(name, unit, text), nothing, kind, "events"))
     centre = build.thermal.node_of.get(INTERFACE)
     if centre is None or not centre.takes_heat:
-        # Only an interface that stores heat can pay for what breaks.
+        # A local release draws its energy from the heat of the interface, so the interface has to store heat.
         for law in build.interface.limits:
             if law.release == "local":
                 message = (
@@ -274,7 +274,7 @@ def sinks(build: Build) -> dict[str, tuple[Sink, ...]]:
 
 
 def _merged(build: Build, shares: Mapping[str, Expression]) -> tuple[Sink, ...]:
-    """One sink a node; shares of the same node add up."""
+    """Return one sink per node; shares of the same node add up."""
     total: dict[str, Expression] = {}
     for place, share in shares.items():
         name = build.thermal.places[place].name
@@ -287,7 +287,7 @@ def _merged(build: Build, shares: Mapping[str, Expression]) -> tuple[Sink, ...]:
 
 
 def _is_one_constant(build: Build, names: Collection[str]) -> bool:
-    """Whether prescribed temperatures are the same and stay as they are."""
+    """True if prescribed temperatures are equal and constant."""
     loads = [build.loads[name] for name in names]
     starts = {load.at_start() for load in loads}
     moves = any(build.slope_of(name) != 0 for name in names) or any(load.jumps() for load in loads)
@@ -295,14 +295,14 @@ def _is_one_constant(build: Build, names: Collection[str]) -> bool:
 
 
 def regime(build: Build) -> str:
-    """The thermal regime in words."""
+    """Return the thermal regime in words."""
     thermal = build.thermal
     nodes = [thermal.members[body.name] for body in build.scene.bodies]
     centre = thermal.members.get(INTERFACE)
     if centre is None:
         if nodes[0] == nodes[1]:
             return "perfect contact without a medium"
-        # What conducts between the bodies is a medium that the case names, or a law of a film or a gap.
+        # The bodies are coupled by a medium if the case names one, or if a law is one of a film or a gap.
         channels = {channel for law in build.scene.heat for channel in law.channels()}
         between = build.interface.medium is not None or channels & {"film", "gas", "gap"}
         return "medium without temperature" if between else "no medium"

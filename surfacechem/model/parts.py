@@ -1,4 +1,4 @@
-"""Records that the phases of the assembly pass on: temperatures, bonding variables and the interface's free energy."""
+"""Records that the phases of the assembly exchange: temperature nodes, bonding variables, heat paths, free energy."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from surfacechem.scene import Body, Conduction
 
 @dataclass(frozen=True)
 class Bond:
-    """A bonding variable that is a state: its symbol, its rate, its initial value, and the amount where it is one."""
+    """A bonding variable that is a state: its symbol, rate, site density (its amount at one) and initial value."""
 
     symbol: Any
     dot: Any
@@ -27,36 +27,36 @@ class Bond:
 
 @dataclass(frozen=True)
 class Slab:
-    """A body with its temperatures in a row, from the contact on; a far side that is held is the last one."""
+    """A body divided into cells: temperatures from the contact on, with a prescribed far side as the last one."""
 
     number: int
     body: Body
     law: Conduction
     points: tuple[float, ...]
     behind: tuple[Node, ...]
-    """The nodes behind that of the contact."""
+    """The nodes behind the one at the contact."""
 
     @property
     def inner(self) -> tuple[Node, ...]:
-        """The nodes of its own that evolve."""
+        """The nodes behind the contact that evolve."""
         return tuple(node for node in self.behind if not node.prescribed)
 
     @property
     def profile(self) -> str:
-        """Name of its temperatures together."""
+        """Name of its temperature profile."""
         return f"profile_{self.number}"
 
 
 @dataclass(frozen=True)
 class Thermal:
-    """Temperature nodes by name, the members that they belong to, and the bodies that are divided into cells."""
+    """Temperature nodes by name, the members that share them, and the bodies that are divided into cells."""
 
     nodes: Mapping[str, Node]
     members: Mapping[str, str]
     """Name of the node of each body, of the interface and of the surroundings."""
     slabs: Mapping[str, Slab] = field(default_factory=dict)
     resistances: Mapping[str, Expression] = field(default_factory=dict)
-    """L / k of the bodies that say how they conduct [m^2 K/W]."""
+    """L / k of the bodies with a stated conductivity [m^2 K/W]."""
 
     @cached_property
     def node_of(self) -> dict[str, Node]:
@@ -75,24 +75,24 @@ class Thermal:
 
     @cached_property
     def places(self) -> dict[str, Node]:
-        """Nodes by the places that powers go to; a body is its contact."""
+        """Nodes by the places that exchange power; the place of a body is its contact."""
         return (
             {node.name: node for slab in self.slabs.values() for node in slab.behind} | dict(self.nodes) | self.node_of
         )
 
     def owners(self, node: Node) -> str:
-        """The members that have a node, in words."""
+        """Return the members that share a node, in words."""
         return " and ".join(member for member, name in self.members.items() if name == node.name)
 
     def volume(self, body: str) -> dict[str, Expression]:
-        """Places in a body with their parts of its volume; the one at the contact is the first."""
+        """Return the places in a body with their fractions of its volume; the place at the contact comes first."""
         if body not in self.slabs:
             return {body: symengine.Integer(1)}
         slab = self.slabs[body]
         return dict(zip((body, *(node.name for node in slab.behind)), grids.volume_shares(slab.points), strict=True))
 
     def with_energy(self, member: str, F: Expression) -> Thermal:
-        """A copy with the free energy of a member [J/m^2]."""
+        """Return a copy with the free energy of a member [J/m^2]."""
         node = self.node_of[member]
         changed = replace(node, energies={**node.energies, member: F})
         return replace(self, nodes={**self.nodes, node.name: changed})
@@ -100,7 +100,7 @@ class Thermal:
 
 @dataclass(frozen=True)
 class HeatPath:
-    """A conductance [W/(m^2 K)] between two ends, in parallel with others of the same ends."""
+    """A conductance [W/(m^2 K)] between two ends, in parallel with others between the same ends."""
 
     ends: tuple[str, str]
     h: Expression
@@ -108,13 +108,13 @@ class HeatPath:
 
 @dataclass(frozen=True)
 class Energy:
-    """Free energy of the interface [J/m^2], and how much of it friction acts beside."""
+    """Free energy of the interface [J/m^2], and the part of the interface on which friction acts."""
 
     psi: Expression
     unbonded: Expression
-    """Fraction of the interface on which friction acts, beside adhesion in parallel."""
+    """Fraction of the interface on which friction acts, in parallel with adhesion."""
     unbonded_energy: Expression
-    """Energy, per area of that fraction, of the elastic gap that friction slides on [J/m^2]."""
+    """Elastic energy of the gap in series with friction, per area of that fraction [J/m^2]."""
 
 
 NO_ENERGY = Energy(symengine.Integer(0), symengine.Integer(1), symengine.Integer(0))

@@ -1,4 +1,4 @@
-"""The assembled scene: states, equations, ledgers, margins and named quantities as one graph of expressions."""
+"""The assembled scene: states, equations, ledger, margins and named quantities as one graph of expressions."""
 
 from __future__ import annotations
 
@@ -23,76 +23,76 @@ from surfacechem.scene import Engine
 Array = NDArray[np.float64]
 
 STABLE_PREFIX = "stable "
-"""Prefix of the names of margins that tell a stable state from an unstable one."""
+"""Prefix of the names of margins that mark the loss of stability of an algebraic state."""
 
 START = "run.t_start"
-"""Path of the time at which a stretch between events starts; within it time counts from there."""
+"""Path of the start time of an arc (flow interval between events); within the arc, time counts from there."""
 
 DUMMY_STATE = "no_state"
-"""Name of the state, always zero, of a scene in which all is prescribed, since solvers need at least one."""
+"""Name of the state, always zero, of a scene in which everything is prescribed: solvers need at least one state."""
 
 RTOL_PATH = "run.rtol"
-"""Path of the relative tolerance of a run, at which endless sequences of events are cut off."""
+"""Path of the relative tolerance of a run, which sets where endless sequences of events are cut off."""
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """A run-time number of the compiled scene: a field of a law, or a local field of a history."""
+    """A run-time number of the compiled scene: a parameter of a law, a mode, a register or a segment's field."""
 
     symbol: Any
     path: str
     spec: Spec
     value: float
     load: Load | None = None
-    """The history whose pieces change the value, if any."""
+    """The history whose segments change the value, if any."""
     field: str = ""
     internal: bool = False
-    """Whether it belongs to the solution method, so that no run may change it."""
+    """True if it belongs to the solution method, so that no run may change it."""
 
     @property
     def changeable(self) -> bool:
-        """Whether a run may give it another value."""
+        """True if a run may give it another value."""
         return not self.internal and self.load is None
 
     def at(self, start: float) -> float:
-        """Value on the piece of time that begins at ``start`` [s]."""
+        """Return the value on the load segment that begins at ``start`` [s]."""
         return self.load.piece(start)[self.field] if self.load else self.value
 
 
 @dataclass(frozen=True)
 class Given:
-    """Initial value of a quantity, given in place of that of a state, which is as a rule the quantity's logarithm."""
+    """Initial value of a quantity, given instead of that of a state, which is usually the quantity's logarithm."""
 
     quantity: Quantity
     value: float
     state: Callable[[Mapping[str, float]], float] | None = None
-    """The state from all values by path, where it is not the logarithm."""
+    """Function that computes the state from all values by path; the logarithm if None."""
 
 
 @dataclass(frozen=True)
 class State:
-    """A variable that the run solves for: evolved by a balance, or algebraic where that has no capacity."""
+    """An unknown of the run: evolved by a balance, or algebraic if that balance has no inertia or capacity."""
 
     quantity: Quantity
     initial: float
     scale: float
     algebraic: bool = False
     start: str = ""
-    """Name of the variable whose initial value it takes, where not its own."""
+    """Name of the variable that gives its initial value, if not the state itself."""
     finest: float | None = None
-    """Size below which it counts as none, relative to the absolute tolerance; its scale, where not given."""
+    """Scale by which the absolute tolerance is multiplied, if smaller than ``scale``."""
     given: Given | None = None
-    """The initial value given of the quantity that it stands for, if any."""
+    """The given initial value of the quantity that the state represents, if any."""
     is_temperature: bool = False
 
     @cached_property
     def symbol(self) -> Any:
-        """Its symbol in the equations."""
+        """Symbol of the state in the equations."""
         return symengine.Symbol(self.name)
 
     @cached_property
     def dot(self) -> Any:
-        """The symbol of its time derivative."""
+        """Symbol of its time derivative."""
         return symengine.Symbol(f"d{self.name}_dt")
 
     @property
@@ -102,16 +102,16 @@ class State:
 
     @cached_property
     def path(self) -> str:
-        """Path of its initial value, or of the quantity given in its place."""
+        """Path of its initial value, or of the quantity that is given instead."""
         return f"initial.{self.given.quantity.name if self.given else self.start or self.name}"
 
     @property
     def at_start(self) -> tuple[Quantity, float]:
-        """The quantity given at the start, and its value."""
+        """The quantity that is given at the start, and its value."""
         return (self.given.quantity, self.given.value) if self.given else (self.quantity, self.initial)
 
     def from_given(self, values: Mapping[str, float]) -> float:
-        """Its initial value, from given values by path."""
+        """Return the initial value of the state, from given values by path."""
         if self.given is None:
             return values[self.path]
         return self.given.state(values) if self.given.state else math.log(values[self.path])
@@ -132,7 +132,7 @@ class Named:
 
 
 def definitions(named: Sequence[Named]) -> dict[Any, Expression]:
-    """Named expressions by name, expanded so that none contains another of these names."""
+    """Return the named expressions by name, expanded so that none contains another of these names."""
     result: dict[Any, Expression] = {}
     for item in named:
         result[symengine.Symbol(item.name)] = without(item.expression, result)
@@ -141,10 +141,10 @@ def definitions(named: Sequence[Named]) -> dict[Any, Expression]:
 
 @dataclass(frozen=True)
 class Account:
-    """A line of the ledger, integrated beside the state.
+    """A line of the ledger: a quantity that is integrated along with the states.
 
     ``kind`` is 'energy supply', 'entropy supply', 'entropy production', 'dissipation', 'heat', 'bonds' or 'statistics';
-    ``law`` names what it belongs to.
+    ``law`` names the law or process that it belongs to.
     """
 
     quantity: Quantity
@@ -155,40 +155,40 @@ class Account:
 
 @dataclass(frozen=True)
 class Margin:
-    """An event function that must stay positive. At its zero the run ends, or restarts if it is only a kink."""
+    """An event function that must stay positive. At its zero the run ends; at a mere kink only the step ends."""
 
     name: str
     expression: Expression
     reason: str
     terminal: bool = True
     remedy: str = ""
-    """Advice on what to change where it is closed from the start."""
+    """Advice on what to change if the margin is not positive at the start."""
     path: str = ""
     """Path of the entry of a case that it belongs to."""
     stability: str = ""
-    """The state whose stability it tells, if any."""
+    """The algebraic state whose stability it monitors, if any."""
     peak: bool = False
-    """Whether a step has to end here and no more, so that it does not pass over a peak; it is no event of the scene."""
+    """True if only a step ends here, so as not to pass over a peak of a law; it is no event of the scene."""
     domain: bool = False
-    """Whether a law ends there, so that no equilibrium lies beyond."""
+    """True if the domain of a law ends here, so that no equilibrium lies beyond."""
     below: tuple[Expression, str] | None = None
-    """An expression, and the reason where it is below zero as the margin closes."""
+    """An expression, and the reason to report if it is negative when the margin closes."""
     bound: tuple[str, float] | None = None
-    """The state whose bound it is, and the bound."""
+    """The state that the margin bounds, and the bound."""
     when: When = field(default_factory=dict)
-    """Modes in which it is active."""
+    """Values of the modes in which it is active."""
     at_start: bool = False
-    """Whether it holds ever after if it holds at the start."""
+    """True if it needs a check at the start only: if it holds there, it holds always."""
 
     @property
     def masked(self) -> Expression:
-        """The expression while the margin is active, else 1, as one expression to be read or printed."""
+        """The expression while the margin is active, else 1, as one expression for reading and printing."""
         return masked(self.expression, self.when)
 
 
 @dataclass(frozen=True)
 class Range:
-    """Range of validity of a law in one variable, beyond which it is an extrapolation."""
+    """Range of validity of a law in one variable; outside, the law extrapolates."""
 
     variable: str
     low: float
@@ -198,9 +198,9 @@ class Range:
 
 @dataclass(frozen=True)
 class RatePair:
-    """Rates forward and backward that are stated apart, held against equilibrium along a run.
+    """A forward and a backward rate that are stated separately, compared with the equilibrium constant along a run.
 
-    ``departure`` names the quantity ln(k_f/k_r) - ln K(g, T), ``law`` the account of the entropy they produce together.
+    ``departure`` names the quantity ln(k_f/k_r) - ln K(g, T), ``law`` the account of the entropy that both produce.
     """
 
     departure: str
@@ -210,7 +210,7 @@ class RatePair:
 
 @dataclass(frozen=True)
 class TimeScale:
-    """Characteristic time of a free motion, with advice where it is too short for a run."""
+    """Characteristic time of a free motion, with advice if it is too short for a run."""
 
     text: str
     time: Expression
@@ -219,7 +219,7 @@ class TimeScale:
 
 @dataclass(frozen=True)
 class ExternalRates:
-    """An engine with the expressions of what it reads."""
+    """An engine that evaluates rates outside the graph, with the expressions of the variables that it reads."""
 
     engine: Engine
     reads: tuple[Expression, ...]
@@ -236,7 +236,7 @@ class Role:
 
 @dataclass(frozen=True)
 class CappedLaw:
-    """The exponents of a law, in words, above whose cap its exponentials go on along their tangents."""
+    """Exponents of a law that are capped: above the cap its exponentials continue along their tangents."""
 
     title: str
     exponents: tuple[Any, ...]
@@ -244,7 +244,7 @@ class CappedLaw:
 
 @dataclass(frozen=True)
 class Caution:
-    """Warning to be given where an expression falls below zero, at the start or along a run."""
+    """Warning to give if an expression becomes negative, at the start or along a run."""
 
     expression: Expression
     text: str
@@ -252,24 +252,24 @@ class Caution:
 
 @dataclass(frozen=True)
 class Profile:
-    """Temperatures across a body, from the contact to the far side."""
+    """Temperature profile across a body, from the contact to the far side."""
 
     number: int
     body: str
     points: tuple[float, ...]
-    """Places as fractions of the thickness."""
+    """Positions of the temperatures, as fractions of the thickness."""
     thickness: str
     """Path of the thickness."""
     surface: str
     """Name of the temperature at the contact."""
     anchored: bool
-    """Whether that is a state."""
+    """True if the temperature at the contact is a state."""
     states: tuple[str, ...]
     """Names of the temperatures inside, in order."""
     far: str = ""
-    """Name of the temperature at the far side where it is given."""
+    """Name of the temperature at the far side if it is prescribed."""
     after: float | None = None
-    """Time after a sudden change from which on the cells have to resolve it, where the scene gives it."""
+    """Time after a sudden change from which on the cells have to resolve the profile, if the scene gives it."""
 
     @property
     def name(self) -> str:
@@ -279,7 +279,7 @@ class Profile:
 
 @dataclass(frozen=True)
 class Conductor:
-    """Data of a body with a conductivity, to judge whether it may be one lump."""
+    """Data of a body with a conductivity, to judge whether one lumped temperature is enough."""
 
     number: int
     body: str
@@ -289,7 +289,7 @@ class Conductor:
     capacity: Expression
     """Heat capacity of the whole body [J/(m^2 K)]."""
     conductance: Expression | None
-    """Conductance of all paths at the contact [W/(m^2 K)]; None in perfect contact."""
+    """Conductance of all heat paths at the contact [W/(m^2 K)]; None in perfect contact."""
 
 
 Note = Range | CappedLaw | RatePair | TimeScale | Caution | Profile | Conductor
@@ -301,8 +301,8 @@ N = TypeVar("N", bound=Note)
 class System:
     """The assembled system: states, equations and everything that is derived from them.
 
-    The equations are G(t, y, dy/dt; p) = 0, linear in dy/dt; ``rows`` names them. ``energy`` and ``entropy`` are the
-    totals whose changes the ledger must explain.
+    The equations are G(t, y, dy/dt; p) = 0, linear in dy/dt; ``rows`` holds the residuals by the names of their states.
+    The named quantities ``E_total`` and ``S_total`` are the totals whose changes the ledger must explain.
     """
 
     t: Any
@@ -317,7 +317,7 @@ class System:
     breakpoints: tuple[float, ...]
     warnings: tuple[str, ...] = ()
     cycles: tuple[str, ...] = ()
-    """Frequencies, by path, of loads under which the state may rest: their work still has to be followed."""
+    """Paths of the frequencies of periodic loads, whose work steps have to resolve even if the state is at rest."""
     modes: tuple[Mode, ...] = ()
     registers: tuple[Register, ...] = ()
     edges: tuple[Edge, ...] = ()
@@ -325,56 +325,56 @@ class System:
     sinks: Mapping[str, tuple[Sink, ...]] = field(default_factory=dict)
     """Sinks of the heat of a jump, by its origin: the interface, or the support of an axis."""
     follows: Mapping[str, Expression] = field(default_factory=dict)
-    """New values of states that follow the normal gap where it jumps, by name."""
+    """Reset map of states that follow the normal gap when it jumps: new values, by name."""
     given: Mapping[str, Expression] = field(default_factory=dict)
     """Tractions of the far field times their gaps [J/m^2], by account of the work."""
     pulls: Mapping[str, tuple[Expression, ...]] = field(default_factory=dict)
-    """Stiffness [Pa/m], displacement [m] and traction [Pa] of the far field, and the gap [m], by the account of the
+    """Stiffness [Pa/m], displacement [m] and traction [Pa] of the far field, and the gap [m], by account of the
     work."""
     notes: tuple[Note, ...] = ()
-    """Notes on what is watched along a run and reported where it matters; no equation depends on them."""
+    """Records that a run monitors and reports if they matter; no equation depends on them."""
     conductances: Mapping[tuple[str, str], Sequence[Expression]] = field(default_factory=dict)
     """Conductances in parallel between two ends [W/(m^2 K)]."""
     outside: ExternalRates | None = None
     whole: bool = False
-    """Whether what is per area elsewhere is that of a pair of bodies."""
+    """True if quantities that are otherwise per area are totals of a pair of bodies."""
     constants: Mapping[str, tuple[Spec, float]] = field(default_factory=dict)
-    """Parameters of laws that are left at their defaults, by path: numbers in the equations, which no run may change
-    unless they are assembled with another value."""
+    """Parameters of laws that have their default values, by path. They are numbers in the equations, so a run can
+    change them only if the scene is assembled again."""
     origin: partial[System] | None = None
-    """Call that assembles it anew, to the last bit: a pickle keeps this and no expressions."""
+    """Call that assembles the system again, to the last bit; a pickle keeps it instead of expressions."""
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Expressions are not pickled but made again, in the same order."""
+        """Pickle the call that assembles the system: expressions are formed again, in the same order."""
         if self.origin is None:
             raise PicklingError("a system that was not assembled from a scene cannot be pickled.")
         return self.origin.func, self.origin.args
 
     @cached_property
     def definitions(self) -> dict[Any, Expression]:
-        """Every name with its expression in t, states, derivatives and parameters only."""
+        """Every name with its expression in terms of t, states, derivatives and parameters only."""
         return definitions(self.named)
 
     def expand(self, expression: Expression) -> Expression:
-        """The expression in t, states, derivatives and parameters only."""
+        """Return the expression in terms of t, states, derivatives and parameters only."""
         return without(expression, self.definitions)
 
     def noted(self, kind: type[N]) -> tuple[N, ...]:
-        """The notes of one kind."""
+        """Return the notes of one kind."""
         return tuple(note for note in self.notes if isinstance(note, kind))
 
     @cached_property
     def profiles(self) -> tuple[Profile, ...]:
-        """Temperatures across bodies; their states stand behind all others, profile after profile."""
+        """Temperature profiles of bodies; their states come after all other states, profile by profile."""
         return self.noted(Profile)
 
     def unit(self, unit: str) -> str:
-        """A unit per area, or that of the same for a pair of bodies."""
+        """Return the unit, or that of the corresponding total if the system is a pair of bodies."""
         return TOTAL_UNITS.get(unit, unit) if self.whole else unit
 
     @cached_property
     def changeable(self) -> dict[str, str]:
-        """Units of all that a run may change, by path: parameters and initial values."""
+        """Units of everything that a run may change, by path: parameters and initial values."""
         given = set(self.outside.engine.gives) if self.outside else set()
         units = {p.path: p.spec.unit for p in self.parameters if p.changeable and p.path not in given}
         return units | {state.path: state.at_start[0].unit for state in self.states}
@@ -387,23 +387,23 @@ class System:
 
     @cached_property
     def inside(self) -> frozenset[str]:
-        """Names of the states inside bodies, which the profiles show together, and of the dummy state."""
+        """Names of the states inside bodies, which the profiles present together, and of the dummy state."""
         return frozenset([DUMMY_STATE, *(name for profile in self.profiles for name in profile.states)])
 
     @cached_property
     def of_cells(self) -> frozenset[Any]:
-        """States inside bodies and their rates, as symbols: each belongs to one cell."""
+        """Symbols of the states inside bodies and of their rates; each belongs to one cell."""
         cells = self.inside - {DUMMY_STATE}
         states = (state for state in self.states if state.name in cells)
         return frozenset(symbol for state in states for symbol in (state.symbol, state.dot))
 
     @property
     def rests(self) -> bool:
-        """Whether nothing changes with time: nothing evolves, and no history that is read does."""
+        """True if nothing changes with time: there are no states, and no named quantity reads a history."""
         return not self.states and not any(depends(item.expression, self.t) for item in self.named)
 
     def with_state(self) -> System:
-        """The system, with a dummy state where it has none."""
+        """Return the system, with a dummy state if it has none."""
         if self.states:
             return self
         state = State(Quantity(DUMMY_STATE, "1", "stands for states"), 0.0, 1.0)
@@ -415,7 +415,7 @@ class System:
         return tuple(item.name.removeprefix("R_") for item in self.named if item.quantity.tag == "e:R")
 
     def with_multipliers(self) -> System:
-        """The system with a factor on each reaction rate, ``multiplier.LABEL``, one unless it is changed."""
+        """Return the system with a factor on each reaction rate, ``multiplier.LABEL``, which is one by default."""
         factors = {
             f"R_{label}": Parameter(
                 symengine.Symbol(f"multiplier_{label}"), f"multiplier.{label}", Spec("1", "factor on a rate"), 1.0
@@ -431,7 +431,7 @@ class System:
 
     @property
     def chains(self) -> list[tuple[int, int, int]]:
-        """First state, end and anchor of each profile; the anchor is -1 where the contact's temperature is given."""
+        """First state, end and anchor of each profile; the anchor is -1 if the contact temperature is prescribed."""
         names = [state.name for state in self.states]
         return [
             (names.index(p.states[0]), names.index(p.states[-1]) + 1, names.index(p.surface) if p.anchored else -1)
@@ -441,7 +441,7 @@ class System:
 
     @cached_property
     def outputs(self) -> tuple[Named, ...]:
-        """The named quantities that go into the dataset."""
+        """The named quantities that are written to the dataset."""
         return tuple(item for item in self.named if item.output)
 
     @cached_property
@@ -462,7 +462,7 @@ class System:
 
     @cached_property
     def energy_has_histories(self) -> bool:
-        """Whether the total energy depends on time by itself, as under a load with a history."""
+        """True if the total energy depends explicitly on time, as under a prescribed load."""
         return self.t in self.definitions[symengine.Symbol("E_total")].free_symbols
 
     @cached_property
@@ -471,7 +471,7 @@ class System:
         return {str(parameter.symbol): parameter.path for parameter in self.parameters}
 
     def reason(self, margin: Margin, inputs: Array) -> str:
-        """Reason why a margin closed, in words, at the arguments of compiled functions there."""
+        """Return the reason, in words, why a margin closed; ``inputs`` are those of compiled functions there."""
         if margin.below is None:
             return margin.reason
         sign, other = margin.below
@@ -479,14 +479,14 @@ class System:
         return other if value < 0 else margin.reason
 
     def residual(self) -> list[Expression]:
-        """The equations, expanded, in the order of the rows."""
+        """Return the residuals, expanded, in the order of the rows."""
         return [self.expand(row) for row in self.rows.values()]
 
     def local(self, expressions: Sequence[Expression]) -> list[Expression]:
-        """Expressions in the time of a stretch, so that an event late in a run is as sharp as an early one."""
+        """Return expressions in the local time of an arc, so that late events are located as sharply as early ones."""
         start = sum((p.symbol for p in self.parameters if p.path == START), symengine.Integer(0))
         origins = [self.parameters[j].symbol for j in self.origins]
-        # What counts from an origin does so in either time; shifted both ways it would be rounded to digits of t.
+        # The time since an origin is the same in both times; shifted twice, it would be rounded to the digits of t.
         lapses = {self.t - origin: symengine.Symbol(f"since {k}") for k, origin in enumerate(origins)}
         shift = {symbol: symbol + start for symbol in (self.t, *origins)}
         back = {dummy: lapse for lapse, dummy in lapses.items()}
@@ -495,7 +495,7 @@ class System:
 
     @cached_property
     def origins(self) -> list[int]:
-        """Columns of the times from which pieces of histories count; a stretch gives them in its own time."""
+        """Columns of the origins of load segments; in an arc they are given in local time."""
         return [j for j, p in enumerate(self.parameters) if p.load is not None and p.field == "origin"]
 
     @cached_property
@@ -505,12 +505,12 @@ class System:
 
     @property
     def memory(self) -> tuple[Mode | Register, ...]:
-        """Modes and registers, which change along edges only."""
+        """Modes and registers, the discrete variables that change along edges only."""
         return (*self.modes, *self.registers)
 
     @cached_property
     def moving_margins(self) -> tuple[Margin, ...]:
-        """The margins that change in the course of a run; when time alone leads to a peak is known before."""
+        """The margins that can close during a run; a peak in time alone is left out, as it is known beforehand."""
         evolved = {x for state in self.states for x in (state.symbol, state.dot)} | {x.symbol for x in self.memory}
         moving = {True: evolved, False: evolved | {self.t}}
         margins = [m for m in self.margins if not m.at_start]
@@ -528,34 +528,34 @@ class System:
         return [[(columns[mode], values) for mode, values in item.when.items()] for item in items]
 
     def in_play(self, parameters: Array) -> tuple[bool, ...]:
-        """Flags of the guards that are active in the modes among the parameters: the moving margins, then the edges."""
+        """Return a flag for each guard, moving margins and then edges: active in the modes among the parameters."""
         return tuple(all(parameters[j] in values for j, values in when) for when in self._when)
 
     @property
     def rules(self) -> list[tuple[int, int, float]]:
-        """Modes of active guards as rows (guard, parameter, value): each parameter has to have one of its values."""
+        """Rows (guard, parameter, value) of active modes: each parameter listed must have one of its values."""
         return [(k, j, value) for k, when in enumerate(self._when) for j, values in when for value in values]
 
     @property
     def moves(self) -> bool:
-        """Whether a gap moves by a balance."""
+        """True if a gap moves by a balance."""
         return not GAPS.isdisjoint(self.state_columns)
 
     @property
     def in_stretches(self) -> bool:
-        """Whether a run is made of stretches, each in a time of its own."""
+        """True if a run consists of arcs, each with a local time."""
         return any(parameter.path == START for parameter in self.parameters)
 
     @property
     def searches(self) -> bool:
-        """Whether the state after an edge needs a search: for the equilibrium of a gap, or the effect of load jumps."""
+        """True if the state after an edge has to be solved for: equilibria of gaps, or responses to jumps of loads."""
         return bool(self.equilibria) or any(edge.times for edge in self.edges)
 
     @property
     def jump_energy(self) -> Expression:
-        """Energy that a jump conserves: the total energy less the work that far-field tractions do in it [J/m^2].
+        """Energy that a jump conserves: the total energy less the work of far-field tractions in the jump [J/m^2].
 
-        Heat contents that depend on temperatures alone are left out: the jump of the rest is what they take up.
+        Heat contents that depend on temperatures alone are left out: they take up the jump of the rest.
         """
         moving = {state.symbol for state in self.states if not state.is_temperature}
         moving |= {self.t, *(item.symbol for item in self.memory)}
@@ -564,5 +564,5 @@ class System:
         return symengine.Add(*moved, *(-work for work in self.given.values()))
 
     def find(self, name: str) -> Named:
-        """The named quantity of that name."""
+        """Return the named quantity of that name."""
         return next(item for item in self.named if item.name == name)

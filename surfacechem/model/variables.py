@@ -1,4 +1,4 @@
-"""Symbols of a scene: parameters of laws, variables and their roles. A law gets what its formula asks for by name."""
+"""Symbols of a scene: parameters of laws, variables and their roles. A law gets its arguments by their names."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ REMEDIES = {
 
 
 def unit_of(name: str) -> str:
-    """Unit of a variable; what the table does not name is a temperature node or a coverage."""
+    """Return the unit of a variable; a name that is not in the table is a temperature node or a coverage."""
     if name in VARIABLES:
         return VARIABLES[name].unit
     return "K" if name.startswith("T") else "1"
@@ -57,7 +57,7 @@ class Parameters:
     def __init__(self, reserved: Iterable[str] = ()) -> None:
         self.items: list[Parameter] = []
         self.constants: dict[str, tuple[Spec, float]] = {}
-        """Specification and value of parameters of laws that are at their defaults, hence numbers in formulas."""
+        """Specification and value of parameters of laws that have their default values, hence numbers in formulas."""
         self._taken = {*VARIABLES, *reserved}
         self._paths: set[str] = set()
         self._numbers: dict[str, int] = {}
@@ -66,7 +66,7 @@ class Parameters:
     def add(
         self, name: str, path: str, spec: Spec, value: float, load: Load | None = None, field: str = ""
     ) -> Expression:
-        """A new parameter of a law as a symbol; its name gives way to names that are taken."""
+        """Add a parameter of a law and return its symbol; if its name is taken it gets another one."""
         owners = [part for part in path.replace("-", "_").split(".")[:-1] if part.isidentifier()]
         candidates = [name, *(f"{name}_{owner}" for owner in reversed(owners))]
         free = next((c for c in candidates if c not in self._taken), "") or self._numbered(name, "_{}", self._taken)
@@ -74,7 +74,7 @@ class Parameters:
         return self._append(Parameter(symengine.Symbol(free), path, spec, value, load, field))
 
     def constant(self, name: str, path: str, spec: Spec, value: float, internal: bool) -> Expression:
-        """A scene-level number under exactly this name."""
+        """Add a scene-level number under exactly this name and return its symbol."""
         spec.check(path, value)
         self._taken.add(name)
         return self._append(Parameter(symengine.Symbol(name), path, spec, value, internal=internal))
@@ -88,7 +88,7 @@ class Parameters:
         return parameter.symbol
 
     def _numbered(self, name: str, ending: str, taken: Container[str]) -> str:
-        """The name with the first number at its end that is not taken."""
+        """Return the name with the first free number appended."""
         i = self._numbers.get(name + ending, 2)
         while (found := name + ending.format(i)) in taken:
             i += 1
@@ -97,19 +97,19 @@ class Parameters:
 
 
 class Variables:
-    """Variables that formulas may read. A definition is made when it is first read; one that nobody reads is not."""
+    """Variables that formulas may read. A variable is made when it is first read; an unread one is never made."""
 
     def __init__(self, parameters: Parameters) -> None:
         self.parameters = parameters
         self.roles: list[Role] = []
         self.varying: list[tuple[Law, str, Spec, Expression]] = []
-        """Parameters whose factors may carry them out of their range: law, name, range and expression."""
+        """Parameters whose factors may carry them out of their range: law, name, specification and expression."""
         self._makers: dict[str, Callable[[], Expression] | Expression] = {}
         self._symbols: dict[str, Expression] = {}
         self._bound: dict[Any, Any] = {}
 
     def define(self, name: str, make: Callable[[], Expression] | Expression, role: str, by: str) -> None:
-        """Give a name its role and its expression, or the way to make it; a second role is an error."""
+        """Give a name its role and its expression, or a function that makes it; a second role is an error."""
         taken = next((r for r in self.roles if r.variable == name), None)
         if taken is not None:
             raise InputError(
@@ -120,15 +120,18 @@ class Variables:
         self.roles.append(Role(name, role, by))
 
     def has(self, name: str) -> bool:
-        """Whether the name has a role."""
+        """True if the name has a role."""
         return name in self._makers
 
     def was_read(self, name: str) -> bool:
-        """Whether anything asked for the name so far."""
+        """True if the name has been read so far."""
         return name in self._symbols
 
     def get(self, name: str, reader: str | Law, path: str = "") -> Expression:
-        """The expression of a name for a law, or something else in words and its path in a case, that reads it."""
+        """Return the expression of a name.
+
+        ``reader`` is a law, or another reader in words, with its ``path`` in a case; messages name it.
+        """
         if name == "p" and isinstance(reader, UnderPressure) and reader.pressure == "contact":
             name = "p_contact"
         if name not in self._symbols:
@@ -153,9 +156,10 @@ class Variables:
     def call(
         self, law: Law, formula: Callable[..., Expression] | None, extra: Mapping[str, Expression] | None = None
     ) -> Expression:
-        """Evaluate a bound law's formula on what it asks for; ``extra`` goes before the scene's own variables.
+        """Evaluate the formula of a bound law on the arguments that it names.
 
-        An argument with a default is left out where the scene has no variable of that name.
+        ``extra`` has precedence over the variables of the scene. An argument with a default is left out if the scene
+        has no variable of that name.
         """
         assert formula is not None, f"{law.name()} does not state this"
         own = extra or {}
@@ -163,9 +167,9 @@ class Variables:
         return formula(**{name: own[name] if name in own else self.get(name, law) for name in names})
 
     def bind(self, law: L, path: str, suffix: str = "", unit: str = "") -> L:
-        """Bind a law: replace every numeric parameter by its symbol, times its factors where it varies.
+        """Bind a law: replace every numeric parameter by its symbol, times its factors if it varies.
 
-        ``path`` is where a law that was built in Python would stand in a case file, ``unit`` what "[x]" stands for.
+        ``path`` is the path in a case file for a law that was built in Python, ``unit`` the meaning of "[x]".
         """
         law = law if law.place else replace(law, place=Place(path=path))
         law = law.with_parts(self.shared)
@@ -179,14 +183,14 @@ class Variables:
         return law.bind(values)
 
     def shared(self, law: L, path: str, suffix: str = "") -> L:
-        """Bind a law that several ask for once, and return it."""
+        """Bind a law that has several readers once, and return it."""
         if law not in self._bound:
             self._bound[law] = self.bind(law, path, suffix)
         found: L = self._bound[law]
         return found
 
     def _parameter(self, law: Law, name: str, spec: Spec, suffix: str) -> Expression:
-        """The symbol of a parameter as the formula sees it, scaled by the area stretch where that applies."""
+        """Return the symbol of a parameter for its formula, scaled by the area stretch if the parameter requires it."""
         symbol = self._symbol(law, name, spec, suffix)
         if spec.stretch and symbol is not None and self.has("J_c"):
             return symbol * self.get("J_c", law) ** spec.stretch

@@ -1,8 +1,8 @@
-r"""Bonding: chemical potentials, rates, bond balances and what the reactions dissipate.
+r"""Bonding: chemical potentials, reaction rates, bond balances and the dissipation of reactions.
 
 A reaction that takes :math:`-\nu_j` molecules of the species j of an adjacent phase brings the enthalpy
 :math:`-\sum_j \nu_j h_j` and the entropy :math:`-\sum_j \nu_j s_j` to the interface, and its affinity contains
-:math:`-\sum_j \nu_j \mu_j`. The phase is at the temperature of the interface, so that nothing is lost on the way.
+:math:`-\sum_j \nu_j \mu_j`. The phase has the temperature of the interface, so that the transfer produces no entropy.
 """
 
 from __future__ import annotations
@@ -31,19 +31,19 @@ NEIGHBOUR_HEAT = "H_neighbours"
 """Account of the enthalpy that reactions take from neighbours."""
 
 RUPTURE_FACTOR = 4
-"""Factor by which bonds may break faster than the rate at which they count as ruptured."""
+"""Ratio of the fastest relaxation allowed under load to the loss rate at which bonds count as ruptured."""
 
 
 @dataclass(frozen=True)
 class Reaction:
-    """A law with symbols for its parameters, its affinity and the account of its dissipation."""
+    """A bound rate law with its affinity and the account of its dissipation."""
 
     label: str
     law: RateLaw
     affinity: Expression
-    """Gibbs energy of a reaction [J], with what it takes from neighbours and the work of a prescribed force on it."""
+    """Gibbs energy of reaction [J], including species taken from neighbours and the work of a prescribed force."""
     account: str
-    """Label of the dissipation: of two one-way reactions one always runs uphill, and only their sum counts."""
+    """Label of the dissipation: of two opposed one-way reactions one always runs uphill, so their sum counts."""
     load: Expression
     """Contribution of a prescribed force to the affinity [J]."""
     rate: Expression = 0
@@ -51,7 +51,7 @@ class Reaction:
 
 
 def laws(build: Build) -> Iterator[Power | Account | Caution | RatePair | Margin]:
-    """Chemical potentials, rates, bond balances and what the reactions dissipate."""
+    """Define chemical potentials, rates and bond balances; yield the powers of reactions."""
     yield from _beside(build)
     mu = _chemical_potentials(build)
     kinetics = {}
@@ -89,7 +89,7 @@ def laws(build: Build) -> Iterator[Power | Account | Caution | RatePair | Margin
 
 
 def _changes(found: Iterable[Reaction]) -> dict[str, list[Expression]]:
-    """Changes of each bonding variable by reactions."""
+    """Return the contributions of reactions to the rate of each bonding variable."""
     changes: dict[str, list[Expression]] = {}
     for item in found:
         for name, nu in item.law.stoichiometry().items():
@@ -98,7 +98,7 @@ def _changes(found: Iterable[Reaction]) -> dict[str, list[Expression]]:
 
 
 def _chemical_potentials(build: Build) -> dict[str, Expression]:
-    """Chemical potential per bond or site [J], by bonding variable."""
+    """Return the chemical potential per bond or site [J], by bonding variable."""
     mu, terms = {}, terms_of(build.psi)
     for name, bond in build.bonding.items():
         psi = symengine.Add(*terms.get(bond.symbol, ()))
@@ -134,13 +134,13 @@ def _reaction(
 
 
 def _with_rates(build: Build, found: Sequence[Reaction]) -> list[Reaction]:
-    """The reactions with their net rates, as named quantities."""
+    """Return the reactions with their net rates as named quantities."""
     laws = {item.label: item.law for item in found if item.law.envelope is None}
     stated = {item.label: _rate(build, item.law, item.affinity) for item in found if item.label in laws}
     rates = stated | {label: _resolved(build, laws, stated, label) for label in _loaded(build, stated)}
     forming = symengine.Add(*(law.stoichiometry().get("phi", 0) * rates[label] for label, law in laws.items()))
-    # One while the bonding state may change, zero at a bound and beyond the reach of bonds. Only what bonds form by may
-    # carry them beyond; a law with an envelope ends at its bound by itself.
+    # One while the bonding state may change; zero at a bound and while debonded. Laws without an envelope could carry
+    # it over a bound; a law with an envelope ends there.
     free: Expression = symengine.Integer(1)
     if "phi" in build.bonding and forming != 0:
         free = build.constraint("debonding").active * build.constrain(bound(build, forming)).active
@@ -160,7 +160,7 @@ def _with_rates(build: Build, found: Sequence[Reaction]) -> list[Reaction]:
 
 
 def _across_an_open_gap(build: Build, law: RateLaw, rate: Expression) -> Iterator[Caution]:
-    """Caution for a law that forms bonds across an open gap at a rate that does not depend on it."""
+    """Yield a caution for a law that forms bonds across an open gap at a rate that is independent of the gap."""
     bonds = {"phi", *build.interface.bonds}
     formed = sum(n for x, n in law.stoichiometry().items() if x in bonds)
     if not formed or not build.variables.has("g_n") or law_reads(law, "bonded"):
@@ -180,7 +180,7 @@ def _rate(build: Build, law: RateLaw, affinity: Expression) -> Expression:
     if "phi" in build.bonding:
         bond = build.bonding["phi"]
         own["dmu_dphi"] = derivative(derivative(build.psi, bond.symbol), bond.symbol) / bond.density
-    for name in law.positive:  # a law that divides by what is zero, whatever the state, is none for this scene
+    for name in law.positive:  # a law that divides by an expression that is zero in this scene does not apply
         value = symengine.sympify(own[name] if name in own else build.variables.get(name, law))
         if value.is_Number and not value > 0:
             raise InputError(
@@ -195,19 +195,20 @@ def _rate(build: Build, law: RateLaw, affinity: Expression) -> Expression:
 
 
 def _loaded(build: Build, rates: Mapping[str, Expression]) -> list[str]:
-    """The rates whose exponents read a load."""
+    """Return the labels of the rates whose exponents read a load."""
     loads = {symengine.Symbol(name) for name in ("g_n", "f", *(f"f_{name}" for name in build.bonding))}
     return [label for label, rate in rates.items() if any(loads & item.free_symbols for item in exponents(rate))]
 
 
 def _resolved(build: Build, laws: Mapping[str, RateLaw], rates: Mapping[str, Expression], label: str) -> Expression:
-    """Scale a rate under load, both ways alike, so that it relaxes no faster than time resolves: at once in any case.
+    """Limit a rate under load, in both directions alike, to the fastest relaxation that time resolves.
 
-    It stays far faster than all else that changes the same species, so that what they share out does not depend on it.
+    It then still relaxes at once, and far faster than all other reactions of the same species, so that the partition of
+    the species between reactions does not depend on the limit.
     """
     law, rate = laws[label], rates[label]
     if any(role.by == SHARED_LOAD and build.variables.was_read(role.variable) for role in build.variables.roles):
-        return rate  # bonds that share a load rupture, which ends the run before
+        return rate  # bonds that share a load rupture first, which ends the run
     own = law.stoichiometry()
     relaxation = _relaxation(build, own, law, rate)
     if relaxation == 0:
@@ -220,13 +221,13 @@ def _resolved(build: Build, laws: Mapping[str, RateLaw], rates: Mapping[str, Exp
 
 
 def _relaxation(build: Build, names: Iterable[str], law: RateLaw, rate: Expression) -> Expression:
-    """Relaxation rate that a law gives the variables of these names [1/s]."""
+    """Return the relaxation rate that a law gives to the named variables [1/s]."""
     changes = ((build.bonding[name], nu) for name, nu in law.stoichiometry().items() if name in names)
     return sum((-nu * derivative(rate, bond.symbol) / bond.density for bond, nu in changes), symengine.Integer(0))
 
 
 def _from_neighbours(build: Build, found: Sequence[Reaction]) -> Iterator[Power]:
-    """The enthalpy and the entropy that reactions take from neighbours."""
+    """Yield the enthalpy and the entropy that reactions take from neighbours."""
     heat, entropy = [], []
     for item in found:
         if item.law.taken:
@@ -241,7 +242,7 @@ def _from_neighbours(build: Build, found: Sequence[Reaction]) -> Iterator[Power]
 
 
 def _beside(build: Build) -> Iterator[Margin]:
-    """The histories of what is beside the interface, as variables."""
+    """Define the histories of the neighbouring phases as variables; yield their limits."""
     if (engine := build.interface.engine) is None:
         return
     values = {}
@@ -253,7 +254,7 @@ def _beside(build: Build) -> Iterator[Margin]:
 
 
 def _made(build: Build, found: Sequence[Reaction]) -> Iterator[Account]:
-    """Production of reactions in neighbours: each species per area, and the electric current into each phase."""
+    """Yield accounts of the species produced in neighbours, per area; name the electric current into each phase."""
     engine, made = build.interface.engine, dict[str, Expression]()
     for item in found:
         for species, nu in item.law.made.items():

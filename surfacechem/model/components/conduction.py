@@ -1,7 +1,7 @@
-"""Conduction across the bodies: temperatures in a row from the contact to the far side, each with its part of a body.
+"""Heat conduction across the bodies: cells in a row from the contact to the far side (finite volumes).
 
 The points are the corners of the cells, so that the first one is the temperature at the contact, with half a cell's
-capacity: the body's own node, which heat paths, laws and perfect contact know. A body is a chain of balances behind it.
+capacity: the body's node, which heat paths, laws and perfect contact use. The rest of the body is a chain of balances.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ from surfacechem.scene import Body, Conduction
 
 
 def variables(build: Build) -> Iterator[Power | Thermal]:
-    """Divide the bodies that conduct, and let heat flow along them."""
+    """Divide the bodies that conduct into cells, and yield their heat fluxes."""
     thermal = build.thermal
     for number, body in enumerate(build.scene.bodies, start=1):
         law = body.conduction
         if law is None:
             continue
         _check(build, body, law)
-        # At the reference state; along the body each place has the factors of its own temperature.
+        # At the reference state: in the body the factors follow the local temperature.
         bound = build.variables.bind(law.at_reference(), f"bodies.{body.name}.conduction", f"_{number}")
         resistances = {**thermal.resistances, body.name: bound.thickness / bound.conductivity}
         thermal = replace(thermal, resistances=resistances)
@@ -44,7 +44,7 @@ def variables(build: Build) -> Iterator[Power | Thermal]:
 
 
 def _check(build: Build, body: Body, law: Conduction) -> None:
-    """InputError where a body that conducts stores no heat, or one with a far side has no cells."""
+    """Raise InputError if a body that conducts has no heat capacity, or one with a far side has no cells."""
     if body.energy is None:
         raise InputError(f"{body.name} conducts heat but stores none: give it a heat capacity C.", law.place)
     for path in build.scene.heat:
@@ -56,7 +56,7 @@ def _check(build: Build, body: Body, law: Conduction) -> None:
 
 
 def _divided(build: Build, thermal: Thermal, number: int, body: Body, law: Conduction) -> tuple[Slab, Thermal]:
-    """The body's energy shared among its nodes."""
+    """Share the body's energy among the nodes of its cells."""
     surface, shares = thermal.node_of[body.name], grids.volume_shares(law.points)
     whole = surface.energies[body.name]
     nodes = dict(thermal.nodes)
@@ -79,7 +79,7 @@ def _divided(build: Build, thermal: Thermal, number: int, body: Body, law: Condu
 
 
 def _far_node(build: Build, number: int, body: Body, law: Conduction) -> Node:
-    """The temperature that is given at or beyond the far side."""
+    """Return the node of the temperature prescribed at the far side, or beyond a film there."""
     name = f"T_far_{number}"
     where = "at" if law.held else "beyond"
     assert law.far is not None
@@ -88,7 +88,7 @@ def _far_node(build: Build, number: int, body: Body, law: Conduction) -> Node:
 
 
 def _fluxes(build: Build, slab: Slab, surface: Node, bound: Conduction) -> Iterator[Power]:
-    """Fluxes from node to node, and through the far side."""
+    """Yield the fluxes from node to node and through the far side."""
     name = slab.body.name
     conductivity = _conductivity(build, slab, surface.name, bound.conductivity)
     links = list(pairwise((surface, *slab.behind)))
@@ -110,7 +110,7 @@ def _fluxes(build: Build, slab: Slab, surface: Node, bound: Conduction) -> Itera
 
 
 def _conductivity(build: Build, slab: Slab, surface: str, reference: Expression) -> Callable[[Expression], Expression]:
-    """Conductivity as a function of the temperature where it is asked for."""
+    """Return the conductivity as a function of the local temperature."""
     given = slab.law.conductivity
     if not isinstance(given, Varying):
         return lambda T: reference
@@ -134,7 +134,7 @@ def _conductivity(build: Build, slab: Slab, surface: str, reference: Expression)
 
 
 def outputs(build: Build) -> Iterator[State | Profile | Conductor]:
-    """The balances and states of the nodes inside the bodies, behind all others."""
+    """Set the balances of the nodes inside the bodies; yield their states, after all other states."""
     for number, body in enumerate(build.scene.bodies, start=1):
         if body.conduction is not None:
             yield _conductor(build, number, body, body.conduction)
@@ -143,7 +143,7 @@ def outputs(build: Build) -> Iterator[State | Profile | Conductor]:
 
 
 def _conductor(build: Build, number: int, body: Body, law: Conduction) -> Conductor:
-    """Data to judge whether a body may be one lump."""
+    """Return the data from which one judges whether a body may be one lump."""
     node, ends = build.thermal.node_of[body.name], build.conductances
     F = node.energies[body.name] / build.thermal.volume(body.name)[body.name]
     paths = [h for pair, several in ends.items() if body.name in pair or pair == BOTH_BODIES for h in several]

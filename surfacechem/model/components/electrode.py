@@ -1,4 +1,4 @@
-r"""Electrodes: phases beside the surface whose potential follows from the charge that they hold.
+r"""Electrodes: phases next to the surface whose potential follows from their charge.
 
 The charge :math:`c\,\varphi` of a double layer per area changes by the current of the reactions, :math:`i`, and by the
 current from outside, :math:`j`: :math:`c\,\dot\varphi=i+j`. Both bring the work :math:`\varphi\,(i+j)`, which is
@@ -21,14 +21,14 @@ from surfacechem.quantities import Quantity
 from surfacechem.scene import Electrode
 
 ELECTRODE = "electrode"
-"""Place to which the work of charge goes."""
+"""Place that receives the work of charge."""
 
 THERMAL_VOLTAGE = 0.025
 """Scale of a potential [V]: the thermal voltage, k_B T over an elementary charge, at room temperature."""
 
 
 def variables(build: Build) -> Iterator[State]:
-    """The potentials."""
+    """Yield the potentials as states."""
     for electrode in _electrodes(build):
         V = electrode.potential
         build.variables.define(V.name, symengine.Symbol(V.name), "evolved", _path(electrode))
@@ -36,7 +36,7 @@ def variables(build: Build) -> Iterator[State]:
 
 
 def laws(build: Build) -> Iterator[Power]:
-    """Charging of capacitances by currents, and the work of the charge."""
+    """Set the charging of capacitances by currents; yield the work of the charge."""
     for electrode in _electrodes(build):
         name, title, V = electrode.phase, electrode.title, symengine.Symbol(electrode.potential.name)
         spec = Spec("F/m^2", "capacitance", above=0)

@@ -1,12 +1,12 @@
-r"""The load on the bonds: normal traction and force per bond, wherever a law reads them.
+r"""Load on the bonds: normal traction and force per bond, defined if a law reads them.
 
-The force on a bond is how much its chemical potential grows with the gap,
+The force on a bond is the derivative of its chemical potential with respect to the gap,
 
 .. math:: f_k = \partial\mu_k / \partial g_n = \partial^2\Psi / \partial\theta_k \partial g_n / N_k
 
-which for a spring is :math:`w_b'(g_n)`: species share the load by their stiffness. Where the potential gives bonds no
-elasticity of their own they share the tensile part of the traction evenly, :math:`f = \langle t_n\rangle / (n_c\phi)`:
-in compression the surfaces carry the load, not the bonds.
+which for a spring is :math:`w_b'(g_n)`: species share the load by their stiffness. If the potential gives bonds no
+elasticity they share the tensile part of the traction evenly, :math:`f = \langle t_n\rangle / (n_c\phi)`: in
+compression the surfaces carry the load, not the bonds.
 
 Source: Bell (1978), Science 200, 618, doi 10.1126/science.347575; shared load as in Erdmann & Schwarz (2004),
 Phys. Rev. Lett. 92, 108102, doi 10.1103/PhysRevLett.92.108102.
@@ -31,7 +31,7 @@ OVERLOAD = "The load breaks all bonds at once: lower `t_n`, or let it grow from 
 
 
 def energies(build: Build) -> None:
-    """Give the normal traction and the force per bond their roles."""
+    """Define the normal traction and the force per bond."""
     g_n = symengine.Symbol("g_n")
     if depends(build.psi, g_n):
         build.variables.define("t_n", symengine.Symbol("t_n"), "derived", "the interface's potential")
@@ -46,7 +46,7 @@ def energies(build: Build) -> None:
 
 
 def _shared(build: Build) -> Expression:
-    """Define the force per bond: the tension over the bonds that carry it; a margin ends a step as its sign changes."""
+    """Define the force per bond as tension over bonded sites, with a margin that ends a step at a change of sign."""
     t_n, n_c, phi = (build.variables.get(x, "the force per bond", "interface") for x in ("t_n", "n_c", "phi"))
     build.add(Margin("t_n", t_n, "the load on the bonds changes its sign", terminal=False))
     carrying = where(phi > LEAST_BONDED, phi, LEAST_BONDED)
@@ -54,7 +54,7 @@ def _shared(build: Build) -> Expression:
 
 
 def laws(build: Build) -> Iterator[Margin]:
-    """End a run where loaded bonds break faster and faster, and time cannot resolve the rest of it."""
+    """Yield margins that end a run at rupture: loaded bonds break ever faster, beyond what time resolves."""
     carriers = list(_carriers(build))
     for name, bonds in carriers:
         losses = (
@@ -62,16 +62,16 @@ def laws(build: Build) -> Iterator[Margin]:
         )
         loss = symengine.Add(*losses)
         if loss != 0:
-            # Bonds that would be gone within what the clock resolves of the time that has passed have ruptured.
+            # Bonds that would be gone within the roundoff of the elapsed time have ruptured.
             left = bonds - TIME_EPS * (build.t + ZERO_TIME) * loss + NO_AMOUNT
-            # What is left of hardly any bonds cannot be told from rounding.
+            # Below this fraction the remaining bonds are roundoff, so the margin stays open.
             left = where(bonds > LEAST_BONDED, left, NO_AMOUNT)
             which = f"the bonds {name}" if len(carriers) > 1 else "the bonds"
             yield Margin(f"{name} left", left, f"{which} ruptured", remedy=OVERLOAD, path="interface")
 
 
 def _carriers(build: Build) -> Iterator[tuple[str, Expression]]:
-    """Bonds whose load grows on the rest as they break: those that share one, or hold a gap that gives way."""
+    """Yield bonds whose rupture increases the load on the rest: they share it, or hold a gap with a balance."""
     for role in build.variables.roles:
         if role.by == SHARED_LOAD and build.variables.was_read(role.variable):
             yield "phi", build.variables.get("phi", "the force per bond", "interface")

@@ -1,6 +1,6 @@
-"""Friction: sliding tractions, their dissipation, and the internal variables of a law.
+"""Friction: sliding tractions, their dissipation, and the internal variables of friction laws.
 
-Such a variable, as the age of a contact, is evolved as its logarithm.
+An internal variable, such as the age of contacts, is evolved as its logarithm.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from surfacechem.quantities import VARIABLES, Quantity
 
 
 def laws(build: Build) -> Iterator[Power | State | Margin]:
-    """Sliding tractions and their dissipation; their power comes from outside."""
+    """Name the sliding tractions; yield their dissipation and the work from outside on prescribed sliding."""
     unbonded, total = build.energy.unbonded, symengine.Integer(0)
     resisting: dict[str, Expression] = {}
     if build.interface.frictions:
@@ -61,15 +61,15 @@ def laws(build: Build) -> Iterator[Power | State | Margin]:
 
 
 def _magnitude(build: Build, tractions: Mapping[str, Expression]) -> Expression:
-    """Magnitude of the traction with these components along the interface."""
+    """Name the magnitude of the sliding traction, given its components."""
     along, *across = tractions.values()
     return build.name(VARIABLES["t_s"], sqrt(along**2 + across[0] ** 2) if across else absolute(along))
 
 
 def pressed(build: Build, law: Friction) -> dict[str, Expression]:
-    """The pressure for a law that needs one, where the gap may open: an open contact does not rub.
+    """Return the pressure, zero in an open gap, for a law that needs it: an open contact has no friction.
 
-    At zero it is one that grows or falls, not one that stays: so a contact begins and ends.
+    At p = 0 the derivative is that of the pressed side: a contact starts to press there as the pressure grows.
     """
     if "p" not in law.nonnegative or "p" in build.scene.loading:
         return {}
@@ -78,14 +78,14 @@ def pressed(build: Build, law: Friction) -> dict[str, Expression]:
 
 
 def memory(build: Build, law: Friction, bound: Friction) -> Iterator[State]:
-    """States of the law and their rates; the initial value is that of the quantity, not of its logarithm."""
+    """Yield the internal variables of a law; the initial value is that of the quantity, not of its logarithm."""
     for name, of in law.internal.items():
         start = build.initial(of)
         if not start > 0:
             raise InputError(f"initial {of} = {start:g} is outside its range: > 0.", path=f"initial.{of}")
         build.variables.define(name, partial(symengine.Symbol, name), "evolved", law.path)
         given = Given(VARIABLES[of], start)
-        # As a logarithm it stays positive, and twenty decades of age are as well resolved as one.
+        # The logarithm keeps it positive, and resolves twenty decades of age as well as one.
         yield State(VARIABLES[name], math.log(start), 1.0, given=given)
         build.name(VARIABLES[of], exp(symengine.Symbol(name)))
     if law.internal:

@@ -1,4 +1,4 @@
-"""The normal gap where it moves by a balance: inertial, overdamped, quasi-static, under dead load, or rigid."""
+"""The normal gap that moves by a balance: inertial, overdamped, quasi-static, under dead load, or rigid."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ OVERLAP_ERROR = "the bodies overlap, and their contact is rigid"
 
 
 def variables(build: Build) -> Iterator[Constraint | Margin | State]:
-    """The normal gap, a state where it moves by a balance, and the rigid contact of bodies that no potential bears."""
+    """Define the normal gap, a state if it moves by a balance, and rigid contact if no potential reads it."""
     mount = support(build, "n")
     if mount is None:
         return
     meets = not any(law_reads(law, "g_n") for law in build.interface.potentials)
     if meets and mount.quasi_static:
-        # An interface that no potential lets open: closed it carries any traction, open it carries none.
+        # No potential of the gap: closed, the interface carries any traction; open, it carries none.
         if not mount.law.k:
             raise InputError(
                 "a rigid interface under dead load has no opening. Give the mounting a stiffness k.",
@@ -45,7 +45,7 @@ def variables(build: Build) -> Iterator[Constraint | Margin | State]:
         _carry(build, closed.reaction)
     else:
         yield from _moving(build, mount)
-        # A law that holds for an open gap only ends the run as the gap closes.
+        # A law whose domain is an open gap ends the run as the gap closes, so it needs no contact.
         if meets and not any("g_n" in law.positive for law in (*build.interface.frictions, *build.scene.heat)):
             closed = contact(
                 far_field(build, mount).force(ZERO, ZERO), _bonded(build), G, V if mount.inertial else None
@@ -62,7 +62,7 @@ def variables(build: Build) -> Iterator[Constraint | Margin | State]:
 
 
 def _refuse_restitution(mount: Support, meets: bool) -> None:
-    """Raise InputError: a coefficient of restitution needs a mass that meets a rigid contact."""
+    """Raise InputError: a coefficient of restitution needs a mass and a rigid contact."""
     why = "a law of the scene ends as the gap closes" if mount.inertial else "nothing with a mass hits anything"
     if mount.inertial and not meets:
         why = "the potential of the gap bears the bodies, and its stiffness and the dampers say how they rebound"
@@ -70,7 +70,7 @@ def _refuse_restitution(mount: Support, meets: bool) -> None:
 
 
 def _moving(build: Build, mount: Support) -> Iterator[State]:
-    """States of a gap that moves by a balance, or the velocity at which dampers let it."""
+    """Yield the states of a gap that moves by a balance, and define its velocity."""
     dot, rates = symengine.Symbol("dg_n_dt"), build.motion.gap_rates
     initial = build.scene.initial.get("g_n", 0.0) if mount.quasi_static else build.initial("g_n")
     build.variables.define("g_n", G, "evolved", mount.by)
@@ -83,7 +83,7 @@ def _moving(build: Build, mount: Support) -> Iterator[State]:
     elif mount.damped:
 
         def yielding() -> Expression:
-            """Given by the state, so that power is linear in rates."""
+            """Return the rate from the state rather than a derivative, so that power is linear in rates."""
             rate = far_field(build, mount).yielding(G, derivative(build.psi, G))
             return build.name(VARIABLES["v_n"], build.constraint("closed").active * rate)
 
@@ -91,13 +91,13 @@ def _moving(build: Build, mount: Support) -> Iterator[State]:
 
 
 def _bonded(build: Build) -> Expression:
-    """Expression above zero where bonds hold a rigid interface."""
+    """Return an expression that is positive while bonds hold a rigid interface."""
     bonds = bonds_left(build)
     return symengine.Integer(bool(build.interface.limits)) if bonds is None else bonds
 
 
 def _carry(build: Build, traction: Expression) -> None:
-    """Define the traction of a rigid contact and its pressure for laws that read them."""
+    """Define the traction of a rigid contact and its pressure, for laws that read them."""
 
     def t_n() -> Expression:
         build.areal(Quantity("t_n", "Pa", "normal traction on body 1", tag="e:cons_tc"), traction)
@@ -111,7 +111,7 @@ def _carry(build: Build, traction: Expression) -> None:
 
 
 def laws(build: Build) -> Iterator[Record]:
-    """Balance of the tractions on the gap, the energies of the bodies and what their dampers turn into heat."""
+    """Yield the balance of tractions on the gap, the energies of the bodies and the dissipation of their dampers."""
     mount = support(build, "n")
     if mount is None:
         return

@@ -1,11 +1,11 @@
-r"""Heat paths between temperature nodes and external heat: fluxes and their entropy production.
+r"""Heat paths between temperature nodes, and external heat: fluxes and their entropy production.
 
-A path with the closure `mean` heats both bodies alike. Its driving force is the temperature of the interface over the
-harmonic mean of the bodies, so that the production of both fluxes is a square,
+A path with the closure `mean` heats both bodies alike. Its driving force is the difference between the temperature of
+the interface and the harmonic mean of the bodies, so that the production of both fluxes is a square,
 
 .. math:: \sigma = h_m \left( T_c - \frac{2 T_1 T_2}{T_1 + T_2} \right)^2 \frac{T_1 + T_2}{T_1 T_2 T_c} \ge 0,
 
-though one of the two alone may run uphill: into the hotter body, from an interface between both temperatures.
+although one of the two fluxes alone may flow uphill: into the hotter body, if the interface is between both.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ from surfacechem.tolerances import NO_AMOUNT
 
 
 def laws(build: Build) -> Iterator[Record]:
-    """Fluxes between nodes and external heat."""
+    """Yield the fluxes between nodes and the external heat."""
     films = [law for law in build.scene.heat if law.is_film]
-    # Paths between the same two ends count together, by what carries the heat.
+    # Parallel paths between the same ends are added up, by channel.
     groups: dict[frozenset[str], tuple[tuple[str, str], dict[str, Expression]]] = {}
     for law in (law for law in build.scene.heat if law not in films):
         for ends, channels in _paths(build, law):
@@ -48,22 +48,22 @@ def laws(build: Build) -> Iterator[Record]:
 
 
 def _external(build: Build) -> Iterator[Power]:
-    """Heat that a scene supplies to its bodies and its interface."""
+    """Yield the heat that a scene supplies to its bodies and its interface."""
     first, second = (body.name for body in build.scene.bodies)
     for member, Q in ((first, "Q_1"), (second, "Q_2"), (INTERFACE, "Q_c")):
         if build.variables.has(Q):
             heat, node = build.variables.get(Q, "the energy balance"), build.thermal.node_of.get(member)
-            # Without a medium that of the interface goes on to the bodies.
+            # Without a medium the heat of the interface goes to the bodies.
             T = build.variables.get("T_c", "the external heat") if node is None else node.T
             text = f"external heat into {member}"
             yield Power(HEAT, OUTSIDE, member, heat, f"H_{Q[2:]}", text, entropy=heat / T)
 
 
 def takers(build: Build) -> dict[str, Expression]:
-    """Shares of the places that take the heat that the interface makes at an instant.
+    """Return the places that receive the heat that the interface makes in a jump, with their shares.
 
-    The interface itself, the ends of its heat without a medium, or, where it stores none, the ends of its paths: its
-    temperature rises until these carry off all of it, in proportion to their conductances.
+    The interface if it stores heat; without a medium the ends of its heat. If its temperature is algebraic, the ends of
+    its heat paths in proportion to their conductances, since it rises until they carry off everything.
     """
     centre = build.thermal.node_of.get(INTERFACE)
     if centre is None:
@@ -76,17 +76,18 @@ def takers(build: Build) -> dict[str, Expression]:
         for end in bodies if pair == BOTH_BODIES else set(pair) - {INTERFACE} if INTERFACE in pair else ():
             ways[end] = ways.get(end, 0) + symengine.Add(*(_area(build, pair) * h for h in channels))
     whole = symengine.Add(*ways.values())
+    # While no path conducts the shares are equal, so that they still sum to one.
     conducts = where(whole > 0, whole, 1)
     return {end: where(whole > 0, h / conducts, symengine.Rational(1, len(ways))) for end, h in ways.items()}
 
 
 def _area(build: Build, ends: Collection[str]) -> Expression:
-    """Area of a path over the reference area: heat leaves to the surroundings through the latter."""
+    """Return the area of a path over the reference area, which heat to the surroundings leaves through."""
     return symengine.Integer(1) if "surroundings" in ends else build.stretch
 
 
 def _two_nodes(build: Build, law: HeatTransfer) -> tuple[Node, Node]:
-    """The nodes of the ends of a path, which are two; closures other than the direct one are of the two bodies."""
+    """Return the nodes of both ends of a path; they must differ, and be bodies unless the closure is direct."""
     a, b = law.between
     if a == b:
         raise InputError(f"a heat path needs two different ends, not {a} twice.", _ends(law))
@@ -101,15 +102,15 @@ def _two_nodes(build: Build, law: HeatTransfer) -> tuple[Node, Node]:
 
 
 def _through_film(build: Build, law: HeatTransfer) -> Iterator[Power | HeatPath]:
-    r"""Heat that a film at the mean temperature T_c gives its walls.
+    r"""Yield the heat that a film with the mean temperature T_c gives to its walls.
 
-    Across the film the temperature is a parabola on a line. With the resistances r of the film and :math:`r_k` of its
-    walls, beyond which the temperatures are :math:`T_k`,
+    Across the film the temperature is a parabola on top of a line. With the resistances r of the film and :math:`r_k`
+    of its walls, beyond which the temperatures are :math:`T_k`,
 
     .. math:: q_1 = \frac{6 (r + 2 r_2) (T_c - T_1) - 2 r (T_2 - T_1)}{r^2 + 4 r (r_1 + r_2) + 12 r_1 r_2}
 
-    and :math:`q_2` likewise. Without a film, r = 0, each wall would have its own path; without resistance of the walls
-    the first coefficient is 6/r, and the second takes back what the two paths in series conduct beyond 1/r.
+    and :math:`q_2` likewise. Without a film, r = 0, each wall would have a separate path. Without resistance of the
+    walls the first coefficient is 6/r; the second term subtracts the excess over 1/r of the two paths in series.
     """
     ends, centre = _two_nodes(build, law), end_node(build, "interface", law)
     bound = build.variables.bind(law, f"heat.{law.name()}")
@@ -127,13 +128,14 @@ def _through_film(build: Build, law: HeatTransfer) -> Iterator[Power | HeatPath]
         q = build.name(flux, build.stretch * (h * (centre.T - node.T) + sign * beside))
         flows.append(Power(HEAT, INTERFACE, end, q, channels={law.channel: q}))
         produced += q * (centre.T - node.T) / (centre.T * node.T)
-    # Booked as one: heat that a wall takes from a film colder than itself has come through it from the other wall.
+    # One account for both: a wall that takes heat from a film colder than itself takes it from the other wall, through
+    # the film.
     yield replace(flows[0], label=build.unique("film"), text="heat flow through the film", entropy=produced)
     yield from flows[1:]
 
 
 def _paths(build: Build, law: HeatTransfer) -> Iterator[tuple[tuple[str, str], dict[str, Expression]]]:
-    """Ends and conductances of a law, by what carries the heat; through the medium two paths of twice as much each."""
+    """Yield ends and conductances of a law, by channel; a path through the medium is two of twice the conductance."""
     (a, b), nodes = law.between, _two_nodes(build, law)
     bound = build.variables.bind(law, f"heat.{law.name()}")
     own = {"T_from": nodes[0].T, "T_to": nodes[1].T}
@@ -150,7 +152,7 @@ def _paths(build: Build, law: HeatTransfer) -> Iterator[tuple[tuple[str, str], d
 
 
 def _between(build: Build, ends: tuple[str, str], channels: Mapping[str, Expression]) -> Iterator[Power]:
-    """All paths between two ends: a flux of each channel where there are several, and their sum."""
+    """Yield the power between two ends, with the flux of each channel if there are several."""
     (a, b), area = ends, _area(build, ends)
     from_node, to_node = end_node(build, a), end_node(build, b)
     difference = from_node.T - to_node.T
@@ -163,7 +165,7 @@ def _between(build: Build, ends: tuple[str, str], channels: Mapping[str, Express
 def _named_flux(
     build: Build, flux: Quantity, parts: Mapping[str, Expression]
 ) -> tuple[Expression, dict[str, Expression]]:
-    """A flux by its name, and its channels by theirs where there are several."""
+    """Name a flux and, if there are several, its channels."""
     if len(parts) == 1:
         total = build.name(flux, *parts.values())
         return total, dict.fromkeys(parts, total)
@@ -175,19 +177,19 @@ def _named_flux(
 
 
 def _path_name(build: Build, a: str, b: str) -> str:
-    """Name of the flux from one end to another: q_12, q_c1, q_1a."""
+    """Return the name of the flux between two ends: q_12, q_c1, q_1a."""
     short = {body.name: str(k) for k, body in enumerate(build.scene.bodies, start=1)}
     short |= {"interface": "c", "surroundings": "a"}
     return build.unique(f"q_{short[a]}{short[b]}")
 
 
 def _ends(law: HeatTransfer | None) -> Place:
-    """Place in a case that names the ends of a heat path."""
+    """Return the place in a case that names the ends of a heat path."""
     return Place(path=f"{law.path}.between" if law else "heat")
 
 
 def end_node(build: Build, end: str, law: HeatTransfer | None = None) -> Node:
-    """The temperature node of an end of a heat path; InputError where it has none."""
+    """Return the temperature node of an end of a heat path; InputError if it has none."""
     if end in build.thermal.node_of:
         return build.thermal.node_of[end]
     if end == "interface":
@@ -200,7 +202,7 @@ def end_node(build: Build, end: str, law: HeatTransfer | None = None) -> Node:
 
 
 def _into_both(build: Build, channels: Mapping[str, Expression]) -> Iterator[Power | str]:
-    """Mean influx q_m = h_m [T_c - 2 T_1 T_2 / (T_1 + T_2)]."""
+    """Yield the mean influx q_m = h_m [T_c - 2 T_1 T_2 / (T_1 + T_2)] into both bodies."""
     bodies = [body.name for body in build.scene.bodies]
     (lower, upper), centre = (end_node(build, name) for name in bodies), end_node(build, "interface")
     difference = centre.T - 2 * lower.T * upper.T / (lower.T + upper.T)

@@ -1,6 +1,6 @@
 """The state of the interface: prescribed variables, bonding states with their bounds, and the free energy.
 
-Where a case gives ``ln_phi`` its initial value the bonding state is solved for as that: survival far below 1e-16.
+If a case gives the initial value of ``ln_phi``, the logarithm is the state, so that survival far below 1e-16 resolves.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ LOADABLE = (
     *("phi", "g_n", "g_t", "v", "v_2", "p", "t_n", "f", "J_c", "Q_1", "Q_2", "Q_c"),
     *("w_n", "w_t", "w_t2", "F_n", "F_t", "F_t2", "u_t"),
 )
-"""Variables that a case may prescribe, beside the temperatures."""
+"""Variables that a case may prescribe, in addition to the temperatures."""
 
 GAP_TRACTIONS = (
     ("g_n", "t_n", "normal traction on body 1"),
@@ -41,15 +41,15 @@ GAP_TRACTIONS = (
     ("u_t", "t_a", "tangential traction on body 1 of what stands beside friction"),
     ("u_t2", "t_a2", "transverse traction on body 1 of what stands beside friction"),
 )
-"""Gap, traction that is its derivative of the free energy, and its long name."""
+"""Gap, traction that is the derivative of the free energy with respect to it, and its long name."""
 
 GAP, SIDE = symengine.symbols("g_n side")
 BY_SIDE = {GAP < 0: SIDE < 0, GAP > 0: SIDE > 0, -GAP < 0: -SIDE < 0, -GAP > 0: -SIDE > 0}
-"""Conditions on the side of touch as conditions on its mode."""
+"""Conditions on the side of touch, mapped to conditions on its mode."""
 
 
 def variables(build: Build) -> Iterator[Bond | Margin]:
-    """Histories under ``loading``, each of which comes to life when something reads it, and the bonding states."""
+    """Define the histories under ``loading``, each made when it is first read, and yield the bonding states."""
     for name, load in build.scene.loading.items():
         if name in build.thermal.nodes:
             continue
@@ -69,7 +69,7 @@ def variables(build: Build) -> Iterator[Bond | Margin]:
         name, by = variable.name, f"interface.{variable.name}"
         amount = _amount(build, variable)
         yield _bonding_state(build, Quantity(name, "1", variable.long_name, species=variable.species), amount, 1.0)
-        # What it amounts to where it is one: N_x per reference area, n_x per current area.
+        # Its amount at the value one: N_x per reference area, n_x per current area.
         build.variables.define(f"N_{name}", symengine.sympify(amount), "constant", by)
         build.variables.define(f"n_{name}", partial(_per_current_area, build, amount), "derived", by)
     if build.interface.bonds:
@@ -78,7 +78,7 @@ def variables(build: Build) -> Iterator[Bond | Margin]:
 
 
 def _amount(build: Build, variable: BondingVariable) -> Expression:
-    """Amount of a bonding variable at the value one [1/m^2]; species of a surface go with its sites."""
+    """Return the amount of a bonding variable at one [1/m^2]; that of a surface species scales with the sites."""
     if not variable.species or build.interface.sites is None:
         spec = Spec("1/m^2", "site density", above=0)
         return build.constant(f"N_{variable.name}", f"interface.{variable.name}.density", spec, variable.density)
@@ -88,7 +88,7 @@ def _amount(build: Build, variable: BondingVariable) -> Expression:
 
 
 def _covered(build: Build) -> Iterator[Margin]:
-    """Margins of the sum of the coverages of a surface, which is one at the start and so always."""
+    """Yield margins of the sum of the coverages of a surface, which stays one if it is one at the start."""
     coverages = [build.bonding[variable.name].symbol for variable in build.interface.variables if variable.species]
     if not coverages:
         return
@@ -100,7 +100,7 @@ def _covered(build: Build) -> Iterator[Margin]:
 
 
 def _bonded_part(build: Build) -> Expression:
-    """All bonds over the bonding sites."""
+    """Return the number of all bonds relative to the bonding sites."""
     N_c = build.variables.get("N_c", "the bonding state", "interface")
     bonds = (build.bonding[name] for name in build.interface.bonds)
     return sum(bond.symbol * bond.density for bond in bonds) / N_c
@@ -116,7 +116,7 @@ def _prescribed(build: Build, name: str, load: Load) -> Expression:
 
 
 def _site_densities(build: Build, sites: Sites) -> None:
-    """Densities of bonding sites: nominal, current, and of each body."""
+    """Define the densities of bonding sites: nominal, current, and of each body."""
     by, spec = "interface.sites", Spec("1/m^2", "nominal density of reference bonding sites", above=0)
 
     def n_c() -> Expression:
@@ -124,7 +124,7 @@ def _site_densities(build: Build, sites: Sites) -> None:
         return build.name(VARIABLES["n_c"], nominal / build.stretch) if build.variables.has("J_c") else nominal
 
     def of_body(k: int, density: float) -> Expression:
-        """Sites of one body; those of the reference are the reference density itself."""
+        """Return the sites of one body; those of the reference body are the reference density."""
         if density == sites.density:
             return build.variables.get("n_c", "the interface", "interface")
         spec = Spec("1/m^2", f"nominal density of bonding sites of body {k}", above=0)
@@ -156,7 +156,7 @@ def _bonding_state(build: Build, quantity: Quantity, density: Expression, limit:
 
 
 def _initial_bonding(build: Build, name: str) -> float:
-    """Initial value of a bonding variable, from its logarithm where that is given."""
+    """Return the initial value of a bonding variable, from its logarithm if that is given."""
     initial = build.scene.initial
     if name != "phi" or LN_PHI not in initial:
         return build.initial(name)
@@ -183,16 +183,16 @@ def _bounds(build: Build, name: str, symbol: Any, limit: float) -> None:
 
 
 def energies(build: Build) -> Iterator[Constraint | Energy | Margin | Thermal]:
-    """The sum of the interface's potentials, and the tractions that follow."""
+    """Yield the free energy of the interface, the sum of its potentials, and name the tractions that follow from it."""
     bounds = {law: build.variables.bind(law, f"interface.potential.{law.name()}") for law in build.interface.potentials}
-    # The tangential gap of a potential, where it is not the elastic one: the displacement, or none.
+    # The tangential gap that a potential reads, if not the elastic one: the displacement, or zero.
     gaps: dict[Potential, Mapping[str, Expression]] = {
         law: {"g_t": symengine.Integer(0)} if arrangement(law) == "none" else {} for law in bounds
     }
     gaps |= {law: {"g_t": displacement(build)} for law in in_parallel(build)}
     stored, energy = _energies(build, bounds, gaps)
     psi = symengine.Integer(0)
-    # The balance of the interface accounts for its own temperature, bonds, gaps and the stretch of its area.
+    # The balance of the interface accounts for its temperature, bonds, gaps and area stretch.
     centre = build.thermal.members.get("interface")
     known = {symengine.Symbol(x) for x in ("phi", "g_n", "g_t", "u_t", "u_t2", "J_c", centre, *build.bonding) if x}
     for law, F in stored.items():
@@ -223,14 +223,14 @@ def energies(build: Build) -> Iterator[Constraint | Energy | Margin | Thermal]:
 def _contact_pressure(
     build: Build, stored: Mapping[Potential, Expression], bounds: Mapping[Potential, Potential]
 ) -> None:
-    """Define the contact pressure, from the repulsive part of potentials that may also pull bodies that touch."""
+    """Define the contact pressure, from the repulsive part of potentials that may also attract bodies in contact."""
     borne = [
         stored[law] if b.repulsion is None else _per_reference_area(build, b, b.repulsion) for law, b in bounds.items()
     ]
     sides = {} if build.mode("side") is None else BY_SIDE
 
     def contact() -> Expression:
-        """Sum of the pressures of the potentials, per current area."""
+        """Return the sum of the pressures of the potentials, per current area."""
         pressed = (positive(-derivative(symengine.sympify(F).xreplace(sides), GAP)) for F in borne)
         return build.name(VARIABLES["p_contact"], symengine.Add(*pressed) / build.stretch)
 
@@ -240,10 +240,10 @@ def _contact_pressure(
 def _energies(
     build: Build, bounds: Mapping[Potential, Potential], gaps: Mapping[Potential, Mapping[str, Expression]]
 ) -> tuple[dict[Potential, Expression], Energy]:
-    """The energy of each potential, with the tangential gap that it has beside friction or behind it.
+    """Return the energy of each potential, as a function of its tangential gap, in parallel or in series with friction.
 
-    Where a potential in parallel says that friction acts on a part of the interface only, so does the elastic gap that
-    friction slides on.
+    If friction acts on part of the interface only, by a potential in parallel, so does the elastic gap in series with
+    friction.
     """
     series = in_series(build)
     found = {law: _per_reference_area(build, b, b.statement, gaps[law]) for law, b in bounds.items()}
@@ -261,15 +261,15 @@ def _energies(
         for law in series:
             sheared = found[law] - symengine.sympify(found[law]).subs({g_t: 0})
             unbonded_energy += sheared
+            # The elastic gap exists on the unbonded fraction only.
             found[law] += (unbonded - 1) * sheared
     return found, Energy(symengine.Integer(0), unbonded, unbonded_energy)
 
 
 def _net_pressure(build: Build) -> None:
-    """Warn of laws for which the attraction of a potential relieves the contact; where that takes all of it what
-    presses friction ends, and a step does.
+    """Warn of laws whose pressure is reduced by the attraction of a potential, and end a step when it reaches zero.
 
-    A law with an adhesive strength of its own has it back.
+    A law with an adhesive strength adds the attraction again.
     """
     attracting = [law.name() for law in build.interface.potentials if law.repulsion is not None]
     readers = [*build.interface.frictions, *build.interface.reactions, *build.scene.heat]
@@ -292,7 +292,7 @@ def _per_reference_area(
     formula: Callable[..., Expression] | None,
     gaps: Mapping[str, Expression] | None = None,
 ) -> Expression:
-    """Free energy of a bound law per reference area, as a function of the area stretch where it depends on that."""
+    """Return the free energy of a bound law per reference area, with its dependence on the area stretch."""
     F = build.variables.call(law, formula, gaps)
     if not build.variables.has("J_c"):
         return F
@@ -308,7 +308,7 @@ def _in_sides(build: Build, given: Expression) -> tuple[Expression, list[Constra
         return given, []
     if "g_n" not in build.motion.gap_rates:
         return given, [Margin("g_n", GAP, "the given gap closes or opens", terminal=False)]
-    # Bodies at no gap are in contact, loaded or not, under a dead load: nothing else holds them there.
+    # Under a dead load, bodies at zero gap count as in contact, loaded or not: nothing else holds them there.
     mount = support(build, "n")
     rests = mount is not None and mount.quasi_static and not mount.law.k
     start = where(GAP > 0, 1.0, -1.0) if rests else where(GAP < 0, -1.0, 1.0)
@@ -321,7 +321,7 @@ def _in_sides(build: Build, given: Expression) -> tuple[Expression, list[Constra
 
 
 def _tractions(build: Build, psi: Expression) -> None:
-    """Tractions of the elastic gaps; the normal one gives the contact pressure where the potential states it."""
+    """Name the tractions of the gaps; define the pressure if the potential gives the normal traction."""
     for gap, traction, text in GAP_TRACTIONS:
         symbol = symengine.Symbol(gap)
         if depends(psi, symbol):
@@ -337,7 +337,7 @@ def _tractions(build: Build, psi: Expression) -> None:
 
 
 def outputs(build: Build) -> None:
-    """Replace the state phi by ln phi: d ln phi / dt is the balance of the bonds per bond."""
+    """Replace the state phi by ln phi: d ln phi / dt is the bond balance divided by phi."""
     if "phi" not in build.bonding or LN_PHI not in build.scene.initial:
         return
     bond = build.bonding["phi"]

@@ -1,7 +1,7 @@
-"""The medium between the bodies: its properties as functions of the interface temperature, for the laws that ask.
+"""The medium between the bodies: its properties as functions of the interface temperature, for laws that read them.
 
-A property of a fluid is a polynomial in pieces between two temperatures, where a run ends. The thermal free energy
-is the double integral of such a polynomial, so that capacity, entropy and energy belong together exactly.
+A property of a fluid is a piecewise polynomial between two temperatures, at which a run ends. The thermal free energy
+is the double integral of such a polynomial, so that capacity, entropy and energy are exactly consistent.
 """
 
 from __future__ import annotations
@@ -33,9 +33,7 @@ FITTED_KEYS = (*PROPERTY_KEYS, "gamma_m")
 
 
 def variables(build: Build) -> Iterator[State]:
-    """Properties of the medium, each of which comes to life when something reads it; the thickness of a film that
-    grows.
-    """
+    """Define the properties of the medium, made when first read; yield the thickness of a film that grows."""
     found = build.interface.medium
     assert found is not None
     _film(build, found)
@@ -52,7 +50,7 @@ def variables(build: Build) -> Iterator[State]:
 
 
 def laws(build: Build) -> None:
-    """The balance of a film that grows and wears."""
+    """Set the balance of a film that grows and wears."""
     found, total = build.interface.medium, symengine.Integer(0)
     assert found is not None
     for law in found.growth:
@@ -99,7 +97,7 @@ def _given(build: Build, name: str, value: float | Property) -> Expression:
 
 
 def _free_energy(build: Build, found: Medium, fluid: Callable[[], FluidFit] | None) -> Expression:
-    """Thermal free energy per volume, whose second derivative is the heat capacity."""
+    """Return the thermal free energy per volume, whose second derivative gives the heat capacity."""
     if found.thickness is None:
         raise InputError("a film that stores heat needs a thickness. Add `thickness`.", Place(path=PATH))
     given = [name for name in ("rho_m", "cp_m") if name in found.properties]
@@ -121,7 +119,8 @@ CAPACITY = "capacity_m"
 """Heat capacity per volume over T; minus its double integral is the free energy."""
 
 FIT_REACHES = (math.inf, 2.0, 1.1)
-"""Widths of a fit in temperatures of a case, tried in this order; the first is the whole range of the fluid."""
+"""Factors by which a fit extends beyond the temperatures of a case, tried in this order; the first takes the whole
+range."""
 
 RANGE_REMEDY = "give `interface.medium.temperatures` that the run will reach"
 
@@ -130,7 +129,7 @@ COEFFICIENT_SPEC = Spec("1", "coefficient of the fit")
 
 
 class FluidFit:
-    """The expressions of a fluid's properties, each fitted once over the temperatures that a run may reach."""
+    """Expressions of a fluid's properties, each fitted once over the temperatures that a run may reach."""
 
     def __init__(self, build: Build, fluid: Fluid) -> None:
         self.build, self.fluid = build, fluid
@@ -146,7 +145,7 @@ class FluidFit:
             build.add(fluid.remark)
 
     def _watch_walls(self) -> None:
-        """Tell where a wall is beyond the range of a film whose properties are those at its own temperature."""
+        """Add cautions for walls beyond the range of the fluid; the film has its properties at its mean temperature."""
         span, thermal = self.fluid.range(self.start), self.build.thermal
         for body in self.build.scene.bodies:
             wall = thermal.nodes[thermal.members[body.name]].T
@@ -156,7 +155,7 @@ class FluidFit:
                 self.build.add(Caution(wall - span.low, f"{span.reason_low} {rest}"))
 
     def property(self, name: str) -> Expression:
-        """A property as a named quantity, constant beyond its range."""
+        """Name a property of the fluid, constant beyond its range."""
         ends, pieces, _ = self._fitted(name)
         text, unit, inside = "piece of the fit of a property", VARIABLES[name].unit, []
         for i, (scaled, coefficients) in enumerate(pieces):
@@ -171,7 +170,7 @@ class FluidFit:
         return self.build.name(VARIABLES[name], symengine.Piecewise(*branches))
 
     def energy(self) -> Expression:
-        """Thermal free energy per volume [J/m^3], zero with its slope at the start."""
+        """Return the thermal free energy per volume [J/m^3]; it and its slope are zero at the start."""
         ends, pieces, fit = self._fitted(CAPACITY)
         branches = []
         for i, ((x, coefficients), joint) in enumerate(zip(pieces, _joints(fit, self.start), strict=True)):
@@ -188,7 +187,7 @@ class FluidFit:
     def _fitted(
         self, quantity: str
     ) -> tuple[list[Expression], list[tuple[Expression, list[Expression]]], tuple[Piece, ...]]:
-        """Ends of the pieces, scaled temperature and coefficients of each, and the pieces as numbers."""
+        """Return ends of the pieces, scaled temperature and coefficients of each, and the pieces as numbers."""
         fit = self._fit(quantity)
         keys = [(f"{quantity}_ends_{i}", f"{quantity}.ends[{i}]") for i in range(len(fit) + 1)]
         numbers = (fit[0].low, *(piece.high for piece in fit))
@@ -202,7 +201,7 @@ class FluidFit:
         return ends, pieces, fit
 
     def _fit(self, quantity: str) -> tuple[Piece, ...]:
-        """The fit over the widest range for which there is one."""
+        """Return the fit over the widest range on which one exists."""
         span = self.fluid.range(self.start)
         for reach, target in (*((reach, FIT_ACCURACY) for reach in FIT_REACHES), (FIT_REACHES[-1], CRITICAL_ACCURACY)):
             low, high = max(min(self.known) / reach, span.low), min(max(self.known) * reach, span.high)
@@ -239,7 +238,7 @@ class FluidFit:
 
 
 def _joints(pieces: Sequence[Piece], T_start: float) -> list[tuple[float, float]]:
-    """Constant and slope that each piece adds to its double integral: smooth, and zero with its slope at T_start."""
+    """Return the constant and slope that each piece adds to its double integral: smooth, and zero at T_start."""
     found = [(0.0, 0.0)]
     for left, right in pairwise(pieces):
         (f, df), (g, dg) = _integrals(left, left.high), _integrals(right, left.high)
@@ -254,7 +253,7 @@ def _joints(pieces: Sequence[Piece], T_start: float) -> list[tuple[float, float]
 
 
 def _integrals(piece: Piece, T: float) -> tuple[float, float]:
-    """Minus the double integral of a piece, from its middle, and its slope."""
+    """Return minus the double integral of a piece, from its middle, and its slope."""
     half = (piece.high - piece.low) / 2
     x = (2 * T - piece.low - piece.high) / (piece.high - piece.low)
     once = np.polynomial.polynomial.polyint(np.array(piece.coefficients))

@@ -1,8 +1,8 @@
-"""Mounting of a direction of the gap on the far field: springs, masses, dampers, their energies; loads that jump.
+"""Mounting of the gap on the far field, by axis: springs, masses, dampers, their energies, and loads that jump.
 
-A gap without inertia or damper moves at once to where the tractions balance again as a load jumps. A far-field
-displacement that jumps does its work on the spring before the gap moves, a far-field traction does it on the way. What
-is not stored of it is heat.
+When a load jumps, a gap without inertia or damper moves at once to the new equilibrium of tractions. A far-field
+displacement that jumps does its work on the spring before the gap moves, a far-field traction during the motion. Work
+that is not stored becomes heat.
 """
 
 from __future__ import annotations
@@ -34,12 +34,12 @@ SECTIONS = {"n": "normal", "t": "tangential", "t2": "transverse"}
 
 @dataclass(frozen=True)
 class Direction:
-    """A direction along the interface: the names of what moves along it."""
+    """A direction along the interface, with the names of its variables."""
 
     axis: str
     velocity: str
     cosine: str
-    """Component of the direction of sliding."""
+    """Name of the component of the slip direction."""
     traction: str
     total: str
     text: str
@@ -53,18 +53,18 @@ ALONG = Direction("t", "v", "direction", "t", "t_t", "tangential traction")
 ACROSS = Direction("t2", "v_2", "direction_2", "t_2", "t_t2", "transverse traction")
 
 SLIDING_TRACTIONS = (ALONG.total, ACROSS.total)
-"""Tractions along the interface, which a stage may wait for though no law reads them."""
+"""Tractions along the interface, which a stage may wait for even if no law reads them."""
 
 
 @dataclass(frozen=True)
 class Support:
-    """The mounting of a direction as the case gives it."""
+    """The mounting of an axis as the case gives it."""
 
     law: Mounting
     axis: str
     by: str
     beside: Support | None = None
-    """The mounting whose mass this one has, and all else where it is given for both."""
+    """The other tangential mounting, which shares the mass, and everything else if one is given for both."""
 
     @property
     def inertial(self) -> bool:
@@ -80,7 +80,7 @@ class Support:
 
 
 def support(build: Build, axis: str) -> Support | None:
-    """The mounting of a direction; a far-field traction alone is a dead load."""
+    """Return the mounting of an axis, or None; a far-field traction alone is a dead load."""
     law: Mounting | None = getattr(build.scene, SECTIONS[axis])
     force = f"F_{axis}"
     pulls = driven(build, force)
@@ -100,7 +100,7 @@ def _refuse_restitution(law: Mounting, axis: str) -> None:
 
 
 def transverse_support(build: Build, along: Support) -> Support | None:
-    """The mounting across a tangential one where the scene moves there: its own, else the same."""
+    """Return the transverse mounting, if the scene moves that way: the one given, else a copy of the tangential one."""
     law = build.scene.transverse
     if law is not None:
         if law.m:
@@ -114,17 +114,17 @@ def transverse_support(build: Build, along: Support) -> Support | None:
 
 
 def driven(build: Build, name: str) -> bool:
-    """Whether a history or the programme gives a variable."""
+    """True if a history or the programme gives the variable."""
     return name in build.scene.loading or any(name in stage.rates for stage in build.scene.programme)
 
 
 def law_reads(law: Law, name: str) -> bool:
-    """Whether a law depends on a variable, by itself or by a factor."""
+    """True if a law depends on the variable, in its formula or by a factor."""
     return name in reads(law.statement) or any(factor.of == name for factor in law.factors)
 
 
 def feels_pressure(law: Law) -> bool:
-    """Whether a law depends on the normal traction, by this or by the pressure."""
+    """True if a law depends on the normal traction or the pressure."""
     return law_reads(law, "p") or law_reads(law, "t_n")
 
 
@@ -150,28 +150,28 @@ class FarField:
 
     @property
     def works(self) -> bool:
-        """Whether it does work."""
+        """True if the far field does work."""
         return bool(self.w_dot != 0 or self.F != 0)
 
     def stored(self, g: Expression) -> Expression:
-        """Elastic energy of the bodies [J/m^2]."""
+        """Return the elastic energy of the bodies [J/m^2]."""
         return elastic_energy(self.k, self.w, g)
 
     def carried(self, g: Expression) -> Expression:
-        """Traction that the bodies carry elastically [Pa], the fall of what they store as the gap opens."""
+        """Return the elastic traction of the bodies [Pa], the decrease of their energy with the gap."""
         slot = symengine.Symbol("opening")
         return -derivative(self.stored(slot), slot).subs({slot: g})
 
     def force(self, g: Expression, rate: Expression) -> Expression:
-        """Traction with which the far field pulls the gap open [Pa]."""
+        """Return the traction with which the far field opens the gap [Pa]."""
         return self.carried(g) + self.c_b * (self.w_dot - rate) + self.F
 
     def size(self, g: Expression) -> Expression:
-        """Size of the tractions that cancel where the far field is in balance [Pa]."""
+        """Return the size of the tractions that balance in the far field [Pa]."""
         return self.k * (absolute(self.w) + absolute(g)) + absolute(self.F)
 
     def paces(self, text: str) -> list[TimeScale]:
-        """The period of a mass on the stiffness of the bodies, or the relaxation of a damper beside it."""
+        """Return the period of a mass on the bodies' stiffness, or the relaxation time of a damper in parallel."""
         if self.k == 0:
             return []
         if self.m != 0:
@@ -183,21 +183,21 @@ class FarField:
         return []
 
     def takers(self, build: Build) -> dict[str, Expression]:
-        """Shares of places in the bodies in the dissipation of the support."""
+        """Return the shares of places in the bodies in the dissipation of the support."""
         shares = zip((body.name for body in build.scene.bodies), (self.beta_1, 1 - self.beta_1), strict=True)
         return {place: share * part for body, share in shares for place, part in build.thermal.volume(body).items()}
 
     def yielding(self, g: Expression, traction: Expression) -> Expression:
-        """Rate of the gap at which the dampers alone resist what drives it [m/s]."""
+        """Return the rate of the gap at which the dampers alone balance the driving traction [m/s]."""
         return (self.force(g, symengine.Integer(0)) - traction) / (self.c_b + self.c_g)
 
     def book(
         self, build: Build, g: Expression, rate: Expression, moves: Expression | None = None
     ) -> Iterator[Power | TimeScale]:
-        """Energies of the bodies, work of the far field, heat of the dampers.
+        """Yield the work of the far field and the dissipation of the dampers; store the energies of the bodies.
 
-        Where the rate is what dampers make of the tractions, and so of their rounding, it does its work on how the gap
-        ``moves``: then energy is conserved in each step, however stiff the damper.
+        An overdamped rate is computed from tractions, with their roundoff. The work is therefore done on the gap's
+        derivative ``moves``: energy is then conserved in each step, however stiff the damper.
         """
         moves = rate if moves is None else moves
         axis = self.mount.axis
@@ -237,12 +237,12 @@ class FarField:
         slides: int = 0,
         bears: Expression = 1,
     ) -> Iterator[Equilibrium]:
-        """Rows of the gap, which moves against ``tractions`` [Pa] by Newton's law, by its dampers, or in equilibrium.
+        """Set the rows of a gap that moves against ``tractions`` [Pa] by Newton's law, by dampers, or in equilibrium.
 
-        ``inertia`` [Pa] is that of a ``velocity`` that something else stands for, ``support`` the row while not active.
+        ``inertia`` [Pa] is that of a state that is a function of the velocity, ``held`` the row while not active.
         """
         name, rows = str(self.gap), build.rows
-        resisted = [-part for part in tractions]  # no sum within the sum, whose parts cancel others of it
+        resisted = [-part for part in tractions]  # separate terms, no nested sum, so that terms cancel symbolically
         if self.mount.inertial:
             rows.kinematics(name, rate)
             force = symengine.Add(self.force(self.gap, rate), *resisted, -self.c_g * rate)
@@ -251,9 +251,9 @@ class FarField:
             else:
                 rows.momentum_of(velocity, inertia, force, active)
         elif self.mount.damped:
-            rows.kinematics(name, rate)  # which is that of the dampers under what is out of balance
+            rows.kinematics(name, rate)  # at the rate of the dampers under the unbalanced traction
         else:
-            # Equilibrium at all times: its rate is the equation, itself the start and what a jump has to find.
+            # Equilibrium at all times: its rate is the equation; the residual is for the start and for jumps.
             residual = symengine.Add(self.force(self.gap, symengine.Integer(0)), *resisted)
             rows.equilibrium(name, build.total_derivative(residual), active, held)
             size = self.size(self.gap) + symengine.Add(*(absolute(part) for part in tractions))
@@ -261,7 +261,7 @@ class FarField:
 
 
 def far_field(build: Build, mount: Support) -> FarField:
-    """The mounting with symbols for its parameters; made once."""
+    """Return the mounting with symbols for its parameters; it is made once."""
     if mount.axis not in build.motion.far_fields:
         law = _bound(build, mount)
         w, F = f"w_{mount.axis}", f"F_{mount.axis}"
@@ -285,10 +285,10 @@ def far_field(build: Build, mount: Support) -> FarField:
 
 
 def _bound(build: Build, mount: Support) -> Mounting | FarField:
-    """The parameters of a mounting as symbols; two directions share the mass, or the whole mounting."""
+    """Return the parameters of a mounting as symbols; two axes share the mass, or the whole mounting."""
     if mount.beside is None:
         law = build.variables.bind(mount.law, f"mechanics.{SECTIONS[mount.axis]}", f"_{mount.axis}")
-        # What makes a gap inertial, overdamped or quasi-static may change, but not vanish.
+        # The parameter that makes a gap inertial, overdamped or quasi-static may change, but not vanish.
         dampers = [name for name in ("c_b", "c_g") if getattr(mount.law, name) > 0]
         makes = "m" if mount.inertial else "k" if mount.quasi_static else dampers[0] if len(dampers) == 1 else ""
         path = f"mechanics.{SECTIONS[mount.axis]}.{makes}"
@@ -305,7 +305,7 @@ def _bound(build: Build, mount: Support) -> Mounting | FarField:
 
 
 def jumps(build: Build) -> Iterator[Constraint]:
-    """The edge at the times at which loads jump, where a gap in equilibrium or a spring feels them."""
+    """Yield the edge at the times of jumps of loads that act on a gap in equilibrium or on a spring."""
     springs = [far.stored(far.gap) for far in build.motion.far_fields.values() if far.works]
     felt = set().union(*(build.expanded(x).free_symbols for x in [*(e.residual for e in build.equilibria), *springs]))
     paths = {item.path for item in build.parameters.items if item.symbol in felt}

@@ -1,20 +1,21 @@
 r"""Opposed one-way laws: their departure from detailed balance, and the work of a prescribed force.
 
-A force f that a scene prescribes is a dead load. Two reactions that undo each other keep detailed balance under it if
-:math:`k_f/k_r` grows like :math:`e^{f(x_f-x_r)/k_BT}` with the work on the way from one state to the other, between
-which a bond gives way by the difference of its distances to the transition state. So the rates say how far a bond of
-the species k lets the load down,
+A prescribed force f is a dead load. Two reactions that undo each other keep detailed balance under it if
+:math:`k_f/k_r` grows like :math:`e^{f(x_f-x_r)/k_BT}`, with the work between the two states. The bond gives way by the
+difference of its distances to the transition state. The rates therefore determine the length by which a bond of the
+species k lets the load down,
 
 .. math:: \sum_k \nu_k \ell_k = x_f - x_r, \qquad \Lambda = -f \sum_k N_k \theta_k \ell_k,
 
 and the load's potential belongs to the affinity of the pair, whose reactions take :math:`f\sum_k\nu_k\ell_k` from it.
-So it does to that of every law which goes by the affinity: in equilibrium :math:`d\ln\frac{\phi}{1-\phi}/df=\ell/k_BT`
-of bonds that mix ideally. A law that feels the force while its reverse follows from the affinity has to say its length
-itself. A prescribed traction that bonds share is such a force too, a share each.
+It also belongs to the affinity of every law that reads an affinity: in equilibrium
+:math:`d\ln\frac{\phi}{1-\phi}/df=\ell/k_BT` of bonds that mix ideally. A law whose rate depends on the force and whose
+reverse follows from the affinity has to state its length. A prescribed traction that bonds share is such a force too,
+in equal shares.
 
-Where pairs around a cycle contradict each other, or reactions whose reverse knows no force, the lengths are the closest
-(least squares), and what is left is a departure from equilibrium. A reaction that nothing undoes takes no work: what
-the load does once a bond has let go is not the interface's.
+If pairs around a cycle contradict each other, or the reverse of a reaction does not depend on the force, the lengths
+are a least-squares fit, and its residual is a departure from equilibrium. A reaction without a reverse takes no work:
+the work of the load after a bond has broken is not done on the interface.
 
 Source: Bell (1978), Science 200, 618, doi 10.1126/science.347575, with the detailed balance of Onsager (1931), Phys.
 Rev. 37, 405, under a load.
@@ -43,7 +44,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Opposed:
-    """One-way laws, by label, that change the bonding variables by ``change``, and those that change them back."""
+    """One-way laws, by label, that change the bonding variables by ``change``, and their reverse laws."""
 
     change: Mapping[str, int | float]
     forward: Mapping[str, RateLaw]
@@ -51,17 +52,17 @@ class Opposed:
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """Labels of all of them."""
+        """Labels of all laws of the group."""
         return (*self.forward, *self.backward)
 
     @property
     def label(self) -> str:
-        """Short name for the quantities that belong to all of them."""
+        """Short name for the quantities of the group."""
         return "_".join(self.labels)
 
     @property
     def told(self) -> tuple[Mapping[str, int | float], Expression] | None:
-        """Change of species and of length, of single reactions that the force drives along a distance."""
+        """Change of species and of length, for a pair of single reactions with distances along the force; else None."""
         forward, backward = list(self.forward.values()), list(self.backward.values())
         x_f, x_r = forward[0].distance, backward[0].distance
         if len(forward) > 1 or len(backward) > 1 or x_f is None or x_r is None:
@@ -70,13 +71,13 @@ class Opposed:
 
     @property
     def title(self) -> str:
-        """The reaction both ways."""
+        """The reaction as a reversible equation."""
         first = next(iter(self.forward.values()))
         return first.title.replace(" => ", " <=> ")
 
 
 def opposed(laws: Mapping[str, RateLaw]) -> list[Opposed]:
-    """The one-way laws that have a counterpart; all that share a stoichiometry belong together."""
+    """Return the groups of one-way laws with a reverse; all laws with the same stoichiometry are in one group."""
     alike: dict[frozenset[tuple[str, float]], dict[str, RateLaw]] = {}
     for label, law in laws.items():
         if law.one_way and (change := law.turnover()):
@@ -84,14 +85,14 @@ def opposed(laws: Mapping[str, RateLaw]) -> list[Opposed]:
     groups: list[Opposed] = []
     for key, forward in alike.items():
         backward = alike.get(frozenset((name, -n) for name, n in key))
-        # The first of a pair in the order of the laws is its forward side.
+        # The law of a pair that comes first in the scene is its forward side.
         if backward and not any(group.backward is forward for group in groups):
             groups.append(Opposed(next(iter(forward.values())).turnover(), forward, backward))
     return groups
 
 
 def departure(build: Build, group: Opposed, mu: Mapping[str, Expression]) -> Iterator[RatePair]:
-    """Departure of one-way rates from detailed balance at zero affinity; none for rates evaluated outside."""
+    """Yield the departure of one-way rates from detailed balance at zero affinity; none for external rates."""
     if any(law.log_rate is None for law in (*group.forward.values(), *group.backward.values())):
         return
     forward, backward = (
@@ -103,7 +104,7 @@ def departure(build: Build, group: Opposed, mu: Mapping[str, Expression]) -> Ite
 
 
 def own_departure(build: Build, label: str, law: RateLaw, affinity: Expression) -> Iterator[RatePair]:
-    """Departure from detailed balance of a law that states both its rates, if the potential depends on the reaction."""
+    """Yield the departure from detailed balance of a law that states both rates, if the potential depends on it."""
     known = any(depends(build.psi, build.bonding[name].symbol) for name in law.stoichiometry())
     if law.log_ratio is not None and known:
         yield _departure(build, label, law.title, build.variables.call(law, law.log_ratio), affinity)
@@ -112,7 +113,7 @@ def own_departure(build: Build, label: str, law: RateLaw, affinity: Expression) 
 def _departure(build: Build, label: str, title: str, log_ratio: Expression, affinity: Expression) -> RatePair:
     T = build.variables.get("T_c", "the equilibrium of a reaction")
     value = build.expanded(log_ratio + affinity / (BOLTZMANN * T))
-    inside = {}  # coverages within bounds where their logarithms and those of their complements exist
+    inside = {}  # coverages kept inside the bounds at which their logarithms exist
     for bond in build.bonding.values():
         below = where(bond.symbol < LARGEST_COVERAGE, bond.symbol, LARGEST_COVERAGE)
         inside[bond.symbol] = where(bond.symbol > LEAST_COVERAGE, below, LEAST_COVERAGE)
@@ -122,7 +123,7 @@ def _departure(build: Build, label: str, title: str, log_ratio: Expression, affi
 
 
 def dead_load(build: Build, laws: Mapping[str, RateLaw], pairs: Sequence[Opposed]) -> dict[str, Expression]:
-    """Potential of a prescribed force per molecule [J], by bonding variable; empty where no rate feels one."""
+    """Return the potential of a prescribed force per molecule [J], by bonding variable; empty if not read."""
     if not _is_force_prescribed(build):
         idle = next((law for law in laws.values() if law.length is not None and law.log_ratio is None), None)
         if idle is not None:
@@ -132,7 +133,7 @@ def dead_load(build: Build, laws: Mapping[str, RateLaw], pairs: Sequence[Opposed
             )
             raise InputError(message, idle.place)
         return {}
-    # A rate that feels the force while its reverse follows from the affinity, without the work.
+    # A rate that depends on the force while its reverse follows from the affinity, without the work.
     unknown = next((law for law in laws.values() if law.lacks_length), None)
     if unknown is not None:
         _hold_at_zero(build, unknown)
@@ -146,13 +147,13 @@ def dead_load(build: Build, laws: Mapping[str, RateLaw], pairs: Sequence[Opposed
 
 
 def _is_force_prescribed(build: Build) -> bool:
-    """Whether the force per bond is given: by itself, or by a traction of which each bond bears its share."""
+    """True if the force per bond is prescribed, directly or by a traction that the bonds share."""
     shares = any(role.variable == "f" and role.by == SHARED_LOAD for role in build.variables.roles)
     return driven(build, "f") or (shares and driven(build, "t_n"))
 
 
 def _hold_at_zero(build: Build, law: RateLaw) -> None:
-    """Keep a force of zero as a number; any other would do work on bonds that the law does not know."""
+    """Fix a force of zero as a number, since a law without a length omits the work of any other force."""
     load = build.scene.loading.get("f")
     if isinstance(load, Load) and getattr(load, "level", None) == 0.0:
         build.parameters.constants[f"{load.path}.level"] = (dict(load.specs())["level"], 0.0)
@@ -168,12 +169,12 @@ def _hold_at_zero(build: Build, law: RateLaw) -> None:
 
 
 def by_affinity(law: RateLaw) -> bool:
-    """Whether a law's rate depends on an affinity that includes the work of a force."""
+    """True if a law's rate depends on an affinity that includes the work of a force."""
     return law.length is not None or "mu" in reads(law.statement)
 
 
 def lengths(laws: Mapping[str, RateLaw], pairs: Sequence[Opposed]) -> dict[str, Expression]:
-    """Displacement of the load as a bond of each species forms [m], as far as pairs tell; empty where none feels it."""
+    """Return the displacement of the load on formation of a bond of each species [m], as far as pairs determine it."""
     known = [pair.told for pair in pairs if pair.told is not None]
     known += [(law.stoichiometry(), law.length) for law in laws.values() if law.length is not None]
     names = list(dict.fromkeys(name for change, _ in known for name in change))
@@ -191,10 +192,11 @@ def _matrix(names: Sequence[str], changes: Sequence[Mapping[str, int | float]]) 
 
 
 def _inverse(changes: Array, kept: Array) -> Array:
-    """Lengths per difference of distance, shape (species, pairs), of which none changes in the reactions ``kept``."""
+    """Return lengths per difference of distance, shape (species, pairs), with none in the reactions ``kept``."""
     if not np.any(kept):
         return np.asarray(np.linalg.pinv(changes))
     _, sizes, rows = np.linalg.svd(kept)
+    # Null space of the kept reactions: lengths in it sum to zero over each of them.
     basis = rows[int(np.sum(sizes > RUN_EPS)) :].T
     left = changes @ basis
     left[np.abs(left) < RUN_EPS] = 0.0

@@ -1,4 +1,4 @@
-"""Staged loading: variables that move at the rates of the present stage, and the events that end stages."""
+"""Staged loading (load steps): variables that move at the rates of the present stage, and events that end stages."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ STATE_SCALES = {"m": LENGTH_SCALE, "m/s": LENGTH_SCALE}
 
 
 def variables(build: Build) -> Iterator[Constraint]:
-    """The stage as a mode, and a state for each variable that the stages move."""
+    """Yield the stage as a mode; define a state for each variable that the stages move."""
     stages = build.scene.programme
     words = {float(i): stage.name for i, stage in enumerate(stages)} | {float(len(stages)): "after the last stage"}
     for i, item in enumerate(stages):
@@ -41,7 +41,7 @@ def variables(build: Build) -> Iterator[Constraint]:
 
 
 def _awaited(stage: Stage) -> str:
-    """Condition that ends a stage, in words; empty where it has no end."""
+    """Return the condition that ends a stage, in words; empty if it has no end."""
     if stage.variable:
         return f"{stage.variable} {'rises' if stage.rising else 'falls'} to {stage.value:g}"
     if stage.duration is not None:
@@ -50,7 +50,7 @@ def _awaited(stage: Stage) -> str:
 
 
 def _driven(build: Build, name: str) -> Expression:
-    """A state that moves at the rate of the present stage."""
+    """Add a state that moves at the rate of the present stage."""
     quantity = VARIABLES[name]
     rate: Expression = symengine.Integer(0)
     for i, item in enumerate(build.scene.programme):
@@ -66,12 +66,12 @@ def _driven(build: Build, name: str) -> Expression:
 
 
 def _during(i: int) -> Expression:
-    """Whether the programme is in its stage i; modes are whole numbers."""
+    """Return the condition that stage i is the present one; modes are whole numbers."""
     return symengine.Lt((STAGE - i) ** 2, symengine.RealDouble(0.25))
 
 
 def stages(build: Build) -> Iterator[Constraint]:
-    """The edge at the end of each stage: after a time, at a value of a variable, or along an edge of the interface."""
+    """Yield the edge at the end of each stage: after a time, at a value of a variable, or along another edge."""
     begun, edges = BEGUN.symbol, []
     waiting = [(i, item) for i, item in enumerate(build.scene.programme) if item.event and item.duration is None]
     for i, item in waiting:
@@ -83,7 +83,7 @@ def stages(build: Build) -> Iterator[Constraint]:
             edges.append(Edge(f"end of {item.name}", guard, reason, modes, passes=True, when={STAGE: (i,)}))
 
     def advancing(edge: Edge) -> dict[Expression, Expression]:
-        """New stage and its start time along an edge that stages wait for."""
+        """Return the new stage and its start time along an edge that stages wait for."""
         modes: dict[Expression, Expression] = {}
         for i, item in waiting:
             if edge.name.startswith(item.event) and not edge.passes:
@@ -95,7 +95,7 @@ def stages(build: Build) -> Iterator[Constraint]:
 
 
 def _refuse_unknown_event(build: Build, i: int, item: Stage) -> None:
-    """InputError unless a stage waits for an edge of the interface, or for the end of a stage before it."""
+    """Raise InputError unless a stage waits for an edge of the interface, or for the end of an earlier stage."""
     before = [f"end of {stage.name}" for stage in build.scene.programme[:i] if not stage.event]
     known = [*(edge.name for edge in build.edges), *before]
     if not any(name.startswith(item.event) for name in known):
@@ -104,7 +104,7 @@ def _refuse_unknown_event(build: Build, i: int, item: Stage) -> None:
 
 
 def _left(build: Build, item: Stage) -> Expression:
-    """Guard of the end of a stage: its time left, or the distance of a variable from its end value."""
+    """Return the guard of the end of a stage: its time left, or the distance of a variable from its end value."""
     path = f"programme.{item.name}"
     if item.duration is not None:
         spec = Spec("s", f"length of the stage {item.name}", above=0)
@@ -117,7 +117,7 @@ def _left(build: Build, item: Stage) -> Expression:
 
 
 def _variable(build: Build, item: Stage) -> Expression:
-    """Variable that a stage waits for: a temperature, a variable or a named quantity."""
+    """Return the variable that a stage waits for: a temperature, a variable or a named quantity."""
     if item.variable in build.thermal.nodes:
         return build.thermal.nodes[item.variable].T
     if build.variables.has(item.variable):

@@ -21,7 +21,7 @@ from surfacechem.quantities import VARIABLES, Quantity
 from surfacechem.tolerances import NO_AMOUNT
 
 _NEWTON = 20
-"""Steps to a temperature from an energy that is close to quadratic."""
+"""Newton steps to a temperature from an energy that is close to quadratic."""
 
 CAPACITY_REMEDY = (
     "The interface's potential takes more capacity than there is. Of a bond energy: kappa_2 (1 - phi_i)^2 must stay "
@@ -30,7 +30,7 @@ CAPACITY_REMEDY = (
 
 
 def variables(build: Build) -> Iterator[Thermal]:
-    """Temperature nodes with their members, prescribed or not; then with the free energies of the bodies."""
+    """Yield the temperature nodes with their members, first without, then with the free energies of the bodies."""
     scene = build.scene
     if scene.T_0 is not None:
         spec = Spec("K", "reference temperature", above=0)
@@ -59,7 +59,7 @@ def variables(build: Build) -> Iterator[Thermal]:
 
 
 def _with_member(build: Build, thermal: Thermal, variable: str, temperature: str | Load, member: str) -> Thermal:
-    """The nodes with that of a member, which may be one of another member, too."""
+    """Return the nodes with that of one more member, which may share the node of another member."""
     own = temperature if isinstance(temperature, Load) else None
     name = variable if isinstance(temperature, Load) else temperature
     message = ""
@@ -92,11 +92,11 @@ def _mean_temperature(build: Build) -> Expression:
 
 
 def rows(build: Build) -> Iterator[Power | State | Margin]:
-    """Energy balances, states and margins of the temperatures; the heat that keeps prescribed ones is recovered."""
+    """Yield states, margins and energy balances of temperatures; prescribed ones give the heat that keeps them."""
     thermal = build.thermal
     yield from (_temperature_state(build, node) for node in thermal.free)
     own_rows = {node.name: build.energy_row(node) for node in thermal.free}
-    # The row of the interface's node is the sum of all; where it has none that is free, that of the first.
+    # The row of the interface's node is the sum of all rows; if it is not free, the first row is.
     centre = thermal.members.get(INTERFACE, "")
     build.rows.energies(own_rows, centre if centre in own_rows else next(iter(own_rows), ""))
     for node in (*thermal.free, *thermal.prescribed):
@@ -141,7 +141,7 @@ def _temperature_state(build: Build, node: Node) -> State:
 
 
 def _initial(build: Build, node: Node) -> float:
-    """Initial value; bodies that touch with different temperatures start from the one that keeps their energy."""
+    """Return the initial value; bodies in perfect contact at different temperatures start from their common energy."""
     thermal = build.thermal
     slabs = [slab for name, slab in thermal.slabs.items() if thermal.members[name] == node.name]
     inside = [build.scene.initial.get(slab.profile) for slab in slabs]
@@ -162,7 +162,7 @@ def _initial(build: Build, node: Node) -> float:
 
 
 def _guess(build: Build, node: Node) -> float:
-    """Start value for an algebraic interface temperature: what is given, or the mean of the bodies."""
+    """Return the start value of an algebraic interface temperature: as given, or the mean of the bodies."""
     initial, bodies = build.scene.initial, build.scene.bodies
     if node.name in initial:
         return initial[node.name]
@@ -172,7 +172,7 @@ def _guess(build: Build, node: Node) -> float:
 
 
 def _fold_margin(build: Build, node: Node, row: Expression) -> Margin:
-    """Stability margin of an algebraic temperature: heat has to leave faster than it is produced as it rises."""
+    """Return the stability margin of an algebraic temperature: heat losses must grow faster with it than production."""
     explicit = {bond.dot: bond.dot - build.rows[name] for name, bond in build.bonding.items()}
     slope = _with_velocity(build, build.expanded(row.subs(explicit)), node.T)
     if slope == 0:
@@ -192,13 +192,14 @@ def _fold_margin(build: Build, node: Node, row: Expression) -> Margin:
 
 
 def _with_velocity(build: Build, heat: Expression, T: Expression) -> Expression:
-    """Slope of a balance of heat with temperature as a motion that has no inertia follows it."""
+    """Return the slope of a heat balance with temperature, including the response of sliding without inertia."""
     following, slope = list(build.motion.slides_by.values()), derivative(heat, T)
     if not any(depends(heat, x) for x in following):
         return slope
     tractions = [build.expanded(build.rows[str(x)]) for x in following]
     A = [[derivative(row, x) for x in following] for row in tractions]
     moved = [derivative(row, T) for row in tractions]
+    # Cramer's rule for dx/dT from the linearised balances of tractions, A dx/dT = -moved.
     for j, x in enumerate(following):
         turned = [[*row[:j], change, *row[j + 1 :]] for row, change in zip(A, moved, strict=True)]
         slope -= derivative(heat, x) * determinant(turned) / determinant(A)

@@ -1,5 +1,5 @@
-"""Constraints of a scene, each with its modes, its edges and the switches and reactions that rows read.
+"""Constraints of a scene, each with its modes, edges and reset maps, and the switches and reactions that rows read.
 
-Unilateral contact and its impacts, the set-valued law of friction, bounds of the bonding state, thresholds of traction,
-envelopes; and folds.
+Unilateral contact and impacts, set-valued friction, bounds of the bonding state, thresholds of traction, envelopes and
+folds.
 """

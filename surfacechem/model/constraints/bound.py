@@ -2,9 +2,9 @@ r"""Bounds of the bonding state: :math:`0 \le \phi \le \phi_{max}`, a differenti
 
 .. math:: N_c\,\dot\phi \in J_c R - \mathcal{N}_{[0, \phi_{max}]}(\phi)
 
-with the normal cone :math:`\mathcal{N}` of the interval: where a law would carry phi beyond, it is held there until the
-law turns round. Holding does no work and takes no energy, since bonds that are not there cannot break and sites that
-are taken bond no partner. A law that declares ``keeps_range`` needs none of this.
+with the normal cone :math:`\mathcal{N}` of the interval: if a law would carry phi beyond a bound, phi is held there
+until the rate points inwards. The constraint does no work and takes no energy, since absent bonds cannot break and
+occupied sites cannot bond. A law that declares ``keeps_range`` needs no bounds.
 
 Source: unilateral bounds of the bonding fraction, Sauer, Duong & Mandadapu (2021), section 3.1; projected dynamics as
 in Acary & Brogliato (2008), Numerical Methods for Nonsmooth Dynamical Systems, doi 10.1007/978-3-540-75392-6.
@@ -38,7 +38,7 @@ BOUNDS = (
 
 
 def bound(build: Build, rate: Expression) -> Constraint:
-    """The bounds of the bonding state, which ``rate`` would change."""
+    """Return the bounds of the bonding state as a constraint; ``rate`` is its rate without bounds."""
     if not _may_leave_the_range(build):
         return Constraint()
     outward = {side: side * _rate_at(build, rate, at, inside, name) for side, at, inside, name, *_ in BOUNDS}
@@ -49,7 +49,7 @@ def bound(build: Build, rate: Expression) -> Constraint:
     mode = Mode("held", 0.0, {side: text for side, text in BOUND_WORDS.items() if side in sides})
     held, edges = mode.symbol, []
     for side, at, _, name, reason, back, why in bounds:
-        # Where the law points inwards no bound is needed: what rounding has carried beyond comes back by itself.
+        # If the law points inwards no bound is needed: a state that roundoff has carried beyond comes back.
         left = where(outward[side] > 0, side * (at - PHI), 1)
         turned = build.stretch * outward[side] / build.bonding["phi"].density
         modes, free = {held: symengine.Integer(side)}, {held: symengine.Integer(0)}
@@ -59,14 +59,14 @@ def bound(build: Build, rate: Expression) -> Constraint:
         ]
 
     def breaking(edge: Edge) -> dict[Expression, Expression]:
-        """New mode along an edge at which bonds break at once: a bound that held the bonding state lets it go."""
+        """Return the new mode along an edge at which bonds break at once: a bound no longer holds the bonding state."""
         return {held: symengine.Integer(0)} if PHI in edge.reset and held not in edge.modes else {}
 
     return Constraint((mode,), edges=tuple(edges), active=1 - held**2, beside=breaking)
 
 
 def _may_leave_the_range(build: Build) -> bool:
-    """Whether any law but those of an envelope does not keep the bonding state in its range by its form."""
+    """True if a law without an envelope may carry the bonding state out of its range."""
     top = next((item.value for item in build.parameters.items if item.path == "phi_max"), None)
     if top is None or LN_PHI in build.scene.initial:
         return False
@@ -75,16 +75,16 @@ def _may_leave_the_range(build: Build) -> bool:
 
 
 def _is_singular(whole: Expression, phi: Expression, numbers: Mapping[Any, float]) -> bool:
-    """Whether a rate has a pole or a logarithm of nothing, but for rounding, at a bonding state."""
+    """True if a rate has a pole, or the logarithm of zero up to roundoff, at a bonding state."""
 
     def has_none(argument: Expression) -> bool:
         try:
             both = [x.subs(numbers) for x in (argument, magnitude(argument))]
-        except RuntimeError:  # a condition on a number that is undefined
+        except RuntimeError:  # a condition on an undefined number
             return True
         if any(x.free_symbols for x in both):
             return False
-        # One rounding: next to a bound, at BOUND_EPS, it is more.
+        # Within one rounding it is zero; at BOUND_EPS next to a bound it is larger.
         return any(x.atoms(*NOT_NUMBERS) for x in both) or abs(float(both[0])) <= 0.5 * EPS * float(both[1])
 
     arguments = (logarithm.args[0].subs({PHI: phi}) for logarithm in whole.atoms(symengine.log))
@@ -92,15 +92,15 @@ def _is_singular(whole: Expression, phi: Expression, numbers: Mapping[Any, float
 
 
 def _rate_at(build: Build, rate: Expression, at: Expression, inside: Expression, name: str) -> Expression:
-    """The rate at a bound; next to it where it is singular there; as it is if that fails."""
+    """Return the rate at a bound, or next to it if it is singular there; the rate unchanged if both fail."""
     whole, numbers = build.expanded(rate), {item.symbol: item.value for item in build.parameters.items}
     phi = next((phi for phi in (at, inside) if not _is_singular(whole, phi, numbers)), None)
     if phi is None:
         return rate
     if whole.subs({PHI: phi}) == 0:
         return symengine.Integer(0)
-    # The quantities that the rate reads, also through others, are named at the bound as well: what is written once is
-    # computed once there, too.
+    # The quantities that the rate reads, directly or through others, are named at the bound too, so that common
+    # subexpressions stay common there.
     needed = {str(symbol) for symbol in rate.free_symbols}
     for item in reversed(build.named):
         if item.name in needed:

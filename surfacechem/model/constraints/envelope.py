@@ -2,10 +2,10 @@ r"""Gradual debonding along an envelope, a unilateral constraint on the bonding 
 
 .. math:: \phi \le \phi_{env}(g_n), \quad \dot\phi \le 0, \quad (\phi_{env} - \phi)\,\dot\phi = 0
 
-unless other laws form bonds. The mode ``debonding`` is 0 while the bonds lie below the envelope, 1 while they break
-along it, and -1 where the gap is open beyond their reach. It is entered as the envelope is reached (``soften``), left
-on unloading (``unload``) and where the last bonds break (``part``); where the traction falls faster with the gap than
-the bodies unload the interface tears open at once (``tear``), which is a fold of the quasi-static gap.
+unless other laws form bonds. The mode ``debonding`` is 0 while phi is below the envelope, 1 while bonds break along it,
+and -1 while the gap is open beyond the reach of bonds. It is entered when phi reaches the envelope (``soften``), left
+on unloading (``unload``) and when the last bonds break (``part``). If the traction falls faster with the gap than the
+bodies unload, the interface tears open at once (``tear``), which is a fold of the quasi-static gap.
 
 Source: Sauer, Duong & Mandadapu (2021), section 5.2; damage as a unilateral constraint as in Raous, Cangemi & Cocu
 (1999), doi 10.1016/S0045-7825(98)00389-2.
@@ -39,18 +39,18 @@ SAME_STIFFNESS = "Give `bond-stiffness` and this law the same E_b."
 
 
 def variables(build: Build) -> Iterator[Constraint]:
-    """The mode, for the laws that read it; bonds can form where the gap is not open beyond their reach."""
+    """Define the mode for the laws that read it; bonds can form unless the gap is open beyond their reach."""
     if any(law.envelope is not None for law in build.interface.reactions):
         build.variables.define("softening", (MODE + MODE**2) / 2, "mode", "interface.bonding")
         yield Constraint((DEBONDING,), active=1 - MODE * (MODE - 1) / 2)
 
 
 def _check(build: Build, law: RateLaw, phi: Expression, g_n: Expression, peak: Expression) -> tuple[Margin, ...]:
-    """Check that the envelope falls from its peak, where it equals the traction of complete bonding."""
+    """Check that the envelope falls from its peak, at which it equals the traction of complete bonding."""
     t_max, g_f = law.t_max, law.g_f  # type: ignore[attr-defined]
     start, end, strength = build.at_start(peak), build.at_start(g_f), build.at_start(t_max)
     what = f"{law.name()}: t_max / E_b = {start:g} m, where complete bonding begins to break,"
-    # Both ends of the fall have to be told apart, and from none.
+    # Both ends of the fall must be distinct, and distinct from zero.
     if not start < (1 - NO_AMOUNT) * end:
         message = f"is not below g_f = {end:g} m: the traction would have to snap back. Raise g_f, or use a limit."
         raise InputError(f"{what} {message}", law.place)
@@ -59,7 +59,7 @@ def _check(build: Build, law: RateLaw, phi: Expression, g_n: Expression, peak: E
     t_n = derivative(build.psi, symengine.Symbol("g_n")).xreplace({g_n: peak, symengine.Symbol("side"): 1})
     bonds = t_n.subs({phi: 1}) - t_n.subs({phi: 0})
     if bonds.has(symengine.zoo):
-        return ()  # the potential does not exist without bonds, which then bear nothing of their own
+        return ()  # the potential is singular without bonds, so all of its traction is theirs
     borne = build.at_start(bonds)
     if abs(borne - strength) > STRENGTH_RTOL * strength:
         raise InputError(
@@ -67,7 +67,7 @@ def _check(build: Build, law: RateLaw, phi: Expression, g_n: Expression, peak: E
             f"not the t_max of {strength:g} Pa. {SAME_STIFFNESS}",
             law.place,
         )
-    # What varies, and what a sweep gives, is watched.
+    # Margins check the same along a run, for parameters that vary or that a sweep changes.
     reason = "the bonds of the potential bear another traction than t_max where they begin to break"
     near = 2 * STRENGTH_RTOL - absolute(build.expanded(bonds / t_max) - 1)
     return (
@@ -79,19 +79,22 @@ def _check(build: Build, law: RateLaw, phi: Expression, g_n: Expression, peak: E
 def softening(
     build: Build, law: RateLaw, forming: Expression, free: Expression
 ) -> tuple[list[Constraint | Margin], Expression]:
-    """Edges that start and end softening, and the rate of a bound law with an envelope, where others form bonds."""
+    """Return the edges that start and end softening, and the rate of a bound law with an envelope.
+
+    ``forming`` is the net rate of the other laws, ``free`` one while the bonding state may change.
+    """
     phi, g_n, n_c = (build.variables.get(name, law) for name in ("phi", "g_n", "n_c"))
     left = build.variables.call(law, law.envelope)
     peak = law.peak()  # type: ignore[attr-defined]
     agrees = _check(build, law, phi, g_n, peak)
-    # The envelope moves with the gap, by its velocity where that has a variable of its own.
+    # The envelope moves at the gap's rate, replaced by the velocity if that is a separate variable.
     rate = build.total_derivative(left)
     if build.variables.has("v_n"):
         rate = rate.subs({symengine.Symbol("dg_n_dt"): build.variables.get("v_n", "the envelope")})
     overshoot = build.name(VARIABLES["overshoot"], forming * free / n_c - rate, output=False)
     lost, bound = {MODE: -ONE}, build.mode("held")
     breaks = {MODE: ONE} if bound is None else {MODE: ONE, bound: ZERO}
-    # Where there are no bonds, and none form, none break.
+    # Without bonds, and without formation, nothing can break.
     present = where(phi > 0, left - phi, where(forming * free > 0, left - phi, 1))
     beyond = where(phi > 0, left - phi + NO_AMOUNT, 1)
     keeps, loses, parted = {MODE: (0,)}, {MODE: (1,)}, {MODE: (-1,)}
@@ -101,7 +104,7 @@ def softening(
     fewer = "a jump leaves fewer bonds than there were"
     edges = [
         Edge("yield", beyond, fewer, reset={phi: remains}, equilibrates=True, heat="snap", when=keeps),
-        # Bonds turn back from the envelope where the gap does: rounding must not take them there again.
+        # After unloading, roundoff must not trigger this edge again: the guard has to become negative.
         Edge("soften", present, "bonds begin to break as the gap opens", breaks, strict=True, when=keeps),
         *_tear(build, phi, left),
         Edge("part", left, "the last bonds break", lost, {phi: ZERO}, equilibrates=True, heat="snap", when=loses),
@@ -110,14 +113,14 @@ def softening(
     if forming != 0:
         margin, reason = where(forming > 0, -left, 1), "the gap is closed enough to bond"
         edges.append(Edge("rejoin", margin, reason, {MODE: ZERO}, strict=True, when=parted))
-    # A run begins with no more bonds than the gap leaves.
+    # At the start phi must not exceed the envelope.
     given = where(build.t > 0, 1, where(left > 0, left, 0) - phi + build.variables.get("slack", "the bonds"))
     reason, remedy = "there are more bonds than the gap leaves", "Give fewer bonds under `initial`, or a smaller gap."
     within = Margin("bonds within their envelope", given, reason, remedy=remedy, path="initial.phi")
     modes = (replace(DEBONDING, start=where(left < 0, -1.0, 0.0)),)
 
     def apart(edge: Edge) -> dict[Expression, Expression]:
-        """New mode along an edge at which the normal gap jumps: bonds leave their envelope until they reach it anew."""
+        """Return the mode after an edge at which the normal gap jumps: phi leaves the envelope for the time being."""
         return {MODE: where(MODE > 0, 0, MODE)} if edge.equilibrates and MODE not in edge.modes else {}
 
     stated: list[Constraint | Margin] = [*agrees, within, Constraint(modes, edges=tuple(edges), beside=apart)]
@@ -125,7 +128,7 @@ def softening(
 
 
 def _tear(build: Build, phi: Expression, left: Expression) -> list[Edge]:
-    """Edge at which a quasi-static gap tears open at once, its mounting being softer than the fall of the traction."""
+    """Return the edge at which a quasi-static gap tears open: its mounting is softer than the fall of the traction."""
     mount = support(build, "n")
     if mount is None or not mount.quasi_static or "g_n" not in build.motion.gap_rates:
         return []

@@ -1,13 +1,13 @@
 r"""Mechanical folds (snap-through): loss of the joint equilibrium of quasi-static gaps.
 
 With the driving traction :math:`r_i` of each gap :math:`g_i` that has neither mass nor damper, the stiffness is
-:math:`A_{ij} = -\partial r_i/\partial g_j`, of which gaps that share a potential have off-diagonal parts: shear softens
-what is opened. A gap that runs away takes no time, so that what it warms keeps its heat: with the temperatures
-:math:`T_k` the stiffness is :math:`A_{ij} = -\partial r_i/\partial g_j - \sum_k \partial r_i/\partial T_k\,
-\partial T_k/\partial g_j`. The rise of the temperatures follows from the energy balances of their nodes. That of what
-is elastic is isentropic, :math:`T \Psi_{T g_j} / C`; that of what slides is the heat of its friction, so that friction
-that falls with temperature loses its balance with a spring that is softer than this fall.
-Equilibrium is stable while det A > 0; where all gaps but one are eliminated this is the Schur complement of that one.
+:math:`A_{ij} = -\partial r_i/\partial g_j`. Gaps that share a potential have off-diagonal entries: shear softens an
+opened gap. A snap takes no time, so that no heat is conducted away during it: with the temperatures :math:`T_k` the
+stiffness is :math:`A_{ij} = -\partial r_i/\partial g_j - \sum_k \partial r_i/\partial T_k\,\partial T_k/\partial g_j`.
+The rise of the temperatures follows from the energy balances of their nodes. For elastic motion it is isentropic,
+:math:`T \Psi_{T g_j} / C`; for sliding it is the heat of friction, so that friction that falls with temperature loses
+its balance with a spring that is softer than this fall. Equilibrium is stable while det A > 0; with all gaps but one
+eliminated this is the Schur complement of that gap.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ Matrix = Sequence[Sequence[Expression]]
 
 
 def jumps(build: Build) -> Iterator[Constraint]:
-    """The edge at which quasi-static gaps lose their equilibrium, with the data that give the direction of the snap."""
+    """Yield the edge at which quasi-static gaps lose their equilibrium, with the data for the direction of the snap."""
     gaps = build.equilibria
     if not gaps:
         return
@@ -41,10 +41,10 @@ def jumps(build: Build) -> Iterator[Constraint]:
     tangent, whole = determinant(relative), determinant(A)
     moved = {symengine.Symbol(x) for gap in gaps for x in (gap.state, *gap.along)}.union(*rises)
     if all(gap.state != "g_n" for gap in gaps) and not tangent.free_symbols & moved:
-        return  # a stiffness that does not change stays what it is
+        return  # a constant stiffness cannot vanish
     falling = tuple(-_along(whole, gap, rise) for gap, rise in zip(gaps, rises, strict=True))
     warming = tuple({str(T): slope for T, slope in rise.items()} for rise in rises)
-    # The same zero with sizes up to 1: what is far stiffer at first must not drown what is left later.
+    # Same zero, bounded by 1: a guard is resolved relative to its largest value, and the stiffness may fall by decades.
     left = tangent - FOLD_STIFFNESS
     snap = Edge(
         "snap",
@@ -58,7 +58,7 @@ def jumps(build: Build) -> Iterator[Constraint]:
 
 
 def _tangent(gaps: Sequence[Equilibrium], residuals: Sequence[Expression], rises: Sequence[Rise]) -> Matrix:
-    """Fall of the traction that drives one gap as another one opens; one where the gap is held."""
+    """Return the stiffness matrix: decrease of the driving traction of a gap as another opens; one for a held gap."""
     A = []
     for i, (gap, residual) in enumerate(zip(gaps, residuals, strict=True)):
         row = [-_along(residual, other, rise) for other, rise in zip(gaps, rises, strict=True)]
@@ -69,22 +69,22 @@ def _tangent(gaps: Sequence[Equilibrium], residuals: Sequence[Expression], rises
 
 
 def _relative(build: Build, A: Matrix) -> tuple[tuple[Expression, ...], ...]:
-    """Stiffness matrix over the reference stiffness of each gap that is not held."""
+    """Return the stiffness matrix, each row divided by the reference stiffness of its gap unless that is held."""
     sizes = [gap.active * _size(build, gap, A[i][i]) + 1 - gap.active for i, gap in enumerate(build.equilibria)]
     return tuple(tuple(entry / size for entry in row) for row, size in zip(A, sizes, strict=True))
 
 
 def _along(expression: Expression, gap: Equilibrium, rise: Rise) -> Expression:
-    """Derivative along a gap, what moves with it, and the temperatures that follow."""
+    """Return the derivative along a gap, including the gaps that move with it and the temperatures that follow."""
     moving = {gap.state: symengine.Integer(1), **gap.along}
     slope = sum((w * derivative(expression, symengine.Symbol(x)) for x, w in moving.items()), symengine.Integer(0))
     return slope + sum((warmer * derivative(expression, T) for T, warmer in rise.items()), 0)
 
 
 def _rises(build: Build, gap: Equilibrium, residuals: Sequence[Expression]) -> Rise:
-    """Rise of the temperatures that the balances of tractions feel along a gap, by the heat of its own motion [K/m].
+    """Return the rise of the temperatures that tractions depend on along a gap, by the heat of its motion [K/m].
 
-    It is what the energy balances say of motion that is faster than any flow of heat.
+    It follows from the energy balances for a motion that is faster than heat conduction.
     """
     free = build.thermal.free
     felt = _felt(build, residuals)
@@ -95,7 +95,7 @@ def _rises(build: Build, gap: Equilibrium, residuals: Sequence[Expression]) -> R
         name: -sum((w * derivative(row, dot) for dot, w in motion.items()), symengine.Integer(0))
         for name, row in rows.items()
     }
-    # A node that stores nothing passes on what it gets.
+    # A node without capacity passes its heat on.
     passing = {x.T: made[x.name] / derivative(rows[x.name], x.T).subs(rest) for x in free if x.capacity() == 0}
     rises = {}
     for node in felt:
@@ -107,7 +107,7 @@ def _rises(build: Build, gap: Equilibrium, residuals: Sequence[Expression]) -> R
 
 
 def _felt(build: Build, residuals: Sequence[Expression]) -> list[Node]:
-    """The nodes whose temperatures the balances of tractions depend on."""
+    """Return the nodes on whose temperatures the balances of tractions depend."""
     felt = [node for node in build.thermal.free if any(depends(residual, node.T) for residual in residuals)]
     for node in felt:
         if node.capacity() == 0:
@@ -120,16 +120,16 @@ def _felt(build: Build, residuals: Sequence[Expression]) -> list[Node]:
 
 
 def _size(build: Build, gap: Equilibrium, own: Expression) -> Expression:
-    """Reference stiffness of a gap, to which its own is related [Pa/m]."""
+    """Return the reference stiffness of a gap, to which its stiffness is related [Pa/m]."""
     far, g = build.motion.far_fields.get(gap.axis), symengine.Symbol(gap.state)
     if far is not None and far.k != 0:
         return far.k + absolute(far.k - own)
     if far is None:
         return where(absolute(g) > 0, build.expanded(gap.size) / absolute(g), 1)
-    # Of what holds the gap itself: friction beside it has no stiffness.
+    # The secant of the potential only: friction in parallel has no stiffness.
     t = build.expanded(derivative(build.psi, g))
     t = t if t != 0 else far.F - build.expanded(gap.residual)
-    # From a closed gap on, where attraction is not zero; what is infinite there is looked at from zero.
+    # From the traction at zero gap, where attraction is not zero; if that is singular, from zero traction.
     closed = t.subs(g, 0)
     secant = (t if closed.has(symengine.nan, symengine.zoo, symengine.oo) else t - closed) * g
     return where(secant > 0, secant / absolute(g) ** 2, where(absolute(own) > 0, absolute(own), 1))

@@ -1,19 +1,18 @@
-r"""Dry friction as a set-valued law: the traction is one of those that the velocity of sliding allows.
+r"""Dry friction as a set-valued force law: the traction is in a set that depends on the slip velocity.
 
 .. math:: t \in L\,\partial|v|
 
-At rest it is any up to the limit L, while sliding it is L against the velocity, in the plane on an ellipse. The mode of
-slip is -1, 0 or 1 along a line; in the plane it is 0 or 1, beside registers of the direction in which sliding began.
-Its edges: the traction that sticking needs passes the limit, the velocity returns to zero.
+At rest the set is the interval up to the limit L; during slip it is L against the velocity. In the plane it is an
+ellipse. The mode ``slip`` is -1, 0 or 1 along a line; in the plane it is 0 or 1, and registers hold the direction in
+which slip began. Its edges: the traction needed to stick exceeds the limit; the velocity returns to zero.
 
-A limit of zero leaves :math:`t = 0` at any velocity: sticking and sliding are the same there, and the direction of
-sliding has no meaning. What slides without inertia goes on as it is, and stops where the limit begins to grow against
-it.
+A limit of zero gives :math:`t = 0` at any velocity: stick and slip coincide, and the slip direction is meaningless.
+Slip without inertia then continues in its mode, and ends when the limit begins to grow against it.
 
-In an impact the same law holds for impulses. A mass m that meets a rigid contact with the velocity v and leaves it with
-:math:`-e\,v` gives the pressure the impulse :math:`J = (1+e)\,m|v|`, and what slides with a mass m_t of its own loses
-:math:`\mu J / m_t` of its velocity, and no more than that. What slides without a mass, or behind a tangential spring of
-the interface, sticks for that instant, and nothing is lost.
+In an impact the same law holds for impulses. A mass m that meets a rigid contact with the velocity v and rebounds with
+:math:`-e\,v` gives the pressure the impulse :math:`J = (1+e)\,m|v|`. A sliding mass m_t loses :math:`\mu J / m_t` of
+its velocity, at most all of it. Slip without a mass, or behind a tangential spring of the interface, sticks for that
+instant without loss.
 
 Source: Coulomb's law as an inclusion, Moreau (1988), Unilateral contact and dry friction in finite freedom dynamics,
 doi 10.1007/978-3-7091-2624-0_1; Sauer, Duong & Mandadapu (2021), eqs. e:dry_fric and e:tt_max; impulses of friction as
@@ -39,7 +38,7 @@ P = symengine.Symbol("p of an impact")
 IMPULSE = Register("impulse", "impulse of the pressure that friction has not answered yet [Pa s]")
 
 TRIAL_PRESSURES = 1e50, 1e100
-"""Pressures [Pa] between which friction has to grow in proportion, as it does at one that is infinite."""
+"""Pressures [Pa] between which friction has to be proportional to pressure, as it must at an infinite one."""
 
 SOFTEN = "Let a potential bear the bodies, such as `penalty`."
 
@@ -54,12 +53,12 @@ def set_valued(
     *,
     equilibrates: bool = False,
 ) -> Constraint:
-    """Edges between sticking and sliding, both ways along a line or in whatever direction of the plane.
+    """Return the edges between stick and slip, in both directions along a line or in any direction of the plane.
 
-    By the mode of slip, ``bears`` is what sticking bears beyond what it has to, ``back`` what is zero where sliding
-    stops. As it begins the registers of its direction are those of ``aim``, and the states ``begin`` change; as it
-    stops the states ``end`` do, and the modes are those of ``onward``: it may go on where sticking does not bear what
-    pulls. Gaps that are quasi-static find their equilibrium.
+    By the slip mode that is entered, ``bears`` is the reserve of sticking (limit less need); by the mode that is left,
+    ``back`` is the guard of the stop. When slip begins, the registers of its direction become ``aim`` and the states
+    ``begin`` are reset. When it stops, the states ``end`` are reset and the modes become ``onward``: it may slip on if
+    sticking cannot bear the pull. If the edge ``equilibrates``, quasi-static gaps find their equilibrium.
     """
     edges = []
     for s, guard in bears.items():
@@ -74,13 +73,13 @@ def set_valued(
 
 
 def breaks_bonds(build: Build) -> dict[Expression, Expression]:
-    """New values of the bonding variables where a law breaks the bonds as sliding begins."""
+    """Return the new values of the bonding variables if a law breaks the bonds when slip begins."""
     law = next((law for law in build.interface.frictions if law.breaks_bonds), None)
     return {} if law is None else broken(build, law)
 
 
 def friction_impulse(build: Build, impulse: Expression) -> Iterator[Constraint]:
-    """Friction impulse: loss of sliding velocity of a mass by the ``impulse`` of the pressure [Pa s] in an impact."""
+    """Yield the friction impulse, by which a sliding mass slows down; ``impulse`` is that of the pressure [Pa s]."""
     laws = [law for law in build.interface.frictions if feels_pressure(law)]
     sliding = [slip for slip in build.motion.slips if slip.slides_inertially]
     if not (laws and sliding):
@@ -93,12 +92,12 @@ def friction_impulse(build: Build, impulse: Expression) -> Iterator[Constraint]:
     due, reason = where(exerted > 0, -1, 1), "friction answers the impact"
     rub = Edge("rub", due, reason, {exerted: ZERO, **stops}, left, heat="local")
     pressed = {exerted: where(absolute(v) > 0, impulse, ZERO)}
-    # Before the bodies rest: friction answers each impact on its own.
+    # Before the rest: friction responds to each impact separately.
     yield Constraint((), (IMPULSE,), (rub,), at_once=True, beside=lambda edge: pressed if edge.is_impact else {})
 
 
 def _impulse_ratio(build: Build, law: Friction, v: Expression) -> Expression:
-    """Impulse of friction over that of the pressure, where sliding slows down under it."""
+    """Return the ratio of the impulse of friction to that of the pressure, for decelerating slip."""
     unknown = f"{law.name()}: what an impact takes from sliding is not known where"
     if law.transverse is not None:
         raise InputError(

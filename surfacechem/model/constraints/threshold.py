@@ -2,10 +2,10 @@ r"""Limits of the normal traction: the interface is bonded until a threshold is 
 
 .. math:: t_n \le t_n^{max}
 
-The mode ``bonded`` ends where the traction passes the strength: the bonding state, or the bonds of a mechanism by the
-reactions in which they break, are lost at once, and a rigid interface opens. Where the strength is that of the bonds it
-comes back with them as the gap closes. Gaps without inertia or damper then find their equilibrium, at once with the
-bodies paying for the bonds, or in a jump of its own where the interface alone pays.
+The mode ``bonded`` ends when the traction exceeds the strength: the bonding state, or the bonds of a mechanism by the
+reactions that break them, are lost at once, and a rigid interface opens. If the strength depends on the bonds, it
+returns with them when the gap closes. Gaps without inertia or damper then find their equilibrium: in the same jump if
+the bodies pay for the bonds, or in a second jump if the interface alone pays.
 
 Source: Sauer, Duong & Mandadapu (2021), eq. e:debond.
 """
@@ -31,12 +31,12 @@ UNRELAXED = Register("loose", "whether the gaps have yet to follow a local jump"
 
 
 def variables(build: Build) -> None:
-    """Define the mode of bonding for potentials that read it; an interface without limits stays as it starts."""
+    """Define the mode of bonding for potentials that read it; an interface without limits keeps its initial mode."""
 
     def bonded() -> Expression:
         start = next((mode.start for mode in build.constraint("closed").modes), None)
         if start is None and build.variables.has("g_n"):
-            # An open gap without bonds is not bonded.
+            # An open gap without bonds starts debonded.
             start = where(build.variables.get("g_n", "the bonds", "interface") > 0, 0, 1)
             bonds = bonds_left(build)
             start = start if bonds is None else where(bonds > 0, 1, start)
@@ -47,7 +47,7 @@ def variables(build: Build) -> None:
 
 
 def bonds_left(build: Build) -> Expression | None:
-    """The bonding state, before it is defined for the laws; None where nothing bonds."""
+    """Return the bonding state, before it is defined for the laws; None if there are no bonds."""
     if "phi" in build.bonding:
         return build.bonding["phi"].symbol
     bonds = [build.bonding[name].symbol for name in build.interface.bonds]
@@ -55,7 +55,7 @@ def bonds_left(build: Build) -> Expression | None:
 
 
 def laws(build: Build) -> Iterator[Constraint]:
-    """Edges at which bonds break as the traction passes a limit; if the strength is theirs, they rejoin at touch."""
+    """Yield the edges at which bonds break as the traction exceeds a limit, and at which they rejoin at touch."""
     closed, reclosing = build.mode("closed"), []
     for law in build.interface.limits:
         if not build.variables.has("t_n"):
@@ -72,19 +72,19 @@ def laws(build: Build) -> Iterator[Constraint]:
     if closed is not None:
         build.reclosing = {closed: ONE, **again}
     elif again and "g_n" in build.motion.gap_rates:
-        # An elastic interface whose strength is that of its bonds can bond again where the gap has closed.
+        # An elastic interface whose strength depends on its bonds can bond again once the gap has closed.
         gap = build.variables.get("g_n", "the limit", "interface")
         reason = "the gap closes, so that bonds can hold again"
         yield Constraint(edges=(Edge("rejoin", gap, reason, again, when=dict.fromkeys(again, (0,))),))
 
 
 def _limit(build: Build, law: Limit, strength: Expression, closed: Expression | None) -> Iterator[Constraint]:
-    """The edge along which the bonds break, and the jump of the gaps where that is one of its own."""
+    """Yield the edge at which the bonds break and, for a local release, the edge at which the gaps follow."""
     t_n, bonded = build.variables.get("t_n", law), build.variables.get("bonded", law)
     local = law.release == "local"
     lost, when = [bonded], {bonded: (1,)}
     if closed is not None:
-        # Closed again, a rigid interface that has debonded bears pressure only.
+        # A rigid interface that has debonded and closed again bears pressure only.
         strength, when = bonded * strength, {closed: (1,)}
         lost, when = ([bonded], {bonded: (1,), **when}) if local else ([bonded, closed], when)
     modes, breaks, g = dict.fromkeys(lost, ZERO), broken(build, law, law.breaks), symengine.Symbol("g_n")
@@ -95,7 +95,8 @@ def _limit(build: Build, law: Limit, strength: Expression, closed: Expression | 
             "`bonded-contact` or `bond-stiffness`, or the factor `proportional: {of: phi}`.",
             law.place,
         )
-    # Where only the interface pays for a broken bond the gaps move in a jump of their own, in which the bodies do.
+    # In a local release the interface pays for the bonds; the gaps then move in a second jump, for which the bodies
+    # pay.
     mount = support(build, "n")
     normal = mount is not None and mount.quasi_static and "g_n" in build.motion.gap_rates
     follow = local and (normal or any(slip.in_equilibrium for slip in build.motion.slips))
@@ -119,7 +120,7 @@ def _limit(build: Build, law: Limit, strength: Expression, closed: Expression | 
 
 
 def broken(build: Build, law: Law, named: str = "") -> dict[Expression, Expression]:
-    """New values of the bonding variables where bonds break at once: of all of them, or of the one ``named``."""
+    """Return the new values of the bonding variables when all bonds, or the bond ``named``, break at once."""
     bonds, bonding = build.interface.bonds, build.bonding
     if not bonds:
         if named:
@@ -127,7 +128,7 @@ def broken(build: Build, law: Law, named: str = "") -> dict[Expression, Expressi
             raise InputError(message, law.place)
         return {bonding["phi"].symbol: ZERO} if "phi" in bonding else {}
     lost = list(bonds)
-    if named:  # by its species, or by the variable itself
+    if named:  # by its species, or by the variable
         texts = {item.name: item.long_name.removeprefix("coverage of ") for item in build.interface.variables}
         species = {texts[bond]: bond for bond in bonds} | {bond: bond for bond in bonds}
         if named not in species:
@@ -144,7 +145,7 @@ def broken(build: Build, law: Law, named: str = "") -> dict[Expression, Expressi
 
 
 def _rupture(build: Build, law: Law, name: str) -> Stoichiometry:
-    """The reaction by which a bond breaks, per bond: the first that turns it into what is no bond."""
+    """Return the stoichiometry of rupture per bond: the first reaction of the bond whose products are no bonds."""
     bonds, ways = build.interface.bonds, []
     for nu in (reaction.stoichiometry() for reaction in build.interface.reactions):
         if nu.get(name):

@@ -1,14 +1,14 @@
-r"""Unilateral contact: the gap is not negative, the contact pushes only, and it pushes only where the gap is closed.
+r"""Unilateral contact: the gap is not negative, the contact only pushes, and only while the gap is closed.
 
 .. math:: 0 \le g_n \perp p \ge 0
 
 The mode ``closed`` of a rigid gap begins as the gap closes and ends under tension. A mass m that reaches contact with
-:math:`v < 0` leaves it with :math:`-e\,v`, by the impulse :math:`(1+e)\,m|v|`, which friction answers by one of its
-own. Finite tractions, those of springs, dampers, cohesion and adhesion, have no part in it. Under a pressing traction
-rebounds follow each other ever faster, infinitely many in a time :math:`2 e|v| m / (1-e)|F|` (Zeno). The bodies rest
-where what is left of this is nothing, beside the time that has passed or the fastest impact.
+:math:`v < 0` rebounds with :math:`-e\,v`, by the impulse :math:`(1+e)\,m|v|`, to which friction adds its impulse.
+Finite tractions, those of springs, dampers, cohesion and adhesion, have no part in it. Under a pressing traction F
+rebounds accumulate, infinitely many in a time :math:`2 e|v| m / (1-e)|F|` (Zeno). The bodies rest once the remainder is
+negligible compared with the elapsed time or the fastest impact.
 
-Where a potential stands for the contact it has to bear the bodies; where none does, a run ends as the gap closes.
+If a potential models the contact it has to bear the bodies; if none does, a run ends as the gap closes.
 
 Source: Signorini's condition and Newton's law of impact as in Moreau (1988), doi 10.1007/978-3-7091-2624-0_1, and
 Brogliato (2016), Nonsmooth Mechanics, doi 10.1007/978-3-319-28664-8.
@@ -35,33 +35,32 @@ LANDED = Register("landed", "whether the bodies have met and do not rebound")
 FASTEST = Register("fastest", "speed of the fastest impact [m/s]")
 
 NO_SPEED, LEAST_IMPACT = 0.1, 10 * PICOMETRE
-"""Part of the fastest impact, or of the time so far, that counts as none, in units of the relative tolerance; and the
-speed [m/s] that the fastest impact has at least there."""
+"""Fraction of the fastest impact, or of the elapsed time, that counts as zero, in units of the relative tolerance; and
+a speed [m/s] that is added to the fastest impact there."""
 
 SHORTEST_REBOUND = 8 * NEWTON_EPS
-"""Part of the time so far that one rebound must take to be told from none: a few hundred ticks of the clock, so that
-its event is found to a per cent of it."""
+"""Fraction of the elapsed time below which the flight of one rebound is unresolved: a few hundred ticks of the clock,
+so that the event is located to a per cent of the flight."""
 
 LEAST_PART = 0.5
-"""Part to which what is conducted per pressure falls, at least, between the ``TRIAL_PRESSURES`` where it is less than
-in proportion."""
+"""Largest fraction to which conductance over pressure falls between the ``TRIAL_PRESSURES`` if it is not
+proportional."""
 
 DEEP_GAP, TOUCH_GAP, NO_PRESSURE = -1.0, PICOMETRE / 1e3, 1e-3
-"""Gaps [m] deep in contact and as good as at touch, and a pressure [Pa] that bears nothing at the former. The softest
-contact in use, of 1 Pa/m, has a thousand times as much there; attraction that changes its sign beyond its pole has some
-1e-14 Pa, and bonds that have all but gone leave little more.
-"""
+"""A gap [m] deep in contact, one practically at touch, and a pressure [Pa] at the former that means no contact. The
+softest contact in use, of 1 Pa/m, has a thousand times as much there; attraction that changes its sign beyond its pole
+has some 1e-14 Pa, and almost vanished bonds leave little more."""
 
 TOUCH_OVERLAP = PICOMETRE
-"""Overlap [m] that still is touch: far below the size of an atom, far above the rounding of a gap."""
+"""Overlap [m] that still counts as touch: far below the size of an atom, far above the rounding of a gap."""
 
 CONTACT_REMEDY = "Give a potential that does, such as `penalty`."
 
 
 def contact(pull: Expression, bonded: Expression, gap: Any = None, velocity: Any = None) -> Constraint:
-    """A rigid contact that ``pull`` opens; it is closed at the start where bonds hold it, or nothing pulls.
+    """Return a rigid contact that ``pull`` opens; it starts closed if bonds hold it or nothing pulls.
 
-    ``gap`` and ``velocity`` are those of what moves by a balance of its own.
+    ``gap`` and ``velocity`` are those of a gap that moves by a balance.
     """
     start = where(bonded > 0, 1, where(pull > 0, 0, 1))
     if velocity is not None:
@@ -73,14 +72,14 @@ def contact(pull: Expression, bonded: Expression, gap: Any = None, velocity: Any
 
 
 def laws(build: Build) -> Iterator[Constraint]:
-    """Edges of a rigid contact: it opens under tension without bonds; a gap that follows at once closes it, too."""
+    """Yield the edges of a rigid contact: opening under tension without bonds; closing of a gap without balance."""
     closed, limits = build.mode("closed"), build.interface.limits
     if closed is None:
         return
     t_n = build.variables.get("t_n", "the rigid interface", "interface")
     debonded = {build.variables.get("bonded", "the rigid interface"): (0,)} if limits else {}
-    if not limits or any(law.release == "local" for law in limits):  # else what debonds opens
-        # What only touches zero does not part a mass.
+    if not limits or any(law.release == "local" for law in limits):  # else debonding opens it
+        # The contact of a mass opens when t_n becomes positive; touching zero is not enough.
         strict, when = any(state.symbol == V for state in build.states), {**debonded, closed: (1,)}
         opens = Edge("open", -t_n, "the interface opens", {closed: ZERO}, equilibrates=True, strict=strict, when=when)
         yield Constraint(edges=(opens,))
@@ -90,13 +89,13 @@ def laws(build: Build) -> Iterator[Constraint]:
 
 
 def _closing(touch: Edge) -> Constraint:
-    """An edge that closes the contact; what loads press together closes as they jump, too."""
+    """Return the constraint of a closing edge; a jump of loads that presses the bodies together closes it too."""
     pressed = {mode: where(touch.masked < 0, value, mode) for mode, value in touch.modes.items()}
     return Constraint(edges=(touch,), beside=lambda edge: pressed if edge.times else {})
 
 
 def impacts(build: Build) -> Iterator[Constraint]:
-    """Closing of a gap that moves: with a mass by an impact, after which the bodies rebound or rest."""
+    """Yield the closing of a gap that moves: with a mass by an impact, after which the bodies rebound or rest."""
     closed = build.mode("closed")
     if closed is None or "g_n" not in build.motion.gap_rates:
         return
@@ -121,21 +120,21 @@ def impacts(build: Build) -> Iterator[Constraint]:
     )
     calm, reason = {LANDED.symbol: ZERO, **build.reclosing}, "the bodies rest on each other"
     rest = Edge("rest", -ONE, reason, calm, equilibrates=True, when={LANDED.symbol: (1,)})
-    # What follows at the same moment comes before what would slide as long as the contact is open.
+    # These edges are due at the same time as slip that would begin while the contact is still open, and go first.
     yield Constraint((), (LANDED, FASTEST) if remembered else (LANDED,), (hits, rest), at_once=True)
 
 
 def _rests(
     build: Build, far: FarField, speed: Expression, pressing: Expression
 ) -> tuple[Expression, dict[Expression, Expression]]:
-    """Indicator, one where the bodies do not rebound, else zero; and new values of the registers that it reads."""
+    """Return an indicator, one if the bodies do not rebound, else zero, and new values of the registers it reads."""
     if far.e == 0:
         return ONE, {}
     tolerance = build.constant("tolerance", RTOL_PATH, Spec("1", "relative tolerance of the run"), 0.0, internal=True)
     swift = where(speed > FASTEST.symbol, speed, FASTEST.symbol)
     rebound = far.e * speed
     nothing = NO_SPEED * tolerance
-    # This flight takes 2 rebound / pressing, and all that follow together 1 / (1 - e) times as long.
+    # The next flight takes 2 rebound / pressing, all flights together 1 / (1 - e) times as long.
     brief = pressing * build.t * ((1 - far.e) * nothing + SHORTEST_REBOUND)
     slow = where(rebound < nothing * (swift + LEAST_IMPACT), 1, where(2 * rebound < brief, 1, 0))
     at_once = build.constant("rests_at", REST_TIME_PATH, Spec("s", "time at which rebounds rest"), -1.0, internal=True)
@@ -143,15 +142,15 @@ def _rests(
 
 
 def jumps(build: Build) -> Iterator[str]:
-    """Warn of laws and conductances that would act at the pressure of an impact, infinite for an instant."""
+    """Yield a warning on laws and conductances that would act at the infinite pressure of an impact."""
     if LANDED not in build.registers:
         return
     found = [law.name() for law in build.interface.reactions if feels_pressure(law)]
-    if not build.motion.slips:  # the velocity of sliding is prescribed, and its drive does the work of friction
+    if not build.motion.slips:  # prescribed slip: its drive does the work of friction
         found += [law.name() for law in build.interface.frictions if feels_pressure(law)]
     for (a, b), channels in build.conductances.items():
         for h in channels:
-            # What grows less than in proportion to the pressure does nothing in no time.
+            # Growth less than in proportion to the pressure gives nothing in zero time.
             at = [build.at_start(h.subs({PRESSURE: p, TRACTION: -p})) / p for p in TRIAL_PRESSURES]
             if at[1] > LEAST_PART * at[0]:
                 found.append(f"the conductance between {a} and {b}")
@@ -161,17 +160,17 @@ def jumps(build: Build) -> Iterator[str]:
 
 
 def closing(build: Build, g: Any) -> Iterator[Margin | str]:
-    """End a run as the gap closes, unless a potential bears the bodies there, or a law ends there by itself."""
+    """End a run as the gap closes, unless a potential bears the bodies there or the domain of a law ends there."""
     if any(margin.domain and margin.expression == g for margin in build.margins):
         return
-    if build.scene.surface is not None:  # whose range of approach a run does not leave
+    if build.scene.surface is not None:  # a run does not leave its range of approach
         return
-    # What the potentials bear deep in contact, unless it is the same as at touch.
+    # The pressure of the potentials deep in contact, unless it is the same as at touch.
     t_n, side = build.expanded(derivative(build.psi, g)), symengine.Symbol("side")
     deep = t_n.subs({g: DEEP_GAP, side: -1})
     borne = symengine.Integer(0) if deep == t_n.subs({g: TOUCH_GAP, side: 1}) else -deep
     without_bonds = borne.subs({bond.symbol: 0 for bond in build.bonding.values()})
-    if not build.at_start(without_bonds) <= NO_PRESSURE:  # nor where a law has no number there
+    if not build.at_start(without_bonds) <= NO_PRESSURE:  # not below, also if it is NaN
         return
     if build.at_start(borne) <= NO_PRESSURE:
         yield f"no potential bears the bodies in contact: the run ends if the gap closes. {CONTACT_REMEDY}"

@@ -1,8 +1,8 @@
 """Formulation of the tangential motion of a scene in each direction, and the tractions of friction.
 
-A direction moves by a balance of its own: inertial, overdamped or quasi-static, and sticking exactly or elastically. In
-the plane a law that is the same in all directions resists along the unit vector of sliding, by its traction at the
-speed of sliding. What sticking bears is half an axis for each direction: of a line, or of an ellipse.
+Each direction that moves by a balance is inertial, overdamped or quasi-static, and sticks exactly or elastically. In
+the plane an isotropic law acts along the unit vector of the slip velocity, with its traction at the slip speed. The
+limit of sticking is a half axis for each direction: of an interval, or of an ellipse.
 """
 
 from __future__ import annotations
@@ -49,17 +49,17 @@ class Formulation:
 
     d: Direction
     mount: Support | None
-    """None where the displacement is prescribed."""
+    """None if the displacement is prescribed."""
     elastic: bool
-    """Whether sticking is elastic: the free energy depends on the elastic gap."""
+    """True if sticking is elastic: the free energy depends on the elastic gap."""
     sticks: bool
-    """Whether some friction has a limit below which nothing slides."""
+    """True if some friction law has a limit below which there is no slip."""
     rate_dependent: bool
-    """Whether what resists sliding depends on its velocity."""
+    """True if the resistance to slip depends on its velocity."""
     dead_load: bool
-    """Whether a given traction alone moves it: what sticks stays where it is, and nothing holds what slides."""
+    """True if only a prescribed traction moves it: sticking holds its place, and nothing balances the load in slip."""
     slides: bool
-    """Whether anything says how the interface slides; an elastic one follows the displacement otherwise."""
+    """True if a law or a rigid interface determines the slip; otherwise the elastic gap is the whole displacement."""
 
     @property
     def inertial(self) -> bool:
@@ -67,17 +67,17 @@ class Formulation:
 
     @property
     def slides_inertially(self) -> bool:
-        """Whether the velocity of sliding itself has inertia."""
+        """True if the slip velocity has inertia."""
         return self.inertial and not self.elastic
 
     @property
     def unstable(self) -> str:
-        """Reason for which no steady sliding velocity exists, with the remedy that fits."""
+        """Reason why no steady slip velocity exists, with the remedy that fits."""
         return f"{UNSTABLE} if sticking were exact, without an elastic gap g_t" if self.elastic else UNSTABLE
 
     @property
     def in_equilibrium(self) -> bool:
-        """Whether a gap of it moves at once where the tractions change."""
+        """True if one of its gaps responds at once to a change of tractions."""
         quasi_static = self.mount is not None and self.mount.quasi_static
         if self.elastic:
             return quasi_static or not self.rate_dependent
@@ -85,12 +85,12 @@ class Formulation:
 
     @property
     def own_velocity(self) -> str:
-        """The velocity of the displacement, which is that of sliding unless the interface is elastic."""
+        """Name of the displacement's velocity, which is the slip velocity unless the interface is elastic."""
         return "v_t" if self.elastic else self.d.velocity
 
 
 def formulations(build: Build) -> tuple[Formulation, ...]:
-    """Formulations of the motion in each direction in which the scene moves by a balance."""
+    """Return the formulations for each direction in which the scene moves by a balance."""
     mount = support(build, "t")
     elastic = bool(in_series(build)) and not driven(build, "g_t")
     across = transverse_support(build, mount) if mount is not None else None
@@ -122,23 +122,23 @@ def _formulation(build: Build, d: Direction, mount: Support | None, elastic: boo
     rate_dependent = any(_feels_velocity(law, d) for law in laws)
     rate_dependent = rate_dependent or (not elastic and mount is not None and mount.damped)
     sticks = any(law.has_limit for law in laws)
-    # Where nothing but its load and friction acts on the displacement, and may hold it.
+    # Only the load and friction act on the displacement, and only friction may hold it.
     free = mount is not None and mount.quasi_static and not (mount.law.k or in_parallel(build))
     dead_load = free and not rate_dependent and (sticks or not elastic)
     return Formulation(d, mount, elastic, sticks, rate_dependent, dead_load, bool(laws) or not elastic)
 
 
 def growth(slope: Expression, damping: Expression) -> Expression:
-    """Stability measure of the slope of what resists sliding, relative to the damping where there is some.
+    """Return a stability measure of the slope of the resistance, relative to the damping if there is any.
 
-    It is the logarithm of one more if positive, as friction's own slope may be infinite at rest.
+    If positive it is the logarithm of one plus the ratio, as the slope of friction may be infinite at rest.
     """
     ratio = slope / damping if damping != 0 else slope
     return where(slope > 0, log(1 + where(slope > 0, ratio, 0)), ratio)
 
 
 def _feels_velocity(law: Friction, d: Direction) -> bool:
-    """Whether a law resists sliding along a direction by the velocity."""
+    """True if the resistance of a law along a direction depends on the velocity."""
     formula = law.transverse if d is ACROSS and law.transverse is not None else law.statement
     return bool({"v", "v_2"} & {*reads(formula)})
 
@@ -148,15 +148,15 @@ def _sheared(build: Build) -> list[Potential]:
 
 
 def arrangement(law: Potential) -> str:
-    """Arrangement of a potential with friction, in series or in parallel."""
+    """Return the arrangement of a potential with friction, in series or in parallel."""
     return law.shear if isinstance(law, TangentialPotential) else "series"
 
 
 def in_parallel(build: Build) -> tuple[Potential, ...]:
-    """The potentials whose tangential gap is the whole displacement, which friction acts along too.
+    """Return the potentials whose tangential gap is the whole displacement, in parallel with friction.
 
-    What moves in two directions has no elastic gap, so that it is the displacement there without friction as well. A
-    gap and a velocity that are prescribed each by itself are no one displacement.
+    A motion in two directions has no elastic gap, so that the gap is the displacement there even without friction. A
+    gap and a velocity that are prescribed separately define no common displacement.
     """
     mount, frictions = support(build, "t"), bool(build.interface.frictions)
     if mount is not None:
@@ -167,15 +167,15 @@ def in_parallel(build: Build) -> tuple[Potential, ...]:
 
 
 def in_series(build: Build) -> tuple[Potential, ...]:
-    """The potentials of an elastic gap, which gives way where friction does."""
+    """Return the potentials of an elastic gap, in series with friction."""
     parallel = in_parallel(build)
     return tuple(law for law in _sheared(build) if law not in parallel)
 
 
 def displacement(build: Build) -> Expression:
-    """The tangential gap of what stands beside friction: the displacement, in two directions its length.
+    """Return the tangential gap in parallel with friction: the displacement, in two directions its length.
 
-    Laws read its square, so that it needs no guard where it is zero.
+    Laws read its square, so that it needs no guard at zero.
     """
     if len(build.motion.slips) == 2:
         return sqrt(sum(symengine.Symbol(slip.d.displacement) ** 2 for slip in build.motion.slips))
@@ -193,7 +193,7 @@ def evolve(
     algebraic: bool = False,
     scale: float = LENGTH_SCALE,
 ) -> Expression:
-    """A new state of the motion, and the variable of its name where something says what it is determined by."""
+    """Add a state of the motion; if ``by`` names what determines it, also a variable of its name."""
     initial = build.scene.initial.get(name, 0.0) if start is None else start
     finest = LEAST_CREEP if name == "v" and any(law.internal for law in build.interface.frictions) else None
     state = State(VARIABLES[name], initial, scale, algebraic, finest=finest, given=given)
@@ -204,13 +204,13 @@ def evolve(
 
 
 def name_traction(build: Build, d: Direction, slides: Expression, carried: Expression, needed: Expression) -> None:
-    """The traction carried while sliding, else what holds the interface."""
+    """Name the total traction: the one carried in slip, else the one that holds the interface."""
     traction = slides * carried + (1 - slides) * needed
     build.areal(Quantity(d.total, "Pa", f"{d.text} on body 1", d.total), traction)
 
 
 def directions(build: Build) -> tuple[Direction, ...]:
-    """The directions in which the interface moves, or in which its velocity is prescribed."""
+    """Return the directions in which the interface moves, or in which its velocity is prescribed."""
     if build.motion.slips:
         return tuple(slip.d for slip in build.motion.slips)
     both = build.variables.has("v_2") or any(law.transverse is not None for law in build.interface.frictions)
@@ -220,13 +220,13 @@ def directions(build: Build) -> tuple[Direction, ...]:
 def resistance(
     build: Build, law: Friction, bound: Friction, own: Mapping[str, Expression]
 ) -> dict[Direction, Expression]:
-    """Tractions of a law [Pa] along the directions of sliding."""
+    """Return the tractions of a law [Pa] by direction of slip."""
     both = directions(build)
     if len(both) == 1:
         formula = bound.driven if law is build.motion.creeping else bound.statement
         traction = build.variables.call(bound, formula, own)
         if any(slip.sticks for slip in build.motion.slips):
-            # A speed without a direction would drive on what rounding moves the wrong way as sliding begins.
+            # |v| has no sign: roundoff that moves the interface the wrong way as slip begins would be driven on.
             v = symengine.Symbol(ALONG.velocity)
             traction = symengine.sympify(traction).subs({absolute(v): SLIP * v})
         return {ALONG: traction}
@@ -238,7 +238,7 @@ def resistance(
         swift = {"v": build.variables.get("speed", law), "direction": ONE}
         size = build.variables.call(bound, bound.statement, {**own, **swift})
         return {d: size * build.variables.get(d.cosine, law) for d in both}
-    # What is linear in the velocity needs no direction at rest.
+    # A resistance linear in the velocity needs no direction at rest.
     speed = symengine.Symbol("speed")
     size = build.variables.call(bound, bound.statement, {**own, "v": speed})
     slope = derivative(size, speed)
@@ -252,7 +252,7 @@ def resistance(
 
 
 def _refuse_one_component(law: Friction) -> None:
-    """InputError where a law reads one component of the velocity, since it would depend on the axes."""
+    """Raise InputError if a law reads one component of the velocity, since it would depend on the axes."""
     if law.internal:
         raise InputError(f"{law.name()} remembers sliding along one direction, and this scene has two.", law.place)
     for name, value in law.varying.items():
@@ -261,20 +261,20 @@ def _refuse_one_component(law: Friction) -> None:
 
 
 def resist(build: Build, d: Direction, traction: Expression) -> None:
-    """Add to what resists sliding along a direction, where the interface moves by a balance."""
+    """Add to the resistance to slip in a direction, if the interface moves by a balance."""
     if build.motion.slips:
         tractions = build.motion.sliding_tractions
         tractions[d.axis] = tractions.get(d.axis, 0) + traction
 
 
 def stick_limit(build: Build, law: Friction, bound: Friction, own: Mapping[str, Expression]) -> None:
-    """Add what a friction law can carry at rest: its limit, at least what it resists sliding with from rest on."""
+    """Add the traction up to which a friction law sticks: its limit, or the kinetic friction at v = 0 if larger."""
     sticking = [slip.d for slip in build.motion.slips if slip.sticks]
     if sticking and bound.has_limit:
-        # It bears no less at rest than it resists sliding with, which happens to no contact.
+        # A limit below kinetic friction is unphysical: it is raised to that, with a caution.
         given = {"p": ONE, **REST}  # 1 Pa stands for any pressure: coefficients are compared
         kinetic = build.variables.call(bound, bound.statement, given)
-        if {"mu_s", "mu_k"} <= vars(bound).keys():  # that of fast sliding, to which that at rest falls
+        if {"mu_s", "mu_k"} <= vars(bound).keys():  # the friction of fast sliding, to which that at rest falls
             static, kinetic = vars(bound)["mu_s"], vars(bound)["mu_k"]
         else:
             static = build.variables.call(bound, bound.limit, given)

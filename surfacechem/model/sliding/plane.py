@@ -1,17 +1,18 @@
-r"""Dry friction in the plane of the interface: a speed and a direction of sliding that both components share.
+r"""Dry friction in the plane of the interface: both components share a slip speed and a slip direction.
 
-The velocity of sliding is its speed s times a unit vector n, which has turned by the angle :math:`\alpha` since sliding
-began. With :math:`f` what drives the interface less what resists it,
+The slip velocity is its speed s times a unit vector n, which has turned by the angle :math:`\alpha` since slip began.
+With :math:`f` the driving traction less the resistance,
 
-.. math:: m \dot s = f \cdot n, \quad m s\,\dot\alpha = f \cdot n_\perp,
+.. math:: m \dot s = f \cdot n, \quad m s\,\dot\alpha = f \cdot n_\perp.
 
-of which the first is regular where sliding stops, so that a stop is the zero of a smooth function. The second is not:
-what is not driven straight turns ever faster into its last direction. There s counts as no less than what friction
-takes away within the rounding of time. That bends the path of such speeds and takes no energy, since what turns does no
-work. Without a mass both lines are balances, which dampers close; springs alone would leave the speed undetermined.
+The first equation is regular as slip stops, so that a stop is the zero of a smooth function. The second is singular:
+unless driven straight, the velocity turns ever faster into its last direction. In it s therefore counts as no less than
+the speed that friction takes away within the rounding of time. That bends the path at such speeds and takes no energy,
+since turning does no work. Without a mass both equations are balances, which dampers close; springs alone would leave
+the speed undetermined.
 
-Friction over all directions is an ellipse of tractions, and sticking bears what is inside. Sliding begins in the
-direction in which friction is the pull.
+Friction over all directions is an ellipse of tractions, and sticking bears its interior. Slip begins in the direction
+whose friction equals the pull.
 
 Source: Sauer, Duong & Mandadapu (2021), eqs. e:dry_fric and e:tt_max, with Newton's law in polar components of the
 velocity; Coulomb's law in the plane as in Acary & Brogliato (2008), doi 10.1007/978-3-540-75392-6.
@@ -46,21 +47,20 @@ LEAST_SPEED = PICOMETRE / 1e6
 """Speed [m/s] below which the turn is never resolved, a picometre in twelve days: it keeps the row regular at t = 0."""
 
 TURN_SCALE = 1e6
-"""Scale of the turn [rad]: what rounding of the pull makes of it as sliding begins is no error. It is accurate to a
-part of one radian, not of itself.
-"""
+"""Scale of the turn [rad]. Its absolute error counts, relative to one radian, and the turn that roundoff of the pull
+causes as slip begins is no error."""
 
 
 @dataclass(frozen=True)
 class Component:
-    """Tractions in one of the two directions: the pull, the resistance to sliding, and the limit of sticking."""
+    """Tractions in one of the two directions: the pull, the resistance to slip, and the limit of sticking."""
 
     d: Direction
     far: FarField
     u: Expression
     rate: Expression
     t_a: Expression
-    """Traction that acts beside friction."""
+    """Traction in parallel with friction."""
     resisted: Expression
     limit: Expression
 
@@ -71,12 +71,12 @@ class Component:
 
     @property
     def driving(self) -> Expression:
-        """Traction that drives sliding."""
+        """Traction that drives slip."""
         return self.far.force(self.u, self.rate) - self.t_a - self.resisted - self.far.c_g * self.rate
 
 
 def states(build: Build, kinds: Sequence[Formulation]) -> Iterator[Constraint]:
-    """Displacements, speed and direction, and the velocities that follow."""
+    """Define displacements, speed, direction, and the velocities that follow; yield the mode and registers of slip."""
     inertial = kinds[0].inertial
     if not inertial and not all(kind.rate_dependent for kind in kinds):
         raise InputError(
@@ -95,7 +95,7 @@ def states(build: Build, kinds: Sequence[Formulation]) -> Iterator[Constraint]:
         evolve(build, kind.d.displacement, "mechanics.tangential")
     by, slow = "balance of the tangential tractions", not inertial
     start: dict[str, Any] = {"speed": {}, "turn": {}}
-    if inertial:  # both are given by the components of the initial velocity
+    if inertial:  # both follow from the components of the initial velocity
         along, across = (build.scene.initial.get(v, 0.0) for v in ("v", "v_2"))
         start["speed"] = {"start": math.hypot(along, across), "given": Given(VARIABLES["v"], along, _speed)}
         start["turn"] = {"start": 0.0, "given": Given(VARIABLES["v_2"], across, lambda _: 0.0)}
@@ -113,13 +113,13 @@ def _speed(values: Mapping[str, float]) -> float:
 
 
 def _began(v: str, values: Mapping[str, float]) -> float:
-    """Component of the unit vector of the initial velocity."""
+    """Return a component of the unit vector of the initial velocity."""
     speed = _speed(values)
     return values[f"initial.{v}"] / speed if speed else float(v == "v")
 
 
 def motion(build: Build, kinds: Sequence[Formulation]) -> Iterator[Record]:
-    """Balances along and across the direction of sliding, and the edges between sticking and sliding."""
+    """Yield the balances along and across the slip direction, and the edges between stick and slip."""
     sides, unbonded = [], build.energy.unbonded
     for kind in kinds:
         assert kind.mount is not None
@@ -138,34 +138,34 @@ def motion(build: Build, kinds: Sequence[Formulation]) -> Iterator[Record]:
     else:
         still, slope = _steady(build, sides, largest)
         if a != b:
-            # Without inertia friction along one direction alone leaves open how sliding begins.
+            # Without inertia, friction along one direction only leaves the onset of slip undetermined.
             reason = "dry friction acts along one of two directions: the way of slip is undetermined"
             ratio = where(largest > 0, where(a > b, b, a) / where(largest > 0, largest, 1) - SQRT_EPS, 1)
             remedy = "Give the mounting a mass `m`, or friction along the other direction, too."
             yield Margin("friction in both directions", ratio, reason, remedy=remedy)
-        # The slope at rest is that of the speeds to come.
+        # The slope at rest is the limit from positive speeds.
         ahead = growth(slope.subs({SPEED: SPEED + TINY}), sum(side.far.c_b + side.far.c_g for side in sides))
         yield Margin(f"{STABLE_PREFIX}speed", ahead, kinds[0].unstable, when={SLIP: (1,)}, stability="speed")
     pull = _scaled(sides, largest)
-    # Sliding begins where the pull points; what nothing holds back begins in the direction of its drive.
+    # Slip begins in the direction of the pull, or, with a limit of zero, in that of the rate of the drive.
     drive = [build.total_derivative(side.far.force(ZERO, ZERO) - side.t_a) for side in sides]
     size, pace = norm(*pull), norm(*drive)
     led = [where(pace > 0, x / where(pace > 0, pace, 1), began) for began, x in zip(BEGAN, drive, strict=True)]
     aimed = [where(size > 0, x / where(size > 0, size, 1), other) for x, other in zip(pull, led, strict=True)]
     aim, beyond = dict(zip(BEGAN, aimed, strict=True)), largest - size
     onward, end = {SLIP: ZERO}, {TURN: ZERO}
-    if kinds[0].inertial:  # it slides on where sticking does not bear what pulls
+    if kinds[0].inertial:  # it slips on if sticking cannot bear the pull
         onward = {SLIP: where(beyond < 0, 1, 0)} | {b: where(beyond < 0, x, b) for b, x in aim.items()}
         end = {TURN: ZERO, SPEED: ZERO}
     yield set_valued({1: beyond}, {1: still}, aim, onward, {**breaks_bonds(build), TURN: ZERO}, end)
 
 
 def _inertial(build: Build, sides: Sequence[Component], largest: Expression) -> Expression:
-    """Newton's law along and across the direction of sliding; returns the guard that is zero where sliding stops."""
+    """Set Newton's law along and across the slip direction; return the guard whose zero stops slip."""
     turn, m = symengine.Symbol("dturn_dt"), sides[0].far.m
     (x, y), (c, s) = (side.driving for side in sides), _unit_vector()
     along, across = c * x + s * y, c * y - s * x
-    # The speed that friction takes away within the rounding of time counts as the least one.
+    # The speed that friction takes away within the rounding of time is the least speed in the turn.
     least = TIME_EPS * largest / m * build.t + LEAST_SPEED
     build.rows.momentum("speed", along, m, SLIP)
     build.rows.switched("turn", SLIP, sqrt(SPEED**2 + least**2) * turn - across / m, turn)
@@ -173,21 +173,21 @@ def _inertial(build: Build, sides: Sequence[Component], largest: Expression) -> 
 
 
 def _steady(build: Build, sides: Sequence[Component], largest: Expression) -> tuple[Expression, Expression]:
-    r"""Balances without inertia; returns the guard that is zero where sliding stops, and their slope with the speed.
+    r"""Set the balances without inertia; return the guard whose zero stops slip, and their slope with the speed.
 
-    What resists sliding in the direction n is the vector :math:`(a n_x, b n_y)`, whose half axes a and b grow with the
-    speed. Its balance with the pull :math:`\mathbf P`, along n and across it, is
+    The resistance to slip in the direction n is the vector :math:`(a n_x, b n_y)`, whose half axes a and b grow with
+    the speed. Its balance with the pull :math:`\mathbf P`, along n and across it, is
 
     .. math:: \mathbf P\cdot n - a - (b - a)\,n_y^2 = 0, \quad \mathbf P\cdot n_\perp - (b - a)\,n_x n_y = 0.
 
-    An ellipse of dry friction is stretched to a circle instead, where one direction does not feel the other. The
-    direction follows at once, so that it has no part in what has to grow with the speed.
+    An ellipse of dry friction is stretched to a circle instead, for which the two balances decouple. The direction
+    follows at once, so that it does not enter the stability condition on the speed.
     """
     pull, sizes = [side.needed for side in sides], [_resistance(build, side) for side in sides]
     (a, b), (n_x, n_y) = sizes, _unit_vector()
     ahead, aside = _turned(pull)
     along, across = ahead - (a + (b - a) * n_y**2), aside - (b - a) * n_x * n_y
-    # What rounding leaves of the balance in which sliding begins must not stop it.
+    # The roundoff of the balance in which slip begins must not stop it.
     still = along.subs({SPEED: 0}) + TRACTION_EPS * largest
     if a != b:
         dry = sum((part.subs({SPEED: 0}) for part in sizes), ZERO)
@@ -195,21 +195,21 @@ def _steady(build: Build, sides: Sequence[Component], largest: Expression) -> tu
     slope = derivative(along, SPEED)
     linear = slope != 0 and not depends(slope, SPEED)
     build.rows.switched("speed", SLIP, -along.subs({SPEED: 0}) / slope - SPEED if linear else along, SPEED)
-    build.rows.switched("turn", SLIP * norm(*pull), across, TURN)  # what nothing pulls has no direction
+    build.rows.switched("turn", SLIP * norm(*pull), across, TURN)  # without a pull there is no direction
     build.motion.slides_by |= {"speed": SPEED, "turn": TURN}
     return still, -derivative(build.expanded(along), SPEED)
 
 
 def _unit_vector() -> tuple[Expression, Expression]:
-    """The direction of sliding: that in which it began, turned. So a straight line stays one to the last digit."""
+    """Return the slip direction: the initial direction, turned. A straight path thus stays exact to the last digit."""
     x, y = BEGAN
     return x * cos(TURN) - y * sin(TURN), y * cos(TURN) + x * sin(TURN)
 
 
 def _turned(pull: Sequence[Expression]) -> tuple[Expression, Expression]:
-    """Components of a vector along and across the direction of sliding.
+    """Return the components of a vector along and across the slip direction.
 
-    They are taken about the direction in which sliding began: there their terms cancel, and what is left is exact.
+    They are formed relative to the direction in which slip began: there their terms cancel and the remainder is exact.
     """
     (x, y), (b, b_2), c, s = pull, BEGAN, cos(TURN), sin(TURN)
     ahead, aside = b * x + b_2 * y, b * y - b_2 * x
@@ -217,28 +217,29 @@ def _turned(pull: Sequence[Expression]) -> tuple[Expression, Expression]:
 
 
 def _elliptic(pull: Sequence[Expression], sizes: Sequence[Expression]) -> tuple[Expression, Expression]:
-    r"""The balances on an ellipse that is stretched to a circle: its size [Pa], then half the angle left to turn.
+    r"""Return the balances on an ellipse stretched to a circle: its size [Pa], then half the angle left to turn.
 
-    The pull (x, y) is in balance with the half axes a, b where :math:`n = (x/a, y/b)` is a unit vector. Stretched by
+    The pull (x, y) is in balance with the half axes a, b if :math:`n = (x/a, y/b)` is a unit vector. Stretched by
     a b this is the vector (x b, y a), whose length, the ``reach`` :math:`\rho`, is that of the circle, the ``radius``
     :math:`r = a b`. The first balance,
 
     .. math:: |(x, y)|\,(\rho - r)/\rho = |(x, y)|\,(\rho^2 - r^2) / \rho\,(\rho + r) = 0,
 
-    does not feel the direction, and is all but linear in the speed s. The ``excess`` :math:`\rho^2 - r^2` is a
+    is independent of the direction and almost linear in the speed s. The ``excess`` :math:`\rho^2 - r^2` is a
     polynomial of s, since :math:`a = a_0 + a_1 s`, :math:`b = b_0 + b_1 s`, so that with
     :math:`r = r_0 + r_1 s + r_2 s^2` its terms are
 
     .. math:: (\rho_0 - r_0)(\rho_0 + r_0), \quad 2\,(x^2 b_0 b_1 + y^2 a_0 a_1 - r_0 r_1), \quad
               x^2 b_1^2 + y^2 a_1^2 - r_1^2 - 2 r_0 r_2, \quad -2 r_1 r_2, \quad -r_2^2.
 
-    The least speed is not lost in them beside dry friction. The second balance is the tangent of half the angle from n
-    to the stretched pull, its part ``across`` n over the sum of its length and its part along n.
+    In this form even the least speed is not lost to rounding next to dry friction. The second balance is the tangent of
+    half the angle from n to the stretched pull: its component ``across`` n over the sum of its length and its component
+    along n.
     """
     (x, y), (a, b) = pull, sizes
     (a_0, a_1), (b_0, b_1) = ((size.subs({SPEED: 0}), derivative(size, SPEED)) for size in sizes)
     if depends(a_1, SPEED) or depends(b_1, SPEED):
-        (a_0, b_0), (a_1, b_1) = (a, b), (ZERO, ZERO)  # no polynomial: as it is
+        (a_0, b_0), (a_1, b_1) = (a, b), (ZERO, ZERO)  # not a polynomial: used unchanged
     r_0, r_1, r_2, reach_0 = a_0 * b_0, a_0 * b_1 + a_1 * b_0, a_1 * b_1, norm(x * b_0, y * a_0)
     excess = (
         (reach_0 - r_0) * (reach_0 + r_0),
@@ -255,22 +256,22 @@ def _elliptic(pull: Sequence[Expression], sizes: Sequence[Expression]) -> tuple[
 
 
 def _power_series(terms: Sequence[Expression]) -> Expression:
-    """A sum of powers of the speed."""
+    """Return the polynomial of the speed with these coefficients."""
     return reduce(lambda total, term: total * SPEED + term, reversed(terms))
 
 
 def _resistance(build: Build, side: Component) -> Expression:
-    """Resistance to sliding along one of the directions alone [Pa]."""
+    """Return the resistance to slip along one of the directions alone [Pa]."""
     own = BEGAN[side.d is ACROSS]
     sliding = {b: symengine.Integer(b == own) for b in BEGAN} | {TURN: ZERO, SLIP: symengine.Integer(1)}
     return build.expanded(side.resisted).subs(sliding) + (side.far.c_b + side.far.c_g) * SPEED
 
 
 def _scaled(sides: Sequence[Component], top: Expression) -> list[Expression]:
-    """The pull where the ellipse that sticking bears is stretched to a circle about its larger half axis."""
+    """Return the pull, scaled so that the ellipse of sticking becomes a circle about its larger half axis."""
     if all(side.limit == top for side in sides):
         return [side.needed for side in sides]
-    # What sticking bears along one direction has to be told from none beside the other.
+    # A limit below roundoff of the larger one is replaced by that roundoff.
     least = where(top > 0, RUN_EPS * top, 1)
     known = [where(side.limit > RUN_EPS * top, side.limit, least) for side in sides]
     return [side.needed * where(top > 0, top / limit, 1) for side, limit in zip(sides, known, strict=True)]

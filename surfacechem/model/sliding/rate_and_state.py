@@ -1,9 +1,9 @@
-r"""Sliding against rate-and-state friction: its traction is the variable, the velocity follows from it.
+r"""Rate-and-state friction: its traction is the unknown, and the slip velocity follows from it.
 
-At rest such friction creeps, by hundreds of decades slower than it slides, and a reversal passes through all of them
-twice. What is smooth there is the traction, here in units of the direct effect: the drive. So it is the state that
-stands for the velocity at all speeds, algebraic without a mass. With one it obeys Newton's law by the chain rule,
-:math:`m\,\dot v(\text{drive}, \theta)` being what is left of the tractions.
+At rest such friction creeps, hundreds of decades slower than it slides, and a reversal passes through all of them
+twice. The traction is smooth there, in units of the direct effect: the drive. It is therefore the state from which the
+velocity follows at all speeds, algebraic without a mass. With a mass it obeys Newton's law by the chain rule,
+:math:`m\,\dot v(\text{drive}, \theta)` being equal to the unbalanced traction.
 
 Source: Dieterich (1979), doi 10.1029/JB084iB05p02161; Ruina (1983), doi 10.1029/JB088iB12p10359; with the direct effect
 as an asinh by Rice, Lapusta & Ranjith (2001), doi 10.1016/S0022-5096(01)00042-4.
@@ -26,19 +26,18 @@ from surfacechem.tolerances import PICOMETRE
 DRIVE = "drive"
 
 DRIVE_SCALE = 1e6
-"""Scale of the drive of a mass: what its traction is resolved to is a part of the direct effect, not of itself."""
+"""Scale of the drive of a mass: its error counts relative to the direct effect, not to its value."""
 
 LEAST_INERTIAL = PICOMETRE / 1e8
-"""Velocity [m/s] below which a mass only delays creep, a picometre in three years; creep then is as swift whatever its
-velocity, and the row stays regular.
-"""
+"""Velocity [m/s] below which a mass only delays creep, a picometre in three years: there the drive responds equally
+fast at any velocity, and the row stays regular."""
 
 
 def evolve_drive(build: Build, *, inertial: bool) -> Expression | None:
-    """The state that stands for the velocity, where the traction of a law can; what reads the velocity gets it there.
+    """Add the drive as the state for the slip velocity, if a law has a velocity as function of its traction; else None.
 
-    A mass feels the rate of the velocity, for which parameters that vary count as they are without their factors.
-    Without one the balance may need the velocity itself, where they vary with it.
+    A mass needs the rate of the velocity, in which varying parameters enter without their factors. Without a mass the
+    balance may need the velocity as unknown, if parameters vary with it.
     """
     law = _law(build, inertial)
     if law is None:
@@ -49,14 +48,14 @@ def evolve_drive(build: Build, *, inertial: bool) -> Expression | None:
         bound = bound.bind({name: symbols[f"{bound.path}.{name}"] for name in varying})
     if not (inertial and varying):
         build.motion.creeping = law
-    # The law's own variables are read before its memory has made them states.
+    # The internal variables of the law are read here before they are defined as states.
     own = {name: symengine.Symbol(name) for name in law.internal}
 
     def velocity() -> Expression:
         return build.name(VARIABLES["v"], build.variables.call(law, bound.velocity, {**own, DRIVE: symbol}))
 
     def at_start(values: Mapping[str, float]) -> float:
-        """The drive at the velocity given, where the search for a balance begins."""
+        """Return the drive at the given velocity, the start value of the search for a balance."""
         drive = build.variables.call(law, bound.drive, {**own, "v": values["initial.v"]})
         return _number_at_start(build, drive, values)
 
@@ -73,12 +72,12 @@ def _number_at_start(build: Build, expression: Expression, values: Mapping[str, 
     numbers |= {state.symbol: state.from_given(values) for state in build.states if state.name != DRIVE}
     try:
         return float(build.expanded(expression).subs({**numbers, build.t: 0.0}))
-    except RuntimeError:  # no real number, as of a negative pressure: it is only where the search begins
+    except RuntimeError:  # no real number, as at a negative pressure: zero will do as a start value
         return 0.0
 
 
 def _law(build: Build, inertial: bool) -> Friction | None:
-    """The first law whose traction can stand for the velocity."""
+    """Return the first law that gives the velocity as a function of its traction."""
     for law in build.interface.frictions:
         varies_with_velocity = any("v" in (factor.of, *reads(factor.factor)) for factor in law.factors)
         if law.velocity is not None and (inertial or not varies_with_velocity):
@@ -87,10 +86,10 @@ def _law(build: Build, inertial: bool) -> Friction | None:
 
 
 def stands_for_velocity(build: Build) -> bool:
-    """Whether the drive is the state that stands for the velocity of sliding."""
+    """True if the drive is the state from which the slip velocity follows."""
     return any(state.name == DRIVE for state in build.states)
 
 
 def inertia(build: Build, m: Expression) -> Expression:
-    """Mass times the rate of the velocity [Pa], which counts what is next to none as a little."""
+    """Return mass times the rate of the velocity [Pa], plus a small inertia of the drive that keeps it regular."""
     return m * build.total_derivative(symengine.Symbol("v") + LEAST_INERTIAL * symengine.Symbol(DRIVE))

@@ -1,11 +1,10 @@
-r"""The tangential motion: the balance of the tractions in each direction, sticking and sliding.
+r"""Tangential motion: the balance of tractions in each direction, stick and slip.
 
-Exact sticking holds the displacement; elastic sticking lets the elastic gap take it up. Sliding is inertial, resisted
-by something that depends on its rate, or rate-independent, in which case the traction itself determines it. With the
-far field's traction t_F, that of adhesion beside friction t_a and of friction t_f the driving traction t_F - t_a - t_f
-is :math:`m\,\dot v`, zero, or zero by its rate, as the mounting has a mass, a damper, or neither. Smooth friction moves
-the interface in two directions by the same equations; what sticks in the plane has one direction of sliding, which both
-share.
+Exact sticking holds the displacement; in elastic sticking the elastic gap follows it. Slip is inertial, rate-dependent,
+or rate-independent, in which case the traction itself determines it. With the far field's traction t_F, that of
+adhesion in parallel with friction t_a and that of friction t_f, the driving traction t_F - t_a - t_f is
+:math:`m\,\dot v`, zero, or zero by its rate, for a mounting with a mass, a damper, or neither. Smooth friction moves
+the interface in two directions by the same equations; stick and slip in the plane has one slip direction for both.
 """
 
 from __future__ import annotations
@@ -44,7 +43,7 @@ SLIP_WORDS = {-1.0: "slides backward", 0.0: "sticks", 1.0: "slides forward"}
 
 
 def variables(build: Build) -> Iterator[Constraint]:
-    """States and modes of the tangential motion."""
+    """Define the unknowns and yield the modes of the tangential motion."""
     found = build.motion.slips = formulations(build)
     if not found:
         _prescribed_direction(build)
@@ -56,7 +55,7 @@ def variables(build: Build) -> Iterator[Constraint]:
 
 
 def laws(build: Build) -> Iterator[Record]:
-    """Balance of the tangential tractions, and the edges between sticking and sliding."""
+    """Yield the balances of tangential tractions, and the edges between stick and slip."""
     if _in_the_plane(build):
         yield from plane.motion(build, build.motion.slips)
     else:
@@ -69,7 +68,7 @@ def _in_the_plane(build: Build) -> bool:
 
 
 def _prescribed_direction(build: Build) -> None:
-    """The direction of sliding where its velocity is prescribed: a sign, or a unit vector."""
+    """Define the slip direction of a prescribed velocity: a sign, or a unit vector."""
     variables, reader = build.variables, "the friction"
     if in_parallel(build):
 
@@ -95,7 +94,7 @@ def _prescribed_direction(build: Build) -> None:
 
 
 def _states(build: Build, kind: Formulation) -> Iterator[Constraint]:
-    """States and modes of the motion in one direction."""
+    """Define the unknowns and yield the modes of the motion in one direction."""
     v, rates, u = kind.d.velocity, build.motion.gap_rates, kind.d.displacement
     alone = len(build.motion.slips) == 1
     if kind.sticks:
@@ -106,7 +105,7 @@ def _states(build: Build, kind: Formulation) -> Iterator[Constraint]:
     if kind.mount is not None:
         _displacement(build, kind, alone)
     if kind.elastic:
-        # It gives way while the interface sticks; the displacement is prescribed where no mounting holds it.
+        # The elastic gap deforms while the interface sticks; without a mounting the displacement is prescribed.
         names = " and ".join(law.name() for law in in_series(build))
         evolve(build, "g_t", f"{names} in series with friction" if build.interface.frictions else names)
         rates["g_t"] = symengine.Symbol("dg_t_dt")
@@ -124,7 +123,7 @@ def _states(build: Build, kind: Formulation) -> Iterator[Constraint]:
 
 
 def _sliding_velocity(build: Build, kind: Formulation) -> Expression:
-    """Sliding velocity: rate of the displacement less that of the elastic gap; zero while it sticks."""
+    """Name the slip velocity: rate of the displacement less that of the elastic gap; zero while sticking."""
     if not kind.slides:
         return ZERO
     if build.variables.has("v_t"):
@@ -135,7 +134,7 @@ def _sliding_velocity(build: Build, kind: Formulation) -> Expression:
 
 
 def _displacement(build: Build, kind: Formulation, alone: bool) -> None:
-    """The displacement, and its velocity where that has inertia or follows from dampers."""
+    """Define the displacement, and its velocity if that has inertia or follows from dampers."""
     assert kind.mount is not None
     name, mount, place = kind.d.displacement, kind.mount, f"mechanics.{SECTIONS[kind.d.axis]}"
     u, rates, v = evolve(build, name, place), build.motion.gap_rates, kind.own_velocity
@@ -148,7 +147,7 @@ def _displacement(build: Build, kind: Formulation, alone: bool) -> None:
     elif kind.elastic and mount.damped:
 
         def yielding() -> Expression:
-            """Velocity at which the dampers bear what is out of balance with the elastic gap."""
+            """Return the velocity at which the dampers bear the unbalanced traction."""
             traction = derivative(build.psi, symengine.Symbol("g_t")) + derivative(build.psi, u)
             return build.name(VARIABLES["v_t"], far_field(build, mount).yielding(u, traction))
 
@@ -157,7 +156,7 @@ def _displacement(build: Build, kind: Formulation, alone: bool) -> None:
 
 
 def _motion(build: Build, kind: Formulation) -> Iterator[Record]:
-    """Balance of the tractions in one direction, and the edges between sticking and sliding."""
+    """Yield the balance of tractions in one direction, and the edges between stick and slip."""
     far = far_field(build, kind.mount) if kind.mount else None
     if build.variables.has("v_t"):
         build.variables.get("v_t", "the mechanics", "mechanics")
@@ -166,7 +165,7 @@ def _motion(build: Build, kind: Formulation) -> Iterator[Record]:
     unbonded, t_a = build.energy.unbonded, derivative(build.psi, u)
     t_f = build.motion.sliding_tractions.get(d.axis, ZERO)
     if kind.elastic:
-        # Per area on which friction acts, however small that is.
+        # Per area on which friction acts, however small.
         needed = derivative(build.psi if unbonded == 1 else build.energy.unbonded_energy, symengine.Symbol("g_t"))
         carried = held = unbonded * needed
     else:
@@ -192,14 +191,13 @@ def _motion(build: Build, kind: Formulation) -> Iterator[Record]:
 def _friction(
     build: Build, kind: Formulation, needed: Expression, t_f: Expression, v: Expression, rest: Expression | None
 ) -> Constraint:
-    """The set-valued law, by the reserve of sticking (limit less need) and a guard that is zero where sliding stops."""
+    """Return the set-valued law, by the reserve of sticking (limit less need) and a guard whose zero stops slip."""
     stops, still, slack = [], v, ZERO
     if kind.slides_inertially:
         still = symengine.Symbol(_velocity_state(build, kind))
         stops = [still]
     elif rest is not None and build.motion.creeping is None:
-        # Where tractions give the velocity what is left of their balance at rest as sliding begins is rounding, which
-        # must not stop it.
+        # The velocity follows from tractions: as slip begins their balance at rest is roundoff and must not stop it.
         still = rest
         far = build.motion.far_fields.get(kind.d.axis)
         size = absolute(needed) if kind.elastic or far is None else far.size(far.gap)
@@ -208,33 +206,33 @@ def _friction(
     limit = _limit(build, kind)
     back = {s: build.expanded(s * still + slack).subs({SLIP: s}) for s in (1, -1)}
     if not (kind.slides_inertially or kind.rate_dependent):
-        # Where nothing is borne, nor begins to be, one direction of sliding is as good as the other: none ends.
+        # While the limit is zero and does not grow, both slip directions are equivalent, and slip does not end.
         grows = build.total_derivative(limit)
         back = {s: where(limit > 0, at, where(grows > 0, at, absolute(at))) for s, at in back.items()}
-    # Beyond touch the law of a contact may go on to negative pressure; nothing gives way there that is not pulled.
+    # Beyond touch a contact law may go on to negative pressure; there slip needs a pull to begin.
     bears = {s: where(limit > 0, limit, 0) - s * needed for s in (1, -1)}
-    # Without inertia the traction is at its limit as sliding stops, and rounding must not start it again.
+    # Without inertia the traction is at its limit as slip stops, and roundoff must not restart it.
     onward = where(absolute(needed) <= limit, 0, sign(needed)) if stops else ZERO
     breaks, end = breaks_bonds(build), dict.fromkeys(stops, ZERO)
-    # What moves at once finds its equilibrium; all else follows the bonds that break, and their heat.
+    # Rate-independent slip finds its equilibrium at once; in other cases only lost bonds and their heat require one.
     equilibrates = bool(breaks) or not (kind.slides_inertially or kind.rate_dependent)
     return set_valued(bears, back, {}, {SLIP: onward}, breaks, end, equilibrates=equilibrates)
 
 
 def _limit(build: Build, kind: Formulation) -> Expression:
-    """Friction limit of sticking [Pa], per area on which friction acts where the interface is elastic."""
+    """Return the friction limit of sticking [Pa], per area with friction if the interface is elastic."""
     return build.motion.stick_limits.get("t", ZERO) * (1 if kind.elastic else build.energy.unbonded)
 
 
 def _velocity_state(build: Build, kind: Formulation) -> str:
-    """The state that is the velocity, or stands for it."""
+    """Return the name of the state that is the velocity, or the drive from which it follows."""
     return DRIVE if not kind.elastic and stands_for_velocity(build) else kind.own_velocity
 
 
 def _balance(
     build: Build, kind: Formulation, far: FarField, slides: Expression, carried: Expression, t_a: Expression
 ) -> Generator[Record, None, Expression | None]:
-    """Rows of the displacement and its velocity; returns their balance at rest, where that gives it."""
+    """Set the rows of the displacement and its velocity; return their balance at rest if they determine slip."""
     name = kind.d.displacement
     u, du = symengine.symbols(f"{name} d{name}_dt")
     rate, tractions = build.motion.gap_rates[name], (carried, t_a)
@@ -266,9 +264,9 @@ def _balance(
 
 
 def _sticks(build: Build, limit: Expression, needed: Expression) -> Iterator[Margin | Constraint]:
-    """Limit of sticking under a traction that nothing else carries, with bonds or once they have broken.
+    """Yield the limit of sticking under a dead load, with bonds or after they have broken.
 
-    Where it bears more without them they break, and it sticks on.
+    If it bears more without bonds, they break and it keeps sticking.
     """
     breaks = breaks_bonds(build)
     limit = build.expanded(limit)
@@ -285,7 +283,7 @@ def _sticks(build: Build, limit: Expression, needed: Expression) -> Iterator[Mar
 def _elastic_rows(
     build: Build, kind: Formulation, slides: Expression, t_f: Expression, t_e: Expression, v: Expression
 ) -> Generator[Record, None, Expression | None]:
-    """Rows of the elastic gap and of sliding without inertia; returns the balance at rest as `_balance`."""
+    """Set the rows of the elastic gap and of slip without inertia; return the balance at rest as `_balance` does."""
     dg, rate = symengine.Symbol("dg_t_dt"), build.motion.gap_rates["u_t"]
     if kind.rate_dependent:
         build.rows.kinematics("g_t", rate - v)
@@ -295,7 +293,7 @@ def _elastic_rows(
     residual = t_f - t_e
     build.rows.equilibrium("g_t", build.total_derivative(residual), slides, dg - rate)
     size = absolute(t_e) + absolute(t_f)
-    # Opposed to the displacement behind it: the elastic gap grows by what does not slide.
+    # Opposed to the displacement in series with it: the elastic gap grows by the part that does not slide.
     yield Equilibrium("g_t", slides * residual, size, active=slides, slides=-1, bears=_limit(build, kind))
     stiffness = derivative(t_e, symengine.Symbol("g_t"))
     if stiffness.free_symbols & {bond.symbol for bond in build.bonding.values()}:
@@ -307,26 +305,26 @@ def _elastic_rows(
 def _sliding_row(
     build: Build, kind: Formulation, slides: Expression, driving: Expression, damping: Expression
 ) -> Generator[Margin, None, Expression]:
-    """Row of a velocity without inertia, from the tractions; sliding is stable while the resistance grows with it.
+    """Set the row of a slip velocity without inertia; slip is stable if the resistance grows with it.
 
-    Returns what is zero where it is at rest [Pa]: the balance there, or else the velocity by the slope of that.
+    Returns a balance that is zero at rest: that of the tractions [Pa], or the velocity from their slope.
     """
     v = build.motion.slides_by[kind.d.velocity]
     slope, balance = -derivative(build.expanded(driving), v), driving
-    # The slope at rest is that of the velocities to come.
+    # The slope at rest is the limit from the slip direction.
     ahead = slope.subs({v: v + SLIP * TINY}) if kind.sticks else slope
     rest, stable = ahead * v, growth(ahead, damping)
     if slope != 0 and not depends(slope, v):
-        # Solved for the velocity, which is nothing but rounding of the tractions as sliding begins.
+        # Solved for the velocity, which is pure roundoff of the tractions as slip begins.
         rest = (driving if derivative(driving, v) == -slope else build.expanded(driving)).subs({v: 0})
         balance, stable = rest / slope - v, slope
-    # What sticks may have nothing that resists sliding, as where nothing presses it, and no such balance.
+    # While sticking there may be no resistance, as without pressure, and hence no such balance.
     if kind.sticks:
         build.rows.switched(str(v), slides, balance, v)
     else:
         build.rows.balance(str(v), balance)
     if build.motion.creeping is not None and len(build.interface.frictions) == 1 and damping != 0:
-        return rest  # both friction and damper resist the more, the faster it slides
+        return rest  # both friction and damper grow with the velocity
     if slope == 0:
         raise InputError(
             "nothing determines the sliding velocity: friction does not depend on it. Give the tangential mounting a "
@@ -338,5 +336,5 @@ def _sliding_row(
 
 
 def _while_sliding(kind: Formulation) -> When:
-    """Modes in which the interface slides; any, where it cannot stick."""
+    """Return the modes in which the interface slides; all modes if it cannot stick."""
     return {SLIP: (-1, 1)} if kind.sticks else {}
