@@ -1,1 +1,1 @@
-"""Contracts of laws: what they state and may read; with the bodies, cells and media that they refer to."""
+"""Contracts of laws: what they state and may read; also the bodies, grids, units and media that laws refer to."""

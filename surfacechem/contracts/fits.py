@@ -1,7 +1,7 @@
-"""Functions of temperature that have no formula as polynomials in pieces, within a verified error.
+"""Piecewise polynomial fits of functions of temperature without a formula, within a verified error.
 
-A property of a fluid is smooth but for kinks, where a correlation ends or a critical enhancement fades. Pieces are as
-long as they can be, so that the kinks lie between them.
+A property of a fluid is smooth except at kinks, where a correlation ends or a critical enhancement fades. Pieces are as
+long as possible, so that kinks lie between them.
 """
 
 from __future__ import annotations
@@ -26,36 +26,35 @@ FIT_ACCURACY = 2e-9
 
 CRITICAL_ACCURACY = 1000 * FIT_ACCURACY
 """The same near a critical point, where published equations of state and their solvers are not smooth to FIT_ACCURACY;
-far below the uncertainty of any property there.
-"""
+it is far below the uncertainty of any property there."""
 
 CHECKS_PER_COEFFICIENT = 5
-"""Points of verification for each coefficient."""
+"""Points of verification per coefficient."""
 
 KINK_RESOLUTION = 1e-7
-"""Kinks are located to this part of the range."""
+"""Accuracy to which kinks are located, as a fraction of the range."""
 
 
 class NoFitError(ValueError):
-    """The function is no piecewise polynomial to the wanted accuracy."""
+    """The function has no piecewise polynomial of the required accuracy."""
 
 
 @dataclass(frozen=True)
 class Piece:
-    """A polynomial on low <= T <= high, its coefficients those of the powers of x = (2 T - low - high)/(high - low)."""
+    """A polynomial on low <= T <= high; its coefficients are those of powers of x = (2 T - low - high)/(high - low)."""
 
     low: float
     high: float
     coefficients: tuple[float, ...]
 
     def __call__(self, T: Array) -> Array:
-        """Values at T."""
+        """Return values at T."""
         x = (2 * T - self.low - self.high) / (self.high - self.low)
         return np.asarray(np.polynomial.polynomial.polyval(x, np.array(self.coefficients)))
 
 
 def fit(function: Callable[[Array], Array], low: float, high: float, target: float = FIT_ACCURACY) -> tuple[Piece, ...]:
-    """The function on low <= T <= high, relative error below a target; NoFitError where that takes too many pieces.
+    """Fit the function on low <= T <= high, relative error below a target; NoFitError if too many pieces are needed.
 
     >>> pieces = fit(lambda T: np.exp(600 / T), 280.0, 360.0)
     >>> len(pieces), bool(abs(pieces[0](300.0) / np.exp(2) - 1) < 1e-10)
@@ -77,8 +76,8 @@ def _padded(powers: ArrayLike) -> tuple[float, ...]:
 
 
 def _longest(function: Callable[[Array], Array], low: float, high: float, target: float) -> Piece:
-    """The longest piece from low on; it ends just beyond a kink, so that the next one starts on the other side."""
-    good, bad, found = low, high, None  # by bisection: a piece that ends before a kink fits, one beyond it does not
+    """Return the longest piece from low on; it ends just beyond a kink, so that the next one starts behind the kink."""
+    good, bad, found = low, high, None  # bisection: a piece that ends before a kink fits, one beyond it does not
     while bad - good > KINK_RESOLUTION * (high - low):
         middle = (good + bad) / 2
         piece = _polynomial(function, low, middle, target)
@@ -88,19 +87,19 @@ def _longest(function: Callable[[Array], Array], low: float, high: float, target
             good, found = middle, piece
     if found is None:
         raise NoFitError(f"it is not smooth at {low:g} K.")
-    # The same polynomial up to there.
+    # The same polynomial, extended to the upper end of the bracket.
     width = found.high - low
     x = np.polynomial.Polynomial([(low + bad - found.low - found.high) / width, (bad - low) / width])
     return Piece(low, bad, _padded(np.polynomial.Polynomial(np.array(found.coefficients))(x).coef))
 
 
 def _polynomial(function: Callable[[Array], Array], low: float, high: float, target: float) -> Piece | None:
-    """The polynomial through the Chebyshev nodes, unless it is off elsewhere."""
+    """Return the polynomial through the Chebyshev nodes; None if its error elsewhere exceeds the target."""
     nodes = np.cos(np.pi * (np.arange(DEGREE + 1) + 0.5) / (DEGREE + 1))
     values = function((low + high) / 2 + (high - low) / 2 * nodes)
     powers = chebyshev.cheb2poly(chebyshev.chebfit(nodes, values, DEGREE))
     piece = Piece(low, high, _padded(powers))
-    # Between the nodes, where the error of an interpolation is largest.
+    # Also between the nodes, where the error of interpolation is largest.
     T = np.linspace(low, high, CHECKS_PER_COEFFICIENT * (DEGREE + 1) + 1)
     exact = function(T)
     return piece if bool(np.all(np.abs(piece(T) - exact) <= target * np.abs(exact))) else None

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 
 def graded(cells: int, grading: float = 1.0) -> tuple[float, ...]:
-    """Points of so many cells whose width grows from the contact by ``grading`` in all, in equal ratios.
+    """Return the points of ``cells`` cells with widths in a geometric series, ``grading`` from the first to the last.
 
     The mapping is smooth and the same for every number of cells, so that halving the cells shows the error.
 
@@ -23,10 +23,10 @@ def graded(cells: int, grading: float = 1.0) -> tuple[float, ...]:
 
 
 def layered(cells: int, layer: float, both: bool = False) -> tuple[float, ...]:
-    """Points of so many cells whose width is in proportion to their distance from the contact plus a ``layer``; with
-    ``both`` to that from the far side as well. Layers of every depth from that one on are then equally well resolved.
+    """Return the points of cells whose width is proportional to their distance from the contact plus a ``layer``.
 
-    The mapping is smooth and the same for every number of cells.
+    With ``both`` also to the distance from the far side. Layers of every depth from ``layer`` on are then equally well
+    resolved. The mapping is smooth and the same for every number of cells.
 
     >>> [round(point, 12) for point in layered(2, layer=1 / 8)]
     [0.0, 0.25, 1.0]
@@ -42,12 +42,12 @@ def layered(cells: int, layer: float, both: bool = False) -> tuple[float, ...]:
 
 
 def e_folds(layer: float, both: bool = False) -> float:
-    """By how many factors of e the width of the cells grows, and falls again towards a far side that has layers."""
+    """Return the logarithm of the growth of the cell width, plus that of its decay towards a far side with layers."""
     return math.log1p(1 / layer) * (2 if both else 1)
 
 
 def volume_shares(at: tuple[float, ...]) -> tuple[float, ...]:
-    """Part of the volume that belongs to each point: half of the cells on either side.
+    """Return the volume fraction of each point: half of the cells on either side.
 
     >>> volume_shares((0.0, 0.25, 1.0))
     (0.125, 0.5, 0.375)

@@ -1,6 +1,6 @@
-"""Factors to SI of the units that cases are mostly written in, without the 0.15 s that importing Pint takes.
+"""Factors to SI for the units that cases mostly use, without the 0.15 s for importing Pint.
 
-What is read here is what Pint reads, to the last digit; whatever is unusual or wrong is left to Pint and its messages.
+Results agree with Pint's to the last digit; unusual or wrong units are left to Pint and its messages.
 
 >>> factor("kJ/m^2/K", "J/(m^2 K)")
 Decimal('1E+3')
@@ -21,7 +21,7 @@ ZERO_CELSIUS = Decimal("273.15")
 """0 degC in K."""
 
 POWER_TOWER = re.compile(r"[\d²³⁰-⁹]\s*\)*\s*(?:\^|\*\*)|(?:\^|\*\*)\s*(?![-+(\d])")
-"""Powers of powers, such as 9^9^9, which would never end, and of numbers."""
+"""Powers of powers, such as 9^9^9, whose evaluation would not end, and powers of numbers."""
 
 _FACTOR = re.compile(r"([^\W\d_]+|%|1)(?:(?:\^|\*\*)([-+]?\d+))?")
 _PRODUCT = re.compile(rf"{_FACTOR.pattern}((\s*\*\s*|\s+){_FACTOR.pattern})*")
@@ -43,13 +43,13 @@ _BASE_UNITS: Mapping[str, Mapping[str, int]] = {
     "V": {"g": 1, "m": 2, "s": -3, "A": -1},
     "F": {"g": -1, "m": -2, "s": 4, "A": 2},
 }
-"""Powers of the base units in each unit; grams and not kilograms, as the prefix belongs to the gram."""
+"""Powers of the base units in each unit; grams, not kilograms, since prefixes apply to the gram."""
 
 _KILOGRAM = Decimal(1000)
 _PREFIXES = {"G": 9, "M": 6, "k": 3, "m": -3, "u": -6, "µ": -6, "μ": -6, "n": -9, "p": -12}
 _PREFIXED = ("m", "g", "s", "mol", "Hz", "N", "Pa", "J", "W", "A", "V", "F")
 THERMAL_ENERGY = Decimal("1.380649e-23") * Decimal("298.15")
-"""kT [J] at 25 degC, in which energies of single bonds are given: 4.116 pN nm."""
+"""kT [J] at 25 degC, a unit of the energy of single bonds: 4.116 pN nm."""
 
 ELECTRON_VOLT = Decimal("1.602176634e-19")
 """J (exact, SI 2019)."""
@@ -71,11 +71,11 @@ _DERIVED_UNITS: Mapping[str, tuple[Decimal | int, str]] = {
     "percent": (Decimal("0.01"), "1"),
     "%": (Decimal("0.01"), "1"),
 }
-"""Units that are a number times another one."""
+"""Units that are multiples of another unit."""
 
 
 def _table() -> dict[str, tuple[Decimal, Mapping[str, int]]]:
-    """Every known name with its factor to the base units, and with its powers of them."""
+    """Return the factor to base units and their powers for every known name."""
     found = {}
     for name, powers in _BASE_UNITS.items():
         # One newton is a thousand g m/s^2.
@@ -90,12 +90,12 @@ KNOWN = _table()
 
 
 class _LeftToPintError(Exception):
-    """Ends the reading of a text that is left to Pint."""
+    """The text has to be parsed by Pint."""
 
 
 @lru_cache(maxsize=1024)
 def factor(given: str, target: str) -> Decimal | None:
-    """The factor from one unit to another; None where either is unusual or where they do not measure the same."""
+    """Return the factor from one unit to another; None if either is unusual or their dimensions differ."""
     try:
         (ours, powers), (theirs, wanted) = _parsed(given), _parsed(target)
     except _LeftToPintError:
@@ -104,7 +104,7 @@ def factor(given: str, target: str) -> Decimal | None:
 
 
 def _parsed(text: str) -> tuple[Decimal, dict[str, int]]:
-    """Factor and powers of the base units of a text."""
+    """Return the factor and the powers of the base units of a text."""
     value, powers = Decimal(1), Counter[str]()
     for name, power in factors(text):
         if name not in KNOWN:
@@ -117,7 +117,7 @@ def _parsed(text: str) -> tuple[Decimal, dict[str, int]]:
 
 
 def factors(text: str) -> list[tuple[str, int]]:
-    """The names in a product or a quotient of units, each with its power.
+    """Return the names in a product or quotient of units, each with its power.
 
     >>> factors("W/(m^2 K)")
     [('W', 1), ('m', -2), ('K', -1)]
@@ -129,7 +129,7 @@ def factors(text: str) -> list[tuple[str, int]]:
         inside = side.strip()
         if inside[:1] + inside[-1:] == "()":
             inside = inside[1:-1]
-        elif sign < 0 and _FACTOR.fullmatch(inside) is None:  # in "J/m^2 K" the eye reads another unit than the rules
+        elif sign < 0 and _FACTOR.fullmatch(inside) is None:  # "J/m^2 K" is ambiguous to a reader
             raise _LeftToPintError
         if _PRODUCT.fullmatch(inside) is None:
             raise _LeftToPintError

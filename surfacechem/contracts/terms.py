@@ -1,4 +1,4 @@
-"""Contracts: what a law states and what it may read.
+"""Contracts: the statement of a law and the variables that it may read.
 
 A law is one class. Its parameters are its fields, its YAML name is its class name in kebab-case, and its method states
 the one formula; the argument names of the method say which quantities it reads. Everything else about it (schema,
@@ -47,10 +47,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Spec:
-    """Specification of a parameter: unit ("[x]" stands for that of the loaded quantity), meaning and allowed range.
+    """Specification of a parameter: unit ("[x]" is the unit of the loaded quantity), meaning and allowed range.
 
-    ``stretch`` is the power of the area stretch J_c with which the formula sees what is given: -1 where that is a
-    density per reference area of what stays with the material, and the formula reads one per current area.
+    ``stretch`` is the power of the area stretch J_c that multiplies the given value in the formula: -1 if the value is
+    a density per reference area that stays with the material, while the formula reads one per current area.
     """
 
     unit: str
@@ -62,7 +62,7 @@ class Spec:
     stretch: int = 0
 
     def resolved(self, x: str) -> Spec:
-        """The specification with the unit that "[x]" stands for."""
+        """Return the specification with "[x]" replaced by a unit."""
         return _resolved(self, x)
 
     def check(self, name: str, value: float) -> None:
@@ -85,7 +85,7 @@ def _resolved(spec: Spec, x: str) -> Spec:
 
 
 def resolved_unit(unit: str, x: str) -> str:
-    """A unit with "[x]" replaced.
+    """Return a unit with "[x]" replaced.
 
     >>> resolved_unit("[x]/s", "m/s")
     'm/s^2'
@@ -105,17 +105,17 @@ def parameter(
     varies: bool = True,
     stretch: int = 0,
 ) -> Any:
-    """A numeric parameter of a law, in SI units; ``varies`` lets a case make it depend on a variable by factors.
+    """Declare a numeric parameter of a law, in SI units; ``varies`` lets a case multiply it by factors of variables.
 
     ``stretch`` is the power of the area stretch that multiplies it, see :class:`Spec`.
-    With the default None the formula says what stands for what is not given.
+    With the default None the formula defines the behaviour without a value.
     """
     spec = Spec(unit, text, above, at_least, at_most, varies, stretch)
     return field(default=default, metadata={"spec": spec})
 
 
 def option(text: str, *, default: Any = dataclasses.MISSING) -> Any:
-    """A structural field of a law: a name or a list, not a number that a sweep may change."""
+    """Declare a structural field of a law: a name or a list, not a number that a sweep may change."""
     return field(default=default, metadata={"option": text})
 
 
@@ -131,7 +131,7 @@ class Law(ABC):
     positive: ClassVar[tuple[str, ...]] = ()
     """Variables that must stay above zero for the law to hold."""
     nonnegative: ClassVar[tuple[str, ...]] = ()
-    """Variables that must not fall below zero, or below what :attr:`least` states."""
+    """Variables that must not fall below zero, or below their value in :attr:`least`."""
 
     place: Place | None = field(default=None, repr=False)
     """Place of the law in its case file; None for laws built in Python."""
@@ -144,7 +144,7 @@ class Law(ABC):
         """Check every numeric parameter against its range."""
         for name, spec in self.specs():
             value = getattr(self, name)
-            # Symbols, which `bind` puts in, have no value to check.
+            # Symbols, which `bind` inserts, have no value to check.
             if isinstance(value, Varying):
                 spec.check(name, value.value)
             elif isinstance(value, int | float):
@@ -157,29 +157,30 @@ class Law(ABC):
 
     @property
     def ranges(self) -> Mapping[str, tuple[float, float]]:
-        """Ranges of variables outside which the law is an extrapolation; a run that leaves them says so."""
+        """Ranges of variables outside which the law is an extrapolation; a run that leaves them reports it."""
         return {}
 
     @property
     def limits(self) -> Mapping[str, tuple[float, float]]:
-        """Ranges of variables outside which the law has no value; a run that reaches an end of them stops."""
+        """Ranges of variables outside which the law has no value; a run that reaches their end stops."""
         return {}
 
     @property
     def least(self) -> Mapping[str, Expression]:
-        """Least values of those ``nonnegative`` variables that may fall below zero."""
+        """Least values of ``nonnegative`` variables whose bound is not zero."""
         return {}
 
     @property
     def peaks(self) -> Mapping[str, Expression | Sequence[Expression]]:
-        """Values of variables at which the formula is narrow, so that a step must not pass over them: where it peaks,
-        begins, ends or bends.
+        """Values of variables near which the formula varies on a short scale: peaks, ends and bends.
+
+        A step must not pass over them.
         """
         return {}
 
     @property
     def kinks(self) -> Mapping[str, Expression]:
-        """Values of variables at which the formula bends, so that a step has to end there."""
+        """Values of variables at which the formula has a kink, so that a step has to end there."""
         return {}
 
     @property
@@ -195,7 +196,7 @@ class Law(ABC):
 
     @property
     def label(self) -> str:
-        """Short name for the quantities that belong to this law."""
+        """Short name for the quantities of this law."""
         return self.name().replace("-", "_")
 
     @property
@@ -205,73 +206,74 @@ class Law(ABC):
 
     @property
     def called(self) -> str:
-        """Name of the law in messages of runs that left its range."""
+        """Name of the law in messages of runs that leave its range."""
         return f"the law {self.name()}"
 
     @classmethod
     def specs(cls) -> Iterator[tuple[str, Spec]]:
-        """Names and specifications of the numeric parameters."""
+        """Yield names and specifications of the numeric parameters."""
         for item in dataclasses.fields(cls):
             if "spec" in item.metadata:
                 yield item.name, item.metadata["spec"]
 
     @classmethod
     def options(cls) -> Iterator[tuple[str, str]]:
-        """Names and meanings of the structural fields."""
+        """Yield names and meanings of the structural fields."""
         for item in dataclasses.fields(cls):
             if "option" in item.metadata:
                 yield item.name, item.metadata["option"]
 
     @property
     def varying(self) -> dict[str, Varying]:
-        """Its parameters that depend on variables, by name."""
+        """Parameters that depend on variables, by name."""
         values = {name: getattr(self, name) for name, _ in self.specs()}
         return {name: value for name, value in values.items() if isinstance(value, Varying)}
 
     @property
     def factors(self) -> list[Factor]:
-        """The factors of its parameters that depend on variables."""
+        """The factors of all parameters that depend on variables."""
         return [factor for value in self.varying.values() for factor in value.factors]
 
     def at_reference(self) -> Self:
-        """The law with its varying parameters at their values at the reference state."""
+        """Return the law with its varying parameters at their reference values."""
         return self.bind({name: value.value for name, value in self.varying.items()})
 
     def refine(self, name: str, spec: Spec) -> Spec:
-        """Specification of a parameter of this very law, where its unit depends on the other fields."""
+        """Return the specification of a parameter of this law, if its unit depends on the other fields."""
         return spec
 
     def is_default(self, name: str) -> bool:
-        """Whether a parameter was left at its default, so that it is a constant of the formula."""
+        """True if a parameter has its default value, so that it is a constant of the formula."""
         default = next(item.default for item in dataclasses.fields(self) if item.name == name)
         return bool(getattr(self, name) == default)
 
     def with_parts(self, bind: Callable[[Law, str, str], Any]) -> Self:
-        """The same law with the laws that it shares with others, if any, put through ``bind``, each with the path under
-        which a case finds its parameters and what is added to their names.
+        """Return the law with its shared sublaws, if any, bound by ``bind``.
+
+        ``bind`` gets a law, the path under which a case finds its parameters, and a suffix of their names.
         """
         return self
 
     def surrogate(self) -> Self:
-        """A cheap stand-in for a law that is costly to compute, so that all else can be checked before."""
+        """Return a cheap substitute for a costly law, so that everything else can be checked first."""
         return self
 
     @property
     def error(self) -> float:
-        """Relative error of the numbers that the law computes for itself; zero where it states a formula."""
+        """Relative error of the numbers that the law computes internally; zero for a formula."""
         return 0.0
 
     def perturbed(self) -> Self:
-        """The law perturbed by its :attr:`error`."""
+        """Return the law perturbed by its :attr:`error`."""
         return self
 
     def given(self, numbers: Mapping[str, float]) -> Self:
-        """The same law with other numbers, which are checked."""
+        """Return the law with other numbers, which are checked."""
         changed: Any = dict(numbers)
         return dataclasses.replace(self, **changed)
 
     def bind(self, values: Mapping[str, Expression]) -> Self:
-        """The same law with some of its parameters replaced, by symbols for instance; nothing is checked."""
+        """Return the law with some of its parameters replaced, by symbols for instance; without a check."""
         # Not `replace`, which would check symbols against ranges.
         bound = copy.copy(self)
         for name, value in values.items():
@@ -288,13 +290,13 @@ class Varying:
 
 
 def reads(formula: Callable[..., Expression]) -> tuple[str, ...]:
-    """The quantities a law's formula reads: the names of its arguments."""
-    # A law says what it reads by the arguments of its formula alone, so that nothing is declared twice.
+    """Return the quantities that a formula reads: the names of its arguments."""
+    # The arguments are the only declaration of what a formula reads.
     return tuple(inspect.signature(formula).parameters)
 
 
 def optional(formula: Callable[..., Expression]) -> frozenset[str]:
-    """The quantities read that a scene need not have: the arguments with a default."""
+    """Return the optional quantities of a formula, which a scene may lack: the arguments with a default."""
     arguments = inspect.signature(formula).parameters.values()
     return frozenset(item.name for item in arguments if item.default is not inspect.Parameter.empty)
 
@@ -306,7 +308,7 @@ class Factor(Law):
     formula = "factor"
 
     keeps_sign: ClassVar[bool] = False
-    """Whether the factor is positive whatever the variable is."""
+    """True if the factor is positive for any value of the variable."""
 
     of: str = option("variable it depends on", default="T_c")
 
@@ -316,27 +318,27 @@ class Factor(Law):
 class Potential(Law):
     """A term of the interface's Helmholtz free energy per area [J/m^2].
 
-    As the surface stretches, its energy stays with the material (bonds, debris) or is a property of the surface that is
-    there (tractions, films): a law says which by ``per``.
+    As the surface stretches, the energy stays with the material (bonds, debris) or belongs to the current surface
+    (tractions, films): ``per`` states which.
     """
 
     contract = "potential"
     formula = "energy"
     per: ClassVar[Literal["reference", "current"]] = "reference"
-    """Area that the energy is per; the assembly multiplies those per current area by the area stretch."""
+    """Reference area of the energy; the assembly multiplies an energy per current area by the area stretch."""
 
     energy: ClassVar[Callable[..., Expression]]
     repulsion: ClassVar[Callable[..., Expression] | None] = None
-    """Part of the energy whose pressure the contact bears, for a law that attracts bodies which touch; None where
-    a law either presses or pulls, so that its pressure is that of the contact."""
+    """Repulsive part of the energy, whose pressure the contact bears, for a law that also attracts bodies in contact.
+    None if a law either repels or attracts, so that its pressure is that of the contact."""
 
 
 class TangentialPotential(Potential):
-    """A potential of the tangential gap, which stands beside friction or carries it.
+    """A potential of the tangential gap, in parallel or in series with friction.
 
     In parallel its gap is the whole displacement, along which friction acts too, and the tractions add up. In series it
-    is an elastic gap: as soon as its traction exceeds what friction bears the interface slides instead. Without shear
-    the gap counts as zero, as where adhesion is made anew wherever the surfaces slide to.
+    is an elastic gap: when its traction exceeds the friction limit the interface slides. Without shear the gap counts
+    as zero, as for adhesion that forms anew during slip.
     """
 
     shear: Literal["parallel", "series", "none"] = option(
@@ -345,11 +347,11 @@ class TangentialPotential(Potential):
         default="parallel",
     )
     unbonded: ClassVar[Callable[..., Expression] | None] = None
-    """Fraction of the interface on which friction acts in parallel; all of it where a law does not say."""
+    """Fraction of the interface on which friction acts in parallel; all of it by default."""
 
 
 class UnderPressure(Law):
-    """A law of the contact pressure p: of the net one, or of that which the contact bears without attraction."""
+    """A law of the contact pressure p: the net one, or the one that the contact bears without attraction."""
 
     pressure: Literal["net", "contact"] = option(
         "the pressure that p stands for: 'net' of all attraction, p = -t_n, or 'contact', the repulsive part p_contact",
@@ -369,39 +371,39 @@ class BodyEnergy(Law):
 
 
 class Friction(Law):
-    """Tangential traction [Pa] while sliding, with the sign of sliding; dissipates traction * v >= 0.
+    """Tangential traction [Pa] during slip, with the sign of the slip velocity; dissipates traction * v >= 0.
 
-    A law that jumps at v = 0 reads ``direction``, the sign of v, and states as ``limit`` what it can bear at rest. In
-    the plane ``direction`` and ``direction_2`` are the components of the unit vector of sliding, and a law without
-    ``transverse`` resists along it, by its traction at the speed of sliding.
+    A law that jumps at v = 0 reads ``direction``, the sign of v, and states as ``limit`` the traction it bears at rest.
+    In the plane ``direction`` and ``direction_2`` are the components of the unit vector of slip, and a law without
+    ``transverse`` acts along it, with its traction at the slip speed.
     """
 
     contract = "friction"
     formula = "traction"
     breaks_bonds: ClassVar[bool] = False
-    """Whether bonds break as sliding starts."""
+    """True if bonds break as slip begins."""
     internal: ClassVar[Mapping[str, str]] = {}
-    """Variables of its own that the law evolves, as logarithms, and what each is the logarithm of."""
+    """Internal variables that the law evolves, as logarithms, and the variable of each logarithm."""
 
     traction: ClassVar[Callable[..., Expression]]
     limit: ClassVar[Callable[..., Expression]]
-    """Magnitude of the traction that sticking bears [Pa]; absent where a law does not stick."""
+    """Friction limit [Pa] of sticking; absent if a law does not stick."""
     drive: ClassVar[Callable[..., Expression]]
-    """Measure of the traction at a velocity, a variable that may replace the velocity; absent where that serves."""
+    """Measure of the traction at a velocity, an unknown that may replace the velocity; absent if not needed."""
     velocity: ClassVar[Callable[..., Expression] | None] = None
     """Inverse of :attr:`drive` [m/s]."""
     driven: ClassVar[Callable[..., Expression]]
     """Traction at a value of :attr:`drive` [Pa]."""
     transverse: ClassVar[Callable[..., Expression] | None] = None
-    """Traction across v, along the interface [Pa]; None where a law is the same in all directions."""
+    """Traction across v, along the interface [Pa]; None for an isotropic law."""
     transverse_limit: ClassVar[Callable[..., Expression]]
-    """Limit of sticking across v alone [Pa], half an axis of an ellipse; absent where a law has no ``transverse``."""
+    """Limit of sticking across v alone [Pa], a half axis of an ellipse; absent without ``transverse``."""
     evolution: ClassVar[Callable[..., Mapping[str, Expression]]]
-    """Rates of the law's own variables [1/s]; absent where it has none."""
+    """Rates of the internal variables [1/s]; absent if there are none."""
 
     @property
     def has_limit(self) -> bool:
-        """Whether the interface can stick by this law."""
+        """True if the interface can stick by this law."""
         return hasattr(self, "limit")
 
 
@@ -412,18 +414,18 @@ class RateType:
     name: str
     """Name in a mechanism."""
     method: str
-    """Method of the law: the logarithm of a factor of the coefficient, or what one of REACTIONS in
-    :mod:`surfacechem.mechanism.rate_types` asks for."""
+    """Method of the law: the logarithm of a factor of the coefficient, or a method that REACTIONS in
+    :mod:`surfacechem.mechanism.rate_types` requires."""
     constants: Mapping[str, float] = field(default_factory=dict)
-    """Parameters of the law that the Arrhenius coefficient stands for: one, or zero where the other way counts."""
+    """Rate constants of the law: one for the constant that the Arrhenius coefficient replaces, zero for its reverse."""
     names: tuple[str, ...] = ()
-    """Parameters of the law that a reaction has by the same names, and with the same defaults."""
+    """Parameters of the law that a reaction has by the same names, with the same defaults."""
     renamed: Mapping[str, str] = field(default_factory=dict)
-    """Parameters that every reaction gives, by names of its own, each with that in the law."""
+    """Parameters that every reaction gives under other names, each with its name in the law."""
     ratios: Mapping[str, str] = field(default_factory=dict)
-    """Rate constants, as ratios to the Arrhenius coefficient, by names of the reaction, each with that in the law."""
+    """Rate constants, as ratios to the Arrhenius coefficient, by their names in a reaction, with those in the law."""
     distance: str = ""
-    """Parameter of the law whose work against the force per bond is the whole factor, if it is."""
+    """Parameter of the law whose work against the force per bond is the whole factor, if that is so."""
 
 
 class RateLaw(Law):
@@ -433,74 +435,74 @@ class RateLaw(Law):
     formula = "rate"
 
     keeps_range: ClassVar[bool] = False
-    """Whether its form keeps phi between zero and one, or below phi_max where it reads the partners n_1 and n_2; what
-    any other law carries to a bound is held there."""
+    """True if its form keeps phi between zero and one, or below phi_max if it reads the partners n_1 and n_2. Any other
+    law is constrained at the bounds."""
     rate_types: ClassVar[tuple[RateType, ...]] = ()
-    """Rate types of mechanisms that it offers."""
+    """Rate types of mechanisms that the law provides."""
     rate: ClassVar[Callable[..., Expression]]
     envelope: ClassVar[Callable[..., Expression] | None] = None
-    """Largest fraction of bonds that an opening leaves, for a law by which bonds break gradually."""
+    """Largest fraction of bonds at an opening, for a law by which bonds break gradually."""
 
     def stoichiometry(self) -> Mapping[str, int | float]:
-        """Change of each bonding variable, in its own amounts, per unit of reaction."""
+        """Return the change of each bonding variable, in its amounts, per unit of reaction."""
         return {"phi": 1}
 
     @property
     def log_rate(self) -> Callable[..., Expression] | None:
-        """Logarithm of the rate where the law runs one way only; None where its rate vanishes with the affinity.
+        """Logarithm of the rate of a one-way law; None if the rate vanishes with the affinity.
 
-        A one-way law and one that undoes it are held against the equilibrium of the potential.
+        A one-way law and its reverse are compared with the equilibrium of the potential.
         """
         return None
 
     @property
     def one_way(self) -> bool:
-        """Whether the law runs one way only."""
+        """True if the law is one-way."""
         # A rate that vanishes with the affinity has no logarithm.
         return self.log_rate is not None
 
     def turnover(self) -> Mapping[str, int | float]:
-        """Change of everything that takes part, what is no bonding variable included: one law may undo another."""
+        """Return the change of all species, including ones that are no bonding variables, to find reverse laws."""
         return self.stoichiometry()
 
     @property
     def distance(self) -> Expression | None:
-        """Distance to the transition state [m] along the force per bond, where that is all that the force does."""
+        """Distance to the transition state [m] along the force per bond, if the force has no other effect."""
         return None
 
     @property
     def balanced(self) -> bool:
-        """Whether the reverse follows from the affinity, with which the rate vanishes."""
+        """True if the reverse rate follows from the affinity, with which the net rate vanishes."""
         return "mu" in reads(self.statement)
 
     @property
     def length(self) -> Expression | None:
-        """Displacement of the load as the law forms a bond [m]; None where the law runs one way or does not say."""
+        """Displacement of the load as the law forms a bond [m]; None if the law is one-way or does not state it."""
         return None
 
     @property
     def lacks_length(self) -> bool:
-        """Whether the rate depends on a force that is missing in the affinity, from which its reverse follows."""
+        """True if the rate depends on a force that is missing in the affinity, from which its reverse follows."""
         return self.balanced and self.length is None and "f" in reads(self.statement)
 
     @property
     def taken(self) -> tuple[Callable[..., Expression], Callable[..., Expression]] | None:
-        """Enthalpy and Gibbs energy [J] that one reaction takes from what is beside the interface; None where nothing.
+        """Enthalpy and Gibbs energy [J] that one reaction takes from neighbouring phases; None if nothing.
 
-        The first is energy that comes in, the second is part of the affinity.
+        The first is an energy supply, the second is part of the affinity.
         """
         return None
 
     @property
     def made(self) -> Mapping[str, float]:
-        """Molecules that one reaction makes beside the interface, by species."""
+        """Molecules that one reaction produces in neighbouring phases, by species."""
         return {}
 
     @property
     def log_ratio(self) -> Callable[..., Expression] | None:
-        """Logarithm of the forward over the backward rate where the law states both; None where they are not its own.
+        """Logarithm of the ratio of forward to backward rate, if the law states both rates; else None.
 
-        It is held against the equilibrium of the potential.
+        It is compared with the equilibrium of the potential.
         """
         return None
 
@@ -525,25 +527,26 @@ class HeatTransfer(Law):
     )
     conductance: ClassVar[Callable[..., Expression]]
     resistances: ClassVar[Callable[..., tuple[Expression, Expression, Expression]] | None] = None
-    """Resistances of the first wall, the film and the second wall [m^2 K/W]; None where heat is not made across."""
+    """Resistances of the first wall, the film and the second wall [m^2 K/W]; None if heat is not produced across a
+    film."""
 
     @property
     def is_film(self) -> bool:
-        """Whether heat that the medium makes leaves it across its own resistance."""
+        """True if heat produced in the medium leaves it across the resistance of the medium."""
         return self.closure == "medium" and self.resistances is not None
 
     def channels(self) -> Mapping[str, Callable[..., Expression]]:
-        """The conductances in parallel that the whole is the sum of, by what carries the heat."""
+        """Return the parallel conductances whose sum is the total, by channel of heat transfer."""
         return {self.channel: self.statement}
 
 
 class Limit(Law):
     """Traction [Pa] at which the interface gives way at once.
 
-    The jump conserves energy. Where it would destroy entropy the run follows ``violation``: refuse, warn or accept.
-    ``release`` says what takes part: 'joint' lets the bodies relax within the jump; 'local' leaves the gap as it is and
-    lets the interface pay alone, before a gap without inertia follows.
-    Bonds of a mechanism break into what the first reaction that breaks them makes of them.
+    The jump conserves energy. If it would destroy entropy the run follows ``violation``: refuse, warn or accept.
+    ``release`` states what takes part: 'joint' lets the bodies relax within the jump; 'local' keeps the gap in the jump
+    and lets the interface alone pay, before a gap without inertia follows. Bonds of a mechanism break into the products
+    of the first reaction that breaks them.
     """
 
     contract = "limit"
@@ -562,24 +565,24 @@ class Load(Law):
     formula = "value"
 
     local: ClassVar[dict[str, str]] = {}
-    """Names and units of fields whose values change from one piece of the history to the next."""
+    """Names and units of fields whose values change from one load segment to the next."""
     cycle: ClassVar[str] = ""
-    """Field that is the frequency of a history that repeats itself."""
+    """Field that is the frequency of a periodic history."""
 
     @abstractmethod
     def value(self, t: Expression) -> Expression:
         """Value at time t [s]."""
 
     def breakpoints(self) -> tuple[float, ...]:
-        """Times [s] at which the history or its slope jumps."""
+        """Return the times [s] at which the history or its slope jumps."""
         return ()
 
     def jumps(self) -> tuple[float, ...]:
-        """Times [s] at which the value itself jumps."""
+        """Return the times [s] at which the value jumps."""
         return ()
 
     def piece(self, start: float) -> Mapping[str, float]:
-        """Values of the local fields on the piece that begins at time ``start`` [s]."""
+        """Return the values of the local fields on the load segment that begins at time ``start`` [s]."""
         return {}
 
     def at_start(self) -> float:
@@ -599,7 +602,7 @@ class Property(Law):
 
 
 class FilmGrowth(Law):
-    """Rate at which the film between the bodies becomes thicker, or thinner [m/s]."""
+    """Rate of the thickness of the film between the bodies [m/s], positive for growth."""
 
     contract = "growth"
     formula = "rate"
@@ -617,16 +620,16 @@ class Shape(Law):
     contract = "shape"
     formula = "point"
     about_axis: ClassVar[bool] = False
-    """Whether v is the angle about z of a surface of revolution."""
+    """True if v is the angle about z of a surface of revolution."""
     closed: ClassVar[tuple[bool, bool]] = (False, False)
-    """Whether u and v come round to where they started."""
+    """True, for u and for v, if the surface is periodic in the parameter."""
 
     radii: ClassVar[Sequence[str]] = ("R",)
     """Parameters that are lengths of the whole shape."""
     rises: ClassVar[int] = 0
-    """Power of the distance from the axis with which it falls away, far from there."""
+    """Power of the distance from the axis with which the surface falls away at large distance."""
     grain: ClassVar[float] = math.inf
-    """Length within which it is smooth [m]: a cell of measured heights, a part of a wave."""
+    """Length below which it is smooth [m]: a cell of measured heights, a fraction of a wavelength."""
 
     turn: float = parameter("rad", "angle by which it is turned about z", default=0.0, varies=False)
     tilt: float = parameter("rad", "angle by which it is tilted about y", default=0.0, varies=False)
@@ -636,7 +639,7 @@ class Shape(Law):
     @property
     @abstractmethod
     def span(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Lowest and highest value of u and of v."""
+        """Bounds of u and of v."""
 
     @property
     def lengths(self) -> list[float]:
@@ -645,12 +648,12 @@ class Shape(Law):
         return [value for value in given if value is not None]
 
     foot: ClassVar[Callable[..., Any] | None] = None
-    """Parameters (..., 2) of the nearest point of each of the points (..., 3), where there is a closed form."""
+    """Parameters (..., 2) of the nearest point to each of the points (..., 3), if there is a closed form."""
     starts: ClassVar[Callable[..., tuple[Any, Any]]]
     """Without a closed form, starts of searches for the nearest point: indices (m,) of the points (n, 3), in order and
-    one or more for each, and the parameters (m, 2) from which the searches begin."""
+    one or more for each, and the parameters (m, 2) at which the searches begin."""
     derivatives: ClassVar[Callable[..., Any] | None] = None
-    """So many derivatives (count, ..., 3) where they are no formulas: 1, u, v, uu, uv, vv, uuu, uuv, uvv, vvv."""
+    """Derivatives (count, ..., 3) that are no formulas, in the order 1, u, v, uu, uv, vv, uuu, uuv, uvv, vvv."""
 
 
 class PairEnergy(Law):
@@ -659,12 +662,12 @@ class PairEnergy(Law):
     contract = "pair"
     formula = "energy"
     cutoff: ClassVar[float] = math.inf
-    """Distance beyond which there is no energy [m]."""
+    """Distance beyond which the energy is zero [m]."""
     decay: ClassVar[float] = 4.0
-    """Power with which the energy falls at large distances, at least."""
+    """Least power with which the energy falls at large distances."""
     parts: ClassVar[Callable[..., Sequence[tuple[Expression, Any]]] | None] = None
-    """Laws without parameters, for a unit of length [m], of which the energy is a sum, each times what its own
-    parameters make of it; where there are none, nothing but the densities may change without a new integration."""
+    """Laws without parameters, for a unit of length [m], whose weighted sum is the energy; the parameters enter the
+    weights. If there are none, a change of any parameter but the densities needs a new integration."""
 
     n_1: float = parameter("1/m^2", "density of interacting points on body 1", above=0, stretch=-1)
     n_2: float = parameter("1/m^2", "density of interacting points on body 2", above=0, stretch=-1)
@@ -674,7 +677,7 @@ class PairEnergy(Law):
 
 @dataclass(frozen=True)
 class FluidRange:
-    """Temperatures [K] at which a fluid stays what it is, and what happens beyond."""
+    """Temperatures [K] between which a fluid keeps its phase, with reasons for both ends."""
 
     low: float
     high: float
@@ -683,9 +686,9 @@ class FluidRange:
 
 
 class Fluid(ABC):
-    """A substance whose properties have no formula; they are fitted where a scene reads them.
+    """A substance whose properties have no formula; they are fitted if a scene reads them.
 
-    Properties go by the names of the table of quantities; ``capacity_m`` is the heat capacity per volume over T,
+    Properties have the names of the table of quantities; ``capacity_m`` is the heat capacity per volume over T,
     rho_m cp_m / T [J/(m^3 K^2)].
     """
 
@@ -694,13 +697,13 @@ class Fluid(ABC):
 
     @abstractmethod
     def range(self, T: float) -> FluidRange:
-        """Temperatures around T [K] at which it has properties; InputError where it has none at T."""
+        """Return the range of temperatures around T [K] with properties; InputError if there are none at T."""
 
     @abstractmethod
     def fit(self, quantity: str, low: float, high: float, target: float) -> tuple[Piece, ...]:
-        """A property between two temperatures [K] to a relative accuracy; InputError where it has none."""
+        """Fit a property between two temperatures [K] to a relative accuracy; InputError if there is none."""
 
     @property
     def remark(self) -> str:
-        """Remark for the user before its properties are fitted; empty if there is none."""
+        """Remark for the user before the properties are fitted; empty if there is none."""
         return ""

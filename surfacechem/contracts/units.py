@@ -27,10 +27,10 @@ _NOT_FINITE = re.compile(r"[-+]?\.?(?:inf|nan)", re.IGNORECASE)
 
 _EXPONENT = re.compile(r"(?:\^|\*\*)\s*\(?\s*[-+]?\s*\d{1,2}(?![\d.])")
 _POWER = re.compile(r"(?<![A-Za-z0-9_µμ])([A-Za-zµμ]+)([-+]\d|[2-4])(?![\w.])")
-"""Powers as CF conventions and many papers write them: s-1, W m-2 K-1, um2."""
+"""Powers in the notation of CF conventions and many papers: s-1, W m-2 K-1, um2."""
 
 _MOST_CHARACTERS = 100
-"""Characters of a quantity; longer texts are no quantities."""
+"""Largest number of characters of a quantity."""
 
 DIMENSION_UNITS = {
     "a pure number": "1",
@@ -74,28 +74,28 @@ DIMENSION_UNITS = {
     "an electric current": "A",
     "an electric current per area": "A/m^2",
 }
-"""Dimensions in words, for messages, each with a unit that has it."""
+"""Dimensions in words, for messages, each with a unit of that dimension."""
 
 _HINT = ' Write it like "J/(m^2 K)" or "1/um^2".'
 
 PER_PARTICLE = {"electron_volt", "millielectron_volt", "kiloelectron_volt", "kT"}
-"""Energies that are of one particle where a molar one is needed."""
+"""Energies per particle, accepted where a molar energy is required."""
 
 SUGGESTED_UNITS = (
     *("K", "degC", "degF", "m", "mm", "um", "nm", "pm", "s", "ms", "us", "ns", "min", "h", "day", "kg", "g", "percent"),
     *("N", "mN", "uN", "nN", "pN", "Pa", "kPa", "MPa", "GPa", "bar", "J", "kJ", "MJ", "mJ", "uJ", "eV", "meV", "kcal"),
     *("W", "kW", "MW", "mW", "mol", "kmol", "rad", "deg", "Hz", "kHz", "meter", "second", "kelvin", "joule", "watt"),
 )
-"""Units for the guess after a misspelt one."""
+"""Units for the suggestion after a misspelt one."""
 
 
 def parse(
     value: object, unit: str, place: Place | None = None, name: str = "the value", *, difference: bool = False
 ) -> float:
-    """The value in SI; InputError unless it is a finite number, or a text with a number and a unit that fits ``unit``.
+    """Return the value in SI; InputError unless it is finite and either a number or a text with a unit that fits.
 
-    ``name`` is what needs the value, for the message. ``difference`` marks an interval, for which a temperature scale
-    with an offset has no meaning.
+    ``name`` is the quantity that needs the value, for the message. ``difference`` marks an interval, for which a
+    temperature scale with an offset has no meaning.
 
     >>> parse("3 nm/s", "m", name="g_n")
     Traceback (most recent call last):
@@ -112,7 +112,7 @@ def parse(
 
 
 def _number(value: object, unit: str, name: str, difference: bool) -> float:
-    if getattr(value, "ndim", None) == 0:  # what an index into an array of xarray gives
+    if getattr(value, "ndim", None) == 0:  # a zero-dimensional array, as from indexing xarray
         value = cast("Any", value).item()
     if isinstance(value, Real) and not isinstance(value, bool):
         return _as_float(value)
@@ -154,7 +154,7 @@ def _converted(number: str, given: str, unit: str, name: str, difference: bool) 
         if given == "degC" and unit == "K" and not difference:
             return float(Decimal(number) + si_units.ZERO_CELSIUS)
     except ArithmeticError:
-        pass  # Pint says what is too large
+        pass  # Pint reports numbers that are too large
     return _by_pint(number, given, unit, name, difference)
 
 
@@ -179,12 +179,12 @@ def _by_pint(number: str, given: str, unit: str, name: str, difference: bool) ->
 
 
 def _has_angle(unit: Any) -> bool:
-    """Whether a unit counts radians, which are dimensionless but not one: 1 rpm is no frequency of 1/60 Hz to Pint."""
+    """True if a unit contains radians. Pint treats them as one, so that 1 rpm would not be 1/60 Hz."""
     return "radian" in str(_registry().Quantity(1, unit).to_root_units().units)
 
 
 def _per_particle(source: Any, target: Any) -> Any:
-    """The same unit per mole where it is meant per particle, and the other way round: eV for J/mol, kJ/mol for J."""
+    """Return the unit per mole if it is meant per particle, and the converse: eV for J/mol, kJ/mol for J."""
     registry = _registry()
     if (
         target.is_compatible_with("J/mol")
@@ -199,7 +199,7 @@ def _per_particle(source: Any, target: Any) -> Any:
 
 @lru_cache(maxsize=1024)
 def _unit(text: str) -> Any:
-    """Pint's unit of a text; InputError where it has none."""
+    """Return Pint's unit of a text; InputError if there is none."""
     import pint
 
     bare = _EXPONENT.sub("", text)
@@ -220,7 +220,7 @@ def _unit(text: str) -> Any:
 
 
 def quotient(unit: str, per: str) -> str:
-    """A unit per another.
+    """Return the quotient of two units.
 
     >>> quotient("m", "s"), quotient("m/s", "s"), quotient("W/m^2", "s"), quotient("1", "m/s")
     ('m/s', 'm/s^2', 'W/(m^2 s)', 's/m')
@@ -249,11 +249,11 @@ TOTAL_UNITS = {
     "1/m^2": "1",
     "1/(m^2 s)": "1/s",
 }
-"""Units of quantities per area, each with that of the total for a pair of bodies."""
+"""Units of quantities per area, each with the unit of the total for a pair of bodies."""
 
 
 def dimension(unit: str) -> str:
-    """The dimension that a unit measures, in words: ``a length [m]``."""
+    """Return the dimension of a unit in words: ``a length [m]``."""
     exact = next((words for words, known in DIMENSION_UNITS.items() if known == unit), None)
     words = exact or _words().get(_unit(unit).dimensionality)
     measured = f"{words} [{unit}]" if words else f"a quantity in {unit}"
@@ -261,7 +261,7 @@ def dimension(unit: str) -> str:
 
 
 def _described(unit: Any) -> str:
-    """The dimension of a unit in words, else the unit in SI."""
+    """Return the dimension of a unit in words, else the unit in SI."""
     words = _words().get(unit.dimensionality)
     return words or f"a quantity in {_registry().Quantity(1, unit).to_base_units().units:~}"
 
@@ -273,7 +273,7 @@ def _words() -> dict[Any, str]:
 
 @lru_cache(maxsize=1)
 def _registry() -> Any:
-    """Pint's registry, from a file in the user's cache folder if possible; in decimals, so that 1/um^2 is 1e12."""
+    """Return Pint's registry, cached in the user's cache folder if possible; in decimals, so that 1/um^2 is 1e12."""
     import pint
 
     registry: Any
@@ -281,5 +281,5 @@ def _registry() -> Any:
         registry = pint.UnitRegistry(cache_folder=":auto:", non_int_type=Decimal)
     except Exception:  # the folder may be read-only, the file half written by another process
         registry = pint.UnitRegistry(non_int_type=Decimal)
-    registry.define(f"kT = {si_units.THERMAL_ENERGY} joule")  # and not a thousand tesla
+    registry.define(f"kT = {si_units.THERMAL_ENERGY} joule")  # not a thousand tesla
     return registry
