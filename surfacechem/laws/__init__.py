@@ -1,4 +1,4 @@
-"""The laws, one family a module. A law is found by the contract it fulfils and its name; nothing else is imported."""
+"""The laws, one family per module. A law is found by its contract and its name; no other family is imported."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ FAMILIES: dict[type[Law], tuple[str, ...]] = {
     PairEnergy: ("pair_laws",),
     FilmGrowth: ("films",),
 }
-"""The modules in which the laws of a contract stand."""
+"""The modules that hold the laws of each contract."""
 
 
 OTHER_ROOMS = {name: f"surfacechem.surfaces.{name}" for name in ("shapes", "pair_laws")}
@@ -52,7 +52,7 @@ OTHER_ROOMS = {name: f"surfacechem.surfaces.{name}" for name in ("shapes", "pair
 
 
 def module(family: str) -> ModuleType:
-    """The module of a family."""
+    """Return the module of a family."""
     return importlib.import_module(OTHER_ROOMS.get(family, f"{__name__}.{family}"))
 
 
@@ -64,7 +64,7 @@ def _stated_in(found: ModuleType, contract: type[Law]) -> Iterator[type[Law]]:
 
 
 def laws(contract: type[Law]) -> dict[str, type[Law]]:
-    """All laws that fulfil a contract, by name."""
+    """Return all laws of a contract, by name."""
     own = [*_of_installed_packages(), *_registered.values(), *_of_the_case.get()]
     return _shipped(contract) | {law.name(): law for law in own if issubclass(law, contract)}
 
@@ -74,12 +74,12 @@ def _shipped(contract: type[Law]) -> dict[str, type[Law]]:
 
 
 def knows(contract: type[Law], name: str) -> bool:
-    """Whether a law of that name fulfils a contract."""
+    """True if a contract has a law of that name."""
     return _found(contract, name) is not None
 
 
 def find(contract: type[Law], name: str) -> type[Law]:
-    """The law of that name; imports no family beyond the one that holds it."""
+    """Return the law of that name; imports no family after the one that holds it."""
     found = _found(contract, name)
     if found is None:
         raise InputError(f"no {contract.contract} law '{name}'.{suggestion(name, laws(contract), LAWS)}")
@@ -87,7 +87,7 @@ def find(contract: type[Law], name: str) -> type[Law]:
 
 
 def _found(contract: type[Law], name: str) -> type[Law] | None:
-    # One family after the other, so that a case imports no more than those before its own.
+    # Family by family, so that a case imports none after the one that it uses.
     for family in FAMILIES[contract]:
         for law in _stated_in(module(family), contract):
             if law.name() == name:
@@ -98,16 +98,16 @@ def _found(contract: type[Law], name: str) -> type[Law] | None:
 # -- laws of one's own ------------------------------------------------------------------------------------------------
 
 ENTRY_POINTS = "surfacechem.laws"
-"""Entry points by which packages give their laws: classes, or modules of them."""
+"""Entry points by which other packages provide laws: classes, or modules of them."""
 
 _registered: dict[str, type[Law]] = {}
 _of_the_case: ContextVar[tuple[type[Law], ...]] = ContextVar("laws of the case that is read", default=())
 
 
 def register(law: L) -> L:
-    """Make a law known by its name to all cases that are read from now on; a decorator, too.
+    """Register a law by its name for all cases read from now on; also a decorator.
 
-    Registered again, as a notebook does when a cell is run again, it takes the place of the one before.
+    A law registered again, as when a notebook cell runs again, replaces the previous one.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ def register(law: L) -> L:
 
 
 def check_own(law: type[Law]) -> None:
-    """InputError unless a class is a law of some contract, with a name that no law of the package has."""
+    """Raise InputError unless a class is a law of some contract, with a name that no law of the package has."""
     contracts = [contract for contract in FAMILIES if contract in getattr(law, "__mro__", ())]
     if not contracts or inspect.isabstract(law):
         known = ", ".join(contract.__name__ for contract in FAMILIES)
@@ -143,14 +143,14 @@ def check_own(law: type[Law]) -> None:
 
 
 def laws_of_module(found: ModuleType) -> list[type[Law]]:
-    """The laws that a module defines."""
+    """Return the laws that a module defines."""
     own = (value for contract in FAMILIES for value in _stated_in(found, contract))
     return list(dict.fromkeys(own))
 
 
 @contextmanager
 def known(own: Sequence[type[Law]]) -> Iterator[None]:
-    """Context in which laws of a case are known: while it is read, and in no other case."""
+    """Context in which the laws of a case are known: while it is read, and in no other case."""
     token = _of_the_case.set(tuple(own))
     try:
         yield
@@ -160,8 +160,8 @@ def known(own: Sequence[type[Law]]) -> Iterator[None]:
 
 @cache
 def _of_installed_packages() -> tuple[type[Law], ...]:
-    """Laws of installed packages, which are imported when a name is none of the package's own, or all are listed."""
-    from importlib.metadata import entry_points  # a case that names no such law need not wait for it
+    """Return the laws of installed packages, imported when a name is not in this package, or to list all laws."""
+    from importlib.metadata import entry_points  # a case that names no such law need not import it
 
     found: list[type[Law]] = []
     for point in entry_points(group=ENTRY_POINTS):
@@ -170,7 +170,7 @@ def _of_installed_packages() -> tuple[type[Law], ...]:
             own = laws_of_module(given) if isinstance(given, ModuleType) else [given]
             for law in own:
                 check_own(law)
-        except Exception as error:  # whatever the code of another package does
+        except Exception as error:  # the code of another package may raise anything
             said = error.message if isinstance(error, InputError) else f"{type(error).__name__}: {error}"
             raise InputError(f"the entry point {point.value} of an installed package gives no laws: {said}") from error
         found += own

@@ -80,8 +80,8 @@ class PartnerMixing(Potential):
               n_b = n_c \phi, \quad n_{1,2}' = n_{1,2} - n_b
 
     The natural partner of bimolecular kinetics: equilibrium is :math:`n_b / (n_1' n_2') = a\,e^{\varepsilon / k_B T}`,
-    its :math:`k_f / k_r`. Partners that have more room meet less often: stretching the surface breaks bonds, and takes
-    up the work :math:`k_B T \ln J_c` of each particle that moves on it. Source: ideal gas in two dimensions (Hill, An
+    its :math:`k_f / k_r`. Partners meet less often at lower density: stretching the surface breaks bonds, and takes up
+    the work :math:`k_B T \ln J_c` of each particle that moves on it. Source: ideal gas in two dimensions (Hill, An
     Introduction to Statistical Thermodynamics, 1960, ch. 4 and 10); K in two dimensions as in Dembo, Torney, Saxman &
     Hammer (1988), doi 10.1098/rspb.1988.0038. Per current area. 0 < phi < min(n_1, n_2) / n_c.
 
@@ -123,15 +123,15 @@ class BondSprings(Potential):
 
 
 class EquilibriumBonds(Potential):
-    r"""Bonds in equilibrium with the gap at a given temperature: they form and break at once, each a spring across it.
+    r"""Bonds in equilibrium with the gap at a given temperature: springs across it that form and break instantly.
 
     .. math:: \Psi = -N k_B T \ln (1 + K s), \quad s = e^{-k_b (g_n - l_0)^2 / 2 k_B T}, \quad
               \phi = \frac{K s}{1 + K s}, \quad t_n = N \phi\,k_b (g_n - l_0)
 
-    The least over :math:`\phi` of ideal mixing with the energy of the springs, with no bonds at zero; for loads that
-    are slow against bonding, at one temperature, that of a bath. For flats and, as it reads the gap alone, for
-    curved surfaces. It bears no contact. Source: Bell, Dembo & Bongrand (1984), doi 10.1016/S0006-3495(84)84252-6, for
-    sites that do not move. Any g_n.
+    The minimum over :math:`\phi` of ideal mixing plus the energy of the springs, zero without bonds; for loads that are
+    slow compared with bonding, at the constant temperature of a bath. For flats and, since it reads only the gap, for
+    curved surfaces. It does not model contact. Source: Bell, Dembo & Bongrand (1984), doi
+    10.1016/S0006-3495(84)84252-6, for sites that do not move. Any g_n.
 
     >>> round(EquilibriumBonds(N=1e16, K=50.0, k_b=1e-3, T=300.0).energy(g_n=0.0) / (1.380649e-23 * 300 * 1e16), 9)
     -3.931825633

@@ -1,8 +1,8 @@
 """Bonds under load: Bell, Dembo spring, two pathways, Dudko-Hummer-Szabo, attachment across a gap.
 
 The effect of load on a rate coefficient is one formula each, for bonding laws and mechanisms alike: ``log_on`` of
-formation and ``log_off`` of rupture. It is stated as its logarithm: a rate is one exponential of a sum, and a factor of
-e^1000 is no infinity. A law lists in ``rate_types`` what mechanisms may use of it.
+formation and ``log_off`` of rupture. Each is a logarithm, so that a rate is one exponential of a sum, and a factor of
+e^1000 does not overflow. ``rate_types`` lists the formulas that mechanisms may use.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class BondRates(RateLaw):
 
     keeps_range = True
     off: ClassVar[str] = "k_off"
-    """Parameter that is the rate of rupture at no force."""
+    """Parameter that is the rate of rupture at zero force."""
 
     def log_on(self, f: Expression, T_c: Expression) -> Expression:
         """Logarithm of the factor of the force on formation: zero, no effect."""
@@ -59,8 +59,8 @@ class BondRates(RateLaw):
 
     @property
     def log_ratio(self) -> Callable[..., Expression] | None:
-        """Logarithm of the rate of formation over that of rupture; None where no bonds form."""
-        # A symbol stands for a number that may be changed, so that bonds may form.
+        """Logarithm of the rate of formation over that of rupture; None if no bonds form."""
+        # A symbol is a number that a run may change, so that bonds may form.
         k_on = vars(self)["k_on"]
         return self._log_ratio if is_symbolic(k_on) or k_on else None
 
@@ -74,8 +74,8 @@ class Bell(BondRates):
 
     .. math:: R = n_c \left[ k_{on} e^{f x_{on} / k_B T_c} (1 - \phi) - k_{off} e^{f x_{off} / k_B T_c}\,\phi \right]
 
-    Source: Bell (1978), Science 200, 618, doi 10.1126/science.347575. A negative x_off is a catch bond. While f x stays
-    below the barrier. The rates are independent of a potential: the audit says whether they agree with one.
+    Source: Bell (1978), Science 200, 618, doi 10.1126/science.347575. A negative x_off is a catch bond. Valid while f x
+    is below the barrier. The rates are independent of a potential: the audit reports whether they agree with it.
 
     >>> Bell(k_off=0.1, x_off=4e-10).rate(phi=1.0, n_c=1.0, f=30e-12, T_c=300.0)
     -1.8123115...
@@ -90,12 +90,12 @@ class Bell(BondRates):
 
     @property
     def length(self) -> Expression | None:
-        """Difference of the two distances to the transition state, where bonds form too."""
-        # Bonds that never form do no work on forming.
+        """Difference of the two distances to the transition state, if bonds form too."""
+        # Without formation there is no work of formation.
         return None if self.log_ratio is None else self.x_on - self.x_off
 
     def log_on(self, f: Expression, T_c: Expression) -> Expression:
-        """Logarithm of the factor of the force on formation: its work on the way to the transition state."""
+        """Logarithm of the factor of the force on formation: its work up to the transition state."""
         return f * self.x_on / (BOLTZMANN * T_c)
 
     def log_off(self, f: Expression, T_c: Expression) -> Expression:
@@ -118,10 +118,10 @@ class ReversibleBell(RateLaw):
 
     .. math:: R = -n_c k_{off} e^{f x_{off} / k_B T_c}\,\phi \left( 1 - e^{-\mu / k_B T_c} \right)
 
-    With a lattice gas and bond springs, whose energy knows the force, bonds form at the rate
-    :math:`k_{off} e^{(\varepsilon + f x_{off} - w_b) / k_B T_c}`. A prescribed force works on the way from one state to
-    the other, :math:`\ell = x_{on} - x_{off}`, by which a bond lets it down as it forms: its work belongs to the
-    affinity, :math:`\mu - f \ell` stands for :math:`\mu`, and bonds form at the rate
+    With a lattice gas and bond springs, whose energy includes the force, bonds form at the rate
+    :math:`k_{off} e^{(\varepsilon + f x_{off} - w_b) / k_B T_c}`. A prescribed force does work over the length
+    :math:`\ell = x_{on} - x_{off}` by which a forming bond lets it down: the work belongs to the affinity,
+    :math:`\mu - f \ell` replaces :math:`\mu`, and bonds form at the rate
     :math:`k_{off} e^{(\varepsilon + f x_{on}) / k_B T_c}`. The equilibrium then obeys
 
     .. math:: \frac{d}{df} \ln\frac{\phi}{1 - \phi} = \frac{\ell}{k_B T_c}
@@ -141,18 +141,18 @@ class ReversibleBell(RateLaw):
 
     @property
     def length(self) -> Expression | None:
-        """Difference of the two distances to the transition state, where both are given."""
+        """Difference of the two distances to the transition state, if both are given."""
         return None if self.x_on is None else self.x_on - self.x_off
 
     def rate(self, phi: Expression, n_c: Expression, f: Expression, T_c: Expression, mu: Expression) -> Expression:
         """Net rate [1/(m^2 s)]."""
         breaking = Bell(k_off=self.k_off, x_off=self.x_off).log_off(f, T_c) + log_fraction(phi)
-        # Rupture and formation in one function: near equilibrium they are equal but for their last digits.
+        # Rupture and formation in one function: near equilibrium they differ in their last digits only.
         return n_c * scaled_expm1(self.k_off, -mu / (BOLTZMANN * T_c), breaking)
 
 
 class DemboSpring(BondRates):
-    r"""Bond spring: slip, ideal or catch bond by how stiff it is in the transition state.
+    r"""Bond spring: a slip, ideal or catch bond, depending on its stiffness in the transition state.
 
     .. math:: R = n_c \left[ k_{on} e^{-\kappa_{ts} f^2 / 2 \kappa^2 k_B T_c} (1 - \phi)
               - k_{off} e^{(\kappa - \kappa_{ts}) f^2 / 2 \kappa^2 k_B T_c}\,\phi \right]
@@ -177,7 +177,7 @@ class DemboSpring(BondRates):
 
     @property
     def peaks(self) -> Mapping[str, Expression]:
-        """Zero force, at which formation, of an unstretched spring, has its peak."""
+        """Zero force, at which the formation of an unstretched spring has its peak."""
         return {} if self.log_ratio is None else {"f": 0.0}
 
     def log_on(self, f: Expression, T_c: Expression) -> Expression:
@@ -199,7 +199,7 @@ class DemboSpring(BondRates):
 
         .. math:: \ln\frac{k}{k_0} = \frac{(\kappa - \kappa_{ts}) f^2}{2 \kappa^2 k_B T}
 
-        A slip bond for :math:`\kappa_{ts} < \kappa`, an ideal bond where both are equal, a catch bond beyond; f is the
+        A slip bond for :math:`\kappa_{ts} < \kappa`, an ideal bond if both are equal, else a catch bond; f is the
         spring's :math:`\kappa (l - \lambda)`. Source: Dembo, Torney, Saxman & Hammer (1988), Proc. R. Soc. Lond. B 234,
         55, doi 10.1098/rspb.1988.0038.
 
@@ -212,7 +212,7 @@ class DemboSpring(BondRates):
 
 
 class TwoPathway(BondRates):
-    r"""Catch-slip bond: force closes one way out of the bound state and opens another.
+    r"""Catch-slip bond: force closes one pathway out of the bound state and opens another.
 
     .. math:: R = n_c \left[ k_{on} (1 - \phi)
               - \left( k_{slip} e^{f x_{slip} / k_B T_c} + k_{catch} e^{-f x_{catch} / k_B T_c} \right) \phi \right]
@@ -236,7 +236,7 @@ class TwoPathway(BondRates):
     k_on: float = parameter("1/s", "rate of formation", default=0.0, at_least=0)
 
     def log_off(self, f: Expression, T_c: Expression) -> Expression:
-        r"""Two ways out of one bound state: force closes the catch pathway and opens the slip pathway.
+        r"""Two pathways out of one bound state: force closes the catch pathway and opens the slip pathway.
 
         .. math:: \frac{k}{k_{slip}} = e^{f x_{slip} / k_B T} + r_c\,e^{-f x_{catch} / k_B T}
 
@@ -259,8 +259,8 @@ class DudkoHummerSzabo(BondRates):
               e^{\Delta G (1 - s^{1/\nu}) / k_B T_c}\,\phi \right], \quad s = 1 - \frac{\nu f x_{off}}{\Delta G}
 
     :math:`\nu = 1/2` is a cusp, 2/3 a cubic well, 1 the law of Bell. Source: Dudko, Hummer & Szabo (2006), Phys. Rev.
-    Lett. 96, 108101, doi 10.1103/PhysRevLett.96.108101. While a barrier above k_B T is left; beyond, the rate stays at
-    its largest value.
+    Lett. 96, 108101, doi 10.1103/PhysRevLett.96.108101. Valid while the barrier exceeds k_B T; beyond, the rate stays
+    at its largest value.
 
     >>> DudkoHummerSzabo(k_off=0.1, x_off=4e-10, barrier=6e-20).rate(phi=1.0, n_c=1.0, f=50e-12, T_c=300.0)
     -8.3417844...
@@ -276,7 +276,7 @@ class DudkoHummerSzabo(BondRates):
 
     @property
     def ranges(self) -> Mapping[str, tuple[float, float]]:
-        """Forces below that at which the barrier vanishes."""
+        """Forces below the one at which the barrier vanishes."""
         if self.varying.keys() & {"barrier", "x_off", "nu"}:
             return {}
         return {"f": (-math.inf, self.barrier / (self.nu * self.x_off))}
@@ -288,8 +288,8 @@ class DudkoHummerSzabo(BondRates):
                   + \frac{\Delta G}{k_B T}\left(1 - s^{1/\nu}\right), \quad s = 1 - \frac{\nu f x_\beta}{\Delta G}
 
         :math:`\nu = 1/2` is a cusp, 2/3 a cubic well, 1 the law of Bell. Source: Dudko, Hummer & Szabo (2006), Phys.
-        Rev. Lett. 96, 108101, doi 10.1103/PhysRevLett.96.108101. While a barrier above k_B T is left,
-        s^(1/nu) > k_B T / dG; beyond, the rate stays at its largest value.
+        Rev. Lett. 96, 108101, doi 10.1103/PhysRevLett.96.108101. Valid while the barrier exceeds k_B T, s^(1/nu) > k_B
+        T / dG; beyond, the rate stays at its largest value.
 
         >>> law = DudkoHummerSzabo(k_off=1.0, x_off=4e-10, barrier=6e-20, nu=0.5)
         >>> round(law.log_off(f=50e-12, T_c=300.0), 6)
@@ -297,19 +297,19 @@ class DudkoHummerSzabo(BondRates):
         """
         height = self.barrier / (BOLTZMANN * T_c)
         tilt = 1 - self.nu * f * self.x_off / self.barrier
-        # Beyond its largest value the formula would fall again, though nothing is left to hold the bond.
+        # Beyond its maximum the formula would fall again, although no barrier is left.
         lowest = power((1 - self.nu) / height, self.nu) + FRACTION_FLOOR
         s = where(tilt > lowest, tilt, lowest)
         return (1 / self.nu - 1) * log(s) + height * (1 - s ** (1 / self.nu))
 
 
 class GapAttachment(RateLaw):
-    r"""Bonds form the less the wider the gap that their tethers have to reach across.
+    r"""Bond formation across a gap, at a rate that falls as the tethers are stretched.
 
     .. math:: R = n_c k_{on} e^{-k_b (g_n - l_0)^2 / 2 k_B T_c} (1 - \phi)
 
-    Source: Dembo, Torney, Saxman & Hammer (1988), doi 10.1098/rspb.1988.0038. Any g_n. It has no reverse; a law of
-    rupture stands beside it.
+    Source: Dembo, Torney, Saxman & Hammer (1988), doi 10.1098/rspb.1988.0038. Any g_n. It has no reverse; combine it
+    with a law of rupture.
 
     >>> GapAttachment(k_on=10.0, stiffness=1e-3, rest_length=2e-8).rate(phi=0.5, n_c=1.0, g_n=2e-8, T_c=300.0)
     5.0
@@ -324,11 +324,11 @@ class GapAttachment(RateLaw):
 
     @property
     def peaks(self) -> Mapping[str, Expression]:
-        """The gap that does not stretch the tether."""
+        """The gap at which the tether is unstretched."""
         return {"g_n": self.rest_length}
 
     def log_on(self, g_n: Expression, T_c: Expression) -> Expression:
-        r"""Bonds form where thermal motion stretches their tether across the gap.
+        r"""Bonds form when thermal motion stretches their tether across the gap.
 
         .. math:: \ln\frac{k}{k_0} = -\frac{k_b (g_n - l_0)^2}{2 k_B T}
 

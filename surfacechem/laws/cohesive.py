@@ -9,7 +9,8 @@ from surfacechem.contracts.terms import Limit, RateLaw, TangentialPotential, par
 from surfacechem.expressions import EXPONENT_CAP, Expression, decay, positive, sqrt, where
 
 CLOSED_GAP = 1e-16
-"""Mixed gap over g_0 of a closed zone, whose direction is undefined: its square is far below the rounding of one."""
+"""Mixed gap over g_0 that regularises a closed zone, whose direction is undefined: its square is far below the rounding
+of one."""
 
 
 class ExponentialCohesiveZone(TangentialPotential):
@@ -22,9 +23,9 @@ class ExponentialCohesiveZone(TangentialPotential):
 
     Shear takes part where the scene has a tangential gap; without one :math:`g = \langle g_n \rangle`. The strength
     :math:`t_{max}` is reached at :math:`g = g_0` in any direction; the work of separation is :math:`e\,t_{max} g_0`.
-    Both may vary with temperature and bonding state; the entropy, heat capacity and chemical potential that go with it
-    follow. With :math:`t_{max} \propto T_0/T` the zone has a positive capacity and cools where it opens; a strength
-    concave in T takes capacity away.
+    Both may vary with temperature and bonding state; the entropy, heat capacity and chemical potential follow. With
+    :math:`t_{max} \propto T_0/T` the zone has a positive capacity and cools as it opens; a strength concave in T
+    reduces the capacity.
 
     Source: Sauer, Duong & Mandadapu (2021), eqs. ex:psi_czm and ex:bt_czm, with the sign of tension and a signed
     normal gap: with its magnitude in the norm the zone would soften in compression too. Any g_n, g_t; reversible.
@@ -45,13 +46,13 @@ class ExponentialCohesiveZone(TangentialPotential):
 
     @property
     def peaks(self) -> Mapping[str, Expression | Sequence[Expression]]:
-        """The gaps at the strength; and no shear, where the stiffness of a pressed zone has its peak and bends."""
+        """The gaps at the strength; and zero shear, the peak and kink of the stiffness of a compressed zone."""
         return {"g_n": self.g_0, "g_t": (-self.g_0, 0.0, self.g_0)}
 
     def energy(self, g_n: Expression, g_t: Expression | None = None) -> Expression:
         """Free energy [J/m^2]."""
         touching, contact = math.e * self.t_max * self.g_0, self.E_n * g_n**2 / 2
-        # Without shear no root is needed, whose slope at a closed zone is rounding.
+        # Without shear no root is needed; at a closed zone its slope would be roundoff.
         if g_t is None or g_t == 0:
             return where(g_n > 0, -touching * _separated(g_n / self.g_0), contact - touching)
         square = where(g_n > 0, g_n**2, 0) + g_t**2
@@ -70,7 +71,7 @@ class XuNeedleman(TangentialPotential):
     The energy of complete separation is zero. :math:`\Phi_n = e\,t_{max} g_0` is the work of normal separation, q the
     ratio of tangential to normal work, r the opening after complete shear without normal traction, over :math:`g_0`.
     The tangential strength is :math:`q \Phi_n \sqrt{2/e} / g_{t0}`. Contact in compression is the same exponential;
-    below :math:`g_n = -300\,g_0` it continues as its tangent.
+    below :math:`g_n = -300\,g_0` it continues along its tangent.
 
     Source: Xu & Needleman (1993), doi 10.1088/0965-0393/1/2/001. Any g_n, g_t; r other than 1. For q other than 1 the
     coupling is known to be weakly founded: incomplete sliding can leave more normal work than there was
@@ -101,7 +102,7 @@ class XuNeedleman(TangentialPotential):
         constant = (1 - self.r) * ratio - self.q * shear
         linear = ratio - (self.r - self.q) / (self.r - 1) * shear
         u, falling = g_n / self.g_0, decay(g_n / self.g_0)
-        # Below -EXPONENT_CAP the whole goes on along its tangent.
+        # Below -EXPONENT_CAP the energy continues along its tangent.
         level = constant - linear * EXPONENT_CAP
         tangent = math.exp(EXPONENT_CAP) * (level + (linear - level) * (u + EXPONENT_CAP))
         return self.Phi_n * where(u > -EXPONENT_CAP, constant * falling + linear * u * falling, tangent)
@@ -114,19 +115,19 @@ def _separated(u: Expression) -> Expression:
 
 
 class AdhesionIntensity(TangentialPotential):
-    r"""Elastic adhesion of an intensity between zero and one, the bonding state.
+    r"""Elastic adhesion whose intensity, between zero and one, is the bonding state.
 
     .. math::
         \Psi = \tfrac12 \phi^2 \left( C_N \langle g_n \rangle^2 + C_T g_t^2 \right)
         + \tfrac12 E_n \langle -g_n \rangle^2 - w \phi
 
-    Tension is :math:`C_N \phi^2 g_n`. Adhesion begins to break where :math:`C_N g_n^2 + C_T g_t^2 = w / \phi`, and w is
-    Dupré's energy. Contact in compression is elastic and does not lose stiffness; the original is rigid, the limit of
-    large :math:`E_n`. Another energy of adhesion than the linear one is had by a bond energy beside it.
+    Tension is :math:`C_N \phi^2 g_n`. Adhesion begins to break at :math:`C_N g_n^2 + C_T g_t^2 = w / \phi`, and w is
+    Dupré's energy. Contact in compression is elastic and keeps its stiffness; the original is rigid, the limit of large
+    :math:`E_n`. For an energy of adhesion that is not linear add a bond energy.
 
-    In parallel with friction :math:`g_t` is the whole displacement. Friction acts on the part that is not bonded,
-    :math:`t_t = \phi^2 C_T g_t + (1 - \phi)\,t_f`, so that shear that begins with complete adhesion peaks no lower
-    than without it, at :math:`\sqrt{w\,C_T}` where nothing delays the loss, and ends on the plateau of friction.
+    In parallel with friction :math:`g_t` is the whole displacement. Friction acts on the unbonded fraction,
+    :math:`t_t = \phi^2 C_T g_t + (1 - \phi)\,t_f`. Shear from complete adhesion therefore peaks no lower than without
+    friction, at :math:`\sqrt{w\,C_T}` for loss without delay, and ends on the plateau of friction.
 
     Source: Raous, Cangémi & Cocu (1999), doi 10.1016/S0045-7825(98)00389-2, after Frémond (1987); friction on the
     part :math:`1 - \phi` as in Raous & Monerie (2002), in Contact Mechanics (Kluwer). Any gaps.
@@ -155,9 +156,9 @@ class AdhesionLoss(RateLaw):
 
     .. math:: b\,\dot\phi = -\langle M \rangle, \quad M = \partial \Psi / \partial \phi = N_c\,\mu
 
-    With the potential of adhesion intensity,
-    :math:`b\,\dot\phi = -\langle (C_N g_n^2 + C_T g_t^2) \phi - w \rangle`. What is lost does not heal: where adhesion
-    would grow, it rests. Where it may heal use the linear law with :math:`c_r = N_c / b`.
+    With the potential of adhesion intensity, :math:`b\,\dot\phi = -\langle (C_N g_n^2 + C_T g_t^2) \phi - w \rangle`.
+    Lost adhesion does not heal: the rate is zero where adhesion would grow. For adhesion that heals use the linear law
+    with :math:`c_r = N_c / b`.
 
     Source: Raous, Cangémi & Cocu (1999), doi 10.1016/S0045-7825(98)00389-2, with the exponent p = 1. Admissible.
 
@@ -183,14 +184,14 @@ class CompliantDebonding(RateLaw):
     .. math:: \phi \le \phi_{env}(g_n) = \frac{t_{max}}{E_b\,g_n}\,\frac{g_f - g_n}{g_f - g_c}, \quad
               g_c = \frac{t_{max}}{E_b}, \quad \dot\phi = \min(R_o / n_c, \dot\phi_{env}) \text{ on the envelope}
 
-    where :math:`R_o` is the net rate of all other bonding laws. So bonds break as fast as the envelope falls and others
-    form them; where the envelope rises faster than others form bonds, or others break bonds faster than it falls, they
-    leave it. Beyond :math:`g_f` no bond forms.
-    With the potential :math:`\tfrac12 \phi E_b g_n^2` the traction is the bilinear law of cohesive zones: it peaks at
-    :math:`t_{max}` and ends at :math:`g_f`; unloading goes back to zero gap along :math:`\phi E_b`. The break is
-    irreversible by itself. Source: Sauer, Duong & Mandadapu (2021), section 5.2 (the path of finite slope); bilinear
-    form as in Camanho & Davila (2002), NASA/TM-2002-211737. :math:`g_f > g_c`; :math:`E_b` is that of the potential.
-    Admissible where the elastic energy of a bond exceeds its bond energy.
+    where :math:`R_o` is the net rate of all other bonding laws. On the envelope bonds break at the rate at which it
+    falls and other laws form bonds; phi leaves the envelope if this rises faster than they form bonds, or falls more
+    slowly than they break bonds. Beyond :math:`g_f` no bond forms. With the potential :math:`\tfrac12 \phi E_b g_n^2`
+    the traction is the bilinear law of cohesive zones: it peaks at :math:`t_{max}` and ends at :math:`g_f`; unloading
+    is linear to zero gap with the stiffness :math:`\phi E_b`. Without other laws debonding is irreversible.
+    Source: Sauer, Duong & Mandadapu (2021), section 5.2 (the path of finite slope); bilinear form as in Camanho &
+    Davila (2002), NASA/TM-2002-211737. :math:`g_f > g_c`; :math:`E_b` is that of the potential. Admissible where the
+    elastic energy of a bond exceeds its bond energy.
 
     >>> law = CompliantDebonding(t_max=1e6, E_b=1e14, g_f=5e-8)
     >>> law.envelope(g_n=1e-8), round(law.envelope(g_n=3e-8), 12)
@@ -202,18 +203,18 @@ class CompliantDebonding(RateLaw):
     g_f: float = parameter("m", "gap at which the last bonds break", above=0)
 
     def peak(self) -> Expression:
-        """Gap at which complete bonding begins to break [m]."""
+        """Return the gap at which complete bonding begins to break [m]."""
         return self.t_max / self.E_b
 
     def envelope(self, g_n: Expression) -> Expression:
-        """Bonding state that the gap leaves; it falls through zero where the last bonds break."""
+        """Return the largest bonding state at a gap; it falls through zero where the last bonds break."""
         start = self.peak()
-        # Closed bonds are whole: below half the gap at the strength the envelope is not looked at.
+        # Below half the gap at the strength all bonds hold, and the value is not used.
         gap = where(g_n > start / 2, g_n, start / 2)
         return start / gap * (self.g_f - gap) / (self.g_f - start)
 
     def rate(self, n_c: Expression, softening: Expression, overshoot: Expression) -> Expression:
-        """Net rate [1/(m^2 s)]; ``overshoot`` is how fast the bonding state would pass the envelope [1/s]."""
+        """Net rate [1/(m^2 s)]; ``overshoot`` is the rate at which phi would exceed the envelope [1/s]."""
         return -n_c * softening * overshoot
 
 

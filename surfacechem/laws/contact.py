@@ -50,10 +50,10 @@ class TangentialStiffness(TangentialPotential):
 
     .. math:: \Psi = \tfrac12 E_t g_t^2, \quad t_t = E_t g_t
 
-    In series with friction it is elastic sticking: :math:`g_t` grows up to what friction bears, then the interface
-    slides. In parallel it holds the whole displacement beside friction, as a layer of glue does. Where :math:`g_t` is
-    prescribed it carries its traction beside that of friction.
-    Source: Sauer, Duong & Mandadapu (2021), eq. ex:psi_c. Any g_t.
+    In series with friction it is elastic sticking: :math:`g_t` grows up to the friction limit, then the interface
+    slides. In parallel with friction it acts on the whole displacement, as a layer of glue does. If :math:`g_t` is
+    prescribed, its traction is added to that of friction. Source: Sauer, Duong & Mandadapu (2021), eq. ex:psi_c. Any
+    g_t.
 
     >>> TangentialStiffness(E_t=1e12).energy(g_t=1e-6)
     0.5
@@ -72,7 +72,7 @@ class TangentialStiffness(TangentialPotential):
 
 
 class Penalty(Potential):
-    r"""Unilateral elastic contact: pressure where the bodies overlap, nothing where they are apart.
+    r"""Unilateral elastic contact: pressure if the bodies overlap, zero traction if they are apart.
 
     .. math:: \Psi = \tfrac12 E_n \langle -g_n \rangle^2, \quad t_n = -E_n \langle -g_n \rangle
 
@@ -93,7 +93,7 @@ class Penalty(Potential):
 
 
 class BondStiffness(Potential):
-    r"""Springs that bonds are: they carry tension in proportion to the bonding state; contact carries compression.
+    r"""Bonds as springs: they carry tension in proportion to the bonding state; contact carries compression.
 
     .. math:: \Psi = \tfrac12 \phi E_b \langle g_n \rangle^2 + \tfrac12 E_n \langle -g_n \rangle^2
 

@@ -15,7 +15,7 @@ class PressureConductance(UnderPressure, HeatTransfer):
 
     .. math:: h = h_0 + h_c \left(\frac{p}{H}\right)^q
 
-    Without pressure, and in tension, :math:`h_0` is left. Any parameter may vary with other variables by factors.
+    Without pressure, and in tension, it is :math:`h_0`. Any parameter may vary with other variables by factors.
     Source: Sauer, Duong & Mandadapu (2021), eq. e:h_spot. 0 <= p <= H.
 
     >>> law = PressureConductance(between=("lower", "upper"), h_0=500.0, h_c=8e3, H=2e9)
@@ -81,7 +81,7 @@ class CooperMikicYovanovich(UnderPressure, HeatTransfer):
     .. math:: h = 1.25\,\frac{k\,m}{\sigma} \left(\frac{p}{H}\right)^{0.95}
 
     Source: Cooper, Mikic & Yovanovich (1969), doi 10.1016/0017-9310(69)90011-8, in the correlation of Yovanovich
-    (1981), AIAA paper 81-1164. About 1.5 % off the full model for 1e-6 <= p/H <= 2.3e-2; a run outside this says so.
+    (1981), AIAA paper 81-1164. About 1.5 % off the full model for 1e-6 <= p/H <= 2.3e-2; a run outside reports it.
 
     >>> law = CooperMikicYovanovich(between=("lower", "upper"), k=20.0, m=0.1, sigma=1e-6, H=2e9)
     >>> round(law.conductance(p=2e6), 6)
@@ -98,7 +98,7 @@ class CooperMikicYovanovich(UnderPressure, HeatTransfer):
     @property
     def ranges(self) -> Mapping[str, tuple[float, float]]:
         """Range in which the correlation was fitted."""
-        # A hardness that varies is taken at its reference value: a range is a hint, no law.
+        # A varying hardness is taken at its reference value: the range only serves a warning.
         hardness = self.at_reference().H
         return {"p": (1e-6 * hardness, 2.3e-2 * hardness)}
 
@@ -113,7 +113,7 @@ class MikicElastic(UnderPressure, HeatTransfer):
     .. math:: h = 1.55\,\frac{k\,m}{\sigma} \left(\frac{\sqrt2\,p}{E' m}\right)^{0.94}
 
     Source: Mikic (1974), doi 10.1016/0017-9310(74)90082-9. About 2 % off the full model for
-    1e-5 <= sqrt(2) p / (E' m) <= 2e-2; a run outside this says so.
+    1e-5 <= sqrt(2) p / (E' m) <= 2e-2; a run outside reports it.
 
     >>> law = MikicElastic(between=("lower", "upper"), k=20.0, m=0.1, sigma=1e-6, E=1.1e11)
     >>> round(law.conductance(p=2e6), 6)
@@ -141,14 +141,14 @@ class MikicElastic(UnderPressure, HeatTransfer):
 
 
 class SongYovanovich(UnderPressure, HeatTransfer):
-    r"""Conductance of plastic asperities that are the harder the smaller their indents.
+    r"""Conductance of plastic asperities whose hardness depends on the size of the indents.
 
     .. math:: h = 1.25\,\frac{k\,m}{\sigma} \left(\frac{p}{H_c}\right)^{0.95}, \quad
               \frac{p}{H_c} = \left[\frac{p}{c_1 (1.62\,\sigma / (\sigma_0 m))^{c_2}}\right]^{1/(1 + 0.071 c_2)}
 
     The Vickers micro-hardness of the softer body is :math:`c_1 (d / \sigma_0)^{c_2}` with the diagonal d of the indent
     and :math:`\sigma_0` = 1 um. Source: Song & Yovanovich (1988), Journal of Thermophysics and Heat Transfer 2, 43,
-    with the correlation of cooper-mikic-yovanovich. Range 1e-6 <= p/H_c <= 2.3e-2; a run outside this says so.
+    with the correlation of cooper-mikic-yovanovich. Range 1e-6 <= p/H_c <= 2.3e-2; a run outside reports it.
 
     >>> law = SongYovanovich(between=("lower", "upper"), k=20.0, m=0.1, sigma=1e-6, c_1=6e9, c_2=-0.26)
     >>> round(law.relative_pressure(2e6), 9)

@@ -12,7 +12,7 @@ class Linear(Factor):
 
     .. math:: f = 1 + s\,(x - x_0)
 
-    Source: first-order expansion. Must stay positive where the parameter must.
+    Source: first-order expansion. Must stay positive if the parameter has to.
 
     >>> Linear(of="phi", slope=0.5).factor(x=0.5)
     1.25
@@ -27,7 +27,7 @@ class Linear(Factor):
 
 
 class Proportional(Factor):
-    r"""In proportion to any variable: the strength of bonds to how many there are.
+    r"""Proportional to any variable, as the strength of bonds is to their number.
 
     .. math:: f = x / x_0
 

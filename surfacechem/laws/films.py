@@ -17,16 +17,16 @@ class Film(HeatTransfer):
 
     .. math:: h = k_m / d_m
 
-    The conductivity is that of the medium at :math:`T_c`. Source: Fourier's law. Films that are thick against the mean
-    free path, and thin enough not to convect.
+    The conductivity is that of the medium at :math:`T_c`. Source: Fourier's law. For films much thicker than the mean
+    free path, and too thin for convection.
 
-    With ``closure: medium`` :math:`T_c` is the mean temperature of the film and heat is made all across it, as by
-    shear: the profile is a parabola on a line, and the film gives the wall k
+    With ``closure: medium`` :math:`T_c` is the mean temperature of the film and heat is produced across it, as by
+    shear: the profile is a parabola on top of a line, and the heat flux into the wall k is
 
     .. math:: q_k = \frac{6 k_m}{d_m} \left( T_c - \frac{T_1 + T_2}{2} \right) + \frac{k_m}{d_m} (T_l - T_k),
               \quad l \ne k
 
-    exact in the steady state where heat is made evenly. Its entropy production is positive while the ratio of the two
+    exact in the steady state for uniform heat production. Its entropy production is positive while the ratio of the two
     temperatures is below 7. Source: plane Couette flow with viscous heating (Bird, Stewart & Lightfoot, Transport
     Phenomena, 2002, section 10.4).
 
@@ -56,8 +56,8 @@ class RarefiedFilm(HeatTransfer):
 
     In contact the gas keeps the mean thickness Y of the voids. Everything but Y and the accommodation is a property of
     the medium at :math:`T_c`. Source: Yovanovich, DeVaal & Hegazy (1982), AIAA paper 82-0888; the jump is that of
-    Kennard, Kinetic Theory of Gases (1938). Dilute gases; from continuum to free molecules within a few per cent where
-    the jumps are small against the temperatures.
+    Kennard, Kinetic Theory of Gases (1938). Dilute gases; from continuum to free molecular flow within a few per cent,
+    for jumps much smaller than the temperatures.
 
     >>> law = RarefiedFilm(between=("lower", "upper"))
     >>> gas = {"k_m": 0.0259, "eta_m": 1.79e-5, "rho_m": 1.138, "cp_m": 1041.0, "gamma_m": 1.401, "p_m": 101325.0}
@@ -102,7 +102,7 @@ class RarefiedFilm(HeatTransfer):
         """Thermal resistances of the jump at each wall, and of the gas between [m^2 K/W]."""
         mean_free_path = eta_m * sqrt(math.pi / (2 * p_m * rho_m))
         prandtl = eta_m * cp_m / k_m
-        # Temperature jumps are like more gas: each wall has a resistance of so much thickness.
+        # A temperature jump is equivalent to a layer of gas: each wall has the resistance of such a thickness.
         jump = 2 * gamma_m / (gamma_m + 1) * mean_free_path / prandtl
         first, second = ((2 - alpha) / alpha * jump / k_m for alpha in (self.alpha_1, self.alpha_2))
         return first, (positive(d_m) + self.Y) / k_m, second
@@ -113,8 +113,8 @@ class FilmShear(Friction):
 
     .. math:: t_t = \eta_m\,v / d_m
 
-    The viscosity is that of the medium at :math:`T_c`, so that the film thins as it heats.
-    Source: Sauer, Duong & Mandadapu (2021), eq. e:visc_fric. Any v; laminar. Dissipates :math:`t_t v \ge 0`.
+    The viscosity is that of the medium at :math:`T_c`, so that it falls as the film heats. Source: Sauer, Duong &
+    Mandadapu (2021), eq. e:visc_fric. Any v; laminar. Dissipates :math:`t_t v \ge 0`.
 
     >>> round(FilmShear().traction(eta_m=0.5, d_m=1e-6, v=0.25), 6)
     125000.0
@@ -132,10 +132,10 @@ class FilmCapacity(Potential):
 
     .. math:: \Psi = d_m f_m(T_c), \quad -T_c\,f_m'' = \rho_m c_{p,m}
 
-    :math:`f_m` is the exact double integral of the heat capacity, zero with its slope at the start. The film keeps its
-    thickness; the work of its thermal expansion goes to its surroundings at constant pressure. Per current area: what
-    flows in as the surface stretches comes from the reference temperature, reversibly. Source: classical
-    thermodynamics.
+    :math:`f_m` is the exact double integral of the heat capacity; it and its slope are zero at the start. The film
+    keeps its thickness; the work of its thermal expansion goes to its surroundings at constant pressure. Per current
+    area: material that flows in as the surface stretches comes from the reference temperature, reversibly.
+    Source: classical thermodynamics.
 
     >>> FilmCapacity().energy(d_m=1e-6, f_m=-2.5e7)
     -25.0
@@ -149,7 +149,7 @@ class FilmCapacity(Potential):
 
 
 class ActivatedGrowth(FilmGrowth):
-    """Growth of a tribofilm over a barrier that a stress lowers."""
+    """Growth of a tribofilm over a barrier that stress lowers."""
 
     G_0: float = parameter("m/s", "growth rate without a barrier", at_least=0)
     E: float = parameter("J", "activation energy without stress", at_least=0)
@@ -170,8 +170,8 @@ class PressureActivatedGrowth(UnderPressure, ActivatedGrowth):
     .. math:: \dot d_m = G_0 \exp\left( -\frac{E - p V}{k_B T_c} \right)
 
     Source: Gosvami, Bares, Mangolini, Konicek, Yablon & Carpick (2015), doi 10.1126/science.1258788, for films of zinc
-    dialkyldithiophosphate under the tip of an atomic force microscope; Bell (1978), doi 10.1126/science.347575. The
-    heat of what is formed, and what it stores, are left out: films are of nanometres.
+    dialkyldithiophosphate under the tip of an atomic force microscope; Bell (1978), doi 10.1126/science.347575. Heat of
+    formation and heat capacity of the film are neglected: films are nanometres thick.
 
     >>> law = PressureActivatedGrowth(G_0=0.1, E=1.28e-19, V=4e-30)
     >>> round(law.rate(p=4e9, T_c=373.0) / law.rate(p=0.0, T_c=373.0), 6)
@@ -188,9 +188,9 @@ class ShearActivatedGrowth(ActivatedGrowth):
 
     .. math:: \dot d_m = G_0 \exp\left( -\frac{E - t_s V}{k_B T_c} \right)
 
-    :math:`t_s` is the magnitude of the traction that resists sliding. Source: Zhang & Spikes (2016), doi
-    10.1007/s11249-016-0706-7, for films of zinc dialkyldithiophosphate that grow in a lubricant between surfaces which
-    do not touch; Bell (1978), doi 10.1126/science.347575. The heat of what is formed, and what it stores, are left out.
+    :math:`t_s` is the magnitude of the sliding traction. Source: Zhang & Spikes (2016), doi 10.1007/s11249-016-0706-7,
+    for films of zinc dialkyldithiophosphate that grow in a lubricant between surfaces which do not touch; Bell (1978),
+    doi 10.1126/science.347575. Heat of formation and heat capacity of the film are neglected.
 
     >>> law = ShearActivatedGrowth(G_0=0.1, E=1.28e-19, V=9e-29)
     >>> round(law.rate(t_s=2e8, T_c=353.0) / law.rate(t_s=0.0, T_c=353.0), 6)
@@ -203,12 +203,12 @@ class ShearActivatedGrowth(ActivatedGrowth):
 
 
 class FilmWear(FilmGrowth):
-    r"""Wear of a film by sliding, the faster the thicker it is.
+    r"""Wear of a film by sliding, at a rate proportional to its thickness.
 
     .. math:: \dot d_m = -|v|\,d_m / L
 
-    Where growth is steady the film tends to the thickness at which both are alike. Source: wear in proportion to the
-    thickness, of which thicker films are softer, as in Akchurin & Bosman (2017), doi 10.1007/s11249-017-0842-8; here
+    With steady growth the film tends to the thickness at which growth and wear balance. Source: wear proportional to
+    the thickness, since thicker films are softer, as in Akchurin & Bosman (2017), doi 10.1007/s11249-017-0842-8; here
     per distance slid, as in Archard (1953), doi 10.1063/1.1721448.
 
     >>> FilmWear(L=0.5).rate(v=-0.1, d_m=1e-7)

@@ -17,8 +17,8 @@ class Coulomb(UnderPressure, Friction):
     .. math:: t_t = \mu\,p\,\mathrm{sgn}(v), \quad |t_t| \le \mu_s\,p \text{ while sticking}
 
     Source: Sauer, Duong & Mandadapu (2021), eqs. e:dry_fric and e:tt_max. Any v; p >= 0. Dissipates
-    :math:`t_t v \ge 0`. Without a static coefficient the interface sticks up to mu p; so it does with one below mu,
-    which `check` and the run then say.
+    :math:`t_t v \ge 0`. Without a static coefficient, or with one below mu, the interface sticks up to mu p; `check`
+    and the run report the latter.
 
     >>> Coulomb(mu=0.3).traction(p=1e5, direction=1.0), Coulomb(mu=0.3, mu_s=0.5).limit(p=1e5)
     (30000.0, 50000.0)
@@ -39,18 +39,18 @@ class Coulomb(UnderPressure, Friction):
 
 
 class MohrCoulomb(UnderPressure, Friction):
-    r"""Dry friction with adhesion: sliding is resisted without pressure, and in tension up to the adhesive strength.
+    r"""Dry friction with adhesion: it acts without pressure too, and in tension up to the adhesive strength.
 
     .. math:: t_t = [\mu \langle p + t_n^{max} \rangle + c]\,\mathrm{sgn}(v)
 
     While sticking :math:`|t_t| \le \mu_s \langle p + t_n^{max} \rangle + c`. Adhesion acts through :math:`t_n^{max}`,
     as in tribology, or through c, as in soil mechanics: for constant coefficients :math:`c = \mu\,t_n^{max}` is the
-    same law. Where sliding breaks all bonds and the strength is proportional to :math:`\phi`, nothing is left of it;
-    let bonds survive sliding or keep a part that does not depend on them.
+    same law. If sliding breaks all bonds, a strength proportional to :math:`\phi` vanishes; let bonds survive sliding
+    or keep a part of the strength that does not depend on them.
 
     Source: Sauer, Duong & Mandadapu (2021), eq. e:M-C; Derjaguin (1934), doi 10.1007/BF01333114. Any v;
-    :math:`p \ge -t_n^{max}`. A gap that opens carries the contact beyond its strength, where only c is left; a
-    pressure that is prescribed there is refused. Dissipates :math:`t_t v \ge 0`.
+    :math:`p \ge -t_n^{max}`. An opening gap carries the contact beyond its strength, where only c remains; a pressure
+    prescribed there is refused. Dissipates :math:`t_t v \ge 0`.
 
     >>> MohrCoulomb(mu=0.5, t_n_max=2e4).traction(p=-1e4, direction=1.0)
     5000.0
@@ -65,12 +65,12 @@ class MohrCoulomb(UnderPressure, Friction):
 
     @property
     def least(self) -> Mapping[str, Expression]:
-        """The tension that the adhesive strength bears."""
+        """The tension equal to the adhesive strength."""
         return {"p": -self.t_n_max}
 
     @property
     def kinks(self) -> Mapping[str, Expression]:
-        """The tension at which only cohesion is left."""
+        """The tension beyond which only cohesion remains."""
         return {"p": -self.t_n_max}
 
     def traction(self, p: Expression, direction: Expression) -> Expression:
@@ -88,8 +88,8 @@ class Stribeck(UnderPressure, Friction):
     .. math:: t_t = \left[ \mu_k + (\mu_s - \mu_k) e^{-|v / v_s|^\delta} \right] p\,\mathrm{sgn}(v) + c_v v
 
     Source: Armstrong-Hélouvry, Dupont & Canudas de Wit (1994), doi 10.1016/0005-1098(94)90209-7; named in Sauer, Duong
-    & Mandadapu (2021), remark 5.12. Any v; p >= 0. Dissipates :math:`t_t v \ge 0`. Where the traction falls with
-    velocity faster than a damper resists, steady sliding is unstable.
+    & Mandadapu (2021), remark 5.12. Any v; p >= 0. Dissipates :math:`t_t v \ge 0`. If the traction falls faster with
+    velocity than the traction of a damper grows, steady sliding is unstable.
 
     >>> round(Stribeck(mu_s=0.6, mu_k=0.4, v_s=1e-3).traction(p=1e5, v=1e-3, direction=1.0), 6)
     47357.588823
@@ -105,8 +105,8 @@ class Stribeck(UnderPressure, Friction):
 
     def traction(self, p: Expression, v: Expression, direction: Expression) -> Expression:
         """Tangential traction [Pa]."""
-        # Without the guard of exp, since the exponent is never positive: slopes combine with their like.
-        # From one on the slope of the power at rest is that of the velocities to come; below one it is infinite.
+        # decay needs no cap, since the exponent is never positive, so that like terms combine in slopes. For delta >= 1
+        # the slope of the power at rest is the limit from positive speeds; for delta < 1 it is infinite.
         ahead = absolute(v) / self.v_s + where(self.delta < 1, 0, TINY)
         fall = decay(power(ahead, self.delta))
         return (self.mu_k + (self.mu_s - self.mu_k) * fall) * p * direction + self.c_v * v
@@ -122,9 +122,9 @@ class BondedCoulomb(UnderPressure, Friction):
     .. math:: |t_t| \le \mu_0\,p \text{ while sticking}, \quad
         \mu_0 = [\phi \mu_b + (1 - \phi) \mu_{ub}] \frac{T_0}{T_c}, \quad t_t = \mu\,p\,\mathrm{sgn}(v)
 
-    Bonds break as sliding starts. Where :math:`\mu_0` falls below :math:`\mu`, as in the heat, :math:`\mu p` is what
-    sticking bears, and the run says so. Source: Sauer, Duong & Mandadapu (2021), eqs. e:mu0 and e:dry_fric. Any v;
-    p >= 0. Dissipates :math:`t_t v \ge 0`.
+    Bonds break as sliding starts. If :math:`\mu_0` falls below :math:`\mu`, as on heating, the limit of sticking is
+    :math:`\mu p`, and the run reports it. Source: Sauer, Duong & Mandadapu (2021), eqs. e:mu0 and e:dry_fric. Any v; p
+    >= 0. Dissipates :math:`t_t v \ge 0`.
 
     >>> BondedCoulomb(mu=0.3, mu_b=0.7, mu_ub=0.3).limit(p=1e5, phi=0.5, T_c=300.0, T_0=300.0)
     50000.0
@@ -151,8 +151,8 @@ class Viscous(Friction):
 
     .. math:: t_t = \eta\,v / g_n
 
-    Source: Sauer, Duong & Mandadapu (2021), eq. e:visc_fric (with eta in Pa s). Any v; g_n > 0.
-    Dissipates :math:`t_t v \ge 0`. It bears nothing at rest.
+    Source: Sauer, Duong & Mandadapu (2021), eq. e:visc_fric (with eta in Pa s). Any v; g_n > 0. Dissipates
+    :math:`t_t v \ge 0`. Zero at rest.
 
     >>> Viscous(eta=0.5).traction(g_n=1e-6, v=0.25)
     125000.0
@@ -168,7 +168,7 @@ class Viscous(Friction):
 
 
 LEAST_VELOCITY = 1e-300
-"""Sliding velocity [m/s] that counts as none in a logarithm."""
+"""Sliding velocity [m/s] that counts as zero in a logarithm."""
 
 
 class RateAndState(UnderPressure, Friction):
@@ -188,12 +188,12 @@ class RateAndState(UnderPressure, Friction):
         return self.driven(p, self.drive(v, ln_theta))
 
     def driven(self, p: Expression, drive: Expression) -> Expression:
-        """Tangential traction [Pa] from its value in units of the direct effect, a p."""
+        """Tangential traction [Pa] from the drive, the traction in units of the direct effect, a p."""
         return self.a * p * drive
 
     def drive(self, v: Expression, ln_theta: Expression) -> Expression:
-        """Traction at a velocity in units of the direct effect, a p."""
-        # The exponential may be beyond the doubles where the product is not: a contact of a year at rest.
+        """Drive at a velocity: the traction in units of the direct effect, a p."""
+        # asinh_exp, since the exponential may overflow while the product does not: a contact of a year at rest.
         return asinh_exp(v / (2 * self.v_0), self._strength(ln_theta))
 
     def velocity(self, drive: Expression, ln_theta: Expression) -> Expression:
@@ -214,10 +214,10 @@ class RateAndStateAging(RateAndState):
     .. math:: t_t = a\,p\,\operatorname{arsinh}\left[\frac{v}{2 v_0}
               \exp\frac{\mu_0 + b \ln(v_0\theta/L)}{a}\right], \quad \dot\theta = 1 - \frac{|v|\,\theta}{L}
 
-    For :math:`v > 0` this is :math:`\mu_0 + a\ln(v/v_0) + b\ln(v_0\theta/L)` times p. Velocity-weakening where b > a:
-    steady sliding is then unstable below the stiffness :math:`(b - a)\,p / L`.
-    Source: Dieterich (1979), doi 10.1029/JB084iB05p02161; Ruina (1983), doi 10.1029/JB088iB12p10359; regularised as in
-    Rice & Ben-Zion (1996), doi 10.1073/pnas.93.9.3811. Any v; p >= 0. Dissipates :math:`t_t v \ge 0`.
+    For :math:`v > 0` this is :math:`\mu_0 + a\ln(v/v_0) + b\ln(v_0\theta/L)` times p. Velocity-weakening if b > a:
+    steady sliding is then unstable below the stiffness :math:`(b - a)\,p / L`. Source: Dieterich (1979), doi
+    10.1029/JB084iB05p02161; Ruina (1983), doi 10.1029/JB088iB12p10359; regularised as in Rice & Ben-Zion (1996), doi
+    10.1073/pnas.93.9.3811. Any v; p >= 0. Dissipates :math:`t_t v \ge 0`.
 
     >>> law = RateAndStateAging(mu_0=0.6, a=0.01, b=0.015, L=1e-5, v_0=1e-6)
     >>> round(law.traction(p=1e6, v=1e-6, ln_theta=2.302585092994046), 3)
@@ -247,7 +247,7 @@ class RateAndStateSlip(RateAndState):
     def evolution(self, v: Expression, ln_theta: Expression) -> Mapping[str, Expression]:
         """Rate of the logarithm of the age [1/s]."""
         speed = absolute(v)
-        # Of a velocity of zero the logarithm would be infinite, and the product with it zero.
+        # At zero velocity the logarithm would be infinite, and its product with the velocity zero.
         moving = where(speed > LEAST_VELOCITY, speed, LEAST_VELOCITY + 0 * speed)
         return {"ln_theta": -speed / self.L * (log(moving / self.L) + ln_theta)}
 
@@ -258,9 +258,8 @@ class AnisotropicCoulomb(UnderPressure, Friction):
     .. math:: (t_t, t_2) = p\,\frac{(\mu_1 v,\ \mu_2 v_2)}{\sqrt{v^2 + v_2^2}}
 
     It sticks within :math:`(t_t/\mu_1)^2 + (t_2/\mu_2)^2 \le p^2`. The traction is not along the slip unless the
-    coefficients are equal, when this is `coulomb` in the plane.
-    Source: Sauer, Duong & Mandadapu (2021), eq. e:dry_fric with a tensor of coefficients. Any velocities; p >= 0.
-    Dissipates :math:`t_t v + t_2 v_2 \ge 0`.
+    coefficients are equal, which gives `coulomb` in the plane. Source: Sauer, Duong & Mandadapu (2021), eq. e:dry_fric
+    with a tensor of coefficients. Any velocities; p >= 0. Dissipates :math:`t_t v + t_2 v_2 \ge 0`.
 
     >>> law = AnisotropicCoulomb(mu_1=0.3, mu_2=0.6)
     >>> law.traction(p=1e5, direction=0.6), law.transverse(p=1e5, direction_2=0.8)

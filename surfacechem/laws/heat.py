@@ -39,8 +39,8 @@ class Radiation(HeatTransfer):
               q = \frac{\sigma (T_1^4 - T_2^4)}{1/\varepsilon_1 + 1/\varepsilon_2 - 1}
 
     :math:`T_1` and :math:`\varepsilon_1` belong to the first end of the path, :math:`T_2` and :math:`\varepsilon_2` to
-    the second. Surroundings that are large against the surface have an emissivity of one. A gap must be wide against
-    the thermal wavelength, about 10 um at 300 K: near-field transfer across narrower ones is stronger.
+    the second. Surroundings much larger than the surface have an emissivity of one. A gap must be much wider than the
+    thermal wavelength, about 10 um at 300 K: near-field transfer across narrower gaps is stronger.
     Source: Stefan-Boltzmann law; Sauer, Duong & Mandadapu (2021), section on heat transfer.
 
     >>> law = Radiation(between=("lower", "upper"), epsilon_1=0.8, epsilon_2=0.6)
@@ -60,15 +60,15 @@ class Radiation(HeatTransfer):
 
 
 class GapConductance(HeatTransfer):
-    r"""Conductance of a gap: contact spots that let go exponentially, gas and radiation that take over.
+    r"""Conductance of a gap: contact spots whose part decays exponentially, gas and radiation that take over.
 
     .. math:: h = h_{rad} + h_{gas} + (h_0 - h_{rad} - h_{gas})\,e^{-C_{trans} g_n}, \quad
               h_{gas} = \frac{k_{gas}}{g_n + g_0}, \quad
               h_{rad} = \frac{\sigma (T_1^2 + T_2^2)(T_1 + T_2)}{1/\varepsilon_1 + 1/\varepsilon_2 - 1}
 
-    In contact (:math:`g_n \le 0`) it is :math:`h_0`; what the pressure adds is a path of its own. It falls as the gap
-    opens only while :math:`h_{gas}(0) + h_{rad} \le h_0`; a scene where it rises at first is warned of. Its three
-    parts are fluxes of their own: spots, gas, radiation. Any parameter may vary with other variables by factors.
+    In contact (:math:`g_n \le 0`) it is :math:`h_0`; a contribution of the pressure is a separate path. It falls as the
+    gap opens only while :math:`h_{gas}(0) + h_{rad} \le h_0`; a scene in which it rises at first gives a warning. Its
+    three parts, spots, gas and radiation, are separate fluxes. Any parameter may vary with other variables by factors.
     Source: Sauer, Duong & Mandadapu (2021), section on heat transfer, after Laschet, Jakumeit & Benke (2004).
 
     >>> law = GapConductance(between=("lower", "upper"), h_0=2e4, C_trans=2e6, k_gas=0.026, g_0=3.7e-7,
@@ -86,7 +86,7 @@ class GapConductance(HeatTransfer):
 
     @property
     def peaks(self) -> Mapping[str, float]:
-        """Touch, beyond which the contact spots let go within a short distance."""
+        """Touch, beyond which the conductance of the contact spots decays within a short distance."""
         return {"g_n": 0.0}
 
     def channels(self) -> Mapping[str, Callable[..., Expression]]:
@@ -94,12 +94,12 @@ class GapConductance(HeatTransfer):
         return {"spots": self.spots, "gas": self.gas, "radiation": self.radiation}
 
     def _contact_fraction(self, g_n: Expression) -> Expression:
-        """Part of the contact that still holds."""
+        """Fraction of the contact spots that remains."""
         return exp(-self.C_trans * positive(g_n))
 
     def spots(self, g_n: Expression) -> Expression:
         """Conductance of the contact spots [W/(m^2 K)]."""
-        # The three add up to the formula of the whole, so that each is a flux of its own.
+        # The three sum to the total formula, so that each is a flux.
         return self.h_0 * self._contact_fraction(g_n)
 
     def gas(self, g_n: Expression) -> Expression:
@@ -123,10 +123,10 @@ class GasGap(HeatTransfer):
               M = \left(\frac{2 - \alpha_1}{\alpha_1} + \frac{2 - \alpha_2}{\alpha_2}\right)
               \frac{2 \gamma}{\gamma + 1} \frac{\Lambda}{\mathrm{Pr}}
 
-    :math:`\Lambda` is the mean free path; M of air at 300 K and 1 atm is 0.22 um at best.
-    In contact the gas keeps the mean thickness Y of the voids. With a medium that is named in the case use
-    rarefied-film, which finds M by itself. Source: Yovanovich, DeVaal & Hegazy (1982), AIAA paper 82-0888. From
-    continuum to free molecules within a few per cent where the jumps are small against the temperatures.
+    :math:`\Lambda` is the mean free path; M of air at 300 K and 1 atm is 0.22 um at best. In contact the gas keeps the
+    mean thickness Y of the voids. For a medium that the case names use rarefied-film, which computes M.
+    Source: Yovanovich, DeVaal & Hegazy (1982), AIAA paper 82-0888. From continuum to free molecular flow within a few
+    per cent, for jumps much smaller than the temperatures.
 
     >>> law = GasGap(between=("lower", "upper"), k=0.026, M=3.7e-7)
     >>> round(law.conductance(g_n=1e-6), 6)
@@ -143,7 +143,7 @@ class GasGap(HeatTransfer):
 
     @property
     def positive(self) -> tuple[str, ...]:  # type: ignore[override]
-        """The gap, where neither roughness nor temperature jumps bound its conductance as it closes."""
+        """The gap, if neither roughness nor temperature jumps bound the conductance as it closes."""
         return () if self.M or self.Y else ("g_n",)
 
     def conductance(self, g_n: Expression) -> Expression:
@@ -154,7 +154,7 @@ class GasGap(HeatTransfer):
 class ConductanceTable(HeatTransfer):
     """Conductances measured at points of one variable; subclasses have the points as a field, and state the law.
 
-    Points are joined by cubics that keep their order: no overshoot, continuous slope; never below zero.
+    Points are joined by monotone cubics: no overshoot, continuous slope, never below zero.
 
     Source: Fritsch & Butland (1984), doi 10.1137/0905021.
     """
@@ -162,7 +162,7 @@ class ConductanceTable(HeatTransfer):
     over: ClassVar[str]
     """The variable."""
     points: ClassVar[str]
-    """The field that holds its points."""
+    """The field with its points."""
 
     conductances: Sequence[float] = option("conductances at the points [W/(m^2 K)]")
     extrapolation: Literal["hold", "linear", "refuse"] = option("beyond the ends of the table", default="hold")
@@ -189,12 +189,12 @@ class ConductanceTable(HeatTransfer):
 
     @property
     def ranges(self) -> Mapping[str, tuple[float, float]]:
-        """From the first point of the table to the last."""
+        """From the first to the last point of the table."""
         return {self.over: (self._at[0], self._at[-1])}
 
     @property
     def peaks(self) -> Mapping[str, Sequence[float]]:
-        """The points of the table, between which all may change."""
+        """The points of the table, between which the value may change arbitrarily."""
         return {self.over: tuple(self._at)}
 
     @property
@@ -203,7 +203,7 @@ class ConductanceTable(HeatTransfer):
         return self.ranges if self.extrapolation == "refuse" else {}
 
     def _interpolated(self, x: Expression) -> Expression:
-        """The conductance [W/(m^2 K)] at a value of the variable; beyond the ends constant, or by the end slopes."""
+        """Return the conductance [W/(m^2 K)] at x; beyond the ends it is constant or continues with the end slope."""
         from scipy.interpolate import PchipInterpolator
 
         at, values, linear = self._at, self.conductances, self.extrapolation == "linear"
@@ -223,8 +223,8 @@ class GapTable(ConductanceTable):
 
     .. math:: h = h(g_n), \quad h(g_j) = h_j
 
-    Beyond its ends the table is held, continued by its end slopes (never below zero), or refused: then the run stops.
-    Source: interpolation of Fritsch & Butland (1984), doi 10.1137/0905021; the values are the user's.
+    Beyond its ends the table is constant, continued with its end slopes (never below zero), or refused: then the run
+    stops. Source: interpolation of Fritsch & Butland (1984), doi 10.1137/0905021; the values are the user's.
 
     >>> law = GapTable(between=("lower", "upper"), gaps=[0, 1e-6, 1e-5], conductances=[2e4, 1.9e4, 2.5e3])
     >>> [law.conductance(g_n=g) for g in (0.0, 1e-6, 1.0)]

@@ -88,7 +88,7 @@ class Relaxation(RateLaw):
 
     def rate(self, mu: Expression, dmu_dphi: Expression, n_c: Expression) -> Expression:
         """Net rate [1/(m^2 s)]."""
-        # A time that falls with temperature is an exponential, whose inverse may have a large exponent.
+        # product, since a time that falls with temperature is an exponential, whose inverse may have a large exponent
         return -n_c * product(1 / self.tau) * mu / dmu_dphi
 
 
@@ -140,7 +140,7 @@ class MassAction(RateLaw):
 
 
 class Bimolecular(RateLaw):
-    r"""Two surfaces with different densities of partners, each of which finds any partner.
+    r"""Two surfaces with different densities of partners; any partner can bond to any other.
 
     .. math:: R = k_f (n_1 - n_c \phi)(n_2 - n_c \phi) - k_r n_c \phi
 
@@ -191,14 +191,14 @@ class KamalSourour(RateLaw):
         return n_c * (k_1 + self.catalysed(phi, T_c)) * power(1 - phi, self.n)
 
     def catalysed(self, phi: Expression, T_c: Expression, shift: Expression = 0) -> Expression:
-        r"""Autocatalytic cure in a mechanism, ``type: Kamal-Sourour``: what is formed speeds up its own formation.
+        r"""Autocatalytic cure in a mechanism, ``type: Kamal-Sourour``: the product accelerates its own formation.
 
         .. math:: R = n^\circ \left( A\,T^b e^{-E_a / R_g T} + A_2 e^{-E_2 / R_g T} \theta_p^{\,m} \right)
                   \theta_r^{\,n}
 
-        One species r turns into one species p. Admissible where it is reversible or mu <= 0.
-        Source: Kamal & Sourour (1973), Polym. Eng. Sci. 13, 59, doi 10.1002/pen.760130110.
+        One species r turns into one species p. Admissible if it is reversible or mu <= 0. Source: Kamal & Sourour
+        (1973), Polym. Eng. Sci. 13, 59, doi 10.1002/pen.760130110.
         """
-        # The part due to what has formed, times exp(shift). As a power it is nothing where nothing has formed: what
-        # waits for its own product does not begin by itself.
+        # The autocatalytic part, times exp(shift). The power is zero without product: a reaction that needs its product
+        # cannot start on its own.
         return scaled_exp(self.A_2, shift - self.E_2 / (GAS_CONSTANT * T_c)) * power(phi, self.m)

@@ -79,7 +79,7 @@ class Table(Load):
     .. math:: x(t) = x_j + s_j (t - t_j) \quad \text{for } t_j \le t < t_{j+1}
 
     A time given twice is a jump, which variables that store energy (gaps, bonds, temperatures of bodies) may not have.
-    Source: definition. The run stops at every point, so no pulse is stepped over.
+    Source: definition. A step ends at every point, so that no pulse is stepped over.
 
     >>> table = Table(times=[0.0, 1.0], values=[0.0, 2.0])
     >>> table.bind(table.piece(0.5)).value(t=0.5)
@@ -116,8 +116,8 @@ class Table(Load):
         return tuple(t for (t, x), (s, y) in pairwise(points) if t == s and x != y)
 
     def piece(self, start: float) -> Mapping[str, float]:
-        """Origin, level and slope of the line that holds from ``start`` on."""
-        # Of a time given twice the later value holds from there on.
+        """Origin, level and slope of the segment that begins at ``start``."""
+        # At a jump the later value holds.
         j = bisect_right(self.times, start) - 1
         if j < 0 or j + 1 >= len(self.times):
             edge = max(j, 0)
@@ -126,9 +126,9 @@ class Table(Load):
         return {"origin": self.times[j], "level": self.values[j], "slope": slope}
 
     def value(self, t: Expression) -> Expression:
-        """Value at time t on the bound piece."""
+        """Value at time t on the bound segment."""
         return self.level + self.slope * (t - self.origin)
 
     def __getattr__(self, name: str) -> Expression:
-        """Local fields exist once the law is bound to a piece."""
+        """Refuse local fields before the law is bound to a segment."""
         raise AttributeError(f"table is not bound to a piece: {name}")

@@ -1,10 +1,10 @@
 r"""Long-range interaction of surfaces that do not touch: Lennard-Jones type, van der Waals, electrostatic.
 
-Between flats the energy is per current area. Between a sphere and a plane it is divided by a reference area, the one
-that all other quantities of the scene are per: the tension is the attractive force over that area. Sites and charges
-stay with the surfaces, so that both thin out as these stretch; radii stay. The force of a sphere of
-sites on its surface is exact, :math:`F = -2\pi R\,[W(g_n) - W(g_n + 2R)]` with the energy W(g_n) between flats.
-Derjaguin's approximation drops the second term.
+Between flats the energy is per current area. Between a sphere and a plane it is divided by the reference area of all
+other quantities of the scene: the tension is the attractive force over that area. Sites and charges stay with the
+surfaces, so that their densities fall as these stretch; radii stay. The force on a sphere with sites on its surface is
+exact, :math:`F = -2\pi R\,[W(g_n) - W(g_n + 2R)]` with the energy W(g_n) between flats. Derjaguin's approximation drops
+the second term.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from surfacechem.contracts.terms import Potential, parameter
 from surfacechem.expressions import Expression, is_symbolic, log, where
 
 REPULSION_WALL = 0.01
-"""Gap over g_0 below which a Lennard-Jones repulsion, then 1e16 times the adhesion energy, goes on as its parabola."""
+"""Gap over g_0 below which a Lennard-Jones repulsion, then 1e16 times the adhesion energy, continues as a parabola."""
 
 CONTACT_DISTANCE = 1.65e-10
 """Distance [m] of surfaces in contact that gives measured surface energies (Israelachvili 2011, ch. 13)."""
 
 
 class LennardJones(Potential):
-    """Sites on two surfaces that attract and, nearer, repel each other; subclasses sum up all pairs.
+    """Sites on two surfaces that attract and, at short distance, repel each other; subclasses sum over all pairs.
 
     The sites stay with the surfaces: their densities are those on the reference area.
     """
@@ -76,8 +76,8 @@ class LennardJonesFlatFlat(LennardJones):
     The sum of :math:`\psi_{12} = \psi_0 [\frac1{45} (g_0/r)^{10} - \frac13 (g_0/r)^4]` over all pairs. No traction at
     :math:`g_0 15^{-1/6}`, where the adhesion energy is :math:`\frac{15^{1/3}}8 A g_0^2`; strength
     :math:`\frac{2\sqrt5}9 A g_0` at :math:`g_0 5^{-1/6}`. Source: Sauer, Duong & Mandadapu (2021), eqs. e:psi12ex and
-    e:bt_sr. g_n > 0; below :math:`0.01\,g_0` the energy goes on as its parabola. Per current area, of densities on the
-    reference area.
+    e:bt_sr. g_n > 0; below :math:`0.01\,g_0` the energy continues as a parabola. Per current area, with densities on
+    the reference area.
 
     >>> flats = LennardJonesFlatFlat(n_1=2e19, n_2=3e19, psi_0=4e-21, g_0=3e-10)
     >>> round(flats.energy(g_n=3e-9), 12)
@@ -101,7 +101,7 @@ class LennardJonesSpherePlane(LennardJones):
 
     W is the energy between flats. The double sum over all pairs, for any ratio of radius and gap. Source: integral of
     Sauer, Duong & Mandadapu (2021), eq. e:psi12ex, over sphere and plane. g_n > 0; below :math:`0.01\,g_0` the energy
-    goes on as its parabola.
+    continues as a parabola.
 
     >>> tip = LennardJonesSpherePlane(n_1=2e19, n_2=3e19, psi_0=4e-21, g_0=3e-10, R=5e-8, area=1e-16)
     >>> f"{tip.energy(g_n=3e-9):.9g}"
@@ -141,7 +141,7 @@ class LennardJonesDerjaguin(LennardJonesSpherePlane):
 
 
 class Attraction(Potential):
-    """A potential that bears no contact, however near the surfaces are."""
+    """A potential without repulsion, at any distance."""
 
     @abstractmethod
     def energy(self, g_n: Expression) -> Expression:
@@ -158,8 +158,7 @@ class VanDerWaalsFlatFlat(Attraction):
     .. math:: \Psi = -\frac{A_H}{12 \pi (g_n + D_0)^2}, \quad t_n = \frac{A_H}{6 \pi (g_n + D_0)^3}
 
     The gap counts from contact, where the outermost atoms are :math:`D_0` apart: there the energy is the work of
-    adhesion :math:`A_H / 12 \pi D_0^2`. Below contact the traction stays what it is at contact; a law of contact has to
-    bear it.
+    adhesion :math:`A_H / 12 \pi D_0^2`. Below contact the traction is constant; a law of contact has to bear it.
 
     Source: Hamaker (1937), doi 10.1016/S0031-8914(37)80203-7; cut-off of Israelachvili, Intermolecular and Surface
     Forces (2011), ch. 13. Not retarded: gaps below about 10 nm. Per current area.
@@ -176,7 +175,7 @@ class VanDerWaalsFlatFlat(Attraction):
     def energy(self, g_n: Expression) -> Expression:
         """Free energy [J/m^2]."""
         distance = _nonnegative_gap(g_n) + self.D_0
-        # A constant traction below contact: the energy goes on along its tangent.
+        # Below contact the traction is constant: the energy continues along its tangent.
         contact = (2 * g_n / self.D_0 - 1) / self.D_0**2
         return self.A_H / (12 * math.pi) * where(g_n > 0, -1 / distance**2, contact)
 
@@ -189,7 +188,7 @@ class VanDerWaalsSpherePlane(Attraction):
         t_n = \frac{2 A_H R^3}{3 a h^2 (h + 2R)^2}, \quad h = g_n + D_0
 
     For a large sphere :math:`a\,t_n = A_H R / 6 h^2`. The gap counts from contact, where the outermost atoms are
-    :math:`D_0` apart. Below contact the traction stays what it is at contact; a law of contact has to bear it.
+    :math:`D_0` apart. Below contact the traction is constant; a law of contact has to bear it.
 
     Source: Hamaker (1937), doi 10.1016/S0031-8914(37)80203-7. Not retarded: gaps below about 10 nm.
 
@@ -218,9 +217,9 @@ class ElectrostaticFlatFlat(Attraction):
 
     .. math:: \Psi = -\frac{s_1 s_2}{2 \varepsilon} g_n, \quad t_n = -\frac{s_1 s_2}{2 \varepsilon}
 
-    Charges of one sign repel. The traction does not fall with the gap as long as that is small against the flats.
-    Source: Coulomb's law summed over two planes (Jackson, Classical Electrodynamics, 1999, ch. 1); Sauer, Duong &
-    Mandadapu (2021), remark 5.9. Fixed charges; any g_n. Per current area, of charge densities on the reference area.
+    Charges of equal sign repel. The traction is independent of the gap as long as the gap is much smaller than the
+    flats. Source: Coulomb's law summed over two planes (Jackson, Classical Electrodynamics, 1999, ch. 1); Sauer, Duong
+    & Mandadapu (2021), remark 5.9. Fixed charges; any g_n. Per current area, of charge densities on the reference area.
 
     >>> round(ElectrostaticFlatFlat(s_1=1e-4, s_2=-2e-4).energy(g_n=1e-6), 8)
     0.00112941
@@ -261,19 +260,20 @@ class ElectrostaticSpherePlane(Attraction):
 
 
 def _nonnegative_gap(g_n: Expression) -> Expression:
-    """The gap, of floats at least zero, since both branches of a conditional formula are evaluated for them."""
+    """Return the gap, for floats at least zero, since for them both branches of a conditional formula are evaluated."""
     return g_n if is_symbolic(g_n) else max(g_n, 0.0)
 
 
 def _repelling(x: Expression, *terms: tuple[int, int]) -> Expression:
-    """Sum of x^-n / d, continued by its parabola below REPULSION_WALL, where nothing comes but trial states of a
-    solver.
+    """Return the sum of x^-n / d, continued by its parabola below REPULSION_WALL.
+
+    Only trial states of a solver get there.
     """
     level, slope, curvature = (
         sum(math.prod(-n - i for i in range(order)) * REPULSION_WALL ** (-n - order) / d for d, n in terms)
         for order in range(3)
     )
-    # Of floats both branches are evaluated, and the powers of a small gap overflow.
+    # For floats both branches are evaluated, and the powers of a small gap would overflow.
     inside, beyond = x if is_symbolic(x) else max(x, REPULSION_WALL), x - REPULSION_WALL
     powers = sum(inside**-n / d for d, n in terms)
     return where(x > REPULSION_WALL, powers, level + beyond * (slope + beyond * curvature / 2))

@@ -14,7 +14,7 @@ class Vogel(Property):
 
     .. math:: \eta = a\,e^{b / (T_c - c)}
 
-    Three measured viscosities fix a, b and c. Source: Vogel (1921), Physikalische Zeitschrift 22, 645.
+    Three measured viscosities determine a, b and c. Source: Vogel (1921), Physikalische Zeitschrift 22, 645.
     :math:`T_c > c`; a run that reaches c stops.
 
     >>> round(Vogel(a=6e-5, b=900.0, c=165.0).value(T_c=313.15), 9)
