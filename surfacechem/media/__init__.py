@@ -1,1 +1,1 @@
-"""Substances between the bodies, with properties from other packages."""
+"""Media between the bodies, with properties from other packages."""

@@ -1,4 +1,4 @@
-"""Fluids of CoolProp, by any name it knows: pure and pseudo-pure fluids, mixtures, incompressible liquids.
+"""Fluids of CoolProp, by their names there: pure and pseudo-pure fluids, mixtures, incompressible liquids.
 
 CoolProp: Bell, Wronski, Quoilin & Lemort (2014), doi 10.1021/ie4033999.
 """
@@ -26,7 +26,7 @@ from surfacechem.errors import InputError
 Array = NDArray[np.float64]
 
 SATURATION_DISTANCE = 1e-5
-"""Relative distance from saturation at which properties end."""
+"""Relative distance from saturation at which the range of properties ends."""
 
 CRITICAL_DISTANCE = 0.1
 """Relative distance from the critical pressure within which properties may have no fit."""
@@ -65,13 +65,13 @@ class CoolPropFluid(Fluid):
     pressure: float
 
     def range(self, T: float) -> FluidRange:
-        """Temperatures around T [K] at which the fluid stays what it is; InputError where it has no properties."""
+        """Return the range of temperatures around T [K] in one phase; InputError if there are no properties at T."""
         low, high, boils, condenses = _limits(self)
         if not low <= T <= high:
             span = f"CoolProp's range is {low:g} to {high:g} K"
             raise InputError(f"{self.title} has no properties at {T:g} K: {span}.")
         end = f"{self.title} has no known properties"
-        # Saturation ends the range on the side on which it lies.
+        # A saturation temperature above T is the upper end, one below T the lower end.
         if boils is not None and boils > T:
             return FluidRange(low, boils * (1 - SATURATION_DISTANCE), end, f"{self.title} boils")
         if condenses is not None and condenses < T:
@@ -91,12 +91,12 @@ class CoolPropFluid(Fluid):
         return f"{self.name} at {self.pressure:g} Pa"
 
     def fit(self, quantity: str, low: float, high: float, target: float = fits.FIT_ACCURACY) -> tuple[fits.Piece, ...]:
-        """A property between two temperatures [K] to a relative accuracy; InputError where CoolProp has none."""
+        """Fit a property between two temperatures [K] to a relative accuracy; InputError if CoolProp has none."""
         return _fit(self, quantity, low, high, target)
 
     @property
     def remark(self) -> str:
-        """Remark on the cost of a mixture that neither boils nor condenses at its pressure: no phase is known."""
+        """Remark on the cost of a mixture without saturation at its pressure, so that its phase is unknown."""
         if len(self.name.split("&")) == 1 or any(_limits(self)[2:]):
             return ""
         return (
@@ -105,7 +105,7 @@ class CoolPropFluid(Fluid):
         )
 
     def critical_remark(self) -> str:
-        """Advice where the critical pressure is so near that properties are not smooth; empty where it is not."""
+        """Return advice if the critical pressure is so close that properties are not smooth; else empty."""
         critical = self._constant("Pcrit")
         if critical is None or abs(self.pressure / critical - 1) > CRITICAL_DISTANCE:
             return ""
@@ -115,7 +115,7 @@ class CoolPropFluid(Fluid):
         )
 
     def values(self, quantity: str, T: Array) -> Array:
-        """A property at temperatures [K] as CoolProp has it."""
+        """Return CoolProp's values of a property at temperatures [K]."""
         return PROPERTIES[quantity](lambda letter: self._properties(letter, T), T)
 
     def _properties(self, letter: str, T: Array) -> Array:
@@ -125,7 +125,7 @@ class CoolPropFluid(Fluid):
         except ValueError:
             found = np.full(T.shape, np.inf)
         for bad in T[~np.isfinite(found)]:
-            try:  # CoolProp says why there is none only of a single value
+            try:  # CoolProp gives the reason for a single value only
                 value = call(letter, given, float(bad), "P", self.pressure, self.name)
                 reason = f"no finite value at {bad:g} K, but {value}."
             except ValueError as error:
@@ -134,8 +134,9 @@ class CoolPropFluid(Fluid):
         return found
 
     def _given(self, T: Array) -> str:
-        """CoolProp's key of temperatures: of a mixture, which boils and condenses at two of them, with the phase, for
-        which it searches a hundred times longer than for a property.
+        """Return CoolProp's key of temperatures, with the phase for a mixture, which has two saturation temperatures.
+
+        CoolProp's search for the phase would take a hundred times longer than a property.
         """
         boils, condenses = _limits(self)[2:]
         if boils == condenses:
@@ -145,9 +146,9 @@ class CoolPropFluid(Fluid):
         return "T|liquid" if boils is not None and T.max() <= boils else "T"
 
     def limits(self) -> list[float | None]:
-        """Least and largest temperature [K] of the properties, those of boiling and of condensing if it does."""
+        """Return the limits of the properties and the temperatures of boiling and condensing, if any [K]."""
         low, high, boils, condenses = self._least(), self._call("Tmax"), self._saturation(0), self._saturation(1)
-        # Of mixtures near their critical point CoolProp finds but one of them.
+        # Of a mixture near its critical point CoolProp finds only one of them.
         if boils is not None and condenses is None:
             condenses = self._end("gas", high, boils)
         elif condenses is not None and boils is None:
@@ -155,25 +156,25 @@ class CoolPropFluid(Fluid):
         return [low, high, boils, condenses]
 
     def _least(self) -> float:
-        """Least temperature at which it has properties: where it freezes, or CoolProp's own."""
+        """Return the least temperature with properties: the freezing point, or CoolProp's minimum."""
         coolprop, low, freezes = _coolprop(), self._call("Tmin"), self._constant("T_freeze") or 0.0
-        with suppress(ValueError):  # of mixtures, of what has no such line, and beside its ends
+        with suppress(ValueError):  # mixtures, substances without a melting line, and pressures beyond its ends
             melting = coolprop.AbstractState("?", self.name).melting_line
             freezes = float(melting(coolprop.iT, coolprop.iP, self.pressure))
         if freezes * (1 + SATURATION_DISTANCE) > low:
             return freezes * (1 + SATURATION_DISTANCE)
-        # The lowest of the temperatures is that of a liquid, too, which vapour of a lower pressure does not reach.
+        # CoolProp's minimum may belong to the liquid, which a vapour below the triple pressure does not reach.
         return low * (1 + SATURATION_DISTANCE) if self.pressure < (self._constant("p_triple") or 0.0) else low
 
     def _constant(self, letters: str) -> float | None:
-        """A constant of the fluid from CoolProp; None where it is not known."""
+        """Return a constant of the fluid from CoolProp; None if it is unknown."""
         try:
             return float(_coolprop().PropsSI(letters, self.name))
         except ValueError:
             return None
 
     def _end(self, phase: str, inside: float, outside: float) -> float | None:
-        """Temperature [K] at which a phase ends, by bisection from one inside it; None where that is another phase."""
+        """Return the temperature [K] at which a phase ends, by bisection; None if ``inside`` is in another phase."""
         state = partial(_coolprop().PhaseSI, "T")
         if state(inside, "P", self.pressure, self.name) != phase:
             return None
@@ -194,7 +195,7 @@ class CoolPropFluid(Fluid):
             raise InputError(f"CoolProp knows no fluid '{self.name}'. {hint}") from None
 
     def _saturation(self, quality: int) -> float | None:
-        """Temperature at which it boils (0) or condenses (1); None where it does neither."""
+        """Return the temperature at which it boils (0) or condenses (1); None if it does not."""
         try:
             return float(_coolprop().PropsSI("T", "P", self.pressure, "Q", quality, self.name))
         except ValueError:
@@ -232,5 +233,5 @@ def _coolprop() -> Any:
 
 
 def _reason(error: ValueError) -> str:
-    """CoolProp's error message, without the call that it repeats."""
+    """Return CoolProp's error message without the call that it repeats."""
     return re.sub(r"\s*:? *PropsSI\(.*", "", str(error), flags=re.DOTALL).strip().rstrip(".") + "."
