@@ -1,8 +1,8 @@
-"""Reactions that are not lowered, and the phases beside a surface: Cantera gives their rates while a scene runs.
+"""Reactions that are not lowered, and phases next to a surface: Cantera evaluates their rates during a run.
 
-The heat of such a reaction follows from the potential like that of any other, since the thermo of surface species is
-lowered. Neighbours, gases and solids, are held at a composition and at the temperature of the interface: what reactions
-take from them, or give to them, leaves them as they are, and brings its enthalpy and its entropy with it.
+The heat of such a reaction follows from the potential as for any other, since the thermo of surface species is lowered.
+Neighbours, gases and solids, have a prescribed composition and the temperature of the interface: reactions take
+molecules, enthalpy and entropy from them without a change of their state.
 """
 
 from __future__ import annotations
@@ -31,35 +31,36 @@ from surfacechem.tolerances import TINY
 Array = NDArray[np.float64]
 
 ASKING = threading.Lock()
-"""Held while Cantera is asked: a surface has one state, which engines and threads share."""
+"""Lock around calls of Cantera: a surface has one state, which engines and threads share."""
 
 GASES = frozenset(("ideal-gas", "Redlich-Kwong", "Peng-Robinson", "plasma"))
-"""Cantera's models of phases whose pressure matters."""
+"""Cantera's phase models that depend on pressure."""
 
 ELEMENTARY_CHARGE = float(ELECTRON_VOLT)
-"""Elementary charge [C]: what an electron volt is in joules."""
+"""Elementary charge [C]: an electron volt in joules."""
 
 FARADAY = ELEMENTARY_CHARGE * MOLECULAR
 """Charge of a kmol of elementary charges [C/kmol]."""
 
 SUM_TOLERANCE = 1e-6
-"""Tolerance of the sum of mole fractions, which is one."""
+"""Tolerance of the sum of mole fractions, which has to be one."""
 
 
 @dataclass(frozen=True)
 class Neighbour:
-    """The state in which a phase beside the surface is held: histories, a constant being one."""
+    """Prescribed state of a phase next to the surface, as histories; constants are histories too."""
 
     pressure: Load | None = None
-    """Pressure [Pa]; None where it is not given."""
+    """Pressure [Pa]; None if it is not given."""
     composition: Mapping[str, Load] = field(default_factory=dict)
     """Mole fractions."""
     rest: str = ""
-    """The species whose mole fraction is one less those of the others; none where these sum to one."""
+    """The species whose mole fraction is one minus the sum of the others; empty if the given ones sum to one."""
     electric_potential: Load | None = None
-    """Electric potential against the surface [V]; None where it is zero."""
+    """Electric potential relative to the surface [V]; None if it is zero."""
     capacitance: float | None = None
-    """Capacitance [F/m^2], if any: the potential then follows from charge, and is a number at the start."""
+    """Capacitance [F/m^2], if any: the potential then follows from the charge, and the value given is the initial
+    one."""
     current: Load | None = None
     """Electric current into the phase from outside [A/m^2]."""
     place: Place | None = None
@@ -71,8 +72,9 @@ class Neighbour:
 
 
 def hold(surface: Any, given: Mapping[str, Neighbour] | None, place: Place | None) -> tuple[str, ...]:
-    """Bring the neighbours of a surface to the states in which they start, and say what they lack; InputError where a
-    state is missing, unknown or odd. None leaves them as they are.
+    """Set the neighbours of a surface to their initial states, and return remarks on species that they lack.
+
+    InputError if a state is missing, unknown or invalid. None leaves the neighbours unchanged.
     """
     if given is None:
         return ()
@@ -88,7 +90,7 @@ def hold(surface: Any, given: Mapping[str, Neighbour] | None, place: Place | Non
 
 
 def _problem(phase: Any, state: Neighbour) -> str:
-    """Error in the state of a phase, in words; empty where it can be held so."""
+    """Return the error of the state of a phase, in words; empty if the state is valid."""
     name, known, given = phase.name, phase.species_names, [*state.composition, *([state.rest] if state.rest else [])]
     pressureless = phase.thermo_model in GASES and state.pressure is None
     if pressureless or (len(known) > 1 and not given):
@@ -107,7 +109,7 @@ def _problem(phase: Any, state: Neighbour) -> str:
 
 
 def _misheld(name: str, state: Neighbour) -> str:
-    """Error in the charge data of a phase, in words; empty where there is none."""
+    """Return the error of the charge data of a phase, in words; empty if there is none."""
     if state.capacitance is None:
         need = f"the current into the neighbour {name} needs a `capacitance`, else its potential is given."
         return "" if state.current is None else need
@@ -121,7 +123,7 @@ def _misheld(name: str, state: Neighbour) -> str:
 
 
 def uneven(name: str, parts: Mapping[str, float], rest: bool) -> str:
-    """Error in the mole fractions of a phase, all or all but a ``rest``, in words; empty where there is none."""
+    """Return the error of mole fractions, all or all but a ``rest``, in words; empty if there is none."""
     for species, part in parts.items():
         if not 0 <= part <= 1:
             return f"the mole fraction {species} = {part:g} in the neighbour {name} is outside its range: 0 to 1."
@@ -131,8 +133,9 @@ def uneven(name: str, parts: Mapping[str, float], rest: bool) -> str:
 
 
 class HeldPhase:
-    """A phase beside the surface, and its ``states`` in the order in which :meth:`put` takes them: histories, or the
-    potential of an ``electrode``.
+    """A phase next to the surface, with the ``states`` that :meth:`put` sets, in order.
+
+    They are histories, and the potential of an ``electrode``.
     """
 
     def __init__(self, phase: Any, state: Neighbour) -> None:
@@ -156,24 +159,24 @@ class HeldPhase:
         self.states = (*((p,) if self._pressed else ()), *((V,) if self._charged else ()), *x)
         self._fractions = [*names.values()]
         self.enthalpies = np.zeros(phase.n_species)
-        """Partial molar enthalpies of its species where it was put last [J/kmol]."""
+        """Partial molar enthalpies of the species in the state set last [J/kmol]."""
         self._parts: Sequence[float] = [math.nan]
         self._all = np.zeros(phase.n_species)
 
     @property
     def taken_over(self) -> list[tuple[Quantity, Load]]:
-        """Those of its pressure and composition, which a reactor may give."""
+        """Histories of pressure and composition, which a reactor may replace."""
         return [item for item in self.histories if item[1] is not self.given.electric_potential]
 
     @property
     def at_start(self) -> list[float]:
-        """Its states at the start."""
+        """Values of the states at the start."""
         starts = {quantity: load.at_start() for quantity, load in self.histories}
         return [starts.get(quantity, self.given.potential_at_start) for quantity in self.states]
 
     def put(self, T: float, values: Sequence[float]) -> None:
-        """Go to a temperature [K] and to values of the histories."""
-        # Beyond the end of a falling pressure rates stay finite, or no step could reach that end.
+        """Set a temperature [K] and values of the states."""
+        # Beyond the zero of a falling pressure rates stay finite; otherwise no step could reach that zero.
         pressure = max(values[0], TINY) if self._pressed else self.pressure
         if self._charged:
             self.phase.electric_potential = values[self._pressed]
@@ -188,7 +191,7 @@ class HeldPhase:
         self.phase.TPX = T, pressure, self._all
 
     def limits(self, values: Mapping[str, Expression]) -> Iterator[tuple[str, Expression, str]]:
-        """Margins on the histories (by name): a name, an expression to stay positive, and the reason if it fails."""
+        """Yield margins of the histories: a name, an expression that must stay positive, and the reason if it fails."""
         name, parts = self.phase.name, [values[q.name] for q, _ in self.histories if q.name in self._fractions]
         if self._pressed:
             yield f"pressure of {name} > 0", values[f"p_{word(name)}"], f"the pressure of {name} reached zero"
@@ -202,12 +205,12 @@ class HeldPhase:
             yield f"sum in {name} = 1", SUM_TOLERANCE - absolute(symengine.Add(*parts) - 1), text
 
     def charged(self, names: Iterable[str]) -> dict[str, float]:
-        """Charge [C] of a molecule of each of these species that is its own and has any."""
+        """Return the charge [C] per molecule of each charged species of this phase among ``names``."""
         charges = dict(zip(self.phase.species_names, self.phase.charges.tolist(), strict=True))
         return {name: ELEMENTARY_CHARGE * charges[name] for name in names if charges.get(name)}
 
     def energies(self, both: Array) -> None:
-        """Set partial molar enthalpies and Gibbs energies of its species [J/kmol], with those of their charges."""
+        """Set partial molar enthalpies and Gibbs energies of the species [J/kmol], including their electric energy."""
         both[0] = self.enthalpies = self.phase.partial_molar_enthalpies
         both[1] = self.phase.chemical_potentials
         if self._charged:
@@ -215,13 +218,13 @@ class HeldPhase:
 
 
 def indices(surface: Any, phase: Any) -> range:
-    """Indices of the species of a phase among those of the kinetics, some of which may have the same name."""
+    """Return the indices of a phase's species in the kinetics, where names may occur more than once."""
     first = surface.kinetics_species_index(0, surface.phase_index(phase.name))
     return range(first, first + phase.n_species)
 
 
 def missing_species(surface: Any) -> tuple[str, ...]:
-    """Species that a neighbour does not hold, though reactions give them to it."""
+    """Return a remark on species that are absent in a neighbour although reactions produce them there."""
     back = np.array([reaction.reversible for reaction in surface.reactions()], dtype=bool)
     made = surface.product_stoich_coeffs.sum(axis=1) + surface.reactant_stoich_coeffs[:, back].sum(axis=1)
     there = (
@@ -239,7 +242,7 @@ def missing_species(surface: Any) -> tuple[str, ...]:
 
 
 class EvaluatedReaction(MechanismReaction):
-    """A reaction whose net rate is a number that comes from outside at every call."""
+    """A reaction whose net rate is a number, evaluated outside at every call."""
 
     value: float = parameter("1/(m^2 s)", "net rate, evaluated by Cantera", varies=False)
     whole: Mapping[str, float] = option("products less reactants, those in neighbours included")
@@ -252,7 +255,7 @@ class EvaluatedReaction(MechanismReaction):
 
     @property
     def one_way(self) -> bool:
-        """Whether the reaction runs one way only."""
+        """True if the reaction is irreversible."""
         return not self.reversible
 
     def turnover(self) -> Mapping[str, int | float]:
@@ -261,7 +264,7 @@ class EvaluatedReaction(MechanismReaction):
 
 
 class NeighbourReaction(EvaluatedReaction):
-    """A reaction that takes something from phases beside the surface, or gives something to them."""
+    """A reaction that takes molecules from, or gives them to, phases next to the surface."""
 
     enthalpy: float = parameter("J", "enthalpy taken from neighbours, evaluated by Cantera", varies=False)
     gibbs: float = parameter("J", "Gibbs energy taken from neighbours, evaluated by Cantera", varies=False)
@@ -269,7 +272,7 @@ class NeighbourReaction(EvaluatedReaction):
 
     @property
     def made(self) -> Mapping[str, float]:
-        """Molecules that one reaction makes in neighbours, by species."""
+        """Molecules that one reaction produces in neighbours, by species."""
         return self.beside
 
     @property
@@ -279,13 +282,13 @@ class NeighbourReaction(EvaluatedReaction):
 
 
 def amounts_taken(surface: Any, phases: Sequence[Any]) -> Any:
-    """Amount of each species of these phases, one after another, that each reaction takes: a row for a reaction."""
+    """Return the amount of each species of these phases that each reaction takes, shape (reactions, species)."""
     rows = [index for phase in phases for index in indices(surface, phase)]
     return np.asarray(surface.reactant_stoich_coeffs - surface.product_stoich_coeffs)[rows].T
 
 
 class SurfaceEngine:
-    """A Cantera surface as the source of the net rates of some of its reactions, and of what they take from neighbours.
+    """A Cantera surface that evaluates the net rates of some of its reactions, and what they take from neighbours.
 
     ``reactions`` are the laws of all its reactions, in its order.
     """
@@ -302,7 +305,7 @@ class SurfaceEngine:
         open_ones = [i for i, law in enumerate(reactions) if isinstance(law, NeighbourReaction)]
         energies = [f"{reactions[i].path}.{name}" for name in ("enthalpy", "gibbs") for i in open_ones]
         self.gives = (*(f"{reactions[i].path}.value" for i in self.positions), *energies)
-        # Rates may read a neighbour that no reaction takes from, by an order.
+        # Rates may depend on a neighbour by an order, without a reaction that takes from it.
         beside = surface.adjacent.items() if len(self.positions) else ()
         self.held = [HeldPhase(phase, neighbours.get(name, Neighbour())) for name, phase in beside]
         self.names = identifiers(dict.fromkeys(name for law in reactions for name in law.made), "")
@@ -313,10 +316,10 @@ class SurfaceEngine:
         self._energies = np.empty(0)
         self._lay_out()
         self._brought: list[tuple[object, ...]] = [()]
-        """Engine, temperature, amount and states to which the surface was brought last, as several may share it."""
+        """Engine, temperature, amount and states set last on the surface, since several engines may share it."""
 
     def beside(self, neighbours: Mapping[str, Neighbour]) -> SurfaceEngine:
-        """A copy with other pressures and compositions of neighbours; InputError where no reaction has such a one."""
+        """Return a copy with other states of neighbours; InputError if no reaction has a neighbour of that name."""
         known = {held.phase.name: held for held in self.held}
         refuse_unknown(neighbours, known, f"no reaction of the surface {self.surface.name} has a neighbour '{{}}'")
         for name, state in neighbours.items():
@@ -329,7 +332,7 @@ class SurfaceEngine:
         return made
 
     def _lay_out(self) -> None:
-        """Allot the slices from which neighbours read their states, and arrays to which they write their energies."""
+        """Assign the slices from which neighbours read their states, and the arrays for their energies."""
         self._last: tuple[Sequence[float], Array] = (), np.empty(0)
         self._both, self._parts = np.empty((2, len(self._taken))), list[tuple[HeldPhase, slice, Array]]()
         first = species = 0
@@ -340,17 +343,17 @@ class SurfaceEngine:
 
     @property
     def temperatures(self) -> tuple[float, float]:
-        """Range in which the thermo of the surface and of its neighbours holds [K]."""
+        """Temperature range in which the thermo of the surface and of its neighbours is valid [K]."""
         phases = [self.surface, *(held.phase for held in self.held)]
         return max(float(phase.min_temp) for phase in phases), min(float(phase.max_temp) for phase in phases)
 
     @property
     def charges(self) -> dict[str, dict[str, float]]:
-        """Charge [C] of a molecule of each species that reactions make in neighbours and that has any, by phase."""
+        """Charge [C] per molecule of each charged species that reactions produce in neighbours, by phase."""
         return {word(held.phase.name): held.charged(self.made_in(held.phase)) for held in self.held}
 
     def made_in(self, phase: Any) -> dict[str, str]:
-        """Those ``names`` that mean species of this neighbour: of several by one name an equation means the first."""
+        """Return the ``names`` of species of this neighbour; an ambiguous name refers to the first such species."""
         meant = self.surface.kinetics_species_index
         there = zip(phase.species_names, indices(self.surface, phase), strict=True)
         return {name: self.names[name] for name, i in there if name in self.names and meant(name) == i}
@@ -371,28 +374,28 @@ class SurfaceEngine:
         return (*self._own, *(quantity.name for held in self.held for quantity in held.states))
 
     def limits(self, values: Mapping[str, Expression]) -> Iterator[tuple[str, Expression, str]]:
-        """Margins on the histories (by name): a name, an expression to stay positive, and the reason if it fails."""
+        """Yield margins of the histories: a name, an expression that must stay positive, and the reason if it fails."""
         for held in self.held:
             yield from held.limits(values)
 
     def __call__(self, values: Sequence[float]) -> Array:
-        """Net rates [1/(m^2 s)] at a temperature, the amount of the first species at full coverage, coverages, and the
-        state of the neighbours.
+        """Return net rates [1/(m^2 s)], then enthalpy and Gibbs energy [J] that each reaction takes from neighbours.
 
-        Then the enthalpy and the Gibbs energy [J] that each reaction with neighbours takes from them.
+        ``values`` are the temperature, the amount of the first species at full coverage, the coverages, and the states
+        of the neighbours.
         """
         with ASKING:
-            # The residual, its outputs and the ledger ask at the same state one after another.
+            # The residual, the outputs and the ledger are evaluated at the same state in turn.
             if values == self._last[0]:
                 return self._last[1]
             T, amount, end = values[0], values[1], 2 + self._count
             if T > 0 and amount > 0:
                 around = self, T, amount, values[end:]
                 if around != self._brought[0]:
-                    self._brought[0] = ()  # nowhere, should Cantera refuse on the way
+                    self._brought[0] = ()  # invalid until all is set, as Cantera may raise
                     self._bring(T, amount, values[end:])
                     self._brought[0] = around
-                # Coverages that a step tries need not sum to one; a mass below zero Cantera does not know.
+                # Trial coverages of a step need not sum to one; Cantera refuses negative mass.
                 try:
                     self.surface.set_unnormalized_coverages(values[2:end])
                 except RuntimeError:  # a CanteraError
@@ -405,9 +408,9 @@ class SurfaceEngine:
             return found
 
     def _bring(self, T: float, amount: float, states: Sequence[float]) -> None:
-        """Bring the surface and its neighbours to a temperature [K], an amount of sites, and states of neighbours."""
+        """Set temperature [K], amount of sites and states of neighbours."""
         self.surface.TP = T, None
-        # A stretched surface has fewer sites per area; their density can be set where the surface has a mass.
+        # A stretched surface has fewer sites per area; Cantera sets their density only for a surface with mass.
         self.surface.set_unnormalized_coverages(np.ones(self._count))
         self.surface.site_density = amount * self._sites / MOLECULAR
         for held, read, written in self._parts:

@@ -6,11 +6,11 @@ The enthalpy and entropy of species k change with the coverages of species j,
           + \theta_j^2 \int_{T_r}^T \left( 1 - \frac{T}{T'} \right) (a_{kj} \ln T' + b_{kj})\,dT' \right],
           \quad T_r = 298.15\,\mathrm{K}
 
-They belong to one potential only if it does not matter in which order coverages change,
-:math:`\partial g_k / \partial n_j = \partial g_j / \partial n_k`. What depends on a species' own coverage always does;
-what depends on another's does where it is linear and the other depends on this one as much, per site.
+They derive from one potential only if the order in which coverages change is irrelevant,
+:math:`\partial g_k / \partial n_j = \partial g_j / \partial n_k`. A dependence on the own coverage always does; one on
+another coverage does if it is linear and the other species has the same dependence on this one, per site.
 
-They are read from ``coverage-dependencies``.
+The entries are read from ``coverage-dependencies``.
 
 Source: Cantera's CoverageDependentSurfPhase; Maxwell's relation of a potential of several variables.
 """
@@ -29,14 +29,14 @@ from surfacechem.quantities import KILO
 from surfacechem.tolerances import EQUAL
 
 REFERENCE_T = 298.15
-"""Temperature [K] at which heat capacities begin to count."""
+"""Reference temperature [K] of heat capacities."""
 
 
 @dataclass(frozen=True)
 class PiecewisePolynomial:
-    """A continuous function of one coverage, zero where that is: polynomials from one knot to the next.
+    """A continuous piecewise polynomial of one coverage, zero at zero coverage.
 
-    ``pieces`` holds for each the coverage at which it begins and its coefficients of the powers of the coverage.
+    ``pieces`` holds for each piece the coverage at which it begins and its coefficients of the powers of the coverage.
 
     >>> PiecewisePolynomial.through([0.0, 0.5, 1.0], [0.0, 1.0, 3.0])(0.75)
     2.0
@@ -48,12 +48,12 @@ class PiecewisePolynomial:
 
     @classmethod
     def polynomial(cls, coefficients: Sequence[float]) -> PiecewisePolynomial:
-        """A polynomial from the coefficients of the first power and up."""
+        """Return a polynomial from the coefficients of the first power and up."""
         return cls(((0.0, (0.0, *coefficients)),) if any(coefficients) else ())
 
     @classmethod
     def through(cls, coverages: Sequence[float], values: Sequence[float]) -> PiecewisePolynomial:
-        """Straight lines through points."""
+        """Return the piecewise linear function through points."""
         lines = []
         for x, y, x_2, y_2 in zip(coverages, values, coverages[1:], values[1:], strict=False):
             slope = (y_2 - y) / (x_2 - x)
@@ -66,13 +66,13 @@ class PiecewisePolynomial:
         if not self.pieces:
             return 0.0
         slopes = [coefficients[1] for _, coefficients in self.pieces]
-        # Straight but for rounding of the numbers, which a file may give with nine digits.
+        # Straight up to rounding of the coefficients, which a file may give with nine digits.
         size = EQUAL * max(map(abs, slopes))
         straight = all(abs(c) <= size for _, coefficients in self.pieces for c in (coefficients[0], *coefficients[2:]))
         return slopes[0] if straight and max(slopes) - min(slopes) <= size else None
 
     def __call__(self, theta: Expression) -> Expression:
-        """Value at a coverage."""
+        """Return the value at a coverage."""
         rows = [(start, _power_sum(c, theta)) for start, c in self.pieces]
         value: Expression = rows[0][1] if rows else 0.0
         for start, row in rows[1:]:
@@ -81,7 +81,7 @@ class PiecewisePolynomial:
 
     @property
     def integral(self) -> PiecewisePolynomial:
-        """The curve of its integral from no coverage on."""
+        """The integral from zero coverage."""
         pieces: list[tuple[float, tuple[float, ...]]] = []
         for start, c in self.pieces:
             whole = (0.0, *(value / (power + 1) for power, value in enumerate(c)))
@@ -102,7 +102,7 @@ class Interaction:
     """Dependence of the enthalpy [J/mol] and entropy [J/(mol K)] of a species on one coverage."""
 
     on: str
-    """The species."""
+    """The species with the coverage."""
     variable: str
     """Name of its coverage."""
     enthalpy: PiecewisePolynomial = PiecewisePolynomial()
@@ -115,17 +115,17 @@ class Interaction:
         return self.enthalpy(theta) - T * self.entropy(theta) + self._capacity(T) * theta**2
 
     def integral(self, T: Expression, theta: Expression) -> Expression:
-        """Its integral over the coverage."""
+        """Return the integral of the Gibbs energy over the coverage."""
         return self.enthalpy.integral(theta) - T * self.entropy.integral(theta) + self._capacity(T) * theta**3 / 3
 
     @property
     def slopes(self) -> tuple[float, float] | None:
-        """Enthalpy and entropy per coverage where both are linear and no heat capacity goes with them."""
+        """Enthalpy and entropy per coverage if both are linear and there is no heat capacity; else None."""
         h, s = self.enthalpy.slope, self.entropy.slope
         return None if h is None or s is None or self.a or self.b else (h, s)
 
     def _capacity(self, T: Expression) -> Expression:
-        """Gibbs energy of the heat capacity a ln T + b, at a coverage of one."""
+        """Return the Gibbs energy of the heat capacity a ln T + b, at a coverage of one."""
         if not (self.a or self.b):
             return 0.0
 
@@ -154,17 +154,17 @@ MODEL_KEYS = {
 CAPACITY_KEYS = ("heat-capacity-a", "heat-capacity-b")
 
 COEFFICIENTS = 4
-"""Number of coefficients of a polynomial, as Cantera reads it."""
+"""Number of coefficients of a polynomial in Cantera."""
 
 PAIRED_KEYS = (
     *(("heat-capacity-a", "heat-capacity-b"), ("enthalpy-coverages", "enthalpies"), ("entropy-coverages", "entropies")),
     *(("enthalpy-low", "enthalpy-high", "enthalpy-change"), ("entropy-low", "entropy-high", "entropy-change")),
 )
-"""Keys that need each other."""
+"""Groups of keys of which each requires the others."""
 
 
 def interactions(source: Source, entry: Any, variables: Mapping[str, str]) -> tuple[Interaction, ...]:
-    """Dependences of a species' thermo on coverages, whose names ``variables`` gives by species."""
+    """Return the dependences of a species' thermo on coverages; ``variables`` has their names by species."""
     found = []
     for name, node in (entry.get(KEY) or {}).items():
         read = partial(_numbers, source, entry, node)
@@ -175,10 +175,10 @@ def interactions(source: Source, entry: Any, variables: Mapping[str, str]) -> tu
 
 
 def _numbers(source: Source, entry: Any, node: Any, key: str) -> list[float]:
-    """One value or several, in J, mol and K."""
+    """Return one or several values, in J, mol and K."""
     import cantera
 
-    # The keys tell energies from entropies: "enthalpies" and all that begin so.
+    # Keys of energies begin with "enthalp", those of entropies do not.
     value, unit = node[key], "J/kmol" if key.startswith("enthalp") else "J/kmol/K"
     declared: Any = {**source.defaults(entry), **(node.get("units") or {})}
     units = cantera.UnitSystem(declared)
@@ -189,7 +189,7 @@ def _numbers(source: Source, entry: Any, node: Any, key: str) -> list[float]:
 
 
 def _curve(node: Any, read: Callable[[str], list[float]], kind: str, many: str) -> PiecewisePolynomial:
-    """The enthalpy or the entropy over the coverage."""
+    """Return the enthalpy or the entropy as a function of the coverage."""
     for key in (kind, f"{kind}-coefficients"):
         if key in node:
             return PiecewisePolynomial.polynomial(read(key))

@@ -1,8 +1,8 @@
-"""Valid keys of a mechanism file. Cantera ignores what it does not know; here it is an error with its line.
+"""Valid keys of a mechanism file: Cantera ignores unknown keys; here they are errors with their line.
 
-The keys of entries stand in :mod:`surfacechem.mechanism.source`. Below are those inside them, what Cantera knows and
-the compiled path does not, with the way out, and entries whose bare number Cantera would misread. :class:`PhaseCheck`
-holds a file against them.
+The keys of entries are in :mod:`surfacechem.mechanism.source`. This module has the keys inside them, the keys that
+Cantera supports and the compiled path does not, with advice, and the entries whose bare number Cantera would misread.
+:class:`PhaseCheck` checks a file against them.
 """
 
 from __future__ import annotations
@@ -39,15 +39,15 @@ THERMO = {"constant-cp": CONSTANT_CP, "NASA7": POLYNOMIAL, "NASA9": POLYNOMIAL, 
 BOND = {"stiffness": "N/m", "rest-length": "m"}
 """Keys of the elasticity of a bond with their units."""
 WRITTEN_SPECIES, WRITTEN_STATE = {"size", "charge"}, ("X", "Y")
-"""Keys that Cantera writes beside those that it documents; the state of a file is not used."""
+"""Undocumented keys that Cantera writes; the state of a file is not used."""
 NEIGHBOUR_KEYS = {"adjacent-phases", "skip-undeclared-elements", "Motz-Wise"}
 """Keys of a phase with neighbours; all elements of its species have to be declared in any case."""
 UNIT_DIMENSIONS = _words("length mass time quantity current temperature pressure energy activation-energy")
-"""Dimensions for which a file may say what a bare number means."""
+"""Dimensions for which a file may define the unit of bare numbers."""
 
 ARRHENIUS = ("A", "b", "Ea")
 MASEL = ("A", "b", "Ea0", "w")
-"""Keys of a rate coefficient by Blowers and Masel, which Cantera evaluates."""
+"""Keys of a Blowers-Masel rate coefficient, which Cantera evaluates."""
 STICKING: Mapping[str, tuple[str, ...]] = {
     "sticking-coefficient": ARRHENIUS,
     "Motz-Wise": (),
@@ -56,12 +56,12 @@ STICKING: Mapping[str, tuple[str, ...]] = {
 }
 """Keys of sticking reactions, with the keys inside."""
 CHARGED: Mapping[str, tuple[str, ...]] = {"beta": (), "exchange-current-density-formulation": ()}
-"""Keys of reactions that carry charge from one phase to another."""
+"""Keys of reactions that transfer charge between phases."""
 
 LEAVE = "With `solver: cantera` under `run` Cantera evaluates it."
 """Advice for reactions that are not lowered."""
 NEEDS = f"the compiled path knows surface species only. {LEAVE[:-1]}, with the neighbours held as the case says."
-"""Advice for entries that need phases beside the surface."""
+"""Advice for entries that require neighbouring phases."""
 STICKING_ADVICE = f"a sticking reaction needs a gas: {NEEDS}"
 CHARGES = f"charge transfer needs a neighbour at an electric potential: {NEEDS}"
 THIRD_BODY_ADVICE = "third bodies belong to gases; remove it."
@@ -93,7 +93,7 @@ GAS_TYPES = _words("three-body falloff chemically-activated pressure-dependent-A
 
 AMOUNT = ("quantity",)
 ENERGIES = ("Ea", "Ea0", "w", "E")
-"""Energies of rates."""
+"""Energies in rates."""
 BARE_UNITS = {
     "site-density": (AMOUNT, "kmol/m^2", "1e-9 mol/m^2"),
     "A": (AMOUNT, "powers of m^2/kmol", "1e8 m^2/mol/s"),
@@ -102,40 +102,40 @@ BARE_UNITS = {
     "s0": (AMOUNT, "J/(kmol K)", "50 J/mol/K"),
     "cp0": (AMOUNT, "J/(kmol K)", "30 J/mol/K"),
 }
-"""Entries whose bare number Cantera counts per kmol: what in `units` says otherwise, the unit, and an example."""
+"""Entries whose bare number Cantera counts per kmol: the key of `units` that changes this, the unit, and an example."""
 TEMPERATURE_KEYS = ("T", "T0", "T-min", "T-max")
-"""Temperatures; Cantera reads degrees Celsius as kelvin without a word."""
+"""Temperatures; Cantera reads degrees Celsius as kelvin without an error."""
 POSITIVE = ("site-density", "sites")
-"""Numbers above zero."""
+"""Numbers that must be positive."""
 
 
 def has_neighbours(phase: Any) -> bool:
-    """Whether a surface phase has others beside it."""
+    """True if a surface phase has neighbours."""
     return bool(phase.get("adjacent-phases"))
 
 
 def _needs_neighbour(kind: str) -> str:
-    """Reason why a rate type needs a neighbour, with advice; empty where it needs none."""
+    """Return the reason why a rate type needs a neighbour, with advice; empty if it needs none."""
     plain = kind.removeprefix("interface-")
     return next((text for start, text in NEIGHBOURLY.items() if plain.startswith(start)), "")
 
 
 def _is_masel(kind: str) -> bool:
-    """Whether a rate type has the coefficient of Blowers and Masel."""
+    """True if a rate type has a Blowers-Masel coefficient."""
     return kind.endswith("Blowers-Masel")
 
 
 def _is_foreign(entry: Any) -> bool:
-    """Whether a reaction is of a type that is not known here, but may be one of another extension."""
+    """True if a reaction has an unknown type, which may belong to another extension."""
     kind = str(entry.get("type", "Arrhenius"))
     known = kind_of(kind) or _is_masel(kind) or _needs_neighbour(kind)
     return "equation" in entry and not known
 
 
 def is_evaluated(entry: Any, names: Iterable[str], beside: bool) -> bool:
-    """Whether only Cantera can evaluate a reaction's rate; ``beside`` tells whether the surface has neighbours.
+    """True if only Cantera can evaluate a reaction's rate.
 
-    ``names`` are the species of the surface.
+    ``names`` are the species of the surface, ``beside`` is true if the surface has neighbours.
     """
     if "equation" not in entry:
         return False
@@ -146,7 +146,7 @@ def is_evaluated(entry: Any, names: Iterable[str], beside: bool) -> bool:
 
 
 def chosen(declared: Any, available: Iterable[str]) -> list[str]:
-    """Names of the species that a phase declares, those of a whole section included."""
+    """Return the names of the species that a phase declares, including those of whole sections."""
     listed = [] if isinstance(declared, str) else declared
     plain = [str(item) for item in listed if not isinstance(item, Mapping)]
     named = [names for item in listed if isinstance(item, Mapping) for names in item.values()]
@@ -157,8 +157,8 @@ def chosen(declared: Any, available: Iterable[str]) -> list[str]:
 class PhaseCheck:
     """Check of a phase of a mechanism against its valid keys and values.
 
-    :meth:`run` raises InputError at the first entry that means nothing, means something else, or cannot be lowered.
-    With ``evaluate`` reactions of other types are left to Cantera.
+    :meth:`run` raises InputError at the first entry that has no meaning, has another meaning in Cantera, or cannot be
+    lowered. With ``evaluate`` reactions of other types are left to Cantera.
     """
 
     def __init__(self, source: Source, phase: Any, evaluate: bool = False) -> None:
@@ -170,9 +170,9 @@ class PhaseCheck:
         """The species of the phase."""
 
     def run(self) -> None:
-        """Check all that the phase uses."""
+        """Check everything that the phase uses."""
         source, phase = self.source, self.phase
-        # Sections that another phase of the file uses are known, though not looked into.
+        # Sections of other phases of the file are known keys, but are not checked.
         self._keys(source.data, {*FILE, *source.sections}, "the file")
         self._units(source.data)
         self._phase()
@@ -211,7 +211,7 @@ class PhaseCheck:
             self._neighbours(phase, ())
 
     def _neighbours(self, phase: Any, before: tuple[str, ...]) -> None:
-        """Refuse a phase that is its own neighbour, or that of a neighbour: Cantera would recurse without end."""
+        """Refuse a phase that is its own neighbour, or its neighbour's neighbour: Cantera would recurse without end."""
         phases = {str(entry.get("name")): entry for entry in self.source.phases}
         path = (*before, str(phase.get("name")))
         declared = phase.get("adjacent-phases") or ()
@@ -225,7 +225,7 @@ class PhaseCheck:
                 self._neighbours(phases[name], path)
 
     def _all_species(self, entries: list[Any]) -> None:
-        """Every species; those of neighbours are Cantera's affair, but one without a name may be a misspelt one."""
+        """Check every species; neighbours' species are left to Cantera, unless they lack a name, perhaps by a typo."""
         there = [str(entry.get("name")) for entry in entries]
         self.names = chosen(self.phase.get("species", "all"), there)
         own = [entry for entry in entries if entry.get("name") in self.names]
@@ -239,7 +239,7 @@ class PhaseCheck:
             self._dependence(entry)
 
     def _composition(self, entries: list[Any]) -> None:
-        """Check that elements are those that the phase declares, else those that exist."""
+        """Check that elements are declared by the phase, else that they exist."""
         import cantera
 
         declared = [str(element.get("symbol")) for element in self.source.data.get("elements") or []]
@@ -247,7 +247,7 @@ class PhaseCheck:
         for entry in entries:
             composition = entry.get("composition") or {}
             title = f"species {entry.get('name')}: composition: no element"
-            # The nearest of all elements that there are is no hint.
+            # The nearest of all existing elements would be a poor suggestion.
             self._among(composition, elements, title, hint="elements" in self.phase)
 
     def _species(self, entry: Any) -> None:
@@ -272,7 +272,7 @@ class PhaseCheck:
                 raise source.error(message, bond, key)
 
     def _dependence(self, entry: Any) -> None:
-        """Check that thermo that depends on coverages means what Cantera reads."""
+        """Check that coverage-dependent thermo is given in the form that Cantera reads."""
         dependences, error = entry.get(KEY), self.source.error
         title = f"species {entry.get('name')}: {KEY}"
         if dependences is None:
@@ -287,7 +287,7 @@ class PhaseCheck:
             self._curve(entry, node, f"{title}: {name}")
 
     def _curve(self, entry: Any, node: Any, title: str) -> None:
-        """Check a dependence of thermo on one coverage: keys of its model, those that need each other, their units."""
+        """Check a dependence of thermo on one coverage: keys of its model, required pairs of keys, units."""
         error, model = self.source.error, str(node.get("model"))
         refuse_unknown([model], MODEL_KEYS, f"{title}: no model '{{}}'", self.source.place(node, "model"))
         self._keys(node, ("model", "units", *MODEL_KEYS[model], *CAPACITY_KEYS), title)
@@ -317,7 +317,7 @@ class PhaseCheck:
         self._units(entry)
         if "equation" not in entry:
             raise error("a reaction has no `equation`.", entry)
-        # First whether any type has the keys, then whether this one has: the guess is among all.
+        # First whether any type has the keys, then whether this one does, so that suggestions come from all.
         law = self._rate_type(entry, title)
         for key in entry:
             if key not in {*REACTION, *own[law.kind]}:
@@ -342,16 +342,17 @@ class PhaseCheck:
         self._coefficients(entry, title)
 
     def _coefficients(self, entry: Any, title: str) -> None:
-        """The numbers of a rate coefficient, and of a sticking coefficient, are not bare."""
+        """Check that the numbers of a rate coefficient, and of a sticking coefficient, have units."""
         orders = {**sides(str(entry["equation"]))[0], **(entry.get("orders") or {})}
-        # Of first order A is a frequency, in 1/s whatever the units; it may be a current, or a chance to stick.
+        # At first order A is in 1/s in any units; with an exchange current it is a current, and sticking coefficients
+        # are pure.
         plain = sum(map(leading, orders.values())) == 1 or bool(entry.get("exchange-current-density-formulation"))
         for key, pure in (("rate-constant", plain), ("sticking-coefficient", True)):
             if isinstance(rate := entry.get(key), Mapping):
                 self._numbers(rate, MASEL[2:] + ARRHENIUS[2 if pure else 0 :], title, entry)
 
     def _rate_type(self, entry: Any, title: str) -> type[InterfaceArrhenius]:
-        """The rate type, which Cantera writes with or without its prefix; a plain rate needs none."""
+        """Return the rate type, which Cantera writes with or without its prefix; Arrhenius needs no type."""
         kind = str(entry.get("type", "Arrhenius"))
         law = kind_of(kind)
         if reason := _needs_neighbour(kind):
@@ -363,14 +364,14 @@ class PhaseCheck:
         raise self.source.error(f"{title}: rate type '{kind}'{problem}", entry, "type")
 
     def _evaluated(self, entry: Any) -> None:
-        """Refuse what Cantera would ignore in a reaction that it evaluates, but for keys of other extensions."""
+        """Refuse entries that Cantera would ignore in a reaction that it evaluates, except keys of other extensions."""
         title = f"reaction {entry['equation']}"
         law = kind_of(str(entry.get("type", "Arrhenius")))
         if law is not None and not law.native:
             kind = entry["type"]
             message = f"{title}: a rate of type '{kind}' belongs to surface species; this one has a neighbour's."
             raise self.source.error(message, entry, "type")
-        # Another extension has keys of its own.
+        # Another extension has unknown keys.
         if not _is_foreign(entry):
             inner: dict[str, tuple[str, ...]] = {**InterfaceArrhenius.keys, **STICKING, **CHARGED}
             if _is_masel(str(entry.get("type"))):
@@ -381,8 +382,9 @@ class PhaseCheck:
         self._equation(entry, [] if self.beside else self.names, title)
 
     def _equation(self, entry: Any, known: list[str], title: str) -> list[str]:
-        """The species that the reaction may name: none are ``known`` where it is left out, because the phase takes only
-        those of its own species.
+        """Check an equation and return the species that the reaction may name.
+
+        None are ``known`` if the reaction is left out, because the phase takes only reactions of its species.
         """
         reactants, products, _ = sides(str(entry["equation"]))
         named = (*reactants, *products)
@@ -403,7 +405,7 @@ class PhaseCheck:
         return known
 
     def _inside(self, entry: Any, inner: Mapping[str, Iterable[str]], known: list[str], title: str) -> None:
-        """The keys inside those of a rate, which are coefficients, and dependences on coverages by species."""
+        """Check the keys inside the entries of a rate: coefficients, and dependences on coverages by species."""
         for key, allowed in inner.items():
             node = entry.get(key)
             if not isinstance(node, Mapping):
@@ -416,7 +418,7 @@ class PhaseCheck:
                     if isinstance(terms, Mapping):
                         self._keys(terms, allowed, f"{title}: {KEY}: {name}")
                         self._numbers(terms, ("E",), title, entry)
-                    elif isinstance(terms, list):  # Cantera's other way to write them
+                    elif isinstance(terms, list):  # Cantera's short form
                         self._numbers(dict(zip(allowed, terms, strict=False)), ("E",), title, entry, (node, name))
 
     def _keys(self, node: Any, known: Iterable[str], title: str, place: Place | None = None) -> None:
@@ -430,14 +432,14 @@ class PhaseCheck:
         self._among(node, allowed, f"{title}: unknown key")
 
     def _among(self, node: Any, known: Collection[str], problem: str, hint: bool = True) -> None:
-        """Check that every key of what may be a mapping is known; a ``hint`` is the nearest of those that are."""
+        """Check that every key of a node, if it is a mapping, is known; with ``hint`` suggest the nearest known key."""
         for name in node if isinstance(node, Mapping) else ():
             if name not in known:
                 guess = suggestion(str(name), known) if hint else ""
                 raise self.source.error(f"{problem} '{name}'.{guess}", node, name)
 
     def _units(self, node: Any) -> None:
-        """The `units` of an entry are dimensions and units that exist."""
+        """Check that the `units` of an entry are existing dimensions and units."""
         import cantera
 
         given, error = node.get("units"), self.source.error
@@ -455,9 +457,9 @@ class PhaseCheck:
     def _numbers(
         self, node: Any, keys: Iterable[str], title: str, entry: Any = None, at: tuple[Any, str] | None = None
     ) -> None:
-        """Numbers of a mapping, if they are there, are what Cantera takes them for: in kelvin, positive, not bare.
+        """Check that numbers of a mapping, if present, mean what Cantera reads: in kelvin, positive, with units.
 
-        Errors are ``at`` an entry of another one where the mapping is not in the file.
+        Errors are placed ``at`` another entry if the mapping is not in the file.
         """
         for key in filter(node.__contains__, keys):
             value, (wanted, unit, example), problem = node[key], BARE_UNITS.get(key, ((), "", "")), ""
@@ -477,7 +479,7 @@ class PhaseCheck:
                 raise self.source.error(f"{title}: {key}: {problem}", *(at or (node, key)))
 
     def _energy(self, value: Any, entry: Any) -> str:
-        """Defect of an energy of a rate, or of one of several, in words; texts that are none Cantera refuses itself."""
+        """Return the defect of an energy of a rate, or of one of several, in words; Cantera refuses invalid texts."""
         import cantera
 
         declared: Any = self.source.defaults(entry)

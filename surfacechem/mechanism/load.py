@@ -1,4 +1,4 @@
-"""Reading a mechanism: Cantera parses, converts units and balances; this lowers what it found to laws."""
+"""Loading of a mechanism: Cantera parses, converts units and balances equations; the result is lowered to laws."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from surfacechem.scene import BondingVariable, Engine, Sites
 from surfacechem.tolerances import NO_AMOUNT
 
 REACTIONS_PATH = "interface.mechanism.reactions"
-"""Path at which a case gives other numbers of reactions than the mechanism."""
+"""Path at which a case changes parameters of reactions."""
 
 
 @dataclass(frozen=True)
@@ -42,21 +42,21 @@ class Mechanism:
     bonds: tuple[str, ...]
     """Names of the coverages that count as bonds."""
     sites: Sites
-    """Density of possible bonds: the site density over the sites that a bond takes."""
+    """Density of possible bonds: the site density over the number of sites of a bond."""
     text: str
-    """The mechanism file."""
+    """Text of the mechanism file."""
     species: Mapping[str, str]
     """Name of the coverage of each species."""
     phase: str
     temperatures: tuple[float, float]
-    """Range in which the thermo of every species holds, those of neighbours included [K]."""
+    """Temperature range in which the thermo of every species is valid, including neighbours [K]."""
     engine: Engine | None = None
     """Engine that evaluates the rates that are not lowered, if any."""
     remarks: tuple[str, ...] = ()
-    """Remarks on what is odd in the file, though not wrong."""
+    """Remarks on unusual entries of the file."""
 
     def coverages(self, given: Mapping[str, float], place: Place | None = None) -> dict[str, float]:
-        """Initial values from coverages by species; those not given are zero, and all must sum to one."""
+        """Return initial values from coverages by species; others are zero, and all must sum to one."""
         refuse_unknown(given, self.species, "coverages: no species '{}'", place)
         total = sum(given.values())
         if abs(total - 1) > NO_AMOUNT:
@@ -74,20 +74,20 @@ def load_mechanism(
     name: str = "",
     text: str | None = None,
 ) -> Mechanism:
-    """Read one surface phase of a Cantera mechanism.
+    """Load one surface phase of a Cantera mechanism.
 
-    ``phase`` may be left out where the file has one surface; ``bonds`` names the species that count as bonds. ``place``
-    is where the case names the mechanism, for errors that are not in the mechanism file itself. With ``evaluate`` what
-    is not lowered is left to Cantera, which gives its rates while a scene runs; ``neighbours`` are the states in which
-    the phases beside the surface are held, None leaves them as the file has them. ``name`` is what errors call the file
-    if not by its path, ``text`` is what it holds where that is already at hand.
+    ``phase`` may be empty if the file has one surface; ``bonds`` names the species that count as bonds. ``place`` is
+    where the case names the mechanism, for errors that are not in the mechanism file. With ``evaluate`` reactions that
+    are not lowered are evaluated by Cantera during a run; ``neighbours`` are the prescribed states of the phases next
+    to the surface, None leaves them as in the file. ``name`` is the name of the file in errors if not its path,
+    ``text`` its content if it is available already.
     """
     if text is None:
         path = find(str(path), Path(), Place(document.OVERRIDE))
         text = document.read(path, name, MECHANISM_LIMITS)
     source = Source(name or str(path), text)
     entry = source.phase(phase, place)
-    # Before Cantera, which ignores what it does not know.
+    # First our check, since Cantera ignores unknown keys.
     PhaseCheck(source, entry, evaluate).run()
     surface, said = _cantera(source, entry)
     odd = hold(surface, neighbours, place)
@@ -97,7 +97,7 @@ def load_mechanism(
     refuse_unknown(bonds, by_name, "bonds: no species '{}' in the mechanism", place)
     chosen = [by_name[bond] for bond in dict.fromkeys(bonds)]
     density = surface.site_density * MOLECULAR
-    # A bond that takes two sites can form half as often, so that phi is the coverage of bonds in either case.
+    # Half as many bonds fit if each takes two sites, so that phi is the coverage of bonds in both cases.
     possible = density / min((item.sites for item in chosen), default=1.0)
     reactions = tuple(_reaction(source, f"R{i}", *one, species) for i, one in enumerate(kept, start=1))
     engine = SurfaceEngine(surface, species, reactions, neighbours or {})
@@ -121,7 +121,7 @@ def load_mechanism(
 
 
 def find(name: str, folder: Path, place: Place) -> Path:
-    """The mechanism file of that name in a folder, in this package, or where Cantera itself looks."""
+    """Return the path of a mechanism file in a folder, in this package, or in Cantera's data directories."""
     path = document.file_in(folder, name, place) or document.file_in(data.mechanisms(), name, place)
     if path is not None:
         return path
@@ -139,15 +139,15 @@ def find(name: str, folder: Path, place: Place) -> Path:
 
 
 def _cantera(source: Source, phase: Any) -> tuple[Any, tuple[str, ...]]:
-    """The phase as Cantera reads it, and what it warns of; its errors keep their line."""
+    """Return the phase as Cantera reads it, with its warnings; its errors keep their line."""
     import cantera
 
     try:
-        with warnings.catch_warnings(record=True) as caught:  # what it warns of becomes remarks of the mechanism
+        with warnings.catch_warnings(record=True) as caught:  # warnings become remarks of the mechanism
             warnings.simplefilter("always")
             surface = cantera.Interface(yaml=_plain_text(source, phase), name=str(phase["name"]))
     except cantera.CanteraError as error:
-        # Its message without its frame, at the line that it names, else at that of the phase.
+        # Cantera's message without its frame, at the line it names, else at that of the phase.
         found = re.search(r"[Ee]rror on lines? (\d+)", str(error))
         noise = re.compile(r"^(\*+|\^|)$|^[|>]|thrown by|[Ee]rror on lines?")
         lines = dict.fromkeys(line.strip() for line in str(error).splitlines())
@@ -159,7 +159,7 @@ def _cantera(source: Source, phase: Any) -> tuple[Any, tuple[str, ...]]:
 
 
 def _plain_text(source: Source, phase: Any) -> str:
-    """The file with our own rate types called Arrhenius, so that Cantera needs no extension to read the rest."""
+    """Return the text with our rate types renamed to Arrhenius, so that Cantera reads it without an extension."""
     text = source.text
     starts = list(accumulate((len(line) for line in text.splitlines(keepends=True)), initial=0))
     places = {}
@@ -168,7 +168,7 @@ def _plain_text(source: Source, phase: Any) -> str:
         if law is not None and not law.native:
             place = source.place(entry, "type")
             places[place.line, place.column] = entry
-    for (line, column), entry in sorted(places.items(), reverse=True):  # from the end, so that places stay
+    for (line, column), entry in sorted(places.items(), reverse=True):  # backwards, so that positions stay valid
         start, kind = starts[line - 1] + column, re.escape(str(entry["type"]))
         renamed, found = re.subn(rf"""\A(\S+\s*:\s*["']?){kind}""", r"\1interface-Arrhenius", text[start:], count=1)
         if not found:
@@ -191,9 +191,9 @@ def _species(surface: Any, source: Source, phase: Any, fixed: bool) -> tuple[Spe
             spring = BondSpring(**own)
         try:
             gibbs = lower(item.thermo)
-        except InputError as error:  # a number that Cantera's units take out of range
+        except InputError as error:  # out of range after Cantera's conversion of units
             raise source.error(f"{title}: thermo: {error.message}", entry, "thermo") from None
-        # Cantera's standard state is at that coverage, ours at full coverage: R T ln of it lies between.
+        # Cantera's standard state is at that coverage, ours at full coverage: they differ by R T times its logarithm.
         if "reference-state-coverage" in phase:
             gibbs = replace(gibbs, shift=-math.log(float(phase["reference-state-coverage"])))
         around = interactions(source, entry, names)
@@ -210,9 +210,9 @@ def _species(surface: Any, source: Source, phase: Any, fixed: bool) -> tuple[Spe
 
 
 def _kept(source: Source, phase: Any, surface: Any) -> list[tuple[Any, Any, bool]]:
-    """Every reaction as Cantera and as the file has it, and whether only Cantera can say how fast it is.
+    """Return every reaction as Cantera and as the file has it, and whether only Cantera can evaluate its rate.
 
-    With `reactions: declared-species` Cantera leaves out those of other species.
+    With `reactions: declared-species` Cantera omits reactions of other species.
     """
     known = dict.fromkeys(surface.kinetics_species_names)
     declared = {name.casefold(): name for name in known}
@@ -220,7 +220,7 @@ def _kept(source: Source, phase: Any, surface: Any) -> list[tuple[Any, Any, bool
     for entry in source.reactions(phase):
         reactants, products, _ = sides(str(entry["equation"]))
         others = [name for name in (*reactants, *products) if name not in known]
-        # Cantera takes a name in another case for the declared one; here two names would stand for one species.
+        # Cantera matches names regardless of case; here two names would stand for one species.
         for name in others:
             if name.casefold() in declared:
                 message = f"reaction {entry['equation']}: no species '{name}'. Write '{declared[name.casefold()]}'."
@@ -235,7 +235,7 @@ def _kept(source: Source, phase: Any, surface: Any) -> list[tuple[Any, Any, bool
 def _reaction(
     source: Source, label: str, reaction: Any, entry: Any, outside: bool, species: tuple[Species, ...]
 ) -> RateLaw:
-    """The law of a reaction: a formula, or a number that comes from Cantera."""
+    """Return the law of a reaction: a formula, or a number that Cantera evaluates."""
     title, place = f"reaction {reaction.equation}", source.place(entry, path=f"{REACTIONS_PATH}.{label}")
     names = dict.fromkeys((*reaction.reactants, *reaction.products))
     change = {name: reaction.products.get(name, 0.0) - reaction.reactants.get(name, 0.0) for name in names}
@@ -251,7 +251,7 @@ def _reaction(
     if not outside:
         return _lowered(reaction, source, entry, species, given)
     elastic = [item.name for item in species if item.name in whole and item.spring is not None]
-    # Cantera's thermo has no place for a gap.
+    # Cantera's thermo does not depend on a gap.
     if reaction.reversible and elastic:
         message = f"{title}: {elastic[0]} is elastic, which Cantera's equilibrium constant does not know. "
         raise InputError(f"{message}Write two one-way reactions.", place)
@@ -262,14 +262,14 @@ def _reaction(
 
 
 def _outside(whole: Mapping[str, float], own: Mapping[str, str]) -> dict[str, float]:
-    """Part of a change that belongs to no species of the surface."""
+    """Return the part of a change that belongs to other phases."""
     return {name: nu for name, nu in whole.items() if name not in own}
 
 
 def _lowered(
     reaction: Any, source: Source, entry: Any, species: tuple[Species, ...], given: Mapping[str, Any]
 ) -> RateLaw:
-    """The law of a reaction as a formula; ``given`` is what it has in common with those that are none."""
+    """Return the law of a reaction as a formula; ``given`` are the fields common to all reactions."""
     title, place = f"reaction {reaction.equation}", given["place"]
     variables = {item.name: item.variable for item in species}
     law = kind_of(str(entry.get("type", "Arrhenius")))
@@ -291,5 +291,5 @@ def _lowered(
             **given,
             **own,
         )
-    except InputError as error:  # a number of Cantera's that is out of range
+    except InputError as error:  # a number of the mechanism is out of range
         raise InputError(f"{title}: {error.message}", error.place or place) from None

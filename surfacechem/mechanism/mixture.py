@@ -1,4 +1,4 @@
-"""Ideal mixture of surface species: what they are, and the free energy from which all their thermodynamics follows."""
+"""Ideal mixture of surface species: their data, and the free energy from which their thermodynamics follows."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from surfacechem.tolerances import EQUAL
 
 
 class Formula:
-    """A formula whose arguments are only known once a mechanism is read."""
+    """A formula whose argument names are known only after a mechanism is read."""
 
     def __init__(self, names: Iterable[str], evaluate: Callable[[Mapping[str, Expression]], Expression]) -> None:
         self.evaluate = evaluate
@@ -31,7 +31,7 @@ class Formula:
 
 
 SPECIES_PATH = "interface.mechanism.species"
-"""Path at which a case gives other numbers of species than the mechanism."""
+"""Path at which a case changes parameters of species."""
 
 
 class BondSpring(Law):
@@ -54,9 +54,9 @@ class BondSpring(Law):
 
 @dataclass(frozen=True)
 class Species:
-    """A surface species: its name in the mechanism, its coverage's name here, its sites, thermo and elasticity.
+    """A surface species: names in the mechanism and of its coverage, sites, thermo and elasticity.
 
-    ``interactions`` say how its thermo depends on coverages.
+    ``interactions`` are the dependences of its thermo on coverages.
     """
 
     name: str
@@ -66,15 +66,15 @@ class Species:
     spring: BondSpring | None = None
     interactions: tuple[Interaction, ...] = ()
     fixed: bool = False
-    """Whether its numbers cannot change, because Cantera uses those of the file."""
+    """True if its parameters cannot change, because Cantera uses those of the file."""
 
     @property
     def path(self) -> str:
-        """Path at which a case gives its numbers."""
+        """Path at which a case changes its parameters."""
         return f"{SPECIES_PATH}.{self.name}"
 
     def bound(self, bind: Bind) -> Species:
-        """The species with symbols for the parameters of its thermo and its spring."""
+        """Return the species with symbols for the parameters of its thermo and its spring."""
         if self.fixed:
             return self
         end = self.variable.removeprefix("theta")
@@ -101,8 +101,8 @@ class IdealMixture(Potential):
               \frac{1}{N_k} \frac{\partial \Psi}{\partial \theta_k} = g_k(T) + w_k(g_n) + k_B T \ln \theta_k
 
     :math:`w_k = \tfrac12 k_b (g_n - l_0)^2` is the elastic energy of species that are springs across the gap,
-    :math:`N_k` is the amount of species k at full coverage, the site density over the sites that k takes. Where the
-    thermo of species depends on coverages the energy of their interactions is added, see
+    :math:`N_k` is the amount of species k at full coverage, the site density over the sites that k takes. If the
+    thermo of species depends on coverages, the energy of their interactions is added, see
     :mod:`surfacechem.mechanism.interaction`. Source: Kee, Coltrin, Glarborg & Zhu, Chemically Reacting Flow (2018),
     ch. 11; the chemical potentials, enthalpies, entropies and heat capacities of Cantera's ideal-surface and
     coverage-dependent-surface phases. 0 <= theta_k <= 1.
@@ -112,12 +112,12 @@ class IdealMixture(Potential):
     temperatures: tuple[float, float] = option("range of the species' thermodynamic data [K]")
 
     def with_parts(self, bind: Bind) -> Self:
-        """The mixture with symbols for the parameters of its species."""
+        """Return the mixture with symbols for the parameters of its species."""
         return self.bind({"species": tuple(item.bound(bind) for item in self.species)})
 
     @property
     def ranges(self) -> Mapping[str, tuple[float, float]]:
-        """The temperatures for which the thermodynamic data hold."""
+        """Temperature range of the thermodynamic data."""
         return {"T_c": self.temperatures}
 
     @property
@@ -135,7 +135,7 @@ class IdealMixture(Potential):
         for species in self.species:
             theta, amount = values[species.variable], values[species.amount]
             elastic = species.spring.energy(values["g_n"]) if species.spring else 0
-            # Mixing in proportion to T is a term of its own: it drops out of the internal energy as a whole.
+            # Mixing is proportional to T: as a separate term it cancels from the internal energy.
             total += amount * theta * (BOLTZMANN * species.gibbs(T) + elastic)
             total += amount * BOLTZMANN * T * (mixing(theta) - theta)
             for interaction in species.interactions:
@@ -149,10 +149,10 @@ class IdealMixture(Potential):
 
 
 def unpaired_dependence(species: Sequence[Species]) -> tuple[str, str] | None:
-    """The first species whose dependence on another belongs to no potential, and that other; None where all do."""
+    """Return the first species with a dependence on another that derives from no potential, and the other; or None."""
     by_name = {item.name: item for item in species}
     pairs = [(item, x, by_name[x.on]) for item in species for x in item.interactions if x.on != item.name]
-    # Maxwell: d g_k / d n_j = d g_j / d n_k, and n is a coverage over the sites that a species takes.
+    # Maxwell: d g_k / d n_j = d g_j / d n_k, where n is a coverage over the number of sites of the species.
     for item, interaction, other in pairs:
         back = next((x for x in other.interactions if x.on == item.name), Interaction(item.name, item.variable))
         ours, theirs = interaction.slopes, back.slopes
@@ -166,7 +166,7 @@ def unpaired_dependence(species: Sequence[Species]) -> tuple[str, str] | None:
 
 
 def word(name: str) -> str:
-    """A name of Cantera's as part of the name of a quantity.
+    """Return a Cantera name as part of the name of a quantity.
 
     >>> word("Li+[elyt]")
     'Li_elyt'
@@ -175,7 +175,7 @@ def word(name: str) -> str:
 
 
 def identifiers(names: Iterable[str], prefix: str = "theta_") -> dict[str, str]:
-    """A unique valid name of a coverage, or of something else, for each species.
+    """Return a unique valid name of the coverage (or other variable) of each species.
 
     >>> identifiers(["free(s)", "bond(s)", "free-s"])
     {'free(s)': 'theta_free_s', 'bond(s)': 'theta_bond_s', 'free-s': 'theta_free_s_2'}

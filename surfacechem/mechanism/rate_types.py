@@ -1,4 +1,4 @@
-"""The rate types that Cantera does not know: each is a law of a case, with an Arrhenius rate for its constant."""
+"""The rate types that Cantera does not have: each is a law of a case, with an Arrhenius coefficient as its constant."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ CANTERA_PREFIX = "interface-"
 
 
 class LawReaction(InterfaceArrhenius):
-    """A surface reaction by a law of a case, which has the Arrhenius coefficient for its constant.
+    """A surface reaction by a law of a case, with the Arrhenius coefficient as its constant.
 
-    Subclasses of subclasses are made by :func:`_made`, one for each rate type that a law lists.
+    The classes of rate types are made by :func:`_made`, one for each rate type of a law.
     """
 
     kind = ""
@@ -34,20 +34,20 @@ class LawReaction(InterfaceArrhenius):
 
     @classmethod
     def own_keys(cls) -> dict[str, str]:
-        """Keys of the reaction in a mechanism file: the parameters of the law, but for its rate constants."""
+        """Keys of the reaction in a mechanism file: the parameters of the law, except its rate constants."""
         return {name.replace("_", "-"): name for name in cls.parameters}
 
     @property
     def stated(self) -> Any:
-        """The law with the numbers of this reaction."""
+        """The law with the parameters of this reaction."""
         own: dict[str, Any] = {name: getattr(self, own) for own, name in self.parameters.items()}
         return self.law(**own | dict(self.rate_type.constants))
 
 
 class LoadedReaction(LawReaction):
-    """A reaction whose Arrhenius coefficient a load changes as it changes a coefficient of a law of bonds.
+    """A reaction whose Arrhenius coefficient has the load factor of a law of bonds.
 
-    What the law calls ``f`` is the force on the bond of this reaction.
+    The law's ``f`` is the force on the bond of this reaction.
     """
 
     @property
@@ -58,7 +58,7 @@ class LoadedReaction(LawReaction):
 
     @property
     def load(self) -> str:
-        """The force per bond: that of the elastic bond which reacts or forms, else the one shared or prescribed."""
+        """The force per bond: that of the elastic bond that reacts or forms, else the shared or prescribed one."""
         elastic = {item.variable for item in self.species if item.spring}
         return next((f"f_{name}" for name in (*self.orders, *self.products) if name in elastic), "f")
 
@@ -74,7 +74,7 @@ class LoadedReaction(LawReaction):
 
     @property
     def distance(self) -> Expression | None:
-        """Distance to the transition state, under a force that is not the bond's own."""
+        """Distance to the transition state, if the force is not that of an elastic bond."""
         known = self.rate_type.distance and self.load == "f"
         return vars(self.stated)[self.rate_type.distance] if known else None
 
@@ -84,38 +84,38 @@ class LoadedReaction(LawReaction):
         return (*super().own_reads(), *arguments)
 
     def exponent(self, values: Mapping[str, Expression]) -> Expression:
-        """Exponent of the rate coefficient with that of the load."""
+        """Exponent of the rate coefficient, including that of the load."""
         log_factor = self.log_factor
         arguments = {name: values[self.load if name == "f" else name] for name in reads(log_factor)}
         return super().exponent(values) + log_factor(**arguments)
 
 
 class AffinityReaction(LawReaction):
-    r"""A reaction whose net rate is a function of its affinity that vanishes with it, so that it runs both ways.
+    r"""A reaction whose net rate is a function of its affinity and vanishes with it: it is reversible.
 
-    The amount of its reactants at full coverage gives the coefficient the unit that it has in mass action.
+    The amounts of its reactants at full coverage give the coefficient the same unit as in mass action.
     """
 
     def __post_init__(self) -> None:
         """Check that the equation is reversible."""
         super().__post_init__()
-        # A net rate is one function; taken one way only it would run on against the affinity.
+        # The net rate is one function; its forward part alone would run against the affinity.
         if not self.reversible:
             raise InputError(f"reaction {self.equation}: a rate by affinity runs both ways; write `<=>`.", self.place)
 
     def net(self, forward: Expression, mu: Expression, T_c: Expression) -> Expression:
-        """Net rate at the forward rate of equal chemical potentials and their change mu [J]."""
+        """Return the net rate from the forward rate at zero affinity and the change of chemical potential mu [J]."""
         rate: Expression = self.stated.net(forward, mu, T_c)
         return rate
 
     @property
     def rate(self) -> Formula:  # type: ignore[override]
-        """Net rate [1/(m^2 s)]; the chemical potential change is that of the whole interface."""
+        """Net rate [1/(m^2 s)]; the change of chemical potential is that of the whole interface."""
         names = ("mu", *self._formula(self._forward).__signature__.parameters)
         return Formula(names, lambda values: self.net(self._forward(values), values["mu"], values["T_c"]))
 
     def _forward(self, values: Mapping[str, Expression], shift: Expression = 0) -> Expression:
-        # Amounts at full coverage: how much is there is in the affinity already.
+        # Amounts at full coverage: the coverages are in the affinity.
         product = self.coefficient(values, shift)
         for item in self.species:
             product *= values[item.concentration] ** plain(self.orders.get(item.variable, 0))
@@ -132,7 +132,7 @@ class AffinityReaction(LawReaction):
 
 
 class CureReaction(LawReaction):
-    """A reaction that its own product catalyses: one species turns into another."""
+    """A reaction catalysed by its product: one species turns into another."""
 
     def __post_init__(self) -> None:
         """Check that one species turns into another."""
@@ -142,29 +142,29 @@ class CureReaction(LawReaction):
             raise InputError(message, self.place)
 
     def coefficient(self, values: Mapping[str, Expression], shift: Expression) -> Expression:
-        """The rate coefficient times exp(shift)."""
+        """Return the rate coefficient times exp(shift)."""
         shift, (product,) = shift + self._order(values), self.products
         return super().coefficient(values, shift) + self.stated.catalysed(values[product], values["T_c"], shift)
 
     def log_coefficient(self, values: Mapping[str, Expression]) -> Expression:
-        """Logarithm of the rate coefficient."""
+        """Return the logarithm of the rate coefficient."""
         law, (product,) = self.stated, self.products
         catalysis = law.m * log_fraction(values[product]) - law.E_2 / (GAS_CONSTANT * values["T_c"])
         return log_sum([super().log_coefficient(values), log(law.A_2) + catalysis]) + self._order(values)
 
     def _order(self, values: Mapping[str, Expression]) -> Expression:
-        """Logarithm of theta^(n - 1), by which the order n differs from that of mass action, one."""
+        """Return the logarithm of theta^(n - 1), the difference of the order n from that of mass action, one."""
         (reactant,), n = self.orders, self.stated.n
         theta = values[reactant]
         return (n - 1) * where(n < 1, log(floored(theta, USED)), log_fraction(theta))
 
 
 REACTIONS: Mapping[str, type[LawReaction]] = {"net": AffinityReaction, "catalysed": CureReaction}
-"""Reactions by the method of a law that they ask for; any other method states what a load does."""
+"""Reactions by the method of a law; any other method is the logarithm of a load factor."""
 
 
 def _made(law: type[RateLaw], rate_type: RateType) -> type[LawReaction]:
-    """The reaction of a rate type: its parameters are fields of the law, its documentation that of the method."""
+    """Make the reaction class of a rate type: its parameters are fields of the law, its docstring the method's."""
     renamed = {**rate_type.renamed, **rate_type.ratios}
     parameters = {**renamed, **{name: name for name in rate_type.names}}
     given = {item.name: item for item in fields(law)}
@@ -172,12 +172,12 @@ def _made(law: type[RateLaw], rate_type: RateType) -> type[LawReaction]:
     for name, source in parameters.items():
         spec = given[source].metadata["spec"]
         if name in rate_type.ratios:
-            # The law has a constant of one here, so that the others are ratios to Arrhenius.
+            # The law's constant is one here, so that the other constants are ratios to the Arrhenius coefficient.
             spec = replace(spec, unit="1", text=f"{spec.text}, over the rate constant")
         own[name] = field(default=MISSING if name in renamed else given[source].default, metadata={"spec": spec})
     text = inspect.getdoc(getattr(law, rate_type.method)) or ""
     namespace = {
-        "__doc__": text.partition("\n\n>>>")[0],  # the worked number is that of the law
+        "__doc__": text.partition("\n\n>>>")[0],  # the worked number is for the law
         "__module__": __name__,
         "__annotations__": dict.fromkeys(own, float),
         "kind": CANTERA_PREFIX + rate_type.name,
@@ -192,7 +192,7 @@ def _made(law: type[RateLaw], rate_type: RateType) -> type[LawReaction]:
 
 @cache
 def kinds() -> dict[str, type[InterfaceArrhenius]]:
-    """Every rate type that is lowered, by Cantera's name: its own, and those that the laws of bonding list."""
+    """Return every rate type that is lowered, by Cantera's name: Arrhenius, and those that laws of bonding list."""
     known: dict[str, type[InterfaceArrhenius]] = {InterfaceArrhenius.kind: InterfaceArrhenius}
     for law in laws(RateLaw).values():
         assert issubclass(law, RateLaw)
@@ -201,11 +201,11 @@ def kinds() -> dict[str, type[InterfaceArrhenius]]:
 
 
 def kind_of(name: str) -> type[InterfaceArrhenius] | None:
-    """The rate type that a mechanism calls by that name; Cantera puts the prefix where it is missing."""
+    """Return the rate type of a name in a mechanism, with or without Cantera's prefix."""
     plain_name = "Arrhenius" if name == "elementary" else name
     return kinds().get(plain_name) or kinds().get(CANTERA_PREFIX + plain_name)
 
 
 def names() -> list[str]:
-    """The rate types as a mechanism writes them."""
+    """Return the rate types as they are written in a mechanism."""
     return [kind.removeprefix(CANTERA_PREFIX) for kind in kinds()]

@@ -1,8 +1,8 @@
 """Rates of surface reactions: mass action whose reverse follows from the thermo, and Cantera's Arrhenius coefficient.
 
-The other rate types are in :mod:`surfacechem.mechanism.rate_types`. What load does in a law of
-:mod:`surfacechem.laws.bonds` is one by the law's ``rate_types``; any other is a subclass with Cantera's name as
-``kind`` and a ``coefficient``.
+The other rate types are in :mod:`surfacechem.mechanism.rate_types`. A load factor of a law of
+:mod:`surfacechem.laws.bonds` becomes a rate type by the law's ``rate_types``; any other rate type is a subclass with
+Cantera's name as ``kind`` and a ``coefficient``.
 """
 
 from __future__ import annotations
@@ -21,13 +21,14 @@ from surfacechem.quantities import BOLTZMANN, GAS_CONSTANT, KILO, MOLECULAR
 NO_COVERAGES: Mapping[str, Expression] = {}
 
 COVERAGE_FLOOR = 1e-20
-"""Coverages below this count as this where a rate depends on their logarithm, as in Cantera."""
+"""Floor of coverages in a rate that depends on their logarithm, as in Cantera."""
 
 USED = 1e-14
 """Coverage below which a reaction of an order below one is complete.
 
-A power has an infinite slope at its end, and the zeroth a step; from here on the rate falls in proportion. A step moves
-time by 4e-16 of it at least, and with it a coverage that is used up within that time: 25 of them are in this layer.
+A power has an infinite slope at its end, and order zero a step; below this coverage the rate is proportional to it. A
+step advances time by at least 4e-16 of itself. A coverage that is consumed within the elapsed time falls by as much, so
+that this layer has room for 25 steps.
 """
 
 
@@ -43,9 +44,9 @@ class CoverageTerm:
     def exponent(self, theta: Expression, T: Expression) -> Expression:
         """Logarithm of the factor."""
         energy: Expression = 0
-        for coefficient in reversed(self.E):  # Horner, from the first power on: without coverage there is no energy
+        for coefficient in reversed(self.E):  # Horner, from the first power on: E(0) = 0
             energy = theta * (energy + coefficient)
-        # Cantera's three dependences in one exponent, which cannot overflow in parts.
+        # One exponent for Cantera's three dependences, so that no factor overflows.
         value = self.a * math.log(10) * theta - energy / (GAS_CONSTANT * T)
         if self.m:
             value += self.m * log(floored(theta))
@@ -53,7 +54,7 @@ class CoverageTerm:
 
 
 def floored(theta: Expression, floor: float = COVERAGE_FLOOR) -> Expression:
-    """The coverage, at least a floor.
+    """Return the coverage, at least a floor.
 
     >>> floored(0.5), floored(0.0)
     (0.5, 1e-20)
@@ -62,7 +63,7 @@ def floored(theta: Expression, floor: float = COVERAGE_FLOOR) -> Expression:
 
 
 class MechanismReaction(RateLaw):
-    """A reaction of a mechanism: its name, its equation and what it changes."""
+    """A reaction of a mechanism: its name, its equation and its stoichiometry."""
 
     number: str = option("short name of the reaction")
     equation: str = option("the reaction as the mechanism writes it")
@@ -107,9 +108,9 @@ class InterfaceArrhenius(MechanismReaction):
         "rate-constant": ("A", "b", "Ea"),
         "coverage-dependencies": ("a", "m", "E"),
     }
-    """Keys of a reaction of this type beside those that every reaction may have, with the keys inside."""
+    """Keys of a reaction of this type in addition to those of every reaction, with the keys inside."""
     native: ClassVar[bool] = True
-    """Whether Cantera knows the type without an extension."""
+    """True if Cantera has the type without an extension."""
 
     orders: Mapping[str, float] = option("forward order of each coverage")
     products: Mapping[str, float] = option("product coefficient of each coverage")
@@ -122,19 +123,19 @@ class InterfaceArrhenius(MechanismReaction):
 
     @classmethod
     def own_keys(cls) -> dict[str, str]:
-        """Keys of the reaction in a mechanism file that Cantera does not know, each with the field that it gives."""
+        """Keys of the reaction in a mechanism file that are not Cantera's, each with its field."""
         return {}
 
     @classmethod
     def parameters_of(cls, reaction: Any, variables: Mapping[str, str], order: float) -> Mapping[str, Any]:
-        """A, b, Ea and the coverage terms, in SI units per molecule, from a Cantera reaction of that total order."""
+        """Return A, b, Ea and coverage terms, in SI units per molecule, from a Cantera reaction of a total order."""
         rate, terms = reaction.rate, []
         for name, term in sorted(rate.coverage_dependencies.items()):
             energies = term["E"] if isinstance(term["E"], list | tuple) else [term["E"]]
             E = tuple(float(energy) / KILO for energy in energies)
             terms.append(CoverageTerm(variables[name], float(term["a"]), float(term["m"]), E))
         return {
-            # One kmol^(1 - n) for a reaction of order n, whose rate counts kmol too.
+            # One kmol^(1 - n) for a reaction of order n, since the rate is in kmol too.
             "A": rate.pre_exponential_factor * MOLECULAR ** (1 - order),
             "b": rate.temperature_exponent,
             "Ea": rate.activation_energy / KILO,
@@ -142,15 +143,15 @@ class InterfaceArrhenius(MechanismReaction):
         }
 
     def with_parts(self, bind: Bind) -> Self:
-        """The reaction with symbols for the parameters of the species that take part."""
+        """Return the reaction with symbols for the parameters of its species."""
         return self.bind({"species": tuple(item.bound(bind) for item in self.species)})
 
     def refine(self, name: str, spec: Spec) -> Spec:
-        """The unit of A follows from the order of this reaction."""
+        """Return the specification; the unit of A follows from the order of this reaction."""
         return replace(spec, unit=unit_of_rate(sum(self.orders.values()))) if name == "A" else spec
 
     def own_reads(self) -> tuple[str, ...]:
-        """Variables that the coefficient reads beside the temperature."""
+        """Return the variables of the coefficient other than temperature."""
         return tuple(term.variable for term in self.coverage)
 
     def exponent(self, values: Mapping[str, Expression]) -> Expression:
@@ -162,7 +163,7 @@ class InterfaceArrhenius(MechanismReaction):
         return value
 
     def coefficient(self, values: Mapping[str, Expression], shift: Expression) -> Expression:
-        """Rate coefficient times exp(shift), with one exponential so that neither factor can overflow."""
+        """Return the rate coefficient times exp(shift), as one exponential so that neither factor overflows."""
         return scaled_exp(self.A * values["T_c"] ** self.b, self.exponent(values) + shift)
 
     def log_coefficient(self, values: Mapping[str, Expression]) -> Expression:
@@ -171,7 +172,7 @@ class InterfaceArrhenius(MechanismReaction):
 
     @property
     def balanced(self) -> bool:
-        """Whether the reverse follows from the thermo."""
+        """True if the reverse follows from the thermo."""
         return self.reversible
 
     @property
@@ -186,7 +187,7 @@ class InterfaceArrhenius(MechanismReaction):
 
     @property
     def reverse(self) -> Formula:
-        """Reverse rate [1/(m^2 s)]; zero where the reaction is irreversible."""
+        """Reverse rate [1/(m^2 s)]; zero for an irreversible reaction."""
         return self._formula(self._reverse)
 
     @property
@@ -196,13 +197,13 @@ class InterfaceArrhenius(MechanismReaction):
 
     @property
     def log_rate(self) -> Formula | None:
-        """Logarithm of the rate where the reaction is irreversible."""
+        """Logarithm of the rate of an irreversible reaction; None for a reversible one."""
         return None if self.reversible else self.log_forward
 
     def _formula(self, evaluate: Callable[[Mapping[str, Expression]], Expression]) -> Formula:
-        # The affinity reads the gap that stretches what changes, and the coverages around it.
+        # The affinity depends on the gap if an elastic species changes, and on the coverages that interact with it.
         changing = [item for item in self.species if self.reversible and self.change.get(item.variable)]
-        # A formula reads no more than it needs: what nobody reads is not in the equations.
+        # Only what is needed: a variable that no formula reads is left out of the equations.
         gap = ("g_n",) if any(item.spring for item in changing) else ()
         own = (name for item in self.species for name in (item.variable, item.concentration))
         around = (x.variable for item in changing for x in item.interactions)
@@ -222,20 +223,20 @@ class InterfaceArrhenius(MechanismReaction):
     def _reverse(self, values: Mapping[str, Expression]) -> Expression:
         if not self.reversible:
             return 0
-        # The equilibrium constant of coverages is exp(-affinity); that of amounts has these powers beside it.
+        # The equilibrium constant of coverages is exp(-affinity); that of amounts has these powers as factors.
         standard: Expression = 1
         for item in self.species:
             standard *= values[item.concentration] ** plain(-self.change.get(item.variable, 0))
         affinity = self.standard_affinity(values["T_c"], values.get("g_n"), values)
-        # One exponential of the sum: coefficient and constant may be beyond the doubles where their product is not.
+        # One exponential of the sum: coefficient and constant may overflow while their product does not.
         return self.coefficient(values, affinity) * standard * self._amounts(values, self.products, 1)
 
     def standard_affinity(
         self, T: Expression, g_n: Expression = None, coverages: Mapping[str, Expression] = NO_COVERAGES
     ) -> Expression:
-        """Standard Gibbs energy of the reaction over k_B T, with the elastic energy of its bonds at the gap g_n.
+        """Return the standard Gibbs energy of the reaction over k_B T, including the elastic energy of bonds.
 
-        Interactions count where ``coverages`` are given.
+        The elastic energy is that at the gap ``g_n`` [m]. Interactions are included if ``coverages`` are given.
         """
         total: Expression = 0
         for item in self.species:
@@ -251,11 +252,14 @@ class InterfaceArrhenius(MechanismReaction):
         return total / T
 
     def _amounts(self, values: Mapping[str, Expression], orders: Mapping[str, float], way: int) -> Expression:
-        """Powers of the amounts in the forward (-1) or backward (1) rate, which ends where what it uses up is gone."""
+        """Return the product of amounts to their orders in the forward (-1) or backward (1) rate.
+
+        It vanishes with each species that the reaction consumes.
+        """
         product: Expression = 1
         for item in self.species:
             order, theta = orders.get(item.variable, 0), values[item.variable]
-            # Below first order the slope is infinite where nothing is left, which no step can follow.
+            # Below first order the slope is infinite at zero coverage, which no step can follow.
             if order < 1 and way * self.change.get(item.variable, 0) > 0:
                 product *= values[item.concentration] ** plain(order) * theta * floored(theta, USED) ** plain(order - 1)
             elif order:
@@ -264,7 +268,7 @@ class InterfaceArrhenius(MechanismReaction):
 
 
 def unit_of_rate(order: float) -> str:
-    """Unit of a rate coefficient for a total order.
+    """Return the unit of a rate coefficient for a total order.
 
     >>> unit_of_rate(1), unit_of_rate(2), unit_of_rate(0)
     ('1/s', 'm^2/s', '1/(m^2 s)')
@@ -276,7 +280,7 @@ def unit_of_rate(order: float) -> str:
 
 
 def plain(number: float) -> int | float:
-    """The integer where the number is one, so that powers stay powers.
+    """Return an integer for a whole number, so that powers stay integer powers.
 
     >>> plain(2.0), plain(0.5)
     (2, 0.5)

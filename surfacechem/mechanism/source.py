@@ -1,6 +1,6 @@
 """The text of a mechanism file with the line of every entry, the entries of a phase, and numbers that Cantera ignores.
 
-Numbers that Cantera reads are converted by Cantera; those of this package only, such as the length of a bond, here.
+Cantera converts the numbers that it reads; this module converts those of this package, such as the length of a bond.
 """
 
 from __future__ import annotations
@@ -20,20 +20,20 @@ from surfacechem.errors import InputError, Place, refuse_unknown, suggestion
 from surfacechem.quantities import AVOGADRO, KILO
 
 MECHANISM_LIMITS = Limits(largest=10_000_000, most=200_000)
-"""Limits of size of a mechanism, which may be that of a large gas beside the surface."""
+"""Size limits of a mechanism, which may be that of a large gas next to the surface."""
 
 ARROWS = ("<=>", "=>", "=")
-"""Arrows between the sides of an equation; only the second is one way."""
+"""Arrows between the sides of an equation; only the second is irreversible."""
 
 DEPENDENT = "coverage-dependent-surface"
 SURFACES = ("ideal-surface", DEPENDENT)
-"""Phase models that are lowered; only in the second thermo depends on coverages."""
+"""Phase models that are lowered; only in the second does thermo depend on coverages."""
 
 YAML_WRITER = "YamlWriter"
-"""Generator name by which Cantera signs the files that it writes."""
+"""Generator name in the files that Cantera writes."""
 
 CANTERA_UNITS = {"length": "m", "quantity": "kmol", "energy": "J", "activation-energy": "J/kmol"}
-"""Units of numbers in such a file where it does not say otherwise."""
+"""Units of numbers in such a file unless it states others."""
 
 ENERGY = ("activation-energy", "quantity")
 OWN_UNITS = {
@@ -42,14 +42,14 @@ OWN_UNITS = {
     "J": (ENERGY, "10 kJ/mol"),
     "J/mol": (ENERGY, "50 kJ/mol"),
 }
-"""Units of numbers that Cantera does not read: what in `units` gives a bare one a meaning, and an example."""
+"""Units of numbers that Cantera does not read: the keys of `units` that give a bare number its unit, and an example."""
 
 LARGEST_NUMBERS = {
     "m": (1e-5, "a length", "0.4 nm"),
     "J": (1e7 / AVOGADRO, "an energy", "50 kJ/mol"),
     "J/mol": (1e7, "an energy", "50 kJ/mol"),
 }
-"""Largest numbers that a molecule may have, even a tether, by unit, each with its kind and an example."""
+"""Largest plausible numbers for a molecule, even a tether, by unit, each with its kind and an example."""
 
 NUMBER, NAME, MAPPING, LIST = (int, float), (str, int, float), (dict,), (list,)
 
@@ -96,9 +96,9 @@ REACTION: Kinds = {
     "id": NAME,
     **_any("negative-orders nonreactant-orders note description"),
 }
-"""Keys of an entry, each with the kinds of value that it may have where that matters before Cantera reads it.
+"""Keys of an entry, each with the allowed types of its value if these matter before Cantera reads it.
 
-Some are for a kind of file or of phase only, and those of rate types stand with these: see
+Some keys are for one kind of file or phase only; those of rate types are in their classes: see
 :mod:`surfacechem.mechanism.keys`.
 """
 
@@ -122,13 +122,13 @@ class Listed(list[Any]):
 
 
 def _placed(tree: Tree) -> Any:
-    """A value whose mappings and lists know their places."""
+    """Return a value with places for its mappings and lists."""
     kinds: Mapping[type, Any] = {dict: Mapped, list: Listed}
     made = kinds.get(type(tree.value))
     return made(tree) if made else tree.value
 
 
-@lru_cache(maxsize=16)  # runs, sweeps and tables of one mechanism read its file again and again
+@lru_cache(maxsize=16)  # runs, sweeps and tables read the same file repeatedly
 def _parsed(text: str, file: str) -> Tree:
     return document.build(text, file, MECHANISM_LIMITS)
 
@@ -149,22 +149,22 @@ class Source:
         self.sections = {name for phase, key in parts for name in sections(phase.get(key, "all"), key)}
         """Names of the sections of species and reactions that some phase of the file uses."""
         self.written = str(self.data.get("generator")) == YAML_WRITER
-        """Whether Cantera itself has written the file."""
+        """True if Cantera has written the file."""
 
     def place(self, node: Any, key: Any = None, path: str = "") -> Place:
-        """Place of a mapping or list, or of one of its entries."""
+        """Return the place of a mapping or list, or of one of its entries."""
         if not isinstance(node, Mapped | Listed):
             return Place(self.file, 0, path)
         inside: Mapping[Any, Tree] = node.tree.value if isinstance(node, Mapped) else dict(enumerate(node.tree.value))
-        # What is missing is missed where the whole stands.
+        # A missing entry is reported at its parent.
         return replace(inside.get(key, node.tree).place, path=path)
 
     def error(self, message: str, node: Any, key: Any = None) -> InputError:
-        """An error at a mapping or list of the file, or at one of its entries."""
+        """Return an error at a mapping or list of the file, or at one of its entries."""
         return InputError(message, self.place(node, key))
 
     def number(self, entry: Any, node: Any, key: str, spec: Spec, title: str = "") -> float:
-        """A number that Cantera does not read, in its SI unit and range; it has a unit, or the file says which."""
+        """Return a number that Cantera does not read, in its SI unit; a bare one has the unit of the file."""
         import cantera
 
         value, (wanted, example) = node[key], OWN_UNITS.get(spec.unit, ((), ""))
@@ -182,7 +182,7 @@ class Source:
             found = converted(units, value if isinstance(value, str) else float(value), spec.unit)
             spec.check(key, found)
         except InputError as error:
-            # Errors of the range name the key already.
+            # Errors of the range contain the key already.
             named = error.message if error.message.startswith(key) else f"{key}: {error.message}"
             raise self.error(f"{title}{named}", node, key) from None
         except (cantera.CanteraError, ValueError):
@@ -190,16 +190,16 @@ class Source:
         return found
 
     def _check(self, node: Any, kinds: Kinds) -> None:
-        """InputError where a key does not hold the kind of value that it must."""
+        """Raise InputError if the value of a key has the wrong type."""
         for key, value in node.items():
             allowed = kinds.get(key)
-            # In Python true is a number; in a mechanism it is not.
+            # In Python true is an int; in a mechanism it is no number.
             if allowed and (not isinstance(value, allowed) or (isinstance(value, bool) and bool not in allowed)):
                 wanted = " or ".join(KIND_WORDS[kind] for kind in allowed if kind in KIND_WORDS)
                 raise self.error(f"{key}: this must be {wanted}, not {node.tree.value[key].shown}.", node, key)
 
     def _entry_list(self, name: str, kinds: Kinds) -> list[Any]:
-        """The mappings of a section; InputError at what is none."""
+        """Return the mappings of a section; InputError at an entry that is none."""
         entries = self.data.get(name)
         if entries is None:
             return []
@@ -212,7 +212,7 @@ class Source:
         return list(entries)
 
     def phase(self, name: str | None, place: Place | None) -> Any:
-        """The phase of that name, else the only surface, else the only one."""
+        """Return the phase of that name, else the only surface, else the only phase."""
         phases = {str(entry.get("name")): entry for entry in self.phases}
         if not phases:
             known = [str(key) for key in self.data]
@@ -232,17 +232,17 @@ class Source:
         return phases[name]
 
     def species(self, phase: Any) -> Iterator[Any]:
-        """The species entries that the phase may use."""
+        """Yield the species entries that the phase may use."""
         yield from self._entries(phase, "species", SPECIES)
 
     def reactions(self, phase: Any) -> Iterator[Any]:
-        """The reaction entries that the phase may use, in order."""
+        """Yield the reaction entries that the phase may use, in order."""
         if phase.get("reactions", "all") != "none":
             yield from self._entries(phase, "reactions", REACTION)
 
     def _entries(self, phase: Any, key: str, kinds: Kinds) -> Iterator[Any]:
         for name in sections(phase.get(key, "all"), key):
-            # A phase that does not say where its entries are may have none.
+            # A phase that does not name its sections may have no entries.
             if name in self.data:
                 yield from self._entry_list(name, kinds)
             elif phase.get(key) is not None:
@@ -251,7 +251,7 @@ class Source:
                 raise InputError(message, self.place(phase, key, key))
 
     def defaults(self, entry: Any) -> Mapping[str, Any]:
-        """Units that a bare number in the entry has; what Cantera itself has written counts in its own."""
+        """Return the units of bare numbers in the entry; in a file that Cantera has written they are Cantera's."""
         own = entry.get("units") if isinstance(entry, Mapping) else None
         written = CANTERA_UNITS if self.written else {}
         given = [item for item in (self.data.get("units"), own) if isinstance(item, Mapping)]
@@ -259,24 +259,24 @@ class Source:
 
 
 def sections(declared: Any, default: str) -> list[str]:
-    """Names of the sections that a phase's `species` or `reactions` refers to."""
+    """Return the names of the sections to which a phase's `species` or `reactions` refers."""
     if isinstance(declared, str):
         return [default]
     named = [next(iter(item)) for item in declared if isinstance(item, Mapping) and item]
     plain = [item for item in declared if not isinstance(item, Mapping)]
-    # A bare word is a species of the section of that name, but a section of reactions.
+    # In `species` a bare word is a species of the default section, in `reactions` it is a section.
     if default == "species" and plain:
         plain = [default]
     return [*plain, *named]
 
 
 def sides(equation: str) -> tuple[dict[str, float], dict[str, float], bool]:
-    """Coefficients of the reactants and of the products, and whether the reaction is reversible.
+    """Return the coefficients of the reactants and of the products, and whether the reaction is reversible.
 
     >>> sides("2 a(s) + b(s) => c(s)")
     ({'a(s)': 2.0, 'b(s)': 1.0}, {'c(s)': 1.0}, False)
     """
-    # As Cantera reads it: names may hold any sign, so that only spaces part them.
+    # As in Cantera: names may contain any sign, so only spaces separate them.
     words = equation.split()
     arrow = next((word for word in words if word in ARROWS), "")
     middle = words.index(arrow) if arrow else len(words)
@@ -293,7 +293,7 @@ def sides(equation: str) -> tuple[dict[str, float], dict[str, float], bool]:
 
 
 def leading(value: Any) -> float:
-    """The number with which a value begins; nan where there is none.
+    """Return the number at the beginning of a value; nan if there is none.
 
     >>> leading("-1e-9 mol/m^2"), leading(2)
     (-1e-09, 2.0)
@@ -312,9 +312,9 @@ def own_parameters(
     read: Callable[[str, Spec], float],
     place: Place | None = None,
 ) -> dict[str, float]:
-    """Parameters of a law from an entry that has them by these keys, each ``read`` as it is specified.
+    """Return the parameters of a law from an entry with these keys, each ``read`` with its specification.
 
-    InputError at a ``place`` where one that has no default is not there.
+    InputError at a ``place`` if a parameter without default is missing.
     """
     specs = dict(law.specs())
     optional = {item.name for item in fields(law) if item.default is not MISSING}
@@ -325,7 +325,7 @@ def own_parameters(
 
 
 def unitless(value: Any, given: Mapping[str, Any], wanted: Iterable[str]) -> float:
-    """The first number other than zero without a unit; zero where ``given`` units have a ``wanted`` dimension."""
+    """Return the first nonzero number without a unit; zero if ``given`` units have a ``wanted`` dimension."""
     if any(item in given for item in wanted):
         return 0
     numbers = value if isinstance(value, list) else [value]
@@ -333,11 +333,11 @@ def unitless(value: Any, given: Mapping[str, Any], wanted: Iterable[str]) -> flo
 
 
 def converted(units: Any, value: str | float, unit: str) -> float:
-    """A number in an SI unit; energies may be per molecule or per mole, as Cantera's activation energies."""
+    """Return a number in an SI unit; energies may be per molecule or per mole, as Cantera's activation energies."""
     if unit == "1":
         return float(value)
     number = _energy(units, value, unit) if unit in ("J", "J/mol") else float(units.convert_to(value, unit))
-    # What was meant in nanometres, or per mole, is not caught by its unit.
+    # A forgotten nano, or per mole, is a valid unit: only the size tells.
     largest, what, example = LARGEST_NUMBERS.get(unit, (inf, "", ""))
     if abs(number) > largest:
         raise InputError(f"{value} is {what} of {number:g} {unit}, which no bond has; write it as `{example}`.")

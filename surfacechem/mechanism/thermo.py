@@ -16,7 +16,7 @@ from surfacechem.expressions import Expression, log, where
 from surfacechem.quantities import GAS_CONSTANT, KILO
 
 Bind = Callable[[Law, str, str], Any]
-"""Puts symbols for the parameters of a law, which gets its path in a case and the end of their names."""
+"""Function that binds a law: it gets the law, its path in a case and the suffix of its parameters' names."""
 
 
 class GibbsForm(Law):
@@ -45,30 +45,30 @@ class ConstantCp(GibbsForm):
     def over_R(self, T: Expression) -> Expression:
         """Value [K] at T [K]."""
         value = self.h0 / GAS_CONSTANT - T * (self.s0 / GAS_CONSTANT)
-        # Without a heat capacity T0 is in no equation.
+        # Without a heat capacity T0 does not enter.
         return value + self.cp0 / GAS_CONSTANT * (T - self.T0 - T * log(T / self.T0)) if self.cp0 != 0 else value
 
 
 class Series(GibbsForm):
-    """A form of many coefficients, which stand in formulas as numbers, so that those of a reaction are summed up.
+    """A form of many coefficients, which are numbers in formulas, so that those of a reaction can be summed.
 
-    A coefficient that a case gives becomes a parameter like any other.
+    A coefficient that a case changes becomes a parameter.
     """
 
     free: frozenset[str] = option("coefficients that are parameters", default=frozenset())
 
     @classmethod
     def of(cls, coefficients: Sequence[float]) -> Self:
-        """The form of these coefficients, in the order of its parameters."""
+        """Return the form with these coefficients, in the order of its parameters."""
         names = (name for name, _ in cls.specs())
         return cls(**cast(dict[str, Any], dict(zip(names, coefficients, strict=True))))
 
     def given(self, numbers: Mapping[str, float]) -> Self:
-        """The same form with other coefficients."""
+        """Return the same form with other coefficients, as parameters."""
         return replace(super().given(numbers), free=self.free | set(numbers))
 
     def is_default(self, name: str) -> bool:
-        """Whether a coefficient is a number of the formula."""
+        """True if a coefficient is a number in the formula."""
         return name not in self.free
 
 
@@ -130,7 +130,7 @@ class Shomate(Series):
 
 @dataclass(frozen=True)
 class ThermoRange:
-    """A form that holds up to the temperature ``top`` [K], which belongs to this piece if ``closed``."""
+    """A form valid up to the temperature ``top`` [K], which belongs to this range if ``closed``."""
 
     top: float
     form: GibbsForm
@@ -139,7 +139,7 @@ class ThermoRange:
 
 @dataclass(frozen=True)
 class StandardGibbs:
-    """Standard molar Gibbs energy over R [K] as a function of temperature, from one range to the next.
+    """Standard molar Gibbs energy over R [K] as a function of temperature, in one or several ranges.
 
     >>> water = StandardGibbs((ThermoRange(1e9, ConstantCp(h0=-8314.462618, s0=16.628925236)),))
     >>> round(water(300.0), 6)
@@ -148,11 +148,11 @@ class StandardGibbs:
 
     pieces: tuple[ThermoRange, ...]
     shift: float = 0.0
-    """Constant added per kelvin, for a standard state of another coverage than one."""
+    """Constant added per kelvin, for a standard state at a coverage other than one."""
 
     def __call__(self, T: Expression) -> Expression:
         """Value [K] at T [K]."""
-        # From the top down, as conditions nest; beyond its ends the outer forms go on.
+        # From the top down, as conditions nest; beyond the ends the outer forms extrapolate.
         value = self.pieces[-1].form.over_R(T)
         for piece in reversed(self.pieces[:-1]):
             below = piece.top >= T if piece.closed else piece.top > T
@@ -161,22 +161,22 @@ class StandardGibbs:
 
     @property
     def ranges(self) -> dict[str, GibbsForm]:
-        """The forms by the name of their range, which has none where one form holds for all temperatures."""
+        """The forms by the names of their ranges; a single form has an empty name."""
         several = len(self.pieces) > 1
         return {f"range_{k}" if several else "": piece.form for k, piece in enumerate(self.pieces, start=1)}
 
     def with_forms(self, forms: Sequence[GibbsForm]) -> StandardGibbs:
-        """The same with other forms in its ranges."""
+        """Return a copy with other forms in its ranges."""
         pairs = zip(self.pieces, forms, strict=True)
         return replace(self, pieces=tuple(replace(piece, form=form) for piece, form in pairs))
 
 
 TWO_RANGES: Mapping[str, tuple[type[Series], int, int]] = {"NasaPoly2": (Nasa7, 8, 1), "ShomatePoly2": (Shomate, 1, 8)}
-"""Cantera's models with two ranges: the form, and where the coefficients of the lower and of the upper range begin."""
+"""Cantera's models with two ranges: the form, and the first coefficient of the lower and of the upper range."""
 
 
 def lower(thermo: Any) -> StandardGibbs:
-    """Standard Gibbs energy of a Cantera species thermo object."""
+    """Return the standard Gibbs energy of a Cantera species thermo object."""
     model, top, c = type(thermo).__name__, float(thermo.max_temp), [float(x) for x in thermo.coeffs]
     if model == "ConstantCp":
         h0, s0, cp0 = (x / KILO for x in c[1:])
@@ -186,6 +186,6 @@ def lower(thermo: Any) -> StandardGibbs:
         return StandardGibbs(tuple(ThermoRange(r[1], Nasa9.of(r[2:]), closed=False) for r in regions))
     form, *starts = TWO_RANGES[model]
     low, high = (c[start : start + 7] for start in starts)
-    # Cantera gives a single range twice.
+    # Cantera repeats a single range.
     below = () if low == high else (ThermoRange(c[0], form.of(low)),)
     return StandardGibbs((*below, ThermoRange(top, form.of(high))))
