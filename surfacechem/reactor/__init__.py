@@ -1,8 +1,8 @@
-"""A scene in a Cantera reactor network, beside gas reactors, reservoirs, walls and flow controllers.
+"""A scene in a Cantera reactor network, with gas reactors, reservoirs, walls and flow controllers.
 
-``interface`` (the reactor that holds a scene), ``network`` (a ReactorNet that stops at breakpoints and limits),
-``coupling`` (how other reactors touch its bodies), ``gas`` (gases and solids that react with it), ``embedded`` (the
-scene in it, and what it went through).
+``interface`` (the reactor that holds a scene), ``network`` (a ReactorNet that stops at breakpoints and events),
+``watch`` (event location inside the integrator's steps), ``coupling`` (connections of other reactors to its bodies),
+``gas`` (gases and solids that react with it), ``embedded`` (the scene as its equations, and its history).
 """
 
 from surfacechem.reactor.gas import ReactingGas, ReactingGasAtPressure, ReactingSolid

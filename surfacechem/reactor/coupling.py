@@ -1,8 +1,8 @@
-"""Coupling of other reactors to the bodies of a scene, and the changes that it makes in the scene.
+"""Coupling of other reactors to the bodies of a scene, and the changes of the scene that it needs.
 
-A body with a heat capacity keeps it, and stands in the network as a reservoir with its temperature: heat through
-Cantera's walls on that reservoir is its external heat. A body without one can be replaced by a reactor: its temperature
-is then the reactor's, and what flows into it the reactor receives.
+A body with a heat capacity is represented in the network by a reservoir at its temperature: heat through Cantera's
+walls on that reservoir is external heat of the body. A body without one can be replaced by a reactor: it has the
+reactor's temperature, and the reactor receives its heat.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ from surfacechem.scene import Body, Scene
 from surfacechem.tolerances import RUN_EPS
 
 LOAD_UNITS = ("Pa", "N", "W/m^2")
-"""Units of loads that do work or heat at their present value, whatever their rate."""
+"""Units of loads that do work or heat by their present value, independent of their rate."""
 
 THERMO_TEMPERATURES = (300.0, 1500.0)
 """Temperatures [K] at which the thermo of species is compared: polynomials change at 1000 K."""
 
 TERM_SIZE = 100.0
-"""Size of the terms that enthalpies and entropies are sums of, in their units of the gas constant."""
+"""Size of the terms of enthalpies and entropies, in units of the gas constant (times temperature)."""
 
 RESERVOIR_YAML = """
 phases:
@@ -41,18 +41,18 @@ phases:
 species:
 - {name: nitrogen, composition: {N: 2}, thermo: {model: constant-cp}}
 """
-"""Mechanism of a reservoir that stands for a body; nothing of it matters but its temperature."""
+"""Mechanism of a reservoir that represents a body; only its temperature matters."""
 
 
 def suffix_of(scene: Scene, name: str) -> str:
-    """Suffix of a body, or of 'interface', in the names of variables; InputError where there is none of that name."""
+    """Return the suffix of a body, or of 'interface', in the names of variables; InputError if the name is unknown."""
     names = {body.name: str(k) for k, body in enumerate(scene.bodies, start=1)} | {"interface": "c"}
     refuse_unknown([name], names, "the scene has no body '{}'")
     return names[name]
 
 
 def node_of(scene: Scene, name: str) -> str:
-    """Name of the evolving temperature of a body or of the interface; InputError where it has none."""
+    """Return the name of the evolving temperature of a body or of the interface; InputError if it has none."""
     suffix = suffix_of(scene, name)
     where = {"1": scene.bodies[0].temperature, "2": scene.bodies[1].temperature, "c": scene.interface.temperature}
     temperature = where[suffix]
@@ -65,7 +65,7 @@ def node_of(scene: Scene, name: str) -> str:
 
 
 def with_heat(scene: Scene, names: Iterable[str]) -> Scene:
-    """The scene with external heat into bodies, to be given while it runs."""
+    """Return the scene with external heat into bodies, whose values are set during a run."""
     loading = dict(scene.loading)
     for name in names:
         heat = f"Q_{suffix_of(scene, name)}"
@@ -76,7 +76,7 @@ def with_heat(scene: Scene, names: Iterable[str]) -> Scene:
 
 
 def with_loads(scene: Scene, values: Mapping[str, float]) -> Scene:
-    """The scene with loads whose values are given while it runs, in place of those that the case prescribes."""
+    """Return the scene with loads whose values are set during a run, in place of those that the case prescribes."""
     forces = [name for name in LOADABLE if VARIABLES[name].unit in LOAD_UNITS]
     for name in values:
         if name not in forces:
@@ -86,16 +86,17 @@ def with_loads(scene: Scene, values: Mapping[str, float]) -> Scene:
 
 
 def function_of(name: str, load: Callable[[float], float] | float | str) -> Callable[[float], float]:
-    """A load as a function of time; InputError for what is neither that nor a number or a text with a unit."""
+    """Return a load as a function of time; InputError unless it is a function, a number or a text with a unit."""
     if callable(load):
         return load
-    level = parse(load, VARIABLES[name].unit, name=name) if name in VARIABLES else 0.0  # of no load, as is said later
+    level = parse(load, VARIABLES[name].unit, name=name) if name in VARIABLES else 0.0  # reported later
     return lambda _: level
 
 
 def with_neighbours(scene: Scene, reactors: Mapping[str, Any]) -> Scene:
-    """The scene with phases beside its surface whose pressures and compositions are given while it runs; electric
-    potentials stay those of the case.
+    """Return the scene with neighbours whose pressures and compositions are set during a run.
+
+    Electric potentials stay those of the case.
     """
     if not reactors:
         return scene
@@ -114,7 +115,7 @@ def with_neighbours(scene: Scene, reactors: Mapping[str, Any]) -> Scene:
 
 
 def _refuse_other_phase(name: str, own: Any, given: Any) -> None:
-    """Refuse a phase that is another one than the neighbour of the mechanism: what is exchanged would not add up."""
+    """Refuse a phase other than the neighbour of the mechanism, since the exchange would violate the balances."""
     if own.species_names != given.species_names:
         names = ", ".join(own.species_names)
         raise InputError(f"the reactor of the neighbour {name} has other species than the mechanism: {names}.")
@@ -128,7 +129,7 @@ def _refuse_other_phase(name: str, own: Any, given: Any) -> None:
 
 
 def _agreement(ours: Any, theirs: Any) -> Iterator[tuple[str, bool]]:
-    """Properties of a species, and whether two of one name agree in them."""
+    """Yield properties of a species, and whether two species of one name agree in them."""
     yield "composition", ours.composition == theirs.composition
     yield "weight", isclose(ours.molecular_weight, theirs.molecular_weight, rel_tol=RUN_EPS)
     both = ours.thermo, theirs.thermo
@@ -145,14 +146,14 @@ def _agreement(ours: Any, theirs: Any) -> Iterator[tuple[str, bool]]:
 
 
 def _state(phase: Any) -> Neighbour:
-    """The state of a phase as it is now."""
+    """Return the present state of a phase."""
     parts = zip(phase.species_names, phase.X.tolist(), strict=True)
     several = phase.n_species > 1
     return Neighbour(Hold(level=float(phase.P)), {name: Hold(level=part) for name, part in parts} if several else {})
 
 
 def with_reactors(scene: Scene, reactors: Mapping[str, Any]) -> Scene:
-    """The scene with bodies whose temperatures are given while it runs."""
+    """Return the scene with bodies whose temperatures are set during a run."""
     first, second = (_replaced(body, reactors.get(body.name)) for body in scene.bodies)
     for name in reactors:
         if suffix_of(scene, name) == "c":
@@ -172,7 +173,7 @@ def _replaced(body: Body, reactor: Any) -> Body:
 
 
 class HeatWall(cantera.Wall):
-    """A wall between reactors, through which an interface gives them heat or moves."""
+    """A wall between reactors by which an interface gives heat to them, or moves."""
 
     def __init__(self, left: Any, right: Any, *, interface: Any, **options: Any) -> None:
         super().__init__(left, right, **options)
@@ -180,7 +181,7 @@ class HeatWall(cantera.Wall):
 
 
 class BodyReservoir(cantera.Reservoir):
-    """A reservoir that stands for a body: it takes heat through walls, and nothing else."""
+    """A reservoir that represents a body: it takes heat through walls and nothing else."""
 
     def _add_wall(self, wall: Any) -> None:
         if wall.velocity != 0.0 or wall.expansion_rate_coeff != 0.0:
@@ -188,7 +189,7 @@ class BodyReservoir(cantera.Reservoir):
         super()._add_wall(wall)
 
     def rigid(self) -> str:
-        """Reason why a wall on it cannot move, with the remedy."""
+        """Return the reason why a wall on it cannot move, with the remedy."""
         return (
             f"a wall on {self.name} moves, and its work would be lost: a body stores heat here, not volume. Leave out "
             "`velocity` and `K`, or put the moving wall between two gases."
@@ -209,17 +210,17 @@ class BodyPort:
         self.reservoir = BodyReservoir(cantera.Solution(yaml=RESERVOIR_YAML, name="body"), clone=False, name=name)
 
     def warm(self, temperature: float) -> None:
-        """Show a temperature [K] to the walls."""
+        """Set the temperature [K] that the walls see."""
         if temperature > 0:
             self.reservoir.phase.TP = temperature, None
             self.reservoir.syncState()
 
     def heat(self) -> float:
-        """Heat [W] that flows into the body through its walls."""
+        """Return the heat [W] that flows into the body through its walls."""
         return sum(self._through(wall) for wall in self.reservoir.walls)
 
     def others(self) -> list[Any]:
-        """Reactors on the other sides of its walls."""
+        """Return the reactors on the other sides of its walls."""
         sides = ((wall.left_reactor, wall.right_reactor) for wall in self.reservoir.walls)
         return [right if left is self.reservoir else left for left, right in sides]
 

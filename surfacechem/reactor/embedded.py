@@ -1,5 +1,6 @@
-"""A scene whose surroundings are given while it runs: assembled, compiled and evaluated for a reactor of a network, and
-its history as the solution that a run hands back.
+"""A scene in a reactor network: assembled, compiled and evaluated with values from the network.
+
+Its recorded history becomes a solution like that of a run.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ from surfacechem.solve.run import Model, Run, Trajectory
 from surfacechem.tolerances import DEFAULT_RTOL, SQRT_EPS, TINY
 
 NO_END = 1e300
-"""End of the last piece of time [s]."""
+"""End of the last load segment [s]."""
 
 NONE: Mapping[str, Callable[[float], float]] = {}
 
@@ -40,12 +41,12 @@ GLOBAL_ERROR = 100
 """Ratio by which the error of a state may exceed the tolerance of a step."""
 
 DIFFERENCE_STEPS = 8 * SQRT_EPS
-"""A few of the steps by which Cantera's integrator differentiates, which bounds must not take for the solution."""
+"""A few of the finite-difference steps of Cantera's integrator, which bounds must tolerate."""
 
 
 @dataclass(frozen=True)
 class NeighbourReactor:
-    """A reactor beside the surface, as the scene sees it."""
+    """A reactor next to the surface, with the indices of its variables in the scene."""
 
     reactor: Any
     held: HeldPhase
@@ -53,12 +54,12 @@ class NeighbourReactor:
     places: NDArray[np.int64]
     """Indices of its pressure and mole fractions among the parameters."""
     species: NDArray[np.int64]
-    """Indices of the species which reactions make."""
+    """Indices of the species that reactions produce."""
     accounts: NDArray[np.int64]
     """Indices of the variables that hold the amount of each."""
 
     def state(self) -> Array:
-        """Its present pressure and mole fractions."""
+        """Return its present pressure and mole fractions."""
         phase, found = self.reactor.phase, np.empty(len(self.places))
         found[0] = phase.P
         if len(found) > 1:
@@ -66,8 +67,9 @@ class NeighbourReactor:
         return found
 
     def given(self, rates: Array, area: float) -> tuple[Array, float]:
-        """Amounts of all species [kmol/s] that reactions on an area give, and their enthalpy [W], from the rates of the
-        variables.
+        """Return amounts of all species [kmol/s] and enthalpy [W] that reactions on an area give.
+
+        ``rates`` are those of the variables of the scene.
         """
         amounts = np.zeros(len(self.held.enthalpies))
         amounts[self.species] = rates[self.accounts] * (area / MOLECULAR)
@@ -75,7 +77,7 @@ class NeighbourReactor:
 
 
 class InstantEvents:
-    """Events of a scene whose arcs something else integrates: what is due, where in a step, and what follows."""
+    """Events of a scene whose arcs are integrated elsewhere: due edges, event functions, and jumps."""
 
     def __init__(self, model: Model, problem: Problem, evaluation: Evaluation) -> None:
         assert model.jumper is not None
@@ -84,7 +86,7 @@ class InstantEvents:
         self.evaluation = evaluation
         """Present state and parameters of the scene."""
         self.loads: Array | None = None
-        """Parameters of the piece of time that has just ended."""
+        """Parameters of the load segment that has just ended."""
 
     @property
     def jumps(self) -> list[Jump]:
@@ -92,36 +94,36 @@ class InstantEvents:
         return self.instant.jumps
 
     def until(self, goal: float, rtol: float) -> None:
-        """Set the time that is integrated next, and the tolerance; what is brief is so against it."""
+        """Set the end of the next integration, relative to which times are brief, and the tolerance."""
         self.instant.end, self.instant.rtol = goal, GLOBAL_ERROR * rtol
 
     def begin_piece(self, parameters: Array) -> None:
-        """Go on with the present modes and other parameters."""
+        """Set the parameters of a new load segment; the modes stay."""
         own, columns = self.evaluation.parameters, self.jumper.mode_columns
         modes, self.loads = own[columns].copy(), own.copy()
         own[:] = parameters
         own[columns] = modes
 
     def here(self) -> Point:
-        """The state last put."""
+        """Return the state set last."""
         at = self.evaluation
         return Point(float(at.inputs[0]), at.y.copy(), at.ydot.copy(), at.parameters.copy())
 
     def margins(self) -> Array:
-        """Guards of the edges at the state last put, infinite where they are not in play."""
+        """Return the guards of the edges at the state set last, infinite if not active."""
         now, playing = self.evaluation.margins(), self.instant.in_play(self.here())
         self.instant.see(self.evaluation.y)
         return np.where(playing, now, np.inf)[self.instant.first :]
 
     def soonest(self) -> float:
-        """Time [s] in which a guard of the state last put would close at its present rate."""
+        """Return the time [s] in which a guard would reach zero at its present rate."""
         now, rates = self.margins(), self.jumper.guard_rates(self.here().inputs())
         with np.errstate(divide="ignore", invalid="ignore"):
             left = np.where((now > 0) & (rates < 0), -now / rates, np.inf)
         return float(left.min(initial=np.inf))
 
     def resolve(self) -> Array | None:
-        """Carry out what is due at the state last put: additions to the ledger; None where the scene ends here."""
+        """Carry out the due edges at the state set last; return what they add to the ledger, None if the scene ends."""
         before, here, loads = self.instant.booked.copy(), self.here(), self.loads
         begun: Point | None = here
         if loads is not None:
@@ -131,13 +133,13 @@ class InstantEvents:
         return self._taken(self.instant.resolve(begun) if begun is not None else None, before)
 
     def fire(self, index: int) -> Array | None:
-        """Carry out an edge at the state last put, and what follows at once."""
+        """Carry out an edge at the state set last, and the edges that are due after it."""
         before = self.instant.booked.copy()
         point = self.instant.apply(index, self.here())
         return self._taken(self.instant.resolve(point) if point is not None else None, before)
 
     def _taken(self, point: Point | None, before: Array) -> Array | None:
-        """Go on from a point; returns what the ledger has gained since."""
+        """Set the state to a point and return the additions to the ledger since ``before``."""
         if point is None:
             return None
         self.evaluation.parameters[:] = point.parameters
@@ -146,7 +148,7 @@ class InstantEvents:
 
 
 class EndError(Exception):
-    """The scene does not go on at a state, with the reason in words."""
+    """The scene ends at a state, with the reason in words."""
 
 
 def _refuse_folds(system: System) -> None:
@@ -159,10 +161,10 @@ def _refuse_folds(system: System) -> None:
 
 
 class EmbeddedScene:
-    """The scene of a case with what the network gives it: temperatures of reactors, heat, factors on its rates.
+    """The scene of a case with values from the network: temperatures of reactors, heat, factors on its rates.
 
     The variables are the differential states and then the ledger, in SI units per area; the parameters are those of
-    the present piece of time.
+    the present load segment.
     """
 
     def __init__(
@@ -196,7 +198,7 @@ class EmbeddedScene:
         """Indices of the parameters, by path."""
         self.states = tuple(system.states[j].name for j in self.evaluation.free)
         self.beside = [self._beside(scene.interface.engine, *item) for item in (neighbours or {}).items()]
-        """The reactors beside the surface."""
+        """The reactors next to the surface."""
 
     def _beside(self, engine: Any, name: str, reactor: Any) -> NeighbourReactor:
         held = next(held for held in engine.held if held.phase.name == name)
@@ -210,20 +212,20 @@ class EmbeddedScene:
         )
 
     def start(self) -> Array:
-        """Initial values of the variables."""
+        """Return the initial values of the variables."""
         ledger = np.zeros(self.problem.program.n_ledger)
         return np.concatenate((self.problem.y0[self.evaluation.free], ledger))
 
     @cached_property
     def varies(self) -> bool:
-        """Whether anything follows a history in time."""
+        """True if anything depends explicitly on time."""
         system = self.model.system
         named = (item.expression for item in system.named)
         return any(depends(expression, system.t) for expression in (*named, *system.rows.values()))
 
     @property
     def output_names(self) -> list[str]:
-        """Names of what is computed from the states."""
+        """Names of the named quantities of the dataset."""
         return [item.name for item in self.model.system.outputs]
 
     @property
@@ -232,7 +234,7 @@ class EmbeddedScene:
         return tuple(account.quantity.name for account in self.model.system.ledger)
 
     def account(self, name: str) -> int:
-        """Position among the variables of the heat that a replaced body needs to keep its temperature."""
+        """Return the index among the variables of the heat that a replaced body needs to keep its temperature."""
         wanted = f"H_T_{coupling.suffix_of(self.case.scene, name)}"
         if wanted not in self.accounts:
             message = f"no heat flows into {name}, so no reactor can take its place. Give it a path under `heat`."
@@ -240,19 +242,19 @@ class EmbeddedScene:
         return len(self.states) + self.accounts.index(wanted)
 
     def edges_that_read(self, name: str) -> list[str]:
-        """Names of the edges whose guards depend on a load."""
+        """Return the names of the edges whose guards depend on a load."""
         system = self.model.system
         symbol = next(item.symbol for item in system.parameters if item.path == f"loading.{name}.level")
         return [edge.name for edge in system.edges if depends(system.expand(edge.guard), symbol)]
 
     def put(self, t: float, x: Array) -> bool:
-        """Go to a time and variables, under the loads of that time; returns whether a state was found."""
+        """Set time, variables and the loads of that time; return whether a consistent state was found."""
         for path, function in self.loads.items():
             self.evaluation.parameters[self.places[path]] = float(function(t))
         return self.evaluation.put(t, x[: len(self.states)])
 
     def rates(self, t: float, x: Array) -> Array:
-        """Time derivatives of the variables; EndError where there are none, or a limit of the scene is passed."""
+        """Return the time derivatives of the variables; EndError if there are none, or if a limit is passed."""
         evaluation = self.evaluation
         if not self.put(t, x):
             raise EndError("no state satisfies the equations")
@@ -260,7 +262,7 @@ class EmbeddedScene:
         return evaluation.rates()
 
     def _refuse_ended(self, margins: Array) -> None:
-        if not len(margins) or margins[margins.argmin()] >= 0:  # which is what is not a number, if any is
+        if not len(margins) or margins[margins.argmin()] >= 0:  # argmin finds NaN, if any
             return
         closed = self._terminal & ~(margins >= 0)
         if closed.any():
@@ -269,7 +271,7 @@ class EmbeddedScene:
             raise EndError(self.model.margins[int(closed.argmax())].reason)
 
     def closest(self, t: float, x: Array) -> str:
-        """Reason for the end where the integrator cannot go on: that of the limit that has come closest."""
+        """Return the reason for the end if the integrator cannot go on: that of the limit that came closest."""
         evaluation, start = self.evaluation, self.start()
         self.put(0.0, start)
         terminal = np.flatnonzero(self._terminal)
@@ -282,7 +284,7 @@ class EmbeddedScene:
         return reasons[int(left.argmin())]
 
     def quantity(self, name: str, t: float, x: Array) -> float:
-        """A state or a named quantity in SI units."""
+        """Return a state or a named quantity in SI units."""
         evaluation, system = self.evaluation, self.model.system
         self.put(t, x)
         found = dict(zip((state.name for state in system.states), evaluation.y, strict=True))
@@ -298,7 +300,7 @@ class EmbeddedScene:
         return tuple(float(t) for t in self.problem.segments[1:-1])
 
     def begin_piece(self, t: float, rtol: float) -> None:
-        """Go on with the pieces of the histories that hold from time t [s] on; bounds give way to the tolerance."""
+        """Set the load segments that begin at time t [s]; bounds get slack for the tolerance."""
         run = Run(times=(0.0, NO_END), rtol=max(rtol, DIFFERENCE_STEPS))
         table = self.model.problem(run, self.values, passing=False).parameters
         parameters = table[bisect_right(self.breakpoints, t)]
@@ -308,20 +310,20 @@ class EmbeddedScene:
             self.evaluation.parameters[:] = parameters
 
     def transitions(self, t: float, x: Array) -> Array:
-        """Margins of the transitions; that which reaches zero is due."""
+        """Return the guards of the transitions at a time and variables."""
         assert self.moments is not None
         self.put(t, x)
         return self.moments.margins()
 
     def ledger_rates(self, t: float, x: Array) -> Array:
-        """Rates of the ledger."""
+        """Return the rates of the ledger."""
         self.put(t, x)
         return self.evaluation.rates()[len(self.states) :]
 
     def moved(self, t: float, x: Array, index: int | None) -> tuple[Array, Array]:
-        """The variables after a transition and what follows, or after what is due anyway; and what the ledger gains.
+        """Return the variables after a transition, or after the due ones if None, and the additions to the ledger.
 
-        EndError where the scene ends with it.
+        EndError if the scene ends with it.
         """
         assert self.moments is not None
         self.put(t, x)
@@ -333,7 +335,7 @@ class EmbeddedScene:
 
 
 class History:
-    """Recorded states of a scene, each with the parameters that held."""
+    """Recorded states of a scene, each with the parameters at that time."""
 
     def __init__(self, scene: EmbeddedScene) -> None:
         self.scene = scene
@@ -343,7 +345,7 @@ class History:
         self.rows: list[tuple[Array, Array, Array, Array]] = []
 
     def append(self, t: float, x: Array) -> None:
-        """Keep variables at a time; a time that is there already is kept as it is."""
+        """Record variables at a time, unless it is recorded already."""
         if self.times and t <= self.times[-1]:
             return
         evaluation, n = self.scene.evaluation, len(self.scene.states)
@@ -352,9 +354,9 @@ class History:
         self.rows.append((evaluation.y.copy(), evaluation.ydot.copy(), x[n:].copy(), evaluation.parameters.copy()))
 
     def solution(self, stop: str, seconds: float, *, alone: bool) -> Solution:
-        """The recorded states as a run, ended by ``stop`` where that is not empty.
+        """Return the recorded states as a solution, ended by ``stop`` if that is not empty.
 
-        Only what ran ``alone`` carries its case, from which a run can be made again.
+        Only the solution of a scene that ran ``alone`` contains its case, from which it can be rerun.
         """
         if len(self.times) < 2:
             raise InputError("nothing was recorded yet: advance the network, or call `record`, at least twice.")
@@ -393,7 +395,7 @@ class History:
         )
 
     def _problem(self) -> Problem:
-        """A piece of time up to each record, with the parameters that held there."""
+        """Return a problem with a load segment up to each record, with its parameters."""
         base, times = self.scene.problem, np.array(self.times)
         before = times[0] - max(1.0, abs(times[0]))
         return Problem(

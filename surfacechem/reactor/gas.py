@@ -1,4 +1,4 @@
-"""Gases and solids that react with the surfaces beside them: they lose what these take, and receive what they make."""
+"""Gases and solids that react with a surface of an interface: reactions take molecules from them and add others."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from surfacechem.solve.adapters.cantera_network import StateVectorReactor
 from surfacechem.solve.contract import Array
 
 REFUSED_CONNECTORS: list[Any] = []
-"""Connectors that were refused: Cantera's part of the reactors they join keeps pointing to them."""
+"""Connectors that were refused: the reactors they join keep pointers to them in Cantera."""
 
 
 def refuse(connector: Any, message: str) -> NoReturn:
-    """Raise InputError for a connector that Cantera makes, which then carries nothing between its reactors."""
+    """Raise InputError for a connector that Cantera creates, and make it carry nothing between its reactors."""
     REFUSED_CONNECTORS.append(connector)
     if isinstance(connector, cantera.FlowDevice):
         connector.device_coefficient = 0.0
@@ -34,14 +34,14 @@ class Receiver:
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
         self.sources: list[tuple[Any, Callable[[float], tuple[Array, float]]]] = []
-        """Interfaces, and the amounts of species [kmol/s] and enthalpy [W] that come in from each at a time [s]."""
+        """Interfaces, each with a function of time [s] for its inflow of species [kmol/s] and enthalpy [W]."""
 
 
 class Gas(Receiver):
-    """Terms that a gas adds to Cantera's own balances.
+    """Source terms of interfaces in Cantera's balances of a gas.
 
-    ``temperature`` is the place of that among its variables: after it come mass fractions, the first is the mass.
-    ``energies`` is Cantera's name of what a species holds of the quantity in whose balance it is [J/kmol].
+    ``temperature`` is the index of the temperature among its variables: mass fractions follow it, and the mass is the
+    first. ``energies`` is Cantera's name of the molar quantity of species in the energy balance [J/kmol].
     """
 
     temperature: int
@@ -52,20 +52,20 @@ class Gas(Receiver):
         self.weights = self.phase.molecular_weights  # type: ignore[attr-defined]
 
     def after_eval(self, t: float, _lhs: Any, rhs: Any) -> None:
-        """Called by Cantera after its own balances of mass, energy and species, which this adds to."""
+        """Add to Cantera's balances of mass, energy and species; Cantera calls it after their evaluation."""
         rates, first, phase = np.asarray(rhs), self.temperature + 1, self.phase  # type: ignore[attr-defined]
         for _, source in self.sources:
             amounts, enthalpy = source(t)
             masses = amounts * self.weights
             total = float(amounts @ self.weights)
             rates[0] += total
-            if self.energy_enabled:  # type: ignore[attr-defined]  # its left side is the heat capacity
+            if self.energy_enabled:  # type: ignore[attr-defined]  # the left side is the heat capacity
                 rates[self.temperature] += enthalpy - float(amounts @ getattr(phase, self.energies))
             rates[first : first + len(masses)] += masses - total * phase.Y
 
 
 class ReactingGas(Gas, cantera.ExtensibleIdealGasReactor):
-    """Cantera's IdealGasReactor for a gas beside the surface of an interface.
+    """Cantera's IdealGasReactor for a gas next to the surface of an interface.
 
     ``InterfaceReactor(..., neighbours={name: gas})`` makes it a neighbour, of one interface or of several.
 
@@ -77,7 +77,7 @@ class ReactingGas(Gas, cantera.ExtensibleIdealGasReactor):
 
 
 class ReactingGasAtPressure(Gas, cantera.ExtensibleIdealGasConstPressureReactor):
-    """Cantera's IdealGasConstPressureReactor for a gas beside the surface of an interface.
+    """Cantera's IdealGasConstPressureReactor for a gas next to the surface of an interface.
 
     Its arguments are those of an IdealGasConstPressureReactor, first the gas, a ``cantera.Solution``.
     """
@@ -90,27 +90,27 @@ MASS = Spec("kg", "mass at the start", above=0)
 
 
 class ReactingSolid(Receiver, StateVectorReactor):
-    """A solid or a liquid beside the surface of an interface, such as the particle of an electrode or its electrolyte.
+    """A solid or a liquid next to the surface of an interface, such as the particle of an electrode or its electrolyte.
 
-    ``InterfaceReactor(..., neighbours={name: solid})`` makes it a neighbour. Its amounts change, each a variable in
-    units of all that is there at the start; temperature and pressure are held as they are, whatever heat that takes.
-    An electric potential is that of the case. Nothing else flows in or out: connectors are refused.
+    ``InterfaceReactor(..., neighbours={name: solid})`` makes it a neighbour. Its variables are its amounts relative to
+    the total amount at the start; temperature and pressure are held constant, whatever heat that takes. Its electric
+    potential is that of the case. There is no other inflow or outflow: connectors are refused.
 
     Parameters
     ----------
     phase
-        A ``cantera.Solution`` in the state of the start.
+        A ``cantera.Solution`` in its initial state.
     mass
-        Its mass at the start: kg, or a text with a unit.
+        Its initial mass: kg, or a text with a unit.
     clone
-        Whether it has a copy of the phase, or the phase itself, whose state then follows it.
+        True for a copy of the phase; False for the phase itself, whose state then follows the reactor.
     name
         Its name in the network.
 
     Raises
     ------
     InputError
-        For what is no mass.
+        For an invalid mass.
     """
 
     switches = {  # noqa: RUF012 - never changed
@@ -119,7 +119,7 @@ class ReactingSolid(Receiver, StateVectorReactor):
     }
 
     def __new__(cls, phase: Any, *, mass: float | str, clone: bool = True, name: str = "solid") -> Self:
-        """Keep the phase itself, or a copy which Cantera makes for a reservoir."""
+        """Use the phase itself, or a copy that Cantera makes for a reservoir."""
         return super().__new__(cls, cantera.Reservoir(phase, clone=True).phase if clone else phase, name=name)
 
     def __init__(self, phase: Any, *, mass: float | str, clone: bool = True, name: str = "solid") -> None:
@@ -128,12 +128,12 @@ class ReactingSolid(Receiver, StateVectorReactor):
         MASS.check("mass", kilograms)
         self.names = tuple(phase.species_names)
         self.whole = kilograms / phase.mean_molecular_weight
-        """Amount at the start [kmol]."""
+        """Total amount at the start [kmol]."""
         self.x = phase.X
 
     @property
     def phase(self) -> Any:
-        """The phase in its present state; Cantera's own would be brought back to that of the start."""
+        """The phase in its present state; Cantera would reset its own phase to the initial state."""
         return self.surface
 
     @property

@@ -44,11 +44,11 @@ class InterfaceReactor(StateVectorReactor):
     overrides
         Changes of the case, as in ``surfacechem.load``.
     area
-        What turns what the scene counts per area into what the network counts: m^2, or a text with a unit.
+        Area by which quantities per area of the scene are multiplied in the network: m^2, or a text with a unit.
     bodies
         Reactors that take the place of bodies: {body: reactor}.
     neighbours
-        Gases beside the surface of its mechanism, by their names there: {phase: ReactingGas}.
+        Gases and solids next to the surface of its mechanism, by their names there: {phase: ReactingGas}.
     name
         Its name in the network; a ``ReactorNet`` of this package numbers names that occur twice.
 
@@ -74,7 +74,7 @@ class InterfaceReactor(StateVectorReactor):
         name: str = "interface",
         **_: Any,
     ) -> Self:
-        """Read the scene, whose reactions Cantera has to know from the start."""
+        """Read the scene: Cantera needs its reactions at creation."""
         scene = EmbeddedScene(_case(case, overrides), bodies or {}, neighbours=neighbours)
         made = super().__new__(cls, contents(scene.reactions or ("bond",)), name=name)
         made.scene = scene
@@ -90,28 +90,28 @@ class InterfaceReactor(StateVectorReactor):
         neighbours: Mapping[str, Any] | None = None,
         name: str = "interface",
     ) -> None:
-        super().__init__(self.surface, name=name)  # Cantera's own part was made in __new__
+        super().__init__(self.surface, name=name)  # Cantera's part was created in __new__
         self._walls: list[Any] = []
-        """Walls which have its area."""
+        """Walls with the area of the interface."""
         self.area = area
         self.bodies, self.neighbours = dict(bodies or {}), dict(neighbours or {})
         self.ports: dict[str, BodyPort] = {}
         self.loads: dict[str, Callable[[float], float]] = {}
         self.pressing: tuple[Any, ...] = ()
-        """Reactors on both sides of the wall that moves as the gap does."""
+        """Reactors on both sides of the wall that moves with the gap."""
         self.passes_breakpoints = False
-        """Whether the network looks after breakpoints."""
+        """True if the network stops at breakpoints."""
         self.t = 0.0
         self._dated = True
-        """Whether that is the time of the variables last put."""
+        """True if ``t`` is the time of the variables set last."""
         self._restarted = 0.0
         """Time of the start or of the last jump, after which steps begin at the rounding of the time."""
         self._connecting = False
-        """Whether a wall is made that carries heat between a body and the reactor in its place."""
+        """True while a wall is created between a body and the reactor in its place."""
         self._varied = False
-        """Whether Cantera varies multipliers while it asks for rates."""
+        """True if Cantera perturbs multipliers between evaluations of rates."""
         self._put, self._told = False, 0.0
-        """Whether variables were put since others asked for rates, and the time at which they did [s]."""
+        """Whether variables were set since other reactors asked for rates, and the time of that request [s]."""
         self.evaluations, self.seconds = 0, 0.0
         self._take_up(self.scene)
         for body, reactor in self.bodies.items():
@@ -121,12 +121,12 @@ class InterfaceReactor(StateVectorReactor):
                 neighbour.sources.append((self, partial(self._given, k)))
 
     def __repr__(self) -> str:
-        """Title and states in a line."""
+        """Return title and states in a line."""
         return f"<InterfaceReactor {self.name!r}: {self.scene.case.title!r}, {', '.join(self.scene.states)}>"
 
     @property
     def area(self) -> float:
-        """Size of the interface, by which the network counts what the scene counts per area: m^2, or set as a text."""
+        """Area by which quantities per area of the scene are multiplied in the network: m^2, or set as a text."""
         return self._area
 
     @area.setter
@@ -143,32 +143,32 @@ class InterfaceReactor(StateVectorReactor):
         self.unit = np.array([1.0] * len(scene.states) + [LEDGER_UNIT] * len(scene.accounts))
         self.x = scene.start()
         self.ledger = self.x[len(scene.states) :].copy()
-        """The ledger of a scene that jumps, which the network integrates by itself."""
+        """The ledger of a scene with jumps, which the network integrates separately."""
         self.reason = ""
         self._last: tuple[float, Array, Array] | None = None
         """Time, variables and rates of the last evaluation."""
         self._current = False
-        """Whether that is of the variables last put."""
+        """True if the rates are those of the variables set last."""
         self._asked: object = None
-        """All that those rates depend on; None where they may depend on more."""
+        """All inputs of those rates; None if they may depend on more."""
         self._heard = np.array([*self._paths()], dtype=np.int64)
         self._accounts = {body: scene.account(body) for body in self.bodies}
-        """Indices of the variables that hold the heat needed by the bodies for which reactors stand."""
+        """Indices of the variables that hold the heat of the bodies that reactors replace."""
         self.history = History(scene)
 
     def _connect(self, reactor: Any, body: str) -> None:
-        """Connect a reactor by a wall through which it loses the heat that keeps the body at its temperature."""
+        """Connect a reactor by a wall through which it supplies the heat that keeps the body at its temperature."""
         self._connecting = True
         heat = lambda t: -float(self._rates_for_others(t)[self._accounts[body]])  # noqa: E731
         self._walls.append(HeatWall(self, reactor, interface=self, A=self.area, Q=heat))
         self._connecting = False
 
     def _given(self, k: int, t: float) -> tuple[Array, float]:
-        """Amounts of species [kmol/s] that reactions give to a neighbour at a time [s], and their enthalpy [W]."""
+        """Return species [kmol/s] and enthalpy [W] that reactions give to a neighbour at a time [s]."""
         return self.scene.beside[k].given(self._rates_for_others(t), self.area)
 
     def _add_wall(self, wall: Any) -> None:
-        """Called by Cantera where a wall is made on this reactor itself, which is two bodies and what is between."""
+        """Refuse a wall on this reactor, which consists of two bodies; Cantera calls it."""
         if self._connecting:
             super()._add_wall(wall)
             return
@@ -176,24 +176,24 @@ class InterfaceReactor(StateVectorReactor):
         refuse(wall, f"a wall on {self.name} does not say which body it touches. Put it on one of them: {names}.")
 
     def _add_inlet(self, device: Any) -> None:
-        """Called by Cantera where a flow device ends here."""
+        """Refuse a flow into this reactor; Cantera calls it."""
         refuse(device, f"{self.name} has no volume that a flow could fill. Let the flow end in a reactor beside it.")
 
     def _add_outlet(self, device: Any) -> None:
-        """Called by Cantera where a flow device begins here."""
+        """Refuse a flow out of this reactor; Cantera calls it."""
         refuse(device, f"{self.name} has no volume from which a flow could come. Let it begin in a reactor beside it.")
 
     def add_sensitivity_reaction(self, m: int) -> None:
-        """Ask for sensitivities to the rate of a reaction, by its index from 0; this reactor is in a network already.
+        """Add sensitivities to the rate of a reaction, by its index from 0; this reactor is in a network already.
 
-        Give the interface to that before the reactors that take from it, or the network stops: only then has Cantera
-        told it the rate that it varies when they ask.
+        In the network the interface must precede the reactors that take from it, or the network stops: Cantera perturbs
+        the rate of a reactor only when it evaluates that reactor.
         """
         super().add_sensitivity_reaction(m)
         self._varied = True
 
     def add_sensitivity_species_enthalpy(self, species: Any) -> None:
-        """Refused: the species' thermo is in the formulas of the scene, where Cantera does not change it."""
+        """Refuse: the thermo of species is in the formulas of the scene, where Cantera does not change it."""
         raise InputError(
             f"sensitivities to the enthalpy of {species} are not known in a network. Change the species in the "
             "mechanism, or use `add_sensitivity_reaction`."
@@ -209,7 +209,7 @@ class InterfaceReactor(StateVectorReactor):
 
     @property
     def T(self) -> float:
-        """Present temperature of the interface [K]; InputError where neither it nor the whole scene has one."""
+        """Present temperature of the interface [K]; InputError if neither it nor the whole scene has one."""
         node = self.scene.case.scene.interface.temperature
         known = (*self.scene.states, *self.scene.output_names)
         own = [name for name in (node if isinstance(node, str) else "T_c", "T") if name in known]
@@ -218,7 +218,7 @@ class InterfaceReactor(StateVectorReactor):
         return self[own[0]]
 
     def body(self, name: str) -> Any:
-        """A reservoir that has the temperature of a body, or of 'interface'; walls on it give and take its heat.
+        """Return a reservoir with the temperature of a body, or of 'interface', for walls that exchange heat with it.
 
         Parameters
         ----------
@@ -228,7 +228,7 @@ class InterfaceReactor(StateVectorReactor):
         Returns
         -------
         cantera.Reservoir
-            Where walls are put.
+            The reservoir on which to put walls.
 
         Raises
         ------
@@ -249,7 +249,7 @@ class InterfaceReactor(StateVectorReactor):
         return self.ports[name].reservoir
 
     def load(self, name: str, function: Callable[[float], float] | float | str) -> None:
-        """Let a function of time [s], or what does not change, be a load in place of one that the case prescribes.
+        """Set a load to a function of time [s] or a constant, in place of one that the case prescribes.
 
         Where it jumps, end an ``advance`` there and call ``reinitialize`` on the network.
 
@@ -263,14 +263,14 @@ class InterfaceReactor(StateVectorReactor):
         Raises
         ------
         InputError
-            For what is no such load or is given already, or after the network has run.
+            For any other name or a load given already, or after the network has run.
         """
         given = function_of(name, function)
         self._take_up(self._loaded(name, given))
         self.loads[name] = given
 
     def _loaded(self, name: str, function: Callable[[float], float]) -> EmbeddedScene:
-        """The scene with another load."""
+        """Return the scene with another load."""
         self._refuse_late(f"the load {name}")
         if name in self.loads:
             raise InputError(f"the load {name} of {self.name} is given already, by `load` or by `press`: give it once.")
@@ -278,10 +278,10 @@ class InterfaceReactor(StateVectorReactor):
         return EmbeddedScene(self.scene.case, self.bodies, self.ports, loads, self.neighbours)
 
     def press(self, gas: Any, outside: Any) -> None:
-        """Let a reactor press the gap open against another one, ``outside``, and grow as the gap opens.
+        """Let a reactor press the gap open against another one, ``outside``, and expand as the gap opens.
 
-        The load ``F_n`` is the difference of their pressures, and a wall between them moves as the gap does, so that
-        what the gas loses is work on the interface and on what is outside.
+        The load ``F_n`` is the difference of their pressures, and a wall between them moves with the gap, so that the
+        energy that the gas loses is work on the interface and on the outside.
 
         Parameters
         ----------
@@ -346,12 +346,12 @@ class InterfaceReactor(StateVectorReactor):
         return rates
 
     def _rates(self, t: float) -> Array:
-        """Rates [SI per s] for the values last put. Where there are none the integrator comes closer, up to the end."""
-        # All reactors of a network have been put before it asks for rates.
+        """Return the rates [SI per s] for the values set last; if there are none, the integrator backs off."""
+        # All reactors of a network are set before it asks for rates.
         if self._current and self._last is not None and self._last[0] == t:
             return self._last[2]
         asked = t, self.x[: len(self.scene.states)].tobytes(), self.heard(t)
-        # The integrator differentiates by every variable in turn, and most are lines of the ledger.
+        # The integrator differentiates by every variable, and most of them are lines of the ledger.
         if asked == self._asked and self._last is not None:
             self._current = True
             return self._last[2]
@@ -368,14 +368,14 @@ class InterfaceReactor(StateVectorReactor):
         return rates
 
     def _rates_for_others(self, t: float) -> Array:
-        """Rates for a reactor in the network, which puts variables before each evaluation if this one is in it, too."""
+        """Return the rates for another reactor; InputError if this one is not in the network, so has no variables."""
         if not self._put and t != self._told:
             raise InputError(self.left_out("a reactor"))
         self._put, self._told = False, t
         return self.attempt(self._rates, t)
 
     def others(self) -> Iterator[tuple[str, Any]]:
-        """Reactors beside it or behind a wall on one of its bodies, and what each does."""
+        """Yield role and reactor for each connected one: in place of a body, next to it, or behind a wall."""
         for body, reactor in self.bodies.items():
             yield f"stands for the body {body}", reactor
         for name, reactor in self.neighbours.items():
@@ -387,7 +387,7 @@ class InterfaceReactor(StateVectorReactor):
                 yield f"has a wall to {name}", reactor
 
     def left_out(self, partner: str) -> str:
-        """Message about a network that has a partner of the interface, but not the interface."""
+        """Return the message on a network that has a partner of the interface, but not the interface."""
         return (
             f"the interface {self.name} to which {partner} is connected is not in the network, so what it gives and "
             "takes would never change: give it to the network too. Where another interface has replaced it, make the "
@@ -395,21 +395,21 @@ class InterfaceReactor(StateVectorReactor):
         )
 
     def _stopped(self, reason: str) -> InterfaceStopped:
-        """The end of the scene here, which is also kept where Cantera loses it."""
+        """Return the end of the scene, which is also stored, since Cantera loses exceptions."""
         self.reason, self.error = reason, InterfaceStopped(reason)
         return self.error
 
     def _stands_still(self, t: float) -> bool:
-        """Whether steps have become as short as the rounding of the time, other than at a start."""
+        """True if steps are as short as the rounding of the time, other than after a start."""
         step = t - self._last[0] if self._last is not None else 0.0
         return 0 < step <= 2 * FEW_EPS * t and t - self._restarted > RUN_EPS * t
 
     def heard(self, t: float) -> object:
-        """All that its rates at a time [s] depend on beside its variables."""
+        """Return everything that the rates at a time [s] depend on besides the variables."""
         return self.area, self._listen(), [f(t) for f in self.loads.values()]
 
     def _listen(self) -> bytes:
-        """Take over temperatures, heats, multipliers and compositions from the network, and tell them as bytes."""
+        """Read temperatures, heats, multipliers and compositions from the network, and return them as bytes."""
         around = [reactor.T for reactor in self.bodies.values()]
         around += [port.heat() / self.area for port in self.ports.values()]
         multipliers = self.surface.forward_rate_constants[: len(self.scene.reactions)]
@@ -419,7 +419,7 @@ class InterfaceReactor(StateVectorReactor):
         return heard.tobytes()
 
     def _paths(self) -> Iterator[int]:
-        """Indices among the scene's parameters of what the network gives, in the order of ``_listen``."""
+        """Yield the indices of these values among the scene's parameters, in the order of ``_listen``."""
         names = [f"T_{suffix_of(self.scene.case.scene, name)}" for name in self.bodies]
         names += [port.heat_name for port in self.ports.values()]
         paths = [f"loading.{name}.level" for name in names]
@@ -451,18 +451,18 @@ class InterfaceReactor(StateVectorReactor):
             )
 
     def ledger_rates(self, t: float, x: Array) -> Array:
-        """Rates of the ledger [SI per s] at given variables."""
+        """Return the rates of the ledger [SI per s] at given variables."""
         self._asked, self._current = None, False
         self._listen()
         return self.scene.ledger_rates(t, x)
 
     def begin_piece(self, t: float, rtol: float) -> None:
-        """Go on with the pieces of the histories that hold from time t [s] on, at a relative tolerance."""
+        """Set the load segments that begin at time t [s], at a relative tolerance."""
         self.t, self._asked, self._current, self._dated = t, None, False, True
         self.scene.begin_piece(t, rtol)
 
     def jump(self, t: float, index: int | None = None) -> None:
-        """Carry out a transition at time t [s], or what is due there anyway, and keep what follows."""
+        """Carry out a transition at time t [s], or the due ones if None, and keep the new state."""
         try:
             self.x, booked = self.scene.moved(t, self.x, index)
             self._refuse_sudden_heat(t)
@@ -484,7 +484,7 @@ class InterfaceReactor(StateVectorReactor):
             )
 
     def end(self) -> None:
-        """Go back to the last state before the end of the scene, and keep it."""
+        """Return to the last state before the end of the scene, and record it."""
         if self._last is not None:
             t, self.x, _ = self._last
             self.record(t)
@@ -492,9 +492,10 @@ class InterfaceReactor(StateVectorReactor):
     # -- results ------------------------------------------------------------------------------------------------------
 
     def __getitem__(self, name: str) -> float:
-        """Present value, in SI units, of a state or of a named quantity of the scene.
+        """Return the present value, in SI units, of a state or of a named quantity of the scene.
 
-        InputError in an ordinary ReactorNet, which tells no time, where the scene has a history and was not recorded.
+        InputError in an ordinary ReactorNet, which does not pass the time, if the scene has a history and was not
+        recorded.
         """
         if self.scene.varies and not self._dated and name not in self.scene.states:
             raise InputError(
@@ -506,16 +507,16 @@ class InterfaceReactor(StateVectorReactor):
 
     @property
     def seconds_per_rate(self) -> float:
-        """Mean time of one evaluation of the rates [s], what surrounds the interface included."""
+        """Mean time of one evaluation of the rates [s], including the values from the network."""
         return self.seconds / max(self.evaluations, 1)
 
     @property
     def coupled(self) -> bool:
-        """Whether anything comes from the network or the script."""
+        """True if any value comes from the network or the script."""
         return bool(self.bodies or self.ports or self.loads or self.neighbours)
 
     def record(self, t: float) -> None:
-        """Keep the present state for the dataset; a `ReactorNet` of this package does so after every step.
+        """Record the present state for the dataset; a `ReactorNet` of this package does so after every step.
 
         Parameters
         ----------

@@ -21,13 +21,13 @@ from surfacechem.solve.adapters.dense_step import Guards, first_crossing
 from surfacechem.solve.contract import Array, Counters, Guard
 
 CVODE_GROWTH = 1e4
-"""Largest ratio of a step of CVODE to the one before: after the first step this, later 10."""
+"""Largest ratio of successive steps of CVODE: after the first step this, later 10."""
 
 STEPS_OF_A_RESIDUAL = 10
-"""Steps between two tests of whether anything changes still, as in Cantera."""
+"""Steps between two tests for a steady state, as in Cantera."""
 
 ASSUMED_LENGTH = 1.0
-"""Length of the integration that is assumed where no end is given [s]."""
+"""Length of the integration that is assumed if no end is given [s]."""
 
 
 SETTINGS = (
@@ -43,14 +43,14 @@ SIDES = ("upstream", "downstream", "left_reactor", "right_reactor")
 class ReactorNet(cantera.ReactorNet):
     """Cantera's ReactorNet for networks with interfaces.
 
-    ``advance`` and ``step`` end a step at every breakpoint of a prescribed history and at every event of a scene, whose
-    jump they carry out, record the interfaces, and raise InterfaceStopped with the reason where a scene ends.
+    ``advance`` and ``step`` end a step at every breakpoint of a prescribed history and at every event of a scene. They
+    carry out its jump, record the interfaces, and raise InterfaceStopped with the reason where a scene ends.
 
     Parameters
     ----------
     reactors
-        Reactors of Cantera and interfaces, whose order is that of indices. Interfaces whose reactions get sensitivities
-        stand before the reactors that take from them.
+        Reactors of Cantera and interfaces, in the order of their indices. Interfaces whose reactions get sensitivities
+        precede the reactors that take from them.
     """
 
     def __init__(self, reactors: Sequence[Any] = ()) -> None:
@@ -60,7 +60,7 @@ class ReactorNet(cantera.ReactorNet):
         self._fresh = True
         self._started = -np.inf
         self._around: list[object] = []
-        """Quantities on which rates depend beside the variables, at the present time."""
+        """Quantities besides the variables on which rates depend, at the present time."""
         super().__init__(reactors)
         self.interfaces += [reactor for reactor in reactors if isinstance(reactor, InterfaceReactor)]
         _number([reactor for reactor in reactors if isinstance(reactor, StateVectorReactor)])
@@ -109,7 +109,7 @@ class ReactorNet(cantera.ReactorNet):
                 return float(self.time)
 
     def _reach(self, goal: float, apply_limit: bool) -> None:
-        """Advance to a time, through the events of scenes on the way."""
+        """Advance to a time, through the events of scenes before it."""
         watch = self._watch
         for interface in watch.interfaces:
             interface.scene.moments.until(goal, self.rtol)  # type: ignore[union-attr]
@@ -129,17 +129,18 @@ class ReactorNet(cantera.ReactorNet):
                 self._anew(f"the event at t = {self.time:g} s")
 
     def _there(self, goal: float) -> bool:
-        """Whether a time is reached: where the integration has just started within rounding of it, the clock alone goes
-        there, since CVODE takes no step as short.
+        """True if a time is reached.
+
+        Just after a start, a time within rounding is reached by setting the clock, since CVODE takes no step as short.
         """
         if self.time == self._started and 0 < goal - self.time <= LATER_LOOK * np.spacing(goal):
             self.initial_time = self._started = goal
         return bool(self.time >= goal)
 
     def _limited(self, now: float, end: float, start: Array) -> float:
-        """The time in a step at which a variable has first changed by its advance limit; the end where none has.
+        """Return the first time in a step at which a variable has changed by its advance limit, else the end.
 
-        Cantera's own limit would count from the last event or step at which we look, not from where the user started.
+        Cantera's limit would count from the last event or request of a step, not from the start of the user's advance.
         """
         limits = np.asarray(self.advance_limits)
         limited = limits >= 0
@@ -147,7 +148,7 @@ class ReactorNet(cantera.ReactorNet):
         def room(_: float, y: Array) -> Array:
             return np.asarray((limits - np.abs(y - start))[limited])
 
-        if np.any(room(now, np.asarray(self.get_state())) < 0):  # an event has gone beyond it
+        if np.any(room(now, np.asarray(self.get_state())) < 0):  # an event has passed the limit
             return now
         step = last_step(self, now, end, np.ones(len(limits)))
         guards = Guards.of([Guard.stop()] * int(limited.sum()), room)
@@ -155,14 +156,14 @@ class ReactorNet(cantera.ReactorNet):
         return first_crossing(step, guards, np.ones(int(limited.sum()), dtype=bool), 0.0)[0]
 
     def _look(self, goal: float) -> None:
-        """Let the integrator take a step, and go a little way into it."""
+        """Make the integrator take a step, advance a little into it, and locate its first event."""
         before = self.time
         super().advance(self._watch.ahead(goal), False)
         self._watch.look()
         self._watch.book(before, self.time)
 
     def _anew(self, where: str) -> None:
-        """Start the integration anew from where it is."""
+        """Restart the integration from the present state."""
         if self.n_sensitivity_params:
             raise InputError(f"sensitivities end at {where}, where the integration starts anew.")
         for interface in self._watch.interfaces:
@@ -171,9 +172,9 @@ class ReactorNet(cantera.ReactorNet):
         self.reinitialize()
 
     def reinitialize(self) -> None:
-        """Start the integration anew from the present states of the reactors, as Cantera's method of this name does.
+        """Restart the integration from the present states of the reactors, like Cantera's method.
 
-        What a script changes of an interface or of what is beside it, as an area or a multiplier, needs no such call.
+        Changes by a script of an interface or its surroundings, such as an area or a multiplier, need no such call.
         """
         super().reinitialize()
         if not self._fresh:
@@ -181,7 +182,7 @@ class ReactorNet(cantera.ReactorNet):
             self._steps, self._started = 0, self.time
 
     def step(self) -> float:
-        """Take one step of the integrator, or go to the next breakpoint where a step could pass it.
+        """Take one step of the integrator, or go to the next breakpoint if a step could pass it.
 
         Returns
         -------
@@ -215,16 +216,16 @@ class ReactorNet(cantera.ReactorNet):
         atol: float = 0.0,
         return_residuals: bool = False,
     ) -> Array | None:
-        """Step until nothing changes any more, as Cantera's method of this name does, through the events on the way.
+        """Step to a steady state, like Cantera's method, through the events before it.
 
         Parameters
         ----------
         max_steps
             Groups of ten steps after which the search ends.
         residual_threshold
-            Relative change in ten steps that counts as none; ten times the tolerance of the network if zero.
+            Relative change in ten steps that counts as zero; ten times the tolerance of the network if zero.
         atol
-            What is added to each variable's largest value, in its own unit; that of the network if zero.
+            Addition to each variable's largest value, in its unit; that of the network if zero.
         return_residuals
             Whether the changes are returned.
 
@@ -254,7 +255,7 @@ class ReactorNet(cantera.ReactorNet):
         raise cantera.CanteraError(f"no steady state was reached in {max_steps * STEPS_OF_A_RESIDUAL} steps.")
 
     def solve_steady(self, loglevel: int = 0) -> None:
-        """Refused with interfaces: reactions on a surface keep its sites, so steady states are not isolated."""
+        """Refuse if there are interfaces: surface sites are conserved, so that steady states are not isolated."""
         if self.interfaces:
             raise InputError(
                 "solve_steady does not know reacting surfaces, whose sites are conserved. Use advance_to_steady_state."
@@ -262,7 +263,7 @@ class ReactorNet(cantera.ReactorNet):
         super().solve_steady(loglevel)
 
     def _watched_step(self, following: Sequence[float]) -> float:
-        """To the end of the integrator's next step, or the event or breakpoint in it."""
+        """Go to the end of the integrator's next step, or to the event or breakpoint in it."""
         watch, ahead = self._watch, min(following, default=np.inf)
         if self._there(ahead):
             return self._advance(ahead)
@@ -273,24 +274,24 @@ class ReactorNet(cantera.ReactorNet):
         return self._advance(min(ahead, watch.known if event is None else event.t))
 
     def _take_up(self) -> None:
-        """Begin, or begin anew where a script has changed anything since."""
+        """Begin, or restart if a script has changed anything."""
         if self._fresh:
             self._begin()
-        elif self._surroundings() != self._around:  # the integrator has been beyond this time, with what was before
+        elif self._surroundings() != self._around:  # the integrator has passed this time with the old values
             self._anew(f"what a script has changed at t = {self.time:g} s")
             self._around = self._surroundings()
 
     def _breakpoints(self) -> list[float]:
-        """Breakpoints ahead, in order."""
+        """Return the breakpoints ahead, in order."""
         return sorted({b for interface in self.interfaces for b in interface.scene.breakpoints if b > self.time})
 
     def _surroundings(self) -> list[object]:
-        """Settings and states that a script may change: of reactors, connectors, and reservoirs behind these."""
+        """Return settings and states that a script may change: of reactors, connectors and their reservoirs."""
         own = [reactor for reactor in self.reactors if not isinstance(reactor, StateVectorReactor)]
         joined = [(*each.inlets, *each.outlets, *each.walls, *each.surfaces) for each in own]
         around = [item for item in chain(*joined) if not isinstance(item, HeatWall)]
-        ends = [getattr(item, end, None) for item in around for end in SIDES]  # one that was refused lacks a side
-        # First, since reactors may share a phase, which shall have the state of one that runs.
+        ends = [getattr(item, end, None) for item in around for end in SIDES]  # a refused connector lacks a side
+        # First, since reactors may share a phase, which must be left in the state of a reactor of the network.
         outside = [end.phase.state.tobytes() for end in ends if end is not None and end not in self.reactors]
         settings = [getattr(item, name, None) for item in (*own, *around) for name in SETTINGS]
         heard = [interface.heard(float(self.time)) for interface in self.interfaces]
@@ -348,7 +349,7 @@ class ReactorNet(cantera.ReactorNet):
 
     @contextmanager
     def _guarded(self) -> Iterator[None]:
-        """Breakpoints are looked after; what an interface raises comes out as it is."""
+        """Context in which the network stops at breakpoints, and an interface's exception replaces Cantera's."""
         for interface in self.interfaces:
             interface.passes_breakpoints = True
         try:
@@ -365,7 +366,7 @@ class ReactorNet(cantera.ReactorNet):
 
 
 def _contents(reactor: Any) -> tuple[bytes, float, bytes]:
-    """State and volume of a reactor, and the rate constants of its reactions, which tell of their multipliers."""
+    """Return state and volume of a reactor, and its rate constants, which show changes of multipliers."""
     phase = reactor.phase
     reacts = reactor.chemistry_enabled and getattr(phase, "n_reactions", 0)
     return phase.state.tobytes(), reactor.volume, phase.forward_rate_constants.tobytes() if reacts else b""

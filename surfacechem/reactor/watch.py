@@ -1,8 +1,8 @@
-"""Events of interfaces inside the steps of a network's integrator.
+"""Event location for interfaces inside the steps of a network's integrator.
 
-The integrator is asked for a time just ahead of the present one, so that it takes one step and no more; the end of that
-step is the time at which it has evaluated last. Between the two its polynomial says where a margin reaches zero, and
-the network has not yet gone there.
+The integrator is asked for a time just ahead of the present one, so that it takes exactly one step; the end of that
+step is the time of its last evaluation. In between, its dense output gives the first zero of a guard before the network
+advances there.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from surfacechem.solve.contract import Array, Guard
 from surfacechem.tolerances import NEGLIGIBLE
 
 FIRST_LOOK = NEGLIGIBLE**3
-"""Time of the first look after a start, as part of what is integrated: the integrator begins with shorter steps."""
+"""Time of the first request after a start, as a fraction of the integration; first steps are shorter."""
 
 SHORTEST_LOOK, LATER_LOOK = 1e4, 4.0
-"""The shortest first look and all later ones, in roundings of the time."""
+"""The shortest first request and all later ones, in roundings of the time."""
 
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(6)
@@ -43,7 +43,7 @@ class InterfaceEvent:
 
 
 class StepWatcher:
-    """Events and dense output of the step that the integrator has taken last."""
+    """Events and dense output of the last step of the integrator."""
 
     def __init__(self, net: Any, interfaces: Sequence[InterfaceReactor]) -> None:
         self.net = net
@@ -56,11 +56,11 @@ class StepWatcher:
         self._steps: list[DenseStep] = []
 
     def restart(self) -> None:
-        """Start anew, as the integrator does."""
+        """Restart, as the integrator does."""
         self.started, self.known, self.event = False, -np.inf, None
 
     def ahead(self, goal: float) -> float:
-        """A time for which the integrator takes a step, [s]."""
+        """Return a time [s] at which a request makes the integrator take one step."""
         now = float(self.net.time)
         self._before = [item.scene.transitions(now, item.x) for item in self.interfaces]
         if self.started:
@@ -69,7 +69,7 @@ class StepWatcher:
         return min(goal, now + max(min(FIRST_LOOK * (goal - now), soonest / 2), SHORTEST_LOOK * float(np.spacing(now))))
 
     def look(self) -> None:
-        """Find the first event in the step that the integrator has just taken."""
+        """Locate the first event in the step that the integrator has just taken."""
         now = float(self.net.time)
         self.started, self.event = True, None
         self.known = max([now, *(item.asked for item in self.interfaces)])
@@ -86,9 +86,10 @@ class StepWatcher:
                 self.event = InterfaceEvent(t, item, fired[0])
 
     def book(self, start: float, end: float) -> None:
-        """Integrate the ledgers over a part of the step, which the integrator does not see where nothing else moves.
+        """Integrate the ledgers over a part of the step.
 
-        What the network gives is known at the ends of steps only, so the integrator's own ledger counts under it.
+        The integrator may step over their changes while nothing else moves. Values from the network are known at the
+        ends of steps only; with them the integrator's ledger is used.
         """
         for item, step in zip(self.interfaces, self._steps, strict=True):
             if item.coupled:
@@ -102,6 +103,6 @@ class StepWatcher:
                 item.ledger = item.ledger + (high - low) / 2 * (WEIGHTS @ np.array(rates))
 
     def _step_of(self, item: InterfaceReactor, now: float) -> DenseStep:
-        """Dense output of the rest of the step from now, for the variables of an interface."""
+        """Return the dense output of the rest of the step, for the variables of an interface."""
         first = sum(reactor.n_vars for reactor in takewhile(lambda reactor: reactor is not item, self.net.reactors))
         return last_step(self.net, now, self.known, item.unit, slice(first, first + item.n_vars))
