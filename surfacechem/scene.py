@@ -29,15 +29,15 @@ from surfacechem.errors import InputError, Place
 from surfacechem.quantities import Quantity
 
 MOST_CELLS = 4096
-"""Cells across a body at most that a case may give."""
+"""Largest number of cells across a body that a case may give."""
 
 
 @dataclass(frozen=True)
 class Body:
     """One of the two bodies.
 
-    ``temperature`` is the name of the temperature node that the body belongs to, or a prescribed history; bodies and
-    interface that share a node are in perfect thermal contact. Without ``energy`` it is a reservoir.
+    ``temperature`` is the name of the body's temperature node, or a prescribed history; bodies and interface that share
+    a node are in perfect thermal contact. Without ``energy`` the body is a reservoir.
     """
 
     name: str
@@ -84,7 +84,7 @@ class Conduction(Law):
 
     @property
     def held(self) -> bool:
-        """Whether the far side is held at a temperature."""
+        """True if the far side has a prescribed temperature."""
         return self.far is not None and self.h_far is None
 
 
@@ -97,10 +97,10 @@ class Mounting(Law):
     far-field traction and nothing else it is under dead load. Source: lumped form of the momentum balance of Sauer,
     Duong & Mandadapu (2021), eq. e:sf_moc.
 
-    Where no potential bears the bodies their contact is rigid. A mass that reaches it with the velocity :math:`v < 0`
-    leaves it with :math:`-e\,v`, and :math:`(1 - e^2)\,m v^2/2` is heat in the bodies (Newton's law of impact;
-    Brogliato (2016), Nonsmooth Mechanics, doi 10.1007/978-3-319-28664-8). A rebound is never assumed: without e the
-    bodies rest on each other as soon as they meet.
+    Without a potential that bears the bodies their contact is rigid. A mass that reaches it with the velocity
+    :math:`v < 0` rebounds with :math:`-e\,v`, and :math:`(1 - e^2)\,m v^2/2` becomes heat in the bodies (Newton's law
+    of impact; Brogliato (2016), Nonsmooth Mechanics, doi 10.1007/978-3-319-28664-8). A rebound is never assumed:
+    without e the bodies rest on each other as soon as they meet.
     """
 
     contract = "mechanics"
@@ -123,9 +123,10 @@ class Mounting(Law):
 
 @dataclass(frozen=True)
 class Stage:
-    """A stage of the loading: rates of what it moves, and one thing that ends it; the last one may be without end.
+    """A stage of the loading: rates of the variables that it moves, and the condition that ends it, if any.
 
-    ``event`` is the name of a transition, or how it begins; ``variable`` ends the stage at ``value``.
+    ``event`` is the name of a transition, or its beginning; ``variable`` ends the stage at ``value``. Only the last
+    stage may have no end.
     """
 
     name: str
@@ -136,7 +137,7 @@ class Stage:
     variable: str = ""
     value: float = 0.0
     rising: bool = True
-    """Whether the variable reaches the value from below."""
+    """True if the variable reaches the value from below."""
     event: str = ""
     place: Place | None = None
 
@@ -150,7 +151,7 @@ class Sites:
     reference: int = 1
 
     def __post_init__(self) -> None:
-        """Densities are positive and the reference side exists."""
+        """Check that densities are positive and the reference side exists."""
         if not (self.density_1 > 0 and self.density_2 > 0):
             raise InputError("site densities must be positive.")
         if self.reference not in (1, 2):
@@ -169,7 +170,7 @@ class Sites:
 
 @dataclass(frozen=True)
 class BondingVariable:
-    """A bonding variable beside phi, a coverage of a mechanism for instance.
+    """A bonding variable other than phi, such as a coverage of a mechanism.
 
     ``density`` is the amount per reference area [1/m^2] at which the variable is one.
     """
@@ -183,63 +184,64 @@ class BondingVariable:
 
 @dataclass(frozen=True)
 class Electrode:
-    """A phase beside the surface whose potential follows from its charge."""
+    """A phase next to the surface whose potential follows from its charge."""
 
     phase: str
-    """Its name in names of quantities."""
+    """Its name as part of names of quantities."""
     title: str
     potential: Quantity
     start: float
-    """Its potential at the start [V]."""
+    """Initial potential [V]."""
     capacitance: float
     """Capacitance [F/m^2]."""
     current: Load | None = None
-    """Electric current into it from outside [A/m^2]; none without one."""
+    """Electric current into it from outside [A/m^2]; None if zero."""
 
 
 class Engine(Protocol):
-    """External evaluator that gives parameters of the scene while it runs, from values of its variables."""
+    """External evaluator of some parameters of the scene during a run, as functions of its variables."""
 
     @property
     def reads(self) -> tuple[str, ...]:
-        """Names of the variables."""
+        """Names of the variables that it reads."""
 
     @property
     def gives(self) -> tuple[str, ...]:
-        """Paths of the parameters."""
+        """Paths of the parameters that it gives."""
 
     @property
     def histories(self) -> Sequence[tuple[Quantity, Load]]:
-        """Histories of what it reads beside the state of the scene."""
+        """Prescribed histories that it reads, in addition to the state of the scene."""
 
     @property
     def electrodes(self) -> Sequence[Electrode]:
-        """Electrodes whose potentials it reads, which belong to the state of the scene."""
+        """Electrodes whose potentials it reads; they are states of the scene."""
 
     def limits(self, values: Mapping[str, Any]) -> Iterable[tuple[str, Any, str]]:
-        """Margins of these histories, by name, that must stay positive: name, expression, and the reason where it does
-        not.
+        """Margins of these histories that must stay positive: name, expression, and the reason if it fails.
+
+        ``values`` are the expressions of the histories by name.
         """
 
     @property
     def names(self) -> Mapping[str, str]:
-        """Names, as parts of names of quantities, of species that reactions make beside the interface, by species."""
+        """Names, for use in names of quantities, of species that reactions produce in neighbours, by species."""
 
     @property
     def charges(self) -> Mapping[str, Mapping[str, float]]:
-        """Charge [C] of a molecule of each of them that has any, by phase."""
+        """Charge [C] per molecule of each charged one of these species, by phase."""
 
     def __call__(self, values: Sequence[float]) -> NDArray[np.float64]:
-        """Values of the parameters at values of the variables."""
+        """Return values of the parameters at values of the variables."""
 
 
 @dataclass(frozen=True)
 class Medium:
     """Medium between the bodies: a fluid, or single properties by name (k_m, eta_m, rho_m, cp_m).
 
-    A property that is given goes before that of the fluid. Without ``thickness`` [m] it fills the normal gap, or is a
-    film whose thickness changes by ``growth``.
-    ``temperatures`` [K] are some that the fluid's properties must cover from the start.
+    A given property replaces that of the fluid. Without ``thickness`` [m] the medium fills the normal gap, or is a film
+    whose thickness changes by ``growth``.
+    ``temperatures`` [K] are values that the fit of the fluid's properties must cover.
     """
 
     fluid: Fluid | None = None
@@ -253,9 +255,9 @@ class Medium:
 class Interface:
     """Interface between the bodies: its laws, bonding variables, temperature and medium.
 
-    ``temperature`` is the interface's node, a prescribed history, or None where there is no medium: then friction and
-    reaction heat go straight into the bodies, the fraction ``partition`` into body 1, the fraction ``loss`` into the
-    surroundings and the rest into body 2.
+    ``temperature`` is the interface's node, a prescribed history, or None without a medium. In that case the heat of
+    friction and reactions goes directly into the bodies: the fraction ``partition`` into body 1, the fraction ``loss``
+    into the surroundings and the rest into body 2.
     """
 
     temperature: str | Load | None = None
@@ -266,19 +268,19 @@ class Interface:
     partition: float = 0.5
     variables: Sequence[BondingVariable] = ()
     bonds: Sequence[str] = ()
-    """Names of those variables that count as bonds where phi is not itself a state."""
+    """Names of those variables that count as bonds if phi is not a state."""
     limits: Sequence[Limit] = ()
     loss: float = 0.0
     medium: Medium | None = None
     engine: Engine | None = None
-    """Engine that evaluates those rates that are not formulas."""
+    """Engine that evaluates the rates that are not formulas."""
     remarks: Sequence[str] = ()
     """Remarks on the source of the laws, for readers of the results."""
 
 
 @dataclass(frozen=True)
 class Scene:
-    """Everything that is computed, and nothing else."""
+    """The complete input of a computation."""
 
     bodies: tuple[Body, Body]
     interface: Interface
@@ -288,12 +290,12 @@ class Scene:
     T_0: float | None = None
     initial: Mapping[str, float] = field(default_factory=dict)
     normal: Mounting | None = None
-    """Mounting of the normal gap, where it moves by a balance."""
+    """Mounting of the normal gap, if it moves by a balance."""
     tangential: Mounting | None = None
-    """Mounting of the tangential displacement, where it moves by a balance."""
+    """Mounting of the tangential displacement, if it moves by a balance."""
     transverse: Mounting | None = None
-    """Mounting of the displacement across it, where it differs from ``tangential``; the mass is the same."""
+    """Mounting of the transverse displacement, if it differs from ``tangential``; the mass is the same."""
     programme: Sequence[Stage] = ()
-    """Stages of the loading, one after the other."""
+    """Stages of the loading, in order."""
     surface: Potential | None = None
-    """Free energy of two surfaces of given shapes; what is per area elsewhere is then that of the whole pair."""
+    """Free energy of two surfaces of given shapes; quantities otherwise per area are then totals of the pair."""
