@@ -1,9 +1,9 @@
-"""Rates of bonds under load in Cantera itself.
+"""Rates of bonds under load as an extension of Cantera.
 
-A mechanism that says ``extensions: [{type: python, name: surfacechem.extension}]`` may give its reactions any rate type
-of this package (``type: Bell`` and so on), in every Cantera script. What a rate reads beside temperature and coverages
-(``f``, the force per bond [N]; ``g_n``, the gap [m]) is an attribute of the surface, which has to be of a subclass of
-``cantera.Interface`` that takes attributes, such as :class:`LoadedInterface`.
+A mechanism with ``extensions: [{type: python, name: surfacechem.extension}]`` may give its reactions any rate type of
+this package (``type: Bell`` and so on), in every Cantera script. Loads that a rate reads in addition to temperature and
+coverages (``f``, the force per bond [N]; ``g_n``, the gap [m]) are attributes of the surface, which has to be of a
+subclass of ``cantera.Interface`` that takes attributes, such as :class:`LoadedInterface`.
 """
 
 from __future__ import annotations
@@ -31,21 +31,21 @@ from surfacechem.tolerances import TINY
 __all__ = ["LoadedInterface"]
 
 PER_KMOL = {"J/mol": KILO, "J": MOLECULAR}
-"""Energies that may be per amount, and how many make one per kmol."""
+"""Energies that may be per amount, with the factor to an energy per kmol."""
 
 LARGEST = 700.0
-"""Affinity over k_B T above which its exponential counts as this one's."""
+"""Largest affinity over k_B T in an exponential."""
 
 TOP = math.exp(EXPONENT_CAP)
 
 FLOOR = TINY ** (1 / 3)
-"""Coverages below this count as this where mass action of up to third order has to be divided out."""
+"""Floor of coverages in a division by mass action of up to third order."""
 
 
 class LoadedInterface(cantera.Interface):
-    """A Cantera surface whose bonds are under load: give it the attributes that its rates read, ``f`` or ``g_n``.
+    """A Cantera surface whose bonds are under load: set the attributes that its rates read, ``f`` or ``g_n``.
 
-    ``f`` [N] may be a mapping from species to forces; a reaction then takes that of the first of its species.
+    ``f`` [N] may be a mapping from species to forces; a reaction then reads that of the first of its species.
     """
 
 
@@ -58,17 +58,17 @@ class Surroundings(cantera.ExtensibleRateData):
         self.names: list[str] = []
         self.surface: Any = None
         self.loads: Mapping[str, Any] = {}
-        """Attributes that the surface itself has."""
+        """Attributes of the surface instance."""
         self._coverages: dict[str, float] | None = None
 
     def update(self, surface: Any) -> bool:
-        """Take over the state; always, since a force can change at constant temperature."""
+        """Update the state; always, since a force can change at constant temperature."""
         self.T, self._coverages = surface.T, None
         if self.surface is not None and self.surface() is surface:
             return True
         if not self.names:
             self.names = [surface.species(k).name for k in range(surface.n_species)]
-        # Only what takes attributes can be referred to weakly; a strong reference would keep the surface alive.
+        # Weak, since a strong reference would keep the surface alive; only a class that takes attributes allows it.
         self.surface = weakref.ref(surface) if hasattr(surface, "__weakref__") else None
         self.loads = getattr(surface, "__dict__", {})
         if self.surface is None:
@@ -77,17 +77,17 @@ class Surroundings(cantera.ExtensibleRateData):
 
     @property
     def coverages(self) -> dict[str, float]:
-        """Coverages by species, taken from the surface where a rate reads one."""
+        """Coverages by species, taken from the surface when a rate first reads one."""
         if self._coverages is None:
             self._coverages = self._of(self.surface())
         return self._coverages
 
     def _of(self, surface: Any) -> dict[str, float]:
-        coverages = getattr(surface, "coverages", None)  # a clone is no Interface; it has lost its load too
+        coverages = getattr(surface, "coverages", None)  # a clone is no Interface, and has lost its load
         return dict(zip(self.names, coverages.tolist(), strict=True)) if coverages is not None else {}
 
     def read(self, name: str, kind: str) -> Any:
-        """An attribute of the surface; there is no default, since a load that was forgotten is not zero."""
+        """Return an attribute of the surface; there is no default, since a forgotten load is not zero."""
         surface = self.surface() if self.surface is not None else None
         if not hasattr(surface, name):
             quantity = VARIABLES[name]
@@ -100,7 +100,7 @@ class Surroundings(cantera.ExtensibleRateData):
 
 
 class _Symbols(dict[str, Any]):
-    """Symbols by name, made where a formula asks for them."""
+    """Symbols by name, made when a formula reads them."""
 
     def __missing__(self, name: str) -> Any:
         self[name] = symengine.Symbol(name)
@@ -108,12 +108,12 @@ class _Symbols(dict[str, Any]):
 
 
 class LoadedRate(cantera.ExtensibleRate):
-    """A rate type of this package as Cantera's; a subclass names the law whose coefficient it evaluates."""
+    """A rate type of this package as an extensible rate of Cantera; subclasses name the law that they evaluate."""
 
     law: ClassVar[type[InterfaceArrhenius]]
 
     def set_parameters(self, node: Any, units: Any) -> None:
-        """Read the entry of a reaction. What is wrong with it is kept for ``validate``, where it gets its line."""
+        """Read the entry of a reaction; an error is kept for ``validate``, which reports it with its line."""
         self.kind = self.law.kind.removeprefix("interface-")
         self.problem, self.capped = "", False
         self.bound: InterfaceArrhenius | None = None
@@ -176,12 +176,12 @@ class LoadedRate(cantera.ExtensibleRate):
         for term in self.bound.coverage:
             entry = entries[term.variable]
             entry["a"], entry["m"] = term.a, term.m
-            entry["E"] = [f"{energy!r} J/mol" for energy in term.E]  # a list gets no units from Cantera
+            entry["E"] = [f"{energy!r} J/mol" for energy in term.E]  # Cantera gives a list no units
         if entries:
             node["coverage-dependencies"] = entries
 
     def validate(self, equation: str, surface: Any) -> None:
-        """Refuse what is wrong with the entry, and what Cantera would make of it."""
+        """Refuse an invalid entry, and one that Cantera would evaluate wrongly."""
         if self.problem:
             raise ValueError(self.problem)
         assert self.bound is not None
@@ -200,7 +200,7 @@ class LoadedRate(cantera.ExtensibleRate):
 
     @cached_property
     def coefficient(self) -> tuple[list[tuple[int, str]], Any, Any, Callable[[], None]]:
-        """Compiled coefficient: numbers and names of arguments beside the temperature, arguments, value, evaluation."""
+        """Compiled coefficient: indices and names of the arguments but temperature, arguments, value, evaluation."""
         assert self.bound is not None
         symbols = _Symbols(T_c=symengine.Symbol("T_c"))
         expression = self.bound.coefficient(symbols, 0.0)
@@ -212,7 +212,7 @@ class LoadedRate(cantera.ExtensibleRate):
         return list(enumerate(symbols))[1:], arguments, value, partial(function, *places)
 
     def eval(self, data: Any) -> float:
-        """Rate coefficient in kmol, m and s."""
+        """Return the rate coefficient in kmol, m and s."""
         reads, arguments, value, evaluate = self.coefficient
         arguments[0] = data.T
         for i, name in reads:
@@ -232,7 +232,7 @@ class LoadedRate(cantera.ExtensibleRate):
         return found
 
     def _read_from(self, data: Surroundings, name: str) -> float:
-        """A coverage or a load, which may be given by species."""
+        """Return a coverage or a load, which may be given by species."""
         if name in data.names:
             return data.coverages[name]
         value = data.read(name, self.kind)
@@ -245,10 +245,10 @@ class LoadedRate(cantera.ExtensibleRate):
 
 
 class ByAffinity(Surroundings):
-    """Data that rates by affinity read: the chemical potentials over R T too."""
+    """Data that rates by affinity read: also the chemical potentials over R T."""
 
     def update(self, surface: Any) -> bool:
-        """Take over the state."""
+        """Update the state."""
         super().update(surface)
         potentials = surface.chemical_potentials / (cantera.gas_constant * self.T)
         self.potentials = dict(zip(self.names, potentials.tolist(), strict=True))
@@ -256,10 +256,10 @@ class ByAffinity(Surroundings):
 
 
 class AffinityRate(LoadedRate):
-    """A rate by affinity as the coefficient of mass action that gives the same net rate."""
+    """A rate by affinity as the coefficient of mass action with the same net rate."""
 
     def eval(self, data: Any) -> float:
-        """Rate coefficient in kmol, m and s."""
+        """Return the rate coefficient in kmol, m and s."""
         law = self.bound
         assert isinstance(law, AffinityReaction)
         x = sum(nu * data.potentials[name] for name, nu in law.change.items())
@@ -270,7 +270,7 @@ class AffinityRate(LoadedRate):
 
 
 def _check_all(node: Any, keys: Collection[str], title: str) -> None:
-    """Raise InputError unless a mapping has these keys and no other, as Cantera's own rates have."""
+    """Raise InputError unless a mapping has exactly these keys, like Cantera's own rates."""
     if not isinstance(node, Mapping):
         raise InputError(f"{title} must be a mapping with {', '.join(sorted(keys))}.")
     refuse_unknown(node, keys, f"{title}: unknown key '{{}}'")
@@ -285,7 +285,7 @@ def _number(units: Any, key: str, value: Any, unit: str) -> float:
         raise InputError(f"{key} = {value} is not a quantity in {unit}.") from None
 
 
-# A rate of Cantera for every rate type that it does not know itself.
+# One Cantera rate for every rate type that Cantera does not have.
 for _kind, _law in kinds().items():
     if not _law.native:
         _rate, _data = (AffinityRate, ByAffinity) if issubclass(_law, AffinityReaction) else (LoadedRate, Surroundings)
