@@ -1,4 +1,4 @@
-"""Solvers by name: our own, and those of the files in ``adapters``, each of which is imported when it is asked for.
+"""Solvers by name: those of this package, and those in ``adapters``, which are imported on first use.
 
 >>> solver("radua")
 Traceback (most recent call last):
@@ -16,27 +16,27 @@ from surfacechem.errors import suggestion
 from surfacechem.solve.contract import Solver
 
 AUTO = "auto"
-"""Name by which the method is chosen for the scene, and the tolerance from the accuracy that is asked for."""
+"""Name that leaves the choice of the method to the program, and that of the tolerance to the requested accuracy."""
 
 CALLING_PYTHON = ("cantera",)
-"""Solvers that call Python for their right-hand sides, and so can use rates evaluated outside."""
+"""Solvers whose right-hand sides are called from Python, so that rates may be evaluated by external code."""
 
 
 _ADAPTERS: dict[str, str] = {}
-"""Files of adapters by the names of their solvers, which are read without importing a library."""
+"""Adapter module of each solver, read from the files without importing a library."""
 for _file in sorted(Path(__file__).with_name("adapters").glob("*.py")):
     _declared = re.search(r"^NAMES = (\(.*\))$", _file.read_text(encoding="utf-8"), re.MULTILINE)
     _ADAPTERS.update(dict.fromkeys(ast.literal_eval(_declared[1]) if _declared else (), _file.stem))
 
 OWN = {"radau": "Radau", "dop853": "Dop853"}
-"""The methods of this package, and their classes."""
+"""Methods of this package, and their classes."""
 
 names = (*OWN, *sorted(_ADAPTERS, key=lambda name: name in CALLING_PYTHON))
 
 
 @cache
 def solver(name: str) -> Solver:
-    """The solver of this name; 'radau' is our own and the default."""
+    """Return the solver of this name; the default is 'radau', a method of this package."""
     if name not in names:
         raise ValueError(f"no solver '{name}'.{suggestion(name, names)}")
     if name in OWN:

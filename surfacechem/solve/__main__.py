@@ -11,8 +11,8 @@ from surfacechem.solve.radau import stepper
 
 
 def main() -> None:
-    """Compile what is not compiled yet and keep it; with the name of a folder, into that, for all processors of this
-    platform.
+    """Compile the stepper if it is not cached; with a folder as argument, compile it into that folder for all
+    processors of this platform.
     """
     if len(sys.argv) > 1:
         with TemporaryDirectory() as cache:

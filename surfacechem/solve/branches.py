@@ -1,9 +1,9 @@
-r"""Searches for the next equilibrium: along one gap to the next root or the fold ahead, or of several gaps at once.
+r"""Searches for the next equilibrium: along one gap to the next root or beyond a fold, or of several gaps at once.
 
-Gaps without inertia or damper take no time. Where several have lost their equilibrium, or are pushed out of it, there
-may be more than one to end in, and which it is depends on the way. It is that of the limit of small and equal dampers,
-in which each gap moves in proportion to what is out of balance of its tractions, :math:`c\,\dot g_i = r_i(g)`. What is
-found lies where the laws hold: a search ends at the ends of their domains.
+Gaps without inertia or damper jump in no time. Where several have lost their equilibrium, or are out of balance, there
+may be more than one equilibrium to jump to, and the path decides which. It is taken from the limit of small and equal
+dampers, in which each gap moves in proportion to the residual of its tractions, :math:`c\,\dot g_i = r_i(g)`. A search
+ends at the limits of the laws' domains, so every equilibrium found lies within them.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ from surfacechem.tolerances import CBRT_EPS, FEW_EPS, NEGLIGIBLE, NO_AMOUNT, PIC
 Curve = Callable[[Sequence[float] | Array], Array]
 
 FIRST_STEP, STEP_GROWTH, MOST_STEPS = NO_AMOUNT, 1.02, 2400
-"""First step of the search for the next equilibrium, relative to the gap, its growth, and the number of steps."""
+"""First step of the search for the next equilibrium, relative to the gap, growth of the steps, and their number."""
 
 SEARCH_REACH = FIRST_STEP * (STEP_GROWTH ** (MOST_STEPS - 1) - 1) / (STEP_GROWTH - 1)
 """Reach of a search, relative to the gap."""
 
 
 def march(driving: Curve, start: float, direction: float, noise: Curve) -> float | None:
-    """The gap at which the push of the driving traction, or that from a fold, ends.
+    """Return the gap at which the driving traction, or the motion that starts from a fold, comes to balance.
 
-    At a fold the push begins as rounding: it counts from where it is more than the ``noise`` of the tractions.
+    At a fold the driving traction starts as roundoff: it counts from where it exceeds the ``noise`` of the tractions.
     """
     push = float(np.sign(driving([start])[0]))
     if push == 0.0 and direction == 0.0:
@@ -39,15 +39,16 @@ def march(driving: Curve, start: float, direction: float, noise: Curve) -> float
 
 
 def steps_ahead(start: float, direction: float) -> Array:
-    """Gaps in ever longer steps from a gap in a direction."""
+    """Return gaps from a start in a direction, with geometrically growing steps."""
     size = FIRST_STEP * max(abs(start), PICOMETRE)
     return np.asarray(start + direction * size * (STEP_GROWTH ** np.arange(MOST_STEPS) - 1) / (STEP_GROWTH - 1))
 
 
 def push_ahead(driving: Curve, start: float, direction: float, least: Curve, *, lost: bool) -> float | None:
-    """The first gap in a direction at which the driving traction pushes on by more than the ``least`` that counts.
+    """Return the first gap in a direction at which the driving traction points onward by more than ``least``.
 
-    None where there is none, or where it resists before and the balance is not known to be ``lost``.
+    None if there is none, or if the traction opposes the motion before it and the equilibrium is not known to be
+    ``lost``.
     """
     gaps = steps_ahead(start, direction)
     values, small = direction * driving(gaps), least(gaps)
@@ -57,7 +58,9 @@ def push_ahead(driving: Curve, start: float, direction: float, least: Curve, *, 
 
 
 def next_root(curve: Curve, start: float, direction: float, sign: float, noise: Curve | None = None) -> float | None:
-    """First zero in a direction of a function of known sign before it, which at the start may be wrong by rounding."""
+    """Return the first zero in a direction of a function with a known sign before it; at the start roundoff may falsify
+    it.
+    """
     gaps = steps_ahead(start, direction)
     values = sign * curve(gaps)
     least = 0.0 if noise is None else noise(gaps)
@@ -70,36 +73,39 @@ def next_root(curve: Curve, start: float, direction: float, sign: float, noise: 
         return float(gaps[j])
 
     def value(g: float) -> float:
-        # A formula may have no value just where it jumps to the other sign, as stiffness does at a bend of a traction.
+        # A formula may be undefined where it jumps to the other sign, as a stiffness is at a kink of the traction.
         return float(np.nan_to_num(sign * curve([g])[0]))
 
-    # The ends count as they were seen among the others: alone they may round to the other sign.
+    # Pass the values already known at the ends: evaluated again by themselves they may round to the other sign.
     found = zero(value, (float(gaps[j - 1]), float(gaps[j])), (float(values[j - 1]), float(values[j])))
-    # At a pole the sign changes too, but there is no zero.
+    # The sign changes at a pole too, which is not a zero.
     return None if abs(curve([found])[0]) > max(abs(values[j - 1]), abs(values[j])) else found
 
 
 Indices = NDArray[np.intp]
 Field = Callable[[Array], Array]
-"""Driving tractions at ways of the gaps from where they begin, both of shape (points, gaps)."""
+"""Function from displacements of the gaps to driving tractions, both of shape (points, gaps)."""
 
 MOTION_RTOL, START_PART = 0.1 * NEGLIGIBLE, NEGLIGIBLE
-"""Tolerance of the motion, relative to the way so far; it begins within this part of its first push."""
+"""Relative tolerance of the damped motion; its absolute tolerance and first step, as a part of the first
+displacement.
+"""
 
 MOTION_STEPS = 20_000
-"""Steps after which motion does not come to rest."""
+"""Number of steps after which the motion is taken not to come to rest."""
 
 
 FIRST_PUSH = 10 * CBRT_EPS
-"""Part of a gap with which motion begins from an unstable balance at least: the difference taken there does not reach
-back to the balance, where laws may have a kink. Ten times is a choice; motion would also leave from twice."""
+"""Least first displacement from an unstable equilibrium, relative to the gap: the difference quotient taken there must
+not reach back to the equilibrium, where laws may have a kink. Ten times CBRT_EPS is a choice; twice would do too.
+"""
 
 NEWTON_REACH, REST_STEPS = NEGLIGIBLE, 12
-"""Part of the way within which Newton's method takes the last step to rest, and how many steps that may have."""
+"""Distance to rest, relative to the displacement, within which Newton's method takes over, and its number of steps."""
 
 
 def stiffness(driving: Field, scale: Array, at: Array) -> Array:
-    """Change of each driving traction along each gap, shape (gaps, gaps)."""
+    """Return the derivative of each driving traction by each gap, shape (gaps, gaps), from central differences."""
     nudges = np.diag(CBRT_EPS * scale)
     values = driving(np.vstack([at + nudges, at - nudges]))
     ahead, behind = np.split(values, 2)
@@ -107,7 +113,7 @@ def stiffness(driving: Field, scale: Array, at: Array) -> Array:
 
 
 def unstable_direction(change: Array) -> Array | None:
-    """Direction in which an imbalance grows the fastest, its largest part 1; None where all decay (stable)."""
+    """Return the fastest growing eigenvector of an imbalance, its largest entry 1; None if all decay (stable)."""
     growth, ways = np.linalg.eig(change)
     fastest = int(np.argmax(growth.real))
     if not growth[fastest].real > 0:
@@ -117,9 +123,9 @@ def unstable_direction(change: Array) -> Array | None:
 
 
 def come_to_rest(driving: Field, scale: Array, onward: Array, begins: Array) -> Array | None:
-    """The way of each gap at which damped motion from a first displacement ends; None where it does not.
+    """Return the displacements at which damped motion comes to rest from a first displacement; None if it does not.
 
-    A gap with a direction other than zero ``onward`` slides: friction resists its motion and pulls nothing back.
+    A gap with a nonzero ``onward`` slides in that direction: friction resists its motion and never pulls it back.
     """
     with PREPARATION:
         from scipy.integrate import Radau
@@ -133,7 +139,7 @@ def come_to_rest(driving: Field, scale: Array, onward: Array, begins: Array) -> 
     start = velocity(0.0, begins[:, None])[:, 0]
     if not np.all(np.isfinite(start)):
         return None
-    least = 0.0 if begins.any() else MOTION_RTOL  # what is close to an unstable balance is not at rest in it
+    least = 0.0 if begins.any() else MOTION_RTOL  # a point close to an unstable equilibrium is not at rest
     rest = _at_rest(driving, scale, onward, begins, least)
     if rest is not None:
         return rest
@@ -141,25 +147,26 @@ def come_to_rest(driving: Field, scale: Array, onward: Array, begins: Array) -> 
     options = {"rtol": MOTION_RTOL, "atol": finest, "first_step": finest / np.max(np.abs(start))}
     motion = Radau(velocity, 0.0, begins, np.inf, jac=change, vectorized=True, **options)
     for _ in range(MOTION_STEPS):
-        with np.errstate(all="ignore"):  # far ahead a trial may see no number
+        with np.errstate(all="ignore"):  # trial values far ahead may not be finite
             motion.step()
         rest = _at_rest(driving, scale, onward, motion.y, least)
         if rest is not None or motion.status != "running":
             return rest
-        if np.any(np.abs(motion.y) > SEARCH_REACH * scale):  # nothing bears it
+        if np.any(np.abs(motion.y) > SEARCH_REACH * scale):  # no equilibrium within reach
             return None
     return None
 
 
 def _resisted(pushes: Array, onward: Array) -> Array:
-    """Driving tractions with friction: a gap that slides is driven in one direction only."""
+    """Return the driving tractions with friction: a sliding gap is driven in its own direction only."""
     return np.where(onward != 0, onward * np.maximum(onward * pushes, 0.0), pushes)
 
 
 def _at_rest(driving: Field, scale: Array, onward: Array, at: Array, least: float) -> Array | None:
-    """The stable equilibrium that is as good as reached, to rounding; None where none is.
+    """Return the stable equilibrium that is reached up to roundoff; None if there is none.
 
-    In it what has slid is in balance, or friction holds it; what nothing pushes, as where it is symmetric, stays.
+    A gap that has slid is then in balance or held by friction. A gap without a driving traction, as under symmetry,
+    stays.
     """
     everything = np.arange(len(at))
     moved = np.nonzero(_resisted(driving(at[None]), onward)[0])[0]
@@ -171,9 +178,9 @@ def _at_rest(driving: Field, scale: Array, onward: Array, at: Array, least: floa
 
 
 def equilibrium(driving: Field, scale: Array, free: Indices, at: Array, least: float) -> Array | None:
-    """The stable equilibrium of the gaps that are free, where a few short steps of Newton's method lead to it.
+    """Return the stable equilibrium of the free gaps, if a few short steps of Newton's method lead to it, else None.
 
-    Each is at most half as long as the one before, the first no longer than the gaps' sizes times ``least``.
+    Each step is at most half as long as the last, the first at most ``least`` times the sizes of the gaps.
     """
     if len(free) == 0:
         return at
@@ -192,6 +199,6 @@ def equilibrium(driving: Field, scale: Array, free: Indices, at: Array, least: f
             break
     if last > NEWTON_REACH * MOTION_RTOL:
         return None
-    # Where nothing bears what is out of balance, Newton's method has no step for it, and that is no rest.
+    # If the stiffness cannot balance a residual, the least-squares step is zero, but this is not an equilibrium.
     borne = np.abs(change) @ scale[free] * max(last, 2 * FEW_EPS)
     return at if np.all(np.abs(driving(at[None])[0, free]) <= 2 * borne) else None

@@ -1,4 +1,4 @@
-"""Automatic choice of the solution method for a scene, with the reason in words."""
+"""Automatic choice of the solver for a problem, with the reason in words."""
 
 import numpy as np
 
@@ -10,20 +10,20 @@ from surfacechem.tolerances import MIN_RTOL
 IMPLICIT, EXPLICIT = "radau", "dop853"
 
 STIFF = 1e3
-"""Length of a run in units of its fastest relaxation above which it is stiff from the start: some two hundred explicit
-steps, at the limit of their stability, cost what the implicit ones of a smooth run do.
+"""Ratio of the length of a run to its shortest relaxation time above which it counts as stiff from the start: some two
+hundred explicit steps at their stability limit cost as much as the implicit steps of a smooth run.
 """
 
 
 def method(problem: Problem, moves: bool) -> tuple[str, str]:
-    """The solver of a problem, of a scene whose gap ``moves`` by a balance or does not, and why, in words.
+    """Return the solver of a problem and the reason in words; ``moves`` is True if a gap follows from a balance.
 
-    What becomes stiff on the way only is seen there: explicit steps are followed by implicit ones in the same run.
+    A run that becomes stiff later needs no choice here: the explicit method then continues with implicit steps.
     """
     program = problem.program
     if program.external is not None:
         return CALLING_PYTHON[0], "rates of the mechanism come from Cantera itself, which it can ask"
-    # The last digit of a gap that touches decides what follows, and implicit steps meet it closer.
+    # After touch the last digit of the gap decides between branches; implicit steps locate it more closely.
     why = _why_implicit(problem) or ("a gap moves, and may touch or stop" if moves else "")
     if why:
         return IMPLICIT, f"implicit, order 5 to 13 by tolerance: {why}"
@@ -31,7 +31,7 @@ def method(problem: Problem, moves: bool) -> tuple[str, str]:
 
 
 def _why_implicit(problem: Problem) -> str:
-    """Reason why steps have to be implicit, in words; empty where they can be explicit."""
+    """Return the reason why steps have to be implicit, in words; empty if they can be explicit."""
     program = problem.program
     if any(program.algebraic):
         return "some states are algebraic"
@@ -50,7 +50,9 @@ def _why_implicit(problem: Problem) -> str:
 
 
 def fastest_relaxation(program: Program, problem: Problem) -> float:
-    """Largest rate [1/s] at which a small disturbance of the start falls; infinite where that is not finite."""
+    """Return the largest decay rate [1/s] of a small perturbation of the initial state; infinite if it is not
+    finite.
+    """
     n, parameters = program.n, problem.parameters[0]
     inputs = np.concatenate([problem.segments[:1], problem.y0, np.zeros(n), parameters])
     assert program.rates is not None

@@ -1,8 +1,9 @@
 """Interface of the solvers: problems and results.
 
-A problem is a fully implicit system of index one, G(t, y, ydot; p) = 0, linear in ydot, over segments with their own
-parameters. Time breakpoints end a step; margins that cross zero stop the run or end a step; a ledger of quadratures
-is integrated beside the state, outside the error norm. A result always carries a status and its reason in words.
+A problem is a fully implicit system of index one, G(t, y, ydot; p) = 0, linear in ydot, over load segments, each with
+its parameters. Breakpoints end a step; margins (event functions) that cross zero stop the run or end a step; a ledger
+of quadratures is integrated along with the state, outside the error norm. A result always carries a status and its
+reason in words.
 """
 
 from abc import ABC, abstractmethod
@@ -36,7 +37,7 @@ class Status(IntEnum):
     STOPPED = 7
     FAILED = 8
     LEFT = 9
-    """Undecided here: the case is left to other code, which carries the run on."""
+    """Not decided here: the run is left to other code, which continues it."""
 
     @property
     def success(self) -> bool:
@@ -58,16 +59,17 @@ REASONS = {
 
 
 CHATTER = 12
-"""Edges at one moment from which on they are chatter."""
+"""Number of edges at one moment from which on they count as chatter."""
 
 RETURN_FACTOR, FITTED_PART = 1.5, 0.1 * NEGLIGIBLE
-"""A time beyond that of the return, in parts of it, and the part of an arc below which the first step is fitted to it:
-what is longer a step meets by itself."""
+"""Length of the first segment of an arc after a rebound, in times of flight, and the part of the arc below which that
+segment is used: a longer flight is resolved by ordinary steps.
+"""
 
 
 HEAT_STEPS = 60
-"""Newton steps in which a body takes on the temperature of its energy at most: where this grows with the square of the
-temperature, far away each halves it, so that these are 18 decades.
+"""Most Newton steps for the temperature of a body of known energy. If the energy grows with the square of the
+temperature, each step far away halves it, so 60 steps cover 18 decades.
 """
 
 
@@ -75,74 +77,75 @@ temperature, far away each halves it, so that these are 18 decades.
 class Guard:
     """Type of an event: the action at a zero crossing of a margin; direction -1 is falling, +1 rising, 0 both.
 
-    A margin that has just fired fires again only after it has left zero. A limit, terminal and falling, that is zero
-    or below at a start fires at once where it falls, with the state of the start, and not where it rises; one that
-    touches zero without crossing it has reached it.
+    A margin that has just fired fires again only after it has left zero. A limit (terminal, falling) that starts at
+    zero or below fires at once, with the initial state, if it falls, and not if it rises; a limit that touches zero
+    without crossing it fires.
     """
 
     terminal: bool
     direction: int = -1
     smooth: bool = False
-    """Whether the equations neither jump nor bend there: then the step onto it has to pass the test of its error."""
+    """True if the equations neither jump nor have a kink there: the step onto it must then pass the error test."""
     strict: bool = False
-    """Whether it has to be passed: touched, or passed for a moment by less than the tolerance, it holds."""
+    """True if zero has to be crossed by more than the tolerance; touching zero does not fire it."""
     domain: bool = False
-    """Whether a law ends there: what it says beyond, be it by rounding, has no meaning."""
+    """True at the end of the domain of a law, beyond which its values, even by roundoff, have no meaning."""
 
     @classmethod
     def stop(cls) -> "Guard":
-        """A terminal event: the run ends where the margin falls to zero."""
+        """Return a terminal event: the run ends where the margin falls to zero."""
         return cls(terminal=True)
 
     @classmethod
     def bear(cls) -> "Guard":
-        """A terminal event: the run ends where the margin falls below zero."""
+        """Return a terminal event: the run ends where the margin falls below zero."""
         return cls(terminal=True, strict=True)
 
     @classmethod
     def restart(cls, direction: int = 0) -> "Guard":
-        """A kink: a step ends there and the run goes on."""
+        """Return a kink: a step ends there and the run goes on."""
         return cls(terminal=False, direction=direction)
 
     @classmethod
     def peak(cls) -> "Guard":
-        """A narrow peak: a step ends there that is short enough to have seen it."""
+        """Return a narrow peak: a step ends there, short enough to have resolved it."""
         return cls(terminal=False, direction=0, smooth=True)
 
 
 @dataclass(frozen=True, kw_only=True)
 class EdgeTables:
-    """Tables of the edges of a system, by which the compiled loop carries runs along them by itself."""
+    """Tables of the edges of a system, from which the compiled loop carries out jumps by itself."""
 
     sizes: Index
-    """Numbers of values in the books of a jump, of values of all nodes, and of the variables that resets write."""
+    """Numbers of totals of a jump, of values of all nodes, and of variables that resets write."""
     code: Index
-    """A row (code, user data) for magnitudes and rates of guards, books, nodes, times of return and each reset; zero
-    where it has not been compiled yet."""
+    """A row (code, user data) for magnitudes of guards, rates of guards, totals of a jump, nodes, times of flight, and
+    each reset; zero if not compiled yet.
+    """
     edges: Index
-    """A row (measured state, taker of the heat, refuses, place among those that return) for each edge."""
+    """A row (measured state, taker of the heat, refuses, index among the rebounding edges) for each edge."""
     when: Index
     """Rows (guard, parameter, value): a guard is active where each of its parameters has one of its values."""
     held: Index
-    """Parameters that change along edges."""
+    """Parameters that change along edges: modes and registers."""
     clocks: Index
-    """Parameters that are times, that of the start of an arc first."""
+    """Parameters that are times, first that of the start of an arc."""
     nodes: Index
-    """The state of each node; -1 for those that pass their heat on."""
+    """Temperature of each node, as the index of its state; -1 for nodes that pass their heat to a reservoir."""
     accounts: Index
-    """A row (kind, place) for each account."""
+    """A row (kind, index) for each account."""
     least_peaks: Array
-    """Sizes of the states that count however small they have been."""
+    """Least magnitude of each state that counts for the roundoff of guards."""
 
     @cached_property
     def words(self) -> Index:
-        """Address and lengths of each table that is read by name, one behind the other."""
+        """Address and lengths of each table that the compiled loop reads by name, in order."""
         tables = self.edges, self.when, self.held, self.clocks, self.nodes, self.accounts, self.least_peaks
         return np.array([word for table in tables for word in (table.ctypes.data, *table.shape)], np.int64)
 
 
 def integers(rows: Sequence[Any], *shape: int) -> Index:
-    """An array of integers of this shape."""
+    """Return an array of integers of this shape."""
     return np.array(rows, np.int64).reshape(shape)
 
 
@@ -157,12 +160,12 @@ NO_EDGES = EdgeTables(
     accounts=integers([], 0, 2),
     least_peaks=np.zeros(0),
 )
-"""Empty tables: runs end at the edges."""
+"""Empty tables: runs end at guards of edges."""
 
 
 @dataclass(frozen=True)
 class Problem:
-    """One initial value problem; algebraic entries of y0 are first guesses."""
+    """An initial value problem; algebraic entries of y0 are first guesses."""
 
     program: Program
     y0: Array
@@ -171,7 +174,7 @@ class Problem:
     segments: Array
     """Breakpoints t_0 < ... < t_end."""
     parameters: Array
-    """One parameter vector a segment."""
+    """One parameter vector for each segment."""
     rtol: float
     atol: Array
     margins: tuple[Guard, ...] = ()
@@ -179,29 +182,36 @@ class Problem:
     max_seconds: float | None = None
     record_steps: bool = False
     exchanged: Array | None = None
-    """Largest amount of each quadrature so far, where the problem continues another."""
+    """Largest magnitude of each quadrature so far, if the problem continues another."""
     seen: Array | None = None
-    """Largest size of each margin so far, where the problem continues another."""
+    """Largest magnitude of each margin so far, if the problem continues another."""
     spacing: float = np.inf
-    """Longest time [s] of a step that is left without a look at the equations: what is briefer may be passed over."""
+    """Longest time [s] of a step whose interior is not checked against the equations; shorter features may be
+    missed.
+    """
     in_play: tuple[bool, ...] | None = None
-    """Flags of the margins that are active in the modes, constant here; None where all are. Others may be anything."""
+    """Flags of the margins that are active in the modes of this problem; None if all are. The values of the others have
+    no meaning.
+    """
     picture: float = 0.0
-    """Part of its range by which a straight line may miss a state between two that are known; 0 where none are added
-    to the outputs and the ends of steps."""
+    """Largest error of linear interpolation between stored states, as a part of the range of each state; 0 if only
+    outputs and ends of steps are stored.
+    """
     before: float = 0.0
-    """Time [s] that the run has lasted before; its logarithm is part of the picture."""
+    """Time [s] from the start of the run to the start of the problem; stored states also resolve the logarithm of the
+    run's time.
+    """
     extremes: Array | None = None
-    """Least and largest states of what the problem continues, shape (2, states)."""
+    """Least and largest states of the part that the problem continues, shape (2, states)."""
     goes_on: bool = False
-    """Whether another problem continues this one: then a kink at its very end counts, as one between segments."""
+    """True if another problem continues this one: a kink at its very end then counts, as between segments."""
     explicit: bool = False
-    """Whether steps may be explicit where the equations give their rates and are not stiff."""
+    """True if steps may be explicit where the equations give their rates and are not stiff."""
     edges: EdgeTables = NO_EDGES
-    """The edges along which the method itself goes on, if it can."""
+    """Edges that the method itself may carry out."""
 
     def __post_init__(self) -> None:
-        """Check the sizes of arrays, which compiled code does not."""
+        """Check the sizes of the arrays, which compiled code does not."""
         n, counts = self.program.n, (self.program.n_parameters, self.program.n_margins)
         given = self.y0.shape, self.atol.shape, self.parameters.shape, len(self.margins)
         if given != ((n,), (n,), (len(self.segments) - 1, counts[0]), counts[1]):
@@ -209,12 +219,12 @@ class Problem:
             raise ValueError(f"{message}; the program has {n} states, {counts[0]} parameters and {counts[1]} margins.")
 
     def __getstate__(self) -> dict[str, Any]:
-        """All but machine code, which a model makes again."""
+        """Return all but the machine code, which a model makes again."""
         return {**vars(self), "program": None}
 
 
 def among(t: Array, times: Array) -> Mask:
-    """Mask of the times that are among others, which are in order.
+    """Return a mask of the times that occur among other, sorted ones.
 
     >>> among(np.array([3.0, 1.0, 2.5]), np.array([1.0, 2.0, 3.0])).tolist()
     [True, True, False]
@@ -236,7 +246,7 @@ class Counters(NamedTuple):
 
 
 class States(NamedTuple):
-    """States and ledgers at a row of times, with their segments where these do not tell."""
+    """States and ledgers at a row of times, with their segments where the times do not determine them."""
 
     t: Array
     y: Array
@@ -253,7 +263,7 @@ class Points:
     ydot: Array
     ledger: Array
     segment: Index | None = field(default=None, kw_only=True)
-    """Segment of each, where several lie so close that their times do not tell."""
+    """Segment of each point, where several lie so close that the times do not determine it."""
 
 
 @dataclass(frozen=True)
@@ -264,30 +274,30 @@ class Events(Points):
 
 
 class EdgeCourse(NamedTuple):
-    """Arcs and jumps of a run that the compiled loop has carried along edges."""
+    """Arcs and jumps of a run whose edges the compiled loop has carried out."""
 
     arcs: Array
-    """Of each arc its start, its length, how many steps, outputs and states inside steps there were before, and its
-    parameters."""
+    """For each arc: start, length, numbers of steps, outputs and stored interior states before it, and parameters."""
     jumps: Array
-    """Of each jump the edge, how many arcs there were before, the energy that it turns into heat, the entropy that it
-    produces, heat and entropy that it passes on, whether it is admissible, the work done in it, by what does it; then
-    t, y, ydot and parameters before it and after it."""
+    """For each jump: the edge, the number of arcs before it, the energy turned into heat, the entropy produced, the
+    heat and entropy passed to reservoirs, whether it is admissible, the work done in it by each source; then t, y, ydot
+    and parameters before it and after it.
+    """
 
 
 @dataclass(slots=True)
 class Result:
-    """A trajectory up to where it ended. Outputs beyond the stop are absent."""
+    """A trajectory up to its end. Outputs beyond the end are absent."""
 
     problem: Problem
     status: Status
     t: float
-    """The time reached: the end, the terminal event, or the last good state."""
+    """Time reached: the end, the terminal event, or the last good state."""
     y: Array
     ydot: Array
     ledger: Array
     margins: Array
-    """Margins at the end; where a run stalls, the one nearest zero is a hint at the reason."""
+    """Margins at the end; if a run stalls, the one nearest zero is a hint at the reason."""
     times: Array
     outputs: Array
     ledger_outputs: Array
@@ -295,28 +305,28 @@ class Result:
     counters: Counters
     steps: Points | None = None
     stepping: float = float("nan")
-    """Time inside a library's own steps [s], without outputs and events; NaN for a method that does them itself."""
+    """Time inside a library's steps [s], without outputs and events; NaN for a method that handles those itself."""
     segment: Index | None = None
-    """Segment of each output, where their times do not tell."""
+    """Segment of each output, where the times do not determine it."""
     inside: States | None = None
-    """States inside steps and at the start of segments that a picture needs."""
+    """States inside steps and at the start of segments that linear interpolation needs."""
     course: EdgeCourse | None = None
-    """Arcs and jumps, where the method carries out edges."""
+    """Arcs and jumps, if the method carries out edges."""
     known: States | None = None
-    """All states that are known, where the result is of several arcs and a picture is wanted."""
+    """All stored states, if the result consists of several arcs and stores states for linear interpolation."""
 
     def segments_at(self, t: Array, known: Index | None = None) -> Index:
-        """Segment of each time; a breakpoint belongs to the one that it ends."""
+        """Return the segment of each time; a breakpoint belongs to the segment that it ends."""
         return np.searchsorted(self.problem.segments[1:-1], t, side="left") if known is None else known
 
     def states(self) -> States:
-        """All states that are known, in order of time, each once on each side of a breakpoint."""
+        """Return all stored states in order of time, each once on each side of a breakpoint."""
         t, y, ledger, segment = self.scattered()
         kept = in_order(t, segment)
         return States(t[kept], y[kept], ledger[kept], segment[kept])
 
     def scattered(self) -> tuple[Array, Array, Array, Index]:
-        """Times, states, ledgers and segments of all that is known, in the order in which it is kept."""
+        """Return times, states, ledgers and segments of all stored states, unsorted."""
         parts = [States(self.times, self.outputs, self.ledger_outputs)]
         if self.steps is not None:
             parts.append(States(self.steps.t, self.steps.y, self.steps.ledger))
@@ -326,13 +336,13 @@ class Result:
         if len(self.problem.segments) == 2:
             return t, y, ledger, np.zeros(len(t), np.int64)
         segment = self.segments_at(t)
-        if self.inside is not None:  # what is added at a breakpoint is its other side
+        if self.inside is not None:  # a state stored at a breakpoint belongs to its other side
             segment[len(t) - len(self.inside.t) :] += among(self.inside.t, self.problem.segments[1:-1])
         return t, y, ledger, segment
 
 
 def in_order(t: Array, segment: Index) -> Index:
-    """Places of what is known at these times, in order of the segments and of the times in them, each time once."""
+    """Return indices that sort points by segment and by time within it, each time once."""
     order = np.lexsort((t, segment))
     new = np.ones(len(order), dtype=bool)
     new[1:] = (np.diff(t[order]) != 0) | (np.diff(segment[order]) != 0)
@@ -344,19 +354,19 @@ class Solver(ABC):
 
     name: str
     counts_rejected = True
-    """Whether it is known how many steps the method has rejected."""
+    """True if the method reports its number of rejected steps."""
     crosses_edges = False
-    """Whether the method goes on along edges by itself."""
+    """True if the method carries out edges by itself."""
 
     def prepare(self) -> None:  # noqa: B027 - most methods need nothing
         """Load what the first solve needs, so that it does not count as run time."""
 
     @abstractmethod
     def solve(self, problem: Problem) -> Result:
-        """Integrate a problem. Failure of the method is a status of the result, never an exception or a wrong
+        """Integrate a problem. A failure of the method is a status of the result, never an exception or a wrong
         number.
         """
 
     def solve_all(self, problems: Sequence[Problem], threads: int = 1) -> list[Result]:
-        """Integrate problems of one model, whatever the number of threads with the same results as one by one."""
+        """Integrate problems of one model, with the same results as one by one, whatever the number of threads."""
         return [self.solve(problem) for problem in problems]

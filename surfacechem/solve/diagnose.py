@@ -1,4 +1,4 @@
-"""Diagnosis of a run that could not go on: a margin that closes, a state that runs away, or too fast a motion."""
+"""Diagnosis of a run that could not go on: a closing margin, a state that diverges, or motion too fast to resolve."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from surfacechem.solve.radau.solver import consistent
 from surfacechem.tolerances import ATOL_OF_SCALE, CLOSED_GUARD, IDLE, NEGLIGIBLE, NEWTON_EPS, RUN_EPS
 
 FEWEST, SHARP = 100.0, RUN_EPS
-"""Steps in a period, fewer than which follow nothing, and the part of the time that a step can still resolve."""
+"""Fewest steps in a period that can resolve it, and the part of the time that a step can still resolve."""
 
 
 def time_scales(system: System, values: Mapping[str, float]) -> list[tuple[TimeScale, float]]:
-    """Characteristic times of free motions of the gaps [s], the shortest first."""
+    """Return the characteristic times of free motions of the gaps [s], the shortest first."""
     point = {parameter.symbol: values[parameter.path] for parameter in system.parameters}
     found = [(pace, float(system.expand(pace.time).subs(point))) for pace in system.noted(TimeScale)]
     return sorted(found, key=lambda item: item[1])
 
 
 def too_fast(system: System, result: Result, values: Mapping[str, float]) -> str:
-    """Motion too fast to be followed, with advice, in words; empty where that is not why a run could not go on."""
+    """Describe motion too fast to be resolved, with advice; empty if that is not why a run could not go on."""
     end = float(result.problem.segments[-1])
     shortest = {Status.MAX_STEPS: FEWEST * end / result.problem.max_steps, Status.STEP_UNDERFLOW: SHARP * result.t}
     for pace, time in time_scales(system, values):
@@ -36,14 +36,15 @@ def too_fast(system: System, result: Result, values: Mapping[str, float]) -> str
 
 
 STALLED = NEGLIGIBLE
-"""A margin that has shrunk to this part of its largest value, and has less than this part of the time that has passed
-left to close, explains why a run cannot go on."""
+"""A margin explains why a run cannot go on if it has shrunk to this part of its largest value and would close within
+this part of the time that has passed.
+"""
 
 RESOLVED = NEWTON_EPS
-"""Part of the time that has passed within which the last digits of a margin do not tell whether it shrinks."""
+"""Part of the time that has passed within which roundoff hides whether a margin shrinks."""
 
 RUNAWAY = 1e12
-"""Size of a state that runs away, in units of its scale."""
+"""Size of a diverging state, in units of its scale."""
 
 ROUNDED_BACK = (
     "the rates lead back from it; they are so far apart that the last digits of the fast ones have carried it there"
@@ -51,7 +52,7 @@ ROUNDED_BACK = (
 
 
 LOOKS_AHEAD = np.ldexp(1.0, np.arange(-4, 3))
-"""Parts of the last step by which a look ahead of the end of a run goes."""
+"""Lengths of the extrapolation beyond the end of a run, in units of the last step."""
 
 
 def termination(
@@ -62,7 +63,9 @@ def termination(
     values: Mapping[str, float],
     named: Callable[[Array], Array],
 ) -> tuple[str, str]:
-    """Status of a run that could not go on, and why, in words; ``named`` gives named quantities at rows of inputs."""
+    """Return the status of a run that could not go on, and the reason; ``named`` evaluates named quantities at rows of
+    inputs.
+    """
     where = f"t = {result.t:.9g} s"
     parameters = result.problem.parameters[result.segments_at(np.array([result.t]))[0]]
     inputs = np.concatenate(([result.t], result.y, result.ydot, parameters))
@@ -79,7 +82,7 @@ def termination(
 
 
 def _unbalanced(system: System, algebraic: Sequence[State], inputs: Array) -> str:
-    """Reason why algebraic states have no values that satisfy their balances."""
+    """Describe why algebraic states have no values that satisfy their balances."""
     if all(state.is_temperature for state in algebraic):
         stable = next(margin for margin in system.margins if margin.stability == algebraic[0].name)
         return system.reason(stable, np.nan_to_num(inputs))
@@ -90,7 +93,7 @@ def _unbalanced(system: System, algebraic: Sequence[State], inputs: Array) -> st
 
 
 def _spent(result: Result) -> str:
-    """Budget of steps of a run that has used it up, and how many of them it was not free to choose; else empty."""
+    """Describe the step budget if it was used up, and how many steps were ended by events or loads; else empty."""
     if result.status is not Status.MAX_STEPS:
         return ""
     problem = result.problem
@@ -103,15 +106,16 @@ def _spent(result: Result) -> str:
 def are_led_back(
     system: System, program: Program, margin: Margin, t: Array, y: Array, parameters: Array
 ) -> NDArray[np.bool_]:
-    """Whether the rates at the bound of a bonding variable lead back, so that rounding has carried it beyond: of runs
-    whose ends are the rows.
+    """Return a mask of runs that ended at the bound of a bonding variable only by roundoff: the rates there lead back.
+
+    The ends of the runs are the rows.
     """
     names, bonds = [state.name for state in system.states], {a.law for a in system.ledger if a.kind == "bonds"}
     if margin.bound is None or margin.bound[0] not in names:
         return np.zeros(len(t), dtype=bool)
     (name, limit), y = margin.bound, y.copy()
     for j, other in enumerate(names):
-        if other in bonds:  # where one kind of bonds has all sites there is no other
+        if other in bonds:  # where one kind of bond occupies all sites, the others are zero
             y[:, j] = np.maximum(y[:, j], 0.0) if limit == 0 else 0.0
     j = names.index(name)
     y[:, j] = limit
@@ -120,7 +124,9 @@ def are_led_back(
 
 
 def closest_margin(system: System, program: Program, margins: Sequence[Margin], result: Result) -> Margin | None:
-    """The margin that is closed, or all but closed and goes on closing, where a run could not go on."""
+    """Return the margin that is closed, or nearly closed and still closing, where a run could not go on; None if there
+    is none.
+    """
     if program.margins is None or not margins:
         return None
     count, end = len(margins), Points(np.array([result.t]), result.y[None], result.ydot[None], result.ledger[None])
@@ -143,7 +149,9 @@ def closest_margin(system: System, program: Program, margins: Sequence[Margin], 
 def _values(
     system: System, program: Program, result: Result, steps: Points, side: Literal["left", "right"] = "left"
 ) -> Array:
-    """Margins at all steps, shape (steps, margins), NaN out of play; at a breakpoint those of the piece on one side."""
+    """Return the margins at all steps, shape (steps, margins), NaN where inactive; ``side`` is the segment at
+    breakpoints.
+    """
     assert program.margins is not None
     segment = np.searchsorted(result.problem.segments[1:-1], steps.t, side=side)
     inputs = [steps.t[:, None], steps.y, steps.ydot, result.problem.parameters[segment]]
@@ -153,7 +161,7 @@ def _values(
 
 
 def runaway(states: Sequence[State], result: Result) -> str | None:
-    """The state that changes so fast that time cannot resolve it, where a run could not go on."""
+    """Describe the state that changes too fast for time to resolve, if that is why a run could not go on."""
     if result.status not in (Status.STEP_UNDERFLOW, Status.NOT_FINITE, Status.SINGULAR):
         return None
     scales = np.array([state.scale for state in states])
@@ -167,7 +175,7 @@ def runaway(states: Sequence[State], result: Result) -> str | None:
     if not (speed[j] * result.t > 1 / IDLE and _is_faster(result, j)):
         return None
     if states[j].given is not None:
-        # A velocity without inertia takes the age of the contact with it.
+        # The age of the contact diverges together with a velocity without inertia: name the velocity.
         names = [state.at_start[0].name for state in states if state.given and (state.algebraic or state is states[j])]
         return f"{names[0]} runs away, faster and faster"
     unit = states[j].quantity.unit
@@ -175,8 +183,9 @@ def runaway(states: Sequence[State], result: Result) -> str | None:
 
 
 def beyond_numbers(system: System, result: Result, inputs: Array, named: Callable[[Array], Array]) -> str | None:
-    """The named quantity that is the first to have no finite value as states go on as they do, where that is why a run
-    could not; of several that from which the others follow.
+    """Describe the first named quantity that becomes infinite or NaN as the states continue, if that ended the run.
+
+    Of several the first in the list is taken, on which the others depend.
     """
     if result.status is Status.NO_CONSISTENT_STATE and not np.all(number := np.isfinite(named(inputs[None])[0])):
         return f"{list(system.output_columns)[int(np.argmin(number))]} is no finite number"
@@ -195,12 +204,12 @@ def beyond_numbers(system: System, result: Result, inputs: Array, named: Callabl
 
 
 def _is_faster(result: Result, j: int) -> bool:
-    """Whether the rate of a state has doubled since a breakpoint or an event, where a steep load may begin."""
+    """True if the rate of a state has doubled since the last breakpoint or event, where a steep load may begin."""
     if result.steps is None:
         return False
     places = np.concatenate((result.problem.segments, result.events.t))
     begun = np.max(places[places <= result.t])
-    # The first step that ends there has come from before; what runs away at once ends further ones at the same time.
+    # The first step that ends there started before it; immediate divergence ends further ones at the same time.
     since = np.searchsorted(result.steps.t, begun)
     since += bool(result.steps.t[since:].size) and result.steps.t[since] == begun
     return bool(np.any(2 * np.abs(result.steps.ydot[since:, j]) < abs(result.ydot[j])))

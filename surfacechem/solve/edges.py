@@ -1,6 +1,6 @@
-"""Edges of the compiled loop: which of them is due at a moment, and the jump along it.
+"""Edges in the compiled loop: which edge is due at a moment, and the jump along it.
 
-It is what an instant does where no gap has to be searched for and nothing rare happens; the rest is left to that.
+This is what :class:`Instant` does where no gap has to be searched for and no rare case occurs; those are left to it.
 """
 
 from typing import Any
@@ -42,7 +42,7 @@ from surfacechem.solve.radau.work import (
 from surfacechem.tolerances import BRIEF_PART, DRIFT, FEW_EPS, GUARD_EPS, MOST_DRIFT, NEWTON_EPS, RUN_EPS, ULPS
 
 NO_EDGE, UNDECIDED = -1, -2
-"""Codes in place of the index of the edge that is due: none is; undecided, so that an instant has to look."""
+"""Values instead of the index of the edge that is due: none is; undecided here, and left to Instant."""
 
 OPEN, CLOSED, NEAR = range(3)
 """States of the guard of an edge."""
@@ -50,7 +50,7 @@ OPEN, CLOSED, NEAR = range(3)
 
 @compiled
 def find_playing(w: Any) -> None:
-    """Mark the guards that are active in the modes of the moment."""
+    """Mark the guards that are active in the present modes."""
     for m in range(w.n_margins):
         w.playing[m] = 1
     k, rules = 0, w.when.shape[0]
@@ -65,7 +65,7 @@ def find_playing(w: Any) -> None:
 
 @compiled
 def find_magnitudes(w: Any) -> None:
-    """Magnitudes of the guards at the peaks of the states, to which their rounding is in proportion."""
+    """Evaluate the magnitudes of the guards at the peaks of the states; their roundoff is proportional to these."""
     for j in range(w.n):
         w.sized[j] = max(w.peaks_seen[j], abs(w.moment[1 + j]))
     if w.n_margins == 0:
@@ -78,7 +78,7 @@ def find_magnitudes(w: Any) -> None:
 
 @compiled
 def _find_guards(w: Any) -> None:
-    """The guards at the moment, with the rates and algebraic variables that belong to it among the inputs."""
+    """Evaluate the guards at the moment, with consistent rates and algebraic variables among the inputs."""
     copy(w.moment, w.inputs)
     for j in range(w.n):
         w.trial[j], w.trial_dot[j] = w.moment[1 + j], 0.0
@@ -90,7 +90,7 @@ def _find_guards(w: Any) -> None:
 
 @compiled
 def _is_beyond(w: Any, first: int) -> bool:
-    """Whether a jump has carried the state beyond a limit."""
+    """True if a jump has carried the state beyond a limit."""
     beyond = False
     for m in range(first):
         slack = 0.0 if w.kinds[m, 5] == 1 else GUARD_EPS * w.magnitude[m]
@@ -100,7 +100,9 @@ def _is_beyond(w: Any, first: int) -> bool:
 
 @compiled
 def _closing(w: Any, m: int) -> int:
-    """Whether the guard of an edge is CLOSED, or is zero and NEAR to it; the drift of the integration is not closed."""
+    """Return CLOSED if the guard of an edge is below zero by more than the drift of the integration, NEAR if it is
+    zero.
+    """
     value, size, small = w.margin_probe[m], w.magnitude[m], GUARD_EPS * w.magnitude[m]
     if w.playing[m] == 0 or value > small:
         return OPEN
@@ -111,7 +113,7 @@ def _closing(w: Any, m: int) -> int:
 
 @compiled
 def _due(w: Any, first: int) -> int:
-    """The edge whose guard is closed, or is zero and closing."""
+    """Return the edge whose guard is closed, or is zero and closing."""
     due, near = NO_EDGE, False
     for m in range(first, w.n_margins):
         w.fired[m] = _closing(w, m)
@@ -122,7 +124,7 @@ def _due(w: Any, first: int) -> int:
         evaluate(w, GUARD_RATES, w.margin_slope)
     for m in range(w.n_margins - 1, first - 1, -1):
         closes = w.fired[m] == NEAR and w.margin_slope[m - first] < 0.0
-        # What has jumped at this moment must not jump back by rounding.
+        # After a jump at this moment roundoff must not trigger the way back.
         if closes and w.jumped[-1] == w.moment[0]:
             return UNDECIDED
         if closes or w.fired[m] == CLOSED:
@@ -132,11 +134,11 @@ def _due(w: Any, first: int) -> int:
 
 @compiled
 def resolve(w: Any, i: int, end: float) -> bool:
-    """Carry out all edges that are due at the moment; False where an instant has to."""
+    """Carry out all edges that are due at the moment; False if this is left to Instant."""
     first = w.n_margins - w.edges.shape[0]
     while True:
         t = w.moment[0]
-        if w.jumped[0] >= t - NEWTON_EPS * max(t, BRIEF_PART * end):  # chatter, also of arcs that take no time
+        if w.jumped[0] >= t - NEWTON_EPS * max(t, BRIEF_PART * end):  # chatter, including arcs of no duration
             return False
         find_magnitudes(w)
         find_playing(w)
@@ -152,7 +154,7 @@ def resolve(w: Any, i: int, end: float) -> bool:
 
 @compiled
 def _look(w: Any, row: Any, books: Any) -> None:
-    """Evaluate the books of a jump; a magnitude that is no number there, as at a bound, counts as zero."""
+    """Evaluate the totals of a jump; a magnitude that is not finite, as at a bound, counts as zero."""
     evaluate_at(w, BOOKS, row, books)
     for k in range(books.shape[0] - 2, books.shape[0]):
         if not abs(books[k]) < np.inf:
@@ -161,9 +163,10 @@ def _look(w: Any, row: Any, books: Any) -> None:
 
 @compiled
 def _warm(w: Any, taker: int, made: float) -> tuple[float, float]:
-    """Give the heat that a jump makes to the nodes after it; heat and entropy that leave through those that pass it on.
+    """Distribute the heat of a jump to the nodes; return the heat and entropy that leave through nodes which pass it
+    on.
 
-    Each temperature is where its energy has risen by what the node takes.
+    Each node's temperature is that at which its energy has risen by its share.
     """
     row, nodes, heat, entropy = w.after, w.nodes.shape[0], 0.0, 0.0
     if nodes == 0:
@@ -192,7 +195,7 @@ def _warm(w: Any, taker: int, made: float) -> tuple[float, float]:
 
 @compiled
 def _coldest(w: Any) -> float:
-    """Temperature before the jump of the coldest node that may take its heat."""
+    """Return the lowest temperature before the jump among the nodes that may take its heat."""
     found, nodes = np.inf, w.nodes.shape[0]
     if nodes > 0:
         evaluate_at(w, NODES, w.moment, w.nodal)
@@ -203,13 +206,13 @@ def _coldest(w: Any) -> float:
 
 @compiled
 def _is_admissible(w: Any, gain: float, small: float, heat: float) -> bool:
-    """Whether a jump gains entropy but for what is small, and for what so much heat may be uncertain."""
+    """True if a jump produces no negative entropy beyond ``small`` and beyond the uncertainty ``heat`` of the heat."""
     return bool(gain >= -small - heat / _coldest(w))
 
 
 @compiled
 def _book(w: Any, made: float, gain: float, heat: float, entropy: float) -> None:
-    """Add the amounts of the jump to the accounts."""
+    """Add the amounts of the jump to the accounts of the ledger."""
     for m in range(w.n_ledger):
         kind, place = w.accounts[m, 0], w.accounts[m, 1]
         if kind == BONDS:
@@ -228,7 +231,7 @@ def _book(w: Any, made: float, gain: float, heat: float, entropy: float) -> None
 
 @compiled
 def _write_event(w: Any, i: int, e: int) -> None:
-    """The edge and the moment at which it is carried out."""
+    """Write the edge and the moment at which it is carried out."""
     counts, n = w.counts[i], w.n
     if counts[EVENTS] < w.events.shape[1]:
         row = w.events[i, counts[EVENTS]]
@@ -255,7 +258,9 @@ def _write_jump(
 
 @compiled
 def jump(w: Any, i: int, e: int) -> bool:
-    """Carry out an edge: reset, share out the heat, judge by the second law, book. False where an instant has to."""
+    """Carry out an edge: reset, distribute the heat, test the second law, update the ledger. False if this is left to
+    Instant.
+    """
     n, t, taker, measure = w.n, w.moment[0], w.edges[e, TAKER], w.edges[e, MEASURE]
     rounding = GUARD_EPS * w.magnitude[w.n_margins - w.edges.shape[0] + e]
     if w.code[BOOKS, 0] == 0:

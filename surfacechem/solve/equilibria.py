@@ -1,6 +1,4 @@
-"""Gaps without mass or damper: the equilibrium that they find together, how they slide into it, and the folds where it
-is lost, found from close by.
-"""
+"""Gaps without mass or damper: their common equilibrium, sliding to it, and the folds at which it is lost."""
 
 from __future__ import annotations
 
@@ -44,22 +42,22 @@ Heat = Callable[[Array], Array]
 """Function from inputs to inputs with the temperatures that a jump to them gives."""
 
 BALANCED = RUN_EPS
-"""Tractions out of balance that count as none, relative to their parts: those of a run hold its rounding."""
+"""Residual of the tractions that counts as balanced, relative to its terms: those of a run include its roundoff."""
 
 NO_BALANCE = "there is no gap at which the tractions are in equilibrium at the start"
 
 CORRECTIONS = 3
-"""Newton steps that take the drift of an integration out of the gaps: each doubles the digits."""
+"""Newton steps that remove the drift of an integration from the gaps: each doubles the digits."""
 
 
 def drift_of(rtol: float) -> float:
-    """Traction out of balance that the integration explains at a tolerance, relative to its parts."""
+    """Return the residual of tractions that the integration may cause at a tolerance, relative to its terms."""
     return min(DRIFT * rtol, MOST_DRIFT)
 
 
 @dataclass(frozen=True)
 class Point:
-    """A state with the parameters that hold there."""
+    """A state with the parameters at that moment."""
 
     t: float
     y: Array
@@ -68,11 +66,11 @@ class Point:
 
     @classmethod
     def of(cls, inputs: Array, n: int) -> Point:
-        """The point at arguments of compiled functions with so many states."""
+        """Make the point from arguments of compiled functions with this number of states."""
         return cls(float(inputs[0]), inputs[1 : 1 + n], inputs[1 + n : 1 + 2 * n], inputs[1 + 2 * n :])
 
     def inputs(self) -> Array:
-        """Arguments of compiled functions."""
+        """Return the arguments of compiled functions."""
         return np.concatenate(([self.t], self.y, self.ydot, self.parameters))
 
 
@@ -83,7 +81,9 @@ def compiled(system: System, expressions: Iterable[Expression]) -> Function:
 
 @dataclass(frozen=True)
 class GapDirection:
-    """A direction in the space of the gaps: what moves, the gap that counts the way, and the tractions along it."""
+    """A direction in the space of the gaps: the moving states, the gap that measures the distance, and the weights of
+    the tractions.
+    """
 
     moves: Array
     """Change of each state, shape (states,)."""
@@ -95,7 +95,7 @@ class GapDirection:
 
 @dataclass(frozen=True)
 class FoldPoint:
-    """A fold: the point there, the way in which the gaps are lost, and the direction along it."""
+    """A fold: its point, the direction in the space of the gaps in which equilibrium is lost, and the sign along it."""
 
     point: Point
     way: GapDirection
@@ -104,20 +104,20 @@ class FoldPoint:
 
 @dataclass(frozen=True)
 class FreeGaps:
-    """The gaps of a point that are not held, counted by how far each has moved from there."""
+    """The gaps that are not held at a point, as displacements from there."""
 
     which: Indices
     columns: Array
     """Columns of the states that are the gaps."""
     moves: Array
-    """Change of the states with each, shape (gaps, states)."""
+    """Change of the states with each gap, shape (gaps, states)."""
     driving: Field
     scale: Array
     """Sizes of the gaps [m]."""
 
 
 class Equilibria:
-    """The quasi-static gaps of a system; each function is compiled when first needed."""
+    """The quasi-static gaps of a system; each function is compiled on first use."""
 
     def __init__(self, system: System) -> None:
         self.system = system
@@ -125,31 +125,35 @@ class Equilibria:
         self.items = system.equilibria
         paths = [parameter.path for parameter in system.parameters]
         self.slip = paths.index(SLIP_PATH) if SLIP_PATH in paths and any(e.slides for e in self.items) else None
-        """Column of the mode of sliding among the parameters, where gaps in equilibrium stick or slide."""
+        """Column of the sliding mode among the parameters, if gaps in equilibrium stick or slide."""
         sided = SIDE_PATH in paths and "g_n" in self.states
         self._side = 1 + 2 * len(self.states) + paths.index(SIDE_PATH) if sided else None
         self.followers = [1 + self.states.index(name) for name in system.follows]
-        """Columns of the states that follow the normal gap where it jumps, among the inputs."""
+        """Columns among the inputs of the states that follow the normal gap where it jumps."""
 
     @cached_property
     def _balance(self) -> Function:
-        """Driving traction and size of its parts, for each gap; by itself, as a search asks for it at many rows."""
+        """Driving traction and size of its terms, for each gap; compiled separately, as searches evaluate it at many
+        rows.
+        """
         return compiled(self.system, (item for e in self.items for item in (e.residual, e.size)))
 
     @cached_property
     def _moving(self) -> Function:
-        """For each gap zero where it is held, and how far each state moves with it."""
+        """For each gap: zero if it is held, and the change of each state with it."""
         rows = ([e.active, *(e.along.get(name, int(name == e.state)) for name in self.states)] for e in self.items)
         return compiled(self.system, (item for row in rows for item in row))
 
     @cached_property
     def _bears(self) -> Function:
-        """Friction limit for each gap [Pa]."""
+        """Friction limit of each gap [Pa]."""
         return compiled(self.system, (e.bears for e in self.items))
 
     @cached_property
     def _tangents(self) -> Function:
-        """For each gap the driving traction, its slope along what moves, and the rate at which loads change it."""
+        """For each gap: driving traction, its derivative along the moving states, and its partial time derivative by
+        the loads.
+        """
         symbols, found = {state.name: state.symbol for state in self.system.states}, []
         for e in self.items:
             residual = self.system.expand(e.residual)
@@ -166,17 +170,17 @@ class Equilibria:
     # -- gaps along a way -----------------------------------------------------------------------------------------
 
     def free(self, point: Point) -> Indices:
-        """Indices of the gaps that are not held."""
+        """Return the indices of the gaps that are not held."""
         return np.nonzero(self._moving(point.inputs())[:: 1 + len(self.states)])[0]
 
     def ways(self, point: Point) -> list[GapDirection]:
-        """The way of each gap by itself."""
+        """Return the direction of each gap by itself."""
         moves = self._moving(point.inputs()).reshape(len(self.items), 1 + len(self.states))[:, 1:]
         alone = np.eye(len(self.items))
         return [GapDirection(moves[j], self.states.index(e.state), alone[j]) for j, e in enumerate(self.items)]
 
     def together(self, point: Point, weights: Array) -> GapDirection:
-        """Several gaps that move together, counted by the one that moves the most, whose weight is 1."""
+        """Return the common direction of several gaps, measured by the gap that moves the most, whose weight is 1."""
         ways = self.ways(point)
         moves = sum((w * way.moves for w, way in zip(weights, ways, strict=True)), np.zeros(len(self.states)))
         return GapDirection(moves, ways[int(np.abs(weights).argmax())].column, weights)
@@ -193,9 +197,11 @@ class Equilibria:
         return FreeGaps(which, columns, moves, driving, np.maximum(np.abs(point.y[columns]), NANOMETRE))
 
     def _arrived(self, rows: Array, *, jumps: bool) -> Array:
-        """Inputs whose gaps have moved, with the mode of touch that belongs to them; in a jump with what follows."""
+        """Update inputs whose gaps have moved with the mode of touch that belongs to them; in a jump with the following
+        states.
+        """
         if self._side is not None:
-            # A law that changes at touch holds on its own side only; beyond it may have poles.
+            # A law that changes at touch is valid on its own side only and may have poles beyond.
             column, g = self._side, rows[:, 1 + self.states.index("g_n")]
             rows[:, column] = np.where(g == 0, rows[:, column], np.sign(g))
         if jumps and self.followers:
@@ -203,19 +209,19 @@ class Equilibria:
         return rows
 
     def along(self, point: Point, way: GapDirection, gaps: Sequence[float] | Array, *, jumps: bool = False) -> Array:
-        """Inputs with the gaps along a way."""
+        """Return inputs with these gaps along a direction."""
         rows = np.repeat(point.inputs()[None], len(gaps), axis=0)
         rows[:, 1 : 1 + len(point.y)] += np.outer(np.asarray(gaps) - point.y[way.column], way.moves)
         rows[:, 1 + way.column] = gaps
         return self._arrived(rows, jumps=jumps)
 
     def moved(self, point: Point, rows: Array) -> Point:
-        """The point with the states and modes of the only row."""
+        """Return the point with the states and modes of the only row."""
         n = len(point.y)
         return replace(point, y=rows[0, 1 : 1 + n], parameters=rows[0, 1 + 2 * n :])
 
     def _curves(self, point: Point, way: GapDirection, heat: Heat | None) -> tuple[Curve, Curve]:
-        """Driving traction along a way and its rounding, as functions of the gap that counts the way."""
+        """Return the driving traction along a direction and its roundoff, as functions of the measuring gap."""
         pulled, jumps = way.pulls != 0, heat is not None
 
         def driving(gaps: Sequence[float] | Array) -> Array:
@@ -229,12 +235,14 @@ class Equilibria:
         return driving, noise
 
     def balance(self, point: Point) -> tuple[Array, Array]:
-        """Driving traction of each gap, and the size of its parts."""
+        """Return the driving traction of each gap, and the size of its terms."""
         values = self._balance(point.inputs())
         return values[::2], values[1::2]
 
     def pushes(self, rows: Array, heat: Heat | None = None) -> Array:
-        """Driving tractions at inputs with the temperatures that a jump to them gives, shape (rows, equilibria)."""
+        """Return driving tractions at inputs with the temperatures that a jump to them gives, shape (rows,
+        equilibria).
+        """
         return np.asarray(np.atleast_2d(self._balance(_warmed(rows, heat)))[:, ::2])
 
     # -- equilibrium ----------------------------------------------------------------------------------------------
@@ -242,11 +250,12 @@ class Equilibria:
     def equilibrate(
         self, point: Point, heat: Heat | None = None, balanced: float = BALANCED, lost: FoldPoint | None = None
     ) -> Point | None:
-        """The point with all gaps in equilibrium; each may move the others through pressure, shear and heat.
+        """Return the point with all gaps in equilibrium, coupled through pressure, shear and heat; None if there is
+        none.
 
-        A single gap is found by a search along it, several at the end of the damped motion that they begin. Where the
-        tractions are ``balanced`` within this part, what slides runs on only if that balance is unstable. From a
-        balance that is ``lost`` gaps go on with the parameters of the point.
+        A single gap is found by a search along it, several gaps as the end of their damped motion. If the tractions are
+        ``balanced`` within this part, a sliding gap moves on only if that equilibrium is unstable. From an equilibrium
+        that is ``lost`` the gaps move on with the parameters of the point.
         """
         if lost is not None:
             return self._released(replace(lost.point, parameters=point.parameters), heat, lost)
@@ -257,10 +266,10 @@ class Equilibria:
         return self._released(point, heat, self._unstable(point, heat) if is_balanced else None)
 
     def equilibrate_near(self, point: Point, heat: Heat, span: Array) -> Point | None:
-        """The point with all gaps in equilibrium, for loads that go from one value to the next little by little.
+        """Return the point with all gaps in equilibrium, for loads that change in small steps.
 
-        Newton's method leads there where its first step is no longer than the gaps or their whole ``span``, shape
-        (states,), and each is at most half as long as the one before; elsewhere they settle.
+        Newton's method is used while its first step is at most as long as the gaps or their whole ``span``, shape
+        (states,), and each further step at most half as long as the last; otherwise the general search.
         """
         if len(self.free(point)) == 0:
             return point
@@ -273,7 +282,9 @@ class Equilibria:
         return self.moved(point, self._arrived(there.inputs()[None], jumps=True))
 
     def _released(self, point: Point, heat: Heat | None, lost: FoldPoint | None) -> Point | None:
-        """Point at which the free gaps come to rest after a lost equilibrium, or from tractions out of balance."""
+        """Return the point at which the free gaps come to rest after a lost equilibrium, or from unbalanced
+        tractions.
+        """
         free = self.free(point)
         if len(free) > 1:
             return self._damped(point, heat, lost)
@@ -288,16 +299,17 @@ class Equilibria:
         else:
             gap = march(driving, start, direction, noise)
             if gap is not None and abs(gap) < GAP_EPS and abs(driving([0.0])) <= noise([0.0]):
-                gap = 0.0  # laws that end with the gap shall know it
+                gap = 0.0  # exact, for laws that end at touch
         if gap is None or (onward and gap == start):
             return None if gap is None else point
         return self.moved(point, self.along(point, way, [gap], jumps=heat is not None))
 
     def _slid(self, point: Point, way: GapDirection, onward: float, driving: Curve, noise: Curve) -> float | None:
-        """The gap at which what slides has come to balance; friction pulls nothing back.
+        """Return the gap at which sliding comes to balance; friction never pulls it back.
 
-        It has begun to slide as the push was above what sticking bears by no less than rounding. Where the stiffness is
-        hardly more than none, as at a fold that is reached in time alone, this makes a way that can be seen.
+        Sliding has begun because the driving traction exceeded the friction limit by at least roundoff. If the
+        stiffness is almost zero, as at a fold that is reached by the change of loads alone, this makes a visible
+        distance.
         """
         start = float(point.y[way.column])
         now, least = onward * float(driving([start])[0]), float(noise([start])[0])
@@ -308,7 +320,7 @@ class Equilibria:
         return march(driving, start, 0.0, noise) if now > 0 else start
 
     def _damped(self, point: Point, heat: Heat | None, lost: FoldPoint | None) -> Point | None:
-        """Point at which several gaps come to rest together, by damped motion."""
+        """Return the point at which several gaps come to rest together, by damped motion."""
         free = self._free(point, heat)
         begins = np.zeros(len(free.which))
         if lost is not None:
@@ -318,20 +330,21 @@ class Equilibria:
             if gap is None:
                 return None
             way = lost.direction * lost.way.pulls[free.which]
-            # What is less drowns in the rounding of the other gaps.
+            # A smaller displacement is lost in the roundoff of the other gaps.
             begins = way * max(abs(gap - start), FIRST_PUSH / float(np.max(np.abs(way) / free.scale)))
         rest = come_to_rest(free.driving, free.scale, self._onward(point)[free.which], begins)
         if rest is None:
             return None
         y, columns = point.y + rest @ free.moves, free.columns
-        y[columns] = np.where(np.abs(y[columns]) < GAP_EPS, 0.0, y[columns])  # laws that end with the gap shall know it
+        y[columns] = np.where(np.abs(y[columns]) < GAP_EPS, 0.0, y[columns])  # exact, for laws that end at touch
         return self.moved(point, self._arrived(replace(point, y=y).inputs()[None], jumps=heat is not None))
 
     def _unstable(self, point: Point, heat: Heat | None) -> FoldPoint | None:
-        """The way in which gaps run away from a balance, where that is unstable: a fold that is passed already.
+        """Return the direction in which gaps leave an unstable equilibrium: a fold that has been passed; None if it is
+        stable.
 
-        Friction that falls with its own heat has no steady sliding on a spring that is softer than this fall. What
-        nothing pushes yet, as where it is symmetric, is pushed by what the loads do next.
+        If friction falls with its own heat, steady sliding is impossible on a spring softer than this fall. A gap
+        without a driving traction yet, as under symmetry, gets the sign of the next change of the loads.
         """
         onward, free = self._onward(point), self._free(point, heat)
         pushes = onward if onward.any() else self._tangents(point.inputs())[2::3]
@@ -347,18 +360,18 @@ class Equilibria:
         way = self.together(point, weights)
         driving, noise = self._curves(point, way, heat)
         start = float(point.y[way.column])
-        left = np.abs(driving([start]))  # the balance was left by no more than the integration explains
+        left = np.abs(driving([start]))  # the residual that the integration may have caused
         begins = push_ahead(driving, start, direction, lambda gaps: noise(gaps) + left, lost=False)
         return None if begins is None else FoldPoint(point, way, direction)
 
     def corrected(self, point: Point) -> Point:
-        """The point without the drift that integration has left in its gaps."""
+        """Return the point without the drift that the integration has left in its gaps."""
         for _ in range(CORRECTIONS if self.items else 0):
             values = self._tangents(point.inputs())
             y = point.y.copy()
             for way, residual, slope in zip(self.ways(point), values[::3], values[1::3], strict=True):
                 change = -residual / slope if slope < 0 else 0.0
-                if abs(change) <= NEGLIGIBLE * max(abs(point.y[way.column]), PICOMETRE):  # else it is no drift
+                if abs(change) <= NEGLIGIBLE * max(abs(point.y[way.column]), PICOMETRE):  # a larger change is not drift
                     y += change * way.moves
             point = replace(point, y=y)
         return point
@@ -366,9 +379,9 @@ class Equilibria:
     # -- sliding --------------------------------------------------------------------------------------------------
 
     def _onward(self, point: Point) -> Array:
-        """Direction in which each gap moves as the interface slides on; zero for what may move in both.
+        """Return the sliding direction of each gap; zero for a gap that may move both ways.
 
-        So may what slides where sticking bears nothing.
+        A sliding gap may move both ways if its friction limit is zero.
         """
         slip = 0.0 if self.slip is None else point.parameters[self.slip]
         if not slip:
@@ -377,19 +390,19 @@ class Equilibria:
         return np.where(self._bears(point.inputs()) > 0, directions, 0.0)
 
     def onward_along(self, point: Point, way: GapDirection) -> float:
-        """Direction of a way in which the interface slides on; zero where nothing slides along it."""
+        """Return the sign of a direction in which the interface slides; zero if nothing slides along it."""
         return float(np.sign(self._onward(point) @ way.pulls))
 
     def with_slip(self, point: Point, slip: float) -> Point:
-        """The point with another mode of sliding."""
+        """Return the point with another mode of sliding."""
         parameters = point.parameters.copy()
         if self.slip is not None:
             parameters[self.slip] = slip
         return replace(point, parameters=parameters)
 
     def is_pushed_back(self, point: Point, drift: float, noise: float = 0.0, heat: Heat | None = None) -> bool:
-        """Whether the tractions would pull what slides back, by more than the ``drift`` of their balance, relative to
-        its parts, and than ``noise`` [Pa].
+        """True if the tractions would pull a sliding gap back, by more than ``drift``, relative to the terms of the
+        balance, and more than ``noise`` [Pa].
         """
         onward = self._onward(point)
         if not onward.any():
@@ -398,12 +411,12 @@ class Equilibria:
         inputs = _warmed(point.inputs()[None], heat)[0]
         residual, slope = self._tangents(inputs)[3 * j : 3 * j + 2]
         size = self._balance(inputs)[2 * j + 1]
-        # Where nothing elastic holds it, it cannot stick.
+        # Without elastic support (slope >= 0) it cannot stick.
         return bool(slope < 0 and onward[j] * residual < -max(drift * size, noise))
 
 
 def _warmed(rows: Array, heat: Heat | None) -> Array:
-    """Inputs with the temperatures that a jump to them gives, where it gives any."""
+    """Return inputs with the temperatures that a jump to them gives, where these are finite."""
     if heat is None:
         return rows
     warmed = heat(rows)
@@ -419,12 +432,14 @@ class Folds:
 
     @cached_property
     def _tangents(self) -> dict[int, Function]:
-        """Tangent stiffness; by itself, as a search asks for it at many rows."""
+        """Tangent stiffness; compiled separately, as a search evaluates it at many rows."""
         return {index: compiled(self.system, [fold.tangent]) for index, fold in self.items.items()}
 
     @cached_property
     def _shapes(self) -> dict[int, Function]:
-        """Functions for the fall of the tangent along each gap, the warming of states by each, and the stiffness."""
+        """Decrease of the tangent stiffness along each gap, warming of states by each gap, and stiffness matrix, for
+        each fold.
+        """
         found = {}
         for index, fold in self.items.items():
             warming = [rise.get(name, 0) for rise in fold.warming for name in self.equilibria.states]
@@ -434,7 +449,7 @@ class Folds:
 
     @cached_property
     def _approach(self) -> Function:
-        """For each gap the driving traction, and how fast it changes."""
+        """Driving traction of each gap, and its total time derivative."""
         states, t, found = self.system.states, self.system.t, []
         for item in self.equilibria.items:
             residual = self.system.expand(item.residual)
@@ -443,13 +458,13 @@ class Folds:
         return compiled(self.system, found)
 
     def _shape(self, index: int, point: Point) -> tuple[Array, GapDirection, Array]:
-        """Fall of the tangent of a fold along each gap, the way that is lost, and the change of the states along it,
-        warming included.
+        """Return the decrease of a fold's tangent along each gap, the singular direction, and the change of the states
+        along it, warming included.
         """
         n = len(self.equilibria.items)
         values = np.atleast_1d(self._shapes[index](point.inputs()))
         falls, warming, entries = np.split(values, [n, n + n * len(self.system.states)])
-        # The way that costs no traction: the gaps by which the stiffness is singular.
+        # The null vector of the stiffness: motion along it changes no traction.
         free, weights = self.equilibria.free(point), np.zeros(n)
         weights[free] = np.linalg.svd(entries.reshape(n, n)[np.ix_(free, free)])[2][-1] if len(free) > 1 else 1.0
         weights /= weights[np.abs(weights).argmax()]
@@ -457,10 +472,11 @@ class Folds:
         return falls, way, way.moves + warming.reshape(n, -1).T @ way.pulls
 
     def at(self, index: int, point: Point) -> FoldPoint | None:
-        """The fold itself, from a point close to it; None where it is out of reach, or the edge is none.
+        """Return the fold near a point; None if it is out of reach, or the edge is not a fold.
 
-        Equilibrium is lost like a square root in time, so that a run ends a little before the fold. Where the stiffness
-        rises as the interface slides on, only time leads to the fold, and nothing pushes the interface there.
+        Near a fold the gap changes with the square root of time, so a run ends a little before it. If the stiffness
+        rises as the interface slides on, only the change of loads leads to the fold, and the interface is not driven
+        there.
         """
         if index not in self.items or not len(self.equilibria.free(point)):
             return None
@@ -480,7 +496,7 @@ class Folds:
         return FoldPoint(self.equilibria.moved(point, self.equilibria.along(point, there, [at])), way, direction)
 
     def held_at(self, index: int, lost: FoldPoint) -> FoldPoint | None:
-        """The same fold where sticking holds what slides; None where that keeps the equilibrium."""
+        """Return the same fold with sliding gaps stuck; None if sticking preserves the equilibrium."""
         point = self.equilibria.with_slip(lost.point, 0.0)
         if self._tangents[index](point.inputs())[0] > FOLD_STIFFNESS:
             return None
@@ -488,7 +504,7 @@ class Folds:
         return FoldPoint(point, way, float(np.sign(falls @ way.pulls)))
 
     def reached(self, point: Point, rtol: float) -> int:
-        """The fold that is so close to a point that time cannot tell them apart; -1 where none is."""
+        """Return the fold so close to a point that the run's tolerance cannot tell them apart; -1 if there is none."""
         for index in self.items:
             found = self.at(index, point)
             if found is None:
@@ -499,10 +515,10 @@ class Folds:
         return -1
 
     def in_time(self, index: int, point: Point, end: float) -> Point:
-        """A point close to a fold at the time of the fold, where that is before the end; else as it is.
+        """Return a point close to a fold, at the time of the fold if that is before the end; else unchanged.
 
-        The traction that resists at the gap of the fold vanishes in proportion to time, whatever the run has missed of
-        a gap that moves ever faster.
+        The resisting traction at the fold's gap falls to zero linearly in time, however inaccurately the run has
+        followed the accelerating gap.
         """
         lost = self.at(index, point)
         if lost is None:

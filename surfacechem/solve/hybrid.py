@@ -1,10 +1,10 @@
-"""Hybrid runs of a system with edges: integrate until one is due, carry it out, go on.
+"""Hybrid runs of a system with edges: integrate until an edge is due, carry it out, go on.
 
-Within an arc the modes are constant and any solver of the contract integrates; where the guard of an edge reaches zero
-the arc ends, the instant carries out what is due, and the next arc starts from there.
+Within an arc the modes are constant and any solver of the contract integrates. Where the guard of an edge reaches zero
+the arc ends, Instant carries out the edges that are due, and the next arc starts from there.
 
-A run calls no solver: it is a generator of problems that is sent their results, so that the arcs of many runs are
-solved in one compiled batch.
+A run does not call a solver: it is a generator that yields problems and receives their results, so that the arcs of
+many runs are solved in one compiled batch.
 """
 
 from __future__ import annotations
@@ -40,20 +40,20 @@ from surfacechem.tolerances import BRIEF_PART, FEW_EPS, FORMULA_EPS, GAP_EPS, UL
 
 Found = TypeVar("Found")
 Flow = Generator[Problem, Result, Found]
-"""Generator that yields one problem after another to be solved, and receives the results."""
+"""Generator that yields one problem after another and receives the results."""
 
 LOST_STATUSES = (Status.STEP_UNDERFLOW, Status.SINGULAR, Status.NO_CONSISTENT_STATE)
-"""Ways in which a solver ends where a quasi-static equilibrium is lost."""
+"""Ends of a solver that may mean the loss of a quasi-static equilibrium."""
 
 MOST_BRIEF_ARCS = 4
-"""Number of brief arcs that time could not resolve that may follow each other."""
+"""Most consecutive brief arcs after a step size underflow."""
 
 ROUNDINGS, MOST_RAISES = 100.0, 3
-"""Tolerance of a sliding velocity in units of its rounding, and how often it is raised."""
+"""Raised absolute tolerance of a sliding velocity in units of its roundoff, and the number of raises."""
 
 
 def solve_together(flows: Sequence[Flow[Found]], method: Solver, threads: int = 1) -> list[Found]:
-    """Run flows to their ends and return their values; problems that they yield at one time are solved in one batch."""
+    """Run flows to their ends and return their values; problems yielded at the same time are solved in one batch."""
     found: dict[int, Found] = {}
     results: dict[int, Any] = dict.fromkeys(range(len(flows)))
     while results:
@@ -69,10 +69,10 @@ def solve_together(flows: Sequence[Flow[Found]], method: Solver, threads: int = 
 
 
 def without_stall(problem: Problem, velocities: NDArray[np.bool_]) -> Flow[Result]:
-    """The result of a problem; ``velocities`` marks the algebraic states that tractions determine.
+    """Solve a problem; ``velocities`` marks the algebraic states that follow from tractions.
 
-    Where such a velocity is near zero it is rounding: what is left of large tractions, divided by a resistance. Where a
-    run stalls at that, its absolute tolerance is raised to this rounding.
+    Near zero such a velocity is roundoff: the difference of large tractions, divided by a resistance. If the step size
+    underflows there, the absolute tolerance of the velocity is raised to this roundoff.
     """
     result = yield problem
     for _ in range(MOST_RAISES if velocities.any() else 0):
@@ -87,7 +87,9 @@ def without_stall(problem: Problem, velocities: NDArray[np.bool_]) -> Flow[Resul
 
 
 def rounding(result: Result) -> Array:
-    """Uncertainty of each unknown at the end of a run by rounding of the equations' terms, shape (states,)."""
+    """Return the uncertainty of each unknown at the end of a run from roundoff of the equations' terms, shape
+    (states,).
+    """
     problem, n = result.problem, len(result.y)
     inputs = np.concatenate(([result.t], result.y, result.ydot, problem.parameters[-1]))
     both = problem.program.derivatives(problem.program.filled(inputs))
@@ -102,7 +104,7 @@ def rounding(result: Result) -> Array:
 
 @dataclass(frozen=True)
 class Arc:
-    """A flow between events as it was solved, in its own time and with its own ledger."""
+    """A solved flow between events, with its time and ledger counted from its start."""
 
     result: Result
     start: Point
@@ -116,7 +118,7 @@ class Arc:
 
     @property
     def is_whole(self) -> bool:
-        """Whether nothing has come before it, neither time nor a jump."""
+        """True if it begins at time zero and no jump comes before it."""
         return not (self.start.t or self.booked.any())
 
 
@@ -135,12 +137,12 @@ class Hybrid:
         self._gaps = np.array([state.name in GAPS for state in system.states])
         """Mask of the states that are gaps."""
         self._start = next(j for j, p in enumerate(system.parameters) if p.path == START)
-        """Column of the time at which a stretch starts."""
+        """Column of the time at which an arc starts."""
         self._brief_arcs = 0
-        """Number of brief arcs in a row that time could not resolve."""
+        """Number of consecutive brief arcs after a step size underflow."""
 
     def run(self) -> Flow[Result]:
-        """The whole run as one result; the instant holds its jumps, and why it ended where one of them ended it."""
+        """Run to the end and return one result; ``instant`` holds the jumps, and the reason if a jump ended the run."""
         problem, instant, columns = self.problem, self.instant, self.jumper.mode_columns
         last, y, modes = None, problem.y0, problem.parameters[0, columns]
         for start, end, row in zip(problem.segments, problem.segments[1:], problem.parameters, strict=False):
@@ -157,14 +159,14 @@ class Hybrid:
         if instant.status is Status.MAX_STEPS and instant.rebounds.count > MANY_REBOUNDS:
             instant.status, instant.reason = Status.FAILED, ENDLESS
         reached = self.arcs[-1].end if self.arcs else float(problem.segments[0])
-        # A jump may have led beyond the last arc, to the very time of a fold.
+        # A jump may lie beyond the last arc, at the time of a fold.
         t = max(reached, instant.jumps[-1].t) if instant.reason and instant.jumps else reached
         if not self.arcs:
             return ended_at_start(problem, instant.status, t, instant.booked)
         return merged(problem, self.arcs, instant.status, t, instant.booked)
 
     def _after(self, arc: Arc, end: float) -> Point | None:
-        """The point from which a run goes on after an arc; None where it ends with it."""
+        """Return the point from which a run goes on after an arc; None if the run ends with it."""
         point = Point(arc.end, arc.result.y, arc.result.ydot, arc.start.parameters)
         if arc.status is Status.FINISHED:
             return point
@@ -187,8 +189,9 @@ class Hybrid:
         return beyond
 
     def _show_until(self, reached: Point, end: float) -> None:
-        """Give the outputs on the last of the way to a fold, which no integration comes to, the state of the fold; so
-        that of an ``end`` which time cannot tell from an event, behind which no arc may follow.
+        """Give outputs between the end of the integration and a fold the state of the fold.
+
+        If ``end`` cannot be told from the event in time, its output is included, since no arc may follow.
         """
         times = self.problem.times[self._written :]
         times = times[times <= reached.t] if reached.t >= end else times[times < reached.t]
@@ -202,17 +205,17 @@ class Hybrid:
             self._written += len(times)
 
     def _beyond(self, arc: Arc, point: Point) -> Point | None:
-        """Point from which a run may go on after a solver has failed; None where there is none."""
-        # At a gap of zero stiffness may jump, and Newton's method stalls: on with the point on the other side.
+        """Return the point from which a run may go on after a solver has failed; None if there is none."""
+        # At zero gap the stiffness may jump and Newton's method stall: go on from the mirrored point.
         closing = self._gaps & (np.abs(point.y) < GAP_EPS) & (point.y * point.ydot < 0)
         if closing.any():
             return replace(point, y=np.where(closing, -point.y, point.y))
-        # What time could not resolve any more goes on in a time of its own.
+        # After an underflow go on with the time counted from here, which is resolved more finely.
         unresolved = arc.status is Status.STEP_UNDERFLOW and arc.result.t > 0 and self._brief_arcs < MOST_BRIEF_ARCS
         return point if unresolved else None
 
     def _is_limited(self, arc: Arc) -> bool:
-        """Whether an arc has brought a limit to zero for all that can be told."""
+        """True if a limit is zero, up to roundoff, at the end of an arc."""
         count, guards = min(self.instant.first, len(arc.result.margins)), self.problem.program.margins
         if not count or guards is None:
             return False
@@ -221,7 +224,9 @@ class Hybrid:
         return bool(np.any(limits & zero & self.instant.in_play(arc.start)[:count]))
 
     def _last_of(self, start: float, end: float) -> float:
-        """The end of an arc: before a breakpoint that no load has, at which a formula is that of what follows."""
+        """Return the end of an arc: just before a breakpoint at which no load changes, since formulas there are those
+        of the next segment.
+        """
         row = int(np.searchsorted(self.problem.segments, end))
         parameters = self.problem.parameters
         if row >= len(parameters) or not np.array_equal(parameters[row - 1], parameters[row]):
@@ -229,7 +234,7 @@ class Hybrid:
         return max(end - FEW_EPS * end, 0.5 * (start + end))
 
     def _flow(self, start: Point, end: float) -> Flow[Arc | None]:
-        """Integrate until an edge, a limit or the end of the segment; None where the run ends before or without it."""
+        """Integrate until an edge, a limit or the end of the segment; None if the run ends before or without it."""
         problem, instant = self.problem, self.instant
         seconds = None if self.deadline is None else self.deadline - time.monotonic()
         if self._steps >= problem.max_steps or (seconds is not None and seconds <= 0):
@@ -258,7 +263,7 @@ class Hybrid:
         result = yield from without_stall(problem, self.system.sliding)
         reached, status = min(start.t + result.t, end), result.status
         if status is Status.FINISHED or (status in LOST_STATUSES and end - reached <= SAME_MOMENT * end):
-            # Where a gap closes at the very end, the last of its digits are rounding of the time.
+            # Where a gap closes at the very end, the remaining time is roundoff.
             reached, status = end, Status.FINISHED
         arc = Arc(result, start, reached, status, times[: len(result.times)], instant.booked)
         self.arcs.append(arc)
@@ -278,8 +283,10 @@ class Hybrid:
 
 
 def carried(problem: Problem, jumper: Jumper) -> Flow[tuple[Result, list[Jump], str] | None]:
-    """A run whose edges the compiled loop carries out: its result, its jumps, and why it ended if they tell; None where
-    the loop leaves it to others.
+    """Run with the compiled loop carrying out the edges; return the result, the jumps, and the reason if a jump ended
+    the run.
+
+    None if the loop leaves the run to :class:`Hybrid`.
     """
     result = yield replace(problem, edges=jumper.edge_tables)
     if result.status is Status.LEFT and jumper.expect_jumps():
@@ -295,7 +302,7 @@ def carried(problem: Problem, jumper: Jumper) -> Flow[tuple[Result, list[Jump], 
 
 
 def with_arc_segments(problem: Problem, result: Result) -> Result:
-    """A result of the compiled loop with its arcs as segments."""
+    """Return a result of the compiled loop with its arcs as segments."""
     assert result.course is not None
     arcs = result.course.arcs
     problem = replace(problem, segments=np.append(arcs[:, 0], problem.segments[-1]), parameters=arcs[:, 5:])
@@ -303,7 +310,7 @@ def with_arc_segments(problem: Problem, result: Result) -> Result:
         return replace(result, problem=problem)
 
     def segments(column: int, count: int) -> Index:
-        """The arc of each of so many points."""
+        """Return the arc of each of this number of points."""
         return np.repeat(np.arange(len(arcs)), np.diff(arcs[:, column], append=count).astype(np.int64))
 
     outputs = States(result.times, result.outputs, result.ledger_outputs, segments(3, len(result.times)))
@@ -321,7 +328,7 @@ def with_arc_segments(problem: Problem, result: Result) -> Result:
 
 
 def ended_at_start(problem: Problem, status: Status, end: float, ledger: Array) -> Result:
-    """The result of a run that ended with a jump at its start."""
+    """Return the result of a run that ended with a jump at its start."""
     n, q, none = problem.program.n, problem.program.n_ledger, np.zeros(0)
     states, lines = np.empty((0, n)), np.empty((0, q))
     events = Events(none, states, states, lines, index=np.empty(0, np.int64))
@@ -330,8 +337,9 @@ def ended_at_start(problem: Problem, status: Status, end: float, ledger: Array) 
 
 
 def with_start(problem: Problem, result: Result) -> Result:
-    """The result with its start as output where it ended there with none, if the equations hold at the start: the state
-    before anything jumps.
+    """Add the initial state as output to a result without outputs, if the equations hold there.
+
+    It is the state before any jump.
     """
     if len(result.times) or not len(problem.times) or result.t > problem.times[0]:
         return result
@@ -345,7 +353,7 @@ def with_start(problem: Problem, result: Result) -> Result:
 
 
 def merged(problem: Problem, arcs: Sequence[Arc], status: Status, end: float, ledger: Array) -> Result:
-    """The arcs as one result, which ends at this time with this ledger."""
+    """Join arcs to one result that ends at this time with this ledger."""
     results = [arc.result for arc in arcs]
     last = results[-1]
     segments = np.array([*(arc.start.t for arc in arcs), problem.segments[-1]])
@@ -374,11 +382,13 @@ def merged(problem: Problem, arcs: Sequence[Arc], status: Status, end: float, le
 
 
 def _known(arcs: Sequence[Arc]) -> States | None:
-    """All known states of the arcs, in the time and ledger of the run, where a picture is wanted."""
+    """Return all stored states of the arcs, in the time and ledger of the run; None if none are stored for
+    interpolation.
+    """
     if not arcs[0].result.problem.picture:
         return None
     found = [arc.result.scattered()[:3] for arc in arcs]
-    # Outputs come first, whose times are those that were asked for.
+    # Outputs come first, at exactly the requested times.
     t = np.concatenate(
         [np.append(arc.times, arc.start.t + rows[0][len(arc.times) :]) for arc, rows in zip(arcs, found, strict=True)]
     )
@@ -391,18 +401,18 @@ def _known(arcs: Sequence[Arc]) -> States | None:
 
 
 def _steps(arcs: Sequence[Arc]) -> Points | None:
-    """The steps of all arcs, each with the number of its arc, where they are recorded."""
+    """Return the steps of all arcs, each with the number of its arc, if they are recorded."""
     if not arcs[0].result.problem.record_steps:
         return None
     taken = [(arc, arc.result.steps) for arc in arcs if arc.result.steps is not None]
-    # The start of an arc, and what time cannot tell from it, is the event that ends the last one.
+    # The start of an arc, and a step too short to change the time, repeat the event that ended the last arc.
     kept = [(arc, some, (arc.start.t + some.t > arc.start.t) | (arc is arcs[0])) for arc, some in taken]
     counts = [int(keep.sum()) for _, _, keep in kept]
     return Points(*_rows(kept), segment=np.repeat(np.arange(len(counts)), counts))
 
 
 def _rows(found: Sequence[tuple[Arc, Points, slice | NDArray[np.bool_]]]) -> tuple[Array, Array, Array, Array]:
-    """Times, states, rates and ledgers of the points that are kept of each arc, in the time and ledger of the run."""
+    """Return times, states, rates and ledgers of the kept points of each arc, in the time and ledger of the run."""
     rows = [
         (arc.start.t + points.t[keep], points.y[keep], points.ydot[keep], arc.booked + points.ledger[keep])
         for arc, points, keep in found

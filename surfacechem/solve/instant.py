@@ -1,7 +1,7 @@
-"""Events at one moment: the edges that are due are carried out in order until none is.
+"""Events at one moment: edges that are due are carried out in order until none is left.
 
-Nothing here integrates and no clock runs: a hybrid run and a network of reactors own an instant each, and tell it where
-the flow between has led. What is due is carried out edge by edge; the ledger gains what each of them books.
+Nothing is integrated here and no time passes: a hybrid run and a network of reactors each own an Instant, and pass it
+the state after every flow. Edges are carried out one by one, and each adds its amounts to the ledger.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from surfacechem.solve.radau.solver import consistent
 from surfacechem.tolerances import BRIEF_PART, GUARD_EPS, IDLE, MICROMETRE, NEWTON_EPS, PICOMETRE
 
 SAME_MOMENT = NEWTON_EPS
-"""Part of the time within which two moments are one: a step onto an event solves for its time."""
+"""Relative difference of times that count as one moment: the step onto an event solves for its time."""
 
 NO_PUSH = "nothing pushes it off where it rests; with a mass or a damper any disturbance would"
 
@@ -38,8 +38,8 @@ MISSED_CLOSING = "the method has not seen the gap close; radau does, or a tighte
 class Rebounds:
     """Rebounds: edges whose guard leaves an exact zero and may soon return, ever lower and sooner (Zeno behaviour).
 
-    How large the guard has been before is no measure of its rounding then, and a first step must not pass the return.
-    ``first`` is the index of the first edge among the guards.
+    The largest size of the guard so far is then no measure of its roundoff, and the first step must not pass the
+    return. ``first`` is the index of the first edge among the guards.
     """
 
     def __init__(self, jumper: Jumper, first: int) -> None:
@@ -47,22 +47,24 @@ class Rebounds:
         self.margins = [first + j for j, item in enumerate(jumper.system.edges) if item.returns is not None]
         self.count = 0
         self.last = (0.0, 0.0)
-        """Time of the last one, and how long it takes to return [s]; zero where that is open."""
+        """Time of the last rebound, and its time of flight [s]; zero if unknown."""
 
     def see(self, jump: Jump) -> None:
-        """Remember a jump where it is a rebound, or ends them."""
+        """Record a jump if it is a rebound."""
         if jump.edge.returns is not None:
             self.count += 1
             self.last = jump.t, float(np.max(self.jumper.times_of_return(jump.after.inputs())))
 
     def pieces(self, start: float, end: float) -> Array:
-        """Pieces of a stretch in its own time: one of its own for what returns so soon that a step might miss it."""
+        """Return the segments of an arc in its own time, with one of their own for a return so soon that a step might
+        miss it.
+        """
         soon = RETURN_FACTOR * self._flight_time(start)
         inside = [soon] if 0 < soon < FITTED_PART * (end - start) else []
         return np.array([0.0, *inside, end - start])
 
     def seen(self, start: float, sizes: Array) -> Array:
-        """Sizes of the margins that their rounding is in proportion to."""
+        """Return the sizes of the margins to which their roundoff is proportional."""
         if not self.margins:
             return sizes
         own = sizes.copy()
@@ -70,7 +72,7 @@ class Rebounds:
         return own
 
     def missed(self, result: Result) -> bool:
-        """Whether an arc has ended beyond what it should have ended at, by more than has a meaning for bodies."""
+        """True if an arc has ended beyond a guard it should have stopped at, by more than a picometre."""
         ended = result.events.index if result.status is Status.EVENT else ()
         playing = result.problem.in_play
         found = [j for j in self.margins if playing is None or playing[j]] if len(result.margins) else []
@@ -83,7 +85,7 @@ class Rebounds:
 
 
 class Instant:
-    """The present moment of a run: what has jumped so far, and how large the states have been."""
+    """The present moment of a run, with the jumps so far and the largest states."""
 
     def __init__(self, system: System, jumper: Jumper, problem: Problem, first: int) -> None:
         self.system, self.jumper, self.program = system, jumper, problem.program
@@ -91,13 +93,13 @@ class Instant:
         """Index of the first edge among the guards; limits come before."""
         self.rtol = problem.rtol
         self.start, self.end = float(problem.segments[0]), float(problem.segments[-1])
-        """Times [s] between which the run goes; what is brief is so against them."""
+        """Start and end of the run [s], the scale for brief times."""
         self.strict = np.array([kind.strict for kind in problem.margins], dtype=bool)
         self.terminal = np.array([kind.terminal for kind in problem.margins], dtype=bool)
         self.scales = velocity_scales(system)
         self.peaks = self.scales.copy()
-        """Largest states seen; what is left of them is rounding. A velocity adds up what forces have given and taken,
-        and is rounding where it is small against its scale; a gap may be exactly zero, at touch.
+        """Largest states so far; their roundoff remains when the states become small. A velocity sums the impulses of
+        forces and is roundoff where small against its scale; a gap may be exactly zero, at touch.
         """
         self.booked = np.zeros(problem.program.n_ledger)
         """Ledger now."""
@@ -110,33 +112,35 @@ class Instant:
         self.limits: list[int] = []
         """Limits that were reached together with the last edge."""
         self.step: LoadStep | None = None
-        """The last loads that have jumped."""
+        """Last jump of the loads."""
         self.flowed = (np.nan, 0.0, np.nan)
-        """Start of the last flow, its length, and its end [s]; the length is sharper than the difference of the two."""
+        """Start of the last flow, its length, and its end [s]; the length is more accurate than the difference of the
+        two.
+        """
         self._sized: tuple[Point | None, Array, Array] = None, self.peaks, self.peaks
-        """A point, the peaks with which it was looked at, and the sizes of the guards there."""
+        """A point, the peaks used there, and the sizes of the guards."""
         self._resolved = 0
         """Number of edges before the last chatter that was resolved."""
         self._sharpened = -np.inf
-        """Time [s] at which the peaks of the states were last forgotten."""
+        """Time [s] at which the peaks of the states were last reset."""
         self.status = Status.FINISHED
         self.reason = ""
-        """Reason why the run ends here, in words, where it does."""
+        """Reason why the run ends here, in words, if it does."""
 
-    # -- what is seen of the guards -------------------------------------------------------------------------------
+    # -- sizes of the guards --------------------------------------------------------------------------------------
 
     def in_play(self, point: Point) -> Mask:
-        """Mask of the guards that are active in the modes of a point."""
+        """Return a mask of the guards that are active in the modes of a point."""
         return np.array(self.system.in_play(point.parameters), dtype=bool)
 
     def see(self, y: Array) -> None:
-        """Keep the largest states seen, shape (..., states)."""
+        """Update the largest states, from states of shape (..., states)."""
         self.peaks = np.fmax(self.peaks, np.fmax.reduce(np.abs(y.reshape(-1, len(self.peaks))), axis=0, initial=0.0))
 
     def sizes(self, point: Point) -> Array:
-        """Magnitudes of the guards at the peaks of the states, to which their rounding is in proportion.
+        """Return the magnitudes of the guards at the peaks of the states; their roundoff is proportional to these.
 
-        What is left of a state that was large is known no better than it was then.
+        A state that was large keeps the absolute uncertainty of that time.
         """
         if self.program.margins is None:
             return np.zeros(0)
@@ -147,14 +151,14 @@ class Instant:
         return self._sized[2]
 
     def consistent(self, point: Point) -> Point:
-        """The point with the rates and algebraic variables that belong to it."""
+        """Return the point with consistent rates and algebraic variables."""
         found = consistent(self.program, point.t, point.y, np.zeros_like(point.y), point.parameters)
         return Point(point.t, found.y, found.ydot, point.parameters)
 
-    # -- what is due ----------------------------------------------------------------------------------------------
+    # -- edges that are due ---------------------------------------------------------------------------------------
 
     def begin(self, point: Point, before: Point | None) -> Point | None:
-        """The start of a load segment, where loads that jump there have moved what is in equilibrium with them."""
+        """Return the start of a load segment, after the jump of quasi-static gaps if loads jump there."""
         corrected = self.jumper.equilibria.corrected
         steps = [index for index, edge in enumerate(self.system.edges) if point.t in edge.times]
         if not steps or before is None:
@@ -164,7 +168,7 @@ class Instant:
         return self.apply(steps[0], point, before) if self.jumper.is_loaded(before, point) else point
 
     def resolve(self, point: Point) -> Point | None:
-        """The point after all edges that are due at its own time; None where the run ends here."""
+        """Return the point after all edges that are due at its time; None if the run ends here."""
         guards = self.program.margins
         if guards is None:
             return point
@@ -189,17 +193,17 @@ class Instant:
             endless = f"transitions follow each other without end (chatter): {last.edge.reason}"
             self.status, self.reason = Status.FAILED, endless
             return None
-        # A fold that lets go of a gap again and again and leaves it where it is counts once, and ends the run.
+        # A fold that fires repeatedly without moving the gap counts once, and ends the run.
         while self.jumps[-2:-1] and self.jumps[-2].edge is last.edge and self.jumps[-2].t == last.t:
             self.jumps.pop()
         self.status, self.reason = Status.EVENT, f"{last.edge.reason}, but {NO_PUSH}"
         return None
 
     def _may_go_on(self, point: Point) -> bool:
-        """Whether edges may follow at a moment; not where they chatter, more of them than any cause needs.
+        """True if edges may follow at a moment; False where they chatter, with more edges than any cause needs.
 
-        That may only seem so where what moves now is rounding of what has moved before: it is forgotten first. Rebounds
-        that follow each other faster than time can tell have come to rest.
+        Chatter may be apparent, where a motion is the roundoff of earlier, larger states: their peaks are reset first.
+        Rebounds that follow each other faster than time can resolve have come to rest.
         """
         t, recent = point.t, len(self.jumps) - self._resolved
         if recent < CHATTER or self.jumps[-CHATTER].t < t - SAME_MOMENT * max(t, BRIEF_PART * self.end):
@@ -214,21 +218,25 @@ class Instant:
         return True
 
     def _due(self, now: Array, playing: Mask, sizes: Array, point: Point) -> int | None:
-        """The edge whose guard is closed, or is zero and closing; the drift of the integration is not closed."""
+        """Return the edge whose guard is below zero by more than the drift of the integration, or is zero and
+        closing.
+        """
         small = GUARD_EPS * sizes
         closed = playing & (now < -np.maximum(drift_of(self.rtol) * sizes, small))
         near = playing & ~closed & (now <= small) & ~self.strict[self.first :]
         if near.any():
             near &= self.jumper.guard_rates(self.consistent(point).inputs()) < 0
-            # Rounding undoes nothing: no edge leads to modes that have been left at this very moment.
+            # Roundoff must not undo an edge: no edge leads back to modes that were left at this moment.
             left = [j.before.parameters[self.jumper.mode_columns] for j in self.jumps[-CHATTER:] if j.t == point.t]
             for j in np.flatnonzero(near).tolist():
                 closed[j] = not any(np.array_equal(self.jumper.modes_after(j, point), modes) for modes in left)
         return int(closed.argmax()) if closed.any() else None
 
     def _closed(self, now: Array, playing: Mask, sizes: Array, due: bool) -> list[int]:
-        """Limits beyond which a jump has carried the state; not what modes say that are left at this moment."""
-        # Beyond the end of a law, be it by rounding, what it says has no meaning.
+        """Return the limits beyond which a jump has carried the state, except those of modes that are left at this
+        moment.
+        """
+        # Beyond the domain of a law, even by roundoff, its values have no meaning.
         margins = self.system.moving_margins[: self.first]
         least = [0.0 if m.domain else -GUARD_EPS * size for m, size in zip(margins, sizes, strict=False)]
         closed = [i for i in range(self.first) if self.terminal[i] and playing[i] and now[i] < least[i]]
@@ -239,13 +247,13 @@ class Instant:
 
     @cached_property
     def _found_anew(self) -> set[int]:
-        """Limits that read states without a past, which are found anew as modes change."""
+        """Limits that read algebraic states, which are found anew as modes change."""
         found = {state.symbol for state in self.system.states if state.algebraic}
         read = [self.system.expand(m.expression).free_symbols for m in self.system.moving_margins[: self.first]]
         return {i for i, symbols in enumerate(read) if symbols & found}
 
     def _borne(self, index: int, point: Point) -> float:
-        """Rounding of the margin of sticking [Pa], on both sides of an edge."""
+        """Return the roundoff of the margin of sticking [Pa], the larger of both sides of an edge."""
         if not (len(self._sticking) and self.system.edges[index].equilibrates):
             return 0.0
         parameters = point.parameters.copy()
@@ -254,7 +262,7 @@ class Instant:
         return GUARD_EPS * float(np.max(both))
 
     def apply(self, index: int, point: Point, last: Point | None = None) -> Point | None:
-        """Carry out an edge and book it; None where the run ends with it."""
+        """Carry out an edge and add it to the ledger; None if the run ends with it."""
         largest, drift = float(self.sizes(point)[self.first + index]), drift_of(self.rtol)
         balanced = BALANCED if self.system.edges[index].times else drift
         slack = EdgeUncertainty(GUARD_EPS * largest, drift * largest, balanced, self._borne(index, point), self.rtol)

@@ -1,12 +1,12 @@
-r"""Sinks of the heat of a jump and their temperatures; for load jumps integrated along the path of the loads.
+r"""Nodes that take the heat of a jump, and their temperatures; for load jumps integrated along the path of the loads.
 
-Loads that jump are the limit of a fast ramp. Friction without a rate follows them at every moment: what jumps goes
-along straight lines of the loads, from part 0 before the step to part 1 after it. Along the way x of what slides each
-body takes the heat
+Loads that jump are the limit of a fast ramp, which rate-independent friction follows at every moment: the jumping loads
+go along straight lines, from part 0 before the step to part 1 after it. Along the sliding path x each body takes the
+heat
 
 .. math:: Q_k = \int s_k\,\mathrm dH
 
-of friction H by the shares :math:`s_k` of the moment.
+of the friction H by the shares :math:`s_k` of the moment.
 """
 
 from __future__ import annotations
@@ -29,23 +29,26 @@ from surfacechem.solve.zeros import zero
 from surfacechem.tolerances import ULPS
 
 Moments = Callable[[Array, Array], tuple[Array, Array]]
-"""From ways and what each taker has taken up to there, shape (ways, takers): the heat made up to each way, shape
-(ways,), and the shares at these moments, shape (ways, takers)."""
+"""Function from places along the path and the heat each node has taken up to there, shape (places, nodes), to the heat
+made up to each place, shape (places,), and the shares there, shape (places, nodes).
+"""
 
 PANEL_DEGREE = 16
-"""Degree of shares and heat on a panel; half of it tells how good that is."""
+"""Degree of the polynomials of shares and heat on a panel; half the degree gives the error estimate."""
 
 NARROWEST, QUADRATURE_PANELS = 2.0**-50, 1000
-"""Panel within which ways have no more digits: there a step of the shares, as at touch, is as sharp as it can be. Such
-a step takes two panels for each digit. Ten of them are more than there are, and what takes more panels is rounding."""
+"""Narrowest panel, at the roundoff of the path, and most panels. A step of the shares, as at touch, takes two panels
+for each bit of its place, a hundred in all. Ten such steps are more than occur; beyond that it is roundoff.
+"""
 
 PICARD_ROUNDS, PICARD_PART = 50, 0.1
-"""Rounds in which what a panel takes has to agree with the temperatures that this gives, within a part of what counts;
-a panel in which it does not is halved, which makes the feedback as weak as it has to be."""
+"""Picard iterations in which the heat of a panel and the temperatures must agree, within this part of the tolerance;
+otherwise the panel is halved, which weakens the feedback until they do.
+"""
 
 
 class JumpHeat:
-    """The nodes that take heat of jumps."""
+    """The nodes that take the heat of jumps."""
 
     def __init__(self, system: System) -> None:
         self.system = system
@@ -54,17 +57,17 @@ class JumpHeat:
 
     @cached_property
     def nodes(self) -> dict[str, Sink]:
-        """Everything that takes heat of jumps, by the name of the node."""
+        """All nodes that take heat of jumps, by name."""
         return {sink.node: sink for sinks in self.system.sinks.values() for sink in sinks}
 
     @cached_property
     def free(self) -> list[int]:
-        """Columns of the temperatures that heat raises, among the inputs."""
+        """Columns among the inputs of the temperatures that heat raises."""
         return [1 + self.states.index(sink.node) for sink in self.nodes.values() if not sink.prescribed]
 
     @cached_property
     def asked(self) -> Function:
-        """Temperature, energy and capacity of each node, and its part of the heat that each maker makes."""
+        """Temperature, energy and capacity of each node, and its share of the heat from each source."""
         shares = [{s.node: s.share for s in sinks} for sinks in self.system.sinks.values()]
         columns = [
             item
@@ -74,7 +77,9 @@ class JumpHeat:
         return compiled(self.system, columns)
 
     def at(self, rows: Array) -> tuple[Array, Array, Array, Array]:
-        """Temperature, energy, capacity and shares of what each maker makes, of each node, shape (rows, nodes)."""
+        """Return temperature, energy and capacity of each node, shape (rows, nodes), and its shares of the heat of each
+        source.
+        """
         values = self.asked(rows).reshape(len(rows), len(self.nodes), -1)
         return values[:, :, 0], values[:, :, 1], values[:, :, 2], values[:, :, 3:]
 
@@ -84,11 +89,10 @@ class JumpHeat:
         return np.array([node.prescribed for node in self.nodes.values()], dtype=bool)
 
     def given(self, rows: Array, made: Array, shares: Array | None) -> tuple[Array, Array, Array]:
-        """Inputs with the temperatures of the nodes after they have taken the heat that is made; the heat that each
-        takes, and its temperature before, each of shape (rows, nodes).
+        """Return inputs after the nodes have taken the heat, the heat that each takes, and its temperature before.
 
-        ``made`` has a column for each maker, and friction last: its heat goes by the ``shares`` along its way, where
-        these are known, else as the interface shares it at the end.
+        The last two have shape (rows, nodes). ``made`` has a column for each source, friction last: its heat is
+        distributed by the ``shares`` along the path if these are known, else as the interface shares it at the end.
         """
         T, U, C, parts = self.at(rows)
         rubbed = parts[:, :, self.interface] if shares is None else shares
@@ -96,26 +100,26 @@ class JumpHeat:
         return self._with_energy(rows, U + taken, U, C), taken, T
 
     def warmed(self, rows: Array, made: Array, shares: Array | None) -> Array:
-        """Inputs with the temperatures of the nodes after they have taken the heat that is made."""
+        """Return inputs with the temperatures of the nodes after they have taken the heat."""
         return self.given(rows, made, shares)[0]
 
     def with_heat(self, rows: Array, taken: Array) -> Array:
-        """Inputs with the temperatures of the nodes after each has taken its heat, shape (rows, nodes)."""
+        """Return inputs with the temperatures of the nodes after each has taken its heat, shape (rows, nodes)."""
         _, U, C, _ = self.at(rows)
         return self._with_energy(rows, U + taken, U, C)
 
     def _with_energy(self, rows: Array, target: Array, U: Array, C: Array) -> Array:
-        """Inputs with the temperatures at which nodes of these energies and capacities have the energies of a target,
-        each of shape (rows, nodes).
+        """Solve for the temperatures at which the nodes have these target energies; all arrays of shape (rows,
+        nodes).
         """
         free = list(zip([j for j, s in enumerate(self.nodes.values()) if not s.prescribed], self.free, strict=True))
         rows, left = rows.copy(), np.arange(len(rows))
-        # Each row ends where it has converged: what it becomes does not depend on the others.
+        # Each row stops when it has converged, so that its result does not depend on the others.
         for _ in range(HEAT_STEPS if free else 0):
             moves = np.zeros(len(left), dtype=bool)
             for j, column in free:
                 T = rows[left, column]
-                with np.errstate(over="ignore", invalid="ignore"):  # far away a search may see no number
+                with np.errstate(over="ignore", invalid="ignore"):  # trial values far away may not be finite
                     change = (target[left, j] - U[:, j]) / C[:, j]
                 moved = T + change
                 moves |= np.abs(change) > ULPS * np.abs(T)
@@ -130,14 +134,14 @@ class JumpHeat:
 
 @dataclass
 class LoadStep:
-    """Loads that jump at one moment."""
+    """A jump of loads at one moment."""
 
     before: Point
     reached: float = 0.0
-    """Part of the way at which the last edge of this moment is taken."""
+    """Part of the path at which the last edge of this moment is carried out."""
 
     def levels(self, system: System, after: Point) -> Array:
-        """By how much each parameter changes as the loads go from before the step to after it."""
+        """Return the change of each parameter as the loads jump."""
         change = np.zeros(len(after.parameters))
         fields: dict[str, dict[str, int]] = {}
         for j, parameter in enumerate(system.parameters):
@@ -156,13 +160,15 @@ class LoadStep:
 
 
 def at_part(point: Point, change: Array, part: float) -> Point:
-    """A point after a step with the loads at a part of their way."""
+    """Return a point after a load jump with the loads at a part of their path."""
     return replace(point, parameters=point.parameters - (1 - part) * change)
 
 
 @cache
 def _panel(degree: int) -> tuple[Array, Array]:
-    """Points of a panel from 0 to 1, and the integrals of f dg up to each of them for values of f and g at all."""
+    """Return the nodes of a panel from 0 to 1, and the integrals of f dg up to each node for nodal values of f and
+    g.
+    """
     points = (1 - np.cos(np.pi * np.arange(degree + 1) / degree)) / 2
     basis = np.linalg.inv(chebyshev.chebvander(2 * points - 1, degree))
     x, weights = np.polynomial.legendre.leggauss(degree + 1)
@@ -176,10 +182,10 @@ def _panel(degree: int) -> tuple[Array, Array]:
 
 
 def shared_heat(moments: Moments, takers: int, small: float, *, feeds_back: bool) -> Array:
-    """Heat that each of the takers has taken at the end of a way from 0 to 1, shape (takers,).
+    """Return the heat that each node has taken along a path from 0 to 1, shape (takers,).
 
-    Panels are halved until the integrals of their polynomials and those of half the degree agree within the heat that
-    is ``small``. Shares that add up to one leave no heat out, whatever the panels.
+    Panels are halved until the integrals of their polynomials and those of half the degree agree within the heat
+    ``small``. Shares that add up to one conserve the heat on any panels.
     """
     (points, integrals), (_, coarse) = _panel(PANEL_DEGREE), _panel(PANEL_DEGREE // 2)
     taken, begin, width, panels = np.zeros(takers), 0.0, 1.0, 0
@@ -205,7 +211,7 @@ def shared_heat(moments: Moments, takers: int, small: float, *, feeds_back: bool
 
 
 def _first(curve: Callable[[float], float], reached: float) -> float:
-    """The part of the way beyond which a curve is below zero, from one that is reached already."""
+    """Return the part of the path beyond which a curve is negative, starting from a part already reached."""
     here, there = curve(reached), curve(1.0)
     if not here > 0:
         return reached
@@ -213,7 +219,7 @@ def _first(curve: Callable[[float], float], reached: float) -> float:
 
 
 class LoadPath:
-    """The way of what slides as loads jump."""
+    """The path of the sliding gaps as loads jump."""
 
     def __init__(
         self,
@@ -225,18 +231,18 @@ class LoadPath:
     ) -> None:
         self.system, self.equilibria, self.heat, self.energy = system, equilibria, heat, energy
         self.moved = next((columns for axis, columns in stages if axis != "n"), [])
-        """Columns of the states that move along the interface, among the inputs."""
+        """Columns among the inputs of the states that move along the interface."""
 
     @cached_property
     def varies(self) -> bool:
-        """Whether the shares of the heat of friction change as loads jump."""
+        """True if the shares of frictional heat change as loads jump."""
         fixed = {p.symbol for p in self.system.parameters if p.load is None}
         shares = [self.system.expand(sink.share) for sink in self.system.sinks[INTERFACE]]
         return any(symengine.sympify(share).free_symbols - fixed for share in shares)
 
     @cached_property
     def warms_itself(self) -> bool:
-        """Whether friction, or how its heat is shared, changes with the temperatures that this heat raises."""
+        """True if friction or the shares of its heat depend on the temperatures that this heat raises."""
         hot = {symengine.Symbol(name) for name in self.heat.nodes}
         felt = [e.residual for e in self.equilibria.items] + [s.share for s in self.system.sinks[INTERFACE]]
         return any(self.system.expand(x).free_symbols & hot for x in felt)
@@ -246,7 +252,7 @@ class LoadPath:
         return compiled(self.system, (edge.guard for edge in self.system.edges))
 
     def reach(self, index: int, step: LoadStep, before: Point) -> None:
-        """Go along the way of the loads to where an edge that follows from them is taken."""
+        """Advance along the path of the loads to where an edge that follows from them is carried out."""
         if self.equilibria.slip is None or not self.varies or self.system.edges[index].times:
             return
         change = step.levels(self.system, before)
@@ -259,11 +265,11 @@ class LoadPath:
         step.reached = _first(guard, step.reached)
 
     def shares(self, step: LoadStep, start: Point, after: Point, broken: float, small: float) -> Array | None:
-        """The shares of the heat of friction of a jump, shape (nodes,), but for heat that is ``small``.
+        """Return the shares of a jump's frictional heat, shape (nodes,), up to heat that is ``small``.
 
-        It begins with that of bonds that are ``broken`` as sliding begins.
-        What slides is at each place at the first part of the way of the loads at which it is pushed on there, warmed
-        by what it has rubbed so far, and all else is in equilibrium at that part.
+        It begins with the heat of bonds that are ``broken`` as sliding begins. The sliding gap is at each place when
+        the loads reach the first part of their path that drives it on there, warmed by the frictional heat so far, with
+        everything else in equilibrium at that part.
         """
         change = step.levels(self.system, after)
         j, way, length = self._way(start, after)
@@ -272,7 +278,7 @@ class LoadPath:
         columns, onward = np.array(self.moved) - 1, float(np.sign(length))
 
         def moment(place: float, floor: float, taken: Array) -> tuple[float, float, Array]:
-            """Part of the way of the loads at a place, if no less than that before it; energy and shares there."""
+            """Return the part of the load path at a place, at least that before it, and energy and shares there."""
             y = start.y.copy()
             y[columns] += place * length * way.moves[columns]
             there = replace(start, y=y, parameters=after.parameters)
@@ -302,7 +308,7 @@ class LoadPath:
         level[self.moved] = start.inputs()[self.moved]
         begun, begin, shares = moment(0.0, step.reached, np.zeros(len(self.heat.nodes)))
         at_once = (broken + float(self.energy(level)[0]) - begin) * shares
-        reached = {0.0: begun}  # at the ends of panels: where sliding eases it runs on at the part it has begun at
+        reached = {0.0: begun}  # at ends of panels: where less load is needed, the part already reached holds
 
         def moments(places: Array, taken: Array) -> tuple[Array, Array]:
             part, found = reached[float(places[0])], []
@@ -317,12 +323,12 @@ class LoadPath:
         return taken / whole if whole > 0 else None
 
     def _held(self, point: Point, span: Array, warm: Heat = lambda rows: rows) -> Point:
-        """The point with all in equilibrium while friction holds; where there is none, as it is."""
+        """Return the point in equilibrium with sliding stuck; unchanged if there is none."""
         stuck = self.equilibria.with_slip(point, 0.0)
         return self.equilibria.equilibrate_near(stuck, warm, span) or stuck
 
     def _way(self, start: Point, after: Point) -> tuple[int, GapDirection, float]:
-        """Index of the gap that slides, its way when sliding by itself, and the distance along that."""
+        """Return the index of the sliding gap, its direction when it slides by itself, and the distance along that."""
         ways = self.equilibria.ways(self.equilibria.with_slip(after, 0.0))
         j = next(j for j, e in enumerate(self.equilibria.items) if e.slides)
         along = [ways[j], *(way for way in ways if way is not ways[j] and 1 + way.column in self.moved)]

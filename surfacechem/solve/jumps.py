@@ -1,7 +1,7 @@
-"""Jumps of the state along an edge: reset, equilibrate, share out the heat, judge by the second law, book.
+"""Jumps of the state along an edge: reset, new equilibrium, distribution of heat, second law, ledger.
 
-Energy is conserved in each: what falls is heat. Source: lumped form of the balances across a jump; Sauer, Duong &
-Mandadapu (2021), section 6.3, for sudden debonding.
+Energy is conserved in each: its decrease becomes heat. Source: lumped form of the balances across a jump; Sauer, Duong
+& Mandadapu (2021), section 6.3, for sudden debonding.
 """
 
 from __future__ import annotations
@@ -44,8 +44,9 @@ NO_ENERGY = "the energy of the interface is not finite after it"
 NO_SHARES = "where the sliding ends and who takes its heat do not agree; with a damper it would take its time"
 
 SHARE_ROUNDS = 20
-"""Rounds in which the end of a slip and the shares of its heat have to agree, where the one depends on the other: each
-adds a digit or more where they converge at all."""
+"""Rounds in which the end of a slip and the shares of its heat have to agree, if each depends on the other: every round
+adds a digit or more where they converge at all.
+"""
 
 
 @dataclass(frozen=True)
@@ -53,15 +54,15 @@ class EdgeUncertainty:
     """Uncertainty of an edge at its moment."""
 
     noise: float = 0.0
-    """Rounding of its guard."""
+    """Roundoff of its guard."""
     drift: float = 0.0
     """Drift of its guard that the integration may have caused."""
     balanced: float = BALANCED
-    """Part of the tractions by which the integration leaves them out of balance."""
+    """Residual of the tractions that the integration may leave, relative to their terms."""
     borne: float = 0.0
-    """Rounding of what sticking bears beyond what it has to [Pa]."""
+    """Roundoff of the margin between friction limit and traction [Pa]."""
     rtol: float = 0.0
-    """Relative tolerance of the run, for what is found along the way of a jump."""
+    """Relative tolerance of the run, for what is found along the path of a jump."""
 
 
 @dataclass(frozen=True)
@@ -75,26 +76,26 @@ class Jump:
     released: float
     """Energy turned into heat [J/m^2]."""
     entropy: float
-    """Entropy produced [J/(m^2 K)], what reservoirs take included."""
+    """Entropy produced [J/(m^2 K)], including that of the heat passed to reservoirs."""
     verdict: str
     since: float = 0.0
-    """Time since the edge before [s], sharper than the difference of their times late in a run."""
+    """Time since the last edge [s], more accurate than the difference of their times late in a run."""
     work: Mapping[str, float] = field(default_factory=dict)
     """Work of the far-field tractions [J/m^2], by account."""
     obstacle: str = ""
-    """Reason why it is impossible, where it is."""
+    """Reason why the jump is impossible, if it is."""
     heat_out: float = 0.0
     """Heat passed to prescribed temperatures [J/m^2]."""
     entropy_out: float = 0.0
 
     @property
     def stops(self) -> bool:
-        """Whether the run cannot, or may not, go on."""
+        """True if the run cannot, or may not, go on."""
         return self.verdict == IMPOSSIBLE or (self.verdict == VIOLATES and self.edge.violation == "refuse")
 
 
 def velocity_scales(system: System) -> Array:
-    """Scales of the velocities among the states, zero for the others."""
+    """Return the scales of the velocities among the states, zero for the other states."""
     return np.array([(state.finest or state.scale) * (state.name in VELOCITIES) for state in system.states])
 
 
@@ -102,18 +103,18 @@ _ONE_THREAD = threading.RLock()
 
 
 class ImpossibleError(Exception):
-    """A jump has no end, with the reason in words."""
+    """A jump has no end state; the message is the reason."""
 
 
 @dataclass(frozen=True)
 class PendingJump:
-    """A jump on its way: the state as modes and bonds have jumped, before gaps and temperatures follow."""
+    """A jump after the reset of modes and bonds, before gaps and temperatures follow."""
 
     index: int
     edge: Edge
     start: Point
     energy: float
-    """Energy that the jump conserves, before it; ``level`` is that at its start [J/m^2]."""
+    """Conserved energy before the jump; ``level`` is that after the reset [J/m^2]."""
     level: float
     fold: FoldPoint | None
     slack: EdgeUncertainty
@@ -122,7 +123,7 @@ class PendingJump:
 
 
 class Jumper:
-    """The jumps of a system, compiled when the first one happens."""
+    """The jumps of a system, compiled on the first jump."""
 
     def __init__(self, system: System, program: Program) -> None:
         self.system = system
@@ -130,7 +131,7 @@ class Jumper:
         self.equilibria = Equilibria(system)
         self.folds = Folds(self.equilibria)
         self._jumps = False
-        """Whether jumps are expected, so that what only they need is worth compiling."""
+        """True if jumps are expected, so that the functions only they need are worth compiling."""
         self._tables: EdgeTables | None = None
         memory = {item.symbol for item in system.memory}
         kept = [p.symbol in memory or p.path == REST_TIME_PATH for p in system.parameters]
@@ -140,7 +141,9 @@ class Jumper:
 
     @cached_property
     def magnitudes(self) -> Function:
-        """Running error bounds of limits and edges, of the inputs and the peaks of the states; one a model."""
+        """Running error bounds of limits and guards of edges, as functions of the inputs and the peaks of the states;
+        one a model.
+        """
         system = self.system
         peaks = {state.symbol: symengine.Symbol(f"peak of {state.name}") for state in system.states}
         guards = [m.expression for m in system.moving_margins] + [edge.guard for edge in system.edges]
@@ -149,12 +152,12 @@ class Jumper:
 
     @cached_property
     def times_of_return(self) -> Function:
-        """Times [s] after which what has rebounded is back."""
+        """Times of flight [s] of rebounds."""
         return compiled(self.system, (edge.returns for edge in self.system.edges if edge.returns is not None))
 
     @cached_property
     def _resets(self) -> list[Function]:
-        """For each edge the new states, and then the new modes and registers."""
+        """Reset map of each edge: the new states, then the new modes and registers."""
         states = [state.symbol for state in self.system.states]
         modes = [self.system.parameters[j].symbol for j in self.mode_columns]
         return [
@@ -164,7 +167,7 @@ class Jumper:
 
     @cached_property
     def guards_read_rates(self) -> bool:
-        """Whether guards depend on rates, or on variables that have to be found with them."""
+        """True if guards depend on rates, or on algebraic variables that are found with them."""
         states = self.system.states
         guards = [*(edge.guard for edge in self.system.edges), *(margin.expression for margin in self.system.margins)]
         read = set().union(*(self.system.expand(guard).free_symbols for guard in guards))
@@ -181,15 +184,15 @@ class Jumper:
     @cached_property
     def _totals(self) -> Function:
         """Energy that a jump conserves, total entropy, and potentials of the far-field tractions; then the magnitudes
-        of the first two. It takes longer to call than to compute.
+        of the first two. A call costs more than the evaluation, so all are in one function.
         """
         system = self.system
         totals = [system.jump_energy, system.find("S_total").expression]
         return compiled(system, [*totals, *system.given.values(), *(magnitude(system.expand(x)) for x in totals)])
 
     def _books(self, rows: Array) -> Array:
-        """Totals at arguments of compiled functions; a magnitude that is no number there, as at a bound, counts as
-        zero.
+        """Return the totals at arguments of compiled functions; a magnitude that is not finite, as at a bound, counts
+        as zero.
         """
         found = self._totals(rows)
         found[..., -2:] = np.where(np.isfinite(found[..., -2:]), found[..., -2:], 0.0)
@@ -197,7 +200,7 @@ class Jumper:
 
     @cached_property
     def _energy(self) -> Function:
-        """Energy that a jump conserves, by itself: a search asks for it at many rows."""
+        """Energy that a jump conserves; compiled separately, as a search evaluates it at many rows."""
         return compiled(self.system, [self.system.jump_energy])
 
     @cached_property
@@ -206,12 +209,12 @@ class Jumper:
         return compiled(self.system, (item for pull in self.system.pulls.values() for item in pull))
 
     def _far_field(self, point: Point) -> Array:
-        """Stiffness, displacement, traction and gap, each by direction, shape (4, directions)."""
+        """Return stiffness, displacement, traction and gap, each by direction, shape (4, directions)."""
         return np.asarray(self._pulls(point.inputs()).reshape(-1, 4).T)
 
     @cached_property
     def _ends(self) -> list[tuple[str, Function]]:
-        """Limits at which laws end as quasi-static gaps move, each behind its reason."""
+        """Limits of the laws' domains that depend on quasi-static gaps, each with its reason."""
         moved = {e.state for e in self.system.equilibria}
         gaps = {state.symbol for state in self.system.states if state.name in moved}
         ends = [m for m in self.system.margins if m.domain and self.system.expand(m.expression).free_symbols & gaps]
@@ -227,7 +230,7 @@ class Jumper:
 
     @cached_property
     def _stages(self) -> list[tuple[str, list[int]]]:
-        """The axes along which gaps move in a jump, and the columns of their states: the normal goes ahead."""
+        """Axes along which gaps move in a jump, the normal first, and the columns of their states."""
         moved: dict[str, set[str]] = {}
         for e in sorted(self.system.equilibria, key=lambda e: e.axis):
             moved.setdefault(e.axis, set()).update((e.state, *e.along))
@@ -235,11 +238,13 @@ class Jumper:
             moved["n"].update(self.system.follows)
         return [(axis, [1 + self.states.index(name) for name in names]) for axis, names in moved.items()]
 
-    # -- what the compiled loop asks ------------------------------------------------------------------------------
+    # -- tables for the compiled loop -----------------------------------------------------------------------------
 
     @property
     def edge_tables(self) -> EdgeTables:
-        """Tables of the edges for the compiled loop; with what only jumps need once these are expected."""
+        """Tables of the edges for the compiled loop; the functions that only jumps need are included once jumps are
+        expected.
+        """
         with _ONE_THREAD:
             self._tables = self._tables or self._edge_tables()
             return self._tables
@@ -266,7 +271,7 @@ class Jumper:
         )
 
     def _row(self, edge: Edge) -> tuple[int, int, bool, int]:
-        """A row of the table of edges."""
+        """Return a row of the table of edges."""
         returns = [item for item in self.system.edges if item.returns is not None]
         taker = self._first_maker(edge)
         return (
@@ -277,7 +282,7 @@ class Jumper:
         )
 
     def expect_jumps(self) -> bool:
-        """Compile what only jumps need; whether that was not done before."""
+        """Have the functions compiled that only jumps need; True if they were not before."""
         with _ONE_THREAD:
             before, self._jumps = self._jumps, True
             self._tables = self._tables if before else None
@@ -285,7 +290,7 @@ class Jumper:
 
     @cached_property
     def _accounts(self) -> list[tuple[int, int]]:
-        """Booking of jumps on each account: its kind, and its place among states or books."""
+        """Kind of each account in jumps, and its index among states or totals."""
         given, found = list(self.system.given), []
         sums = {"dissipation": RELEASED, "entropy production": PRODUCED, "energy supply": HEAT_OUT}
         for account in self.system.ledger:
@@ -299,7 +304,7 @@ class Jumper:
         return found
 
     def booked(self, jump: Jump) -> Array:
-        """Amounts that a jump adds to the accounts of the ledger."""
+        """Return the amounts that a jump adds to the accounts of the ledger."""
         changes = jump.after.y - jump.before.y
         sums = {
             RELEASED: jump.released,
@@ -309,13 +314,15 @@ class Jumper:
         }
         amounts = []
         for account, (kind, place) in zip(self.system.ledger, self._accounts, strict=True):
-            # The work of loads that jump, and on the last of the way to a fold, is that of other accounts, too.
+            # Jumping loads, and the last part before a fold, do work on other accounts too.
             work = jump.work.get(account.quantity.name, 0.0)
             amounts.append(changes[place] if kind == BONDS else sums.get(kind, work))
         return np.array(amounts)
 
     def carried_out(self, arcs: Array, rows: Array, start: float, end: float) -> list[Jump]:
-        """The jumps that the compiled loop has carried out, from its rows of arcs and of jumps between these times."""
+        """Return the jumps that the compiled loop has carried out, from its rows of arcs and jumps between these
+        times.
+        """
         edges, given, found, last = self.system.edges, list(self.system.given), [], start
         columns = 7 + len(given)
         width = (rows.shape[1] - columns) // 2
@@ -323,7 +330,7 @@ class Jumper:
             index, arc, released, gain, heat, entropy, admissible, *work = numbers
             point, after = (Point.of(row[k : k + width], len(self.states)) for k in (columns, columns + width))
             began, length = arcs[int(arc) - 1, :2].tolist() if arc else (math.nan, 0.0)
-            # The length of the arc before is sharper than the difference of two times.
+            # The length of the last arc is more accurate than the difference of two times.
             since = length + (point.t - min(began + length, end)) if began == last else point.t - last
             verdict, done = ADMISSIBLE if admissible else VIOLATES, dict(zip(given, work, strict=True))
             found.append(
@@ -332,14 +339,14 @@ class Jumper:
             last = point.t
         return found
 
-    # -- what an instant asks -------------------------------------------------------------------------------------
+    # -- questions of an Instant ----------------------------------------------------------------------------------
 
     def modes_after(self, index: int, point: Point) -> Array:
-        """The modes and registers that an edge sets."""
+        """Return the modes and registers that an edge sets."""
         return self._resets[index](point.inputs())[len(point.y) :]
 
     def is_loaded(self, before: Point, point: Point) -> bool:
-        """Whether a jump of the loads does work or sets anything in motion."""
+        """True if a jump of the loads does work or changes the balance of tractions."""
         if self.equilibria.items:
             (last, sizes), (now, _) = self.equilibria.balance(before), self.equilibria.balance(point)
             if np.any(np.abs(now - last) > BALANCED * sizes):
@@ -360,8 +367,10 @@ class Jumper:
         last: Point | None = None,
         step: LoadStep | None = None,
     ) -> Jump:
-        """Carry out an edge, ``since`` the one before [s]. ``last`` is the state before loads jump, or where the
-        integration ended close to a fold; ``step`` are loads that have jumped at this moment.
+        """Carry out an edge, ``since`` seconds after the last one.
+
+        ``last`` is the state before loads jump, or where the integration ended close to a fold; ``step`` are the loads
+        that have jumped at this moment.
         """
         edge, fold = self.system.edges[index], self.folds.at(index, before)
         before, start = self._reset(index, before if fold is None else fold.point, fold)
@@ -378,7 +387,7 @@ class Jumper:
             after, released, heat_out, entropy_out = self._heated(rest, release, shares)
         except ImpossibleError as obstacle:
             return replace(jump, obstacle=str(obstacle))
-        # Friction pulls nothing back.
+        # Friction never pulls a gap back: it sticks.
         if edge.equilibrates and self.equilibria.is_pushed_back(after, slack.balanced, slack.borne):
             after = self.equilibria.with_slip(after, 0.0)
         gain, admissible, done = self._judged(
@@ -389,29 +398,30 @@ class Jumper:
         return Jump(before.t, edge, before, after, released, gained, verdict, since, work, "", heat_out, entropy_out)
 
     def _reset(self, index: int, before: Point, fold: FoldPoint | None) -> tuple[Point, Point]:
-        """The point before a jump, and with the modes and states that the edge resets."""
+        """Return the point before a jump, and the point after the reset map of the edge."""
         slip, n = self.equilibria.slip, len(before.y)
         values = self._resets[index](before.inputs())
         if slip is not None and before.parameters[slip] and not values[n + self.mode_columns.index(slip)]:
-            # What the integration has left of the balance would look like a push to what sticks from here on.
+            # The remaining residual of the integration would act as a driving traction on the sticking interface.
             before = self.equilibria.corrected(before)
             values = self._resets[index](before.inputs())
         parameters = before.parameters.copy()
         parameters[self.mode_columns] = values[n:]
         if self.system.edges[index].fold is not None and fold is None and slip is not None:
-            parameters[slip] = 0.0  # there is no steady sliding, and nothing pushes it on
+            parameters[slip] = 0.0  # no steady sliding, and nothing drives it
         return before, Point(before.t, values[:n], np.zeros(n), parameters)
 
     def _opened(self, edge: Edge, before: Point, last: Point | None) -> tuple[Array, dict[str, float]]:
-        """The books before a jump, and the work up to there that the integration has not seen.
+        """Return the totals before a jump, and the work up to there that the integration does not include.
 
-        That of far-field displacements that jump before anything moves, and that on the last of the way to a fold.
+        It is the work of far-field displacements that jump before anything moves, and that between the end of the
+        integration and a fold.
         """
         if last is None or not (edge.times or edge.fold):
             return self._books(before.inputs()), {}
         books = self._books((last if edge.times else before).inputs())
-        # What the jump makes is counted from where the integration ended. Free nodes are at the fold already, with the
-        # heat of the last of the way in their temperatures; reservoirs have still to pass it.
+        # The heat of the jump counts from the end of the integration. Free nodes are already at the fold, with the heat
+        # of the last part in their temperatures; reservoirs have not received theirs yet.
         unseen = edge.fold and not self._heat.free
         if unseen:
             books[:2] = self._books(last.inputs())[:2]
@@ -432,7 +442,9 @@ class Jumper:
         return books, dict(zip(accounts, lift.tolist(), strict=True))
 
     def _equilibrated(self, release: PendingJump) -> tuple[Point, Array | None]:
-        """Point at which the gaps come to rest, and the shares of friction's heat where its path decides them."""
+        """Return the point at which the gaps come to rest, and the shares of frictional heat if its path decides
+        them.
+        """
         shares: Array | None = None
         for _ in range(SHARE_ROUNDS):
             after = self._kept(release, self._rested(release, shares))
@@ -445,14 +457,16 @@ class Jumper:
                 break
         else:
             raise ImpossibleError(NO_SHARES)
-        # Touch leaves gaps where they are; any other jump may leave the domain of a law.
+        # Touch does not move gaps; any other jump may leave the domain of a law.
         closed = [] if release.edge.measure else [why for why, end in self._ends if not end(after.inputs())[0] > 0]
         if closed:
             raise ImpossibleError(f"{NO_DOMAIN}: {closed[0]}")
         return after, shares
 
     def _kept(self, release: PendingJump, after: Point | None) -> Point:
-        """The end of a jump; with the modes of its edge where what its guard measures has not moved."""
+        """Return the end of a jump, with the modes set by the edge if the state that its guard measures has not
+        moved.
+        """
         if after is None:
             raise ImpossibleError(NO_REST)
         edge, slack, slip = release.edge, release.slack, self.equilibria.slip
@@ -464,7 +478,9 @@ class Jumper:
         return self.equilibria.with_slip(replace(after, parameters=release.start.parameters), sliding)
 
     def _rested(self, release: PendingJump, shares: Array | None) -> Point | None:
-        """Point at which the gaps come to rest. Sliding goes on or sticks: friction never pulls it back."""
+        """Return the point at which the gaps come to rest. Sliding continues or sticks: friction never pulls it
+        back.
+        """
 
         def heat(rows: Array) -> Array:
             return self._heat.warmed(rows, self._made(rows, release), shares)
@@ -480,11 +496,13 @@ class Jumper:
         onward = found.with_slip(trial, slip)
         if found.is_pushed_back(onward, release.slack.balanced, release.slack.borne, heat):
             return trial
-        # Where sticking keeps the equilibrium it is sliding that is lost.
+        # Where sticking preserves the equilibrium, only that of sliding is lost.
         return found.equilibrate(onward, heat, release.slack.balanced, lost=fold if stuck is None else None)
 
     def _path_shares(self, release: PendingJump, after: Point) -> Array | None:
-        """The shares by which the heat of friction is taken along the way of loads that jump, where that matters."""
+        """Return the shares of the frictional heat along the path of jumping loads; None if the path does not
+        matter.
+        """
         step, edge = release.step, release.edge
         slip, path = self.equilibria.slip, self._load_path
         if step is None or edge.heat == "snap" or slip is None or not after.parameters[slip] or not path.varies:
@@ -497,11 +515,10 @@ class Jumper:
         return path.shares(step, release.start, after, broken, release.slack.rtol * made + small)
 
     def _made(self, rows: Array, release: PendingJump) -> Array:
-        """Heat that a jump to each of the rows makes [J/m^2], by who makes it, shape (rows, makers + 1).
+        """Return the heat of a jump to each of the rows [J/m^2] by source, shape (rows, sources + 1).
 
-        Friction is last, with the bonds that it breaks.
-        The energy falls as the state jumps, then as gaps follow, axis by axis: friction holds what would slide until
-        the normal gap is where it goes to.
+        Friction is last, with the bonds that it breaks. The energy falls in the reset, then as gaps follow, axis by
+        axis: friction prevents sliding until the normal gap has arrived.
         """
         edge, start = release.edge, release.start
         made = np.zeros((len(rows), len(self.system.sinks) + 1))
@@ -515,11 +532,11 @@ class Jumper:
         for axis, columns in self._stages:
             here[:, columns] = rows[:, columns]
             now = self._energy(here)[:, 0]
-            if axis == "n":  # the interface gives way where it loses bonds, or where it slides
+            if axis == "n":  # the interface makes heat where bonds break, or where it slides
                 gives = np.any(rows[:, lost] != start.inputs()[lost], axis=1)
             else:
                 gives = rows[:, parameters + slip] != 0 if slip is not None else np.zeros(len(rows), dtype=bool)
-            with np.errstate(invalid="ignore"):  # far away from where it begins a search may see no number
+            with np.errstate(invalid="ignore"):  # trial values far away may not be finite
                 fall = level - now
             made[~gives, self._maker(edge, axis)] += fall[~gives]
             made[gives, self._maker(edge, INTERFACE) if axis == "n" else -1] += fall[gives]
@@ -527,16 +544,18 @@ class Jumper:
         return made
 
     def _maker(self, edge: Edge, axis: str) -> int:
-        """Column of the part that makes the heat along an axis."""
+        """Return the column of the source that makes the heat along an axis."""
         makers = list(self.system.sinks)
         return makers.index(axis if axis in makers and edge.heat != "snap" else INTERFACE)
 
     def _first_maker(self, edge: Edge) -> int:
-        """Column of the part that makes heat of what is released before gaps move; the last, of friction, if local."""
+        """Return the column of the source of the energy released before gaps move; the last one, friction, if it is
+        local.
+        """
         return -1 if edge.heat == "local" else self._maker(edge, "n" if edge.heat == "joint" else INTERFACE)
 
     def _heated(self, point: Point, release: PendingJump, shares: Array | None) -> tuple[Point, float, float, float]:
-        """The point with the heat made in its nodes; energy released, heat and entropy passed to reservoirs."""
+        """Return the point with the heat in its nodes; energy released, heat and entropy passed to reservoirs."""
         rows = point.inputs()[None]
         heated, *amounts = self._warmed(rows, self._made(rows, release), np.array([release.energy]), shares)
         if not np.all(np.isfinite(heated)):
@@ -547,8 +566,10 @@ class Jumper:
     def _warmed(
         self, rows: Array, made: Array, energy: Array, shares: Array | None = None
     ) -> tuple[Array, Array, Array, Array]:
-        """Inputs with the heat made in their nodes, not a number where they cannot take it; energy released, heat and
-        entropy passed to reservoirs. What does not count beside the ``energy`` before is not made.
+        """Return inputs with the heat in their nodes; energy released, heat and entropy passed to reservoirs.
+
+        The inputs are NaN where nodes cannot take the heat. Heat that is negligible compared with ``energy`` counts as
+        zero.
         """
         small = FEW_EPS * np.maximum(self._books(rows)[:, -2], np.abs(energy))
         made = np.where(np.abs(made) <= small[:, None], 0.0, made)
@@ -564,10 +585,11 @@ class Jumper:
     def _judged(
         self, edge: Edge, before: Array, after: Array, books: Array, noise: Array, entropy_out: Array | float
     ) -> tuple[Array, Mask, dict[str, Array]]:
-        """Entropy that jumps between these rows produce, whether the second law admits it, and the work done in them.
+        """Return the entropy that jumps between these rows produce, whether the second law admits it, and the work
+        done.
 
-        What does not count: rounding, and what the ``noise`` of the state that a guard measures makes of entropy and of
-        energy, as heat of the coldest that may take it.
+        Negative production is tolerated up to roundoff, and up to the effect of the guard's ``noise`` on entropy and on
+        energy, the latter as heat at the temperature of the coldest node.
         """
         perturbed = before.copy()
         if edge.measure:

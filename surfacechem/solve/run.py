@@ -1,4 +1,4 @@
-"""A system in time: compiled once, run with any values of its parameters."""
+"""Models and their runs: a system is compiled once and run with any values of its parameters."""
 
 from __future__ import annotations
 
@@ -32,28 +32,28 @@ from surfacechem.solve.segments import Passing
 from surfacechem.tolerances import ATOL_OF_SCALE, DEFAULT_RTOL, EPS, FINER_BY, LINE_ERROR, SQRT_EPS
 
 GROUPS = {"energy supply": 0, "dissipation": 0, "heat": 0, "entropy supply": 1, "entropy production": 1, "bonds": 2}
-"""Accounts whose quadratures are measured together."""
+"""Groups of accounts whose quadrature errors are compared with a common scale."""
 
 LOOKS_PER_RUN, CLOSER = 60.0, 7.3
-"""Looks at the equations in a run, and how many times more in the second one, which must not share its blindness.
-Choices: a look costs an evaluation, and 7.3 is no whole number, so that the looks of the two fall on different times.
-What both miss lasts less than 1/438 of the run, which every estimate says.
+"""Least number of checks of steps against the equations inside in a run, and the factor for the second run, which must
+not miss the same features. Choices: a check costs an evaluation, and 7.3 is not an integer, so that the checks of the
+two runs are at different times. Features that both miss last less than 1/438 of the run, as every estimate says.
 """
 
 ROWS_AT_ONCE = 10_000
-"""Rows in which named quantities are evaluated together, so that they take some MB."""
+"""Rows for which named quantities are evaluated together; they take some MB."""
 
 SAMPLED_OUTPUTS = 100
-"""Outputs, about, that tell how large rounding is."""
+"""Approximate number of outputs from which roundoff is estimated."""
 
 OWN = "radau"
-"""The method of this package."""
+"""Default method."""
 
 COLDER_GUESSES = 0.95 ** np.arange(1, 40)
-"""Parts of the first guess of a temperature that are tried where that leads to an unstable one."""
+"""Factors of the first guess of a temperature that are tried if it leads to an unstable one."""
 
 STATE_SPEC, POSITIVE_SPEC = Spec("", "initial value"), Spec("", "initial value", above=0)
-"""Ranges of initial values: finite, and positive where the logarithm is the state; margins check the rest."""
+"""Ranges of initial values: finite, and positive if the logarithm is the state; margins check the rest."""
 
 
 @dataclass(frozen=True)
@@ -67,26 +67,26 @@ class Run:
     max_steps: int = 100_000
     max_seconds: float | None = None
     accuracy: float | None = None
-    """Relative accuracy that was asked for, if no tolerances were given."""
+    """Requested relative accuracy, if no tolerances were given."""
     picture: float | None = None
-    """Part of its range by which straight lines between outputs, which then follow the run, may miss a quantity; the
-    outputs are ``times`` where this is None."""
-    looks: float = LINE_ERROR
-    """Part of its range to which states are known inside steps that are too long for a straight line, whatever the
-    outputs are; 0 where the ends of steps and the outputs are all that is known."""
-    steady: bool = False
-    """Whether it ends where nothing changes any more; the times are then those of a run of any length."""
-    rest: float | None = None
-    """Time at which it comes to rest [s], where that was found before."""
-    perturbed: bool = False
-    """Whether loads differ in their last digits: where a result depends on these, two runs of the same numbers would
-    agree.
+    """Largest error of linear interpolation between outputs, which are then chosen by the run, as a part of the range
+    of each quantity; None if the outputs are ``times``.
     """
+    looks: float = LINE_ERROR
+    """Error, as a part of its range, to which each state is known by linear interpolation inside long steps, whatever
+    the outputs; 0 if only ends of steps and outputs are stored.
+    """
+    steady: bool = False
+    """True if it ends where nothing changes any more; the times are then those of a run of any length."""
+    rest: float | None = None
+    """Time at which it comes to rest [s], if that was found before."""
+    perturbed: bool = False
+    """True if loads are perturbed in their last digits, so that two runs differ where the result depends on these."""
     samples: float = LOOKS_PER_RUN
-    """Parts of the run in each of which its steps are held against the equations at least once."""
+    """Number of parts of the run in each of which steps are checked at least once against the equations inside."""
 
     def __post_init__(self) -> None:
-        """Check that output times start at zero, where the initial values hold, and increase; and the tolerances."""
+        """Check the tolerances, and that output times start at zero, where the initial values hold, and increase."""
         if len(self.times) < 2 or self.times[0] != 0 or any(map(operator.le, self.times[1:], self.times)):
             raise InputError("output times must start at 0 and increase from each to the next, at least two.")
         if not (0 < self.rtol < 1 and 0 <= (self.atol or 0.0) < np.inf):
@@ -95,20 +95,22 @@ class Run:
             )
 
     def second(self, rtol: float, **others: Any) -> Run:
-        """The run that tells the error of this one: at another tolerance, the absolute one in proportion, and with more
-        looks at the equations, elsewhere; of explicit steps by implicit ones, which do not share their blindness.
+        """Return the run that estimates the error of this one.
+
+        It has another relative tolerance, an absolute one in proportion, and more checks inside steps, at other times.
+        Explicit steps are compared with implicit ones, which do not miss the same features.
 
         Parameters
         ----------
         rtol
             The other relative tolerance.
         others
-            What else differs.
+            Further differences.
 
         Returns
         -------
         Run
-            The same but for that.
+            The same run with these differences.
         """
         atol = None if self.atol is None else self.atol * rtol / self.rtol
         used = OWN if self.solver == EXPLICIT else self.solver
@@ -117,7 +119,7 @@ class Run:
 
 
 class Discontinuities(NamedTuple):
-    """Moments at which quantities may leap, run by run and in order of time: jumps, and breakpoints of loads."""
+    """Moments at which quantities may jump, by run and in order of time: jumps, and breakpoints of loads."""
 
     owner: Index
     """The run of each."""
@@ -127,15 +129,17 @@ class Discontinuities(NamedTuple):
     after: dict[str, Array]
     """The same right after."""
     lasts: Mask
-    """Those that no other one follows at the same time."""
+    """Mask of the last one at each time."""
 
     @classmethod
     def of(cls, model: Model, owner: Index, before: Array, after: Array) -> Discontinuities:
-        """Those of runs of a model with these arguments of compiled functions on both sides, a row each."""
+        """Return the discontinuities of runs of a model from arguments of compiled functions on both sides, a row
+        each.
+        """
         order, n = np.lexsort((before[:, 0], owner)), len(model.system.states)
         owner, before, after = owner[order], before[order], after[order]
         t, y, ydot = before[:, 0], slice(1, 1 + n), slice(1 + n, 1 + 2 * n)
-        if len(t):  # rates and algebraic variables are still those before
+        if len(t):  # rates and algebraic variables are still those from before
             found = consistent(model.program, t, after[:, y], 0.0, after[:, 1 + 2 * n :])
             after[found.valid, y], after[found.valid, ydot] = found.y[found.valid], found.ydot[found.valid]
         names = [*(state.name for state in model.system.states), *model.system.output_columns]
@@ -158,43 +162,45 @@ class Trajectory:
     jumps: tuple[Jump, ...] = ()
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        """Give the problem the machine code that the model has made anew."""
+        """Restore the machine code of the problem from the model, which has compiled it again."""
         problem = replace(state["result"].problem, program=state["model"].program)
         vars(self).update(state, result=replace(state["result"], problem=problem))
 
     def at(self, rows: States) -> Trajectory:
-        """The trajectory with these states at its outputs."""
+        """Return the trajectory with these states as outputs."""
         t, y, ledger, segment = rows
         result = copy(self.result)
         result.times, result.outputs, result.ledger_outputs, result.segment = t, y, ledger, segment
         return replace(self, result=result)
 
     def at_times(self, times: Sequence[float] | Array) -> Trajectory:
-        """The trajectory with those of its outputs alone that are at these times."""
+        """Return the trajectory with only the outputs at these times."""
         kept = self.picked(np.isin(self.result.times, times))
         return replace(kept, run=replace(self.run, times=tuple(times)))
 
     def picked(self, rows: Index | Mask) -> Trajectory:
-        """The trajectory with some of its outputs alone."""
+        """Return the trajectory with some of its outputs."""
         result = self.result
         segment = result.segments_at(result.times, result.segment)
         return self.at(States(result.times[rows], result.outputs[rows], result.ledger_outputs[rows], segment[rows]))
 
     @property
     def some(self) -> Trajectory:
-        """The trajectory with a sample of its outputs, enough to tell how large rounding is."""
+        """The trajectory with a sample of its outputs, enough to estimate roundoff."""
         count = len(self.result.times)
         return self.picked(np.arange(0, count, max(count // SAMPLED_OUTPUTS, 1)))
 
     @cached_property
     def looked(self) -> Trajectory:
-        """The trajectory with outputs where runs are compared: at the ends of its steps and at what the stepper knows
-        inside them, whatever outputs were asked for; at those, too, where nothing inside is known.
+        """The trajectory with outputs at which runs are compared, whatever outputs were requested.
+
+        They are the ends of its steps and the stored states inside them; the requested outputs are included if no
+        states inside are stored.
         """
         result = self.result
         rows = result.known or result.states()
         t = np.minimum(rows.t, self.run.times[-1])  # the last step may end beyond it by rounding
-        kept = np.diff(t, prepend=-1.0) > 0  # of two sides of a moment the first, which an output has, too
+        kept = np.diff(t, prepend=-1.0) > 0  # of the two sides of a moment keep the first, as an output does
         if (result.known or result.inside) is not None and result.steps is not None:
             kept &= among(rows.t, result.steps.t) | ~among(rows.t, result.times)
         assert rows.segment is not None
@@ -212,7 +218,7 @@ class Trajectory:
     def rates(self) -> Array:
         """Time derivatives of the states at the output times, shape (times, states).
 
-        Those of algebraic ones, which no equation gives, are differences; at the start, where no time has passed, zero.
+        Those of algebraic states, which no equation gives, are difference quotients; zero at t = 0.
         """
         program, n = self.model.program, len(self.model.system.states)
         t, y, rates, parameters = np.split(self._inputs, [1, 1 + n, 1 + 2 * n], axis=1)
@@ -225,13 +231,15 @@ class Trajectory:
 
     @cached_property
     def roundings(self) -> dict[str, float]:
-        """By how much the last bit of a state changes each named quantity at most."""
+        """Largest change of each named quantity by one rounding of a state."""
         return self.felt(EPS * self.result.outputs)
 
     def felt(self, changes: Array) -> dict[str, float]:
-        """By how much changes of one state at a time, shape (times, states), change each named quantity at most."""
+        """Return the largest change of each named quantity if one state at a time changes by ``changes``, shape (times,
+        states).
+        """
         model, system, times = self.model, self.model.system, self.result.times
-        # No flux reads one of the states inside bodies alone but the first, and those are not named.
+        # Of the states inside bodies only the first enters a flux; the others are not named.
         own = [j for j, state in enumerate(system.states) if state.name not in system.inside]
         together = max(1, ROWS_AT_ONCE // max(len(times), 1))
         worst = np.zeros(self.outputs.shape[1])
@@ -240,7 +248,7 @@ class Trajectory:
             for perturbed, j in zip(rows, some, strict=True):
                 perturbed[:, 1 + j] += changes[:, j]
             values = model.named(rows.reshape(len(some) * len(times), rows.shape[-1]))
-            with np.errstate(invalid="ignore"):  # quantities may be infinite, whatever the last bit is
+            with np.errstate(invalid="ignore"):  # quantities may be infinite
                 apart = np.abs(values.reshape(len(some), *self.outputs.shape) - self.outputs)
                 worst = np.fmax(worst, np.fmax.reduce(apart.max(axis=1, initial=0.0)))
         return dict(zip(system.output_columns, worst, strict=True))
@@ -259,7 +267,7 @@ class Trajectory:
 
     @cached_property
     def leaps(self) -> Discontinuities:
-        """Jumps from which the run goes on, and the breakpoints of loads between jumps that it has passed."""
+        """Jumps from which the run goes on, and the breakpoints of loads, apart from jumps, that it has passed."""
         model, result, steps = self.model, self.result, self.result.steps
         sides = [(jump.before.inputs(), jump.after.inputs()) for jump in self.jumps if not jump.stops]
         before, after = np.array(sides).reshape(-1, 2, model.program.n_inputs).swapaxes(0, 1)
@@ -273,7 +281,7 @@ class Trajectory:
 
     @cached_property
     def within_bounds(self) -> dict[str, Array]:
-        """As :attr:`everywhere`, with bonds that rounding has carried below none set to none."""
+        """As :attr:`everywhere`, with bond densities that roundoff has made negative set to zero."""
         result, steps = self.result, self.result.steps
         bonds = {account.law for account in self.model.system.ledger if account.kind == "bonds"}
         least = np.array([0.0 if state.name in bonds else -np.inf for state in self.model.system.states])
@@ -290,7 +298,7 @@ class Trajectory:
 
 
 def values_of(system: System, changes: Mapping[str, float] | None = None) -> dict[str, float]:
-    """Every parameter and initial value by path, with some of them changed."""
+    """Return every parameter and initial value by path, with some of them changed."""
     values = {parameter.path: parameter.at(0.0) for parameter in system.parameters}
     values |= {state.path: state.at_start[1] for state in system.states}
     if not changes:
@@ -307,7 +315,7 @@ def values_of(system: System, changes: Mapping[str, float] | None = None) -> dic
 
 
 def refuse_static(system: System, case: str = "CASE") -> None:
-    """InputError where nothing of a scene changes."""
+    """Raise InputError if nothing in a scene changes."""
     if system.rests:
         command = f"`surfacechem evaluate {case}` gives its quantities"
         remedy = f"Let a temperature or bonds evolve, or a history change; {command}."
@@ -315,10 +323,10 @@ def refuse_static(system: System, case: str = "CASE") -> None:
 
 
 def stable_guess(system: System, program: Program, y: Array, parameters: Array) -> Array:
-    """First guesses that lead to a stable state; those given, where they do or where none does.
+    """Return first guesses that lead to a stable state; the given ones if they do or if none does.
 
-    Heat that grows with temperature meets what leaves twice: in a stable state, and above it in one that any
-    disturbance ignites or cools down.
+    Heat production that grows with temperature can balance the losses twice: in a stable state, and at a higher
+    temperature in one from which any perturbation leads to ignition or cooling.
     """
     guessed = np.array([state.algebraic and state.is_temperature for state in system.states])
     if not guessed.any():
@@ -338,7 +346,7 @@ def stable_guess(system: System, program: Program, y: Array, parameters: Array) 
 
 
 def _are_stable(system: System, program: Program, y: Array, parameters: Array) -> NDArray[np.bool_]:
-    """Mask of the first guesses that lead to states in which all limits of stability are open."""
+    """Return a mask of the first guesses that lead to states in which all stability limits are positive."""
     playing = system.in_play(parameters)
     checks = [i for i, m in enumerate(system.moving_margins) if m.stability and playing[i]]
     if not checks or program.margins is None:
@@ -349,7 +357,7 @@ def _are_stable(system: System, program: Program, y: Array, parameters: Array) -
 
 
 class Model:
-    """A system with its machine code, made when it is built."""
+    """A system with its machine code, compiled when it is built."""
 
     def __init__(self, system: System) -> None:
         refuse_static(system)
@@ -364,7 +372,7 @@ class Model:
             external = ExternalInputs(reads, positions, outside.engine)
         self.system = system
         self.margins = system.moving_margins
-        """The margins that can close on the way; the rest is checked at the start only."""
+        """Margins that can close during the run; the others are checked at the start only."""
         program = compile_program(
             system.t,
             inputs[1 : n + 1],
@@ -382,14 +390,16 @@ class Model:
         outputs = [system.expand(item.expression) for item in system.outputs]
         self.output_function: Function = compile_function(inputs, outputs, system.of_cells)
         self.compile_seconds = time.perf_counter() - start
-        """Time to compile the equations, and what is first needed in a run: of gaps at rest, of guards and of jumps."""
+        """Time to compile the equations, and the functions first needed in a run: quasi-static gaps, guards and
+        jumps.
+        """
 
     def __reduce__(self) -> tuple[type[Model], tuple[System]]:
-        """Machine code is not pickled but made again from the system."""
+        """Pickle the system only; its machine code is compiled again."""
         return type(self), (self.system,)
 
     def values(self, changes: Mapping[str, float] | None = None) -> dict[str, float]:
-        """Every parameter and initial value by path, in SI, with some of them changed.
+        """Return every parameter and initial value by path, in SI, with some of them changed.
 
         Parameters
         ----------
@@ -399,29 +409,29 @@ class Model:
         Returns
         -------
         dict
-            Values by path: what `run` may change.
+            Values by path: those that a run may change.
 
         Raises
         ------
         InputError
-            Where there is no parameter of a path, or a value is outside its range.
+            If there is no parameter of a path, or a value is outside its range.
         """
         return values_of(self.system, changes)
 
     @cached_property
     def equilibria(self) -> Equilibria:
-        """The quasi-static gaps, with the code that finds them; one a model."""
+        """The quasi-static gaps and their compiled functions; one a model."""
         return self.jumper.equilibria if self.jumper else Equilibria(self.system)
 
     @cached_property
     def passing(self) -> Passing:
-        """Search for the times at which prescribed variables pass narrow places."""
+        """Search for the times at which prescribed variables pass narrow features."""
         return Passing(self.system)
 
     def problem(self, run: Run, values: Mapping[str, float], *, passing: bool = True) -> Problem:
-        """The initial value problem; InputError where the initial state is not admissible.
+        """Return the initial value problem; raise InputError if the initial state is not admissible.
 
-        ``passing`` ends pieces where given variables pass what is narrow, too.
+        ``passing`` also ends segments where prescribed variables pass narrow features.
         """
         system, end = self.system, run.times[-1]
         segments = pieces.segments(system, end, values)
@@ -437,7 +447,7 @@ class Model:
         if system.equilibria:
             y, parameters = self._equilibrated(y, parameters)
         start = stable_guess(system, self.program, y, parameters[0])
-        if system.equilibria:  # the gaps given are where the search begins; what it finds has to be admissible, too
+        if system.equilibria:  # given gaps are first guesses only; those found must be admissible too
             self._limits.check(start, parameters[0])
         return Problem(
             program=self.program,
@@ -457,7 +467,9 @@ class Model:
         )
 
     def _equilibrated(self, y: Array, parameters: Array) -> tuple[Array, Array]:
-        """The states with their gaps in equilibrium, and the parameters of all segments with the modes found there."""
+        """Return the states with their gaps in equilibrium, and the parameters of all segments with the modes found
+        there.
+        """
         settled = self.equilibria.equilibrate(Point(0.0, y, np.zeros_like(y), parameters[0].copy()))
         if settled is None:
             raise InputError(f"{NO_BALANCE}.", path="mechanics")
@@ -473,7 +485,7 @@ class Model:
 
     @cached_property
     def _guards(self) -> tuple[Guard, ...]:
-        """Event types for the zeros of limits, and behind them of the guards of edges."""
+        """Event types of the limits, followed by those of the guards of edges."""
         limits = (
             Guard.peak() if m.peak else replace(Guard.stop(), domain=m.domain) if m.terminal else Guard.restart()
             for m in self.margins
@@ -498,28 +510,30 @@ class Model:
         Raises
         ------
         InputError
-            Where there is no parameter of a path, or the start is not admissible.
+            If there is no parameter of a path, or the start is not admissible.
         """
         return self.solve_values(run, self.values(changes))
 
     def chosen(self, run: Run, values: Mapping[str, float]) -> Run:
-        """The run with a method, where the choice is left to us the one that suits the scene with these values."""
+        """Return the run with a method: if the choice is left to the program, the one that suits the scene with these
+        values.
+        """
         if run.solver != AUTO:
             return run
         try:
             return self._with_method(run, self.problem(run, values))
-        except InputError:  # the run says so itself
+        except InputError:  # the run raises it again
             return replace(run, solver=OWN)
 
     def _with_method(self, run: Run, problem: Problem) -> Run:
         return replace(run, solver=method(problem, self.system.moves)[0]) if run.solver == AUTO else run
 
     def solve_values(self, run: Run, values: Mapping[str, float]) -> Trajectory:
-        """Run with every value given, whatever bounds they need."""
+        """Run with every value given, without a check of their ranges."""
         return self.solve_all([(run, values)])[0]
 
     def solve_all(self, runs: Sequence[tuple[Run, Mapping[str, float]]], threads: int = 1) -> list[Trajectory]:
-        """Runs that differ in values and output times, together in the compiled loop."""
+        """Solve runs that differ in values and output times, together in the compiled loop."""
         before = PREPARATION.seconds
         problems = [self.problem(*pair) for pair in runs]
         run = self._with_method(runs[0][0], problems[0])
@@ -536,14 +550,14 @@ class Model:
             (each if each.solver == run.solver else replace(each, solver=run.solver), values, problem)
             for (each, values), problem in zip(runs, problems, strict=True)
         ]
-        # A limit in seconds is one of each run by itself.
+        # A limit in seconds applies to each run alone.
         groups = [[item] for item in items] if run.max_seconds else [items]
         return [done for group in groups for done in self._solve_together(used, group, threads)]
 
     def _solve_together(
         self, used: Solver, items: Sequence[tuple[Run, Mapping[str, float], Problem]], threads: int
     ) -> list[Trajectory]:
-        """Runs whose arcs are solved in batches; each has its part of their time."""
+        """Solve runs whose arcs go into common batches; each counts an equal part of the run time."""
         start, prepared = time.perf_counter(), PREPARATION.seconds
         ends = solve_together([self._flow(problem, used.crosses_edges) for _, _, problem in items], used, threads)
         compiling = PREPARATION.seconds - prepared
@@ -556,8 +570,9 @@ class Model:
         return done
 
     def _flow(self, problem: Problem, crosses: bool) -> Flow[tuple[Result, tuple[Jump, ...], tuple[str, str] | None]]:
-        """A run as a flow: its result, its jumps, and how it ended where a jump ended it; a method that ``crosses``
-        edges is asked to.
+        """Return a run as a flow: its result, its jumps, and how it ended if a jump ended it.
+
+        ``crosses`` is True if the method can carry out edges by itself.
         """
         if self.jumper is None:
             return (yield from without_stall(problem, self.system.sliding)), (), None
@@ -571,7 +586,7 @@ class Model:
         return result, tuple(jumps), (word, f"{reason} at t = {result.t:.9g} s") if reason else None
 
     def verdict(self, run: Run, result: Result, values: Mapping[str, float]) -> tuple[str, str]:
-        """Outcome of a run and its reason, in words."""
+        """Return the outcome of a run and its reason, in words."""
         where = f"t = {result.t:.9g} s"
         if result.status is Status.FINISHED:
             return (
@@ -591,14 +606,14 @@ class Model:
     def evaluate(
         self, result: Result, t: Array, y: Array, ydot: Array, segment: NDArray[np.int64] | None = None
     ) -> Array:
-        """Named quantities along a trajectory.
+        """Evaluate named quantities along a trajectory.
 
         Parameters
         ----------
         result, t, y, ydot
-            A result, and times [s], states and their slopes along it, shapes (n,), (n, states), (n, states).
+            A result, and times [s], states and their rates along it, shapes (n,), (n, states), (n, states).
         segment
-            Number of the segment between breakpoints that each time is in; the times tell it where it is not given.
+            Number of the segment between breakpoints of each time; determined from the times if not given.
 
         Returns
         -------
@@ -608,7 +623,7 @@ class Model:
         return self.named(self.inputs(result, t, y, ydot, segment))
 
     def named(self, inputs: Array) -> Array:
-        """Named quantities at arguments of compiled functions, which are filled in place."""
+        """Return named quantities at arguments of compiled functions, which are filled in place."""
         if not len(inputs):
             return np.empty((0, self.output_function.n_out))
         return self.output_function(self.program.filled(inputs))
@@ -616,6 +631,6 @@ class Model:
     def inputs(
         self, result: Result, t: Array, y: Array, ydot: Array, segment: NDArray[np.int64] | None = None
     ) -> Array:
-        """Arguments of compiled functions along a trajectory."""
+        """Return the arguments of compiled functions along a trajectory."""
         parameters = result.problem.parameters[result.segments_at(t, segment)]
         return np.concatenate([t[:, None], y, ydot, parameters], axis=1)

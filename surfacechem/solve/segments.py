@@ -1,8 +1,8 @@
-"""Segments of time between which the parameters of a system may jump, and the parameters of each.
+"""Load segments: intervals of time between which parameters may jump, and the parameters of each.
 
-A segment also ends where a given variable passes what is narrow: at turning points of histories, and at places where
-a formula changes. What depends on time alone needs no step to be found: a run ends a piece there, so that no step
-passes over it.
+A segment also ends where a prescribed variable passes a narrow feature: at turning points of histories, and where a
+formula changes branch. Functions of time alone need no step to be located, so the ends of segments are computed in
+advance, and no step passes over the feature.
 """
 
 from __future__ import annotations
@@ -21,15 +21,18 @@ from surfacechem.solve.contract import Array
 from surfacechem.tolerances import FEW_EPS, GUARD_EPS, NEGLIGIBLE
 
 PARTS_OF_A_PERIOD, MOST_PARTS = 8.17, 20_000
-"""Parts into which the period of a load is cut, so many that no cut falls on a reversal, and the number of them above
-which it is left to the steps."""
+"""Parts of the period of a load, a number such that no cut falls on a reversal, and the number of parts in a run above
+which periods are not cut.
+"""
 
 BETWEEN_POINTS, LARGEST_SLACK = 1e3, NEGLIGIBLE
-"""Slack of bonding beyond its bounds between two points of a step, in tolerances, and at most."""
+"""Slack of bonding beyond its bounds between two points of a step, in tolerances, and its largest value."""
 
 
 def segments(system: System, end: float, values: Mapping[str, float]) -> Array:
-    """Pieces of time: between breakpoints, and parts of the period of a load where the state may be at rest."""
+    """Return the segments of a run: between breakpoints, and parts of the period of a load under which the state may
+    rest.
+    """
     inside = [t for t in system.breakpoints if 0 < t < end]
     for path in system.cycles:
         count = math.floor(PARTS_OF_A_PERIOD * values[path] * end)
@@ -39,7 +42,7 @@ def segments(system: System, end: float, values: Mapping[str, float]) -> Array:
 
 
 def segment_parameters(system: System, starts: Array, rtol: float, values: Mapping[str, float]) -> Array:
-    """Parameters of each piece: loads as they start it, bounds with the slack that the tolerance needs."""
+    """Return the parameters of each segment: loads as they start it, bounds with the slack that the tolerance needs."""
     rows = np.repeat([[values[parameter.path] for parameter in system.parameters]], len(starts), axis=0)
     for j, parameter in enumerate(system.parameters):
         if parameter.load is not None:
@@ -52,15 +55,16 @@ def segment_parameters(system: System, starts: Array, rtol: float, values: Mappi
 
 
 def perturb_histories(system: System, parameters: Array) -> None:
-    """Change the numbers of histories by a few roundings, one up, the next down: a last digit may be lost where a state
-    is rounded, at an impact for instance. Times that pieces count from stay.
+    """Change the numbers of histories by a few roundings, alternately up and down. Origins of time stay.
+
+    A single rounding might be lost where a state is rounded, for instance in an impact.
     """
     loads = [j for j, p in enumerate(system.parameters) if p.path.startswith("loading.") and p.field != "origin"]
     parameters[:, loads] *= 1 + FEW_EPS * (-1.0) ** np.arange(len(loads))
 
 
 def start_modes(system: System, parameters: Array, values: Mapping[str, float]) -> None:
-    """Modes and registers that follow from the initial state."""
+    """Set the modes and registers that follow from the initial state."""
     symbols = [p.symbol for p in system.parameters]
     if started := [mode for mode in system.modes if mode.start is not None]:
         initial = {state.symbol: state.from_given(values) for state in system.states}
@@ -71,7 +75,7 @@ def start_modes(system: System, parameters: Array, values: Mapping[str, float]) 
 
 
 def start_registers(system: System, parameters: Array, values: Mapping[str, float]) -> None:
-    """Registers that follow from the initial state."""
+    """Set the registers that follow from the initial state."""
     symbols = [p.symbol for p in system.parameters]
     for register in system.registers:
         if register.given is not None:
@@ -79,22 +83,27 @@ def start_registers(system: System, parameters: Array, values: Mapping[str, floa
 
 
 COMPARISONS = (symengine.StrictLessThan, symengine.LessThan)
-"""SymEngine turns the others round."""
+"""SymEngine reverses the other comparisons."""
 
 TURN_PARTS, LOOKS_IN_A_PERIOD = 64, 8
-"""Parts of a run in each of which a given variable is taken to turn at most once, and of the period of one that repeats
-itself, where a sine turns once in four of them. A choice: what turns twice within a part is not found, and more parts
-cost evaluations of what depends on time alone."""
+"""Parts of a run, and of the period of a cyclic load, in each of which a prescribed variable is assumed to turn at most
+once; a sine turns once in four parts. A choice: two turns within a part are not found, and more parts cost evaluations
+of functions of time alone.
+"""
 
 PARTS_PER_STEP = 10
-"""Parts of periods for each step allowed: two a period end a step, so that the steps are used up before the parts."""
+"""Most parts of periods for each step allowed: two turns a period end a step, so the steps are used up before the
+parts.
+"""
 
 BISECTIONS = 64
-"""Bisections that take any part of a run to the last bit of its time."""
+"""Bisections that reduce any part of a run to the last bit of its time."""
 
 
 class Passing:
-    """Search for the times at which prescribed variables, by time alone, pass narrow places of a system."""
+    """Search for the times at which prescribed variables, as functions of time alone, pass narrow features of a
+    system.
+    """
 
     def __init__(self, system: System) -> None:
         turns, places = _narrow(system)
@@ -104,7 +113,7 @@ class Passing:
             dtype=np.int64,
         )
         self.reads = {system.parameters[j].path for j in self._columns}
-        """Paths of the parameters that they depend on."""
+        """Paths of the parameters that these depend on."""
         self._function: Function | None = None
         if turns or places:
             symbols = [system.parameters[j].symbol for j in self._columns]
@@ -113,13 +122,14 @@ class Passing:
 
     @property
     def is_empty(self) -> bool:
-        """Whether there are none."""
+        """True if there are none."""
         return self._function is None
 
     def pieces(self, segments: Array, table: Array, frequency: float, max_steps: int) -> tuple[Array, Array]:
-        """Segments that end at these times, too, and their parameters; those of the segments given are ``table``.
+        """Return segments that also end at these times, and their parameters; those of the given segments are
+        ``table``.
 
-        ``frequency`` [1/s] is the highest of a given variable.
+        ``frequency`` [1/s] is the highest of a prescribed variable.
         """
         if self._function is None:
             return segments, table
@@ -135,7 +145,7 @@ class Passing:
         return np.insert(segments, within + 1, found), np.insert(table, within + 1, table[within], axis=0)
 
     def _find(self, segments: bytes, table: bytes, density: float) -> Array:
-        """All times inside the segments, in order; each is looked at in so many parts a second."""
+        """Return all times inside the segments, in order, from a search with ``density`` parts a second."""
         ends = np.frombuffer(segments)
         values = np.frombuffer(table).reshape(len(ends) - 1, -1)
         parts = np.ceil(density * np.diff(ends)).astype(np.int64)
@@ -151,7 +161,7 @@ class Passing:
         return np.unique(np.concatenate([turning, passed]))
 
     def _zeros(self, low: Array, high: Array, values: Array, which: slice) -> Array:
-        """Times at which functions change sign between these times, the first time beyond each change."""
+        """Return the times at which functions change sign in these intervals, the first time beyond each change."""
         assert self._function is not None
         function = self._function
 
@@ -170,8 +180,10 @@ class Passing:
 
 
 def _narrow(system: System) -> tuple[list[Expression], list[Expression]]:
-    """Expressions in time alone that change sign at narrow places: slopes of histories that turn inside functions other
-    than sums, products and whole powers; and differences that conditions compare, with the peaks of laws.
+    """Return expressions in time alone whose sign changes mark narrow features.
+
+    They are the slopes of histories that enter functions other than sums, products and whole powers, the differences
+    that conditions compare, and the peaks of laws.
     """
     bent, compared, t = set(), set(), system.t
     for member in _members(system):
@@ -187,25 +199,25 @@ def _narrow(system: System) -> tuple[list[Expression], list[Expression]]:
 
 
 def _of_time(system: System, expressions: Sequence[Expression]) -> list[Expression]:
-    """Those that depend on time and on parameters alone, each once."""
+    """Return the expressions that depend on time and parameters alone, each once."""
     given = {system.t, *(parameter.symbol for parameter in system.parameters)}
     return [item for item in dict.fromkeys(expressions) if system.t in item.free_symbols <= given]
 
 
 def _members(system: System) -> list[Expression]:
-    """Expressions that are integrated, and the named quantities in them."""
+    """Return the integrated expressions, and the named quantities in them."""
     integrated = [symengine.sympify(row) for row in (*system.rows.values(), *(item.rate for item in system.ledger))]
     named = [symengine.sympify(expression) for _, expression in needed(_definitions(system), integrated)]
     return integrated + named
 
 
 def _compared(expression: Expression) -> set[Expression]:
-    """Differences of what the conditions of an expression compare."""
+    """Return the differences of the two sides of an expression's conditions."""
     conditions = {condition for piece in expression.atoms(symengine.Piecewise) for condition in piece.args[1::2]}
     single = {item for condition in conditions for item in (condition, *condition.atoms(*COMPARISONS))}
     return {item.args[0] - item.args[1] for item in single if isinstance(item, COMPARISONS)}
 
 
 def _definitions(system: System) -> list[tuple[Expression, Expression]]:
-    """Named quantities with what they are made of."""
+    """Return the named quantities with their definitions."""
     return [(symengine.Symbol(item.name), item.expression) for item in system.named]

@@ -1,4 +1,4 @@
-"""A zero between two places, in Python: SciPy's take a quarter of a second to import, as long as most runs last."""
+"""Root finding in an interval, in Python: importing SciPy's takes a quarter of a second, as long as most runs."""
 
 from collections.abc import Callable
 
@@ -6,21 +6,21 @@ from surfacechem.tolerances import FEW_EPS, TINY
 
 
 def zero(value: Callable[[float], float], ends: tuple[float, float], at_ends: tuple[float, float]) -> float:
-    """Zero of a function of one variable by bracketing, to the last digits of the place.
+    """Return a zero of a function of one variable by bracketing, to the last digits of the argument.
 
-    Each step is by inverse quadratic interpolation where that is monotone, else by half.
+    Each step is by inverse quadratic interpolation where that is monotone, else by bisection.
 
     Parameters
     ----------
     value
-        The function; what is not a number counts as negative.
+        The function; NaN counts as negative.
     ends, at_ends
-        Two places, in any order, and the values there, of different signs.
+        Two arguments, in any order, and the values there, of different signs.
 
     Returns
     -------
     float
-        The place. Source: Chandrupatla (1997), Advances in Engineering Software 28, 145-149.
+        The zero. Source: Chandrupatla (1997), Advances in Engineering Software 28, 145-149.
 
     Examples
     --------
