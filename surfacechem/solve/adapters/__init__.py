@@ -1,1 +1,1 @@
-"""Solvers of other libraries under the same contract."""
+"""Solvers of other libraries under the contract of this package."""

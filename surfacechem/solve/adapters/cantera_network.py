@@ -1,7 +1,7 @@
-"""Cantera's ReactorNet under the contract, and the reactor that holds a system of ours in a network.
+"""Cantera's ReactorNet under the contract, and the reactor that holds a system of this package in a network.
 
-Cantera has one absolute tolerance for all variables, so each variable is counted in units of its own tolerance. Values
-inside the last step come from the integrator's own polynomial, whose derivatives it gives at the end of the step.
+Cantera has one absolute tolerance for all variables, so each variable is given in units of its own tolerance. Values
+inside the last step come from the integrator's polynomial, whose derivatives it provides at the end of the step.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ from surfacechem.tolerances import FORMULA_EPS, TINY
 NAMES = ("cantera",)
 
 LEDGER_UNIT = 1e100
-"""Ledgers are counted in this many of their SI units, so that they stay out of the integrator's error norm."""
+"""Unit of the ledger, in SI units: so large that the ledger does not contribute to the integrator's error norm."""
 
 LONGEST_STEP = 0.1
-"""Part of a stretch that a step may take: Cantera cannot be told to end a step at an event."""
+"""Longest step, as a part of the arc: Cantera cannot be made to end a step at an event."""
 
 FACTORIALS = np.cumprod(np.maximum(np.arange(13.0), 1.0))
 """Factorials up to the highest order of CVODES."""
@@ -55,10 +55,10 @@ MULTIPLIERS_ONLY = (
 
 
 class Contents(cantera.Interface):
-    """A Cantera surface whose reactions have multipliers; it has no state, and refuses access to one."""
+    """A Cantera surface whose reactions have multipliers; it has no state and refuses access to one."""
 
     def __setattr__(self, name: str, value: object) -> None:
-        """Refuse what would be ignored; private names are Cantera's own."""
+        """Refuse attributes that would have no effect; private names are Cantera's."""
         if name != "name" and not name.startswith("_"):
             raise InputError(MULTIPLIERS_ONLY)
         super().__setattr__(name, value)
@@ -77,7 +77,9 @@ for _name in (
 
 
 def contents(reactions: Sequence[str] = ("bond",)) -> Any:
-    """A Cantera surface that stands for a scene: one reaction for each of ours, its rate constant the multiplier."""
+    """Return a Cantera surface that represents a scene: one reaction for each of the scene, with the multiplier as rate
+    constant.
+    """
     species = (f"- {{name: {name}, composition: {{}}, thermo: {{model: constant-cp}}}}" for name in reactions)
     entries = (f"- {{equation: open => {name}, rate-constant: {{A: 1, b: 0, Ea: 0}}}}" for name in reactions)
     text = CONTENTS.format(names=", ".join(reactions), species="\n".join(species), reactions="\n".join(entries))
@@ -86,16 +88,18 @@ def contents(reactions: Sequence[str] = ("bond",)) -> Any:
 
 @cache
 def _nothing() -> Any:
-    """A surface for reactors that need one and do not use it: Cantera takes half a millisecond to read it."""
+    """Return an empty surface for reactors that require one without using it; Cantera takes half a millisecond to read
+    it.
+    """
     return contents()
 
 
 class BackOffError(Exception):
-    """There are no rates here, but a shorter step may end where there are."""
+    """Rates do not exist here, but a shorter step may end where they do."""
 
 
 def _switch(name: str) -> property:
-    """A switch of Cantera's reactors that cannot be changed, which it would be without effect."""
+    """Return a read-only switch of Cantera's reactors, for settings that would have no effect."""
 
     def change(self: StateVectorReactor, on: bool) -> None:
         kept, instead = self.switches[name]
@@ -106,22 +110,22 @@ def _switch(name: str) -> property:
 
 
 class StateVectorReactor(cantera.ExtensibleReactor):
-    """A reactor whose state and rates are not Cantera's. The only place that knows how Cantera calls its hooks.
+    """A reactor whose state and rates are not Cantera's; the only place that depends on Cantera's hooks.
 
-    Its variables, their number and their rates are what a subclass states. Once they have raised anything but
-    BackOffError, they raise it for good, since Cantera repeats a failed evaluation with ever smaller steps.
+    A subclass provides its variables, their number and their rates. Once these have raised an error other than
+    BackOffError, every later call raises it too, since Cantera repeats a failed evaluation with ever smaller steps.
     """
 
     surface: Any
     names: tuple[str, ...]
     error: Exception | None = None
     switches: Mapping[str, tuple[bool, str]]
-    """Switches of Cantera's reactors that are fixed: whether they are on, and the alternative to them, in words."""
+    """Fixed switches of Cantera's reactors: whether they are on, and the alternative to them, in words."""
     asked: float = 0.0
     """Time of the last evaluation [s]: after a step of the integrator, its end."""
 
     def __new__(cls, surface: Any, *_: Any, name: str = "(none)") -> Self:
-        """Keep the surface itself, where Cantera takes a clone, which would lose the Python attributes."""
+        """Keep the given surface: Cantera would take a clone without the Python attributes."""
         made = super().__new__(cls, surface, clone=False, name=name)  # type: ignore[call-arg]
         made.surface = surface
         return made
@@ -129,14 +133,14 @@ class StateVectorReactor(cantera.ExtensibleReactor):
     chemistry_enabled, energy_enabled = _switch("chemistry_enabled"), _switch("energy_enabled")
 
     def start(self) -> Array:
-        """Present values of the variables."""
+        """Return the present values of the variables."""
         raise NotImplementedError
 
     def put(self, x: Array) -> None:
-        """Take over values of the variables."""
+        """Set the values of the variables."""
 
     def rates(self, t: float) -> Array:
-        """Time derivatives of the variables at time t [s], for the values last put."""
+        """Return the time derivatives of the variables at time t [s], for the values last put."""
         raise NotImplementedError
 
     def attempt(self, evaluate: Callable[[float], Array], t: float) -> Array:
@@ -152,7 +156,7 @@ class StateVectorReactor(cantera.ExtensibleReactor):
             raise self._failure(error) from None
 
     def _failure(self, error: Exception) -> Exception:
-        """Exception for Cantera, a new one each time, whose traceback holds nothing."""
+        """Return a new exception for Cantera, so that its traceback keeps no objects alive."""
         return cantera.CanteraError(f"{type(error).__name__}: {error}")
 
     # -- Cantera 3.2's hooks ---------------------------------------------------------------------------------------
@@ -172,7 +176,7 @@ class StateVectorReactor(cantera.ExtensibleReactor):
         self.put(np.array(y))
 
     def replace_update_connected(self, _pressure: bool) -> None:
-        """Do nothing: other reactors read nothing of the contents."""
+        """Do nothing: other reactors do not read the contents."""
 
     def replace_eval(self, t: float, _lhs: Any, rhs: Any) -> None:  # its left side is one
         self.asked = t
@@ -182,17 +186,18 @@ class StateVectorReactor(cantera.ExtensibleReactor):
         return self.names[i]
 
     def replace_component_index(self, name: str) -> int:
-        if name not in self.names:  # lines of the ledger, in a unit that is none, are of no use
+        if name not in self.names:  # the accounts of the ledger, in an artificial unit, are not offered
             known = [each for each in self.names if not each.endswith(f" / {LEDGER_UNIT:g}")]
             refuse_unknown([name], known, f"{self.name} has no component '{{}}'")
         return self.names.index(name)
 
 
 class _SystemReactor(StateVectorReactor):
-    """The equations of a stretch, in units of their tolerances, and the ledger where rates come from outside.
+    """The equations of an arc, in units of their tolerances, and the ledger if rates come from external code.
 
-    Published mechanisms have reactions that run both ways far faster than anything changes. What the integrator's
-    polynomial misses of their balance they magnify in a quadrature along it, not in sums by the integrator's own rule.
+    Published mechanisms have reactions that run both ways far faster than anything else changes. Their balance along
+    the integrator's polynomial is inaccurate, and they magnify this error in a quadrature along it, but not if the
+    integrator itself sums the ledger.
     """
 
     def __init__(self, surface: Any, view: View, x: Array) -> None:
@@ -215,7 +220,7 @@ class _SystemReactor(StateVectorReactor):
     def rates(self, t: float) -> Array:
         self.view.residuals += 1
         evaluation, x = self.evaluation, self.scaled * self.unit
-        # What is not finite Cantera refuses itself, as it does what is not found.
+        # Cantera itself rejects rates that are not finite, as it does this error.
         if not evaluation.reach(t, x[: self.count] if self.counts else x):
             raise BackOffError("no consistent state")
         rates: Array = (evaluation.rates() if self.counts else evaluation.slopes()) / self.unit
@@ -223,8 +228,9 @@ class _SystemReactor(StateVectorReactor):
 
 
 def last_step(net: Any, start: float, end: float, unit: Array, columns: slice = slice(None)) -> DenseStep:
-    """The step that a network has taken last, from the derivatives of its integrator's polynomial at the present time;
-    with variables that it counts in units.
+    """Return the last step of a network, from the derivatives of its integrator's polynomial at the present time.
+
+    ``unit`` are the units in which the network has the variables.
     """
     now, orders = float(net.time), np.arange(int(net.solver_stats["last_order"]) + 1)
     derivatives = np.array([net.get_derivative(k)[columns] for k in orders.tolist()])
@@ -257,7 +263,7 @@ class _Stretch(Method):
         times, ends = [self.t], np.zeros((most + 1, 3, len(reactor.unit)))
         ends[0] = reactor.scaled if self.last is None else self.last
         while len(times) <= most and self.t < self.end and self.failure is None:
-            # Cantera knows no time to stop at: a step beyond it would not have felt what is there.
+            # Cantera has no stop time, and a step beyond the end would miss what changes there.
             if self.end - self.t < self.longest:
                 self.net.max_time_step = max(self.end - self.t, FORMULA_EPS * self.end)
             try:
@@ -277,7 +283,9 @@ class _Stretch(Method):
         return Steps(np.array(times), partial(self._step, times, rows), at_nodes(rows[..., : reactor.count]))
 
     def _step(self, times: Sequence[float], rows: Array, k: int) -> DenseStep:
-        """One of the steps from and to these times by the coefficients of its polynomial, and its ledger if any."""
+        """Return one of the steps between these times from the coefficients of its polynomial, with its ledger if
+        any.
+        """
         start, end, n = times[k], times[k + 1], self.reactor.count
         y = partial(on_step, end, end - start, rows[k][:, :n])
         gained = partial(on_step, end, end - start, rows[k][:, n:]) if rows.shape[2] > n else None
@@ -308,5 +316,5 @@ class CanteraSolver(SteppingSolver):
 
 
 def make(_name: str) -> CanteraSolver:
-    """The solver."""
+    """Return the solver."""
     return CanteraSolver()

@@ -1,4 +1,4 @@
-"""A step of an integrator of any library, the first crossing of a guard inside it, and the ledger along it."""
+"""Steps of any library's integrator with dense output, the first zero of a guard in a step, and the ledger along it."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
@@ -12,15 +12,15 @@ from surfacechem.solve.zeros import zero
 from surfacechem.tolerances import FORMULA_EPS, SQRT_EPS
 
 GUARD_POINTS = 16
-"""Points of a step at which guards are looked at; zeros in pairs between two of them show in a lowest point."""
+"""Points of a step at which guards are evaluated; a pair of zeros between two points shows as a minimum."""
 
 
 @dataclass(frozen=True)
 class DenseStep:
     """A step from ``start`` to ``end`` [s], with the variables at any time in it.
 
-    ``many`` gives a row of them for each of several times, where a library can do so at once; ``ledger`` is what the
-    ledger has gained since the library began, where that integrates it.
+    ``many`` returns the variables at several times, a row each, if a library can do that at once; ``ledger`` is the
+    change of the ledger since the library started, if the library integrates it.
     """
 
     start: float
@@ -30,7 +30,7 @@ class DenseStep:
     ledger: Callable[[float], Array] | None = None
 
     def rows(self, times: Array) -> Array:
-        """Variables at several times, a row each."""
+        """Return the variables at several times, a row each."""
         return self.many(times) if self.many else np.array([self.y(t) for t in times.tolist()])
 
 
@@ -39,7 +39,7 @@ class Steps:
     """Consecutive steps, each made on demand.
 
     ``times`` are the start of the first and the ends of all; ``inside`` [step, node, variable] are the variables at
-    NODES but the first, where they are known.
+    NODES except the first, if they are known.
     """
 
     times: Array
@@ -48,15 +48,17 @@ class Steps:
 
     @classmethod
     def of(cls, steps: Sequence[DenseStep]) -> "Steps":
-        """The steps of a list."""
+        """Return the steps of a list."""
         return cls(np.array([steps[0].start, *(step.end for step in steps)]), steps.__getitem__)
 
     def since(self, first: int) -> Callable[[int], DenseStep]:
-        """The steps from one of them on."""
+        """Return the steps from one of them on."""
         return lambda k: self.step(first + k)
 
     def at_nodes(self, times: Array) -> Array:
-        """Variables at these times of NODES but the first of each step, the last of which may be cut: a row each."""
+        """Return the variables, a row each, at these times of NODES except the first of each step; the last step may be
+        cut.
+        """
         count = len(times)
         known = 0 if self.inside is None else count - bool(times[-1, -1] < self.times[count])
         rows = [self.step(k).rows(times[k]) for k in range(known, count)]
@@ -67,12 +69,12 @@ class Steps:
 
 @dataclass
 class Guards:
-    """Functions of time and variables that act where they cross zero, each with the side of zero it is on.
+    """Event functions of time and variables, each with its side of zero.
 
     A side is 1 or -1; it is 0 for a guard that starts at zero or has just fired, until it has left zero. ``largest`` is
-    the largest size of each so far, in proportion to which it is zero; ``now`` are the values that were met last.
-    ``due`` are limits that started at zero or beyond and have not left there: they act where they fall. ``rows`` gives
-    the values at several times at once, a row each, where that is possible.
+    the largest magnitude of each so far, to which its roundoff is proportional; ``now`` are the latest values. ``due``
+    are limits that started at zero or beyond and have not left yet: they fire if they fall. ``rows`` evaluates the
+    guards at several times at once, a row each, if that is possible.
     """
 
     values: Callable[[float, Array], Array]
@@ -87,7 +89,7 @@ class Guards:
 
     @classmethod
     def of(cls, kinds: Sequence[Guard], values: Callable[[float, Array], Array], seen: Array | None = None) -> "Guards":
-        """The guards of a problem, with the largest sizes ``seen`` before, if any."""
+        """Return the guards of a problem, with the largest magnitudes ``seen`` before, if any."""
         directions = np.array([float(kind.direction) for kind in kinds])
         strict = np.array([kind.strict for kind in kinds], dtype=bool)
         limits = np.array([kind.terminal and kind.direction <= 0 for kind in kinds], dtype=bool)
@@ -103,7 +105,7 @@ class Guards:
         self.due[list(fired)] = False
 
     def follow(self, now: Array) -> None:
-        """Update sides and sizes with these values, on the way to which no guard has fired."""
+        """Update sides and magnitudes with these values, if no guard has fired before them."""
         self.largest = np.fmax(self.largest, np.abs(now))
         left = np.abs(now) > np.where((self.sides != 0.0) & ~self.strict, 0.0, FORMULA_EPS * self.largest)
         self.sides = np.where(left, np.sign(now), self.sides)
@@ -111,23 +113,23 @@ class Guards:
         self.now = now
 
     def _change_of_due(self, now: Array) -> Array:
-        """Change of the values of the guards that are due since the last; others may be infinite."""
+        """Return the change of the due guards since the last values; zero for the others, which may be infinite."""
         return np.subtract(now, self.now, out=np.zeros_like(now), where=self.due)
 
     def crossed(self, now: Array) -> NDArray[np.bool_]:
-        """Mask of values that lie across zero in a direction that counts; strict ones by more than their rounding."""
+        """Return a mask of guards across zero in a direction that counts; strict ones by more than their roundoff."""
         across = np.where(self.strict, now < -FORMULA_EPS * self.largest, now * self.sides <= 0.0)
         return across & (self.sides != 0.0) & (self.sides * self.directions <= 0.0)
 
     def fallen(self, now: Array) -> NDArray[np.bool_]:
-        """Mask of the guards that are due and have fallen to these values."""
+        """Return a mask of the due guards that have fallen to these values."""
         return self.due & (self._change_of_due(now) < -FORMULA_EPS * self.largest)
 
     def far(self, values: Array, active: NDArray[np.bool_]) -> int:
-        """Number of first steps in which no guard changes as much as it is away from zero; all have then followed them.
+        """Count the first steps in which no guard changes by as much as its distance from zero, and follow them.
 
-        ``values`` [step, point, guard] are those at some points of steps one after another, the end of each last. Most
-        guards are bounds of states that are far from them in all steps of a run.
+        ``values`` [step, point, guard] are those at some points of consecutive steps, the end of each last. Most guards
+        are bounds of states that stay far from them throughout a run.
         """
         lowest, highest, ends = values.min(axis=1), values.max(axis=1), values[:, -1]
         if not active.all():
@@ -146,8 +148,8 @@ class Guards:
         return count
 
     def untouched(self, times: Array, step: DenseStep, active: NDArray[np.bool_]) -> bool:
-        """Whether all active ones are seen to stay on their sides at these times of a step, its start first, with no
-        dip between; all have then followed it.
+        """True if all active guards stay on their sides at these times of a step, its start first, with no dip between;
+        they are then updated.
         """
         if self.rows is None:
             return False
@@ -166,10 +168,11 @@ class Guards:
 def first_crossing(
     step: DenseStep, guards: Guards, active: NDArray[np.bool_], resolution: float
 ) -> tuple[float, list[int]]:
-    """The time at which active guards cross zero first in a step, and which do within the resolution [s] of it.
+    """Return the time of the first zero of the active guards in a step, and those with a zero within the resolution [s]
+    of it.
 
-    The end of the step and none where none does; the guards have then followed it. A guard that crosses zero and back
-    between two points at which it is looked at is found where its values leave room for that.
+    Without a zero these are the end of the step and an empty list, and the guards are updated. A guard that crosses
+    zero twice between two points is found where its values allow a minimum below zero.
     """
 
     def at(t: float) -> Array:
@@ -186,7 +189,7 @@ def first_crossing(
 
     times = np.unique(np.linspace(step.start, step.end, GUARD_POINTS + 1))  # fewer in a step of few roundings
     if guards.due.any():
-        # What begins at zero as a power of time may go either way inside a step, whose end is right.
+        # Motion that begins as a power of time may have either sign on the polynomial inside; its end is right.
         soon, late = guards.fallen(at(times[1])), guards.fallen(at(times[-1]))
         if np.any(fallen := np.where(guards.sides != 0.0, soon, late) & active):
             return step.start, np.flatnonzero(fallen).tolist()
@@ -199,7 +202,7 @@ def first_crossing(
         zeros = dips(points[-3:]) if len(points) > 2 else {}
         zeros |= {i: _zero(one(i), last, t) for i in np.flatnonzero(guards.crossed(now) & active).tolist()}
         if zeros:
-            # Another guard may have crossed and come back in the same interval: it is still rising at its end.
+            # Another guard may cross and return in the same interval; it is then still rising at its end.
             near = t - SQRT_EPS * (step.end - step.start)
             if last < near < t:
                 zeros = dips([points[-2], (near, at(near)), points[-1]]) | zeros
@@ -210,7 +213,9 @@ def first_crossing(
 
 
 def _zero(value: Callable[[float], float], low: float, high: float) -> float:
-    """Zero of a function that is positive at the lower end; that end where it is not, though it should be."""
+    """Return the zero of a function that is positive at the lower end; next to that end if roundoff makes it negative
+    there.
+    """
     at_low, at_high = value(low), value(high)
     if not at_low > 0.0 > at_high:
         return high if at_high == 0.0 else float(np.nextafter(low, high))
@@ -218,8 +223,8 @@ def _zero(value: Callable[[float], float], low: float, high: float) -> float:
 
 
 def _may_dip(guards: Guards, times: Array, values: Array) -> NDArray[np.bool_]:
-    """Mask of three values in a row [time, guard] whose middle one is the lowest, so little above zero that a smooth
-    guard may reach it; a row for each three.
+    """Return a mask of triples of values [time, guard] whose middle one is a minimum so low that a smooth guard may
+    reach zero.
     """
     heights, steps = guards.sides * values, np.diff(times)[:, None]
     before, middle, after = heights[:-2], heights[1:-1], heights[2:]
@@ -230,15 +235,15 @@ def _may_dip(guards: Guards, times: Array, values: Array) -> NDArray[np.bool_]:
 
 
 def _bottom(value: Callable[[float], float], a: float, b: float, c: float) -> float:
-    """The first point across zero found on the way to the lowest point between a and c, else that point.
+    """Return the minimum between a and c, or the first point across zero met in the search.
 
-    By parabolas, and by a tenth of the larger part where these make no progress, as close as the value of a minimum
-    tells its place (after Brent 1973, Algorithms for Minimization without Derivatives, chapter 5).
+    By parabolas, or a tenth of the larger part where these make no progress, to the accuracy with which values
+    determine a minimum (after Brent 1973, Algorithms for Minimization without Derivatives, chapter 5).
     """
     at_a, at_b, at_c = value(a), value(b), value(c)
     while at_b > 0.0 and c - a > SQRT_EPS * (abs(b) + (c - a)):
         left, right = (b - a) * (at_b - at_c), (b - c) * (at_b - at_a)
-        bend = left - right  # none where the values are too small for one
+        bend = left - right  # zero if the values underflow
         x = b - 0.5 * ((b - a) * left - (b - c) * right) / bend if bend else b
         if not (a < x < c and abs(x - b) > 0.01 * (c - a)):  # no progress: into the larger part
             x = b + 0.1 * (c - b) if c - b > b - a else b - 0.1 * (b - a)
@@ -254,7 +259,7 @@ def _bottom(value: Callable[[float], float], a: float, b: float, c: float) -> fl
 
 
 NODES = np.array([0.0, 0.11747233803526766, 0.35738424175967742, 0.64261575824032258, 0.88252766196473235, 1.0])
-"""Gauss-Lobatto points of a step: the polynomials of the libraries have order five at most."""
+"""Gauss-Lobatto points of a step: the libraries' polynomials have at most order five."""
 
 
 HERMITE = np.linalg.inv(
@@ -263,27 +268,29 @@ HERMITE = np.linalg.inv(
 """Matrix from values, slopes and second derivatives at -1 and at 0 to the coefficients of their polynomial."""
 
 DERIVATIVES = np.tile(np.arange(3.0), 2)
-"""Their orders."""
+"""Orders of these derivatives."""
 
 AT_NODES = np.power.outer(NODES[1:] - 1.0, np.arange(6.0))
-"""Powers of (time - end) / size at the nodes but the first."""
+"""Powers of (time - end) / size at the nodes except the first."""
 
 
 def hermite(sizes: Array, ends: Array) -> Array:
-    """Coefficients [step, power, variable] of polynomials in (time - end) / size, for steps of these sizes one after
-    another, from value, slope and second derivative at their ends: [end, derivative, variable].
+    """Return coefficients [step, power, variable] of polynomials in (time - end) / size of consecutive steps of these
+    sizes.
+
+    They interpolate value, slope and second derivative at the ends: [end, derivative, variable].
     """
     scales = np.power.outer(sizes, DERIVATIVES)[..., None]
     return np.asarray(HERMITE @ (np.concatenate((ends[:-1], ends[1:]), axis=1) * scales))
 
 
 def at_nodes(rows: Array) -> Array:
-    """Values [step, node, variable] of such polynomials at the nodes but the first."""
+    """Return the values [step, node, variable] of such polynomials at the nodes except the first."""
     return np.asarray(AT_NODES @ rows)
 
 
 def on_step(end: float, size: float, rows: Array, t: Any) -> Array:
-    """Values of one such polynomial at a time, or at several in a row each; a step too short for the clock is its end.
+    """Evaluate one such polynomial at a time, or at several in a row each; a step of size zero has its end value.
 
     >>> on_step(1.0, 0.5, np.array([[2.0], [4.0]]), 0.75), on_step(1.0, 0.0, np.array([[2.0], [4.0]]), 1.0)
     (array([0.]), array([2.]))
@@ -300,9 +307,9 @@ WEIGHTS = 1 / (30 * np.polynomial.Legendre.basis(5)(2 * NODES - 1) ** 2)
 
 
 def gained_at(part: float, rates: Array) -> Array:
-    """Gain of the ledger up to a part of a step, over the length of the step, from its rates at the nodes.
+    """Return the change of the ledger up to a part of a step, per length of the step, from its rates at the nodes.
 
-    Quadratures stay outside the library: it would have to count them in its error norm to integrate them well, and a
-    state at rest, which needs no steps, may do work all the same.
+    The libraries do not integrate the ledger: they would need it in their error norm to integrate it well, and a state
+    at rest, which needs no steps, may still do work.
     """
     return np.asarray(part ** np.arange(1.0, len(NODES) + 1) @ (TO_POWERS @ rates))

@@ -1,5 +1,6 @@
-"""A program at one state after another, or at several at once, for a library that calls from Python: no array is made
-twice.
+"""Evaluation of a program at one state after another, or at several at once, for libraries that call from Python.
+
+Buffers are reused, so that no array is allocated twice.
 """
 
 from __future__ import annotations
@@ -20,8 +21,8 @@ from surfacechem.solve.radau.stepper import COLUMNS, END
 class Evaluation:
     """State, derivatives and parameters of a program in one buffer, made consistent by :meth:`put`.
 
-    ``y``, ``ydot`` and ``parameters`` are views of it; algebraic variables are searched from ``guess``, where they were
-    at the time before. ``ledger()`` are the rates of the ledger there, ``margins()`` the values of the margins.
+    ``y``, ``ydot`` and ``parameters`` are views of it; the search for algebraic variables starts from ``guess``, their
+    values at the last time. ``ledger()`` returns the rates of the ledger, ``margins()`` the margins.
     """
 
     def __init__(self, program: Program, y: Array, parameters: Array) -> None:
@@ -45,16 +46,16 @@ class Evaluation:
         return stepper.repeated(search_batch(self.program, ends, table, self._counts))
 
     def put(self, t: float, differential: Array) -> bool:
-        """Go to a state; whether derivatives and algebraic variables were found there."""
-        # Nothing times a number is nothing, unless that is infinite or none.
+        """Set time and differential variables; True if derivatives and algebraic variables were found."""
+        # Zero times an infinite rate or NaN is NaN, so one product tests all rates.
         return self.reach(t, differential) and (self._rates is None or math.isfinite(self.ydot.dot(self._nothing)))
 
     def reach(self, t: float, differential: Array) -> bool:
-        """Go to a state; whether algebraic variables were found there. Where there are none, derivatives may not be
-        finite.
+        """Set time and differential variables; True if algebraic variables were found. Without any, derivatives may not
+        be finite.
         """
-        # At the same time the search begins at the same place: an integrator that differentiates by 1e-27 m would
-        # else divide by it what rounding makes of two searches, and take a step that it does not correct for right.
+        # At the same time start from the same guess: an integrator that takes differences over 1e-27 m would
+        # otherwise divide the roundoff of two searches by it, and accept a wrong step as needing no correction.
         if t != self.inputs[0]:
             self.guess = self._found
             self.inputs[0] = t
@@ -77,7 +78,7 @@ class Evaluation:
         return found
 
     def hold(self, t: float, y: Array, ydot: Array, whole: bool = True) -> None:
-        """Go to a state that is known, with the parameters that come from outside if the whole of it is asked for."""
+        """Set a known state, with the parameters from external code if ``whole`` is set."""
         self.inputs[0] = t
         self.y[:] = y
         self.ydot[:] = ydot
@@ -88,37 +89,37 @@ class Evaluation:
         self.inputs[external.positions] = external.evaluate(self._reads().tolist())
 
     def restart(self, y: Array) -> None:
-        """Take over a state after a jump; algebraic variables are searched from there."""
+        """Set the state after a jump; the search for algebraic variables starts from there."""
         self.y[:] = y
         self.guess = self._found = y[self.algebraic]
 
     def slopes(self) -> Array:
-        """Derivatives of the differential variables."""
+        """Return the derivatives of the differential variables."""
         return self.ydot[self.free] if len(self.algebraic) else self.ydot
 
     def rates(self) -> Array:
-        """Derivatives of the differential variables and of the ledger."""
+        """Return the derivatives of the differential variables and of the ledger."""
         return np.concatenate((self.slopes(), self._ledger()))
 
     def ledger(self) -> Array:
-        """Rates of the ledger."""
+        """Return the rates of the ledger."""
         return self._ledger().copy()
 
     def margins(self) -> Array:
-        """Values of the margins."""
+        """Return the margins."""
         return self._margins().copy()
 
 
 class Evaluations:
-    """A program at many states at once with the same parameters, in one buffer whose rows keep them."""
+    """Evaluation of a program at many states at once with the same parameters, in one reused buffer."""
 
     def __init__(self, program: Program, parameters: Array) -> None:
         self.program = program
         self._inputs = np.concatenate((np.zeros(1 + 2 * program.n), parameters))[None]
 
     def __call__(self, times: Array, y: Array) -> tuple[Array, Array, Array, Array]:
-        """States with the algebraic variables found, which are not a number where there are none, their derivatives,
-        rates of the ledger and values of the margins, a row for each time.
+        """Return consistent states and their derivatives, NaN where none are found, rates of the ledger and margins, by
+        time.
         """
         program, n = self.program, self.program.n
         rows = program.filled(self._filled(times, y))
@@ -139,12 +140,12 @@ class Evaluations:
         return states.copy(), ydot.copy(), ledger, margins
 
     def margins(self, times: Array, y: Array) -> Array:
-        """Values of margins that read nothing but the state, a row for each time."""
+        """Return margins that depend on time and state alone, a row for each time."""
         assert self.program.margins is not None
         return self.program.margins(self._filled(times, y))
 
     def _filled(self, times: Array, y: Array) -> Array:
-        """Inputs at these states; those before are gone."""
+        """Return the buffer with these states; earlier ones are overwritten."""
         n, count = self.program.n, len(times)
         if count > len(self._inputs):
             self._inputs = np.repeat(self._inputs[:1], count, axis=0)
@@ -154,7 +155,7 @@ class Evaluations:
 
 
 class _Code:
-    """A compiled function of a buffer of inputs: a call from NumPy takes five times as long."""
+    """A compiled function of a buffer of inputs: a call through NumPy takes five times as long."""
 
     def __init__(self, function: Function | None, inputs: Array, out: Array | None = None) -> None:
         self.out = np.zeros(function.n_out if function else 0) if out is None else out

@@ -14,11 +14,11 @@ from surfacechem.tolerances import EPS
 NAMES = ("lsoda", "bdf", "scipy-radau")
 
 SMALLEST_RTOL = 100 * EPS
-"""SciPy raises smaller tolerances to this with a warning."""
+"""Smallest relative tolerance of SciPy, which raises smaller ones to it with a warning."""
 
 
 class _Stretch(Method):
-    """Steps that count time from their start: what begins there may be over before the run's own clock ticks."""
+    """Steps with the time counted from their start: a fast transient may be over before the time of the run changes."""
 
     def __init__(self, kind: type[OdeSolver], view: View, t: float, end: float, y: Array) -> None:
         self.start, self.t, self.end, self.most = t, t, end, view.problem.max_steps
@@ -52,11 +52,11 @@ class _Stretch(Method):
         while self.t == before:
             passed, taken = self.solver.t, self.counted(taken)
             self._step()
-            if not self.solver.t > passed:  # some go on like this for ever
+            if not self.solver.t > passed:  # some methods would repeat such steps endlessly
                 raise StepError("the step size fell to zero")
             self.t = self.end if self.solver.status == "finished" else self.start + float(self.solver.t)
         inside, start, end, last = self.solver.dense_output(), self.start, self.t, self.solver.y.copy()
-        # The clock of the run may tick before the library's last step.
+        # The time of the run may round to before the library's last step.
         return DenseStep(before, end, lambda t: np.asarray(last if t == end else inside(max(t - start, inside.t_old))))
 
     def _step(self) -> None:
@@ -86,5 +86,5 @@ class SciPySolver(SteppingSolver):
 
 
 def make(name: str) -> SciPySolver:
-    """The solver of this name."""
+    """Return the solver of this name."""
     return SciPySolver(name, {"lsoda": LSODA, "bdf": BDF, "scipy-radau": Radau}[name])

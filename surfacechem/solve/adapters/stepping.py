@@ -1,6 +1,4 @@
-"""Runs with a library's method: its single steps, and around them the segments, events, outputs and checks of the
-contract.
-"""
+"""Runs with single steps of a library's method, and the segments, events, outputs and checks of the contract."""
 
 import time
 from abc import ABC, abstractmethod
@@ -18,19 +16,18 @@ from surfacechem.solve.radau import stepper
 from surfacechem.tolerances import NEGLIGIBLE, SQRT_EPS, ULPS
 
 ENTROPY_GROUP = 1
-"""The group of the ledger's lines of entropy."""
+"""Group of the ledger's entropy accounts."""
 
 MISSED_ERROR = 100.0
-"""Errors in units of the tolerance beyond which a step has not seen what lies before an event."""
+"""Defect, in tolerances, above which a step has missed something before an event."""
 
 FIRST_TOGETHER, TOGETHER_GROWTH, MOST_TOGETHER = 8, 16, 256
-"""Steps at a time that the equations are looked at together, at first, how many times more each time, and at most. What
-comes after an event has been stepped through for nothing; from 64 to 256 at most make no difference to a run of a
-hundred reactions.
+"""Number of steps for which the equations are evaluated together: at first, its growth, and at most. Steps beyond an
+event are wasted; between 64 and 256 the maximum makes no difference to a run of a hundred reactions.
 """
 
 LONGEST_FIRST = 1e3
-"""First change of a state that its rate may predict, in units of the state."""
+"""Largest first change of a state that its rate may predict, in units of the state."""
 
 
 class StepError(Exception):
@@ -38,14 +35,14 @@ class StepError(Exception):
 
 
 class NoStateError(Exception):
-    """No consistent state exists at a point the run needs."""
+    """No consistent state exists at a point that the run needs."""
 
 
 class View(Evaluation):
-    """The problem as a library sees it in one segment: x = differential or all variables.
+    """The problem in one segment as a library sees it: x = differential or all variables.
 
-    For libraries that know no algebraic variables it is reduced to x' = f(t, x) of the differential ones. Algebraic
-    variables are first searched from the state at the start.
+    For libraries without algebraic variables it is reduced to x' = f(t, x) of the differential ones. The first search
+    for algebraic variables starts from the initial state.
     """
 
     def __init__(self, problem: Problem, parameters: Array, start: Array) -> None:
@@ -55,30 +52,32 @@ class View(Evaluation):
         self.many = Evaluations(problem.program, parameters)
         self.atol = problem.atol[self.differential]
         self.residuals = self.jacobians = 0
-        """Right-hand sides and Jacobians that the library has asked for; those for outputs and events do not count."""
+        """Right-hand sides and Jacobians requested by the library; those for outputs and events do not count."""
 
     def row(self, t: float, y: Array, ydot: Array) -> Array:
-        """Arguments of compiled functions at a state."""
+        """Return the arguments of compiled functions at a state."""
         return self.program.filled(np.concatenate(([t], y, ydot, self.parameters)))
 
     def complete(self, t: float, x: Array) -> tuple[Array, Array]:
-        """State and derivative from the differential variables, the algebraic ones found from the equations."""
+        """Return state and derivatives from the differential variables, with the algebraic ones found from the
+        equations.
+        """
         if not self.put(t, x):
             return np.full_like(self.y, np.nan), np.full_like(self.y, np.nan)
         return self.y.copy(), self.ydot.copy()
 
     def matrices(self, t: float, y: Array, ydot: Array) -> tuple[Array, Array]:
-        """G_y and G_ydot."""
+        """Return G_y and G_ydot."""
         self.jacobians += 1
         return self.program.derivatives(self.row(t, y, ydot))
 
     def reduced_rates(self, t: float, x: Array) -> Array:
-        """The right-hand side f of the reduced system."""
+        """Return the right-hand side f of the reduced system."""
         self.residuals += 1
         return self.complete(t, x)[1][self.differential]
 
     def reduced_jacobian(self, t: float, x: Array) -> Array:
-        """df/dx, from G_x dx + G_u du = 0 with u the derivatives and algebraic variables."""
+        """Return df/dx, from G_x dx + G_u du = 0 with u the derivatives and algebraic variables."""
         y, ydot = self.complete(t, x)
         by_state, by_rate = self.matrices(t, y, ydot)
         unknown = np.where(self.differential, by_rate, by_state)
@@ -89,33 +88,33 @@ class View(Evaluation):
 
 
 class Method(ABC):
-    """One library method running over one stretch without breakpoints."""
+    """One library method running over one interval without breakpoints."""
 
     most: int
-    """Steps that it may take before the clock of the run ticks."""
+    """Most steps without a change of the run's time."""
 
     def counted(self, taken: int) -> int:
-        """One step more since the clock ticked; StepError where there are too many."""
+        """Count a step without a change of the run's time; raise StepError if there are too many."""
         if taken >= self.most:
             raise StepError(f"more than {self.most} steps without a change of the time in its last digit")
         return taken + 1
 
     @abstractmethod
     def advance(self) -> DenseStep:
-        """Take one step of the library's choice."""
+        """Take one step, of the size that the library chooses."""
 
     def several(self, _most: int) -> Steps:
-        """Take at least one step, and up to so many where earlier ones can still be looked into after later ones."""
+        """Take at least one step, and up to this many if the dense output of earlier steps remains available."""
         return Steps.of([self.advance()])
 
     @property
     def factorizations(self) -> int:
-        """Matrices factored so far; 0 where the library does not tell."""
+        """Matrices factored so far; 0 if the library does not report them."""
         return 0
 
     @property
     def own_jacobians(self) -> int:
-        """Jacobians that the library has made so far by itself."""
+        """Jacobians that the library has formed by itself so far."""
         return 0
 
     @property
@@ -129,10 +128,10 @@ class SteppingSolver(Solver):
 
     counts_rejected = False
     keeps_algebraic = False
-    """Whether x holds the algebraic variables too."""
+    """True if x includes the algebraic variables."""
 
     def prepare(self) -> None:
-        stepper.LOOP.load()  # consistent states are found by it
+        stepper.LOOP.load()  # it finds consistent states
 
     @abstractmethod
     def begin(self, view: View, t: float, end: float, y: Array, ydot: Array) -> Method:
@@ -157,7 +156,7 @@ class SteppingSolver(Solver):
 
 @dataclass(frozen=True)
 class _Along:
-    """Values along steps one after another: at the start of the first, and at the nodes of each but its start."""
+    """Values along consecutive steps: at the start of the first, and at the nodes of each except its start."""
 
     start: Array
     rows: Array
@@ -165,30 +164,30 @@ class _Along:
 
     @property
     def ends(self) -> Array:
-        """At the ends of the steps; a copy, as what is kept of a run would else keep all nodes."""
+        """Values at the ends of the steps; a copy, since a view would keep all nodes in memory."""
         return self.rows[:, -1].copy()
 
     def starts(self) -> Array:
-        """At the starts of the steps."""
+        """Return the values at the starts of the steps."""
         return np.concatenate((self.start[None], self.rows[:-1, -1]))
 
     def part(self, first: int, end: int) -> "_Along":
-        """Those along some of the steps."""
+        """Return the values along some of the steps."""
         return _Along(self.rows[first - 1, -1] if first else self.start, self.rows[first:end])
 
     def within(self, k: int) -> Array:
-        """At all nodes of one step."""
+        """Return the values at all nodes of one step."""
         one = self.part(k, k + 1)
         return np.vstack((one.start, one.rows[0]))
 
     def integral(self, sizes: Array) -> Array:
-        """Integral of these rates over steps of these sizes."""
+        """Return the integral of these rates over steps of these sizes."""
         return sizes[:, None] * (WEIGHTS[1:] @ self.rows + WEIGHTS[0] * self.starts())
 
 
 @dataclass(frozen=True)
 class _Inside:
-    """The equations at the quadrature points of steps one after another."""
+    """State, rates, ledger rates and margins at the quadrature points of consecutive steps."""
 
     times: Array
     """Start of the first step and ends of all [s]."""
@@ -204,13 +203,13 @@ class _Inside:
         return np.diff(self.times)
 
     def part(self, first: int, end: int) -> "_Inside":
-        """Those of some of the steps."""
+        """Return those of some of the steps."""
         along = (each.part(first, end) for each in (self.y, self.ydot, self.ledger, self.margins))
         return _Inside(self.times[first : end + 1], *along)
 
 
 class _Run:
-    """A run in the making: where it stands, and what it has produced so far."""
+    """A run in progress: its present state and its results so far."""
 
     def __init__(self, solver: SteppingSolver, problem: Problem) -> None:
         program = problem.program
@@ -222,16 +221,16 @@ class _Run:
         self.entropic = np.array(program.groups) == ENTROPY_GROUP
         self.guards = Guards.of(problem.margins, self._guards, problem.seen)
         self.plain = program.plain_margins and not program.algebraic_mask.any()
-        """Whether margins read nothing but what a library integrates."""
+        """True if margins depend only on variables that the library integrates."""
         if self.plain:
             self.guards.rows = lambda times, x: self.view.many.margins(times, x)
         self.in_play = np.array((True,) * program.n_margins if problem.in_play is None else problem.in_play, bool)
         self.outputs: list[Array] = []
         self.fired: list[int] = []
         self.events: list[tuple[Array, Array, Array, Array]] = []
-        """The same at events, whose margins these are."""
+        """Times, states, rates and ledgers at events, whose margins are in ``fired``."""
         self.steps: list[tuple[Array, Array, Array, Array]] = []
-        """Times, states, rates and ledgers at the ends of steps, of some at a time."""
+        """Times, states, rates and ledgers at the ends of steps, of several steps at a time."""
         self.count = self.residuals = self.jacobians = self.factorizations = self.rejected = 0
         self.stepping = 0.0
         """Time inside the library's steps [s]."""
@@ -243,7 +242,7 @@ class _Run:
         self.view = View(self.problem, parameters, self.y)
 
     def through_segment(self, end: float) -> Status:
-        """Go on to the end of a segment, with a fresh start of the library after each event on the way."""
+        """Integrate to the end of a segment, restarting the library after each event."""
         fired: list[int] = []
         while self.t < end:
             start = self.t
@@ -280,7 +279,7 @@ class _Run:
         return Status.STOPPED if limit is not None and time.monotonic() - self.started > limit else None
 
     def _within_budget(self, most: int) -> int:
-        """So many steps, or those that the budget has left at the pace so far, at least one."""
+        """Return this number of steps, or the number that the budget allows at the pace so far, at least one."""
         most, limit = min(most, self.problem.max_steps - self.count), self.problem.max_seconds
         if limit is None or not self.count:
             return most
@@ -288,8 +287,8 @@ class _Run:
         return max(1, min(most, int(self.count * (limit - passed) / passed)))
 
     def _to_event(self, method: Method, end: float) -> list[int]:
-        """Step until an event, the end or the budget's; returns the margins that fired."""
-        # Where algebraic variables are searched from the state before, that is to be close.
+        """Step until an event, the end, or the end of the budget; return the margins that fired."""
+        # Algebraic variables are searched from those of the last step, which must be close: one step at a time.
         start, most = self.t, 1 if len(self.view.algebraic) else FIRST_TOGETHER
         while self.t < end and self._over_budget() is None:
             before = time.perf_counter()
@@ -315,9 +314,11 @@ class _Run:
         return []
 
     def _through(self, step: DenseStep, end: float) -> list[int] | None:
-        """Go through a step in which something may happen; where the library has to start anew, what has fired."""
+        """Accept a step that may have an event; return the margins that fired if the library has to restart, else
+        None.
+        """
         within = replace(step, start=self.t, end=min(step.end, end))
-        # Guards that are zero at one instant are so up to the error of the library's polynomial.
+        # Simultaneous zeros differ by the error of the library's polynomial.
         resolution = min(self.problem.rtol, SQRT_EPS) * (within.end - self.t) + ULPS * abs(within.end)
         reached, fired = first_crossing(within, self.guards, self.in_play, resolution)
         inside = self._inside(Steps.of([step]), reached)
@@ -328,10 +329,10 @@ class _Run:
         return fired or None
 
     def _accept(self, step: Callable[[int], DenseStep], inside: _Inside, fired: Iterable[int] = ()) -> None:
-        """Move on to the end of these steps, with their outputs and events."""
+        """Move on to the end of these steps, and store their outputs and events."""
         times, y, ydot = inside.times, inside.y.ends, inside.ydot.ends
         gains = inside.ledger.integral(inside.sizes)
-        # What the library does not integrate itself there is nothing else to rely on for.
+        # Quadrature is the only value of accounts that the library does not integrate.
         relied = np.ones(len(y), bool) if step(0).ledger is None else self._adds_up(inside, NEGLIGIBLE)
         for k in np.flatnonzero(~relied).tolist():
             gains[k] = self._gained(step(k), float(times[k]), float(times[k + 1]), gains[k])
@@ -354,7 +355,7 @@ class _Run:
     def _put_out(
         self, step: Callable[[int], DenseStep], inside: _Inside, ledgers: Array, relied: NDArray[np.bool_]
     ) -> None:
-        """Keep the outputs within steps, from the ledger at their ends and its rates inside."""
+        """Store the outputs within steps, from the ledger at their ends and its rates inside."""
         times = inside.times
         for t in self.problem.times[len(self.outputs) :].tolist():
             if t > times[-1]:
@@ -371,14 +372,15 @@ class _Run:
             self.outputs.append(row)
 
     def _gained(self, step: DenseStep, start: float, end: float, quadrature: Array) -> Array:
-        """Gain of the ledger in a part of a step as the library integrates it; entropy by quadrature all the same,
-        whose production the library does not resolve.
+        """Return the change of the ledger over a part of a step as the library integrates it.
+
+        Entropy is integrated by quadrature all the same: the library does not resolve its production.
         """
         assert step.ledger is not None
         return np.where(self.entropic, quadrature, step.ledger(end) - step.ledger(start))
 
     def _inside(self, steps: Steps, reached: float) -> _Inside:
-        """The equations at the quadrature points of steps up to a time within the last of them."""
+        """Evaluate the equations at the quadrature points of steps up to a time within the last of them."""
         view = self.view
         ends = np.concatenate(([self.t], steps.times[1:-1], [reached]))
         times = ends[:-1, None] + np.diff(ends)[:, None] * NODES[1:]
@@ -393,7 +395,7 @@ class _Run:
         return _Inside(ends, *along)
 
     def _state(self, step: DenseStep, t: float) -> tuple[Array, Array]:
-        """State and derivative inside the last step."""
+        """Return state and derivatives inside the last step."""
         x = step.y(t)
         if not self.solver.keeps_algebraic:
             return self.view.complete(t, x)
@@ -401,13 +403,18 @@ class _Run:
         return self.view.complete(t, x[self.view.differential])
 
     def _guards(self, t: float, x: Array) -> Array:
-        """Margins from the library's variables; without a search for the rest where nothing of it is read."""
+        """Return the margins from the library's variables; the other variables are found only if margins depend on
+        them.
+        """
         state = (x, np.zeros_like(x)) if self.plain else self._state(DenseStep(t, t, lambda _: x), t)
         self.view.hold(t, *state, whole=not self.problem.program.plain_margins)
         return self.view.margins()
 
     def _check_first(self, step: DenseStep, reached: float) -> None:
-        """A first step far longer than the layer it starts in may end in another solution, unseen by its own test."""
+        """Raise StepError if the first step is far longer than the transient it starts in.
+
+        Such a step may end on another solution, which its error test does not detect.
+        """
         y, _ = self._state(step, reached)
         moved = np.abs(self.ydot) * (reached - self.t)
         seen = np.abs(self.y) + np.abs(y) + self.problem.atol
@@ -415,8 +422,9 @@ class _Run:
             raise StepError("the first step is longer than the layer it starts in")
 
     def _adds_up(self, inside: _Inside, factor: float) -> NDArray[np.bool_]:
-        """Mask of steps whose rates add up to the increment, to so many tolerances; a step that is tested at its end
-        alone passes over a peak on the way.
+        """Return a mask of steps whose integrated rates equal the increment within ``factor`` tolerances.
+
+        It finds peaks inside a step, which a test at its end alone misses.
         """
         ends, starts = inside.y.ends, inside.y.starts()
         missed = np.abs(inside.ydot.integral(inside.sizes) - (ends - starts))
@@ -424,7 +432,7 @@ class _Run:
         return np.asarray(np.all((missed <= factor * sizes)[:, self.view.differential], axis=1))
 
     def result(self, status: Status) -> Result:
-        """The result of the run under the contract."""
+        """Return the result of the run under the contract."""
         problem, program = self.problem, self.problem.program
         n, q = program.n, program.n_ledger
 

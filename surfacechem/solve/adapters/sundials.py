@@ -15,13 +15,13 @@ from surfacechem.tolerances import RUN_EPS
 
 NAMES = ("cvode", "ida")
 
-# Warnings that steps are small would go to the terminal; what a step fails of is raised.
+# Suppress warnings about small steps on the terminal; failures of steps are raised.
 os.environ.setdefault("SUNLOGGER_WARNING_FILENAME", os.devnull)
 
 
 class _Stretch(Method):
-    """Single steps of either library, which counts time from their start; interpolation inside the last step is a step
-    back to it.
+    """Single steps of either library, with time counted from their start; dense output inside the last step is a step
+    back.
     """
 
     def __init__(self, library: Any, most: int, t: float, end: float, *start: Array) -> None:
@@ -32,13 +32,13 @@ class _Stretch(Method):
         self._call(lambda: library.init_step(0.0, *start))
 
     def _call(self, action: Any) -> Any:
-        # The wrapper prints what it also raises.
+        # The wrapper prints the errors that it also raises.
         try:
             with redirect_stdout(None):
                 answer = action()
         except (ValueError, RuntimeError, ArithmeticError, np.linalg.LinAlgError, SystemError) as error:
             raise StepError(str(error)) from error
-        except KeyError as error:  # the library's wrapper has no words for this return code
+        except KeyError as error:  # the wrapper has no message for this return code
             raise StepError(f"SUNDIALS gave up with its return code {error}") from error
         if not answer.success:
             raise StepError(str(answer.message))
@@ -54,7 +54,7 @@ class _Stretch(Method):
 
     def _step(self) -> None:
         self.before = self.passed
-        # After an interpolation the library first returns to where it was.
+        # After an interpolation the first call only returns to the end of the last step.
         for _attempt in range(2):
             answer = self._call(lambda: self.integrator.step(self.length, method="onestep", tstop=self.length))
             self.passed, self.x = float(answer.t), np.array(answer.y)
@@ -63,8 +63,8 @@ class _Stretch(Method):
         raise StepError("the step size fell to zero")
 
     def _at(self, t: float) -> Array:
-        since = max(t - self.start, self.before)  # the clock of the run may tick before this step
-        if t >= self.t or since >= self.passed:  # by rounding: asked for what is beyond, the library would step on
+        since = max(t - self.start, self.before)  # the time of the run may round to before this step
+        if t >= self.t or since >= self.passed:  # beyond the end by roundoff, where the library would take another step
             return self.x
         answer = self._call(lambda: self.integrator.step(since, method="normal", tstop=self.length))
         if not abs(answer.t - since) <= RUN_EPS * since:
@@ -73,7 +73,7 @@ class _Stretch(Method):
 
 
 def _longest(problem: Problem) -> float:
-    """Longest step, as either library is told it; 0 where there is none."""
+    """Return the longest step in the libraries' form; 0 if unlimited."""
     return problem.spacing if np.isfinite(problem.spacing) else 0.0
 
 
@@ -129,5 +129,5 @@ class IDASolver(SteppingSolver):
 
 
 def make(name: str) -> SteppingSolver:
-    """The solver of this name."""
+    """Return the solver of this name."""
     return CVODESolver() if name == "cvode" else IDASolver()
