@@ -1,8 +1,7 @@
-"""Consistent states: the derivatives of the differential variables and the values of the algebraic ones from G(t, y,
-ydot) = 0.
+"""Consistent states: rates of the differential variables and values of the algebraic variables from G(t, y, ydot) = 0.
 
-The unknowns enter one damped Newton iteration whose matrix has the column of G_ydot for a differential variable and
-that of G_y for an algebraic one; it is regular exactly when the system has index one.
+All unknowns are found by one damped Newton iteration. Its matrix has the column of G_ydot for a differential variable
+and that of G_y for an algebraic one; it is regular exactly when the system has index one.
 """
 
 from typing import Any
@@ -16,16 +15,16 @@ from surfacechem.tolerances import FEW_EPS, NEGLIGIBLE, SQRT_EPS, TINY
 CONSISTENT, NO_STATE, SINGULAR_STATE, NOT_FINITE_STATE = range(4)
 LIMIT = 100
 CONVERGING = NEGLIGIBLE * SQRT_EPS
-"""Correction after which the next one, in proportion to its square, is below EPS even with a factor of a million."""
+"""Correction after which the next one, being quadratic in it, is below EPS even with a factor of a million."""
 FAR = 1.0 / NEGLIGIBLE**2
-"""Corrections that tell whether equations are straight: what rounding adds to one is negligible beside so many."""
+"""Multiple of a correction for the linearity test: the roundoff of one correction is negligible compared with it."""
 SMALLEST_PIVOT = FEW_EPS
-"""Scaled pivot that is what rounding leaves of zero."""
+"""Scaled pivot at the roundoff of zero."""
 
 
 @compiled
 def _residual(w: Any) -> bool:
-    """Residual at the trial state into the right-hand side; whether it is finite."""
+    """Write the residual at the trial state to the right-hand side; True if it is finite."""
     set_inputs(w, w.trial, w.trial_dot)
     evaluate(w, RESIDUAL, w.rhs)
     return bool(finite(w.rhs))
@@ -33,7 +32,7 @@ def _residual(w: Any) -> bool:
 
 @compiled
 def _fold(w: Any) -> bool:
-    """Eliminate the chains from the matrix of the unknowns; of a chain these are the rates."""
+    """Eliminate the chains from the matrix of the unknowns; the unknowns of a chain are its rates."""
     core = w.core
     for c in range(w.links):
         anchor = w.chains[c, 2]
@@ -50,13 +49,13 @@ def _fold(w: Any) -> bool:
 
 @compiled
 def _factor(w: Any) -> bool:
-    """Factor the matrix of the unknowns, its columns in units of their largest entry beside that of its row."""
+    """Factor the matrix of the unknowns, each column in units of its largest entry relative to that entry's row."""
     n = w.core
     evaluate_jacobian(w)
     for i in range(n):
         for j in range(n):
             w.real[i, j] = w.jacobian[0 if w.algebraic[j] else 1, i, j]
-    # Unknowns may differ by forty decades, as may equations: only entries beside those of their row can be compared.
+    # Unknowns may differ by forty decades, and so may equations: compare entries relative to their rows.
     for i in range(n):
         w.delta[i] = 0.0
         for j in range(n):
@@ -73,7 +72,7 @@ def _factor(w: Any) -> bool:
 
 @compiled
 def _correction(w: Any, delta: Any) -> float:
-    """Newton correction for the present residual; returns its size in the algebraic variables."""
+    """Compute the Newton correction for the present residual; return its size in the algebraic variables."""
     norm = 0.0
     for j in range(w.n):
         delta[j] = -w.rhs[j]
@@ -96,7 +95,7 @@ def _move(w: Any, delta: Any, fraction: float) -> None:
 
 @compiled
 def _size(w: Any, delta: Any, unit: Any) -> float:
-    """Size of a correction of the algebraic variables in these units; not a number where it is none."""
+    """Return the size of a correction of the algebraic variables in these units, NaN included."""
     norm = 0.0
     for j in range(w.n):
         if w.algebraic[j] and not abs(delta[j]) / unit[j] <= norm:
@@ -106,18 +105,19 @@ def _size(w: Any, delta: Any, unit: Any) -> float:
 
 @compiled
 def _damped(w: Any, delta: Any) -> bool:
-    """Move as far along the correction as lets the next one by the same matrix be no larger; False if there is no such
+    """Move as far along the correction as the next one by the same matrix does not increase; False if there is no such
     move.
 
-    Residuals are no measure: those of rates are as large as what they divide by is small, and linear anyway.
-    Source: Deuflhard (2011), Newton Methods for Nonlinear Problems, section 2.1, the natural monotonicity test.
+    Residuals cannot be the measure: those of rates scale with the inverse of a possibly small coefficient, and are
+    linear anyway. Source: Deuflhard (2011), Newton Methods for Nonlinear Problems, section 2.1, the natural
+    monotonicity test.
     """
-    following, unit = w.g[1], w.error  # memory that no step is using now
+    following, unit = w.g[1], w.error  # memory of the step, unused here
     for j in range(w.n):
         unit[j] = abs(w.trial[j]) + abs(delta[j]) + TINY
     before = _size(w, delta, unit)
     fraction = 1.0
-    # Forty halvings reach 1e-12 of the correction, which is no move any more.
+    # Forty halvings reach 1e-12 of the correction, a negligible move.
     _move(w, delta, 1.0)
     for _halving in range(40):
         if _residual(w):
@@ -131,12 +131,12 @@ def _damped(w: Any, delta: Any) -> bool:
 
 @compiled
 def _is_rounding(w: Any, delta: Any) -> bool:
-    """Whether a correction that does not become smaller is rounding: where the equations are straight far along it
-    nothing else is left of what one correction solves.
+    """True if a correction that does not decrease is roundoff: if the equations are linear far along it, a correction
+    solves them, and only roundoff is left.
     """
     _move(w, delta, FAR)
     straight = _residual(w)
-    _correction(w, w.g[1])  # memory that no step is using now
+    _correction(w, w.g[1])  # memory of the step, unused here
     _move(w, delta, -FAR)
     for j in range(w.n):
         small = NEGLIGIBLE * FAR * (abs(delta[j]) + FEW_EPS * abs(w.trial[j]))
@@ -165,7 +165,7 @@ def find_consistent(w: Any) -> int:
         if norm >= norm_last and _is_rounding(w, delta):
             return CONSISTENT
         if not _damped(w, delta):
-            # At rounding level the corrections cannot fall any more.
+            # At roundoff level the corrections no longer decrease.
             return CONSISTENT if norm <= SQRT_EPS or _is_rounding(w, delta) else NO_STATE
         norm_last = norm
     return NO_STATE

@@ -1,4 +1,4 @@
-"""A whole run, compiled: segments, steps, events, outputs; and the loop over a batch of runs."""
+"""Whole runs, compiled: segments, steps, events, outputs, edges; and the loop over a batch of runs."""
 
 from typing import Any
 
@@ -55,19 +55,19 @@ LEFT = int(Status.LEFT)
 
 
 MOST_REFUSED = 40
-"""Steps that the ledger may refuse beside every second, since the last restart: what it misses may be noise, which must
-not end a run.
+"""Steps that the ledger may reject since the last restart, in addition to half of all: its error may be noise, which
+must not end a run.
 """
 FEWEST_LOOKS = 4
-"""Points of a segment at which its steps are held against the equations, however short it is: a choice. Each costs an
-evaluation in every segment; what lasts less than a fourth of a segment may be missed.
+"""Fewest checks of the steps against the equations inside in a segment, however short: a choice. Each costs an
+evaluation in every segment; a feature that lasts less than a fourth of a segment may be missed.
 """
 SINGULAR_POWER = 0.5
-"""Power of the step with which the error of an account falls at least where its rate is singular at the start: that of
-a rate that grows like the inverse root, as of ideal diffusion; that of a logarithm falls with the step itself.
+"""Least order in the step of the error of an account whose rate is singular at the start: that of an inverse square
+root, as in ideal diffusion; the error of a logarithm is of order one.
 """
 LEAST_NORM = 1e-2
-"""Error norm of the last step below which the controller learns nothing more from it (Hairer & Wanner II, IV.8)."""
+"""Error norm of the last step below which it tells the controller nothing more (Hairer & Wanner II, IV.8)."""
 
 TAKEN, AGAIN, MISSED, ENDED = range(4)
 """Verdicts on a step."""
@@ -75,7 +75,7 @@ TAKEN, AGAIN, MISSED, ENDED = range(4)
 
 @compiled
 def _write_state(w: Any, row: Any, t: float) -> None:
-    """[t | y | ydot | ledger] of the current state, the ledger on top of what was booked before the arc."""
+    """Write [t | y | ydot | ledger] of the current state, including the ledger at the start of the arc."""
     n = w.n
     row[0] = t
     for j in range(n):
@@ -87,14 +87,14 @@ def _write_state(w: Any, row: Any, t: float) -> None:
 
 @compiled
 def _now(w: Any) -> float:
-    """Time of the run."""
+    """Return the time of the run."""
     return float(w.origin + (w.base + w.tau))
 
 
 @compiled
 def _write_events(w: Any, events: Any, counts: Any) -> bool:
-    """A row for each guard that fired, but for those of edges, which are written as these are carried out; True if one
-    of them is terminal.
+    """Write a row for each guard that fired, except those of edges, which are written as these are carried out; True if
+    one of them is terminal.
     """
     now = w.base + w.tau
     terminal = False
@@ -106,7 +106,7 @@ def _write_events(w: Any, events: Any, counts: Any) -> bool:
             continue
         k = min(counts[EVENTS], events.shape[0]) - 1
         if w.kinds[m, 0] == 0:
-            # A step ends just short of a kink and the next one passes it: that is one event.
+            # A step ends just short of a kink and the next one passes it: count one event.
             while k >= w.first_event and now - (events[k, 1] - w.origin) <= RUN_EPS * now and events[k, 0] != m:
                 k -= 1
             if k >= w.first_event and now - (events[k, 1] - w.origin) <= RUN_EPS * now:
@@ -115,14 +115,14 @@ def _write_events(w: Any, events: Any, counts: Any) -> bool:
             row = events[counts[EVENTS]]
             row[0] = m
             _write_state(w, row[1:], _now(w))
-        # Those for which there is no room are counted all the same: the run is then repeated with room for all.
+        # Count events without space too: the run is then repeated with space for all.
         counts[EVENTS] += 1
     return terminal
 
 
 @compiled
 def _record(w: Any, records: Any, counts: Any) -> None:
-    # What time cannot tell from the start of an arc is the event that ended the last one.
+    # A step too short to change the time repeats the event that ended the last arc.
     if counts[RECORDS] > 0 and w.clocks.shape[0] > 0 and _now(w) == w.origin:
         return
     if counts[RECORDS] < records.shape[0]:
@@ -132,8 +132,9 @@ def _record(w: Any, records: Any, counts: Any) -> None:
 
 @compiled
 def _write_up_to(w: Any, i: int, end: float) -> None:
-    """The outputs up to this time of the arc that are not written yet, all with the state of now: at the start of a
-    segment, and where time cannot tell an event from its end, behind which no arc may follow.
+    """Write the outputs up to this time of the arc that are still missing, all with the present state.
+
+    Needed at the start of a segment, and where time cannot tell an event from its end, after which no arc may follow.
     """
     counts, times = w.counts[i], w.times[row_of(w.times, i)]
     while counts[OUTPUTS] < times.shape[0] and is_within(w, times[counts[OUTPUTS]], end):
@@ -143,7 +144,7 @@ def _write_up_to(w: Any, i: int, end: float) -> None:
 
 @compiled
 def _start(w: Any, i: int) -> int:
-    """Begin anew at the current state, with the tables begun where it is the first one."""
+    """Start or restart at the current state; record it if it is the first."""
     outcome = restart(w)
     if outcome != GOOD:
         return outcome
@@ -154,7 +155,7 @@ def _start(w: Any, i: int) -> int:
     if counts[RECORDS] == 0:
         _record(w, w.records[i], counts)
     elif w.picture > 0.0 and w.tau == 0.0:
-        # The other side of where a segment begins.
+        # Store the state on the other side of the breakpoint.
         if counts[INSIDE] < w.inside_times.shape[1]:
             w.inside_times[i, counts[INSIDE]] = w.origin + w.base
             write_now(w, w.inside[i, counts[INSIDE]])
@@ -164,22 +165,24 @@ def _start(w: Any, i: int) -> int:
 
 @compiled
 def _is_brief(w: Any, h: float) -> bool:
-    """Whether a step is too brief for the ledger to shorten it: what ends the run there is told by the states."""
+    """True if a step is too brief for the ledger to shorten it: there the states decide whether the run ends."""
     return bool(h < LOOSE_RTOL * (w.base + w.tau))
 
 
 @compiled
 def _ledger_limit(w: Any, h: float, remaining: float) -> float:
-    """Longest next step that serves the ledger; shorter than this one where this one does not."""
+    """Return the longest next step that the error of the ledger allows; shorter than this one if its own error is too
+    large.
+    """
     norm = 0.0 if _is_brief(w, h) else min(ledger_norm(w, h, remaining), 1e30)
     h_refused, w.h_refused = w.h_refused, 0.0
     if norm == 0.0:
         return np.inf
-    # The local error of a quadrature of order 2s - 1 goes with h^(2s), slower where a rate is singular at the start.
+    # The local error of a quadrature of order 2s - 1 is O(h^(2s)), of lower order if a rate is singular at the start.
     power, least = 2.0 * stage_count(w.member), 0.1
-    if w.tau < h < h_refused:  # farther from the start a rate is as smooth as elsewhere
+    if w.tau < h < h_refused:  # farther from the start the rate is smooth
         found = np.log(w.norm_refused / norm) / np.log(h_refused / h)
-        # What falls slower still is noise, which no shorter step is rid of.
+        # An error of lower order is noise, which a shorter step does not reduce.
         if found >= SINGULAR_POWER:
             power, least = min(power, found), 0.01
     limit = h * max(least, 0.9 * max(norm, NEGLIGIBLE) ** (-1.0 / power))
@@ -194,10 +197,10 @@ def _ledger_limit(w: Any, h: float, remaining: float) -> float:
 
 @compiled
 def _judge(w: Any, h: float, limit: float, left: float, spacing: float) -> tuple[int, float]:
-    """Whether a step that has converged is TAKEN, and up to where; else the size of the next trial.
+    """Return a verdict on a converged step, and a size: up to where it is TAKEN, or that of the next trial.
 
-    An event may cut it short; it is tried again where the ledger asks for less than it (``limit``), where a guard may
-    be passed at its start, and up to what it has MISSED between its stages.
+    An event may shorten it. It is repeated if the ledger allows less (``limit``), if a guard may be passed at its
+    start, and, MISSED, up to a feature between its stages.
     """
     if limit < h:
         return AGAIN, limit
@@ -210,8 +213,8 @@ def _judge(w: Any, h: float, limit: float, left: float, spacing: float) -> tuple
     if size == 0.0:
         return AGAIN, 0.25 * h
     if size != h:
-        # The step onto an event may end where a rate is singular, which the longer one did not. The ledger comes near
-        # to it in ever shorter steps, and counts over the last one with the rates at its start.
+        # The step onto an event may end where a rate is singular, unlike the longer step. The ledger approaches it
+        # in ever shorter steps, and holds the rates at the start over the last one.
         limit = _ledger_limit(w, size, left)
         if limit < size:
             restore_sides(w)
@@ -219,7 +222,7 @@ def _judge(w: Any, h: float, limit: float, left: float, spacing: float) -> tuple
         if _is_brief(w, size) and ledger_norm(w, size, left) > 1.0:
             hold_rates(w, size)
     if size > LOOK_PART * spacing:
-        # Beside the ends of a segment and beside events there may be something narrow.
+        # Next to the ends of a segment and to events there may be narrow features.
         seen = unseen(w, size, spacing, left, w.tau == 0.0, size == left or any_true(w.fired))
         if seen < 1.0:
             restore_sides(w)
@@ -229,12 +232,14 @@ def _judge(w: Any, h: float, limit: float, left: float, spacing: float) -> tuple
 
 @compiled
 def _accept(w: Any, i: int, size: float, end: float, goes_on: bool) -> None:
-    """Move on by a step of this size, with its outputs; to the very end of the segment where it is all but reached."""
+    """Move on by a step of this size and write its outputs; to the exact end of the segment if that is reached up to
+    roundoff.
+    """
     counts = w.counts[i]
     reached = w.base + (w.tau + size)
     whole = size == (end - w.base) - w.tau or reached >= end
     times = w.times[row_of(w.times, i)]
-    # Outputs at the end of an arc are those up to the end of what the arc is in.
+    # The last outputs of an arc are those up to the end of its segment.
     shown = w.shown - w.origin if whole and end == w.arc_end else end if whole else reached
     counts[OUTPUTS] = write_outputs(w, times, w.outputs[i], counts[OUTPUTS], size, shown)
     if w.picture > 0.0:
@@ -251,7 +256,7 @@ def _accept(w: Any, i: int, size: float, end: float, goes_on: bool) -> None:
 
 @compiled
 def _run_segment(w: Any, i: int, end: float, goes_on: bool) -> int:
-    """Integrate to the end of a segment; GOOD, or the status that ends the run."""
+    """Integrate to the end of a segment; return GOOD, or the status that ends the run."""
     h, size_last, norm_last, aim = 0.0, 0.0, 1.0, np.inf
     spacing = w.spacing[row_of(w.spacing, i)]
     if spacing < np.inf:
@@ -264,7 +269,7 @@ def _run_segment(w: Any, i: int, end: float, goes_on: bool) -> int:
             h, size_last, norm_last, aim = first_size(w, end - w.base), 0.0, 1.0, np.inf
         left = (end - w.base) - w.tau
         remaining = min(left, aim - w.tau)
-        # No tiny last step: two of half the length are better than a whole one and a rest.
+        # No tiny last step: two equal steps are better than a full one and a remainder.
         if h >= remaining * (1.0 - SQRT_EPS):
             h = remaining
         elif 2.0 * h > remaining:
@@ -280,7 +285,7 @@ def _run_segment(w: Any, i: int, end: float, goes_on: bool) -> int:
             return EVENT
         if verdict != TAKEN:
             if verdict == MISSED:
-                # A step ends there, so that its last stage feels what the others have missed.
+                # End a step there, so that its last stage sees what the other stages have missed.
                 aim = w.tau + size
             w.rejected += 1
             w.h_factored = 0.0
@@ -289,7 +294,7 @@ def _run_segment(w: Any, i: int, end: float, goes_on: bool) -> int:
         if size == remaining:
             aim = np.inf
         _accept(w, i, size, end, goes_on)
-        # The controller compares steps that were judged by their error, whatever an event has left of them.
+        # The controller compares the steps whose error was estimated, even if an event has shortened them.
         size_last, norm_last = h, max(norm, LEAST_NORM)
         h = min(keep_matrices(w, h, min(proposed, limit)), growing_size(w))
         if any_true(w.fired):
@@ -306,7 +311,7 @@ def _forget(w: Any, i: int) -> None:
     w.member = w.last_member = w.tries = w.calm = w.fresh = w.refused = 0
     if w.core >= LARGE_MATRIX:
         for m in range(w.order.shape[0]):
-            w.order[m, 3, 0] = -1  # that of another run counts for nothing
+            w.order[m, 3, 0] = -1  # discard the pivot order of another run
     clear(w.q)
     clear(w.ydot)
     clear(w.noise)
@@ -316,7 +321,7 @@ def _forget(w: Any, i: int) -> None:
 
 @compiled
 def _run_segments(w: Any, i: int) -> int:
-    """A run that ends at events: GOOD, or the status that ends it."""
+    """Run until an event ends it; return GOOD, or the status that ends it."""
     segments, peaks = w.segments[row_of(w.segments, i)], w.peaks[row_of(w.peaks, i)]
     _forget(w, i)
     copy(peaks[: w.n_ledger], w.q_largest)
@@ -340,7 +345,7 @@ def _run_segments(w: Any, i: int) -> int:
 
 @compiled
 def _begin_arc(w: Any, i: int) -> None:
-    """An arc from the moment, in a time of its own."""
+    """Begin an arc at the moment, with its own time."""
     n, counts, t = w.n, w.counts[i], w.moment[0]
     if counts[ARCS] < w.arcs.shape[1]:
         row = w.arcs[i, counts[ARCS]]
@@ -361,7 +366,7 @@ def _begin_arc(w: Any, i: int) -> None:
 
 @compiled
 def _see_guards(w: Any, flight_time: float) -> None:
-    """Start the largest sizes of the guards; after a rebound those that return count as zero, to their rounding."""
+    """Initialize the largest sizes of the guards; after a rebound zero for those that return, as for exact values."""
     copy(w.magnitude, w.margin_largest)
     first = w.n_margins - w.edges.shape[0]
     for e in range(w.edges.shape[0]):
@@ -371,18 +376,19 @@ def _see_guards(w: Any, flight_time: float) -> None:
 
 @compiled
 def _run_arc(w: Any, i: int, end: float, goes_on: bool) -> int:
-    """Flow from the moment until an edge or a limit, or to the end of a segment; GOOD, or the status that ends the arc,
-    which is at the new moment.
+    """Flow from the moment to an edge, a limit, or the end of a segment; return GOOD, or the status that ends the arc.
+
+    The moment is then that of its end.
     """
     flight_time = w.flight_time if w.rebounded == w.moment[0] else 0.0
     _begin_arc(w, i)
     _see_guards(w, flight_time)
-    # Not to a breakpoint that no load has, as a formula there is that of what follows.
+    # Stop just short of a breakpoint at which no load changes: formulas there are those of the next segment.
     last = end if w.loads_change else max(end - FEW_EPS * end, 0.5 * (w.origin + end))
     w.arc_end, w.shown, w.base = last - w.origin, end, 0.0
     status = GOOD
     if 0.0 < RETURN_FACTOR * flight_time < FITTED_PART * w.arc_end:
-        # What returns so soon that a step might miss it has a piece of its own.
+        # A return so soon that a step might miss it gets a separate segment.
         status = _run_segment(w, i, RETURN_FACTOR * flight_time, True)
         w.base, w.tau = w.base + w.tau, 0.0
     if status == GOOD:
@@ -405,7 +411,7 @@ def _run_arc(w: Any, i: int, end: float, goes_on: bool) -> int:
 
 @compiled
 def _has_missed(w: Any) -> bool:
-    """Whether an arc has ended beyond what it should have ended at, by more than has a meaning for bodies."""
+    """True if an arc has ended beyond a guard it should have stopped at, by more than a picometre."""
     first, missed = w.n_margins - w.edges.shape[0], False
     if w.edges.shape[0] == 0:
         return missed
@@ -419,7 +425,9 @@ def _has_missed(w: Any) -> bool:
 
 @compiled
 def _carry_out(w: Any, i: int) -> int:
-    """The edge at which an arc has ended: GOOD, EVENT where it was a limit, LEFT where an instant has to look."""
+    """Carry out the edge at which an arc has ended: GOOD, EVENT if it was a limit, LEFT if the edge is left to
+    Instant.
+    """
     first, last, limit = w.n_margins - w.edges.shape[0], -1, False
     for m in range(w.n_margins):
         fired = w.fired[m] != 0
@@ -433,7 +441,7 @@ def _carry_out(w: Any, i: int) -> int:
 
 @compiled
 def _begin_arcs(w: Any, i: int) -> None:
-    """The start of a run that goes on along edges."""
+    """Initialize a run whose edges are carried out here."""
     clear(w.booked)
     clear(w.exchanged)
     copy(w.least_peaks, w.peaks_seen)
@@ -447,7 +455,7 @@ def _begin_arcs(w: Any, i: int) -> None:
 
 @compiled
 def _begin_segment(w: Any, i: int, segment: int) -> None:
-    """The moment at the start of a segment: with its parameters, but for the modes and registers, which last."""
+    """Set the moment to the start of a segment, with its parameters, except the modes and registers, which last."""
     parameters, first = w.parameters[i], 1 + 2 * w.n
     for k in range(w.held.shape[0]):
         w.reset[k] = w.moment[first + w.held[k]]
@@ -464,7 +472,7 @@ def _begin_segment(w: Any, i: int, segment: int) -> None:
 
 @compiled
 def _run_arcs(w: Any, i: int) -> int:
-    """A run that goes on along edges: GOOD, or the status that ends it."""
+    """Run and carry out edges; return GOOD, or the status that ends the run."""
     segments = w.segments[row_of(w.segments, i)]
     last = segments.shape[0] - 1
     _begin_arcs(w, i)
@@ -490,7 +498,7 @@ def _run_arcs(w: Any, i: int) -> int:
 
 @compiled
 def _run(w: Any, i: int) -> None:
-    """One run, from its initial state to its end."""
+    """Run from the initial state to the end."""
     counts, end, segments = w.counts[i], w.ends[i], w.segments[row_of(w.segments, i)]
     w.steps = w.rejected = w.residuals = w.jacobians = w.factorizations = w.iterations = 0
     w.origin, w.base, w.tau, w.h_factored = 0.0, segments[0], 0.0, 0.0
@@ -509,7 +517,7 @@ def _run(w: Any, i: int) -> None:
 
 @compiled
 def _make_consistent(w: Any, i: int) -> None:
-    """The state of a row [t | y | ydot] made consistent in place."""
+    """Make the state of a row [t | y | ydot] consistent in place."""
     n, row = w.n, w.ends[i]
     w.inputs[0] = row[0]
     copy(w.parameters[row_of(w.parameters, i), 0], w.inputs[1 + 2 * n :])
@@ -521,9 +529,10 @@ def _make_consistent(w: Any, i: int) -> None:
 
 
 def run_batch(first: int, last: int, memory: Any, batch: Any) -> None:
-    """Runs first to last - 1 of a batch, whose fields come as a plain tuple, since Numba looks at the types of a named
-    one twice as long. Every run writes to its own rows, so the result does not depend on the threads, each of which has
-    a memory of its own. Without segments the rows of ``ends`` are made consistent.
+    """Solve runs first to last - 1 of a batch; without segments make the rows of ``ends`` consistent.
+
+    The fields of the batch come as a plain tuple, since Numba takes twice as long to type a named one. Every run writes
+    to its own rows and each thread has its own memory, so the result does not depend on the threads.
     """
     w = lay_out(batch, memory)
     w.loose = loosening(w.rtol)

@@ -1,7 +1,7 @@
-"""Events: zeros of margins inside a step, and the sides of zero on which margins start.
+"""Event location: zeros of margins inside a step, and the sides of zero on which margins start.
 
-Margins are examined at interior points of the step, since a high order steps over double crossings; a lowest point
-between them is looked for where it may reach zero. The first zero is bracketed on the corrected polynomial, then the
+Margins are evaluated at interior points of the step, since a step of high order may contain two crossings; minima
+between the points are located if they may reach zero. The first zero is bracketed on the corrected polynomial, then the
 step is repeated onto it with the full order of the method.
 """
 
@@ -18,32 +18,32 @@ from surfacechem.solve.radau.work import MARGINS, any_true, clear, compiled, cop
 from surfacechem.tolerances import CBRT_EPS, EPS, FORMULA_EPS, LOOSE_RTOL, NEWTON_EPS, RUN_EPS, SQRT_EPS, TINY
 
 LEAVING, AT_ZERO, BEYOND, RISING, FALLING, OUT_OF_PLAY = 0.0, 2.0, -2.0, 3.0, -3.0, 4.0
-"""Sides of zero besides 1 and -1: of a margin that has just fired, of a limit that starts at zero, and beyond it; of
-one that leaves zero in this step; and of one that is not in play in the modes of the run, on which side it stays.
+"""Sides of zero other than 1 and -1: of a margin that has just fired; of a limit that starts at zero, or beyond it; of
+a limit that leaves zero in this step, upwards or downwards; of a margin that is inactive in the modes of the run.
 """
 
 ALIKE_NOISE = 1e3
-"""Values of a margin that differ by less, in units of its noise, do not tell which is closer to zero."""
+"""Difference of two values of a margin, in units of its noise, below which it is unknown which is closer to zero."""
 
 AT_START, NEEDS_SHORTER = -1.0, -2.0
-"""Instead of where margins reach zero: a limit is passed at the start; a shorter step has to tell whether one is."""
+"""Codes instead of the place of a zero: a limit is passed at the start; only a shorter step can decide if it is."""
 
 
 @compiled
 def noise(w: Any, m: int) -> float:
-    """Size of a margin that is zero for all that can be told: its rounding, in proportion to the largest seen."""
+    """Return the size below which a margin counts as zero: its roundoff, proportional to its largest value so far."""
     return float(FORMULA_EPS * w.margin_largest[m])
 
 
 @compiled
 def is_limit(w: Any, m: int) -> bool:
-    """Whether the run may not go on where this margin is below zero."""
+    """True if the run must end where this margin is below zero."""
     return bool(w.kinds[m, 0] == 1 and w.kinds[m, 1] <= 0)
 
 
 @compiled
 def start_margins(w: Any) -> None:
-    """Sides of zero at a start or restart."""
+    """Set the sides of zero at a start or restart."""
     if w.n_margins == 0:
         return
     put(w, 0.0, w.y, w.ydot)
@@ -67,14 +67,14 @@ def start_margins(w: Any) -> None:
 
 @compiled
 def keep_sides(w: Any) -> None:
-    """Remember the margins at the start of a step."""
+    """Store the margins at the start of a step."""
     copy(w.side, w.side_first)
     copy(w.margin_before, w.margin_first)
 
 
 @compiled
 def restore_sides(w: Any) -> None:
-    """Go back to the margins at the start of a step that is made again; none has fired."""
+    """Restore the margins at the start of a step that is repeated; none has fired."""
     copy(w.side_first, w.side)
     copy(w.margin_first, w.margin_before)
     clear(w.fired)
@@ -82,13 +82,13 @@ def restore_sides(w: Any) -> None:
 
 @compiled
 def update_sides(w: Any) -> None:
-    """Move on to the margins of now: their sides, the largest seen, and what was before."""
+    """Move on to the present margins: update their sides, largest values and last values."""
     copy(w.margin_before, w.margin_earlier)
     copy(w.side, w.side_last)
     for m in range(w.n_margins):
         value, side = w.margin[m], w.side[m]
         w.margin_largest[m] = max(w.margin_largest[m], abs(value))
-        # What has left zero is on a side at once; what leaves it has to be seen clear of rounding first.
+        # A margin on a side changes it at once; one that leaves zero must first exceed roundoff.
         least = 0.0 if abs(side) == 1.0 and w.kinds[m, 3] == 0 else noise(w, m)
         if abs(side) < AT_ZERO and abs(value) > least:
             w.side[m] = 1.0 if value > 0.0 else -1.0
@@ -97,7 +97,7 @@ def update_sides(w: Any) -> None:
 
 @compiled
 def crosses(w: Any, m: int) -> bool:
-    """Whether a margin lies across zero from its side, in a direction that counts; a strict one by more than noise."""
+    """True if a margin has crossed zero from its side, in a direction that counts; a strict one by more than noise."""
     side, value, direction = w.side[m], w.margin[m], w.kinds[m, 1]
     if w.kinds[m, 3] == 1:
         return bool(side == 1.0 and value < -noise(w, m))
@@ -108,7 +108,7 @@ def crosses(w: Any, m: int) -> bool:
 
 @compiled
 def mark_at_end(w: Any) -> None:
-    """Mark the kinks that reach zero with the end of a segment: the next one cannot tell on which side they were."""
+    """Mark the kinks that reach zero at the end of a segment: the next segment cannot tell on which side they were."""
     put(w, 0.0, w.y, w.ydot)
     evaluate(w, MARGINS, w.margin)
     for m in range(w.n_margins):
@@ -120,14 +120,18 @@ def mark_at_end(w: Any) -> None:
 
 @compiled
 def _leave(w: Any, m: int, rises: bool, held: float) -> None:
-    """A limit that starts at zero or beyond goes this way; one that rises from zero has this side."""
+    """Set the side of a limit that starts at zero or beyond and leaves it; ``held`` is that of one that rises from
+    zero.
+    """
     beyond = w.side[m] == BEYOND
     w.side[m] = FALLING if not rises else -1.0 if beyond else held
 
 
 @compiled
 def _follow_rates(w: Any, h: float) -> None:
-    """Sides of limits that start at zero or beyond and leave it as they would at the rate at which the step starts."""
+    """Set the sides of limits that start at zero or beyond and leave as fast as the rate at the start of the step
+    predicts.
+    """
     for j in range(w.n):
         w.trial[j] = w.y[j] + SCAN_EDGE * h * w.ydot[j]
     put(w, SCAN_EDGE * h, w.trial, w.ydot)
@@ -140,7 +144,7 @@ def _follow_rates(w: Any, h: float) -> None:
 
 @compiled
 def _any_at_zero(w: Any) -> bool:
-    """Whether limits start a step at zero or beyond; how far each falls and rises in it is none yet."""
+    """True if limits start a step at zero or beyond; reset how far each falls and rises in it."""
     found = False
     for m in range(w.n_margins):
         if w.side[m] == RISING:
@@ -152,15 +156,15 @@ def _any_at_zero(w: Any) -> bool:
 
 @compiled
 def _sides_are_known(w: Any, h: float) -> bool:
-    """Whether the step tells to which sides limits go that start at zero.
+    """True if the step determines to which sides limits go that start at zero.
 
-    What a load sets in motion from rest begins as a power of time, far below what the tolerance lets the polynomial be
-    wrong there, which may go either way. A shorter step tells what goes both ways by more; the shortest goes where it
-    goes farther.
+    Motion from rest under a load begins as a power of time, far below the error that the tolerance allows the
+    polynomial there, which may have either sign. If a limit both falls and rises by more than the tolerance, a shorter
+    step is needed; in the shortest step the larger excursion decides.
     """
     if not _any_at_zero(w):
         return True
-    # How far each falls and rises in the step, into the rows that will hold brackets.
+    # Store how far each falls and rises in the step in the rows for brackets.
     for i in range(4 * w.member + 9):
         put_scanned(w, h, i)
         evaluate(w, MARGINS, w.margin)
@@ -182,7 +186,7 @@ def _sides_are_known(w: Any, h: float) -> bool:
 
 @compiled
 def _probe(w: Any, h: float, m: int, x: float) -> float:
-    """A margin at the fraction x of the step, from the polynomial."""
+    """Evaluate a margin at the fraction x of the step, on the polynomial."""
     put_inside(w, h, x)
     evaluate(w, MARGINS, w.margin_probe)
     return float(w.margin_probe[m])
@@ -190,14 +194,14 @@ def _probe(w: Any, h: float, m: int, x: float) -> float:
 
 @compiled
 def _may_reach(a: float, b: float, c: float, at_a: float, at_b: float, at_c: float) -> bool:
-    """Whether a smooth function of these values has a lowest point in between that may be zero."""
+    """True if a smooth function with these values may have a minimum at or below zero in between."""
     steepest = max((at_a - at_b) / (b - a), (at_c - at_b) / (c - b))
     return at_b < at_a and at_b < at_c and at_b <= steepest * (c - a)
 
 
 @compiled
 def _vertex(a: float, b: float, c: float, at_a: float, at_b: float, at_c: float) -> float:
-    """Lowest point of the parabola, or a point in the larger part where that is no progress."""
+    """Return the minimum of the parabola, or a point in the larger part if that is no progress."""
     left, right = (b - a) * (at_b - at_c), (b - c) * (at_b - at_a)
     x = b - 0.5 * ((b - a) * left - (b - c) * right) / (left - right)
     if a < x < c and abs(x - b) > 1e-2 * (c - a):
@@ -207,15 +211,15 @@ def _vertex(a: float, b: float, c: float, at_a: float, at_b: float, at_c: float)
 
 @compiled
 def _reaches(w: Any, h: float, m: int, a: float, b: float, c: float) -> float:
-    """Point near b at which a margin with a minimum there is across zero, or touches it; -1 where it does not.
+    """Return a point near b where a margin with a minimum there is across zero, or touches it; -1 if it does not.
 
-    By parabolas, and by a tenth of the larger part where these make no progress, as close as the value of a minimum
-    tells its place (after Brent 1973, Algorithms for Minimization without Derivatives, chapter 5).
+    By parabolas, or a tenth of the larger part where these make no progress, to the accuracy with which values
+    determine a minimum (after Brent 1973, Algorithms for Minimization without Derivatives, chapter 5).
     """
     side = w.side[m]
     touches = is_limit(w, m) and w.kinds[m, 3] == 0
-    # A strict one has to pass zero by more than the error of the states, which may be less than the tolerance: at loose
-    # tolerances a fixed part counts all the same, since what is brief is shallow, too.
+    # A strict margin has to pass zero by more than the error of the states, which may be below the tolerance: at loose
+    # tolerances a fixed part is used, since a brief dip is also shallow.
     shallow = max(min(w.rtol, LOOSE_RTOL) * w.margin_largest[m], noise(w, m))
     least = shallow if w.kinds[m, 3] == 1 else 0.0
     at_a, at_b, at_c = side * _probe(w, h, m, a), side * _probe(w, h, m, b), side * _probe(w, h, m, c)
@@ -239,7 +243,7 @@ def _reaches(w: Any, h: float, m: int, a: float, b: float, c: float) -> float:
 
 @compiled
 def _dips(w: Any, h: float, m: int, a: float, b: float, c: float) -> bool:
-    """Whether a margin reaches zero between three points though it is not across it at any; keeps the bracket."""
+    """True if a margin reaches zero between three points without being across at any of them; stores the bracket."""
     side = w.side[m]
     if abs(side) != 1.0 or side * w.kinds[m, 1] > 0.0:
         return False
@@ -254,13 +258,13 @@ def _dips(w: Any, h: float, m: int, a: float, b: float, c: float) -> bool:
 
 @compiled
 def _mark(w: Any, h: float, earlier: float, before: float, x: float) -> float:
-    """Mark the margins that reach zero up to x with their brackets; x if there are any, AT_START where a limit is
+    """Mark the margins that reach zero up to x, and their brackets; return x if there are any, AT_START if a limit is
     passed there, else 0.
     """
     found = 0.0
     for m in range(w.n_margins):
         w.low[m], w.high[m] = before, x
-        # A limit that goes the wrong way from zero, or from beyond it, has left it by now.
+        # A limit that falls from zero, or from beyond it, has left zero by now.
         falls = w.side[m] == FALLING and w.margin[m] < -noise(w, m)
         if falls and before <= SCAN_EDGE:
             found = AT_START
@@ -275,10 +279,11 @@ def _mark(w: Any, h: float, earlier: float, before: float, x: float) -> float:
 
 @compiled
 def _scan(w: Any, h: float) -> tuple[float, float]:
-    """The first interval in which margins reach zero: its start, and its end; in place of that 0 if there is none,
-    AT_START where a limit is passed there, NEEDS_SHORTER where one may be.
+    """Return the start and the end of the first interval in which margins reach zero.
+
+    The end is 0 if there is none, AT_START if a limit is passed at the start, NEEDS_SHORTER if one may be.
     """
-    # All points at once: one product of tables and stages instead of a polynomial at each.
+    # All points at once: one product of tables and stages instead of a polynomial at each point.
     scan_step(w)
     if not _sides_are_known(w, h):
         return 0.0, NEEDS_SHORTER
@@ -289,7 +294,7 @@ def _scan(w: Any, h: float) -> tuple[float, float]:
         evaluate(w, MARGINS, w.margin)
         found = _mark(w, h, earlier, before, x)
         if found > 0.0:
-            # Others may have their lowest point in this interval, which shows from a point just behind it.
+            # Others may have a minimum in this interval, which shows with a point just behind it.
             keep_polynomial(w)
             copy(w.margin_before, w.margin_earlier)
             copy(w.margin, w.margin_before)
@@ -307,27 +312,27 @@ def _scan(w: Any, h: float) -> tuple[float, float]:
 
 @compiled
 def _bracketed(w: Any, h: float, m: int, low: float, high: float) -> float:
-    """Zero of one margin on the polynomial: the crossed end of a small bracket (Illinois method).
+    """Return the zero of one margin on the polynomial: the crossed end of a small bracket (Illinois method).
 
     Source: Dowell & Jarratt (1971), A modified regula falsi method, BIT 11.
     """
     side = w.side[m]
     value_high, value_low = _probe(w, h, m, high), _probe(w, h, m, low)
     if value_high * side > 0.0:
-        # It touches zero there.
+        # The margin only touches zero there.
         return high
     kept = 0
     for iteration in range(100):
         if high - low <= NEWTON_EPS * high or value_high == 0.0:
             break
         x = low + (high - low) * (value_low / (value_low - value_high))
-        # Bisection at times: near a multiple zero the secants creep.
+        # Bisect every eighth time: near a multiple zero the secants converge slowly.
         if not low < x < high or iteration % 8 == 7:
             x = 0.5 * (low + high)
         value = _probe(w, h, m, x)
         if value * side <= 0.0:
             high, value_high = x, value
-            # An end that stays for a second time counts half, so that the secant moves past the zero.
+            # Halve the value at an end that is kept twice, so that the secant passes the zero.
             value_low *= 0.5 if kept == 1 else 1.0
             kept = 1
         else:
@@ -339,7 +344,7 @@ def _bracketed(w: Any, h: float, m: int, low: float, high: float) -> float:
 
 @compiled
 def _first(w: Any, h: float) -> tuple[int, float]:
-    """The marked margin that reaches zero first, and where; the slopes of all that cross, per step."""
+    """Return the marked margin that reaches zero first, and where; store the slopes, per step, of all that cross."""
     first, earliest = -1, 2.0
     for m in range(w.n_margins):
         w.margin_slope[m] = 0.0
@@ -356,7 +361,7 @@ def _first(w: Any, h: float) -> tuple[int, float]:
 
 @compiled
 def _step_implicitly(w: Any, size: float) -> float:
-    """Repeat the step with another size; the norm of its error."""
+    """Repeat the step with another size; return the norm of its error."""
     w.h_factored = 0.0
     if not factor_newton(w, size):
         return np.inf
@@ -369,8 +374,8 @@ def _step_implicitly(w: Any, size: float) -> float:
 
 @compiled
 def _step_onto(w: Any, size: float) -> float:
-    """Repeat the step with another size, with the full order of the method, and the margins at its end; returns the
-    norm of its error.
+    """Repeat the step with another size and the full order of the method, and evaluate the margins at its end; return
+    the norm of its error.
     """
     norm = step_explicitly(w, size, np.inf) if w.explicit != 0 else _step_implicitly(w, size)
     if not norm < np.inf:
@@ -383,21 +388,22 @@ def _step_onto(w: Any, size: float) -> float:
 
 @compiled
 def _resolution(w: Any, size: float) -> float:
-    """Resolution of time at the end of a step: half the spacing of doubles there."""
+    """Return the resolution of time at the end of a step: half the spacing of doubles there."""
     return float(0.5 * EPS * (abs(w.base + w.tau) + size))
 
 
 @compiled
 def _onto(w: Any, size: float, worst: float) -> float:
-    """The size of a repeated step; 0 where it fails or its error is not below the worst."""
+    """Repeat the step; return its size, or 0 if it fails or its error is not below ``worst``."""
     return size if _step_onto(w, size) < worst else 0.0
 
 
 @compiled
 def _refine(w: Any, h: float, m: int, x: float, worst: float) -> float:
-    """Step onto the zero of margin m, landing on the crossed side; returns the step size, or 0 where the repeated
-    step fails or its error is not below the worst. A margin that touches zero has no slope to refine with, and one
-    that all but touches it none to be trusted.
+    """Step onto the zero of margin m, ending on the crossed side.
+
+    Return the step size, or 0 if the repeated step fails or its error is not below ``worst``. The slope of a margin
+    that touches zero vanishes, and that of a near touch is unreliable: neither is used.
     """
     side, slope = w.side[m], w.margin_slope[m]
     size = best = x * h
@@ -410,32 +416,32 @@ def _refine(w: Any, h: float, m: int, x: float, worst: float) -> float:
         value = w.margin[m]
         change = -value / slope * h if slope != 0.0 else 0.0
         crossed = value * side <= 0.0 or slope == 0.0
-        # What is left after a few attempts is the rounding of the margin itself.
+        # After a few attempts the remaining value is roundoff of the margin.
         if crossed and (abs(change) <= resolution * (1 + attempt) or nudge > 0.0 or attempt >= 6):
             return size
         if abs(value) > 2.0 * closest + ALIKE_NOISE * noise(w, m):
-            # Where it came closest it is zero, or the polynomial was too coarse to tell.
+            # Its closest value counts as zero if it is noise; otherwise the polynomial was too coarse.
             return _onto(w, best, worst) if closest <= ALIKE_NOISE * noise(w, m) else 0.0
         if abs(value) < closest:
             best, closest = size, abs(value)
         if not crossed and abs(change) <= resolution:
-            # A zero that time does not resolve is passed by the least that crosses it, and not gone back to.
+            # Time does not resolve this zero: cross it by the smallest push, and do not return.
             nudge = change = max(2.0 * nudge, resolution)
         else:
             nudge = 0.0
-        # The secant may be wrong near a kink: no step is changed by more than a factor of two.
+        # The secant may be wrong near a kink: change the step by at most a factor of two.
         size = min(max(size + change, 0.5 * size), min(2.0 * size, 1.25 * h))
     return _onto(w, size, worst)
 
 
 @compiled
 def _short_of(w: Any, h: float, m: int, size: float) -> float:
-    """A step that ends just short of a kink, where it counts as zero or time knows nothing nearer: beyond it the last
-    stage would feel what begins there.
+    """Return a step that ends just short of a kink, as near as noise and time resolve: beyond it the last stage would
+    already see the other branch.
     """
     side = w.side[m]
     slope = max(abs(w.margin_slope[m]) / h, abs(w.margin_before[m]) / size)
-    # Twice as far at each attempt, so that few are needed whatever the slope.
+    # Double the distance at each attempt, so that few are needed for any slope.
     for attempt in range(40):
         shorter = size - _resolution(w, size) * 2.0**attempt
         if not (shorter > 0.5 * size and _step_onto(w, shorter) < np.inf):
@@ -449,14 +455,16 @@ def _short_of(w: Any, h: float, m: int, size: float) -> float:
 
 @compiled
 def _resolved(w: Any, size: float) -> float:
-    """Difference of two times that are one for all that can be told."""
+    """Return the difference below which two times count as equal."""
     return float(NEWTON_EPS * abs(w.base + w.tau) + RUN_EPS * size)
 
 
 @compiled
 def _mark_coincident(w: Any, h: float, size: float, first: int) -> bool:
-    """Keep as fired the margins that are across zero too, or within rounding of it in time; whether one besides the
-    first is well across: then the polynomial was too coarse to tell which comes first, as over a kink it knows not of.
+    """Mark as fired the margins that are also across zero, or within roundoff of it in time.
+
+    True if another than the first is well across: the polynomial was then too coarse to order them, as across an
+    unknown kink.
     """
     near, passed = _resolved(w, size), False
     for m in range(w.n_margins):
@@ -470,7 +478,7 @@ def _mark_coincident(w: Any, h: float, size: float, first: int) -> bool:
 
 @compiled
 def _kink_at(w: Any, first: int) -> int:
-    """The kink at which a step ends: the margin that it went for, or another that fires there; -1 if there is none."""
+    """Return the kink at which a step ends: the located margin, or another that fires there; -1 if there is none."""
     found = -1
     for m in range(w.n_margins):
         if w.kinds[m, 0] == 0 and w.kinds[m, 2] == 0 and (m == first or (found < 0 and w.fired[m] != 0)):
@@ -480,8 +488,10 @@ def _kink_at(w: Any, first: int) -> int:
 
 @compiled
 def find_event(w: Any, h: float) -> float:
-    """Size of the step onto the first event, marking all that fire there, or onto where one seemed to be, marking
-    none; h if there is none, 0 if the step must be repeated, AT_START if a limit is passed at the start.
+    """Find the first event in the step and step onto it; return the size of the step, and mark all margins that fire.
+
+    It is h if there is no event, 0 if the step must be repeated, and AT_START if a limit is passed at the start. If the
+    event proves not to exist, the step ends there with no margin marked.
     """
     before, end = _scan(w, h)
     if end == NEEDS_SHORTER:
@@ -491,9 +501,9 @@ def find_event(w: Any, h: float) -> float:
         return h if end == 0.0 else AT_START
     first, earliest = _first(w, h)
     if earliest < before:
-        # A lowest point shows one point later: the sides that hold there are those of the point before it.
+        # A minimum is detected one point later: restore the sides of the point before it.
         copy(w.side_last, w.side)
-    # A fold may lie just beyond a guard: there explicit steps have to be as good as elsewhere.
+    # A fold may lie just beyond a guard: explicit steps have to pass their error test there too.
     tested = w.kinds[first, 2] == 1 or (w.explicit != 0 and w.kinds[first, 0] == 1)
     size = _refine(w, h, first, max(earliest, TINY), 1.0 if tested else np.inf)
     if size == 0.0:
@@ -507,7 +517,7 @@ def find_event(w: Any, h: float) -> float:
         size = _short_of(w, h, short, size)
         _mark_coincident(w, h, size, short)
         w.fired[short] = 1
-    # Where a strict margin is not zero at the end, the polynomial has seen what is not there.
+    # If a strict margin is not zero at the end, its dip was an artefact of the polynomial.
     left = w.margin[first] * w.side[first]
     reached = left <= ALIKE_NOISE * noise(w, first) + abs(w.margin_slope[first]) * _resolved(w, size) / h
     w.fired[first] = w.kinds[first, 3] == 0 or reached

@@ -1,8 +1,8 @@
 """Outputs inside a step.
 
-The collocation polynomial serves where it satisfies the equations between the stages. In components that follow
-others at once it is a mere interpolation, which the error estimate of the step does not see; there an output is
-computed by a step of its own, from the start of the main step, which has the full order of the method.
+The collocation polynomial is used if it satisfies the equations between the stages. In components that follow others
+instantaneously it merely interpolates, and the error estimate of the step does not include that error; then an output
+is computed by a separate step from the start of the main step, with the full order of the method.
 """
 
 from typing import Any
@@ -27,19 +27,20 @@ from surfacechem.solve.radau.work import compiled, copy
 from surfacechem.tolerances import FINER_BY
 
 POLYNOMIAL_ERROR = 2.0
-"""Error of the polynomial between its stages, in units of the tolerance."""
+"""Largest error of the polynomial between its stages, in units of the tolerance."""
 
 MOST_PARTS = 64
-"""Parts of a step, equal in time or in its logarithm, between which states are added for a picture at most: a
-polynomial of order 7 needs no more."""
+"""Most parts of a step, equal in time or in its logarithm, between which states are stored: a polynomial of order 7
+needs no more.
+"""
 
 FLAT_RANGE = 1e3
-"""A range of so many tolerances of a state is no picture but its error."""
+"""Range of a state, in tolerances, added to the actual range: a smaller variation is error."""
 
 
 @compiled
 def _largest(w: Any, floor: float) -> float:
-    """Largest error in units of the tolerance, of the part above so many times the noise."""
+    """Return the largest error in units of the tolerance, less ``floor`` times the noise."""
     norm = 0.0
     for j in range(w.n):
         size = (abs(w.error[j]) - floor * w.noise[j]) / w.weight[j]
@@ -51,7 +52,7 @@ def _largest(w: Any, floor: float) -> float:
 
 @compiled
 def _write_by_step(w: Any, size: float, h: float, output: Any) -> None:
-    """An output by a step of its own, which has the full order; by the polynomial where Newton's method fails."""
+    """Write an output computed by a separate step of full order; from the polynomial if Newton's method fails."""
     stepped = False
     if 0.0 < size < h and w.explicit != 0:
         stepped = step_explicitly(w, size, np.inf) < np.inf
@@ -71,7 +72,7 @@ def _write_by_step(w: Any, size: float, h: float, output: Any) -> None:
 
 @compiled
 def write_four(w: Any, times: Any, outputs: Any, first: int, end: int, h: float, origin: float) -> None:
-    """Up to four outputs on the polynomials of the step."""
+    """Write up to four outputs from the polynomials of the step."""
     k, x, n = w.member, w.fractions, w.n
     top, last = stage_count(k) + 1, end - 1
     for i in range(4):
@@ -90,7 +91,7 @@ def write_four(w: Any, times: Any, outputs: Any, first: int, end: int, h: float,
 
 @compiled
 def _correct_ledger(w: Any, h: float) -> None:
-    """The next term of the ledger's polynomial, from the defect of its rates at the probe."""
+    """Add the next term of the ledger's polynomial, from the defect of its rates at the probe."""
     k = w.member
     probe_ledger(w, h)
     for m in range(w.n_ledger):
@@ -103,9 +104,9 @@ def _correct_ledger(w: Any, h: float) -> None:
 
 @compiled
 def _polynomial_serves(w: Any, h: float) -> bool:
-    """Prepare the polynomials of state and ledger; whether that of the state is as good as the ends of the step."""
+    """Prepare the polynomials of state and ledger; True if that of the state is as accurate as the ends of the step."""
     keep_polynomial(w)
-    # Midway between the stages the polynomial is worst: do the equations hold there?
+    # Check the equations midway between the stages, where the polynomial is least accurate.
     defect_inside(w, h, PROBE[w.member])
     serves = _largest(w, 0.0) <= POLYNOMIAL_ERROR
     if not serves:
@@ -118,7 +119,7 @@ def _polynomial_serves(w: Any, h: float) -> bool:
 
 @compiled
 def _restore_step(w: Any, h: float) -> None:
-    """The main step as it was before others were made inside it: its stages, quadratures and factors."""
+    """Restore the main step after others were taken inside it: its stages, quadratures and factors."""
     if w.explicit != 0:
         step_explicitly(w, h, np.inf)
     for i in range(stage_count(w.member)):
@@ -131,7 +132,7 @@ def _restore_step(w: Any, h: float) -> None:
 
 @compiled
 def _write_inside(w: Any, times: Any, outputs: Any, first: int, last: int, h: float, origin: float) -> None:
-    """States at times between the ends of the step, counted from an origin."""
+    """Write states at times between the ends of the step, counted from an origin."""
     if _polynomial_serves(w, h):
         for i in range(first, last, 4):
             write_four(w, times, outputs, i, last, h, origin)
@@ -141,13 +142,13 @@ def _write_inside(w: Any, times: Any, outputs: Any, first: int, last: int, h: fl
     for i in range(first, last):
         _write_by_step(w, ((times[i] - origin) - w.base) - w.tau, h, outputs[i])
     _restore_step(w, h)
-    # What Newton's method knew decides on the next step, which must not depend on the outputs that were asked for.
+    # Restore the state of Newton's method too: the next step must not depend on the requested outputs.
     w.theta, w.contraction, w.guessed, w.tries = theta, contraction, guessed, tries
 
 
 @compiled
 def _add_booked(w: Any, rows: Any, first: int, last: int) -> None:
-    """Add the ledger booked before the arc to rows of states and ledgers."""
+    """Add the ledger at the start of the arc to rows of states and ledgers."""
     for i in range(first, last):
         for m in range(w.n_ledger):
             rows[i, w.n + m] += w.booked[m]
@@ -155,7 +156,7 @@ def _add_booked(w: Any, rows: Any, first: int, last: int) -> None:
 
 @compiled
 def write_now(w: Any, row: Any) -> None:
-    """State and ledger of now."""
+    """Write the present state and ledger."""
     copy(w.y, row)
     for m in range(w.n_ledger):
         row[w.n + m] = w.booked[m] + w.q[m]
@@ -163,19 +164,21 @@ def write_now(w: Any, row: Any) -> None:
 
 @compiled
 def is_within(w: Any, t: float, end: float) -> bool:
-    """Whether an output is up to this time of the arc, and not behind its segment, which may round to its end."""
+    """True if an output time is at most this time of the arc, and not after its segment, whose end it may round to."""
     return bool(t - w.origin <= end and t <= w.shown)
 
 
 @compiled
 def write_outputs(w: Any, times: Any, outputs: Any, first: int, h: float, end: float) -> int:
-    """Outputs up to the end of the step, which lies at this time of the arc; returns how many the run has now."""
+    """Write the outputs up to the end of the step, which is at this time of the arc; return the number of the run so
+    far.
+    """
     last = first
     while last < times.shape[0] and times[last] - w.origin < end:
         last += 1
     if last > first:
         _write_inside(w, times, outputs, first, last, h, w.origin)
-    while last < times.shape[0] and is_within(w, times[last], end):  # several where the time of the arc rounds
+    while last < times.shape[0] and is_within(w, times[last], end):  # several if the time of the arc rounds
         end_of_step(w, h, outputs[last], w.trial_dot, outputs[last, w.n :])
         last += 1
     _add_booked(w, outputs, first, last)
@@ -184,18 +187,19 @@ def write_outputs(w: Any, times: Any, outputs: Any, first: int, h: float, end: f
 
 @compiled
 def _parts(w: Any, h: float, growth: float) -> Any:
-    """Parts of the step in each of which a straight line misses no state by more than the picture allows: equal ones
-    of its time, and of the logarithm of the time of the run, which becomes 1 + ``growth`` times as long.
+    """Return the numbers of parts of the step in which linear interpolation of every state keeps to the allowed error.
+
+    The parts are equal in time, or in the logarithm of the time of the run, which becomes 1 + ``growth`` times as long.
     """
     scan_step(w)
     last, by_time, by_ratio = 4 * w.member + 8, 0.0, 0.0
     for i in range(last + 1):
         x = SCANNED[w.member, i]
         w.decades[i] = np.log1p(growth * x) / np.log1p(growth) if growth > 0.0 else x
-        # What is given may be a ramp since the segment began, which bends over the logarithm alone.
+        # A load may be a ramp since the start of the segment, which is curved over the logarithm only.
         by_ratio = max(by_ratio, abs(x - w.decades[i]) * h / ((w.tau + h) * FINER_BY))
     for m in range(w.n):
-        # Of the steps before count their ends, which others know who go on from an arc.
+        # Ranges include the ends of earlier steps only, so that a continued run has the same.
         low = w.least[m] = min(w.least[m], w.y[m])
         high = w.largest[m] = max(w.largest[m], w.y[m])
         missed, beside, total = 0.0, 0.0, w.scanned[last, m]
@@ -206,7 +210,7 @@ def _parts(w: Any, h: float, growth: float) -> Any:
             beside = max(beside, abs(change - w.decades[i] * total))
         size = high - low + FLAT_RANGE * w.weight[m]
         by_time, by_ratio = max(by_time, missed / size), max(by_ratio, beside / size)
-    # What a line misses goes with the square of its length.
+    # The error of linear interpolation is of second order in its length.
     return (
         min(int(np.ceil(np.sqrt(by_time / w.picture))), MOST_PARTS),
         min(int(np.ceil(np.sqrt(by_ratio / w.picture))), MOST_PARTS),
@@ -215,14 +219,16 @@ def _parts(w: Any, h: float, growth: float) -> Any:
 
 @compiled
 def write_picture(w: Any, times: Any, states: Any, first: int, h: float) -> int:
-    """States inside the step without which its picture would not be true, over time and over its logarithm; returns
-    how many the run has now, those among them for which there was no room.
+    """Store states inside the step so that linear interpolation, over time and over its logarithm, keeps to the allowed
+    error.
+
+    Return the number of the run so far, including those for which there was no memory.
     """
     start = w.before + (w.origin + (w.base + w.tau))
     growth = h / start if start > 0.0 else 0.0
     parts, ratios = _parts(w, h, growth)
     if ratios > 0 and growth <= parts * np.expm1(np.log1p(growth) / ratios):
-        ratios = 0  # equal parts of the time are short enough where its logarithm is the longest
+        ratios = 0  # equal parts of the time suffice where parts of its logarithm are longest
     middle = first + max(parts - 1, 0)
     last = middle + max(ratios - 1, 0)
     if first < last <= times.shape[0]:

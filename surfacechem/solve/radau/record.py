@@ -1,6 +1,6 @@
-"""A record of compiled code: pointers, sizes and numbers of a trajectory, or of several at once, behind one address.
+"""A record for compiled code: pointers, sizes and scalars of one or several trajectories behind one address.
 
-By value its arrays would be hundreds of arguments of every call.
+Passed by value its arrays would be hundreds of arguments of every call.
 """
 
 from collections.abc import Mapping, Sequence
@@ -36,15 +36,15 @@ _NUMBA: dict[Any, Any] = {float: types.float64, int: types.int64, complex: types
 class _Field(NamedTuple):
     kind: Any
     shape: tuple[str | int, ...] | None
-    """Of an array: None where its lengths stand behind its address."""
+    """Shape of an array; None if its lengths are stored after its address."""
     place: int
-    """In words of eight bytes."""
+    """Offset in words of eight bytes."""
 
 
 def _layout(
     sizes: Sequence[str], numbers: Mapping[str, type], memory: Mapping[str, Any]
 ) -> tuple[dict[str, _Field], int]:
-    """The fields of a record and its number of words."""
+    """Return the fields of a record and its number of words."""
     fields: dict[str, _Field] = {}
     place = 0
     for name, (dtype, axes) in {**EDGE_TABLES, **BATCH}.items():
@@ -61,10 +61,10 @@ def _layout(
 
 
 class StepperRecord(types.Type):
-    """The type of a record: what it is given (a batch), numbers that change, and arrays that it works on.
+    """The type of a record: its inputs (a batch), scalars that change, and work arrays.
 
     ``sizes`` are the names of the entries of the first table of the batch; ``numbers`` and ``memory`` give the type of
-    each number, and type and shape of each array, by name.
+    each scalar, and type and shape of each array, by name.
     """
 
     def __init__(self, name: str, sizes: Sequence[str], numbers: Mapping[str, type], memory: Mapping[str, Any]) -> None:
@@ -88,13 +88,13 @@ class _RecordFields(AttributeTemplate):
 
 
 def _word(builder: Any, work: Any, place: int, kind: Any) -> Any:
-    """Pointer to a word of the record."""
+    """Return a pointer to a word of the record."""
     return builder.bitcast(builder.gep(work, [_WORD(8 * place)], inbounds=True), kind.as_pointer())
 
 
 def _fixed(builder: Any, work: Any, place: int, kind: Any) -> Any:
-    """A word that never changes: an address, a size, a number of the batch. Told so, the compiler keeps it in a
-    register instead of looking again after each store.
+    """Load a word that never changes: an address, a size, a scalar of the batch. The metadata lets the compiler keep it
+    in a register instead of loading it again after each store.
     """
     value = builder.load(_word(builder, work, place, kind))
     value.set_metadata("invariant.load", builder.module.add_metadata([]))
@@ -140,8 +140,8 @@ def _store_field(_context: Any, builder: Any, signature: Any, args: Any, name: s
 
 
 def laying_out(record: StepperRecord) -> Any:
-    """A function that makes the record of a batch, on its caller's stack: what it is given, and the addresses of what
-    it works on, one behind the other in a memory.
+    """Return a function that makes the record of a batch on its caller's stack: its inputs, and the addresses of its
+    work arrays, contiguous in a memory.
     """
     fields = record.fields
 
@@ -182,7 +182,7 @@ def laying_out(record: StepperRecord) -> Any:
                         count = _WORD(length)
                     size = builder.mul(size, count)
                 free = builder.add(free, size)
-            # What follows is told that these words never change: it must not know that they have just been written.
+            # Later loads are marked invariant: hide from the optimizer that the words have just been written.
             opaque = ir.FunctionType(_POINTER, [_POINTER])
             return builder.asm(opaque, "", "=r,0,~{memory}", [work], True)
 

@@ -1,4 +1,4 @@
-"""The default solver: Radau IIA of adaptive order 5, 9, 13, compiled; single runs, batches, and consistent states."""
+"""The default solver: compiled Radau IIA of adaptive order 5, 9, 13; single runs, batches, and consistent states."""
 
 import threading
 from collections.abc import Sequence
@@ -45,9 +45,9 @@ EVENT_ROWS = 64
 STEP_ROWS = 512
 INSIDE_ROWS = 4096
 Room: TypeAlias = tuple[int, int, int, int]
-"""So many steps, events, states inside steps, and jumps of a run."""
+"""Numbers of steps, events, stored states inside steps, and jumps for which a run has memory."""
 CHUNK = 256
-"""Runs a thread takes at a time."""
+"""Runs that a thread takes at a time."""
 _STATUSES = tuple(Status)
 
 
@@ -68,12 +68,12 @@ def _no_rows(runs: int) -> Array:
 
 @lru_cache(maxsize=64)
 def _zeros(count: int) -> Array:
-    """Zeros that nothing writes to: a run may be briefer than making them."""
+    """Return cached zeros that nothing writes to: a run may take less time than allocating them."""
     return np.zeros(count)
 
 
 def _peaks(problem: Problem) -> Array:
-    """Largest accounts and guards, and extremes, of what a problem continues; none where it continues nothing."""
+    """Return the largest accounts and guards, and the extremes, of the part that a problem continues; zeros if none."""
     accounts, guards = problem.exchanged, problem.seen
     none, unseen = _zeros(problem.program.n_ledger), _zeros(problem.program.n_margins)
     if accounts is None and guards is None:
@@ -89,7 +89,7 @@ def _contiguous(values: ArrayLike) -> Array:
 
 
 def _with_edges(tables: Sequence[NDArray[Any]], edges: EdgeTables) -> Sequence[NDArray[Any]]:
-    """The tables of a program, and those of edges."""
+    """Return the tables of a program, with those of edges."""
     if edges is NO_EDGES:
         return *tables, edges.words
     sizes, code, *others = tables
@@ -99,7 +99,7 @@ def _with_edges(tables: Sequence[NDArray[Any]], edges: EdgeTables) -> Sequence[N
 
 
 def _edge_rows(problem: Problem, count: int, arcs: int, jumps: int) -> tuple[Array, Array]:
-    """Room for so many arcs and jumps of each run."""
+    """Return memory for these numbers of arcs and jumps of each run."""
     if problem.edges is NO_EDGES:
         return _no_rows(count), _no_rows(count)
     inputs, parameters = problem.program.n_inputs, problem.program.n_parameters
@@ -109,9 +109,10 @@ def _edge_rows(problem: Problem, count: int, arcs: int, jumps: int) -> tuple[Arr
 def batch_of(
     problem: Problem, runs: Sequence[Array], room: Room | None = None, tables: Sequence[NDArray[Any]] | None = None
 ) -> Any:
-    """Runs that share with a problem all but their y0, parameters, spacing, max_steps, peaks, segments and times,
-    which are given in this order with the run as first axis; with this room for each, or as much as is usual, and with
-    the tables of its program or others.
+    """Return a batch of runs of a problem.
+
+    The runs share with it all but their y0, parameters, spacing, max_steps, peaks, segments and times, which are given
+    in this order with the run as first axis. ``room`` and ``tables`` replace the usual memory and the program's tables.
     """
     program, times = problem.program, runs[-1]
     explicit = tables is None and problem.explicit and program.rates is not None
@@ -140,7 +141,7 @@ def batch_of(
 
 
 def _run_one(problem: Problem, room: Room | None = None) -> Any:
-    """A batch of one, run; the compiled loop looks at the stop flag before every step."""
+    """Run a batch of one; the compiled loop checks the stop flag before every step."""
     y0, parameters, segments, times = (
         _contiguous(values)[None] for values in (problem.y0, problem.parameters, problem.segments, problem.times)
     )
@@ -178,14 +179,14 @@ class Radau(Solver):
         return _whole(problem, _run_one(problem), 0)
 
     def solve_all(self, problems: Sequence[Problem], threads: int = 1) -> list[Result]:
-        """Results of problems of one model and one tolerance, each the same as that of :meth:`solve`, whatever the
-        number of threads; limits in seconds do not count.
+        """Solve problems of one model and one tolerance, each with the same result as :meth:`solve`, whatever the
+        number of threads; limits in seconds are ignored.
         """
         if len(problems) == 1:
             return [self.solve(problems[0])]
         alike: dict[tuple[Any, ...], list[int]] = {}
         for i, problem in enumerate(problems):
-            # What problems of one batch have in common, beside the model and its margins.
+            # Common to the problems of a batch, in addition to the model and its margins.
             shape = len(problem.segments), problem.atol.tobytes(), problem.rtol
             picture = problem.picture and (problem.picture, problem.before)
             crosses = problem.edges is not NO_EDGES
@@ -204,8 +205,7 @@ class Radau(Solver):
 
 
 class Dop853(Radau):
-    """Explicit steps of order 8 as long as the equations give their rates and are not stiff, those of Radau IIA from
-    there on.
+    """Explicit steps of order 8 as long as the equations give their rates and are not stiff, then steps of Radau IIA.
 
     Source: Hairer, Norsett & Wanner, Solving Ordinary Differential Equations I, section II.5, and its program DOP853.
     """
@@ -220,10 +220,10 @@ class Dop853(Radau):
 
 
 def _solved(problems: Sequence[Problem]) -> list[Result]:
-    """Results of problems of one model, and of one shape."""
+    """Solve problems of one model and one shape."""
 
     def shared(rows: Sequence[Array]) -> Array:
-        """A row for all problems where theirs are alike, else those of each."""
+        """Return a single row if all problems have the same, else a row for each."""
         alike = all(np.array_equal(values, rows[0]) for values in rows[1:])
         return _contiguous(rows[0])[None] if alike else np.array(rows, dtype=float)
 
@@ -231,7 +231,7 @@ def _solved(problems: Sequence[Problem]) -> list[Result]:
     y0, parameters, spacing, peaks = (np.array(values, float) for values in zip(*own, strict=True))
     max_steps = np.array([each.max_steps for each in problems])
     most = max(len(each.times) for each in problems)
-    # Outputs that a run has not are at infinity, which none reaches.
+    # Pad the outputs with infinite times, which no run reaches.
     times = shared([np.pad(each.times, (0, most - len(each.times)), constant_values=np.inf) for each in problems])
     segments = shared([each.segments for each in problems])
     batch = batch_of(problems[0], (y0, parameters, spacing, max_steps, peaks, segments, times))
@@ -240,8 +240,9 @@ def _solved(problems: Sequence[Problem]) -> list[Result]:
 
 
 def _whole(problem: Problem, batch: Any, i: int) -> Result:
-    """The result of a run of a batch; where its tables were too short it is repeated with the sizes it turned out to
-    need: as far again where a limit in seconds has ended it, whatever the clock says then.
+    """Return the result of a run of a batch; if its tables were too short, repeat it with the sizes that it needed.
+
+    A run that was ended by its limit in seconds is repeated for the same number of steps, whatever time that takes.
     """
     repeated, stopped = problem, False
     while True:
@@ -262,7 +263,7 @@ def _result(problem: Problem, batch: Any, i: int, counts: Sequence[int]) -> Resu
     outputs, end = counts[OUTPUTS], batch.ends[i]
     m = 1 + 2 * n + program.n_ledger
     values = batch.outputs[i, :outputs]
-    # The room for the steps of many runs is not kept for those that they took.
+    # Copy the rows of many runs, so that their unused memory is freed.
     kept = np.array if len(batch.counts) > 1 else np.asarray
 
     def written(table: Array, column: int) -> Array:
@@ -303,9 +304,11 @@ def _no_events(n: int, q: int) -> Events:
 
 
 def solve_arrays(problem: Problem, *columns: Array, room: Room | None = None) -> Any:
-    """The batch of runs that share with a problem all but y0, parameters, spacing, peaks, segments and times, which are
-    given in this order with the run as first axis, or of length one where it is the same for all; its rows as the
-    stepper writes them, with this room for each or as much as is usual.
+    """Solve runs that share with a problem all but y0, parameters, spacing, peaks, segments and times; return their
+    batch.
+
+    These are given in this order with the run as first axis, which has length one where a value is the same for all.
+    The rows of the batch are as the stepper writes them; ``room`` replaces the usual memory for each run.
     """
     y0, parameters, spacing, *others = map(np.ascontiguousarray, columns)
     batch = batch_of(problem, (y0, parameters, spacing, np.array((problem.max_steps,)), *others), room)
@@ -323,7 +326,7 @@ class Consistent:
 
 
 def search_batch(program: Program, ends: Array, table: Array, counts: NDArray[np.int64]) -> Any:
-    """The batch whose rows [t | y | ydot] of ``ends`` are made consistent where they stand.
+    """Return the batch whose rows [t | y | ydot] of ``ends`` are made consistent in place.
 
     ``table`` [row, 1, parameter] may have one row for all; ``counts`` [row, COLUMNS] gets the outcomes under END.
     """
@@ -339,7 +342,7 @@ def search_batch(program: Program, ends: Array, table: Array, counts: NDArray[np
 def consistent(program: Program, t: ArrayLike, y: ArrayLike, ydot: ArrayLike, parameters: ArrayLike) -> Consistent:
     """Keep the differential variables; find their derivatives and the algebraic variables.
 
-    For one state or a row of states [..., n]; entries of ``ydot`` and of algebraic variables are first guesses;
+    For one state or an array of states [..., n]; entries of ``ydot`` and of algebraic variables are first guesses;
     parameters are one vector or one for each state.
     """
     values = np.asarray(y, dtype=float)
@@ -364,7 +367,7 @@ def consistent(program: Program, t: ArrayLike, y: ArrayLike, ydot: ArrayLike, pa
 
 
 def output_rates(result: Result) -> Array:
-    """Derivatives at the outputs, from the equations: the polynomial's own derivative is one order less accurate."""
+    """Return the derivatives at the outputs from the equations: those of the polynomial are of one order less."""
     problem = result.problem
     if not len(result.times):
         return np.empty_like(result.outputs)
@@ -373,9 +376,9 @@ def output_rates(result: Result) -> Array:
 
 
 def rates_at(program: Program, t: Array, y: Array, parameters: Array) -> Array:
-    """Derivatives of states, shape (rows, n), at times and with parameters of their own."""
+    """Return the derivatives of states, shape (rows, n), at times and with parameters of each row."""
     guess = np.zeros_like(y)
-    # A formula is there much sooner than the solution of a linear system for each row.
+    # A formula is much faster than a linear system for each row.
     if program.external is None and program.n <= MOST_RATE_STATES and program.rates is not None:
         return program.rates(np.concatenate([t[:, None], y, guess, parameters], axis=1))
     return consistent(program, t, y, guess, parameters).ydot

@@ -1,9 +1,9 @@
-"""Radau IIA coefficients for 3, 5 and 7 stages, and the tables and settings that follow from them.
+"""Radau IIA coefficients for 3, 5 and 7 stages, and the tables and settings derived from them.
 
-coefficients.json has those that are rounded from 60 digits: the nodes c are the zeros of P_{s-1} - P_s shifted to
-(0, 1]; A is the collocation matrix; A^-1 = T diag(lambda) T^-1 is kept as one real eigenvector and (s-1)/2 complex
-pairs, of which only the member with positive imaginary part is stored (PAIR_COLUMNS carries the factor 2 of its
-conjugate). Tables are padded to seven stages; the first index is the family member k = (s - 3) / 2.
+coefficients.json contains those rounded from 60 digits: the nodes c are the zeros of P_{s-1} - P_s shifted to (0, 1]; A
+is the collocation matrix; A^-1 = T diag(lambda) T^-1 is stored as one real eigenvector and (s-1)/2 complex pairs, of
+which only the member with positive imaginary part is stored (PAIR_COLUMNS includes the factor 2 of its conjugate).
+Tables are padded to seven stages; the first index is the family member k = (s - 3) / 2.
 
 Source: Hairer & Wanner, Solving Ordinary Differential Equations II, sections IV.5 and IV.8.
 """
@@ -20,17 +20,17 @@ from surfacechem.solve.radau.stepper import SCAN_POINTS
 STAGES = (3, 5, 7)
 
 SCAN_EDGE = 1e-6
-"""Distance, as a part of the step, of the points beside its ends that show the slopes of margins there."""
+"""Distance from the ends of a step, as a part of it, of the points that determine the slopes of margins there."""
 MEMBER_RTOLS = (2e-5, 3e-12)
-"""Relative tolerances above which 3 and 5 stages reach an error soonest, measured on Robertson's and other problems."""
+"""Relative tolerances above which 3 and 5 stages are the most efficient, measured on Robertson's and other problems."""
 COARSE_RTOL = 3e-6
-"""Tolerance above which one Newton correction is not believed: a thinner layer may hide behind its Jacobian."""
+"""Tolerance above which a single Newton correction is not trusted: its Jacobian may have missed a thinner layer."""
 
 _GIVEN = json.loads(Path(__file__).with_name("coefficients.json").read_text(encoding="utf-8"))
 
 
 def _padded(name: str) -> NDArray[Any]:
-    """The three tables of this name, each s by s, s by p, ... in its own size, in one zero-padded array."""
+    """Return the three tables of this name, of shape (s, s), (s, p), ..., in one zero-padded array."""
     given = _GIVEN[name]
     if isinstance(given, dict):
         parts = [[np.array(member) for member in given[part]] for part in ("real", "imag")]
@@ -56,30 +56,32 @@ PAIR_COLUMNS = _padded("PAIR_COLUMNS")
 
 
 LAST_STAGE, STAGES_OF_DENSE = 15, 13
-"""Of the explicit method: the last row of its rates, and those before the ones that only its polynomial needs."""
+"""Of the explicit method: the last row of its rates, and the number of rows before those that only its dense output
+needs.
+"""
 
 
 def _rows(name: str, columns: int) -> NDArray[np.float64]:
-    """Rows of different lengths as a zero-padded table."""
+    """Return rows of different lengths as a zero-padded table."""
     return np.array([np.pad(row, (0, columns - len(row))) for row in _GIVEN[name]])
 
 
 EXPLICIT_NODES = np.array(_GIVEN["EXPLICIT_NODES"])
 EXPLICIT = np.pad(_rows("EXPLICIT", LAST_STAGE + 1), ((1, 0), (0, 0)))
-"""Changes of the state at the stages of the explicit method from the rates of those before; row 12 is its step."""
+"""Coefficients of the stages of the explicit method by the rates of earlier stages; row 12 is the step."""
 EXPLICIT_ERRORS = _rows("EXPLICIT_ERRORS", LAST_STAGE + 1)
-"""Errors of order 5 and 3 from the rates."""
+"""Coefficients of the errors of order 5 and 3."""
 _step, _first, _last = EXPLICIT[12], np.eye(LAST_STAGE + 1)[0], np.eye(LAST_STAGE + 1)[12]
 DENSE_FACTORS = np.array(
     [_step, _first - _step, 2.0 * _step - _last - _first, *_rows("EXPLICIT_DENSE", LAST_STAGE + 1)]
 )
-"""F_0, F_1, ... of the polynomial x (F_0 + (1 - x) (F_1 + x (F_2 + (1 - x) (F_3 + ...)))) of an explicit step from all
-its rates; F_0 to F_2 are from both ends.
+"""Coefficients of F_0, F_1, ... in the dense output x (F_0 + (1 - x) (F_1 + x (F_2 + (1 - x) (F_3 + ...)))) of an
+explicit step, by all its rates; F_0 to F_2 interpolate both ends.
 """
 
 
 def _dense(nodes: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Changes at the nodes of an explicit step's polynomial from all its rates."""
+    """Return the coefficients of an explicit step's dense output at these nodes, by all its rates."""
     table = np.zeros((len(nodes), LAST_STAGE + 1))
     for i, factor in enumerate(reversed(DENSE_FACTORS)):
         table = (table + factor) * (nodes if i % 2 == 0 else 1.0 - nodes)[:, None]
@@ -90,13 +92,15 @@ DENSE = _dense(np.array(_GIVEN["NODES"][2]))
 
 
 def _lagrange(nodes: NDArray[np.float64]) -> NDArray[np.float64]:
-    """1 / (c_j prod_{k != j} (c_j - c_k)): barycentric weights of the nodes 0, c_1, ..., c_s without the node 0."""
+    """Return 1 / (c_j prod_{k != j} (c_j - c_k)): barycentric weights of the nodes 0, c_1, ..., c_s without the
+    node 0.
+    """
     gaps = nodes[:, None] - nodes[None, :] + np.eye(len(nodes))
     return np.asarray(1.0 / (nodes * gaps.prod(axis=1)))
 
 
 def _defect(nodes: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Coefficients of x, x^2, ... in the integral from 0 to x of prod_i (1 - x / c_i)."""
+    """Return the coefficients of x, x^2, ... in the integral from 0 to x of prod_i (1 - x / c_i)."""
     product = np.poly1d([1.0])
     for node in nodes:
         product *= np.poly1d([-1.0 / node, 1.0])
@@ -104,21 +108,23 @@ def _defect(nodes: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _probe(nodes: NDArray[np.float64]) -> np.float64:
-    """Point at which the interpolation error x prod_i (x - c_i) is largest."""
+    """Return the point at which the interpolation error x prod_i (x - c_i) is largest."""
     x = np.linspace(0.0, 1.0, 1001)
     return np.float64(x[np.argmax(np.abs(x * np.prod(x[:, None] - nodes, axis=1)))])
 
 
 def _probe_rate(nodes: NDArray[np.float64], x: float) -> NDArray[np.float64]:
-    """Values at x of the Lagrange polynomials on c_1, ..., c_s and, last of eight, on 0."""
+    """Return the values at x of the Lagrange polynomials on c_1, ..., c_s and, last of eight, on 0."""
     points = np.append(nodes, 0.0)
     values = [np.prod((x - np.delete(points, i)) / (c - np.delete(points, i))) for i, c in enumerate(points)]
     return np.concatenate([values[:-1], np.zeros(8 - len(points)), values[-1:]])
 
 
 def _newton(nodes: NDArray[np.float64], coefficients: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The polynomial of these coefficients of x, x^2, ... in Newton's form x, x (x - c_1), x (x - c_1)(x - c_2), ...;
-    the last of ten factors is x again.
+    """Return a polynomial with these coefficients of x, x^2, ... in Newton's form x, x (x - c_1), x (x - c_1)(x - c_2),
+    ...
+
+    The last of ten factors is x again.
     """
     rest, result = np.poly1d(coefficients[::-1]), np.zeros(9)
     for i, node in enumerate(np.append(nodes, 0.0)):
@@ -129,26 +135,29 @@ def _newton(nodes: NDArray[np.float64], coefficients: NDArray[np.float64]) -> ND
 
 
 def _probe_shape(nodes: NDArray[np.float64], x: float) -> NDArray[np.float64]:
-    """Coefficients of x, x^2, ... in the integral from 0 of x prod_i (x - c_i), which is one at the probe."""
+    """Return the coefficients of x, x^2, ... in the integral from 0 of x prod_i (x - c_i), scaled to one at the
+    probe.
+    """
     product = np.poly1d(np.append(nodes, 0.0), r=True)
     return np.asarray((product / product(x)).integ().coeffs[::-1][1:])
 
 
 def _scanned(k: int) -> NDArray[np.float64]:
-    """Fractions of the step, from its start, just inside its end, to its end; more points for higher orders."""
+    """Return fractions of the step, from its start, just inside its end, to its end; more points for higher orders."""
     last = 4 * k + 7
     inside = [SCAN_EDGE, *(np.arange(1, last) / last), 1.0 - SCAN_EDGE, 1.0]
     return np.pad(inside, (0, SCAN_POINTS - len(inside)), constant_values=1.0)
 
 
 def _scan_table(nodes: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Value and rate at the points of the polynomial through (0, 0), (c_j, z_j) per unit z_j, and, behind these, of
-    the shape of its error.
+    """Return value and rate at the points, per unit z_j, of the polynomial through (0, 0), (c_j, z_j).
+
+    The last column is the shape of its error.
     """
     table = np.zeros((2, SCAN_POINTS, 8))
     for j, c in enumerate(nodes):
         others = np.append(np.delete(nodes, j), 0.0)
-        # As products: sums of powers would lose digits, and the end of the step is a node.
+        # Products keep the digits that sums of powers would lose; the end of the step is a node.
         parts = (points[:, None] - others) / (c - others)
         table[0, :, j] = parts.prod(axis=1)
         for i, other in enumerate(others):
@@ -159,7 +168,7 @@ def _scan_table(nodes: NDArray[np.float64], points: NDArray[np.float64]) -> NDAr
 
 
 def _inverse_gaps(nodes: NDArray[np.float64]) -> NDArray[np.float64]:
-    """1 / (c_i - c_{i-level}) for divided differences of each level; level 0 divides by c_i."""
+    """Return 1 / (c_i - c_{i-level}) for divided differences of each level; level 0 divides by c_i."""
     table = np.zeros((7, 7))
     for level in range(len(nodes)):
         for i in range(level, len(nodes)):
@@ -168,7 +177,7 @@ def _inverse_gaps(nodes: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _real_rows() -> NDArray[np.float64]:
-    """T^-1 and T as real tables: a row, or a column, of the real eigenvector, then two of each pair."""
+    """Return T^-1 and T as real tables: a row, or a column, of the real eigenvector, then two of each pair."""
     rows, columns = np.zeros((3, 7, 7)), np.zeros((3, 7, 7))
     rows[:, 0], rows[:, 1::2], rows[:, 2::2] = REAL_ROW, PAIR_ROWS.real, PAIR_ROWS.imag
     columns[:, :, 0], columns[:, :, 1::2], columns[:, :, 2::2] = REAL_COLUMN, PAIR_COLUMNS.real, -PAIR_COLUMNS.imag
@@ -179,22 +188,23 @@ TO_PARTS, FROM_PARTS = _real_rows()
 """From residuals to the right-hand sides of the decoupled systems, and from their solutions to the stages."""
 _members = [NODES[k, :s] for k, s in enumerate(STAGES)]
 START_RATE = np.array([np.pad(-_lagrange(c) * np.prod(-c), (0, 7 - len(c))) for c in _members])
-"""Value at 0 of the Lagrange polynomials on c_1, ..., c_s: extrapolates stage rates to the start of the step."""
+"""Values at 0 of the Lagrange polynomials on c_1, ..., c_s: they extrapolate stage rates to the start of the step."""
 START_SLOPE = np.array([np.pad(-_lagrange(c) * np.prod(-c) / c, (0, 7 - len(c))) for c in _members])
-"""Derivative at 0 of the polynomial through (0, 0), (c_j, z_j): its difference to the true rate is the error
-estimate."""
+"""Derivative at 0 of the polynomial through (0, 0), (c_j, z_j): its difference from the true rate is the error
+estimate.
+"""
 INVERSE_GAPS = np.array([_inverse_gaps(c) for c in _members])
 NEWTON_NODES = np.array([np.pad(c, (0, 9 - len(c))) for c in _members])
 DEFECT = np.array([_newton(c, _defect(c)) for c in _members])
 """Shape of the error of the collocation polynomial, per unit defect of its derivative at 0, in Newton's form."""
 PROBE = np.array([_probe(c) for c in _members])
-"""Fraction of the step at which a component that the stages only interpolate is worst."""
+"""Fraction of the step at which the error of an interpolated component is largest."""
 PROBE_RATE = np.array([_probe_rate(c, x) for c, x in zip(_members, PROBE, strict=True)])
-"""Extrapolates the rates of the stages and of the start (last) to the probe."""
+"""Coefficients that extrapolate the rates of the stages and of the start (last) to the probe."""
 PROBE_SHAPE = np.array([_newton(c, _probe_shape(c, x)) for c, x in zip(_members, PROBE, strict=True)])
 """Shape of a quadrature's error, per unit defect of its rate at the probe, in Newton's form."""
 SCANNED = np.array([_scanned(k) for k in range(len(STAGES))])
-"""Points of a step at which margins are examined."""
+"""Points of a step at which margins are evaluated."""
 _scans = np.array([_scan_table(c, x) for c, x in zip(_members, SCANNED, strict=True)])
 SCAN_VALUES, SCAN_RATES = np.ascontiguousarray(_scans[:, 0]), np.ascontiguousarray(_scans[:, 1])
-"""State and rate at these points from the stages and, behind them, the correction of the polynomial."""
+"""State and rate at these points by the stages and, in the last column, the correction of the polynomial."""

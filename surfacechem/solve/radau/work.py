@@ -1,10 +1,12 @@
-"""The memory of one trajectory, calls of machine code by its address, and tables times stages.
+"""The memory of one trajectory, calls of machine code by its address, and products of tables and stages.
 
-The address is data, not a function type: code compiled here never depends on the scene it calls and is cached for good.
+The address is data, not a function type: code compiled here does not depend on the scene that it calls, and stays
+cached.
 
-A table of coefficients times the matrix [stage, state] is what a step does most often. Its loops are too short for a
-compiler to make vectors of them; here they are written as vectors, whatever the number of states: the last vector of
-a row runs over into the next row, which is written after it, or into rows that are kept free behind the last stage.
+The product of a table of coefficients and the matrix [stage, state] is the most frequent operation of a step. Its loops
+are too short to be vectorized by a compiler; here they are written with vectors, whatever the number of states: the
+last vector of a row overwrites the start of the next row, which is written later, or rows kept free behind the last
+stage.
 """
 
 from typing import Any
@@ -34,8 +36,8 @@ PARTS: set[str] = set()
 
 
 def compiled(function: Any) -> Any:
-    """A part of the kernel. Nothing is allocated: without reference counts the code compiles and runs about twice as
-    fast.
+    """Compile a part of the kernel. Nothing is allocated: without reference counts the code compiles and runs about
+    twice as fast.
     """
     PARTS.add(function.__qualname__)
     return _njit(error_model="numpy", _nrt=False, no_cpython_wrapper=True, no_cfunc_wrapper=True)(function)
@@ -44,8 +46,8 @@ def compiled(function: Any) -> Any:
 RESIDUAL, JACOBIAN, LEDGER, MARGINS, RATES, MAGNITUDES, GUARD_RATES, BOOKS, NODES, TIMES_OF_RETURN, RESETS = np.arange(
     11
 )
-"""Rows of the table of addresses (code, user data), of resets the first. NumPy's integers, as Numba compiles what takes
-a Python constant anew for each constant.
+"""Rows of the table of addresses (code, user data); of resets the first. They are NumPy integers, as Numba compiles a
+function anew for each Python constant.
 """
 
 WORK = StepperRecord("Work", SIZES, NUMBERS, MEMORY)
@@ -69,13 +71,13 @@ def _call(_context: Any, _address: Any, _out: Any, _inputs: Any, _user: Any) -> 
 
 @compiled
 def evaluate(w: Any, which: int, result: Any) -> None:
-    """Call a function of the program on the current inputs."""
+    """Call a function of the program at the current inputs."""
     _call(w.code[which, 0], result.ctypes.data, w.inputs.ctypes.data, w.code[which, 1])
 
 
 @compiled
 def evaluate_at(w: Any, which: int, inputs: Any, result: Any) -> None:
-    """Call a function of the program on these inputs."""
+    """Call a function of the program at these inputs."""
     _call(w.code[which, 0], result.ctypes.data, inputs.ctypes.data, w.code[which, 1])
 
 
@@ -98,11 +100,11 @@ def _set_number(_context: Any, _address: Any, _value: Any) -> Any:
 
 @compiled
 def evaluate_jacobian(w: Any) -> None:
-    """The derivatives at the current inputs: of the core, its border and the bands, which lie one behind the other."""
+    """Evaluate the derivatives at the current inputs: core, border and bands, which are contiguous in memory."""
     evaluate(w, JACOBIAN, w.jacobian)
     if len(w.nonzeros) == 0:
         return
-    # From the last to the first each goes to its own place, which is not before that where it was written.
+    # From last to first, move each entry to its position, which is never before the one it was written to.
     start, end = w.jacobian.ctypes.data, w.jacobian.size + w.border_derivatives.size + w.band_derivatives.size
     for k in range(len(w.nonzeros) - 1, -1, -1):
         value, place = _number(start + 8 * k), w.nonzeros[k]
@@ -116,7 +118,7 @@ def evaluate_jacobian(w: Any) -> None:
 
 @compiled
 def set_inputs(w: Any, y: Any, ydot: Any) -> None:
-    """State and rates of the next call."""
+    """Write state and rates to the inputs."""
     n, inputs = w.n, w.inputs
     for j in range(n):
         inputs[1 + j] = y[j]
@@ -125,14 +127,14 @@ def set_inputs(w: Any, y: Any, ydot: Any) -> None:
 
 @compiled
 def put(w: Any, offset: float, y: Any, ydot: Any) -> None:
-    """Inputs of the next call, this time after the start of the step."""
+    """Write state and rates to the inputs, at this time after the start of the step."""
     w.inputs[0] = w.base + (w.tau + offset)
     set_inputs(w, y, ydot)
 
 
 @compiled
 def row_of(table: Any, i: int) -> int:
-    """Row of run i in a table that has one for each run, or one for all."""
+    """Return the row of run i in a table with one row for each run, or one for all."""
     return min(i, int(table.shape[0]) - 1)
 
 
@@ -145,14 +147,14 @@ def copy(source: Any, target: Any) -> None:
 
 @compiled
 def clear(target: Any) -> None:
-    """Set entry by entry; a slice assignment would bring broadcasting and its errors."""
+    """Set to zero entry by entry; a slice assignment would compile broadcasting and its errors."""
     for j in range(target.shape[0]):
         target[j] = 0
 
 
 @compiled
 def any_true(flags: Any) -> bool:
-    """Whether a flag is set."""
+    """True if a flag is set."""
     found = False
     for flag in flags:
         found = found or flag != 0
@@ -161,7 +163,7 @@ def any_true(flags: Any) -> bool:
 
 @compiled
 def finite(values: Any) -> bool:
-    """Whether no entry is infinite or NaN."""
+    """True if no entry is infinite or NaN."""
     total = 0.0
     for value in values:
         total += 0.0 * value
@@ -170,7 +172,7 @@ def finite(values: Any) -> bool:
 
 @compiled
 def keep_largest(values: Any, largest: Any) -> None:
-    """Keep the largest magnitudes seen."""
+    """Update the largest magnitudes."""
     for j in range(values.shape[0]):
         largest[j] = max(largest[j], abs(values[j]))
 
@@ -184,8 +186,10 @@ _VECTOR = ir.VectorType(_NUMBER, WIDTH)
 def combine(
     _context: Any, _table: Any, _width: Any, _rows: Any, _terms: Any, _values: Any, _states: Any, _out: Any
 ) -> Any:
-    """Rows of a table of some width times the first so many rows of values; table, values and result, which is another
-    matrix, are given by their addresses.
+    """Multiply rows of a table by the first rows of a matrix of values; all three matrices are given by their
+    addresses.
+
+    The result must be another matrix than the values.
     """
     signature = types.void(*(types.intp,) * 7)
 
@@ -205,7 +209,7 @@ def combine(
             with _loop(builder, terms) as term:
                 factor = builder.load(place(table, row.index, width, term.index, _NUMBER))
                 value = builder.load(place(values, term.index, states, first, _VECTOR), align=8)
-                # The factor in every place of a vector.
+                # Broadcast the factor to a vector.
                 nothing, lanes = _Constant(_VECTOR, ir.Undefined), ir.VectorType(ir.IntType(32), WIDTH)
                 single = builder.insert_element(nothing, factor, ir.IntType(32)(0))
                 factors = builder.shuffle_vector(single, nothing, _Constant(lanes, [0] * WIDTH))
@@ -217,10 +221,10 @@ def combine(
 
 
 def weighted_sums(table: Any) -> Any:
-    """A function that takes a row of this table times the rows of a matrix of some width, given by its address, of
-    which it takes the first so many columns, into another.
+    """Return a function that multiplies a row of this table and the rows of a matrix, given by its address.
 
-    The factors stand in the code and those that are zero nowhere, so it takes half the time of :func:`combine`.
+    It takes the first columns of a matrix of any width. The factors are constants in the code and zeros are skipped, so
+    it takes half the time of :func:`combine`.
     """
 
     @_intrinsic
@@ -241,7 +245,7 @@ def weighted_sums(table: Any) -> Any:
                 cases.add_case(_WORD(i), block)
                 builder.position_at_end(block)
                 with _strided_loop(builder, _WORD(0), columns, _WORD(WIDTH), inc=True) as (first, _):
-                    # Two sums, of which neither waits for the other.
+                    # Two independent sums, so that neither waits for the other.
                     totals = [_Constant(_VECTOR, [0.0] * WIDTH)] * 2
                     for k, j in enumerate(np.flatnonzero(factors)):
                         pointer = builder.bitcast(place(values, int(j), first), _VECTOR.as_pointer())
