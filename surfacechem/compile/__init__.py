@@ -1,1 +1,1 @@
-"""Expressions as machine code and as readable Python, and the folder in which compiled code is kept."""
+"""Expressions as machine code and as readable Python, and the cache folder of compiled code."""

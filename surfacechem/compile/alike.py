@@ -1,8 +1,8 @@
-"""Expressions that are alike, as those of the cells of a body: each form is compiled once, and called in a loop.
+"""Expressions of the same form, such as those of a body's cells: each form is compiled once and called in a loop.
 
-The balances of cells, their derivatives and the terms of sums over them are one function of other states and other
-numbers. The code of such a form is vectors, each of whose places belongs to a cell; which states and numbers it reads
-is a table beside it. So the time to compile does not grow with the number of cells, nor does another grid need any.
+The balances of cells, their derivatives and the terms of sums over them are one function of different states and
+numbers. The code of such a form is vectorised over the cells, and a table contains the states and numbers that each
+cell reads. So the compile time does not grow with the number of cells, and another grid needs no new code.
 """
 
 from __future__ import annotations
@@ -33,14 +33,16 @@ if TYPE_CHECKING:
 
 _WORD: Any = ir.IntType(64)
 _HEADER_WORDS = 5
-"""Header words before those of the loops: results; of the rest its number, code, user data and table of places."""
+"""Header words before those of the loops: number of results; of the rest its number, code, user data and table of
+results.
+"""
 _LOOP_WORDS = 5
-"""Words of a loop: cases, and the tables of shared inputs, of own inputs, of numbers and of places."""
+"""Words of a loop: number of cases, and the tables of shared inputs, own inputs, numbers and results."""
 
 
 @dataclass(frozen=True)
 class Form:
-    """Functions of the inputs that all cases of a loop share, of the own inputs of each, and of its numbers."""
+    """Functions of the inputs shared by all cases of a loop, of the own inputs of each case, and of its numbers."""
 
     expressions: tuple[Any, ...]
     shared: tuple[Any, ...]
@@ -49,16 +51,14 @@ class Form:
 
     @property
     def has_code(self) -> bool:
-        """Whether each case reads what is its own, by functions that have, with their derivatives, code for vectors."""
+        """True if each case has own inputs, and vector code exists for all functions and their derivatives."""
         slopes = (slope for row in self.expressions for slope in gradient(row).values())
         return bool(self.own) and all(map(vectors.has_code, (*self.expressions, *slopes)))
 
 
 @dataclass(frozen=True)
 class FormLoop:
-    """The cases of a form, one behind the other: the inputs that each reads, its numbers, and the results to which it
-    is added.
-    """
+    """The cases of a form in order: the inputs that each reads, its numbers, and the results to which it is added."""
 
     form: Form
     own: list[int] = field(default_factory=list)
@@ -70,7 +70,9 @@ class FormLoop:
         return len(self.places) // len(self.form.expressions)
 
     def tables(self, inputs: Mapping[Any, int]) -> tuple[NDArray[Any], ...]:
-        """Places of the shared inputs, and by vectors of cases the own inputs, the numbers and the places of each."""
+        """Return the positions of the shared inputs; own inputs and numbers by vectors of cases; and the positions of
+        the results.
+        """
         vectors = -(-self.count // LANES)
 
         def by_vectors(values: Sequence[Any], kind: type) -> NDArray[Any]:
@@ -82,7 +84,7 @@ class FormLoop:
         return shared, by_vectors(self.own, np.int64), by_vectors(self.numbers, float), np.array(self.places, np.int64)
 
     def slopes(self, inputs: Mapping[Any, int], places: Mapping[tuple[int, int], int]) -> FormLoop:
-        """Derivatives of rows by all inputs, as far as these have ``places``, by row and input."""
+        """Return the loop of the derivatives of rows by inputs, for the row and input pairs in ``places``."""
         (row,), shared = self.form.expressions, [inputs[symbol] for symbol in self.form.shared]
         variables = {place for _, place in places}
         symbols = enumerate((*self.form.own, *self.form.shared))
@@ -94,10 +96,10 @@ class FormLoop:
 
 
 FormMatch = tuple[str, tuple[int, ...], tuple[float, ...]]
-"""A form as text, and its contents from left to right: places of inputs, and numbers."""
+"""A form as text, and its contents from left to right: positions of inputs, and numbers."""
 
 
-@lru_cache(maxsize=2)  # all functions of a scene share them
+@lru_cache(maxsize=2)  # shared by all functions of a scene
 class _Forms:
     """The forms of expressions, with the inputs and numbers of each expression in its form."""
 
@@ -106,7 +108,7 @@ class _Forms:
         self._known: dict[Any, FormMatch] = {symbol: ("x", (place,), ()) for symbol, place in self.places.items()}
 
     def of(self, part: Any) -> FormMatch:
-        """The form of a part."""
+        """Return the form of a part of an expression."""
         found = self._known.get(part)
         if found is not None:
             return found
@@ -122,7 +124,7 @@ class _Forms:
         return found
 
     def _whole(self, part: Any) -> FormMatch:
-        """The form of a part that is no sum or product: its numbers belong to it."""
+        """Return the form of a part that is neither sum nor product: its numbers belong to the form."""
         own = self._own(part)
         form = part.xreplace({x: symengine.Symbol(f"x {k}") for k, x in enumerate(own)})
         numbers = [float(number).hex() for number in form.atoms(symengine.RealDouble)]
@@ -132,7 +134,7 @@ class _Forms:
         return sorted((x for x in part.free_symbols if x in self.places), key=self.places.__getitem__)
 
     def form(self, part: Any) -> Form:
-        """The function that a part and its like have in common."""
+        """Return the function of which a part and those of the same form are cases."""
         own: dict[Any, Any] = {}
         numbers: list[Any] = []
 
@@ -151,13 +153,13 @@ class _Forms:
 
 
 _COMMUTATIVE = "Add", "Mul"
-"""Kinds whose arguments are put in an order that those alike have in common: along the cells."""
+"""Kinds whose arguments are sorted, so that parts of the same form have them in the same order: along the cells."""
 
 
 def loops_of(
     inputs: Sequence[Any], expressions: Sequence[Any], own: Collection[Any]
 ) -> tuple[list[FormLoop], list[Any]]:
-    """The loops over parts that differ in their ``own`` inputs and in numbers only, and the rest of each expression.
+    """Return the loops over parts that differ only in their ``own`` inputs and numbers, and the rest of each.
 
     >>> x = symengine.symbols("x0:20")
     >>> k = symengine.Symbol("k")
@@ -181,7 +183,7 @@ def loops_of(
             loop.numbers.extend(numbers)
             loop.places.append(place)
             members[key].append(term)
-    # In an order that does not depend on that of the terms of sums.
+    # Sorted, since the order of terms in sums is not reproducible.
     several = {key: loop for key, loop in sorted(loops.items()) if loop.count >= LANES and loop.form.has_code}
     rest: list[list[Any]] = [[] for _ in expressions]
     for key, loop in loops.items():
@@ -192,7 +194,7 @@ def loops_of(
 
 
 def _terms(expression: Any) -> Sequence[Any]:
-    """The terms of a long sum, or the expression."""
+    """Return the terms of a long sum, or the expression."""
     if expression == 0:
         return ()
     args = expression.args if type(expression).__name__ == "Add" else ()
@@ -200,7 +202,7 @@ def _terms(expression: Any) -> Sequence[Any]:
 
 
 class LoopCode:
-    """The code of loops with the tables that it reads, and the code of the rest."""
+    """The code of loops with their tables, and the code of the rest."""
 
     def __init__(
         self, inputs: Sequence[Any], loops: Sequence[FormLoop], rest: Sequence[Any], code: Function | None
@@ -222,7 +224,7 @@ class LoopCode:
         self._call: Any = C_FUNCTION(self.address)
 
     def __call__(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The results of rows of inputs."""
+        """Return the results for rows of inputs."""
         rows = values.reshape(-1, values.shape[-1])
         found = np.empty((len(rows), self._n_out))
         for out, given in zip(found, rows, strict=True):
@@ -233,8 +235,10 @@ class LoopCode:
 @lru_cache(maxsize=64)
 @PREPARATION
 def _code_of(forms: tuple[Form, ...]) -> Any:
-    """Code of loops over these forms, and around them that of the rest: ``void f(double *out, const double *inputs,
-    void *user)``, whose user data are the words of the table.
+    """Return the code of loops over these forms, which also calls that of the rest.
+
+    Its signature is ``void f(double *out, const double *inputs, void *user)``, with the words of the table as user
+    data.
     """
 
     def made() -> bytes:
@@ -246,7 +250,7 @@ def _code_of(forms: tuple[Form, ...]) -> Any:
         code.builder.ret_void()
         return object_code(code.builder)
 
-    sources = map(source_digest, (__file__, vectors.__file__))  # by which code is made
+    sources = map(source_digest, (__file__, vectors.__file__))  # the sources that generate the code
     origins = (str((form.expressions, form.shared, form.own, form.numbers)) for form in forms)
     return engine(from_file(code_file([*sources, *origins]), made, bytes, bytes))
 
@@ -259,12 +263,12 @@ class _Loops:
         self.out, self.inputs, self.user = self.builder.function.args
 
     def nothing(self) -> None:
-        """Results to which all is added."""
+        """Set the results to zero, since everything is added to them."""
         with self._each(self._word(0)) as i:
             self.builder.store(NUMBER(0.0), self._entry(self.out, i))
 
     def rest(self) -> None:
-        """Call the code of the part that is in no loop."""
+        """Call the code of the expressions that are in no loop."""
         b = self.builder
         count, address, user, places = map(self._word, range(1, _HEADER_WORDS))
         with b.if_then(b.icmp_signed(">", count, _WORD(0))):
@@ -275,7 +279,7 @@ class _Loops:
                 self._add(self._read(places, i, _WORD), self._read(values, i))
 
     def loop(self, form: Form, head: int) -> None:
-        """Add the values of a form, for as many cases as the words of its loop tell."""
+        """Add the values of a form, for the number of cases in the words of its loop."""
         b = self.builder
         count, shared, own, numbers, places = (self._word(head + k) for k in range(_LOOP_WORDS))
         known, results = {}, [b.alloca(VECTOR) for _ in form.expressions]
@@ -304,7 +308,7 @@ class _Loops:
         return self._read(self.user, _WORD(place), _WORD)
 
     def _entry(self, start: Any, place: Any, kind: Any = NUMBER) -> Any:
-        """A pointer to a word or a number, so many behind a pointer or an address."""
+        """Return a pointer to a word or a number at an offset from a pointer or an address."""
         start = start if start.type == self.out.type else self.builder.inttoptr(start, self.out.type)
         entry = self.builder.gep(start, [self.builder.mul(place, _WORD(8))])
         return self.builder.bitcast(entry, kind.as_pointer())
@@ -318,7 +322,7 @@ class _Loops:
 
     @contextmanager
     def _each(self, count: Any) -> Iterator[Any]:
-        """Code for each number below a count."""
+        """Generate code for each number below a count."""
         b = self.builder
         before, test = b.block, b.append_basic_block()
         b.branch(test)

@@ -1,8 +1,8 @@
-"""The compiled stepper without its compiler: machine code that Numba has made, loaded and called by itself.
+"""The compiled stepper without its compiler: machine code made by Numba, loaded and called without it.
 
-Importing Numba takes half of the time of a brief process. The code needs nothing of it: it is loaded by LLVM alone, in
-a tenth of that time. A call costs some ten microseconds more than Numba's own, which is why only processes that make
-few of them use it.
+Importing Numba takes half of the time of a brief process. The code does not need it: LLVM alone loads the code in a
+tenth of that time. A call takes some ten microseconds longer than through Numba, so only processes with few calls use
+it.
 """
 
 from __future__ import annotations
@@ -34,10 +34,10 @@ UNUSED_SYMBOLS = (
     "numba_runtime_build_excinfo_struct",
     "numba_unpickle",
 )
-"""Symbols that only the entry from Python calls, which is unused here: they are bound to code that ends the process."""
+"""Symbols that only the unused entry from Python calls: they are bound to code that ends the process."""
 
 LOADING_TIMEOUT = 60.0
-"""Time [s] after which a process that loads the code has failed."""
+"""Time [s] after which the test process that loads the code has failed."""
 
 LOADING_TEST = """
 import sys
@@ -48,7 +48,7 @@ assert load(Path(sys.argv[1])) is not None
 
 
 def keep(kernel: Any, folder: Path) -> None:
-    """Keep the machine code of a kernel that Numba has just compiled; only if a process of its own can load it."""
+    """Store the machine code of a kernel that Numba has just compiled; only if a separate process can load it."""
     if untrusted(folder) is not None:
         return
     (made,) = kernel.overloads.values()
@@ -67,7 +67,7 @@ def keep(kernel: Any, folder: Path) -> None:
 
 
 def load(folder: Path) -> Callable[..., None] | None:
-    """The kernel whose code is kept in a folder; None where there is none that can be trusted."""
+    """Return the kernel whose code is stored in a folder; None if there is none that can be trusted."""
     if untrusted(folder) is not None:
         return None
     try:
@@ -81,16 +81,16 @@ def load(folder: Path) -> Callable[..., None] | None:
 
 
 def engine(code: bytes, unused: Sequence[str] = ()) -> Any:
-    """An engine that holds machine code; symbols that it names and does not use end the process."""
+    """Return an engine that holds machine code; calls of the ``unused`` symbols end the process."""
     import llvmlite.binding as llvm
 
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
     machine = llvm.Target.from_default_triple().create_target_machine(jit=True)
     missing = llvm.parse_assembly("\n".join(f"declare void @{name}()" for name in unused))
-    found = llvm.create_mcjit_compiler(missing, machine)  # which owns both from here on
+    found = llvm.create_mcjit_compiler(missing, machine)  # takes ownership of both
     abort = ctypes.cast(ctypes.CDLL(None).abort, ctypes.c_void_p).value if unused else None
-    for name in unused:  # in this engine alone: Numba may be at work in the same process
+    for name in unused:  # in this engine only: Numba may be running in the same process
         found.add_global_mapping(missing.get_function(name), abort)
     found.add_object_file(llvm.ObjectFileRef.from_data(code))
     found.finalize_object()
@@ -98,7 +98,7 @@ def engine(code: bytes, unused: Sequence[str] = ()) -> Any:
 
 
 class Kernel:
-    """Machine code of a function of integers, numbers, contiguous arrays and tuples of these that returns nothing."""
+    """Machine code of a function without results, of integers, floats, contiguous arrays and tuples of these."""
 
     def __init__(self, name: str, code: bytes) -> None:
         self._engine = engine(code, UNUSED_SYMBOLS)
@@ -107,7 +107,7 @@ class Kernel:
         self._nothing, self._error = ctypes.c_void_p(), ctypes.c_void_p()
 
     def __call__(self, *arguments: Any) -> None:
-        """Call the kernel; the interpreter goes on in other threads meanwhile."""
+        """Call the kernel; it releases the interpreter lock."""
         words = _words(arguments)
         if self._call is None:
             kinds = [ctypes.c_double if isinstance(word, float) else ctypes.c_int64 for word in words]
@@ -119,8 +119,8 @@ class Kernel:
 
 
 def _words(argument: Any) -> Sequence[Any]:
-    """An argument as Numba passes it: entry by entry of a tuple; of an array its owners, number and size of entries,
-    address, shape, strides.
+    """Return an argument as Numba passes it: a tuple entry by entry; of an array its owners, number and size of
+    entries, address, shape, strides.
     """
     if isinstance(argument, tuple):
         return [word for entry in argument for word in _words(entry)]

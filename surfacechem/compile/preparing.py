@@ -1,6 +1,6 @@
-"""Preparation time of a run: code compiled and libraries loaded when they are first needed.
+"""Preparation time of a run: compilation of code and import of libraries on first use.
 
-It is no run time. What is slow once is done inside ``PREPARATION``, as a block or as a decorator.
+It does not count as run time. Work that is slow only once is done inside ``PREPARATION``, as a block or a decorator.
 
 >>> before = PREPARATION.seconds
 >>> with PREPARATION:
@@ -16,7 +16,7 @@ from types import TracebackType
 
 
 class _Stopwatch(ContextDecorator, threading.local):
-    """A stopwatch of each thread; a block within another counts once."""
+    """A stopwatch for each thread; nested blocks count once."""
 
     seconds = 0.0
     """Time spent so far [s]."""

@@ -1,9 +1,9 @@
-r"""The equations of an assembled scene as readable Python that runs, and as LaTeX.
+r"""The equations of an assembled scene as readable, executable Python, and as LaTeX.
 
 The Python form is a module of functions with the signature of the compiled ones: ``residual``, ``jacobian``,
 ``outputs``, ``ledger`` and ``margins`` of (t, y, ydot, parameters). It is the debug mode: where the compiled code
-returns NaN, this one raises at the line of the quantity concerned. Where a history is made of pieces, each is printed
-with its time, and the functions use those of the piece in which t lies unless they are given others.
+returns NaN, this one raises at the line of the quantity concerned. If a history consists of pieces, each is printed
+with its start, and the functions use the piece in which t lies unless ``parameters`` are passed.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from surfacechem.model.system import Named, Parameter, System
 from surfacechem.quantities import VARIABLES, Quantity, spelled
 
 CODE_WIDTH = 100
-"""Printed lines are broken beyond this, where an expression lets them."""
+"""Width of printed lines; longer ones are broken where an expression permits."""
 
 
 @dataclass(frozen=True)
@@ -44,26 +44,26 @@ class Row:
 RELATIONS = (symengine.LessThan, symengine.StrictLessThan, symengine.Equality, symengine.Unequality)
 
 CONDITION_PREFIX = "condition of "
-"""Prefix of the names of symbols that stand for terms printed by themselves."""
+"""Prefix of the names of symbols that stand for separately printed terms."""
 
 
 @lru_cache(maxsize=1000)
 def sympy_form(expression: Expression) -> Any:
-    """The same expression in SymPy, with products of sums left as they are: expanded, they would round differently.
+    """Return the same expression in SymPy, without expanding products of sums, which would change the rounding.
 
-    Several functions print the same quantities, and SymPy looks long at the conditions of a piecewise one.
+    Cached: several functions print the same quantities, and SymPy is slow with conditions of piecewise expressions.
     """
     with distribute(False):
         return symengine.sympify(expression)._sympy_()
 
 
 class _Printer(Printer):  # type: ignore[misc]
-    """A printer of SymPy's that prints piecewise terms of conditions by themselves, where their symbols stand."""
+    """A SymPy printer that prints piecewise terms inside conditions separately, in the places of their symbols."""
 
     _terms: Mapping[str, Any] = {}
 
     def text(self, expression: Expression) -> str:
-        # SymPy brings conditions into a canonical form, which takes it for ever where piecewise terms are in them.
+        # SymPy's canonical form of conditions does not finish if they contain piecewise terms.
         whole, around = symengine.sympify(expression), self._terms
         inner = {piece for relation in whole.atoms(*RELATIONS) for piece in relation.atoms(symengine.Piecewise)}
         self._terms = {f"{CONDITION_PREFIX}{k}": piece for k, piece in enumerate(sorted(inner, key=str))}
@@ -91,7 +91,7 @@ class _Python(_Printer, PythonCodePrinter):  # type: ignore[misc]
 
 
 def python(system: System, title: str = "") -> str:
-    """The equations as the source of a Python module."""
+    """Return the equations as the source of a Python module."""
     printer = _Python()
     functions = [
         _function(system, printer, name, text, rows, ", ".join(printer.name(row.name) for row in rows))
@@ -113,7 +113,7 @@ def python(system: System, title: str = "") -> str:
 
 
 def executable(system: System) -> ModuleType:
-    """The printed module, ready to call; its source shows in tracebacks and debuggers."""
+    """Return the printed module, ready to call; its source shows in tracebacks and debuggers."""
     source = python(system)
     module = ModuleType("surfacechem_equations")
     module.__file__ = f"<equations {id(system):#x}>"
@@ -123,7 +123,7 @@ def executable(system: System) -> ModuleType:
 
 
 def _functions(system: System) -> dict[str, tuple[str, list[Row]]]:
-    """Every printed function: what it returns, in words and by row."""
+    """Return the text and the rows of every printed function."""
     balances = [Row(f"balance_{name}", row, f"balance of {name}") for name, row in system.rows.items()]
     outputs = [Row(item.name, symengine.Symbol(item.name), "") for item in system.outputs]
     ledger = [
@@ -142,9 +142,9 @@ def _functions(system: System) -> dict[str, tuple[str, list[Row]]]:
 
 
 def pieces(system: System) -> list[tuple[float, tuple[float, ...]]]:
-    """Times [s] from which numbers of histories hold, and these numbers, in the order of :func:`changing`.
+    """Return the pieces of histories: start [s], and the numbers in the order of :func:`changing`.
 
-    At its time a piece does not hold yet; the first one holds from the start.
+    A piece excludes its start; the first one holds from the beginning.
     """
     loads = [system.parameters[j] for j in changing(system)]
     found: list[tuple[float, tuple[float, ...]]] = []
@@ -156,12 +156,12 @@ def pieces(system: System) -> list[tuple[float, tuple[float, ...]]]:
 
 
 def changing(system: System) -> list[int]:
-    """Places of the parameters that change from piece to piece of a history."""
+    """Return the positions of the parameters that change from piece to piece of a history."""
     return [j for j, p in enumerate(system.parameters) if p.load is not None]
 
 
 def _pieces(system: System) -> list[str]:
-    """The pieces of histories, and the function that finds the parameters of a time."""
+    """Return the pieces of histories, and the function that finds the parameters at a time."""
     found = pieces(system)
     if not found:
         return []
@@ -188,12 +188,14 @@ def _parameter_text(parameter: Parameter) -> str:
 
 
 def _jacobian(system: System, printer: _Python) -> str:
-    """The derivatives of the balances by the states and by their rates, as two lists of rows."""
+    """Return the function for the derivatives of the balances by the states and by their rates, as two lists of
+    rows.
+    """
     n = len(system.states)
     arguments = system.inputs[1 : 1 + 2 * n]
     known = {symengine.Symbol(item.name): item for item in system.named}
     slopes, names = jacobian([*system.rows.values()], arguments, [(x, item.expression) for x, item in known.items()])
-    # Names that no formula has, and that Python takes.
+    # Names that are valid in Python and in no formula.
     own = {x: symengine.Symbol(re.sub(r"^d (.*) by (.*)$", r"slope_of_\1_by_\2", str(x))) for x, _ in names}
     named = [known.get(x) or Named(Quantity(str(own[x]), "1", str(x)), slope.xreplace(own)) for x, slope in names]
     cells: list[list[str]] = []
@@ -226,7 +228,7 @@ def _function(system: System, printer: _Python, name: str, text: str, rows: Sequ
 
 
 def quantities_read(named: Sequence[Named], expressions: Iterable[Expression]) -> list[Named]:
-    """Those named quantities that the expressions read, directly or through others, in their order."""
+    """Return the named quantities that expressions read, directly or through others, in order."""
     items = {symengine.Symbol(item.name): item for item in named}
     return [items[symbol] for symbol, _ in needed([(x, item.expression) for x, item in items.items()], [*expressions])]
 
@@ -236,7 +238,7 @@ def _described(quantity: Quantity) -> str:
 
 
 def _safe(text: str) -> str:
-    """Text that ends neither a comment nor a docstring."""
+    """Return text that ends neither a comment nor a docstring."""
     return " ".join(text.split()).replace("\\", "/").replace('"""', "'''")
 
 
@@ -254,8 +256,9 @@ def _assignment(printer: _Python, name: str, expression: Expression, text: str) 
 
 
 def _broken_line(before: str, text: str, after: str) -> list[str]:
-    """The text between brackets, broken before operators and after commas where it is too long for one line; a product
-    that is too long by itself before its functions.
+    """Return text between brackets, broken before operators and after commas if it is too long for one line.
+
+    A product that is too long is broken before its functions.
     """
     if len(before + text + after) <= CODE_WIDTH:
         return [before + text + after]
@@ -274,7 +277,7 @@ def _broken_line(before: str, text: str, after: str) -> list[str]:
 
 
 class Latex(_Printer, LatexPrinter):  # type: ignore[misc]
-    """LaTeX with the symbols of the package."""
+    """LaTeX printer with the symbols of the package."""
 
     def _print_Float(self, expression: Any) -> str:
         mantissa, _, power = f"{float(expression)!r}".partition("e")
@@ -289,7 +292,7 @@ class Latex(_Printer, LatexPrinter):  # type: ignore[misc]
 
 
 def symbol(name: str) -> str:
-    r"""LaTeX of a name.
+    r"""Return the LaTeX of a name.
 
     >>> symbol("phi_max"), symbol("dT_dt"), symbol("q_1"), symbol("R_linear_affinity")
     ('\\phi_{\\mathrm{max}}', '\\dot{T}', 'q_{1}', 'R_{\\mathrm{linear\\,affinity}}')
@@ -303,7 +306,7 @@ def symbol(name: str) -> str:
 
 
 def unit(text: str) -> str:
-    r"""LaTeX of a unit.
+    r"""Return the LaTeX of a unit.
 
     >>> unit("W/(m^2 K)")
     '\\mathrm{W/(m^{2}\\,K)}'
@@ -312,7 +315,7 @@ def unit(text: str) -> str:
 
 
 def latex(system: System, title: str = "") -> str:
-    """The equations as a LaTeX align environment, the values of the parameters as comments."""
+    """Return the equations as a LaTeX align environment, with the values of the parameters as comments."""
     printer = Latex({"mul_symbol": r"\,", "fold_short_frac": False})
     heading = f"{title}: {system.regime}" if title else system.regime
     values = [f"%   {p.symbol} = {float(p.at(0.0))!r} {_parameter_text(p)}" for p in system.parameters]

@@ -1,8 +1,8 @@
-"""SymEngine expressions to machine code.
+"""Compilation of SymEngine expressions to machine code.
 
-Every function of a program shares one input layout, [t | y | ydot | p], so that a trajectory keeps one buffer and
-fills the parameters once. The machine code is SymEngine's own LLVM output: about 10 ms for a small scene, kept in the
-user's cache folder, reached as a raw pointer by the stepper and as a vectorised function from Python.
+All functions of a program have the same inputs, [t | y | ydot | p], so that a trajectory has one buffer and fills in
+the parameters once. The machine code is SymEngine's LLVM output: about 10 ms for a small scene, cached in the user's
+cache folder, called by the stepper through a raw pointer and from Python as a vectorised function.
 """
 
 import ctypes
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from surfacechem.compile.vectors import LaneFunction
 
 C_FUNCTION = ctypes.PYFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
-"""The C signature of machine code, for calls from Python with addresses."""
+"""C signature of machine code, for calls from Python with addresses."""
 
 
 @dataclass(frozen=True)
@@ -49,14 +49,14 @@ class Function:
     n_in: int
     n_out: int
     keep: Any
-    """Owns the machine code: the address is valid as long as this object lives."""
+    """Owner of the machine code: the address is valid as long as this object lives."""
 
     def __call__(self, inputs: ArrayLike) -> NDArray[np.float64]:
         values = np.ascontiguousarray(inputs, dtype=float)
-        if not (self.n_out and values.size):  # machine code of nothing cannot be called, nor on nothing
+        if not (self.n_out and values.size):  # code without results or inputs cannot be called
             return np.empty((*values.shape[:-1], self.n_out))
         if values.shape == (self.n_in,):
-            # In half of the time that the library takes to look at what it is given.
+            # A direct call, in half the time that the library takes to check its arguments.
             code, row, results = self._called
             found = results()
             code(found, row.from_buffer(values), self.user)
@@ -65,13 +65,13 @@ class Function:
 
     @cached_property
     def _called(self) -> tuple[Any, Any, Any]:
-        """The code as Python calls it by itself, and the types of its inputs and results."""
+        """The code for direct calls from Python, and the types of its inputs and results."""
         return C_FUNCTION(self.address), ctypes.c_double * self.n_in, ctypes.c_double * self.n_out
 
 
 @dataclass(frozen=True)
 class ExternalInputs:
-    """Fills parameters of inputs with results of an external function of the values that it reads there."""
+    """Parameters that an external function computes from values at the inputs, and writes to them."""
 
     reads: Function
     positions: NDArray[np.int64]
@@ -79,7 +79,7 @@ class ExternalInputs:
     evaluate: Callable[[Sequence[float]], NDArray[np.float64]]
 
     def __call__(self, inputs: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The inputs, one row or many, filled in place."""
+        """Fill the inputs, one row or many, in place."""
         rows = inputs.reshape(-1, inputs.shape[-1])
         rows[:, self.positions] = [self.evaluate(values) for values in self.reads(rows).tolist()]
         return inputs
@@ -87,8 +87,8 @@ class ExternalInputs:
 
 @dataclass(frozen=True)
 class Lanes:
-    """The code of a program for eight cases at once: rates of states and accounts, and margins, by time, state and
-    parameters alone.
+    """The code of a program for eight cases at once: rates of states and accounts, and margins, as functions of time,
+    state and parameters.
     """
 
     rates: "LaneFunction"
@@ -97,9 +97,9 @@ class Lanes:
 
 @dataclass(frozen=True)
 class Chain:
-    """States from ``first`` to before ``end``, each coupled to its neighbours only, the first one to ``anchor``.
+    """States from ``first`` to before ``end``, each coupled only to its neighbours, the first one to ``anchor``.
 
-    The anchor is a state before all chains, -1 where there is none.
+    The anchor is a state before all chains; -1 if there is none.
     """
 
     first: int
@@ -108,17 +108,19 @@ class Chain:
 
 
 SPARSE_FROM = 400
-"""Derivatives from which on those that are zero are not formed."""
+"""Number of derivatives from which on those that are identically zero are omitted."""
 
 MOST_OPTIMISED = 200
-"""Expressions from which on they are not optimised: that takes ten times as long as to make code of them, for code that
-is faster by a quarter or less.
+"""Number of expressions from which on they are not optimised: that takes ten times as long as generating their code,
+and makes it at most a quarter faster.
 """
 
 _ONE_THREAD = threading.RLock()
 
 MOST_RATE_STATES = 50
-"""States of a network beyond which a second function of its rates takes longer to compile than any run gains by it."""
+"""Number of states of a network above which compiling a second function, of its rates, takes longer than any run
+gains.
+"""
 
 
 @dataclass(frozen=True)
@@ -131,38 +133,40 @@ class Program:
     n_margins: int
     residual: Function
     jacobian: Function
-    """dG/dy (row-major), then dG/dydot, of the core; then of its border and of the bands of the chains. Of many only
-    those that may not be zero, whose places :attr:`nonzeros` has.
+    """dG/dy (row-major), then dG/dydot, of the core; then of its border and of the bands of the chains. If there are
+    many, only those that may be nonzero, whose positions are in :attr:`nonzeros`.
     """
     ledger: Function | None
-    """Rates of the quadratures integrated beside the state."""
+    """Rates of the quadratures integrated along with the state."""
     margins: Function | None
     """Functions whose zeros are events."""
     algebraic: tuple[bool, ...]
-    """Per state: no equation contains its derivative."""
+    """Per state: True if no equation contains its derivative."""
     external: ExternalInputs | None = None
     chains: tuple[Chain, ...] = ()
     nonzeros: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
-    """Places of the derivatives that are formed, in their order; none where all are."""
+    """Positions of the computed derivatives, in order; empty if all are computed."""
     groups: tuple[int, ...] = ()
-    """Per quadrature: errors of a group are measured by its largest, 0 to 2; -1 for what steps need not serve."""
+    """Group of each quadrature, 0 to 2, whose largest value scales their errors; -1 if steps need not control its
+    error.
+    """
     solved: Callable[[], Function | None] = lambda: None
-    """Makes the code of the rates by themselves; None where the equations do not give them one after another."""
+    """Compile the rates in explicit form; None if the equations cannot be solved for them one by one."""
     laned: Callable[[], Lanes | None] = lambda: None
-    """Makes the code for eight cases at once; None where there is none for it."""
+    """Compile the code for eight cases at once; None if that is not possible."""
     plain_margins: bool = False
-    """Whether margins read neither derivatives nor what comes from outside."""
+    """True if margins depend neither on derivatives nor on external parameters."""
 
     def filled(self, inputs: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The inputs, one row or many, with the parameters that come from outside."""
+        """Return the inputs, one row or many, with the external parameters filled in."""
         return self.external(inputs) if self.external else inputs
 
     @cached_property
     def tables(self) -> tuple[NDArray[Any], ...]:
         """Tables of a program for the stepper: its sizes (states, accounts, margins, inputs; in the core, chains, cells
-        of chains; nothing of edges); a row (code, user data) for residual, jacobian, ledger, margins and rates, zero
-        where absent; which states are algebraic; a row (first, end, anchor) for each chain; the places of the
-        derivatives that are formed; the group of each quadrature, -1 where it is in none.
+        of chains; zeros for edges); a row (code, user data) for residual, jacobian, ledger, margins and rates, zero
+        where absent; a mask of the algebraic states; a row (first, end, anchor) for each chain; the positions of the
+        computed derivatives; the group of each quadrature, -1 if it is in none.
         """
         core = self.chains[0].first if self.chains else self.n
         sizes = self.n, self.n_ledger, self.n_margins, self.n_inputs, core, len(self.chains), self.n - core, 0, 0, 0
@@ -174,22 +178,23 @@ class Program:
 
     @cached_property
     def rates(self) -> Function | None:
-        """The rates by time, state and parameters alone, compiled when they are first asked for; by one thread, as
-        machine code that another one replaces is gone while tables have its address.
+        """The rates as functions of time, state and parameters, compiled on first use.
+
+        By one thread only: replaced machine code would be freed while tables contain its address.
         """
         with _ONE_THREAD:
             return vars(self).get("rates") or self.solved()
 
     @cached_property
     def lanes(self) -> Lanes | None:
-        """The code for eight cases at once, compiled when it is first asked for, by one thread as well."""
+        """The code for eight cases at once, compiled on first use, also by one thread only."""
         with _ONE_THREAD:
             return vars(self).get("lanes") or self.laned()
 
     @cached_property
     def lane_tables(self) -> tuple[NDArray[Any], ...]:
-        """Tables of a program for steps of eight cases at once: its sizes (states, accounts, margins, inputs, columns
-        that are integrated); else as the other tables.
+        """Tables of a program for steps of eight cases at once: its sizes (states, accounts, margins, inputs,
+        integrated columns); otherwise as the other tables.
         """
         assert self.lanes is not None
         sizes = self.n, self.n_ledger, self.n_margins, self.n_inputs, self.n + self.n_ledger
@@ -207,7 +212,7 @@ class Program:
         return sizes, code, *others
 
     def derivatives(self, inputs: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """dG/dy and dG/dydot as matrices [..., equation, variable]."""
+        """Return dG/dy and dG/dydot as matrices [..., equation, variable]."""
         values, core = self.jacobian(inputs), self.chains[0].first if self.chains else self.n
         if len(self.nonzeros):
             found = values
@@ -229,7 +234,7 @@ class Program:
 
 
 def _scattered(values: NDArray[np.float64], n: int, chains: Sequence[Chain]) -> NDArray[np.float64]:
-    """Both matrices from the results of a compiled Jacobian."""
+    """Return both matrices from the results of a compiled Jacobian."""
     core = chains[0].first
     both = np.zeros((*values.shape[:-1], 2, n, n))
     own, linked = np.split(values, [2 * core * core], axis=-1)
@@ -247,9 +252,9 @@ def compile_function(
 ) -> Function:
     """Compile a vector of expressions; inputs that no expression contains are allowed.
 
-    What ``steps`` call a thousand times is optimised; of other code, which takes twice as long to optimise as to make,
-    the calls are few. Expressions that are alike but for the inputs that are their ``own``, as those of cells, are
-    loops over one.
+    Functions for ``steps``, with thousands of calls, are optimised. Others have few calls, and optimising takes twice
+    as long as generating the code. Expressions that differ only in their ``own`` inputs, as those of cells, are
+    compiled as loops over one of them.
     """
     if not own:
         return _machine_code(tuple(inputs), tuple(expressions), steps)
@@ -259,7 +264,7 @@ def compile_function(
 
 
 def _looped(inputs: Sequence[Any], loops: Sequence["FormLoop"], rest: Sequence[Any]) -> Function:
-    """The code of loops and of what is in none."""
+    """Return the code of loops and of the expressions that are in none."""
     from surfacechem.compile.alike import LoopCode
 
     left = tuple(expression for expression in rest if expression != 0)
@@ -269,7 +274,7 @@ def _looped(inputs: Sequence[Any], loops: Sequence["FormLoop"], rest: Sequence[A
 
 @dataclass(frozen=True)
 class _Derivatives:
-    """Lazy entries of a Jacobian without chains: to load its code, the expressions to differentiate are enough."""
+    """Entries of a Jacobian without chains, differentiated on demand: the expressions are enough to load its code."""
 
     residual: tuple[Any, ...]
     variables: tuple[Any, ...]
@@ -285,13 +290,13 @@ class _Derivatives:
         return iter(_entries(self.residual, self.variables, self.named, self.wanted))
 
     def origins(self) -> list[str]:
-        """All that the entries follow from, as text."""
+        """Return everything that determines the entries, as text."""
         names = [part for pair in self.named for part in pair]
         differentiation = map(source_digest, (__file__, calculus.__file__))
         return [*differentiation, *serialised((*self.variables, *names, *self.residual))]
 
 
-@lru_cache(maxsize=128)  # a scene that is loaded again, or differs in numbers alone, has the same expressions
+@lru_cache(maxsize=128)  # a scene that is reloaded, or differs in numbers only, has the same expressions
 @PREPARATION
 def _machine_code(
     inputs: tuple[Any, ...], expressions: tuple[Any, ...] | _Derivatives, steps: bool = False
@@ -301,7 +306,7 @@ def _machine_code(
     def make() -> Any:
         return symengine.Lambdify(list(inputs), list(expressions), backend="llvm", cse=True, opt_level=opt_level)
 
-    # Code is loaded in a tenth of the time that it takes to make.
+    # Loading code takes a tenth of the time of generating it.
     origins = expressions.origins() if isinstance(expressions, _Derivatives) else serialised(expressions)
     code = from_file(code_file([str(opt_level), _digest(inputs), *origins]), make, pickle.loads, pickle.dumps)
     function, user = code.as_ctypes()
@@ -311,13 +316,14 @@ def _machine_code(
 
 @lru_cache(maxsize=8)
 def _digest(inputs: tuple[Any, ...]) -> str:
-    """Digest of the inputs, which all functions of a scene share."""
+    """Return a digest of the inputs, which all functions of a scene share."""
     return hashlib.sha256("\n".join(serialised(inputs)).encode()).hexdigest()
 
 
 def serialised(expressions: Sequence[Any]) -> list[str]:
-    """Expressions as they stand, to the last bit and in their order: each part once, by the places of its arguments,
-    and last the places of the expressions themselves.
+    """Return expressions as text, exact to the last bit and in their order.
+
+    Each part occurs once, with the positions of its arguments; last are the positions of the expressions themselves.
 
     >>> x, y = symengine.symbols("x y")
     >>> serialised([x + 0.1, y])
@@ -331,7 +337,7 @@ def serialised(expressions: Sequence[Any]) -> list[str]:
         part, args = left.pop()
         if part in places:
             continue
-        if args is None:  # which SymEngine makes anew whenever it is asked
+        if args is None:  # SymEngine makes new arguments at each access
             args = part.args
             missing = [(arg, None) for arg in args if arg not in places]
             if missing:
@@ -346,11 +352,11 @@ def serialised(expressions: Sequence[Any]) -> list[str]:
 
 
 Named = Sequence[tuple[Any, Any]]
-"""Symbols with the expressions that they stand for; these may contain the symbols before them."""
+"""Symbols with their expressions, which may contain the symbols before them."""
 
 
 def expanded(named: Named, expressions: Sequence[Any]) -> list[Any]:
-    """The expressions without the named symbols; what is named is one object in all of them."""
+    """Return expressions with named symbols replaced; equal symbols are replaced by the same object."""
     known: dict[Any, Any] = {}
 
     def replaced(expression: Any) -> Any:
@@ -366,10 +372,10 @@ def expanded(named: Named, expressions: Sequence[Any]) -> list[Any]:
 def jacobian(
     residual: Sequence[Any], variables: Sequence[Any], named: Named = ()
 ) -> tuple[list[dict[Any, Any]], list[tuple[Any, Any]]]:
-    """Derivatives that are not zero, a mapping by variable for each equation, and the names that they contain.
+    """Return the nonzero derivatives, a mapping by variable for each equation, and the named symbols that they contain.
 
-    What is named is differentiated once, by the symbols that it contains, and its derivatives are named themselves: so
-    the work grows like what is not zero, however often a name is used.
+    Each named expression is differentiated once, by the symbols in it, and its derivatives are named too, so the work
+    is proportional to the number of nonzeros, however often a name is used.
 
     >>> x, y, r = symengine.symbols("x y r")
     >>> (row,), names = jacobian([r + x], [x, y], [(r, x**2 * y)])
@@ -396,7 +402,7 @@ def jacobian(
 
 
 def _depends(residual: Sequence[Any], variables: Sequence[Any], named: Named) -> list[set[int]]:
-    """The variables that each equation contains, itself or in what is named.
+    """Return the variables that each equation contains, directly or in named expressions.
 
     >>> x, y, z, r = symengine.symbols("x y z r")
     >>> _depends([z + r, y], [x, y, z], [(r, x + 1)])
@@ -414,8 +420,8 @@ def _depends(residual: Sequence[Any], variables: Sequence[Any], named: Named) ->
 
 
 def _derivatives(n: int, chains: Sequence[Chain]) -> Iterator[tuple[int, int]]:
-    """Equation and variable of all derivatives in their order, by states and then by rates: of the core, of its border,
-    along the chains; -1 where there is no variable.
+    """Yield equation and variable of all derivatives in order, by states and then by rates: of the core, of its border,
+    along the chains; the variable is -1 where there is none.
     """
     core = chains[0].first if chains else n
     linked, border = list(_linked(core, chains)), core * len(chains)
@@ -427,7 +433,7 @@ def _derivatives(n: int, chains: Sequence[Chain]) -> Iterator[tuple[int, int]]:
 def _entries(
     residual: Sequence[Any], variables: Sequence[Any], named: Named, wanted: Iterable[tuple[int, int]]
 ) -> list[Any]:
-    """Derivatives of equations by variables."""
+    """Return derivatives of equations by variables."""
     slopes, names = jacobian(residual, variables, named)
     zero = symengine.Integer(0)
     return expanded(names, [slopes[i].get(variables[j], zero) for i, j in wanted])
@@ -436,7 +442,7 @@ def _entries(
 def _slopes(
     inputs: Sequence[Any], residual: Sequence[Any], variables: Sequence[Any], named: Named
 ) -> tuple[Function, NDArray[np.int64]]:
-    """The code of the Jacobian, and the places of the derivatives that it forms where these are not all."""
+    """Return the code of the Jacobian, and the positions of the computed derivatives if these are not all."""
     named = needed(named, residual)
     wanted, places = tuple(_derivatives(len(residual), ())), np.empty(0, np.int64)
     if len(wanted) >= SPARSE_FROM:
@@ -448,7 +454,7 @@ def _slopes(
 def _nonzeros(
     residual: Sequence[Any], variables: Sequence[Any], chains: Sequence[Chain], named: Named
 ) -> tuple[tuple[tuple[int, int], ...], NDArray[np.int64]]:
-    """Equation and variable of the derivatives that may not be zero, and their places."""
+    """Return equation and variable of the derivatives that may be nonzero, and their positions."""
     depends = _depends(residual, variables, named)
     every = {k: (i, j) for k, (i, j) in enumerate(_derivatives(len(residual), chains)) if j in depends[i]}
     return tuple(every.values()), np.array([*every], np.int64)
@@ -457,8 +463,9 @@ def _nonzeros(
 def _chained(
     inputs: Sequence[Any], residual: Sequence[Any], variables: Sequence[Any], chains: Sequence[Chain], named: Named
 ) -> tuple[Function, Function, NDArray[np.int64]]:
-    """The code of the equations and of their Jacobian where there are chains, whose forms are differentiated once; and
-    the places of its derivatives.
+    """Return the code of equations with chains and of their Jacobian, and the positions of its derivatives.
+
+    Each form of the chains' equations is differentiated once.
     """
     from surfacechem.compile.alike import loops_of
 
@@ -474,7 +481,7 @@ def _chained(
 
 
 def cell_inputs(inputs: Sequence[Any], core: int, n: int) -> set[Any]:
-    """Of the inputs those that belong to one cell: its state and rate."""
+    """Return the inputs that belong to one cell: its state and rate."""
     return {*inputs[1 + core : 1 + n], *inputs[1 + n + core : 1 + 2 * n]}
 
 
@@ -490,9 +497,9 @@ def compile_program(
     chains: Sequence[Chain] = (),
     named: Named = (),
 ) -> Program:
-    """Compile a system with the Jacobians differentiated from its residual; expressions may contain what is ``named``.
+    """Compile a system, with Jacobians differentiated from its residual; expressions may contain ``named`` symbols.
 
-    States and equations that form chains stand behind the others, chain after chain.
+    States and equations of chains come after the others, chain by chain.
     """
     if not len(states) == len(derivatives) == len(residual):
         counts = f"{len(states)} states, {len(derivatives)} derivatives and {len(residual)} equations"
@@ -532,7 +539,7 @@ def compile_program(
 def _compiled_rates(
     inputs: Sequence[Any], residual: Sequence[Any], derivatives: Sequence[Any], chains: Sequence[Chain]
 ) -> Function | None:
-    """The code of the rates; none where there are chains."""
+    """Return the code of the rates; None if there are chains."""
     rates = None if chains else solved_rates(residual, derivatives)
     return compile_function(inputs, rates, steps=True) if rates else None
 
@@ -544,7 +551,7 @@ def _compiled_lanes(
     chains: Sequence[Chain],
     others: Sequence[Sequence[Any]],
 ) -> Lanes | None:
-    """The code for eight cases at once; none where the equations do not give their rates by themselves."""
+    """Return the code for eight cases at once; None if the equations do not give their rates explicitly."""
     from surfacechem.compile.vectors import compile_lanes
 
     rates = None if chains else solved_rates(residual, derivatives)
@@ -559,7 +566,7 @@ def _compiled_lanes(
 
 
 def solved_rates(residual: Sequence[Any], rates: Sequence[Any]) -> list[Any] | None:
-    """The rates from equations that give them one after another; None from others.
+    """Return the rates from equations that can be solved for them one by one; else None.
 
     >>> a, b, x = symengine.symbols("a b x")
     >>> solved_rates([2 * b + a - 3 * x, a - x], [a, b])
@@ -579,7 +586,7 @@ def solved_rates(residual: Sequence[Any], rates: Sequence[Any]) -> list[Any] | N
 
 
 def needed(named: Named, expressions: Sequence[Any]) -> Named:
-    """The named symbols that the expressions contain, directly or through others.
+    """Return the named symbols that the expressions contain, directly or through others.
 
     >>> a, b, c, x = symengine.symbols("a b c x")
     >>> needed([(a, 2 * x), (b, a**2), (c, b)], [b])
@@ -595,10 +602,10 @@ def needed(named: Named, expressions: Sequence[Any]) -> Named:
 
 
 def _linked(core: int, chains: Sequence[Chain]) -> Iterator[tuple[int, int]]:
-    """Equation and variable of each derivative outside the core, in the order of the compiled function.
+    """Yield equation and variable of each derivative outside the core, in the order of the compiled function.
 
-    First how the equations of the core read the first variable of each chain, then each equation of a chain by the
-    variables inwards, its own and outwards; -1 where there is none.
+    First the derivatives of the core's equations by the first variable of each chain, then those of each equation of a
+    chain by the inner neighbour, its own variable and the outer neighbour; -1 where there is none.
     """
     yield from ((i, chain.first) for i in range(core) for chain in chains)
     for chain in chains:

@@ -1,8 +1,8 @@
-r"""The equations of an assembled scene as a paper prints them.
+r"""The equations of an assembled scene in the form of a paper.
 
-The program evaluates formulas that are guarded against overflow, division by zero and rates that no clock resolves
-(:mod:`surfacechem.expressions`). Here they stand without their guards, with the names of constants in place of digits,
-a line for each mode (sticking, sliding), and solved for the rate that they evolve.
+The program evaluates formulas that are guarded against overflow, division by zero and rates that time does not resolve
+(:mod:`surfacechem.expressions`). Here they are printed without these guards, with the names of constants instead of
+digits, a line for each mode (sticking, sliding), and solved for the rate that they evolve.
 
 >>> from surfacechem.expressions import exp, log_fraction
 >>> x, y = symengine.symbols("x y")
@@ -29,10 +29,10 @@ from surfacechem.quantities import AVOGADRO, BOLTZMANN, GAPS, GAS_CONSTANT, STEF
 from surfacechem.tolerances import EQUAL, FRACTION_FLOOR, LEAST_BONDED, LEAST_COVERAGE
 
 EXPONENT_CAPS = (EXPONENT_CAP, LARGE_EXPONENT, LITERAL, -30.0)
-"""Exponents below which a formula holds as it stands."""
+"""Exponents up to which a formula is valid without its guard."""
 
 FLOORS = (FRACTION_FLOOR, LEAST_BONDED, LEAST_COVERAGE)
-"""Amounts above which a formula holds as it stands."""
+"""Amounts above which a formula is valid without its guard."""
 
 K_B, R, N_A = map(symengine.Symbol, ("Boltzmann constant", "gas constant", "Avogadro constant"))
 
@@ -45,24 +45,24 @@ CONSTANTS = {
     symengine.sqrt(2 * symengine.pi): (math.sqrt(2 * math.pi), ""),
     symengine.E: (math.e, ""),
 }
-"""Constants that formulas hold as digits, and their LaTeX, by what stands for them."""
+"""Constants that formulas contain as digits, and their LaTeX, by symbol."""
 
 FACTORS = [symengine.Rational(*parts) for parts in ((1, 1), (2, 1), (4, 1), (8, 1), (1, 2), (1, 4), (3, 2), (2, 3))]
 
 MOST_COMBINATIONS = 12
-"""Number of combinations of modes up to which each has its line."""
+"""Most combinations of modes for which each has its line."""
 
 LINE_LETTERS = 300
-"""Letters of LaTeX that do not fit into a line."""
+"""Letters of LaTeX above which an equation does not fit on a line."""
 
 PHONE_LETTERS = 220
-"""Letters of LaTeX of a term that do not fit into the line of a phone."""
+"""Letters of LaTeX above which a term does not fit on the line of a phone."""
 
 MOST_SIMPLIFIED = 40
-"""Operations of an expression up to which SymPy looks for a shorter form of it."""
+"""Most operations of an expression for which SymPy searches for a shorter form."""
 
 TABLE_NUMBERS = 12
-"""Numbers in a piecewise expression from which on it is a table rather than a formula."""
+"""Numbers in a piecewise expression from which on it is printed as a table rather than a formula."""
 
 TABLE_PREFIX = "table over "
 """Prefix of the names of symbols that stand for a table."""
@@ -70,22 +70,22 @@ TABLE_PREFIX = "table over "
 HALF = symengine.Rational(1, 2)
 
 GOLDEN_RATIO = 0.6180339887
-"""Its multiples fill an interval evenly."""
+"""Its multiples modulo one fill an interval evenly."""
 
 
 class Equation(NamedTuple):
-    """An equation as LaTeX: its left side, and what follows in pieces between which a line may break."""
+    """An equation as LaTeX: its left side, and the rest in pieces between which a line may break."""
 
     left: str
     pieces: Sequence[str]
     text: str
     """Its meaning, in words."""
     when: str
-    """Modes in which it holds, where not in all."""
+    """Modes in which it holds; empty if in all."""
 
 
 class Statement(NamedTuple):
-    """An equation before it is printed, of a state or of a named quantity."""
+    """An equation of a state or a named quantity before it is printed."""
 
     name: str
     left: Expression
@@ -95,8 +95,8 @@ class Statement(NamedTuple):
 
 
 def equations(system: System) -> tuple[list[Equation], dict[str, str]]:
-    """The balances of a scene and the quantities that they read; and the LaTeX of its parameters, and of what is given
-    at the start, by their paths.
+    """Return the balances of a scene and the quantities that they read, and the LaTeX of its parameters and initial
+    values by path.
     """
     printer = PaperPrinter(_names(system))
     symbols = {p.path: printer.text(p.symbol) for p in system.parameters}
@@ -105,10 +105,10 @@ def equations(system: System) -> tuple[list[Equation], dict[str, str]]:
 
 
 def statements(system: System) -> list[Statement]:
-    """Every equation of a scene that a reader needs: the balances, then what they read."""
+    """Return every equation of a scene that a reader needs: the balances, then the quantities that they read."""
     levels = _constant_values(system)
     loads = {role.variable for role in system.roles if role.role == "prescribed"}
-    # What is given stands by its name wherever another quantity holds its formula.
+    # Print a prescribed quantity by its name wherever another quantity contains its formula.
     given = {
         item.expression: symengine.Symbol(item.name)
         for item in system.named
@@ -125,12 +125,12 @@ def statements(system: System) -> list[Statement]:
 
 
 def _constant_values(system: System) -> set[Expression]:
-    """The numbers that are the value of a variable, and no more."""
+    """Return the parameters that are just the constant value of a variable."""
     return {p.symbol for p in system.parameters if p.path.endswith(".level")}
 
 
 def _names(system: System) -> dict[str, str]:
-    """LaTeX of symbols that are not named like variables."""
+    """Return the LaTeX of symbols that are not named like variables."""
     names = {str(name): latex for name, (_, latex) in CONSTANTS.items()}
     for p in system.parameters:
         place = p.path.split(".")
@@ -156,7 +156,7 @@ def _names(system: System) -> dict[str, str]:
 
 
 def readable(expression: Expression) -> Expression:
-    """The expression without its numerical guards: its form wherever none of them acts."""
+    """Return the expression without its numerical guards: its form wherever none of them acts."""
     whole = symengine.sympify(expression)
     if isinstance(whole, symengine.Piecewise):
         return _unguarded([*map(readable, whole.args[::2])], [*map(readable, whole.args[1::2])])
@@ -169,7 +169,7 @@ def readable(expression: Expression) -> Expression:
 
 
 def _constant(value: float) -> Expression:
-    """A number as a simple multiple of a constant of nature, or as an integer, where it is one."""
+    """Return a number as a simple multiple of a constant of nature, or as an integer, if it is one."""
     if value == round(value) and abs(value) < 1 / EQUAL:
         return symengine.Integer(round(value))
     for (name, (size, _)), power, factor in product(CONSTANTS.items(), (1, -1), FACTORS):
@@ -179,7 +179,7 @@ def _constant(value: float) -> Expression:
 
 
 def _unguarded(values: Sequence[Any], conditions: Sequence[Any]) -> Expression:
-    """A piecewise expression by its plain name, or by its value beside its guard."""
+    """Return a piecewise expression in its plain form: by its function's name, or without its guard."""
     first, condition = values[0], conditions[0]
     if condition == False:  # noqa: E712 - an expression, not a flag
         return _unguarded(values[1:], conditions[1:])
@@ -196,12 +196,12 @@ def _unguarded(values: Sequence[Any], conditions: Sequence[Any]) -> Expression:
 
 
 def _without_choice(first: Any, other: Any, low: Any, high: Any) -> Expression | None:
-    """Plain form of a choice, ``first`` for low < high and else ``other``; None where it has none."""
+    """Return the plain form of a choice, ``first`` for low < high, else ``other``; None if it has none."""
     if {first, other} == {low, high}:
         return symengine.Min(low, high) if first == low else symengine.Max(low, high)
     if (first, other, high) == (-low, low, 0) or (first, other, low) == (high, -high, 0):
         return symengine.Abs(low if high == 0 else high)
-    if other == 1 and first * high == low:  # no rate is faster than the clock
+    if other == 1 and first * high == low:  # cap of rates that time does not resolve
         return other
     if low == 0 and not other.free_symbols and not first.is_Number:  # a divisor, or the base of a power
         return first.xreplace({symengine.Max(0, high): high})
@@ -209,13 +209,13 @@ def _without_choice(first: Any, other: Any, low: Any, high: Any) -> Expression |
 
 
 def _is_cap(condition: Any) -> bool:
-    """Whether a condition keeps an exponent or a logarithm within what numbers hold."""
+    """True if a condition keeps an exponent or a logarithm within the floating-point range."""
     low, high = condition.args
     return (high.is_Number and float(high) in EXPONENT_CAPS) or (low.is_Number and float(low) in FLOORS)
 
 
 def _are_equal(one: Expression, other: Expression) -> bool:
-    """Whether two expressions are one in other words, as far as some states tell."""
+    """True if two expressions are equal at some states."""
     symbols = sorted(one.free_symbols | other.free_symbols, key=str)
     for place in range(1, 4):
         state = {x: 0.3 + math.fmod(place * (k + 1) * GOLDEN_RATIO, 0.5) for k, x in enumerate(symbols)}
@@ -232,7 +232,7 @@ Splitter = Callable[[Expression], tuple[Expression, Expression]]
 
 
 def _balance(system: System, name: str, row: Expression) -> Iterator[Statement]:
-    """A balance, solved for the rate that it evolves."""
+    """Yield a balance, solved for the rate that it evolves."""
     state = next(state for state in system.states if state.name == name)
 
     def sides(expression: Expression) -> tuple[Expression, Expression]:
@@ -247,7 +247,7 @@ def _balance(system: System, name: str, row: Expression) -> Iterator[Statement]:
 
 
 def _definition(system: System, item: Named) -> Iterator[Statement]:
-    """Definition of a named quantity, unless it is a mode, which is no more than its own name."""
+    """Yield the definition of a named quantity, unless it is a mode, which is only a name."""
     if str(item.expression) == item.name:
         return
     text = f"{item.quantity.long_name} [{item.quantity.unit}]"
@@ -255,7 +255,7 @@ def _definition(system: System, item: Named) -> Iterator[Statement]:
 
 
 def _grouped(system: System, item: Named, sides: Splitter, text: str) -> Iterator[Statement]:
-    """An equation once for every group of modes in which it is the same."""
+    """Yield an equation once for every group of modes in which it is the same."""
     expression = item.expression
     modes = [mode for mode in system.modes if mode.symbol in expression.free_symbols]
     if math.prod(len(mode.words) for mode in modes) > MOST_COMBINATIONS:
@@ -271,26 +271,26 @@ def _grouped(system: System, item: Named, sides: Splitter, text: str) -> Iterato
 
 
 def _plain(name: str, expression: Expression) -> Expression:
-    """The expression of a named quantity without its guards; that of a fit by its name."""
+    """Return the expression of a named quantity without its guards; that of a fit by its name."""
     if any(str(x).startswith(f"{name}_ends_") for x in symengine.sympify(expression).free_symbols):
         return symengine.Symbol(f"{name} of a fit")
     return readable(expression)
 
 
 def _tabulated(expression: Expression) -> Expression:
-    """The expression with a symbol in place of each table of numbers, as interpolations are."""
+    """Return the expression with a symbol for each table of numbers, such as an interpolation."""
     tables = [p for p in expression.atoms(symengine.Piecewise) if len(p.atoms(symengine.Float)) > TABLE_NUMBERS]
     return expression.xreplace({p: symengine.Symbol(TABLE_PREFIX + str(max(map(str, p.free_symbols)))) for p in tables})
 
 
 def _is_negative(expression: Expression) -> bool:
-    """Whether a capacity or a stiffness is written with the other sign, as a state of open bodies tells."""
+    """True if a capacity or a stiffness has a negative sign, as evaluated at a state of open gaps."""
     state = {x: symengine.Integer(8) if str(x) in GAPS else HALF for x in expression.free_symbols}
     return bool(sympy_form(expression.xreplace(state)).n() < 0)
 
 
 def _shortest(expression: Expression) -> Expression:
-    """The shortest of an expression, its common factors taken out, and what SymPy makes of it."""
+    """Return the shortest form of an expression: as it is, with common factors extracted, or simplified by SymPy."""
     if {K_B, R} <= expression.free_symbols and not expression.has(symengine.E):
         expression = expression.xreplace({K_B: R / N_A})
     whole = sympy_form(expression)
@@ -312,16 +312,16 @@ class PaperPrinter(Latex):
         self.names = names
 
     def equation(self, line: Statement) -> Equation:
-        """A line as LaTeX, the right side in its terms."""
+        """Return a line as LaTeX, with the right side in its terms."""
         right = sympy_form(line.right)
-        # A minus before a sum, and a product that is too long for a line, are those of each term.
+        # Distribute a minus before a sum, and a product that is too long for a line.
         if right.as_coeff_Mul()[1].is_Add or len(self.text(right)) > LINE_LETTERS:
             right = sympy.expand_mul(right, deep=False)
         left, pieces = self._broken_product(sympy_form(line.left)), self._broken_sum(right)
         return Equation(left[0], [*left[1:], f"= {pieces[0]}", *pieces[1:]], line.text, line.when)
 
     def _broken_sum(self, expression: Any) -> list[str]:
-        """A sum in pieces that begin with the signs of its terms."""
+        """Return a sum in pieces that begin with the signs of its terms."""
         pieces: list[str] = []
         for term in self._as_ordered_terms(expression):
             first, *rest = self._broken_product(term)
@@ -329,13 +329,13 @@ class PaperPrinter(Latex):
         return pieces
 
     def _broken_product(self, term: Any) -> list[str]:
-        """A term in one piece; one that is long in its factors, and those of them that are sums in their terms."""
+        """Return a term in one piece; a long one in its factors, and large factors that are sums in their terms."""
         if len(self.text(term)) <= PHONE_LETTERS or not term.is_Mul:
             return [self.text(term)]
         factors = term.as_ordered_factors()
         large = [factor for factor in factors if len(self.text(factor)) > PHONE_LETTERS / 4]
         rest = sympy.Mul(*(factor for factor in factors if factor not in large))
-        # What is divided by stands last.
+        # Divisors come last.
         large.sort(key=lambda factor: bool((1 / factor).is_Add))
         pieces = ["-" if rest == -1 else self.text(rest)]
         for factor in large:
@@ -343,7 +343,7 @@ class PaperPrinter(Latex):
         return pieces[rest == 1 and not (1 / large[0]).is_Add :]
 
     def _bracketed(self, factor: Any, opened: str) -> list[str]:
-        """A factor; one that is a sum in its terms, between brackets."""
+        """Return a factor, or the terms of a factor that is a sum, between brackets."""
         first, *more = self._broken_sum(factor) if factor.is_Add else [self.text(factor)]
         return [f"{opened}{first}", *more[:-1], f"{more[-1]})"] if more else [first]
 
@@ -361,7 +361,7 @@ class PaperPrinter(Latex):
         return rf"\left({latex}\right)" if " / " in latex else latex
 
     def _rate(self, latex: str) -> str:
-        """The dot stands over the letter, not over its index."""
+        """Return a rate, with the dot over the letter and not over its index."""
         base, line, index = latex.partition("_")
         if base.startswith((r"\ln", "|")):
             return rf"\frac{{\mathrm{{d}} {latex}}}{{\mathrm{{d}} t}}"

@@ -1,9 +1,9 @@
-"""SymEngine expressions to machine code that evaluates eight cases at once: what sweeps run on.
+"""Compilation of SymEngine expressions to machine code that evaluates eight cases at once, for sweeps.
 
-SymEngine's own code is scalar. Here the same graph becomes vectors of LLVM, each of whose places belongs to a case of
-its own: inputs and results have the case as last axis. Exponentials and logarithms are vectors, too, right to one unit
-in the last place; functions that are rare in laws are those of the C library, place by place. A processor without
-vectors of this length is served by several shorter ones.
+SymEngine's code is scalar. Here the same graph becomes LLVM vectors with one case in each lane: inputs and results have
+the case as last axis. Exponentials and logarithms are vectorised too, accurate to one unit in the last place; functions
+that are rare in laws are called from the C library, lane by lane. On a processor with shorter vectors LLVM uses several
+of them.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from surfacechem.compile.objectcode import engine
 from surfacechem.compile.preparing import PREPARATION
 
 LANES = 8
-"""Cases of a vector: one of the widest vectors there are, or two of those of most processors, which hide each other's
+"""Cases of a vector: one of the widest vector registers, or two of those of most processors, which hide each other's
 latency.
 """
 
@@ -40,8 +40,10 @@ _POINTER = ir.IntType(8).as_pointer()
 
 @dataclass(frozen=True)
 class LaneFunction:
-    """Machine code with the C signature ``void f(double *out, const double *inputs, void *user)``, inputs [input, case]
-    and results [result, case].
+    """Machine code for eight cases at once.
+
+    Its C signature is ``void f(double *out, const double *inputs, void *user)``, with inputs [input, case] and results
+    [result, case].
 
     >>> x, y = symengine.symbols("x y")
     >>> compile_lanes([x, y], [x * y, x + y])(np.arange(16.0).reshape(2, 8))[:, :3]
@@ -52,10 +54,10 @@ class LaneFunction:
     address: int
     n_out: int
     keep: Any
-    """Owns the machine code: the address is valid as long as this object lives."""
+    """Owner of the machine code: the address is valid as long as this object lives."""
 
     def __call__(self, inputs: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The results for eight cases, shape (results, 8), from inputs of the shape (inputs, 8)."""
+        """Return the results for eight cases, shape (results, 8), from inputs of shape (inputs, 8)."""
         values = np.ascontiguousarray(inputs, dtype=float)
         found = np.empty((self.n_out, LANES))
         code = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)(self.address)
@@ -67,7 +69,7 @@ class LaneFunction:
 def compile_lanes(inputs: Sequence[Any], expressions: Sequence[Any]) -> LaneFunction:
     """Compile a vector of expressions of the inputs for eight cases at once.
 
-    NotImplementedError where an expression contains what has no code here.
+    Raise NotImplementedError if an expression contains a function without vector code.
     """
     builder = function_body()
     places = {symbol: place for place, symbol in enumerate(inputs)}
@@ -86,14 +88,14 @@ def _entry(builder: Any, argument: Any, place: int) -> Any:
 
 
 def function_body() -> Any:
-    """A builder of the body of a function ``f`` in a module of its own."""
+    """Return a builder of the body of a function ``f`` in a new module."""
     kind = ir.FunctionType(ir.VoidType(), [_POINTER] * 3)
     function: Any = ir.Function(ir.Module(name="lanes"), kind, name="f")
     return ir.IRBuilder(function.append_basic_block())
 
 
 def object_code(builder: Any) -> bytes:
-    """The machine code of the builder's module, made for this processor."""
+    """Return the machine code of the builder's module for this processor."""
     _binding.initialize_native_target()
     _binding.initialize_native_asmprinter()
     features = _binding.get_host_cpu_features().flatten()
@@ -106,8 +108,8 @@ def object_code(builder: Any) -> bytes:
 
 
 def _arguments_first(whole: Any, parts: Callable[[Any], Sequence[Any]], known: Mapping[Any, Any]) -> Iterator[Any]:
-    """All that an expression is made of and that is not known, what is nested deeply without a stack; whoever asks for
-    the next makes each known.
+    """Yield all unknown parts of an expression, arguments first, without recursion; the caller adds each to
+    ``known``.
     """
     left = [whole]
     while left:
@@ -119,12 +121,12 @@ def _arguments_first(whole: Any, parts: Callable[[Any], Sequence[Any]], known: M
 
 
 class Code:
-    """Vectors for expressions, each part of the graph once; ``read`` gives those of the symbols."""
+    """Vectors for expressions, each part of the graph once; ``read`` returns those of the symbols."""
 
     def __init__(self, builder: Any, read: Callable[[Any], Any], expressions: Sequence[Any]) -> None:
         self.builder, self.read = builder, read
         self.known: dict[Any, Any] = {}
-        """Values of parts that have been formed where the code that is written now is reached."""
+        """Values of parts that are available at the present position of the code."""
         self.costs: dict[Any, bool] = {}
         named, reduced = symengine.cse([symengine.sympify(each) for each in expressions]) if expressions else ([], [])
         self.definitions = dict(named)
@@ -134,21 +136,21 @@ class Code:
         return (self.definitions[part],) if part in self.definitions else part.args
 
     def value(self, expression: Any) -> Any:
-        """The vector of a number, a symbol or a function, or the mask of a condition."""
+        """Return the vector of a number, a symbol or a function, or the mask of a condition."""
         for part in _arguments_first(expression, self._first, self.known):
             self.known[part] = self._made(part)
         return self.known[expression]
 
     def _first(self, part: Any) -> Sequence[Any]:
-        """Parts that are formed before a part: its arguments, but for those of a choice that only some cases need."""
+        """Return the parts evaluated before a part: its arguments, except branches that only some cases need."""
         parts = self._parts(part)
         return parts[1:2] if type(part).__name__ == "Piecewise" and self._costs(part) else parts
 
     def _costs(self, expression: Any) -> bool:
-        """Whether an expression takes longer than a jump around it."""
+        """True if an expression takes longer than a jump around it."""
         for part in _arguments_first(expression, self._parts, self.costs):
             kind = type(part).__name__
-            # These take some ten times as long as a sum.
+            # These functions take some ten times as long as a sum.
             slow = kind in ("log", *_LIBRARY) or (kind == "Pow" and not part.args[1].is_Integer)
             self.costs[part] = slow or any(self.costs[each] for each in self._parts(part))
         return self.costs[expression]
@@ -173,7 +175,7 @@ class Code:
         raise NotImplementedError(f"no vector code for {kind}: {part}")
 
     def _chosen(self, args: Sequence[Any]) -> Any:
-        """The first value whose condition holds, of values that are formed only where a case needs them."""
+        """Return the first value whose condition holds; each value is evaluated only if a case needs it."""
         value, condition, *rest = args
         holds = self.value(condition)
         first = self._where_any(holds, lambda: self.value(value))
@@ -183,7 +185,7 @@ class Code:
         return self.builder.select(holds, first, other)
 
     def _where_any(self, mask: Any, made: Callable[[], Any]) -> Any:
-        """A value made in code that is jumped over where the mask holds for no case."""
+        """Return a value whose code is skipped if the mask is false in all cases."""
         bits = ir.IntType(LANES)
         needed = self.builder.icmp_unsigned("!=", self.builder.bitcast(mask, bits), bits(0))
         before = self.builder.block
@@ -198,12 +200,12 @@ class Code:
         return result
 
     def _piecewise(self, _part: Any, values: Sequence[Any]) -> Any:
-        """The first value whose condition holds."""
+        """Return the first value whose condition holds."""
         pairs = list(zip(values[::2], values[1::2], strict=True))
         return reduce(lambda rest, pair: self.builder.select(pair[1], pair[0], rest), pairs[::-1], number(np.nan))
 
     def _relation(self, part: Any, values: Sequence[Any]) -> Any:
-        truths = values[0].type == MASK  # a condition that is compared with another one
+        truths = values[0].type == MASK  # a comparison of two conditions
         compare = self.builder.icmp_unsigned if truths else self.builder.fcmp_ordered
         return compare(_RELATIONS[type(part).__name__], *values)
 
@@ -215,7 +217,7 @@ class Code:
         return reduce(lambda a, b: self.builder.select(self.builder.fcmp_ordered(sign, a, b), a, b), values)
 
     def _product(self, part: Any, _values: Sequence[Any]) -> Any:
-        """A product, with one division for all its negative powers."""
+        """Return a product, with one division for all its negative powers."""
         above: list[Any] = []
         below: list[Any] = []
         for factor in part.args:
@@ -240,7 +242,7 @@ class Code:
         return self._by_library("pow", [self.known[base], self.known[exponent]])
 
     def _whole_power(self, base: Any, exponent: int) -> Any:
-        """A power by repeated squares."""
+        """Return a power by repeated squaring."""
         square, found = self.known[base], None
         while exponent:
             if exponent % 2:
@@ -250,7 +252,7 @@ class Code:
         return found
 
     def _by_library(self, name: str, values: Sequence[Any]) -> Any:
-        """A function of the C library at each place."""
+        """Call a function of the C library in each lane."""
         kind = ir.FunctionType(NUMBER, [NUMBER] * len(values))
         function = self.builder.module.globals.get(name) or ir.Function(self.builder.module, kind, name=name)
         places = map(ir.IntType(32), range(LANES))
@@ -271,7 +273,7 @@ _METHODS: dict[str, Callable[[Any, Any, Any], Any]] = {
     **dict.fromkeys(("And", "Or"), Code._joined),
     **dict.fromkeys(("Max", "Min"), Code._extreme),
 }
-"""Method that forms the vectors of a node of the graph, by its kind."""
+"""Method that generates the vectors of a node of the graph, by its kind."""
 _TRIGONOMETRIC = "sin", "cos", "tan", "asin", "acos", "atan"
 _HYPERBOLIC = "sinh", "cosh", "tanh", "asinh", "acosh", "atanh"
 _LIBRARY = {name: name for name in (*_TRIGONOMETRIC, *_HYPERBOLIC, "erf", "erfc")} | {"Abs": "fabs"}
@@ -279,7 +281,7 @@ _LIBRARY = {name: name for name in (*_TRIGONOMETRIC, *_HYPERBOLIC, "erf", "erfc"
 
 
 def has_code(expression: Any) -> bool:
-    """Whether there are vectors for all that an expression contains."""
+    """True if there is vector code for everything in an expression."""
     left = [expression]
     while left:
         part = left.pop()
@@ -291,12 +293,12 @@ def has_code(expression: Any) -> bool:
 
 
 def number(value: float) -> Any:
-    """The same number at every place."""
+    """Return a vector with the same number in every lane."""
     return _Constant(VECTOR, [value] * LANES)
 
 
 def gathered(builder: Any, values: Iterable[Any]) -> Any:
-    """A vector of numbers, each put in its place as it is formed."""
+    """Return a vector of numbers, each inserted as it is formed."""
     found = _Constant(VECTOR, ir.Undefined)
     for lane, value in enumerate(values):
         found = builder.insert_element(found, value, ir.IntType(32)(lane))
@@ -312,7 +314,7 @@ def _bits(value: float) -> int:
 
 
 def by_vector(builder: Any, function: str, value: Any) -> Any:
-    """A function that processors have for vectors, as `sqrt`."""
+    """Call a function that LLVM provides for vectors, such as `sqrt`."""
     name = f"llvm.{function}.v{LANES}f64"
     declared = builder.module.globals.get(name)
     if declared is None:
@@ -321,8 +323,8 @@ def by_vector(builder: Any, function: str, value: Any) -> Any:
 
 
 def _polynomial(builder: Any, x: Any, coefficients: Sequence[float]) -> Any:
-    """A polynomial by its coefficients, the lowest first: pairs, pairs of pairs, ... (Estrin), since in a chain of
-    products and sums each has to wait for the one before.
+    """Evaluate a polynomial from its coefficients, the lowest first: in pairs, pairs of pairs, ... (Estrin), since in
+    Horner's scheme each operation has to wait for the one before.
     """
     terms = [number(c) for c in coefficients]
     while len(terms) > 1:
@@ -334,21 +336,21 @@ def _polynomial(builder: Any, x: Any, coefficients: Sequence[float]) -> Any:
 
 _LN2_HIGH = 0.693147180369123816490
 _LN2_LOW = float(Decimal(2).ln() - Decimal(_LN2_HIGH))
-"""The logarithm of 2 in two parts, the first with zeros behind, so that its multiples are exact (fdlibm)."""
+"""The logarithm of 2 in two parts, the first with trailing zeros, so that its multiples are exact (fdlibm)."""
 _ROUNDING_SHIFT = 1.5 * 2.0**52
-"""Added and taken off again this rounds to a whole number, which stands in the last bits of the sum: many processors
-have no vector instruction that makes a word of a number, or shifts one with its sign.
+"""Adding and subtracting it rounds to an integer, which is in the last bits of the sum: many processors have no vector
+instruction that converts a number to an integer, or shifts an integer with its sign.
 """
 _MAX_EXP, _MIN_EXP = 709.782712893384, -745.2
-"""Arguments at which exp overflows, and at which it underflows to zero."""
+"""Arguments above which exp overflows, and below which it underflows to zero."""
 _EXP = [1.0 / factorial(k) for k in range(2, 14)]
-"""Taylor's series without its first two terms: below half of the logarithm of 2 the next one is 4e-18."""
+"""Taylor series without its first two terms: below half of the logarithm of 2 the next one is 4e-18."""
 
 
 def exp(builder: Any, x: Any) -> Any:
     """Exponential of a vector: 2^k exp(r) with abs(r) at most half of the logarithm of 2 (Cody & Waite)."""
     inside = builder.select(builder.fcmp_ordered(">", x, number(_MAX_EXP)), number(_MAX_EXP), x)
-    # No NaN passes either.
+    # The ordered comparison also replaces NaN.
     inside = builder.select(builder.fcmp_ordered(">=", inside, number(_MIN_EXP)), inside, number(_MIN_EXP))
     rounded = builder.fadd(builder.fmul(inside, number(1.4426950408889634)), number(_ROUNDING_SHIFT))
     whole = builder.fsub(rounded, number(_ROUNDING_SHIFT))
@@ -356,7 +358,7 @@ def exp(builder: Any, x: Any) -> Any:
     rest = builder.fsub(rest, builder.fmul(whole, number(_LN2_LOW)))
     series = builder.fmul(builder.fmul(rest, rest), _polynomial(builder, rest, _EXP))
     found = builder.fadd(number(1.0), builder.fadd(rest, series))
-    # In two factors, as the whole power of 2 may lie beyond the range.
+    # In two factors, as the power of 2 may lie beyond the range.
     power = builder.sub(builder.bitcast(rounded, INTEGERS), _whole(_bits(_ROUNDING_SHIFT)))
     half = builder.sub(builder.lshr(builder.add(power, _whole(2048)), _whole(1)), _whole(1024))
     for part in (half, builder.sub(power, half)):
@@ -370,15 +372,17 @@ _LOG_EVEN = [6.666666666666735130e-01, 2.857142874366239149e-01, 1.8183572161618
 _LOG_ODD = [3.999999999940941908e-01, 2.222219843214978396e-01, 1.531383769920937332e-01]
 """Coefficients of the series of log((1 + s) / (1 - s)) / s - 2 in even and odd powers of s^2 (fdlibm, e_log.c)."""
 _SQRT_HALF_BITS = 0x3FE6A09E667F3BCD
-"""The bits of the root of one half."""
+"""The bits of the square root of one half."""
 
 
 def log(builder: Any, x: Any) -> Any:
-    """Natural logarithm of a vector (fdlibm, e_log.c): x = 2^k (1 + f) with 1 + f between the roots of 1/2 and 2."""
+    """Natural logarithm of a vector (fdlibm, e_log.c): x = 2^k (1 + f) with 1 + f between the square roots of 1/2 and
+    2.
+    """
     tiny = builder.fcmp_ordered("<", x, number(2.0**-1022))
     scaled = builder.select(tiny, builder.fmul(x, number(2.0**54)), x)
     bits = builder.sub(builder.bitcast(scaled, INTEGERS), _whole(_SQRT_HALF_BITS))
-    # k + 1024 is above zero, and a word below 2^52 with the bits of that number is the number 2^52 more.
+    # k + 1024 is positive; an integer below 2^52, or-ed with the bits of 2^52, is that double plus the integer.
     counted = builder.lshr(builder.add(bits, _whole(1024 << 52)), _whole(52))
     counted = builder.bitcast(builder.or_(counted, _whole(_bits(2.0**52))), VECTOR)
     power = builder.fsub(counted, builder.select(tiny, number(2.0**52 + 1078.0), number(2.0**52 + 1024.0)))
@@ -394,7 +398,7 @@ def log(builder: Any, x: Any) -> Any:
     )
     found = builder.fsub(builder.fmul(power, number(_LN2_HIGH)), builder.fsub(builder.fsub(half, inner), f))
     usual = builder.and_(builder.fcmp_ordered(">", x, number(0.0)), builder.fcmp_ordered("<", x, number(np.inf)))
-    # Infinity, zero, below it, and what is no number.
+    # Infinity, zero, negative numbers, and NaN.
     zero = builder.select(builder.fcmp_ordered("==", x, number(0.0)), number(-np.inf), number(np.nan))
     other = builder.select(builder.fcmp_ordered("==", x, number(np.inf)), x, zero)
     return builder.select(usual, found, other)

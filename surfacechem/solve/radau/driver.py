@@ -366,7 +366,7 @@ def _begin_arc(w: Any, i: int) -> None:
 
 @compiled
 def _see_guards(w: Any, flight_time: float) -> None:
-    """Initialize the largest sizes of the guards; after a rebound zero for those that return, as for exact values."""
+    """Initialise the largest sizes of the guards; after a rebound zero for those that return, as for exact values."""
     copy(w.magnitude, w.margin_largest)
     first = w.n_margins - w.edges.shape[0]
     for e in range(w.edges.shape[0]):
@@ -441,7 +441,7 @@ def _carry_out(w: Any, i: int) -> int:
 
 @compiled
 def _begin_arcs(w: Any, i: int) -> None:
-    """Initialize a run whose edges are carried out here."""
+    """Initialise a run whose edges are carried out here."""
     clear(w.booked)
     clear(w.exchanged)
     copy(w.least_peaks, w.peaks_seen)

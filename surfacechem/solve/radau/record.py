@@ -182,7 +182,7 @@ def laying_out(record: StepperRecord) -> Any:
                         count = _WORD(length)
                     size = builder.mul(size, count)
                 free = builder.add(free, size)
-            # Later loads are marked invariant: hide from the optimizer that the words have just been written.
+            # Later loads are marked invariant: hide from the optimiser that the words have just been written.
             opaque = ir.FunctionType(_POINTER, [_POINTER])
             return builder.asm(opaque, "", "=r,0,~{memory}", [work], True)
 

@@ -4,7 +4,7 @@ The address is data, not a function type: code compiled here does not depend on 
 cached.
 
 The product of a table of coefficients and the matrix [stage, state] is the most frequent operation of a step. Its loops
-are too short to be vectorized by a compiler; here they are written with vectors, whatever the number of states: the
+are too short to be vectorised by a compiler; here they are written with vectors, whatever the number of states: the
 last vector of a row overwrites the start of the next row, which is written later, or rows kept free behind the last
 stage.
 """
