@@ -1,1 +1,1 @@
-"""Two curved surfaces: their nearest places, the interaction of their points, and the resultant force."""
+"""Two curved surfaces: their nearest points, the interaction of their points, and the resultant force."""

@@ -1,8 +1,8 @@
-"""Fits of a function of the approach to values and slopes at a few approaches: an energy with its force, for instance.
+"""Fits of a function of the approach to values and slopes at a few approaches, such as an energy and its force.
 
-Between two approaches the slope is a polynomial through Chebyshev's points, of which twice as many hold those before;
-where more of them do not help the piece is halved. Source: Trefethen (2013), Approximation Theory and Approximation
-Practice, chapters 2 and 8.
+Between two approaches the slope is a Chebyshev interpolant. Each degree is twice the last, so that its nodes include
+the earlier ones; where higher degrees do not help, the piece is halved. Source: Trefethen (2013), Approximation Theory
+and Approximation Practice, chapters 2 and 8.
 """
 
 from __future__ import annotations
@@ -23,26 +23,30 @@ from surfacechem.surfaces.projection import Array
 from surfacechem.tolerances import NEGLIGIBLE, TINY
 
 DEGREES = (2, 4, 8, 16, 32)
-"""Degrees of the polynomials in the approach that are tried one after the other."""
+"""Degrees of the polynomials in the approach, tried in this order."""
 
 SECOND_FIT_GAIN = 8
 """Factor by which a second fit is tighter, for which the errors of the integrals leave room."""
 
 GAIN_DEGREE, PIECE_SAMPLES = 8, 9
-"""Degree from which it is told whether a higher one is worth it, and the places that a piece takes beside its end."""
+"""Degree from which on it is tested if a higher one is worthwhile, and number of samples that a piece adds to its
+end.
+"""
 
 SHORTEST_PIECE = 2.0**-26
-"""Fraction of the range of approaches below which no piece is divided; at a kink of the force errors do not count."""
+"""Fraction of the range of approaches below which no piece is divided; errors of such short pieces, at kinks of the
+force, are ignored.
+"""
 
 MOST_PIECES = 200
 
 CHECK_PLACES = (-0.97, -0.52, 0.14, 0.71, 0.97)
-"""Places on a piece, beside its ends, at which the error of a polynomial is seen."""
+"""Points of a piece, in addition to its ends, at which the error of a polynomial is tested."""
 
 logger = logging.getLogger(__name__)
 
 Samples = Callable[[float], tuple[float, float, float]]
-"""Energy [J] and force [N], tension positive, at an approach [m], and the relative error of both."""
+"""Function from an approach [m] to energy [J], force [N], tension positive, and the relative error of both."""
 
 
 @dataclass(frozen=True)
@@ -59,57 +63,61 @@ class ApproachPiece:
     powers: bool
 
     def _place(self, d: Expression) -> tuple[Expression, float]:
-        """Coordinate of an approach in the piece, from -1 to 1, and half of the length of the piece."""
+        """Return the coordinate of an approach in the piece, from -1 to 1, and half the length of the piece."""
         ends = (math.log(self.low), math.log(self.high)) if self.powers else (self.low, self.high)
         half = (ends[1] - ends[0]) / 2
-        # A product with 1 / half would be a factor of its own in a high power, too large for a number.
+        # Divide: a factor 1 / half would be expanded in high powers, and overflow.
         return (log(d) if self.powers else d) / half - (ends[0] / half + 1), half
 
     def force(self, d: float) -> float:
-        """Slope of the energy at an approach [N]."""
+        """Return the slope of the energy at an approach [N]."""
         value = float(np.polynomial.polynomial.polyval(self._place(d)[0], self.coefficients))
         return value * self.energy(d) / d if self.powers else value
 
     def energy(self, d: Expression) -> Expression:
-        """Energy at an approach [J]."""
+        """Return the energy at an approach [J]."""
         x, half = self._place(d)
         whole = np.polynomial.Polynomial(self.coefficients).integ(lbnd=-1).coef.tolist()
-        # A sum of powers, whose higher derivatives are no longer than itself.
+        # A sum of powers, since its derivatives are no longer expressions.
         found = self.start + half * sum(c * x**k for k, c in enumerate(whole))
         return decay(-found) if self.powers else found
 
 
 @dataclass(frozen=True)
 class ApproachEnergy:
-    """Energy over the approach in pieces, all times a factor: the sign of what is a power law."""
+    """Energy as a function of the approach, in pieces, times a factor: the sign of the energy if logarithms are
+    fitted.
+    """
 
     pieces: tuple[ApproachPiece, ...]
     force: float
     """Slope of the first piece at the least approach [N]."""
     factor: float = 1.0
     error: float = 0.0
-    """Largest error of the force relative to it, or to a thousandth of its largest value in a piece; to all of that
-    where it changes its sign.
+    """Largest relative error of the force; relative to at least a thousandth of its largest value in a piece, and to
+    that value if the force changes sign there.
     """
 
     @property
     def numbers(self) -> list[Any]:
-        """All numbers that determine it, to be kept in a file."""
+        """All numbers that determine it, for storage in a file."""
         return [[astuple(piece) for piece in self.pieces], self.force, self.factor, self.error]
 
     @classmethod
     def of(cls, numbers: Sequence[Any]) -> ApproachEnergy:
-        """The energy made of numbers that have been kept."""
+        """Return the energy from stored numbers."""
         pieces, *rest = numbers
         made = (ApproachPiece(a, b, tuple(coefficients), *others) for a, b, coefficients, *others in pieces)
         return cls(tuple(made), *rest)
 
     def perturbed(self, sign: float = 1.0) -> ApproachEnergy:
-        """The energy, larger by its error, or smaller where the sign is negative."""
+        """Return the energy increased by its error, or decreased for a negative sign."""
         return replace(self, factor=self.factor * (1 + sign * self.error))
 
     def energy(self, d: Expression) -> Expression:
-        """Energy at an approach [J]; nearer than the first, where only trial states of a solver are, along a line."""
+        """Return the energy at an approach [J]; linear below the least approach, which only trial states of a solver
+        reach.
+        """
         first, result = self.pieces[0], self.pieces[-1].energy(d)
         for piece in reversed(self.pieces[:-1]):
             result = where(d < piece.high, piece.energy(d), result)
@@ -118,8 +126,9 @@ class ApproachEnergy:
 
 
 class CachedSamples:
-    """A function of the approach, computed once at each: that is logged, with how many are known to be needed, which
-    the ``budget`` is for.
+    """A function of the approach, evaluated once at each, and logged with the number of samples so far and expected.
+
+    The expected number is that of the ``budget``.
     """
 
     def __init__(self, samples: Samples, budget: Budget) -> None:
@@ -127,7 +136,7 @@ class CachedSamples:
         self.at: dict[float, tuple[float, float, float]] = {}
 
     def __call__(self, d: float) -> tuple[float, float, float]:
-        """Sample at an approach, logged and computed where it is not known yet."""
+        """Return the sample at an approach; log and compute it if it is not known yet."""
         if d not in self.at:
             amount = {"done": len(self.at), "total": max(self.budget.integrals, len(self.at) + 1)}
             logger.info("integral over the surfaces at the approach %.3g m", d, extra=amount)
@@ -136,7 +145,7 @@ class CachedSamples:
 
 
 def straight(low: float, high: float) -> ApproachEnergy:
-    """An energy that grows along a line, for one that is not known yet."""
+    """Return a linear energy, as a placeholder for one that is not known yet."""
     return ApproachEnergy((ApproachPiece(low, high, (1.0,), 0.0, powers=False),), 0.0)
 
 
@@ -149,25 +158,25 @@ def fitted(
     floor: tuple[float, float] = (0.0, 0.0),
     budget: Budget | None = None,
 ) -> ApproachEnergy:
-    """The energy between two approaches, so that its slope is the force within a relative error.
+    """Fit the energy between two approaches, so that its slope is the force within a relative error.
 
-    It bends at the approaches ``cuts``; energies [J] and forces [N] below a ``floor`` count as that; a ``budget``
-    learns how many of the samples are needed. InputError where it is not smooth elsewhere.
+    It may have kinks at the approaches ``cuts``; energies [J] and forces [N] below a ``floor`` count as equal to it;
+    the ``budget`` gets the number of samples needed. InputError if it is not smooth elsewhere.
 
     An energy of one sign at positive approaches is fitted by its logarithm, in which a power is a straight line.
     """
     sample, inside = CachedSamples(samples, budget or Budget(rtol)), [cut for cut in cuts if low < cut < high]
     sample.budget.integrals = (1 + len(inside)) * PIECE_SAMPLES + 1
-    first = sample(low)  # what has no force there is refused before anything else is computed
+    first = sample(low)  # raises an error for a missing force before anything else is computed
     powers = low > 0 and not inside
-    if powers:  # and its energies all above or all below zero, and more than nothing
+    if powers:  # and all energies of one sign, above the floor
         energies = [sample(d)[0] for d in (low, math.sqrt(low * high), high)]
         powers = min(energies) > floor[0] or max(energies) < -floor[0]
     least = 0.0 if powers else floor[1]
-    # What pieces miss of a slope of ln E adds up along them: then they are made once more, closer.
+    # Errors of the slope of ln E accumulate along the pieces: fit again with a tighter tolerance if needed.
     for aim in (rtol, rtol / SECOND_FIT_GAIN):
         curve = joined(divided(sample, [low, *inside, high], powers, aim, least), *first[:2], powers)
-        # Between the places that are looked at it may miss more, hardly twice as much.
+        # Between the samples the error may be larger, but hardly twice as large.
         error = float(2 * largest_error(curve, sample.at, least) + max(error for _, _, error in sample.at.values()))
         if error <= rtol:
             break
@@ -175,12 +184,12 @@ def fitted(
 
 
 def largest_error(curve: ApproachEnergy, at: Mapping[float, tuple[float, float, float]], least: float) -> float:
-    """Largest difference of the slope of a curve from the forces that it is made of, relative to them in each piece, or
-    to the ``least`` that counts.
+    """Return the largest difference between a curve's slope and the sampled forces, relative to the forces in each
+    piece, or to ``least``.
     """
     worst = 0.0
     for piece in curve.pieces:
-        if len(piece.coefficients) == 1:  # a kink, too short to count
+        if len(piece.coefficients) == 1:  # at a kink, too short to matter
             continue
         inside = {d: sample for d, sample in at.items() if piece.low <= d <= piece.high}
         units = [abs(energy) / d if piece.powers else 1.0 for d, (energy, _, _) in inside.items()]
@@ -193,7 +202,7 @@ def largest_error(curve: ApproachEnergy, at: Mapping[float, tuple[float, float, 
 def divided(
     sample: CachedSamples, ends: Sequence[float], powers: bool, rtol: float, least: float
 ) -> list[tuple[float, float, Array]]:
-    """Pieces that are halved until a polynomial is the force on each; at a kink until they are too short to count."""
+    """Halve pieces until a polynomial fits the force on each; at a kink until they are too short to matter."""
     found: list[tuple[float, float, Array]] = []
     waiting = list(pairwise(ends))[::-1]
     while waiting:
@@ -206,7 +215,7 @@ def divided(
             found.append((a, b, coefficients))
         elif _extent(a, b, powers) > SHORTEST_PIECE * _extent(ends[0], ends[-1], powers):
             middle = approach_at(0.0, a, b, powers)
-            # The lower half is the next, so that pieces are found in order.
+            # The lower half comes next, so that pieces are found in order.
             waiting += [(middle, b), (a, middle)]
         else:
             found.append((a, b, np.array([(value_at(sample, a, powers) + value_at(sample, b, powers)) / 2])))
@@ -214,18 +223,20 @@ def divided(
 
 
 def _extent(a: float, b: float, powers: bool) -> float:
-    """Length between two approaches, of their logarithms where powers are fitted."""
+    """Return the length between two approaches, or between their logarithms if powers are fitted."""
     return math.log(b / a) if powers else b - a
 
 
 def value_at(sample: Samples, d: float, powers: bool) -> float:
-    """Value at an approach that a polynomial interpolates: the force, or the slope of ln E over ln d."""
+    """Return the value that a polynomial interpolates at an approach: the force, or the slope of ln E over ln d."""
     energy, force, _ = sample(d)
     return force * d / energy if powers else force
 
 
 def polynomial(sample: CachedSamples, a: float, b: float, powers: bool, rtol: float, least: float) -> Array | None:
-    """Coefficients of the polynomial fitted between two approaches; None where a higher degree gains too little."""
+    """Return the coefficients of a polynomial fitted between two approaches; None if a higher degree gains too
+    little.
+    """
 
     def value(x: float) -> float:
         return value_at(sample, approach_at(x, a, b, powers), powers)
@@ -238,7 +249,7 @@ def polynomial(sample: CachedSamples, a: float, b: float, powers: bool, rtol: fl
         fit = np.polynomial.chebyshev.Chebyshev.fit(nodes, values, degree, domain=[-1, 1])
         if before is None:
             continue
-        # What one of half the degree misses is the root of what this one does, as errors fall like a power of it.
+        # The error is geometric in the degree: that of half the degree is the square root of this one's.
         largest = max(float(np.max(np.abs(values))), size)
         off, goal = float(np.max(np.abs(before(nodes) - values))) / largest, rtol * size / largest
         if off**2 <= goal and all(abs(fit(x) - value(x)) <= rtol * size for x in CHECK_PLACES):
@@ -250,21 +261,23 @@ def polynomial(sample: CachedSamples, a: float, b: float, powers: bool, rtol: fl
 
 
 def size_of(values: Array, least: float) -> float:
-    """Size to which errors of values in a piece are relative: the smallest of one sign, or a part of the largest."""
+    """Return the size to which errors in a piece are relative: the smallest value of one sign, or a part of the
+    largest.
+    """
     sizes = np.abs(values)
     one_sided = values.min() >= 0 or values.max() <= 0
     return float(max(sizes.min() if one_sided else sizes.max(), NEGLIGIBLE * sizes.max(), least, TINY))
 
 
 def approach_at(x: float, a: float, b: float, powers: bool) -> float:
-    """The approach at -1 <= x <= 1, the ends as they are."""
+    """Return the approach at -1 <= x <= 1; exact at the ends."""
     if abs(x) == 1:
         return b if x > 0 else a
     return math.sqrt(a * b) * (b / a) ** (x / 2) if powers else (a + b) / 2 + x * (b - a) / 2
 
 
 def joined(found: list[tuple[float, float, Array]], energy: float, force: float, powers: bool) -> ApproachEnergy:
-    """Pieces whose energies go on where the one before ends."""
+    """Join pieces to an energy that is continuous."""
     start, pieces = math.log(abs(energy)) if powers else energy, []
     for a, b, coefficients in found:
         piece = ApproachPiece(a, b, tuple(map(float, coefficients)), start, powers)

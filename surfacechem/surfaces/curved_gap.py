@@ -1,7 +1,7 @@
-"""Force of a law of the gap between two curved surfaces: its energy integrated over one of them.
+"""Force of a law of the gap between two curved surfaces: its energy per area integrated over one of them.
 
-Each point of body 1 counts with the gap to the nearest point of body 2, where the opposite traction acts, so that net
-force and net moment vanish to rounding. For a pairwise law with the energy between flats this is its local
+Each point of body 1 contributes with the gap to its closest point on body 2, where the opposite traction acts, so that
+net force and net moment vanish up to roundoff. For a pairwise law with the energy between flats this is its local
 approximation. Source: Sauer, Duong & Mandadapu (2021), eqs. e:bt_sr and e:psi_c.
 """
 
@@ -28,19 +28,21 @@ from surfacechem.tolerances import FORMULA_EPS, NEGLIGIBLE, SQRT_EPS, SUM_RTOL, 
 GAP = "g_n"
 
 Density = Callable[[Array], Array]
-"""Energy per area [J/m^2] and traction [Pa], tension positive, (n, 2) for n gaps [m]."""
+"""Function from n gaps [m] to energy per area [J/m^2] and traction [Pa], tension positive, shape (n, 2)."""
 
 AREA_ACCURACY = NEGLIGIBLE**2
-"""Relative accuracy of the area of contact, which no force follows from, unless less is asked for."""
+"""Relative accuracy of the contact area, which affects no force, unless a lower one is requested."""
 
 UP = np.array([0.0, 0.0, 1.0])
 
 
 @dataclass(frozen=True)
 class Contact:
-    """Energy [J], forces [N] and moments about the origin [N m] on both bodies, area where they touch or overlap [m^2],
-    heat conductance [W/K] and its slope over the approach [W/(K m)], least gap [m] and at how many places it is, and
-    the error relative to the size of each.
+    """Result of the integrals over the gap.
+
+    Energy [J], forces [N] and moments about the origin [N m] on both bodies, area of touch or overlap [m^2], heat
+    conductance [W/K] and its slope over the approach [W/(K m)], least gap [m] and the number of places with it, and the
+    error relative to the size of each.
     """
 
     energy: float
@@ -57,7 +59,7 @@ class Contact:
 
 
 def density(law: Potential | HeatTransfer) -> Callable[[Array], Array]:
-    """Value and slope of a law over the gap as machine code; InputError where it reads anything else."""
+    """Return value and slope of a law over the gap as machine code; InputError if it depends on anything else."""
     import symengine
 
     foreign = [name for name in reads(law.statement) if name != GAP and name not in optional(law.statement)]
@@ -70,13 +72,13 @@ def density(law: Potential | HeatTransfer) -> Callable[[Array], Array]:
 
 
 def between_flats(law: PairEnergy) -> Density:
-    """Energy of a pair summed over two flats: the traction is exact, t = -2 pi n_1 n_2 g psi(g).
+    """Return the energy of a pair law summed over two flats: the traction is exact, t = -2 pi n_1 n_2 g psi(g).
 
-    The energy is counted from a gap of a thousand times the least of those that are asked for.
+    The energy is zero at a thousand times the least of the gaps it is evaluated at.
     """
     psi, amount = kernel(law), 2 * np.pi * law.n_1 * law.n_2
     if law.parts is not None:
-        # The integral of a power of the distance is one.
+        # The integral of a power of the distance is a power.
         parts = [(amount * factor / (part.decay - 2), kernel(part)) for factor, part in law.parts(1.0)]
 
         def summed(gaps: Array) -> Array:
@@ -87,7 +89,7 @@ def between_flats(law: PairEnergy) -> Density:
     ends, last = np.array([bend for extent in laws_by_extent([law]) for bend in extent.bends]), law.cutoff
 
     def at(gaps: Array) -> Array:
-        # Pieces of r = g exp(t) up to where the law ends or, where it does not, to exp(8) g, cut where it bends.
+        # Pieces of r = g exp(t) up to the cutoff or, without one, to exp(8) g, cut at kinks.
         g = gaps.reshape(-1, 1)
         most = np.log(np.maximum(last / g, 1)) if math.isfinite(last) else np.full_like(g, 8.0)
         cuts = np.clip(np.log(np.maximum(ends / g, 1)), 0, most)
@@ -95,7 +97,7 @@ def between_flats(law: PairEnergy) -> Density:
         r = g * np.exp(t)
         whole = np.sum(psi(r)[..., 0] * r**2 * w, axis=1)
         if math.isinf(last):
-            # What is left of a power of the distance follows from its end.
+            # The remainder of a power follows from its value at the end.
             end = g[:, 0] * math.exp(8)
             whole += psi(end)[..., 0] * end**2 / (law.decay - 2)
         return np.stack([amount * whole.reshape(gaps.shape), -amount * gaps * psi(gaps)[..., 0]], axis=-1)
@@ -104,7 +106,7 @@ def between_flats(law: PairEnergy) -> Density:
 
 
 def bends(laws: Iterable[Potential | HeatTransfer]) -> list[float]:
-    """Gaps at which laws have kinks or are narrow, and zero."""
+    """Return the gaps at which laws have kinks or narrow peaks, and zero."""
     found = {0.0}
     for law in laws:
         for places in (law.kinks.get(GAP, ()), law.peaks.get(GAP, ())):
@@ -113,8 +115,11 @@ def bends(laws: Iterable[Potential | HeatTransfer]) -> list[float]:
 
 
 def level_approaches(lower: Surface, upper: Surface, levels: Sequence[float]) -> list[float]:
-    """Approaches at which the least gap passes levels; for two plates where a corner of one of them does, or where
-    edges of both cross, in closed form: there the force over the approach bends. The ``upper`` body is at zero.
+    """Return the approaches at which the least gap passes levels, where the force has kinks; the ``upper`` body is at
+    zero.
+
+    For two plates these are the approaches at which a corner of one of them does, or crossing edges of both, in closed
+    form.
     """
     if not all(type(body.shape) is Plane for body in (lower, upper)):
         return [_approach_at_level(lower, upper, level) for level in levels]
@@ -123,7 +128,7 @@ def level_approaches(lower: Surface, upper: Surface, levels: Sequence[float]) ->
     n, m = upper.axes[:, 2], lower.axes[:, 2]
     found = []
     for moved in (above + level * n for level in levels):
-        # A corner of one plate over the other, which is an offset of the upper one by the level.
+        # A corner of one plate over the other; the upper one is offset by the level.
         over, under = (below - moved[0]) @ n / n[2], -moved @ m / m[2]
         found += over[_is_on_plate(upper, below - over[:, None] * UP)].tolist()
         found += under[_is_on_plate(lower, moved + under[:, None] * UP)].tolist()
@@ -139,8 +144,8 @@ def level_approaches(lower: Surface, upper: Surface, levels: Sequence[float]) ->
 
 
 def _approach_at_level(lower: Surface, upper: Surface, level: float) -> float:
-    """The approach at which the least gap is a level, which it is itself where no body is tilted about its highest
-    point.
+    """Return the approach at which the least gap equals a level; they are equal unless a body is tilted about its
+    highest point.
     """
     size = length(lower, upper)
     d, before, step = level, math.nan, math.nan
@@ -149,20 +154,20 @@ def _approach_at_level(lower: Surface, upper: Surface, level: float) -> float:
         left = level - float(near.gap[0])
         if abs(left) <= FORMULA_EPS * size:
             break
-        # The secant; at first as if the gap grew as much as the approach, more than which it cannot.
+        # Secant method; the first slope is 1, the largest possible.
         step = left * (step / (before - left) if before - left else 1.0) if math.isfinite(before) else left
         d, before = d + step, left
     return d
 
 
 def _corners(plate: Surface, far: float) -> Array:
-    """Corners (4, 3), one after the other."""
+    """Return the corners of a plate in order, shape (4, 3)."""
     (a, b), (c, e) = np.nan_to_num(plate.shape.span, posinf=far, neginf=-far)
     return np.asarray(plate.derivatives(np.array([(a, c), (b, c), (b, e), (a, e)]), FIRST_ORDER)[0])
 
 
 def _is_on_plate(plate: Surface, x: Array) -> NDArray[np.bool_]:
-    """Whether each of the points (n, 3) in the plane of a plate is on it."""
+    """Return a mask of the points (n, 3) in a plate's plane that are on the plate."""
     return np.asarray(
         np.all(np.abs((x @ plate.axes)[:, :2]) <= np.max(plate.shape.span, axis=1) * (1 + FORMULA_EPS), axis=1)
     )
@@ -178,10 +183,10 @@ def over_gap(
     floor: tuple[float, float] = (0.0, 0.0),
     budget: Budget | None = None,
 ) -> Contact:
-    """Integral of laws of the gap over body 1; ``levels`` are gaps [m] at which the laws bend.
+    """Integrate laws of the gap over body 1; ``levels`` are gaps [m] at which the laws have kinks.
 
-    Errors are relative to the energy and the force, or to a ``floor`` [J, N] where that is larger. InputError where an
-    accuracy is out of reach, or takes more than a ``budget`` that is that of other integrals, too.
+    Errors are relative to energy and force, or to a ``floor`` [J, N] if that is larger. InputError if an accuracy is
+    out of reach, or takes more than a ``budget``, which other integrals may share.
     """
     check_finite(lower, upper)
     size, budget = length(lower, upper), budget or Budget(rtol)
@@ -199,7 +204,7 @@ def over_gap(
             *[force] * 6,
             *[max(moment, force * size)] * 6,
         ]
-        # Where bodies just touch rounding decides what overlaps.
+        # Where bodies just touch, the overlap is roundoff.
         area = max(abs(found[13]), SQRT_EPS * size**2) * max(1.0, AREA_ACCURACY / rtol)
         flow = max(abs(found[14]), TINY)
         return np.array([*parts, area, flow, max(abs(found[15]), flow / size)])
@@ -213,7 +218,7 @@ def over_gap(
 
 
 def _check_end(patches: Patches, rules: Rules, sizes: Array) -> None:
-    """Raise InputError where what is integrated over an endless surface does not fall off on the way to its far end."""
+    """Raise InputError if an integrand over an infinite surface does not decay towards its far end."""
     low, high = np.isinf(np.transpose(patches.surface.shape.span))
     last = (high & (patches.high == patches.high.max(axis=0))) | (low & (patches.low == patches.low.min(axis=0)))
     if not last.any():
@@ -221,7 +226,7 @@ def _check_end(patches: Patches, rules: Rules, sizes: Array) -> None:
     ends = patches[last.any(axis=1)]
     none = np.zeros(len(ends), dtype=int)
     share = np.abs(rules(ends, none, none).sum(axis=0) / sizes)
-    # Energies may count from anywhere; a force or a conductance that has no end is none.
+    # The zero of energy is arbitrary, but force and conductance must be finite.
     for name, part in (("force", share[1:7]), ("conductance", share[14:15])):
         if part.max() > NEGLIGIBLE:
             text = f"the {name} over a surface without end has no end either: give that body a radius or a length"
@@ -229,11 +234,11 @@ def _check_end(patches: Patches, rules: Rules, sizes: Array) -> None:
 
 
 def integrands(x: Array, near: Projection, laws: Sequence[Density], heat: Sequence[Callable[[Array], Array]]) -> Array:
-    """Integrands per area at points (n, 3) of body 1, in the order of :class:`Contact`."""
+    """Return the integrands per area at points (n, 3) of body 1, in the order of :class:`Contact`."""
     count = np.zeros((*near.gap.shape, 16))
     for law in laws:
         psi, traction = np.moveaxis(law(near.gap), -1, 0)
-        # Tension pulls body 1 against the direction in which body 2 sees it.
+        # Tension pulls body 1 against the direction from body 2 to it.
         pull = -traction[..., None] * near.direction
         count[..., 0] += psi
         count[..., 1:7] += np.concatenate([pull, -pull], axis=-1)
@@ -242,6 +247,6 @@ def integrands(x: Array, near: Projection, laws: Sequence[Density], heat: Sequen
     for path in heat:
         h, slope = np.moveaxis(path(near.gap), -1, 0)
         count[..., 14] += h
-        # As body 2 moves up, the gap to its nearest point grows by the vertical part of their direction.
+        # As body 2 moves up, the gap to its closest point grows by the vertical component of the direction.
         count[..., 15] -= slope * near.direction[..., 2]
     return count

@@ -1,5 +1,7 @@
-"""Sums over the inner of two surfaces of laws of the distance: on circles around a foot where all points are alike,
-else on nodes that gather around that.
+"""Sums of laws of the distance over the inner of two surfaces.
+
+On a surface whose points are all equivalent they are sums over circles around the foot of a point, else over nodes that
+are graded towards the foot.
 """
 
 from __future__ import annotations
@@ -21,29 +23,31 @@ from surfacechem.surfaces.shapes import Sphere
 from surfacechem.tolerances import NEGLIGIBLE, TINY
 
 TRUNCATION_PART = 0.01
-"""Truncation error of a sum as a fraction of the accuracy: what is far away of one surface is not summed."""
+"""Truncation error of a sum as a fraction of the accuracy: distant parts of a surface are omitted."""
 
 BEND_SEARCH_COST = 4
-"""Points that are looked at for one on a ray, as bends are sought along it."""
+"""Points evaluated for each node on a ray, in the search for kinks along it."""
 
 CHEBYSHEV_NODES, TABLE_CHECKS = np.cos(np.pi * (np.arange(24) + 0.5) / 24), np.array([-0.97, -0.52, 0.14, 0.71])
-"""Gaps for a polynomial of their logarithm, and places between them at which it is tried."""
+"""Chebyshev nodes in the logarithm of the gap for a table, and points between them at which it is tested."""
 
 TABLE_LENGTH = 0.5
-"""Length of these pieces: over one a sum of r^-10 falls to a fiftieth."""
+"""Length of a table's piece in the logarithm of the gap: over one, a sum of r^-10 falls to a fiftieth."""
 
 MOST_FALL, END_NODES = 100.0, 6
-"""Largest ratio of a sum in a table to its size at the smaller end, so that the error of the larger is a tenth of the
-accuracy of the smaller; and the number of gaps over which that size is taken, as the sum may change its sign.
+"""Largest ratio of a sum in a table to its size at the smaller end, so that the error of the larger value is a tenth of
+the accuracy of the smaller; and the number of gaps over which that size is taken, as the sum may change sign.
 """
 
 FEWEST_TABULATED = 56
-"""Points up to which sums are made one by one where no table is good enough or used again: twice what that takes."""
+"""Points up to which sums are computed one by one if no table is accurate enough or used again: twice the cost of a
+table.
+"""
 
 
 @lru_cache(maxsize=64)
 def kernel(law: PairEnergy) -> Kernel:
-    """Energy of a pair and its slope as machine code, (n, 2) for n distances."""
+    """Return the energy of a pair and its slope as machine code, (n, 2) for n distances."""
     import symengine
 
     r = symengine.Symbol("r")
@@ -51,15 +55,15 @@ def kernel(law: PairEnergy) -> Kernel:
 
 
 def with_slope(formula: Expression, symbol: Expression) -> Kernel:
-    """A formula and its slope over the one symbol in it as machine code, (n, 2) for n values of that."""
+    """Return a formula of one symbol and its slope as machine code, (n, 2) for n values of the symbol."""
     import symengine
 
     value = symengine.sympify(formula)
-    # Branches that divide by zero are not taken.
+    # Branches that would divide by zero are not taken.
     compiled: Kernel = symengine.Lambdify([symbol], [value, value.diff(symbol)], backend="llvm")
 
     def values(places: Array) -> Array:
-        # The machine code takes no empty array.
+        # The machine code does not accept an empty array.
         flat = compiled(places.reshape(-1, 1)) if places.size else np.empty(0)
         return np.asarray(flat).reshape(*places.shape, 2)
 
@@ -67,7 +71,9 @@ def with_slope(formula: Expression, symbol: Expression) -> Kernel:
 
 
 def laws_by_extent(laws: Sequence[PairEnergy]) -> dict[Extent, list[int]]:
-    """Numbers of the laws that share nodes, by extent: one for each set of kinks and cutoff, one for all without."""
+    """Group the indices of laws that share nodes by extent: one for each set of kinks and cutoff, one for all laws
+    without.
+    """
     found: dict[tuple[float, ...], list[int]] = {}
     for k, law in enumerate(laws):
         bends = law.kinks.get("r", ())
@@ -84,9 +90,9 @@ def laws_by_extent(laws: Sequence[PairEnergy]) -> dict[Extent, list[int]]:
 def inner_sums(
     surface: Surface, x: Array, laws: Sequence[PairEnergy], level: int, rtol: float
 ) -> tuple[list[Sums], int]:
-    """Sums over the inner surface for points (n, 3), of each law, and the number of pairs of points.
+    """Return the sums of each law over the inner surface for points (n, 3), and the number of pairs of points.
 
-    InputError where a point is in the body.
+    InputError if a point is inside the body.
     """
     near = surface.nearest(x)
     if not np.all(near.gap > 0):
@@ -103,8 +109,8 @@ def inner_sums(
 def _sums_of(
     surface: Surface, x: Array, near: Projection, laws: Sequence[PairEnergy], extent: Extent, level: int, rtol: float
 ) -> tuple[list[Sums], int]:
-    """Sums over the inner surface of laws of one extent."""
-    # Of what lies beyond, a part of size (h / reach)^(decay - 2) of all is missed.
+    """Return sums over the inner surface of laws of one extent."""
+    # Truncation at the reach omits a part (h / reach)^(decay - 2) of the sum.
     farther = (rtol * TRUNCATION_PART) ** (-1 / (extent.decay - 2))
     if not is_round(surface.shape):
         reach = np.minimum(near.gap * farther, extent.cutoff)
@@ -119,8 +125,10 @@ def _sums_of(
 
 @dataclass(frozen=True)
 class SumsByGap:
-    """Sums (n, 2 laws) around the feet of points at gaps (n,) on a shape whose points are all alike, which do not
-    depend on where that is: circles up to where laws end or, where they do not, so many times farther than the gap.
+    """Sums (n, 2 laws) around the feet of points at gaps (n,), on a shape whose points are all equivalent.
+
+    They do not depend on where the foot is: they are over circles up to the laws' cutoff or, without one, up to
+    ``farther`` times the gap.
     """
 
     shape: Shape
@@ -131,24 +139,24 @@ class SumsByGap:
     rtol: float
 
     def at(self, gaps: Array) -> tuple[Array, int]:
-        """The sums, and the number of pairs of points that they take."""
+        """Return the sums, and the number of pairs of points."""
         r, height, area = self._circles(gaps)
         sums = []
         for law in self.laws:
             psi, slope = np.moveaxis(kernel(law)(r), -1, 0)
-            # Energy, and force along the normal; what points across that cancels.
+            # Energy, and force along the normal; tangential components cancel.
             sums += [(psi * area).sum(-1), (-slope * area / r * height).sum(-1)]
         return np.stack(sums, axis=-1), area.size
 
     def _circles(self, gap: Array) -> tuple[Array, Array, Array]:
-        """Circles around the feet: their distances from the points, how far they lie below them, and their areas, each
-        (n, k).
+        """Return circles around the feet: their distances from the points, depths below these, and areas, each (n,
+        k).
         """
         bent = self.shape.bulge / self.shape.R if isinstance(self.shape, Sphere) else 0.0
         last = math.pi / abs(bent) if bent else math.inf
         ends = [np.zeros_like(gap)]
         for bend in self.extent.bends:
-            # The circle at which the distance is that of a bend, from the law of cosines.
+            # The circle on which the distance is that of a kink, from the law of cosines.
             chord = np.sqrt(np.maximum(bend - gap, 0.0) * (bend + gap) / np.maximum(1 + bent * gap, TINY))
             ends.append(2 / abs(bent) * np.arcsin(np.minimum(chord * abs(bent) / 2, 1)) if bent else chord)
         if math.isinf(self.extent.cutoff):
@@ -160,15 +168,15 @@ class SumsByGap:
         ds = w * np.hypot(gap, s)
         chord = 2 * np.sin(bent * s / 2) / bent if bent else s
         radius = np.sin(bent * s) / bent if bent else s
-        # The law of cosines for a chord, which does not cancel next to the foot.
+        # The law of cosines in terms of the chord, which does not cancel next to the foot.
         r = np.sqrt(gap**2 + (1 + bent * gap) * chord**2)
         return r, gap + bent * chord**2 / 2, 2 * math.pi * np.abs(radius) * ds
 
 
 @lru_cache(maxsize=4096)
 def table(profile: SumsByGap, low: float, high: float) -> tuple[Array | None, int]:
-    """Coefficients of Chebyshev's polynomials (24, 2 laws) of a logarithm of the gap between two of them, none where
-    they miss what is between, and the number of pairs that they take.
+    """Return Chebyshev coefficients (24, 2 laws) in the logarithm of the gap between two of its values, and the number
+    of pairs evaluated; no coefficients if they miss the values between the nodes.
     """
     at = (low + high) / 2 + (high - low) / 2 * np.concatenate([CHEBYSHEV_NODES, TABLE_CHECKS])
     known, pairs = profile.at(np.exp(at))
@@ -182,13 +190,15 @@ def table(profile: SumsByGap, low: float, high: float) -> tuple[Array | None, in
 
 
 def tabulated(profile: SumsByGap, gaps: Array) -> tuple[Array, int]:
-    """A profile (n, k) of many gaps, and the number of pairs that it takes; from tables over pieces of the logarithm of
-    the gap, which are the same for all points and approaches, unless it bends.
+    """Return a profile (n, k) of many gaps, and the number of pairs evaluated.
+
+    Unless the profile has kinks, it comes from tables over pieces of the logarithm of the gap, which are the same for
+    all points and approaches.
     """
     at, parts = np.log(gaps), []
     low, high = float(at.min()), float(at.max())
     if profile.extent.bends:
-        # Next to the end of a law there is next to nothing, of which a table over more would miss a lot.
+        # Next to a cutoff the sums nearly vanish, and a table across it would have a large relative error.
         levels = [math.log(gap) for gap in profile.extent.levels(profile.shape)]
         inside = [level for level in levels if low < level < high]
         edges = np.unique([*np.linspace(low, high, math.ceil(high - low) + 1), *inside])

@@ -1,8 +1,8 @@
-"""Patches cut where the gap passes a level at which a law has a kink, and where the nearest point comes to an edge of
-the other surface, so that rules stay accurate on both sides.
+"""Patches cut along levels of the gap at which a law has a kink, and along lines where the foot reaches an edge of the
+other surface, so that quadrature stays accurate on both sides.
 
-Source: Saye (2015), doi 10.1137/140966290: along the direction in which the gap changes most its level is found on each
-line of nodes; the other direction is cut where the level leaves the patch.
+Source: Saye (2015), doi 10.1137/140966290: the level is located on each line of nodes along the direction in which the
+gap changes most; the other direction is cut where the level leaves the patch.
 """
 
 from __future__ import annotations
@@ -20,29 +20,30 @@ from surfacechem.surfaces.patches import FIRST_LEVEL, Levels, Patches
 from surfacechem.surfaces.projection import FIRST_ORDER, Array, Projection, Surface
 
 SAMPLES = np.array([0, 1 / 128, 1 / 4, 1 / 2, 3 / 4, 127 / 128, 1])
-"""Places along each side of a patch at which it is seen whether it has a level. Two at either end tell the slope there:
-a height that turns round between two others has passed it with another sign.
+"""Points along each side of a patch at which it is tested for a level. The pairs at the ends give the slope there: a
+minimum or maximum between other points shows as a change of its sign.
 """
 
 SLIGHT_CUT, CUT_HALVINGS = 0.1, 8
-"""A patch of which a level cuts off less, as part times rest, is halved at first, at most so many times more than it
-takes until its area is the accuracy.
+"""A patch divided so unevenly that part times rest is below this is halved first. The second is the number of halvings
+in excess of those that reduce its area to the accuracy.
 """
 
 MOST_CROSSED = 256
-"""Patches that an edge crosses beside their level are halved, too, while they are no more: where lines meet, not where
-they run along each other.
+"""Patches crossed by an edge in addition to their level are halved too, if there are at most this many: lines then
+cross rather than run along each other.
 """
 
 SIDE_PARTS, ROOT_SAMPLES = 3, 10
-"""Parts of a side on each of which there are lines of nodes, and gaps that are looked at to find a level on a line."""
+"""Parts of a side with separate lines of nodes, and gaps evaluated to locate a level on a line."""
 
 
 @dataclass(frozen=True)
 class LevelPatches(Patches):
-    """Patches with the level (n,) that each has, the number of one of the gap to another surface or of an edge of
-    that, and the direction (n,) along which it is found; minus one where there is none. Heights over a level that are
-    less than the ``noise`` [m] are none.
+    """Patches with levels: of the gap to another surface, or of the distance beyond one of its edges.
+
+    ``level`` (n,) is the index of each patch's level, and ``along`` (n,) the direction in which it is located, -1 if it
+    has none. Heights above a level smaller than ``noise`` [m] count as zero.
     """
 
     arrays: ClassVar[Sequence[str]] = (*Patches.arrays, "level", "along", "share", "crossed", "leaves")
@@ -53,36 +54,38 @@ class LevelPatches(Patches):
     level: Levels
     along: Levels
     share: Array
-    """Fraction of each below the level times that above."""
+    """Fraction of each patch below the level times the fraction above."""
     crossed: NDArray[np.bool_]
-    """Whether an edge divides each in another way."""
+    """True for patches that an edge divides in another way."""
     leaves: Array
-    """Coordinates across that direction at which the level leaves each at its ends (n, 2), unless not sought yet."""
+    """Coordinates across that direction at which the level leaves each patch at its ends (n, 2); NaN if not known
+    yet.
+    """
 
     @property
     def fewest(self) -> int:
-        """Level of the rule that patches begin with: a level may bulge between the lines on which it is found."""
+        """Level of the first rule of patches: a cut may be curved between the lines on which it is located."""
         return FIRST_LEVEL if self.other.search == 1 else super().fewest
 
     @property
     def kinds(self) -> Levels:
-        """The direction of each."""
+        """Direction of the level of each patch."""
         return self.along
 
     def halved(self) -> Self:
-        """Halves of the patches, each with the level it has itself."""
+        """Return the halves of the patches, each with its own level."""
         return super().halved().marked().left()
 
     def marked(self) -> Self:
-        """Patches with the level and its direction as they now are."""
+        """Return the patches with their levels and directions determined anew."""
         u, v = (self.low[:, k, None] + (self.high - self.low)[:, k, None] * SAMPLES for k in range(2))
         x, near = self.seen(*np.broadcast_arrays(u[:, :, None], v[:, None, :]))
         heights = self.heights(near)
-        # Of several levels the one that divides a patch most evenly.
+        # Take the level that divides a patch most evenly.
         below, above = (np.mean(s * heights > self.noise, axis=(1, 2)) for s in (-1, 1))
         best, share = np.argmax(below * above, axis=1), np.max(below * above, axis=1)
         over = np.take_along_axis(heights, best[:, None, None, None], axis=-1)
-        # Along its direction a line of nodes passes a level once.
+        # Choose a direction in which each line of nodes crosses the level once.
         steps = [np.diff(over[..., 0], axis=k + 1) for k in range(2)]
         turns = np.stack(
             [
@@ -92,7 +95,7 @@ class LevelPatches(Patches):
         )
         steepness = np.stack([np.abs(step).mean(axis=(1, 2)) for step in steps])
         along = np.argmax(np.where(np.array(self.alike)[:, None], -1.0, np.where(turns, 0.0, steepness)), axis=0)
-        # Two edges are never one line; where a gap jumps its level is on the edge. Far from the body no edge counts.
+        # Two edges never coincide; where a gap jumps its level is on the edge. Far from the body edges do not matter.
         edges = np.arange(heights.shape[-1]) < len(self.other.edges)
         alike = np.mean((heights > 0) == (over > 0), axis=(1, 2))
         apart = np.where(edges & edges[best, None], np.arange(len(edges)) != best[:, None], (alike > 0) & (alike < 1))
@@ -103,7 +106,9 @@ class LevelPatches(Patches):
         return replace(self, level=best, along=along, share=share, crossed=crossed, leaves=none)
 
     def nodes(self, order: int) -> tuple[Array, Array]:
-        """Points (n, k, 3) of a rule, and their areas (n, k), on both sides of the level; all of one kind."""
+        """Return points (n, k, 3) of a rule on both sides of the level, and their areas (n, k); all patches are of one
+        kind.
+        """
         k = int(self.along[0])
         if k < 0:
             return super().nodes(order)
@@ -117,22 +122,24 @@ class LevelPatches(Patches):
         return self.points(np.stack(at if k == 0 else at[::-1], axis=-1), length * thickness[..., None])
 
     def most(self, order: int) -> int:
-        """Two sides of the level on each line, and parts across them."""
+        """Return the points of a rule on each patch: two sides of the level on each line, and parts across the
+        lines.
+        """
         return super().most(order) * (2 * SIDE_PARTS if self.along[0] >= 0 else 1)
 
     def cost(self, order: int) -> int:
-        """Cost of the searches for the level on each line of nodes."""
+        """Return the cost of the searches for the level on each line of nodes."""
         return 0 if self.along[0] < 0 else len(self) * SIDE_PARTS * order * ROOT_SAMPLES * self.other.search
 
     def _across(self, j: int, order: int) -> tuple[Array, Array]:
-        """Nodes and weights (n, m) across the direction of the level, cut where it leaves the patch."""
+        """Return nodes and weights (n, m) across the direction of the level, cut where it leaves the patch."""
         if self.alike[j]:
             return self.rule(j, order)
         edges = np.column_stack([self.low[:, j], self.leaves, self.high[:, j]])
         return gauss_rule(np.sort(edges, axis=1), order)
 
     def left(self) -> Self:
-        """Patches with the places where their levels leave them."""
+        """Return the patches with the points at which their levels leave them."""
         leaves = self.leaves.copy()
         for k in range(2):
             chosen = self.along == k
@@ -144,12 +151,14 @@ class LevelPatches(Patches):
         return replace(self, leaves=leaves)
 
     def divided(self, k: int) -> Self:
-        """Patches divided at their levels once for all, where nothing changes across a direction."""
+        """Return the patches divided at their levels once and for all, if nothing varies across a direction."""
         passed, rest = self[self.along == k], self[self.along != k]
         return rest.joined(passed.cut(k, passed.crossing(k, passed.low[:, 1 - k])))
 
     def crossing(self, k: int, across: Array) -> Array:
-        """Coordinate along a direction where each patch passes its level, at one (n,) across it; else its end."""
+        """Return the coordinate at which each patch passes its level along a direction, at ``across`` (n,); else its
+        end.
+        """
         from scipy.optimize.elementwise import find_root
 
         def above(t: Array, across: Array, which: Array) -> Array:
@@ -162,23 +171,25 @@ class LevelPatches(Patches):
         return np.asarray(np.where(found.success, found.x, ends[1]))
 
     def seen(self, u: Array, v: Array) -> tuple[Array, Projection]:
-        """Points (n, ..., 3) at substituted parameters (n, ...), and what they see of the other surface."""
+        """Return points (n, ..., 3) at substituted parameters (n, ...), and their projections onto the other
+        surface.
+        """
         at = np.stack([self.parameters(k, t)[0] for k, t in enumerate((u, v))], axis=-1)
         x = self.surface.derivatives(at, FIRST_ORDER)[0]
         return x, self.other.nearest(x)
 
     def heights(self, near: Projection) -> Array:
-        """Distances (n, ..., levels) [m] of points beyond edges, along which a gap may jump, and over its levels."""
+        """Return distances (n, ..., levels) [m] of points beyond edges, along which the gap may jump, and above gap
+        levels.
+        """
         return np.concatenate([near.beyond, near.gap[..., None] - self.levels], axis=-1)
 
 
 def with_levels(patches: Patches, other: Surface, levels: Sequence[float], noise: float, rtol: float) -> LevelPatches:
-    """Patches of a surface, each with the level of the gap to the other, or the edge of that, which passes through it,
-    if one does.
-    """
+    """Return patches of a surface with the gap levels and edges of the other surface that divide them."""
     for k in range(2):
         if not patches.alike[k]:
-            # The places that patches gather around, where gaps are least, are at corners of them.
+            # Points of least gap, towards which patches are graded, must be at corners of patches.
             around = (patches.low[:, k] < 0) & (patches.high[:, k] > 0)
             patches = patches[~around].joined(patches[around].cut(k, 0.0))
     parts = {name: getattr(patches, name) for name in ("surface", "alike", *Patches.arrays)}

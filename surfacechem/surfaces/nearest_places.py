@@ -1,7 +1,7 @@
-"""Places where two surfaces are nearest to each other: all of them, however many there are and however near.
+"""All points at which two surfaces are locally nearest, however many and however close to each other.
 
-Gaps are looked at all over one surface, finer than the grain of both, and from each place where no neighbour is nearer
-Newton's method leads to the least gap.
+The gap is sampled on a grid over one surface, finer than the grain of both. From each grid point that is nearer than
+its neighbours Newton's method leads to the local minimum.
 """
 
 from __future__ import annotations
@@ -21,26 +21,26 @@ from surfacechem.surfaces.shapes import Indices
 from surfacechem.tolerances import CBRT_EPS, EQUAL, FORMULA_EPS, SQRT_EPS
 
 COARSE_STEPS, STEPS_PER_GRAIN = 32, 4
-"""Steps along a surface between places that are looked at, at least, and per grain."""
+"""Least number of grid steps along a surface, and steps per grain."""
 
 MOST_PLACES = 5_000_000
-"""Places of the finest grid, at most."""
+"""Most points of the finest grid."""
 
 PLACES_AT_ONCE, CALL_COST = 100_000, 200
-"""Places that are looked at together, and those that take as long as any, however few they are."""
+"""Points evaluated together, and the overhead of a call in points."""
 
 
 ZOOM_PLACES, ZOOM_FACTOR = 9, 0.6
-"""Places along each side of a grid around one of least gap, and how much smaller the next is."""
+"""Points along each side of a grid around the least gap, and the factor by which the next grid is smaller."""
 
 MOST_TURN = math.atan(1e3)
-"""Turn [rad] beyond which nearest places of surfaces without end are not sought farther out: a choice."""
+"""Turn [rad] beyond which nearest points of infinite surfaces are not searched farther out: a choice."""
 
 
 @dataclass(frozen=True)
 class NearPlaces:
-    """Parameters (k, 2) of the places of a surface that are nearest to the other, and the gaps there [m]; the nearest
-    is the first.
+    """Parameters (k, 2) of the points of a surface that are nearest to the other, and the gaps there [m]; the nearest
+    first.
     """
 
     at: Array
@@ -48,7 +48,7 @@ class NearPlaces:
 
     @property
     def count(self) -> int:
-        """Number of places that are as near as the nearest."""
+        """Number of points that are as near as the nearest."""
         return int(np.sum(self.gap <= self.gap[0] + EQUAL * abs(self.gap[0])))
 
 
@@ -60,12 +60,11 @@ def near_places(
     grain: float = math.inf,
     take: Callable[[int], None] = lambda _: None,
 ) -> NearPlaces:
-    """Places of one surface that are nearer to the other than those around them.
+    """Return the points of one surface at which the gap to the other has a local minimum.
 
-    Where a surface has no end they are sought near the origin, within ``size`` [m] and as much farther as one that is
-    turned is nearest to what rises like a square. Those that are farther than the nearest by more than a grain count
-    for nothing of their own. InputError where there are too many to look at; ``take`` is told before how many points
-    take as long as what is looked at.
+    An infinite surface is searched near the origin, within ``size`` [m] and, if tilted, as far as a tilted plane is
+    nearest to a parabola. Minima that exceed the least gap by more than a grain may be omitted. InputError if the grid
+    has too many points; ``take`` is called in advance with the cost in points.
     """
     sought = size * (1 + math.tan(min(abs(outer.shape.tilt) + abs(inner.shape.tilt), MOST_TURN)))
     low, high = np.nan_to_num(np.transpose(outer.shape.span), posinf=sought, neginf=-sought)
@@ -74,7 +73,7 @@ def near_places(
     # Lengths of the surface along its two parameters, at most.
     extents = np.linalg.norm(tangents, axis=-1).max(axis=(1, 2)) * (high - low)
     wide = min(grain, extents.max() / COARSE_STEPS * STEPS_PER_GRAIN)
-    # A surface without a grain needs no more than the coarsest places.
+    # A surface without a grain needs only the coarsest grid.
     halvings = np.ceil(np.log2(np.maximum(STEPS_PER_GRAIN * extents / grain / COARSE_STEPS, 1))).astype(int)
     steps = np.where(alike, 1, COARSE_STEPS * 2**halvings)
     if math.prod(int(n) for n in steps) > MOST_PLACES:
@@ -94,11 +93,11 @@ def near_places(
     chosen = chosen[gaps[tuple(chosen.T)] <= gaps.min() + wide]
     poles = (chosen[:, 0] == 0) & (outer.shape.about_axis and low[0] == 0 and not alike[1])
     if poles.any():
-        # At a pole no direction leads anywhere: the search begins beside it, where the gap is least.
+        # At a pole all directions are degenerate: start the search next to it, where the gap is least.
         chosen, poles = np.concatenate([chosen, [[1, int(np.argmin(gaps[1]))]]]), np.append(poles, False)
     apart, noise = np.where(alike, 0.0, (high - low) / steps), FORMULA_EPS * size
     at, gaps = _refined(outer, inner, gap, parameters(chosen), apart, extents.max(), noise)
-    # A pole that is not nearer than where this leads is no place of its own.
+    # Drop a pole that is not nearer than the point found from there.
     kept = ~poles | (gaps < gaps[-1] - noise)
     at, gaps = at[kept], gaps[kept]
     return _distinct(outer, at, gaps, SQRT_EPS * extents.max())
@@ -107,10 +106,11 @@ def near_places(
 def _near_grid(
     gap: Callable[[Indices], Array], steps: Indices, halvings: Indices, extents: Array, wide: float
 ) -> Array:
-    """Gaps on a grid of so many steps, infinite where they cannot be within a width of the least.
+    """Return the gaps on a grid with these steps, infinite where they cannot be within a ``wide`` distance of the
+    least.
 
-    From one place to another a gap changes by no more than their distance, so that the grid is made finer only where a
-    place between those of a coarser one may be near.
+    Between two points a gap changes by at most their distance, so the grid is refined only where a point between those
+    of a coarser one may be near.
     """
     found = np.full(steps + 1, np.inf)
     strides = [np.minimum(2**halvings, 2**k) for k in range(halvings.max(), -1, -1)]
@@ -129,12 +129,12 @@ def _near_grid(
 
 
 def _mesh(axes: Iterable[ArrayLike]) -> NDArray[Any]:
-    """All pairs (n, 2) of places along two axes."""
+    """Return all pairs (n, 2) of points on two axes."""
     return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
 
 
 def _lowest(gaps: Array, closed: tuple[bool, bool], noise: float) -> Indices:
-    """Indices (n, 2) of places of a grid that no neighbour is nearer than; one of those alike and side by side."""
+    """Return the indices (n, 2) of grid points with no nearer neighbour; one of each group of equal neighbours."""
     from scipy.ndimage import label, minimum_filter, minimum_position
 
     modes: Any = ["wrap" if comes_round else "nearest" for comes_round in closed]
@@ -148,8 +148,9 @@ def _lowest(gaps: Array, closed: tuple[bool, bool], noise: float) -> Indices:
 def _refined(
     outer: Surface, inner: Surface, gap: Callable[[Array], Array], at: Array, steps: Array, long: float, noise: float
 ) -> tuple[Array, Array]:
-    """The places (n, 2) of least gap near some, no step longer than that of the grid, over a ``long`` surface [m], and
-    the gaps there.
+    """Return the points (n, 2) of least gap near starting points, and the gaps there.
+
+    No step is longer than that of the grid; the surface is ``long`` [m].
     """
     low, high = outer.bounds
 
@@ -171,7 +172,7 @@ def _refined(
             for k, shift in enumerate(np.diag(small))
         )
         E, F, G = (np.einsum("nc,nc->n", tangents[i], tangents[j]) for i, j in ((0, 0), (0, 1), (1, 1)))
-        # A slope that changes the gap by its rounding is none.
+        # A slope that changes the gap by roundoff counts as zero.
         first[np.abs(first * steps) <= noise] = 0.0
         uu, vv = (bent if free else metric / long for bent, metric, free in ((uu, E, steps[0]), (vv, G, steps[1])))
         hessian = long * uu, long * (uv + vu) / 2, long * vv
@@ -182,16 +183,18 @@ def _refined(
     nearest = np.array([np.argmin(gaps)])
     first, here = slope(found[nearest])[0], found[nearest]
     first[((here <= low) & (first > 0)) | ((here >= high) & (first < 0))] = 0.0
-    # Along an edge of the other surface, where the gap bends or jumps, there may be no rest for Newton's method.
+    # Along an edge of the other surface the gap has kinks or jumps, and Newton's method may not converge.
     if np.abs(first * steps).max() > SQRT_EPS * long:
         found[nearest], gaps[nearest] = _nelder_mead(gap, here[0], steps, np.array([low, high]))
     return found, gaps
 
 
 def _nelder_mead(gap: Callable[[Array], Array], at: Array, steps: Array, bounds: Array) -> tuple[Array, float]:
-    """The place (2,) of least gap near one by the method of Nelder and Mead, which needs no slope, and on grids that
-    shrink around the best so far, as that may come to rest where the gap jumps; and the gap there, which looked at
-    again may be that beyond the jump by rounding.
+    """Return the point (2,) of least gap near a start, and the gap there.
+
+    By the method of Nelder and Mead, which needs no slope, and then on grids that shrink around the best point so far,
+    as that method may stall where the gap jumps. The returned gap is the one found: evaluated again, roundoff may give
+    the value beyond the jump.
     """
     from scipy.optimize import minimize
 
@@ -209,14 +212,14 @@ def _nelder_mead(gap: Callable[[Array], Array], at: Array, steps: Array, bounds:
         gaps = gap(places)
         k = np.argmin(gaps)
         best, least = (places[k], float(gaps[k])) if gaps[k] < least else (at, least)
-        # While the best is moving the grid stays as wide.
+        # Keep the width of the grid while the best point moves.
         size *= 1.0 if np.max(np.abs(best - at) / np.maximum(steps, POLE)) > size / 2 else ZOOM_FACTOR
         at = best
     return at, least
 
 
 def _distinct(outer: Surface, at: Array, gap: Array, near: float) -> NearPlaces:
-    """The places without those that are the same point, by gap."""
+    """Return the points in order of the gap, without duplicates."""
     from scipy.spatial import KDTree
 
     order = np.argsort(gap, kind="stable")

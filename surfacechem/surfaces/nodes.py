@@ -1,8 +1,8 @@
-"""Sums over the inner of two surfaces: quadrature nodes that gather around the nearest point.
+"""Quadrature nodes on the inner of two surfaces that are graded towards the foot of an outer point.
 
 Around the foot of a point at the distance h the parameters are x = h sinh t. In t the distance has no feature narrower
-than pi/2 whatever h is, so that Gauss's rule on pieces of a fixed length converges geometrically for any gap; the
-number of pieces grows with the logarithm of size over gap. Feet that are as near lie within 2 h, so that one is enough.
+than pi/2 for any h, so Gauss quadrature on pieces of a fixed length converges geometrically for any gap; the number of
+pieces grows with the logarithm of size over gap. Equally near feet lie within 2 h, so one is enough.
 
 Source: Johnston & Elliott (2005), doi 10.1002/nme.1208, for the substitution.
 """
@@ -22,16 +22,16 @@ from surfacechem.surfaces.projection import FIRST_ORDER, POLE, Array, Projection
 from surfacechem.surfaces.shapes import Cavity, Cylinder, Indices, Plane, Sphere
 
 ORDERS = (4, 6, 9, 13, 18, 25)
-"""Points of Gauss's rule on each piece, more and more of them until two in a row agree."""
+"""Gauss points on each piece, increased until two successive rules agree."""
 
 LAST_LEVEL = len(ORDERS) - 1
-"""Level of the last of the orders; rules of higher levels inside have pieces that are half as long."""
+"""Level of the last order; inside, rules of higher levels have pieces of half the length."""
 
 PIECE_LENGTH = 2.0
 """Length of a piece in t."""
 
 Kernel = Callable[[Array], Array]
-"""Energy of a law and its slope (n, 2) at n distances."""
+"""Function from n distances to energy and slope of a law, shape (n, 2)."""
 
 Sums = tuple[Array, Array]
 """For n outer points: energy (n,), and force on them (n, 3)."""
@@ -39,8 +39,10 @@ Sums = tuple[Array, Array]
 
 @dataclass(frozen=True)
 class Grid:
-    """Points (k, 3) of the inner surface with their areas (k,), and for which of the n points (n, 3) of the outer one
-    each is; where they are as many for each, (n, k / n, 3) and (n, k / n).
+    """Points (k, 3) of the inner surface with areas (k,), each with the index of its outer point among ``outer`` (n,
+    3).
+
+    If all outer points have equally many, the shapes are (n, k / n, 3) and (n, k / n), without an index.
     """
 
     outer: Array
@@ -49,7 +51,7 @@ class Grid:
     area: Array
 
     def sums(self, law: Kernel) -> Sums:
-        """Sums over the inner points of a law of the distance."""
+        """Return the sums of a law of the distance over the inner points."""
         owner = self.owner
         away = (self.outer[:, None] if owner is None else self.outer[owner]) - self.x
         r = np.sqrt(np.einsum("...c,...c", away, away))
@@ -63,7 +65,7 @@ class Grid:
 
 
 def is_round(shape: Shape) -> bool:
-    """Whether all points of a shape are alike: a plane without end, a whole sphere or cavity."""
+    """True if all points of a shape are equivalent: an infinite plane, a whole sphere or cavity."""
     if type(shape) is Plane:
         return shape.length is None and shape.width is None
     return type(shape) is Sphere or (type(shape) is Cavity and shape.angle == math.pi)
@@ -71,8 +73,10 @@ def is_round(shape: Shape) -> bool:
 
 @dataclass(frozen=True)
 class Extent:
-    """Range of laws of the distance: the power with which they decay at least, their cutoff, infinite where there is
-    none, and distances (increasing) [m] at which they have kinks, the cutoff the last of them.
+    """Range of laws of the distance.
+
+    Their least power of decay, their cutoff (infinite without one), and distances (increasing) [m] at which they have
+    kinks, the cutoff being the last.
     """
 
     decay: float
@@ -80,7 +84,9 @@ class Extent:
     bends: tuple[float, ...]
 
     def levels(self, shape: Shape) -> list[float]:
-        """Gaps to a shape [m] at which sums over it bend: there its nearest or its farthest point is at a bend."""
+        """Return the gaps to a shape [m] at which sums over it have kinks: its nearest or farthest point is then at a
+        kink.
+        """
         found = set(self.bends)
         if isinstance(shape, Sphere) and is_round(shape):
             found |= {shape.bulge * (bend - 2 * shape.R) for bend in self.bends}
@@ -91,12 +97,12 @@ _legendre = lru_cache(np.polynomial.legendre.leggauss)
 
 
 def order_of(level: int) -> int:
-    """Points of the rule of a level."""
+    """Return the number of points of a level's rule."""
     return ORDERS[min(level, LAST_LEVEL)]
 
 
 def gauss_rule(edges: Array, order: int) -> tuple[Array, Array]:
-    """Nodes and weights (n, k) of Gauss's rule on each of the pieces between edges (n, pieces + 1)."""
+    """Return nodes and weights (n, k) of Gauss quadrature on each of the pieces between edges (n, pieces + 1)."""
     x, w = _legendre(order)
     length = np.diff(edges)[..., None]
     at = edges[:, :-1, None] + length * (x + 1) / 2
@@ -104,8 +110,10 @@ def gauss_rule(edges: Array, order: int) -> tuple[Array, Array]:
 
 
 def piece_edges(low: Array, high: Array, grain: Array | float = math.inf, level: int = 0) -> Array:
-    """Edges (n, k) of pieces from parameters ``low`` to ``high`` (n,) around zero, none longer than PIECE_LENGTH, nor
-    than the grain of the surface, in units of the scale of sinh t; shorter ones for a level above the last.
+    """Return edges (n, k) of pieces from parameters ``low`` to ``high`` (n,) around zero.
+
+    None is longer than PIECE_LENGTH or than the grain of the surface, in units of the scale of sinh t; shorter ones for
+    levels above the last.
     """
     if np.all(np.isinf(grain)):
         return divided(np.stack([low, high], axis=1), level)
@@ -114,7 +122,7 @@ def piece_edges(low: Array, high: Array, grain: Array | float = math.inf, level:
 
 
 def divided(edges: Array, level: int) -> Array:
-    """Edges (n, k) of pieces between given ones (n, m), none longer than PIECE_LENGTH; shorter ones for a level above
+    """Divide the pieces between given edges (n, m) so that none is longer than PIECE_LENGTH; shorter for levels above
     the last.
     """
     found = [edges[:, :1]]
@@ -125,7 +133,7 @@ def divided(edges: Array, level: int) -> Array:
 
 
 def _outward(end: Array, grain: Array | float, parts: int) -> Array:
-    """Edges of parts of pieces from zero to an end; where that is reached sooner the last pieces are empty."""
+    """Return edges of pieces, or of parts of them, from zero to an end; trailing pieces of a shorter row are empty."""
     found = [np.zeros_like(end)]
     while np.any(found[-1] < end):
         wide = np.minimum(found[-1] + PIECE_LENGTH / parts, np.arcsinh(np.sinh(found[-1]) + grain / parts))
@@ -134,7 +142,7 @@ def _outward(end: Array, grain: Array | float, parts: int) -> Array:
 
 
 def tensor_grid(surface: Surface, x: Array, found: Projection, reach: Array, level: int) -> Grid:
-    """Nodes of a surface around the nearest point for each point (n, 3), up to a reach (n,)."""
+    """Return nodes of a surface around the foot of each point (n, 3), up to a reach (n,)."""
     low, high = np.transpose(surface.shape.span)
     _, x_u, x_v = surface.derivatives(found.at, FIRST_ORDER)
     axes = []
@@ -154,22 +162,22 @@ def tensor_grid(surface: Surface, x: Array, found: Projection, reach: Array, lev
 
 
 def _parameter_bound(surface: Surface, k: int, tangent: Array, distance: Array) -> Array:
-    """Bound on the difference of parameters along a direction from those of a foot, with the length (n,) of its
-    tangent, for points within a distance (n,) of it.
+    """Return a bound on the parameter difference from a foot, along a direction with tangents of this length (n,), for
+    points within a distance (n,) of the foot.
     """
     shape = surface.shape
-    # A chord of an angle, or a line across its half plane, is not as short; other parameters are lengths.
+    # An angle may differ by up to pi times distance over tangent; other parameters are lengths.
     return math.pi * distance / tangent if shape.closed[k] or isinstance(shape, Sphere) else distance
 
 
 def alike_around(outer: Surface, inner: Surface) -> bool:
-    """Whether nothing changes around a common axis."""
+    """True if nothing varies around a common axis."""
     axial = all(s.shape.tilt == 0 for s in (outer, inner)) and outer.shape.about_axis
     return axial and (inner.shape.about_axis or is_round(inner.shape))
 
 
 def alike_along(outer: Surface, inner: Surface) -> bool:
-    """Whether nothing changes along a cylinder over something without end in its direction."""
+    """True if nothing varies along a cylinder over a surface that is infinite in its direction."""
     shapes = outer.shape, inner.shape
     if not isinstance(shapes[0], Cylinder) or any(shape.tilt for shape in shapes):
         return False

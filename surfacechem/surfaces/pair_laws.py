@@ -28,7 +28,7 @@ class InversePower(PairEnergy):
     m: float = parameter("1", "power of the distance", above=2, varies=False)
 
     def energy(self, r: Expression) -> Expression:
-        """Energy of a pair [J]."""
+        """Return the energy of a pair [J]."""
         return self.psi_0 * (self.r_0 / r) ** self.m
 
     @property
@@ -37,7 +37,7 @@ class InversePower(PairEnergy):
         return self.m
 
     def parts(self, unit: float) -> Sequence[tuple[Expression, PairEnergy]]:
-        """Terms of the energy: factor and law of each."""
+        """Return the terms of the energy: factor and law of each."""
         return [(self.psi_0 * (self.r_0 / unit) ** self.m, _power(self.m, unit))]
 
 
@@ -56,11 +56,11 @@ class LennardJonesPair(PairEnergy):
     g_0: float = parameter("m", "range of the interaction", above=0, varies=False)
 
     def energy(self, r: Expression) -> Expression:
-        """Energy of a pair [J]."""
+        """Return the energy of a pair [J]."""
         return self.psi_0 * ((self.g_0 / r) ** 10 / 45 - (self.g_0 / r) ** 4 / 3)
 
     def parts(self, unit: float) -> Sequence[tuple[Expression, PairEnergy]]:
-        """Terms of the energy: factor and law of each."""
+        """Return the terms of the energy: factor and law of each."""
         ratio = self.g_0 / unit
         return [(self.psi_0 * ratio**10 / 45, _power(10, unit)), (-self.psi_0 * ratio**4 / 3, _power(4, unit))]
 
@@ -80,7 +80,7 @@ class PenaltyPair(PairEnergy):
     r_0: float = parameter("m", "distance below which points repel", above=0, varies=False)
 
     def energy(self, r: Expression) -> Expression:
-        """Energy of a pair [J]."""
+        """Return the energy of a pair [J]."""
         return self.k / 2 * positive(self.r_0 - r) ** 2
 
     @property
@@ -131,14 +131,14 @@ class PairTable(PairEnergy):
 
     @cached_property
     def cubics(self) -> list[list[float]]:
-        """Coefficients between the points, of the third power first."""
+        """Coefficients between the points, that of the third power first."""
         from scipy.interpolate import PchipInterpolator
 
         coefficients: list[list[float]] = PchipInterpolator(self.distances, self.energies).c.T.tolist()
         return coefficients
 
     def energy(self, r: Expression) -> Expression:
-        """Energy of a pair [J]."""
+        """Return the energy of a pair [J]."""
         x, psi = self.distances, self.energies
         result = 0.0 * r
         for low, high, (a, b, c, d) in reversed(list(zip(x, x[1:], self.cubics, strict=False))):
@@ -149,5 +149,5 @@ class PairTable(PairEnergy):
 
 
 def _power(m: float, unit: float) -> PairEnergy:
-    """A power of the distance over a unit of length, with nothing else to it."""
+    """Return the pure power of the distance over a unit of length."""
     return InversePower(n_1=1.0, n_2=1.0, psi_0=1.0, r_0=unit, m=m)

@@ -28,16 +28,16 @@ from surfacechem.surfaces.shapes import Plane
 from surfacechem.tolerances import FORMULA_EPS, GAP_EPS, NEGLIGIBLE, SUM_RTOL, TINY, ULPS
 
 DECAY_DISTANCES = np.array([1e3, 2e3])
-"""Distances over the size of the surfaces at which it is seen how a law falls off."""
+"""Distances, in sizes of the surfaces, at which the decay of a law is tested."""
 
 MOST_DECADES = 100
-"""Reach over gap, in decades, at most: the largest area is its square."""
+"""Largest reach over gap, in decades: the largest area is its square."""
 
 ENDLESS_REACH = 1e6
-"""Reach over a surface without end, in sizes of the surfaces: so far an end of a law or of a plate is looked for."""
+"""Reach over an infinite surface, in sizes of the surfaces, within which a cutoff or an end of a plate is expected."""
 
 POINTS_AT_ONCE = 8
-"""Points at which tractions are summed together where the other surface has no circles."""
+"""Points at which tractions are summed together if the other surface has no circles."""
 
 INTEGRALS = 7
 """Energy, and three components of force and moment."""
@@ -45,8 +45,9 @@ INTEGRALS = 7
 
 @dataclass(frozen=True)
 class PairForces:
-    """Energy [J], forces [N] and moments about the origin [N m] on both bodies, and the largest error of any of them
-    relative to its size. With several laws all are arrays over them.
+    """Energy [J], forces [N] and moments about the origin [N m] on both bodies, and the largest relative error of any.
+
+    With several laws all are arrays over them.
     """
 
     energy: Array
@@ -58,24 +59,24 @@ class PairForces:
     gap: float
     """Least gap of the surfaces [m]."""
     places: int
-    """Places at which they are as near."""
+    """Number of points at which they are as near."""
     pairs: int
-    """Pairs of points that were looked at."""
+    """Pairs of points that were evaluated."""
 
 
 def interaction(
     lower: Surface, upper: Surface, laws: Sequence[PairEnergy], rtol: float = SUM_RTOL, budget: Budget | None = None
 ) -> PairForces:
-    """The double integrals of some laws over two surfaces; InputError where an accuracy is out of reach, or takes more
-    than a ``budget`` that is that of other integrals, too.
+    """Return the double integrals of laws over two surfaces.
 
-    Densities count as they are in each law.
+    InputError if an accuracy is out of reach, or takes more than a ``budget``, which other integrals may share. Each
+    law uses its own densities.
     """
     check_finite(lower, upper)
     for law in laws:
         _check_decay(law, length(lower, upper), rtol)
         _check_energy(lower, upper, law)
-    # The inner surface is the simpler one, if any.
+    # The inner surface is the simpler one, if one is.
     swapped = is_round(lower.shape) and (not is_round(upper.shape) or isinstance(lower.shape, Plane))
     swapped |= not is_round(upper.shape) and lower.shape.grain > upper.shape.grain
     outer, inner = (upper, lower) if swapped else (lower, upper)
@@ -92,15 +93,15 @@ def interaction(
             found[:, j, 0], found[:, j, 1:4], found[:, j, 4:] = energy, push, cross(x, push)
         return found * amounts, pairs
 
-    # What is left out is a hundredth of the accuracy, but for factors of order one.
+    # The truncation error is a hundredth of the accuracy, up to factors of order one.
     rounded += 0.0 if all(math.isfinite(law.cutoff) for law in laws) else 0.1 * rtol
     left = max(rtol, 2 * rounded) - rounded
-    # Next to the end of a law the energy is its force times the distance to that.
+    # Next to a cutoff the energy is of the order of the force times the distance to it.
     arms = np.array([min(gap, law.cutoff - gap) if law.cutoff > gap else gap for law in laws])[:, None]
     found, error, pairs = integral(
         patches, integrand, inner.search, lambda found: _sizes(found, gap, arms), left, budget
     )
-    # Each pair of points has opposite forces on the line through both, and no moment.
+    # The two points of a pair have opposite forces on the line through both, and no net moment.
     _, force, moment = np.split(-found if swapped else found, [1, 4], axis=-1)
     return PairForces(found[:, 0], force, -force, moment, -moment, error + rounded, gap, near.count, pairs)
 
@@ -108,7 +109,7 @@ def interaction(
 def _cut_patches(
     outer: Surface, inner: Surface, found: Sequence[Extent], rtol: float, budget: Budget
 ) -> tuple[Patches, NearPlaces]:
-    """Patches of the outer surface, cut where sums over the inner one bend, and where the surfaces are nearest."""
+    """Return patches of the outer surface, cut where sums over the inner one have kinks, and the nearest points."""
     size = length(outer, inner)
     reach = max(_reach(outer, inner, extent, rtol) for extent in found)
     patches, near = outer_patches(outer, inner, size, reach, budget)
@@ -123,12 +124,12 @@ def _cut_patches(
 
 
 def _rounding(x: Array, gap: float, found: Sequence[Extent], rtol: float) -> float:
-    """Relative error from rounding of coordinates x at a gap; InputError where an accuracy is out of reach by it."""
+    """Return the relative error from roundoff of coordinates x at a gap; InputError if it prevents an accuracy."""
     least = FORMULA_EPS + ULPS * float(np.linalg.norm(x)) / gap
     if least > rtol / 2:
         text = f"the accuracy {rtol:.2g} of an integral over the surfaces is out of reach"
         raise InputError(f"{text}: rounding leaves {least:.2g}.")
-    # Next to the end of a law there is next to nothing, which the distance to that end tells.
+    # Next to a cutoff the values nearly vanish, and depend on the distance to it.
     left = min((extent.cutoff - gap for extent in found if extent.cutoff > gap), default=math.inf)
     return least + FORMULA_EPS * gap / left
 
@@ -136,9 +137,9 @@ def _rounding(x: Array, gap: float, found: Sequence[Extent], rtol: float) -> flo
 def pair_traction(
     x: Array, normals: Array, inner: Surface, laws: Sequence[PairEnergy], rtol: float, budget: Budget
 ) -> Array:
-    """Normal tractions (n,) [Pa], tension positive, at points (n, 3) of a surface from all points of another.
+    """Return normal tractions (n,) [Pa], tension positive, at points (n, 3) of a surface from all points of another.
 
-    InputError where the sums over the other surface take more than a ``budget``, of which each lot of points is an
+    InputError if the sums over the other surface take more than a ``budget``, in which each slice of points is an
     integral.
     """
     found = np.zeros(len(x))
@@ -150,13 +151,13 @@ def pair_traction(
 
 
 def slices_of(count: int, inner: Surface) -> list[slice]:
-    """Slices of so many points that are summed together."""
+    """Return slices of this number of points that are summed together."""
     together = count if is_round(inner.shape) else POINTS_AT_ONCE
     return [slice(begin, begin + together) for begin in range(0, count, together)]
 
 
 def _forces_per_area(x: Array, inner: Surface, laws: Sequence[PairEnergy], rtol: float, budget: Budget) -> Array:
-    """Forces per area (n, 3) on points (n, 3), by rules of higher and higher level until two in a row agree."""
+    """Return forces per area (n, 3) on points (n, 3), by rules of increasing level until two successive ones agree."""
     before = None
     for level in range(1, LAST_LEVEL + 1):
         sums, pairs = inner_sums(inner, x, laws, level, rtol)
@@ -169,22 +170,22 @@ def _forces_per_area(x: Array, inner: Surface, laws: Sequence[PairEnergy], rtol:
 
 
 def check_finite(lower: Surface, upper: Surface) -> None:
-    """Raise InputError where two surfaces without end run along each other, so that their energy has no end either."""
+    """Raise InputError if two infinite surfaces run along each other, so that their energy is infinite too."""
     shapes = [surface.shape for surface in (lower, upper)]
     endless = [[not shape.about_axis and not np.all(np.isfinite(ends)) for ends in shape.span] for shape in shapes]
-    # What has no end in both directions shares one with anything that has none in one.
+    # A surface infinite in both directions shares a direction with any that is infinite in one.
     parallel = all(endless[0]) or all(endless[1]) or abs(math.sin(shapes[0].turn - shapes[1].turn)) < FORMULA_EPS
     if any(endless[0]) and any(endless[1]) and parallel:
         raise InputError("both surfaces are endless: give one of them a length, so that the force is finite.")
 
 
 def _check_decay(law: PairEnergy, size: float, rtol: float) -> None:
-    """Raise InputError where a law falls off slower than it says, or so slowly that no reach is far enough."""
+    """Raise InputError if a law decays slower than its `decay`, or so slowly that no reach is sufficient."""
     if math.isfinite(law.cutoff):
         return
     near, far = np.abs(kernel(law)(size * DECAY_DISTANCES)[:, 0])
     power = math.log2(near / far) if far > 0 else math.inf
-    # What falls off faster beside it changes the power by little.
+    # Terms that decay faster change the power only slightly.
     if power < law.decay - NEGLIGIBLE:
         text = f"{law.name()} falls off like r^-{power:.3g} over long distances, slower than r^-{law.decay:g}"
         raise InputError(f"{text} as its `decay` says; state a `decay` that it has, above 2.", law.place)
@@ -194,8 +195,8 @@ def _check_decay(law: PairEnergy, size: float, rtol: float) -> None:
 
 
 def _reach(lower: Surface, upper: Surface, extent: Extent, rtol: float) -> float:
-    """Distance from the nearest place up to which a surface is integrated over [m]: farther away is next to
-    nothing.
+    """Return the distance from the nearest point up to which a surface is integrated over [m]; the rest is
+    negligible.
     """
     size, power = length(lower, upper), extent.decay - 2
     if math.isfinite(extent.cutoff):
@@ -204,19 +205,19 @@ def _reach(lower: Surface, upper: Surface, extent: Extent, rtol: float) -> float
     rises = max(shape.rises for shape in shapes)
     if not rises or any(np.all(np.isfinite(shape.span)) for shape in shapes):
         return float(size * (rtol * TRUNCATION_PART) ** (-1 / power))
-    # At the distance u two without end are u^p apart, and flats there have u^(p (2 - m)) of a power m, on u du.
+    # At the distance u two infinite ones are u^p apart; for a power m the energy of flats is u^(p (2 - m)) u du.
     drop = max(-surface.shape.point(size, 0.0)[2] for surface in (lower, upper) if surface.shape.rises == rises)
-    if rises == 1:  # to the side to which they are turned, two that rise alike stay closer
+    if rises == 1:  # on the side to which they are tilted, two equal slopes stay closer
         drop = max(drop - size * math.tan(sum(abs(shape.tilt) for shape in shapes)), TINY)
     return float(size * max(1.0, size / drop) ** (1 / rises) * (rtol * TRUNCATION_PART) ** (-1 / (rises * power - 2)))
 
 
 def _check_energy(lower: Surface, upper: Surface, law: PairEnergy) -> None:
-    """Raise InputError where two surfaces without end separate so slowly that their energy has no end."""
+    """Raise InputError if two infinite surfaces separate so slowly that their energy is infinite."""
     shapes = [surface.shape for surface in (lower, upper)]
     turned = [shape for shape in shapes if shape.about_axis and not np.all(np.isfinite(shape.span))]
     endless = turned and not any(np.all(np.isfinite(shape.span)) for shape in shapes)
-    # At the distance u their gap is u^p, and what flats have of a power m of it is 2 pi u du u^(p (2 - m)).
+    # At the distance u their gap is u^p, and the energy of flats for a power m is 2 pi u du u^(p (2 - m)).
     separation = max(shape.rises for shape in shapes)
     if endless and math.isinf(law.cutoff) and separation * (law.decay - 2) <= 2:
         text = f"two endless surfaces have an infinite energy where points interact like r^-{law.decay:g}"
@@ -224,20 +225,21 @@ def _check_energy(lower: Surface, upper: Surface, law: PairEnergy) -> None:
 
 
 def length(lower: Surface, upper: Surface) -> float:
-    """A length of the surfaces [m]: the largest radius or extent."""
+    """Return a length of the surfaces [m]: the largest radius or extent."""
     shapes = [surface.shape for surface in (lower, upper)]
-    # What comes round is an angle.
+    # A closed parameter is an angle.
     ends = [end for s in shapes if not s.about_axis for end, closed in zip(s.span, s.closed, strict=True) if not closed]
     spans = [b - a for a, b in ends if np.isfinite(b - a)]
     return float(max([*shapes[0].lengths, *shapes[1].lengths, *spans], default=1.0))
 
 
 def _sizes(found: Array, gap: float, reach: Array) -> Array:
-    """Sizes of energies, forces and moments that errors are relative to, as some components vanish: of energies the
-    force over a ``reach`` [m] at least.
+    """Return the sizes of energies, forces and moments to which errors are relative, as some components vanish.
+
+    That of an energy is at least the force over a ``reach`` [m].
     """
     force = np.maximum(np.linalg.norm(found[:, 1:4], axis=-1, keepdims=True), TINY)
-    # What is nowhere anything has the size of the smallest number.
+    # Entries that vanish everywhere have the size of the smallest number.
     turning = np.linalg.norm(found[:, 4:], axis=-1, keepdims=True)
     moment = np.maximum(turning, force * gap)
     energy = np.maximum(np.abs(found[:, :1]), force * reach)

@@ -1,11 +1,11 @@
-"""Integrals over the outer of two surfaces: patches around each place that is near, divided until they are accurate.
+"""Integrals over the outer of two surfaces: patches around each near point, divided until the integrals are accurate.
 
-Each place has a rectangle of parameters, in which nodes gather around it; a patch is no larger than the grain of the
-surfaces. Patches on which two rules do not agree have more points, or are divided. What is looked at thus does not
-depend on the accuracy, so that no place is missed at a low one.
+Each near point has a rectangle of parameters, in which nodes are graded towards it; a patch is no larger than the grain
+of the surfaces. Patches on which two rules disagree get a higher order, or are divided. The points of the first search
+do not depend on the accuracy, so no near point is missed at a low one.
 
-Source: Bentley (1975), doi 10.1145/361002.361007, for rectangles around points; Berntsen, Espelid & Genz (1991),
-doi 10.1145/210232.210233, for the adaptive subdivision of many regions at a time.
+Source: Bentley (1975), doi 10.1145/361002.361007, for rectangles around points; Berntsen, Espelid & Genz (1991), doi
+10.1145/210232.210233, for the adaptive subdivision of many regions at a time.
 """
 
 from __future__ import annotations
@@ -27,42 +27,48 @@ from surfacechem.surfaces.shapes import Disc, Plane
 from surfacechem.tolerances import NEGLIGIBLE
 
 LEAST_GAIN, FIRST_LEVEL = 4.0, 2
-"""A rule of a level above enough gains as much at least, or the patch is divided; enough are those below to tell."""
+"""Least gain in accuracy of the next level, below which a patch is divided; and the level from which on this is
+tested.
+"""
 
 HIGHER_START = NEGLIGIBLE, NEGLIGIBLE**3
-"""Accuracies from which on patches in one direction begin with a rule of one more level: their points cost little."""
+"""Accuracies below each of which patches in one direction begin one level higher: their points are cheap."""
 
 MOST_POINTS = 200_000_000
-"""Pairs of points, of one integral or of all over an approach, after which an accuracy is out of reach: minutes."""
+"""Most pairs of points, of one integral or of all over an approach, before an accuracy is out of reach: minutes."""
 
 RULE_COST = 10_000
-"""Pairs of points that take as long as any use of a rule, however few its points are."""
+"""Overhead of applying a rule, in pairs of points."""
 
 JUDGED_PART = 8
-"""Part of the most points, one over this, after which it is seen whether the error of an integral falls fast enough,
-since there were as many times fewer.
+"""Factor by which the number of points has to grow before it is tested, from 1/8 of the maximum on, if the error
+decreases fast enough.
 """
 
 FIRST_INTEGRALS = 2
-"""Integrals of an approach that tell what all of them take: the nearest, and one that is farther."""
+"""Integrals of an approach from which the cost of all is estimated: the nearest, and one that is farther."""
 
 PAIRS_AT_ONCE = 400_000
-"""Pairs of points that are looked at together."""
+"""Pairs of points that are evaluated together."""
 
 CONTACT_GAP = 2.0**-20
-"""Fraction of the size of a surface below which a gap is one of contact."""
+"""Fraction of the size of a surface below which a gap counts as contact."""
 
 Levels = NDArray[np.int_]
-"""Index of the order that each patch has."""
+"""Index of each patch's order."""
 
 Integrand = Callable[[Array, int], tuple[Array, int]]
-"""Values (n, ...) per area at points (n, 3), with rules of a level inside, and how many were looked at together."""
+"""Function from points (n, 3), and the level of the rules inside, to values (n, ...) per area and the number of pairs
+of points.
+"""
 
 
 @dataclass(frozen=True)
 class Patches:
-    """Patches of a surface between substituted parameters ``low`` and ``high`` (n, 2), around ``at`` with ``scale``
-    (n, 2); directions in which nothing changes have two nodes.
+    """Patches of a surface between substituted parameters ``low`` and ``high`` (n, 2), around ``at`` with ``scale`` (n,
+    2).
+
+    Directions in which nothing varies (``alike``) have two nodes.
     """
 
     surface: Surface
@@ -77,53 +83,55 @@ class Patches:
 
     @property
     def kinds(self) -> Levels:
-        """Numbers (n,): patches of one kind have rules of as many points."""
+        """Kind of each patch (n,): patches of one kind have rules with equally many points."""
         return np.zeros(len(self), dtype=int)
 
     @property
     def fewest(self) -> int:
-        """Level of the rule that patches begin with: of few patches two rules may agree where neither is right."""
+        """Level of the first rule: with few patches two rules may agree while both are wrong."""
         return FIRST_LEVEL if any(self.alike) else 1
 
     def __getitem__(self, chosen: NDArray[Any] | slice) -> Self:
-        """Some of the patches."""
+        """Return some of the patches."""
         return replace(self, **{name: getattr(self, name)[chosen] for name in self.arrays})
 
     def __len__(self) -> int:
-        """Number of patches."""
+        """Return the number of patches."""
         return len(self.at)
 
     def nodes(self, order: int) -> tuple[Array, Array]:
-        """Points (n, k, 3) of a rule, and their areas (n, k); all patches are of one kind."""
+        """Return points (n, k, 3) of a rule, and their areas (n, k); all patches are of one kind."""
         (u, du), (v, dv) = (self.parameters(k, *self.rule(k, order)) for k in range(2))
         u, v = np.broadcast_arrays(u[:, :, None], v[:, None, :])
         return self.points(np.stack([u, v], axis=-1), du[:, :, None] * dv[:, None, :])
 
     def most(self, order: int) -> int:
-        """Points of a rule on each, at most; all patches are of one kind."""
+        """Return the largest number of points of a rule on each patch; all patches are of one kind."""
         return order**2
 
     def cost(self, order: int) -> int:
-        """Pairs of points that take as long as finding those of a rule."""
+        """Return the cost of finding the points of a rule, in pairs of points."""
         return 0 * order
 
     def points(self, at: Array, lengths: Array) -> tuple[Array, Array]:
-        """Points (n, k, 3) at parameters (n, ..., 2), and their areas (n, k) from products of lengths (n, ...)."""
+        """Return points (n, k, 3) at parameters (n, ..., 2), and their areas (n, k) from products of lengths (n,
+        ...).
+        """
         x, areas = self.surface.elements(at.reshape(len(at), -1, 2))
         return x, areas * lengths.reshape(len(at), -1)
 
     def rule(self, k: int, order: int) -> tuple[Array, Array]:
-        """Nodes and weights (n, m) along a direction."""
+        """Return nodes and weights (n, m) along a direction."""
         ends = np.stack([self.low[:, k], self.high[:, k]], axis=1)
         if not self.alike[k]:
             return gauss_rule(ends, order)
         middle, half = ends.mean(axis=1)[:, None], np.diff(ends) / 2
-        # Across a closed direction what points there cancels, along a length Gauss's rule of two points.
+        # Around a closed direction tangential components cancel; along a length it is the Gauss rule of two points.
         shift = half / 2 if self.surface.shape.closed[k] else half / math.sqrt(3)
         return middle + shift * [-1, 1], half * np.ones(2)
 
     def parameters(self, k: int, t: Array, w: Array | float = 1.0) -> tuple[Array, Array]:
-        """Parameters (n, ...) from substituted ones along a direction, and their lengths for some weights."""
+        """Return parameters (n, ...) from substituted ones along a direction, and weights transformed with them."""
         shape = -1, *[1] * (t.ndim - 1)
         at, scale = self.at[:, k].reshape(shape), self.scale[:, k].reshape(shape)
         if self.alike[k]:
@@ -131,7 +139,7 @@ class Patches:
         return at + scale * np.sinh(t), scale * np.cosh(t) * w
 
     def line(self, k: int, count: int) -> Array:
-        """Parameters along a direction, from end to end of all patches; graded where they are around one place."""
+        """Return parameters along a direction from end to end of all patches; graded if they are around one point."""
         ends = [self.parameters(k, edge[:, k, None])[0] for edge in (self.low, self.high)]
         low, high = float(ends[0].min()), float(ends[1].max())
         if self.alike[k] or np.ptp(self.at[:, k]):
@@ -140,7 +148,7 @@ class Patches:
         return np.asarray(self.at[0, k] + self.scale[0, k] * np.sinh(np.linspace(t[0], t[1], count)))
 
     def halved(self) -> Self:
-        """Their halves in each direction in which something changes."""
+        """Return the halves of the patches in each direction in which something varies."""
         found = self
         for k in range(2):
             if not self.alike[k]:
@@ -148,13 +156,13 @@ class Patches:
         return found
 
     def cut(self, k: int, at: Array | float) -> Self:
-        """Parts below substituted parameters (n,) along a direction, followed by the parts above."""
+        """Return the parts below substituted parameters (n,) along a direction, followed by the parts above."""
         low, high = self.low.copy(), self.high.copy()
         low[:, k] = high[:, k] = at
         return replace(self, high=high).joined(replace(self, low=low))
 
     def joined(self, *others: Self) -> Self:
-        """These patches and others."""
+        """Return these patches and others."""
         parts: dict[str, Any] = {
             name: np.concatenate([getattr(part, name) for part in (self, *others)]) for name in self.arrays
         }
@@ -164,11 +172,12 @@ class Patches:
 def outer_patches(
     outer: Surface, inner: Surface, size: float, reach: float, budget: Budget
 ) -> tuple[Patches, NearPlaces]:
-    """The patches of a surface, graded towards the other up to a ``reach`` [m], and where that is nearest; the search
-    for that is part of the ``budget``.
+    """Return the patches of a surface, graded towards the other up to a ``reach`` [m], and the nearest points.
+
+    The search for the nearest points counts in the ``budget``.
     """
     if type(outer.shape) is Plane and is_round(outer.shape) and outer.shape.tilt == 0:
-        # Polar coordinates, in which nothing may change around an axis.
+        # Polar coordinates, in which nothing may vary around an axis.
         polar = Surface(Disc(), outer.upper, outer.approach)
         outer = polar if alike_around(polar, inner) else outer
     alike = alike_along(outer, inner), alike_around(outer, inner)
@@ -177,8 +186,8 @@ def outer_patches(
     tangents = outer.derivatives(near.at, FIRST_ORDER)[1:]
     lengths = np.maximum(np.linalg.norm(tangents, axis=-1).T, POLE)
     first, low, high = near.at[0], *np.transpose(outer.shape.span)
-    # Bodies that are far apart see each other from as far. A parameter without end is a distance from the axis or along
-    # it, and where a surface is steep it is as much flatter: the root of its radius grows like the length of a step.
+    # Bodies far apart need a larger reach. An infinite parameter is a distance from the axis or along
+    # it; its range is scaled with the length of a step, which is large where the surface is steep.
     endless = np.isinf(low) | np.isinf(high)
     far = reach * max(1.0, float(near.gap[0]) / size) * np.where(endless, lengths[0], 1 / lengths[0])
     closed = np.array(outer.shape.closed)
@@ -189,7 +198,7 @@ def outer_patches(
     at = np.where(closed, first + np.remainder(near.at - first + math.pi, 2 * math.pi) - math.pi, near.at)
     at = np.clip(at, low, high)
     scales = np.maximum(np.abs(near.gap), size * CONTACT_GAP)[:, None] / lengths
-    # Lengths of a direction in which nothing changes are those of the parameter.
+    # In a direction in which nothing varies the scale is one.
     scales = np.where(alike, 1.0, scales)
     rectangles = around_each(at, low, high, lengths[0])
     patches = [
@@ -200,7 +209,7 @@ def outer_patches(
 
 
 def around_each(at: Array, low: Array, high: Array, lengths: Array) -> list[tuple[int, tuple[Array, Array]]]:
-    """A rectangle around each of some places (n, 2) within one, cut where they are the farthest apart."""
+    """Divide a rectangle into one for each of some points (n, 2), cut where they are farthest apart."""
     waiting, found = [(np.arange(len(at)), low, high)], []
     while waiting:
         group, low, high = waiting.pop()
@@ -220,7 +229,7 @@ def around_each(at: Array, low: Array, high: Array, lengths: Array) -> list[tupl
 def _patches(
     outer: Surface, at: Array, scale: Array, box: tuple[Array, Array], grain: Array, alike: tuple[bool, bool]
 ) -> Patches:
-    """Patches of one rectangle of parameters."""
+    """Return the patches of one rectangle of parameters."""
     pairs = []
     for k in range(2):
         ends = (np.stack(box)[:, k] - at[k]) / scale[k]
@@ -239,23 +248,23 @@ class OutOfReachError(InputError):
 
 
 class Budget:
-    """Cost of integrals, at least so many together, in pairs of points; OutOfReachError before it is too much."""
+    """Cost of a number of integrals in pairs of points; raises OutOfReachError before it becomes too large."""
 
     def __init__(self, rtol: float) -> None:
         """Begin a budget for an accuracy that messages name."""
         self.rtol, self.integrals, self.done, self.spent = rtol, 1, 0, 0.0
 
     def whole(self, ahead: float) -> float:
-        """Least cost of all integrals, where those that are done and the next one take so much."""
+        """Return the least cost of all integrals, if those done and the next one cost this much."""
         return ahead * max(1.0, self.integrals / max(self.done + 1, FIRST_INTEGRALS))
 
     def take(self, points: int) -> None:
-        """Count so many pairs of points that are next; OutOfReachError where they are too many."""
+        """Count the pairs of points that come next; raise OutOfReachError if they are too many."""
         self.spent += points
         self.refuse_beyond(self.spent)
 
     def refuse_beyond(self, ahead: float) -> None:
-        """Raise OutOfReachError where that is too much."""
+        """Raise OutOfReachError if this cost is too large."""
         if self.whole(ahead) > MOST_POINTS:
             text = f"the accuracy {self.rtol:.2g} of an integral over the surfaces is out of reach"
             what = f"{self.integrals} of them take" if self.integrals > 1 else "it takes"
@@ -265,15 +274,15 @@ class Budget:
 
 
 class Rules:
-    """Values of an integrand over patches by rules of some orders; InputError before they take too long."""
+    """Values of an integrand over patches by rules of some orders; raises InputError before they take too long."""
 
     def __init__(self, integrand: Integrand, search: int, budget: Budget) -> None:
-        """Take the points that a projection to the other surface costs, and the budget."""
+        """Store the integrand, the cost of a projection onto the other surface in points, and the budget."""
         self.integrand, self.search, self.budget, self.points = integrand, search, budget, 0
-        self.each: dict[int, float] = {}  # pairs of points of one outer point, by the level inside
+        self.each: dict[int, float] = {}  # pairs of points for each outer point, by the level inside
 
     def __call__(self, patches: Patches, levels: Levels, inside: Levels) -> Array:
-        """Integrals (n, ...) over each patch, with the order of its level, and with that of another one inside."""
+        """Return integrals (n, ...) over each patch, with the orders of its level and of its level inside."""
         found: dict[int, Array] = {}
         ranks = np.stack([levels, inside, patches.kinds], axis=1)
         for rank in np.unique(ranks, axis=0):
@@ -283,10 +292,10 @@ class Rules:
         return np.array([found[k] for k in range(len(levels))])
 
     def _of_order(self, patches: Patches, order: int, inside: int) -> Array:
-        """Integrals (n, ...) over each patch by one rule."""
+        """Return integrals (n, ...) over each patch by one rule."""
         found, begin = [], 0
         while begin < len(patches):
-            # One patch at first, as nobody knows yet how many pairs its points have.
+            # One patch at first: the number of pairs of its points is not known yet.
             each = self.each.get(inside, PAIRS_AT_ONCE) * patches.most(order)
             part = patches[begin : begin + max(1, int(PAIRS_AT_ONCE / each))]
             x, area = part.nodes(order)
@@ -303,8 +312,10 @@ class Rules:
 
 @dataclass(frozen=True)
 class PatchResults:
-    """Results on some patches: levels of the rules over and inside each, values (n, ...), their changes with the last
-    rule over it and inside it, and with the one before (n, 2, ...), and whether a higher order gained little.
+    """Results on some patches.
+
+    Levels of the rules over and inside each, values (n, ...), their last two changes by the rule over the patch and by
+    that inside (n, 2, ...), and flags of patches on which a higher order gained little.
     """
 
     patches: Patches
@@ -316,7 +327,7 @@ class PatchResults:
     stuck: NDArray[np.bool_]
 
     def but(self, gone: NDArray[np.bool_], others: PatchResults) -> PatchResults:
-        """The results without those of some patches, and with others."""
+        """Return the results without those of some patches, and with others."""
         kept = {
             item.name: np.concatenate([getattr(self, item.name)[~gone], getattr(others, item.name)])
             for item in fields(self)[1:]
@@ -333,11 +344,11 @@ def integral(
     budget: Budget,
     nested: bool = True,
 ) -> tuple[Array, float, int]:
-    """Integral over patches, its error relative to the ``sizes`` of the entries, no larger than what is ``left`` to it,
-    and how many points it took.
+    """Return an integral over patches, its error relative to the ``sizes`` of the entries, and the number of points.
 
-    A ``nested`` integrand is a sum itself, with an error of its own; each of its points has a projection to the other
-    surface that costs as much as ``search`` points. InputError where it takes more than its budget.
+    The error is at most ``left``. A ``nested`` integrand is itself a sum with an error; each of its points has a
+    projection onto the other surface that costs as much as ``search`` points. InputError if it takes more than its
+    budget.
     """
     first = patches.fewest if not any(patches.alike) else FIRST_LEVEL + sum(left < goal for goal in HIGHER_START)
     rules, begin, before = Rules(integrand, search, budget), np.full(len(patches), first), budget.spent
@@ -367,14 +378,16 @@ def integral(
         )
         if halved.any():
             halves = known.patches[halved].halved()
-            # A rule on half of a patch is as good as one of higher order.
+            # On half of a patch a rule is as accurate as one of higher order on the whole.
             times = len(halves) // int(halved.sum())
             start, inside = np.maximum(known.level[halved] - 1, patches.fewest), known.inside[halved]
             known = known.but(halved, _start(rules, halves, np.tile(start, times), np.tile(inside, times), nested))
 
 
 def _expected(met: Sequence[tuple[float, float]], rtol: float) -> float:
-    """Points at which the error is that asked for, if it goes on to fall with the power of them with which it did."""
+    """Extrapolate the number of points at which the error reaches the tolerance, with its order of convergence so
+    far.
+    """
     points, error = met[-1]
     fewer, before = next(item for item in met[::-1] if item[0] <= points / JUDGED_PART or item is met[0])
     gain, more = math.log(max(before / error, 1.0)), math.log(points / fewer) if points > fewer else 1.0
@@ -382,7 +395,7 @@ def _expected(met: Sequence[tuple[float, float]], rtol: float) -> float:
 
 
 def _start(rules: Rules, patches: Patches, level: Levels, inside: Levels, nested: bool) -> PatchResults:
-    """Results on patches by rules of some levels and of those before."""
+    """Return results on patches by rules of some levels and of those before."""
     value = rules(patches, level, inside)
     steps = range(1, patches.fewest + 1)
     over = _changes(value, *(rules(patches, level - k, inside) for k in steps))
@@ -393,12 +406,12 @@ def _start(rules: Rules, patches: Patches, level: Levels, inside: Levels, nested
 
 
 def _changes(value: Array, before: Array, first: Array | None = None) -> Array:
-    """The last change of values (n, ...) and the one before (n, 2, ...), none where that is not known."""
+    """Return the last two changes of values (n, ...), shape (n, 2, ...); zero if the earlier one is not known."""
     return np.stack([value - before, np.zeros_like(before) if first is None else before - first], axis=1)
 
 
 def _raise_level(rules: Rules, known: PatchResults, mask: NDArray[np.bool_], steps: tuple[int, int]) -> None:
-    """Rules of a higher level over, or inside, some patches."""
+    """Raise the level of the rules over, or inside, some patches."""
     known.level[mask] += steps[0]
     known.inside[mask] += steps[1]
     finer = rules(known.patches[mask], known.level[mask], known.inside[mask])
@@ -410,7 +423,9 @@ def _raise_level(rules: Rules, known: PatchResults, mask: NDArray[np.bool_], ste
 
 
 def _largest(changes: Array, size: Array) -> Array:
-    """Errors (n,) of patches, the largest of all entries; what the change before the last says may have been missed."""
+    """Return the errors (n,) of patches, the largest of all entries; at least what the change before the last
+    suggests.
+    """
     entries = tuple(range(1, changes.ndim - 1))
     last, before = (np.abs(changes[:, k] / size).max(axis=entries, initial=0.0) for k in range(2))
     return np.asarray(np.maximum(last, before / LEAST_GAIN))

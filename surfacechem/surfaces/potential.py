@@ -1,7 +1,8 @@
-"""Free energy of two curved surfaces and heat conductance between them over their approach, from a few integrals.
+"""Free energy of two curved surfaces, and heat conductance between them, as functions of the approach from a few
+integrals.
 
-The energy is a potential of the gap like any other, so that every gap model can be driven by it. In a scene with
-surfaces all that is per area elsewhere is that of the whole pair: N for Pa, J for J/m^2, kg for kg/m^2.
+The energy is a potential of the gap like any other, so that every gap model can use it. In a scene with surfaces
+quantities per area are those of the whole pair: N for Pa, J for J/m^2, kg for kg/m^2.
 """
 
 from __future__ import annotations
@@ -37,11 +38,11 @@ log = logging.getLogger(__name__)
 
 SOURCES = [*(path for room in ("surfaces", "laws", "contracts") for path in sorted((PACKAGE / room).glob("*.py")))]
 SOURCES += [PACKAGE / f"{name}.py" for name in ("expressions", "quantities", "tolerances")]
-"""Source files from which integrals follow: of the laws all that they share, too."""
+"""Source files that integrals depend on, including the common parts of the laws."""
 
 
 class _IntegrationTime(threading.local):
-    """Time that integrals over surfaces have taken so far, of each thread."""
+    """Time spent on integrals over surfaces so far, by thread."""
 
     seconds = 0.0
 
@@ -51,7 +52,7 @@ INTEGRATION_TIME = _IntegrationTime()
 
 @contextmanager
 def integrating() -> Iterator[None]:
-    """Count the time spent meanwhile as time spent on integrals."""
+    """Count the time of a block as time spent on integrals."""
     start = time.perf_counter()
     try:
         yield
@@ -60,15 +61,17 @@ def integrating() -> Iterator[None]:
 
 
 JUMP_SAMPLES = 2000
-"""Places between which it is seen whether a law jumps."""
+"""Number of points between which a law is tested for jumps."""
 
 
 def first_jump(law: Callable[[Array], Array], places: Array) -> float | None:
-    """First jump between increasing places of the energy of a law, the first of its values (n, 2); None without any."""
+    """Return the first jump, between increasing points, of a law's energy, the first of its values (n, 2); None if
+    none.
+    """
     a, b = places[:-1], places[1:]
     low, high = law(a)[:, 0], law(b)[:, 0]
     sizes = np.maximum(np.abs(low), np.abs(high))
-    # Far out a law may be the rounding of what it is a difference of.
+    # Far out a law may be the roundoff of a difference.
     least = np.maximum(NEGLIGIBLE * sizes, FORMULA_EPS * sizes.max())
     while np.any(b - a > SQRT_EPS * (np.abs(a) + np.abs(b))):
         middle = (a + b) / 2
@@ -76,7 +79,7 @@ def first_jump(law: Callable[[Array], Array], places: Array) -> float | None:
         lower = np.abs(between - low) > np.abs(high - between)
         a, low = np.where(lower, a, middle), np.where(lower, low, between)
         b, high = np.where(lower, middle, b), np.where(lower, between, high)
-        # A change that is left of next to nothing is one at a place.
+        # The interval is too short to distinguish points: the remaining change is a jump.
         if np.all(b - a <= GAP_EPS):
             break
     jumps = np.abs(high - low) > least
@@ -97,38 +100,40 @@ class CurvedSurfaces(Potential):
 
     @property
     def limits(self) -> Mapping[str, tuple[float, float]]:
-        """The approaches between which it is known."""
+        """Range of approaches in which the energy is known."""
         return {"g_n": self.approach}
 
     @property
     def called(self) -> str:
-        """The key of its range."""
+        """Key of this range in a case."""
         return "`surface.approach`"
 
     def of_run(self, values: Mapping[str, float]) -> Self:
-        """The surfaces with the numbers of the pair laws that a run has, by path."""
+        """Return the surfaces with a run's numbers for the pair laws, by path."""
         paths = [{name: f"{law.path}.{name}" for name, _ in law.specs()} for law in self.pairs]
         own = [{name: values[path] for name, path in each.items() if path in values} for each in paths]
         return replace(self, pairs=tuple(law.given(each) for law, each in zip(self.pairs, own, strict=True)))
 
     def thinned(self, stretch: float) -> Self:
-        """The surfaces with densities reduced by the stretch of the area; shapes are as given."""
+        """Return the surfaces with densities reduced by the stretch of the area; shapes are unchanged."""
         if stretch == 1:
             return self
         own = [{name: getattr(law, name) / stretch for name in ("n_1", "n_2")} for law in self.pairs]
         return replace(self, pairs=tuple(law.given(each) for law, each in zip(self.pairs, own, strict=True)))
 
     def surfaces(self, d: float) -> tuple[Surface, Surface]:
-        """The two surfaces at an approach [m]."""
+        """Return the two surfaces at an approach [m]."""
         return Surface(self.shapes[0]), Surface(self.shapes[1], True, d)
 
     def with_parts(self, bind: Callable[[Law, str, str], Any]) -> Self:
-        """The surfaces with the parameters of the pair laws as symbols; those of the gap are in its integrals."""
+        """Return the surfaces with symbols for the parameters of the pair laws; those of gap laws are inside the
+        integrals.
+        """
         bound = tuple(bind(law, f"surface.pair.{law.name()}", "") for law in self.pairs)
         return self.bind({"pairs": bound, "curves": self.curves, "strongest": self.strongest})
 
     def surrogate(self) -> Self:
-        """The surfaces with energies that are straight lines, in place of integrals."""
+        """Return the surfaces with linear energies in place of integrals."""
         line = straight(*self.approach)
         curves = tuple(line for law in self.pairs for _ in self.parts(law)), line if self.gap_laws else None
         return self.bind({"curves": curves, "strongest": self.approach[0]})
@@ -140,7 +145,7 @@ class CurvedSurfaces(Potential):
         return max(curve.error for curve in (*curves, *([over_the_gap] if over_the_gap else [])))
 
     def perturbed(self) -> Self:
-        """The surfaces where all that repels is too strong by its error, and all that attracts too weak."""
+        """Return the surfaces with all repulsion too strong, and all attraction too weak, by its error."""
         curves, over_the_gap = self.curves
         signs = [math.copysign(1.0, factor) for law in self.pairs for factor, _ in self.parts(law)]
         found = tuple(curve.perturbed(sign * curve.factor) for curve, sign in zip(curves, signs, strict=True))
@@ -148,7 +153,7 @@ class CurvedSurfaces(Potential):
 
     @cached_property
     def strongest(self) -> float:
-        """The approach at which the tension is largest [m]."""
+        """Approach at which the tension is largest [m]."""
         import symengine
 
         g = symengine.Symbol("g_n")
@@ -163,17 +168,17 @@ class CurvedSurfaces(Potential):
         return {"g_n": self.strongest}
 
     def parts(self, law: PairEnergy) -> list[tuple[Expression, PairEnergy]]:
-        """Laws of which one is a sum, each with its factor."""
+        """Return the laws of which a law is the sum, each with its factor."""
         if law.parts is not None:
-            # In units of a length that makes powers of the distance numbers of usual size.
+            # In units of a length for which powers of the distance are of moderate size.
             return list(law.parts(max(abs(end) for end in self.approach)))
         return [(1.0, law.given({"n_1": 1.0, "n_2": 1.0}))]
 
     @cached_property
     def curves(self) -> tuple[tuple[ApproachEnergy, ...], ApproachEnergy | None]:
-        """Energies over the approach of the parts of all pair laws per product of densities, and of the gap laws."""
+        """Energies over the approach: of the parts of all pair laws per product of densities, and of the gap laws."""
         parts = [part for law in self.pairs for _, part in self.parts(law)]
-        # Other numbers of the same surfaces, as in a sweep, have the same integrals.
+        # Surfaces that differ only in their numbers, as in a sweep, have the same integrals.
         mark = fingerprint(self.shapes, parts, self.gap_laws, self.approach, self.accuracy)
         if mark not in INTEGRATED_CURVES:
             with integrating():
@@ -184,14 +189,14 @@ class CurvedSurfaces(Potential):
         return curves[: len(parts)], next(iter(curves[len(parts) :]), None)
 
     def integrated(self, parts: Sequence[PairEnergy]) -> list[ApproachEnergy]:
-        """Energies over the approach of some parts from their integrals."""
+        """Return energies over the approach of some parts from their integrals."""
         self._refuse_jumps()
         if self.heat_laws:
-            # A conductance that has no end is refused before any force is integrated.
+            # Raise an error for an infinite conductance before any force is integrated.
             with self.at_approach(self.approach[0]):
                 heat = [density(law) for law in self.heat_laws]
                 over_gap(*self.surfaces(self.approach[0]), [], bends(self.heat_laws), heat, NEGLIGIBLE)
-        # Errors of the samples must not look like what a polynomial misses.
+        # Errors of the samples must not be taken for errors of a polynomial.
         rtol, finer = self.accuracy, max(self.accuracy / 64, RUN_EPS)
 
         met: dict[float, PairForces] = {}
@@ -217,14 +222,14 @@ class CurvedSurfaces(Potential):
                 contact = over_gap(*self.surfaces(d), laws, levels, (), finer, floor, spent)
             return contact.energy, float(contact.force_1[2]), contact.error
 
-        # Where bodies just touch, or a law has faded, the force is that of rounding; what counts is that in the range.
+        # Where bodies just touch, or a law has decayed, the force is roundoff: use the scale of the whole range.
         for d in self.approach:
             energy, force, _ = of_gap(d)
             floor = max(floor[0], NEGLIGIBLE * abs(energy)), max(floor[1], NEGLIGIBLE * abs(force))
         return [*found, fitted(of_gap, *self.approach, rtol, cuts, floor, spent)]
 
     def _refuse_jumps(self) -> None:
-        """Raise InputError where the energy of a law jumps, so that no force is its slope."""
+        """Raise InputError if the energy of a law jumps, where it has no force."""
         least, largest = self.approach
         far = largest + length(*self.surfaces(largest))
         beyond = np.geomspace(abs(largest) or far * NEGLIGIBLE, far, JUMP_SAMPLES)
@@ -239,14 +244,14 @@ class CurvedSurfaces(Potential):
 
     @contextmanager
     def at_approach(self, d: float) -> Iterator[None]:
-        """Messages name the approach at which something is computed."""
+        """Name the approach in messages of errors raised in a block."""
         try:
             yield
         except InputError as error:
             raise InputError(f"at the approach g_n = {d:.4g} m {error.message}", self.place) from None
 
     def energy(self, g_n: Expression) -> Expression:
-        """Free energy [J]."""
+        """Return the free energy [J]."""
         curves, over_the_gap = self.curves
         whole, waiting = 0.0 * g_n if over_the_gap is None else over_the_gap.energy(g_n), iter(curves)
         for law in self.pairs:
@@ -255,26 +260,28 @@ class CurvedSurfaces(Potential):
         return whole
 
     def repulsion(self) -> Expression:
-        """Repulsion; none that could be told from the attraction."""
+        """Return zero: repulsion cannot be separated from attraction."""
         return 0.0
 
     def contact(self, d: float, pairs: bool = True, budget: Budget | None = None) -> Contact:
-        """Contact at an approach by the laws of the gap, and by the pair laws through their energy between flats."""
+        """Return the contact at an approach by the laws of the gap, and by the pair laws through their energy between
+        flats.
+        """
         heat = [density(law) for law in self.heat_laws]
-        # Conductances bend where laws of force may not.
+        # Conductances may have kinks where laws of force have none.
         levels = self._levels(pairs, self.heat_laws)
         return over_gap(*self.surfaces(d), self._local(pairs), levels, heat, self.accuracy, self._floor, budget)
 
     def _levels(self, pairs: bool, heat: Sequence[HeatTransfer] = ()) -> list[float]:
-        """Gaps at which local laws bend: those of pairs do at the distances at which a pair does."""
+        """Return the gaps at which local laws have kinks; for pair laws these are the distances of their kinks."""
         found = [bend for extent in laws_by_extent(self.pairs) for bend in extent.bends] if pairs else []
         return sorted({*bends((*self.gap_laws, *heat)), *found})
 
     def totals(self, approaches: Array, stretches: Array) -> Array:
-        """Results for each approach at its stretch of the area, shape (8, n).
+        """Return results for each approach at its stretch of the area, shape (8, n).
 
         Force on body 1 [N], its moments about x and y [N m], force of the local law [N], least gap [m], number of
-        places that are as near, area of contact [m^2], conductance [W/K].
+        places with it, area of contact [m^2], conductance [W/K].
         """
 
         def found() -> list[list[float]]:
@@ -295,7 +302,7 @@ class CurvedSurfaces(Potential):
 
     @cached_property
     def _floor(self) -> tuple[float, float]:
-        """A small part of energy [J] and force [N] of the laws of the gap at the ends of the range."""
+        """Small parts of energy [J] and force [N] of the gap laws at the ends of the range."""
         floor = 0.0, 0.0
         for pair in map(self.surfaces, self.approach):
             found = over_gap(*pair, self._local(True), self._levels(True), rtol=NEGLIGIBLE, floor=floor)
@@ -306,9 +313,11 @@ class CurvedSurfaces(Potential):
     def tractions(
         self, x: Array, normals: Array, gaps: Array, approaches: Array, stretches: Array
     ) -> tuple[Array, bool]:
-        """Normal tractions (k, n) on body 1 [Pa], tension positive, at points (n, 3) with normals and gaps (k, n) at
-        approaches (k,) with their stretches of the area; and whether those of pairs are sums over body 2: over a rough
-        one, or where they take more than their budget, they are those of the local law.
+        """Return normal tractions (k, n) on body 1 [Pa], tension positive, and whether those of pair laws are sums over
+        body 2.
+
+        At points (n, 3) with normals and gaps (k, n), at approaches (k,) with their stretches of the area. Over a rough
+        body 2, or if the sums exceed their budget, tractions are those of the local law.
         """
         own, upper = [self.thinned(stretch) for stretch in stretches.tolist()], self.surfaces(0.0)[1]
 
@@ -333,7 +342,7 @@ class CurvedSurfaces(Potential):
         return [*map(density, self.gap_laws), *(map(between_flats, self.pairs) if pairs else ())]
 
     def forces(self, d: float, budget: Budget | None = None) -> tuple[Array, Array]:
-        """Force [N] and moment about the origin [N m] on body 1 at an approach, from all laws."""
+        """Return force [N] and moment about the origin [N m] on body 1 at an approach, from all laws."""
         force, moment = np.zeros((2, 3))
         if self.pairs:
             pair = interaction(*self.surfaces(d), self.pairs, self.accuracy, budget)
@@ -357,16 +366,16 @@ class CurvedConductance(HeatTransfer):
 
     @property
     def limits(self) -> Mapping[str, tuple[float, float]]:
-        """The approaches between which it is known."""
+        """Range of approaches in which the conductance is known."""
         return self.pair.limits
 
     @property
     def called(self) -> str:
-        """The key of its range."""
+        """Key of this range in a case."""
         return self.pair.called
 
     def surrogate(self) -> Self:
-        """The law with a conductance that is a straight line, in place of integrals."""
+        """Return the law with a linear conductance in place of integrals."""
         return self.bind({"curve": straight(*self.pair.approach)})
 
     @property
@@ -375,7 +384,7 @@ class CurvedConductance(HeatTransfer):
         return self.curve.error
 
     def perturbed(self) -> Self:
-        """The law, larger by its error."""
+        """Return the law, larger by its error."""
         return self.bind({"curve": self.curve.perturbed()})
 
     @cached_property
@@ -392,7 +401,7 @@ class CurvedConductance(HeatTransfer):
             return found.conductance, found.conductance_slope, found.error
 
         def integrated() -> list[Any]:
-            # A conductance and its slope are fitted like an energy and its force.
+            # Conductance and slope are fitted like energy and force.
             cuts = level_approaches(*pair.surfaces(0.0), levels)
             return fitted(sample, *pair.approach, pair.accuracy, cuts, budget=budget).numbers
 
@@ -402,5 +411,5 @@ class CurvedConductance(HeatTransfer):
         return INTEGRATED_CURVES[mark][0]
 
     def conductance(self, g_n: Expression) -> Expression:
-        """Conductance [W/K]."""
+        """Return the conductance [W/K]."""
         return self.curve.energy(g_n)

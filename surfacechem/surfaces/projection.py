@@ -1,10 +1,10 @@
 """Surfaces in space and their closest-point projection.
 
-Body 1 lies below its surface. Body 2 is the mirror image of a body that does, moved up by the approach d: at d = 0 the
-highest point of one is at the lowest of the other.
+Body 1 lies below its surface. Body 2 is the mirror image of such a body, moved up by the approach d: at d = 0 the
+highest point of one touches the lowest of the other.
 
 Source: Sauer, Duong & Mandadapu (2021), section 2 with eq. e:gap; Konyukhov & Schweizerhof (2013), Computational
-Contact Mechanics, doi 10.1007/978-3-642-31531-2, for rates and for where a projection is unique.
+Contact Mechanics, doi 10.1007/978-3-642-31531-2, for rates and the uniqueness of a projection.
 """
 
 from __future__ import annotations
@@ -26,27 +26,27 @@ from surfacechem.tolerances import CLOSED_GUARD, EQUAL, FEW_EPS, TINY, ULPS
 Array = NDArray[np.float64]
 
 MOST_NEWTON_STEPS = 100
-"""Steps of Newton's method after which a search ends; some ten are the rule."""
+"""Most steps of Newton's method; some ten are usual."""
 
 MOST_HALVINGS = 16
-"""Times that a step is halved at most."""
+"""Most halvings of a step."""
 
 SEARCH_COST = 500
-"""Pairs of points that take as long as a projection without a closed form."""
+"""Cost of a projection without a closed form, in pairs of points."""
 
 POLE = CLOSED_GUARD
-"""Parameter at the pole of a surface of revolution, where directions along it have no length."""
+"""Least parameter next to the pole of a surface of revolution, where directions have no length."""
 
 FIRST_ORDER, SECOND_ORDER, THIRD_ORDER = 3, 6, 10
 """Numbers of derivatives up to an order: x; x_u, x_v; x_uu, x_uv, x_vv; and four of third order."""
 
 AREA_ALONE = 0
-"""Argument that asks for points and areas per parameters alone."""
+"""Argument for points and areas per parameters only."""
 
 
 @lru_cache(maxsize=64)
 def _compiled(shape: Shape, count: int) -> Callable[[Array], Array]:
-    """The point of a shape and its derivatives, or its area per parameters, as machine code."""
+    """Return the point of a shape with its derivatives, or its area per parameters, as machine code."""
     import symengine
 
     u, v = symengine.symbols("u v")
@@ -66,12 +66,12 @@ def _compiled(shape: Shape, count: int) -> Callable[[Array], Array]:
 
 @dataclass(frozen=True)
 class Projection:
-    """Nearest points of a surface; arrays over the points that were projected.
+    """Closest points of a surface; arrays over the projected points.
 
-    ``at`` holds the parameters (..., 2), ``gap`` the distance along ``direction``, negative inside the body [m],
-    ``beyond`` how far the points are beyond each edge along the surface (..., edges) [m]. The direction is the normal,
-    but at an edge and a tip that from the nearest point. Where it was searched for, ``rivals`` are the points (m,) that
-    searches were for, counted along all of them, and the parameters (m, 2) that these have found.
+    ``at`` are the parameters (..., 2), ``gap`` is the distance along ``direction``, negative inside the body [m],
+    ``beyond`` the distance of the points beyond each edge along the surface (..., edges) [m]. The direction is the
+    normal, but at an edge or a tip that from the closest point. After a search, ``rivals`` are the indices (m,) of the
+    points of all searches, in one flat row, and the parameters (m, 2) that these have found.
     """
 
     surface: Surface
@@ -85,13 +85,13 @@ class Projection:
 
     @cached_property
     def tied(self) -> NDArray[np.bool_]:
-        """Whether another point is as near, for each."""
+        """Mask of the points with another equally close point of the surface."""
         shape, size = self.surface.shape, np.abs(self.gap)
         x = self.point + self.gap[..., None] * self.direction
         D = self.surface.derivatives(self.at, SECOND_ORDER)
         found = _degenerate(D, self.normal * _dot(x - self.point, self.normal)[..., None])
         if shape.about_axis:
-            # For a point on the axis all around is alike.
+            # For a point on the axis all points around it are equally close.
             own, around = (x - [0.0, 0.0, self.surface.approach]) @ self.surface.axes, np.linalg.norm(D[2], axis=-1)
             found |= (np.hypot(own[..., 0], own[..., 1]) < EQUAL * around) & (around > EQUAL * size)
         if self.rivals is not None:
@@ -116,8 +116,10 @@ class Curvature:
 
 @dataclass(frozen=True)
 class Rates:
-    """Rates of a projection while point and surface move: of the parameters, of the gap [m/s], of the gap vector from
-    the surface to the point [m/s], of the normal [1/s], and of the curvature there.
+    """Rates of a projection while point and surface move.
+
+    Of the parameters, of the gap [m/s], of the gap vector from the surface to the point [m/s], of the normal [1/s], and
+    of the curvature there.
     """
 
     at: Array
@@ -137,13 +139,13 @@ class Surface:
 
     @cached_property
     def axes(self) -> Array:
-        """Rotation, of the upper body with a reflection, from the coordinates of the shape to space."""
+        """Rotation, for the upper body with a reflection, from the coordinates of the shape to space."""
         (s, c), (sn, cs) = ((np.sin(angle), np.cos(angle)) for angle in (self.shape.turn, self.shape.tilt))
         tilted = np.array([[cs, 0, sn], [0, 1, 0], [-sn, 0, cs]]) @ np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
         return np.asarray(np.diag([1.0, 1.0, -1.0]) @ tilted if self.upper else tilted)
 
     def derivatives(self, at: Array, count: int = THIRD_ORDER) -> Array:
-        """Points and derivatives (count, ..., 3) at parameters (..., 2)."""
+        """Return points and derivatives (count, ..., 3) at parameters (..., 2)."""
         if self.shape.derivatives is not None:
             own = self.shape.derivatives(at[..., 0], at[..., 1], count)
         else:
@@ -155,11 +157,11 @@ class Surface:
 
     @property
     def search(self) -> int:
-        """Points that cost about as much as a projection."""
+        """Cost of a projection, in points."""
         return 1 if self.shape.foot is not None else SEARCH_COST
 
     def elements(self, at: Array) -> tuple[Array, Array]:
-        """Points (..., 3) and areas per parameters (...)."""
+        """Return points (..., 3) and areas per parameters (...)."""
         if self.shape.derivatives is not None:
             x, x_u, x_v = self.derivatives(at, FIRST_ORDER)
             return x, np.linalg.norm(cross(x_u, x_v), axis=-1)
@@ -167,12 +169,12 @@ class Surface:
         return table[..., :3] @ self.axes.T + [0.0, 0.0, self.approach], table[..., 3]
 
     def normals(self, derivatives: Array) -> Array:
-        """Unit normals (..., 3) out of the body."""
+        """Return unit normals (..., 3) out of the body."""
         outward = cross(derivatives[1], derivatives[2]) * (-1 if self.upper else 1)
         return np.asarray(outward / np.linalg.norm(outward, axis=-1, keepdims=True))
 
     def nearest(self, x: ArrayLike) -> Projection:
-        """Projection of points (..., 3)."""
+        """Project points (..., 3)."""
         x = np.asarray(x, dtype=float)
         own = (x - [0.0, 0.0, self.approach]) @ self.axes
         rivals = None
@@ -188,10 +190,10 @@ class Surface:
         at = self.off_pole(at)
         D = self.derivatives(at, FIRST_ORDER)
         normal, away = self.normals(D), x - D[0]
-        # Beyond an edge the distance is not along the normal, which then tells the side only.
+        # Beyond an edge the distance is not along the normal, which then determines only the side.
         size = np.linalg.norm(away, axis=-1)
         side = _dot(away, normal)
-        # Behind an edge and beyond it is beside the body, not in it.
+        # A point behind the surface but beyond an edge is next to the body, not inside it.
         beyond, at_edge = self._beyond(at, away, D[1:3])
         gap = np.where((side < 0) & ~np.any(beyond > 0, axis=-1), -size, size)
         off = (at_edge & (size > 0))[..., None]
@@ -200,20 +202,20 @@ class Surface:
 
     @cached_property
     def bounds(self) -> tuple[Array, Array]:
-        """Least and largest parameters (2,) of a search: what comes round has no edge that a step could leave."""
+        """Least and largest parameters (2,) of a search; closed parameters have no bounds."""
         low, high = np.transpose(self.shape.span)
         low = np.where(self.shape.closed, -np.inf, low) + (POLE if self.shape.about_axis else 0.0)
         return low, np.where(self.shape.closed, np.inf, high)
 
     def off_pole(self, at: Array) -> Array:
-        """Parameters (..., 2) beside a pole in place of those at it, where no direction along it has a length."""
+        """Move parameters (..., 2) at a pole, where directions have no length, next to it."""
         begins_at_pole = self.shape.about_axis and self.shape.span[0][0] == 0
         return np.asarray(np.maximum(at, [POLE, -np.inf])) if begins_at_pole else at
 
     @cached_property
     def edges(self) -> list[tuple[int, int, float]]:
-        """Edges of the surface: number of the parameter, side (minus one below, plus one above), and its value there; a
-        tip is an edge, a pole none.
+        """Edges of the surface: index of the parameter, side (-1 below, +1 above), and its value there; a tip is an
+        edge, a pole is not.
         """
         found = []
         for k, ends in enumerate(self.shape.span):
@@ -225,8 +227,8 @@ class Surface:
         return found
 
     def _beyond(self, at: Array, away: Array, tangents: Array) -> tuple[Array, NDArray[np.bool_]]:
-        """Distances beyond each edge [m], (..., edges), of points that are ``away`` from their feet, and whether the
-        feet are at an edge or a tip.
+        """Return the distances beyond each edge [m], (..., edges), of points that are ``away`` from their feet, and a
+        mask of the feet at an edge or a tip.
         """
         found, at_edge = np.empty((*at.shape[:-1], len(self.edges))), np.zeros(at.shape[:-1], dtype=bool)
         for j, (k, side, end) in enumerate(self.edges):
@@ -236,9 +238,7 @@ class Surface:
         return found, at_edge
 
     def _search(self, places: Array, starts: Array) -> Array:
-        """Parameters (n, 2) of nearest points of some (n, 3) by Newton's method; a step that does not come nearer is
-        halved.
-        """
+        """Return parameters (n, 2) of the closest points of some (n, 3) by Newton's method with halved steps."""
         low, high = self.bounds
 
         def value(at: Array, which: Indices) -> Array:
@@ -251,19 +251,19 @@ class Surface:
             metric, hessian = _forms(D, away)
             move = newton_step(slope, hessian, metric, at <= low, at >= high)
             if self.shape.about_axis:
-                move[..., 1] = 0.0  # the angle about the axis is that of the start
+                move[..., 1] = 0.0  # keep the angle about the axis
             return move
 
         return descended(np.clip(starts, low, high), low, high, value, step)
 
     def curvature(self, at: Array, rate: Array | None = None) -> Curvature:
-        """Curvature at parameters (..., 2), and its rate where they move at a rate."""
+        """Return the curvature at parameters (..., 2), and its rate if they change at a ``rate``."""
         D = self.derivatives(at)
         E, F, G = _metric(D)
         outward = cross(D[1], D[2]) * (-1 if self.upper else 1)
         size = np.linalg.norm(outward, axis=-1)
         n = outward / size[..., None]
-        # What follows is the product rule, with rates of the derivatives along the path of the parameters.
+        # The product rule, with rates of the derivatives along the path of the parameters.
         p, q = np.moveaxis(np.zeros_like(at) if rate is None else rate, -1, 0)[..., None]
         turned = [p * D[k] + q * D[k + 1] for k in (3, 4, 6, 7, 8)]  # rates of x_u, x_v, x_uu, x_uv, x_vv
         swing = (cross(turned[0], D[2]) + cross(D[1], turned[1])) * (-1 if self.upper else 1)
@@ -279,8 +279,10 @@ class Surface:
         return Curvature(mean, gaussian, (top / 2 - mean * area_dot) / area, (bottom - gaussian * area_dot) / area)
 
     def rates(self, x: ArrayLike, moves: ArrayLike, shift: ArrayLike = (0, 0, 0), spin: ArrayLike = (0, 0, 0)) -> Rates:
-        """Rates of the projection of points that move at velocities [m/s], as the surface moves by ``shift`` [m/s] and
-        turns about the origin by ``spin`` [rad/s]; InputError where the nearest point is not one.
+        """Return the rates of the projection of points with velocities ``moves`` [m/s].
+
+        The surface moves by ``shift`` [m/s] and turns about the origin by ``spin`` [rad/s]. InputError if the closest
+        point is not unique.
         """
         x, moves, spin = (np.asarray(item, dtype=float) for item in (x, moves, spin))
         found = self.nearest(x)
@@ -288,7 +290,7 @@ class Surface:
             raise InputError("two points of the surface are equally near, so that their distance has no rate.")
         D = self.derivatives(found.at, SECOND_ORDER)
         relative = moves - np.asarray(shift, dtype=float) - cross(spin, x)
-        # At a pole, which is next to it alone, what is on the axis is on its normal.
+        # At a pole, replaced by a point next to it, the axis counts as its normal.
         at = self._rates(found.at, D, found.gap[..., None] * found.direction, relative)
         glide = at[..., :1] * D[1] + at[..., 1:] * D[2]
         vector = relative - glide + cross(spin, x - D[0])
@@ -303,16 +305,18 @@ class Surface:
         return Rates(at, _dot(relative, found.direction), vector, normal, self.curvature(found.at, at))
 
     def _rates(self, at: Array, D: Array, away: Array, relative: Array) -> Array:
-        """Rates of the parameters of nearest points that others, ``away`` from them, move relative to the surface."""
+        """Return the rates of the parameters of closest points, for points ``away`` from them that move relative to the
+        surface.
+        """
         low, high = np.transpose(self.shape.span)
         low = low + (POLE if self.shape.about_axis else 0.0)
         slopes = np.stack([_dot(away, D[k]) for k in (1, 2)], axis=-1)
         sizes = np.linalg.norm(away, axis=-1)[..., None] * np.moveaxis(np.linalg.norm(D[1:3], axis=-1), 0, -1)
-        # Beyond an edge, and at a tip, a point stays there.
+        # The foot of a point beyond an edge or a tip stays there.
         held = ((at <= low) & (slopes < -EQUAL * sizes)) | ((at >= high) & (slopes > EQUAL * sizes))
         held &= ~np.array(self.shape.closed)
         if self.shape.about_axis:
-            # Around a tip there is no way.
+            # At a tip the angle is degenerate.
             held[..., 1] |= held[..., 0] & (at[..., 0] <= POLE)
         _, (a, b, c) = _forms(D, away)
         a, c = np.where(held[..., 0], 1.0, a), np.where(held[..., 1], 1.0, c)
@@ -327,7 +331,7 @@ def _dot(a: Array, b: Array) -> Array:
 
 
 def cross(a: Array, b: Array) -> Array:
-    """Products (..., 3) of vectors, of few of them in a tenth of the time that NumPy takes."""
+    """Return vector products (..., 3); for few vectors in a tenth of the time of NumPy's."""
     (a0, a1, a2), (b0, b1, b2) = ((v[..., 0], v[..., 1], v[..., 2]) for v in (a, b))
     return np.stack([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0], axis=-1)
 
@@ -337,7 +341,7 @@ def _metric(D: Array) -> tuple[Array, Array, Array]:
 
 
 def _degenerate(D: Array, away: Array) -> NDArray[np.bool_]:
-    """Whether points are where normals meet, so that not one point is nearest but many."""
+    """Return a mask of points at which normals meet, so that many points are closest."""
     (E, F, G), (a, b, c) = _forms(D, away)
     # Eigenvalues of the second in terms of the first, 1 - distance * curvature, vanish there.
     area = E * G - F**2
@@ -346,7 +350,7 @@ def _degenerate(D: Array, away: Array) -> NDArray[np.bool_]:
 
 
 def _forms(D: Array, away: Array) -> tuple[tuple[Array, Array, Array], tuple[Array, Array, Array]]:
-    """The metric, and the second derivatives of half the squared distance, each uu, uv, vv."""
+    """Return the metric, and the second derivatives of half the squared distance, each uu, uv, vv."""
     E, F, G = _metric(D)
     return (E, F, G), (E - _dot(away, D[3]), F - _dot(away, D[4]), G - _dot(away, D[5]))
 
@@ -360,15 +364,16 @@ def descended(
     noise: float = 0.0,
     gain: float = 0.0,
 ) -> Array:
-    """Parameters (n, 2) between bounds at which values are least, from steps that are halved where they do not lower
-    them by more than their ``noise``, and end where one that was halved gains no more than a part ``gain``; values and
-    steps are asked for where the search has not ended.
+    """Return parameters (n, 2) between bounds that minimise values.
+
+    Steps are halved unless they lower the value, up to ``noise``; a search ends if a halved step gains less than a part
+    ``gain``. Values and steps are evaluated only for searches that have not ended.
     """
     found, which = at.copy(), np.arange(len(at))
     for _ in range(MOST_NEWTON_STEPS):
         here = found[which]
         now, move, length = value(here, which), step(here, which), np.ones(len(which))
-        # Close to the end values agree to rounding, while steps still get shorter.
+        # Close to the end values agree up to roundoff, while steps still become shorter.
         most = now + np.maximum(noise, FEW_EPS * np.abs(now))
         tried = np.clip(here + move, low, high)
         after = value(tried, which)
@@ -381,7 +386,7 @@ def descended(
             after[worse] = value(tried[worse], which[worse])
         found[which] = np.where((after > most)[:, None], here, tried)
         moving = np.any(np.abs(found[which] - here) > ULPS * np.abs(here), axis=1)
-        # Where values have a kink steps are cut short for ever.
+        # At a kink of the values steps would be halved endlessly.
         moving &= (length == 1) | (now - after > gain * np.abs(now))
         which = which[moving]
         if len(which) == 0:
@@ -392,12 +397,13 @@ def descended(
 def newton_step(
     slope: Array, hessian: tuple[Array, Array, Array], metric: tuple[Array, Array, Array], lowest: Any, highest: Any
 ) -> Array:
-    """Newton's step (..., 2) from a slope (..., 2) and second derivatives uu, uv, vv, or with the metric for these
-    where they are not convex; none across an edge.
+    """Return Newton's step (..., 2) from a slope (..., 2) and second derivatives uu, uv, vv; none across an edge.
+
+    Where these are not convex the metric replaces them.
     """
     held = (lowest & (slope > 0)) | (highest & (slope < 0))
     slope = np.where(held, 0.0, slope)
-    # Along an edge only what is along it counts.
+    # At an edge only the component along it counts.
     E, F, G = metric[0], np.where(held.any(axis=-1), 0.0, metric[1]), metric[2]
     a, b, c = (
         np.where(held[..., 0], E, hessian[0]),

@@ -1,7 +1,7 @@
-"""Sums over a surface of laws with kinks or a cutoff: along rays from the nearest point, cut at these distances.
+"""Sums over a surface of laws with kinks or a cutoff: along rays from the foot, cut at the distances of these.
 
-The rays go to the edges of the surface, or to where a law ends at the latest, in parameters that have no pole. On the
-way out nodes gather at the start as in :mod:`surfacechem.surfaces.nodes`, and along edges at the nearest point.
+The rays go to the edges of the surface, or at most to the cutoff, in parameters without a pole. Along a ray nodes are
+graded towards its start as in :mod:`surfacechem.surfaces.nodes`, and along edges towards the closest point.
 
 Source: Duffy (1982), doi 10.1137/0719090, for the rays; Saye (2015), doi 10.1137/140966290, for the cuts.
 """
@@ -20,13 +20,15 @@ from surfacechem.surfaces.shapes import Indices, Sphere
 from surfacechem.tolerances import TINY
 
 BEND_SAMPLES = 4
-"""Parts of a piece between whose ends it is seen whether the distance passes that of a bend."""
+"""Parts of a piece between whose ends it is tested if the distance passes that of a kink."""
 
 
 @dataclass(frozen=True)
 class Rays:
-    """Rays (k,) from the feet of n points (n, 3) to the edges of a surface: for which point each is, its start and
-    end in coordinates (k, 2) without a pole, and twice the area of its triangle there (k,).
+    """Rays (k,) from the feet of n points (n, 3) to the edges of a surface.
+
+    Each has the index of its point, start and end in coordinates (k, 2) without a pole, and twice the area of its
+    triangle in these (k,).
     """
 
     surface: Surface
@@ -38,34 +40,34 @@ class Rays:
     area: Array
 
     def chosen(self, which: Indices) -> Rays:
-        """Some of the rays, each as often as it is asked for."""
+        """Return some of the rays, with repetitions if an index occurs several times."""
         parts = {name: getattr(self, name)[which] for name in ("owner", "start", "end", "area")}
         return replace(self, **parts)
 
     @property
     def scale(self) -> Array:
-        """Fractions of the rays (k,) that are as long as the gap."""
+        """Gap of each ray's point as a fraction of the ray (k,)."""
         ends = np.linalg.norm(self.at(np.ones(len(self.owner)))[0] - self.at(np.zeros(len(self.owner)))[0], axis=-1)
         return np.asarray(self.gaps[self.owner] / np.maximum(ends, TINY))
 
     def at(self, s: Array) -> tuple[Array, Array]:
-        """Points (k, ..., 3) and areas per area of the coordinates (k, ...) at parts (k, ...) of the way."""
+        """Return points (k, ..., 3) at parts (k, ...) of the rays, and areas per area of the coordinates (k, ...)."""
         there = (slice(None), *[None] * (s.ndim - 1))
         return pole_free(self.surface, self.start[there] + s[..., None] * (self.end - self.start)[there])
 
     def distances(self, s: Array) -> Array:
-        """Distances of the points at parts (k, ...) of the way."""
+        """Return the distances of the points at parts (k, ...) of the rays."""
         owners = self.points[self.owner][(slice(None), *[None] * (s.ndim - 1))]
         return np.asarray(np.linalg.norm(self.at(s)[0] - owners, axis=-1))
 
 
 def has_pole(surface: Surface) -> bool:
-    """Whether its parameters are a distance from a pole and an angle about it."""
+    """True if the parameters of a surface are a distance from a pole and an angle about it."""
     return surface.shape.about_axis and not surface.shape.closed[0]
 
 
 def pole_free(surface: Surface, w: Array) -> tuple[Array, Array]:
-    """Points (..., 3) at coordinates (..., 2), and areas per area of these (...)."""
+    """Return points (..., 3) at coordinates (..., 2), and areas per area of these (...)."""
     if not has_pole(surface):
         return surface.elements(w)
     u = np.maximum(np.hypot(w[..., 0], w[..., 1]), POLE)
@@ -74,12 +76,12 @@ def pole_free(surface: Surface, w: Array) -> tuple[Array, Array]:
 
 
 def ray_grid(surface: Surface, x: Array, near: Projection, reach: Array, extent: Extent, level: int) -> Grid:
-    """Nodes of a surface for points (n, 3) with their feet, up to where a law ends or to a reach (n,)."""
+    """Return nodes of a surface for points (n, 3) with their feet, up to a law's cutoff or a reach (n,)."""
     seen = np.flatnonzero(near.gap < extent.cutoff)
     if not len(seen):
         return Grid(x, seen, np.empty((0, 3)), np.empty(0))
     feet, gaps = near.at[seen], near.gap[seen]
-    # What is within reach of a point is by the gap farther from its foot, at most.
+    # Points within reach of a point are farther from its foot by at most the gap.
     edges = _circle if has_pole(surface) else _rectangle
     start, end, area = edges(surface, feet, gaps, reach[seen] + gaps, level)
     owner = np.repeat(np.arange(len(seen)), end.shape[1])
@@ -96,7 +98,7 @@ def ray_grid(surface: Surface, x: Array, near: Projection, reach: Array, extent:
 
 
 def _pieces(rays: Rays, extent: Extent, level: int) -> tuple[Indices, Array]:
-    """Pieces of rays, without those beyond the end of a law: of which ray each is, and its ends (m, 2) in t."""
+    """Return pieces of rays up to the cutoff: the ray of each, and its ends (m, 2) in t."""
     from scipy.optimize.elementwise import find_root
 
     scale = rays.scale
@@ -127,7 +129,7 @@ def _pieces(rays: Rays, extent: Extent, level: int) -> tuple[Indices, Array]:
 
 
 def _rectangle(surface: Surface, feet: Array, gaps: Array, far: Array, level: int) -> tuple[Array, Array, Array]:
-    """Rays (n, k) to a rectangle of parameters around each foot: starts, ends, and twice their areas."""
+    """Return rays (n, k) to a rectangle of parameters around each foot: starts, ends, and twice their areas."""
     lengths = np.linalg.norm(surface.derivatives(feet, 3)[1:], axis=-1)
     low, high = np.transpose(surface.shape.span)
     sides = []
@@ -139,7 +141,7 @@ def _rectangle(surface: Surface, feet: Array, gaps: Array, far: Array, level: in
     ends, areas = [], []
     for k in range(2):
         for side in sides[k]:
-            # Along a side what is seen from the foot has the length of their distance, or of the gap.
+            # Along a side the integrand varies on the scale of the distance from the foot, or of the gap.
             unit = np.maximum(np.abs(side) * lengths[k], gaps) / lengths[1 - k]
             edges = divided(np.stack([np.arcsinh(end / unit) for end in sides[1 - k]], axis=1), level)
             t, w = gauss_rule(edges, order_of(level))
@@ -152,12 +154,12 @@ def _rectangle(surface: Surface, feet: Array, gaps: Array, far: Array, level: in
 
 
 def _circle(surface: Surface, feet: Array, gaps: Array, far: Array, level: int) -> tuple[Array, Array, Array]:
-    """Rays (n, k) to a circle, around the pole or around each foot where the edge is far away."""
+    """Return rays (n, k) to a circle around the pole, or around each foot where the edge is far away."""
     length = np.linalg.norm(surface.derivatives(feet, 3)[1], axis=-1)
     (_, edge), _ = surface.shape.span
     angle = feet[:, 1]
     start = feet[:, :1] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-    # Angles from the pole are no lengths, but all of them are few.
+    # Angles from the pole are not lengths, but few in all: rays go to the edge.
     beyond = np.zeros(len(feet), dtype=bool) if isinstance(surface.shape, Sphere) else edge - feet[:, 0] > far
     radius = np.where(beyond, far, edge)
     middle = np.where(beyond[:, None], start, 0.0)

@@ -25,26 +25,28 @@ Point = tuple[Expression, Expression, Expression]
 
 FULL_TURN = (-math.pi, math.pi)
 MAX_SLOPE = 1.57
-"""Slope of a cone at most; a needle has no height."""
+"""Largest slope of a cone; a needle has no height."""
 
 PER_HALF_WAVE, PER_CELL, MOST_NODES = 128, 8, 1_000_000
-"""Places along half a wave, and along each cell of measured heights, among which a search for the nearest point begins,
-and those of all cells at most.
+"""Points along half a wave, and along each cell of measured heights, from which searches for the closest point start,
+and the most points of all cells.
 """
 
 OWN_PART = 0.6
-"""Fraction of the way from one of these places to the next within which it is the one beside the nearest point: half,
-and what Newton's step may be wrong by.
+"""Fraction of the spacing of these points within which a Newton step must stay for its start to be the one next to the
+closest point: one half, and the error of the step.
 """
 
 SPLINE_OVERSHOOT = 0.1
-"""Fraction of the range of heights by which a spline through them may be above the highest, as summits lie between."""
+"""Fraction of the range of heights by which a spline may exceed the highest, as summits lie between the points."""
 
 
 def _stays_near(away: Array, slopes: Array, ends: Sequence[NDArray[np.bool_]], widths: Sequence[float]) -> Array:
-    """Whether Newton's step, from places (n, 3) that points are ``away`` from, stays beside them; at an edge along it.
+    """Return a mask of Newton steps that stay near their starts (n, 3), from which points are ``away``; at an edge
+    along it.
 
-    ``slopes`` (n, 5) are derivatives of the heights: u, v, uu, uv, vv; ``ends`` tell where u and v have none.
+    ``slopes`` (n, 5) are derivatives of the heights: u, v, uu, uv, vv; ``ends`` are masks of starts at edges in u and
+    in v.
     """
     (h_u, h_v, h_uu, h_uv, h_vv), (x_u, x_v, up) = slopes.T, away.T
     E = np.where(ends[0], 1.0, 1 + h_u**2 - up * h_uu)
@@ -57,7 +59,7 @@ def _stays_near(away: Array, slopes: Array, ends: Sequence[NDArray[np.bool_]], w
 
 
 def _half(extent: float | None) -> tuple[float, float]:
-    """Interval from minus to plus half of an extent, which may be infinite."""
+    """Return the interval from minus to plus half of an extent, which may be infinite."""
     half = math.inf if extent is None else extent / 2
     return -half, half
 
@@ -79,7 +81,7 @@ class Plane(Shape):
     width: float | None = parameter("m", "extent along y", default=None, above=0, varies=False)
 
     def point(self, u: Expression, v: Expression) -> Point:
-        """Point at the coordinates (u, v)."""
+        """Return the point at the coordinates (u, v)."""
         return u, v, 0 * u
 
     @property
@@ -88,7 +90,7 @@ class Plane(Shape):
         return _half(self.length), _half(self.width)
 
     def foot(self, x: Array) -> Array:
-        """Parameters of the nearest point: below the point, or on the edge."""
+        """Return the parameters of the closest point: below the point, or on the edge."""
         low, high = np.transpose(self.span)
         return np.asarray(np.clip(x[..., :2], low, high))
 
@@ -107,12 +109,12 @@ class Sphere(Shape):
     about_axis = True
     closed = (False, True)
     bulge: ClassVar[int] = 1
-    """Sign of the bulge: 1 where the centre is in the body, -1 where it is outside."""
+    """Sign of the curvature: 1 if the centre is inside the body, -1 if it is outside."""
 
     R: float = parameter("m", "radius", above=0, varies=False)
 
     def point(self, u: Expression, v: Expression) -> Point:
-        """Point at the angles u from the axis and v about it."""
+        """Return the point at the angles u from the axis and v about it."""
         return self.R * sin(u) * cos(v), self.R * sin(u) * sin(v), -2 * self.bulge * self.R * sin(u / 2) ** 2
 
     @property
@@ -121,8 +123,8 @@ class Sphere(Shape):
         return (0.0, math.pi), FULL_TURN
 
     def foot(self, x: Array) -> Array:
-        """Parameters of the nearest point: along the radius, or on the edge."""
-        # The direction from the centre, counted from the apex.
+        """Return the parameters of the closest point: along the radius, or on the edge."""
+        # The direction from the centre, as an angle from the apex.
         up = self.R + self.bulge * x[..., 2]
         angles = np.arctan2(np.hypot(x[..., 0], x[..., 1]), up), np.arctan2(x[..., 1], x[..., 0])
         return np.asarray(np.clip(np.stack(angles, axis=-1), *np.transpose(self.span)))
@@ -182,21 +184,21 @@ class Cylinder(Shape):
     length: float | None = parameter("m", "length", default=None, above=0, varies=False)
 
     def point(self, u: Expression, v: Expression) -> Point:
-        """Point at the length u and the angle v from the highest line."""
+        """Return the point at the length u and the angle v from the highest line."""
         return u, self.R * sin(v), -2 * self.R * sin(v / 2) ** 2
 
     @property
     def span(self) -> Span:
-        """Length, and angles all around."""
+        """Length, and full angle."""
         return _half(self.length), FULL_TURN
 
     def foot(self, x: Array) -> Array:
-        """Parameters of the nearest point: along the radius, or on the edge."""
+        """Return the parameters of the closest point: along the radius, or on the edge."""
         return np.stack([np.clip(x[..., 0], *_half(self.length)), np.arctan2(x[..., 1], x[..., 2] + self.R)], axis=-1)
 
 
 class SurfaceOfRevolution(Shape):
-    """Surface of revolution over the distance u from its axis; without a radius of its edge it has no end."""
+    """Surface of revolution over the distance u from its axis; infinite without a radius of its edge."""
 
     about_axis = True
     closed = (False, True)
@@ -205,18 +207,18 @@ class SurfaceOfRevolution(Shape):
 
     @property
     def span(self) -> Span:
-        """Distances up to the edge, and angles all around."""
+        """Distances up to the edge, and full angle."""
         return (0.0, math.inf if self.radius is None else self.radius), FULL_TURN
 
     def starts(self, x: Array) -> tuple[Indices, Array]:
-        """Starts of the search at the angle of the points about the axis and at the opposite one."""
+        """Return starts of the search at the angle of the points about the axis and at the opposite one."""
         angle, radius = np.arctan2(x[:, 1], x[:, 0]), np.hypot(x[:, 0], x[:, 1])
         starts = np.stack([radius, angle, radius, angle + math.pi], axis=-1).reshape(-1, 2)
         return np.repeat(np.arange(len(x)), 2), starts
 
     @abstractmethod
     def point(self, u: Expression, v: Expression) -> Point:
-        """Point at the distance u from the axis and the angle v about it."""
+        """Return the point at the distance u from the axis and the angle v about it."""
 
 
 class Disc(SurfaceOfRevolution):
@@ -233,11 +235,11 @@ class Disc(SurfaceOfRevolution):
     radii = ("radius",)
 
     def point(self, u: Expression, v: Expression) -> Point:
-        """Point at the distance u from the axis and the angle v about it."""
+        """Return the point at the distance u from the axis and the angle v about it."""
         return u * cos(v), u * sin(v), 0 * u
 
     def foot(self, x: Array) -> Array:
-        """Parameters of the nearest point: below the point, or on the edge."""
+        """Return the parameters of the closest point: below the point, or on the edge."""
         at = np.stack([np.hypot(x[..., 0], x[..., 1]), np.arctan2(x[..., 1], x[..., 0])], axis=-1)
         return np.asarray(np.clip(at, *np.transpose(self.span)))
 
@@ -258,7 +260,7 @@ class Paraboloid(SurfaceOfRevolution):
     R: float = parameter("m", "radius of curvature at the highest point", above=0, varies=False)
 
     def point(self, u: Expression, v: Expression) -> Point:
-        """Point at the distance u from the axis and the angle v about it."""
+        """Return the point at the distance u from the axis and the angle v about it."""
         return u * cos(v), u * sin(v), -(u**2) / (2 * self.R)
 
 
@@ -279,11 +281,13 @@ class Cone(SurfaceOfRevolution):
     slope: float = parameter("rad", "angle between its side and the plane", above=0, at_most=MAX_SLOPE, varies=False)
 
     def point(self, u: Expression, v: Expression) -> Point:
-        """Point at the distance u from the axis and the angle v about it."""
+        """Return the point at the distance u from the axis and the angle v about it."""
         return u * cos(v), u * sin(v), -u * math.tan(self.slope)
 
     def foot(self, x: Array) -> Array:
-        """Parameters of the nearest point: on the line of its side below the point, or on the tip or the edge."""
+        """Return the parameters of the closest point: on the line of the side below the point, or on the tip or the
+        edge.
+        """
         along = np.hypot(x[..., 0], x[..., 1]) * math.cos(self.slope) - x[..., 2] * math.sin(self.slope)
         at = np.stack([along * math.cos(self.slope), np.arctan2(x[..., 1], x[..., 0])], axis=-1)
         return np.asarray(np.clip(at, *np.transpose(self.span)))
@@ -309,7 +313,7 @@ class Torus(Shape):
     r: float = parameter("m", "radius of its tube", above=0, varies=False)
 
     def point(self, u: Expression, v: Expression) -> Point:
-        """Point at the angle u about the middle of the tube and v about the axis."""
+        """Return the point at the angles u about the middle of the tube and v about the axis."""
         out = self.hole + self.r * (1 + sin(u))
         return out * cos(v), out * sin(v), -2 * self.r * sin(u / 2) ** 2
 
@@ -319,7 +323,7 @@ class Torus(Shape):
         return FULL_TURN, FULL_TURN
 
     def foot(self, x: Array) -> Array:
-        """Parameters of the nearest point: along the radius of the tube."""
+        """Return the parameters of the closest point: along the radius of the tube."""
         out = np.hypot(x[..., 0], x[..., 1]) - self.hole - self.r
         return np.stack([np.arctan2(out, x[..., 2] + self.r), np.arctan2(x[..., 1], x[..., 0])], axis=-1)
 
@@ -344,13 +348,13 @@ class Wavy(Plane):
     wavelength_2: float | None = parameter("m", "wavelength along y", default=None, above=0, varies=False)
 
     def point(self, u: Expression, v: Expression) -> Point:
-        """Point at the coordinates (u, v)."""
+        """Return the point at the coordinates (u, v)."""
         across = 1 if self.wavelength_2 is None else cos(2 * math.pi / self.wavelength_2 * v)
         return u, v, self.amplitude * (cos(2 * math.pi / self.wavelength * u) * across - 1)
 
     @property
     def grain(self) -> float:  # type: ignore[override]
-        """A quarter of a wave."""
+        """A quarter of a wavelength."""
         return min(self.wavelength, self.wavelength_2 or math.inf) / 4
 
     @property
@@ -360,7 +364,7 @@ class Wavy(Plane):
 
     @cached_property
     def nodes(self) -> Any:
-        """Places (along each wave, and height) from a crest to half a wave away."""
+        """Points (along each wave, and height) from a crest to half a wave away."""
         from scipy.spatial import KDTree
 
         axes = [np.linspace(0, wave / 2, PER_HALF_WAVE) for wave in self.waves]
@@ -369,9 +373,12 @@ class Wavy(Plane):
         return KDTree(np.column_stack([places, heights]))
 
     def starts(self, x: Array) -> tuple[Indices, Array]:
-        """The nearest of some places of the half wave that the points are in, and its mirror images in the crest or
-        trough that is nearer: a place beyond these has an image that is nearer than itself. That image is none where an
-        edge cuts the half wave off: the one farther in has places, too, and so have its crests and troughs.
+        """Return starts of the search: the nearest of some points of the half wave in which each point lies, and mirror
+        images.
+
+        The images are in the nearer crest or trough: a start beyond these has an image that is nearer than itself. An
+        edge that cuts off the half wave may also cut off the image: then points of the next half wave inwards, its
+        crests and troughs are starts too.
         """
         waves, (low, high) = self.waves, np.transpose(self.span)
         count = len(waves)
@@ -414,7 +421,7 @@ class Heights(Shape):
     z: Sequence[float] = option("heights, all along y for the first x, then for the next [m]")
 
     def __post_init__(self) -> None:
-        """Check that the grid is whole."""
+        """Check that the grid is complete."""
         super().__post_init__()
         for name, places in (("x", self.x), ("y", self.y)):
             if len(places) < 6 or np.any(np.diff(places) <= 0):
@@ -438,7 +445,7 @@ class Heights(Shape):
         return RectBivariateSpline(self.x, self.y, z - z.max(), kx=5, ky=5)
 
     def point(self, u: Expression, v: Expression) -> Point:
-        """Point at the coordinates (u, v)."""
+        """Return the point at the coordinates (u, v)."""
         return u, v, self.spline.ev(u, v)
 
     @property
@@ -453,9 +460,11 @@ class Heights(Shape):
 
     @cached_property
     def nodes(self) -> Any:
-        """Places of the surface (x, y, z), some in each cell of the grid unless these are many, in order and for
-        searches; and how much the square of a distance d is above that of the nearest point at the place beside it, at
-        most: a + b d.
+        """Starts of searches on the surface (x, y, z), with derivatives of the heights and a tree of them, several in
+        each cell unless these are many; and the numbers a, b of a bound.
+
+        For a point at the distance d, the squared distance of the start next to its closest point exceeds the least one
+        by at most a + b d.
         """
         from scipy.spatial import KDTree
 
@@ -464,7 +473,7 @@ class Heights(Shape):
         x, y = (np.interp(t, range(len(p)), p) for t, p in zip(at, (self.x, self.y), strict=True))
         places = np.stack([*np.meshgrid(x, y, indexing="ij"), self.spline(x, y)], axis=-1)
         slopes = [self.spline(x, y, *order) for order in ((1, 0), (0, 1), (2, 0), (1, 1), (0, 2))]
-        # Where a point is nearest the square of its distance has no slope: beside it it grows with the second
+        # At the closest point the slope of the squared distance vanishes: next to it the growth is given by the second
         # derivative, 2 (|x_u|^2 - d n . x_uu).
         h_u, h_v, h_uu, h_uv, h_vv = slopes
         first = math.sqrt(1 + (h_u**2 + h_v**2).max())
@@ -474,8 +483,8 @@ class Heights(Shape):
         return places, np.stack(slopes, axis=-1), KDTree(places.reshape(-1, 3)), growth
 
     def starts(self, x: Array) -> tuple[Indices, Array]:
-        """Starts of the search: of the places beside which the nearest point may be, those that no neighbour is nearer
-        than, and those from which Newton's method leads to none of them.
+        """Return starts of the search: of those next to which the closest point may be, the ones without a nearer
+        neighbour, and the ones whose Newton step does not lead to another start.
         """
         places, slopes, tree, (a, b) = self.nodes
         d = tree.query(x)[0]
@@ -487,14 +496,14 @@ class Heights(Shape):
         distance = np.linalg.norm(away, axis=-1)
         ends = [(k == 0) | (k == count - 1) for k, count in zip((i, j), places.shape, strict=False)]
         for offsets in product((-1, 0, 1), repeat=2):
-            # At an edge the nearest point may be one that is so along it alone.
+            # At an edge the closest point may be a minimum only along the edge.
             beside = (np.where(end, k, k + offset) for end, k, offset in zip(ends, (i, j), offsets, strict=True))
             least &= distance <= np.linalg.norm(x[which] - places[tuple(beside)], axis=-1)
         least |= _stays_near(away, slopes[i, j], ends, widths)
         return which[least], places[i, j, :2][least]
 
     def derivatives(self, u: Array, v: Array, count: int) -> Array:
-        """Points and derivatives of the spline."""
+        """Return points and derivatives of the spline."""
         orders = [(i - j, j) for i in range(4) for j in range(i + 1)][:count]
         found = np.zeros((len(orders), *np.shape(u), 3))
         found[0, ..., 0], found[0, ..., 1], found[1, ..., 0], found[2, ..., 1] = u, v, 1.0, 1.0
