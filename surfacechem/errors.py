@@ -1,4 +1,4 @@
-"""Errors a user can act on: place, thing, what is allowed, nearest guess."""
+"""Errors that a user can act on: place, thing, allowed values, nearest guess."""
 
 from __future__ import annotations
 
@@ -10,16 +10,18 @@ from dataclasses import dataclass, field
 from typing import Self
 
 LINES, NEAR = 240, 6
-"""Total length of names [characters] up to which a message lists all, some two lines; of more so many, the nearest."""
+"""Total length of names [characters] up to which a message lists all, some two lines; and the number of nearest ones
+that it lists otherwise.
+"""
 
 LAWS, PATHS = "`surfacechem laws`", "`surfacechem equations CASE`"
-"""Commands, as messages name them, that list all laws, and all paths of parameters of a case."""
+"""Commands in messages that list all laws, and all paths of parameters of a case."""
 
 LONGEST = 2000
-"""Largest length of a message [characters]: more is not read."""
+"""Largest length of a message [characters]; nobody reads more."""
 
 LIKE = 0.6
-"""Similarity of two names above which one is a guess for the other: a choice, that of `difflib`."""
+"""Similarity of two names above which one is suggested for the other: a choice, that of `difflib`."""
 
 FILE_SUFFIX = re.compile(r"\.(ya?ml|nc|csv)$")
 
@@ -43,9 +45,9 @@ class SurfacechemError(Exception):
 
 
 class PlacedError(SurfacechemError):
-    """One line that can be read, whatever it quotes, with the place that it is about.
+    """An error message of one printable line, with the place in the input that it is about.
 
-    Who knows no file gives the ``path`` in the case, to which the reader of the case knows file and line.
+    Code without access to the file gives the ``path`` in the case, to which the reader of the case adds file and line.
     """
 
     def __init__(self, message: str, place: Place | None = None, *, path: str = "") -> None:
@@ -54,7 +56,7 @@ class PlacedError(SurfacechemError):
         super().__init__(printable(f"{place}: {message}" if place and str(place) else message))
 
     def at(self, place: Place) -> Self:
-        """The same error with its place, unless it already knows one."""
+        """Return the same error with its place, unless it already has one."""
         return self if self.place else type(self)(self.message, place)
 
 
@@ -64,7 +66,7 @@ class InputError(PlacedError):
 
 @contextmanager
 def placed(place: Place) -> Iterator[None]:
-    """Input errors from inside get this place, unless they already know one."""
+    """Add this place to input errors raised in a block, unless they already have one."""
     try:
         yield
     except InputError as error:
@@ -76,7 +78,7 @@ class OutputError(PlacedError):
 
 
 def printable(text: str) -> str:
-    r"""The text with line breaks and control characters as their escapes.
+    r"""Return text with line breaks and control characters as escapes.
 
     >>> print(printable("unknown key 'load\ning'"))
     unknown key 'load\ning'
@@ -85,14 +87,15 @@ def printable(text: str) -> str:
 
 
 def shortened(text: str) -> str:
-    """A text that is too long to be read without its middle."""
+    """Return a text, without its middle if it is too long to be read."""
     half = LONGEST // 2
     return text if len(text) <= LONGEST else f"{text[:half]} [...] {text[-half:]}"
 
 
 def suggestion(name: str, known: Iterable[str], listed_by: str = "") -> str:
-    """``" Did you mean 'x'? Known: x, y."`` for a name that is not among the known ones; of many the nearest, and the
-    command or the page that lists all.
+    """Return ``" Did you mean 'x'? Known: x, y."`` for an unknown name.
+
+    Of many known names the nearest are listed, with the command or the page that lists all.
 
     >>> suggestion("mu_s", ["k", "mu"])
     " Did you mean 'mu'? Known: k, mu."
@@ -110,7 +113,7 @@ def suggestion(name: str, known: Iterable[str], listed_by: str = "") -> str:
 def refuse_unknown(
     names: Iterable[str], known: Collection[str], message: str, place: Place | None = None, listed_by: str = ""
 ) -> None:
-    """Raise InputError for the first name that is none of the known ones; it stands where the message has {}.
+    """Raise InputError for the first name that is not among the known ones; {} in the message stands for it.
 
     >>> refuse_unknown(["k", "mu_s"], ["k", "mu"], "no parameter '{}'")
     Traceback (most recent call last):
@@ -123,7 +126,7 @@ def refuse_unknown(
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
-    """``" Did you mean 'x'?"`` for a name that is not among the known ones, nothing where none of them is like it.
+    """Return ``" Did you mean 'x'?"`` for an unknown name, or an empty text if no known one is similar.
 
     >>> nearest("cluster", ["bouncing-plate", "adhesion-cluster-held"]), nearest("debonding.yml", ["ends.yaml"])
     (" Did you mean 'adhesion-cluster-held'?", '')
@@ -133,9 +136,9 @@ def nearest(name: str, known: Iterable[str]) -> str:
 
 
 def likeness(name: str, other: str) -> tuple[float, float]:
-    """Similarity of two names, without the suffixes of files, then with them.
+    """Return the similarity of two names, without file suffixes, then with them.
 
-    A name that has the words of the other among its own is nearer than its spelling says.
+    A name whose words are all contained in the other counts as more similar than by its spelling.
     """
     one, two = (FILE_SUFFIX.sub("", text.lower()) for text in (name[:LONGEST], other))
     words = [word for word in re.split(r"[^a-z0-9]+", one) if word]

@@ -1,4 +1,4 @@
-"""Elementary functions that take floats and symbols alike, guarded at their singular ends.
+"""Elementary functions of floats and symbols, guarded at their singular points.
 
 Laws are written with these. Given a float they return a float; given a SymEngine expression they return one that
 SymEngine differentiates exactly and compiles. Every function here keeps its value *and its derivative* finite.
@@ -17,32 +17,32 @@ Expression: TypeAlias = Any
 """A float or a SymEngine expression."""
 
 EXPONENT_CAP = 300.0
-"""Largest exponent taken literally; above it exp continues as its tangent.
+"""Largest exponent of a plain exponential; above it exp continues as its tangent.
 
-A rate of exp(300) = 2e130 times its prefactor is instantaneous on every time scale a run can resolve, and its square
-is still a finite double, so error norms and matrix factorisations survive it.
+A rate of exp(300) = 2e130 times its prefactor is instantaneous on every time scale that a run can resolve, and its
+square is still a finite double, so error norms and matrix factorisations remain finite.
 """
 
 
 def is_symbolic(*values: Expression) -> bool:
-    """Whether any of the values is a symbolic expression."""
-    # Of the type, as an expression that is asked for its symbols collects them.
+    """True if any of the values is a symbolic expression."""
+    # Test the type: reading the attribute of an expression would collect its symbols.
     return any(hasattr(type(value), "free_symbols") for value in values)
 
 
 def depends(expression: Expression, symbol: Expression) -> bool:
-    """Whether the expression contains the symbol."""
+    """True if the expression contains the symbol."""
     return is_symbolic(expression) and symbol in _symbols(expression)
 
 
 @lru_cache(maxsize=8)
 def _symbols(expression: Expression) -> Any:
-    """Symbols of an expression: a potential of many species is asked for each of them in turn."""
+    """Return the symbols of an expression, cached: a potential of many species is tested for each of them in turn."""
     return expression.free_symbols
 
 
 def without(expression: Expression, known: Mapping[Any, Expression]) -> Expression:
-    """The expression without the symbols that are known; offered all of them, SymEngine would look for each."""
+    """Replace the known symbols in an expression; only those in it are passed on, as SymEngine would search for all."""
     import symengine
 
     whole = symengine.sympify(expression)
@@ -51,7 +51,7 @@ def without(expression: Expression, known: Mapping[Any, Expression]) -> Expressi
 
 
 def derivative(expression: Expression, symbol: Expression) -> Expression:
-    """Derivative of an expression, without the empty pieces that differentiation leaves of guarded functions.
+    """Differentiate an expression, and remove the zero pieces that differentiation leaves of guarded functions.
 
     >>> import symengine
     >>> x, T = symengine.symbols("x T")
@@ -68,7 +68,7 @@ def derivative(expression: Expression, symbol: Expression) -> Expression:
 
 
 def terms_of(expression: Expression) -> dict[Any, list[Expression]]:
-    """Terms of a sum by the symbols that they contain: a derivative of it needs no others.
+    """Return the terms of a sum by the symbols in them: a derivative by a symbol needs no others.
 
     >>> import symengine
     >>> x, y = symengine.symbols("x y")
@@ -87,8 +87,9 @@ def terms_of(expression: Expression) -> dict[Any, list[Expression]]:
 
 
 def gradient(expression: Expression, known: dict[Any, dict[Any, Expression]] | None = None) -> dict[Any, Expression]:
-    """Derivatives that are not zero, by symbol: what an expression is made of is differentiated once, by the symbols
-    that it contains. ``known`` keeps what has been differentiated.
+    """Return the nonzero derivatives of an expression by symbol.
+
+    Every subexpression is differentiated once, by the symbols that it contains; ``known`` stores these results.
 
     >>> import symengine
     >>> x, y = symengine.symbols("x y")
@@ -108,13 +109,13 @@ def gradient(expression: Expression, known: dict[Any, dict[Any, Expression]] | N
 
 
 def _slopes(whole: Any, known: dict[Any, dict[Any, Expression]]) -> dict[Any, list[Expression]]:
-    """Terms of the derivatives of a node by each symbol, one from each of its arguments."""
+    """Return the terms of the derivatives of a node by each symbol, one from each of its arguments."""
     import symengine
 
     if whole.is_Symbol:
         return {whole: [symengine.Integer(1)]}
     found: dict[Any, list[Expression]] = {}
-    if isinstance(whole, symengine.Piecewise):  # its arguments are values and conditions by turns
+    if isinstance(whole, symengine.Piecewise):  # its arguments alternate between values and conditions
         branches = [gradient(value, known) for value in whole.args[::2]]
         zero = symengine.Integer(0)
         for symbol in dict.fromkeys(symbol for branch in branches for symbol in branch):
@@ -130,7 +131,7 @@ def _slopes(whole: Any, known: dict[Any, dict[Any, Expression]]) -> dict[Any, li
 
 
 def _partial(whole: Any, k: int) -> Expression:
-    """Derivative of a sum, product, power or function by its argument number k."""
+    """Differentiate a sum, product, power or function by its argument number k."""
     import symengine
 
     arguments = whole.args
@@ -143,10 +144,10 @@ def _partial(whole: Any, k: int) -> Expression:
 
 
 def magnitude(expression: Expression, sizes: Mapping[Any, Expression] | None = None) -> Expression:
-    """Running error bound: evaluated in doubles, the expression errs by a few times half an EPS of this.
+    """Return the running error bound: evaluated in doubles, the expression errs by a few times half an EPS of this.
 
-    Symbols count with their ``sizes``, else with what they are: they are rounded themselves, and a sum of large terms
-    that cancel is known no better than its terms.
+    Symbols contribute their ``sizes``, else their absolute values: they are rounded too, and a sum of large terms that
+    cancel is no more accurate than its terms.
 
     Source: Higham (2002), Accuracy and Stability of Numerical Algorithms, section 3.3.
 
@@ -173,11 +174,11 @@ def magnitude(expression: Expression, sizes: Mapping[Any, Expression] | None = N
             sides, conditions = [bound(side) for side in e.args[::2]], list(e.args[1::2])
             first = conditions[0]
             if len(sides) == 2 and isinstance(first, symengine.StrictLessThan | symengine.LessThan):
-                apart = first.args[0] - first.args[1]  # within its rounding that decides on the side
+                apart = first.args[0] - first.args[1]  # within roundoff of the condition either side may apply
                 sides.insert(0, sides[0] + sides[1])
                 conditions.insert(0, symengine.Le(symengine.Abs(apart), FORMULA_EPS * bound(apart)))
             return symengine.Piecewise(*zip(sides, conditions, strict=True))
-        if e.is_Add or e.is_Mul:  # each term or factor errs while the others stand
+        if e.is_Add or e.is_Mul:  # the error of each term or factor, with the others exact
             return symengine.Add(*(symengine.Abs(_partial(e, i)) * bound(a) for i, a in enumerate(e.args)))
         # |f'(a)| M(a), and |f| for the rounding of f itself
         errors = (symengine.Abs(_partial(e, i)) * bound(a) for i, a in enumerate(e.args) if a.free_symbols)
@@ -195,7 +196,7 @@ def _engine(*values: Expression) -> Any:
 
 
 def where(condition: Expression, yes: Expression, no: Expression) -> Expression:
-    """``yes`` where the condition holds, else ``no``."""
+    """Return ``yes`` where the condition holds, else ``no``."""
     if isinstance(condition, bool):
         return yes if condition else no
     import symengine
@@ -216,14 +217,14 @@ def exp(x: Expression) -> Expression:
 
 
 LITERAL = 250.0
-"""Exponent up to which a product with an exponential is multiplied as it stands; well below EXPONENT_CAP."""
+"""Largest exponent of a product with a plain exponential; well below EXPONENT_CAP."""
 
 
 def scaled_exp(factor: Expression, exponent: Expression) -> Expression:
-    """Product factor * exp(exponent) with one exponential, so that what is tiny may have a large exponent.
+    """Return factor * exp(exponent) with one exponential, so that a tiny factor may have a large exponent.
 
-    Beyond LITERAL the logarithm of a factor below one is part of the exponent, and with it of what is capped;
-    exponentials in the factor are taken by their exponents.
+    Above LITERAL the logarithm of a factor below one is added to the exponent before it is capped; exponentials in the
+    factor are combined with it.
 
     >>> scaled_exp(2.0, 0.0), round(scaled_exp(1e-239, 560.0), 6)
     (2.0, 16029.126851)
@@ -244,7 +245,7 @@ def scaled_exp(factor: Expression, exponent: Expression) -> Expression:
 
 
 def product(*factors: Expression) -> Expression:
-    """Product of which all exponentials are one, see :func:`scaled_exp`.
+    """Return the product with all exponentials combined into one, see :func:`scaled_exp`.
 
     >>> product(2.0, 3.0)
     6.0
@@ -256,7 +257,9 @@ def product(*factors: Expression) -> Expression:
 
 
 def _exponential(factor: Expression) -> tuple[Expression, Expression]:
-    """Split a product into the factors beside exponentials, guarded ones included, and the sum of their exponents."""
+    """Split a product into its other factors and the sum of the exponents of its exponentials, guarded ones
+    included.
+    """
     import symengine
 
     node = symengine.sympify(factor)
@@ -276,7 +279,7 @@ def _exponential(factor: Expression) -> tuple[Expression, Expression]:
 
 
 def exponents(expression: Expression) -> list[Expression]:
-    """The exponents of an expression that :func:`exp` and :func:`expm1` cap.
+    """Return the exponents in an expression that :func:`exp` and :func:`expm1` cap.
 
     >>> import symengine
     >>> exponents(2 * exp(symengine.Symbol("x")) + 1)
@@ -298,13 +301,13 @@ def expm1(x: Expression) -> Expression:
         return expm1(float(x))
     import symengine
 
-    # 2 e^(x/2) sinh(x/2) is exact near zero; the outer pieces are where one of its factors would over- or underflow.
+    # 2 e^(x/2) sinh(x/2) is accurate near zero; in the outer pieces one of its factors would over- or underflow.
     middle = 2 * symengine.exp(x / 2) * symengine.sinh(x / 2)
     return symengine.Piecewise((symengine.exp(x) - 1, x < -30.0), (middle, x < EXPONENT_CAP), (exp(x), True))
 
 
 def scaled_expm1(factor: Expression, x: Expression, shift: Expression = 0) -> Expression:
-    """Product factor * exp(shift) * (exp(x) - 1) with one exponential, see :func:`scaled_exp`.
+    """Return factor * exp(shift) * (exp(x) - 1) with one exponential, see :func:`scaled_exp`.
 
     >>> scaled_expm1(2.0, -1e-20), round(scaled_expm1(1e-239, 560.0), 6)
     (-2e-20, 16029.126851)
@@ -315,14 +318,14 @@ def scaled_expm1(factor: Expression, x: Expression, shift: Expression = 0) -> Ex
 
 
 def _falling(x: Expression) -> Expression:
-    """exp(x) - 1 for x <= 0, of a symbolic x."""
+    """exp(x) - 1 for a symbolic x <= 0."""
     import symengine
 
     return where(x < -30.0, symengine.exp(x) - 1, 2 * symengine.exp(x / 2) * symengine.sinh(x / 2))
 
 
 def decay(x: Expression) -> Expression:
-    """exp(-x) where x is not negative; its derivatives combine with their like, which those of a guarded exp do not."""
+    """exp(-x) for x >= 0; unlike those of a guarded exp, like terms of its derivatives combine."""
     if not is_symbolic(x):
         return exp(-x)
     import symengine
@@ -336,11 +339,11 @@ def log(x: Expression) -> Expression:
 
 
 LARGE_EXPONENT = 200.0
-"""Exponent above which arsinh(x exp(exponent)) is taken by its logarithm."""
+"""Exponent above which arsinh(x exp(exponent)) is computed by its logarithm."""
 
 
 def log_fraction(x: Expression) -> Expression:
-    """Natural logarithm of a fraction, or of a rate that may vanish, finite at zero."""
+    """Natural logarithm of a fraction, or of a rate that may vanish; finite at zero."""
     if not is_symbolic(x):
         return math.log(max(x, FRACTION_FLOOR))
     import symengine
@@ -351,7 +354,7 @@ def log_fraction(x: Expression) -> Expression:
 def mixing(x: Expression) -> Expression:
     """Fraction times its logarithm, x ln x, with derivatives ln x + 1 and 1/x.
 
-    Those of a product with a guarded ln x hold x/x^2, which is not finite near zero.
+    The derivatives of a product with a guarded ln x contain x/x^2, which is not finite near zero.
 
     >>> mixing(1.0), mixing(0.5) == -0.5 * math.log(2.0)
     (0.0, True)
@@ -364,7 +367,7 @@ def mixing(x: Expression) -> Expression:
 
 
 def log_sum(logarithms: Iterable[Expression]) -> Expression:
-    """Logarithm of a sum of which only the logarithms are known.
+    """Logarithm of a sum, from the logarithms of its terms.
 
     >>> log_sum([-1000.0, -1000.0])
     -999.3068528194401
@@ -382,7 +385,7 @@ def sqrt(x: Expression) -> Expression:
 
 
 def asinh_exp(x: Expression, exponent: Expression) -> Expression:
-    """arsinh(x exp(exponent)); for large exponents by its logarithm, so that none overflows."""
+    """arsinh(x exp(exponent)); for large exponents by its logarithm, without overflow."""
     if not is_symbolic(x, exponent):
         if x == 0:
             return 0.0
@@ -412,7 +415,7 @@ def _half(x: Expression, exponent: Expression) -> Expression:
 
 
 def norm(x: Expression, y: Expression) -> Expression:
-    """Length of a vector; its derivatives are zero where it has none.
+    """Length of a vector; its derivatives are zero at the zero vector.
 
     >>> norm(3.0, 4.0), norm(0.0, 0.0)
     (5.0, 0.0)
@@ -451,7 +454,7 @@ def positive(x: Expression) -> Expression:
 
 
 def power(base: Expression, exponent: Expression) -> Expression:
-    """base**exponent; a fractional power of what rounding has carried below zero is zero.
+    """base**exponent; a fractional power of a base that roundoff has made negative is zero.
 
     >>> power(4.0, -0.5), power(-1.0, -0.5)
     (0.5, 0.0)

@@ -1,7 +1,7 @@
 r"""The table of quantities: symbol, unit, long name, equation tag.
 
-Every name that a law may read or a dataset may hold stands here once. Quantities are per unit reference area and in
-SI units; temperatures are absolute. Sign conventions: the gap is :math:`g = x_2 - x_1`, the traction acts on body 1
+Every name that a law may read or a dataset may contain is listed here once. Quantities are per unit reference area and
+in SI units; temperatures are absolute. Sign conventions: the gap is :math:`g = x_2 - x_1`, the traction acts on body 1
 (tension positive), :math:`q_k` flows from the interface into body k.
 
 Source of tags: the equation labels of Sauer, Duong & Mandadapu (2021), doi 10.1177/10812865211032723.
@@ -22,7 +22,7 @@ AVOGADRO = 6.02214076e23
 """Avogadro constant [1/mol] (exact, SI 2019)."""
 
 KILO = 1000.0
-"""Moles in a kmol, in which Cantera counts."""
+"""Moles in a kmol, Cantera's unit."""
 
 MOLECULAR = KILO * AVOGADRO
 """Molecules in a kmol."""
@@ -41,7 +41,7 @@ class Quantity:
     latex: str = ""
     tag: str = ""
     species: str = ""
-    """Name in the mechanism of the species, for a coverage; else empty."""
+    """Name of the species in the mechanism, for a coverage; else empty."""
 
 
 def _table(*rows: tuple[str, ...]) -> dict[str, Quantity]:
@@ -115,13 +115,13 @@ GAPS = frozenset(("g_n", "g_t", "u_t", "u_t2"))
 VELOCITIES = frozenset(("v_n", "v_t", "v", "v_2", "speed"))
 
 INTERNAL = frozenset(("t", "T_from", "T_to", "ln_theta", "gamma_m", "f_m", "dmu_dphi"))
-"""Variables that laws read of each other, and no case names."""
+"""Variables that laws read from each other, and no case names."""
 
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def raised(text: str) -> str:
-    """Text with its powers raised.
+    """Return text with its powers as superscripts.
 
     >>> raised("J/(m^2 K)"), raised("m^-1")
     ('J/(m² K)', 'm⁻¹')
@@ -133,11 +133,11 @@ GREEK = {
     *("alpha", "beta", "gamma", "delta", "epsilon", "eta", "theta", "kappa", "lambda", "mu", "nu", "xi"),
     *("pi", "rho", "sigma", "tau", "phi", "psi", "chi", "omega"),
 }
-"""Letters that names spell out."""
+"""Greek letters that names spell out."""
 
 
 def spelled(name: str) -> str:
-    r"""LaTeX of the letters of a name, with its subscript.
+    r"""Return the LaTeX of a name with its subscript.
 
     >>> spelled("T_1"), spelled("phi"), spelled("D_coulomb"), spelled("theta_bond_s")
     ('T_{1}', '\\phi', 'D_{\\mathrm{coulomb}}', '\\theta_{\\mathrm{bond\\,s}}')
@@ -154,7 +154,7 @@ def _letters(text: str) -> str:
 
 def _subscript(text: str) -> str:
     parts = text.split("_")
-    # Indices are letters and numbers, which need no upright word.
+    # Indices are single letters and numbers, set without an upright font.
     if all(len(part) == 1 or part in GREEK or re.fullmatch(r"\w?\d\w?", part) for part in parts):
         return " ".join(part if re.search(r"\d", part) else _letters(part) for part in parts)
     if set(parts) & GREEK:
