@@ -257,9 +257,7 @@ def product(*factors: Expression) -> Expression:
 
 
 def _exponential(factor: Expression) -> tuple[Expression, Expression]:
-    """Split a product into its other factors and the sum of the exponents of its exponentials, guarded ones
-    included.
-    """
+    """Split a product into its other factors and the sum of the exponents of its (guarded) exponentials."""
     import symengine
 
     node = symengine.sympify(factor)

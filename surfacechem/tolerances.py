@@ -13,9 +13,7 @@ EPS = float_info.epsilon
 """Spacing of doubles at 1, 2^-52 = 2.2e-16. One operation errs by at most half of it; time resolves no less."""
 
 ULPS = 2 * EPS
-"""Error of one term of a formula, 4.4e-16: library functions are accurate to one unit in the last place, not to
-half.
-"""
+"""Error of one term of a formula, 4.4e-16: library functions are accurate to one unit in the last place, not half."""
 
 FEW_EPS = 4 * EPS
 """Relative difference of numbers that are equal except for the order of a few operations, 8.9e-16: eight of them, at
@@ -65,9 +63,7 @@ tolerances: ten times the default tolerance of a run.
 """
 
 LINE_ERROR = 1e-3
-"""Largest error of linear interpolation between two outputs, relative to the range of a quantity: a pixel of a large
-figure.
-"""
+"""Largest error of linear interpolation between outputs, relative to a quantity's range: a pixel of a large figure."""
 
 FINER_BY = 8
 """Factor by which the stepper stores states more closely, as quantities that depend on them may be more curved."""
@@ -185,9 +181,7 @@ the nearest that a fraction can be told from one. A closer equilibrium is at the
 """
 
 LEAST_CREEP = 1e-25
-"""Least velocity [m/s] that counts in friction with a state: it creeps at rest, tens of decades slower than it
-slides.
-"""
+"""Least velocity [m/s] that counts in friction with a state: creep at rest is tens of decades slower than sliding."""
 
 ZERO_TIME = 1e-100
 """Time [s] that counts as zero: a rate at the cap of an exponent, 1e130 times its prefactor, acts within it."""

@@ -70,9 +70,7 @@ class FormLoop:
         return len(self.places) // len(self.form.expressions)
 
     def tables(self, inputs: Mapping[Any, int]) -> tuple[NDArray[Any], ...]:
-        """Return the positions of the shared inputs; own inputs and numbers by vectors of cases; and the positions of
-        the results.
-        """
+        """Return positions of shared inputs; own inputs and numbers by vectors of cases; positions of results."""
         vectors = -(-self.count // LANES)
 
         def by_vectors(values: Sequence[Any], kind: type) -> NDArray[Any]:

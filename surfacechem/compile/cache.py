@@ -47,9 +47,7 @@ _version = cache(version)
 
 
 def processor() -> str:
-    """Return the name of the processor; if unknown, the instruction sets found by Numba still protect the machine
-    code.
-    """
+    """Return the name of the processor; if unknown, Numba's list of instruction sets still protects the code."""
     try:
         with open("/proc/cpuinfo", encoding="utf-8") as lines:
             return next(line for line in lines if line.startswith("model name"))
@@ -122,9 +120,7 @@ def is_filled(folder: Path) -> bool:
 
 
 def _content(folder: Path) -> bytes | None:
-    """Return the content of the file that Numba loads; None if any file made with it is damaged: all are then made
-    anew.
-    """
+    """Return the content of the file that Numba loads; None if any file made with it is damaged."""
     try:
         contents = {path.name: unsealed(path.read_bytes()) for path in folder.glob("kernel.*")}
     except OSError:
@@ -133,17 +129,13 @@ def _content(folder: Path) -> bytes | None:
 
 
 def untrusted(folder: Path) -> str | None:
-    """Return the reason why code in this folder could be another user's; None if it cannot be, or there is no
-    folder.
-    """
+    """Return the reason why code in this folder could be another user's; None if it cannot, or without a folder."""
     inside = (Path(place, name) for place, folders, files in os.walk(folder) for name in (*folders, *files))
     return cache_folder.untrusted((folder, *inside))
 
 
 class _KernelCache:
-    """Cache in which Numba looks up and stores the machine code of a function: one file, independent of the sources'
-    location.
-    """
+    """Cache in which Numba looks up a function's machine code: one file, independent of the place of the sources."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -187,9 +179,7 @@ def _warn(folder: Path, problem: str) -> None:
 
 
 def _numba_patches(parts: Collection[str]) -> list[tuple[Any, str, Any]]:
-    """Return patches (object, attribute, value) with which Numba compiles a kernel of these parts in half the usual
-    time.
-    """
+    """Return patches (object, attribute, value) with which Numba compiles a kernel of these parts twice as fast."""
     import numba
     from numba.core import llvm_bindings
     from numba.core.codegen import JITCodeLibrary, JITCPUCodegen

@@ -188,9 +188,7 @@ def _parameter_text(parameter: Parameter) -> str:
 
 
 def _jacobian(system: System, printer: _Python) -> str:
-    """Return the function for the derivatives of the balances by the states and by their rates, as two lists of
-    rows.
-    """
+    """Return the function for the derivatives of the balances, by states and by rates, as two lists of rows."""
     n = len(system.states)
     arguments = system.inputs[1 : 1 + 2 * n]
     known = {symengine.Symbol(item.name): item for item in system.named}

@@ -87,9 +87,7 @@ class ExternalInputs:
 
 @dataclass(frozen=True)
 class Lanes:
-    """The code of a program for eight cases at once: rates of states and accounts, and margins, as functions of time,
-    state and parameters.
-    """
+    """Code for eight cases at once: rates of states and accounts, and margins, from time, state and parameters."""
 
     rates: "LaneFunction"
     margins: "LaneFunction"
@@ -118,9 +116,7 @@ and makes it at most a quarter faster.
 _ONE_THREAD = threading.RLock()
 
 MOST_RATE_STATES = 50
-"""Number of states of a network above which compiling a second function, of its rates, takes longer than any run
-gains.
-"""
+"""Number of states of a network above which a second function, of its rates, costs more time than any run gains."""
 
 
 @dataclass(frozen=True)
@@ -147,9 +143,7 @@ class Program:
     nonzeros: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
     """Positions of the computed derivatives, in order; empty if all are computed."""
     groups: tuple[int, ...] = ()
-    """Group of each quadrature, 0 to 2, whose largest value scales their errors; -1 if steps need not control its
-    error.
-    """
+    """Group of each quadrature, 0 to 2, whose largest value scales their errors; -1 if its error is not controlled."""
     solved: Callable[[], Function | None] = lambda: None
     """Compile the rates in explicit form; None if the equations cannot be solved for them one by one."""
     laned: Callable[[], Lanes | None] = lambda: None

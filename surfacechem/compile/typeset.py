@@ -95,8 +95,9 @@ class Statement(NamedTuple):
 
 
 def equations(system: System) -> tuple[list[Equation], dict[str, str]]:
-    """Return the balances of a scene and the quantities that they read, and the LaTeX of its parameters and initial
-    values by path.
+    """Return the balances of a scene with the quantities they read, and the LaTeX of parameters and initial values.
+
+    The latter are mappings by path.
     """
     printer = PaperPrinter(_names(system))
     symbols = {p.path: printer.text(p.symbol) for p in system.parameters}

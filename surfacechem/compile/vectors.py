@@ -108,9 +108,7 @@ def object_code(builder: Any) -> bytes:
 
 
 def _arguments_first(whole: Any, parts: Callable[[Any], Sequence[Any]], known: Mapping[Any, Any]) -> Iterator[Any]:
-    """Yield all unknown parts of an expression, arguments first, without recursion; the caller adds each to
-    ``known``.
-    """
+    """Yield unknown parts of an expression, arguments first, without recursion; the caller adds each to ``known``."""
     left = [whole]
     while left:
         missing = [each for each in parts(left[-1]) if each not in known] if left[-1] not in known else []
@@ -376,9 +374,7 @@ _SQRT_HALF_BITS = 0x3FE6A09E667F3BCD
 
 
 def log(builder: Any, x: Any) -> Any:
-    """Natural logarithm of a vector (fdlibm, e_log.c): x = 2^k (1 + f) with 1 + f between the square roots of 1/2 and
-    2.
-    """
+    """Natural logarithm of a vector (fdlibm, e_log.c): x = 2^k (1 + f) with sqrt(1/2) <= 1 + f < sqrt(2)."""
     tiny = builder.fcmp_ordered("<", x, number(2.0**-1022))
     scaled = builder.select(tiny, builder.fmul(x, number(2.0**54)), x)
     bits = builder.sub(builder.bitcast(scaled, INTEGERS), _whole(_SQRT_HALF_BITS))

@@ -58,9 +58,7 @@ def push_ahead(driving: Curve, start: float, direction: float, least: Curve, *, 
 
 
 def next_root(curve: Curve, start: float, direction: float, sign: float, noise: Curve | None = None) -> float | None:
-    """Return the first zero in a direction of a function with a known sign before it; at the start roundoff may falsify
-    it.
-    """
+    """Return the first zero in a direction of a function with a known sign before it, at the start up to roundoff."""
     gaps = steps_ahead(start, direction)
     values = sign * curve(gaps)
     least = 0.0 if noise is None else noise(gaps)
@@ -87,9 +85,7 @@ Field = Callable[[Array], Array]
 """Function from displacements of the gaps to driving tractions, both of shape (points, gaps)."""
 
 MOTION_RTOL, START_PART = 0.1 * NEGLIGIBLE, NEGLIGIBLE
-"""Relative tolerance of the damped motion; its absolute tolerance and first step, as a part of the first
-displacement.
-"""
+"""Relative tolerance of the damped motion; absolute tolerance and first step, as parts of the first displacement."""
 
 MOTION_STEPS = 20_000
 """Number of steps after which the motion is taken not to come to rest."""

@@ -50,9 +50,7 @@ def _why_implicit(problem: Problem) -> str:
 
 
 def fastest_relaxation(program: Program, problem: Problem) -> float:
-    """Return the largest decay rate [1/s] of a small perturbation of the initial state; infinite if it is not
-    finite.
-    """
+    """Return the largest decay rate [1/s] of a small perturbation of the initial state; may be infinite."""
     n, parameters = program.n, problem.parameters[0]
     inputs = np.concatenate([problem.segments[:1], problem.y0, np.zeros(n), parameters])
     assert program.rates is not None

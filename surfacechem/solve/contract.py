@@ -186,21 +186,15 @@ class Problem:
     seen: Array | None = None
     """Largest magnitude of each margin so far, if the problem continues another."""
     spacing: float = np.inf
-    """Longest time [s] of a step whose interior is not checked against the equations; shorter features may be
-    missed.
-    """
+    """Longest time [s] of a step without a check against the equations inside; shorter features may be missed."""
     in_play: tuple[bool, ...] | None = None
-    """Flags of the margins that are active in the modes of this problem; None if all are. The values of the others have
-    no meaning.
-    """
+    """Flags of the margins that are active in the modes of this problem; None if all are. Others may have any value."""
     picture: float = 0.0
     """Largest error of linear interpolation between stored states, as a part of the range of each state; 0 if only
     outputs and ends of steps are stored.
     """
     before: float = 0.0
-    """Time [s] from the start of the run to the start of the problem; stored states also resolve the logarithm of the
-    run's time.
-    """
+    """Time [s] from the start of the run to that of the problem; stored states also resolve the logarithm of time."""
     extremes: Array | None = None
     """Least and largest states of the part that the problem continues, shape (2, states)."""
     goes_on: bool = False
@@ -363,9 +357,7 @@ class Solver(ABC):
 
     @abstractmethod
     def solve(self, problem: Problem) -> Result:
-        """Integrate a problem. A failure of the method is a status of the result, never an exception or a wrong
-        number.
-        """
+        """Integrate a problem. A failure is a status of the result, never an exception or a wrong number."""
 
     def solve_all(self, problems: Sequence[Problem], threads: int = 1) -> list[Result]:
         """Integrate problems of one model, with the same results as one by one, whatever the number of threads."""

@@ -63,9 +63,7 @@ def termination(
     values: Mapping[str, float],
     named: Callable[[Array], Array],
 ) -> tuple[str, str]:
-    """Return the status of a run that could not go on, and the reason; ``named`` evaluates named quantities at rows of
-    inputs.
-    """
+    """Return the status of a run that could not go on, and why; ``named`` evaluates quantities at rows of inputs."""
     where = f"t = {result.t:.9g} s"
     parameters = result.problem.parameters[result.segments_at(np.array([result.t]))[0]]
     inputs = np.concatenate(([result.t], result.y, result.ydot, parameters))
@@ -124,9 +122,7 @@ def are_led_back(
 
 
 def closest_margin(system: System, program: Program, margins: Sequence[Margin], result: Result) -> Margin | None:
-    """Return the margin that is closed, or nearly closed and still closing, where a run could not go on; None if there
-    is none.
-    """
+    """Return the margin that is closed, or nearly so and still closing, where a run could not go on; else None."""
     if program.margins is None or not margins:
         return None
     count, end = len(margins), Points(np.array([result.t]), result.y[None], result.ydot[None], result.ledger[None])
@@ -149,9 +145,7 @@ def closest_margin(system: System, program: Program, margins: Sequence[Margin], 
 def _values(
     system: System, program: Program, result: Result, steps: Points, side: Literal["left", "right"] = "left"
 ) -> Array:
-    """Return the margins at all steps, shape (steps, margins), NaN where inactive; ``side`` is the segment at
-    breakpoints.
-    """
+    """Return the margins at all steps, shape (steps, margins), NaN where inactive; ``side`` is that of breakpoints."""
     assert program.margins is not None
     segment = np.searchsorted(result.problem.segments[1:-1], steps.t, side=side)
     inputs = [steps.t[:, None], steps.y, steps.ydot, result.problem.parameters[segment]]

@@ -100,9 +100,7 @@ def _is_beyond(w: Any, first: int) -> bool:
 
 @compiled
 def _closing(w: Any, m: int) -> int:
-    """Return CLOSED if the guard of an edge is below zero by more than the drift of the integration, NEAR if it is
-    zero.
-    """
+    """Return CLOSED if an edge's guard is below zero by more than the integration's drift, NEAR if it is zero."""
     value, size, small = w.margin_probe[m], w.magnitude[m], GUARD_EPS * w.magnitude[m]
     if w.playing[m] == 0 or value > small:
         return OPEN
@@ -163,8 +161,7 @@ def _look(w: Any, row: Any, books: Any) -> None:
 
 @compiled
 def _warm(w: Any, taker: int, made: float) -> tuple[float, float]:
-    """Distribute the heat of a jump to the nodes; return the heat and entropy that leave through nodes which pass it
-    on.
+    """Distribute the heat of a jump to the nodes; return the heat and entropy that reservoirs take.
 
     Each node's temperature is that at which its energy has risen by its share.
     """
@@ -206,7 +203,7 @@ def _coldest(w: Any) -> float:
 
 @compiled
 def _is_admissible(w: Any, gain: float, small: float, heat: float) -> bool:
-    """True if a jump produces no negative entropy beyond ``small`` and beyond the uncertainty ``heat`` of the heat."""
+    """True if entropy production is not negative, up to ``small`` and an uncertainty ``heat`` of the heat."""
     return bool(gain >= -small - heat / _coldest(w))
 
 
@@ -258,9 +255,7 @@ def _write_jump(
 
 @compiled
 def jump(w: Any, i: int, e: int) -> bool:
-    """Carry out an edge: reset, distribute the heat, test the second law, update the ledger. False if this is left to
-    Instant.
-    """
+    """Carry out an edge: reset, distribute heat, test the second law, update the ledger. False if left to Instant."""
     n, t, taker, measure = w.n, w.moment[0], w.edges[e, TAKER], w.edges[e, MEASURE]
     rounding = GUARD_EPS * w.magnitude[w.n_margins - w.edges.shape[0] + e]
     if w.code[BOOKS, 0] == 0:

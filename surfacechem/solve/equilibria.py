@@ -81,9 +81,7 @@ def compiled(system: System, expressions: Iterable[Expression]) -> Function:
 
 @dataclass(frozen=True)
 class GapDirection:
-    """A direction in the space of the gaps: the moving states, the gap that measures the distance, and the weights of
-    the tractions.
-    """
+    """A direction in the space of the gaps, the gap that measures the distance, and the weights of the tractions."""
 
     moves: Array
     """Change of each state, shape (states,)."""
@@ -133,9 +131,7 @@ class Equilibria:
 
     @cached_property
     def _balance(self) -> Function:
-        """Driving traction and size of its terms, for each gap; compiled separately, as searches evaluate it at many
-        rows.
-        """
+        """Driving traction and size of its terms, for each gap; compiled separately for searches over many rows."""
         return compiled(self.system, (item for e in self.items for item in (e.residual, e.size)))
 
     @cached_property
@@ -151,9 +147,7 @@ class Equilibria:
 
     @cached_property
     def _tangents(self) -> Function:
-        """For each gap: driving traction, its derivative along the moving states, and its partial time derivative by
-        the loads.
-        """
+        """For each gap: driving traction, its derivative along the moving states, and its partial time derivative."""
         symbols, found = {state.name: state.symbol for state in self.system.states}, []
         for e in self.items:
             residual = self.system.expand(e.residual)
@@ -197,9 +191,7 @@ class Equilibria:
         return FreeGaps(which, columns, moves, driving, np.maximum(np.abs(point.y[columns]), NANOMETRE))
 
     def _arrived(self, rows: Array, *, jumps: bool) -> Array:
-        """Update inputs whose gaps have moved with the mode of touch that belongs to them; in a jump with the following
-        states.
-        """
+        """Update the mode of touch in inputs whose gaps have moved; in a jump the following states too."""
         if self._side is not None:
             # A law that changes at touch is valid on its own side only and may have poles beyond.
             column, g = self._side, rows[:, 1 + self.states.index("g_n")]
@@ -240,9 +232,7 @@ class Equilibria:
         return values[::2], values[1::2]
 
     def pushes(self, rows: Array, heat: Heat | None = None) -> Array:
-        """Return driving tractions at inputs with the temperatures that a jump to them gives, shape (rows,
-        equilibria).
-        """
+        """Return driving tractions, shape (rows, equilibria), with the temperatures that a jump to the rows gives."""
         return np.asarray(np.atleast_2d(self._balance(_warmed(rows, heat)))[:, ::2])
 
     # -- equilibrium ----------------------------------------------------------------------------------------------
@@ -250,8 +240,7 @@ class Equilibria:
     def equilibrate(
         self, point: Point, heat: Heat | None = None, balanced: float = BALANCED, lost: FoldPoint | None = None
     ) -> Point | None:
-        """Return the point with all gaps in equilibrium, coupled through pressure, shear and heat; None if there is
-        none.
+        """Return the point with all gaps in equilibrium, coupled by pressure, shear and heat; None if none exists.
 
         A single gap is found by a search along it, several gaps as the end of their damped motion. If the tractions are
         ``balanced`` within this part, a sliding gap moves on only if that equilibrium is unstable. From an equilibrium
@@ -282,9 +271,7 @@ class Equilibria:
         return self.moved(point, self._arrived(there.inputs()[None], jumps=True))
 
     def _released(self, point: Point, heat: Heat | None, lost: FoldPoint | None) -> Point | None:
-        """Return the point at which the free gaps come to rest after a lost equilibrium, or from unbalanced
-        tractions.
-        """
+        """Return the point at which the free gaps come to rest after losing equilibrium, or when unbalanced."""
         free = self.free(point)
         if len(free) > 1:
             return self._damped(point, heat, lost)
@@ -340,8 +327,7 @@ class Equilibria:
         return self.moved(point, self._arrived(replace(point, y=y).inputs()[None], jumps=heat is not None))
 
     def _unstable(self, point: Point, heat: Heat | None) -> FoldPoint | None:
-        """Return the direction in which gaps leave an unstable equilibrium: a fold that has been passed; None if it is
-        stable.
+        """Return the direction in which gaps leave an unstable equilibrium, a fold already passed; None if stable.
 
         If friction falls with its own heat, steady sliding is impossible on a spring softer than this fall. A gap
         without a driving traction yet, as under symmetry, gets the sign of the next change of the loads.
@@ -437,9 +423,7 @@ class Folds:
 
     @cached_property
     def _shapes(self) -> dict[int, Function]:
-        """Decrease of the tangent stiffness along each gap, warming of states by each gap, and stiffness matrix, for
-        each fold.
-        """
+        """For each fold: decrease of the tangent along each gap, warming of states by each gap, stiffness matrix."""
         found = {}
         for index, fold in self.items.items():
             warming = [rise.get(name, 0) for rise in fold.warming for name in self.equilibria.states]

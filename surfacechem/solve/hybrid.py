@@ -87,9 +87,7 @@ def without_stall(problem: Problem, velocities: NDArray[np.bool_]) -> Flow[Resul
 
 
 def rounding(result: Result) -> Array:
-    """Return the uncertainty of each unknown at the end of a run from roundoff of the equations' terms, shape
-    (states,).
-    """
+    """Return the uncertainty of each unknown at the end of a run from roundoff of its equation, shape (states,)."""
     problem, n = result.problem, len(result.y)
     inputs = np.concatenate(([result.t], result.y, result.ydot, problem.parameters[-1]))
     both = problem.program.derivatives(problem.program.filled(inputs))
@@ -224,8 +222,9 @@ class Hybrid:
         return bool(np.any(limits & zero & self.instant.in_play(arc.start)[:count]))
 
     def _last_of(self, start: float, end: float) -> float:
-        """Return the end of an arc: just before a breakpoint at which no load changes, since formulas there are those
-        of the next segment.
+        """Return the end of an arc: just before a breakpoint without a change of loads.
+
+        Formulas at the breakpoint are those of the next segment.
         """
         row = int(np.searchsorted(self.problem.segments, end))
         parameters = self.problem.parameters
@@ -283,8 +282,7 @@ class Hybrid:
 
 
 def carried(problem: Problem, jumper: Jumper) -> Flow[tuple[Result, list[Jump], str] | None]:
-    """Run with the compiled loop carrying out the edges; return the result, the jumps, and the reason if a jump ended
-    the run.
+    """Run with the compiled loop carrying out the edges; return result, jumps, and the reason if a jump ended it.
 
     None if the loop leaves the run to :class:`Hybrid`.
     """
@@ -382,9 +380,7 @@ def merged(problem: Problem, arcs: Sequence[Arc], status: Status, end: float, le
 
 
 def _known(arcs: Sequence[Arc]) -> States | None:
-    """Return all stored states of the arcs, in the time and ledger of the run; None if none are stored for
-    interpolation.
-    """
+    """Return all stored states of the arcs, in the run's time and ledger; None if interpolation needs none."""
     if not arcs[0].result.problem.picture:
         return None
     found = [arc.result.scattered()[:3] for arc in arcs]

@@ -56,9 +56,7 @@ class Rebounds:
             self.last = jump.t, float(np.max(self.jumper.times_of_return(jump.after.inputs())))
 
     def pieces(self, start: float, end: float) -> Array:
-        """Return the segments of an arc in its own time, with one of their own for a return so soon that a step might
-        miss it.
-        """
+        """Return the segments of an arc in its own time, with a separate one for a return that a step might miss."""
         soon = RETURN_FACTOR * self._flight_time(start)
         inside = [soon] if 0 < soon < FITTED_PART * (end - start) else []
         return np.array([0.0, *inside, end - start])
@@ -114,9 +112,7 @@ class Instant:
         self.step: LoadStep | None = None
         """Last jump of the loads."""
         self.flowed = (np.nan, 0.0, np.nan)
-        """Start of the last flow, its length, and its end [s]; the length is more accurate than the difference of the
-        two.
-        """
+        """Start, length and end of the last flow [s]; the length is more accurate than the difference of the others."""
         self._sized: tuple[Point | None, Array, Array] = None, self.peaks, self.peaks
         """A point, the peaks used there, and the sizes of the guards."""
         self._resolved = 0
@@ -158,7 +154,7 @@ class Instant:
     # -- edges that are due ---------------------------------------------------------------------------------------
 
     def begin(self, point: Point, before: Point | None) -> Point | None:
-        """Return the start of a load segment, after the jump of quasi-static gaps if loads jump there."""
+        """Return the start of a load segment; if loads jump there, after the jump of the state that they cause."""
         corrected = self.jumper.equilibria.corrected
         steps = [index for index, edge in enumerate(self.system.edges) if point.t in edge.times]
         if not steps or before is None:
@@ -218,9 +214,7 @@ class Instant:
         return True
 
     def _due(self, now: Array, playing: Mask, sizes: Array, point: Point) -> int | None:
-        """Return the edge whose guard is below zero by more than the drift of the integration, or is zero and
-        closing.
-        """
+        """Return the edge whose guard is below zero by more than the integration's drift, or is zero and closing."""
         small = GUARD_EPS * sizes
         closed = playing & (now < -np.maximum(drift_of(self.rtol) * sizes, small))
         near = playing & ~closed & (now <= small) & ~self.strict[self.first :]
@@ -233,9 +227,7 @@ class Instant:
         return int(closed.argmax()) if closed.any() else None
 
     def _closed(self, now: Array, playing: Mask, sizes: Array, due: bool) -> list[int]:
-        """Return the limits beyond which a jump has carried the state, except those of modes that are left at this
-        moment.
-        """
+        """Return the limits beyond which a jump has carried the state, except those of modes left at this moment."""
         # Beyond the domain of a law, even by roundoff, its values have no meaning.
         margins = self.system.moving_margins[: self.first]
         least = [0.0 if m.domain else -GUARD_EPS * size for m, size in zip(margins, sizes, strict=False)]

@@ -77,9 +77,7 @@ class JumpHeat:
         return compiled(self.system, columns)
 
     def at(self, rows: Array) -> tuple[Array, Array, Array, Array]:
-        """Return temperature, energy and capacity of each node, shape (rows, nodes), and its shares of the heat of each
-        source.
-        """
+        """Return temperature, energy and capacity of each node, shape (rows, nodes), and its shares by source."""
         values = self.asked(rows).reshape(len(rows), len(self.nodes), -1)
         return values[:, :, 0], values[:, :, 1], values[:, :, 2], values[:, :, 3:]
 
@@ -109,9 +107,7 @@ class JumpHeat:
         return self._with_energy(rows, U + taken, U, C)
 
     def _with_energy(self, rows: Array, target: Array, U: Array, C: Array) -> Array:
-        """Solve for the temperatures at which the nodes have these target energies; all arrays of shape (rows,
-        nodes).
-        """
+        """Solve for the temperatures at which the nodes have these target energies, shape (rows, nodes)."""
         free = list(zip([j for j, s in enumerate(self.nodes.values()) if not s.prescribed], self.free, strict=True))
         rows, left = rows.copy(), np.arange(len(rows))
         # Each row stops when it has converged, so that its result does not depend on the others.
@@ -166,9 +162,7 @@ def at_part(point: Point, change: Array, part: float) -> Point:
 
 @cache
 def _panel(degree: int) -> tuple[Array, Array]:
-    """Return the nodes of a panel from 0 to 1, and the integrals of f dg up to each node for nodal values of f and
-    g.
-    """
+    """Return the nodes of a panel from 0 to 1, and the integrals of f dg up to each, for nodal values of both."""
     points = (1 - np.cos(np.pi * np.arange(degree + 1) / degree)) / 2
     basis = np.linalg.inv(chebyshev.chebvander(2 * points - 1, degree))
     x, weights = np.polynomial.legendre.leggauss(degree + 1)

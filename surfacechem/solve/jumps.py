@@ -141,9 +141,7 @@ class Jumper:
 
     @cached_property
     def magnitudes(self) -> Function:
-        """Running error bounds of limits and guards of edges, as functions of the inputs and the peaks of the states;
-        one a model.
-        """
+        """Running error bounds of limits and guards, as functions of inputs and peaks of the states; one a model."""
         system = self.system
         peaks = {state.symbol: symengine.Symbol(f"peak of {state.name}") for state in system.states}
         guards = [m.expression for m in system.moving_margins] + [edge.guard for edge in system.edges]
@@ -191,9 +189,7 @@ class Jumper:
         return compiled(system, [*totals, *system.given.values(), *(magnitude(system.expand(x)) for x in totals)])
 
     def _books(self, rows: Array) -> Array:
-        """Return the totals at arguments of compiled functions; a magnitude that is not finite, as at a bound, counts
-        as zero.
-        """
+        """Return the totals at arguments of compiled functions; infinite magnitudes, as at a bound, count as zero."""
         found = self._totals(rows)
         found[..., -2:] = np.where(np.isfinite(found[..., -2:]), found[..., -2:], 0.0)
         return found
@@ -242,9 +238,7 @@ class Jumper:
 
     @property
     def edge_tables(self) -> EdgeTables:
-        """Tables of the edges for the compiled loop; the functions that only jumps need are included once jumps are
-        expected.
-        """
+        """Tables of the edges for the compiled loop; functions that only jumps need once jumps are expected."""
         with _ONE_THREAD:
             self._tables = self._tables or self._edge_tables()
             return self._tables
@@ -320,9 +314,7 @@ class Jumper:
         return np.array(amounts)
 
     def carried_out(self, arcs: Array, rows: Array, start: float, end: float) -> list[Jump]:
-        """Return the jumps that the compiled loop has carried out, from its rows of arcs and jumps between these
-        times.
-        """
+        """Return the jumps that the compiled loop has carried out between these times, from its rows."""
         edges, given, found, last = self.system.edges, list(self.system.given), [], start
         columns = 7 + len(given)
         width = (rows.shape[1] - columns) // 2
@@ -442,9 +434,7 @@ class Jumper:
         return books, dict(zip(accounts, lift.tolist(), strict=True))
 
     def _equilibrated(self, release: PendingJump) -> tuple[Point, Array | None]:
-        """Return the point at which the gaps come to rest, and the shares of frictional heat if its path decides
-        them.
-        """
+        """Return the point at which the gaps come to rest, and the shares of frictional heat if its path matters."""
         shares: Array | None = None
         for _ in range(SHARE_ROUNDS):
             after = self._kept(release, self._rested(release, shares))
@@ -464,9 +454,7 @@ class Jumper:
         return after, shares
 
     def _kept(self, release: PendingJump, after: Point | None) -> Point:
-        """Return the end of a jump, with the modes set by the edge if the state that its guard measures has not
-        moved.
-        """
+        """Return the end of a jump, with the modes set by the edge if its measured state has not moved."""
         if after is None:
             raise ImpossibleError(NO_REST)
         edge, slack, slip = release.edge, release.slack, self.equilibria.slip
@@ -478,9 +466,7 @@ class Jumper:
         return self.equilibria.with_slip(replace(after, parameters=release.start.parameters), sliding)
 
     def _rested(self, release: PendingJump, shares: Array | None) -> Point | None:
-        """Return the point at which the gaps come to rest. Sliding continues or sticks: friction never pulls it
-        back.
-        """
+        """Return the point at which the gaps come to rest, sliding or sticking: friction never pulls sliding back."""
 
         def heat(rows: Array) -> Array:
             return self._heat.warmed(rows, self._made(rows, release), shares)
@@ -500,9 +486,7 @@ class Jumper:
         return found.equilibrate(onward, heat, release.slack.balanced, lost=fold if stuck is None else None)
 
     def _path_shares(self, release: PendingJump, after: Point) -> Array | None:
-        """Return the shares of the frictional heat along the path of jumping loads; None if the path does not
-        matter.
-        """
+        """Return the shares of the frictional heat along the path of jumping loads; None if it does not matter."""
         step, edge = release.step, release.edge
         slip, path = self.equilibria.slip, self._load_path
         if step is None or edge.heat == "snap" or slip is None or not after.parameters[slip] or not path.varies:
@@ -549,9 +533,7 @@ class Jumper:
         return makers.index(axis if axis in makers and edge.heat != "snap" else INTERFACE)
 
     def _first_maker(self, edge: Edge) -> int:
-        """Return the column of the source of the energy released before gaps move; the last one, friction, if it is
-        local.
-        """
+        """Return the source of the energy released before gaps move; the last one, friction, if it is local."""
         return -1 if edge.heat == "local" else self._maker(edge, "n" if edge.heat == "joint" else INTERFACE)
 
     def _heated(self, point: Point, release: PendingJump, shares: Array | None) -> tuple[Point, float, float, float]:
@@ -585,8 +567,7 @@ class Jumper:
     def _judged(
         self, edge: Edge, before: Array, after: Array, books: Array, noise: Array, entropy_out: Array | float
     ) -> tuple[Array, Mask, dict[str, Array]]:
-        """Return the entropy that jumps between these rows produce, whether the second law admits it, and the work
-        done.
+        """Return the entropy that jumps between these rows produce, the second law's verdict, and the work done.
 
         Negative production is tolerated up to roundoff, and up to the effect of the guard's ``noise`` on entropy and on
         energy, the latter as heat at the temperature of the coldest node.

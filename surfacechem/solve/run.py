@@ -133,9 +133,7 @@ class Discontinuities(NamedTuple):
 
     @classmethod
     def of(cls, model: Model, owner: Index, before: Array, after: Array) -> Discontinuities:
-        """Return the discontinuities of runs of a model from arguments of compiled functions on both sides, a row
-        each.
-        """
+        """Return the discontinuities of runs of a model from inputs on both sides, a row each."""
         order, n = np.lexsort((before[:, 0], owner)), len(model.system.states)
         owner, before, after = owner[order], before[order], after[order]
         t, y, ydot = before[:, 0], slice(1, 1 + n), slice(1 + n, 1 + 2 * n)
@@ -235,9 +233,7 @@ class Trajectory:
         return self.felt(EPS * self.result.outputs)
 
     def felt(self, changes: Array) -> dict[str, float]:
-        """Return the largest change of each named quantity if one state at a time changes by ``changes``, shape (times,
-        states).
-        """
+        """Return the largest change of each named quantity by ``changes`` of one state, shape (times, states)."""
         model, system, times = self.model, self.model.system, self.result.times
         # Of the states inside bodies only the first enters a flux; the others are not named.
         own = [j for j, state in enumerate(system.states) if state.name not in system.inside]
@@ -281,7 +277,7 @@ class Trajectory:
 
     @cached_property
     def within_bounds(self) -> dict[str, Array]:
-        """As :attr:`everywhere`, with bond densities that roundoff has made negative set to zero."""
+        """As :attr:`everywhere`, with bonding states that roundoff has made negative set to zero."""
         result, steps = self.result, self.result.steps
         bonds = {account.law for account in self.model.system.ledger if account.kind == "bonds"}
         least = np.array([0.0 if state.name in bonds else -np.inf for state in self.model.system.states])
@@ -390,9 +386,7 @@ class Model:
         outputs = [system.expand(item.expression) for item in system.outputs]
         self.output_function: Function = compile_function(inputs, outputs, system.of_cells)
         self.compile_seconds = time.perf_counter() - start
-        """Time to compile the equations, and the functions first needed in a run: quasi-static gaps, guards and
-        jumps.
-        """
+        """Time to compile the equations, and the functions first needed in a run: gaps, guards and jumps."""
 
     def __reduce__(self) -> tuple[type[Model], tuple[System]]:
         """Pickle the system only; its machine code is compiled again."""
@@ -467,9 +461,7 @@ class Model:
         )
 
     def _equilibrated(self, y: Array, parameters: Array) -> tuple[Array, Array]:
-        """Return the states with their gaps in equilibrium, and the parameters of all segments with the modes found
-        there.
-        """
+        """Return the states with gaps in equilibrium, and all segments' parameters with the modes found there."""
         settled = self.equilibria.equilibrate(Point(0.0, y, np.zeros_like(y), parameters[0].copy()))
         if settled is None:
             raise InputError(f"{NO_BALANCE}.", path="mechanics")
@@ -515,9 +507,7 @@ class Model:
         return self.solve_values(run, self.values(changes))
 
     def chosen(self, run: Run, values: Mapping[str, float]) -> Run:
-        """Return the run with a method: if the choice is left to the program, the one that suits the scene with these
-        values.
-        """
+        """Return the run with a method: the given one, or the one chosen for the scene with these values."""
         if run.solver != AUTO:
             return run
         try:
@@ -529,7 +519,7 @@ class Model:
         return replace(run, solver=method(problem, self.system.moves)[0]) if run.solver == AUTO else run
 
     def solve_values(self, run: Run, values: Mapping[str, float]) -> Trajectory:
-        """Run with every value given, without a check of their ranges."""
+        """Run with every value given, without a check of parameter ranges."""
         return self.solve_all([(run, values)])[0]
 
     def solve_all(self, runs: Sequence[tuple[Run, Mapping[str, float]]], threads: int = 1) -> list[Trajectory]:

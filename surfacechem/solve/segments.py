@@ -30,7 +30,7 @@ BETWEEN_POINTS, LARGEST_SLACK = 1e3, NEGLIGIBLE
 
 
 def segments(system: System, end: float, values: Mapping[str, float]) -> Array:
-    """Return the segments of a run: between breakpoints, and parts of the period of a load under which the state may
+    """Return the segments of a run: between breakpoints, and parts of a load's period under which the state may
     rest.
     """
     inside = [t for t in system.breakpoints if 0 < t < end]
@@ -101,9 +101,7 @@ BISECTIONS = 64
 
 
 class Passing:
-    """Search for the times at which prescribed variables, as functions of time alone, pass narrow features of a
-    system.
-    """
+    """Search for the times at which prescribed variables, as functions of time alone, pass narrow features."""
 
     def __init__(self, system: System) -> None:
         turns, places = _narrow(system)
@@ -126,8 +124,7 @@ class Passing:
         return self._function is None
 
     def pieces(self, segments: Array, table: Array, frequency: float, max_steps: int) -> tuple[Array, Array]:
-        """Return segments that also end at these times, and their parameters; those of the given segments are
-        ``table``.
+        """Return the segments, whose parameters are ``table``, cut at these times, and the new parameters.
 
         ``frequency`` [1/s] is the highest of a prescribed variable.
         """

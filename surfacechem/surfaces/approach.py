@@ -29,13 +29,11 @@ SECOND_FIT_GAIN = 8
 """Factor by which a second fit is tighter, for which the errors of the integrals leave room."""
 
 GAIN_DEGREE, PIECE_SAMPLES = 8, 9
-"""Degree from which on it is tested if a higher one is worthwhile, and number of samples that a piece adds to its
-end.
-"""
+"""Degree from which on a higher one is tested for its gain, and number of samples that a piece adds to its end."""
 
 SHORTEST_PIECE = 2.0**-26
-"""Fraction of the range of approaches below which no piece is divided; errors of such short pieces, at kinks of the
-force, are ignored.
+"""Fraction of the range of approaches below which a piece, at a kink of the force, is not divided; its error is
+ignored.
 """
 
 MOST_PIECES = 200
@@ -51,9 +49,7 @@ Samples = Callable[[float], tuple[float, float, float]]
 
 @dataclass(frozen=True)
 class ApproachPiece:
-    """Piece between two approaches: the force as a polynomial of x, -1 to 1; with ``powers`` the slope of ln E over ln
-    d.
-    """
+    """Force between two approaches as a polynomial of x, -1 to 1; with ``powers`` the slope of ln E over ln d."""
 
     low: float
     high: float
@@ -85,9 +81,7 @@ class ApproachPiece:
 
 @dataclass(frozen=True)
 class ApproachEnergy:
-    """Energy as a function of the approach, in pieces, times a factor: the sign of the energy if logarithms are
-    fitted.
-    """
+    """Energy over the approach, in pieces, times a factor: the sign of the energy if logarithms are fitted."""
 
     pieces: tuple[ApproachPiece, ...]
     force: float
@@ -115,9 +109,7 @@ class ApproachEnergy:
         return replace(self, factor=self.factor * (1 + sign * self.error))
 
     def energy(self, d: Expression) -> Expression:
-        """Return the energy at an approach [J]; linear below the least approach, which only trial states of a solver
-        reach.
-        """
+        """Return the energy at an approach [J]; below the least, which only trial states reach, it is linear."""
         first, result = self.pieces[0], self.pieces[-1].energy(d)
         for piece in reversed(self.pieces[:-1]):
             result = where(d < piece.high, piece.energy(d), result)
@@ -234,9 +226,7 @@ def value_at(sample: Samples, d: float, powers: bool) -> float:
 
 
 def polynomial(sample: CachedSamples, a: float, b: float, powers: bool, rtol: float, least: float) -> Array | None:
-    """Return the coefficients of a polynomial fitted between two approaches; None if a higher degree gains too
-    little.
-    """
+    """Return a polynomial fitted between two approaches; None if a higher degree gains too little."""
 
     def value(x: float) -> float:
         return value_at(sample, approach_at(x, a, b, powers), powers)
@@ -261,7 +251,7 @@ def polynomial(sample: CachedSamples, a: float, b: float, powers: bool, rtol: fl
 
 
 def size_of(values: Array, least: float) -> float:
-    """Return the size to which errors in a piece are relative: the smallest value of one sign, or a part of the
+    """Return the size to which errors in a piece are relative: the least value of one sign, or a part of the
     largest.
     """
     sizes = np.abs(values)

@@ -115,11 +115,10 @@ def bends(laws: Iterable[Potential | HeatTransfer]) -> list[float]:
 
 
 def level_approaches(lower: Surface, upper: Surface, levels: Sequence[float]) -> list[float]:
-    """Return the approaches at which the least gap passes levels, where the force has kinks; the ``upper`` body is at
-    zero.
+    """Return the approaches at which the least gap passes levels, where the force has kinks.
 
-    For two plates these are the approaches at which a corner of one of them does, or crossing edges of both, in closed
-    form.
+    The ``upper`` body is at zero. For two plates these are the approaches at which a corner of one of them passes a
+    level, or crossing edges of both, in closed form.
     """
     if not all(type(body.shape) is Plane for body in (lower, upper)):
         return [_approach_at_level(lower, upper, level) for level in levels]
@@ -144,8 +143,8 @@ def level_approaches(lower: Surface, upper: Surface, levels: Sequence[float]) ->
 
 
 def _approach_at_level(lower: Surface, upper: Surface, level: float) -> float:
-    """Return the approach at which the least gap equals a level; they are equal unless a body is tilted about its
-    highest point.
+    """Return the approach at which the least gap is a level: the level itself unless a body is tilted about its
+    summit.
     """
     size = length(lower, upper)
     d, before, step = level, math.nan, math.nan

@@ -40,9 +40,7 @@ the accuracy of the smaller; and the number of gaps over which that size is take
 """
 
 FEWEST_TABULATED = 56
-"""Points up to which sums are computed one by one if no table is accurate enough or used again: twice the cost of a
-table.
-"""
+"""Points up to which sums are computed singly if no table is accurate or used again: twice the cost of a table."""
 
 
 @lru_cache(maxsize=64)
@@ -71,9 +69,7 @@ def with_slope(formula: Expression, symbol: Expression) -> Kernel:
 
 
 def laws_by_extent(laws: Sequence[PairEnergy]) -> dict[Extent, list[int]]:
-    """Group the indices of laws that share nodes by extent: one for each set of kinks and cutoff, one for all laws
-    without.
-    """
+    """Group the laws that share nodes by extent: one for each set of kinks and cutoff, one for all laws without."""
     found: dict[tuple[float, ...], list[int]] = {}
     for k, law in enumerate(laws):
         bends = law.kinks.get("r", ())
@@ -149,9 +145,7 @@ class SumsByGap:
         return np.stack(sums, axis=-1), area.size
 
     def _circles(self, gap: Array) -> tuple[Array, Array, Array]:
-        """Return circles around the feet: their distances from the points, depths below these, and areas, each (n,
-        k).
-        """
+        """Return circles around the feet: distances from the points, depths below these, and areas, each (n, k)."""
         bent = self.shape.bulge / self.shape.R if isinstance(self.shape, Sphere) else 0.0
         last = math.pi / abs(bent) if bent else math.inf
         ends = [np.zeros_like(gap)]

@@ -58,9 +58,7 @@ class LevelPatches(Patches):
     crossed: NDArray[np.bool_]
     """True for patches that an edge divides in another way."""
     leaves: Array
-    """Coordinates across that direction at which the level leaves each patch at its ends (n, 2); NaN if not known
-    yet.
-    """
+    """Coordinates across that direction where the level leaves each patch at its ends (n, 2); NaN if unknown."""
 
     @property
     def fewest(self) -> int:
@@ -106,9 +104,7 @@ class LevelPatches(Patches):
         return replace(self, level=best, along=along, share=share, crossed=crossed, leaves=none)
 
     def nodes(self, order: int) -> tuple[Array, Array]:
-        """Return points (n, k, 3) of a rule on both sides of the level, and their areas (n, k); all patches are of one
-        kind.
-        """
+        """Return a rule's points (n, k, 3) on both sides of the level, and areas (n, k); patches are of one kind."""
         k = int(self.along[0])
         if k < 0:
             return super().nodes(order)
@@ -122,9 +118,7 @@ class LevelPatches(Patches):
         return self.points(np.stack(at if k == 0 else at[::-1], axis=-1), length * thickness[..., None])
 
     def most(self, order: int) -> int:
-        """Return the points of a rule on each patch: two sides of the level on each line, and parts across the
-        lines.
-        """
+        """Return a rule's points on each patch: on two sides of the level, in several parts across."""
         return super().most(order) * (2 * SIDE_PARTS if self.along[0] >= 0 else 1)
 
     def cost(self, order: int) -> int:
@@ -156,9 +150,7 @@ class LevelPatches(Patches):
         return rest.joined(passed.cut(k, passed.crossing(k, passed.low[:, 1 - k])))
 
     def crossing(self, k: int, across: Array) -> Array:
-        """Return the coordinate at which each patch passes its level along a direction, at ``across`` (n,); else its
-        end.
-        """
+        """Return the coordinate along a direction at which each patch passes its level, at ``across``; else its end."""
         from scipy.optimize.elementwise import find_root
 
         def above(t: Array, across: Array, which: Array) -> Array:
@@ -171,17 +163,13 @@ class LevelPatches(Patches):
         return np.asarray(np.where(found.success, found.x, ends[1]))
 
     def seen(self, u: Array, v: Array) -> tuple[Array, Projection]:
-        """Return points (n, ..., 3) at substituted parameters (n, ...), and their projections onto the other
-        surface.
-        """
+        """Return points (n, ..., 3) at substituted parameters (n, ...), and their projections on the other surface."""
         at = np.stack([self.parameters(k, t)[0] for k, t in enumerate((u, v))], axis=-1)
         x = self.surface.derivatives(at, FIRST_ORDER)[0]
         return x, self.other.nearest(x)
 
     def heights(self, near: Projection) -> Array:
-        """Return distances (n, ..., levels) [m] of points beyond edges, along which the gap may jump, and above gap
-        levels.
-        """
+        """Return distances (n, ..., levels) [m] beyond edges, where the gap may jump, and above levels of the gap."""
         return np.concatenate([near.beyond, near.gap[..., None] - self.levels], axis=-1)
 
 

@@ -39,9 +39,7 @@ MOST_TURN = math.atan(1e3)
 
 @dataclass(frozen=True)
 class NearPlaces:
-    """Parameters (k, 2) of the points of a surface that are nearest to the other, and the gaps there [m]; the nearest
-    first.
-    """
+    """Parameters (k, 2) of a surface's points that are nearest to the other, and gaps [m]; the nearest first."""
 
     at: Array
     gap: Array
@@ -106,8 +104,7 @@ def near_places(
 def _near_grid(
     gap: Callable[[Indices], Array], steps: Indices, halvings: Indices, extents: Array, wide: float
 ) -> Array:
-    """Return the gaps on a grid with these steps, infinite where they cannot be within a ``wide`` distance of the
-    least.
+    """Return the gaps on a grid with these steps, infinite where they cannot be within ``wide`` of the least.
 
     Between two points a gap changes by at most their distance, so the grid is refined only where a point between those
     of a coarser one may be near.

@@ -39,8 +39,7 @@ Sums = tuple[Array, Array]
 
 @dataclass(frozen=True)
 class Grid:
-    """Points (k, 3) of the inner surface with areas (k,), each with the index of its outer point among ``outer`` (n,
-    3).
+    """Points (k, 3) of the inner surface with areas (k,), each with the index of its outer point (n, 3).
 
     If all outer points have equally many, the shapes are (n, k / n, 3) and (n, k / n), without an index.
     """
@@ -84,9 +83,7 @@ class Extent:
     bends: tuple[float, ...]
 
     def levels(self, shape: Shape) -> list[float]:
-        """Return the gaps to a shape [m] at which sums over it have kinks: its nearest or farthest point is then at a
-        kink.
-        """
+        """Return the gaps to a shape [m] at which its nearest or farthest point is at a kink: sums have kinks there."""
         found = set(self.bends)
         if isinstance(shape, Sphere) and is_round(shape):
             found |= {shape.bulge * (bend - 2 * shape.R) for bend in self.bends}
@@ -122,9 +119,7 @@ def piece_edges(low: Array, high: Array, grain: Array | float = math.inf, level:
 
 
 def divided(edges: Array, level: int) -> Array:
-    """Divide the pieces between given edges (n, m) so that none is longer than PIECE_LENGTH; shorter for levels above
-    the last.
-    """
+    """Divide pieces between edges (n, m) so that none exceeds PIECE_LENGTH; into shorter ones above the last level."""
     found = [edges[:, :1]]
     for low, high in pairwise(edges.T):
         parts = math.ceil(float(np.max(high - low)) / PIECE_LENGTH) * 2 ** max(level - LAST_LEVEL, 0)

@@ -195,9 +195,7 @@ def _check_decay(law: PairEnergy, size: float, rtol: float) -> None:
 
 
 def _reach(lower: Surface, upper: Surface, extent: Extent, rtol: float) -> float:
-    """Return the distance from the nearest point up to which a surface is integrated over [m]; the rest is
-    negligible.
-    """
+    """Return the distance from the nearest point up to which a surface is integrated over [m]."""
     size, power = length(lower, upper), extent.decay - 2
     if math.isfinite(extent.cutoff):
         return ENDLESS_REACH * max(size, extent.cutoff)

@@ -27,9 +27,7 @@ from surfacechem.surfaces.shapes import Disc, Plane
 from surfacechem.tolerances import NEGLIGIBLE
 
 LEAST_GAIN, FIRST_LEVEL = 4.0, 2
-"""Least gain in accuracy of the next level, below which a patch is divided; and the level from which on this is
-tested.
-"""
+"""Least gain in accuracy of the next level, below which a patch is divided; and the level from which this is tested."""
 
 HIGHER_START = NEGLIGIBLE, NEGLIGIBLE**3
 """Accuracies below each of which patches in one direction begin one level higher: their points are cheap."""
@@ -58,17 +56,14 @@ Levels = NDArray[np.int_]
 """Index of each patch's order."""
 
 Integrand = Callable[[Array, int], tuple[Array, int]]
-"""Function from points (n, 3), and the level of the rules inside, to values (n, ...) per area and the number of pairs
-of points.
-"""
+"""Function from points (n, 3), and the level of the rules inside, to values (n, ...) per area and a number of pairs."""
 
 
 @dataclass(frozen=True)
 class Patches:
-    """Patches of a surface between substituted parameters ``low`` and ``high`` (n, 2), around ``at`` with ``scale`` (n,
-    2).
+    """Patches of a surface between substituted parameters ``low`` and ``high``, around ``at`` with ``scale``.
 
-    Directions in which nothing varies (``alike``) have two nodes.
+    All four have shape (n, 2). Directions in which nothing varies (``alike``) have two nodes.
     """
 
     surface: Surface
@@ -114,9 +109,7 @@ class Patches:
         return 0 * order
 
     def points(self, at: Array, lengths: Array) -> tuple[Array, Array]:
-        """Return points (n, k, 3) at parameters (n, ..., 2), and their areas (n, k) from products of lengths (n,
-        ...).
-        """
+        """Return points (n, k, 3) at parameters (n, ..., 2), and their areas (n, k) from products of lengths."""
         x, areas = self.surface.elements(at.reshape(len(at), -1, 2))
         return x, areas * lengths.reshape(len(at), -1)
 
@@ -385,9 +378,7 @@ def integral(
 
 
 def _expected(met: Sequence[tuple[float, float]], rtol: float) -> float:
-    """Extrapolate the number of points at which the error reaches the tolerance, with its order of convergence so
-    far.
-    """
+    """Extrapolate the number of points at which the error reaches the tolerance, by its convergence so far."""
     points, error = met[-1]
     fewer, before = next(item for item in met[::-1] if item[0] <= points / JUDGED_PART or item is met[0])
     gain, more = math.log(max(before / error, 1.0)), math.log(points / fewer) if points > fewer else 1.0
@@ -423,9 +414,7 @@ def _raise_level(rules: Rules, known: PatchResults, mask: NDArray[np.bool_], ste
 
 
 def _largest(changes: Array, size: Array) -> Array:
-    """Return the errors (n,) of patches, the largest of all entries; at least what the change before the last
-    suggests.
-    """
+    """Return the largest errors (n,) of patches over all entries; no less than the change before the last suggests."""
     entries = tuple(range(1, changes.ndim - 1))
     last, before = (np.abs(changes[:, k] / size).max(axis=entries, initial=0.0) for k in range(2))
     return np.asarray(np.maximum(last, before / LEAST_GAIN))

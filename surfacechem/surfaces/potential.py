@@ -1,5 +1,4 @@
-"""Free energy of two curved surfaces, and heat conductance between them, as functions of the approach from a few
-integrals.
+"""Free energy of two curved surfaces, and heat conductance between them, over the approach, from a few integrals.
 
 The energy is a potential of the gap like any other, so that every gap model can use it. In a scene with surfaces
 quantities per area are those of the whole pair: N for Pa, J for J/m^2, kg for kg/m^2.
@@ -65,9 +64,7 @@ JUMP_SAMPLES = 2000
 
 
 def first_jump(law: Callable[[Array], Array], places: Array) -> float | None:
-    """Return the first jump, between increasing points, of a law's energy, the first of its values (n, 2); None if
-    none.
-    """
+    """Return the first jump, between increasing points, of a law's energy, the first of its values (n, 2)."""
     a, b = places[:-1], places[1:]
     low, high = law(a)[:, 0], law(b)[:, 0]
     sizes = np.maximum(np.abs(low), np.abs(high))
@@ -126,9 +123,7 @@ class CurvedSurfaces(Potential):
         return Surface(self.shapes[0]), Surface(self.shapes[1], True, d)
 
     def with_parts(self, bind: Callable[[Law, str, str], Any]) -> Self:
-        """Return the surfaces with symbols for the parameters of the pair laws; those of gap laws are inside the
-        integrals.
-        """
+        """Return the surfaces with symbols for the parameters of the pair laws; gap laws are inside integrals."""
         bound = tuple(bind(law, f"surface.pair.{law.name()}", "") for law in self.pairs)
         return self.bind({"pairs": bound, "curves": self.curves, "strongest": self.strongest})
 
@@ -264,9 +259,7 @@ class CurvedSurfaces(Potential):
         return 0.0
 
     def contact(self, d: float, pairs: bool = True, budget: Budget | None = None) -> Contact:
-        """Return the contact at an approach by the laws of the gap, and by the pair laws through their energy between
-        flats.
-        """
+        """Return the contact at an approach by the gap laws, and by the pair laws' energy between flats."""
         heat = [density(law) for law in self.heat_laws]
         # Conductances may have kinks where laws of force have none.
         levels = self._levels(pairs, self.heat_laws)
@@ -313,11 +306,10 @@ class CurvedSurfaces(Potential):
     def tractions(
         self, x: Array, normals: Array, gaps: Array, approaches: Array, stretches: Array
     ) -> tuple[Array, bool]:
-        """Return normal tractions (k, n) on body 1 [Pa], tension positive, and whether those of pair laws are sums over
-        body 2.
+        """Return normal tractions (k, n) on body 1 [Pa], tension positive, and True if pair laws are summed.
 
         At points (n, 3) with normals and gaps (k, n), at approaches (k,) with their stretches of the area. Over a rough
-        body 2, or if the sums exceed their budget, tractions are those of the local law.
+        body 2, or if sums over it exceed their budget, tractions are those of the local law.
         """
         own, upper = [self.thinned(stretch) for stretch in stretches.tolist()], self.surfaces(0.0)[1]
 

@@ -214,8 +214,9 @@ class Surface:
 
     @cached_property
     def edges(self) -> list[tuple[int, int, float]]:
-        """Edges of the surface: index of the parameter, side (-1 below, +1 above), and its value there; a tip is an
-        edge, a pole is not.
+        """Edges of the surface: index of the parameter, side (-1 below, +1 above), and its value there.
+
+        A tip is an edge, a pole is not.
         """
         found = []
         for k, ends in enumerate(self.shape.span):
@@ -305,8 +306,8 @@ class Surface:
         return Rates(at, _dot(relative, found.direction), vector, normal, self.curvature(found.at, at))
 
     def _rates(self, at: Array, D: Array, away: Array, relative: Array) -> Array:
-        """Return the rates of the parameters of closest points, for points ``away`` from them that move relative to the
-        surface.
+        """Return the rates of the parameters of closest points, for relative velocities of points ``away`` from
+        there.
         """
         low, high = np.transpose(self.shape.span)
         low = low + (POLE if self.shape.about_axis else 0.0)

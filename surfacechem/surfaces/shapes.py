@@ -42,11 +42,10 @@ SPLINE_OVERSHOOT = 0.1
 
 
 def _stays_near(away: Array, slopes: Array, ends: Sequence[NDArray[np.bool_]], widths: Sequence[float]) -> Array:
-    """Return a mask of Newton steps that stay near their starts (n, 3), from which points are ``away``; at an edge
-    along it.
+    """Return a mask of Newton steps that stay near their starts (n, 3), from which points are ``away``.
 
     ``slopes`` (n, 5) are derivatives of the heights: u, v, uu, uv, vv; ``ends`` are masks of starts at edges in u and
-    in v.
+    in v, along which their steps go.
     """
     (h_u, h_v, h_uu, h_uv, h_vv), (x_u, x_v, up) = slopes.T, away.T
     E = np.where(ends[0], 1.0, 1 + h_u**2 - up * h_uu)
@@ -285,9 +284,7 @@ class Cone(SurfaceOfRevolution):
         return u * cos(v), u * sin(v), -u * math.tan(self.slope)
 
     def foot(self, x: Array) -> Array:
-        """Return the parameters of the closest point: on the line of the side below the point, or on the tip or the
-        edge.
-        """
+        """Return the parameters of the closest point: on the side below the point, or on the tip or the edge."""
         along = np.hypot(x[..., 0], x[..., 1]) * math.cos(self.slope) - x[..., 2] * math.sin(self.slope)
         at = np.stack([along * math.cos(self.slope), np.arctan2(x[..., 1], x[..., 0])], axis=-1)
         return np.asarray(np.clip(at, *np.transpose(self.span)))
@@ -373,8 +370,7 @@ class Wavy(Plane):
         return KDTree(np.column_stack([places, heights]))
 
     def starts(self, x: Array) -> tuple[Indices, Array]:
-        """Return starts of the search: the nearest of some points of the half wave in which each point lies, and mirror
-        images.
+        """Return starts of the search: the nearest points of the half wave in which each point lies, and mirror images.
 
         The images are in the nearer crest or trough: a start beyond these has an image that is nearer than itself. An
         edge that cuts off the half wave may also cut off the image: then points of the next half wave inwards, its

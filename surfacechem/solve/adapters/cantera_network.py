@@ -77,9 +77,7 @@ for _name in (
 
 
 def contents(reactions: Sequence[str] = ("bond",)) -> Any:
-    """Return a Cantera surface that represents a scene: one reaction for each of the scene, with the multiplier as rate
-    constant.
-    """
+    """Return a Cantera surface for a scene: one reaction for each of its own, the rate constant as multiplier."""
     species = (f"- {{name: {name}, composition: {{}}, thermo: {{model: constant-cp}}}}" for name in reactions)
     entries = (f"- {{equation: open => {name}, rate-constant: {{A: 1, b: 0, Ea: 0}}}}" for name in reactions)
     text = CONTENTS.format(names=", ".join(reactions), species="\n".join(species), reactions="\n".join(entries))
@@ -88,9 +86,7 @@ def contents(reactions: Sequence[str] = ("bond",)) -> Any:
 
 @cache
 def _nothing() -> Any:
-    """Return an empty surface for reactors that require one without using it; Cantera takes half a millisecond to read
-    it.
-    """
+    """Return an empty surface for reactors that require one, cached: Cantera takes half a millisecond to read it."""
     return contents()
 
 
@@ -283,9 +279,7 @@ class _Stretch(Method):
         return Steps(np.array(times), partial(self._step, times, rows), at_nodes(rows[..., : reactor.count]))
 
     def _step(self, times: Sequence[float], rows: Array, k: int) -> DenseStep:
-        """Return one of the steps between these times from the coefficients of its polynomial, with its ledger if
-        any.
-        """
+        """Return a step between these times from the coefficients of its polynomial, with its ledger if any."""
         start, end, n = times[k], times[k + 1], self.reactor.count
         y = partial(on_step, end, end - start, rows[k][:, :n])
         gained = partial(on_step, end, end - start, rows[k][:, n:]) if rows.shape[2] > n else None

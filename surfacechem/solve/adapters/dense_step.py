@@ -56,9 +56,7 @@ class Steps:
         return lambda k: self.step(first + k)
 
     def at_nodes(self, times: Array) -> Array:
-        """Return the variables, a row each, at these times of NODES except the first of each step; the last step may be
-        cut.
-        """
+        """Return the variables at these times of NODES except the first of each step; the last step may be cut."""
         count = len(times)
         known = 0 if self.inside is None else count - bool(times[-1, -1] < self.times[count])
         rows = [self.step(k).rows(times[k]) for k in range(known, count)]
@@ -168,11 +166,10 @@ class Guards:
 def first_crossing(
     step: DenseStep, guards: Guards, active: NDArray[np.bool_], resolution: float
 ) -> tuple[float, list[int]]:
-    """Return the time of the first zero of the active guards in a step, and those with a zero within the resolution [s]
-    of it.
+    """Return the time of the first zero of the active guards in a step, and all that are zero within the resolution.
 
     Without a zero these are the end of the step and an empty list, and the guards are updated. A guard that crosses
-    zero twice between two points is found where its values allow a minimum below zero.
+    zero twice between two points is found where its values allow a minimum below zero. Times are in s.
     """
 
     def at(t: float) -> Array:
@@ -213,9 +210,7 @@ def first_crossing(
 
 
 def _zero(value: Callable[[float], float], low: float, high: float) -> float:
-    """Return the zero of a function that is positive at the lower end; next to that end if roundoff makes it negative
-    there.
-    """
+    """Return the zero of a function positive at the lower end; next to that end if roundoff makes it negative."""
     at_low, at_high = value(low), value(high)
     if not at_low > 0.0 > at_high:
         return high if at_high == 0.0 else float(np.nextafter(low, high))
@@ -223,9 +218,7 @@ def _zero(value: Callable[[float], float], low: float, high: float) -> float:
 
 
 def _may_dip(guards: Guards, times: Array, values: Array) -> NDArray[np.bool_]:
-    """Return a mask of triples of values [time, guard] whose middle one is a minimum so low that a smooth guard may
-    reach zero.
-    """
+    """Return a mask of triples [time, guard] with a middle minimum so low that a smooth guard may reach zero."""
     heights, steps = guards.sides * values, np.diff(times)[:, None]
     before, middle, after = heights[:-2], heights[1:-1], heights[2:]
     steepest = np.maximum((before - middle) / steps[:-1], (after - middle) / steps[1:])
@@ -275,8 +268,7 @@ AT_NODES = np.power.outer(NODES[1:] - 1.0, np.arange(6.0))
 
 
 def hermite(sizes: Array, ends: Array) -> Array:
-    """Return coefficients [step, power, variable] of polynomials in (time - end) / size of consecutive steps of these
-    sizes.
+    """Return coefficients [step, power, variable] of polynomials in (time - end) / size of consecutive steps.
 
     They interpolate value, slope and second derivative at the ends: [end, derivative, variable].
     """

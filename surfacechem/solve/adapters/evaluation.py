@@ -51,8 +51,9 @@ class Evaluation:
         return self.reach(t, differential) and (self._rates is None or math.isfinite(self.ydot.dot(self._nothing)))
 
     def reach(self, t: float, differential: Array) -> bool:
-        """Set time and differential variables; True if algebraic variables were found. Without any, derivatives may not
-        be finite.
+        """Set time and differential variables; True if algebraic variables were found.
+
+        Without any of these, derivatives may not be finite.
         """
         # At the same time start from the same guess: an integrator that takes differences over 1e-27 m would
         # otherwise divide the roundoff of two searches by it, and accept a wrong step as needing no correction.
@@ -118,9 +119,7 @@ class Evaluations:
         self._inputs = np.concatenate((np.zeros(1 + 2 * program.n), parameters))[None]
 
     def __call__(self, times: Array, y: Array) -> tuple[Array, Array, Array, Array]:
-        """Return consistent states and their derivatives, NaN where none are found, rates of the ledger and margins, by
-        time.
-        """
+        """Return consistent states and rates, NaN where none exist, rates of the ledger and margins, by time."""
         program, n = self.program, self.program.n
         rows = program.filled(self._filled(times, y))
         states, ydot = rows[:, 1 : 1 + n], rows[:, 1 + n : 1 + 2 * n]

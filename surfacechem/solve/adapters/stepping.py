@@ -59,9 +59,7 @@ class View(Evaluation):
         return self.program.filled(np.concatenate(([t], y, ydot, self.parameters)))
 
     def complete(self, t: float, x: Array) -> tuple[Array, Array]:
-        """Return state and derivatives from the differential variables, with the algebraic ones found from the
-        equations.
-        """
+        """Return state and derivatives from the differential variables, solving for the algebraic ones."""
         if not self.put(t, x):
             return np.full_like(self.y, np.nan), np.full_like(self.y, np.nan)
         return self.y.copy(), self.ydot.copy()
@@ -314,9 +312,7 @@ class _Run:
         return []
 
     def _through(self, step: DenseStep, end: float) -> list[int] | None:
-        """Accept a step that may have an event; return the margins that fired if the library has to restart, else
-        None.
-        """
+        """Accept a step that may have an event; return the fired margins if the library has to restart, else None."""
         within = replace(step, start=self.t, end=min(step.end, end))
         # Simultaneous zeros differ by the error of the library's polynomial.
         resolution = min(self.problem.rtol, SQRT_EPS) * (within.end - self.t) + ULPS * abs(within.end)
@@ -403,9 +399,7 @@ class _Run:
         return self.view.complete(t, x[self.view.differential])
 
     def _guards(self, t: float, x: Array) -> Array:
-        """Return the margins from the library's variables; the other variables are found only if margins depend on
-        them.
-        """
+        """Return the margins from the library's variables, finding other variables only if margins need them."""
         state = (x, np.zeros_like(x)) if self.plain else self._state(DenseStep(t, t, lambda _: x), t)
         self.view.hold(t, *state, whole=not self.problem.program.plain_margins)
         return self.view.margins()

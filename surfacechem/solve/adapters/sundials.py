@@ -20,9 +20,7 @@ os.environ.setdefault("SUNLOGGER_WARNING_FILENAME", os.devnull)
 
 
 class _Stretch(Method):
-    """Single steps of either library, with time counted from their start; dense output inside the last step is a step
-    back.
-    """
+    """Single steps of either library, with time counted from their start; dense output is a step back."""
 
     def __init__(self, library: Any, most: int, t: float, end: float, *start: Array) -> None:
         self.integrator, self.most = library, most

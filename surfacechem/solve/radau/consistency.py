@@ -105,8 +105,7 @@ def _size(w: Any, delta: Any, unit: Any) -> float:
 
 @compiled
 def _damped(w: Any, delta: Any) -> bool:
-    """Move as far along the correction as the next one by the same matrix does not increase; False if there is no such
-    move.
+    """Move as far along the correction as the next one by the same matrix does not grow; False if it always does.
 
     Residuals cannot be the measure: those of rates scale with the inverse of a possibly small coefficient, and are
     linear anyway. Source: Deuflhard (2011), Newton Methods for Nonlinear Problems, section 2.1, the natural

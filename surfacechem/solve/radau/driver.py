@@ -171,9 +171,7 @@ def _is_brief(w: Any, h: float) -> bool:
 
 @compiled
 def _ledger_limit(w: Any, h: float, remaining: float) -> float:
-    """Return the longest next step that the error of the ledger allows; shorter than this one if its own error is too
-    large.
-    """
+    """Return the longest next step that the error of the ledger allows; shorter than this one if that is rejected."""
     norm = 0.0 if _is_brief(w, h) else min(ledger_norm(w, h, remaining), 1e30)
     h_refused, w.h_refused = w.h_refused, 0.0
     if norm == 0.0:
@@ -232,9 +230,7 @@ def _judge(w: Any, h: float, limit: float, left: float, spacing: float) -> tuple
 
 @compiled
 def _accept(w: Any, i: int, size: float, end: float, goes_on: bool) -> None:
-    """Move on by a step of this size and write its outputs; to the exact end of the segment if that is reached up to
-    roundoff.
-    """
+    """Move on by a step of this size and write its outputs; up to roundoff to the exact end of the segment."""
     counts = w.counts[i]
     reached = w.base + (w.tau + size)
     whole = size == (end - w.base) - w.tau or reached >= end
@@ -425,9 +421,7 @@ def _has_missed(w: Any) -> bool:
 
 @compiled
 def _carry_out(w: Any, i: int) -> int:
-    """Carry out the edge at which an arc has ended: GOOD, EVENT if it was a limit, LEFT if the edge is left to
-    Instant.
-    """
+    """Carry out the edge at which an arc has ended: GOOD, EVENT at a limit, LEFT if left to Instant."""
     first, last, limit = w.n_margins - w.edges.shape[0], -1, False
     for m in range(w.n_margins):
         fired = w.fired[m] != 0

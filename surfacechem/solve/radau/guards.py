@@ -120,18 +120,14 @@ def mark_at_end(w: Any) -> None:
 
 @compiled
 def _leave(w: Any, m: int, rises: bool, held: float) -> None:
-    """Set the side of a limit that starts at zero or beyond and leaves it; ``held`` is that of one that rises from
-    zero.
-    """
+    """Set the side of a limit that leaves its start at zero or beyond; ``held`` is that of a rise from zero."""
     beyond = w.side[m] == BEYOND
     w.side[m] = FALLING if not rises else -1.0 if beyond else held
 
 
 @compiled
 def _follow_rates(w: Any, h: float) -> None:
-    """Set the sides of limits that start at zero or beyond and leave as fast as the rate at the start of the step
-    predicts.
-    """
+    """Set the sides of limits that start at zero or beyond and leave as fast as their initial rate predicts."""
     for j in range(w.n):
         w.trial[j] = w.y[j] + SCAN_EDGE * h * w.ydot[j]
     put(w, SCAN_EDGE * h, w.trial, w.ydot)
@@ -258,8 +254,9 @@ def _dips(w: Any, h: float, m: int, a: float, b: float, c: float) -> bool:
 
 @compiled
 def _mark(w: Any, h: float, earlier: float, before: float, x: float) -> float:
-    """Mark the margins that reach zero up to x, and their brackets; return x if there are any, AT_START if a limit is
-    passed there, else 0.
+    """Mark the margins that reach zero up to x, with their brackets.
+
+    Return x if there are any, AT_START if a limit is passed at the start, else 0.
     """
     found = 0.0
     for m in range(w.n_margins):

@@ -170,9 +170,7 @@ def is_within(w: Any, t: float, end: float) -> bool:
 
 @compiled
 def write_outputs(w: Any, times: Any, outputs: Any, first: int, h: float, end: float) -> int:
-    """Write the outputs up to the end of the step, which is at this time of the arc; return the number of the run so
-    far.
-    """
+    """Write the outputs up to the end of the step, at this time of the arc; return the run's number of outputs."""
     last = first
     while last < times.shape[0] and times[last] - w.origin < end:
         last += 1
@@ -219,8 +217,7 @@ def _parts(w: Any, h: float, growth: float) -> Any:
 
 @compiled
 def write_picture(w: Any, times: Any, states: Any, first: int, h: float) -> int:
-    """Store states inside the step so that linear interpolation, over time and over its logarithm, keeps to the allowed
-    error.
+    """Store states inside the step so that linear interpolation over time and its logarithm is accurate enough.
 
     Return the number of the run so far, including those for which there was no memory.
     """

@@ -304,8 +304,7 @@ def _no_events(n: int, q: int) -> Events:
 
 
 def solve_arrays(problem: Problem, *columns: Array, room: Room | None = None) -> Any:
-    """Solve runs that share with a problem all but y0, parameters, spacing, peaks, segments and times; return their
-    batch.
+    """Solve runs that share a problem except y0, parameters, spacing, peaks, segments and times; return the batch.
 
     These are given in this order with the run as first axis, which has length one where a value is the same for all.
     The rows of the batch are as the stepper writes them; ``room`` replaces the usual memory for each run.

@@ -275,9 +275,7 @@ class Loop:
         return self._kernel is not None or is_filled(self.folder)
 
     def load(self) -> Any:
-        """Return the compiled function. A ``brief`` loop is loaded without its compiler: calls are slower, but there
-        are few.
-        """
+        """Return the compiled function; a ``brief`` loop without its compiler: its calls are slower, but few."""
         if self._kernel is None:
             with self._lock:
                 self._kernel = self._kernel or (self._brief and objectcode.load(self.folder)) or self._compiled()

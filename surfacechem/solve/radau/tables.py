@@ -92,9 +92,7 @@ DENSE = _dense(np.array(_GIVEN["NODES"][2]))
 
 
 def _lagrange(nodes: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return 1 / (c_j prod_{k != j} (c_j - c_k)): barycentric weights of the nodes 0, c_1, ..., c_s without the
-    node 0.
-    """
+    """Return 1 / (c_j prod_{k != j} (c_j - c_k)), barycentric weights of the nodes 0, c_1, ..., c_s except 0."""
     gaps = nodes[:, None] - nodes[None, :] + np.eye(len(nodes))
     return np.asarray(1.0 / (nodes * gaps.prod(axis=1)))
 
@@ -121,10 +119,9 @@ def _probe_rate(nodes: NDArray[np.float64], x: float) -> NDArray[np.float64]:
 
 
 def _newton(nodes: NDArray[np.float64], coefficients: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return a polynomial with these coefficients of x, x^2, ... in Newton's form x, x (x - c_1), x (x - c_1)(x - c_2),
-    ...
+    """Return a polynomial with these coefficients of x, x^2, ... in Newton's form.
 
-    The last of ten factors is x again.
+    Its basis is x, x (x - c_1), x (x - c_1)(x - c_2), ..., of which the last of ten factors is x again.
     """
     rest, result = np.poly1d(coefficients[::-1]), np.zeros(9)
     for i, node in enumerate(np.append(nodes, 0.0)):
@@ -135,9 +132,7 @@ def _newton(nodes: NDArray[np.float64], coefficients: NDArray[np.float64]) -> ND
 
 
 def _probe_shape(nodes: NDArray[np.float64], x: float) -> NDArray[np.float64]:
-    """Return the coefficients of x, x^2, ... in the integral from 0 of x prod_i (x - c_i), scaled to one at the
-    probe.
-    """
+    """Return the coefficients of x, x^2, ... in the integral of x prod_i (x - c_i), scaled to one at the probe."""
     product = np.poly1d(np.append(nodes, 0.0), r=True)
     return np.asarray((product / product(x)).integ().coeffs[::-1][1:])
 
@@ -190,9 +185,7 @@ _members = [NODES[k, :s] for k, s in enumerate(STAGES)]
 START_RATE = np.array([np.pad(-_lagrange(c) * np.prod(-c), (0, 7 - len(c))) for c in _members])
 """Values at 0 of the Lagrange polynomials on c_1, ..., c_s: they extrapolate stage rates to the start of the step."""
 START_SLOPE = np.array([np.pad(-_lagrange(c) * np.prod(-c) / c, (0, 7 - len(c))) for c in _members])
-"""Derivative at 0 of the polynomial through (0, 0), (c_j, z_j): its difference from the true rate is the error
-estimate.
-"""
+"""Derivative at 0 of the polynomial through (0, 0), (c_j, z_j): its error is the error estimate of the step."""
 INVERSE_GAPS = np.array([_inverse_gaps(c) for c in _members])
 NEWTON_NODES = np.array([np.pad(c, (0, 9 - len(c))) for c in _members])
 DEFECT = np.array([_newton(c, _defect(c)) for c in _members])

@@ -36,8 +36,9 @@ PARTS: set[str] = set()
 
 
 def compiled(function: Any) -> Any:
-    """Compile a part of the kernel. Nothing is allocated: without reference counts the code compiles and runs about
-    twice as fast.
+    """Compile a part of the kernel.
+
+    Nothing is allocated: without reference counts the code compiles and runs about twice as fast.
     """
     PARTS.add(function.__qualname__)
     return _njit(error_model="numpy", _nrt=False, no_cpython_wrapper=True, no_cfunc_wrapper=True)(function)
@@ -186,8 +187,7 @@ _VECTOR = ir.VectorType(_NUMBER, WIDTH)
 def combine(
     _context: Any, _table: Any, _width: Any, _rows: Any, _terms: Any, _values: Any, _states: Any, _out: Any
 ) -> Any:
-    """Multiply rows of a table by the first rows of a matrix of values; all three matrices are given by their
-    addresses.
+    """Multiply rows of a table by the first rows of a matrix of values; matrices are given by their addresses.
 
     The result must be another matrix than the values.
     """
