@@ -180,7 +180,7 @@ def outer_patches(
     lengths = np.maximum(np.linalg.norm(tangents, axis=-1).T, POLE)
     first, low, high = near.at[0], *np.transpose(outer.shape.span)
     # Bodies far apart need a larger reach. An infinite parameter is a distance from the axis or along
-    # it; its range is scaled with the length of a step, which is large where the surface is steep.
+    # it; where the surface is steep it is also flatter: the root of its radius grows like the length of a step.
     endless = np.isinf(low) | np.isinf(high)
     far = reach * max(1.0, float(near.gap[0]) / size) * np.where(endless, lengths[0], 1 / lengths[0])
     closed = np.array(outer.shape.closed)
