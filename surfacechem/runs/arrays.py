@@ -1,7 +1,7 @@
 """Batches of runs of one model as arrays: from columns of values through the compiled loop to columns of results.
 
-No object is made for a run. What the arrays cannot tell (a start that is not admissible, an edge that is due, a run
-that could not go on) is left to runs that are looked at one by one.
+No object is made per run. Runs that arrays leave open (an inadmissible start, an edge that is due at the start, a run
+that could not go on) are solved one by one.
 """
 
 from __future__ import annotations
@@ -32,13 +32,13 @@ from surfacechem.solve.run import Discontinuities, Model, Run
 from surfacechem.tolerances import EPS, GUARD_EPS, MICROMETRE, PICOMETRE
 
 MOST_ROWS = 4096, 1024
-"""Largest numbers of steps and events of a run for which there is room: what has more is looked at by itself."""
+"""Largest numbers of steps and events of a run for which memory is allocated; a run with more is solved by itself."""
 
 PILOT_RUNS = 16
-"""Runs of a batch by which the number of steps and events of the others is estimated."""
+"""Runs of a batch from which the numbers of steps and events of the others are estimated."""
 
 FIRST_RUNS = 100
-"""Runs of a plan that are tried for one that is admissible, whose problem the others share."""
+"""Runs of a plan among which an admissible one is searched for, whose problem the others share."""
 
 
 Values = tuple[Array, dict[str, Array]]
@@ -47,7 +47,7 @@ Values = tuple[Array, dict[str, Array]]
 
 @dataclass(frozen=True)
 class Ends:
-    """Runs of a batch that the arrays tell: rows of the arguments of compiled functions where each ended."""
+    """Result of a batch of runs, with the parameters, the starts of the segments and the output times of each."""
 
     batch: Any
     table: Array
@@ -56,16 +56,18 @@ class Ends:
     times: Array
 
     def inputs(self, owner: Index, t: Array, y: Array, ydot: Array, after: bool = False) -> Array:
-        """Arguments of compiled functions at points of the runs that own them; at a breakpoint before it or after."""
+        """Return the arguments of compiled functions at points of the runs ``owner``; at a breakpoint before it or
+        after.
+        """
         breaks = self.segments[np.minimum(owner, len(self.segments) - 1), 1:-1]
         segment = (t[:, None] >= breaks if after else t[:, None] > breaks).sum(axis=1)
         return np.concatenate([t[:, None], y, ydot, self.table[owner, segment]], axis=1)
 
 
 def is_array(model: Model, plan: Plan, run: Run, problem: Problem) -> bool:
-    """Whether runs of a plan differ in nothing but values of states and parameters: so that arrays tell all."""
+    """True if the runs of a plan differ only in values of states and parameters, so that arrays can solve them."""
     system = model.system
-    # A load that ends the runs is one ramp.
+    # A load that ends the runs must be one ramp without breakpoints.
     jumps = system.searches or (plan.load and len(problem.segments) > 2)
     own = (
         run.solver in (IMPLICIT, EXPLICIT)
@@ -79,14 +81,14 @@ def is_array(model: Model, plan: Plan, run: Run, problem: Problem) -> bool:
 
 
 def cannot_jump(model: Model, problem: Problem) -> bool:
-    """Whether runs may have no jumps: they are of one arc, and begin in the same modes whatever their values are."""
+    """True if no run can jump: each has one arc, and all begin in the same modes, whatever their values are."""
     one_arc = model.jumper is None or len(problem.segments) == 2
     return one_arc and all(mode.start is None for mode in model.system.modes)
 
 
 def of_each(best: np.ufunc, owner: Index, table: Array, count: int) -> Array:
-    """Reduction by ``best`` of the rows of each of so many runs [rows, columns], which ``owner`` says in order; not a
-    number where a run has none.
+    """Reduce the rows [rows, columns] of each of ``count`` runs by ``best``; ``owner`` gives the run of each row, in
+    ascending order. NaN for a run without rows.
     """
     found = np.full((count, table.shape[1]), np.nan)
     runs, first = np.unique(owner, return_index=True)
@@ -96,7 +98,7 @@ def of_each(best: np.ufunc, owner: Index, table: Array, count: int) -> Array:
 
 
 def _starts_as_given(system: System, swept: set[str]) -> bool:
-    """Whether states start with what is given, or with its logarithm, and neither they nor registers are searched."""
+    """True if states start at given values or their logarithms, and no state or register has to be searched for."""
     searched = [state for state in system.states if state.algebraic]
     made = [state for state in system.states if state.given is not None and state.given.state and state.path in swept]
     registers = [register for register in system.registers if register.given is not None]
@@ -104,10 +106,10 @@ def _starts_as_given(system: System, swept: set[str]) -> bool:
 
 
 class ArrayRuns:
-    """Runs of a plan that :func:`is_array` says are arrays."""
+    """Runs of a plan that can be solved as arrays, see :func:`is_array`."""
 
     jumps = False
-    """Whether runs go on behind their jumps."""
+    """True if runs go on after their jumps."""
 
     def __init__(self, model: Model, plan: Plan, run: Run, changes: Mapping[str, float], keep: Keep) -> None:
         self.model, self.plan, self.run, self.keep = model, plan, run, keep
@@ -125,15 +127,15 @@ class ArrayRuns:
         self.impacts = [len(model.margins) + j for j, edge in enumerate(system.edges) if edge.is_impact]
         """Columns of the guards of impacts."""
         self.unseen = np.zeros((1, model.program.n_ledger + model.program.n_margins))
-        """Largest accounts and guards where nothing has been seen before."""
+        """Largest accounts and guards before any evaluation: zero."""
         every = self.keeps_extremes or bool(keep.series)
         self.keeps_course = every or keep.balances
-        """Whether more is kept than ends and events."""
+        """True if more is kept than ends and events."""
         self.shape = self.problem.times if every else self.problem.times[[0, -1]]
         """Output times of a run of the case."""
 
     def _first_problem(self, changes: Mapping[str, float]) -> Problem:
-        """The problem of the first run that is admissible; InputError where none of the first is."""
+        """Return the problem of the first admissible run; InputError if none of the first FIRST_RUNS is admissible."""
         refused = InputError("no run of the plan is admissible.", path="sweep")
         for number in range(min(self.plan.size, FIRST_RUNS)):
             point = {path: float(value[0]) for path, value in self.plan.at(np.array([number])).items()}
@@ -147,7 +149,7 @@ class ArrayRuns:
 
     @cached_property
     def limits(self) -> Function | None:
-        """Margins that must be above zero at the start, but those of derivatives; then the sizes of their terms."""
+        """Margins that must be positive at the start, except those that read rates; then magnitudes of their terms."""
         system = self.model.system
         rates = {state.dot for state in system.states}
         found = [expression for _, expression in system.limits if not expression.free_symbols & rates]
@@ -155,7 +157,7 @@ class ArrayRuns:
 
     @cached_property
     def ramp(self) -> Function | None:
-        """Value and slope at the start of the load that ends the runs, where one does."""
+        """Initial value and slope of the load that ends the runs, if there is one."""
         if not self.plan.load:
             return None
         system = self.model.system
@@ -164,7 +166,7 @@ class ArrayRuns:
 
     @cached_property
     def modes(self) -> tuple[list[int], Function]:
-        """Columns of the modes that follow from the start, and what they are there."""
+        """Columns of the modes that follow from the initial state, and their values there."""
         system = self.model.system
         found = {mode.symbol: system.expand(mode.start) for mode in system.modes if mode.start is not None}
         columns = [j for j, parameter in enumerate(system.parameters) if parameter.symbol in found]
@@ -174,7 +176,7 @@ class ArrayRuns:
     # -- from values to arrays ----------------------------------------------------------------------------------------
 
     def solve(self, values: Mapping[str, Array]) -> tuple[Mask, Columns]:
-        """Solve runs with these values: whether the result of each is certain, and the columns of those that are."""
+        """Solve runs with these values; return the mask of runs with a certain result, and their columns."""
         table, y0 = self.starts(values)
         rows = np.concatenate([np.zeros((len(y0), 1)), y0, np.zeros_like(y0), table[:, 0]], axis=1)
         peaks, quiet = self.guards(rows)
@@ -187,7 +189,7 @@ class ArrayRuns:
         segments = self.problem.segments[None]
         if self.ramp is not None:
             segments = np.column_stack([np.zeros(len(own)), ends[own]])
-        # Looks at the equations follow the length of a run; outputs are for what is kept of its course.
+        # The spacing of checks against the equations scales with the run; outputs serve only what is kept of it.
         problem = replace(self.problem, times=times[0], record_steps=self.keeps_steps, picture=0.0)
         spacing = segments[:, -1] / self.run.samples
         clear, columns = self._columns(self._solved(problem, y0[own], table[own], spacing, peaks, segments, times))
@@ -195,12 +197,12 @@ class ArrayRuns:
         return told, {name: column[clear] for name, column in columns.items()}
 
     def _solved(self, problem: Problem, y0: Array, table: Array, *others: Array) -> Ends:
-        """The runs; ``others`` are spacing, peaks, segments and times as the stepper takes them."""
+        """Solve the runs; ``others`` are spacing, peaks, segments and times as the stepper takes them."""
         *_, segments, times = others
         return Ends(solve_batch(problem, y0, table, *others), table, segments, times)
 
     def starts(self, values: Mapping[str, Array]) -> tuple[Array, Array]:
-        """Parameters [run, segment, parameter] and initial states [run, state]."""
+        """Return parameters [run, segment, parameter] and initial states [run, state]."""
         count, states = len(next(iter(values.values()))), self.model.system.states
         table = np.repeat(self.problem.parameters[None], count, axis=0)
         y0 = np.repeat(np.array([state.from_given(self.values) for state in states])[None], count, axis=0)
@@ -216,7 +218,7 @@ class ArrayRuns:
         return table, y0
 
     def _admissible(self, values: Mapping[str, Array], rows: Array) -> Mask:
-        """Whether each start is within all ranges, and beyond doubt within all limits."""
+        """Return the mask of starts that are within all ranges, and by more than roundoff within all limits."""
         told: Mask = np.all(np.isfinite(rows), axis=1)
         system = self.model.system
         specs = {parameter.path: parameter.spec for parameter in system.parameters}
@@ -225,14 +227,14 @@ class ArrayRuns:
             if spec is not None:
                 told &= (column > spec.above) & (column >= spec.at_least) & (column <= spec.at_most)
         if self.limits is not None:
-            # What is zero but for rounding is looked at in exact numbers, run by run.
+            # Margins that may be zero within roundoff are decided in exact numbers, run by run.
             with np.errstate(all="ignore"):
                 limits, sizes = np.split(self.limits(rows), 2, axis=1)
                 told &= np.all(limits > GUARD_EPS * sizes, axis=1)
         return told
 
     def ends(self, rows: Array) -> tuple[Array, Array]:
-        """Time at which each run ends, and the output times: of each, where a load ends them, else of all."""
+        """Return the end time of each run, and the output times: of each run if a load ends them, else of all."""
         if self.ramp is None:
             return np.full(len(rows), self.problem.segments[-1]), self.shape[None]
         assert self.plan.until is not None
@@ -242,12 +244,14 @@ class ArrayRuns:
         return ends, np.asarray(self.shape / self.shape[-1]) * ends[:, None]
 
     def guards(self, rows: Array) -> tuple[Array, Mask]:
-        """Largest accounts and guards before the start, as a first arc has them, and whether no edge is due in each."""
+        """Return largest accounts and guards before the start, as a first arc has them, and the mask of runs without an
+        edge that is due there.
+        """
         model, count = self.model, len(rows)
         program, jumper = model.program, model.jumper
         if jumper is None or program.margins is None:
             return self.unseen, np.ones(count, dtype=bool)
-        # As an instant sees them at the start of a run, when nothing has been seen before.
+        # The same magnitudes as at the start of a single run, where nothing has been evaluated before.
         first, scales = (
             len(model.margins),
             np.array([(s.finest or s.scale) * (s.name in VELOCITIES) for s in model.system.states]),
@@ -267,12 +271,12 @@ class ArrayRuns:
     # -- from arrays to columns ---------------------------------------------------------------------------------------
 
     def _columns(self, found: Ends) -> tuple[Mask, Columns]:
-        """Whether the result of each run is certain, and the columns of those of which it is."""
+        """Return the mask of runs with a certain result, and their columns."""
         batch, n = found.batch, self.n
         counts, count = batch.counts, len(batch.counts)
         end, every = batch.ends, np.arange(count)
         last = found.inputs(every, end[:, 0], end[:, 1 : 1 + n], end[:, 1 + n : 1 + 2 * n])
-        whole = np.flatnonzero(counts[:, END] == Status.FINISHED)  # at outputs rates are those of the equations, too
+        whole = np.flatnonzero(counts[:, END] == Status.FINISHED)  # rates from the equations, as at outputs
         if self.keep.last and len(whole):
             rows = last[whole]
             rows[:, 1 + n : 1 + 2 * n] = rates_at(
@@ -280,7 +284,7 @@ class ArrayRuns:
             )
             last[whole] = rows
         status, reason, clear = self._verdicts(found, last)
-        # What its tables were too short for, and what ended before its first output, is looked at by itself.
+        # A run that overflows its tables, or ends before its first output, is solved by itself.
         clear &= (counts[:, EVENTS] <= batch.events.shape[1]) & (counts[:, OUTPUTS] > 0)
         clear &= (counts[:, RECORDS] <= batch.records.shape[1]) | (not self.keeps_steps)
         columns: Columns = {
@@ -295,7 +299,7 @@ class ArrayRuns:
         return clear, columns | self._event_columns(found)
 
     def _verdicts(self, found: Ends, last: Array) -> tuple[Any, Any, Mask]:
-        """Codes of status and reason, and whether those of each run are known without a look at it."""
+        """Return codes of status and reason, and the mask of runs for which both are certain."""
         model, batch = self.model, found.batch
         outcome = batch.counts[:, END]
         ended, stopped = outcome == Status.FINISHED, outcome == Status.EVENT
@@ -304,13 +308,13 @@ class ArrayRuns:
         clear = ended | (stopped & whole)
         if whole and stopped.any():
             self._stops(found, last, stopped, reason, clear)
-        elif not whole:  # a gap that has closed unseen
+        elif not whole:  # a gap may have closed without an event
             gaps = batch.ends[:, -model.program.n_margins :]
             clear &= ~(gaps[:, self.impacts] < -PICOMETRE).any(axis=1)
         return np.where(stopped, STATUSES.index("stopped"), 0).astype(np.int8), reason, clear
 
     def _stops(self, found: Ends, last: Array, stopped: Mask, reason: Any, clear: Mask) -> None:
-        """Set the reasons of runs that a limit has stopped; not clear are those that its own rates lead back from."""
+        """Set the reasons of runs stopped by a limit; a run that its own rates lead back from it is not certain."""
         model, batch, n = self.model, found.batch, self.n
         newest = np.clip(batch.counts[:, EVENTS], 1, batch.events.shape[1]) - 1
         index = batch.events[np.arange(len(stopped)), newest, 0]
@@ -323,7 +327,7 @@ class ArrayRuns:
                 clear[hit] &= ~led & (margin.below is None)
 
     def _values(self, rows: Array) -> Values:
-        """States and named quantities at rows of arguments: the table of all of them, and its columns by name."""
+        """Return states and named quantities at rows of arguments: the table of all, and its columns by name."""
         system = self.model.system
         table = np.concatenate([rows[:, 1 : 1 + self.n], self.model.output_function(rows)], axis=1)
         return table, dict(
@@ -331,12 +335,12 @@ class ArrayRuns:
         )
 
     def along(self, found: Ends, clear: Mask) -> Columns:
-        """Series, extremes and balances, from outputs and steps."""
+        """Return series, extremes and balances, from outputs and steps."""
         batch, n, keep = found.batch, self.n, self.keep
         counts, times = batch.counts, found.times
         count, most = batch.outputs.shape[:2]
         reached = np.arange(most) < counts[:, OUTPUTS, None]
-        # A row for each output that a run has reached, so that nothing is evaluated in vain.
+        # One row per output that a run has reached, so that nothing is evaluated in vain.
         owner, k = np.nonzero(reached)
         t, y = times[np.minimum(owner, len(times) - 1), k], batch.outputs[owner, k, :n]
         rows = found.inputs(owner, t, y, np.zeros_like(y))
@@ -352,8 +356,8 @@ class ArrayRuns:
         return columns | self.extremes(found, clear, owner, table, list(values))
 
     def extremes(self, found: Ends, clear: Mask, owner: Index, outputs: Array, names: list[str]) -> Columns:
-        """Largest and least values of quantities of these names over the outputs [outputs, names], which ``owner`` says
-        the runs of, over the ends of steps, and behind leaps.
+        """Return largest and smallest values of the quantities ``names`` over outputs [outputs, names] of the runs
+        ``owner``, over the ends of steps, and after jumps.
         """
         batch, n = found.batch, self.n
         taken = np.arange(batch.records.shape[1]) < np.where(clear, batch.counts[:, RECORDS], 0)[:, None]
@@ -370,9 +374,9 @@ class ArrayRuns:
         return columns
 
     def _leaps(self, found: Ends) -> Discontinuities:
-        """Jumps of the runs, and the breakpoints of loads between these that they have passed."""
+        """Return the jumps of the runs, and the breakpoints of loads that they have passed between jumps."""
         batch, n, width = found.batch, self.n, self.model.program.n_inputs
-        # Without room for jumps or steps where runs end at their edges, or nothing is looked for along them.
+        # These tables are empty if runs end at their edges, or if nothing along the runs is kept.
         rows, records = (
             table if table.shape[1] else np.empty((len(table), 0, 2 * width)) for table in (batch.jumps, batch.records)
         )
@@ -389,23 +393,23 @@ class ArrayRuns:
 
     @cached_property
     def totals(self) -> Function:
-        """The totals that are balanced."""
+        """Totals that are balanced: energy and entropy."""
         system = self.model.system
         return compile_function(system.inputs, [system.expand(system.find(name).expression) for name, _ in TOTALS])
 
     def balances(self, found: Ends, rows: Array, values: Mapping[str, Array], reached: Mask) -> Columns:
-        """Errors of the balances of each run over its outputs, as its audit has them."""
+        """Return the errors of the balances of each run over its outputs, as in its audit."""
         system, batch, n = self.model.system, found.batch, self.n
         owner, k = np.nonzero(reached)
 
         def whole(column: Array) -> Array:
-            """A table of the runs; beyond the end of a run as at its start, so that nothing is exchanged there."""
-            # The runs next to each other in memory: NumPy is slow to find what is largest along few outputs in a row.
+            """Return a table of runs and outputs; beyond the end of a run it repeats the start, with no exchange."""
+            # Column-major, since NumPy is slow in finding the largest of a few contiguous outputs.
             filled = np.zeros(reached.shape, order="F")
             filled[owner, k] = column
             return filled if reached.all() else np.where(reached, filled, filled[:, :1])
 
-        # The same residuals and roundings as those of the audit of one run, over the outputs that there are.
+        # The same residuals and roundings as in the audit of one run, over the existing outputs.
         every = [name for total, parts in TOTALS for name in (total, *parts)]
         named = {name: whole(values[name]) for name in every if name in values}
         outputs = np.asfortranarray(batch.outputs[..., n:])
@@ -425,7 +429,7 @@ class ArrayRuns:
         return {**columns, "site_error": sites}
 
     def _rounding(self, rows: Array) -> Array:
-        """Largest change of each total by the last bit of a state, shape (rows, 2)."""
+        """Return the largest change of each total by the last bit of a state, shape (rows, 2)."""
         totals, worst, moved = self.totals(rows), np.zeros((len(rows), len(TOTALS))), rows.copy()
         for j in range(1, 1 + self.n):
             moved[:, j] *= 1 + EPS
@@ -434,7 +438,7 @@ class ArrayRuns:
         return worst
 
     def _event_columns(self, found: Ends) -> Columns:
-        """First times of events after which a run goes on, and of values that are reached."""
+        """Return the first times of events after which a run goes on, and of values that are reached."""
         batch, keep = found.batch, self.keep
         named = [margin.name for margin in self.model.margins] + [edge.name for edge in self.model.system.edges]
         columns: Columns = {}
@@ -466,19 +470,19 @@ class JumpingRuns(ArrayRuns):
 
     jumps = True
     room: Room = 0, 16, 0, 0
-    """Steps and events for which a run has room; as many as the runs before have needed."""
+    """Table sizes of a run, of steps and events among others; as large as earlier runs needed."""
 
     def guards(self, rows: Array) -> tuple[Array, Mask]:
-        """Accounts and guards where nothing has been seen; edges may be due in all runs."""
+        """Return zero accounts and guards; edges may be due in all runs."""
         return self.unseen, np.ones(len(rows), dtype=bool)
 
     def _solved(self, problem: Problem, y0: Array, table: Array, *others: Array) -> Ends:
-        """Runs along their edges; once more where there was no room for what happens in them."""
+        """Solve runs along their edges; repeat them if their tables were too small."""
         jumper, looks = self.model.jumper, self.keeps_steps or bool(self.keep.reach)
         assert jumper is not None
         jumper.expect_jumps()
         problem, columns = replace(problem, edges=jumper.edge_tables), (y0, table, *others)
-        # A few of them tell for how much the others need room.
+        # A few pilot runs give the table sizes of the others.
         some = np.arange(0, len(y0), max(len(y0) // PILOT_RUNS, 1))
         few = [column[some] if len(column) == len(y0) else column for column in columns]
         for given in (few, columns):

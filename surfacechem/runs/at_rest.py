@@ -15,39 +15,41 @@ from surfacechem.solve.run import Model, Run, Trajectory
 from surfacechem.tolerances import LINE_ERROR, NEGLIGIBLE, RUN_ERROR
 
 HORIZON = 1e8
-"""Time [s] for which rest is looked for, three years: beyond, step sizes times the rates of a fast surface are more
-than a double resolves beside one.
+"""Longest time [s] of the search for a steady state, three years: beyond it the product of step size and rate of a
+fast surface is so large that a double no longer resolves one next to it.
 """
 
 REST_RATIO = 10.0
-"""Least ratio of the time looked at to the time to come to rest, with which a state counts as at rest."""
+"""Least ratio of the integrated time to the time at which the states come to rest, for the end to count as steady."""
 
 SHORTER_TIMES = (1e6, 1e4, 1e2, 1.0)
-"""Times [s] for which rest is looked for where errors of a fast surface, summed over years, hide it: its sites do not
-stay what they are.
+"""Shorter times [s] of the search, tried where errors of a fast surface, summed over years, hide the steady state: the
+number of sites drifts.
 """
 
 PATH = "run.until"
 
 
 class UnrestError(InputError):
-    """A run that does not come to rest."""
+    """A run that reaches no steady state."""
 
 
 def refuse_histories(system: System) -> None:
-    """Raise InputError where no steady state can be."""
+    """Raise InputError if a prescribed variable depends on time, so that no steady state exists."""
     moving = [item.name for item in system.named if depends(system.expand(item.expression), system.t)]
     if moving:
         raise InputError(f"{moving[0]} changes in time, so there is no steady state: give it one value.", path=PATH)
 
 
 def to_rest(model: Model, run: Run, values: Mapping[str, float]) -> Run:
-    """The run that ends where the states have come within their tolerances of values that they keep ten times as long,
-    and keep but for a thousandth for three years; twice as long as one that stops before. InputError where there is
-    none.
+    """Return the run that ends at its steady state; InputError if none is found.
+
+    The end is the first time after which all states stay within their tolerances of a value that they keep for ten
+    times as long, and within a thousandth of it for three years. A run that an event stops lasts twice the time of that
+    event.
     """
     refuse_histories(model.system)
-    # A shorter look would take slow changes, and those that follow when nothing happened for long, for none.
+    # A shorter search would miss slow changes, and those that set in after a long time of rest.
     far = _looked(model, run, values, HORIZON)
     if far.status == "stopped":
         return replace(run, times=_until(run, min(2 * far.result.t, HORIZON) or HORIZON))
@@ -58,7 +60,7 @@ def to_rest(model: Model, run: Run, values: Mapping[str, float]) -> Run:
     for end in (HORIZON, *(SHORTER_TIMES if drifting or audit(far).site_error > run.rtol else ())):
         near = far if end == HORIZON else _looked(model, run, values, end)
         last, change = _rest_of(near)[0], np.abs(near.result.y - far.result.y)
-        # Both end in states that differ slightly, or by a trace of something.
+        # Both end states agree to a thousandth of their size; of traces, to a thousandth of their scale.
         alike = np.all(change <= NEGLIGIBLE * np.maximum(np.abs(near.result.y), scales))
         if near.status == "finished" and last * REST_RATIO <= end and alike:
             return replace(run, times=_until(run, last), rest=last)
@@ -71,7 +73,7 @@ def _looked(model: Model, run: Run, values: Mapping[str, float], end: float) -> 
 
 
 def all_to_rest(model: Model, run: Run, points: Iterable[Mapping[str, float]]) -> list[Run]:
-    """The runs with these values, all of which end where the last of them has come to rest."""
+    """Return the runs with these values, all with the end time of the last one to reach its steady state."""
     found = [to_rest(model, run, values) for values in points]
     last = max(each.times[-1] for each in found)
     return [replace(each, times=_until(each, last)) for each in found]
@@ -82,7 +84,9 @@ def _until(run: Run, end: float) -> tuple[float, ...]:
 
 
 def _rest_of(reached: Trajectory, tolerances: float = 1.0) -> tuple[float, int]:
-    """The first time of a run after which no state is more tolerances away from its last value, and which is last."""
+    """Return the first time after which every state stays within so many ``tolerances`` of its final value, and the
+    index of the last state to do so.
+    """
     result = reached.result
     known, problem = result.known or result.states(), result.problem
     evolved = np.flatnonzero(~problem.program.algebraic_mask)

@@ -1,4 +1,4 @@
-"""Check of a scene before it runs: its dimensionless numbers, its time scales, what is unused."""
+"""Check of a scene before it runs: dimensionless numbers, time scales, unused parameters."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ from surfacechem.solve.run import Model
 from surfacechem.tolerances import CONSERVED_RATE, FEW_EPS, RUN_EPS, TINY
 
 LUMP_BIOT = 0.1
-"""Biot number up to which a lump is taken for good: it errs by 3 % then."""
+"""Largest Biot number at which a lump is accurate enough: its relaxation rate errs by 3 % there."""
 
 EVEN_FOURIER = 2.0
-"""Fourier number from which on a slab in perfect contact has become even: 1 % of a difference is left."""
+"""Fourier number above which a slab in perfect contact has a uniform temperature: 1 % of a difference is left."""
 
 
 @dataclass(frozen=True)
 class Group:
-    """A dimensionless number or a time scale that tells how a scene will behave."""
+    """A dimensionless number or a time scale that characterises a scene."""
 
     name: str
     value: float
@@ -54,7 +54,7 @@ class Start:
 
 
 def consistent_start(model: Model, values: Mapping[str, float]) -> Start | None:
-    """Rates and algebraic variables at the start by Newton's method; None where it finds none."""
+    """Solve for rates and algebraic variables at the start by Newton's method; None if it breaks down."""
     system = model.system
     n = len(system.states)
     algebraic = np.array([state.algebraic for state in system.states])
@@ -63,7 +63,7 @@ def consistent_start(model: Model, values: Mapping[str, float]) -> Start | None:
     for _ in range(50):
         inputs = np.concatenate([[0.0], y, ydot, parameters])
         K, M = model.program.derivatives(inputs)
-        # The unknowns are the rates of what evolves and the values of what is algebraic.
+        # The unknowns are the rates of evolved states and the values of algebraic ones.
         matrix, residual = np.where(algebraic, K, M), model.program.residual(inputs)
         if not (np.all(np.isfinite(matrix)) and np.all(np.isfinite(residual))):
             return None
@@ -80,13 +80,13 @@ def consistent_start(model: Model, values: Mapping[str, float]) -> Start | None:
 
 
 def rates(start: Start) -> NDArray[np.complex128]:
-    """Finite growth rates [1/s] of small disturbances at the start; conserved quantities are left out."""
-    # Rows in units of their own, since balances of energy and of sites differ by many decades.
+    """Return the finite growth rates [1/s] of small disturbances at the start, except those of conserved quantities."""
+    # Rows are scaled, since balances of energy and of sites differ by many decades.
     rows = np.maximum(np.abs(start.M).max(axis=1), np.abs(start.K).max(axis=1))
     scale = np.where(rows > 0, rows, 1.0)[:, None]
     evolves = np.any(start.M != 0, axis=0)
     unknown = np.where(evolves, start.M, start.K) / scale
-    # By the rates of what evolves and the values of what is algebraic, of which only the former are kept.
+    # Solved for the rates of evolved states and the values of algebraic ones; only the former are kept.
     growth = np.linalg.solve(unknown, -start.K[:, evolves] / scale)[evolves]
     values = np.asarray(np.linalg.eigvals(growth), dtype=np.complex128)
     largest = np.max(np.abs(values), initial=0.0)
@@ -94,7 +94,7 @@ def rates(start: Start) -> NDArray[np.complex128]:
 
 
 def groups(model: Model, scene: Scene, values: Mapping[str, float], start: Start | None, end: float) -> list[Group]:
-    """Dimensionless numbers and time scales of a scene, as far as parameters and consistent initial state tell them."""
+    """Return the dimensionless numbers and time scales that follow from parameters and consistent initial state."""
     found = [*_bond_energy(scene), *_activation(scene, values)]
     if start is not None:
         found += _affinity(model.system, scene, start)
@@ -108,12 +108,12 @@ def groups(model: Model, scene: Scene, values: Mapping[str, float], start: Start
 
 
 def number(value: float | Varying) -> float:
-    """A parameter at the reference state."""
+    """Return a parameter at the reference state."""
     return value.value if isinstance(value, Varying) else float(value)
 
 
 def _bond_energy(scene: Scene) -> Iterator[Group]:
-    """Energy of bonds against heat content."""
+    """Yield the energy of bonds over the heat content."""
     C, T_0 = capacity_with_interface(scene), scene.T_0
     bonds = [law for law in scene.interface.potentials if law.name() == "bond-energy"]
     if C and T_0 and bonds:
@@ -131,7 +131,7 @@ def _bond_energy(scene: Scene) -> Iterator[Group]:
 
 
 def _activation(scene: Scene, values: Mapping[str, float]) -> Iterator[Group]:
-    """Activation energies against the temperature at the start."""
+    """Yield activation energies over the thermal energy at the start."""
     temperatures = [values[name] for name in ("initial.T_c", "initial.T", "initial.T_1") if name in values]
     for reaction in scene.interface.reactions:
         energy = number(getattr(reaction, "E_a", 0.0))
@@ -141,7 +141,7 @@ def _activation(scene: Scene, values: Mapping[str, float]) -> Iterator[Group]:
 
 
 def capacity_with_interface(scene: Scene) -> float:
-    """Heat capacity at T_0 of all that shares the interface's temperature; of both bodies where there is no medium."""
+    """Return the heat capacity at T_0 of all at the interface's temperature; of both bodies without a medium."""
     node = scene.interface.temperature
     bodies = [body for body in scene.bodies if node is None or body.temperature == node]
     stores = [(body.energy, "C") for body in bodies] + [(law, "C_c") for law in scene.interface.potentials]
@@ -157,7 +157,7 @@ def _affinity(system: System, scene: Scene, start: Start) -> Iterator[Group]:
 
 
 def _heat_paths(system: System, scene: Scene, start: Start, end: float) -> Iterator[Group]:
-    """Heat paths against capacities, over the whole run."""
+    """Yield the heat exchange of each path over the whole run, relative to the capacities."""
     capacities = {s.name: c for s, c in zip(system.states, np.diag(start.M), strict=True) if s.is_temperature}
     for profile in system.profiles:
         capacities[profile.surface] = sum(capacities.get(name, 0.0) for name in (profile.surface, *profile.states))
@@ -170,7 +170,7 @@ def _heat_paths(system: System, scene: Scene, start: Start, end: float) -> Itera
 
 
 def _dissipation(system: System, start: Start, end: float) -> Iterator[Group]:
-    """Dissipation over the whole run against heat content."""
+    """Yield the dissipation over the whole run relative to the heat content."""
     stored = np.diag(start.M)
     heat = sum(value for name, value in start.outputs.items() if name.startswith("D_"))
     content = float(stored @ np.where((stored > 0) & (start.y > 1), start.y, 0.0))
@@ -191,7 +191,7 @@ def _time_scales(start: Start, end: float) -> Iterator[Group]:
 
 
 def warnings(system: System) -> list[str]:
-    """Warnings of the assembly, and of what is given but has no effect."""
+    """Return the warnings of the assembly, and warnings about given values without effect."""
     rows = [*system.residual(), *map(system.expand, _evaluated(system))]
     read = {symbol for row in rows for symbol in row.free_symbols}
     idle = [
@@ -199,13 +199,13 @@ def warnings(system: System) -> list[str]:
         for p in system.parameters
         if p.symbol not in read and not p.internal and not p.path.startswith("initial.")
     ]
-    # Over curved bodies a conductance is known over a range of approaches alone, and grows as one presses on the other.
+    # Between curved bodies a conductance is known over a range of approaches only, and grows under load.
     at_touch = () if system.whole else conductance_warnings(system)
     return [*system.warnings, *at_touch, *idle]
 
 
 def _evaluated(system: System) -> list[Expression]:
-    """Formulas that a run evaluates beside the equations."""
+    """Return the formulas that a run evaluates in addition to the equations."""
     formulas = [*[a.rate for a in system.ledger], *[m.masked for m in system.margins]]
     formulas += [*[i.expression for i in system.outputs], *[c.resistance for c in system.noted(Conductor)]]
     formulas += [x for item in system.edges for x in (item.masked, *item.modes.values(), *item.reset.values())]
@@ -213,8 +213,8 @@ def _evaluated(system: System) -> list[Expression]:
 
 
 def _heat_shares(system: System) -> list[Expression]:
-    """Shares of the heat of jumps."""
-    # What slides or snaps makes all of its heat in the interface, none in supports.
+    """Return the shares of the heat of jumps."""
+    # Sliding and snap-through release all heat in the interface, none in supports.
     jumps = [item for item in system.edges if (item.equilibrates or item.reset) and not item.measure]
     supported = any(item.heat == "joint" for item in jumps)
     makers = [sinks for maker, sinks in system.sinks.items() if jumps and (supported or maker == INTERFACE)]
@@ -222,29 +222,30 @@ def _heat_shares(system: System) -> list[Expression]:
 
 
 def start_warnings(model: Model, problem: Problem, start: Start | None, end: float) -> list[str]:
-    """Warnings about the state at the start, and about bodies that should not be one lump."""
+    """Return warnings about the initial state, and about bodies that should not be lumped."""
     first = np.concatenate([np.zeros(1), problem.y0, np.zeros(len(problem.y0)), problem.parameters[0]])
     lumps = lumpings(model.system, start, end) if start is not None else []
     return [*active_cautions(model.system, first[None]), *(text for body in lumps for text in body.warnings())]
 
 
 def laws_of(scene: Scene) -> list[Law]:
-    """Every law of a scene, in the order of the case file."""
+    """Return every law of a scene, in the order of the case file."""
     interface = scene.interface
     bodies = [body.energy for body in scene.bodies if body.energy is not None]
     return [*bodies, *interface.potentials, *interface.reactions, *interface.frictions, *scene.heat]
 
 
-# -- bodies that are one lump -----------------------------------------------------------------------------------------
+# -- lumped bodies ----------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
 class Lumping:
-    """A body's numbers: h L / k at its contact, infinite in perfect contact, and k t / (C L) over the run.
+    """Biot and Fourier numbers of a body: h L / k at its contact, infinite in perfect contact, and k t / (C L) of the
+    run.
 
-    A slab insulated behind, cooled through a conductance h at its face, relaxes at the rate zeta^2 alpha / L^2 with
-    zeta tan(zeta) = Bi; a lump at Bi alpha / L^2, which is faster. Source: Carslaw & Jaeger (1959), Conduction of Heat
-    in Solids, section 3.11.
+    A slab insulated at its back, cooled through a conductance h at its face, relaxes at the rate zeta^2 alpha / L^2
+    with zeta tan(zeta) = Bi; a lump at Bi alpha / L^2, which is faster. Source: Carslaw & Jaeger (1959), Conduction of
+    Heat in Solids, section 3.11.
     """
 
     number: int
@@ -255,7 +256,7 @@ class Lumping:
 
     @property
     def fast(self) -> float:
-        """Part by which a lump would relax too fast.
+        """Relative excess of the relaxation rate of a lump.
 
         >>> round(Lumping(1, "lower", True, 0.1, 1.0).fast, 4), round(Lumping(1, "lower", True, 1.0, 1.0).fast, 4)
         (0.0336, 0.351)
@@ -264,18 +265,18 @@ class Lumping:
 
     @property
     def left(self) -> float:
-        """Fraction of a difference within the body that is left at the end, its face held."""
+        """Fraction of a difference within the body that is left at the end if its face is held."""
         return math.exp(-(math.pi**2) * self.fourier / 4)
 
     def rows(self) -> Iterator[tuple[str, float, str]]:
-        """Names, values and meanings for a summary."""
+        """Yield names, values and meanings for a summary."""
         if math.isfinite(self.biot):
             verdict = "" if not self.biot else f"; as a lump it would relax {self.fast:.2%} too fast"
             yield f"Bi_{self.number}", self.biot, f"h L / k of {self.body} at the start{verdict}"
         yield f"Fo_{self.number}", self.fourier, f"k t / (C L) of {self.body}: length of the run against conduction"
 
     def warnings(self) -> Iterator[str]:
-        """Warnings about a body as one lump, with the size of the error."""
+        """Yield warnings about a lumped body, with the size of the error."""
         if not self.is_lump:
             return
         remedy = "Give its `conduction` a number of cells."
@@ -292,7 +293,7 @@ class Lumping:
 
 
 def first_root(biot: float) -> float:
-    """The first root of zeta tan(zeta) = Bi.
+    """Return the first root of zeta tan(zeta) = Bi.
 
     >>> round(first_root(1.0), 6), round(first_root(1e-12) ** 2 / 1e-12, 9)
     (0.860334, 1.0)
@@ -307,7 +308,7 @@ def first_root(biot: float) -> float:
 
 
 def lumpings(system: System, start: Start, end: float) -> list[Lumping]:
-    """The numbers of the bodies that say how they conduct, at the start."""
+    """Return the numbers at the start of each body that states how it conducts."""
     found = []
     for c in system.noted(Conductor):
         expressions = [system.expand(item) for item in (c.resistance, c.capacity, c.conductance or 0)]

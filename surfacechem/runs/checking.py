@@ -1,4 +1,6 @@
-"""Errors of a store: of runs spread evenly over its plan, and of those that took the most steps, each as by itself."""
+"""Errors of the runs of a store: of a sample spread evenly over its plan, and of the runs with the most steps, each
+found as for a single run.
+"""
 
 from __future__ import annotations
 
@@ -23,10 +25,10 @@ if TYPE_CHECKING:
 Array = NDArray[Any]
 
 HARDEST_RUNS = 100
-"""Runs with the most steps that are checked beside those of the plan."""
+"""Runs with the most steps that are checked in addition to the sample of the plan."""
 
 RUNS_AT_ONCE = 200
-"""Runs that are checked together, with all of their steps in memory."""
+"""Runs that are checked together, with all their steps in memory."""
 
 BALANCE_COLUMNS = (*BALANCES, "destroys_entropy")
 
@@ -35,21 +37,21 @@ CHECKED_COLUMNS = {
     "error": ("float64", "largest relative error of the run"),
     **{name: ("float64", END_COLUMNS[name]) for name in BALANCE_COLUMNS},
 }
-"""Columns that are stored of a run that is checked: type and meaning."""
+"""Columns that are stored for each checked run: type and meaning."""
 
 
 @dataclass(frozen=True)
 class Checked:
-    """Result of a check: the worst error that is known, how many are not, and the source of the errors."""
+    """Result of a check: the largest known error, the number of unknown ones, and the source of the errors."""
 
     error: float
     unknown: int
     count: int
     destroys: int
-    """Runs in which a law or a jump destroys entropy."""
+    """Number of runs in which a law or a jump destroys entropy."""
     source: str
     why: str
-    """Reason why the error is not known, of one of the runs of which it is not."""
+    """Reason why an error is unknown, from one of the runs with an unknown error."""
 
     def __str__(self) -> str:
         """The errors in words."""
@@ -59,7 +61,7 @@ class Checked:
 
 
 def checked_arrays(size: int, count: int) -> tuple[dict[str, int], dict[str, StoredArray]]:
-    """Dimensions and arrays of what is checked in a store of so many runs."""
+    """Return dimensions and arrays of the checked runs in a store of ``size`` runs."""
     sizes = {"checked": min(count, size), "hardest": min(HARDEST_RUNS, size)} if count else {}
     arrays = {
         f"{which}_{key}": StoredArray(kind, (which,), {"units": "1", "long_name": text})
@@ -70,13 +72,13 @@ def checked_arrays(size: int, count: int) -> tuple[dict[str, int], dict[str, Sto
 
 
 def check(stream: Stream, threads: int | None = None) -> Checked | None:
-    """Find the errors of the runs that are checked and store them, once every chunk is there; None before."""
+    """Find and store the errors of the checked runs, once every chunk is there; None before."""
     store, plan = stream.store, stream.chunks.plan
     sizes = {name: store.layout.sizes[name] for name in ("checked", "hardest") if name in store.layout.sizes}
     if not sizes or not all((store.marks / str(number)).exists() for number in range(store.layout.chunks)):
         return None
     chosen = {"checked": np.sort(permuted(np.arange(sizes["checked"]), plan.size, 0)), "hardest": _hardest(stream)}
-    # Evenly spread by a permutation of the plan, the same for every writer.
+    # A fixed permutation of the plan spreads the sample evenly and is the same for every writer.
     found: dict[str, Array] = {}
     told: list[SweepAccuracy] = []
     for which, index in chosen.items():
@@ -89,10 +91,10 @@ def check(stream: Stream, threads: int | None = None) -> Checked | None:
         return np.concatenate([found[f"{which}_{key}"] for which in chosen])
 
     numbers, once = np.unique(both("run"), return_index=True)
-    once = once[numbers >= 0]  # the hardest are filled up with -1 where fewer have not failed
+    once = once[numbers >= 0]  # -1 fills up the hardest runs where fewer succeeded
     errors, destroys = both("error")[once], np.nansum(both("destroys_entropy")[once])
     worst = float(np.fmax.reduce(errors, initial=-np.inf))
-    # One source of each method: why it is no exact solution is said of each run in words of its own.
+    # One source per method: the reason against an exact solution, after the semicolon, differs from run to run.
     sources = {each.source.partition(";")[0]: each.source for each in sorted(told, key=lambda each: len(each.source))}
     why = next((each.why for each in told if each.why), "")
     return Checked(worst, int(np.isnan(errors).sum()), len(errors), int(destroys), "; ".join(sources.values()), why)
@@ -101,7 +103,7 @@ def check(stream: Stream, threads: int | None = None) -> Checked | None:
 def _columns(
     stream: Stream, index: Index, size: int, threads: int | None
 ) -> tuple[dict[str, Array], list[SweepAccuracy]]:
-    """The arrays of the runs of these numbers, and what is known of the errors."""
+    """Return the arrays of the runs with these numbers, and the accuracies of their portions."""
     columns, told = {key: np.full(size, np.nan) for key in CHECKED_COLUMNS}, []
     columns["run"] = np.append(index, np.full(size - len(index), -1))
     for first, part, errors, accuracy in _errors(stream, index, threads):
@@ -112,7 +114,7 @@ def _columns(
 
 
 def _hardest(stream: Stream) -> Index:
-    """Numbers of the runs with the most steps that have not failed, in their order."""
+    """Return the numbers of the runs with the most steps that did not fail, in ascending order."""
     steps, numbers = np.empty(0, np.int64), np.empty(0, np.int64)
     for number in range(stream.store.layout.chunks):
         taken, status = stream.store.read("steps", number), stream.store.read("status", number)
@@ -121,7 +123,7 @@ def _hardest(stream: Stream) -> Index:
             np.concatenate([steps, taken[went]]),
             np.concatenate([numbers, stream.store.layout.index(number)[went]]),
         )
-        # Of equally many steps the first of the plan, so that the choice depends on nothing else.
+        # Ties go to the first run of the plan, so that the choice is unique.
         best = np.lexsort((numbers, -steps))[:HARDEST_RUNS]
         steps, numbers = steps[best], numbers[best]
     return np.sort(numbers)
@@ -130,7 +132,7 @@ def _hardest(stream: Stream) -> Index:
 def _errors(
     stream: Stream, index: Index, threads: int | None
 ) -> Iterator[tuple[int, Index, dict[str, Any], SweepAccuracy]]:
-    """Errors and balances of runs by themselves, some at a time; nothing of one that is not admissible."""
+    """Yield errors and balances of runs solved by themselves, a portion at a time; nothing for an inadmissible run."""
     chunks = stream.chunks
     even = replace(chunks.simulation.case.run, picture=None)  # no outputs are shown
     for first in range(0, len(index), RUNS_AT_ONCE):
@@ -138,7 +140,7 @@ def _errors(
         try:
             done = chunks.simulation.sweep_plan(chunks.plan.picked(part), chunks.changes, threads, even)
         except InputError:
-            # One of them is refused: each alone, so that the others have an error.
+            # One of them is refused: solve each alone, so that the others get an error.
             if len(part) > 1:
                 for k, one in enumerate(part.tolist()):
                     for _, single, errors, accuracy in _errors(stream, np.array([one]), threads):
@@ -146,15 +148,17 @@ def _errors(
             continue
         assert done.accuracy is not None
         values = {name: [end[name] for end in done.run_ends] for name in BALANCE_COLUMNS}
-        found = np.maximum(done.accuracy.errors, _apart(stream, part, done))  # an unknown error stays unknown
+        found = np.maximum(done.accuracy.errors, _apart(stream, part, done))  # NaN, an unknown error, stays NaN
         yield first, part, {"error": found, **values}, done.accuracy
 
 
 def _apart(stream: Stream, part: Index, done: SweepSolution) -> Array:
-    """Distance of what is stored of runs from the same runs by themselves: of their ends, relative to these, by more
-    than may be rounding; for one that an event has stopped of the time alone, since its state may change there by any
-    amount in the last digit of it. Runs until a steady state last as long as the longest by themselves: their states
-    alone are compared, beside their scales.
+    """Return the difference between the stored ends of runs and the ends of the same runs solved by themselves,
+    relative to the latter and beyond roundoff.
+
+    For a run stopped by an event only the time counts: there the state may change by any amount within the last digit
+    of the time. Runs to a steady state, solved by themselves, all last as long as the slowest of them: only their
+    states are compared, relative to their scales at least.
     """
     chunks = stream.chunks
     ends = RunByRun(chunks.model, Keep(last=chunks.keep.last)).columns(done.runs, 0, done.audits)

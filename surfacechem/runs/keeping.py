@@ -1,4 +1,4 @@
-"""Columns that a store keeps of each run: ends, extremes, times of events, series; codes for how runs end."""
+"""Columns that a store keeps of each run: end, extremes, times of events, series; codes for the ends of runs."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ from surfacechem.solve.radau.solver import rates_at
 from surfacechem.solve.run import Model, Trajectory
 
 Columns = dict[str, NDArray[Any]]
-"""Columns that are kept, by name, the run as first axis."""
+"""Kept columns by name; the first axis is the run."""
 
 STATUSES = ("finished", "stopped", "failed", "refused")
-"""Ends of runs, in the order of their codes; refused is one whose values are not admissible at its start."""
+"""Ends of runs, in the order of their codes; the values of a refused run are not admissible at its start."""
 
 INADMISSIBLE, OTHER_REASON = "the values are not admissible at the start", "another reason"
 
 CAME_TO_REST, NOT_AT_REST = "came to rest", "it does not come to rest"
-"""Reasons for the end of a run until a steady state, and for its failure."""
+"""Reasons for the end of a run to a steady state, and for its failure."""
 
 END_COLUMNS = {
     "status": "how the run ended",
@@ -42,7 +42,7 @@ END_COLUMNS = {
     "site_error": "largest residual of the site balances",
     "destroys_entropy": "1 where a law or a jump does, else 0",
 }
-"""Columns on the end of every run, with their meaning; only the time has a unit, seconds."""
+"""Columns about the end of every run, with their meaning; only the time has a unit, seconds."""
 
 BALANCES = tuple(f"{kind}_error" for kind in ("energy", "entropy", "site"))
 """Columns of END_COLUMNS that are errors of balances."""
@@ -51,18 +51,18 @@ EXTREMES = {
     "max": (np.fmax, "at most, over outputs, steps and jumps"),
     "min": (np.fmin, "at least, over outputs, steps and jumps"),
 }
-"""Extremes of a run: suffix of the names of their columns, function that finds them, and words."""
+"""Extremes of a run: suffix of their column names, reduction, and words."""
 
 SINGLE_COLUMNS = {"last": "at the end of the run", **{which: words for which, (_, words) in EXTREMES.items()}}
-"""Numbers of each run and quantity, by what the names of their columns end with, in words."""
+"""Columns with one number for each run and quantity: suffix of their names, and words."""
 
 REACHES = "reaches "
-"""Prefix of the names of margins that tell when a quantity reaches a value."""
+"""Prefix of the names of margins that locate when a quantity reaches a value."""
 
 
 @dataclass(frozen=True)
 class Keep:
-    """Names of the quantities and events of which something is kept; values to be reached by name."""
+    """Selection of results to be kept: names of quantities and events, and values to be reached by name."""
 
     last: tuple[str, ...] = ()
     max: tuple[str, ...] = ()
@@ -72,29 +72,29 @@ class Keep:
     at_events: tuple[str, ...] = ()
     reach: Mapping[str, float] | None = None
     balances: bool = True
-    """Whether the errors of the balances are."""
+    """True if the errors of the balances are kept."""
 
 
 def recorded_keep(record: str) -> Keep:
-    """Selection of what is kept, from its record in a store."""
+    """Restore a selection from its record in a store."""
     content: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in json.loads(record).items()}
     return Keep(**content)
 
 
 def end_of(run: Trajectory) -> dict[str, Any]:
-    """Entries of END_COLUMNS for a run, beside its balances."""
+    """Return the entries of END_COLUMNS for a run, without its balances."""
     steps = run.result.counters.steps
     return {"status": run.status, "reason": run.reason, "time_reached": run.result.t, "steps": steps}
 
 
 def balances_of(run: Trajectory, books: Audit) -> dict[str, Any]:
-    """Entries of END_COLUMNS for the balances of a run."""
+    """Return the entries of END_COLUMNS for the balances of a run."""
     destroys = books.destroys or entropy_destroyed(run.jumps) > 0
     return {**{name: getattr(books, name) for name in BALANCES}, "destroys_entropy": destroys}
 
 
 def keep_of(section: KeepSection | None, system: System) -> Keep:
-    """Selection of what is kept, by name: all ends, extremes and events by default; InputError at an unknown name."""
+    """Return the selection of a section, by default all ends, extremes and events; InputError for an unknown name."""
     states = [state.name for state in system.states if state.name not in system.inside]
     known = {"quantities": [*quantities(system)], "events": event_names(system), "states": states}
     if section is None:
@@ -115,13 +115,15 @@ def keep_of(section: KeepSection | None, system: System) -> Keep:
 
 
 def event_names(system: System) -> list[str]:
-    """Events after which a run goes on: kinks and edges. One that ends it is its reason."""
+    """Return the names of events after which a run goes on: kinks and edges. A terminal event is the reason for the
+    end.
+    """
     kinks = [margin.name for margin in system.moving_margins if not (margin.terminal or margin.peak)]
     return list(dict.fromkeys([*kinks, *(edge.name for edge in system.edges)]))
 
 
 def reaching(system: System, keep: Keep) -> System:
-    """The system that also locates where quantities reach the values of which the times are kept; with no ledger where
+    """Return the system with margins that locate when quantities reach the values to be kept, and without a ledger if
     no balances are kept.
     """
     symbols = {state.name: state.symbol for state in system.states}
@@ -134,7 +136,7 @@ def reaching(system: System, keep: Keep) -> System:
 
 
 def reason_table(system: System) -> list[str]:
-    """Reasons for the ends of runs, in the order of the codes."""
+    """Return the reasons for the ends of runs, in the order of their codes."""
     margins = system.moving_margins
     ends = [text for margin in margins for text in (margin.reason, *(margin.below or ("", ""))[1:]) if text]
     failures = [text for status, text in REASONS.items() if not status.success]
@@ -143,7 +145,7 @@ def reason_table(system: System) -> list[str]:
 
 
 def variable(name: str) -> str:
-    """The name of an event as part of that of a variable.
+    """Return the name of an event as part of a variable name.
 
     >>> variable("g_n > 0")
     'g_n_0'
@@ -152,7 +154,7 @@ def variable(name: str) -> str:
 
 
 def described(system: System, keep: Keep) -> dict[str, tuple[str, str, str]]:
-    """Type, unit and meaning of every column but the series, by name."""
+    """Return type, unit and meaning of every column except the series, by name."""
     q = quantities(system)
     codes = {"status": "int8", "reason": "int16", "steps": "int32"}
     found = {
@@ -176,37 +178,37 @@ def described(system: System, keep: Keep) -> dict[str, tuple[str, str, str]]:
 
 
 def at_end(run: Trajectory) -> dict[str, float]:
-    """States and named quantities at the end of a run, whether that is an output or not, by name."""
+    """Return states and named quantities at the end of a run by name, also where the end is no output."""
     result, model = run.result, run.model
     names = [state.name for state in model.system.states] + [*model.system.output_columns]
     t, y, ydot = np.array([result.t]), result.y[None], result.ydot[None]
-    if result.status is Status.FINISHED:  # at outputs rates are those of the equations, too
+    if result.status is Status.FINISHED:  # rates from the equations, as at outputs
         ydot = rates_at(model.program, t, y, result.problem.parameters[-1:])
     return dict(zip(names, [*result.y, *model.evaluate(result, t, y, ydot)[0]], strict=True))
 
 
 def extreme(run: Trajectory, name: str, which: str) -> float:
-    """The largest or the smallest value of a quantity over the outputs and the steps of a run, and behind leaps."""
+    """Return the largest or smallest value of a quantity over outputs and steps of a run, and after its jumps."""
     seen = np.concatenate([run.everywhere[name], run.leaps.after[name][run.leaps.lasts]])
     with np.errstate(invalid="ignore"):
         return float(EXTREMES[which][0].reduce(seen, initial=np.nan))
 
 
 def crossed(before: NDArray[Any], after: NDArray[Any], level: float) -> NDArray[np.bool_]:
-    """Whether each leap carries a quantity across a level, or onto it."""
+    """True for each jump that carries a quantity across a level, or onto it."""
     return ((before < level) & (after >= level)) | ((before > level) & (after <= level))
 
 
 class RunByRun:
-    """Columns of runs that are solved and looked at one after the other: any scene, any end."""
+    """Columns of runs that are solved and evaluated one after the other: any scene, any end."""
 
     def __init__(self, model: Model, keep: Keep, steady: bool = False) -> None:
         self.model, self.keep = model, keep
         self.reasons = [*reason_table(model.system), *((CAME_TO_REST, NOT_AT_REST) if steady else ())]
 
     def columns(self, runs: Sequence[Trajectory | str], times: int, audits: Sequence[Audit] = ()) -> Columns:
-        """Columns that are kept of runs, with so many output times, audited anew or as given; a run that failed or was
-        refused is given by the reason.
+        """Return the kept columns of runs with ``times`` output times; ``audits`` saves a second audit. A failed or
+        refused run is given by its reason.
         """
         found = [run for run in runs if not isinstance(run, str)]
         books = iter(audits or map(audit, found) if self.keep.balances else [None] * len(found))
@@ -237,9 +239,9 @@ class RunByRun:
         return row | self._events(run)
 
     def _events(self, run: Trajectory) -> dict[str, float]:
-        """Times of events and of values reached, each the first of its name."""
+        """Return the first time of each event, and of each value that is reached, by column."""
         row: dict[str, float] = {}
-        # Events are in order of time, so that the first of a name is the one that counts.
+        # Events are in order of time, so that the first of a name counts.
         columns = self.model.system.state_columns
         reached = {f"{REACHES}{name}": f"time_to_{name}" for name in self.keep.reach or {}}
         for event in events_of(run) if self.keep.events or reached else ():
@@ -256,7 +258,7 @@ class RunByRun:
         return row
 
     def _code(self, reason: str) -> int:
-        """The code of a reason, which goes on behind what the table has of it."""
-        # Reasons of runs go on with times and numbers, which are no part of the code.
+        """Return the code of the longest entry of the reason table with which a reason begins."""
+        # Reasons of runs end with times and numbers, which are no part of the code.
         fitting = [text for text in self.reasons if reason.startswith(text)]
         return self.reasons.index(max(fitting, key=len, default=OTHER_REASON))

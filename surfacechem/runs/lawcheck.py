@@ -1,5 +1,5 @@
-"""Check of a law of one's own against what every law has to keep: documented, with units, the same for floats and
-symbols, and never against the second law.
+"""Check of a user's own law against the requirements on every law: documentation, units, equal results for floats and
+symbols, and the second law.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from surfacechem.quantities import BOLTZMANN, VARIABLES
 from surfacechem.tolerances import NO_AMOUNT, TINY
 
 DRAWS = 20
-"""Draws of parameters and variables; a choice."""
+"""Number of random draws of parameters and variables; a choice."""
 
 RANGE_PARTS, ROOM = (0.1, 0.9), 600.0
-"""Fractions of a range that are drawn from, and twice the temperature [K] of a room."""
+"""Fractions of a range between which values are drawn, and twice the room temperature [K]."""
 
 READABLE = {*VARIABLES, "x", "T", "N_c", "M", "u", "r"}
-"""Names that formulas may read in every scene, beside temperatures and coverages by name."""
+"""Names that formulas may read in every scene, in addition to temperatures and coverages by name."""
 
 GIVEN, VALUES = (0.0, 1.0, 3.0), (1.0, 2.0, 0.5)
 OPTIONS: dict[str, Any] = {
@@ -36,7 +36,7 @@ OPTIONS: dict[str, Any] = {
     **dict.fromkeys(("times", "pressures", "gaps"), GIVEN),
     **dict.fromkeys(("values", "conductances"), VALUES),
 }
-"""Values of options that have no default."""
+"""Values of options without a default."""
 
 DOCUMENTED = {
     ".. math::": "no formula: write it under `.. math::` in the docstring",
@@ -46,7 +46,7 @@ DOCUMENTED = {
 
 
 def problems(law: type[Law]) -> list[str]:
-    """Rules that a law breaks, in words; none where all is well."""
+    """Return the requirements that a law violates, in words; empty if there are none."""
     found = [message for mark, message in DOCUMENTED.items() if mark not in (inspect.getdoc(law) or "")]
     found += [f"{name} has no meaning: say what it is" for name, spec in law.specs() if not spec.text]
     for name, spec in law.specs():
@@ -61,7 +61,7 @@ def problems(law: type[Law]) -> list[str]:
 
 
 def worked_numbers(law: type[Law]) -> Iterator[str]:
-    """The worked numbers of the docstring, run with what the module of the law knows."""
+    """Run the worked numbers of the docstring in the namespace of the law's module, and yield those that fail."""
     runner = doctest.DocTestRunner(verbose=False, optionflags=doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE)
     known = vars(sys.modules[law.__module__])
     for example in doctest.DocTestFinder(recurse=False).find(law, law.__name__, globs=known):
@@ -85,11 +85,11 @@ def first_error(law: type[Law]) -> Iterator[str]:
             wrong = f"its formula fails: {type(error).__name__}: {error}"
         if wrong:
             yield wrong
-            return  # the same is as a rule wrong everywhere
+            return  # one example is enough: the same error usually occurs everywhere
 
 
 def _instance(law: type[Law], draw: random.Random) -> Any:
-    """The law with parameters in their ranges."""
+    """Return the law with random parameters within their ranges."""
     values = {name: option for name, option in OPTIONS.items() if name in dict(law.options())}
     for name, spec in law.specs():
         low = max(spec.above, spec.at_least)
@@ -100,10 +100,10 @@ def _instance(law: type[Law], draw: random.Random) -> Any:
 
 
 def _differs(law: Law, values: dict[str, float]) -> str:
-    """Disagreement of floats and symbols, or a result that is no number; empty where there is none."""
+    """Return a disagreement of floats and symbols, or a result that is not finite, in words; empty if there is none."""
     symbols = {name: symengine.Symbol(name) for name in values}
     number = law.statement(**values)
-    if isinstance(number, tuple):  # a place in space, which its own tests look at
+    if isinstance(number, tuple):  # a point in space, which tests of its law check
         return ""
     if not isinstance(number, int | float) or not math.isfinite(number):
         return f"its formula gives {number} at {_shown(values)}"
@@ -114,7 +114,7 @@ def _differs(law: Law, values: dict[str, float]) -> str:
 
 
 def second_law_violation(law: Law, values: dict[str, float]) -> str:
-    """Violation of the second law, by a law that drives what it has to resist; empty where there is none."""
+    """Return a violation of the second law in words: a law drives what it must resist. Empty if there is none."""
     if isinstance(law, Friction) and "v" in values:
         for v in (0.7, -0.7):
             own = values | {"v": v} | ({"direction": math.copysign(1.0, v)} if "direction" in values else {})
@@ -134,7 +134,7 @@ def _shown(values: dict[str, float]) -> str:
 
 
 def report(found: list[type[Law]]) -> tuple[str, bool]:
-    """Errors of each law, as text, and whether all is well."""
+    """Return the errors of each law as text, and True if there are none."""
     lines, well = [], True
     for law in found:
         wrong = problems(law)

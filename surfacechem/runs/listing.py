@@ -35,7 +35,7 @@ ACCENTED = r"\s*(?:\{\s*(\w)\s*\}|(\w))"
 
 
 def plain(latex: str) -> str:
-    """A LaTeX formula as text.
+    """Convert a LaTeX formula to text.
 
     >>> plain(chr(92) + "dot" + chr(92) + "phi = -" + chr(92) + "frac{M}{N_c}")
     'dφ/dt = -M/N_c'
@@ -58,7 +58,7 @@ def plain(latex: str) -> str:
 
 
 def _unnested(text: str) -> str:
-    """The innermost fractions, roots, powers and subscripts without their braces."""
+    """Write the innermost fractions, roots, powers and subscripts without braces."""
     inner = r"\s*\{([^{}\\]*)\}"
     either = r"\s*(?:\{([^{}\\]*)\}|(\w))"
     text = re.sub(rf"({FUNCTIONS}\s*)\\[dt]?frac{either}{either}", r"\1(\\frac{\2\3}{\4\5})", text)
@@ -73,7 +73,7 @@ def _atom(text: str) -> str:
 
 
 def law_list() -> list[Sheet]:
-    """The laws by contract, one a line."""
+    """List the laws by contract, one per line."""
     sheets = []
     for contract in FAMILIES:
         rows = [(name, _first_line(law)) for name, law in laws(contract).items()]
@@ -82,7 +82,7 @@ def law_list() -> list[Sheet]:
 
 
 def law_table(contract: type[Law]) -> str:
-    """The laws of a contract: what each states, its formula, parameters and source."""
+    """Describe the laws of a contract: statement, formulas, parameters and source of each."""
     parts = [f"{contract.contract.upper()}: {_first_line(contract)}"]
     for law in laws(contract).values():
         texts = [_first_line(law), *formulas(law), *parameters(law), f"Source: {source(law)}"]
@@ -99,12 +99,12 @@ def _first_line(kind: type) -> str:
 
 
 def formulas(law: type[Law]) -> list[str]:
-    """The formulas of a law's docstring as text."""
+    """Return the formulas of a law's docstring as text."""
     return [plain(" ".join(block.split())) for block in FORMULA.findall(f"{inspect.getdoc(law)}\n")]
 
 
 def parameters(law: type[Law]) -> Iterator[str]:
-    """One line for each parameter and option."""
+    """Yield one line for each parameter and option."""
     for name, spec in law.specs():
         allowed = "" if spec.range == "any" else f", {spec.range}"
         default = next(item.default for item in fields(law) if item.name == name)
@@ -115,20 +115,20 @@ def parameters(law: type[Law]) -> Iterator[str]:
 
 
 def source(law: type[Law]) -> str:
-    """Source of a law, as its docstring gives it."""
+    """Return the source of a law as given in its docstring."""
     found = re.search(r"Source: (.*?)(?:\n\n|\Z)", inspect.getdoc(law) or "", re.DOTALL)
     text = " ".join(found[1].split()) if found else "not stated"
     return ROLE.sub(lambda m: plain(m[1]), text)
 
 
 def _apart(formula: str) -> str:
-    """Formulas in a line, or each in its own where they are too long for one."""
+    """Indent formulas, each on its own line if they are too long for one."""
     several = formula if len(formula) < TEXT_WIDTH else formula.replace(",  ", ",\n").replace(";  ", ";\n")
     return textwrap.indent(several, "    ")
 
 
 def law_page(name: str) -> str:
-    """Everything about the laws of that name, or of that contract: docstring, parameters and their ranges."""
+    """Describe all laws of that name, or of that contract: docstring, parameters and their ranges."""
     if asked := [contract for contract in FAMILIES if contract.contract == name]:
         return law_table(asked[0])
     every = [(contract, law) for contract in FAMILIES for law in laws(contract).values()]
@@ -145,13 +145,13 @@ def law_page(name: str) -> str:
 
 
 def case_table() -> Sheet:
-    """Names and titles of the shipped cases."""
+    """List names and titles of the shipped cases."""
     rows = [(path.stem, title(path)) for path in sorted(cases().glob("*.yaml"))]
     return Sheet(tables={"": rows}) if rows else Sheet("no cases are installed")
 
 
 def case_text(name: str) -> str:
-    """The text of a shipped case; InputError with the nearest name where there is none."""
+    """Return the text of a shipped case; InputError with the nearest name if there is none."""
     known = {path.stem: path for path in cases().glob("*.yaml")}
     if name not in known:
         raise InputError(f"no case '{name}' comes with the package.{suggestion(name, known)}")
@@ -159,7 +159,7 @@ def case_text(name: str) -> str:
 
 
 def title(path: Path) -> str:
-    """The title of a case file."""
+    """Return the title of a case file."""
     from ruamel.yaml import YAML
     from ruamel.yaml.error import YAMLError
 

@@ -1,7 +1,7 @@
-"""A scene at given states, without a run: its quantities there, with exact derivatives by what is given.
+"""Evaluation of a scene at given states, without a run: quantities and their exact derivatives by given values.
 
-At each point the states and the prescribed variables have given values, and what is prescribed is held. What follows
-from the balances there is solved for: the rates of what evolves, the values of what has no capacity or inertia.
+At each point the states and the prescribed variables have given values, and prescribed variables are held. The balances
+are solved for the rest: rates of evolved states, and values of states without capacity or inertia.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ from surfacechem.tolerances import GUARD_EPS, RUN_EPS, TINY
 Points = Mapping[str, ArrayLike]
 
 MOST_NEWTON = 50
-"""Largest number of Newton's steps; what is linear, as all rates are, takes one."""
+"""Largest number of Newton iterations; linear unknowns, such as all rates, take one."""
 
 POINT = ("point",)
 UNSOLVED = "the equations have no solution with these values"
@@ -55,14 +55,14 @@ class PointResults(Results):
     """Quantities at points: ``dataset`` is the xarray Dataset, ``write`` saves the same as netCDF."""
 
     values: Sequence[Column]
-    """Quantities that are given, and those that follow from them."""
+    """Given quantities, and those that follow from them."""
     slopes: Sequence[Column]
-    """Derivatives of what follows by what is given."""
+    """Derivatives of the quantities that follow by the given ones."""
     refused: Sequence[str]
-    """Reason why the laws do not hold at a point, by point; empty where they do."""
+    """Reason why a law is not valid at a point, by point; empty where all are."""
 
     def __repr__(self) -> str:
-        """Number of points in a line."""
+        """Return the number of points in a line."""
         return f"<Points of {self.title!r}: {len(self.refused)}, {len(self.values)} quantities>"
 
     @property
@@ -79,15 +79,15 @@ class PointResults(Results):
 
     @property
     def attributes(self) -> Mapping[str, str | float | int]:
-        """Attributes of the dataset: its origin."""
+        """Attributes of the dataset, with its origin."""
         return {**self._origin("evaluated", f"at {len(self.refused)} points"), "versions": versions()}
 
 
 def with_histories_held(scene: Scene) -> Scene:
-    """The scene with every history held at its value at the start."""
+    """Return the scene with every history held at its initial value."""
 
     def level(load: Any) -> Any:
-        # One parameter stands for all of a history, so that derivatives are by that.
+        # One parameter replaces a history, so that derivatives can be taken by it.
         return Hold(level=load.at_start(), place=load.place) if isinstance(load, Load) else load
 
     def body(number: int) -> Any:
@@ -106,22 +106,24 @@ def with_histories_held(scene: Scene) -> Scene:
 
 @dataclass(frozen=True)
 class Argument:
-    """Argument that points may give: its place among those of compiled functions, and its quantity."""
+    """Argument that points may give: its column among the arguments of compiled functions, and its quantity."""
 
     column: int
     quantity: Quantity
     path: str
     is_log: bool = False
-    """Whether the argument is its logarithm."""
+    """True if the argument is the logarithm of the quantity."""
     is_made: bool = False
-    """Whether the argument is made of it, and of other values at the start."""
+    """True if the argument is computed from the quantity and from other initial values."""
 
     def values(self, table: Array) -> Array:
-        """Its values, from the arguments."""
+        """Return the values of the quantity from the table of arguments."""
         return np.exp(table[:, self.column]) if self.is_log else table[:, self.column]
 
     def put(self, table: Array, values: Array) -> None:
-        """Make these its values; of what has no logarithm the argument is no number, so that no law holds there."""
+        """Write values of the quantity into the table; where the logarithm does not exist the argument is NaN, so that
+        no law is valid.
+        """
         with np.errstate(invalid="ignore"):
             table[:, self.column] = np.log(np.where(values > 0, values, np.nan)) if self.is_log else values
 
@@ -139,7 +141,7 @@ class Evaluator:
         """Arguments of compiled functions at the start of the case."""
         self.given, self.parameters = _states(system) | _histories(system), _parameters(system)
         balances = _balances(system, self.quasi_static)
-        # What is solved for: rates of what evolves, values of what is algebraic or in equilibrium.
+        # Unknowns: rates of evolved states, values of states that are algebraic or in equilibrium.
         self.unknown = [1 + j if state.algebraic else 1 + n + j for j, state in enumerate(system.states)]
         self.unknown += [1 + system.state_columns[name] for name in balances]
         self.rows = [*_rates(system, balances), *(item for item in system.outputs if item.name not in self.given)]
@@ -151,12 +153,14 @@ class Evaluator:
         self.modes = [mode for mode in system.modes if mode.start is not None]
 
     def at(self, points: Points) -> tuple[list[Column], list[Column], list[str]]:
-        """Columns of what is given, what follows and the derivatives; why laws do not hold, by point."""
+        """Return columns of given quantities, of those that follow and of derivatives, and the reason at each point
+        where a law is not valid.
+        """
         table, asked = self._table(points)
         lost = self._settle(table, asked)
         sought = self._sought(asked)
         unknown = [self.unknown[i] for i in sought]
-        # All that may be given, in one order, but for what is solved for.
+        # All arguments that may be given, in a fixed order, except the unknowns.
         own = {name: item for name, item in self.given.items() if item.column not in unknown}
         values, slopes, margins = self._solved(table, sought, unknown)
         shown = {i: row.quantity for i, row in enumerate(self.rows, start=len(self.unknown)) if row.name not in own}
@@ -166,13 +170,13 @@ class Evaluator:
         total, there = self.slopes.total(slopes, [*shown], by, sought, unknown)
         derivatives: list[Column] = []
         for k, item in enumerate(own.values()):
-            # The argument of what is a logarithm is ln x, whose derivative by x is 1/x.
+            # If the argument is ln x, its derivative by x is 1/x.
             per = 1 / item.values(table) if item.is_log else 1.0
             derivatives += _by(item.quantity, [*shown.values()], total[:, :, k].T * per, there[:, k])
         return found, derivatives, np.where(lost, NO_BALANCE, self.conditions.reasons(table, margins)).tolist()
 
     def _table(self, points: Points) -> tuple[Array, dict[str, Argument]]:
-        """The arguments of compiled functions at each point, and what the points give."""
+        """Return the arguments of compiled functions at each point, and the arguments that the points give."""
         asked, columns = self._given(points)
         table = np.tile(self.first, (len(columns), 1))
         if any(item.is_made for item in asked):
@@ -182,19 +186,19 @@ class Evaluator:
         for item, x in zip(asked, columns.T, strict=True):
             if not item.is_made:
                 item.put(table, x)
-        # A point has no past: bodies that overlap are in contact, what slides slides.
+        # A point has no history: its modes, contact and sliding, follow from its state.
         if self.modes:
             table[:, [self.system.inputs.index(mode.symbol) for mode in self.modes]] = self._start(table)
         return table, {item.quantity.name: item for item in asked}
 
     def _given(self, points: Points) -> tuple[list[Argument], Array]:
-        """Arguments that the points give, and their values, shape (points, arguments)."""
+        """Return the arguments that the points give, and their values, shape (points, arguments)."""
         known = self.names | self.parameters
         for name in points:
             if name not in known:
                 raise InputError(f"points cannot give '{name}'.{suggestion(name, known)}")
         given = {name: _numbers(name, value, known[name].quantity.unit) for name, value in points.items()}
-        for end in (np.min, np.max):  # ranges are those of a run
+        for end in (np.min, np.max):  # the ranges are the same as in a run
             values_of(self.system, {name: end(x) for name, x in given.items() if name in self.parameters})
         first = {known[name].column: name for name in reversed(given)}
         for name in given:
@@ -208,7 +212,7 @@ class Evaluator:
         return [known[name] for name in given], np.array(columns).T if given else np.zeros((1, 0))
 
     def _begun(self, changes: Mapping[str, float]) -> Array:
-        """Arguments at the start of a run with some values changed, by path."""
+        """Return the arguments at the start of a run, with some values changed by path."""
         system = self.system
         values = {**values_of(system), **changes}
         parameters = np.array([[values[parameter.path] for parameter in system.parameters]])
@@ -217,13 +221,17 @@ class Evaluator:
         return np.array([0.0, *states, *np.zeros(len(states)), *parameters[0]])
 
     def _sought(self, asked: Mapping[str, Argument]) -> list[int]:
-        """The balances that hold, by number: those of what the points do not give, nor take along."""
+        """Return the indices of the balances to be solved: of unknowns that points neither give nor carry along with a
+        gap.
+        """
         led = [name for item in self.quasi_static if item.state in asked for name in item.along]
         known = [item.column for item in (*asked.values(), *(self.given[name] for name in led))]
         return np.flatnonzero(~np.isin(self.unknown, known)).tolist()
 
     def _settle(self, table: Array, asked: Collection[str]) -> NDArray[np.bool_]:
-        """Let gaps that points do not give find their equilibrium, as at the start of a run; whether there is none."""
+        """Equilibrate the gaps that points do not give, as at the start of a run; return the mask of points without any
+        equilibrium.
+        """
         lost = np.zeros(len(table), dtype=bool)
         free = [item for item in self.quasi_static if item.state not in asked]
         moves = [{name: far for name, far in item.along.items() if name not in asked} for item in free]
@@ -239,7 +247,7 @@ class Evaluator:
 
     @cached_property
     def names(self) -> dict[str, Argument]:
-        """Arguments that points may give by name, by that of the dataset too."""
+        """Arguments that points may give, by name, and by name in the dataset."""
         found = dict(self.given)
         for column, state in enumerate(self.system.states, start=1):
             if state.given and state.given.state:
@@ -249,28 +257,28 @@ class Evaluator:
 
     @cached_property
     def quasi_static(self) -> list[Equilibrium]:
-        """The gaps in equilibrium that nothing holds at the start."""
+        """Gaps in equilibrium that are free at the start."""
         items, start = self.system.equilibria, Point.of(self.first, len(self.system.states))
         return [items[k] for k in Equilibria(self.system).free(start)] if items else []
 
     @cached_property
     def _start(self) -> Function:
-        """The modes in which a run would start from a state."""
+        """Modes in which a run would start from a state."""
         return compile_function(self.system.inputs, [self.system.expand(mode.start) for mode in self.modes])
 
     def _solved(self, table: Array, rows: Sequence[int], unknown: Sequence[int]) -> tuple[Array, Array, Array]:
-        """Balances and rows at the points, their derivatives and the margins, where these balances hold."""
+        """Solve the balances; return balances and rows at the points, their derivatives, and the margins."""
         for _ in range(MOST_NEWTON):
             values, slopes, margins = self.slopes(table)
             change = -_solve(self.slopes.block(slopes, rows, unknown), values[:, rows, None])[..., 0]
             if np.all(np.isnan(change) | (np.abs(change) <= RUN_EPS * np.maximum(np.abs(table[:, unknown]), TINY))):
                 break
-            table[:, unknown] += change  # all of a row becomes not a number where its balances have no solution
+            table[:, unknown] += change  # all of a row becomes NaN where its balances have no solution
         return values, slopes, margins
 
 
 class Conditions:
-    """Limits of laws, and edges that a run would take at once; whether a state is stable is not asked of a point."""
+    """Limits of laws, and guards of edges that a run would take at once. Stability is not required of a point."""
 
     def __init__(self, system: System) -> None:
         self._limits = [margin for margin, _ in system.limits if not margin.stability]
@@ -278,26 +286,27 @@ class Conditions:
 
     @property
     def margins(self) -> list[Any]:
-        """Expressions of the limits, then of the guards, then of the sizes of these."""
+        """Expressions of the limits, of the guards, and of the magnitudes of the guards, in this order."""
         closed = [limit.masked for limit in self._limits] + [edge.masked for edge in self._edges]
         return closed + [magnitude(edge.guard) for edge in self._edges]
 
     def reasons(self, table: Array, margins: Array) -> list[str]:
-        """Why no run could be at each point with these arguments and margins; empty where one could."""
+        """Return the reason why no run could be at a point with these arguments and margins; empty where one could."""
         limits, guards, sizes = np.split(margins, np.cumsum([len(self._limits), len(self._edges)]), axis=1)
         unsolved, due = np.isnan(table).any(axis=1), guards < -GUARD_EPS * np.nan_to_num(sizes)
         told = [limit.reason for limit in self._limits] + [edge.reason for edge in self._edges]
-        # The first that holds; behind all of them stands that none does.
+        # The first true column gives the reason; the last one, always true, gives none.
         found = np.column_stack([unsolved, ~(limits > 0), due, np.ones(len(table), dtype=bool)])
         return [(UNSOLVED, *told, "")[first] for first in found.argmax(axis=1)]
 
 
 FLUX_UNITS = ("Pa", "W/m^2", "N", "W")
-"""Units of tractions and heat fluxes, whose derivatives a contact element takes by name, zeros among them."""
+"""Units of tractions and heat fluxes; a contact element reads all their derivatives by name, also those that are zero.
+"""
 
 
 class Slopes:
-    """Rows of expressions with their exact derivatives by some arguments, compiled together, and with some margins."""
+    """Expressions with their exact derivatives by some arguments, and margins, compiled as one function."""
 
     def __init__(self, system: System, rows: Sequence[Any], by: Sequence[int], margins: Sequence[Any]) -> None:
         inputs, self.by = system.inputs, list(by)
@@ -312,7 +321,7 @@ class Slopes:
         self._function = compile_function(inputs, whole, system.of_cells)
 
     def __call__(self, table: Array) -> tuple[Array, Array, Array]:
-        """Values, derivatives of shape (points, rows, arguments), and margins."""
+        """Return values, derivatives of shape (points, rows, arguments), and margins."""
         ends = np.cumsum([len(self.pattern), self._entries.shape[1]])
         values, entries, margins = np.split(self._function(table), ends, axis=1)
         slopes = np.zeros((len(table), *self.pattern.shape))
@@ -320,28 +329,29 @@ class Slopes:
         return values, slopes, margins
 
     def block(self, slopes: NDArray[Any], rows: Sequence[int], by: Sequence[int]) -> NDArray[Any]:
-        """Derivatives of some rows by some arguments."""
+        """Return the derivatives of some rows by some arguments."""
         return slopes[..., rows, :][..., [self.by.index(column) for column in by]]
 
     def total(
         self, slopes: Array, rows: Sequence[int], by: Sequence[int], sought: Sequence[int], unknown: Sequence[int]
     ) -> tuple[Array, NDArray[np.bool_]]:
-        """Derivatives of rows by what is given, through what is solved for too, and which of them may be other than 0.
+        """Return total derivatives of rows by given arguments, including those through the unknowns, and the mask of
+        those that may be nonzero.
 
         G(u, x) = 0 gives du/dx = -(dG/du)^-1 dG/dx.
         """
         parts = [(rows, by), (rows, unknown), (sought, unknown), (sought, by)]
         direct, through, inner, outer = (self.block(slopes, *part) for part in parts)
         there, passes, among, reached = (self.block(self.pattern, *part) for part in parts)
-        # Which unknowns follow an argument through others: what is zero for every scene of this form is left out.
+        # Dependence of unknowns on an argument through other unknowns: derivatives that are always zero are left out.
         for _ in unknown:
             reached = reached | (among @ reached)
-        with np.errstate(invalid="ignore"):  # where nothing is found there are no derivatives
+        with np.errstate(invalid="ignore"):  # NaN where no solution was found
             return direct - through @ _solve(inner, outer), there | (passes @ reached)
 
 
 def _states(system: System) -> dict[str, Argument]:
-    """States as points may give them, but for those inside bodies."""
+    """Return the states as arguments by name, except those inside bodies."""
     found = []
     for column, state in enumerate(system.states, start=1):
         is_log = state.given is not None and state.given.state is None
@@ -352,21 +362,21 @@ def _states(system: System) -> dict[str, Argument]:
 
 
 def _histories(system: System) -> dict[str, Argument]:
-    """Prescribed variables, which are parameters where they are held."""
+    """Return the prescribed variables, which are held and thus parameters, as arguments by name."""
     levels = {p.symbol: p.path for p in system.parameters if p.path.endswith(LEVEL_SUFFIX)}
     held_at = [(item.quantity, item.expression) for item in system.named if item.expression in levels]
     return {q.name: Argument(system.inputs.index(symbol), q, levels[symbol]) for q, symbol in held_at}
 
 
 def _parameters(system: System) -> dict[str, Argument]:
-    """Parameters of laws by path."""
+    """Return the parameters of laws as arguments by path."""
     own = [p for p in system.parameters if p.changeable and not p.path.endswith(LEVEL_SUFFIX)]
     quantities = [Quantity(re.sub(r"\W+", "_", p.path).strip("_"), p.spec.unit, p.spec.text) for p in own]
     return {p.path: Argument(system.inputs.index(p.symbol), q, p.path) for p, q in zip(own, quantities, strict=True)}
 
 
 def _balances(system: System, gaps: Sequence[Equilibrium]) -> dict[str, Any]:
-    """Residuals of equilibrium by state: the balance of each gap, and the motion of what follows it."""
+    """Return the residuals of equilibrium by state: the balance of each gap, and the motion of states carried along."""
     found = {item.state: system.expand(item.residual) for item in gaps}
     moved = {state.name: state.symbol - state.initial for state in system.states}
     for item in gaps:
@@ -375,7 +385,7 @@ def _balances(system: System, gaps: Sequence[Equilibrium]) -> dict[str, Any]:
 
 
 def _rates(system: System, balances: Collection[str]) -> Iterator[Named]:
-    """Rates of what evolves and values of what is algebraic or in equilibrium."""
+    """Yield rates of evolved states, and values of states that are algebraic or in equilibrium."""
     for state in system.states:
         if state.algebraic or state.name in balances:
             yield Named(state.quantity, state.symbol)
@@ -385,7 +395,7 @@ def _rates(system: System, balances: Collection[str]) -> Iterator[Named]:
 
 
 def _capacities(system: System, scene: Scene, given: Mapping[str, Argument]) -> Iterator[Named]:
-    """Heat capacities of the bodies and the interface, but for bodies that are divided into cells."""
+    """Yield heat capacities of the bodies and the interface, except of bodies that are divided into cells."""
     members = [(f"{k}", body.name, body.temperature) for k, body in enumerate(scene.bodies, start=1)]
     divided = {profile.body for profile in system.profiles}
     for end, owner, temperature in (*members, ("c", "the interface", scene.interface.temperature)):
@@ -396,7 +406,7 @@ def _capacities(system: System, scene: Scene, given: Mapping[str, Argument]) -> 
 
 
 def _numbers(name: str, value: ArrayLike, unit: str) -> Array:
-    """Values of a column in SI; a text is a quantity with its unit."""
+    """Return the values of a column in SI; a text is a quantity with its unit."""
     if isinstance(value, str):
         return np.array([parse(value, unit, name=name)])
     if isinstance(value, list | tuple) and any(isinstance(x, str) for x in value):
@@ -411,9 +421,9 @@ def _numbers(name: str, value: ArrayLike, unit: str) -> Array:
 
 
 def _solve(matrix: Array, right: Array) -> Array:
-    """Solutions of many systems; not a number where a matrix is singular."""
-    with np.errstate(invalid="ignore"):  # where no gap was found there are no numbers
-        singular = np.linalg.slogdet(matrix)[0] == 0  # NumPy would refuse all for the sake of one
+    """Solve many linear systems; NaN where a matrix is singular."""
+    with np.errstate(invalid="ignore"):  # NaN where no gap was found
+        singular = np.linalg.slogdet(matrix)[0] == 0  # one singular matrix would make NumPy refuse all
     return np.asarray(np.linalg.solve(np.where(singular[:, None, None], np.nan, matrix), right))
 
 
@@ -423,18 +433,18 @@ def _column(quantity: Quantity, values: Array) -> Column:
 
 
 def _by(x: Quantity, shown: Sequence[Quantity], slopes: Array, there: NDArray[np.bool_]) -> Iterator[Column]:
-    """Derivatives of quantities by one, of those that depend on it; of tractions and heat fluxes all of them."""
+    """Yield the derivatives by one quantity of those that depend on it, and of all tractions and heat fluxes."""
     for quantity, values, depends in zip(shown, slopes, there, strict=True):
         if depends or quantity.unit in FLUX_UNITS:
             name = "_by_".join(DATASET_NAMES.get(name, name) for name in (quantity.name, x.name))
-            # What else the names say is theirs.
+            # Only the heads of the long names: the rest describes the quantities alone.
             top, bottom = (re.split("[:,(]", q.long_name)[0].strip() for q in (quantity, x))
             text = f"derivative of the {top} by the {bottom}"
             yield Column(name, POINT, values, quotient(quantity.unit, x.unit), text)
 
 
 def read_points(path: Path, evaluator: Evaluator) -> dict[str, list[float]]:
-    """Points from a CSV file, whose first line has names and units: ``g_n [nm], T_1 [K]``."""
+    """Read points from a CSV file, whose first line has names and units: ``g_n [nm], T_1 [K]``."""
     if not path.is_file():
         raise InputError("there is no such file of points.", Place(str(path)))
     text = CSVText(Tree(document.read(path, str(path)), Place(str(path))), quoted=True)
@@ -447,7 +457,7 @@ def read_points(path: Path, evaluator: Evaluator) -> dict[str, list[float]]:
 
 
 def evaluation(evaluator: Evaluator, points: Points, **origin: Any) -> PointResults:
-    """Quantities at points, with where they are from."""
+    """Evaluate quantities at points, and return them with their origin."""
     try:
         points = dict(points)
     except (TypeError, ValueError):

@@ -1,4 +1,4 @@
-"""Repetition of a run from its own file: the case and mechanism that the dataset carries, with the recorded solver."""
+"""Repetition of a run from its own file: the dataset carries the case, the mechanism and the solver."""
 
 from __future__ import annotations
 
@@ -37,19 +37,19 @@ DEPARTURE_TYPES: Mapping[str, tuple[type, ...]] = {
     "max_steps": (int,),
     "error": (str,),
 }
-"""Settings, with their types, in which a file may say that its run was not that of its case."""
+"""Settings, with their types, that a file may record as different from those of its case."""
 
 
 @dataclass(frozen=True)
 class Record:
-    """Content of a file: its attributes and every variable."""
+    """Content of a file: attributes and variables."""
 
     path: Path
     attributes: Mapping[str, Any]
     variables: Mapping[str, Any]
 
     def attribute(self, name: str, kind: type[A]) -> A:
-        """A global attribute of a kind; InputError where the file has none of that name."""
+        """Return a global attribute of this type; InputError if the file has none of that name."""
         if name not in self.attributes:
             raise self.error(f"has no attribute '{name}'; only datasets written by a run can be run again.")
         value = self.attributes[name]
@@ -65,12 +65,12 @@ class Record:
         return Place(str(self.path))
 
     def error(self, message: str) -> InputError:
-        """An input error about this file."""
+        """Return an input error about this file."""
         return InputError(message, self.place)
 
 
 def read(path: str | Path) -> Record:
-    """The attributes and variables of a netCDF file."""
+    """Read the attributes and variables of a netCDF file."""
 
     def record() -> Record:
         import netCDF4
@@ -86,13 +86,13 @@ def read(path: str | Path) -> Record:
 
 @dataclass(frozen=True)
 class KeptSweep:
-    """A repeated sweep of whose runs a part is kept."""
+    """A repeated sweep of which a part of the results is kept."""
 
     data: xarray.Dataset
 
     @classmethod
     def of(cls, record: Record, case: cases.Case) -> KeptSweep:
-        """A repeated sweep that has kept what its case says, in one file."""
+        """Repeat the sweep of a record and load what its case keeps."""
         try:
             plan = recorded_plan(record.attribute("sweep", str))
             changes = dict(json.loads(record.attribute("changes", str)))
@@ -116,7 +116,7 @@ class KeptSweep:
 
 
 def run_again(record: Record, allow_code: bool = False) -> Solution | SweepSolution | KeptSweep:
-    """The case of a record, run or swept as it was; with ``allow_code`` by laws whose source the record keeps."""
+    """Repeat the run or sweep of a record; ``allow_code`` permits laws whose source code the record carries."""
     mechanism = record.attribute("mechanism", str) if "mechanism" in record.attributes else None
     text = record.attribute("case", str)
     if not text:
@@ -138,7 +138,7 @@ def run_again(record: Record, allow_code: bool = False) -> Solution | SweepSolut
             picture=departures.get("picture", case.run.picture),
             atol=departures.get("atol", case.run.atol),
             max_steps=departures.get("max_steps", case.run.max_steps),
-            max_seconds=None,  # seconds are not the same twice
+            max_seconds=None,  # a limit of wall-clock time is not reproducible
         )
         plan = recorded_plan(record.attribute("sweep", str)) if "sweep" in record.attributes else None
     except InputError as error:
@@ -149,7 +149,7 @@ def run_again(record: Record, allow_code: bool = False) -> Solution | SweepSolut
 
 
 def _departures(record: Record) -> Mapping[str, Any]:
-    """Settings in which the run was not that of its case."""
+    """Return the recorded settings that differ from those of the case."""
     if "departures" not in record.attributes:
         return {}
     try:
@@ -166,7 +166,7 @@ def _departures(record: Record) -> Mapping[str, Any]:
 
 
 def differences(record: Record, solution: Solution | SweepSolution | KeptSweep) -> list[str]:
-    """Names of the variables that are not bit for bit those of the record, or in one of the two only."""
+    """Return the names of variables that are not bit for bit those of the record, or are missing in one of the two."""
     ours = {column.name: np.asarray(column.values) for column in solution.columns}
     theirs = record.variables
     return [name for name in dict.fromkeys([*theirs, *ours]) if not _identical(ours.get(name), theirs.get(name))]

@@ -36,7 +36,7 @@ class Sheet:
 
 
 def counted(count: int, what: str) -> str:
-    """A number with its noun, in the plural if need be.
+    """Return a number with its noun, in the plural if need be.
 
     >>> counted(1, "run"), counted(61, "run")
     ('1 run', '61 runs')
@@ -45,7 +45,7 @@ def counted(count: int, what: str) -> str:
 
 
 def columns(rows: Iterable[Sequence[str]]) -> list[str]:
-    """Rows as text in columns."""
+    """Format rows as text in aligned columns."""
     table = [list(row) for row in rows]
     widths = [max(len(cell) for cell in column) for column in zip(*table, strict=True)]
     return ["  ".join(f"{cell:<{w}}" for cell, w in zip(row, widths, strict=True)).rstrip() for row in table]

@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
 
 def load(source: Source, overrides: Overrides = ()) -> Simulation:
-    """Read and check a case; it is assembled and compiled when that is first needed.
+    """Read and check a case; it is assembled and compiled when first needed.
 
     Parameters
     ----------
@@ -50,13 +50,13 @@ def load(source: Source, overrides: Overrides = ()) -> Simulation:
         The path of a case file or the name of a shipped case; a text of several lines, a mapping of the keys of a case,
         or an open file. Files that a text or a mapping names are looked for in the working directory.
     overrides
-        What to change in the case before it is read: a text "path=value", a list of them, or a mapping from path to
-        value, as numbers in SI or as texts with units.
+        Changes of the case before it is read: a text "path=value", a list of them, or a mapping from path to value, as
+        numbers in SI or as texts with units.
 
     Returns
     -------
     Simulation
-        Which runs, sweeps and evaluates the case.
+        Object that runs, sweeps and evaluates the case.
 
     Raises
     ------
@@ -87,7 +87,7 @@ def run(source: Source, overrides: Overrides = ()) -> Solution:
     Raises
     ------
     InputError
-        Where the case is no case that can be run; how a run ends is its status, never an exception.
+        If the case cannot be run; how a run ends is its status, never an exception.
     """
     return load(source, overrides).run()
 
@@ -98,7 +98,7 @@ def sweep(
     until: Mapping[str, object] | None = None,
     overrides: Overrides = (),
 ) -> SweepSolution:
-    """Read a case and run its sweep, or the one given.
+    """Read a case and run its sweep, or the given one.
 
     Parameters
     ----------
@@ -115,7 +115,7 @@ def sweep(
     Raises
     ------
     InputError
-        Where the case has no sweep and none is given, or a path or value of it is wrong.
+        If the case has no sweep and none is given, or a path or value of it is wrong.
     """
     return load(source, overrides).sweep(over, until)
 
@@ -128,13 +128,13 @@ class Simulation:
         self._sweep_models: dict[str, Model] = {}
         self._freed: dict[frozenset[str], Simulation] = {}
         self._grids = {} if grids is None else grids
-        """Simulations of the same case by the cells of their bodies."""
+        """Simulations of the same case, by the cells of their bodies."""
         self._grids.setdefault(spatial.grid(case.scene), self)
         self.integrals_seconds = 0.0
-        """Time that the integrals over surfaces took."""
+        """Time that integrals over surfaces took [s]."""
 
     def _repr_html_(self) -> str:
-        """HTML for a notebook: the title, what is solved for, and the summary of ``check``."""
+        """Return HTML for a notebook: title, unknowns, and the summary of ``check``."""
         from surfacechem.runs.check import warnings
         from surfacechem.runs.summaries import check_summary
 
@@ -143,29 +143,29 @@ class Simulation:
         return f"<pre>{escape(str(told))}</pre>"
 
     def __repr__(self) -> str:
-        """Title and states in a line."""
+        """Return title and states in a line."""
         states = ", ".join(state.name for state in self.system.states) or "nothing to solve"
         return f"<Simulation {self.case.title!r}: {states}>"
 
     @classmethod
     def of(cls, scene: Scene, run: Run | None = None, title: str = "a scene in Python") -> Simulation:
-        """The simulation of a scene that is built in Python, which does all that one of a case does.
+        """Make the simulation of a scene built in Python, which does all that the simulation of a case does.
 
         Parameters
         ----------
         scene
             Two bodies, the interface, heat paths, loading and initial values, in SI.
         run
-            Output times and tolerances; needed to run it, not to evaluate it.
+            Output times and tolerances; needed to run the scene, not to evaluate it.
         title
-            Its name in figures and datasets. These hold no case, so that they cannot be run again from themselves.
+            Name in figures and datasets. These hold no case, so that they cannot be run again from themselves.
 
         Returns
         -------
         Simulation
-            Assembled and compiled when first needed; an InputError of the scene comes then.
+            Assembled and compiled when first needed; an InputError of the scene is raised then.
         """
-        times = run and replace(run, times=tuple(map(float, run.times)))  # an array would do as well
+        times = run and replace(run, times=tuple(map(float, run.times)))  # times may be an array
         return cls(Case("scene", title, "", "", scene, times, None, None, "", None, {"": Place(title)}, ""))
 
     @cached_property
@@ -192,7 +192,7 @@ class Simulation:
 
     @cached_property
     def evaluator(self) -> Evaluator:
-        """The scene compiled for its values at given states."""
+        """The scene compiled for evaluation at given states."""
         from surfacechem.runs.points import Evaluator
 
         try:
@@ -207,25 +207,25 @@ class Simulation:
         ----------
         points
             Values by name, each a number, a list of them, or a text with a unit: prescribed variables, states, or
-            parameters by path. In SI; what is not given has the value of the case at its start. What has no capacity
-            or inertia is solved for unless it is given.
+            parameters by path. In SI; the default is the value of the case at its start. States without capacity or
+            inertia are solved for unless they are given.
 
         Returns
         -------
         xarray.Dataset
-            Along ``point``: what is given, tractions, fluxes, rates, energies, entropies, heat capacities, and the
-            derivative of each by what is given, ``t_n_by_g_n`` for instance, with unit and long name. ``admissible``
-            is zero where a law does not hold, and ``reason`` says why.
+            Along ``point``: given values, tractions, fluxes, rates, energies, entropies, heat capacities, and the
+            derivative of each by the given ones, ``t_n_by_g_n`` for instance, with unit and long name. ``admissible``
+            is zero where a law is not valid, and ``reason`` says why.
 
         Raises
         ------
         InputError
-            Where the scene has nothing of a name, or a value is no finite number or outside its range.
+            If the scene has no quantity of a name, or a value is not finite or outside its range.
         """
         return self.evaluated(points).dataset
 
     def evaluated(self, points: Points | None = None) -> PointResults:
-        """Quantities of the scene at given states, ready to be written."""
+        """Evaluate quantities of the scene at given states, as results that can be written."""
         from surfacechem.runs.points import evaluation
 
         return evaluation(self.evaluator, {} if points is None else points, **self._origin({}))
@@ -240,9 +240,9 @@ class Simulation:
         run
             Other output times, solver and tolerances than the case's.
         error
-            Where the error of the run is from, once it is asked for: "auto", the exact solution of the case if there is
+            Source of the error of the run, once it is asked for: "auto", the exact solution of the case if there is
             one, else a second run at a tighter tolerance; "estimate", always a second run; "balances", no second run,
-            where no accuracy is asked for that it would verify.
+            which is refused if a requested accuracy has to be verified.
 
         Returns
         -------
@@ -282,8 +282,8 @@ class Simulation:
     def _judged(
         self, trajectory: Trajectory, unused: str, way: str, estimate: Accuracy | None, errors: list[CellErrors]
     ) -> Judgement:
-        """The error of a run in one of the ways, from a second run that there was or from one that is made; ``unused``
-        says why the exact solution does not count, ``errors`` are those of its cells where these are known.
+        """Return the error of a run by one of the ways, from an existing second run or from a new one; ``unused`` is
+        the reason why the exact solution does not apply, ``errors`` are those of the cells if they are known.
         """
         case = self.case
         exact = (case.reference.name, case.reference.options) if case.reference and not unused else None
@@ -300,14 +300,14 @@ class Simulation:
         return Judgement(found, exact_outputs(found, exact, case.scene), notes)
 
     def _origin(self, changes: Mapping[str, float]) -> dict[str, Any]:
-        """Origin of results: texts of the case, changes, and time spent before."""
+        """Return the origin of results: texts of the case, changes, and time spent before the run."""
         case = self.case
         texts = {"title": case.title, "source": case.source, "case": case.text, "mechanism": case.mechanism_text or ""}
         spent = max(simulation.integrals_seconds for simulation in self._grids.values())
         return {**texts, "changes": changes, "before_seconds": spent}
 
     def _unused(self, values: Mapping[str, float]) -> str:
-        """Reason why the exact solution of the case does not count with these values; empty where it does."""
+        """Return the reason why the exact solution of the case does not apply to these values; empty if it does."""
         if self.case.reference is None or not values:
             return self.case.unused
         own = self.model.values()
@@ -315,7 +315,7 @@ class Simulation:
         return self.case.reference.fixed if departs else self.case.unused
 
     def _with(self, scene: Scene) -> Simulation:
-        """The simulation with the cells of another scene, assembled and compiled once for each choice of them."""
+        """Return the simulation with the cells of another scene, assembled and compiled once per choice of cells."""
         key = spatial.grid(scene)
         # Shared by all simulations of the case, so that a search for an accuracy compiles each grid once.
         if key not in self._grids:
@@ -325,8 +325,8 @@ class Simulation:
     def _resolved(
         self, settings: Run, values: Mapping[str, float], plan: Plan | None = None, threads: int | None = None
     ) -> tuple[Simulation, Sequence[Trajectory], list[CellErrors]]:
-        """The simulation with the cells that its accuracy needs, its run or its runs over a plan, and the errors of the
-        cells of each where an accuracy chooses all of them.
+        """Return the simulation with the cells that the accuracy needs, its run or its runs over a plan, and the errors
+        of the cells of each run if an accuracy determines all cells.
         """
         chosen = self._with(spatial.tightened(self.case.scene, settings.accuracy))
         scene, system = chosen.case.scene, chosen.system
@@ -337,7 +337,7 @@ class Simulation:
         points = [values_of(system, {**values, **point}) for point in (plan.points if plan else [{}])]
         looked = spatial.looked_at(system, settings)
         runs = sweeps.settings(system, plan, looked, points) if plan else [looked]
-        # Of a sweep all runs have the same cells, those of the run that needs the most.
+        # All runs of a sweep share the cells of the run that needs the most.
         times = [spatial.shortest(system, *pair) for pair in zip(runs, points, strict=True)]
         cells: Scene | None = spatial.with_resolved_layers(scene, spatial.layers(system, points, times))
         for _ in range(1 + spatial.MOST_GRIDS):
@@ -349,14 +349,14 @@ class Simulation:
             cells = spatial.refined(cells, spatial.worst_errors(errors), chosen._layers(*done))
         if settings.times != looked.times or settings.picture is not None:
             done = chosen._solved(settings, values, plan, threads)
-        # Errors at outputs that are asked for are told at these.
+        # Errors at given output times are estimated at these times.
         known = not spatial.with_given_cells(scene) and (settings.picture is not None or settings.times == looked.times)
         return chosen, done, errors if known else []
 
     def _solved(
         self, settings: Run, values: Mapping[str, float], plan: Plan | None = None, threads: int | None = None
     ) -> Sequence[Trajectory]:
-        """The run with these values, or the runs over a plan: a run is a batch of one."""
+        """Solve the run with these values, or the runs over a plan: a run is a batch of one."""
         try:
             if plan is None:
                 if settings.steady:
@@ -366,7 +366,7 @@ class Simulation:
                 return [self.model.solve(settings, values)]
             from surfacechem.runs import sweeps
 
-            # Statistics of rupture are part of what is compiled.
+            # Statistics of rupture are compiled with the equations.
             key = plan.until[0] if plan.until else ""
             if key not in self._sweep_models:
                 self._sweep_models[key] = Model(sweeps.prepared(self.system, plan)) if key else self.model
@@ -375,14 +375,14 @@ class Simulation:
             raise self.case.located(plan.located(error) if plan else error) from None
 
     def _layers(self, *runs: Trajectory) -> dict[str, float]:
-        """By body, the least layer that heat has reached when runs, or events in them, are first looked at."""
+        """Return by body the thinnest layer that heat has reached when outputs or events of runs first show it."""
         events = [np.concatenate([*event_times(run).values(), []]) for run in runs]
         pairs = zip(runs, events, strict=True)
         times = [spatial.shortest(self.system, run.run, run.values, at) for run, at in pairs]
         return spatial.layers(self.system, [run.values for run in runs], times)
 
     def _cell_errors(self, trajectory: Trajectory) -> CellErrors:
-        """Errors of the cells, by variable; nothing where no body has any."""
+        """Return the errors of the cells by variable; none if no body is divided."""
         scene = self.case.scene
         if not spatial.is_divided(scene):
             return CellErrors()
@@ -391,7 +391,7 @@ class Simulation:
             return self._halved(trajectory)
         if spatial.resolves(scene, parts) and (found := self._halved(trajectory)).converged:
             return found
-        # Cells wider than a layer agree on almost nothing having happened: only others that resolve it tell the error.
+        # Grids coarser than the layer agree that almost nothing has happened; only one resolving it shows the error.
         other = self._with(spatial.with_resolved_layers(scene, parts, given=True))
         held_against = other._as_before(trajectory)
         own = other._halved(held_against)
@@ -399,19 +399,19 @@ class Simulation:
         return own.added_to(found)
 
     def _law_errors(self, trajectory: Trajectory) -> CellErrors:
-        """Errors of a run from those of the numbers that laws compute for themselves; none where no law has any."""
+        """Return the errors of a run due to errors of numbers that laws compute themselves; none if no law has any."""
         if not inexact(self.case.scene):
             return CellErrors()
         return law_errors(trajectory, self._perturbed._as_before(trajectory), self.case.scene)
 
     @cached_property
     def _perturbed(self) -> Simulation:
-        """The simulation whose laws are wrong by the errors of the numbers that they compute for themselves."""
+        """Simulation whose laws are perturbed by the errors of the numbers that they compute themselves."""
         return Simulation(replace(self.case, scene=perturbed(self.case.scene)))
 
     def _halved(self, trajectory: Trajectory, given: bool = True) -> CellErrors:
-        """Errors of the cells from runs with a half and a quarter of them; without ``given`` of those that an accuracy
-        chooses only.
+        """Estimate the errors of the cells from runs with a half and a quarter of them; without ``given`` only of cells
+        that an accuracy determines.
         """
         coarser = [self._with(spatial.coarsened(self.case.scene, divisor, given)) for divisor in (2, 4)]
         runs = [trajectory, *(simulation._as_before(trajectory) for simulation in coarser)]
@@ -419,7 +419,7 @@ class Simulation:
         return spatial.cell_errors(near, far, trajectory.run.rtol)
 
     def _as_before(self, trajectory: Trajectory) -> Trajectory:
-        """A run with other cells again with these, which share its values but for those of the cells."""
+        """Repeat a run of another grid with these cells, with the same values except those of the cells."""
         values = {path: value for path, value in trajectory.values.items() if path in self._units}
         return self._solved(trajectory.run, values)[0]
 
@@ -434,8 +434,8 @@ class Simulation:
     ) -> SweepSolution:
         """Run over values of parameters in one call of the compiled loop; nothing is compiled twice.
 
-        What is not given is that of the section ``sweep`` of the case, but for ``keep``: all of every run is kept.
-        :meth:`stream` keeps what the section says.
+        Arguments that are not given are those of the section ``sweep`` of the case. Its ``keep`` is ignored: all of
+        every run is kept; :meth:`stream` keeps what the section says.
 
         Parameters
         ----------
@@ -446,11 +446,11 @@ class Simulation:
         changes
             Values that differ from the case, by path, in SI or with a unit, the same for all runs.
         threads
-            How many runs are solved at a time; as many as there are processors if not given.
+            Number of runs solved at a time; by default the number of processors.
         sample
             {of: distributions by path, runs, method, seed}.
         combine
-            "grid", every value with every other, or "zip", the first of all, then the second of all.
+            "grid", every value with every other, or "zip", the first values of all, then the second ones.
 
         Returns
         -------
@@ -471,7 +471,7 @@ class Simulation:
         threads: int | None = None,
         run: Run | None = None,
     ) -> SweepSolution:
-        """Run a plan whose values are in SI, with all of its runs in memory; ``run`` instead of the case's."""
+        """Run a plan with values in SI, with all runs in memory; ``run`` replaces the settings of the case."""
         from surfacechem.format.sections import MOST_RUNS
         from surfacechem.runs import sweeps
 
@@ -506,7 +506,7 @@ class Simulation:
         resume: bool = False,
         part: tuple[int, int] = (1, 1),
     ) -> Stream:
-        """A sweep of any size that is about to go into a store, of which `run` computes what is missing.
+        """Prepare a sweep of any size into a store; ``run`` of the result computes the missing runs.
 
         Parameters
         ----------
@@ -517,9 +517,9 @@ class Simulation:
         changes
             Values that differ from the case, by path, in SI or with a unit, the same for all runs.
         resume
-            Whether an unfinished store of the same plan goes on.
+            True to continue an unfinished store of the same plan.
         part
-            Which part of how many is computed.
+            Number of the part to compute, and number of parts.
 
         Returns
         -------
@@ -529,7 +529,7 @@ class Simulation:
         Raises
         ------
         InputError
-            Where the store is there already, is another plan's, or cannot hold what is asked for.
+            If the store exists already, belongs to another plan, or cannot hold what is asked for.
         """
         from surfacechem.runs import streaming
 
@@ -553,7 +553,7 @@ class Simulation:
         sample: Mapping[str, object] | None = None,
         combine: str | None = None,
     ) -> Plan:
-        """The plan of a sweep in SI: a function from the number of a run to its values.
+        """Return the plan of a sweep in SI: a function from the number of a run to its values.
 
         Parameters
         ----------
@@ -586,18 +586,19 @@ class Simulation:
 
     @cached_property
     def _units(self) -> dict[str, str]:
-        """Units of all that a run may change, by path, parameters at their defaults among them."""
+        """Units of all values that a run may change, by path, including parameters at their defaults."""
         system = self.system
         return {**{path: spec.unit for path, (spec, _) in system.constants.items()}, **system.changeable}
 
     def _ready(self, changes: Overrides, plan: Plan | None = None) -> tuple[Simulation, dict[str, float]]:
-        """The simulation in whose equations stand symbols for the defaults that are swept, or that changes depart from,
-        and the changes that it takes: the case with these values, assembled anew; itself where no default is.
+        """Return the simulation in which defaults that are swept or changed are parameters, and the changes for it.
+
+        It is the case assembled anew with symbols for these defaults; without any it is this simulation.
         """
         constants, values = self.system.constants, self._values(changes)
         departing = {path: x for path, x in values.items() if path in constants and x != constants[path][1]}
         for path, ends in plan.at(np.array([0, plan.size - 1])).items() if plan else ():
-            if path in constants:  # any other value does for what needs a symbol
+            if path in constants:  # any value but the default makes it a symbol
                 usual = constants[path][1]
                 departing[path] = next((x for x in ends.tolist() if x != usual), math.nextafter(usual, math.inf))
         if not departing:
@@ -625,14 +626,14 @@ class Simulation:
         return {path: parse(value, units[path], name=path) for path, value in changes.items()}
 
     def _is_key(self, path: str, value: object) -> bool:
-        """Whether a path is that of a key of the case, be its value a wrong one; initial values are parameters."""
+        """True if a path is a key of the case, even if its value is wrong; initial values are parameters."""
         case = self.case
         if not case.text or path.startswith("initial."):
             return False
         try:
             apply(parse_document(case.text), {path: value})
         except InputError:
-            return False  # there is nothing whose key it would be
+            return False  # there is no such section
         try:
             cases.load_text(case.text, case.name, mechanism_text=case.mechanism_text, overrides={path: value})
         except InputError as error:

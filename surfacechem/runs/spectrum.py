@@ -1,9 +1,9 @@
-r"""Force spectra: the value of a growing load at which bonds break, from the run itself.
+r"""Force spectra: statistics of the growing load at which bonds rupture, evaluated along a single run.
 
 Along a run in which a prescribed variable x grows, the survival is :math:`S=\phi/\phi_i` and the density of ruptures
 :math:`-dS/dx`. The median is where S crosses one half, the mode where the density is largest, and both are located as
-events; the mean is :math:`x_0+\int S\,dx`, integrated beside the state. Under a constant load the integral of S over
-time is the mean lifetime.
+events; the mean is :math:`x_0+\int S\,dx`, integrated along with the state. Under a constant load the integral of S
+over time is the mean lifetime.
 
 Source: Evans & Ritchie (1997), Biophys. J. 72, 1541-1555, doi 10.1016/S0006-3495(97)78802-7.
 """
@@ -25,8 +25,8 @@ from surfacechem.solve.run import Trajectory
 from surfacechem.tolerances import LEAST_BONDED
 
 INTACT = LEAST_BONDED**0.5
-"""Largest survival at the end, 1e-6, at which the mean is known: what is left then is less than half of the decades to
-LEAST_BONDED, at which a run has ruptured and ends.
+"""Largest survival at the end, 1e-6, for which the mean is known: half of the decades down to LEAST_BONDED, at which
+all bonds count as ruptured and a run ends.
 """
 
 MEDIAN_REASON, MODE_REASON = "half of the bonds are broken", "the density of ruptures is stationary"
@@ -49,7 +49,7 @@ class Lifetime:
 
 
 def history(system: System, variable: str) -> Expression:
-    """A prescribed variable that is a straight line in time, as an expression; InputError for any other."""
+    """Return a prescribed variable that is linear in time as an expression; InputError for any other."""
     named = next((item for item in system.named if item.name == variable), None)
     if named is None:
         raise InputError(f"no law reads a prescribed {variable}.", path="sweep.until")
@@ -63,16 +63,16 @@ def history(system: System, variable: str) -> Expression:
 
 
 def evolves_bonds(system: System) -> bool:
-    """Whether bonds evolve."""
+    """True if bonds evolve."""
     phi = symengine.Symbol("phi")
     return bool(system.expand(phi).free_symbols & {state.symbol for state in system.states})
 
 
 def breaks_bonds(system: System) -> bool:
-    """Whether bonds evolve that only break, so that each has one force at which it does."""
+    """True if bonds evolve and only break, so that each has one force of rupture."""
     if not evolves_bonds(system):
         return False
-    # Where bonds form when there are none the loss of bonds is no count of ruptures.
+    # If bonds form at phi = 0 they can rebind, and the loss of bonds does not count ruptures.
     names = {state.symbol for state in system.states if state.name == "phi" or state.name.startswith("theta_")}
     gone = _total(system, system.expand(symengine.Symbol("phi"))).subs(dict.fromkeys(names, 0))
     point = {p.symbol: p.at(0.0) for p in system.parameters} | {s.symbol: s.initial for s in system.states}
@@ -82,7 +82,7 @@ def breaks_bonds(system: System) -> bool:
 
 
 def with_rupture(system: System, variable: str) -> System:
-    """The system that also records where its bonds break as the variable grows, and ends when all are broken."""
+    """Return the system with statistics of rupture over ``variable``, whose runs end when all bonds are broken."""
     unit = next(item.quantity.unit for item in system.named if item.name == variable)
     speed = derivative(history(system, variable), system.t)
     left, survival = _survival(system)
@@ -103,8 +103,8 @@ def with_rupture(system: System, variable: str) -> System:
 
 
 def with_lifetime(system: System, least: float) -> System:
-    """The system that also integrates the survival over time, and ends when it has fallen to the ``least``; InputError
-    where bonds can form again, or too many would be left.
+    """Return the system with the time integral of the survival, whose runs end when the survival has fallen to
+    ``least``; InputError if bonds can form again, or if ``least`` leaves too many.
     """
     if not breaks_bonds(system):
         message = "no lifetimes: no bonds evolve here, or they can form again, and none breaks once."
@@ -123,7 +123,7 @@ def with_lifetime(system: System, least: float) -> System:
 
 
 def _survival(system: System) -> tuple[Quantity, Expression]:
-    """The bonding state over its initial value, which is a parameter."""
+    """Return the bonding state over its initial value, which is a parameter."""
     phi = system.expand(symengine.Symbol("phi"))
     paths = {p.path: p.symbol for p in system.parameters}
     start = {s.symbol: paths[f"initial.{s.name}"] for s in system.states if f"initial.{s.name}" in paths}
@@ -131,8 +131,8 @@ def _survival(system: System) -> tuple[Quantity, Expression]:
 
 
 def lifetimes(survival: Array, density: Array, speed: Array) -> Array:
-    r"""Mean lifetimes [s] at each load from runs at growing loads: :math:`\tau=S/(p\,\dot x)`, the survivors over how
-    fast they break; not a number where hardly a bond is left. The ``speed`` of the load is one for each run.
+    r"""Return mean lifetimes [s] at each load from runs at growing loads: :math:`\tau=S/(p\,\dot x)`, the survivors
+    over their rate of rupture; NaN where hardly a bond is left. ``speed`` is the loading rate, one for each run.
 
     It is the lifetime at a constant load where bonds have no memory, and the same for all speeds. Source: Dudko, Hummer
     & Szabo (2008), PNAS 105, 15755, doi 10.1073/pnas.0806085105.
@@ -146,7 +146,7 @@ def lifetimes(survival: Array, density: Array, speed: Array) -> Array:
 
 
 def _total(system: System, expression: Expression) -> Expression:
-    """Time derivative along a run; rates of bonds are put in where they are known, as they are better than slopes."""
+    """Return the time derivative along a run; known rates of bonds are more accurate than slopes of states."""
     bonds = {account.law: system.expand(account.rate) for account in system.ledger if account.kind == "bonds"}
     total = derivative(expression, system.t)
     for state in system.states:
@@ -155,7 +155,7 @@ def _total(system: System, expression: Expression) -> Expression:
 
 
 def statistics(trajectory: Trajectory, variable: str) -> Statistics:
-    """Statistics of a run of a system :func:`with_rupture`; not a number where the run does not tell."""
+    """Return the statistics of a run of a system :func:`with_rupture`; NaN where the run does not determine them."""
     model, result = trajectory.model, trajectory.result
     columns = model.system.output_columns
     column, density = columns[variable], columns[f"density_{variable}"]
@@ -172,13 +172,13 @@ def statistics(trajectory: Trajectory, variable: str) -> Statistics:
 
 
 def lifetime(trajectory: Trajectory) -> Lifetime:
-    """Mean lifetime of a run of a system :func:`with_lifetime`; not a number where too many bonds are left."""
+    """Return the mean lifetime of a run of a system :func:`with_lifetime`; NaN if too many bonds are left."""
     survivors, integral = _at_end(trajectory, "lifetime")
     return Lifetime(integral if survivors <= 1.01 * INTACT else math.nan)
 
 
 def _at_end(trajectory: Trajectory, account: str) -> tuple[float, float]:
-    """The survival at the end of a run, and an account of its ledger."""
+    """Return the survival at the end of a run, and an account of its ledger."""
     result, system = trajectory.result, trajectory.model.system
     end = trajectory.model.evaluate(result, np.array([result.t]), result.y[None], result.ydot[None])[0]
     accounts = [item.quantity.name for item in system.ledger]

@@ -1,4 +1,4 @@
-"""Sweeps of any size: runs in chunks, from the plan to the store, with no more in memory than is being computed."""
+"""Sweeps of any size: runs are computed in chunks, from the plan to the store, with only current chunks in memory."""
 
 from __future__ import annotations
 
@@ -36,24 +36,25 @@ if TYPE_CHECKING:
 
 
 EXPLICIT_RUNS, IMPLICIT_RUNS, JUMPING_RUNS, SLOW_RUNS = 2**16, 2**14, 2**12, 2**9
-"""Runs of a chunk at most, about a second or two: of those that take explicit steps, or implicit ones, that jump, and
-that are looked at one by one.
+"""Largest numbers of runs in a chunk, about one or two seconds of work: of runs with explicit steps, with implicit
+steps, with jumps, and of runs that are solved one by one.
 """
 
 RUNS_OF_A_PIECE = 2**12
-"""Runs that one thread takes at a time at most: of fewer, calls of NumPy and what threads wait for each other show."""
+"""Largest number of runs that a thread takes at a time; with far fewer, calls of NumPy and waiting threads cost time.
+"""
 
 
 def processors() -> int:
-    """Processors that this process may use: of a job on a shared machine fewer than there are."""
+    """Return the number of processors that this process may use: fewer than there are for a job on a shared machine."""
     try:
         return len(os.sched_getaffinity(0))
-    except AttributeError:  # on some systems nobody knows
+    except AttributeError:  # not every system reports it
         return os.cpu_count() or 1
 
 
 class ChunkRuns:
-    """The runs of a plan, in any order and in parts of any size, as columns of what is kept."""
+    """The runs of a plan, computed in any order and in parts of any size, as columns of the kept results."""
 
     def __init__(
         self,
@@ -68,7 +69,7 @@ class ChunkRuns:
         self.changes, self.checked = changes, checked
         self.model = Model(keeping.reaching(sweeps.prepared(simulation.system, plan), keep))
         case = simulation.case
-        # Where the case names no solver, the one that suits the scene.
+        # If the case names no solver, the one that suits the scene.
         asked = case.run if "run.solver" in case.places else replace(case.run, solver=AUTO)
         chosen = run or self.model.chosen(asked, self.model.values(changes))
         self.run = sweeps.following(self.model, plan, chosen, changes) if keep.series and run is None else chosen
@@ -78,17 +79,17 @@ class ChunkRuns:
         self.ways = [arrays] if told and cannot_jump(self.model, arrays.problem) else []
         if told and self.model.system.edges:
             self.ways.append(JumpingRuns(self.model, plan, self.run, changes, keep))
-        """Ways to compute runs as arrays, in the order in which they are tried; the rest is looked at one by one."""
+        """Ways to compute runs as arrays, in the order in which they are tried; the rest is solved run by run."""
         self.arrays = arrays if self.ways else None
 
     @property
     def explicit(self) -> bool:
-        """Whether runs take explicit steps and do not jump."""
+        """True if runs take explicit steps and do not jump."""
         return any(way.problem.explicit and not way.jumps for way in self.ways)
 
     @property
     def at_once(self) -> int:
-        """Runs of a chunk at most."""
+        """Largest number of runs in a chunk."""
         if self.explicit:
             return EXPLICIT_RUNS
         if all(way.jumps for way in self.ways):
@@ -97,12 +98,12 @@ class ChunkRuns:
 
     @property
     def waits(self) -> bool:
-        """Whether the loop that steps eight runs at once has to be compiled before the first of them."""
+        """True if the loop that steps eight runs at once has to be compiled before the first of them."""
         return self.explicit and self.model.program.lanes is not None and not lane_batch.LOOP.is_compiled
 
     @cached_property
     def piece(self) -> int:
-        """Runs that are computed at once, so that their outputs and all that is made of them stay small."""
+        """Number of runs computed at once, small enough that outputs and all derived arrays stay small."""
         system = self.model.system
         if self.arrays is None:
             return 2**6
@@ -111,14 +112,14 @@ class ChunkRuns:
         return int(np.clip(CHUNK_BYTES // (2 * row), 2**6, RUNS_OF_A_PIECE))
 
     def flags(self, name: str) -> dict[str, Any]:
-        """Attributes with the meaning of the codes of a variable, where it holds codes."""
+        """Return the attributes with codes and their meanings, if the variable holds codes."""
         words = {"status": STATUSES, "reason": self.one_by_one.reasons}.get(name)
         if words is None:
             return {}
         return {"flag_values": list(range(len(words))), "flag_meanings": " ".join(map(variable, words))}
 
     def columns(self, index: Index) -> Columns:
-        """Columns that are kept of the runs of these numbers."""
+        """Compute the kept columns of the runs with these numbers."""
         values = self.plan.at(index)
         times = len(self.run.times)
         columns: Columns = {}
@@ -129,17 +130,17 @@ class ChunkRuns:
             left = left[~told]
             if not len(left):
                 return columns
-        # What arrays do not tell is run by run, and the same in any company.
+        # Runs that arrays leave open are solved run by run; results do not depend on the other runs of a chunk.
         _put(columns, left, self.one_by_one.columns(self._solved(values, left), times), len(index))
         return columns
 
     def _solved(self, values: Mapping[str, Any], chosen: Index) -> list[Trajectory | str]:
-        """Some runs by themselves; of one whose values are not admissible, or that does not come to rest, why."""
+        """Solve runs one by one; for a run that is inadmissible or reaches no steady state return the reason."""
         points = [{path: float(column[i]) for path, column in values.items()} for i in chosen.tolist()]
-        try:  # through the compiled loop together
+        try:  # all in one call of the compiled loop
             full = [self.model.values({**self.changes, **point}) for point in points]
             runs = sweeps.settings(self.model.system, self.plan, self.run, full)
-            if self.run.steady:  # each until its own rest, whatever the others are
+            if self.run.steady:  # each to its steady state, whatever the other runs are
                 runs = [to_rest(self.model, run, at) for run, at in zip(runs, full, strict=True)]
             return [*self.model.solve_all(list(zip(runs, full, strict=True)))]
         except InputError as error:
@@ -149,7 +150,7 @@ class ChunkRuns:
 
 
 def _put(columns: Columns, own: Index, found: Columns, count: int) -> None:
-    """Put what is kept of some of so many runs into the columns of all."""
+    """Write the columns of the runs ``own`` into the columns of all ``count`` runs."""
     for name, column in found.items():
         nothing = np.nan if column.dtype.kind == "f" else 0
         whole = columns.setdefault(name, np.full((count, *column.shape[1:]), nothing, column.dtype))
@@ -161,7 +162,7 @@ def _put(columns: Columns, own: Index, found: Columns, count: int) -> None:
 
 @dataclass(frozen=True)
 class Job:
-    """All that a worker needs to compute any runs of a sweep, as text."""
+    """Definition of a sweep as text, from which a worker computes any of its runs."""
 
     name: str
     case: str
@@ -182,7 +183,7 @@ def _runs_of(job: Job) -> ChunkRuns:
 
 
 def columns_of(job: Job, index: Index) -> Columns:
-    """Columns that are kept of some runs of a sweep, computed in any process."""
+    """Compute the kept columns of some runs of a sweep, in any process."""
     return _runs_of(job).columns(index)
 
 
@@ -194,12 +195,12 @@ class Progress:
     done: int
     failed: int
     resumed: int
-    """Runs that were there before."""
+    """Runs that were stored before."""
 
 
 @dataclass(frozen=True)
 class Stream:
-    """A sweep on its way into a store."""
+    """A sweep that is written to a store."""
 
     chunks: ChunkRuns = field(repr=False)
     store: Store
@@ -208,15 +209,15 @@ class Stream:
 
     @property
     def numbers(self) -> range:
-        """Chunks of this part: every so many, so that parts take the same time."""
+        """Chunks of this part, at a stride of the number of parts, so that parts take equal time."""
         k, count = self.part
         return range(k - 1, self.store.layout.chunks, count)
 
     def run(
         self, threads: int | None = None, client: Any = None, told: Callable[[Progress], None] = lambda _: None
     ) -> Store:
-        """Compute what is missing and store it; ``client`` is that of a cluster of dask.distributed, whose workers
-        compute while this process writes.
+        """Compute the missing chunks and store them. With the ``client`` of a dask.distributed cluster its workers
+        compute, while this process writes.
         """
         layout = self.store.layout
         with self.store.locked(f"{self.part[0]}-of-{self.part[1]}"):
@@ -228,7 +229,7 @@ class Stream:
             done, failed = resumed, 0
             told(Progress(runs, done, failed, resumed))
             for number, columns in self._computed(missing, threads or processors(), client):
-                # Only this thread writes, so that chunks and their marks come in order.
+                # Only this thread writes, so that chunks and their marks are written in order.
                 self.store.write(number, columns)
                 done += len(columns["status"])
                 failed += int(np.sum(columns["status"] >= STATUSES.index("failed")))
@@ -236,11 +237,11 @@ class Stream:
         return self.store
 
     def check(self, threads: int | None = None) -> Checked | None:
-        """Find the errors of the runs that are checked and store them, once every chunk is there; None before."""
+        """Find and store the errors of the checked runs, once every chunk is there; None before."""
         return checking.check(self, threads)
 
     def _computed(self, numbers: Sequence[int], threads: int, client: Any) -> Iterator[tuple[int, Columns]]:
-        """The columns of chunks, in order; the next are computed while one is written."""
+        """Yield the columns of chunks in order; the next chunks are computed while one is written."""
         pool = ThreadPoolExecutor(threads)
 
         def submit(part: Index) -> Any:
@@ -253,7 +254,7 @@ class Stream:
         try:
             for number in numbers:
                 index = self.store.layout.index(number)
-                # All threads share a chunk, in parts that are alike.
+                # The threads share a chunk in parts of equal size.
                 rounds = -(-len(index) // (threads * self.chunks.piece))
                 size = len(index) if client else -(-len(index) // (threads * rounds))
                 parts = [index[first : first + size] for first in range(0, len(index), size)]
@@ -263,7 +264,7 @@ class Stream:
             while waiting:
                 yield _joined(*waiting.popleft())
         finally:
-            # Where writing has failed nothing more is computed in vain.
+            # If writing has failed, nothing more is computed in vain.
             for future in (future for _, futures in waiting for future in futures):
                 future.cancel()
             pool.shutdown(wait=False, cancel_futures=True)
@@ -275,7 +276,7 @@ def _joined(number: int, futures: Sequence[Any]) -> tuple[int, Columns]:
 
 
 def failed_runs(path: Path, status: str) -> Plan:
-    """The plan of the runs of a store that ended in one way; InputError where none has, or nothing is stored."""
+    """Return the plan of the runs of a store with this status; InputError if it has none, or is no store of a sweep."""
     if status not in STATUSES:
         raise InputError(f"no runs are called '{status}'.{suggestion(status, STATUSES)}", Place(path="--only"))
     data = opened(path)
@@ -297,7 +298,7 @@ def stream(
     resume: bool = False,
     part: tuple[int, int] = (1, 1),
 ) -> Stream:
-    """A sweep that is about to go into a store, which is made, or opened to be gone on with."""
+    """Prepare a sweep into a store, which is created, or opened to be continued."""
     target, case = store_path(path), simulation.case
     section = case.sweep or SweepSection()
     keep = keep_of(section.keep, sweeps.prepared(simulation.system, plan))
@@ -322,7 +323,7 @@ def stream(
 
 
 def _layout(chunks: ChunkRuns, job: Job) -> Layout:
-    """Arrays, coordinates and attributes of the store of a sweep."""
+    """Return arrays, coordinates and attributes of the store of a sweep."""
     system, plan, keep = chunks.model.system, chunks.plan, chunks.keep
     names = sweeps.parameter_names(system, plan)
     sizes = sweeps.dimensions(plan, names)
@@ -344,7 +345,7 @@ def _layout(chunks: ChunkRuns, job: Job) -> Layout:
 
 
 def _attributes(chunks: ChunkRuns, job: Job) -> dict[str, Any]:
-    """Origin of a store: the same for all that write to it, and nothing that changes from time to time."""
+    """Return the attributes of a store: the same for all writers, and none that changes with time."""
     case = chunks.simulation.case
     return {
         "Conventions": CONVENTIONS,

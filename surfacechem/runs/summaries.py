@@ -1,4 +1,4 @@
-"""Summaries of a run and of a scene for the command line: one fact a line."""
+"""Summaries of runs and scenes for the command line: one fact per line."""
 
 from __future__ import annotations
 
@@ -45,11 +45,11 @@ REGIMES = {
 
 
 MOST_EVENTS, MOST_RUNS = 30, 100
-"""Events of a run and runs of a sweep that are listed."""
+"""Largest numbers of events of a run, and of runs of a sweep, that are listed."""
 
 
 def duration(seconds: float) -> str:
-    """A time with a unit that fits.
+    """Return a time in a suitable unit.
 
     >>> duration(0.00123), duration(75.0)
     ('1.23 ms', '75 s')
@@ -61,7 +61,7 @@ def duration(seconds: float) -> str:
 
 
 def states(system: System) -> str:
-    """The states by name; algebraic ones say so."""
+    """List the states by name; algebraic ones are marked."""
     lone = [state for state in system.states if state.name not in system.inside]
     names = [f"{state.name} (algebraic)" if state.algebraic else state.name for state in lone]
     names += [f"{profile.name} ({len(profile.points) - 1} cells)" for profile in system.profiles]
@@ -69,8 +69,8 @@ def states(system: System) -> str:
 
 
 def run_summary(solution: Solution, written: Path | None, details: bool = False) -> Sheet:
-    """Summary of a run: what was solved, its end, accuracy and speed, and where it is; with ``details`` every error and
-    count, and the events.
+    """Summarise a run: states and solver, end, accuracy, speed and file; with ``details`` all errors, counts and
+    events.
     """
     from surfacechem.solve import solver
 
@@ -96,7 +96,7 @@ def run_summary(solution: Solution, written: Path | None, details: bool = False)
 
 
 def run_details(solution: Solution) -> dict[str, Rows]:
-    """The error of each variable, every count, and the events of a run."""
+    """Return tables of the error of each variable, of all counts, and of the events of a run."""
     found = {name: value for name, value in solution.attributes.items() if name.startswith("count_")}
     errors = solution.accuracy.everywhere if solution.accuracy else {}
     jumps = solution.trajectory.jumps
@@ -138,9 +138,7 @@ def _balances(books: Audit, unit: str) -> str:
 
 
 def sweep_summary(solution: SweepSolution, written: Path | None, details: bool = False) -> Sheet:
-    """Summary of a sweep: what was swept, the ends of the runs, their accuracy and speed, and where they are; with
-    ``details`` the end of each run.
-    """
+    """Summarise a sweep: parameters, ends of runs, accuracy, speed and file; with ``details`` the end of each run."""
     error = ""
     if accuracy := solution.accuracy:
         known = accuracy.known
@@ -167,7 +165,7 @@ def sweep_summary(solution: SweepSolution, written: Path | None, details: bool =
 
 
 def sweep_details(solution: SweepSolution) -> dict[str, Rows]:
-    """Table of the end of each run of a sweep, or of the first ones, with their parameters."""
+    """Return a table of the ends of the runs of a sweep, or of the first ones, with their parameters."""
     errors = [f"error {error:.2g}" for error in solution.accuracy.errors] if solution.accuracy else [""] * MOST_RUNS
     shown = range(min(len(solution.runs), MOST_RUNS))
     points = solution.plan.at(np.arange(len(shown)))
@@ -185,7 +183,7 @@ def sweep_details(solution: SweepSolution) -> dict[str, Rows]:
 
 
 def swept_in_words(plan: Plan, names: Mapping[str, str], units: Mapping[str, str]) -> str:
-    """The parameters of a plan, with how many values of each and between which, and the draws of a sample."""
+    """Describe the parameters of a plan: number of values and range of each, and the draws of a sample."""
     axes = []
     for (name, path), axis in zip(names.items(), plan.axes, strict=False):
         first, last = axis.at(np.array([0, -1]) % len(axis))
@@ -200,7 +198,7 @@ def swept_in_words(plan: Plan, names: Mapping[str, str], units: Mapping[str, str
 
 
 def points_summary(found: PointResults, written: Path | None) -> Sheet:
-    """Quantities and non-zero derivatives of a single point; of many, how many there are and where."""
+    """Summarise points: quantities and non-zero derivatives of a single one; of many, their number and the file."""
     refused = [(i, why) for i, why in enumerate(found.refused) if why]
     facts, rows, count = [], [], len(found.refused)
     if count == 1:
@@ -219,7 +217,7 @@ def points_summary(found: PointResults, written: Path | None) -> Sheet:
 
 
 def _sweep_events(solution: SweepSolution) -> str:
-    """Jumps of all runs, and the verdicts of the second law on them, in words."""
+    """Describe the jumps of all runs, and the verdicts of the second law on them."""
     runs = [run.jumps for run in solution.runs]
     jumps = [jump for run in runs for jump in run]
     if not jumps:
@@ -245,7 +243,7 @@ def check_summary(
     warnings: Sequence[str],
     choices: Sequence[Sequence[str]] = (),
 ) -> Sheet:
-    """A scene said back in words, with its numbers and what is odd about it."""
+    """Describe a scene in words, with its dimensionless numbers and warnings."""
     from surfacechem.runs.check import laws_of
 
     sections: dict[str, Sequence[Sequence[str]]] = {
@@ -268,7 +266,7 @@ def check_summary(
 
 
 def surface_rows(scene: Scene) -> list[tuple[str, ...]]:
-    """Shapes of both bodies, what acts between them, and where that is integrated."""
+    """Return rows with the shapes of both bodies, the interactions between them, and the range of approaches."""
     surface: Any = scene.surface
     if surface is None:
         return []
@@ -280,7 +278,7 @@ def surface_rows(scene: Scene) -> list[tuple[str, ...]]:
 
 
 def _numbers(law: Law) -> str:
-    """The parameters of a law that are not their defaults, and how many numbers its lists have."""
+    """List the parameters of a law that differ from their defaults, and the lengths of its lists."""
     found = []
     for item in dataclasses.fields(law):
         value = getattr(law, item.name)
@@ -293,7 +291,7 @@ def _numbers(law: Law) -> str:
 
 
 def _plan(system: System, run: Run | None) -> str:
-    """Solver, outputs and ends of steps of a run, in words."""
+    """Describe solver, outputs, breakpoints and kinks of a run."""
     if run is None:
         return "none, as everything is given; `surfacechem evaluate` gives its quantities at any state"
     outputs = f"{len(run.times)} output times" if run.picture is None else "outputs that follow the run"
@@ -306,7 +304,7 @@ def _plan(system: System, run: Run | None) -> str:
 
 
 def _compiled(system: System, run: Run) -> str:
-    """Parts of a run that are machine code, and those that are left to Python, in words."""
+    """Describe which parts of a run are machine code, and which run in Python."""
     if run.solver in CALLING_PYTHON:
         return "the equations; Cantera makes the steps, and asks Python for every right-hand side"
     if run.solver not in (*OWN, AUTO):
@@ -317,7 +315,7 @@ def _compiled(system: System, run: Run) -> str:
 
 
 def _state_rows(system: System) -> list[tuple[str, ...]]:
-    """States with unit, kind, start and meaning; those inside a body are one row."""
+    """Return rows of states with unit, kind, initial value and meaning; the states inside a body are one row."""
     starts = {state.name: state.initial for state in system.states}
     rows: list[tuple[str, ...]] = []
     for s in system.states:
@@ -331,7 +329,7 @@ def _state_rows(system: System) -> list[tuple[str, ...]]:
 
 
 def _worst(stream: Stream, chunks: Sequence[int]) -> str:
-    """The worst balance of energy in some chunks of a store."""
+    """Describe the worst energy balance of some chunks of a store."""
     if not stream.chunks.keep.balances:
         return "not kept"
     errors = [np.fmax.reduce(stream.store.read("energy_error", number), initial=0.0) for number in chunks]
@@ -339,9 +337,7 @@ def _worst(stream: Stream, chunks: Sequence[int]) -> str:
 
 
 def store_summary(stream: Stream, store: Store, checked: Checked | None, file: Path | None = None) -> tuple[str, Sheet]:
-    """Word for the end of a sweep that went into a store, or through one into a file; and its summary with the ends of
-    its runs.
-    """
+    """Return the status and the summary of a sweep into a store, or through a store into a file."""
     from surfacechem.runs.keeping import STATUSES
     from surfacechem.runs.sweeps import parameter_names
 

@@ -1,4 +1,4 @@
-"""Sweeps: a grid of parameter values, the runs over it, the error of each, and all of it as a dataset."""
+"""Sweeps: runs over a grid of parameter values, the error of each run, and their dataset."""
 
 from __future__ import annotations
 
@@ -48,19 +48,19 @@ from surfacechem.tolerances import EPS
 Rupture = Statistics | Lifetime
 
 RESERVED_COLUMNS = ("time", RUN_DIMENSION, "species", "coverage", "error", "entropy_destroyed", "lifetime")
-"""Names of dimensions and columns of sweeps that are no quantities."""
+"""Names of dimensions and columns of sweeps that are not quantities."""
 
 COLUMN_PREFIXES = ("event", "checked", "hardest")
-"""Beginnings of the names of dimensions and columns of events, and of runs that are checked."""
+"""Prefixes of the names of dimensions and columns of events and of checked runs."""
 
 MOST_FOLLOWED = 64
-"""Runs that the output times of a sweep follow; of more so many, evenly spread over them."""
+"""Largest number of runs from which the output times of a sweep are chosen; of more, an evenly spread subset."""
 
 MOST_OUTPUTS = 128_000
-"""Outputs of all runs of a sweep together, where these need more than even times would be."""
+"""Outputs of all runs of a sweep together, if they need more than the evenly spaced times."""
 
 RUNS_AT_A_TIME = 256
-"""Runs that are solved at a time; between portions a sweep tells how far it is."""
+"""Runs that are solved at a time; progress is reported between portions."""
 
 log = logging.getLogger(__name__)
 
@@ -68,8 +68,8 @@ log = logging.getLogger(__name__)
 
 
 def prepared(system: System, plan: Plan) -> System:
-    """The system that a sweep compiles: with statistics of rupture where a load grows until bonds break, with their
-    lifetime where they do under any load.
+    """Return the system that a sweep compiles: with statistics of rupture if a load grows until bonds break, with the
+    mean lifetime if runs end at a given survival.
     """
     if plan.until is None:
         return system
@@ -88,7 +88,7 @@ def prepared(system: System, plan: Plan) -> System:
 def solve(
     model: Model, plan: Plan, run: Run, changes: Mapping[str, float], threads: int | None = None
 ) -> list[Trajectory]:
-    """The runs of a :func:`prepared` system over the plan; how a run ends is its status, never an exception."""
+    """Solve the runs of a :func:`prepared` system over the plan; how a run ends is its status, never an exception."""
     values = _values(model, plan, changes)
     run = model.chosen(run, values[0])
     runs = settings(model.system, plan, following(model, plan, run, changes, threads), values)
@@ -109,8 +109,8 @@ def solve(
 
 
 def following(model: Model, plan: Plan, run: Run, changes: Mapping[str, float], threads: int | None = None) -> Run:
-    """The settings with output times that follow the runs of a plan, or some that are evenly spread over many, where no
-    times are asked for.
+    """Return the settings with output times that resolve the runs of a plan, or an evenly spread subset of many;
+    unchanged if times were given.
     """
     if run.picture is None or plan.load or run.steady:
         return run
@@ -119,7 +119,7 @@ def following(model: Model, plan: Plan, run: Run, changes: Mapping[str, float], 
         pairs = [(run, model.values({**changes, **point})) for point in some.points]
         done = model.solve_all(pairs, threads or os.cpu_count() or 1)
     except InputError:
-        return run  # which of the runs are refused is said where all are solved
+        return run  # refused runs are reported when all runs are solved
     return replace(run, times=shared_times(done, max(len(run.times), MOST_OUTPUTS // plan.size)))
 
 
@@ -129,7 +129,7 @@ def _with_values(
     points: Sequence[Mapping[str, float]],
     error: InputError,
 ) -> InputError:
-    """The error with what is swept in the first run that is refused."""
+    """Return the error with the swept values of the first refused run."""
     for pair, point in zip(runs, points, strict=False):
         try:
             model.problem(*pair)
@@ -139,14 +139,14 @@ def _with_values(
 
 
 def _of_run(point: Mapping[str, float], error: InputError, path: str = "") -> InputError:
-    """The error with what is swept in its run."""
+    """Return the error with the swept values of its run."""
     given = ", ".join(f"{path} = {value:g}" for path, value in point.items())
     more = f"This is the run with {given}; a store, -o NAME.zarr, counts such runs as refused and goes on."
     return InputError(f"{error.message} {more}", error.place, path=path)
 
 
 def _values(model: Model, plan: Plan, changes: Mapping[str, float]) -> list[dict[str, float]]:
-    """The values of each run; InputError for the first that is out of its range."""
+    """Return the values of each run; InputError for the first that is out of its range."""
     values = []
     for point in plan.points:
         try:
@@ -158,8 +158,8 @@ def _values(model: Model, plan: Plan, changes: Mapping[str, float]) -> list[dict
 
 
 def settings(system: System, plan: Plan, run: Run, values: Sequence[Mapping[str, float]]) -> list[Run]:
-    """The settings of each run: the same output times for all, or stretched to where a load is reached that the plan
-    names.
+    """Return the settings of each run: the same output times for all, or times stretched to the moment at which the
+    load reaches the value in the plan.
     """
     run = replace(run, picture=None, looks=0.0)
     if plan.until is None or not plan.load:
@@ -181,33 +181,33 @@ def settings(system: System, plan: Plan, run: Run, values: Sequence[Mapping[str,
     return runs
 
 
-# -- how far they are from the truth ----------------------------------------------------------------------------------
+# -- errors of the runs -----------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
 class SweepAccuracy:
-    """Largest relative error of each run and where it is from; exact statistics by name where they are known."""
+    """Largest relative error of each run and its source; exact statistics by name, where known."""
 
     errors: NDArray[np.float64]
     source: str
     exact: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
     why: str = ""
-    """Reason why the error is not known, of one of the runs of which it is not."""
+    """Reason why an error is unknown, from one of the runs with an unknown error."""
 
     @property
     def known(self) -> NDArray[np.float64]:
-        """The errors that are known."""
+        """Known errors."""
         return self.errors[np.isfinite(self.errors)]
 
     @property
     def unknown(self) -> str:
-        """Number of runs of which the error is not known, and the reason, in words; '' where of none."""
+        """Number of runs with an unknown error and the reason, in words; '' if there are none."""
         count = len(self.errors) - len(self.known)
         return unknown_in(count, self.why) if count else ""
 
 
 def unknown_in(count: int, why: str) -> str:
-    """Words for the number of runs of which the error is not known, and the reason.
+    """Describe the number of runs with an unknown error, and the reason.
 
     >>> unknown_in(2, "unknown: the run ended at its start")
     'unknown in 2 runs: the run ended at its start'
@@ -218,12 +218,12 @@ def unknown_in(count: int, why: str) -> str:
 def accuracy(
     case: Case, done: SweepSolution, threads: int | None, cells: Callable[[], Sequence[CellErrors]]
 ) -> SweepAccuracy:
-    """Error of each run: from the exact solution of the case, else from a second sweep; not a number where it is not
-    known. ``cells`` finds the errors of the cells across bodies of each run.
+    """Return the error of each run, from the exact solution of the case, else from a second sweep; NaN if it is
+    unknown. ``cells`` finds the errors of the cells across bodies of each run.
     """
     unused, named = case.unused, case.reference
     second = cache(lambda: _second(done, threads))
-    # Options of a reference are those of the case as written, so that they fit no other run.
+    # Options of a reference belong to the case as written, and fit no other run.
     if named is not None and not named.options:
         try:
             return _held(done, _against_exact(case, done, named.name, second))
@@ -238,8 +238,8 @@ def accuracy(
 
 
 def _held(done: SweepSolution, found: SweepAccuracy) -> SweepAccuracy:
-    """The errors with a word where they miss what was asked for: the runs of a sweep share one tolerance, and none is
-    repeated at a tighter one.
+    """Add a note if errors exceed the requested accuracy: the runs of a sweep share one tolerance, and none is repeated
+    at a tighter one.
     """
     wanted = done.run.accuracy
     if wanted is None or not np.any(found.known > wanted):
@@ -249,7 +249,7 @@ def _held(done: SweepSolution, found: SweepAccuracy) -> SweepAccuracy:
 
 
 def _estimated(done: SweepSolution, second: SweepSolution, cells: Sequence[CellErrors]) -> tuple[list[float], str]:
-    """Errors of all runs, with those of their cells, from a second sweep; and why one of them is not known."""
+    """Return the errors of all runs from a second sweep, with those of cells, and the reason if one is unknown."""
     if done.statistics:
         pairs = zip(done.statistics, second.statistics, cells, strict=True)
         errors = [_of_statistics(ours, theirs) + found.largest for ours, theirs, found in pairs]
@@ -260,16 +260,17 @@ def _estimated(done: SweepSolution, second: SweepSolution, cells: Sequence[CellE
 
 
 def _second(done: SweepSolution, threads: int | None) -> SweepSolution:
-    """The runs at another tolerance, as that of a single run."""
+    """Solve the runs at the second tolerance, as for a single run."""
     pairs = [(second_settings(run), run.values) for run in done.runs]
     runs = done.model.solve_all(pairs, threads or os.cpu_count() or 1)
     return replace(done, run=done.run.second(second_tolerance(done.run.rtol)), runs=runs)
 
 
 def _against_exact(case: Case, done: SweepSolution, name: str, second: Callable[[], SweepSolution]) -> SweepAccuracy:
-    """Errors of the load at rupture, else of all; InputError where the solution is not that of every run.
+    """Return the errors of the load at rupture, else of all quantities; InputError if the solution does not fit every
+    run.
 
-    For the loads at rupture that is tested on the outermost runs. A run that ended at its start has no error.
+    For loads at rupture the fit is tested on the outermost runs. A run that ended at its start has no error.
     """
     begun = [i for i, run in enumerate(done.runs) if len(run.looked.result.times) > 1]
     if not begun:
@@ -292,7 +293,7 @@ def _against_exact(case: Case, done: SweepSolution, name: str, second: Callable[
 
 
 def _of_statistics(found: Rupture, exact: references.Reference | Rupture) -> float:
-    """Largest error of the load at rupture, or that of the lifetime; that of one which is exactly zero is absolute."""
+    """Return the largest error of the load at rupture, or that of the lifetime; absolute if the exact value is zero."""
     pairs = [(getattr(found, each.name), getattr(exact, each.name)) for each in fields(found)]
     errors = [float(abs(ours - true) / abs(true) if true else abs(ours)) for ours, true in pairs]
     return max(max(errors), EPS)
@@ -302,7 +303,7 @@ def _of_statistics(found: Rupture, exact: references.Reference | Rupture) -> flo
 
 
 def parameter_names(system: System, plan: Plan) -> dict[str, str]:
-    """Paths of the swept parameters by their names in the dataset: the last parts of a path that are no other's."""
+    """Return the paths of the swept parameters by their names in the dataset: the shortest unique tails of paths."""
     taken = _column_names(system)
     found: dict[str, str] = {}
     for path in plan.paths:
@@ -314,7 +315,7 @@ def parameter_names(system: System, plan: Plan) -> dict[str, str]:
 
 
 def _column_names(system: System) -> set[str]:
-    """Names that columns of a file or a store of a sweep may have, and its dimensions, beside those of
+    """Return the names that columns and dimensions of a file or store of a sweep may have, except those of
     COLUMN_PREFIXES.
     """
     kept, shown = keep_of(None, system), {DATASET_NAMES.get(name, name) for name in quantities(system)}
@@ -325,13 +326,13 @@ def _column_names(system: System) -> set[str]:
 
 
 def dimensions(plan: Plan, names: Mapping[str, str]) -> dict[str, int]:
-    """Sizes of the dimensions of a sweep by name: those of a grid are its parameters."""
+    """Return the sizes of the dimensions of a sweep by name; those of a grid are its parameters."""
     own = [RUN_DIMENSION] if plan.zipped else list(names)[: len(plan.axes)]
     return dict(zip([*own, *([RUN_DIMENSION] if plan.sample else [])], plan.shape, strict=True))
 
 
 def parameter_columns(system: System, plan: Plan, names: Mapping[str, str]) -> list[Column]:
-    """The values of the swept parameters, each along its own dimension, formed where they are asked for."""
+    """Return the values of the swept parameters, each along its own dimension, computed when they are read."""
     columns = []
     sample, drawn = plan.sample, set(plan.sample.draws) if plan.sample else set()
     values = {axis.path: LazyArray(axis.at, len(axis)) for axis in plan.axes}
@@ -355,22 +356,22 @@ class SweepSolution(Results):
     model: Model
     plan: Plan
     run: Run
-    """Settings of all runs; where a load ends them, each has output times of its own."""
+    """Settings of all runs; if a load ends them, each has its own output times."""
     runs: Sequence[Trajectory]
     judge: Callable[[SweepSolution], SweepAccuracy] | None = None
     """Function that finds the errors of the runs."""
 
     def __getstate__(self) -> dict[str, Any]:
-        """A pickle carries the errors themselves, not what would find them."""
+        """Pickle the errors themselves instead of the function that finds them."""
         return {**vars(self), "accuracy": self.accuracy, "judge": None}
 
     @cached_property
     def accuracy(self) -> SweepAccuracy | None:
-        """The errors of the runs, found when they are first asked for, and where they are from."""
+        """Errors of the runs and their source, found on first access."""
         return self.judge(self) if self.judge else None
 
     def __repr__(self) -> str:
-        """Title, size and ends in a line."""
+        """Return title, size and ends in a line."""
         return f"<SweepSolution {self.title!r}: {counted(len(self.runs), 'run')}, {self.ends}>"
 
     @property
@@ -399,12 +400,12 @@ class SweepSolution(Results):
         return [end_of(run) | balances_of(run, books) for run, books in zip(self.runs, self.audits, strict=True)]
 
     def worst(self, balance: str) -> float:
-        """Largest error over all runs of the balance of energy, entropy or site."""
+        """Return the largest error over all runs of the balance of energy, entropy or site."""
         return float(np.max([getattr(books, f"{balance}_error") for books in self.audits]))
 
     @cached_property
     def statistics(self) -> Sequence[Rupture]:
-        """Mode, median and mean of the load at rupture of each run, or its lifetime; empty where the sweep has none."""
+        """Mode, median and mean of the load at rupture of each run, or its lifetime; empty if the sweep has none."""
         if self.plan.until is None or not spectrum.breaks_bonds(self.system):
             return []
         if not self.plan.load:
@@ -418,7 +419,7 @@ class SweepSolution(Results):
 
     @property
     def ends(self) -> str:
-        """Numbers of runs by the way in which they ended, in words."""
+        """Numbers of runs by status, in words."""
         every = [run.status for run in self.runs]
         return ", ".join(f"{every.count(status)} {status}" for status in dict.fromkeys(every))
 
@@ -426,7 +427,7 @@ class SweepSolution(Results):
     def status(self) -> str:
         """'failed' if a run failed numerically, 'stopped' if physics stopped all of them, else 'finished'.
 
-        That physics stops some runs is a result of a sweep; that all bonds break is what a spectrum is made for.
+        If physics stops some runs this is a result of a sweep; in a spectrum all bonds are meant to break.
         """
         every = {run.status for run in self.runs}
         stopped = every == {"stopped"} and not self.statistics
@@ -444,7 +445,7 @@ class SweepSolution(Results):
 
     @property
     def inner(self) -> str:
-        """The dimension along each run: time, or the load that all runs grow to."""
+        """Dimension along each run: time, or the load that ends all runs."""
         return self.plan.load or "time"
 
     @cached_property
@@ -467,14 +468,14 @@ class SweepSolution(Results):
         return (*columns, *([self._lifetime(columns)] if self.told and self.plan.load else []))
 
     def _statistic(self, which: str) -> tuple[str, str, str]:
-        """Name, unit and meaning of a statistic in the dataset."""
+        """Return name, unit and meaning of a statistic in the dataset."""
         if not self.plan.load:
             return which, "s", "mean lifetime"
         load = quantities(self.system)[self.plan.load]
         return f"{self.plan.load}_{which}", load.unit, f"{STATISTICS[which]} {load.long_name} at rupture"
 
     def _single(self) -> Iterator[Column]:
-        """The last, the largest and the smallest values of each run, which may lie between the times that all share."""
+        """Yield the last, largest and smallest values of each run, which may lie between the shared output times."""
         ends = [at_end(run) for run in self.runs]
         for name, q in quantities(self.system).items():
             found = {which: [extreme(run, name, which) for run in self.runs] for which in EXTREMES}
@@ -484,16 +485,16 @@ class SweepSolution(Results):
                 yield self._of_each(own, found[which], q.unit, f"{q.long_name} {words}")
 
     def _lifetime(self, columns: Sequence[Column]) -> Column:
-        """Lifetimes over the load, which grows at the same speed all along each run."""
+        """Return lifetimes over the load, which grows at a constant rate along each run."""
         known, load = {column.name: column for column in columns}, self.inner
-        # Runs until a load are refused where it is no straight line in time.
+        # A load that ends runs is linear in time; any other is refused.
         speed = np.diff(known[load].values[:2]) / np.diff(known["time"].values[..., :2], axis=-1)
         values = spectrum.lifetimes(known["survival"].values, known[f"density_{load}"].values, speed)
         text = f"mean lifetime at a constant {known[load].long_name}, of bonds without memory"
         return Column("lifetime", (*self.axes, load), values, "s", text)
 
     def _coordinates(self, load: Column | None) -> list[Column]:
-        """The swept parameters, and the times or, where a load ends the runs, the values of this."""
+        """Return the swept parameters, and the times or, if a load ends the runs, the values of this load."""
         swept = parameter_columns(self.system, self.plan, self.parameters)
         columns = [replace(column, values=column.values[:]) for column in swept]
         times = np.array([run.result.problem.times for run in self.runs])
@@ -506,7 +507,7 @@ class SweepSolution(Results):
         return [*columns, Column("time", (*self.axes, self.inner), each, "s", "time since the start")]
 
     def _of_runs(self) -> list[Column]:
-        """Columns on the runs: end, balances, jumps and error."""
+        """Return columns about the runs: end, balances, jumps and error."""
         columns = [
             self._of_each(name, [end[name] for end in self.run_ends], "s" if name == "time_reached" else "1", text)
             for name, text in END_COLUMNS.items()
@@ -520,7 +521,7 @@ class SweepSolution(Results):
         return columns
 
     def _of_each(self, name: str, values: Sequence[Any] | NDArray[np.float64], unit: str, text: str) -> Column:
-        """A column of one value a run."""
+        """Return a column with one value per run."""
         shaped = np.array(values, object if isinstance(values[0], str) else float).reshape(self.plan.shape)
         return Column(name, tuple(self.axes), shaped, self.system.unit(unit), text)
 
