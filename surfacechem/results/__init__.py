@@ -1,1 +1,1 @@
-"""Results of a run: dataset, events, balances and the error of each answer."""
+"""Results of a run: dataset, events, balances and errors."""

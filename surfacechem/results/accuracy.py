@@ -1,4 +1,4 @@
-"""Relative errors, and their estimates where no exact solution is known."""
+"""Relative errors, and their estimates if no exact solution is known."""
 
 from __future__ import annotations
 
@@ -17,30 +17,30 @@ from surfacechem.tolerances import CONTROL_RTOL, LOOSEST_RTOL, MAX_RTOL, MIN_RTO
 Array = NDArray[np.float64]
 
 SECOND_RUN_FACTOR = 1e-2
-"""Without an exact solution the error is estimated from a second run whose tolerance is lower by this factor."""
+"""Ratio of the tolerance of the second run, from which an error is estimated, to that of the first one."""
 
 RTOL_PART = 1e-2
-"""The tolerance of a step is this part of the accuracy asked for. Over the exact solutions the error of a run is below
-a hundred times its tolerance, but near singular ends.
+"""Fraction of the requested accuracy that is the tolerance of a step: for the exact solutions the error of a run is
+below a hundred times its tolerance, except near singular ends.
 """
 
 CELLS_UNKNOWN = "the error of the cells across bodies does not fall as their number grows"
-"""Reason why the error of a run with cells is not known."""
+"""Reason why the error of a run with cells is unknown."""
 
 ENDED_AT_START = "the run ended at its start"
 
 NOTHING_EVOLVES = "nothing evolves, and no work is done"
-"""Reason why two runs at different tolerances tell nothing."""
+"""Reason why the difference of two runs at different tolerances is no estimate."""
 
 
 def check_tolerance(rtol: float, option: str) -> None:
-    """Raise InputError for a relative tolerance out of the range of runs: what is tighter is rounding."""
+    """Raise InputError for a relative tolerance out of the range of runs: tighter ones are below roundoff."""
     if not MIN_RTOL <= rtol <= MAX_RTOL:
         raise InputError(f"{rtol:g} is outside its range: >= {MIN_RTOL:g} and <= {MAX_RTOL:g}.", Place(path=option))
 
 
 def first_tolerance(accuracy: float) -> float:
-    """Relative tolerance of a step for an accuracy that is asked for.
+    """Return the relative tolerance of a step for a requested accuracy.
 
     >>> first_tolerance(1e-8), first_tolerance(1e-20)
     (1e-10, 1e-13)
@@ -49,7 +49,7 @@ def first_tolerance(accuracy: float) -> float:
 
 
 def second_tolerance(rtol: float) -> float:
-    """Tolerance of the second run; only one that is tighter than all others has a looser one.
+    """Return the tolerance of the second run; it is looser only if the first is tighter than all others.
 
     >>> second_tolerance(1e-8), second_tolerance(1e-13), second_tolerance(1e-15)
     (1e-10, 3e-14, 1e-13)
@@ -60,8 +60,8 @@ def second_tolerance(rtol: float) -> float:
 
 
 def relative_errors(values: Array, exact: Array, floor: float | Array) -> Array:
-    """Errors relative to the exact value at the same time, or to ``floor`` if that is more; absolute where both are
-    zero.
+    """Return errors relative to the exact value at the same time, or to ``floor`` if that is larger; absolute if both
+    are zero.
 
     >>> relative_errors(np.array([1.5, 2.0, 1e-9]), np.array([1.0, 2.0, 0.0]), 1e-6).tolist()
     [0.5, 0.0, 0.001]
@@ -74,8 +74,8 @@ def relative_errors(values: Array, exact: Array, floor: float | Array) -> Array:
 def errors_over_time(
     values: Mapping[str, Array], true: Mapping[str, Array], floors: Mapping[str, float | Array]
 ) -> dict[str, Array]:
-    """Relative errors of the variables that have true values, at the times that both have; ``floors`` are sizes below
-    which errors are relative to these.
+    """Return relative errors of the variables that have true values, at the times that both have. An error is relative
+    to the entry of ``floors`` if the value is smaller.
     """
     found = {}
     for name, exact in true.items():
@@ -88,8 +88,7 @@ def errors_over_time(
 def largest_errors(
     values: Mapping[str, Array], true: Mapping[str, Array], floors: Mapping[str, float | Array]
 ) -> dict[str, float]:
-    """The largest relative error of each variable that has true values: how far a run is from an exact solution, or
-    from another run.
+    """Return the largest relative error of each variable that has true values, from an exact solution or another run.
 
     >>> largest_errors({"T": np.array([301.0, 303.0])}, {"T": np.array([300.0, 300.0])}, {"T": 1.0})
     {'T': 0.01}
@@ -107,44 +106,44 @@ class Accuracy:
     """The exact solution's name, the second run and its tolerance, or the balances, in words."""
     variables: Mapping[str, float] = field(default_factory=dict)
     exact: Mapping[str, Any] = field(default_factory=dict, compare=False)
-    """Exact values at the output times, by variable, where an exact solution was named."""
+    """Exact values at the output times, by variable, if an exact solution was named."""
     asked: float | None = None
-    """Accuracy that was asked for, where the tolerance was chosen from it."""
+    """Requested accuracy, if the tolerance was chosen from it."""
     named: Callable[[], Mapping[str, float]] = field(default=dict, compare=False)
-    """The errors of what follows from the compared variables, by variable, where they are known."""
+    """Function for the errors of quantities that follow from the compared variables, by name, where known."""
 
     @cached_property
     def everywhere(self) -> dict[str, float]:
-        """The errors of all variables of which one is known, by variable."""
+        """All known errors, by variable."""
         return {**self.named(), **self.variables}
 
 
 @dataclass(frozen=True)
 class CellErrors:
-    """Relative errors that a second run at another tolerance does not see, by variable: those that cells across bodies
-    leave, or numbers that laws compute for themselves; nothing where there are none.
+    """Relative errors that a second run at another tolerance does not see, by variable: of the cells across bodies, or
+    of numbers that laws compute themselves; empty if there are none.
     """
 
     variables: Mapping[str, float] = field(default_factory=dict)
     converged: bool = True
-    """Whether half of the cells and a quarter of them confirm the order, so that the errors are known."""
+    """True if runs with a half and a quarter of the cells confirm the order, so that the errors are known."""
     in_noise: bool = False
-    """Whether the tolerance of the run hides what more cells would change."""
+    """True if errors of the tolerance hide the effect of more cells."""
     source: str = "and one with half of the cells"
-    """Source of the errors, in words that follow those for the errors of the tolerance."""
+    """Source of the errors, in words that continue the source of the errors of the tolerance."""
 
     @property
     def largest(self) -> float:
-        """The largest error; not a number where it is not known."""
+        """Largest error; NaN if it is unknown."""
         return max(self.variables.values(), default=0.0) if self.converged else math.nan
 
     def added_to(self, other: CellErrors) -> CellErrors:
-        """Errors of both; known where both are."""
+        """Return the sum of both errors, known if both are."""
         names = {**self.variables, **other.variables}
         total = {name: self.variables.get(name, 0.0) + other.variables.get(name, 0.0) for name in names}
         return replace(other, variables=total, converged=self.converged and other.converged)
 
     def beside(self, other: CellErrors) -> CellErrors:
-        """Errors of two kinds together, with the words for both."""
+        """Return the sum of errors of two kinds, with the sources of both."""
         kinds = [found.source for found in (other, self) if found.variables]
         return replace(self.added_to(other), source=", ".join(kinds), in_noise=self.in_noise or other.in_noise)

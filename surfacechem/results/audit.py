@@ -1,7 +1,7 @@
 """Audit of energy, entropy and sites along a run, against the ledger.
 
-The equations satisfy both laws of thermodynamics as they stand, so the residuals measure the integration. A law that
-dissipates less than nothing shows in ``least``.
+The equations satisfy both laws of thermodynamics exactly, so the residuals measure the integration. A law with negative
+entropy production shows in ``least``.
 
 Source: Sauer, Duong & Mandadapu (2021), sections 3.3, 3.4 and 4.3.
 """
@@ -24,17 +24,17 @@ from surfacechem.tolerances import EPS, SQRT_EPS
 
 OPEN_BALANCE, TIGHTEST_JUDGED = 1000.0, SQRT_EPS / 16
 """Relative residual, in tolerances of the run, above which a balance counts as open: errors of smooth runs stay below a
-hundred tolerances. Tighter runs than TIGHTEST_JUDGED, 9e-10, are judged as this one, since their rounding adds up, too.
+hundred tolerances. Runs tighter than TIGHTEST_JUDGED, 9e-10, are judged by this tolerance, since rounding adds up, too.
 """
 
 LAST_DIGITS = 10
-"""Number of last digits that add up in a balance, beside one a step."""
+"""Number of last digits that add up in a balance, in addition to one per step."""
 
 ROUNDED_PART = 1e-2
-"""An exchange of which rounding may be this part, or more, is not resolved."""
+"""Ratio of rounding to an exchanged amount, from which on the amount is not resolved."""
 
 ERROR_MARGIN = 10.0
-"""Error of the integration, in tolerances of a law's turnover and of the states on which its production depends."""
+"""Error of the integration, in tolerances: of a law's turnover, and of the states on which its production depends."""
 
 
 @dataclass(frozen=True)
@@ -42,9 +42,9 @@ class Audit:
     """Residuals of the balances at the output times and the least dissipation of each law."""
 
     energy: Array
-    """Total energy minus what was supplied since the start [J/m^2], shape (times,)."""
+    """Total energy minus the energy supplied since the start [J/m^2], shape (times,)."""
     entropy: Array
-    """Total entropy minus what was supplied and produced since the start [J/(m^2 K)], shape (times,)."""
+    """Total entropy minus the entropy supplied and produced since the start [J/(m^2 K)], shape (times,)."""
     sites: Array
     """Largest residual of the site balances [1], shape (times,)."""
     energy_scale: float
@@ -58,14 +58,14 @@ class Audit:
     entropy_stored: float
     """Largest entropy whose last digits the total entropy cannot resolve [J/(m^2 K)]."""
     energy_rounding: float
-    """Energy that the last digits of the states stand for over all steps [J/m^2]; where all that is exchanged is less
-    than the work that errors within the tolerance of the states would do, this work."""
+    """Energy of the last digits of the states, summed over all steps [J/m^2]; if less is exchanged than the work of
+    errors within the tolerance of the states, this work."""
     entropy_rounding: float
-    """Entropy that the last digits of the states stand for over all steps [J/(m^2 K)]."""
+    """Entropy of the last digits of the states, summed over all steps [J/(m^2 K)]."""
     least: Mapping[str, float]
     """Least entropy production of each dissipative law over all steps and outputs [W/(m^2 K)]."""
     losses: Callable[[], tuple[Mapping[str, float], float]]
-    """Function for what is destroyed, which takes time where surroundings are asked for rates."""
+    """Function for the destroyed fractions; it is slow if the surroundings have to be asked for rates."""
 
     @cached_property
     def _lost(self) -> tuple[Mapping[str, float], float]:
@@ -73,7 +73,7 @@ class Audit:
 
     @property
     def destroyed(self) -> Mapping[str, float]:
-        """Fraction of its turnover that each dissipative law destroys, beyond rounding; nothing where that is less than
+        """Fraction of its turnover that each dissipative law destroys, beyond rounding; zero if the amount is less than
         the last digit of the total.
         """
         return self._lost[0]
@@ -85,15 +85,15 @@ class Audit:
 
     @property
     def energy_error(self) -> float:
-        """Largest energy residual, relative to the energy exchanged, or to that stored where it is no more than its
-        rounding.
+        """Largest energy residual relative to the exchanged energy, or to the stored energy if the exchange is within
+        its rounding.
         """
         return float(resolved(self.energy, self.energy_scale, self.energy_stored, self.energy_rounding))
 
     @property
     def entropy_error(self) -> float:
-        """Largest entropy residual, relative to that exchanged or produced, or to that stored where it is no more than
-        its rounding.
+        """Largest entropy residual relative to the entropy exchanged or produced, or to the stored entropy if that is
+        within its rounding.
         """
         return float(resolved(self.entropy, self.entropy_scale, self.entropy_stored, self.entropy_rounding))
 
@@ -104,22 +104,22 @@ class Audit:
 
     @cached_property
     def violations(self) -> tuple[str, ...]:
-        """Laws that destroyed entropy beyond the tolerance of the run, or whose production is not a number."""
+        """Laws that destroyed entropy beyond the tolerance of the run, or whose production is NaN."""
         most = ERROR_MARGIN * self.rtol
         return tuple(law for law, low in self.least.items() if not (low >= 0 or self.destroyed[law] <= most))
 
     @property
     def destroys(self) -> bool:
-        """Whether a law destroyed entropy, or all of them together did."""
+        """True if a law destroyed entropy, or all laws together did."""
         return bool(self.violations) or not self.destroyed_together <= ERROR_MARGIN * self.rtol
 
     @cached_property
     def findings(self) -> tuple[str, ...]:
-        """Defects of the balances, in words; none, as a rule."""
+        """Defects of the balances in words, usually none."""
         found = [f"the law {law.replace('_', ' ')} destroys entropy" for law in self.violations]
         if self.destroys and not found:
             found = ["the laws together destroy entropy"]
-        # What is exchanged may be less than the rounding of a body's heat content.
+        # The exchanged amount may be less than the rounding of a body's heat content.
         energy = _relative(np.maximum(np.abs(self.energy) - self.energy_rounding, 0), self.energy_scale)
         entropy = _relative(np.maximum(np.abs(self.entropy) - self.entropy_rounding, 0), self.entropy_scale)
         open_balances = (("energy", energy), ("entropy", entropy), ("sites", self.site_error))
@@ -136,25 +136,27 @@ def _relative(residual: Array, scale: Any) -> Any:
 
 
 def resolved(residual: Array, scale: Any, stored: Any, rounding: Any) -> Any:
-    """Relative residual along the last axis, of one run or of many; where what was exchanged is lost in the last digits
-    of what is stored, relative to this.
+    """Return the relative residual along the last axis, of one run or of many; if the exchanged amount is lost in the
+    last digits of the stored one, relative to the latter.
     """
     unresolved = (np.max(np.abs(residual), axis=-1, initial=0.0) <= rounding) & (ROUNDED_PART * scale <= rounding)
     return _relative(residual, np.where(unresolved, np.maximum(scale, stored), scale))
 
 
 TOTALS = ("E_total", ("U_1", "U_2", "U_c")), ("S_total", ("S_1", "S_2", "S_c"))
-"""Totals that are balanced, each with its parts."""
+"""Balanced totals, each with its parts."""
 
 ACCOUNT_KINDS = (("energy supply",), ("dissipation",)), (("entropy supply", "entropy production"), ())
-"""Kinds of accounts that explain how these change, and of others that tell, too, how much was exchanged."""
+"""Kinds of accounts that explain the change of each total, and of further ones that count as exchange only."""
 
 
 def residuals(system: System, named: Mapping[str, Array], ledger: Array) -> list[tuple[Array, Any]]:
-    """Residuals of the balances of TOTALS at the outputs of one run or of many, and the most that was exchanged till
-    then; from what there is of TOTALS and of their parts [..., times], and the ledger [..., times, accounts].
+    """Return the residuals of the balances of TOTALS at the outputs of one run or of many, and the largest amounts
+    exchanged up to then.
+
+    ``named`` has the existing TOTALS and parts [..., times], ``ledger`` the accounts [..., times, accounts].
     """
-    # Transitions at the very start come before the first output.
+    # Transitions at the very start are booked before the first output.
     ledger = ledger - ledger[..., :1, :]
 
     found = []
@@ -169,19 +171,19 @@ def residuals(system: System, named: Mapping[str, Array], ledger: Array) -> list
 
 
 def accounts(system: System, ledger: Array, *kinds: str) -> Array:
-    """Columns of a ledger, of accounts of these kinds."""
+    """Return the columns of a ledger for accounts of these kinds."""
     return ledger[..., [j for kind in kinds for j in system.account_columns.get(kind, ())]]
 
 
 def audit(trajectory: Trajectory) -> Audit:
-    """Audit of a trajectory."""
+    """Audit a trajectory."""
     model, result, outputs, steps = trajectory.model, trajectory.result, trajectory.outputs, trajectory.result.steps
     system, column = model.system, model.system.output_columns
     ledger = result.ledger_outputs - result.ledger_outputs[:1]
     known = {name: outputs[:, column[name]] for total, parts in TOTALS for name in (total, *parts) if name in column}
     (energy, exchanged), (entropy, turned) = residuals(system, known, result.ledger_outputs)
     energy_scale, entropy_scale = float(exchanged), float(turned)
-    if steps:  # a brief load may come and go between outputs; the ends of the steps have seen it
+    if steps:  # a brief load may come and go between outputs; the ends of steps resolve it
         energy_scale = max(energy_scale, largest(accounts(system, steps.ledger, "energy supply", "dissipation")))
     E, S = (outputs[:, column[name]] for name in ("E_total", "S_total"))
     energy_stored = max(trajectory.roundings["E_total"] / EPS, largest(E))
@@ -189,7 +191,7 @@ def audit(trajectory: Trajectory) -> Audit:
     roundings, untimed = LAST_DIGITS, 0.0
     if steps and len(steps.t):
         roundings += len(steps.t)
-        if system.energy_has_histories:  # of one that is steep no more is known than within the last digits of time
+        if system.energy_has_histories:  # a steep one is known only to within the last digits of time
             later = model.evaluate(result, steps.t * (1 + EPS), steps.y, steps.ydot, steps.segment)
             untimed = largest(later[:, column["E_total"]] - trajectory.everywhere["E_total"][len(result.times) :])
     sites = np.zeros(len(ledger))
@@ -199,7 +201,7 @@ def audit(trajectory: Trajectory) -> Audit:
     rounding = EPS * energy_stored * roundings + untimed
     left = largest(energy)
     if left > rounding + OPEN_BALANCE * TIGHTEST_JUDGED * energy_scale:
-        # Tractions of a gap on a spring that nothing pulls are differences of large ones: what they do is an error.
+        # Tractions of a spring gap without load are differences of large ones: their work is an error.
         errors = _exchanged_by_errors(trajectory)
         if left <= errors and ROUNDED_PART * energy_scale <= errors:
             rounding, energy_stored = errors, max(energy_stored, errors / (ERROR_MARGIN * trajectory.run.rtol))
@@ -221,7 +223,7 @@ def audit(trajectory: Trajectory) -> Audit:
 
 
 def _least(trajectory: Trajectory) -> dict[str, float]:
-    """Least entropy production of each law over outputs and steps."""
+    """Return the least entropy production of each law over outputs and steps."""
     values, least, system = trajectory.within_bounds, {}, trajectory.model.system
     for j in system.account_columns.get("entropy production", ()):
         rates = values.get(f"sigma_{system.ledger[j].law}", np.empty(0))
@@ -232,8 +234,10 @@ def _least(trajectory: Trajectory) -> dict[str, float]:
 
 
 def _is_past_its_end(trajectory: Trajectory, value: float) -> bool:
-    """Whether the last point tells nothing of a law's production, since the run stopped there where a law may end: it
-    has no value, or is at the same instant as the point before, on either side of the end by rounding.
+    """True if the last point does not count for a law's production, since the run stopped at the end of the law.
+
+    There the production has no value, or the point is at the same instant as the one before, with roundoff deciding the
+    side of the end.
     """
     steps = trajectory.result.steps
     at_once = ERROR_MARGIN * trajectory.run.rtol
@@ -242,16 +246,17 @@ def _is_past_its_end(trajectory: Trajectory, value: float) -> bool:
 
 
 def _losses(trajectory: Trajectory, least: Mapping[str, float], stored: float) -> tuple[Mapping[str, float], float]:
-    """The part that each law destroys, and all together."""
+    """Return the fraction that each law destroys, and the fraction that all destroy together."""
     destroyed = {law: 0.0 if low >= 0 else _destroyed(trajectory, [law], stored) for law, low in least.items()}
     together = _destroyed(trajectory, list(least), stored) if any(destroyed.values()) else 0.0
     return destroyed, together
 
 
 def _destroyed(trajectory: Trajectory, laws: list[str], stored: float) -> float:
-    """Fraction of the entropy that laws turn over together that they destroy, by the ledger or at the ends of steps.
+    """Return the fraction of the entropy turned over by the laws that they destroy, by the ledger or at the ends of
+    steps.
 
-    Nothing where it is less than the last digit of the total, which then is the same with it and without.
+    Zero if the amount is less than the last digit of the total, which it then does not change.
     """
     result, accounts, points = trajectory.result, trajectory.model.system.ledger, _steps(trajectory)
     ledger = points.ledger.copy()
@@ -260,7 +265,7 @@ def _destroyed(trajectory: Trajectory, laws: list[str], stored: float) -> float:
         rates[-1], ledger[-1] = 0.0, ledger[-2]
     columns = [j for j, a in enumerate(accounts) if a.kind == "entropy production" and a.law in laws]
     booked, lengths = np.diff(ledger[:, columns].sum(axis=1)), np.diff(points.t)
-    # The end of a step tells of it, but for the first of an arc: between arcs production may jump.
+    # The production at the end of a step stands for the step, except for the first of an arc: it may jump between arcs.
     seen = rates[1:] * np.where(np.diff(result.segments_at(points.t, points.segment)) > 0, 0.0, lengths)
     amount, whole = losses_of(booked, seen)
     if amount <= ERROR_MARGIN * trajectory.run.rtol * whole:
@@ -276,7 +281,7 @@ def _destroyed(trajectory: Trajectory, laws: list[str], stored: float) -> float:
 
 
 def _steps(trajectory: Trajectory) -> Points:
-    """The ends of the steps of a run, its outputs where these are not known."""
+    """Return the ends of the steps of a run, or its outputs if steps were not recorded."""
     result = trajectory.result
     if result.steps is not None and len(result.steps.t) > 1:
         return result.steps
@@ -284,7 +289,7 @@ def _steps(trajectory: Trajectory) -> Points:
 
 
 def _exchanged_by_errors(trajectory: Trajectory) -> float:
-    """Energy that errors within the tolerance of the states would exchange over all steps [J/m^2]."""
+    """Return the energy that errors within the tolerance of the states would exchange over all steps [J/m^2]."""
     system, ledger, points = trajectory.model.system, trajectory.model.program.ledger, _steps(trajectory)
     columns = [j for kind in ("energy supply", "dissipation") for j in system.account_columns.get(kind, ())]
     if ledger is None or len(points.t) < 2:
@@ -296,11 +301,12 @@ def _exchanged_by_errors(trajectory: Trajectory) -> float:
 def _rounding_of(
     trajectory: Trajectory, points: Points, function: Function, columns: list[int], chosen: NDArray[np.int64]
 ) -> Iterator[Array]:
-    """Rounding of the sum of what a function gives in some columns, the production of laws for instance, in chosen
-    steps, shape (steps,): by how much last digits of all that it depends on change it at the ends of a step, and errors
-    within the tolerance of the states.
+    """Yield the rounding of the sum of some columns of a function, the production of laws for instance, in chosen
+    steps, shape (steps,).
 
-    First of what is computed at once, then with one after another of what surroundings are asked for.
+    It is the change at the ends of a step by the last digits of all arguments, and by errors of the states within the
+    tolerance. First by arguments of cheap evaluations, then one by one by those for which surroundings have to be
+    asked.
     """
     model, result = trajectory.model, trajectory.result
     ends = np.union1d(chosen, chosen + 1)
@@ -331,14 +337,14 @@ def _rounding_of(
             found += np.nan_to_num(np.abs(function(moved)[:, columns] - now))
     yield rounding()
     if external:
-        for moved in asking:  # only where it reads another state
+        for moved in asking:  # only if the surroundings read the changed state
             found += np.nan_to_num(np.abs(function(external(moved))[:, columns] - now))
             yield rounding()
 
 
 def losses_of(booked: Array, seen: Array, rounded: Array | float = 0.0) -> tuple[Any, Any]:
-    """Amounts destroyed and turned over along the last axis: by the ledger, or at the ends of the steps if that is
-    more.
+    """Return the amounts destroyed and turned over along the last axis: by the ledger, or at the ends of the steps if
+    that is more.
 
     >>> [float(x) for x in losses_of(np.array([1.0, -0.25]), np.array([0.75, -0.5]), 0.125)]
     [0.375, 1.25]
@@ -349,5 +355,5 @@ def losses_of(booked: Array, seen: Array, rounded: Array | float = 0.0) -> tuple
 
 
 def largest(values: Any) -> float:
-    """The largest absolute value of what may be empty."""
+    """Return the largest absolute value; zero for an empty array."""
     return float(np.max(np.abs(values), initial=0.0))

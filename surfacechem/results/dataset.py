@@ -42,11 +42,11 @@ DATASET_NAMES = {
     "W_t": "work_t",
     "W_t2": "work_t2",
 }
-"""Names that differ in the dataset, where no two may be the same but for their case."""
+"""Names that differ in the dataset, where no two names may differ in upper and lower case only."""
 
 
 def changes_of(attributes: Mapping[str, Any]) -> dict[str, tuple[float, str]]:
-    """Changes of a run to its case, from its attributes: values in SI by path, each with its unit.
+    """Return the changes of a run to its case, from its attributes: values in SI by path, each with its unit.
 
     >>> changes_of({"departures": '{"changes": {"initial.T": 280.0}, "units": {"initial.T": "K"}}'})
     {'initial.T': (280.0, 'K')}
@@ -60,7 +60,7 @@ def changes_of(attributes: Mapping[str, Any]) -> dict[str, tuple[float, str]]:
 
 
 def quantities(system: System) -> dict[str, Quantity]:
-    """States, but for those inside bodies, and named quantities, by name."""
+    """Return the states, except those inside bodies, and the named quantities, by name."""
     states = {state.name: state.quantity for state in system.states if state.name not in system.inside}
     return states | {item.name: item.quantity for item in system.outputs}
 
@@ -68,14 +68,14 @@ def quantities(system: System) -> dict[str, Quantity]:
 def quantity_columns(
     runs: Sequence[Trajectory], inner: str = "time", axes: Mapping[str, int] | None = None
 ) -> list[Column]:
-    """States and named quantities at the output times of one run, or of many along the ``axes`` of a sweep, by name and
-    size: there a quantity is not a number where a run did not arrive.
+    """Return states and named quantities at the output times of one run, or of many along the ``axes`` of a sweep, by
+    name and size; in a sweep a quantity is NaN at times that a run did not reach.
     """
     system = runs[0].model.system
     kept = [j for j, state in enumerate(system.states) if state.name not in system.inside]
     most = max(len(run.result.problem.times if axes else run.result.times) for run in runs)
     found = quantities(system)
-    # One table for all, so that a column is a view of it.
+    # One table for all quantities; a column is a view of it.
     table = np.full((len(runs), most, len(found)), np.nan)
     for rows, run in zip(table, runs, strict=True):
         reached = len(run.result.times)
@@ -88,8 +88,8 @@ def quantity_columns(
 
 
 def coverage_columns(system: System, columns: Iterable[Column]) -> list[Column]:
-    """Columns of coverages among these, along the names that species have in the mechanism, which names of variables
-    cannot be.
+    """Return columns of all coverages, along the names of the species in the mechanism, which may not be valid names of
+    variables.
     """
     species = {state.name: state.quantity.species for state in system.states if state.quantity.species}
     found = {column.name: column for column in columns if column.name in species}
@@ -104,13 +104,13 @@ def coverage_columns(system: System, columns: Iterable[Column]) -> list[Column]:
 
 
 def profile_values(trajectory: Trajectory, profile: Profile) -> Array:
-    """Temperatures across a body at the output times, shape (times, points)."""
+    """Return the temperatures across a body at the output times, shape (times, points)."""
     names = [profile.surface, *profile.states, *([profile.far] if profile.far else [])]
     return np.stack([trajectory.everywhere[name][: len(trajectory.result.times)] for name in names], axis=1)
 
 
 def profile_columns(trajectory: Trajectory) -> list[Column]:
-    """Each profile and its coordinate."""
+    """Return the columns of each profile and of its coordinate."""
     found = []
     for profile in trajectory.model.system.profiles:
         x, values = f"x_{profile.number}", profile_values(trajectory, profile)
@@ -121,7 +121,7 @@ def profile_columns(trajectory: Trajectory) -> list[Column]:
 
 
 def _above(module: str) -> Any:
-    """A module of a room above, by name, imported late: what draws results imports them, and they cannot import it."""
+    """Import a module of a higher room by name, at call time: the modules that draw results import this one."""
     return import_module(f"surfacechem.{module}")
 
 
@@ -132,12 +132,12 @@ class Results(ABC):
     title: str = ""
     source: str = ""
     case: str = ""
-    """Text of the case, from which the run can be made again."""
+    """Text of the case, from which the run can be repeated."""
     mechanism: str = ""
     changes: Mapping[str, float] = field(default_factory=dict)
     """Parameters and initial values that differ from the case, by path."""
     before_seconds: float = 0.0
-    """Time that integrals over surfaces took before anything was run [s]."""
+    """Time that integrals over surfaces took before the run [s]."""
 
     @property
     @abstractmethod
@@ -150,13 +150,13 @@ class Results(ABC):
         """Global attributes: scalars and strings only."""
 
     def _changed(self, system: System) -> dict[str, object]:
-        """Entries of `departures` for the changes; none where there are none."""
+        """Return the entries of `departures` for the changes; empty if there are none."""
         units = system.changeable
         told = {"changes": dict(self.changes), "units": {path: units[path] for path in self.changes}}
         return told if self.changes else {}
 
     def _origin(self, made: str, how: str) -> dict[str, str | float | int]:
-        """Attributes that say where the dataset is from; it is ``made``, or evaluated."""
+        """Return attributes with the origin of the dataset, which is ``made``, or evaluated."""
         return {
             "Conventions": CONVENTIONS,
             "title": self.title,
@@ -172,13 +172,13 @@ class Results(ABC):
         return as_dataset(self.columns, self.attributes)
 
     def __getitem__(self, name: str) -> xarray.DataArray:
-        """A variable of the dataset, by its name; InputError where it has none of that name."""
+        """Return a variable of the dataset by name; InputError if it has none of that name."""
         if name not in self.dataset:
             raise InputError(f"no variable '{name}'.{suggestion(name, map(str, self.dataset))}")
         return self.dataset[name]
 
     def plot(self, variables: Sequence[str] | None = None, against: str | None = None, celsius: bool = False) -> Figure:
-        """The figure of the dataset, which a notebook shows; ``savefig`` writes it.
+        """Draw the figure of the dataset; a notebook shows it, ``savefig`` writes it.
 
         Parameters
         ----------
@@ -187,23 +187,23 @@ class Results(ABC):
         against
             The variable along the axis, instead of time.
         celsius
-            Whether temperatures are in degrees Celsius instead of kelvins.
+            True for temperatures in degrees Celsius instead of kelvins.
 
         Returns
         -------
         matplotlib.figure.Figure
-            What ``savefig`` writes, and a notebook shows.
+            The figure.
 
         Raises
         ------
         InputError
-            Where the dataset has no variable of a name.
+            If the dataset has no variable of a name.
         """
         figure: Figure = _above("plots").figure(self.dataset, variables, against, celsius)
         return figure
 
     def report(self, path: str | Path = "report.html") -> Path:
-        """Write one page of it all, which needs no other file and no network.
+        """Write one self-contained page of all results, which needs no other file and no network.
 
         Parameters
         ----------
@@ -218,17 +218,17 @@ class Results(ABC):
         Raises
         ------
         InputError
-            Where the name of the file is that of another format.
+            If the name of the file is that of another format.
         """
         written: Path = _above("studies.run_report").write(self.dataset, path)
         return written
 
     def _repr_html_(self) -> str:
-        """HTML for a notebook: the summary and a small figure."""
+        """Return HTML for a notebook: the summary and a small figure."""
         return str(_above("studies.run_report").glance(self))
 
     def write(self, path: str | Path) -> Path:
-        """Save as netCDF, or as a table where the name ends with .csv or .parquet; whole or not at all.
+        """Save as netCDF, or as a table if the name ends with .csv or .parquet; whole or not at all.
 
         Parameters
         ----------
@@ -243,7 +243,7 @@ class Results(ABC):
         Raises
         ------
         OutputError
-            Where it cannot be written.
+            If it cannot be written.
         """
         target = dataset_path(path)
         if target.suffix.lower() in TABLES:

@@ -1,4 +1,4 @@
-"""Error of a run: against an exact solution, a second run at another tolerance, or from its own balances.
+"""Error of a run: from an exact solution, from a second run at another tolerance, or from its own balances.
 
 >>> import surfacechem
 >>> case = surfacechem.load("exothermic")
@@ -49,28 +49,28 @@ from surfacechem.tolerances import (
 )
 
 ENDED_EARLIER = "ended earlier"
-"""Note on a second run that did not come as far."""
+"""Note on a second run that ended before the first one."""
 
 WAYS = ("auto", "estimate", "balances")
-"""Sources of the error: an exact solution if there is one, else a second run; always a second run; the balances, which
-costs nothing.
+"""Sources of the error: an exact solution if there is one, else a second run; always a second run; the balances, at no
+cost.
 """
 
 MOST_TIMES = 400
-"""Times at which an exact solution is evaluated at most."""
+"""Largest number of times at which an exact solution is evaluated."""
 
 DRIVING_TIMES = 10.0 ** np.arange(-15, 1)
-"""Fractions of a run in which one state may drive another."""
+"""Time steps, relative to a run, over which one state may drive another."""
 
 ENERGY_UNIT, ENTROPY_UNIT = "J/m^2", "J/(m^2 K)"
-"""Units of accounts that belong together."""
+"""Units of accounts that are compared with each other."""
 
 EVENTS = "event times"
-"""Name of the times of events among the compared variables."""
+"""Name of the event times among the compared variables."""
 
 
 def check_way(way: str, run: Run) -> None:
-    """Raise InputError for what is none of the WAYS, and where it leaves out what verifies the accuracy of a run."""
+    """Raise InputError for an unknown way, and for one that leaves out the second run needed to verify an accuracy."""
     refuse_unknown([way], WAYS, "no source '{}' of an error", Place(path="--error"))
     if way == "balances" and run.solver == AUTO:
         text = f"the accuracy {asked_accuracy(run):g} is verified by a second run, which `balances` leaves out"
@@ -85,10 +85,11 @@ def accuracy(
     cells: Callable[[], CellErrors] = CellErrors,
     estimate: Accuracy | None = None,
 ) -> Accuracy:
-    """The error of a run in one of the WAYS; ``exact`` names the exact solution of its case, with its parameters.
+    """Return the error of a run in one of the WAYS; ``exact`` names the exact solution of its case, with its
+    parameters.
 
     ``cells`` finds the errors of the cells across bodies, which a second run at another tolerance does not see;
-    ``estimate`` is that of a second run, where there was one.
+    ``estimate`` is the estimate from a second run, if there was one.
     """
     if ended_at_start(trajectory):
         return unknown(ENDED_AT_START)
@@ -112,18 +113,18 @@ def accuracy(
 
 
 def ended_at_start(trajectory: Trajectory) -> bool:
-    """Whether a run has not gone on from its start: no method has had a part in what is known of it."""
+    """True if a run ended at its start, so that no step of a method has contributed to it."""
     result = trajectory.result
     return not len(result.times) or (trajectory.status == "stopped" and result.t == 0)
 
 
 def inexact(scene: Scene) -> list[Law]:
-    """Laws that compute numbers for themselves, with an error."""
+    """Return the laws that compute numbers themselves, with an error."""
     return [law for law in (*scene.interface.potentials, *scene.heat) if law.error > 0]
 
 
 def law_errors(trajectory: Trajectory, other: Trajectory, scene: Scene) -> CellErrors:
-    """Errors of a run from those of the numbers that laws compute, by another run whose laws are wrong by these."""
+    """Return the errors of a run due to errors of numbers that laws compute, from a run whose laws differ by these."""
     also = [name for name in trajectory.model.system.output_columns if name == "t_n" or name.startswith("q_")]
     errors, note = state_differences(trajectory, other, also=also)
     if note or trajectory.status != other.status:
@@ -140,24 +141,24 @@ def against_exact(
     second: Trajectory | None = None,
     late: Mapping[str, float] | None = None,
 ) -> Accuracy:
-    """Largest errors where the run is looked at, and those of the times of events, which a second run tells; it is
-    made where it is needed, none is given, and it is not known how ``late`` events are.
+    """Return the largest errors at the times at which the run is compared, and those of the times of events.
 
-    InputError where the exact solution is another scene's.
+    Event times are compared with a second run. It is made if ``second`` is not given and the errors ``late`` of event
+    times are unknown. InputError if the exact solution is another scene's.
     """
     from surfacechem.results.matching import exact_values
 
-    # Exact solutions have no events to compare with: the times of these come from a second run.
+    # Exact solutions have no list of events: the times of events are compared with a second run.
     if late is None and (found := event_times(trajectory)):
         expected = event_times(second or _second(trajectory))
         late = {} if difference(found, expected) else event_errors(found, expected, trajectory.run.times[-1])
     late = dict(late or {})
     latest = max(late.values(), default=0.0)
-    # How well cells resolve what has just begun is told at the times that are asked for.
+    # With cells, whose layers are unresolved at first, errors are taken at the requested times.
     seen = trajectory if trajectory.model.system.profiles else fewer(trajectory.looked, latest)
     exact = exact_values(name, options, scene, seen, to_the_end=True, side=max([SIDE, *late.values()]))
     alike = _off_events(seen, latest)
-    for values in exact.values():  # where a solution ends with an infinite slope its last moment has none
+    for values in exact.values():  # a solution that ends with an infinite slope has no value at its last moment
         alike &= np.isfinite(values.reshape(len(values), -1)).all(axis=1)
     ours, known = computed(seen), sizes(seen, named=exact.keys() - states(seen).keys())
     if not alike.all():
@@ -170,7 +171,7 @@ def against_exact(
 def exact_outputs(
     found: Accuracy, exact: tuple[str, Mapping[str, float]] | None, scene: Scene
 ) -> Callable[[Trajectory], dict[str, Array]] | None:
-    """Function for the exact values at the outputs of a run; None where its accuracy is from elsewhere."""
+    """Return a function for the exact values at the outputs of a run; None if its accuracy has another source."""
     if exact is None or not found.exact:
         return None
     from surfacechem.results.matching import exact_values
@@ -180,9 +181,10 @@ def exact_outputs(
 
 
 def _off_events(trajectory: Trajectory, late: float) -> Mask:
-    """Whether each output is away from every jump and from the end of what physics stopped, whose times may err by this
-    part of them: near these the side of an exact solution, and its slope, depend on the time. Brief is what is so
-    beside the time to the next of them.
+    """Return the mask of outputs away from every jump, and from the end of a run stopped by physics.
+
+    The times of these may err by the relative amount ``late``, and near them the side of an exact solution, and its
+    slope, depend on the time. Outputs are also left out within a brief part of the time to the next jump.
     """
     result, end = trajectory.result, trajectory.run.times[-1]
     moments = np.unique([jump.t for jump in trajectory.jumps] + [result.t] * (trajectory.status == "stopped"))
@@ -192,8 +194,8 @@ def _off_events(trajectory: Trajectory, late: float) -> Mask:
 
 
 def fewer(trajectory: Trajectory, late: float = 0.0) -> Trajectory:
-    """The run with so few of its outputs that an exact solution is quick: its ends, and others away from events, whose
-    times may be ``late`` by this part of them.
+    """Return the run with at most MOST_TIMES outputs, so that an exact solution is quick: its ends, and outputs away
+    from events, whose times may err by the relative amount ``late``.
     """
     times = trajectory.result.times
     if len(times) <= MOST_TIMES:
@@ -203,8 +205,9 @@ def fewer(trajectory: Trajectory, late: float = 0.0) -> Trajectory:
 
 
 def second_settings(trajectory: Trajectory, known: bool = False) -> Run:
-    """The run that tells the error of another: at another tolerance, looked at elsewhere and more often, with outputs
-    also where the two are compared; ``known`` inside its steps, too, where it may be handed out.
+    """Return the settings of the second run: another tolerance, more and other checks against the equations, and
+    outputs also at the times of comparison. With ``known`` it records states inside its steps, too, as it may become
+    the result.
     """
     run, seen = trajectory.run, trajectory.looked.result.times
     times = tuple(np.union1d(run.times, seen).tolist())
@@ -213,17 +216,17 @@ def second_settings(trajectory: Trajectory, known: bool = False) -> Run:
 
 
 def _second(trajectory: Trajectory, known: bool = False) -> Trajectory:
-    """The closer run."""
+    """Make the second run."""
     return trajectory.model.solve_values(second_settings(trajectory, known), trajectory.values)
 
 
 def against_tighter(trajectory: Trajectory) -> Accuracy:
-    """Errors estimated from a second run."""
+    """Estimate the errors from a second run."""
     return estimated(trajectory, _second(trajectory))
 
 
 def estimated(trajectory: Trajectory, second: Trajectory) -> Accuracy:
-    """Errors of states and of the times of events as a second run at another tolerance tells them."""
+    """Return the errors of states and event times, estimated from a second run at another tolerance."""
     other = second.run.rtol
     if ended_at_start(trajectory):
         return unknown(ENDED_AT_START)
@@ -236,33 +239,33 @@ def estimated(trajectory: Trajectory, second: Trajectory) -> Accuracy:
     errors, note = state_differences(trajectory.looked, second)
     if not errors:
         return unknown(NOTHING_EVOLVES if len(trajectory.result.times) > 1 else ENDED_AT_START)
-    if note:  # one of the two went another way
+    if note:  # the two runs took different events
         return unknown(f"a second run at rtol {other:.0e}, which had {note}")
     return Accuracy(stated(errors), second_run(second.run), errors, named=partial(of_named, trajectory.looked, second))
 
 
 def unknown(why: str) -> Accuracy:
-    """The error of a run of which nothing is known."""
+    """Return an unknown error, with its reason."""
     return Accuracy(math.nan, f"unknown: {why}")
 
 
 def stated(errors: Mapping[str, float]) -> float:
-    """The error of a whole run: the largest, and never less than the last digit."""
+    """Return the error of a whole run: the largest, and at least the last digit."""
     return max(*errors.values(), EPS)
 
 
 def second_run(run: Run, kind: str = "run") -> str:
-    """Source of an estimate, in words: what is briefer, and that no law tells of, may be missed by both runs."""
+    """Describe the source of an estimate: a briefer process that no law announces may be missed by both runs."""
     return f"estimate: a second {kind} at rtol {run.rtol:.0e} that resolves 1/{run.samples:.0f} of the time"
 
 
 def state_differences(
     ours: Trajectory, theirs: Trajectory, first: int = 0, also: Collection[str] = ()
 ) -> tuple[dict[str, float], str]:
-    """Largest differences of two runs in each state, in named quantities that are ``also`` asked for, and in the times
-    of events; and in which events they differ.
+    """Return the largest differences of two runs in each state, in the named quantities ``also``, and in event times;
+    and a note on events in which they differ.
 
-    States are compared from the ``first`` output that both have.
+    States are compared from the output number ``first`` of those that both have.
     """
     found, expected = event_times(ours), event_times(theirs)
     note = difference(found, expected)
@@ -287,9 +290,9 @@ def state_differences(
 
 
 def of_named(ours: Trajectory, theirs: Trajectory) -> dict[str, float]:
-    """Largest differences of two runs in each named quantity; empty where they differ in events.
+    """Return the largest differences of two runs in each named quantity; empty if their events differ.
 
-    What may be rounding is no difference, and beside events and breakpoints a time is compared, not a value.
+    Differences within roundoff count as zero. Next to events and breakpoints times are compared instead of values.
     """
     found, expected = event_times(ours), event_times(theirs)
     if difference(found, expected):
@@ -302,7 +305,7 @@ def of_named(ours: Trajectory, theirs: Trajectory) -> dict[str, float]:
     names, true = second.model.system.output_columns, second.outputs
     rounded = RUN_ERROR * np.array(list(second.some.roundings.values()))
     size = np.transpose(list(map(sizes(second, named=names).__getitem__, names)))
-    with np.errstate(invalid="ignore"):  # what is infinite in both is the same
+    with np.errstate(invalid="ignore"):  # infinite values of both are equal
         missed = np.fmax(np.abs(first.outputs - true) - rounded, 0.0)
     errors = np.fmax.reduce(np.divide(missed, size, out=np.zeros_like(missed), where=size > 0), initial=0.0)
     nothing = _squares(ours.run.rtol, second.some, state_floors(theirs)) if errors.max(initial=0) > NEGLIGIBLE else ()
@@ -310,8 +313,10 @@ def of_named(ours: Trajectory, theirs: Trajectory) -> dict[str, float]:
 
 
 def _squares(rtol: float, trajectory: Trajectory, least: Array) -> list[str]:
-    """Named quantities that never exceed what errors of this part of the states make of them, and that only by their
-    squares, as the energy of a spring at no extension: of such a zero no digit is known, and none is missed.
+    """Return the named quantities that never exceed the effect of errors of this relative size of the states, an effect
+    that is quadratic in them.
+
+    The energy of a spring at zero extension is an example: no digit of such a zero is known, and none is missed.
     """
     changes = rtol * np.maximum(np.abs(trajectory.result.outputs), least)
     made, by_less = (np.array(list(trajectory.felt(each).values())) for each in (changes, changes / FINER_BY))
@@ -321,7 +326,7 @@ def _squares(rtol: float, trajectory: Trajectory, least: Array) -> list[str]:
 
 
 def _changes(trajectory: Trajectory, columns: list[int]) -> Array:
-    """Changes of some named quantities within the time that has passed, at the rates of the outputs."""
+    """Return the changes of some named quantities within the elapsed time, at the rates of the outputs."""
     result = trajectory.result
     passed = SQRT_EPS * result.times
     y, segment = result.outputs + passed[:, None] * trajectory.rates, result.segments_at(result.times, result.segment)
@@ -331,20 +336,22 @@ def _changes(trajectory: Trajectory, columns: list[int]) -> Array:
 
 
 def _compared(trajectory: Trajectory, also: Collection[str]) -> dict[str, Array]:
-    """States at the output times, and some named quantities; of a scene without states what is exchanged."""
+    """Return the states at the output times, and some named quantities; for a scene without states the exchanged
+    amounts.
+    """
     own = states(trajectory) or exchanged(trajectory)
     return own | {name: each for name, each in computed(trajectory).items() if name in also} if also else own
 
 
 def _at_same_places(a: Array, b: Array, x_a: Sequence[float], x_b: Sequence[float]) -> tuple[Array, Array]:
-    """Two profiles at the places of the one that has fewer."""
+    """Return two profiles at the points of the one that has fewer."""
     if x_a == x_b:
         return a, b
     return (_cubic(x_a, a, x_b), b) if len(x_a) > len(x_b) else (a, _cubic(x_b, b, x_a))
 
 
 def _cubic(places: Sequence[float], rows: Array, wanted: Sequence[float]) -> Array:
-    """Values at other places along rows, by the polynomial through the four nearest ones of each."""
+    """Interpolate rows at other places, by the polynomial through the four nearest points of each."""
     x, at = np.array(places), np.array(wanted)
     width = min(len(x), 4)
     first = np.clip(np.searchsorted(x, at) - width // 2, 0, len(x) - width)
@@ -355,9 +362,10 @@ def _cubic(places: Sequence[float], rows: Array, wanted: Sequence[float]) -> Arr
 
 
 def agree_at_jumps(times: Array, first: Trajectory, second: Trajectory) -> Mask:
-    """Whether two runs with the same events have made the same jumps at each time; times of events are compared apart.
+    """Return the mask of times at which two runs with the same events have made the same jumps; event times are
+    compared separately.
 
-    One of them may have made another at the end, where rounding decides whether it still happens.
+    One run may have made one more jump at the end, where roundoff decides whether it still happens.
     """
     both = min(len(first.jumps), len(second.jumps))
     pairs = [(one.t, other.t) for one, other in zip(first.jumps[:both], second.jumps[:both], strict=True)]
@@ -365,7 +373,7 @@ def agree_at_jumps(times: Array, first: Trajectory, second: Trajectory) -> Mask:
 
 
 def clear_of(times: Array, pairs: Sequence[tuple[float, float]] | Array) -> Mask:
-    """Whether each time lies between none of these pairs, the times at which two runs have the same event.
+    """Return the mask of times outside all of these intervals between the times of the same event in two runs.
 
     >>> clear_of(np.array([0.5, 1.0, 2.5, 4.0]), [(2.0, 3.0), (1.0, 1.0)]).tolist()
     [True, False, False, True]
@@ -376,7 +384,7 @@ def clear_of(times: Array, pairs: Sequence[tuple[float, float]] | Array) -> Mask
 
 
 def with_cells(estimate: Accuracy, cells: CellErrors) -> Accuracy:
-    """An estimate with the errors of the cells across bodies added; not known where those are not."""
+    """Add the errors of the cells across bodies to an estimate; the sum is unknown if they are."""
     if not cells.variables:
         return estimate
     if not cells.converged:
@@ -384,7 +392,7 @@ def with_cells(estimate: Accuracy, cells: CellErrors) -> Accuracy:
     if math.isnan(estimate.error):
         if estimate.source != unknown(NOTHING_EVOLVES).source:
             return estimate
-        # Where nothing evolves there is no other error than that of the laws.
+        # If nothing evolves the errors of laws are the only ones.
         words = f"estimate: a second run {cells.source.removeprefix('and one ')}"
         return Accuracy(stated(cells.variables), words, cells.variables)
     errors = dict(estimate.variables)
@@ -396,32 +404,34 @@ def with_cells(estimate: Accuracy, cells: CellErrors) -> Accuracy:
 
 
 def states(trajectory: Trajectory) -> dict[str, Array]:
-    """States at the output times, by name; those inside bodies together."""
+    """Return the states at the output times, by name; those inside a body as one profile."""
     system, outputs = trajectory.model.system, trajectory.result.outputs
     found = {name: outputs[:, j] for name, j in system.state_columns.items() if name not in system.inside}
     return found | {profile.name: profile_values(trajectory, profile) for profile in system.profiles}
 
 
 def exchanged(trajectory: Trajectory) -> dict[str, Array]:
-    """Accounts of the ledger at the output times, by name."""
+    """Return the accounts of the ledger at the output times, by name."""
     names = [account.quantity.name for account in trajectory.model.system.ledger]
     return dict(zip(names, trajectory.result.ledger_outputs.T, strict=True))
 
 
 def computed(trajectory: Trajectory) -> dict[str, Array]:
-    """States and named quantities at the output times, by name."""
+    """Return states and named quantities at the output times, by name."""
     return states(trajectory) | dict(zip(trajectory.model.system.output_columns, trajectory.outputs.T, strict=True))
 
 
 def sizes(trajectory: Trajectory, named: Collection[str] = ()) -> dict[str, Array]:
-    """Sizes to which errors of states are relative, at each output: value plus change within the time that has passed,
-    at most the largest value, unless it changes by itself in a moment; at the end, unless that is one of physics, the
-    value alone. For profiles the least that counts, for what is ``named`` beside the states the largest value, or the
-    change within the time that has passed if that is more.
+    """Return the sizes to which errors are relative, at each output.
 
-    The error of a run is then such that every state is, to this part of itself, the value of a time that is right to
-    this part of itself, which is all that can be said near a zero; and that it is right to this part of its largest
-    value at its own time, too, but for moments.
+    For a state this is its value plus its change within the elapsed time at the current rate, at most its largest
+    value, unless it changes by itself within a moment; at the end, unless physics ended the run, the value alone. For a
+    profile it is the least size that counts, for a quantity ``named`` in addition to states the largest value, or the
+    change within the elapsed time if that is more.
+
+    An error of this relative size means that every state is, up to this part of itself, the value at a time that is
+    right up to this part of itself, which is all that can be known near a zero; and, except for brief moments, that it
+    is right at its own time up to this part of its largest value.
     """
     system, result, least = trajectory.model.system, trajectory.result, state_floors(trajectory)
     found: dict[str, Array] = {}
@@ -443,8 +453,8 @@ def sizes(trajectory: Trajectory, named: Collection[str] = ()) -> dict[str, Arra
 
 
 def floors(trajectory: Trajectory) -> dict[str, float]:
-    """Sizes below which errors are relative to these: of states, and of named quantities and accounts their largest
-    value.
+    """Return the sizes below which errors are relative to these: of states their floors, of named quantities and
+    accounts their largest values.
     """
     system = trajectory.model.system
     found = dict(zip(system.state_columns, state_floors(trajectory).tolist(), strict=True))
@@ -455,8 +465,10 @@ def floors(trajectory: Trajectory) -> dict[str, float]:
 
 
 def _exchanged_sizes(trajectory: Trajectory) -> dict[str, float]:
-    """The largest value of each account, at least the part of all that is stored or exchanged with it that is no more
-    of a state: what a spring releases at no extension is rounding. Energy over temperature is an entropy.
+    """Return the largest value of each account, at least ATOL_OF_SCALE of all that is stored or exchanged in its unit.
+
+    A smaller account, as the energy that a spring releases at zero extension, is roundoff. Energy over temperature
+    counts as entropy.
     """
     system = trajectory.model.system
     units = [each.unit for each in (*(o.quantity for o in system.outputs), *(a.quantity for a in system.ledger))]
@@ -472,15 +484,15 @@ def _exchanged_sizes(trajectory: Trajectory) -> dict[str, float]:
 
 
 def state_floors(trajectory: Trajectory) -> Array:
-    """Size of each state at which its absolute tolerance is as much as the relative one, and at most its scale."""
+    """Return the size of each state at which its absolute tolerance equals the relative one, at most its scale."""
     scales = np.array([state.scale for state in trajectory.model.system.states])
     least = np.minimum(trajectory.result.problem.atol / trajectory.run.rtol, scales)
-    # What never exceeds the last digit of its scale is nothing, however tight the absolute tolerance: a species that no
-    # reaction makes has a coverage of rounding.
+    # A state that never exceeds the last digit of its scale is zero, however tight the absolute tolerance: the coverage
+    # of a species that no reaction makes is roundoff.
     most = np.abs(trajectory.result.outputs).max(axis=0, initial=0.0)
     least = np.where(most < EPS * scales, np.maximum(least, EPS * scales), least)
     small = (most > 0) & (most < least)
-    if small.any():  # nor is a velocity that the last digit of a load drives
+    if small.any():  # so is a velocity that the last digit of a load drives
         ends = {0, len(trajectory.result.times) // 2, len(trajectory.result.times) - 1}
         driven = _driven(trajectory.picked(np.array(sorted(ends))))
         least = np.where(small & (most <= RUN_ERROR * EPS * driven), np.maximum(least, driven), least)
@@ -488,8 +500,10 @@ def state_floors(trajectory: Trajectory) -> Array:
 
 
 def _driven(trajectory: Trajectory) -> Array:
-    """Largest size that each state reaches if all others drive it over a moment of any length in the time of the run,
-    as in an implicit step: for a mass on a spring its gap times its frequency, shape (states,).
+    """Return the largest size of each state if all others drive it over a time step of any length within the run, shape
+    (states,).
+
+    The step is an implicit one. For a mass on a spring the size of the velocity is the gap times the frequency.
     """
     program, result = trajectory.model.program, trajectory.result
     segment = result.segments_at(result.times, result.segment)
@@ -505,7 +519,7 @@ def _driven(trajectory: Trajectory) -> Array:
 
 
 def difference(found: Mapping[str, Array], expected: Mapping[str, Array]) -> str:
-    """Difference of the events of two runs, in words; empty where they have the same. Kinks do not count.
+    """Describe the difference of the events of two runs; empty if they have the same. Kinks do not count.
 
     >>> difference({"slip": [0.1]}, {"slip": [0.1, 0.2], "stop": [0.3]})
     'other events: 2 slip instead of 1, 1 stop instead of 0'
@@ -517,10 +531,10 @@ def difference(found: Mapping[str, Array], expected: Mapping[str, Array]) -> str
 
 
 def event_errors(found: Mapping[str, Array], expected: Mapping[str, Array], end: float) -> dict[str, float]:
-    """Largest error of the times of events, each relative to its own time, or to ERROR_FLOOR of the run if that is
+    """Return the largest error of event times, each relative to its own time, or to ERROR_FLOOR of the run if that is
     more.
 
-    Kinks of which one of the two has more are left out; empty where no time is compared.
+    Kinks of which one of the two runs has more are left out; empty if no time is compared.
     """
     errors = [
         np.abs(found[name] - times) / np.maximum(times, ERROR_FLOOR * end)
@@ -531,19 +545,20 @@ def event_errors(found: Mapping[str, Array], expected: Mapping[str, Array], end:
 
 
 def asked_accuracy(run: Run) -> float:
-    """The relative accuracy that a run asks for."""
+    """Return the relative accuracy that a run asks for."""
     return run.accuracy if run.accuracy is not None else run.rtol / RTOL_PART
 
 
 def verified(first: Trajectory) -> tuple[Trajectory, Accuracy]:
-    """The loosest of a row of runs, each tighter by a hundred, that differs from the next by no more than was asked.
+    """Return the loosest of a sequence of runs, each tighter by a hundred, that differs from the next by at most the
+    requested accuracy.
 
-    The first has a hundredth of the accuracy as its tolerance. Most runs are confirmed by their second, so the cost is
+    The tolerance of the first is a hundredth of the accuracy. Most runs are confirmed by the second, so the cost is
     that of two runs, the second at a hundredth of the tolerance.
     """
     wanted = asked_accuracy(first.run)
     while True:
-        last = first.run.rtol <= MIN_RTOL  # nothing tighter resolves more
+        last = first.run.rtol <= MIN_RTOL  # a tighter run would not be more accurate
         second = _second(first, known=True)
         found = replace(compared(first, second), asked=wanted)
         if second.status == "failed" or found.error <= wanted:
@@ -557,7 +572,7 @@ def verified(first: Trajectory) -> tuple[Trajectory, Accuracy]:
 
 
 def compared(first: Trajectory, second: Trajectory) -> Accuracy:
-    """Largest differences of two runs: of states and of times of events, the end among them where physics set it."""
+    """Return the largest differences of two runs: of states, and of event times including an end set by physics."""
     rtol = second.run.rtol
     if second.status == "failed":
         return unknown(f"a second run at rtol {rtol:.0e} failed: {second.reason}")
@@ -565,7 +580,7 @@ def compared(first: Trajectory, second: Trajectory) -> Accuracy:
     if first.status != second.status:
         return Accuracy(math.inf, f"{source}, which {second.status}: {second.reason}")
     errors, others = state_differences(first.looked, second)
-    if others and first.run.rtol > MIN_RTOL:  # there rounding decides of events that change nothing
+    if others and first.run.rtol > MIN_RTOL:  # at MIN_RTOL roundoff decides on events without effect
         return Accuracy(math.inf, f"{source}, which had {others}")
     if not errors:
         return unknown(ENDED_AT_START)
@@ -573,7 +588,7 @@ def compared(first: Trajectory, second: Trajectory) -> Accuracy:
 
 
 def rounding_of_time(trajectory: Trajectory) -> float:
-    """Largest relative change of a state by the last bit of the time: no run is nearer than that.
+    """Return the largest relative change of a state by the last bit of time: no run is more accurate than that.
 
     It is large where a state runs towards a singular end.
     """
@@ -585,7 +600,7 @@ def rounding_of_time(trajectory: Trajectory) -> float:
 
 
 def reasons(problem: Problem, run: Run, moves: bool) -> list[tuple[str, str, str]]:
-    """Settings chosen for a run, whose gap ``moves`` by a balance or does not, and the reasons, a row each."""
+    """Return rows of the settings chosen for a run with their reasons; ``moves`` is True if a balance moves its gap."""
     part = f"a hundredth of the accuracy {asked_accuracy(run):.0e}, as errors of smooth runs are below 100 rtol"
     if run.rtol == MIN_RTOL:
         part = f"for the accuracy {asked_accuracy(run):.0e}; below this is rounding"

@@ -1,4 +1,4 @@
-"""The events of runs as a table: times, what happened, states before and after, energies and verdicts."""
+"""Table of the events of runs: times, names and reasons, states before and after, energies and verdicts."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from surfacechem.solve.run import Trajectory
 from surfacechem.tolerances import NEGLIGIBLE, RUN_EPS
 
 SIDE = RUN_EPS / 8
-"""Relative distance from a jump at which a time is that of the jump, 1.1e-13: times are summed, too, over some 1e5
+"""Relative distance from a jump within which a time is equal to that of the jump, 1.1e-13: times are sums over some 1e5
 steps, whose roundings add up to a tenth of those of 1e7.
 """
 
@@ -25,29 +25,29 @@ REST = "rest"
 STEADY = "steady"
 
 KINK = "kink of "
-"""Prefix of the names of events that change nothing but a formula."""
+"""Prefix of the names of events at which only a formula changes."""
 
 
 @dataclass(frozen=True)
 class EventRow:
-    """An event with the states at its two sides, and its jump where it is one."""
+    """An event with the states on both sides of it, and its jump if it is one."""
 
     t: float
     since: float
-    """Time since the last jump before it, or since the start."""
+    """Time since the preceding jump, or since the start."""
     name: str
     reason: str
     before: Array
     after: Array
     jump: Jump | None = None
     released: float = 0.0
-    """Energy turned into heat, entropy produced and verdict of the second law: nothing where nothing jumps."""
+    """Energy turned into heat; it, the entropy produced and the verdict of the second law are empty without a jump."""
     entropy: float = 0.0
     verdict: str = ""
 
 
 def events_of(trajectory: Trajectory) -> list[EventRow]:
-    """Jumps and other events of a run in order of time."""
+    """Return jumps and other events of a run in order of time."""
     margins, events = trajectory.model.margins, trajectory.result.events
     found = [
         EventRow(float(t), 0.0, margins[i].name, margins[i].reason, y, y)
@@ -68,8 +68,10 @@ def events_of(trajectory: Trajectory) -> list[EventRow]:
 
 
 def event_columns(runs: Sequence[Trajectory], axes: Mapping[str, int] | None = None) -> list[Column]:
-    """The table of one run, or of many along the ``axes`` of a sweep, by name and size: there times and values are not
-    set beyond the last event of a run. Without the columns of jumps where no run jumps; empty where nothing happens.
+    """Return the table of one run, or of many along the ``axes`` of a sweep, by name and size.
+
+    In a sweep, entries beyond the last event of a run are unset. Columns of jumps are left out if no run jumps; empty
+    if there are no events.
     """
     system, events = runs[0].model.system, [events_of(run) for run in runs]
     most = max(map(len, events))
@@ -109,14 +111,14 @@ def event_columns(runs: Sequence[Trajectory], axes: Mapping[str, int] | None = N
 
 
 def event_times(trajectory: Trajectory) -> dict[str, Any]:
-    """Times [s] of the events by name, in order; where physics stopped the run, also that of its end.
+    """Return the times [s] of the events by name, in order; if physics stopped the run, also the time of its end.
 
-    Names of kinks, at which a formula changes and nothing else, begin with KINK: whether one that is only grazed is met
-    is a matter of rounding.
+    Names of kinks, at which only a formula changes, begin with KINK: roundoff decides whether a kink that is only
+    grazed counts.
 
-    Impacts slower than a thousandth of the fastest so far are left out, with what happens at their time but rest: of
-    endless rebounds, how many there are is a matter of the tolerance. So is what falls on the very end of the run:
-    rounding decides whether it still happens. When a run has come to rest is a matter of the tolerance, too.
+    Impacts slower than a thousandth of the fastest so far are left out, with all events at their time except rest: the
+    number of rebounds in a Zeno sequence depends on the tolerance. Events at the very end of the run are left out, as
+    roundoff decides whether they happen, and so is the time of a steady state, which depends on the tolerance.
     """
     columns = trajectory.model.system.state_columns
     end, fastest, slow = trajectory.run.times[-1] * (1 - SIDE), 0.0, -np.inf
@@ -136,13 +138,13 @@ def event_times(trajectory: Trajectory) -> dict[str, Any]:
 
 
 def entropy_destroyed(jumps: Sequence[Jump]) -> float:
-    """Most entropy that a jump has destroyed [J/(m^2 K)]; one that was refused destroys none."""
+    """Return the most entropy that a jump has destroyed [J/(m^2 K)]; a jump that was refused destroys none."""
     return max((-jump.entropy for jump in jumps if jump.verdict == VIOLATES and not jump.stops), default=0.0)
 
 
 def event_findings(jumps: Sequence[Jump], unit: str = "J/(m^2 K)") -> list[str]:
-    """Jumps against the second law that the case did not accept, in words; those that repeat in one line. ``unit`` is
-    that of the entropy.
+    """Describe jumps that violate the second law and that the case did not accept; repeated ones in one line. ``unit``
+    is the unit of entropy.
     """
     flagged: dict[tuple[str, str], list[Jump]] = {}
     for jump in jumps:
@@ -161,7 +163,7 @@ def event_findings(jumps: Sequence[Jump], unit: str = "J/(m^2 K)") -> list[str]:
 
 
 def event_waits(trajectory: Trajectory) -> list[str]:
-    """Transitions for which a run that reached its end was still waiting, in words."""
+    """Describe transitions for which a run that reached its end was still waiting."""
     parameters, last = trajectory.model.system.parameters, trajectory.jumps[-1:]
     findings = []
     for mode in trajectory.model.system.modes:
@@ -173,18 +175,18 @@ def event_waits(trajectory: Trajectory) -> list[str]:
 
 
 def event_violations(jumps: Sequence[Jump]) -> list[str]:
-    """Names of the transitions that have destroyed entropy, or would have."""
+    """Return the names of transitions that have destroyed entropy, or would have."""
     return list(dict.fromkeys(jump.edge.name for jump in jumps if jump.verdict != ADMISSIBLE))
 
 
 def event_counts(jumps: Sequence[Jump]) -> str:
-    """Names of the transitions, and how often each happened."""
+    """List the names of the transitions with their counts."""
     names = [jump.edge.name for jump in jumps]
     return ", ".join(f"{names.count(name)} {name}" if names.count(name) > 1 else name for name in dict.fromkeys(names))
 
 
 def event_summary(jumps: Sequence[Jump], exchanged: float, unit: str = "J/m^2") -> str:
-    """The transitions of a run in one line; ``exchanged`` is the largest energy that anything exchanged."""
+    """Summarise the transitions of a run in one line; ``exchanged`` is the largest energy that was exchanged."""
     released = sum(jump.released for jump in jumps)
     verdicts = {jump.verdict for jump in jumps} - {ADMISSIBLE}
     heat = f"; released {released:.4g} {unit}" if abs(released) > len(jumps) * RUN_EPS * exchanged else ""

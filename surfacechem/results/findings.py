@@ -1,11 +1,11 @@
-"""Findings on a run for its reader, in words, beside its balances and events.
+"""Findings on a run for its reader, in words, in addition to its balances and events.
 
-Pairs of rates that contradict the equilibrium of the potential, rates so fast that none resolves them, laws out of
-their sense or range, fluxes and errors that are no result.
+They are about pairs of rates that contradict the equilibrium of the potential, rates too fast to be resolved, laws
+outside their validity or range, and fluxes and errors that make a result meaningless.
 
 Where the interface is in equilibrium every reaction runs as often forward as back, so that k_f/k_r is the equilibrium
-constant K(g, T), the elastic energy of the bonds included. A reversible law has this by construction; two laws that run
-one way each have it only if their parameters say so.
+constant K(g, T), including the elastic energy of the bonds. A reversible law satisfies this by construction; two
+one-way laws do so only if their parameters agree.
 
 Source: Onsager (1931), Phys. Rev. 37, 405 (detailed balance); Sauer, Duong & Mandadapu (2021), section 4.3 (entropy).
 """
@@ -27,12 +27,12 @@ from surfacechem.solve.run import Trajectory
 from surfacechem.tolerances import EPS, ERROR_FLOOR, NEGLIGIBLE, RUN_EPS
 
 LOST_FLUX = NEGLIGIBLE / 10
-"""A flux that the last bit of a temperature changes by more than this part of the largest flux is no result: of four
-digits none is left that counts.
+"""Relative change of a flux by the last bit of a temperature, above which the flux is lost: of four digits none is
+certain. It is relative to the largest flux.
 """
 
 LARGE_ERROR, MISSED_BY = 1e-2, 10
-"""Relative error that is told as a warning, and how many times what was asked for may be missed without one."""
+"""Relative error above which there is a warning, and multiple of the requested accuracy that is allowed without one."""
 
 ROUNDED_DEPARTURE = NEGLIGIBLE
 """Departures below this are rounding of published numbers."""
@@ -40,7 +40,7 @@ ROUNDED_DEPARTURE = NEGLIGIBLE
 
 @dataclass(frozen=True)
 class BalanceVerdict:
-    """Range of ln(k_f/k_r) - ln K(g, T) along a run, and whether they produced entropy all the time."""
+    """Range of ln(k_f/k_r) - ln K(g, T) along a run, and whether the pair of rates always produced entropy."""
 
     title: str
     low: float
@@ -54,17 +54,17 @@ class BalanceVerdict:
 
     @property
     def consistent(self) -> bool:
-        """Whether the rates keep detailed balance, up to rounding of their parameters."""
+        """True if the rates satisfy detailed balance, up to rounding of their parameters."""
         return self.largest <= ROUNDED_DEPARTURE
 
     def __str__(self) -> str:
-        """The verdict in words."""
+        """Return the verdict in words."""
         entropy = "entropy production stayed positive" if self.dissipates else "it DESTROYED ENTROPY"
         return f"{self.title}: {in_words(self.low, self.high)}; {entropy}"
 
 
 def in_words(low: float, high: float) -> str:
-    """A range of departures in words.
+    """Describe a range of departures.
 
     >>> in_words(-2.3, 0.0)
     'k_f/k_r departs from the equilibrium constant K(g, T) by a factor exp(-2.3) at most'
@@ -78,7 +78,7 @@ def in_words(low: float, high: float) -> str:
 
 
 def verdicts(trajectory: Trajectory, audit: Audit) -> tuple[BalanceVerdict, ...]:
-    """The verdict on each pair of rates, over all outputs and steps."""
+    """Return the verdict on each pair of rates, over all outputs and steps."""
     found = []
     for pair in trajectory.model.system.noted(RatePair):
         values = trajectory.everywhere[pair.departure]
@@ -89,7 +89,7 @@ def verdicts(trajectory: Trajectory, audit: Audit) -> tuple[BalanceVerdict, ...]
 
 
 def findings(trajectory: Trajectory, accuracy: Accuracy | None) -> list[str]:
-    """Everything but the verdicts, in words."""
+    """Return all findings except the verdicts, in words."""
     system, rows = trajectory.model.system, np.empty((0, 0))
     if [*system.noted(CappedLaw), *system.noted(Caution)]:  # arguments of compiled functions at the outputs and steps
         model, result, steps = trajectory.model, trajectory.result, trajectory.result.steps
@@ -106,10 +106,10 @@ def findings(trajectory: Trajectory, accuracy: Accuracy | None) -> list[str]:
 
 
 def _capped_rates(system: System, rows: NDArray[np.float64]) -> list[str]:
-    """Laws whose rate was beyond exp(EXPONENT_CAP) at one of several states."""
+    """Return warnings about laws whose rate exceeded exp(EXPONENT_CAP) at one of the states."""
     found = []
     for law in system.noted(CappedLaw) if len(rows) else ():
-        # Interpreted, since they are needed once.
+        # Interpreted rather than compiled, since they are needed once.
         exponents = [system.expand(expression) for expression in law.exponents]
         values = symengine.Lambdify(system.inputs, exponents, backend="lambda")(rows)
         largest = float(np.nanmax(values, initial=-np.inf))
@@ -122,7 +122,7 @@ def _capped_rates(system: System, rows: NDArray[np.float64]) -> list[str]:
 
 
 def active_cautions(system: System, rows: NDArray[np.float64]) -> list[str]:
-    """The cautions that apply at one of several states, which are the arguments of compiled functions."""
+    """Return the cautions that apply at one of the states, given as arguments of compiled functions."""
     cautions = system.noted(Caution)
     if not (cautions and len(rows)):
         return []
@@ -133,7 +133,7 @@ def active_cautions(system: System, rows: NDArray[np.float64]) -> list[str]:
 
 
 def _inaccurate(trajectory: Trajectory, found: Accuracy | None) -> list[str]:
-    """Warning of an error well beyond what was asked for, or so large that there is no result."""
+    """Return a warning of an error that is unknown, well beyond the requested accuracy, or too large for a result."""
     if found is not None and math.isnan(found.error) and trajectory.status == "finished":
         return [f"the error is not known: {found.source.partition(': ')[2]}"]
     if found is None or not found.error > (LARGE_ERROR if found.asked is None else MISSED_BY * found.asked):
@@ -144,11 +144,11 @@ def _inaccurate(trajectory: Trajectory, found: Accuracy | None) -> list[str]:
 
 
 def _lost_fluxes(trajectory: Trajectory) -> list[str]:
-    """Fluxes through conductances so large that the temperature difference is rounding."""
+    """Return a warning about fluxes through conductances so large that the temperature difference is roundoff."""
     fluxes = {name: size for name, size in trajectory.roundings.items() if name.startswith("q_")}
     everywhere, duration = trajectory.everywhere, trajectory.result.t
     most = max((largest(everywhere[name]) for name in fluxes), default=0.0)
-    # What rounding alone carries over the whole run counts against the heat that there is, wherever its zero lies.
+    # Heat that roundoff carries over the whole run is compared with the heat content, independent of its zero.
     content = trajectory.roundings.get("E_total", 0.0) / EPS
     felt = ERROR_FLOOR * max(largest(everywhere["E_total"]), content)
     lost = [name for name, size in fluxes.items() if size > LOST_FLUX * most and size * duration > felt]
@@ -157,7 +157,7 @@ def _lost_fluxes(trajectory: Trajectory) -> list[str]:
 
 
 def _extrapolations(trajectory: Trajectory) -> list[str]:
-    """Laws that the run has used outside their range."""
+    """Return warnings about laws that the run has used outside their range."""
     found = []
     for limit in trajectory.model.system.noted(Range):
         values = trajectory.everywhere[limit.variable]

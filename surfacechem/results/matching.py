@@ -1,7 +1,7 @@
 """Exact solution of a scene: parameters read off the scene, and a check that it solves the scene's equations.
 
-An exact solution that is named for a scene it does not belong to is refused: it must start where the scene starts and
-satisfy the assembled equations.
+An exact solution that does not belong to the scene is refused: it must have the initial values of the scene and satisfy
+the assembled equations.
 """
 
 from __future__ import annotations
@@ -25,36 +25,37 @@ from surfacechem.solve.run import Trajectory
 from surfacechem.tolerances import EQUAL, EQUATION_MISMATCH, FEW_EPS, QUARTER_EPS, RUN_EPS, SQRT_EPS
 
 Solution = Callable[[Array], dict[str, Array]]
-"""Exact values under the names of the scene, at any times."""
+"""Function for exact values under the names of the scene, at any times."""
 
 DIFFERENCE_ROUNDING = 2 * FEW_EPS
-"""Last digits of a difference of five values."""
+"""Relative rounding of a difference of five values."""
 
 MOST_PROBES = 7
-"""Times at which the equations are tested; as many stretches between events, where there are so many."""
+"""Number of times at which the equations are tested, in as many arcs between events if there are so many."""
 
 JUMP_RATIO = 10.0
-"""A solution jumps where it changes by so many times as much as over an equal time before. What is smooth changes as
-much, a power p of the time left 1/(2^p - 1) times as much: 2.4 times for a root. Ten, that of p = 1/7, is a choice; a
-smaller jump is taken for a change, and what is beyond it counts as an error."""
+"""Ratio of the change of a solution to that over an equal time before, above which the change is a jump. A smooth
+solution has the ratio 1, a power p of the remaining time 1/(2^p - 1): 2.4 for a root. Ten, that of p = 1/7, is a
+choice; a smaller jump is taken for a smooth change, and the difference behind it counts as an error.
+"""
 
 END_PART = 0.01
-"""Fraction of a stretch near its ends in which nothing is tested: a run knows the times of its events only so well."""
+"""Fraction of an arc near its ends in which nothing is tested, since the times of events have errors."""
 
 SHORTEST_ARC = 8 * SQRT_EPS
-"""Part of the time so far below which an arc is too short for differences in time: their steps are DIFFERENCE_STEP of
-it, 1e-11 of the time, of which its last digit is 2e-5.
+"""Ratio of its length to the time, below which an arc is too short for differences in time: their steps are
+DIFFERENCE_STEP of it, 1e-11 of the time, of which the last digit of time is 2e-5.
 """
 
 DIFFERENCE_STEP = QUARTER_EPS
-"""Step of differences in time over five points, in parts of the time that an arc has lasted: truncation is of fourth
+"""Step of five-point differences in time, relative to the time since the start of the arc: truncation is of fourth
 order, 2e-16, and rounding 1e-12.
 """
 
 
 @contextmanager
 def _in_range() -> Iterator[None]:
-    """Raise InputError for an arithmetic error, such as an overflow: the scene is another."""
+    """Raise InputError for an arithmetic error, such as an overflow: the solution is for another scene."""
     try:
         yield
     except ArithmeticError:
@@ -65,10 +66,11 @@ def _in_range() -> Iterator[None]:
 def exact_values(
     name: str, options: Mapping[str, float], scene: Scene, run: Trajectory, to_the_end: bool = False, side: float = SIDE
 ) -> dict[str, Array]:
-    """Exact values at the output times by the names of the scene's variables; InputError if it is another scene's.
+    """Return exact values at the output times by the names of the scene's variables; InputError if the solution is
+    another scene's.
 
-    A run with outputs ``to_the_end`` may have them beyond that of the solution, by the error of its own; its jumps may
-    be those of the solution where their times differ by the part ``side`` of them.
+    With ``to_the_end`` the outputs of a run may lie beyond the end of the solution by the error of its own end. Jumps
+    of run and solution are the same if their times differ by less than the fraction ``side``.
     """
     view = SceneView(scene, run)
     reference = match(references.get(name), options, view)
@@ -79,7 +81,7 @@ def exact_values(
     probes, since = _probes(*_edges(run)) if tested else (np.empty(0), np.empty(0))
     step = DIFFERENCE_STEP * since
     around = [probes + k * step for k in (-2, -1, 0, 1, 2)]
-    # All of it at once, as an exact solution costs by the call.
+    # All times in one call, as the cost of an exact solution is per call.
     every = solution(np.concatenate([times, before_end, *around]))
     first = len(times) + len(before_end)
     exact = {each: values[: len(times)].copy() for each, values in every.items()}
@@ -102,10 +104,10 @@ def exact_values(
 def _choose_sides(
     exact: dict[str, Array], before_end: Mapping[str, Array], solution: Solution, run: Trajectory, side: float
 ) -> None:
-    """Take the exact values, at output times that are those of a jump, on the side on which the run has it.
+    """Replace exact values at the times of jumps by those on the side of the jump on which the run has its output.
 
-    That may be a jump of the run or of its loads, or one of the solution at the very end, of which rounding decides
-    whether a run still has it.
+    Jumps are those of the run and of its loads, and one of the solution at the very end, where roundoff decides whether
+    a run still has it.
     """
     times = run.result.times
     moments = np.array([*run.result.problem.segments[1:-1], *(jump.t for jump in run.jumps)])
@@ -127,7 +129,7 @@ def _choose_sides(
 
 
 def _take_nearer(exact: dict[str, Array], others: Mapping[str, Array], run: Trajectory, at: NDArray[np.bool_]) -> None:
-    """Put other values at some outputs in the place of those that are farther from the run's."""
+    """Replace exact values at some outputs by other values that are nearer to those of the run."""
     system = run.model.system
     for name, other in others.items():
         if name in system.state_columns:
@@ -141,11 +143,12 @@ def _take_nearer(exact: dict[str, Array], others: Mapping[str, Array], run: Traj
 
 
 def match(kind: type[Reference], options: Mapping[str, float], view: SceneView) -> Reference:
-    """The reference with the parameters of the scene, and with ``options`` for those that the scene does not tell.
+    """Return the reference with the parameters of the scene, and ``options`` for those that the scene does not
+    determine.
 
-    InputError where an option is not what the scene has, as after a change of the scene alone.
+    InputError if an option differs from the value of the scene, as after a change of the scene alone.
     """
-    # Options count for what the scene does not tell; where it does they must agree.
+    # Options supply parameters that the scene does not determine; others must agree with the scene.
     values, told = dict(options), kind.from_scene(view)
     for item in dataclasses.fields(kind):  # type: ignore[arg-type]
         found, spec = told.get(item.name), item.metadata["spec"]
@@ -165,7 +168,7 @@ def _same(a: float, b: float, scale: float) -> bool:
 
 
 def _solution(reference: Reference, view: SceneView, t: Array) -> dict[str, Array]:
-    """Exact values under the names of the scene; from the heat also the temperature that it gives."""
+    """Return exact values under the names of the scene, and the temperature that follows from the heat."""
     exact = reference.solution(t)
     energies = {body.energy.name() for body in view.scene.bodies if body.energy is not None}
     if "T" not in exact and "heat" in exact and energies in ({"quadratic"}, {"constant"}) and view.temperature:
@@ -176,9 +179,9 @@ def _solution(reference: Reference, view: SceneView, t: Array) -> dict[str, Arra
 
 
 def _with_profiles(reference: Reference, exact: Mapping[str, Array], scene: Scene, run: Trajectory) -> dict[str, Array]:
-    """Exact values of bodies without cells by the names of the scene, with their profiles.
+    """Return exact values of bodies without cells by the names of the scene, with their profiles.
 
-    Two bodies have no temperature where they touch at the instant when they do: ours is taken.
+    At the instant of first contact the temperature of the contact is undefined: the value of the run is taken.
     """
     system, times = run.model.system, run.result.times
     result = {name: x.copy() for name, x in exact.items() if name in system.state_columns | system.output_columns}
@@ -197,12 +200,12 @@ def _with_profiles(reference: Reference, exact: Mapping[str, Array], scene: Scen
 
 
 def renamed(exact: Mapping[str, Array], run: Trajectory) -> dict[str, Array]:
-    """Exact values under the names of the scene; those it does not have are left out."""
+    """Return exact values under the names of the scene; variables that it does not have are left out."""
     system = run.model.system
     known = system.state_columns | system.output_columns
     temperatures = [state.name for state in system.states if state.is_temperature and state.name not in system.inside]
     rates = [own for own in known if own.startswith("R_")]
-    # What an exact solution calls otherwise.
+    # Variables with another name in exact solutions.
     others = {"T": temperatures, "R_c": rates, "sigma_chem": [f"sigma_{own[2:]}" for own in rates]}
     result = {}
     for name, values in exact.items():
@@ -213,7 +216,7 @@ def renamed(exact: Mapping[str, Array], run: Trajectory) -> dict[str, Array]:
 
 
 def _check_start(exact: Mapping[str, Array], run: Trajectory) -> None:
-    """Refuse a solution that starts elsewhere."""
+    """Refuse a solution with other initial values."""
     for j, state in enumerate(run.model.system.states):
         if state.name in exact:
             start, ours = exact[state.name][0], run.result.outputs[0, j]
@@ -230,7 +233,7 @@ def _check_equations(near: Mapping[str, Array], run: Trajectory, t: Array, step:
     if missing := [name for name in names if name not in near]:
         raise InputError(f"it says nothing of {', '.join(missing)}.")
     values = np.array([near[name] for name in names]).reshape(len(names), 5, len(t))
-    # Rates by central differences, and how far these are rounding.
+    # Rates by central differences, and their rounding.
     slope = (8 * (values[:, 3] - values[:, 1]) - (values[:, 4] - values[:, 0])) / (12 * step)
     rounding = (DIFFERENCE_ROUNDING * (np.abs(values[:, 2]) + np.abs(t * slope)) / step).T
     y, ydot = values[:, 2].T, slope.T
@@ -241,14 +244,14 @@ def _check_equations(near: Mapping[str, Array], run: Trajectory, t: Array, step:
     by_state, by_rate = program.derivatives(inputs)
     terms = by_rate * ydot[:, None, :]
     known = (np.abs(by_rate) * rounding[:, None, :]).sum(axis=2)
-    # What rounding of the rates may be is no miss.
+    # Residuals within the rounding of the rates count as zero.
     misses = np.copysign(np.maximum(np.abs(misses) - known, 0.0), misses)
     sizes = np.abs(terms).sum(axis=2) + np.abs(misses - terms.sum(axis=2))
-    # Near equilibrium an equation is a sum of nothing, so its largest size over the run is the scale.
+    # Near equilibrium all terms of an equation vanish, so its largest size over the run is the scale.
     largest = sizes.max(axis=0)
     parts = np.abs(misses) / np.where(largest > 0, largest, 1.0)
-    # A balance without rates has no size of its own, as its terms cancel. It says where the algebraic states are, so
-    # that it is missed by as much as they are off: the correction of Newton's method, in parts of them.
+    # A balance without rates has no scale, as its terms cancel. It determines algebraic states, so that its error is
+    # that of these states: the correction of Newton's method, relative to them.
     still, algebraic = ~by_rate.any(axis=(0, 2)), np.array([state.algebraic for state in system.states])
     if still.any():
         reach = np.abs(y[:, algebraic]).max(axis=0)
@@ -264,7 +267,7 @@ def _check_equations(near: Mapping[str, Array], run: Trajectory, t: Array, step:
 
 
 def _check_given(exact: Mapping[str, Array], run: Trajectory, t: Array, y: Array, ydot: Array) -> None:
-    """Refuse a solution under another load."""
+    """Refuse a solution for another load."""
     columns = run.model.system.output_columns
     loads = {role.variable for role in run.model.system.roles if role.role == "prescribed"}
     given = [name for name in columns if name in loads and name in exact]
@@ -276,14 +279,16 @@ def _check_given(exact: Mapping[str, Array], run: Trajectory, t: Array, y: Array
 
 
 def _edges(run: Trajectory) -> tuple[float, ...]:
-    """Times between which a run has no event or breakpoint, in order."""
+    """Return the times between which a run has no event or breakpoint, in order."""
     end = float(run.result.times[-1])
     return tuple(sorted({end, *(t for t in run.result.problem.segments.tolist() if t <= end)}))
 
 
 @lru_cache
 def _probes(*edges: float) -> tuple[Array, Array]:
-    """Times at which the equations are tested, inside the stretches between ``edges``, and how long each has lasted."""
+    """Return the times at which the equations are tested, inside the arcs between ``edges``, and the time since the
+    start of the arc at each.
+    """
     if len(edges) < 2:
         raise InputError("the run ended before anything could be compared.")
     long = np.flatnonzero(np.diff(edges) > SHORTEST_ARC * np.array(edges[1:]))

@@ -1,6 +1,4 @@
-"""Columns of data, and files of them: netCDF with CF conventions, and tables. A file takes its place only when it is
-whole.
-"""
+"""Columns of data and their files: netCDF with CF conventions, and tables. Only a complete file replaces an old one."""
 
 from __future__ import annotations
 
@@ -33,13 +31,13 @@ R = TypeVar("R")
 CONVENTIONS = "CF-1.11"
 
 READING_TIMEOUT = 20.0
-"""Time [s] that reading a small file may take: in one that is damaged HDF5 may look for something without end."""
+"""Time [s] that reading a small file may take: in a damaged file HDF5 may search without end."""
 
 _BEGUN_READING: dict[Path, subprocess.Popen[bytes]] = {}
-"""Processes that try files which are read soon."""
+"""Processes that test files which are read soon."""
 
 LEAST_BANDWIDTH = 1e7
-"""Bytes per second that a disk gives at the least."""
+"""Least speed of a disk, in bytes per second."""
 
 READING_TEST = """
 import sys
@@ -54,7 +52,7 @@ with netCDF4.Dataset(sys.argv[1]) as file:
             with suppress(Exception):
                 item[...]
 """
-"""A process that reads all of a file, whatever the errors on the way."""
+"""Program that reads all of a file and ignores errors on the way."""
 
 SUFFIXES = (".nc", ".nc4", ".cdf")
 """Suffixes of netCDF files."""
@@ -64,15 +62,15 @@ TABLES = (CSV, PARQUET)
 """Suffixes of files that hold a dataset as a table."""
 
 COORDINATES = "coordinates"
-"""Global attribute that names auxiliary coordinates: coordinates that no dimension is called like."""
+"""Global attribute that names auxiliary coordinates: those without a dimension of the same name."""
 
 RUN_SUFFIXES = (*SUFFIXES, *TABLES)
-"""Suffixes of files to which a run is written."""
+"""Suffixes of files to which a run can be written."""
 
 
 @dataclass(frozen=True)
 class Column:
-    """One variable of the dataset."""
+    """A variable of the dataset."""
 
     name: str
     dimensions: tuple[str, ...]
@@ -81,7 +79,7 @@ class Column:
     long_name: str
     tag: str = ""
     error: float | None = None
-    """Largest relative error, where it is known."""
+    """Largest relative error, if known."""
 
     @property
     def attributes(self) -> dict[str, str | float]:
@@ -93,7 +91,7 @@ class Column:
 
 @cache
 def cf_unit(unit: str) -> str:
-    """A unit of this package in the notation of the CF conventions.
+    """Return a unit of this package in the notation of the CF conventions.
 
     >>> cf_unit("W/(m^2 K)"), cf_unit("1/m^2"), cf_unit("1"), cf_unit("m/s^2")
     ('W m-2 K-1', 'm-2', '1', 'm s-2')
@@ -108,17 +106,19 @@ def cf_unit(unit: str) -> str:
 
 @cache
 def package_version(name: str) -> str:
-    """Version of an installed package, read once a process."""
+    """Return the version of an installed package, read once per process."""
     return version(name)
 
 
 def versions() -> str:
-    """Versions of what a result depends on."""
+    """Return the versions of the packages on which a result depends."""
     return ", ".join(f"{name} {package_version(name)}" for name in ("surfacechem", "numpy", "numba", "symengine"))
 
 
 def as_dataset(columns: Sequence[Column], attributes: Mapping[str, str | float | int]) -> xarray.Dataset:
-    """The xarray Dataset of columns; those along themselves, time, and what an attribute names are coordinates."""
+    """Return the xarray Dataset of columns. Coordinates are columns along themselves, time, and those that an attribute
+    names.
+    """
     import xarray
 
     data = {c.name: (c.dimensions, c.values, c.attributes) for c in columns}
@@ -129,7 +129,7 @@ def as_dataset(columns: Sequence[Column], attributes: Mapping[str, str | float |
 
 
 def dataset_path(path: str | Path) -> Path:
-    """The path of a file that is to hold a dataset; InputError where its suffix is that of another format.
+    """Return the path of a file for a dataset; InputError if its suffix is that of another format.
 
     >>> dataset_path("run.nc").name
     'run.nc'
@@ -147,12 +147,12 @@ def dataset_path(path: str | Path) -> Path:
 
 @contextmanager
 def replacing(target: Path) -> Iterator[Path]:
-    """A temporary file beside the target that takes its place, and its permissions, when all went well.
+    """Open a temporary file next to the target, which replaces it and takes over its permissions on success.
 
-    A link is followed; what is no regular file, or protected, is left alone: InputError. OutputError where what is
-    written does not fit on the disk.
+    A link is followed. InputError if the target is no regular file, or protected; OutputError if writing fails, on a
+    full disk for instance.
     """
-    target = target.resolve()  # what a link points to, so that the link stays one
+    target = target.resolve()  # the file that a link points to, so that the link stays
     place = Place(str(target))
     if target.is_dir():
         raise InputError("is a directory; give a file name to write to.", place)
@@ -164,8 +164,8 @@ def replacing(target: Path) -> Iterator[Path]:
         raise InputError(f"cannot be written: there is no folder {target.parent}.", place)
     replaced = stat.S_IMODE(target.stat().st_mode) if target.exists() else None
     temporary = target.with_name(f".surfacechem-{secrets.token_hex(8)}{target.suffix}")
-    try:  # from here on, so that no signal finds a file that nobody removes
-        try:  # an empty file of these permissions without those that the user's umask takes away
+    try:  # from here on, so that a signal leaves no temporary file
+        try:  # an empty file with these permissions, less those of the user's umask
             mode = 0o666 if replaced is None else replaced
             os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, mode))
         except OSError as error:
@@ -178,12 +178,14 @@ def replacing(target: Path) -> Iterator[Path]:
             temporary.chmod(replaced)
         temporary.replace(target)
     finally:
-        with suppress(OSError):  # where a file system is read-only not even a file that is not there is removed
+        with suppress(OSError):  # on a read-only file system removing fails even if there is no file
             temporary.unlink()
 
 
 def _reason(path: Path, error: OSError) -> str:
-    """Reason why a file could not be written. HDF5 does not say; plain writing meets what it has met."""
+    """Return the reason why a file could not be written. HDF5 does not give it; plain writing fails for the same
+    reason.
+    """
     if error.strerror:
         return error.strerror
     try:
@@ -196,7 +198,9 @@ def _reason(path: Path, error: OSError) -> str:
 
 
 def save(target: Path, columns: Sequence[Column], attributes: Mapping[str, str | float | int]) -> None:
-    """A netCDF file, whole or not at all; OutputError says where the data is kept where it cannot be written."""
+    """Write a netCDF file, whole or not at all. If it cannot be written the data goes to a temporary folder, which the
+    OutputError names.
+    """
     try:
         with replacing(target) as temporary:
             write_netcdf(temporary, columns, attributes)
@@ -213,7 +217,7 @@ def save(target: Path, columns: Sequence[Column], attributes: Mapping[str, str |
 
 
 def write_netcdf(path: Path, columns: Sequence[Column], attributes: Mapping[str, str | float | int]) -> None:
-    """Write columns and attributes to a new file; OSError where that cannot be."""
+    """Write columns and attributes to a new file; OSError if that fails."""
     import netCDF4
 
     try:
@@ -227,19 +231,19 @@ def write_netcdf(path: Path, columns: Sequence[Column], attributes: Mapping[str,
                 variable.setncatts(column.attributes)
                 variable[...] = column.values
             file.setncatts(attributes)
-    except RuntimeError as error:  # the library's for all that HDF5 meets
+    except RuntimeError as error:  # the library raises it for all errors of HDF5
         raise OSError(str(error)) from error
 
 
 def read_netcdf(path: Path) -> xarray.Dataset:
-    """The dataset of a file, all of it, as it is written; OSError where that cannot be read."""
+    """Read the whole dataset of a file as it is written; OSError if it cannot be read."""
     import netCDF4
     import xarray
 
     def attributes(item: Any) -> dict[str, Any]:
         return {name: item.getncattr(name) for name in item.ncattrs()}
 
-    # xarray.open_dataset, indexes and checks of arrays import Dask and Pint where they are installed, for a second.
+    # xarray.open_dataset, indexes and checks of arrays import Dask and Pint if installed, which takes a second.
     with netCDF4.Dataset(path) as file:
         file.set_auto_maskandscale(False)
         found = {
@@ -256,12 +260,12 @@ def read_netcdf(path: Path) -> xarray.Dataset:
 
 
 def save_kept(dataset: xarray.Dataset, target: Path) -> Path:
-    """Write what a sweep has kept as one file, netCDF or a table, which has words for codes."""
+    """Write the kept results of a sweep to one file, netCDF or a table, in which codes are replaced by words."""
     if target.suffix.lower() in TABLES:
         runs = dataset.drop_dims(["checked", "hardest"], errors="ignore")
         words = {"status": runs["status"].attrs["flag_meanings"].split(), "reason": runs.attrs["reasons"]}
         told = {name: runs[name].copy(data=np.array(texts, object)[runs[name].values]) for name, texts in words.items()}
-        # A table has the rows of its first variable: outputs where there are series.
+        # A table has the rows of its first variable: outputs if there are series.
         save_table(target, runs.assign(told)[sorted(runs.data_vars, key=lambda name: -runs[name].ndim)])
     else:
         with replacing(target) as path:
@@ -270,10 +274,10 @@ def save_kept(dataset: xarray.Dataset, target: Path) -> Path:
 
 
 def save_table(target: Path, dataset: xarray.Dataset) -> None:
-    """A row for each output, whole or not at all; each column is headed by its name and unit, ``v [m s-1]``, that of
-    words by its name.
+    """Write one row per output, whole or not at all. Each column is headed by its name and unit, ``v [m s-1]``, text by
+    its name.
 
-    What has other dimensions than the first variable, events and profiles for instance, is in netCDF only.
+    Variables with other dimensions than the first one, events and profiles for instance, are in netCDF only.
     """
     frame = table(dataset)
     with replacing(target) as temporary:
@@ -284,11 +288,11 @@ def save_table(target: Path, dataset: xarray.Dataset) -> None:
 
 
 def table(dataset: xarray.Dataset) -> Any:
-    """The pandas data frame of a dataset."""
+    """Return the pandas data frame of a dataset."""
     along = set(next(iter(dataset.data_vars.values())).dims)
     names = [name for name, item in dataset.data_vars.items() if item.dims and set(item.dims) <= along]
     with warnings.catch_warnings():
-        # Of a table with more than a hundred columns pandas says that it is made of many parts.
+        # pandas warns that a table with more than a hundred columns is fragmented.
         warnings.simplefilter("ignore")
         frame = dataset[names].to_dataframe().reset_index()
     units = {name: dataset[name].attrs.get("units", "1") for name in frame if dataset[name].dtype.kind not in "OUT"}
@@ -296,7 +300,7 @@ def table(dataset: xarray.Dataset) -> Any:
 
 
 def reading(path: Path, read: Callable[[], R]) -> R:
-    """Result of ``read`` on a netCDF file; InputError where there is none, it is a store, a table, or damaged."""
+    """Return the result of ``read`` on a netCDF file; InputError if it is missing, a store, a table, or damaged."""
     if path.is_dir():
         remedy = "`surfacechem sweep CASE -o NAME.zarr --resume` computes what it misses, and `plot` draws it"
         raise InputError(f"is a folder. A store is not run again: {remedy}.", Place(str(path)))
@@ -308,18 +312,18 @@ def reading(path: Path, read: Callable[[], R]) -> R:
         _try_elsewhere(path, READING_TIMEOUT + size / LEAST_BANDWIDTH)
         return read()
     except FileNotFoundError:
-        beside = [other.name for other in path.parent.glob(f"*{path.suffix}")]  # a sweep has its own name
+        beside = [other.name for other in path.parent.glob(f"*{path.suffix}")]  # a sweep's file has another name
         raise InputError(f"there is no file {path}.{nearest(path.name, beside)}") from None
-    except Exception as error:  # of a damaged file the library may meet anything
+    except Exception as error:  # a damaged file may raise anything in the library
         reason = " ".join(str(getattr(error, "strerror", None) or error).split()) or type(error).__name__
         raise InputError(f"is not a readable netCDF dataset: {reason}.", Place(str(path))) from error
 
 
 def _try_elsewhere(path: Path, seconds: float) -> None:
-    """Raise OSError where a process that reads the file dies of it, or takes longer than some seconds.
+    """Raise OSError if a process that reads the file crashes, or takes longer than so many seconds.
 
-    In a damaged file HDF5 may go on without end, and nothing but the end of its process stops it: a thread would keep
-    its locks, and crash the process that ends with it.
+    In a damaged file HDF5 may search without end, and only the end of its process stops it: a thread would keep its
+    locks, and crash the process at exit.
     """
     with _BEGUN_READING.pop(path, None) or _trial(path) as trial:
         try:
@@ -327,7 +331,7 @@ def _try_elsewhere(path: Path, seconds: float) -> None:
         except subprocess.TimeoutExpired:
             trial.kill()
             raise TimeoutError(f"no answer in {seconds:g} s") from None
-    if code not in (0, 1):  # 1 is that of an exception, which is met again here
+    if code not in (0, 1):  # 1 means an exception, which reading raises again in this process
         raise OSError(f"a process that reads it crashes (exit code {code})")
 
 
@@ -338,6 +342,6 @@ def _trial(path: Path) -> subprocess.Popen[bytes]:
 
 
 def begin_reading(path: Path) -> None:
-    """Begin to test whether a file that is read soon is readable, beside what is done until then."""
+    """Start testing in parallel whether a file that will be read soon is readable."""
     if path.is_file():
         _BEGUN_READING[path] = _trial(path)

@@ -1,9 +1,9 @@
-"""Choice of outputs that follow a run: of all known states those without which its picture would not be true.
+"""Choice of outputs that resolve a run: the subset of all known states that linear interpolation needs.
 
-Known are the ends of steps, both sides of events and breakpoints, the times at which runs are compared, and what the
-stepper adds inside steps that are too long for a straight line. The picture is true where straight lines between
-outputs, over time as over its logarithm, miss no quantity by more than a part of its range. Where quantities bend
-between two states that are known, the run is made again from one to the other.
+Known states are the ends of steps, both sides of events and breakpoints, the times at which runs are compared, and the
+states that the stepper adds inside steps that are too long for a straight line. The subset is sufficient if straight
+lines between outputs, over time and over its logarithm, miss no quantity by more than a part of its range. Where
+quantities bend between two known states, the run is repeated from one to the other.
 """
 
 from __future__ import annotations
@@ -21,33 +21,34 @@ from surfacechem.solve.run import Trajectory
 from surfacechem.tolerances import EPS, FINER_BY, RUN_ERROR
 
 LONG_INTERVAL = 64
-"""Rows between two that are kept of which one in the middle is kept, too, where the line between the two misses any."""
+"""Distance of two kept rows beyond which the one in the middle is kept, too, if the line between the two misses any."""
 
 SHARED_DENSITY = 2
-"""Outputs that many runs share for one that the closest of them has."""
+"""Ratio of the density of shared outputs of many runs to that of the run with the densest outputs."""
 
 MOST_REFINED, PARTS_REFINED, REFINEMENT_ROUNDS = 100, 16, 2
-"""Largest number of known states between which a run is refined, into how many parts, and how often in turn."""
+"""Largest numbers of intervals that are refined, of parts of each, and of rounds."""
 
 
 def _two_sided(t: Array) -> tuple[Array, Mask]:
-    """Times that increase, and which rows to keep: where several have one time, the first, moved to just before it, and
-    the last.
+    """Return increasing times and the mask of rows to keep. Of rows with one time, the first is moved to just before
+    it, and only the first and the last are kept.
     """
     same = np.diff(t) <= 0
     begins, ends = np.append(True, ~same), np.append(~same, True)
     moved = np.where(begins & ~ends & (t > 0), np.nextafter(t, -1.0), t)
     kept = (begins & (t > 0)) | ends
-    # Of a row that lies where another has been moved to, the one beside the event counts.
+    # If another row lies at the time to which one was moved, the one next to the event is kept.
     rows = np.flatnonzero(kept)
     kept[rows[:-1][np.diff(moved[rows]) <= 0]] = False
     return moved, kept
 
 
 def needed_rows(t: Array, values: Array, allowed: Array, kept: Mask) -> Mask:
-    """Rows between which straight lines over time, and over its logarithm, miss no value by more than is allowed.
+    """Return the mask of rows between which straight lines, over time and over its logarithm, miss no value by more
+    than is allowed.
 
-    ``values`` has shape (times, quantities), ``allowed`` is for each quantity; rows that are ``kept`` are among them.
+    ``values`` has shape (times, quantities), ``allowed`` one entry for each quantity; rows that are ``kept`` stay.
     """
     kept = kept.copy()
     kept[[0, -1]] = True
@@ -61,11 +62,11 @@ def needed_rows(t: Array, values: Array, allowed: Array, kept: Mask) -> Mask:
         missed = _missed(ways, scaled, left, rows, right)
         begins = np.flatnonzero(np.diff(left, prepend=-1))
         most, counts = np.maximum.reduceat(missed, begins), np.diff(begins, append=len(rows))
-        # The worst row of each interval that is missed; what lies in the others is not looked at again.
+        # The worst row of each interval that a line misses; rows in other intervals are done.
         again = np.repeat(most > 1, counts)
         worst = np.flatnonzero(again & (missed == np.repeat(most, counts)))
         kept[rows[worst[np.diff(left[worst], append=len(t)) > 0]]] = True
-        # Where all swings are alike the worst is next to an end each time: halves come to an end, too.
+        # In a periodic signal the worst row is next to an end each time; bisection ends sooner.
         middle = (rows == (left + right) // 2) & (right - left > LONG_INTERVAL)
         kept[rows[again & middle]] = True
         rows = rows[again & ~kept[rows]]
@@ -73,8 +74,8 @@ def needed_rows(t: Array, values: Array, allowed: Array, kept: Mask) -> Mask:
 
 
 def _missed(ways: Sequence[Array], values: Array, left: Index, rows: Index, right: Index) -> Array:
-    """Largest error of lines from one row to another at rows between them, the one way or the other: over time or its
-    logarithm; ``values`` has shape (quantities, times).
+    """Return the larger error of lines over time and over its logarithm, from one row to another, at rows between them;
+    ``values`` has shape (quantities, times).
     """
     start, missed = values.take(left, axis=1), np.zeros(len(rows))
     rise, risen = values.take(right, axis=1) - start, values.take(rows, axis=1) - start
@@ -88,7 +89,9 @@ def _missed(ways: Sequence[Array], values: Array, left: Index, rows: Index, righ
 
 
 def _edges(values: Array) -> Mask:
-    """Rows with an extreme of a quantity, and those beside which one begins or ceases to be a number."""
+    """Return the mask of rows with an extreme of a quantity, and of those next to which a quantity becomes or ceases to
+    be finite.
+    """
     number = np.isfinite(values)
     found = np.zeros(len(values), bool)
     changes = np.any(number[1:] != number[:-1], axis=1)
@@ -102,14 +105,15 @@ def _edges(values: Array) -> Mask:
 
 
 def _chosen(rows: States, which: Mask | Index) -> States:
-    """Some of the rows."""
+    """Return some of the rows."""
     assert rows.segment is not None
     return States(rows.t[which], rows.y[which], rows.ledger[which], rows.segment[which])
 
 
 def _bends(trajectory: Trajectory, allowed: Array, seen: Mask) -> list[States]:
-    """States between outputs, where lines from one output to the next miss named quantities that are ``seen`` by more
-    than is allowed: they may bend where states do not. The run is made again there alone, from the output before.
+    """Return states between outputs where lines miss the named quantities that are ``seen`` by more than is allowed.
+
+    Named quantities may bend where states do not. Only there the run is repeated, from the output before.
     """
     result, y, rates = trajectory.result, trajectory.result.outputs, trajectory.rates
     t, segment, problem = result.times, result.segments_at(result.times, result.segment), result.problem
@@ -117,7 +121,7 @@ def _bends(trajectory: Trajectory, allowed: Array, seen: Mask) -> list[States]:
     right, length, parameters = left + 1, np.diff(t)[left], problem.parameters[segment[left]]
     middle = t[left] + length / 2
     states = (y[left] + y[right]) / 2 + length[:, None] / 8 * (rates[left] - rates[right])
-    # Small differences of algebraic states are quantities, too.
+    # Quantities may be small differences of algebraic states, so these have to be consistent.
     states = consistent(problem.program, middle, states, rates[left], parameters).y
     between = trajectory.at(States(middle, states, result.ledger_outputs[left], segment[left]))
     lines = (trajectory.outputs[left] + trajectory.outputs[right]) / 2
@@ -141,20 +145,20 @@ def _bends(trajectory: Trajectory, allowed: Array, seen: Mask) -> list[States]:
 
 
 def pictured(trajectory: Trajectory) -> Trajectory:
-    """The trajectory with the outputs that its picture needs, instead of those at which runs are compared."""
+    """Return the trajectory with outputs that resolve it, instead of the times at which runs are compared."""
     part, rows = trajectory.run.picture, trajectory.result.known or trajectory.result.states()
     if part is None or len(rows.t) < 2:
         return trajectory
     t, sides = _two_sided(rows.t)
-    # What cells do not resolve yet is no part of the picture, but for how it begins.
+    # Times at which cells do not yet resolve a thermal layer are left out, except its start.
     system, end = trajectory.model.system, trajectory.run.times[-1]
     sides &= ~unresolved(system, end, t) | np.isin(t, layer_starts(system, end))
     return _pictured(trajectory, part, _chosen(rows._replace(t=t), sides), REFINEMENT_ROUNDS)
 
 
 def shared_times(runs: Sequence[Trajectory], most: int) -> tuple[float, ...]:
-    """Output times that all runs share: as close to each other everywhere as in the picture of the closest of them, or
-    as close as ``most`` are, with what no line may pass over in any of them where there is room for that.
+    """Return output times for all runs: everywhere as dense as those of the run with the densest outputs, or as dense
+    as ``most`` times can be. If there is room, times that no line may skip in any of the runs are added.
     """
     pictures = [picture for picture in map(pictured, runs) if len(picture.result.times) > 1]  # others end at once
     own, usual = [picture.result.times for picture in pictures], runs[0].run.times
@@ -166,7 +170,7 @@ def shared_times(runs: Sequence[Trajectory], most: int) -> tuple[float, ...]:
         within = slice(None, np.searchsorted(middles, t[-1]))  # a run that was stopped has no outputs later
         each = np.diff(t)[np.searchsorted(t, middles[within], side="right") - 1]
         density[within] = np.maximum(density[within], 1 / each)
-    # Two for one, since they are not where each picture has its own.
+    # Two for one, since they are not at the best times of each run.
     count = np.append(0.0, np.cumsum(SHARED_DENSITY * density * lengths))
     parts = min(int(np.ceil(count[-1])) + 1, most)
     times = [np.interp(np.linspace(0, count[-1], parts), count, every), every[[0, -1]]]
@@ -177,19 +181,19 @@ def shared_times(runs: Sequence[Trajectory], most: int) -> tuple[float, ...]:
 
 
 def _event_times(trajectory: Trajectory) -> Array:
-    """Times of events."""
+    """Return the times of events."""
     return np.array([*trajectory.result.events.t, *(jump.t for jump in trajectory.jumps)])
 
 
 def _beside(trajectory: Trajectory) -> Mask:
-    """Outputs at both sides of events."""
+    """Return the mask of outputs on either side of an event."""
     t, moments = trajectory.result.times, _event_times(trajectory)
     return np.isin(t, moments) | np.isin(np.nextafter(t, np.inf), moments)
 
 
 def _steps(trajectory: Trajectory) -> Array:
-    """Times at both sides of breakpoints at which a load steps, so that the picture has them: an output at a breakpoint
-    is one before the step.
+    """Return the times on both sides of breakpoints at which a load steps; the output at a breakpoint is before the
+    step.
     """
     t, breaks = trajectory.result.times, trajectory.result.problem.segments[1:-1]
     breaks = breaks[
@@ -199,22 +203,22 @@ def _steps(trajectory: Trajectory) -> Array:
 
 
 def _pictured(trajectory: Trajectory, part: float, rows: States, rounds: int) -> Trajectory:
-    """The trajectory with those of the rows that its picture needs, and others where it bends between them."""
+    """Return the trajectory with the rows that resolve it, and with further rows where it bends between them."""
     while True:
         whole = trajectory.at(rows)
         result = whole.result
         early = unresolved(whole.model.system, whole.run.times[-1], result.times)
-        # What is shown over time, shape (times, quantities), and what a last bit or the absolute tolerance of a
-        # state makes of it.
+        # Quantities over time, shape (times, quantities), and their change by the last bit or the absolute tolerance
+        # of a state.
         quantities = np.hstack([result.outputs, result.ledger_outputs, whole.outputs])
         some, first = whole.some, quantities.shape[1] - whole.outputs.shape[1]
         unknown = some.felt(EPS * np.abs(some.result.outputs) + result.problem.atol)
         noise = np.pad(RUN_ERROR * np.array([*unknown.values()]), (first, 0))
-        # What may be an error is not pictured, however loose the tolerance no more of a value than the part, and what
-        # is early counts for no range.
+        # Errors of the run need not be resolved, but they are at most this part of a value at any tolerance. Early
+        # rows, whose layers are unresolved, do not count for the ranges.
         values = np.where(np.isfinite(quantities), quantities, 0.0)
         known, error = values if early.all() else values[~early], min(RUN_ERROR * whole.run.rtol, part)
-        # The rest of the part is what the states that are known miss of those between them.
+        # The rest of the part is the error of known states for the states between them.
         allowed = (1 - 1 / FINER_BY) * part * np.ptp(known, axis=0) + error * np.abs(values).max(axis=0) + noise
         seen = np.ptp(values, axis=0) > allowed
         if not rounds or not (bends := _bends(whole, allowed[first:], seen[first:])):

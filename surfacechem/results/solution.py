@@ -1,4 +1,4 @@
-"""A run with its balances, its error and its warnings, and all of it as a labelled dataset."""
+"""Results of a run: balances, error, warnings, and a labelled dataset."""
 
 from __future__ import annotations
 
@@ -22,19 +22,19 @@ from surfacechem.solve.contract import Array, Status
 from surfacechem.solve.run import Run, Trajectory
 
 RECORDED_SETTINGS = ("times", "picture", "atol", "max_steps")
-"""Settings of a run that a dataset records where they are not those of its case; others are attributes."""
+"""Settings of a run that a dataset records if they differ from those of its case; others are attributes."""
 
 REACTION_CLASSES = {"exothermic": 1, "endothermic": -1}
-"""Classes of reactions, with the sign of their heat."""
+"""Classes of reactions with the sign of their heat."""
 
 
 @dataclass(frozen=True)
 class Judgement:
-    """Error of a run, as far as it is known."""
+    """Error of a run, as far as known."""
 
     accuracy: Accuracy | None = None
     exact: Callable[[Trajectory], Mapping[str, Array]] | None = None
-    """Exact values at the outputs of a run, by variable, where the case has any."""
+    """Function for the exact values at the outputs of a run, by variable, if the case has any."""
     notes: tuple[str, ...] = ()
     """Further notes for readers of the results."""
 
@@ -43,22 +43,22 @@ class Judgement:
 class Solution(Results):
     """Results of a run. ``dataset`` is the xarray Dataset; ``write`` saves the same as netCDF.
 
-    The error of the run, which an exact solution or a second run tells, is found when it is first asked for.
+    The error of the run, from an exact solution or a second run, is computed on first access.
     """
 
     trajectory: Trajectory
-    """The run, with its states at the times at which runs are compared."""
+    """The run, with states at the times at which runs are compared."""
     judge: Callable[[], Judgement] = Judgement
     """Function that finds the error of the run."""
     case_run: Run | None = None
-    """Run settings of the case; where the run was another, the dataset says so."""
+    """Run settings of the case; the dataset records those that differ."""
     surface: Any = None
-    """Free energy of two curved surfaces, where the scene has any."""
+    """Free energy of two curved surfaces, if the scene has any."""
     error_from: str = "auto"
-    """Source of the error that was asked for."""
+    """Requested source of the error."""
 
     def __repr__(self) -> str:
-        """Title, end and error in a line."""
+        """Return title, end and error in a line."""
         error = f", error {self.accuracy.error:.1e}" if self.accuracy else ""
         return f"<Solution {self.title!r}: {self.status}, {self.reason}{error}>"
 
@@ -78,12 +78,12 @@ class Solution(Results):
         return self.judge()
 
     def __getstate__(self) -> dict[str, Any]:
-        """A pickle carries the error itself, not what would find it."""
+        """Pickle the error itself instead of the function that finds it."""
         return {**vars(self), "judgement": self.judgement, "judge": Judgement}
 
     @property
     def accuracy(self) -> Accuracy | None:
-        """The error of the run, and where it is from."""
+        """Error of the run, and its source."""
         return self.judgement.accuracy
 
     @property
@@ -93,7 +93,7 @@ class Solution(Results):
 
     @cached_property
     def shown(self) -> Trajectory:
-        """The run with its states at the times of the dataset, which follow it where none were asked for."""
+        """The run with states at the times of the dataset, which resolve it if no times were asked for."""
         return pictured(self.trajectory)
 
     @cached_property
@@ -103,7 +103,7 @@ class Solution(Results):
 
     @cached_property
     def verdicts(self) -> tuple[BalanceVerdict, ...]:
-        """Whether pairs of one-way reactions keep detailed balance."""
+        """Verdicts on detailed balance of pairs of one-way reactions."""
         return verdicts(self.trajectory, self.audit)
 
     @cached_property
@@ -205,7 +205,7 @@ class Solution(Results):
         }
 
     def _reaction(self) -> dict[str, str]:
-        """Class of what the reactions do, where they have a heat; what the tolerance does not resolve is none."""
+        """Return the class of the reactions, if they have a heat; heat within the tolerance counts as zero."""
         heat = self.trajectory.everywhere.get("q_reaction")
         if heat is None:
             return {}
@@ -214,7 +214,7 @@ class Solution(Results):
         return {"reaction": " and ".join(found) or "isothermic"}
 
     def _departures(self) -> dict[str, str]:
-        """Settings in which the run was not that of its case, for running it again."""
+        """Return the settings in which the run differs from its case, for running it again."""
         run = self.trajectory.run
         departures = self._changed(self.trajectory.model.system)
         if self.case_run is not None:
@@ -223,5 +223,5 @@ class Solution(Results):
         if self.error_from != "auto":
             departures["error"] = self.error_from
         if self.trajectory.result.status is Status.STOPPED:
-            departures["max_steps"] = self.trajectory.result.counters.steps  # seconds are not the same twice
+            departures["max_steps"] = self.trajectory.result.counters.steps  # a time limit is not reproducible
         return {"departures": json.dumps(departures)} if departures else {}

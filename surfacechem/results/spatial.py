@@ -1,10 +1,10 @@
 """Cells across bodies: their number, their widths, and the discretisation error.
 
-Heat that begins to enter through a face has reached the depth sqrt(alpha t) a time t later. An error of cells can only
-be told from other cells where both resolve that layer: cells far wider than it agree on almost nothing having happened.
-Where an accuracy asks for cells they are therefore graded towards the layer of the time from which it is to hold, and
-as many as their error needs there, whatever the outputs are; where their number is given and too small for the layer of
-what is looked at first, cells that are not are what they are held against.
+Heat that begins to enter through a face has reached the depth sqrt(alpha t) a time t later. The error of a grid can be
+estimated from another grid only if both resolve that layer: cells far wider than it agree that almost nothing has
+happened. If an accuracy chooses the cells they are therefore graded towards the layer at the time from which it is to
+hold, and their number follows from the error there, whatever the outputs are. If their number is given and too small
+for the layer at the first output, they are compared with cells that resolve it.
 
 The cells are of second order: half of them have four times the error.
 """
@@ -33,39 +33,45 @@ from surfacechem.tolerances import RUN_EPS
 FEW = 4
 
 CELLS_PER_E_FOLD = 8
-"""Cells at first in which the distance from a face grows by e: errors are some 0.4 % of a rise in temperature then."""
+"""Initial number of cells over which the distance from a face grows by e: errors are then some 0.4 % of a rise in
+temperature.
+"""
 
 THINNEST_LAYER = 2.0**-30
-"""Fraction of a body below which its layer is an atom's; the width of a cell at the far side has six digits there."""
+"""Least thickness of a layer relative to the body: it is of atomic size, and the width of a cell at the far side still
+has six digits.
+"""
 
 FLUX_MARGIN, MOST_GROWTH = 3.0, 16.0
-"""Part of the accuracy that temperatures use up, as heat fluxes are differences of them and err by more, and the most
-by which cells are multiplied at once."""
+"""Ratio of the accuracy to the error allowed for temperatures, as heat fluxes are differences of them and err by more;
+and largest factor by which the number of cells grows at once."""
 
 MOST_CHOSEN_CELLS = 1024
-"""Cells across a body at most that an accuracy chooses: two bodies of them take a second to get ready, each of the
-several times that errors are looked for."""
+"""Largest number of cells across a body that an accuracy chooses: for two such bodies each of the several estimates of
+the error takes a second of preparation."""
 
 MOST_GRIDS = 6
-"""Grids after which a search for an accuracy ends; two or three are the rule."""
+"""Largest number of grids in the search for an accuracy; two or three are usual."""
 
 UNRESOLVED_START = 200
-"""Number of parts of a run of which one has passed when cells resolve what began at once, where nothing says when."""
+"""Inverse of the fraction of a run after which cells resolve a layer from its start, if the case gives no time."""
 
 TIME_RATIO = 2.0
-"""Ratio of the times at which the errors of cells are told behind something sudden."""
+"""Ratio of successive times after a sudden change at which the errors of cells are estimated."""
 
 ORDER, LEAST_ORDER = 4.0, 2.0
-"""Ratio of errors with half of the cells to those with all: of second order, and of first, the least that converges."""
+"""Ratio of the error with half of the cells to that with all: for second order, and for first, the least that
+converges.
+"""
 
 
 def is_divided(scene: Scene) -> bool:
-    """Whether a body has cells."""
+    """True if a body has cells."""
     return any(True for _ in _laws(scene))
 
 
 def asked_cell_accuracy(scene: Scene) -> float | None:
-    """The accuracy that cells are chosen by, the tighter of two; None where the scene gives their number."""
+    """Return the accuracy that chooses the cells, the tighter of two; None if the scene gives their number."""
     return min((law.accuracy for _, law in _laws(scene) if law.accuracy is not None), default=None)
 
 
@@ -84,9 +90,7 @@ def _changed(scene: Scene, change: Callable[[str, Conduction], Conduction]) -> S
 
 
 def tightened(scene: Scene, accuracy: float | None) -> Scene:
-    """The scene with cells as accurate as the run is asked to be, where an accuracy chooses them; itself where they
-    are.
-    """
+    """Return the scene with the accuracy of the run for cells that an accuracy chooses, unless their own is tighter."""
     least = asked_cell_accuracy(scene)
     if accuracy is None or least is None or least <= accuracy:
         return scene
@@ -94,49 +98,53 @@ def tightened(scene: Scene, accuracy: float | None) -> Scene:
 
 
 def with_given_cells(scene: Scene) -> list[str]:
-    """Names of the bodies whose number of cells is given."""
+    """Return the names of the bodies whose number of cells is given."""
     return [name for name, law in _laws(scene) if law.accuracy is None]
 
 
 def few(scene: Scene) -> Scene:
-    """The scene with a few cells, as its equations are alike for any number of them."""
+    """Return the scene with a few cells; its equations have the same form for any number of them."""
     return _changed(scene, lambda _, law: replace(law, cells=min(law.cells, FEW)))
 
 
 def coarsened(scene: Scene, divisor: int, given: bool = True) -> Scene:
-    """The scene with a half or a quarter of its cells; without ``given`` of those that an accuracy chooses only."""
+    """Return the scene with a half or a quarter of its cells; without ``given`` only of those chosen by an accuracy."""
     return _changed(
         scene, lambda _, law: replace(law, cells=law.cells // divisor) if given or law.accuracy is not None else law
     )
 
 
 def grid(scene: Scene) -> tuple[object, ...]:
-    """Settings that tell the cells of a scene from those of another."""
+    """Return the settings that identify the cells of a scene."""
     return tuple((law.cells, law.layer, law.accuracy) for _, law in _laws(scene))
 
 
 def first_look(system: System, end: float) -> float:
-    """Time [s] after something sudden from which on cells are to resolve it, in a run of this length [s]."""
+    """Return the time [s] after a sudden change from which on cells resolve it, in a run of this length [s]."""
     return min([p.after for p in system.profiles if p.after is not None], default=end / UNRESOLVED_START)
 
 
 def layer_starts(system: System, end: float) -> Array:
-    """Times [s] at which something sudden may begin a layer: the start, and the breakpoints of loads."""
+    """Return the times [s] at which a thermal layer may begin: the start, and the breakpoints of loads."""
     return np.unique([0.0, *(t for t in system.breakpoints if 0 < t < end)])
 
 
 def unresolved(system: System, end: float, t: Array) -> NDArray[np.bool_]:
-    """Whether at each time something sudden has just begun that cells do not resolve yet; at none without cells."""
+    """Return a mask of the times at which a layer has just begun that cells do not resolve yet; all False without
+    cells.
+    """
     if not system.profiles:
         return np.zeros(len(t), bool)
     starts = layer_starts(system, end)
     since = t - starts[np.searchsorted(starts, t, side="right") - 1]
-    # Times and their differences are rounded.
+    # The margin is the rounding of times and their differences.
     return np.asarray(since < first_look(system, end) - RUN_EPS * t)
 
 
 def looked_at(system: System, run: Run) -> Run:
-    """The run at the times at which the errors of cells are told, which are the case's and not those of the outputs."""
+    """Return the run with the times at which errors of cells are estimated; they depend on the case, not on its
+    outputs.
+    """
     end = run.times[-1]
     after = first_look(system, end)
     times = [end * (i / UNRESOLVED_START) for i in range(UNRESOLVED_START)]
@@ -148,10 +156,10 @@ def looked_at(system: System, run: Run) -> Run:
 
 
 def shortest(system: System, run: Run, values: Mapping[str, float], events: Iterable[float] = ()) -> float:
-    """Shortest time [s] between what starts a layer, a load or an event, and what is looked at, one of the times of the
-    run or an event.
+    """Return the shortest time [s] from the start of a layer, by a load or an event, to an output of the run or an
+    event.
 
-    What follows within the tolerance is at the same instant.
+    Events within the tolerance of the start are at the same instant.
     """
     events = list(events)
     starts = np.unique([*layer_starts(system, run.times[-1]), *events])
@@ -163,9 +171,10 @@ def shortest(system: System, run: Run, values: Mapping[str, float], events: Iter
 
 
 def layers(system: System, points: Sequence[Mapping[str, float]], times: Sequence[float]) -> dict[str, float]:
-    """By body, the least part of its thickness that heat has reached after a time [s], rounded to a power of two.
+    """Return by body the thinnest layer that heat has reached after a time [s], relative to its thickness and rounded
+    to a power of two.
 
-    ``points`` are values of runs by path, ``times`` go with them. Properties are those at the start.
+    ``points`` are values of runs by path, each with one of the ``times``. Properties are those at the start.
     """
     paths = {p.symbol: p.path for p in system.parameters} | {s.symbol: s.path for s in system.states}
     found = {}
@@ -180,10 +189,10 @@ def layers(system: System, points: Sequence[Mapping[str, float]], times: Sequenc
 
 
 def with_resolved_layers(scene: Scene, parts: Mapping[str, float], given: bool = False) -> Scene:
-    """The scene with cells that resolve layers of these ``parts`` of the bodies where an accuracy chooses them, or
-    where their number is ``given``.
+    """Return the scene with cells that resolve layers of the relative thickness ``parts``, for bodies whose cells an
+    accuracy chooses, or whose number is ``given``.
 
-    Beside an accuracy, a ``grading`` is the least one.
+    Together with an accuracy, ``grading`` is a lower bound.
     """
 
     def change(name: str, law: Conduction) -> Conduction:
@@ -196,15 +205,14 @@ def with_resolved_layers(scene: Scene, parts: Mapping[str, float], given: bool =
 
 
 def _cells(number: float) -> int:
-    """A number of cells that has a half and a quarter."""
+    """Return a number of cells that can be halved twice."""
     return min(4 * max(math.ceil(number / 4), 2), MOST_CHOSEN_CELLS)
 
 
 def refined(scene: Scene, found: CellErrors, parts: Mapping[str, float]) -> Scene | None:
-    """The scene with the cells that an accuracy needs, as far as the errors of these tell; None where there is no more
-    to do.
+    """Return the scene with the cells that an accuracy needs according to these errors; None if nothing is to be done.
 
-    Layers that an event has begun since are graded for. Where nothing converges, something is thinner than known.
+    The grid is graded for layers that events have begun. If there is no convergence, a layer is thinner than assumed.
     """
     accuracy, laws = asked_cell_accuracy(scene), {name: law for name, law in _laws(scene) if law.accuracy is not None}
     if accuracy is None:
@@ -213,7 +221,7 @@ def refined(scene: Scene, found: CellErrors, parts: Mapping[str, float]) -> Scen
     if not found.converged:
         factor, thinner = 2.0, 0.25
     elif found.largest > accuracy / FLUX_MARGIN and not found.in_noise:
-        # Rounded up, and a little more, lest the next estimate be just above what was aimed at.
+        # With a margin of 10 %, lest the next estimate be just above the aim.
         factor = min(math.sqrt(1.1 * FLUX_MARGIN * found.largest / accuracy), MOST_GROWTH)
     now = {name: max(min(parts[name], law.layer * thinner), THINNEST_LAYER) for name, law in laws.items()}
     if factor == 1.0 and all(now[name] == law.layer for name, law in laws.items()):
@@ -231,7 +239,7 @@ def refined(scene: Scene, found: CellErrors, parts: Mapping[str, float]) -> Scen
 
 
 def resolves(scene: Scene, parts: Mapping[str, float]) -> bool:
-    """Whether half of the cells resolve layers of these ``parts`` of the bodies, with two or more in a quarter."""
+    """True if half of the cells resolve layers of the relative thickness ``parts``, with at least two in a quarter."""
 
     def fine(law: Conduction, layer: float) -> bool:
         at = replace(law, cells=law.cells // 2).points
@@ -241,7 +249,8 @@ def resolves(scene: Scene, parts: Mapping[str, float]) -> bool:
 
 
 def cell_errors(near: Mapping[str, float], far: Mapping[str, float], rtol: float) -> CellErrors:
-    """Errors from the differences of a run to one with half of its cells, and of that to one with a quarter.
+    """Return errors from the differences between a run and one with half of its cells, and between that and one with a
+    quarter.
 
     >>> cell_errors({"T": 3e-6}, {"T": 1.2e-5}, 1e-11).variables["T"]
     1e-06
@@ -249,7 +258,7 @@ def cell_errors(near: Mapping[str, float], far: Mapping[str, float], rtol: float
     False
     """
     first, second = (max(each.values(), default=0.0) for each in (near, far))
-    in_noise = first <= rtol / RTOL_PART  # errors of runs are below that
+    in_noise = first <= rtol / RTOL_PART  # errors of runs are below this
     if in_noise:
         return CellErrors(near, in_noise=True)
     factors = {name: min(max(far[name] / d, LEAST_ORDER), ORDER) if d else ORDER for name, d in near.items()}
@@ -258,22 +267,22 @@ def cell_errors(near: Mapping[str, float], far: Mapping[str, float], rtol: float
 
 
 def worst_errors(errors: Sequence[CellErrors]) -> CellErrors:
-    """The errors of that of several runs whose errors are the largest, or are not known."""
+    """Return the errors of the run whose largest error is the largest, or unknown."""
     return max(errors, key=lambda found: found.largest if found.converged else math.inf, default=CellErrors())
 
 
 def differences(better: Trajectory, worse: Trajectory) -> dict[str, float]:
-    """Differences of states, profiles and times of events of two runs with different cells, by name and relative to the
-    better one; infinite for what only one of them has.
+    """Return differences of states, profiles and times of events of two runs with different cells, by name and relative
+    to the better one; infinite for events that only one of them has.
 
-    The initial values are given, and none of the cells'.
+    Initial values are left out, as they are given and not due to the cells.
     """
     errors, note = state_differences(worse, better, first=1)
     return {**errors, EVENTS: math.inf} if note or better.status != worse.status else errors
 
 
 def unmet_accuracy(scene: Scene, errors: CellErrors, found: Accuracy | None = None) -> tuple[str, ...]:
-    """Words for errors that are not known, for an accuracy that the most cells do not reach, or that a given number of
+    """Describe errors that are unknown, an accuracy that the most cells do not reach, or one that a given number of
     cells misses.
     """
     if not errors.converged:

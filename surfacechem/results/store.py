@@ -1,7 +1,7 @@
-"""Stores of sweeps: Zarr version 3, chunk by chunk, each of which counts once a mark with its checksum is there.
+"""Stores of sweeps in Zarr version 3, written chunk by chunk; a chunk is valid once a mark with its checksum exists.
 
-A store appears whole, with every array and none of its values. Chunks are written by one writer for each part, and may
-be written again: what is in a chunk follows from the case and the plan alone. So a writer may be killed at any moment,
+A store is created at once, with every array and no values. Each part has one writer of its chunks. Chunks may be
+written again, since their content follows from the case and the plan alone. So a writer may be killed at any moment,
 and the finished store has the same bytes as one that was never interrupted.
 """
 
@@ -34,7 +34,7 @@ STORE_SUFFIX = ".zarr"
 MARKS_FOLDER = ".marks"
 
 COORDINATE_PART = 2**20
-"""Values of a coordinate that are written at a time."""
+"""Number of values of a coordinate that are written at a time."""
 
 CHUNK_BYTES = 64 * 2**20
 """Size of a chunk of all variables together."""
@@ -49,7 +49,7 @@ SHARED_ATTRIBUTES = {
     "check": "what is checked",
     "versions": "the versions",
 }
-"""Attributes that two writers of a store must share, and how messages call them."""
+"""Attributes that all writers of a store must share, and their names in messages."""
 
 ZARR_NEEDED = (
     "stores, and files of a sweep with `keep`, need Zarr, which is not installed: pip install 'surfacechem[sweeps]', "
@@ -68,7 +68,7 @@ class StoredArray:
 
 @dataclass(frozen=True)
 class Layout:
-    """Layout of a store: sizes of its dimensions, of which those of the runs come first; arrays; coordinates."""
+    """Layout of a store: sizes of its dimensions, those of the runs first; arrays; coordinates."""
 
     sizes: Mapping[str, int]
     runs: tuple[str, ...]
@@ -80,7 +80,7 @@ class Layout:
     coordinates: Sequence[Column]
     attributes: Mapping[str, Any]
     at_once: int
-    """Most runs of a chunk."""
+    """Largest number of runs in a chunk."""
 
     @cached_property
     def shape(self) -> tuple[int, ...]:
@@ -89,7 +89,7 @@ class Layout:
 
     @cached_property
     def chunk(self) -> tuple[int, ...]:
-        """Runs of a chunk along each of their dimensions, the last first."""
+        """Number of runs of a chunk along each of their dimensions; the last dimension is filled first."""
         bytes_of_run = sum(
             np.dtype(v.kind).itemsize * math.prod(self.sizes[d] for d in v.dimensions[len(self.runs) :])
             for v in self.variables.values()
@@ -112,7 +112,7 @@ class Layout:
         return math.prod(self.counts)
 
     def region(self, number: int) -> tuple[slice, ...]:
-        """The runs of a chunk."""
+        """Return the runs of a chunk, as slices."""
         places = np.unravel_index(number, self.counts)
         return tuple(
             slice(int(k) * part, min((int(k) + 1) * part, size))
@@ -120,7 +120,7 @@ class Layout:
         )
 
     def index(self, number: int) -> NDArray[np.int64]:
-        """Numbers of the runs of a chunk, in its order."""
+        """Return the numbers of the runs of a chunk, in its order."""
         ranges = [np.arange(part.start, part.stop) for part in self.region(number)]
         return np.ravel_multi_index(np.meshgrid(*ranges, indexing="ij"), self.shape).ravel()
 
@@ -155,32 +155,32 @@ class Store:
                 self._array(name)[...] = values
 
     def mark(self, name: str, text: str) -> None:
-        """Put a mark in its place, whole or not at all."""
-        # A name that is replaced at once is there whole or not at all, whenever the process is killed.
+        """Write a mark, whole or not at all."""
+        # Renaming is atomic: the mark is whole or absent, whenever the process is killed.
         temporary = self.marks / f".{secrets.token_hex(8)}"
         temporary.write_text(text)
         temporary.replace(self.marks / name)
 
     def done(self, number: int) -> bool:
-        """Whether a chunk is marked, and is what its mark says."""
+        """True if a chunk is marked, and matches its mark."""
         try:
             return (self.marks / str(number)).read_text() == self.checksum(number)
         except OSError:
             return False
 
     def checksum(self, number: int) -> str:
-        """A checksum of the files of a chunk; values that are all missing have none."""
+        """Return the checksum of the files of a chunk; arrays whose values are all missing have no file."""
         found = hashlib.sha256()
         places = "/".join(map(str, np.unravel_index(number, self.layout.counts)))
         for name, variable in self.layout.variables.items():
             inner = "/0" * (len(variable.dimensions) - len(self.layout.runs))
-            # Of the files, as a disk may spoil what was written well; Zarr leaves out what is all missing.
+            # Of the files, since data may be damaged on the disk. Zarr writes no file if all values are missing.
             file = self.path / name / f"c/{places}{inner}"
             found.update(file.read_bytes() if file.exists() else b"")
         return found.hexdigest()
 
     def read(self, name: str, number: int) -> NDArray[Any]:
-        """Values of an array in a chunk, a run a row."""
+        """Return the values of an array in a chunk, one row per run."""
         values = np.asarray(self._array(name)[self.layout.region(number)])
         return values.reshape(-1, *values.shape[len(self.layout.runs) :])
 
@@ -191,7 +191,7 @@ class Store:
 
     @contextmanager
     def writing(self) -> Iterator[None]:
-        """Raise OutputError where the disk does not take what is written."""
+        """Raise OutputError if writing to the disk fails."""
         try:
             yield
         except OSError as error:
@@ -200,7 +200,7 @@ class Store:
 
     @contextmanager
     def locked(self, part: str) -> Iterator[None]:
-        """Be the one writer of a part; InputError where there is one. A lock ends with its process."""
+        """Lock a part for this writer; InputError if it has another one. The lock ends with its process."""
         import fcntl
 
         file = self.marks / f"writer-{part}"
@@ -216,12 +216,12 @@ class Store:
 
     @property
     def dataset(self) -> xarray.Dataset:
-        """The store as it is, read when it is asked for."""
+        """The dataset of the store as it is now; values are read on access."""
         return opened(self.path)
 
 
 def opened(path: str | Path) -> xarray.Dataset:
-    """The dataset of a store, whose values are read when they are asked for."""
+    """Open the dataset of a store; values are read on access."""
     import xarray
 
     _zarr()
@@ -241,7 +241,7 @@ def _zarr() -> Any:
 
 
 def store_path(path: str | Path) -> Path:
-    """The path of a store; InputError where nothing can be written there."""
+    """Return the path of a store; InputError if nothing can be written there."""
     target = Path(path)
     _zarr()
     if not target.parent.is_dir():
@@ -252,9 +252,9 @@ def store_path(path: str | Path) -> Path:
 
 
 def begin(path: Path, layout: Layout, resume: bool) -> Store:
-    """A store of this layout: a new one, or the one that is there, if it is of the same case, plan and versions.
+    """Return a store of this layout: a new one, or the existing one if it is of the same case, plan and versions.
 
-    InputError where there is another, or where it is not asked to ``resume``.
+    InputError if another one exists, or if one exists and ``resume`` is False.
     """
     if not path.exists():
         temporary = path.with_name(f".surfacechem-{secrets.token_hex(8)}{STORE_SUFFIX}")
@@ -262,7 +262,7 @@ def begin(path: Path, layout: Layout, resume: bool) -> Store:
         try:
             with store.writing():
                 _make(temporary, layout)
-            # Of several that start at once the first one has made it, and the others go on with that.
+            # If several processes start at once the first makes the store, and the others continue with it.
             with suppress(OSError):
                 temporary.rename(path)
                 return store
@@ -279,7 +279,7 @@ def begin(path: Path, layout: Layout, resume: bool) -> Store:
         known = False
     if not known:
         raise InputError("is no store of a sweep; give another name.", place)
-    # As JSON has it, in which the store keeps it.
+    # Attributes as they are after writing and reading JSON, the format of the store.
     ours = json.loads(json.dumps(dict(layout.attributes)))
     different = [word for name, word in SHARED_ATTRIBUTES.items() if there.get(name) != ours.get(name)]
     if different:
@@ -288,7 +288,7 @@ def begin(path: Path, layout: Layout, resume: bool) -> Store:
 
 
 def _make(path: Path, layout: Layout) -> None:
-    """All arrays, without values but those of the coordinates."""
+    """Create all arrays, without values except those of the coordinates."""
     zarr = _zarr()
     group = zarr.create_group(path, zarr_format=3, attributes=dict(layout.attributes))
     for name, item in {**layout.variables, **layout.beside}.items():
@@ -310,11 +310,11 @@ def _make(path: Path, layout: Layout) -> None:
             dimension_names=column.dimensions,
             attributes=column.attributes,
         )
-        for first in range(0, values.shape[0], COORDINATE_PART):  # of a plan there may be more values than memory
+        for first in range(0, values.shape[0], COORDINATE_PART):  # a plan may have more values than fit into memory
             made[first : first + COORDINATE_PART] = values[first : first + COORDINATE_PART]
-    # Coordinates are written at once, as they follow from the plan.
+    # Coordinates are complete from the beginning, as they follow from the plan.
     with warnings.catch_warnings():
-        # Not yet of the standard, and read by what knows it only: without, each array is looked for by itself.
+        # Consolidated metadata is not yet part of the standard; readers without it open each array by itself.
         warnings.simplefilter("ignore")
         zarr.consolidate_metadata(path)
     (path / MARKS_FOLDER).mkdir()

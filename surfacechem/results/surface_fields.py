@@ -1,4 +1,4 @@
-"""Results on two curved surfaces at some output times of a run: moment, area of contact, and fields over body 1."""
+"""Results on two curved surfaces at some output times of a run: moments, area of contact, and fields over body 1."""
 
 from __future__ import annotations
 
@@ -18,16 +18,18 @@ if TYPE_CHECKING:
 
 
 MOST_SURFACE_TIMES = 9
-"""Output times, evenly spread, at which the surfaces are looked at."""
+"""Number of evenly spread output times at which results on the surfaces are computed."""
 
 POINTS_ALONG, POINTS_AROUND, POINTS_ACROSS = 81, 16, 33
-"""Points of the fields from an axis on and around it; both ways where there is none."""
+"""Points of the fields away from and around an axis of symmetry; in both directions if there is none."""
 
 TIME = "surface_time"
 
 
 def surface_columns(trajectory: Trajectory, surface: CurvedSurfaces) -> tuple[list[Column], float]:
-    """Columns over their own times and over the surface of body 1, and the time that they took [s]."""
+    """Return columns over the times of the surfaces and over the surface of body 1, and the time of their integrals
+    [s].
+    """
     from surfacechem.surfaces.potential import INTEGRATION_TIME, integrating
 
     before, times = INTEGRATION_TIME.seconds, trajectory.result.times
@@ -35,7 +37,7 @@ def surface_columns(trajectory: Trajectory, surface: CurvedSurfaces) -> tuple[li
     columns = [Column(TIME, (TIME,), times[chosen], "s", "times at which the surfaces are looked at")]
     with integrating():
         surface, gaps = surface.of_run(trajectory.values), trajectory.everywhere["g_n"][: len(times)][chosen]
-        # A run may end a rounding beyond the approaches that are known.
+        # A run may end a rounding beyond the range of tabulated approaches.
         approaches, stretches = np.clip(gaps, *surface.approach), np.ones_like(gaps)
         if "J_c" in trajectory.everywhere:
             stretches = trajectory.everywhere["J_c"][: len(times)][chosen]
@@ -44,7 +46,7 @@ def surface_columns(trajectory: Trajectory, surface: CurvedSurfaces) -> tuple[li
 
 
 def _totals(surface: CurvedSurfaces, approaches: Array, stretches: Array) -> list[Column]:
-    """Moment, area of contact, conductance, and how far off the local law is."""
+    """Return moment, area of contact, conductance, and the deviation of the local law."""
     from surfacechem.surfaces.nodes import alike_around
 
     force, moment_x, moment_y, local, least, places, area, across = surface.totals(approaches, stretches)
@@ -71,7 +73,7 @@ def _totals(surface: CurvedSurfaces, approaches: Array, stretches: Array) -> lis
 
 
 def _fields(surface: CurvedSurfaces, approaches: Array, stretches: Array) -> Sequence[Column]:
-    """Gap and traction over points of body 1, which gather where body 2 is nearest."""
+    """Return gap and traction at points of body 1, which are denser where body 2 is nearest."""
     from surfacechem.surfaces.pairwise import length
     from surfacechem.surfaces.patches import Budget, outer_patches
     from surfacechem.surfaces.projection import FIRST_ORDER
@@ -86,7 +88,7 @@ def _fields(surface: CurvedSurfaces, approaches: Array, stretches: Array) -> Seq
     x, normals = D[0], lower.normals(D)
     near = [replace(upper, approach=d).nearest(x) for d in approaches.tolist()]
     gap, opposite = np.array([one.gap for one in near]), np.array([one.point for one in near])
-    # Around an axis all columns are alike.
+    # With an axis of symmetry all columns around it are equal.
     some = slice(0, 1 if patches.alike[1] else None)
     points, directions = (part[:, some].reshape(-1, 3) for part in (x, normals))
     gaps = gap[:, :, some].reshape(len(gap), -1)
