@@ -1,1 +1,1 @@
-"""Many runs that answer one question: precision, stability, the rates of a mechanism."""
+"""Studies of many runs: precision, stability, rates of a mechanism, reports."""

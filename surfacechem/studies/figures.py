@@ -1,7 +1,7 @@
-"""Figures from lists: runs and sweeps of cases with their exact curves and with published data on them.
+"""Figures from lists: runs and sweeps of cases with their exact curves and published data.
 
-A list is a YAML file of figures; each has two axes and some curves. What a curve shows is computed when the figure is
-drawn, and its largest distance from the exact curve stands below it.
+A list is a YAML file of figures; each has two axes and some curves. Curves are computed when the figure is drawn; the
+caption gives the largest distance from the exact curve.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ log = logging.getLogger(__name__)
 SCALES = "linear", "log"
 
 HIDDEN_PART = 1 / 200
-"""Fraction of its range by which a curve has to differ from another to be seen beside it."""
+"""Fraction of its range by which a curve has to differ from another to be seen next to it."""
 
 EXACT_STYLE: Mapping[str, Any] = {"color": "0.8", "linewidth": 4.5, "zorder": 1}
 """Style of exact curves."""
@@ -61,7 +61,7 @@ def _anything(content: Content) -> Entries:
     return Entries(others=Deferred(content), by_scene=True)
 
 
-# -- what stands in a list --------------------------------------------------------------------------------------------
+# -- sections of a list -----------------------------------------------------------------------------------------------
 
 
 class AxisSection(Section):
@@ -129,24 +129,24 @@ class ListSection(Section):
     figures: Sequence[FigureSection] = key(ListOf(Nested(FigureSection)), "the figures", REQUIRED)
 
 
-# -- what is drawn of it ----------------------------------------------------------------------------------------------
+# -- drawing ----------------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
 class Line:
-    """A curve as computed, in the units of its axes, shape (n,), with the exact one where that is known, and data."""
+    """A computed curve in the units of its axes, shape (n,), with the exact one if known, and data."""
 
     label: str
     x: Array
     y: Array
     refused: NDArray[np.bool_]
-    """Whether the second law is broken at each point, though energy is conserved."""
+    """Mask of points that violate the second law, although energy is conserved."""
     exact: tuple[Array, Array] | None
     data: tuple[Array, Array] | None
 
     @property
     def distance(self) -> float:
-        """The largest distance from the exact curve, as a part of the ranges that this spans; NaN without one."""
+        """Largest distance from the exact curve, relative to the ranges of the latter; NaN without one."""
         if self.exact is None:
             return np.nan
         spans = [float(np.nanmax(part) - np.nanmin(part)) or 1.0 for part in self.exact]
@@ -156,8 +156,8 @@ class Line:
 
 
 def _distance(point: Array, line: Array) -> float:
-    """Distance of a point from a polyline of shape (n, 2)."""
-    # Where the curve jumps, its two sides belong to one place: hence from the line between them, not along y.
+    """Return the distance of a point from a polyline of shape (n, 2)."""
+    # Distance from the line, not along y: at a jump of the curve both of its sides have the same x.
     start, step = line[:-1], np.diff(line, axis=0)
     length = np.maximum(np.sum(step**2, axis=1), np.finfo(float).tiny)
     along = np.clip(np.sum((point - start) * step, axis=1) / length, 0, 1)
@@ -165,7 +165,7 @@ def _distance(point: Array, line: Array) -> float:
 
 
 def _coincide(one: Line, other: Line) -> bool:
-    """Whether two curves hide each other."""
+    """True if two curves hide each other."""
     span = float(np.ptp(other.y[np.isfinite(other.y)])) or 1.0
     near = np.interp(one.x, other.x, other.y) - one.y
     return bool(np.nanmax(np.abs(near)) < HIDDEN_PART * span)
@@ -186,17 +186,17 @@ class ListFigure:
         return " ".join([f"{self.section.title}.", *([f"{self.section.source}."] if self.section.source else []), *far])
 
     def draw(self) -> Plot:
-        """The figure."""
+        """Draw the figure."""
         from surfacechem.plots.style import COLOURS, panels
 
         with panels(5.4, 3.6) as (plot, ((ax,),)):
             for curve in self.curves:
                 if curve.exact is not None:
-                    ax.plot(*curve.exact, **EXACT_STYLE)  # wide, so that it is seen below what lies on it
+                    ax.plot(*curve.exact, **EXACT_STYLE)  # wide, so that it is seen below the curves on it
             for i, curve in enumerate(self.curves):
                 colour = COLOURS[i % len(COLOURS)]
                 shown = np.where(curve.refused, np.nan, curve.y)
-                # One curve on another is dashed, so that both are seen.
+                # A curve on top of another is dashed, so that both are seen.
                 dashed = any(_coincide(curve, other) for other in self.curves[:i])
                 ax.plot(curve.x, shown, "--" if dashed else "-", color=colour, label=curve.label or None)
                 if curve.refused.any():
@@ -220,12 +220,12 @@ class ListFigure:
 
 
 def lists() -> Path:
-    """The folder of the lists that come with surfacechem."""
+    """Return the folder of the lists that come with surfacechem."""
     return shipped.cases() / "figures"
 
 
 def read_list(name: str) -> ListSection:
-    """A list of figures by the name of a shipped one or by its path."""
+    """Read a list of figures by the name of a shipped one or by its path."""
     path = Path(name) if Path(name).suffix else lists() / f"{name}.yaml"
     if not document.is_file(path):
         known = [path.stem for path in lists().glob("*.yaml")]
@@ -234,14 +234,14 @@ def read_list(name: str) -> ListSection:
 
 
 def pictures(content: ListSection) -> Iterator[ListFigure]:
-    """The figures of a list, one after another, each when its runs are done."""
+    """Yield the figures of a list, each when its runs are done."""
     for number, section in enumerate(content.figures):
         log.info("%s", section.name, extra={"done": number, "total": len(content.figures)})
         yield ListFigure(section, [_curve(section, curve) for curve in section.curves])
 
 
 def write_all(content: ListSection, folder: Path, suffix: str) -> list[tuple[Path, str]]:
-    """Draw the figures of a list into a folder; returns the files and what stands below each."""
+    """Draw the figures of a list into a folder; return the files and their captions."""
     from surfacechem.plots import write
 
     written = []
@@ -252,7 +252,7 @@ def write_all(content: ListSection, folder: Path, suffix: str) -> list[tuple[Pat
 
 
 def _curve(figure: FigureSection, section: CurveSection) -> Line:
-    """Line of a case along the axes."""
+    """Compute the line of a case along the axes."""
     folder = Path(section.tree.place.file).parent
     dataset, exact_ends = _computed(section, folder, f"{figure.y.variable}_exact")
     axes = {"x": figure.x, "y": figure.y}
@@ -261,7 +261,7 @@ def _curve(figure: FigureSection, section: CurveSection) -> Line:
     exact = tuple(np.array(section.exact, dtype=float).T) if section.exact else None
     if exact_ends is not None:
         exact = x, exact_ends / per["y"]
-    # Energy is conserved there, so that only the verdict on the jump tells.
+    # Energy is conserved at a refused point, so only the verdict on the jump identifies it.
     refused = np.zeros(x.shape, dtype=bool)
     if section.over and "event_verdict" in dataset:
         refused = np.any(dataset["event_verdict"].values == "destroys entropy", axis=-1)
@@ -269,7 +269,7 @@ def _curve(figure: FigureSection, section: CurveSection) -> Line:
 
 
 def _computed(section: CurveSection, folder: Path, exact: str) -> tuple[xarray.Dataset, Array | None]:
-    """The run or the sweep of a curve, and the exact values of its variable along it; None where none are known."""
+    """Compute the run or the sweep of a curve, and the exact values of its variable along it; None if unknown."""
     case = str(folder / section.case) if Path(section.case).suffix else section.case
     over, until = ({path: tree.plain() for path, tree in of.items()} for of in (section.over, section.until))
     try:
@@ -279,7 +279,7 @@ def _computed(section: CurveSection, folder: Path, exact: str) -> tuple[xarray.D
             return dataset, np.asarray(dataset[exact].values, dtype=float)
         if not over or simulation.case.reference is None:
             return dataset, None
-        # A sweep over several times keeps no exact curves: each of its runs is made by itself.
+        # A sweep has no exact curves over time: each of its runs is repeated by itself.
         ends = [simulation.run(point).dataset for point in simulation.plan(over).points]
     except InputError as error:
         raise error.at(section.tree.place) from None
@@ -287,7 +287,7 @@ def _computed(section: CurveSection, folder: Path, exact: str) -> tuple[xarray.D
 
 
 def _values(dataset: xarray.Dataset, axis: AxisSection) -> Array:
-    """A variable of a run over time, or of a sweep what its runs end at."""
+    """Return a variable of a run over time, or its values at the ends of the runs of a sweep."""
     if (name := axis.variable) not in dataset.variables:
         raise axis.error(f"no variable '{name}'.{suggestion(name, list(map(str, dataset.variables)))}", "variable")
     values = dataset[name]
@@ -295,21 +295,21 @@ def _values(dataset: xarray.Dataset, axis: AxisSection) -> Array:
 
 
 def _unit(dataset: xarray.Dataset, axis: AxisSection, per: Tree | None) -> float:
-    """Value that counts as one along an axis [SI]."""
+    """Return the value that counts as one along an axis [SI]."""
     if per is None or axis.variable not in dataset.variables:
         return 1.0
     return si(per.plain(), _own_unit(dataset[axis.variable]), per.place, "per")
 
 
 def _own_unit(values: xarray.DataArray) -> str:
-    """The unit of a variable as a case writes it."""
+    """Return the unit of a variable in the notation of a case."""
     return re.sub(r"([A-Za-z])(-?\d+)", r"\1^\2", str(values.attrs.get("units", "1")))
 
 
 def _data(
     dataset: xarray.Dataset, figure: FigureSection, section: CurveSection, folder: Path, per: Mapping[str, float]
 ) -> tuple[Array, Array] | None:
-    """The published data of a curve along the same axes."""
+    """Return the published data of a curve along the same axes."""
     if (given := section.data) is None:
         return None
     path = document.file_in(folder, given.file, given.tree.place)
@@ -318,7 +318,7 @@ def _data(
     table = CSVText(Tree(document.read(path), Place(str(path))))
     found = []
     for name, axis, column in (("x", figure.x, given.x), ("y", figure.y, given.y)):
-        # A column without a unit holds the numbers of the axis itself.
+        # A column without a unit is in the units of the axis.
         shown = (column, "") in table.columns
         unit, scale = ("1", 1.0) if shown else (_own_unit(dataset[axis.variable]), per[name])
         found.append(np.array(table.column(column, unit, column)) / scale)

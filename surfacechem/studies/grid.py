@@ -1,7 +1,8 @@
-"""The grid of a study: every solver at every value of a problem, run once for what it gives and again for its time.
+"""The grid of a study: every solver at every value of a problem, run once for its result and again for its time.
 
-A first run warms up and gives errors and counts. The rounds that follow are timed and interleaved, so that a busy
-moment of the machine does not hit one solver alone; brief runs are repeated within a round. Compilation is apart.
+The first run warms up and gives errors and counts. The following rounds are timed and interleaved, so that a busy
+moment of the machine does not affect one solver only; brief runs are repeated within a round. Compilation is not
+included.
 """
 
 from __future__ import annotations
@@ -21,38 +22,38 @@ from surfacechem.solve import names, solver
 from surfacechem.solve.contract import Counters
 from surfacechem.solve.run import Trajectory
 
-# Choices: a busy scheduler takes turns of milliseconds; of brief runs over 50 ms some are undisturbed, and the least
-# time counts.
-# Runs briefer than this [s] are repeated within a round up to this time, at least and at most so often.
+# Choices: a busy scheduler switches every few milliseconds; among repeats over 50 ms some are undisturbed, and the
+# least time counts.
+# Runs briefer than this [s] are repeated within a round up to this time; least and largest number of repeats.
 BRIEF_RUN, LEAST_REPEATS, MOST_REPEATS = 0.05, 3, 20
 
 # A solver at one value is not timed again once it has taken this long [s].
 ROUND_SECONDS = 1.0
 
-# Errors with which libraries end that cannot even say how a run failed.
+# Exceptions of libraries that do not report a failure by a status.
 LIBRARY_ERRORS = (ArithmeticError, RuntimeError, ValueError)
 
 
 @dataclass
 class Cell:
-    """One solver at one problem and one value: outcome, counts and times; studies add what they judge it by."""
+    """One solver at one problem and one value: outcome, counts and times; studies add their measures."""
 
     outcome: str
     reason: str
     counters: Counters = field(default_factory=Counters, kw_only=True)
-    """Counts of the solver; of no run where there are no seconds."""
+    """Counts of the solver; empty without run times."""
     seconds: list[float] = field(default_factory=list, kw_only=True)
-    """Run times; of a failed solve, the time that it took to fail."""
+    """Run times; for a failed solve, the time until the failure."""
     stepping: list[float] = field(default_factory=list, kw_only=True)
-    """Fractions of the run times inside a library's own steps; NaN for a method that does everything itself."""
+    """Parts of the run times inside a library's own steps; NaN for a method that does everything itself."""
     again: Callable[[], Trajectory] | None = field(default=None, kw_only=True, repr=False)
-    """Function that runs it once more."""
+    """Function that repeats the run."""
     solver: str = field(default="", kw_only=True)
     value: float = field(default=math.nan, kw_only=True)
-    """The value at which it was run; with the solver, its place in the grid."""
+    """Value of the parameter; with the solver, the place in the grid."""
 
     def count(self, name: str) -> float:
-        """A count of the solver; not a number where its library does not tell."""
+        """Return a count of the solver; NaN if its library does not report it."""
         counters = self.counters
         if not self.seconds or (name == "rejected" and not solver(self.solver).counts_rejected):
             return math.nan
@@ -65,10 +66,10 @@ C = TypeVar("C", bound=Cell)
 
 
 def attempt(solve: Callable[[], Trajectory], judge: Callable[[Trajectory | Exception], C]) -> C:
-    """A run and what the study makes of it, or of the error with which a library ended."""
+    """Run, and judge the result, or the error with which a library ended."""
     try:
         with warnings.catch_warnings(), np.errstate(all="ignore"):
-            warnings.simplefilter("ignore")  # libraries warn of what the status says
+            warnings.simplefilter("ignore")  # the status says what libraries warn about
             done = solve()
             cell = judge(done)
     except (*LIBRARY_ERRORS, InputError) as error:
@@ -84,8 +85,8 @@ log = logging.getLogger(__name__)
 def filled(
     solvers: Sequence[str], prepared: Mapping[float, Callable[[str], C]], rounds: int = 0
 ) -> dict[tuple[str, float], C]:
-    """The cells of a problem by solver and value: each is run once, by solver from what is prepared for the value, and
-    then timed in so many rounds.
+    """Return the cells of a problem by solver and value. Each is run once, by solver with the function prepared for the
+    value, and then timed in so many rounds.
     """
     cells = {(name, value): run(name) for name in solvers for value, run in prepared.items()}
     for number in range(rounds):
@@ -101,7 +102,7 @@ def filled(
 
 
 def _time_again(cell: Cell) -> None:
-    """A round of a cell; one that ends otherwise, where the machine is too busy for its time limit, does not count."""
+    """Time a round of a cell. Runs with another outcome, when a busy machine exceeds the time limit, do not count."""
     spent: list[float] = []
     most = MOST_REPEATS if min(cell.seconds) <= BRIEF_RUN else 1
     while cell.again and len(spent) < most and (len(spent) < LEAST_REPEATS or sum(spent) <= BRIEF_RUN):
@@ -116,8 +117,8 @@ def _time_again(cell: Cell) -> None:
 def check_options(
     solvers: Sequence[str], tolerances: Sequence[float], rounds: int, bounds: tuple[int, int], options: Sequence[str]
 ) -> None:
-    """Raise InputError for a solver that there is not, a tolerance that no solver takes, rounds out of bounds, and for
-    none of the first two; ``options`` names the three.
+    """Raise InputError for an unknown solver, a tolerance out of range, rounds out of bounds, and an empty list of
+    either; ``options`` names the three.
     """
     refuse_unknown(solvers, names, "no solver '{}'", Place(path=options[0]))
     for rtol in tolerances:

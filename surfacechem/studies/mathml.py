@@ -1,4 +1,4 @@
-r"""Formulas in LaTeX as MathML, which browsers draw without a script and without a network.
+r"""Formulas in LaTeX as MathML, which browsers draw without scripts and without a network.
 
 >>> mathml("a_1")
 '<math><mrow><msub><mi>a</mi><mn>1</mn></msub></mrow></math>'
@@ -18,24 +18,24 @@ if TYPE_CHECKING:
     from surfacechem.compile.typeset import Equation
 
 UPRIGHT_WORD = re.compile(r"\\mathrm\{([^{}]{2,})\}")
-"""Upright words, which are text rather than a product of letters."""
+"""Upright words, which are text instead of a product of letters."""
 
 MATH_TAG = re.compile(r"<math [^>]*>")
 
 ALIGNED = re.compile(r"\\(begin|end)\{aligned\}")
-"""Lines below each other, by the name that the converter knows."""
+"""Environment of aligned lines, which the converter knows by another name."""
 
 SIZED_BRACKET = re.compile(r"\\[bB]igg?(?:[lr]?)(\\[{}]|\\[lr]angle|[][()])")
-"""Brackets of a given size, which here have that of what they enclose."""
+"""Brackets of a given size; here their size follows from their content."""
 
 OPENING_BRACKETS = ("(", "[", r"\{", r"\langle")
 
 FUNCTION_NAME = re.compile(r"<m([io])>([a-z]{2,})</m\1>(?=((?:<mrow>)?<mo [^>]*>(?:&#x00028;|\[|&#x0007B;))?)")
-"""The name of a function, and the bracket that may follow it."""
+"""Name of a function, and the bracket that may follow it."""
 
 THIN_SPACE = "0.167em"
 SET_OFF = f'<mo form="prefix" lspace="{THIN_SPACE}" rspace="{{1}}">{{0}}</mo>'
-"""A function is set off from what stands before it and, without a bracket, from what it is of."""
+"""Space between a function and the preceding term and, without a bracket, its argument."""
 
 SPACING = {
     "<mo>&#x02202;</mo>": "<mi>&#x02202;</mi>",  # a partial derivative is no binary operator
@@ -45,25 +45,25 @@ SPACING = {
 }
 
 SCRIPT_SIZE = 0.75
-"""Size of an index or exponent, relative to what it belongs to."""
+"""Size of an index or exponent relative to its base."""
 
 LETTER_WIDTH, OPERATOR_WIDTH, BRACKET_WIDTH, MARGIN_WIDTH = 0.56, 1.3, 0.4, 0.25
-"""Widths of parts of a formula [em], rather too wide than too narrow."""
+"""Upper estimates of the widths of parts of a formula [em]."""
 
 FONT = Path(__file__).with_name("stix-two-math.woff2")
 """Letters, signs and brackets of STIX Two Math that formulas need."""
 
 
 class Typeset(str):
-    """LaTeX that a page typesets; as text it is what it is."""
+    """LaTeX text that a page typesets; as a string it is the source."""
 
     def __html__(self) -> str:
-        """The formula as it is, for templates, which would escape a text."""
+        """Return the formula as MathML, for templates, which would escape a text."""
         return mathml(self)
 
 
 def mathml(latex: str, *, display: bool = False) -> str:
-    """A formula; fractions in a ``display`` are large."""
+    """Convert a formula; fractions are large with ``display``."""
     from latex2mathml.converter import convert
 
     words = UPRIGHT_WORD.sub(lambda m: rf"\text{{{m[1].replace(chr(92) + ',', ' ')}}}", latex)
@@ -76,15 +76,15 @@ def mathml(latex: str, *, display: bool = False) -> str:
 
 
 def equation(line: Equation) -> str:
-    """An equation whose lines break between its terms; a term that is wider than the page is drawn smaller."""
+    """Convert an equation with line breaks between terms; a term wider than the page is drawn smaller."""
     first = mathml(f"{line.left} {line.pieces[0]}", display=True)
-    # A sign at the beginning of a line has the room of one between two terms.
+    # A sign at the beginning of a line is spaced like one between two terms.
     rest = [mathml(piece, display=True).replace("<mo>", '<mo form="infix">', 1) for piece in line.pieces[1:]]
     return " ".join(map(_fitted, [first, *rest]))
 
 
 def font() -> str:
-    """The font of formulas as a data address, so that a page needs no other file."""
+    """Return the font of formulas as a data address, so that a page needs no other file."""
     return f"data:font/woff2;base64,{b64encode(FONT.read_bytes()).decode()}"
 
 
@@ -94,7 +94,7 @@ def _fitted(formula: str) -> str:
 
 
 def _width(element: Element) -> float:
-    """Width of an element [em], estimated from above."""
+    """Estimate the width of an element [em] from above."""
     tag = str(element.tag)
     parts: list[float] = [_width(part) for part in element]
     if tag in ("mi", "mn", "mtext", "ms"):

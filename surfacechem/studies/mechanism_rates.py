@@ -1,11 +1,11 @@
-"""Numbers of a mechanism over temperature and force: standard thermo, equilibrium constants, rates, and cycles.
+"""Rates of a mechanism over temperature and force: standard thermo, equilibrium constants, rates, and cycles.
 
-Everything is kept as logarithms, so that no exponent is too large to be shown. Rates are those at coverages of one, per
-possible bond, so that forward over reverse is the equilibrium constant of the coverages whatever the order.
+All are kept as logarithms, so that no exponent overflows. Rates are those at coverages of one, per possible bond, so
+that forward over reverse is the equilibrium constant of the coverages whatever the order.
 
-Cycles are reactions that lead back to where they began: they change nothing, so that in equilibrium the product of
-their k_f/k_r is one, whatever the thermo of the species. Rates whose product is not one keep the cycle running without
-end. Source: Wegscheider (1901), Monatsh. Chem. 22, 849, doi 10.1007/BF01517498.
+Cycles are sequences of reactions whose changes sum to zero, so that in equilibrium the product of their k_f/k_r is one,
+whatever the thermo of the species. Rates with another product keep the cycle running without end. Source: Wegscheider
+(1901), Monatsh. Chem. 22, 849, doi 10.1007/BF01517498.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class Curves:
         }
         springs = {name: item.spring for name, item in self.species.items() if item.spring}
         self.pulled = next((name for name, spring in springs.items() if spring.stiffness), "")
-        """The species on which the force acts: the first elastic one, whose gap the others share; none otherwise."""
+        """Species on which the force acts: the first elastic one, whose gap the others share; empty without any."""
         self._amounts = {variable.name: variable.density for variable in mechanism.variables}
         first = next(iter(self.species.values()))
         self.site_density = self._amounts[first.variable] * first.sites
@@ -70,7 +70,7 @@ class Curves:
             self._numbers |= {symbol: float(getattr(law, name)) for name, symbol in _symbols(law).items()}
 
     def _names(self, springs: Mapping[str, Any]) -> dict[str, Expression]:
-        """Expressions of the names that a law may read; the gap is that at which the pulled bond carries the force."""
+        """Return the expressions of names that a law may read; at the gap the pulled bond carries the force."""
         pulled = springs.get(self.pulled)
         gap = pulled.rest_length + FORCE / pulled.stiffness if pulled else 0.0
         known: dict[str, Expression] = {**self._coverages, "T_c": TEMPERATURE, "f": FORCE, "g_n": gap}
@@ -92,7 +92,7 @@ class Curves:
 
     @property
     def evaluated(self) -> list[EvaluatedReaction]:
-        """Reactions whose rates Cantera gives while a scene runs."""
+        """Reactions whose rates Cantera computes during a run."""
         return [law for law in self.mechanism.reactions if isinstance(law, EvaluatedReaction)]
 
     @property
@@ -103,7 +103,7 @@ class Curves:
         return any(depends(expression, FORCE) for expression in (*rates, *constants))
 
     def thermo(self, temperature: float) -> dict[str, Thermo]:
-        """Standard thermo of every species at a temperature [K], without force."""
+        """Return the standard thermo of every species at a temperature [K], without force."""
         found = {}
         for name, item in self.species.items():
             g = symengine.sympify(item.gibbs(TEMPERATURE))
@@ -113,22 +113,22 @@ class Curves:
         return found
 
     def log_forward(self, label: str, temperatures: Array, forces: Array) -> Array:
-        """Logarithm of the forward rate per possible bond [1/s]."""
+        """Return the logarithm of the forward rate per possible bond [1/s]."""
         return self._evaluate(self._log_rate([label], self.laws[label].change), temperatures, forces)
 
     def log_reverse(self, label: str, temperatures: Array, forces: Array) -> Array | None:
-        """Logarithm of the reverse rate per possible bond [1/s]; None where the reaction is irreversible."""
+        """Return the logarithm of the reverse rate per possible bond [1/s]; None if the reaction is irreversible."""
         if not self.laws[label].reversible:
             return None
         return self.log_forward(label, temperatures, forces) - self.log_equilibrium(label, temperatures, forces)
 
     def log_equilibrium(self, label: str, temperatures: Array, forces: Array) -> Array:
-        """Logarithm of the equilibrium constant of the coverages."""
+        """Return the logarithm of the equilibrium constant of the coverages."""
         paired = any(label in pair.labels for pair in self.pairs)
         return self._evaluate(self._log_equilibrium(self.laws[label].change, paired), temperatures, forces)
 
     def departure(self, pair: Opposed, temperatures: Array, forces: Array) -> Array:
-        """ln(k_f/k_r) - ln K of reactions that undo each other."""
+        """Return ln(k_f/k_r) - ln K of a pair of opposed reactions."""
         forward, backward = (self._log_rate(laws, pair.change) for laws in (pair.forward, pair.backward))
         return self._evaluate(forward - backward - self._log_equilibrium(pair.change, True), temperatures, forces)
 
@@ -136,13 +136,15 @@ class Curves:
         return formula(**{name: self._known[name] for name in reads(formula)})
 
     def _log_rate(self, labels: Iterable[str], change: Mapping[str, int | float]) -> Expression:
-        """Logarithm of a rate over the amount of the bond that the reaction makes or breaks."""
+        """Return the logarithm of a rate over the amount of the bond that the reaction makes or breaks."""
         laws = (self.laws[label] for label in labels)
         total = log_sum([self._call(law.bind(_symbols(law)).log_forward) for law in laws])
         return total - log(min(self._amounts[name] for name in change))
 
     def _log_equilibrium(self, change: Mapping[str, int | float], paired: bool) -> Expression:
-        """Logarithm of the equilibrium constant, with the work of a prescribed force on reactions that are undone."""
+        """Return the logarithm of the equilibrium constant; for ``paired`` reactions with the work of a prescribed
+        force.
+        """
         total: Expression = 0
         for name, nu in change.items():
             total += nu * derivative(self._psi, self._coverages[name]) / self._amounts[name]
@@ -150,7 +152,7 @@ class Curves:
         return -total / (BOLTZMANN * TEMPERATURE)
 
     def _evaluate(self, expression: Expression, temperatures: Array, forces: Array) -> Array:
-        """Values at coverages of one."""
+        """Evaluate an expression at coverages of one."""
         full = symengine.sympify(expression).subs(dict.fromkeys(self._coverages.values(), 1))
         function = symengine.Lambdify([TEMPERATURE, FORCE, *self._numbers], [full], cse=True)
         points = np.stack(np.broadcast_arrays(temperatures, forces, *self._numbers.values()), axis=-1)
@@ -158,24 +160,24 @@ class Curves:
 
 
 def _symbols(law: InterfaceArrhenius) -> dict[str, Expression]:
-    """A symbol for every number of a law: the logarithm of one that is zero is infinite only when it is evaluated."""
+    """Return a symbol for every number of a law: the logarithm of a zero becomes infinite only when evaluated."""
     return {name: symengine.Symbol(f"{law.label}.{name}") for name, _ in law.specs()}
 
 
 @dataclass(frozen=True)
 class ReactionCycle:
-    """Steps that together change nothing, each with how often it is taken; backwards where that is negative."""
+    """Steps whose changes sum to zero, each with its multiplicity, which is negative if it is taken backwards."""
 
     steps: Sequence[tuple[Step, int]]
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """Labels of all its reactions."""
+        """Labels of all reactions of the cycle."""
         pairs = (step.labels if isinstance(step, Opposed) else (step,) for step, _ in self.steps)
         return tuple(label for labels in pairs for label in labels)
 
     def departure(self, curves: Curves, temperatures: Array, forces: Array) -> Array:
-        """Logarithm of the product of k_f/k_r around the cycle."""
+        """Return the logarithm of the product of k_f/k_r around the cycle."""
         total = np.zeros(np.broadcast_shapes(np.shape(temperatures), np.shape(forces)))
         for step, times in self.steps:
             if isinstance(step, Opposed):
@@ -184,7 +186,7 @@ class ReactionCycle:
 
 
 def cycles(curves: Curves) -> list[ReactionCycle]:
-    """Independent cycles that hold at least one pair or one-way reaction; others agree by construction."""
+    """Return independent cycles with at least one pair or one-way reaction; others agree by construction."""
     paired = {label for pair in curves.pairs for label in pair.labels}
     steps: list[Step] = [*(label for label in curves.laws if label not in paired), *curves.pairs]
     changes = [curves.laws[step].change if isinstance(step, str) else step.change for step in steps]
@@ -197,7 +199,7 @@ def cycles(curves: Curves) -> list[ReactionCycle]:
 
 
 def null_space(changes: Sequence[Mapping[str, float]]) -> list[list[int]]:
-    """Integer combinations of changes that are none, one for each change that depends on those before it."""
+    """Return integer combinations of changes that vanish, one for each change that depends on those before it."""
     from sympy import Matrix  # type: ignore[import-untyped]  # slow to import
 
     names = dict.fromkeys(name for change in changes for name in change)
@@ -210,7 +212,7 @@ def null_space(changes: Sequence[Mapping[str, float]]) -> list[list[int]]:
 
 
 def cycle_verdict(cycle: ReactionCycle, curves: Curves, temperatures: Array, forces: Array) -> str:
-    """Verdict on a cycle, which comes to rest or does not, in words."""
+    """Return the verdict on a cycle in words: whether it comes to rest."""
     one_way = {step: times for step, times in cycle.steps if isinstance(step, str) and not curves.laws[step].reversible}
     if one_way and min(one_way.values()) < 0 < max(one_way.values()):
         return "goes round neither way, since it has one-way reactions in both directions"

@@ -25,10 +25,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-# Temperature [K] at which the thermo of the species is shown, where it is in range.
+# Temperature [K] at which the thermo of the species is shown, if it is in range.
 STANDARD_T = 298.15
 
-# Values of a range that tables and curves show.
+# Numbers of values of a range in tables and in curves.
 TABLE_COLUMNS, CURVE_POINTS = 5, 200
 
 
@@ -40,17 +40,17 @@ class Span:
     high: float
 
     def values(self, number: int = TABLE_COLUMNS) -> Array:
-        """Evenly spaced values; one where the ends are the same."""
+        """Return evenly spaced values; a single one if the ends are equal."""
         return np.linspace(self.low, self.high, number if self.high > self.low else 1)
 
     def text(self, unit: str, scale: float = 1.0) -> str:
-        """The range in a unit of which ``scale`` make one in SI."""
+        """Return the range in a unit, ``scale`` of which are one SI unit."""
         ends = dict.fromkeys(f"{end * scale:g}" for end in (self.low, self.high))
         return f"{' to '.join(ends)} {unit}"
 
 
 def span(text: str, unit: str, option: str, above: float = -math.inf) -> Span:
-    """A range such as ``280..360 K``, or one value.
+    """Parse a range such as ``280..360 K``, or one value.
 
     >>> span("280..360 K", "K", "--temperature")
     Span(low=280.0, high=360.0)
@@ -66,13 +66,13 @@ def span(text: str, unit: str, option: str, above: float = -math.inf) -> Span:
 
 
 def reference(temperatures: Span) -> float:
-    """The one temperature [K] at which a range is shown."""
+    """Return the single temperature [K] at which a range is shown."""
     inside = temperatures.low <= STANDARD_T <= temperatures.high
     return STANDARD_T if inside else (temperatures.low + temperatures.high) / 2
 
 
 def mechanism_sheet(curves: Curves, temperatures: Span, forces: Span) -> str:
-    """Everything about a mechanism, one fact a line."""
+    """Describe a mechanism, one fact per line."""
     shown, grid = reference(temperatures), _grid(curves, temperatures, forces)
     T, f = temperatures.values(), forces.values()
     types = []
@@ -103,7 +103,7 @@ def mechanism_sheet(curves: Curves, temperatures: Span, forces: Span) -> str:
 
 
 def reaction_lines(curves: Curves, temperatures: Span, forces: Span) -> Iterator[str]:
-    """Formula, numbers and verdict of each reaction that is lowered."""
+    """Yield formula, numbers and verdict of each lowered reaction."""
     for label, law in curves.laws.items():
         place = f"{law.place.file}:{law.place.line}" if law.place else ""
         units = {name: law.refine(name, spec).unit for name, spec in law.specs()}
@@ -125,12 +125,12 @@ def _species(curves: Curves, temperature: float) -> Iterator[tuple[str, ...]]:
 
 
 def _number(value: float, digits: int = 6) -> str:
-    """A difference of numbers of up to a thousand [kJ/mol]; rounding is shown as zero."""
+    """Format a difference of numbers of up to a thousand [kJ/mol]; roundoff is shown as zero."""
     return f"{value:.{digits}g}" if abs(value) > 1e3 * RUN_EPS else "0"
 
 
 def verdict(curves: Curves, label: str, temperatures: Span, forces: Span) -> str:
-    """Verdict on the detailed balance of a reaction, in words."""
+    """Return the verdict on the detailed balance of a reaction, in words."""
     if curves.laws[label].reversible:
         return "consistent by construction: the reverse follows from K(g, T)"
     pair = next((pair for pair in curves.pairs if label in pair.labels), None)
@@ -160,7 +160,7 @@ def _table(curves: Curves, name: str, x: Array, T: Array, f: Array) -> Iterator[
 
 
 def power_of_ten(logarithm: float) -> str:
-    """A number of which the natural logarithm is known, however large it is.
+    """Format a number given by its natural logarithm, however large it is.
 
     >>> power_of_ten(0.0), power_of_ten(1000.0), power_of_ten(-math.inf)
     ('1', '1.97e+434', '0')
@@ -174,7 +174,7 @@ def power_of_ten(logarithm: float) -> str:
 
 
 def remarks(curves: Curves) -> Iterator[str]:
-    """Peculiarities of a mechanism that are not wrong."""
+    """Yield peculiarities of a mechanism that are not errors."""
     yield from curves.mechanism.remarks
     idle = set(curves.mechanism.species.values())
     around = [name for name, item in curves.species.items() if item.interactions]
@@ -192,7 +192,7 @@ def remarks(curves: Curves) -> Iterator[str]:
 
 
 def figure(curves: Curves, temperatures: Span, forces: Span) -> Figure:
-    """Rates (left) and equilibrium constants (right), over temperature and in a second row over force."""
+    """Draw rates (left) and equilibrium constants (right), over temperature and in a second row over force."""
     from surfacechem.plots.style import COLOURS, NOTE_STYLE, TITLE_STYLE, panels
 
     shown, T, f = reference(temperatures), temperatures.values(CURVE_POINTS), forces.values(CURVE_POINTS)

@@ -1,4 +1,4 @@
-"""Error against run time: cases over tolerances and solvers, against a reference whose own uncertainty is stated."""
+"""Error against run time: cases over tolerances and solvers, compared with a reference of known uncertainty."""
 
 from __future__ import annotations
 
@@ -61,13 +61,13 @@ does all of it in compiled code. A count that a library does not tell is left em
 
 @dataclass
 class WorkPoint(Cell):
-    """One solver at one tolerance: 'finished', 'stopped' by physics as the reference, 'failed', or 'omitted'."""
+    """One solver at one tolerance: 'finished', 'stopped' by physics as in the reference, 'failed', or 'omitted'."""
 
     errors: Errors | None = None
     energy: float = math.nan
 
     def error(self, kind: str, variable: str = "") -> float:
-        """The error of a variable, else the largest; not a number where there is none."""
+        """Return the error of a variable, else the largest; NaN if there is none."""
         if self.errors is None:
             return math.nan
         return self.errors.by_kind[kind].get(variable, math.nan) if variable else self.errors.worst(kind)
@@ -75,7 +75,7 @@ class WorkPoint(Cell):
 
 @dataclass(frozen=True)
 class ComparedCase:
-    """One case: what it was held against, or why there is nothing, and its points by solver and tolerance."""
+    """A case with its reference, or the reason why there is none, and its points by solver and tolerance."""
 
     subject: Subject
     variables: Sequence[str]
@@ -89,7 +89,7 @@ class ComparedCase:
         return self.subject.case.name
 
     def uncertainty(self, kind: str) -> float:
-        """The uncertainty of the reference; not a number where there is none."""
+        """Return the uncertainty of the reference; NaN if there is none."""
         return self.truth.uncertainty.worst(kind) if self.truth else math.nan
 
 
@@ -101,7 +101,7 @@ def precision(
     repeat: int = REPEAT,
     overrides: Sequence[str] | Mapping[str, object] = (),
 ) -> Study:
-    """Run cases with several solvers over tolerances and hold them against a reference: error against run time.
+    """Run cases with several solvers over tolerances and compare them with a reference: error against run time.
 
     Parameters
     ----------
@@ -126,7 +126,7 @@ def precision(
     Raises
     ------
     InputError
-        Where something is unknown, before anything runs.
+        If a name is unknown, before anything runs.
     """
     check_options(solvers, tolerances, repeat, (1, MOST_REPEAT), ("solvers", "tolerances", "repeat"))
     cases = [cases] if isinstance(cases, str | Path) else cases
@@ -158,7 +158,7 @@ def precision(
 def _subjects(
     cases: Sequence[str | Path], overrides: Sequence[str] | Mapping[str, object], variables: Sequence[str]
 ) -> list[Subject]:
-    """The cases; InputError for one that is given twice, and for a variable that none has."""
+    """Return the cases; InputError for a case given twice, and for a variable that none has."""
     subjects = [subject(load(name, overrides)) for name in cases]
     names = [one.case.name for one in subjects]
     if twice := next((name for name in names if names.count(name) > 1), None):
@@ -172,7 +172,7 @@ def _subjects(
 
 
 def subject(simulation: Simulation) -> Subject:
-    """A case as the study sees it; InputError where it cannot start."""
+    """Return a case as subject of the study; InputError if it cannot start."""
     case, model = simulation.case, simulation.model
     try:
         model.problem(case.run, model.values())
@@ -184,7 +184,7 @@ def subject(simulation: Simulation) -> Subject:
 def _compared(
     subject: Subject, wanted: Sequence[str], solvers: Sequence[str], tolerances: Sequence[float], repeat: int
 ) -> ComparedCase:
-    """A case measured: its states, or those of the wanted variables that it has."""
+    """Measure a case: its states, or the wanted variables that it has."""
     name, known = subject.case.name, subject.names
     variables = tuple(name for name in wanted if name in known) or tuple(subject.states)
     log.info("%s: its reference", name)
@@ -223,7 +223,7 @@ def _judged(truth: Truth | None, done: Trajectory | Exception) -> WorkPoint:
 
 
 def _variables() -> Iterator[Variable]:
-    """The variables over case, solver and tolerance, the coordinates first."""
+    """Yield the variables over case, solver and tolerance, the coordinates first."""
     every = ("case", "solver", "tolerance")
     yield Variable("tolerance", ("tolerance",), float, "1", "relative tolerance asked for")
     yield Variable("case_name", ("case",), lambda case: case.name, "1", "name of the case")
@@ -297,7 +297,7 @@ def _of_case(case: ComparedCase) -> Iterator[PageSection]:
 
 
 def _row(point: WorkPoint, case: ComparedCase) -> list[str]:
-    """A line of the table: errors, of which those below the uncertainty of the reference say no more than that."""
+    """Return a row of the table; errors below the uncertainty of the reference are marked."""
     seconds = [f(point.seconds or [math.nan]) for f in (min, median, max)]
     times = ["" if math.isnan(t) else duration(t) for t in (*seconds, min(point.stepping, default=math.nan))]
     counts = ["" if math.isnan(n) else f"{n:.0f}" for n in map(point.count, COUNTS)]
@@ -310,7 +310,7 @@ def _row(point: WorkPoint, case: ComparedCase) -> list[str]:
 
 
 def _omissions(compared: Sequence[ComparedCase]) -> Iterator[str]:
-    """Solvers that cannot run a case, and cases without a reference."""
+    """Yield solvers that cannot run a case, and cases without a reference."""
     points = [(case, point) for case in compared for point in case.points.values() if point.outcome == "omitted"]
     yield from dict.fromkeys(f"{case.name}: {point.solver}: {point.reason}" for case, point in points)
     yield from (f"{case.name}: no errors: {case.reference}" for case in compared if case.truth is None)

@@ -1,8 +1,8 @@
-"""The outcome of a study of many runs: a table in the terminal, a netCDF file, a figure, and one HTML page of it all.
+"""Result of a study of many runs: a table in the terminal, a netCDF file, a figure, and one HTML page with all of it.
 
-A study declares what lies along its axes, the variables that are read off there, and the sections of its report; the
-dataset, the figure, the page and the files follow. The page needs no other file: its figure is inline SVG, the machine
-and the versions are in it. Each file appears whole or not at all.
+A study declares the items along its axes, the variables at each place, and the sections of its report; dataset, figure,
+page and files follow. The page needs no other file: it contains its figure as SVG, the machine and the versions. Each
+file is written whole or not at all.
 
 >>> from surfacechem.studies.report import Page, PageSection, PageTable
 >>> table = PageTable(("solver", "error"), [("radau", "1e-10")])
@@ -47,7 +47,7 @@ if TYPE_CHECKING:
 
     from surfacechem.compile.typeset import Equation
 
-# Packages whose versions a report states.
+# Packages whose versions a report lists.
 LIBRARIES = ("surfacechem", "numpy", "scipy", "numba", "symengine", "cantera", "scikit-sundae", "xarray", "matplotlib")
 
 # The files of a study, in the order in which they are written.
@@ -55,7 +55,7 @@ SUFFIXES = (".nc", ".svg", ".png", ".html")
 
 
 class PageTable(NamedTuple):
-    """Rows of texts under a heading; ``marked`` are the numbers of rows that stand out, such as failures."""
+    """Rows of texts under a heading; ``marked`` are the indices of highlighted rows, such as failures."""
 
     heading: Sequence[str]
     rows: Sequence[Sequence[str]]
@@ -64,7 +64,7 @@ class PageTable(NamedTuple):
 
 
 class PageSection(NamedTuple):
-    """A part of a report: paragraphs, the figure and tables under a heading; details are for the page only."""
+    """A part of a report: paragraphs, figure and tables under a heading; details are shown on the page only."""
 
     title: str
     paragraphs: Sequence[str] = ()
@@ -72,26 +72,26 @@ class PageSection(NamedTuple):
     figure: bool = False
     details: bool = False
     drawings: Sequence[Callable[[], Figure]] = ()
-    """Figures of this section alone, each with its words as the first paragraph says them."""
+    """Figures of this section, which the first paragraph describes."""
     equations: Sequence[Equation] = ()
     """Equations, which a page typesets without scripts."""
     code: str = ""
-    """Text that is shown as it is, of a case for instance."""
+    """Text that is shown verbatim, a case for instance."""
 
 
 @dataclass(frozen=True)
 class Page:
-    """A study as a reader sees it."""
+    """A study as presented to a reader."""
 
     title: str
     command: str
     sections: Sequence[PageSection]
     omissions: Sequence[str] = ()
-    """Parts that were left out, each with its reason."""
+    """Omitted parts, each with its reason."""
     draw: Callable[[], Figure] | None = None
 
     def text(self) -> str:
-        """The study for a terminal, without its figure."""
+        """Return the study for a terminal, without its figure."""
         parts = [self.title]
         for section in self.sections:
             lines = [section.title, *(f"  {line}" for line in section.paragraphs)]
@@ -106,7 +106,7 @@ class Page:
         return "\n\n".join(parts)
 
     def html(self) -> str:
-        """The study as one HTML page that needs no other file."""
+        """Return the study as one HTML page that needs no other file."""
         from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
         loader = FileSystemLoader(Path(__file__).parent)
@@ -121,13 +121,13 @@ class Page:
         return template.render(page=self, figures=self._figures(), drawn=drawn, machine=machine(), font=font)
 
     def write(self, target: Path) -> None:
-        """Save it as one HTML file, whole or not at all."""
+        """Save the page as one HTML file, whole or not at all."""
         text = self.html()
         with replacing(target) as temporary:
             temporary.write_text(text, encoding="utf-8")
 
     def _figures(self) -> list[str]:
-        """The figure as SVG, and the one that a phone shows in its place if it is narrower."""
+        """Return the figure as SVG and, if it is narrower, the version that a phone shows instead."""
         if self.draw is None:
             return []
         from surfacechem.plots.style import narrow
@@ -139,20 +139,20 @@ class Page:
 
 
 def inline_svg(figure: Figure, prefix: str = "f0-") -> str:
-    """A figure as an SVG element of a page, whose names begin with a prefix of their own."""
+    """Return a figure as an SVG element of a page; all its identifiers begin with the prefix."""
     from surfacechem import plots
 
     buffer = StringIO()
     plots.save(figure, buffer, "svg")
     text = buffer.getvalue()
     text = re.sub(r"<metadata>.*?</metadata>", "", text[text.index("<svg") :], flags=re.DOTALL)
-    # Names of the figure must differ from those of the page.
+    # Identifiers of the figure must differ from those of the page.
     return re.sub(r'(\bid="|url\(#|href="#)', rf"\g<1>{prefix}", text)
 
 
 @cache
 def machine() -> dict[str, str]:
-    """Processor, system, Python and libraries on which a study was made."""
+    """Return processor, system, Python and libraries on which a study was made."""
     info = Path("/proc/cpuinfo")
     lines = info.read_text(encoding="utf-8", errors="replace").splitlines() if info.exists() else []
     processor = next((line.partition(":")[2].strip() for line in lines if line.startswith("model name")), "")
@@ -165,7 +165,7 @@ def machine() -> dict[str, str]:
 
 
 class Variable(NamedTuple):
-    """A variable of a study: the axes that it goes over, and how it is read off what lies at a place of each."""
+    """A variable of a study: its axes, and the function that reads it from the items at a place."""
 
     name: str
     over: tuple[str, ...]
@@ -183,23 +183,23 @@ class Study:
     arguments: Sequence[str]
     """Arguments of the command line."""
     axes: Mapping[str, Sequence[Any]]
-    """The items along each dimension."""
+    """Items along each dimension."""
     variables: Sequence[Variable]
-    """The variables of the dataset, the coordinates first."""
+    """Variables of the dataset, the coordinates first."""
     sections: Sequence[PageSection]
     omissions: Sequence[str]
     settings: Mapping[str, str | float | int] = field(default_factory=dict)
-    """Global attributes of its own."""
+    """Global attributes of this study."""
     status: str = "finished"
-    """'failed' where a study lacks what it is to compare with; else 'finished'."""
+    """'failed' if a study lacks a reference; else 'finished'."""
 
     def __repr__(self) -> str:
-        """Size in a line."""
+        """Return the size in a line."""
         return f"<Study of {self.kind}: {', '.join(f'{name} {len(items)}' for name, items in self.axes.items())}>"
 
     @property
     def command(self) -> str:
-        """The command line that makes the study again."""
+        """Command line that repeats the study."""
         return shlex.join(["surfacechem", self.kind, *self.arguments])
 
     @cached_property
@@ -231,19 +231,19 @@ class Study:
     def dataset(self) -> xarray.Dataset:
         """The study as an xarray Dataset over its axes.
 
-        In that of ``precision`` ``dataset.set_index(case="case_name", solver="solver_name")`` lets ``sel`` find cases
-        and solvers by name; since ``tolerance`` is also an argument of ``sel``, tolerances are asked for by
+        For ``precision``, ``dataset.set_index(case="case_name", solver="solver_name")`` lets ``sel`` find cases and
+        solvers by name; since ``tolerance`` is also an argument of ``sel``, tolerances are selected by
         ``sel({"tolerance": 1e-8})``.
         """
         return as_dataset(self.columns, self.attributes)
 
     def figure(self) -> Figure:
-        """The figure of the study, which its dataset alone is enough for.
+        """Draw the figure of the study, from its dataset alone.
 
         Returns
         -------
         matplotlib.figure.Figure
-            What ``savefig`` writes.
+            The figure.
         """
         from surfacechem.plots.study import figure
 
@@ -251,16 +251,16 @@ class Study:
 
     @property
     def page(self) -> Page:
-        """The report; ``page.text()`` is its tables, ``page.html()`` all of it."""
+        """The report; ``page.text()`` has its tables, ``page.html()`` all of it."""
         return Page(self.title, self.command, self.sections, self.omissions, self.figure)
 
     def write(self, path: str | Path) -> list[Path]:
-        """Save as netCDF, SVG, PNG and HTML side by side.
+        """Save as netCDF, SVG, PNG and HTML files next to each other.
 
         Parameters
         ----------
         path
-            What the names of the files begin with.
+            The files without their suffixes.
 
         Returns
         -------
@@ -270,7 +270,7 @@ class Study:
         Raises
         ------
         OutputError
-            Where one of them cannot be written.
+            If one of them cannot be written.
         """
         from surfacechem import plots
 
@@ -278,13 +278,13 @@ class Study:
         save(files[".nc"], self.columns, self.attributes)
         for suffix in (".svg", ".png"):
             plots.write(figure, files[suffix])
-            figure.set_layout_engine("none")  # both have the same, which takes as long to find as to draw
+            figure.set_layout_engine("none")  # both share the layout, which takes as long as the drawing
         self.page.write(files[".html"])
         return list(files.values())
 
 
 def targets(path: str | Path) -> dict[str, Path]:
-    """The files of a study by their suffix, side by side; InputError where another suffix is asked for.
+    """Return the files of a study by suffix, all in one folder; InputError for another suffix.
 
     >>> [str(path) for path in targets("a/study.nc").values()]
     ['a/study.nc', 'a/study.svg', 'a/study.png', 'a/study.html']

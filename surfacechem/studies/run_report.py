@@ -1,6 +1,6 @@
-"""A run or a sweep as one page: the scene in words and as a drawing, equations, figures, events, balances, a rerun.
+"""Report of a run or a sweep as one page: scene in words and as a drawing, equations, figures, events, balances, rerun.
 
-All of it is from the dataset; the scene is read from the case that it keeps.
+All of it comes from the dataset; the scene is read from the case in it.
 """
 
 from __future__ import annotations
@@ -45,16 +45,16 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 MOST_EVENTS = 100
-"""Events that a page lists."""
+"""Largest number of events that a page lists."""
 
 QUICK_SECONDS = 1.0
-"""Run time [s] up to which a page runs a case again at looser tolerances."""
+"""Largest run time [s] at which a page repeats a case at looser tolerances."""
 
 TOLERANCES = tuple(10.0**-digits for digits in (4, 6, 8, 10))
 
 
 def page(data: xarray.Dataset | str | Path) -> Page:
-    """The report of a dataset of a run or a sweep, or of its file."""
+    """Return the report of a dataset of a run or a sweep, or of its file."""
     dataset = opened(data)
     place = Place(str(data)) if isinstance(data, str | Path) else None
     if "keep" in dataset.attrs:
@@ -74,7 +74,7 @@ def page(data: xarray.Dataset | str | Path) -> Page:
             raise InputError("the scene was built in Python, and the dataset holds no case.")
         case = cases.load_text(attributes["case"], mechanism_text=attributes.get("mechanism"))
         sections += [*_scene(case, attributes), *_events(dataset), _balances(attributes), *_precision(case, attributes)]
-    except InputError as error:  # code that the dataset carries is not run to draw it
+    except InputError as error:  # a report does not execute code that the dataset carries
         sections += [*_events(dataset), _balances(attributes)]
         omissions.append(f"The scene and its equations: {error.message}")
     untitled = dataset.assign_attrs(title="")  # the page has the title above
@@ -84,7 +84,7 @@ def page(data: xarray.Dataset | str | Path) -> Page:
 
 
 def _again(data: xarray.Dataset | str | Path, attributes: Mapping[str, Any]) -> tuple[str, str]:
-    """The command that runs a dataset again, empty where there is none, and what it needs."""
+    """Return the command that repeats the run of a dataset, empty if there is none, and its requirements."""
     if not attributes["case"]:
         return "", "The scene was built in Python; its script runs it again."
     if isinstance(data, str | Path):
@@ -100,7 +100,7 @@ def _again(data: xarray.Dataset | str | Path, attributes: Mapping[str, Any]) -> 
 
 
 def report_path(path: str | Path) -> Path:
-    """The path of a report; InputError where its suffix is that of another format."""
+    """Return the path of a report; InputError if its suffix is that of another format."""
     target = Path(path)
     if target.suffix.lower() not in (".html", ".htm"):
         raise InputError(f"a report is HTML: give {target.stem or 'report'}.html.", Place(str(path)))
@@ -115,13 +115,13 @@ def write(data: xarray.Dataset | str | Path, path: str | Path) -> Path:
 
 
 def glance(results: Results) -> str:
-    """A summary and a small figure, for a notebook."""
+    """Return a summary and a small figure as HTML, for a notebook."""
     if isinstance(results, Solution):
         sheet = run_summary(results, None)
     else:
         sheet = sweep_summary(results, None) if isinstance(results, SweepSolution) else points_summary(results, None)  # type: ignore[arg-type]
     shown = f"<pre>{html.escape(str(sheet))}</pre>"
-    if "status" not in results.attributes:  # points have no figure of their own
+    if "status" not in results.attributes:  # points have no figure
         return shown
     picture = BytesIO()
     save(results.plot(), picture, "png")
@@ -129,7 +129,7 @@ def glance(results: Results) -> str:
 
 
 def _ending(attributes: Any) -> str:
-    """Text on the end, the accuracy and the speed of a run."""
+    """Describe the end, the accuracy and the speed of a run."""
     text = f"{attributes['status']}: {attributes['reason']}; {attributes['solver']} at rtol {attributes['rtol']:g}."
     if "error" in attributes:
         text += f" Error {attributes['error']:.2g} ({attributes['error_source']})."
@@ -140,12 +140,12 @@ def _ending(attributes: Any) -> str:
 
 
 def _values(attributes: Mapping[str, Any]) -> dict[str, float]:
-    """Changes of a run to its case, in SI, by path."""
+    """Return the changes of a run to its case, in SI, by path."""
     return {path: value for path, (value, _) in changes_of(attributes).items()}
 
 
 def _as_run(case: cases.Case, changes: Mapping[str, float]) -> Scene:
-    """The scene of a case with those changes of a run that a case can say."""
+    """Return the scene of a case with the changes of a run that can be overrides of a case."""
     for path, value in changes.items():
         with suppress(InputError):
             case = cases.load_text(case.text, mechanism_text=case.mechanism_text, overrides={path: value})
@@ -153,7 +153,7 @@ def _as_run(case: cases.Case, changes: Mapping[str, float]) -> Scene:
 
 
 def _scene(case: cases.Case, attributes: Mapping[str, Any]) -> Iterator[PageSection]:
-    """The scene of a run in words, as a drawing, and as equations."""
+    """Yield sections on the scene of a run: words, drawing, and equations."""
     system, scene = case.system(), _as_run(case, _values(attributes))
     regime = f"{system.regime}: {REGIMES.get(system.regime, '')}"
     rows = [(role.variable, role.role, role.by) for role in system.roles if role.role != "internal"]
@@ -167,14 +167,16 @@ def _scene(case: cases.Case, attributes: Mapping[str, Any]) -> Iterator[PageSect
     stated = list(dict.fromkeys(law for kind in acting for law in _stated(type(kind))))
     yield PageSection("The scene", words, tables, drawings=[lambda: drawing.figure(scene)])
     yield PageSection("Laws", equations=stated)
-    if spatial.is_divided(scene):  # equations of many cells read alike
+    if spatial.is_divided(scene):  # the equations of all cells have the same form
         system = replace(case, scene=spatial.few(case.scene)).system()
     lines, symbols = equations(system)
     yield PageSection("Equations", tables=[_numbers(system, symbols, attributes)], equations=lines, details=True)
 
 
 def _numbers(system: System, symbols: Mapping[str, str], attributes: Mapping[str, Any]) -> PageTable:
-    """Parameters and initial values of a run, with those of its case where they differ, and which of them are swept."""
+    """Return the table of parameters and initial values of a run; values that differ from the case, and swept ones, are
+    marked.
+    """
     own, changes, units = values_of(system), _values(attributes), system.changeable
     values = {path: f"{value:.6g}" for path, value in values_of(system, changes).items()}
     values |= dict.fromkeys(recorded_plan(attributes["sweep"]).paths if "sweep" in attributes else (), "swept")
@@ -190,7 +192,7 @@ def _numbers(system: System, symbols: Mapping[str, str], attributes: Mapping[str
 
 
 def equation_sheet(system: System, title: str) -> Sheet:
-    """The equations as text for a terminal: each with what it is, and with the modes in which it holds."""
+    """Return the equations as text for a terminal, each with its meaning and the modes in which it holds."""
     rows = [
         (plain(" ".join((line.left, *line.pieces))), "; ".join(filter(None, (line.text, line.when))))
         for line in equations(system)[0]
@@ -199,7 +201,7 @@ def equation_sheet(system: System, title: str) -> Sheet:
 
 
 def _stated(law: type[Law]) -> Iterator[Equation]:
-    """The formulas of a law as its docstring states them."""
+    """Yield the formulas in the docstring of a law."""
     name = law.name().replace("-", " ")
     for block in FORMULA.findall(f"{inspect.getdoc(law)}\n"):
         pieces = re.split(r"(?<=[,;]) *\\quad *", " ".join(block.split()))
@@ -207,7 +209,7 @@ def _stated(law: type[Law]) -> Iterator[Equation]:
 
 
 def _events(dataset: xarray.Dataset) -> list[PageSection]:
-    """The events of a run with their verdicts."""
+    """Return the section on the events of a run with their verdicts."""
     if "event_time" not in dataset or dataset["event_time"].ndim != 1:
         return []
     names = [name for name in ("event_name", "event_reason", "event_verdict") if name in dataset]
@@ -220,7 +222,7 @@ def _events(dataset: xarray.Dataset) -> list[PageSection]:
 
 
 def _balances(attributes: Any) -> PageSection:
-    """Section on the residuals of the balances."""
+    """Return the section on the residuals of the balances."""
     rows = [(name, f"{attributes[f'{name}_error']:.2g}") for name in ("energy", "entropy", "site")]
     destroyed = attributes.get("entropy_violations", "none")
     rows.append(("laws that destroy entropy", destroyed))
@@ -228,8 +230,8 @@ def _balances(attributes: Any) -> PageSection:
 
 
 def _precision(case: cases.Case, attributes: Any) -> Iterator[PageSection]:
-    """Error against run time: the case again at looser tolerances, where that takes little."""
-    # What the numbers of the dataset are of is the case itself, or they are not to be compared with.
+    """Yield the section on error against run time: the case at looser tolerances, if that is quick."""
+    # Only the results of the case itself can be compared with runs of it.
     if "sweep" in attributes or "departures" in attributes or attributes["run_seconds"] > QUICK_SECONDS:
         return
     simulation, rows = Simulation(case), []

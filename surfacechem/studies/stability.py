@@ -1,9 +1,9 @@
-"""The stability matrix: dangerous regimes solved to so many digits, refused for the right reason, or failed, by solver.
+"""The stability matrix: correct digits, refusals and failures of each solver in difficult regimes.
 
-The condition number of a problem tells how well it determines its answer, from the exact answer alone: a relative
-change eps of the data changes the answer by up to eps times this number, whatever solves the problem. So many of its
-digits are lost to the rounding of the data, and to the tolerance of a solver, whose error is that of a problem with
-changed data. Source: Higham (2002), Accuracy and Stability of Numerical Algorithms, section 1.6.
+The condition number of a problem follows from the exact answer alone: a relative change eps of the data changes the
+answer by up to eps times this number, for any solver. Its decimal logarithm is the number of digits lost to the
+rounding of the data; the same applies to the tolerance of a solver, whose error is that of a problem with changed data.
+Source: Higham (2002), Accuracy and Stability of Numerical Algorithms, section 1.6.
 
 >>> study = stability("seconds", solvers=["radau"], quick=True, rounds=0)
 >>> bool(study.dataset["digits"].min() > 9)
@@ -40,41 +40,41 @@ from surfacechem.tolerances import EPS, ERROR_FLOOR
 
 log = logging.getLogger(__name__)
 
-# Right to some digits; ended or refused for the right reason; a failure that says so; a wrong answer; an answer to a
+# Correct to some digits; ended or refused for the right reason; a reported failure; a wrong answer; an answer to a
 # problem whose condition leaves no digits at the tolerance.
 SOLVED, REFUSED, FAILED, WRONG, SENSITIVE = OUTCOMES = ("solved", "refused", "failed", "wrong", "sensitive")
 
-# Tolerance of every solver, and the steps after which a run has failed. Choices: all of the libraries take this
-# tolerance, and need 60 to 440 steps at it where a regime is mild.
+# Tolerance of every solver, and the steps after which a run counts as failed. Choices: all libraries accept this
+# tolerance, and need 60 to 440 steps for it in mild regimes.
 STUDY_RTOL, STEPS = 1e-10, 1500
 
-# Digits below which a value that is given out as an answer is wrong, and those that a double holds.
+# Digits below which a returned value counts as wrong, and digits of a double.
 LEAST, MOST = 2.0, 16.0
 
 SOLVERS = (OWN, "dop853", "lsoda", "bdf", "scipy-radau", "cvode", "ida")
 
-# Rounds of a search for a worst corner, and the most that may be asked for.
+# Rounds of a search for a worst corner: default and maximum.
 SEARCH_ROUNDS, MOST_ROUNDS = 12, 10_000
 
 SEED = 20210301
-# Differential evolution: points kept, length of a difference, share of its coordinates that is taken. Few points, since
-# each is a case to be compiled; the other two are in the ranges that Storn & Price advise.
+# Differential evolution: population, weight of a difference, crossover probability. Few points, since each is a case to
+# be compiled; the other two are in the ranges that Storn & Price recommend.
 POPULATION, WEIGHT, CROSSOVER = 8, 0.7, 0.8
 
-# A failure counts as worse than any error, a wrong answer as worse than a failure.
+# A failure is worse than any error, a wrong answer worse than a failure.
 PENALTY = {FAILED: MOST, WRONG: 2 * MOST}
 
 Answer = Mapping[str, Array]
 Data = Mapping[str, float]
 
-# The output times among the data.
+# Name of the output times among the data.
 TIME_NAME = "t"
 
-# Relative steps of the data, from 1e-6 to 16 roundings.
+# Relative steps of the data for differences, from 1e-6 to 16 roundings.
 PERTURBATIONS = tuple(2.0**-k for k in (20, 24, 28, 32, 36, 40, 44, 48))
 
-# Relative change of a slope from one step to the next, below which it is one: a choice, as condition numbers are told
-# to one digit. Less would ask for shorter steps, in whose slopes there is more rounding.
+# Relative change of a slope from one step to the next, below which it is accepted: a choice, as condition numbers are
+# given to one digit. A smaller one would require shorter steps, whose slopes have more rounding.
 STRAIGHT_PART = 0.1
 
 MEANING = (
@@ -88,16 +88,16 @@ MEANING = (
 
 @dataclass
 class Attempt(Cell):
-    """One solver at one problem: its outcome, and the digits it kept."""
+    """One solver at one problem: its outcome, and its correct digits."""
 
     digits: float
-    """-log10 of the largest relative error, of values or of the time of the end; none where the input is refused."""
+    """-log10 of the largest relative error, of values or of the end time; MOST for an expected refusal."""
     condition: float = math.nan
-    """Condition number of the problem: relative change of its answer over that of its data; none where not known."""
+    """Condition number of the problem: relative change of its answer over that of its data; NaN if unknown."""
 
     @property
     def text(self) -> str:
-        """The attempt in a table.
+        """Text of the attempt in a table.
 
         >>> Attempt("solved", "in T", 9.87).text, Attempt("failed", "stiff", 0.0).text
         ('9.9', '×')
@@ -115,7 +115,7 @@ class MatrixRow(NamedTuple):
 
 
 class Corner(NamedTuple):
-    """The worst point that a search has found, of how many tried, and how many were not solved."""
+    """The worst point that a search has found, the number of points tried, and the number of those not solved."""
 
     regime: Regime
     point: Mapping[str, float]
@@ -131,20 +131,20 @@ def stability(
     quick: bool = False,
     rounds: int = SEARCH_ROUNDS,
 ) -> Study:
-    """Solve difficult regimes over decades of their parameter and tell the digits that each solver keeps.
+    """Solve difficult regimes over decades of their parameter and report the correct digits of each solver.
 
     Parameters
     ----------
     *regimes
-        Names of regimes; all if none is named.
+        Names of regimes; all by default.
     solvers
         Names of solvers.
     rtol
         Relative tolerance of each.
     quick
-        Whether four values of each parameter are enough.
+        True to use only four values of each parameter.
     rounds
-        Rounds of a search for the worst corner of each regime that has one; none where it is zero.
+        Rounds of a search for the worst corner of each regime that has one; no search if zero.
 
     Returns
     -------
@@ -154,7 +154,7 @@ def stability(
     Raises
     ------
     InputError
-        Where no regime or solver has a name.
+        If a name is not that of a regime or solver.
     """
     found = chosen(regimes)
     check_options(solvers, [rtol], rounds, (0, MOST_ROUNDS), ("--solvers", "--rtol", "--search"))
@@ -183,7 +183,7 @@ def stability(
 
 
 def thinned(values: Sequence[float]) -> list[float]:
-    """First, middle and last of the values, and the one before the last."""
+    """Return the first, the middle, the last but one, and the last of the values."""
     return [values[i] for i in sorted({0, len(values) // 2, len(values) - 2, len(values) - 1})]
 
 
@@ -191,7 +191,7 @@ def thinned(values: Sequence[float]) -> list[float]:
 
 
 def prepared(problem: Trial, rtol: float = STUDY_RTOL) -> Callable[[str], Attempt]:
-    """Attempts at a problem by solver; it is read and compiled once."""
+    """Return a function that solves a problem with a solver; the problem is read and compiled once."""
     try:
         model = Model(read(problem).system())
     except InputError as error:
@@ -205,14 +205,14 @@ def prepared(problem: Trial, rtol: float = STUDY_RTOL) -> Callable[[str], Attemp
 
 
 def read(problem: Trial) -> Case:
-    """The case of a problem with its changes."""
+    """Return the case of a problem with its changes."""
     changes = {**problem.changes, "run": {"times": list(problem.times)}}
     case = cases.load(problem.case, changes)
     return replace(case, reference=None)  # the regime has its own expectation
 
 
 def _judged(expected: Expectation, rtol: float, known: float, done: Trajectory | Exception) -> Attempt:
-    """Outcome, digits and reason of a run, judged by the ``known`` condition of its problem."""
+    """Judge a run by the ``known`` condition of its problem: outcome, digits and reason."""
     if isinstance(done, Exception):
         return _unfinished(expected, known, done)
     outcome, digits, reason = WRONG, 0.0, done.reason
@@ -232,14 +232,14 @@ def _judged(expected: Expectation, rtol: float, known: float, done: Trajectory |
 
 
 def _unfinished(expected: Expectation, known: float, error: Exception) -> Attempt:
-    """Attempt that ended in an error: right where its refusal was expected, for that reason."""
+    """Return the attempt for an error; it is right if this refusal was expected, for that reason."""
     reason = error.message if isinstance(error, InputError) else f"{type(error).__name__}: {error}"
     right = isinstance(expected, Refused) and expected.reason in reason
     return Attempt(REFUSED if right else FAILED, reason, MOST if right else 0.0, known)
 
 
 def _largest_error(expected: Exact, done: Trajectory) -> tuple[float, str]:
-    """The largest relative error of a run, and the variable that has it."""
+    """Return the largest relative error of a run, and the variable that has it."""
     compared = {*expected.also, *(state.name for state in done.model.system.states)}
     exact = {name: np.asarray(v) for name, v in expected.values(done.result.times).items() if name in compared}
     errors = largest_errors(computed(done), exact, {name: answer_floor(true) for name, true in exact.items()})
@@ -248,7 +248,7 @@ def _largest_error(expected: Exact, done: Trajectory) -> tuple[float, str]:
 
 
 def digits_of(error: float) -> float:
-    """Digits that an error leaves.
+    """Return the correct digits that an error leaves.
 
     >>> digits_of(1e-8), digits_of(0.0), digits_of(math.nan), digits_of(10.0)
     (8.0, 16.0, 0.0, 0.0)
@@ -259,7 +259,7 @@ def digits_of(error: float) -> float:
 
 
 def digits_left(condition: float, change: float) -> float:
-    """Digits of an answer that a relative change of the data leaves.
+    """Return the digits of an answer that a relative change of the data leaves.
 
     >>> round(digits_left(1e6, 1e-10), 9), digits_left(1.0, 1e-20), digits_left(1e20, 1e-10)
     (4.0, 16.0, 0.0)
@@ -267,14 +267,14 @@ def digits_left(condition: float, change: float) -> float:
     return digits_of(condition * change) if math.isfinite(condition) else math.nan
 
 
-# -- its condition -----------------------------------------------------------------------------------------------------
+# -- condition of a problem --------------------------------------------------------------------------------------------
 
 
 def condition(problem: Trial, names: Collection[str]) -> float:
-    """Largest relative change of the named values over that of the data, all of which change at once; not a number
-    where the problem has no answer in numbers, or the data are not stated.
+    """Return the largest relative change of the named values over that of the data, all of which change at once; NaN if
+    the answer is not numerical or the data are not given.
 
-    Data are the parameters of the exact solution and the output times; those that are zero stay so.
+    Data are the parameters of the exact solution and the output times; zeros are not changed.
 
     >>> from surfacechem.studies.regimes import regimes
     >>> [f"{condition(regimes()['cold'].problem(part), ['T']):.0e}" for part in (1e-3, 1e-6)]
@@ -303,14 +303,15 @@ def condition(problem: Trial, names: Collection[str]) -> float:
 
 
 def answer_floor(values: Array | float) -> float:
-    """Size of an exact answer below which its errors are relative to this: a part of its largest value."""
+    """Return the size of an exact answer below which errors are relative to this: a part of its largest value."""
     return ERROR_FLOOR * float(np.max(np.abs(values), initial=0.0))
 
 
 def _slopes(answer: Callable[[Data], Answer], base: Answer, data: Data, name: str) -> Answer:
-    """Relative changes of the answer over that of one of the data, with the largest step that the next one confirms.
+    """Return the relative change of the answer over that of one of the data, for the largest step that the next one
+    confirms.
 
-    A step goes the other way where there is no answer.
+    If there is no answer in one direction the step is taken in the other.
     """
     before: Answer = {}
     for step in PERTURBATIONS:
@@ -321,7 +322,7 @@ def _slopes(answer: Callable[[Data], Answer], base: Answer, data: Data, name: st
                 found, done = answer({**data, name: moved}), abs(moved - data[name]) / abs(data[name])
                 now = {key: relative_errors(found[key], base[key], answer_floor(base[key])) / done for key in base}
                 break
-        # Long steps see the curvature, short ones rounding: taken is the first slope that the next step confirms.
+        # Long steps include curvature, short ones rounding: the first slope that the next step confirms is taken.
         changes = ((np.abs(before[key] - slope), STRAIGHT_PART * slope) for key, slope in now.items())
         if before and now and all(np.max(change, initial=0.0) <= np.max(most, initial=0.0) for change, most in changes):
             return now
@@ -333,7 +334,8 @@ def _slopes(answer: Callable[[Data], Answer], base: Answer, data: Data, name: st
 
 
 def worst_corner(regime: Regime, rounds: int = SEARCH_ROUNDS, rtol: float = STUDY_RTOL, seed: int = SEED) -> Corner:
-    """Differential evolution over the regime's space, on decimal logarithms; the same seed gives the same corner.
+    """Search for the worst point of the regime's space by differential evolution of decimal logarithms; deterministic
+    for a given seed.
 
     Source: Storn & Price (1997), Differential evolution, J. Global Optim. 11, 341 (rand/1/bin), as in SciPy.
     """
@@ -346,7 +348,7 @@ def worst_corner(regime: Regime, rounds: int = SEARCH_ROUNDS, rtol: float = STUD
         point = {name: float(10.0**x) for name, x in zip(names, logarithms, strict=True)}
         try:
             cell = prepared(regime.corner(**point), rtol)(OWN)
-        except InputError as error:  # the corner is outside of what the exact solution holds for
+        except InputError as error:  # the point is outside the validity of the exact solution
             cell = Attempt(REFUSED, error.message, MOST)
         seen.append((MOST - cell.digits + PENALTY.get(cell.outcome, 0.0), point, cell))
         return -seen[-1][0]
@@ -371,7 +373,7 @@ def worst_corner(regime: Regime, rounds: int = SEARCH_ROUNDS, rtol: float = STUD
 
 
 def _variables(first: str) -> Iterator[Variable]:
-    """The variables over regime, decade and solver, the coordinates first; nothing where a regime has fewer values."""
+    """Yield the variables over regime, decade and solver, coordinates first; empty beyond the values of a regime."""
 
     def at(read: Callable[[Attempt], float | str], nothing: float | str = math.nan) -> Callable[..., float | str]:
         def value(row: MatrixRow, k: int, solver: str = first) -> float | str:
@@ -404,7 +406,7 @@ def _variables(first: str) -> Iterator[Variable]:
 def _sections(
     rows: Sequence[MatrixRow], corners: Sequence[Corner], solvers: Sequence[str], rtol: float
 ) -> Iterator[PageSection]:
-    """The report; the terminal shows the summary and the corners."""
+    """Yield the sections of the report; the terminal shows the summary and the corners."""
     headings = ("condition", "possible", f"at rtol {rtol:g}")
     lines = []
     for regime, values, cells in rows:
@@ -429,7 +431,7 @@ def _sections(
 
 
 def _details(row: MatrixRow, headings: Sequence[str], rtol: float) -> PageTable:
-    """Every cell of a regime, with what was said of the first solver's."""
+    """Return the table of every cell of a regime, with steps and reasons of the first solver."""
     lines, marked = [], []
     for i, value in enumerate(row.values):
         first, *_ = cells = [cell for cell in row.cells.values() if cell.value == value]
@@ -441,7 +443,7 @@ def _details(row: MatrixRow, headings: Sequence[str], rtol: float) -> PageTable:
 
 
 def _kept(cells: Sequence[Attempt]) -> str:
-    """The least digits of all answers, and how many cells failed or are wrong."""
+    """Describe the least digits of all answers, and the numbers of failed and wrong cells."""
     outcomes = [cell.outcome for cell in cells]
     answers = [cell.digits for cell in cells if cell.outcome not in OUTCOME_COLOURS]
     counts = [f"{outcomes.count(word)} {word}" for word in OUTCOME_COLOURS if word in outcomes]
@@ -449,13 +451,13 @@ def _kept(cells: Sequence[Attempt]) -> str:
 
 
 def _condition_texts(number: float, rtol: float) -> Sequence[str]:
-    """A condition number, the digits that are possible, and those that it leaves at the tolerance."""
+    """Return a condition number, the possible digits, and the digits that it leaves at the tolerance."""
     left = (f"{digits_left(number, change):.1f}" for change in (EPS, rtol))
     return (f"{number:.0e}", *left) if math.isfinite(number) else ("", "", "")
 
 
 def _omissions(rows: Sequence[MatrixRow], solvers: Sequence[str], searched: bool) -> Iterator[str]:
-    """Values, solvers, searches and steps that were left out, each with the reason."""
+    """Yield values, solvers, searches and steps that were left out, each with the reason."""
     every, taken = sum(len(row.regime.values) for row in rows), sum(len(row.values) for row in rows)
     if taken < every:
         yield f"{every - taken} of {every} values of the regimes, for the sake of time"

@@ -1,4 +1,4 @@
-"""Steady states of mechanisms, and how much each reaction and the temperature control what is made there.
+"""Steady states of mechanisms, and the control of their rates by each reaction and by the temperature.
 
 Source of the degree of rate control: Campbell (2017), ACS Catal. 7, 2770, doi 10.1021/acscatal.7b00115.
 """
@@ -26,36 +26,36 @@ from surfacechem.studies.mechanism_rates import null_space
 from surfacechem.tolerances import CBRT_EPS, EPS, LINE_ERROR, LOOSE_RTOL, NEGLIGIBLE, RUN_EPS, TINY
 
 LONGER_BY, MOST_ATTEMPTS = 10.0, 16
-"""Factor by which the next attempt is longer where the steady state was not reached, and number of attempts."""
+"""Factor by which the next attempt is longer if the steady state was not reached, and number of attempts."""
 
 TRACE_COVERAGE = EPS**2
-"""Coverage [1] below which a change is no longer one in proportion: the rounding of a rounding."""
+"""Coverage [1] below which changes are no longer relative to the coverage: the rounding of a rounding."""
 
 
 @dataclass(frozen=True)
 class SteadyState:
-    """Steady state of a mechanism: coverages by species, and rates of what was asked for, in SI units.
+    """Steady state of a mechanism: coverages by species, and requested rates, in SI units.
 
     ``control`` are degrees of rate control, d ln(rate) / d ln(factor on a reaction), by rate and reaction; they sum to
-    one. ``barriers`` are apparent activation energies, R T^2 d ln(rate) / dT [J/mol], where the temperature is held.
+    one. ``barriers`` are apparent activation energies, R T^2 d ln(rate) / dT [J/mol], if the temperature is held.
     """
 
     title: str
     time: float
-    """Time of a run that has come there [s]."""
+    """Time of a run that has reached it [s]."""
     coverages: Mapping[str, float]
     states: Mapping[str, float]
-    """All others, such as temperatures and potentials, by name."""
+    """All other states, such as temperatures and potentials, by name."""
     rates: Mapping[str, float]
     control: Mapping[str, Mapping[str, float]]
     barriers: Mapping[str, float]
     equations: Mapping[str, str]
     """Equations of the reactions."""
     units: Mapping[str, str]
-    """Units of the rates, and of those states."""
+    """Units of the rates and of these states."""
 
     def __str__(self) -> str:
-        """Tables of coverages, rates and control."""
+        """Return tables of coverages, rates and control."""
         names = [*self.rates]
         barriers = {name: f"apparent barrier {value / 1e3:.4g} kJ/mol" for name, value in self.barriers.items()}
         control = [
@@ -76,16 +76,16 @@ class SteadyState:
 
 
 def steady(source: Source, of: Sequence[str] = (), overrides: Overrides = ()) -> SteadyState:
-    """The steady state of a case with a mechanism, and what controls its rates.
+    """Return the steady state of a case with a mechanism, and the control of its rates.
 
     Parameters
     ----------
     source
-        As for :func:`surfacechem.load`. Nothing may change in time but the state.
+        As for :func:`surfacechem.load`. Only the state may change in time.
     overrides
         As for :func:`surfacechem.load`.
     of
-        Names of quantities, ``production_CO2`` for instance; all productions in neighbours if not given.
+        Names of quantities, ``production_CO2`` for instance; by default all productions in neighbours.
 
     Returns
     -------
@@ -95,7 +95,7 @@ def steady(source: Source, of: Sequence[str] = (), overrides: Overrides = ()) ->
     Raises
     ------
     InputError
-        Where the case has a history, jumps, or comes to no rest.
+        If the case has a history or jumps, or reaches no steady state.
     """
     simulation = load(source, overrides)
     system = simulation.system.with_multipliers()
@@ -129,7 +129,7 @@ def steady(source: Source, of: Sequence[str] = (), overrides: Overrides = ()) ->
 
 
 def _wanted(system: System, of: Sequence[str]) -> dict[str, int]:
-    """Places of quantities among the outputs; of all productions if none is named."""
+    """Return the indices of quantities among the outputs, by name; of all productions if none is named."""
     names = [item.name for item in system.outputs]
     refuse_unknown(of, names, "the case has no quantity '{}'")
     wanted = [*of] or [name for name in names if name.startswith("production_")]
@@ -139,7 +139,7 @@ def _wanted(system: System, of: Sequence[str]) -> dict[str, int]:
 
 
 def _conserved(interface: Interface) -> list[dict[str, float]]:
-    """Conserved sums of coverages, each by its weights: the sites of each kind, a spectator species."""
+    """Return the weights of conserved sums of coverages, by coverage: sites of each kind, a spectator species."""
     changes = [law.stoichiometry() for law in interface.reactions]
     coverages = {variable.name: variable.density for variable in interface.variables}
     own = [{str(j): nu for j, change in enumerate(changes) if (nu := change.get(name))} for name in coverages]
@@ -150,11 +150,11 @@ def _conserved(interface: Interface) -> list[dict[str, float]]:
 
 
 HELD_TEMPERATURE = re.compile(r"(bodies\..+|interface)\.temperature\.level|loading\.T\w*\.level")
-"""Parameters that are temperatures of bodies and interface."""
+"""Paths of parameters that are temperatures of bodies and interface."""
 
 
 def _held(system: System, values: Mapping[str, float]) -> list[str]:
-    """Parameters that are the temperatures of bodies and interface, where all are held at the same one."""
+    """Return the parameters that are temperatures of bodies and interface, if all are held at the same value."""
     if any(state.is_temperature for state in system.states):
         return []
     paths = [parameter.path for parameter in system.parameters if HELD_TEMPERATURE.fullmatch(parameter.path)]
@@ -162,7 +162,7 @@ def _held(system: System, values: Mapping[str, float]) -> list[str]:
 
 
 class _Rest:
-    """The equations at their steady state, with multipliers and temperatures that may change."""
+    """The equations at their steady state, with multipliers and temperatures that can be varied."""
 
     def __init__(
         self, model: Model, run: Run, wanted: dict[str, int], conserved: Sequence[Mapping[str, float]]
@@ -194,28 +194,30 @@ class _Rest:
 
     @property
     def units(self) -> dict[str, str]:
-        """Units of the quantities that were asked for, and of all other states."""
+        """Units of the requested quantities and of all states other than coverages."""
         asked = (self.model.system.outputs[j].quantity for j in self.wanted.values())
         return {quantity.name: quantity.unit for quantity in (*asked, *self.quantities) if not quantity.species}
 
     def rates(self, x: Array) -> Array:
-        """Time derivatives of the states."""
+        """Return the time derivatives of the states."""
         self.evaluation.put(0.0, x)
         return self.evaluation.ydot[self.evaluation.free].copy()
 
     def outputs(self, x: Array) -> Array:
-        """The quantities that were asked for."""
+        """Return the requested quantities."""
         self.evaluation.put(0.0, x)
         return np.asarray(self.model.output_function(self.evaluation.inputs)[[*self.wanted.values()]])
 
     def drop_small(self) -> None:
-        """Leave out what is not made."""
+        """Leave out productions that are zero."""
         sizes = np.abs(self.outputs(self.x))
         kept = zip(self.wanted.items(), sizes > LOOSE_RTOL * sizes.max(), strict=True)
         self.wanted = dict(item for item, made in kept if made)
 
     def response(self, paths: Sequence[str]) -> Array:
-        """Change of the quantities where these parameters all change in proportion, and the state follows."""
+        """Return the change of the quantities, including that of the steady state, per relative change of these
+        parameters.
+        """
         parameters, columns = self.evaluation.parameters, [self._place[path] for path in paths]
         first = parameters[columns].copy()
         ends = []
@@ -230,7 +232,9 @@ class _Rest:
         return np.asarray((out_up - out_down) / (2 * CBRT_EPS) + following)
 
     def _root(self, x: Array) -> Array | None:
-        """The steady state near x, by Newton's method among states that conserve the same; None where there is none."""
+        """Return the steady state near x, by Newton's method among states with the same conserved sums; None if it
+        fails.
+        """
         for _ in range(20):
             step = self._solve(self._slopes(x), -self.rates(x), x)
             x = x + step
@@ -241,7 +245,7 @@ class _Rest:
         return None
 
     def _slopes(self, x: Array) -> Array:
-        """Derivatives of the rates by the states, in proportion to these."""
+        """Return the derivatives of the rates by relative changes of the states."""
         columns = []
         for j, size in enumerate(np.abs(x) + TRACE_COVERAGE):
             step = np.zeros(len(x))
@@ -250,7 +254,7 @@ class _Rest:
         return np.array(columns).T
 
     def _solve(self, slopes: Array, right: Array, x: Array) -> Array:
-        """The change of the state that changes the rates by so much and keeps what is conserved."""
+        """Return the change of the state that changes the rates by ``right`` and keeps the conserved sums unchanged."""
         sizes = np.abs(x) + TRACE_COVERAGE
         matrix = np.vstack((slopes, self._conserved * sizes))
         rows = np.maximum(np.abs(matrix).max(axis=1), TINY)

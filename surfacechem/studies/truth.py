@@ -1,11 +1,11 @@
-"""The reference of a study: the exact solution, else two different methods that agree; its uncertainty is stated.
+"""Reference of a study: the exact solution, else two different methods that agree; with its uncertainty.
 
-A method is run at two tight tolerances a decade apart and extrapolated in the tolerance, to which its error is taken to
-be proportional. Of several methods the two that agree best are believed, and how far they differ is the uncertainty, or
-how far the extrapolation went if that is more. The uncertainty of an exact solution is that of its evaluation: how far
-it moves when the times move by their last bit.
+A method is run at two tight tolerances a decade apart and extrapolated in the tolerance, assuming an error proportional
+to it. Of several methods the two that agree best are used. The uncertainty is their difference, or the size of the
+extrapolation if that is more. The uncertainty of an exact solution is that of its evaluation: its change when the times
+change by their last bit.
 
-Runs are compared where a tight one is looked at, and errors are relative to what those of every run are.
+Runs are compared at the known states of a tight run, and errors are relative to the same sizes as those of any run.
 """
 
 from __future__ import annotations
@@ -31,29 +31,29 @@ from surfacechem.tolerances import EPS, MIN_RTOL, SQRT_EPS
 
 Values = Mapping[str, Array]
 
-# Different families: collocation twice, by different authors, and multistep. A bug of one is not one of the other.
-# Methods that a reference may be made of, the quicker first; the last only where it is needed.
+# Methods for a reference, the quicker first; the last only if no other can run the case. They are of different
+# families, two implementations of collocation and multistep methods, so that they share no bug.
 REFERENCE_METHODS = ("radau", "lsoda", "scipy-radau", "cantera")
 
-# Closer tolerances would differ by little more than rounding, others would leave the range where errors follow them.
-# Ratio of the two tolerances from which a method is extrapolated.
+# Ratio of the two tolerances from which a method is extrapolated. With closer ones the difference would be little more
+# than rounding, with others errors would no longer be proportional to the tolerance.
 TEN = 10.0
 
-# A solve that takes longer than this counts as failed, unless the case allows less; one for a reference may take so
-# long [s]: which methods it is made of must not depend on how busy a machine is.
+# A solve that takes longer than this counts as failed, unless the case allows less; limit for a reference [s], long
+# enough that the choice of its methods does not depend on the load of the machine.
 MOST_SECONDS, LONGEST_SOLVE = 60.0, 900.0
 
 # Relative tolerances of a study, if none are given.
 TOLERANCES = tuple(10.0**-k for k in (4, 6, 8, 10, 12))
 
-# Methods that differ by more do not agree: a reference must still tell the errors of the loosest tolerance.
+# Methods that differ by more do not agree: a reference must resolve at least the errors of the loosest tolerance.
 AGREEMENT = TOLERANCES[0] / 100
 
-# Two that differ by no more than this need no third.
+# Two methods that differ by no more than this need no third.
 REFERENCE_ERROR = TEN * TOLERANCES[-1]
 
 NORMS = ("final", "max", "l2")
-# The kinds of errors; the last is not of variables.
+# The kinds of errors; the last one does not belong to a variable.
 MEANING = {
     "final": "relative error at the end",
     "max": "largest relative error",
@@ -64,16 +64,16 @@ MEANING = {
 
 @dataclass(frozen=True)
 class Errors:
-    """Errors by kind and variable; those of the times of events are of no variable, and there may be none."""
+    """Errors by kind and variable; errors of event times belong to no variable, and there may be none."""
 
     by_kind: Mapping[str, Mapping[str, float]] = field(default_factory=lambda: {kind: {} for kind in MEANING})
 
     def worst(self, *kinds: str) -> float:
-        """The largest over the variables; not a number where there is none."""
+        """Return the largest error over the variables; NaN if there is none."""
         return float(np.max([error for kind in kinds for error in self.by_kind[kind].values()] or [math.nan]))
 
     def larger(self, other: Errors) -> Errors:
-        """The larger error of two for each kind and variable."""
+        """Return the larger of two errors for each kind and variable."""
         found = {}
         for kind, errors in self.by_kind.items():
             names = dict.fromkeys((*errors, *other.by_kind[kind]))
@@ -82,7 +82,7 @@ class Errors:
 
 
 def mean_square(times: Array, error: Array) -> float:
-    """Root mean square in time, by the trapezoidal rule.
+    """Return the root mean square in time, by the trapezoidal rule.
 
     >>> mean_square(np.array([0.0, 1.0, 3.0]), np.array([0.2, 0.2, 0.2]))
     0.2
@@ -94,7 +94,7 @@ def mean_square(times: Array, error: Array) -> float:
 
 @dataclass(frozen=True)
 class Subject:
-    """A case that any solver may run at any tolerance."""
+    """A case that can be run with any solver at any tolerance."""
 
     case: Case
     model: Model
@@ -107,18 +107,18 @@ class Subject:
 
     @property
     def names(self) -> list[str]:
-        """Names of all that may be compared."""
+        """Names of all quantities that can be compared."""
         return [*self.states, *(item.name for item in self.model.system.outputs)]
 
     def solve(self, name: str, rtol: float, limit: float = MOST_SECONDS) -> Trajectory:
-        """A run with another solver and tolerance, its absolute tolerance in proportion."""
+        """Run with another solver and tolerance, the absolute tolerance in proportion."""
         run = self.case.run
         atol = None if run.atol is None else run.atol * rtol / run.rtol
         seconds = run.max_seconds or limit
         return self.model.solve(replace(run, solver=name, rtol=rtol, atol=atol, max_seconds=seconds))
 
     def unable(self, name: str) -> str:
-        """The reason for which a solver cannot run this case; empty where it can."""
+        """Return the reason why a solver cannot run this case; empty if it can."""
         if self.model.program.external is not None and name not in CALLING_PYTHON:
             return "rates of the mechanism come from Cantera itself, which this solver cannot ask"
         try:
@@ -128,12 +128,12 @@ class Subject:
         return ""
 
     def methods(self) -> list[str]:
-        """Methods for a reference; that of Cantera only where no other can run the case."""
+        """Return the methods for a reference; Cantera's only if no other can run the case."""
         able = [name for name in REFERENCE_METHODS if not self.unable(name)]
         return [name for name in able if name != "cantera"] or able
 
     def tight(self, method: str, rtol: float) -> Trajectory:
-        """A run for a reference; InputError where it comes to nothing."""
+        """Run for a reference; InputError if it fails."""
         try:
             found = self.solve(method, rtol, LONGEST_SOLVE)
             why = found.reason if found.status == "failed" or len(found.result.times) < 2 else ""
@@ -146,7 +146,7 @@ class Subject:
 
 @dataclass(frozen=True)
 class Truth:
-    """True values of the variables at the output times, true times of the events, and how uncertain both are."""
+    """True values of the variables at the output times, true event times, and the uncertainty of both."""
 
     source: str
     status: str
@@ -155,19 +155,19 @@ class Truth:
     floors: Mapping[str, float | Array]
     events: Values
     end: float
-    """End of the run as it was asked for [s]."""
+    """Requested end of the run [s]."""
     uncertainty: Errors = field(default_factory=Errors)
 
     @classmethod
     def of(cls, run: Trajectory, source: str, variables: Sequence[str]) -> Truth:
-        """That of a run, without values and events."""
+        """Return the truth with times and floors of a run, without values and events."""
         known: dict[str, float | Array] = {**floors(run), **sizes(run)}
         found = {name: size for name, size in known.items() if name in variables}
         return cls(source, run.status, run.result.times, {}, found, {}, run.run.times[-1])
 
     def errors(self, values: Values, events: Values) -> Errors:
-        """Errors of values and of times of events, over the output times that both have reached."""
-        # Where a run has not had the same events as this its error is that of a time.
+        """Return the errors of values and of event times, over the output times that both have reached."""
+        # Between the times of the same event in the two runs only its time has an error.
         both = [(events.get(name, ()), times) for name, times in self.events.items()]
         pairs = [pair for found, times in both if len(found) == len(times) for pair in zip(found, times, strict=True)]
         alike = clear_of(self.times, pairs)
@@ -185,7 +185,7 @@ class Truth:
         )
 
     def objection(self, trajectory: Trajectory) -> str:
-        """The reason for which a run has no errors: it failed, or came to another end; empty where it has."""
+        """Return the reason why a run has no errors: it failed, or ended otherwise; empty if it has."""
         if trajectory.status == "failed":
             return trajectory.reason
         if trajectory.status != self.status:
@@ -196,13 +196,13 @@ class Truth:
 
 
 def looked_at(subject: Subject) -> Subject:
-    """The subject with outputs where a tight run is looked at; as it is where that comes to nothing."""
+    """Return the subject with outputs at the known states of a tight run; unchanged if that run fails."""
     try:
         found = subject.tight(subject.methods()[0], MIN_RTOL)
     except InputError:
         return subject
     run, times = subject.case.run, fewer(found.looked).result.times
-    # Towards an event states may change like a root, so that next to it the rounding of time decides.
+    # Towards an event states may change like a square root, so that next to it errors are those of rounding in time.
     moments = np.concatenate([[0.0], *event_times(found).values()])
     times = times[np.all(np.abs(times[:, None] - moments) > SQRT_EPS * moments, axis=1)]
     times = np.union1d(times, [0.0, run.times[-1]])
@@ -210,13 +210,13 @@ def looked_at(subject: Subject) -> Subject:
 
 
 def establish(subject: Subject, variables: Sequence[str]) -> Truth:
-    """The truth of a case; InputError where there is none to be had."""
+    """Return the truth of a case; InputError if none can be found."""
     reference = subject.case.reference
     if reference is None:
         return numerical(subject, variables)
     trajectory = subject.tight(subject.methods()[0], MIN_RTOL)
     result = trajectory.result
-    # A second evaluation at times one rounding earlier tells how far rounding moves the exact values.
+    # A second evaluation at times one rounding earlier gives the effect of rounding on the exact values.
     perturbed = replace(trajectory, result=replace(result, times=result.times * (1 - EPS)))
     try:
         exact, moved = (
@@ -226,7 +226,7 @@ def establish(subject: Subject, variables: Sequence[str]) -> Truth:
         found = numerical(subject, variables)
         unused = f"the exact solution {reference.name} does not apply to this scene: {error.message}"
         return replace(found, source=f"{found.source}; {unused}")
-    # Variables and times of events that the exact solution does not state are those of two methods.
+    # Variables and event times that the exact solution does not give are those of two methods.
     known = {name: exact[name] for name in variables if name in exact}
     whole, others = Truth.of(trajectory, "", variables), [name for name in variables if name not in known]
     beside = numerical(subject, others) if others or event_times(trajectory) else whole
@@ -243,7 +243,7 @@ def establish(subject: Subject, variables: Sequence[str]) -> Truth:
 
 
 def numerical(subject: Subject, variables: Sequence[str]) -> Truth:
-    """The truth from the two methods that agree best; InputError where no two agree."""
+    """Return the truth from the two methods that agree best; InputError if no two agree."""
     name = subject.case.name
     found: list[Truth] = []
     failures = []
@@ -270,14 +270,14 @@ def numerical(subject: Subject, variables: Sequence[str]) -> Truth:
 
 
 def _apart(a: Truth, b: Truth) -> float:
-    """Largest difference of two methods; infinite where they come to other ends or events."""
+    """Return the largest difference of two methods; infinite if their ends or events differ."""
     if a.status != b.status or difference(a.events, b.events) or len(a.times) != len(b.times):
         return math.inf
     return float(np.nan_to_num(a.errors(b.values, b.events).worst("max", "event"), nan=math.inf))
 
 
 def _extrapolated(subject: Subject, method: str, variables: Sequence[str]) -> Truth:
-    """Values and times of events of one method; uncertain is how far the extrapolation went."""
+    """Return values and event times of one method; their uncertainty is the size of the extrapolation."""
     loose, tight = (subject.tight(method, rtol) for rtol in (MIN_RTOL * TEN, MIN_RTOL))
     n = min(len(loose.result.times), len(tight.result.times))
     before, after = ({name: computed(run)[name][:n] for name in variables} for run in (loose, tight))
@@ -293,5 +293,5 @@ def _extrapolated(subject: Subject, method: str, variables: Sequence[str]) -> Tr
 
 
 def _limit(loose: Array, tight: Array) -> Array:
-    """Richardson extrapolation of errors in proportion to the tolerance."""
+    """Extrapolate errors in proportion to the tolerance (Richardson)."""
     return np.asarray(tight + (tight - loose) / (TEN - 1))

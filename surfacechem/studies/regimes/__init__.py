@@ -1,6 +1,7 @@
-"""Regimes of the stability matrix: a case, a parameter taken over decades until it breaks, and what is expected there.
+"""Regimes of the stability matrix: a case, a parameter varied over decades until the problem breaks, and the expected
+result.
 
-A function marked `regime` in any file of this folder is one; finding it needs nothing else.
+A function marked `regime` in any file of this folder is a regime and is found without registration.
 
 >>> list(regimes())[:3]
 ['affinity', 'bell', 'capacity']
@@ -24,15 +25,16 @@ Values: TypeAlias = Mapping[str, Array | float]
 
 R = TypeVar("R", bound=Reference)
 
-# Cases that show nothing but where solvers fail stand beside their regimes.
+# Cases that serve only to show failures of solvers are in the folder of their regimes.
 FOLDER = Path(__file__).parent
 
 
 @dataclass(frozen=True)
 class Exact:
-    """The run finishes with these values at its output times [s], by name; with so many events, if that is stated.
+    """Expectation that the run finishes with these values at its output times [s], by name, and with so many events, if
+    stated.
 
-    States are compared, and named quantities that are listed; each value relative to itself.
+    States are compared, and the named quantities in ``also``; errors are relative to each value.
     """
 
     values: Callable[[Array], Values]
@@ -40,39 +42,39 @@ class Exact:
     events: int | None = None
     data: Mapping[str, float] = field(default_factory=dict)
     again: Callable[[Mapping[str, float], Array], Values] | None = None
-    """The values for other data, which tell how well the problem determines them."""
+    """Function for the values with other data, from which the condition number of the problem follows."""
 
     @classmethod
     def of(cls, reference: R, read: Callable[[R, Array], Values] = Reference.solution, **more: Any) -> Exact:
-        """The values of an exact solution, as they are or as ``read`` off it; its parameters are the data."""
+        """Return the values of an exact solution, or those that ``read`` takes from it; its parameters are the data."""
         return cls(lambda t: read(reference, t), **_varied(reference, read), **more)
 
 
 @dataclass(frozen=True)
 class Stops:
-    """Physics ends the run, for a reason that contains these words, at a time [s]."""
+    """Expectation that physics ends the run, for a reason that contains these words, at a time [s]."""
 
     reason: str
     t: float
     data: Mapping[str, float] = field(default_factory=dict)
     again: Callable[[Mapping[str, float]], float] | None = None
-    """The time for other data, which tell how well the problem determines it."""
+    """Function for the time with other data, from which the condition number of the problem follows."""
 
     @classmethod
     def of(cls, reason: str, reference: R, read: Callable[[R], float] = lambda one: one.end_time) -> Stops:
-        """The end of an exact solution, or what is ``read`` off it; its parameters are the data."""
+        """Return the end of an exact solution, or the time that ``read`` takes from it; its parameters are the data."""
         return cls(reason, read(reference), **_varied(reference, read))
 
 
 def _varied(reference: R, read: Callable[..., Any]) -> dict[str, Any]:
-    """The parameters of an exact solution as data, and what is read off it for other data."""
+    """Return the parameters of an exact solution as data, and a function for its values with other data."""
     data = {item.name: getattr(reference, item.name) for item in fields(reference)}  # type: ignore[arg-type]
     return {"data": data, "again": lambda data, *t: read(type(reference)(**data), *t)}
 
 
 @dataclass(frozen=True)
 class Refused:
-    """The input is refused before anything is computed, for a reason that contains these words."""
+    """Expectation that the input is refused before anything is computed, for a reason that contains these words."""
 
     reason: str
 
@@ -82,7 +84,7 @@ Expectation: TypeAlias = Exact | Stops | Refused
 
 @dataclass(frozen=True)
 class Trial:
-    """A case, by the name of a shipped one or by its file, with changes by path, and what is expected of its run."""
+    """A case, by its name if shipped or by its file, with changes by path, and the expected result of its run."""
 
     case: str
     times: Sequence[float]
@@ -93,20 +95,20 @@ class Trial:
 
 @dataclass(frozen=True)
 class Regime:
-    """One row of the stability matrix: a parameter that is taken over decades, and the problem at each value."""
+    """A row of the stability matrix: a parameter that varies over decades, and the problem at each value."""
 
     name: str
     title: str
     symbol: str
-    """The parameter, as in a heading."""
+    """Symbol of the parameter in headings."""
     values: Sequence[float]
     problem: Callable[[float], Trial]
     label: Callable[[float], str]
-    """A value as in a heading."""
+    """Text of a value in headings."""
     corner: Callable[..., Trial]
-    """The problem at a point of the space, of parameters by name."""
+    """The problem at a point of the space, given by parameters by name."""
     space: Mapping[str, tuple[float, float]]
-    """Decimal logarithms between which a search for the worst corner moves each parameter; empty where it does not."""
+    """Bounds of the decimal logarithm of each parameter in the search for the worst corner; empty without a search."""
 
 
 def regime(
@@ -117,7 +119,9 @@ def regime(
     label: Callable[[float], str] = "{:g}".format,
     **space: tuple[float, float],
 ) -> Callable[[Callable[..., Trial]], Regime]:
-    """Makes a regime of a problem as a function of the parameter, which gives the name; ``corner`` where it differs."""
+    """Make a regime of a problem, a function of the parameter whose name it takes; ``corner`` is the problem of the
+    search, if it differs.
+    """
 
     def made(problem: Callable[..., Trial]) -> Regime:
         name = problem.__name__.replace("_", "-")
@@ -128,14 +132,14 @@ def regime(
 
 @cache
 def regimes() -> dict[str, Regime]:
-    """Every regime by name."""
+    """Return every regime by name."""
     modules = [import_module(f"{__name__}.{module.name}") for module in pkgutil.iter_modules(__path__)]
     found = [item for module in modules for item in vars(module).values() if isinstance(item, Regime)]
     return {item.name: item for item in sorted(found, key=lambda item: item.name)}
 
 
 def chosen(names: Sequence[str]) -> list[Regime]:
-    """The regimes of these names, or all; InputError with the nearest guess."""
+    """Return the regimes of these names, or all; InputError with the nearest guess."""
     known = regimes()
     refuse_unknown(names, known, "no regime '{}'")
     return [known[name] for name in names or known]

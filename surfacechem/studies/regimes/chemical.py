@@ -1,4 +1,4 @@
-"""Bonding at the edge of what a heat capacity, an affinity or a time scale bears, and bonds under load."""
+"""Chemical regimes: bonding at the limits of heat capacity, affinity and time scales, and bonds under load."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ N_C = 1e18
     label=lambda value: f"2^{math.log2(value):.0f}" if value else "0",
 )
 def endothermic(value: float) -> Trial:
-    r"""Bonds take all heat but :math:`1-\kappa`: bodies of 256 K end at :math:`256\sqrt{1-\kappa}` after a layer
-    :math:`\tau(1-\kappa)/2`. With kappa = 1 nothing is left and the input is refused.
+    r"""Bonds take all heat except :math:`1-\kappa`: bodies at 256 K end at :math:`256\sqrt{1-\kappa}` after a layer
+    :math:`\tau(1-\kappa)/2`. With kappa = 1 no heat is left and the input is refused.
     """
     K_2 = 512.0 * (1.0 - value)
     rate = {"value": N_C / K_2, "times": [{"power": {"exponent": -2}}]}
@@ -49,7 +49,9 @@ def endothermic(value: float) -> Trial:
 def bonding_while_sliding(
     tau: float, C_1: float = 1.5, K_0: float = 120.0, D: float = 1e-3, T_i: float = 320.0
 ) -> Trial:
-    """Capacities, energies, heating and times of any size; the interface takes as much heat as it may."""
+    """Return the problem with capacities, energies, heating and times of any size; the interface takes all the heat it
+    may.
+    """
     given = {"C_1": C_1, "K_0": K_0, "T_i": T_i, "tau": tau, "D": D}
     exact = Bonding(C_2=0.7, C_c=0.3, T_0=300.0, phi_i=0.1, K_1=60.0, K_2=240.0, **given)
     changes = {
@@ -76,13 +78,13 @@ def bonding_while_sliding(
     T_i=(0.0, 4.0),
 )
 def scale_ratio(value: float) -> Trial:
-    """Bonds form within a part of the second while friction heats the bodies for a million seconds."""
+    """Bonds that form within a fraction of a second while friction heats the bodies for a million seconds."""
     return bonding_while_sliding(1e6 / value)
 
 
 @regime("Exothermic bonding in 1e-15 to 1e15 s", "tau [s]", tuple(10.0**k for k in (-15, -10, -5, 0, 5, 10, 15)))
 def seconds(value: float) -> Trial:
-    """The same reaction from attoseconds to the age of the Earth."""
+    """The same reaction from femtoseconds to 30 million years."""
     exact = ExothermicBonding(C_1=1.0, C_2=1.0, T_0=300.0, K_0=300.0, tau=value)
     changes = {"interface.bonding.linear-affinity.c_r": N_C / 300.0 / value}
     return Trial("exothermic", [value * k / 4 for k in range(1, 21)], Exact.of(exact), changes)
@@ -97,7 +99,7 @@ def seconds(value: float) -> Trial:
     rate=(-12.0, 12.0),
 )
 def affinity(a: float, T: float = 310.0, rate: float = 1.0) -> Trial:
-    r"""The exponential law from equilibrium to an affinity of a million :math:`k_BT`, where its rate overflows."""
+    r"""Exponential law from equilibrium to an affinity of a million :math:`k_BT`, where its rate overflows."""
     n = 5e17
     K = a * n * BOLTZMANN * T
     exact = ExponentialAffinitySolution(n_c=n, C_r=rate * n * n / K, K_c=K, T=T)
@@ -114,7 +116,9 @@ def affinity(a: float, T: float = 310.0, rate: float = 1.0) -> Trial:
 
 @regime("Thermal runaway of an activated reaction", "E_a / (R_g T)", (1.0, 5.0, 10.0, 24.0, 50.0, 100.0, 200.0))
 def runaway(value: float) -> Trial:
-    """Self-heating that explodes: the higher the activation, the later and the steeper, and the less is it known."""
+    """Thermal explosion by self-heating: the higher the activation, the later and steeper, and the less well
+    conditioned.
+    """
     E_a, A = value * GAS_CONSTANT * 300.0, math.exp(value)
     exact = AdiabaticArrhenius(A=A, E_a=E_a, T_i=300.0, delta_T=80.0)
     changes = {"interface.bonding.arrhenius.A": A, "interface.bonding.arrhenius.E_a": E_a}
@@ -123,7 +127,9 @@ def runaway(value: float) -> Trial:
     speeds = (1 - phi) * np.exp(value - E_a / (GAS_CONSTANT * (300.0 + 80.0 * phi)))
 
     def again(data: Mapping[str, float], t: Array) -> Mapping[str, Array]:
-        """Bonds for other data, to first order, from when as many are reached, which needs no root of a runaway."""
+        """Return the bonds for other data to first order, from the times at which they are reached, which needs no root
+        of a runaway.
+        """
         other = AdiabaticArrhenius(**data)
         bonds = phi + speeds * (t - other.time(phi))
         return {"phi": bonds, "T": other.T_i + other.delta_T * bonds}
@@ -134,7 +140,7 @@ def runaway(value: float) -> Trial:
 
 @regime("Cooling towards T = 0", "T / T_0", (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 0.0))
 def cold(value: float) -> Trial:
-    """Heat is drawn at a constant rate until the temperature is this part of its start; at zero the run stops."""
+    """Cooling at a constant rate until the temperature is this part of its initial value; at zero the run stops."""
     exact = CoolingToZero(C=100.0, T_0=300.0, T_i=300.0, Q=50.0)
     if value == 0.0:
         return Trial("cooling-to-zero", [2 * exact.end_time], Stops.of("the temperature T reached zero", exact))
@@ -142,7 +148,7 @@ def cold(value: float) -> Trial:
     return Trial("cooling-to-zero", [last / 2, last], Exact.of(exact))
 
 
-# -- bonds under load: exponents beyond what a double holds, and rupture with an infinite slope ------------------------
+# -- bonds under load: exponents beyond the range of doubles, and rupture with an infinite slope -----------------------
 
 T, X = 300.0, 4e-10
 FORCE = BOLTZMANN * T / X
@@ -159,9 +165,9 @@ MOST_IMMEDIATE = 230.0
     k_off=(-12.0, 12.0),
 )
 def bell(exponent: float, k_off: float = 0.1) -> Trial:
-    """A force that speeds rupture up by exp(10000): the bonds are gone, without an infinity.
+    """Force that accelerates rupture by up to exp(10000): the bonds vanish, without an infinity.
 
-    Times are that of rupture, or 1e-100 s where it is shorter: rates beyond exp(300) are taken as immediate.
+    Times are relative to that of rupture, or to 1e-100 s if it is shorter: rates beyond exp(300) count as immediate.
     """
     force = exponent * FORCE
     exact = BellConstantForce(k_off=k_off, x_off=X, T=T, f=force)
@@ -173,7 +179,7 @@ def bell(exponent: float, k_off: float = 0.1) -> Trial:
 
 @regime("Rupture under a shared load", "load per site x / (k_B T)", (1e-6, 1e-3, 0.1, 0.5, 1.0, 10.0, 100.0, 500.0))
 def rupture(value: float) -> Trial:
-    """Bonds that share a load until the last one breaks, at a time known to rounding."""
+    """Bonds that share a load until the last one breaks, at a time known up to roundoff."""
     sites = 1e14
     exact = SharedLoadCluster(k_off=0.5, x_off=X, T=T, n_c=sites, t_n=value * sites * FORCE)
     changes = {"loading.t_n": value * sites * FORCE}
@@ -188,7 +194,9 @@ def rupture(value: float) -> Trial:
     (1e-12, 1e-6, 1e-3, 0.1, 0.9, 1.2, 1.2499999, 1.26, 1e6),
 )
 def debonding(value: float) -> Trial:
-    """All bonds break at once, and heat pays for what springs do not: less and less is left, then nothing."""
+    """All bonds break at once, and heat pays for the part of their energy that springs do not: ever less is left, then
+    none.
+    """
     K_0 = value * 600.0
     changes = {"interface.potential.bond-energy.K_0": K_0}
     strength = 38.72983346207417e6

@@ -1,4 +1,4 @@
-"""Heat exchange where capacities vanish, conductances become contact, and temperatures lose their balance."""
+"""Thermal regimes: vanishing capacities, conductances up to perfect contact, temperatures that lose their balance."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from surfacechem.references.semenov_fold import SemenovFold
 from surfacechem.references.three_temperatures import ThreeTemperatures
 from surfacechem.studies.regimes import FOLDER, Exact, Refused, Stops, Trial, regime
 
-# Cases of a medium that bonds take heat from, and of a film that friction heats.
+# Cases of a medium from which bonds take heat, and of a film heated by friction.
 MEDIUM_CASE, FILM_CASE = str(FOLDER / "medium.yaml"), str(FOLDER / "film.yaml")
 
 BODIES = {"C_1": 1200.0, "C_2": 500.0, "C_c": 8.0, "h_1": 2500.0, "h_2": 700.0, "D_0": 150.0}
 
 
 def three_temperatures(**parameters: float) -> Trial:
-    """Two bodies and a medium, from its layer to the end."""
+    """Return the problem of two bodies and a medium, from the initial layer to the end."""
     p = {**BODIES, **parameters}
     exact = ThreeTemperatures(T_1=290.0, T_2=350.0, T_c=300.0, **p)
     changes = {
@@ -37,13 +37,13 @@ def three_temperatures(**parameters: float) -> Trial:
 
 @regime("Capacity of the interface to nothing", "C_c [J/(m^2 K)]", (8.0, 1e-3, 1e-6, 1e-9, 1e-12, 1e-15, 1e-18))
 def capacity(value: float) -> Trial:
-    """A medium whose capacity vanishes: it follows the bodies after a layer as short as its capacity is small."""
+    """Medium whose capacity vanishes: it follows the bodies after a layer as short as its capacity is small."""
     return three_temperatures(C_c=value)
 
 
 @regime("Conductances to perfect contact", "h [W/(m^2 K)]", (1e0, 1e4, 1e8, 1e12, 1e16, 1e20))
 def conductance(value: float) -> Trial:
-    """Conductances until the two bodies are in perfect contact."""
+    """Conductances that grow until the two bodies are in perfect contact."""
     return three_temperatures(h_1=value, h_2=value)
 
 
@@ -60,7 +60,7 @@ def conductance(value: float) -> Trial:
     D_0=(-6.0, 6.0),
 )
 def stiffness(value: float) -> Trial:
-    """One body light and well connected, the other heavy and insulated: a range of rates in a linear system."""
+    """Light, well connected body and heavy, insulated one: a wide range of rates in a linear system."""
     spread = math.sqrt(value)
     return three_temperatures(C_1=spread, C_2=1.0, C_c=1.0 / spread, h_1=1.0, h_2=1.0, D_0=1e-3)
 
@@ -71,7 +71,9 @@ def stiffness(value: float) -> Trial:
     (1e-1, 1e-4, 1e-8, 1e-12, 1e-15, -1e-15, -1e-8, -1e-1),
 )
 def lost_capacity(value: float) -> Trial:
-    """Bonds take 0.8 J/(m^2 K) from a medium of a little more, which settles, or of a little less, which is refused."""
+    """Bonds that take 0.8 J/(m^2 K) from a medium with slightly more, which settles, or slightly less, which is
+    refused.
+    """
     changes = {"interface.potential.interface-capacity.C_c": 0.8 + value}
     if value < 0:
         return Trial(MEDIUM_CASE, [1.0], Refused("heat capacity at T_c was lost"), changes)
@@ -92,8 +94,8 @@ CRITICAL_HEAT = 50.0 / (math.e * 0.05)
     (0.5, 1e-1, 1e-3, 1e-6, 1e-9, 1e-12, -1e-9, -1e-3, -1e-1),
 )
 def ignition(value: float) -> Trial:
-    r"""Heat of a medium without capacity that grows exponentially with its temperature: one half before the fold at
-    :math:`H/(e\beta)`, where the temperature is known to the root of rounding, and none beyond.
+    r"""Medium without capacity whose heat grows exponentially with its temperature: one half before the fold at
+    :math:`H/(e\beta)`, where the temperature is known to the square root of rounding, and no solution beyond.
     """
     heat = (1.0 - value) * CRITICAL_HEAT
     changes = {"interface.friction.viscous.eta": {"value": heat * 1e-4, "times": [{"exponential": {"beta": -0.05}}]}}
