@@ -25,36 +25,36 @@ def figure(
     against: str | None = None,
     celsius: bool = False,
 ) -> Figure:
-    """The figure that suits a dataset or its netCDF file, of a run, of a sweep, or of a study; or of several of them.
+    """Draw the figure of a dataset or of its netCDF file: of a run, a sweep, a study, or several of them.
 
     Parameters
     ----------
     data
-        A dataset, or the path of its file; or a list of them, whose curves are named by what differs.
+        A dataset, or the path of its file; or a list of them, whose curves are named by their differences.
     variables
         Names of the variables to show, instead of the usual choice.
     against
-        The variable along the axis: instead of time, and of a sweep, whose runs are then drawn each, instead of what is
-        swept.
+        The variable along the axis, instead of time; for a sweep, whose runs are then drawn one by one, instead of the
+        swept parameter.
     celsius
-        Whether temperatures are in degrees Celsius instead of kelvins.
+        True for temperatures in degrees Celsius instead of kelvins.
 
     Returns
     -------
     matplotlib.figure.Figure
-        What ``savefig`` writes, and a notebook shows.
+        The figure, which ``savefig`` writes and a notebook shows.
 
     Raises
     ------
     InputError
-        Where a file is no dataset of surfacechem, or has no variable of a name.
+        If a file is no dataset of surfacechem, or has no variable of a name.
     """
     _check_choice(variables, against)
     several = [data] if isinstance(data, str | Path) or not isinstance(data, Sequence) else data
     datasets = [opened(each) for each in several]
     if celsius:
         datasets = [in_celsius(dataset) for dataset in datasets]
-    # What draws other datasets than this one is not imported.
+    # Only the module for this kind of dataset is imported.
     if len(datasets) > 1:
         from surfacechem.plots import comparison
 
@@ -78,7 +78,7 @@ def figure(
 
 
 def _check_choice(variables: Sequence[str] | None, against: str | None) -> None:
-    """InputError where variables are no list, or none that could be drawn over another."""
+    """Raise InputError if the variables are no list, or only the variable of the axis."""
     if isinstance(variables, str):
         raise InputError(f"variables are a list of names, not '{variables}'; a figure is written by its savefig.")
     if variables and {*variables} == {against}:

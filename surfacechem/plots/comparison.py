@@ -1,4 +1,4 @@
-"""Several runs, or several sweeps of one parameter, in one figure: a colour for each, named by what differs."""
+"""Several runs, or several sweeps of one parameter, in one figure: one colour each, named by their differences."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from surfacechem.plots.style import COLOURS, symbol, unit
 from surfacechem.results.dataset import changes_of
 
 LINE_STYLES = ("-", "--", ":", "-.")
-"""Lines of the variables of a panel, whose colours say of which dataset they are."""
+"""Line styles of the variables of a panel; the colour identifies the dataset."""
 
 TEXT_KEYS = ("title", "description", "source", "reference")
 """Keys of a case that do not describe its scene."""
@@ -33,23 +33,23 @@ TEXT_KEYS = ("title", "description", "source", "reference")
 LONG_NUMBER = re.compile(r"\b\d\.?\d{7,}(?:e[+-]?\d+)?|\b\d+\.\d{7,}(?:e[+-]?\d+)?")
 
 LONG_LABEL = 40
-"""Length of a label [letters] that does not leave room for another beside it."""
+"""Length of a label [letters] above which two do not fit side by side."""
 
 MOST_DIFFERENCES = 4
-"""Parameters that a legend names; of more the titles or the files tell more."""
+"""Largest number of parameters in a legend; with more, titles or files identify the datasets better."""
 
 
 def figure(
     datasets: Sequence[xarray.Dataset], variables: Sequence[str] | None = None, against: str | None = None
 ) -> Figure:
-    """The figure of several datasets, all of runs or all of sweeps over the same parameter."""
+    """Draw several datasets, all of runs or all of sweeps over the same parameter."""
     over, panels = _content(datasets, variables, against)
     if not panels:
         raise InputError("there is nothing to plot: none of the variables varies.")
     shown = [over, *(name for panel in panels for name in panel.names)]
     names, colours = _labels_with_coincidences(datasets, shown), colours_of(len(datasets))
     starts = [run.first_shown(dataset, panels) for dataset in datasets] if over == "time" else []
-    # What needs decades is lost on a linear axis; what does not can be read on both.
+    # A dataset that needs a logarithmic axis is unreadable on a linear one; others can be read on both.
     begin = min((start for start in starts if start is not None), default=None)
     with style.panels(6.4, 1.2 + 0.17 * len(datasets) + 1.7 * len(panels), len(panels), sharex=True) as (plot, grid):
         for ax, panel in zip(grid[:, 0], panels, strict=True):
@@ -66,7 +66,7 @@ def figure(
 def _content(
     datasets: Sequence[xarray.Dataset], variables: Sequence[str] | None, against: str | None
 ) -> tuple[str, list[Panel]]:
-    """Variable along the axis, and the panels."""
+    """Return the variable along the axis, and the panels."""
     sweeps = ["sweep" in dataset.attrs for dataset in datasets]
     if any("study" in dataset.attrs for dataset in datasets) or any(sweeps) != all(sweeps):
         raise InputError("a figure takes runs or sweeps, not both.")
@@ -80,14 +80,14 @@ def _content(
 
 
 def colours_of(count: int) -> list[str]:
-    """Colours that do not repeat."""
+    """Return colours that do not repeat."""
     if count <= len(COLOURS):
         return list(COLOURS[:count])
     return [to_hex(colour) for colour in matplotlib.colormaps["viridis"](np.linspace(0, 0.9, count))]
 
 
 def labels(datasets: Sequence[xarray.Dataset]) -> list[str]:
-    r"""Label of each dataset by what differs between them: parameters and solver, else the title, else the file.
+    r"""Label each dataset by its differences from the others: parameters and solver, else the title, else the file.
 
     >>> cases = [f"interface: {{friction: [coulomb: {{mu: {mu}}}]}}" for mu in (0.3, 0.6)]
     >>> labels([xarray.Dataset(attrs={"case": text, "solver": "radau"}) for text in cases])
@@ -97,17 +97,17 @@ def labels(datasets: Sequence[xarray.Dataset]) -> list[str]:
     every = dict.fromkeys(path for each in known for path in each)
     paths = [path for path in every if len({each.get(path) for each in known}) > 1]
     texts = [str(dataset.attrs.get("title", "")) for dataset in datasets]
-    # More differences than fit into a legend are those of two different cases, whose titles tell them apart.
+    # More differences than fit into a legend are those of different cases, which differ in their titles.
     if 0 < len(paths) <= MOST_DIFFERENCES:
         names = _short(paths)
         texts = [", ".join(f"{name} = {each.get(path, 'not given')}" for path, name in names.items()) for each in known]
-    # Datasets that still have the same name are told apart by their files.
+    # Datasets that still have the same name are named by their files.
     files = [Path(str(d.encoding.get("source", f"dataset {k}"))).stem for k, d in enumerate(datasets, 1)]
     return [text if texts.count(text) == 1 else file for text, file in zip(texts, files, strict=True)]
 
 
 def _short(paths: Sequence[str]) -> dict[str, str]:
-    """The last words of paths, as many as tell them apart, or the symbol for them."""
+    """Return the last parts of paths that make them unique, or the symbol for them."""
     last = [path.rpartition(".")[2] for path in paths]
     return {
         path: style.parameter_name(name) if last.count(name) == 1 else " ".join(path.split(".")[-2:])
@@ -116,7 +116,7 @@ def _short(paths: Sequence[str]) -> dict[str, str]:
 
 
 def _settings(dataset: xarray.Dataset) -> dict[str, str]:
-    """Values of the case of a dataset by path, as they are written, with what the run has changed."""
+    """Return the values of the case of a dataset by path, as written, with the changes of the run."""
     text, attributes = str(dataset.attrs.get("case", "")), dataset.attrs
     found: dict[str, str] = {}
     leaves = [document.parse(text)] if text else []
@@ -126,7 +126,7 @@ def _settings(dataset: xarray.Dataset) -> dict[str, str]:
             leaves = [*(tree.value.values() if isinstance(tree.value, dict) else tree.value), *leaves]
         else:
             found[tree.place.path] = str(tree.value)
-    # A run from Python may differ from its case, which the dataset says apart.
+    # A run from Python may differ from its case; the dataset records the changes separately.
     for path, (value, si) in changes_of(attributes).items():
         text, size = style.prefixed(si, np.array([value]))
         found[parameter_path(path, found)] = f"{value / size:g} {text}".removesuffix(" 1").rstrip()
@@ -135,7 +135,7 @@ def _settings(dataset: xarray.Dataset) -> dict[str, str]:
 
 
 def _short_number(text: str) -> str:
-    """A number, with its unit if it has one, in as many digits as a legend needs.
+    """Shorten a number, with its unit if it has one, to the digits that a legend needs.
 
     >>> _short_number("6.6666666666666667e15 1/J/s"), _short_number("radau"), _short_number("-0.1 MPa")
     ('6.66667e+15 1/J/s', 'radau', '−0.1 MPa')
@@ -144,7 +144,7 @@ def _short_number(text: str) -> str:
 
 
 def _merge_panels(found: Sequence[Sequence[Panel]]) -> list[Panel]:
-    """Panels of all datasets, those with the same title and unit as one."""
+    """Merge panels of all datasets with the same title and unit."""
     names: dict[tuple[str, str], dict[str, None]] = {}
     for panel in (panel for each in found for panel in each):
         names.setdefault((panel.title, panel.unit), {}).update(dict.fromkeys(panel.names))
@@ -152,14 +152,14 @@ def _merge_panels(found: Sequence[Sequence[Panel]]) -> list[Panel]:
 
 
 def _labels_with_coincidences(datasets: Sequence[xarray.Dataset], shown: Sequence[str]) -> list[str]:
-    """The labels of datasets, which say where a curve is below another one and so not seen."""
+    """Return the labels of datasets, with a note on those whose curves are hidden below others."""
     names = labels(datasets)
     twins = [next(k for k, other in enumerate(datasets) if _coincide(other, each, shown)) for each in datasets]
     return [names[k] + (f", the same as {names[j]}" if j < k else "") for k, j in enumerate(twins)]
 
 
 def _coincide(one: xarray.Dataset, other: xarray.Dataset, names: Sequence[str]) -> bool:
-    """Whether two datasets hold the same values of these."""
+    """True if two datasets hold the same values of these variables."""
     both = [name for name in names if name in one or name in other]
     return all(
         name in one and name in other and np.array_equal(one[name].values, other[name].values, equal_nan=True)
@@ -170,7 +170,7 @@ def _coincide(one: xarray.Dataset, other: xarray.Dataset, names: Sequence[str]) 
 def _draw(
     ax: Axes, datasets: Sequence[xarray.Dataset], panel: Panel, over: str, colours: Sequence[str], begin: float | None
 ) -> None:
-    """The variables of a panel, each in its kind of line, of all datasets that have them."""
+    """Draw the variables of a panel, each in its line style, for all datasets that have them."""
     drawn = []
     for dataset, colour in zip(datasets, colours, strict=False):
         for name, dash in zip(panel.names, cycle(LINE_STYLES), strict=False):
@@ -190,7 +190,7 @@ def _draw(
 
 
 def _label_axis(axes: Sequence[Axes], datasets: Sequence[xarray.Dataset], over: str, begin: float | None) -> None:
-    """The axis that all panels share: time, over decades from ``begin`` on, a variable, or the swept parameter."""
+    """Label the shared axis: time, over decades from ``begin`` on, a variable, or the swept parameter."""
     first, values = datasets[0][over], np.concatenate([dataset[over].values for dataset in datasets])
     if over == "time":
         run.label_time(axes, values, unit(first), begin)

@@ -17,20 +17,20 @@ from surfacechem.plots.style import Array
 from surfacechem.tolerances import NEGLIGIBLE, SQRT_EPS
 
 FIELDS = ("gap", "traction")
-"""Fields that have a figure of their own."""
+"""Fields that are drawn in a separate figure."""
 
 ROWS, HEIGHT = 3, 2.3
-"""Panels, and the height of each [inch]."""
+"""Number of panels, and the height of each [inch]."""
 
 PANEL_SPACING = 0.08
 """Space above and below each [inch]: twice the usual."""
 
 PROFILE_REACH = 1.5
-"""So much farther than the traction is felt the surfaces are drawn."""
+"""Ratio of the drawn distance to that over which the traction is significant."""
 
 
 def figure(dataset: xarray.Dataset) -> Figure:
-    """The surfaces, the traction on them at several times, and the force over the approach."""
+    """Draw the surfaces, the traction on them at several times, and the force over the approach."""
     with style.panels(6.4, 0.9 + HEIGHT * ROWS, ROWS) as (plot, grid):
         draw(grid[:, 0].tolist(), dataset)
         style.headings(plot, grid[0, 0], dataset)
@@ -38,12 +38,12 @@ def figure(dataset: xarray.Dataset) -> Figure:
 
 
 def has_surfaces(dataset: xarray.Dataset) -> bool:
-    """Whether a run is one of two curved surfaces, with their fields."""
+    """True if the dataset is of a run of two curved surfaces, with their fields."""
     return {*FIELDS, "opposite_z", "approach", "force"} <= set(dataset)
 
 
 def draw_below(axes: Sequence[Axes], dataset: xarray.Dataset) -> None:
-    """The surfaces on the last axes of a figure; the others share theirs."""
+    """Draw the surfaces on the last axes of a figure; the other axes share their x."""
     for ax in axes[: -ROWS - 1]:
         ax.sharex(axes[-ROWS - 1])
         ax.tick_params(labelbottom=False)
@@ -52,7 +52,7 @@ def draw_below(axes: Sequence[Axes], dataset: xarray.Dataset) -> None:
 
 def draw(axes: Sequence[Axes], dataset: xarray.Dataset) -> None:
     """Draw the panels on axes of a figure, one below the other."""
-    # Each has an axis of its own, whose words stand apart from the panel below.
+    # Each panel has its own x axis, whose label needs space above the panel below.
     engine: Any = axes[0].figure.get_layout_engine()
     engine.set(h_pad=PANEL_SPACING)
     even, (along, at) = _is_axisymmetric(dataset), _section(dataset)
@@ -66,13 +66,15 @@ def draw(axes: Sequence[Axes], dataset: xarray.Dataset) -> None:
 
 
 def _is_axisymmetric(dataset: xarray.Dataset) -> bool:
-    """Whether nothing changes about the axis."""
+    """True if the gap does not change around the axis."""
     gap = dataset["gap"].values
     return bool(np.ptp(gap, axis=2).max() <= SQRT_EPS * np.abs(gap).max())
 
 
 def _is_facing(dataset: xarray.Dataset) -> NDArray[np.bool_]:
-    """Whether each point is on the side that is nearest: seen from above a closed body covers itself."""
+    """Return the mask of points on the side that is nearest to the other body: seen from above a closed body hides
+    itself.
+    """
     from scipy.ndimage import label
 
     x, y = (dataset[f"surface_{axis}"].values for axis in "xy")
@@ -84,7 +86,7 @@ def _is_facing(dataset: xarray.Dataset) -> NDArray[np.bool_]:
 
 
 def _section(dataset: xarray.Dataset) -> tuple[Array, Any]:
-    """Distances along a section through the nearest point [m], and which of the points it is."""
+    """Return distances along a section through the nearest point [m], and the indices of its points."""
     column = int(np.unravel_index(np.argmin(dataset["gap"].values[0]), dataset["gap"].shape[1:])[1])
     x, y = (dataset[f"surface_{axis}"].values for axis in "xy")
     rows = np.flatnonzero(_is_facing(dataset)[:, column])
@@ -92,25 +94,25 @@ def _section(dataset: xarray.Dataset) -> tuple[Array, Any]:
         return np.hypot(x, y)[rows, column], (rows, column)
     columns, last = np.full(len(rows), column), x.shape[1] - 1
     if max(np.ptp(ends[:, [0, -1]], axis=1).max() for ends in (x, y)) <= SQRT_EPS * np.ptp(x):
-        # About an axis a section goes on where the opposite column begins.
+        # Beyond the axis the section continues along the opposite column.
         rows, columns = np.append(rows[::-1], rows), np.append(np.full(len(rows), (column + last // 2) % last), columns)
     at = rows, columns
     return x[at] if np.ptp(x[at]) > np.ptp(y[at]) else y[at], at
 
 
 def _reach(dataset: xarray.Dataset, along: Array, at: Any) -> float:
-    """Distance to which the traction is felt [m]."""
+    """Return the distance over which the traction is significant [m]."""
     size = np.abs(dataset["traction"].values[:, *at]).max(axis=0)
-    # Bodies are much larger than what acts between them, of which nothing would be seen at their size.
+    # Bodies are much larger than the range of their interaction, which would be invisible at their scale.
     felt = np.abs(along[size > NEGLIGIBLE * size.max()])
     whole = float(np.abs(along).max())
     return min(PROFILE_REACH * float(felt.max(initial=0.0)), whole) or whole
 
 
 def _drawn_times(dataset: xarray.Dataset) -> Iterator[tuple[int, Any, str]]:
-    """Times that are drawn, with colour and words: the least and the largest approach and some between."""
+    """Yield the times that are drawn, with colour and label: the least and the largest approach and some between."""
     approach = dataset["approach"].values
-    # Runs linger where little changes: approaches are spread by their rank, not by time.
+    # Runs may rest for long: approaches are spread by their rank, not by time.
     order = np.argsort(approach)
     for k in order[style.evenly_spread(len(order), 4)].tolist():
         share = float(np.mean(approach < approach[k]))
@@ -119,7 +121,7 @@ def _drawn_times(dataset: xarray.Dataset) -> Iterator[tuple[int, Any, str]]:
 
 
 def _draw_profiles(ax: Axes, dataset: xarray.Dataset, even: bool, along: Array, at: Any, reach: float) -> None:
-    """Section through both bodies; the upper one at several approaches."""
+    """Draw a section through both bodies, the upper one at several approaches."""
     signs = (1, -1) if even else (1,)
     for sign in signs:
         ax.plot(sign * along, dataset["surface_z"].values[at], color="black", label="body 1" if sign > 0 else "_")
@@ -140,7 +142,7 @@ def _draw_profiles(ax: Axes, dataset: xarray.Dataset, even: bool, along: Array, 
 
 
 def _draw_tractions(ax: Axes, dataset: xarray.Dataset, along: Array, at: Any, reach: float) -> None:
-    """Traction over the distance from the axis at several approaches."""
+    """Draw the traction over the distance from the axis at several approaches."""
     shown = np.abs(along) <= reach
     values = dataset["traction"].values[:, *at]
     for k, colour, _ in _drawn_times(dataset):
@@ -152,21 +154,21 @@ def _draw_tractions(ax: Axes, dataset: xarray.Dataset, along: Array, at: Any, re
 
 
 def _draw_field(ax: Axes, dataset: xarray.Dataset) -> None:
-    """Traction over the surface where it is the largest."""
+    """Draw the traction over the surface at the time when it is largest."""
     facing = _is_facing(dataset)
     seen: Any = np.ix_(facing.any(axis=1), facing.any(axis=0))
     values = dataset["traction"].values[:, *seen]
     k = int(np.argmax(np.abs(values).max(axis=(1, 2))))
     text, size = style.prefixed("Pa", values[k])
     x, y = (dataset[f"surface_{axis}"].values[seen] for axis in "xy")
-    # White is no traction, whatever the least and the largest are.
+    # White is zero traction: the colour scale is symmetric.
     most = float(np.abs(values[k]).max()) / size
     colours: dict[str, Any] = {"cmap": "RdBu_r", "vmin": -most, "vmax": most}
-    # As an image, since a page would hold each triangle.
+    # Rasterized, since a vector graphic would contain every triangle.
     mesh = ax.pcolormesh(x, y, values[k] / size, shading="gouraud", rasterized=True, **colours)
     ax.figure.colorbar(mesh, cax=ax.inset_axes((1.05, 0, 0.05, 1)), label=f"Traction [{text}]")
     ax.set_aspect("equal")
-    # What is drawn is the square around all that is felt, or what there is of the surface in it.
+    # The drawn part is a square around all significant tractions, cut to the surface.
     felt = np.abs(values[k]) >= NEGLIGIBLE * np.abs(values[k]).max()
     ends = [(float(part[felt].min()), float(part[felt].max())) for part in (x, y)]
     half = PROFILE_REACH / 2 * max(b - a for a, b in ends)
@@ -180,7 +182,7 @@ def _draw_field(ax: Axes, dataset: xarray.Dataset) -> None:
 
 
 def _draw_force(ax: Axes, dataset: xarray.Dataset) -> None:
-    """Force over the approach, and what the local law gives."""
+    """Draw the force over the approach, and the force of the local law."""
     approach, force = dataset["g_n"].values, dataset["t_n"].values
     style.draw_curve(ax, dataset, "g_n", force, label="force")
     if "local_difference" in dataset:

@@ -1,4 +1,4 @@
-"""A drawing of a scene: two bodies, the interface between them, heat paths, springs, and what is given."""
+"""Drawing of a scene: two bodies, the interface between them, heat paths, springs, and prescribed variables."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ WIDTH, HEIGHT, GAP = 2.7, 0.95, 0.26
 """Dimensions of the drawing [inch]: width and height of a body, and the height of the interface between the two."""
 
 BESIDE, OVER, LINE = 1.6, 0.5, 0.145
-"""Room [inch] beside the bodies for heat paths, over them for springs and far sides, and of a line of text."""
+"""Space [inch] next to the bodies for heat paths, over them for springs and far sides, and height of a line of text."""
 
 SIZE = 7.5
 COILS = 5
 MOST_LETTERS = 44
-"""Letters of a line below the drawing."""
+"""Largest number of letters in a line below the drawing."""
 
 HEATED_BODY = {"Q_1": 0, "Q_2": 1, "Q_c": None}
-"""Heat that a case supplies, and the number of the body that receives it; None for the interface."""
+"""External heat supplies, and the number of the body that receives them; None for the interface."""
 
 
 def figure(scene: Scene) -> Figure:
-    """The drawing; body 1 is the lower one."""
+    """Draw a scene; body 1 is the lower one."""
     below = _given(scene)
     left = BESIDE if scene.heat else 0.1
     right = 0.85 if scene.tangential or any(name in scene.loading for name in HEATED_BODY) else 0.1
@@ -63,7 +63,7 @@ def figure(scene: Scene) -> Figure:
 
 
 def _temperature(temperature: str | Load | None) -> str:
-    """Temperature of a member, in words."""
+    """Describe the temperature of a body or the interface."""
     if temperature is None:
         return "no temperature of its own"
     if isinstance(temperature, Load):
@@ -95,7 +95,7 @@ def _arrow(axes: Axes, start: tuple[float, float], end: tuple[float, float], kin
 
 
 def _heat(axes: Axes, scene: Scene) -> None:
-    """Heat paths as arrows beside the bodies, one for all that run between the same ends; heat that is supplied."""
+    """Draw heat paths as arrows next to the bodies, one for all between the same ends, and external heat supplies."""
     levels = [-HEIGHT / 2, GAP + HEIGHT / 2]
     ends = {body.name: level for body, level in zip(scene.bodies, levels, strict=True)} | {"interface": GAP / 2}
     paths: dict[tuple[str, ...], list[str]] = {}
@@ -111,7 +111,7 @@ def _heat(axes: Axes, scene: Scene) -> None:
             at = -0.55, level
         else:
             low, high = sorted(ends[end] for end in between)
-            # Beside each other, as several may reach from body to body.
+            # Side by side, as several may reach from body to body.
             x = -0.12 - 0.2 * inside.index(between)
             _arrow(axes, (x, low), (x, high))
             at = -0.2 - 0.2 * (len(inside) - 1), (low + high) / 2 + 0.1
@@ -124,12 +124,12 @@ def _heat(axes: Axes, scene: Scene) -> None:
 
 
 def _has_far_heat_path(body: Body) -> bool:
-    """Whether heat passes the far side of a body."""
+    """True if heat passes the far side of a body."""
     return body.conduction is not None and body.conduction.far is not None
 
 
 def _far_side(axes: Axes, body: Body, edge: float, way: int) -> None:
-    """Draw the temperature at which the far side of a body that conducts is held, or of its coolant."""
+    """Draw the temperature at which the far side of a conducting body, or its coolant, is held."""
     if body.conduction is None or body.conduction.far is None:
         return
     end = edge + way * 0.3
@@ -141,7 +141,7 @@ def _far_side(axes: Axes, body: Body, edge: float, way: int) -> None:
 
 
 def _spring(axes: Axes, mounting: Mounting, start: tuple[float, float], end: tuple[float, float]) -> None:
-    """A spring from a body to a wall, with what the mounting has."""
+    """Draw a spring from a body to a wall, with the elements of the mounting."""
     along, across = np.subtract(end, start), np.subtract(end, start)[::-1]
     across = across / np.linalg.norm(across)
     ways = np.concatenate([[0.0, 0.2], np.linspace(0.2, 0.8, 2 * COILS), [0.8, 1.0]])
@@ -150,14 +150,14 @@ def _spring(axes: Axes, mounting: Mounting, start: tuple[float, float], end: tup
     axes.plot(*(np.array(end) + np.array([[-0.25], [0.25]]) * across).T, color=SPRING, linewidth=2.5)
     parts = {"k": mounting.k, "m": mounting.m, "damper": mounting.c_b + mounting.c_g}
     text = ", ".join(name for name, value in parts.items() if value) or "dead load"
-    # Beside a spring that stands upright there is room for its words, over one that lies.
+    # The text is next to an upright spring, and over a horizontal one.
     above = end[0] == start[0]
     place = (end[0] + 0.32, end[1] - 0.1) if above else (start[0] + 0.05, end[1] + 0.33)
     axes.text(*place, text, va="center", fontsize=SIZE, color=SPRING)
 
 
 def _given(scene: Scene) -> list[str]:
-    """Lines about what acts in the interface, and what is given."""
+    """Return lines about the laws of the interface, and about prescribed variables."""
     interface = scene.interface
     rows: list[tuple[str, Sequence[str]]] = [
         ("energy", [law.title for law in interface.potentials]),
@@ -171,7 +171,7 @@ def _given(scene: Scene) -> list[str]:
 
 
 def _wrapped(word: str, names: Sequence[str]) -> list[str]:
-    """A word and names in lines; four of them, since reactions of a mechanism may be many."""
+    """Return a word and up to four names in lines, since a mechanism may have many reactions."""
     unique = list(dict.fromkeys(names))
     text = f"{word}: {', '.join(unique[:4])}" + (f" and {len(unique) - 4} more" if len(unique) > 4 else "")
     return [text] if "$" in text else wrap(text, MOST_LETTERS, subsequent_indent="    ")

@@ -20,36 +20,36 @@ from surfacechem.plots.run import PANELS, of_kind
 from surfacechem.plots.style import COLOURS, Array, symbol, unit, unit_text, varies
 
 MOST_MEMBERS = 100
-"""Curves that are drawn of a sample; of more runs a fair part, evenly spread over their numbers."""
+"""Largest number of curves of a sample; of more runs an evenly spread subset is drawn."""
 
 MOST_POINTS = 2**20
-"""Runs whose values are drawn; of more a fair part."""
+"""Largest number of runs whose values are drawn; of more an evenly spread subset."""
 
 MOST_PANELS = 3
 
 COUNTED = ("steps", "destroys_entropy")
-"""Variables on the solver or the laws, not on what happens."""
+"""Variables about the solver or the laws instead of the physics."""
 
 NAME_ORDER = (
     *(r"lifetime", r"(phi|theta).*_last", r"T.*_max", r"(phi|T).*(?<!_m..)"),
     *(r"time_to.*", r"time.*", r".*(?<!_m..)", r".*"),
 )
-"""Names in the order in which they are shown: lifetimes, bonds at the end, largest temperatures, what else tells of the
-ends, other extremes.
+"""Order in which variables are shown: lifetimes, bonds at the end, largest temperatures, other final values, other
+extremes.
 """
 
 BINS, PARAMETER_BINS = 40, 12
-"""Bars of a distribution, and parts of the range of a parameter in each of which the effect is shown."""
+"""Numbers of bins of a distribution, and of bins of a parameter in an effect plot."""
 
 PERCENTILES = (5.0, 50.0, 95.0)
 """Percentiles of a distribution that are drawn."""
 
 SEEN_PART = 0.99
-"""Fraction of the largest value of a variable that an output has to come to; less is told."""
+"""Fraction of the largest value of a variable that some output must reach; otherwise a note is written."""
 
 
 def figure(dataset: xarray.Dataset, plan: Plan, axes: Sequence[str], variables: Sequence[str] | None = None) -> Figure:
-    """The figure of a grid of two parameters, of a sample, or of more parameters."""
+    """Draw a grid of two parameters, a sample, or a grid of more parameters."""
     dataset = with_final_bonds(dataset, axes)
     parameters = [str(name) for name, x in dataset.coords.items() if len(x.dims) == 1 and x.dims[0] in axes]
     names = chosen(dataset, axes, variables)
@@ -62,19 +62,19 @@ def figure(dataset: xarray.Dataset, plan: Plan, axes: Sequence[str], variables: 
 
 
 def chosen(dataset: xarray.Dataset, axes: Sequence[str], variables: Sequence[str] | None) -> list[str]:
-    """The variables that are drawn: those asked for, else those of the ends that differ from run to run."""
+    """Return the variables to be drawn: those asked for, else final values that differ between runs."""
     known = number_names(dataset, axes)
     refuse_unknown(variables or (), known, "no variable '{}' in the sweep", style.place_of(dataset))
     return list(dict.fromkeys(variables)) if variables else varying_numbers(dataset, axes, known)
 
 
 def number_names(dataset: xarray.Dataset, axes: Sequence[str]) -> list[str]:
-    """Names of the numbers that each run has, not only those that are checked, at its end or along it."""
+    """Return the names of numbers of every run, not only of checked ones, at its end or along it."""
     return [str(n) for n, x in dataset.data_vars.items() if x.dtype.kind == "f" and x.dims[: len(axes)] == tuple(axes)]
 
 
 def varying_numbers(dataset: xarray.Dataset, axes: Sequence[str], known: Sequence[str]) -> list[str]:
-    """Numbers of each run that differ from run to run: of phases and temperatures, else of events."""
+    """Return the numbers that differ between runs: of bonds and temperatures, else of events."""
     found = sorted(known, key=lambda name: next(k for k, rank in enumerate(NAME_ORDER) if re.fullmatch(rank, name)))
     ends = [name for name in found if dataset[name].ndim == len(axes) and "error" not in name and name not in COUNTED]
     shown = _distinct(dataset, [name for name in ends if varies(subsample(dataset, name))])
@@ -83,7 +83,7 @@ def varying_numbers(dataset: xarray.Dataset, axes: Sequence[str], known: Sequenc
 
 
 def _distinct(dataset: xarray.Dataset, names: Sequence[str]) -> list[str]:
-    """The names without those of equal values: what is largest at the end tells no more than the end."""
+    """Return the names without those of equal values, such as a maximum that is the final value."""
     shown: list[str] = []
     for name in names:
         values = subsample(dataset, name)
@@ -92,8 +92,8 @@ def _distinct(dataset: xarray.Dataset, names: Sequence[str]) -> list[str]:
 
 
 def with_final_bonds(dataset: xarray.Dataset, axes: Sequence[str]) -> xarray.Dataset:
-    """The dataset with bonds at the end of each run, or where neither they nor temperatures vary with what else varies
-    at the end; as it is where it holds such numbers already.
+    """Return the dataset with bonds at the end of each run; with all other final values if neither bonds nor
+    temperatures vary. It is unchanged if it holds such numbers already.
     """
     series = [name for name in series_names(dataset, axes) if name in dataset.data_vars]
     if not series or any(str(name).endswith("_last") for name in dataset):
@@ -106,7 +106,7 @@ def with_final_bonds(dataset: xarray.Dataset, axes: Sequence[str]) -> xarray.Dat
 
 
 def final_values(dataset: xarray.Dataset, name: str) -> Array:
-    """The value at the end of each run, or at the last output before where that is all there is; nan where it failed or
+    """Return the value at the end of each run, or at the last output if that is all there is; NaN if the run failed or
     was refused.
     """
     ended = f"{name}_last"
@@ -118,24 +118,24 @@ def final_values(dataset: xarray.Dataset, name: str) -> Array:
 
 
 def ends_are_known(dataset: xarray.Dataset, names: Sequence[str]) -> bool:
-    """Whether the last values are those at the ends of all runs, none of which has stopped after its last output."""
+    """True if the last values are those at the ends of all runs, none of which stopped after its last output."""
     return all(f"{name}_last" in dataset for name in names) or not style.has_no_end(dataset, style.STOPPED).any()
 
 
 def subsample(dataset: xarray.Dataset, name: str) -> Array:
-    """Values of a variable, of a fair part of the runs where they are many."""
+    """Return the values of a variable, of an evenly spread subset if there are many runs."""
     series = dataset[name].ndim > dataset["status"].ndim
     values = (dataset[name].values if series else final_values(dataset, name)).ravel()
     return np.asarray(values[:: -(-values.size // MOST_POINTS)], dtype=float)
 
 
 def quantity_label(values: xarray.DataArray) -> str:
-    """Symbol or words of a variable, and its unit."""
+    """Return symbol or words for a variable, and its unit."""
     return f"{style.quantity_words(values)} [{unit_text(unit(values))}]"
 
 
 def heat_maps(dataset: xarray.Dataset, plan: Plan, axes: Sequence[str], names: Sequence[str]) -> Figure:
-    """Colours over two parameters, a map for each variable; white where a run has no value."""
+    """Draw colours over two parameters, one map per variable; white where a run has no value."""
     x, y = (dataset[name] for name in axes)
     with style.panels(5.6, 0.6 + 3.3 * len(names), len(names), sharex=True) as (plot, grid):
         for ax, name in zip(grid[:, 0], names, strict=True):
@@ -149,9 +149,9 @@ def heat_maps(dataset: xarray.Dataset, plan: Plan, axes: Sequence[str], names: S
 
 
 def trajectories(dataset: xarray.Dataset, axes: Sequence[str], variables: Sequence[str] | None, against: str) -> Figure:
-    """Each run of a sweep over one of its variables, or over time."""
+    """Draw each run of a sweep over one of its variables, or over time."""
     series = series_names(dataset, axes)
-    # Along the runs there is time, or where a load ends them, the load.
+    # The dimension along the runs is time or, if a load ends them, the load.
     inner = [str(dim) for name in series for dim in dataset[name].dims if dim not in axes]
     known = [*series, *dict.fromkeys(inner)]
     asked = (*(variables or ()), against)
@@ -167,13 +167,13 @@ def trajectories(dataset: xarray.Dataset, axes: Sequence[str], variables: Sequen
 
 
 def series_names(dataset: xarray.Dataset, axes: Sequence[str]) -> list[str]:
-    """Numbers along the runs of a sweep."""
+    """Return the names of numbers along the runs of a sweep."""
     many = [str(n) for n, x in dataset.variables.items() if x.dtype.kind == "f" and x.ndim == len(axes) + 1]
     return [name for name in many if "event" not in dataset[name].dims]
 
 
 def curves(dataset: xarray.Dataset, axes: Sequence[str], names: Sequence[str], against: str | None = None) -> Figure:
-    """Series of all runs, or of a fair part of them, which the figure says; over ``against`` instead of time."""
+    """Draw series of all runs, or of an evenly spread subset, whose size is noted; over ``against`` instead of time."""
     count = int(np.prod([dataset.sizes[name] for name in axes]))
     members = style.evenly_spread(count, MOST_MEMBERS)
     over = dataset[against or str(dataset[names[0]].dims[-1])]
@@ -200,7 +200,7 @@ def curves(dataset: xarray.Dataset, axes: Sequence[str], names: Sequence[str], a
 
 
 def _peaks_between_outputs(dataset: xarray.Dataset, name: str) -> str:
-    """The largest magnitude of a variable where no output of any run comes near it, as of a slip that is brief."""
+    """Describe the largest magnitude of a variable if no output of any run comes near it, as in a brief slip."""
     ends = [dataset[key].values for key in (f"{name}_max", f"{name}_min") if key in dataset]
     reached, shown = max(map(style.largest, ends), default=0.0), style.largest(dataset[name].values)
     if shown >= SEEN_PART * reached:
@@ -210,14 +210,14 @@ def _peaks_between_outputs(dataset: xarray.Dataset, name: str) -> str:
 
 
 def colours(dataset: xarray.Dataset, axes: Sequence[str]) -> ScalarMappable:
-    """Colours of the values of a parameter."""
+    """Return the colour map of the values of a parameter."""
     values = dataset[axes[0]].values
     scale = LogNorm if style.over_decades(values) else Normalize
     return ScalarMappable(scale(values.min(), values.max()), "viridis")
 
 
 def line_style(dataset: xarray.Dataset, axes: Sequence[str], member: int) -> dict[str, Any]:
-    """Style of the curve of a run: a colour that tells its parameter where there is one, a legend where few are."""
+    """Return the style of the curve of a run: coloured by its parameter if there is one, with a legend for few runs."""
     shape = dataset["status"].shape
     if RUN_DIMENSION not in axes and np.prod(shape) <= style.MOST_CURVES:
         place = [int(k) for k in np.unravel_index(member, shape)]
@@ -231,7 +231,9 @@ def line_style(dataset: xarray.Dataset, axes: Sequence[str], member: int) -> dic
 def effects(
     dataset: xarray.Dataset, plan: Plan, axes: Sequence[str], parameters: Sequence[str], names: Sequence[str]
 ) -> Figure:
-    """The distribution of each variable, and its median and band over each parameter, whatever the others are."""
+    """Draw the distribution of each variable, and its median and band over each parameter, over all values of the
+    others.
+    """
     drawn = plan.sample.draws if plan.sample else {}
     ratios = {axis.path: axis.logarithmic for axis in plan.axes}
     ratios |= {path: draw.over_decades for path, draw in drawn.items()}
@@ -257,14 +259,14 @@ def effects(
 
 
 def path_of(parameter: str, plan: Plan) -> str:
-    """The path of a swept parameter by its name in the dataset, the last parts of the path; '' where none fits."""
+    """Return the path of a swept parameter by its name in the dataset, a tail of the path; '' if none fits."""
     wanted = parameter.removesuffix("_swept")
     parts = {path: name_parts(path) for path in plan.paths}
     return next((path for path, p in parts.items() if wanted in ("_".join(p[k:]) for k in range(len(p)))), "")
 
 
 def distribution(ax: Axes, values: Array) -> None:
-    """Bars along the axis of the values, with the median and the band."""
+    """Draw a histogram along the axis of the values, with the median and the band."""
     known = values[np.isfinite(values)]
     if len(known):
         ax.hist(known, bins=BINS, orientation="horizontal", color=COLOURS[0], alpha=0.6)
@@ -273,7 +275,7 @@ def distribution(ax: Axes, values: Array) -> None:
 
 
 def effect(ax: Axes, over: Array, values: Array) -> None:
-    """Median and band of the values in parts of a parameter with as many runs each, or at each of its values."""
+    """Draw median and band of the values in bins of a parameter with equal numbers of runs, or at each value."""
     known = np.isfinite(values) & np.isfinite(over)
     over, values = over[known], values[known]
     if not len(over):

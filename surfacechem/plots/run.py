@@ -1,7 +1,7 @@
-"""Figures of runs: states, fluxes and balances over time, the exact solution dashed where the dataset has one; and of
-quantities at given states, over what these differ in.
+"""Figures of runs: states, fluxes and balances over time, with exact solutions dashed; and of quantities at given
+states, over the quantity in which these differ.
 
-Events are thin lines with their names, stages and modes are bands; a curve is dotted where it jumps.
+Events are thin lines with their names, stages and modes are bands; a curve is dotted at a jump.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from surfacechem.plots import curved, style
 from surfacechem.plots.style import Array, meaning, symbol, unit, varies
 from surfacechem.tolerances import EPS, RUN_EPS
 
-# Panels of the usual figure: title, and patterns of the unit and of the names.
+# Panels of the default figure: title, and patterns of the unit and of the names.
 PANELS: tuple[tuple[str, str, str], ...] = (
     ("Temperature", "K|degC", r".*"),
     ("Bonding", "1", r"(?!formed_|departure_|x_|.*_residual$|J_c$|n_c$|gamma_m$|ln_theta$|drive$).*"),
@@ -40,7 +40,7 @@ PANELS: tuple[tuple[str, str, str], ...] = (
     ("Heat flux", "W m-2", r"q_(?!m$|t$|.*_nominal$)\w+"),
     ("Dissipation", "W m-2", r"D_\w+"),
     ("Force per bond", "N", r"f"),
-    # Of a pair of bodies.
+    # Of a pair of bodies with curved surfaces.
     ("Force", "N", r"t_(?!.*_nominal$)\w+"),
     ("Heat flow", "W", r"q_(?!m$|t$|.*_nominal$)\w+"),
     ("Dissipated power", "W", r"D_\w+"),
@@ -49,60 +49,61 @@ PANELS: tuple[tuple[str, str, str], ...] = (
 # Residuals and the attributes that hold their largest relative values.
 RESIDUALS = {"energy_residual": "energy_error", "entropy_residual": "entropy_error", "site_residual": "site_error"}
 
-# Residuals below this, which is far below the last digit of what is balanced, are drawn as this.
+# Residuals below this, far below the last digit of the balanced total, are drawn as this.
 LEAST_DRAWN = EPS / 256
 
-# Residuals whose largest is below this are rounding of the last digit, and need no panel.
+# Residuals that stay below this are rounding of the last digit, and need no panel.
 ROUNDED_RESIDUAL = 4 * EPS
 
-# Dashes of exact solutions, far enough from each other that the colour of a run below them is seen.
+# Dashes of exact solutions, with gaps that show the colour of the run below.
 DASHES = (0, (3, 5))
 
 # Times that span more than this go on a logarithmic axis, unless they are evenly spaced.
 LOG_AXIS_RATIO = 1e3
 
-# Part of the run that is too short to be seen on a linear axis, and the part of its range by which a quantity has to
-# change within it to be shown on a logarithmic one; what comes before LOG_AXIS_PART of the run is left out of that.
+# Part of the run that is too short to be visible on a linear axis, and part of its range by which a quantity has to
+# change within it to get a logarithmic one, which begins at LOG_AXIS_PART of the run at the earliest.
 EARLY_PART, EARLY_CHANGE, LOG_AXIS_PART = 1 / 200, 0.3, 1 / 1e7
 
-# So many events in the last decade of the time, most of all, would be crowded on a logarithmic axis.
+# So many events in the last decade of time, if they are the majority, would be crowded on a logarithmic axis.
 MOST_IN_LAST_DECADE = 3
 
 # Unit of heat fluxes.
 FLUX = "W m-2"
 
-# A flux that is so many times larger before EARLY_PART than after it would be a spike and a line at zero.
+# A flux whose range is so many times larger with the time before EARLY_PART than without would be a spike and a line at
+# zero.
 SPIKE_RATIO = 20.0
 
-# A title of so many letters does not fit beside a panel; one of fewer does not with its unit in one line.
+# A title of so many letters does not fit next to a panel; one of ONE_LINE_LETTERS needs a second line for its unit.
 MOST_TITLE_LETTERS, ONE_LINE_LETTERS = 24, 14
 
-# Names of the temperatures across bodies, functions of time and place.
+# Names of temperature profiles across bodies, functions of time and place.
 PROFILE = re.compile("profile_[12]")
 
-# Times at which profiles are drawn, evenly spread over the outputs.
+# Number of times at which profiles are drawn, evenly spread over the outputs.
 PROFILE_TIMES = 6
 
-# Part of the width of a panel in which lines of events are one line.
+# Part of the width of a panel within which lines of events are merged.
 EVENT_SPACING = 1 / 120
 
-# Up to this many events have their names written above them; above so many lines nothing could be told from them.
+# Largest number of events with names above them, and largest number of lines of events.
 MOST_NAMED_EVENTS, MOST_EVENT_LINES = 8, 60
 
-# Lines of events whose names repeat, those of the most frequent name first.
+# Line styles of events whose names repeat, the most frequent name first.
 EVENT_LINE_STYLES = ("dotted", "dashed", "dashdot")
 
-# Rows of names above the first panel; width of a letter and of the space beside panels [inch], space between two names
-# in widths of the panel, and height of a row in points.
+# Rows of names above the first panel; width of a letter and of the margins of panels [inch], space between two names in
+# widths of the panel, and height of a row in points.
 NAME_ROWS, LETTER_INCHES, SIDE_WIDTH, NAME_SPACING, NAME_ROW_HEIGHT = 3, 0.06, 1.7, 0.02, 9.0
 
-# Curves of a panel that have colours of their own: the largest; more would not be told apart.
+# Number of curves of a panel with distinct colours: the largest ones.
 MOST_COLOURED = len(style.COLOURS) - 1
 
-# Names in a label of curves that coincide.
+# Largest number of names in a label of coinciding curves.
 MOST_NAMES = 3
 
-# Units of what is shown of given states if nothing is asked for, tractions and heat fluxes, and how many panels.
+# Units of the quantities shown by default for given states, tractions and heat fluxes, and largest number of panels.
 UNITS_AT_STATES, MOST_PANELS_AT_STATES = ("Pa", "W m-2", "N", "W"), 4
 
 
@@ -116,7 +117,7 @@ class Panel:
 
 
 def figure(dataset: xarray.Dataset, variables: Sequence[str] | None = None, against: str | None = None) -> Figure:
-    """The figure of a run; ``variables`` are shown instead of the usual choice, over ``against`` instead of time."""
+    """Draw a run; ``variables`` are shown instead of the default choice, over ``against`` instead of time."""
     style.check_variables(dataset, {"time": ("time",)})
     if not np.isfinite(dataset["time"].values).all():
         raise InputError("time does not hold finite numbers.", style.place_of(dataset))
@@ -135,7 +136,7 @@ def figure(dataset: xarray.Dataset, variables: Sequence[str] | None = None, agai
 
 
 def _balances_err(dataset: xarray.Dataset) -> bool:
-    """Whether a balance closes to less than the last digit, or it is not known how far it does."""
+    """True if a balance closes to less than the last digit, or if its largest residual is unknown."""
     largest = [style.attribute(dataset, error) for name, error in RESIDUALS.items() if name in dataset]
     return any(error is None or not error < ROUNDED_RESIDUAL for error in largest)
 
@@ -143,7 +144,7 @@ def _balances_err(dataset: xarray.Dataset) -> bool:
 def _stacked(
     dataset: xarray.Dataset, shown: Sequence[Panel], against: str | None, balances: bool, below: int
 ) -> Figure:
-    """Panels that share an axis, the balances, and rows of surfaces below, if any."""
+    """Draw panels that share an axis, the balances, and rows of surfaces below, if any."""
     rows = len(shown) + balances
     height = 0.9 + (2.6 if against else 1.55) * rows + curved.HEIGHT * below
     with style.panels(6.4, height, rows + below, sharex=not below) as (plot, grid):
@@ -161,13 +162,13 @@ def _stacked(
 
 
 def at_states(dataset: xarray.Dataset, variables: Sequence[str] | None, against: str | None) -> Figure:
-    """Each of the variables at given states, else tractions and heat fluxes that differ, over ``against``, else over
-    the first that differs.
+    """Draw variables at given states, by default tractions and heat fluxes that differ, over ``against``, by default
+    the first quantity that differs.
     """
     known = curves(dataset, "point")
     asked = [*(variables or ()), *filter(None, [against])]
     refuse_unknown(asked, known, "no variable '{}' at the states", style.place_of(dataset))
-    # Quantities, no derivatives, that are not the same at all states.
+    # Quantities, without derivatives, that differ between states.
     differing = [name for name in known if len(np.unique(dataset[name].values)) > 1 and "_by_" not in name]
     if not differing:
         raise InputError("a figure needs states that differ.", style.place_of(dataset))
@@ -187,14 +188,14 @@ def at_states(dataset: xarray.Dataset, variables: Sequence[str] | None, against:
 
 
 def _usual_at_states(dataset: xarray.Dataset, names: Sequence[str]) -> Sequence[str]:
-    """Tractions and heat fluxes among these, or where there are none the first."""
+    """Return the tractions and heat fluxes among the names; without any the first names."""
     return ([name for name in names if unit(dataset[name]) in UNITS_AT_STATES] or names)[:MOST_PANELS_AT_STATES]
 
 
 def first_shown(dataset: xarray.Dataset, panels: Sequence[Panel]) -> float | None:
-    """Time at which a logarithmic axis begins; None where a linear one shows what the panels hold."""
+    """Return the time at which a logarithmic axis begins; None if a linear one is sufficient for the panels."""
     times = dataset["time"].values
-    # Fluxes and powers follow from what changes: where they start is no reason for another axis.
+    # Fluxes follow from changes of states: their initial values are no reason for a logarithmic axis.
     names = [name for panel in panels if panel.unit != FLUX for name in panel.names if name in dataset]
     moments = np.array([t for t, _ in _event_times(dataset)])
     late = int(np.sum(moments > times[-1] / 10))
@@ -205,18 +206,18 @@ def first_shown(dataset: xarray.Dataset, panels: Sequence[Panel]) -> float | Non
 
 
 def curves(dataset: xarray.Dataset, over: str = "time") -> list[str]:
-    """Names of the numbers that are functions of time, or of another dimension, alone."""
+    """Return the names of numbers that are functions of time, or of another dimension, only."""
     return [str(n) for n, values in dataset.data_vars.items() if values.dims == (over,) and values.dtype.kind == "f"]
 
 
 def of_kind(dataset: xarray.Dataset, names: Sequence[str], units: str, pattern: str) -> list[str]:
-    """Names that a panel of the usual figure shows; modes are shown as bands, exact values dashed."""
+    """Return the names that a panel of the default figure shows; modes are shown as bands, exact values dashed."""
     fitting = [name for name in names if re.fullmatch(units, unit(dataset[name])) and re.fullmatch(pattern, name)]
     return [name for name in fitting if not (name.endswith("_exact") or style.is_mode(dataset[name]))]
 
 
 def panels(dataset: xarray.Dataset, variables: Sequence[str] | None, against: str | None) -> list[Panel]:
-    """Panels of the variables by unit, or of all that vary by kind, without the variable that is their axis."""
+    """Return panels of the variables by unit, or of all that vary by kind, without the variable of the axis."""
     known = curves(dataset)
     asked = (*(variables or ()), *filter(None, [against]))
     refuse_unknown(asked, known, "no variable '{}' over time in the dataset", style.place_of(dataset))
@@ -242,7 +243,7 @@ def _by_kind(dataset: xarray.Dataset, known: Sequence[str]) -> list[Panel]:
             names = [name for name in names if name in ("q_1", "q_2")]
         elif title == "Bonding" and any(name.startswith("theta_") for name in names):
             title = "Coverage"
-        # What is nothing beside another quantity of its unit is rounding of what both are made of.
+        # A quantity below the last digit of another one of its unit is rounding.
         sizes = {
             name: style.largest(dataset[name].values) for name in known if re.fullmatch(units, unit(dataset[name]))
         }
@@ -253,7 +254,7 @@ def _by_kind(dataset: xarray.Dataset, known: Sequence[str]) -> list[Panel]:
 
 
 def _across(dataset: xarray.Dataset, names: Sequence[str]) -> Figure:
-    """Temperatures across bodies at several times, the contact in the middle."""
+    """Draw temperatures across bodies at several times, with the contact in the middle."""
     for name in names:
         if not PROFILE.fullmatch(name) or name not in dataset:
             raise InputError(f"{name} goes over time, a profile over places; show them in figures of their own.")
@@ -273,7 +274,7 @@ def _across(dataset: xarray.Dataset, names: Sequence[str]) -> Figure:
 
 
 def _draw(ax: Axes, dataset: xarray.Dataset, panel: Panel, over: str, first: float | None) -> None:
-    """The curves of a panel, with the unit that suits what is seen of them from ``first`` on."""
+    """Draw the curves of a panel, with the unit that suits their visible part from ``first`` on."""
     t = dataset[over].values
     _draw_curves(ax, dataset, panel, over)
     start = first or 0.0
@@ -282,21 +283,21 @@ def _draw(ax: Axes, dataset: xarray.Dataset, panel: Panel, over: str, first: flo
     drawn = _finite_values(dataset, panel, t >= start if start else slice(None))
     words = panel.title or ", ".join(map(symbol, panel.names[:MOST_NAMES]))
     style.label(ax.yaxis, words, panel.unit, drawn, between=" " if len(panel.title) < ONE_LINE_LETTERS else "\n")
-    if len(drawn) and not varies(drawn):  # a line, not rounding blown up to the panel's height
+    if len(drawn) and not varies(drawn):  # a constant, whose rounding must not fill the panel
         middle = float(drawn.mean())
         ax.set_ylim(middle - 0.05 * abs(middle or 1.0), middle + 0.05 * abs(middle or 1.0))
     style.legend(ax)
 
 
 def _finite_values(dataset: xarray.Dataset, panel: Panel, rows: Any = slice(None)) -> Array:
-    """Finite values that a panel shows, at some of its points."""
+    """Return the finite values that a panel shows, at some of its points."""
     values = np.concatenate([dataset[name].values[rows] for name in panel.names])
     return np.asarray(values[np.isfinite(values)])
 
 
 def _show_behind_spike(ax: Axes, dataset: xarray.Dataset, panel: Panel) -> float:
-    """Limit a panel of fluxes to their range from a time on where a spike at the start hides all else, and note the
-    size of the spike; returns that time, 0 where all is seen.
+    """Limit a panel of fluxes to their range after an initial spike that would hide all else, and note the size of the
+    spike; return the time at which that range begins, 0 without a spike.
     """
     t = dataset["time"].values
     start = float(EARLY_PART * t[-1])
@@ -312,11 +313,11 @@ def _show_behind_spike(ax: Axes, dataset: xarray.Dataset, panel: Panel) -> float
 
 
 def _draw_curves(ax: Axes, dataset: xarray.Dataset, panel: Panel, over: str) -> None:
-    """The curves of a panel, and the exact ones; where they are many, the largest in colours and the rest in grey."""
+    """Draw the curves of a panel, and the exact ones; of many the largest in colours and the rest in grey."""
     groups, marker = group_coinciding(dataset, panel.names), "o" if dataset.sizes["time"] == 1 else ""
     rest: list[list[str]] = []
     if len(groups) > len(style.COLOURS):
-        # A trace gas beside a full surface is nothing to be told by its colour.
+        # Curves of traces cannot be distinguished next to large ones and need no colours.
         groups.sort(key=lambda names: -style.largest(dataset[names[0]].values))
         groups, rest = groups[:MOST_COLOURED], groups[MOST_COLOURED:]
     for names in groups:
@@ -334,7 +335,7 @@ def _draw_curves(ax: Axes, dataset: xarray.Dataset, panel: Panel, over: str) -> 
 
 
 def group_coinciding(dataset: xarray.Dataset, names: Sequence[str]) -> list[list[str]]:
-    """The names in groups whose curves coincide, so that none hides another."""
+    """Group names whose curves coincide, so that none hides another."""
     groups: list[list[str]] = []
     for name in names:
         values = dataset[name].values
@@ -347,7 +348,7 @@ def group_coinciding(dataset: xarray.Dataset, names: Sequence[str]) -> list[list
 
 
 def _draw_balances(ax: Axes, dataset: xarray.Dataset) -> None:
-    """Residuals relative to what their attributes state as the largest relative value."""
+    """Draw residuals, scaled such that the largest is the relative value in their attributes."""
     known = curves(dataset)
     for name in (name for name in RESIDUALS if name in known):
         relative, largest = np.abs(dataset[name].values), style.attribute(dataset, RESIDUALS[name])
@@ -363,9 +364,9 @@ def _draw_balances(ax: Axes, dataset: xarray.Dataset) -> None:
 def _draw_axis(
     axes: Sequence[Axes], dataset: xarray.Dataset, against: str | None, first: float | None
 ) -> tuple[float, str]:
-    """The axis that all panels share: a variable, or time, logarithmic from ``first`` on where that is given, with
-    bands of modes and lines at events; returns how many points names need above the panels, and the events that have
-    none there.
+    """Draw the shared axis with bands of modes and lines at events: a variable, or time, logarithmic from ``first`` on.
+
+    Return the height in points that names need above the panels, and a text on the events that have none there.
     """
     times, moments = dataset["time"].values, _event_times(dataset)
     if against:
@@ -380,9 +381,7 @@ def _draw_axis(
 
 
 def label_time(axes: Sequence[Axes], times: Array, unit: str, first: float | None) -> None:
-    """The axis of time that panels share; where ``first`` is given a logarithmic one from there on, without what has
-    happened before.
-    """
+    """Label the shared axis of time; with ``first`` it is logarithmic from there on, and earlier values are ignored."""
     if first is None:
         style.label(axes[-1].xaxis, "Time", unit, times)
         return
@@ -398,9 +397,7 @@ def label_time(axes: Sequence[Axes], times: Array, unit: str, first: float | Non
 
 
 def _event_times(dataset: xarray.Dataset) -> list[tuple[float, str]]:
-    """Times of the events and what they are called: by name, or by reason where the name is the variable that passes
-    zero.
-    """
+    """Return times and names of the events; the reason replaces the name if that is the variable that passes zero."""
     if "event_time" not in dataset:
         return []
     named = {name: ("event",) for name in ("event_name", "event_reason") if name in dataset}
@@ -412,15 +409,15 @@ def _event_times(dataset: xarray.Dataset) -> list[tuple[float, str]]:
 
 
 def _named_events(moments: Sequence[tuple[float, str]]) -> list[tuple[float, str]]:
-    """Times and names of the events that have one; ends of stages show as bands."""
+    """Return times and names of the events that have a name; ends of stages are shown as bands."""
     return [(t, name) for t, name in moments if name and not name.startswith("end of ")]
 
 
 def _draw_events(
     axes: Sequence[Axes], width: float, moments: Sequence[tuple[float, str]], below: int
 ) -> tuple[int, str]:
-    """Thin vertical lines at the events, one for those that follow each other closely; returns the rows of names above
-    the panels, and the events that have none there.
+    """Draw thin vertical lines at the events, one for several that are close; return the rows of names above the
+    panels, and a text on the events that have none there.
     """
     named = _named_events(moments)
     places = _merge_close_events(axes[0], named)
@@ -439,7 +436,9 @@ def _draw_events(
 
 
 def _merge_close_events(ax: Axes, events: Sequence[tuple[float, str]]) -> list[tuple[float, str]]:
-    """Times and names of events, those that a figure cannot tell apart as one: a slip, and the stop that ends it."""
+    """Return times and names of events, with those that a figure cannot separate as one: a slip, and the stop that ends
+    it.
+    """
     found: list[tuple[float, list[str]]] = []
     last = -np.inf
     for t, at, name in _positions_across_panel(ax, events):
@@ -452,8 +451,10 @@ def _merge_close_events(ax: Axes, events: Sequence[tuple[float, str]]) -> list[t
 
 
 def _positions_across_panel(ax: Axes, items: Sequence[tuple[float, str]]) -> list[tuple[float, float, str]]:
-    """Values of x with their texts in order, and where each lies, from 0 at the left to 1 at the right of a panel."""
-    ax.get_xlim()  # limits that follow from what is drawn are not known before
+    """Return values of x and their positions, from 0 at the left to 1 at the right of a panel, with their texts, in
+    order.
+    """
+    ax.get_xlim()  # this call computes the limits from the drawn curves
     items = sorted(items)
     points = np.array([(x, 0.0) for x, _ in items]).reshape(-1, 2)
     places = (ax.transScale + ax.transLimits).transform(points)[:, 0].tolist()
@@ -461,7 +462,7 @@ def _positions_across_panel(ax: Axes, items: Sequence[tuple[float, str]]) -> lis
 
 
 def _numbered(ax: Axes, width: float, places: Sequence[tuple[float, str]], below: int) -> tuple[int, str]:
-    """Names above the panels where they fit beside each other, else numbers, and the name that all of them have."""
+    """Write names above the panels if they fit side by side, else numbers with a text on the name that all share."""
     text = places[0][1]
     if rows := _write_rows(ax, width, places, below, lanes=1):
         return rows, ""
@@ -470,15 +471,15 @@ def _numbered(ax: Axes, width: float, places: Sequence[tuple[float, str]], below
 
 
 def _most_frequent(names: Sequence[str], lines: Mapping[str, str]) -> str:
-    """Counts of the most frequent events, and their kinds of lines, in words."""
+    """Describe the counts of the most frequent events, and their line styles."""
     counts = Counter(names).most_common(MOST_NAMES)
     kinds = {name: f" ({line})" for name, line in lines.items()}
     return ", ".join(f"{f'{count} ' if count > 1 else ''}{name}{kinds.get(name, '')}" for name, count in counts)
 
 
 def _draw_bands(axes: Sequence[Axes], dataset: xarray.Dataset) -> list[tuple[float, str]]:
-    """The stages of a programme, every other one, whose middles and names it returns; else times in which a mode is not
-    what it was at the start.
+    """Draw bands: every other stage of a programme, with middles and names of all as the result; else the times in
+    which a mode differs from its initial value.
     """
     modes = [name for name in curves(dataset) if style.is_mode(dataset[name])]
     staged, named = "stage" in modes, []
@@ -493,7 +494,7 @@ def _draw_bands(axes: Sequence[Axes], dataset: xarray.Dataset) -> list[tuple[flo
 
 
 def _mode_spans(dataset: xarray.Dataset, name: str) -> list[tuple[float, float, float]]:
-    """Start, end and value of a mode between events; what lies between two outputs is too short to be seen."""
+    """Return start, end and value of a mode between events; changes between two outputs are too brief to be visible."""
     times, values = dataset["time"].values, dataset[name].values.astype(float)
     known = dataset["event_time"].values if "event_time" in dataset else np.empty(0)
     changes = [j for j in range(1, len(values)) if values[j] != values[j - 1]]
@@ -505,8 +506,8 @@ def _mode_spans(dataset: xarray.Dataset, name: str) -> list[tuple[float, float, 
 
 
 def _write_rows(ax: Axes, width: float, items: Sequence[tuple[float, str]], below: int, lanes: int = NAME_ROWS) -> int:
-    """Small words above a panel, each over its time, in as many rows as they need so that none is on another; returns
-    how many. Nothing is written where there is no room for all.
+    """Write small texts above a panel, each over its time, in rows without overlap; return the number of rows. Nothing
+    is written if there is no room for all.
     """
     placed: list[tuple[float, int, str]] = []
     ends = [0.0] * lanes
@@ -529,8 +530,8 @@ def _write_rows(ax: Axes, width: float, items: Sequence[tuple[float, str]], belo
 
 
 def wants_log_axis(times: Array, quantities: Sequence[Array] = ()) -> bool:
-    """True for times that want a logarithmic axis: they have a ratio, or span decades and much happens in so small a
-    part of them that nobody would see it.
+    """True for times that need a logarithmic axis: they have a constant ratio, or span decades and quantities change
+    much in a part too short to be visible.
 
     >>> t = np.append(0.0, np.logspace(-6, 2, 50))
     >>> wants_log_axis(t), wants_log_axis(np.linspace(0, 5, 100_001))
@@ -545,6 +546,6 @@ def wants_log_axis(times: Array, quantities: Sequence[Array] = ()) -> bool:
     ratios = after[1:] / after[:-1]
     if np.ptp(ratios) < style.FLAT * ratios[0]:
         return True
-    # What jumps as the run starts, such as the direction of friction, needs no decades.
+    # A jump at the start of the run, such as that of the direction of friction, needs no logarithmic axis.
     early = (times > 0) & (times <= EARLY_PART * times[-1])
     return any(np.ptp(values[early]) > EARLY_CHANGE * np.ptp(values) for values in quantities if varies(values))

@@ -1,4 +1,4 @@
-"""Figures of ruptures: the load at rupture over what is swept, its distributions, lifetimes."""
+"""Figures of rupture: the load at rupture over the swept parameter, its distributions, lifetimes."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from surfacechem.plots.style import COLOURS, MOST_CURVES, Array, symbol, unit
 
 
 def load_of(dataset: xarray.Dataset) -> str:
-    """The load at whose growth the bonds of a sweep break; '' for other sweeps."""
+    """Return the load under whose growth the bonds of a sweep rupture; '' for other sweeps."""
     names = (str(name).removesuffix("_mode") for name in dataset.data_vars if str(name).endswith("_mode"))
     loads = [load for load in names if all(f"{load}_{which}" in dataset for which in STATISTICS)]
     return loads[0] if loads else ""
@@ -26,21 +26,21 @@ def load_of(dataset: xarray.Dataset) -> str:
 MARKERS = "osD"
 
 NEGLIGIBLE_LIFETIME = 0.01
-"""Fraction of the shortest lifetime in which next to nothing happens."""
+"""Fraction of the shortest lifetime within which hardly a bond breaks."""
 
 PANEL_HEIGHT, LINE_WIDTH = 2.3, 1.2
-"""Height of a panel [inch], and width of a curve over the load in points."""
+"""Height of a panel [inch], and width of a curve over the load [points]."""
 
 MOST_LARGE_MARKERS = 30
-"""Points from which on large ones would hide each other."""
+"""Number of points from which on large markers would hide each other."""
 
 
 def figure(dataset: xarray.Dataset, load: str, variables: Sequence[str] | None = None) -> Figure:
-    """The spectrum, the distribution p(f) at some of its places and the lifetime against the load, or ``variables``
-    over the load.
+    """Draw the spectrum, the distribution p(f) for some runs and the lifetime over the load; or ``variables`` over the
+    load.
     """
     series = (f"density_{load}", "lifetime")
-    held = all(name in dataset and load in dataset[name].dims for name in series)  # what runs were at each load, too
+    held = all(name in dataset and load in dataset[name].dims for name in series)  # series over the load are there
     names = variables or ("", *(series if held else ()))
     with style.panels(6.4, 0.7 + PANEL_HEIGHT * len(names), len(names)) as (plot, grid):
         for ax, name in zip(grid[:, 0], names, strict=True):
@@ -62,9 +62,9 @@ def figure(dataset: xarray.Dataset, load: str, variables: Sequence[str] | None =
 
 
 def _members(dataset: xarray.Dataset, load: str) -> list[tuple[tuple[int, ...], str]]:
-    """Places of some runs, evenly spread over those whose most probable load is inside the range, with their names."""
+    """Return indices and names of some runs, evenly spread over those whose most probable load is positive."""
     modes = dataset[f"{load}_mode"].values
-    # At slow loads most bonds break before there is any load, and their peak at zero would dwarf all others.
+    # At low loading rates most bonds break before the load grows, and their peak at zero would dwarf all others.
     inside = np.argwhere(modes > dataset[load].values[0])
     places = inside if len(inside) else np.argwhere(np.isfinite(modes))
     chosen = places[style.evenly_spread(len(places), MOST_CURVES)]
@@ -74,7 +74,7 @@ def _members(dataset: xarray.Dataset, load: str) -> list[tuple[tuple[int, ...], 
 def _draw_over(
     ax: Axes, dataset: xarray.Dataset, load: str, values: Array, scale: Callable[[Array], Array] = np.asarray
 ) -> None:
-    """Values of some runs over the load, as one curve where theirs coincide on this scale."""
+    """Draw values of some runs over the load; as one curve if they coincide on this scale."""
     members = _members(dataset, load)
     notes = [f"{len(members)} of {dataset['status'].size} runs"] if len(members) < dataset["status"].size else []
     shown = np.array([values[place] for place, _ in members])
@@ -89,14 +89,14 @@ def _draw_over(
 
 
 def _coincide(curves: Array) -> bool:
-    """Whether curves are nowhere farther from each other than their line is wide, where they are known."""
+    """True if curves nowhere differ by more than the width of their line, where they are known."""
     low, high = np.fmin.reduce(curves), np.fmax.reduce(curves)
     apart, range_ = np.fmax.reduce(high - low), np.fmax.reduce(high) - np.fmin.reduce(low)
     return bool(apart * 72 * PANEL_HEIGHT <= LINE_WIDTH * range_)
 
 
 def _draw_series(ax: Axes, dataset: xarray.Dataset, load: str, name: str) -> None:
-    """A variable over the load; the distribution of the load at rupture up to where all bonds are broken."""
+    """Draw a variable over the load; the distribution of the load at rupture is drawn until all bonds are broken."""
     values = dataset[name].values
     if name == f"density_{load}":
         text, size = style.prefixed(unit(dataset[load]), dataset[load].values)
@@ -112,8 +112,8 @@ def _draw_series(ax: Axes, dataset: xarray.Dataset, load: str, name: str) -> Non
 
 
 def _draw_statistics(ax: Axes, dataset: xarray.Dataset, told: Mapping[str, str], size: float) -> None:
-    """Draw the results of each run over what is swept, by name with its label in the legend, in a colour for each or
-    for each value of a second parameter; exact values as lines.
+    """Draw results of each run over the swept parameter, by name with their labels in the legend, in one colour for
+    each or for each value of a second parameter; exact values as lines.
     """
     parameter = dataset[str(dataset["status"].dims[0])]
     style.draw_parameter(ax.xaxis, parameter)
@@ -133,7 +133,7 @@ def _draw_statistics(ax: Axes, dataset: xarray.Dataset, told: Mapping[str, str],
 
 
 def lifetimes(dataset: xarray.Dataset) -> Figure:
-    """The lifetime over what is swept, the exact one as a line, and the survival over time of some of the runs."""
+    """Draw the lifetime over the swept parameter, the exact one as a line, and the survival over time of some runs."""
     with style.panels(6.4, 5.3, 2) as (plot, grid):
         above, below = grid[:, 0]
         _draw_statistics(above, dataset, {"lifetime": "runs"}, 1.0)
@@ -147,12 +147,12 @@ def lifetimes(dataset: xarray.Dataset) -> Figure:
 
 
 def _draw_survival(ax: Axes, dataset: xarray.Dataset) -> None:
-    """Bonds that are left over time, of runs evenly spread over those whose lifetime is known."""
+    """Draw the survival over time of runs evenly spread over those with a known lifetime."""
     known = np.argwhere(np.isfinite(dataset["lifetime"].values))
     chosen = style.evenly_spread(len(known), MOST_CURVES)
     times, survival = dataset["time"].values, dataset["survival"].values
     for place, colour in zip(known[chosen], COLOURS, strict=False):
-        # Where all have broken a run has ended.
+        # A run ends when all bonds have broken: NaN after its end is a survival of zero.
         values = np.nan_to_num(survival[tuple(place)])
         ax.plot(times, values, color=colour, label=style.member_name(dataset, place))
     lifetimes = np.sort(dataset["lifetime"].values[tuple(known.T)])

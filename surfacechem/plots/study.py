@@ -1,4 +1,4 @@
-"""Figures of studies: run time against error over solvers and tolerances, and digits kept in dangerous regimes."""
+"""Figures of studies: run time over error for solvers and tolerances, and correct digits in difficult regimes."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from surfacechem.tolerances import EPS
 
 
 def figure(dataset: xarray.Dataset) -> Figure:
-    """The figure of a study, by the attribute that names it."""
+    """Draw the figure of a study, by the attribute that names its kind."""
     return stability(dataset) if str(dataset.attrs["study"]) == "stability" else precision(dataset)
 
 
 # -- run time against error --------------------------------------------------------------------------------------------
 
-# Variables that name what lies along a dimension; CF allows coordinate variables of numbers only.
+# Variables with the labels along a dimension; CF allows only numbers as coordinate variables.
 LABEL_VARIABLES = {"case": "case_name", "solver": "solver_name", "variable": "variable_name"}
 
 # Variables on x, with their labels.
@@ -45,19 +45,19 @@ NUMBER_DIMENSIONS = {
 # Variables that are read, with their dimensions.
 TEXT_DIMENSIONS = {"status": POINT_DIMENSIONS, **{name: (dimension,) for dimension, name in LABEL_VARIABLES.items()}}
 
-# Errors below this are drawn as this: below the last digit, so that an error of zero has a place on a logarithmic axis
-# of its own.
+# Errors below this are drawn as this: it is below the last digit, so that an error of zero has a distinct place on a
+# logarithmic axis.
 LEAST_ERROR = EPS / 16
 
 BELOW, STEPPING = "below the uncertainty of the reference", "inside the library's own steps"
 
 
 def precision(dataset: xarray.Dataset) -> Figure:
-    """Run time against error, a row for each case.
+    """Draw run time over error, one row per case.
 
-    Bars reach from the least to the median time. Dashed lines are the times inside a library's own steps, without what
-    an adapter adds for events and outputs. Hollow marks in the shaded region are below the uncertainty of the
-    reference; crosses at the right edge are failed solves, at the time that they took to fail.
+    Bars reach from the least to the median time. Dashed lines are the times inside a library's own steps, without those
+    of an adapter for events and outputs. Hollow marks in the shaded region are below the uncertainty of the reference;
+    crosses at the right edge are failed solves, at the time until the failure.
     """
     style.check_variables(dataset, NUMBER_DIMENSIONS, TEXT_DIMENSIONS)
     drawn = [name for name in ERRORS if bool((dataset[name] > 0).any())] or ["energy_error"]
@@ -117,10 +117,10 @@ def _legend(dataset: xarray.Dataset, looks: list[tuple[str, str]]) -> list[Line2
 
 # -- digits kept -------------------------------------------------------------------------------------------------------
 
-# Marks of the outcomes that are not a plain solution.
+# Marks of the outcomes other than a solution.
 OUTCOME_MARKS = {"refused": "R", "failed": "×", "wrong": "!", "sensitive": "~"}
 
-# Colours of the outcomes whose digits say nothing.
+# Colours of the outcomes whose digits are meaningless.
 OUTCOME_COLOURS = {"failed": "0.75", "wrong": "#d62728", "sensitive": "#f0c36d"}
 
 OUTCOMES = {
@@ -135,8 +135,8 @@ DARK_DIGITS = 8.0
 
 
 def stability(dataset: xarray.Dataset) -> Figure:
-    """Digits as a heat map, a row for each regime: those that the problem's condition leaves, then those that each
-    solver keeps; to the right is more extreme.
+    """Draw digits as a heat map, one row per regime: possible digits by the problem's condition, then those of each
+    solver; regimes become more extreme to the right.
     """
     cell = ("regime", "decade", "solver")
     numbers = {"decade": ("decade",), "possible": cell[:2], "digits": cell}

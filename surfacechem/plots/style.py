@@ -31,7 +31,7 @@ from surfacechem.tolerances import RUN_EPS
 
 Array = NDArray[np.float64]
 
-# The palette of Okabe and Ito, which colour-blind readers can tell apart.
+# The palette of Okabe and Ito, whose colours colour-blind readers can distinguish.
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7f7f7f")
 
 STYLE: Any = {
@@ -52,10 +52,10 @@ STYLE: Any = {
     "ytick.labelsize": 8.5,
 }
 
-# A curve that changes by less than this part of its size, 9e-10, is constant: rounding may be all of it.
+# A curve that changes by less than this part of its size, 9e-10, is constant: the change may be rounding.
 FLAT = 1000 * RUN_EPS
 
-# Units that take a prefix, and the largest values between which they need none.
+# Units that take a prefix, and the range of the largest value in which they need none.
 TAKES_PREFIX = ("J", "N", "Pa", "W", "m", "s")
 WITHOUT_PREFIX = (0.1, 1e3)
 
@@ -66,30 +66,30 @@ NOTE_STYLE: Any = {"fontsize": 8, "color": "#555555"}
 """Style of the title of a figure, and of a note above its panels."""
 
 LETTERS_PER_INCH, TITLE_PER_INCH = 16, 9.5
-"""Letters in an inch: of a line of facts above the panels, and of the title and the words below an axis."""
+"""Letters per inch: of the notes above the panels, and of the title and the labels of axes."""
 
 READABLE_SIZES = (1e-2, 1e4)
-"""Sizes of numbers that are read without counting zeros."""
+"""Range of numbers that are readable without counting zeros."""
 
 POWERS = (-4, 5)
-"""Powers of ten of the largest values of an axis, between which its ticks need none."""
+"""Range of the exponent of the largest value of an axis in which its ticks need no power of ten."""
 
 MOST_TICKED_RATIO = 1e5
-"""Largest over smallest value of a logarithmic axis that has ticks inside its decades."""
+"""Largest ratio of the ends of a logarithmic axis that has ticks inside its decades."""
 
 MOST_CURVES = 7
-"""Values of a parameter that are drawn as curves of their own: as many as there are colours."""
+"""Largest number of values of a parameter that are drawn as separate curves: the number of colours."""
 
 
 COLUMN_WIDTH = ContextVar("widest", default=6.4)
 """Width of a figure of one column [inch]."""
 
 PHONE_WIDTH = 4.4
-"""Width [inch] at which letters can be read on a phone."""
+"""Width [inch] of a figure that is readable on a phone."""
 
 
 class Plot(Figure):
-    """A figure that notebooks show by themselves."""
+    """A figure that notebooks display."""
 
     def _repr_png_(self) -> bytes:
         buffer = BytesIO()
@@ -99,7 +99,7 @@ class Plot(Figure):
 
 @contextmanager
 def panels(width: float, height: float, rows: int = 1, columns: int = 1, **sharing: Any) -> Iterator[tuple[Plot, Any]]:
-    """A figure of this size [inch] and its axes, shape (rows, columns), in the style of this package meanwhile."""
+    """Open a figure of this size [inch] with axes of shape (rows, columns), in the style of this package."""
     width = min(width, COLUMN_WIDTH.get()) if columns == 1 else width
     with matplotlib.rc_context(STYLE):
         plot = Plot(figsize=(width, height), layout="constrained")
@@ -109,7 +109,7 @@ def panels(width: float, height: float, rows: int = 1, columns: int = 1, **shari
 
 @contextmanager
 def narrow() -> Iterator[None]:
-    """Draw narrow figures meanwhile, for a page that a phone shows."""
+    """Draw narrow figures inside this context, for a page on a phone."""
     usual = COLUMN_WIDTH.set(PHONE_WIDTH)
     try:
         yield
@@ -118,20 +118,20 @@ def narrow() -> Iterator[None]:
 
 
 def save(plot: Figure, target: Any, kind: str) -> None:
-    """Write a figure as png, svg or pdf; the same figure gives the same bytes."""
+    """Write a figure as png, svg or pdf; equal figures give equal bytes."""
     metadata: Mapping[str, None] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind, {})
     with matplotlib.rc_context(STYLE):
         plot.savefig(target, format=kind, dpi=160, metadata=metadata)
 
 
 def write(plot: Figure, target: Path) -> None:
-    """Save a figure in the format that the suffix of its file names; the file appears whole or not at all."""
+    """Save a figure in the format given by the suffix; the file is written whole or not at all."""
     with replacing(target) as temporary:
         save(plot, temporary, target.suffix.lower().removeprefix("."))
 
 
 def opened(data: xarray.Dataset | str | Path) -> xarray.Dataset:
-    """A dataset, read from its netCDF file if need be; InputError where the file is none."""
+    """Return a dataset, read from its netCDF file if need be; InputError if the file is none."""
     if isinstance(data, xarray.Dataset):
         return data
     path = Path(data)
@@ -144,8 +144,8 @@ def opened(data: xarray.Dataset | str | Path) -> xarray.Dataset:
 
 
 def in_celsius(dataset: xarray.Dataset) -> xarray.Dataset:
-    """The dataset with its temperatures in degrees Celsius."""
-    found = dataset.assign_coords()  # a copy that shares all else
+    """Return the dataset with its temperatures in degrees Celsius."""
+    found = dataset.assign_coords()  # a shallow copy
     for name, values in dataset.variables.items():
         if values.attrs.get("units") == "K":
             found[name] = (values.dims, values.values - float(ZERO_CELSIUS), {**values.attrs, "units": "degC"})
@@ -155,8 +155,8 @@ def in_celsius(dataset: xarray.Dataset) -> xarray.Dataset:
 def check_variables(
     dataset: xarray.Dataset, numbers: Mapping[str, tuple[str, ...]], texts: Mapping[str, tuple[str, ...]] | None = None
 ) -> None:
-    """Raise InputError where variables that are drawn are missing, or not what surfacechem writes: numbers in double
-    precision, or texts, over these dimensions.
+    """Raise InputError if variables to be drawn are missing, or are not numbers in double precision, or texts, over
+    these dimensions, as surfacechem writes them.
     """
     for name, dimensions in {**numbers, **(texts or {})}.items():
         if name not in dataset.variables:
@@ -168,7 +168,7 @@ def check_variables(
 
 
 def evenly_spread(count: int, most: int) -> list[int]:
-    """At most so many of the numbers below a count, evenly spread over all of them.
+    """Return at most ``most`` of the numbers below ``count``, evenly spread.
 
     >>> evenly_spread(100, 4), evenly_spread(3, 7)
     ([0, 33, 66, 99], [0, 1, 2])
@@ -178,7 +178,7 @@ def evenly_spread(count: int, most: int) -> list[int]:
 
 
 def attribute(dataset: xarray.Dataset, name: str) -> float | None:
-    """The value of a global attribute; None where there is none."""
+    """Return the value of a global attribute; None if there is none."""
     value = dataset.attrs.get(name)
     if value is not None and not isinstance(value, (float, int, np.number)):
         raise InputError(f"the attribute '{name}' is no number.", place_of(dataset))
@@ -186,13 +186,13 @@ def attribute(dataset: xarray.Dataset, name: str) -> float | None:
 
 
 def place_of(dataset: xarray.Dataset) -> Place | None:
-    """The file of a dataset."""
+    """Return the file of a dataset."""
     source = dataset.encoding.get("source")
     return Place(str(source)) if source else None
 
 
 def headings(plot: Figure, ax: Axes, dataset: xarray.Dataset, above: float = 0.0, more: str = "") -> None:
-    """Write title, end, error, solver and what ``more`` there is to say, so many points above the axes."""
+    """Write title, end, error, solver and the note ``more``, ``above`` points above the axes."""
     attributes = dataset.attrs
     title = wrap(str(attributes.get("title", "")), int(TITLE_PER_INCH * plot.get_figwidth())) or [""]
     plot.suptitle("\n".join(title), **TITLE_STYLE)
@@ -208,7 +208,7 @@ def headings(plot: Figure, ax: Axes, dataset: xarray.Dataset, above: float = 0.0
         facts.append(f"{dataset.sizes['event']} events between {dataset.sizes['time']} outputs")
     place = ax.get_subplotspec()
     columns = place.get_gridspec().ncols if place else 1
-    # Where there are columns, the middle of a line over the first one has to be within it, or the others make room.
+    # With several columns the middle of a line over the first one has to be within it, else the layout shifts them.
     room = int(LETTERS_PER_INCH * (plot.get_figwidth() - 0.8) * min(1.0, 2 / columns))
     lines = _wrapped([*facts, more], room)
     more_lines = above + 10 * (len(lines) - 1) + 14 * (len(title) - 1)
@@ -217,14 +217,14 @@ def headings(plot: Figure, ax: Axes, dataset: xarray.Dataset, above: float = 0.0
 
 
 WITHOUT_END, STOPPED = ("failed", "refused"), "stopped"
-"""Statuses of runs whose last values are no ends, and of those that ended before the others."""
+"""Statuses of runs whose last values are no final values, and of runs that ended early."""
 
 STATUS_MARKERS = dict(zip((*WITHOUT_END, STOPPED), "xds", strict=True))
-"""Their markers."""
+"""Markers of these statuses."""
 
 
 def _ends(dataset: xarray.Dataset) -> str:
-    """Numbers of runs of a store by the way in which they ended, in words; '' of what is none."""
+    """Describe the numbers of runs of a store by status; '' if the dataset is no store."""
     words = str(dataset["status"].attrs.get("flag_meanings", "")).split() if "status" in dataset else []
     counts = {word: int(np.count_nonzero(dataset["status"].values == code)) for code, word in enumerate(words)}
     counts |= {"missing": dataset["status"].size - sum(counts.values())} if words else {}
@@ -232,16 +232,14 @@ def _ends(dataset: xarray.Dataset) -> str:
 
 
 def has_no_end(dataset: xarray.Dataset, *words: str) -> NDArray[np.bool_]:
-    """Whether each run of a sweep ended in one of these ways, which a store has as codes."""
+    """Return the mask of runs of a sweep with one of these statuses, which a store has as codes."""
     status = dataset["status"]
     codes = str(status.attrs.get("flag_meanings", "")).split()
     return np.isin(status.values, [codes.index(word) if codes else word for word in words])
 
 
 def mark_without_end(axes: Sequence[Axes], dataset: xarray.Dataset) -> None:
-    """Marks on the axis of what is swept where runs have no ends, so that it reaches as far as the sweep, and where
-    some have stopped before the others.
-    """
+    """Mark failed, refused and stopped runs on the axis of the swept parameter, which then spans the whole sweep."""
     x = dataset[str(dataset["status"].dims[0])].values
     for word in STATUS_MARKERS:
         found = has_no_end(dataset, word)
@@ -250,7 +248,7 @@ def mark_without_end(axes: Sequence[Axes], dataset: xarray.Dataset) -> None:
 
 
 def mark(axes: Sequence[Axes], x: NDArray[np.float64], word: str) -> None:
-    """Marks of one of these words on the axis, with a legend, where there are any."""
+    """Mark points with one of these statuses on the axis, with a legend, if there are any."""
     for k, ax in enumerate(axes if len(x) else ()):
         look: Any = {"color": "0.4", "markerfacecolor": "white", "clip_on": False, "zorder": 3}
         across, label = ax.get_xaxis_transform(), "_" if k else word
@@ -259,18 +257,18 @@ def mark(axes: Sequence[Axes], x: NDArray[np.float64], word: str) -> None:
 
 
 MARKER_SIZE, MARKER_SPACING = 3.5, 2
-"""Diameter of the markers of runs in points, and how many of them have to fit between two."""
+"""Diameter of the markers of runs [points], and number of them that has to fit between two."""
 
 
 def marker(ax: Axes, count: int) -> str:
-    """Marker of points so few across a figure that their line would pass for a curve known everywhere; else ''."""
+    """Return a marker for points so sparse that a line alone would suggest a curve known everywhere; else ''."""
     whole = ax.get_figure(root=True)
     assert whole is not None
     return "o" if count * MARKER_SIZE * (1 + MARKER_SPACING) <= 72 * whole.get_figwidth() else ""
 
 
 def _wrapped(facts: Sequence[str], room: int) -> list[str]:
-    """Facts in lines of so many letters; only one that is longer than a line is broken itself."""
+    """Return facts in lines of ``room`` letters; only a fact longer than a line is broken itself."""
     lines: list[str] = []
     for fact in filter(None, facts):
         if lines and len(lines[-1]) + 3 + len(fact) <= room:
@@ -281,14 +279,14 @@ def _wrapped(facts: Sequence[str], room: int) -> list[str]:
 
 
 def legend(ax: Axes) -> None:
-    """The legend beside the axes."""
+    """Draw the legend next to the axes."""
     _, labels = ax.get_legend_handles_labels()
     if labels:
         ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), borderaxespad=0.4, handlelength=1.6)
 
 
 def meaning(values: xarray.DataArray) -> str:
-    """The meaning of a variable: its long name up to where details begin.
+    """Return the meaning of a variable: its long name without details.
 
     >>> meaning(xarray.DataArray(0.0, attrs={"long_name": "state of bonds: 1 is bonded"}))
     'State of bonds'
@@ -298,12 +296,12 @@ def meaning(values: xarray.DataArray) -> str:
 
 
 def variable_words(values: xarray.DataArray) -> str:
-    """The meaning of a variable and its symbol."""
+    """Return the meaning of a variable and its symbol."""
     return f"{meaning(values)} {symbol(str(values.name))}"
 
 
 def quantity_words(values: xarray.DataArray) -> str:
-    """The symbol of a variable; of a time to a value or an event, its words."""
+    """Return the symbol of a variable, or words for a time to a value or an event."""
     name = str(values.name)
     if not name.startswith("time_"):
         return symbol(name)
@@ -312,19 +310,17 @@ def quantity_words(values: xarray.DataArray) -> str:
 
 
 def is_mode(values: xarray.DataArray) -> bool:
-    """True for a mode of the automaton, as the long name of a variable says."""
+    """True for a mode of the automaton, according to the long name of a variable."""
     return str(values.attrs.get("long_name", "")).startswith("mode (")
 
 
 def drawn_as(values: xarray.DataArray) -> Any:
-    """Style of the line of a variable from one output to the next: a step for a mode."""
+    """Return the draw style of a variable between outputs: a step for a mode."""
     return "steps-post" if is_mode(values) else "default"
 
 
 def draw_curve(ax: Axes, dataset: xarray.Dataset, over: str, values: Array, **look: Any) -> None:
-    """Draw values over a variable, dotted from one output to the next where both have the same time: a jump passes no
-    value in between.
-    """
+    """Draw values over a variable, dotted between two outputs at the same time: a jump has no values in between."""
     x, times = dataset[over].values, dataset[dataset[over].dims[0]].values
     jumps = 1 + np.flatnonzero(np.abs(np.diff(times)) <= FLAT * np.abs(times[1:]))
     (line,) = ax.plot(np.insert(x, jumps, np.nan), np.insert(values, jumps, np.nan), **look)
@@ -335,12 +331,12 @@ def draw_curve(ax: Axes, dataset: xarray.Dataset, over: str, values: Array, **lo
 
 
 def unit(values: xarray.DataArray) -> str:
-    """The unit of a variable in the notation of the CF conventions."""
+    """Return the unit of a variable in the notation of the CF conventions."""
     return str(values.attrs.get("units", "1"))
 
 
 def symbol(name: str) -> str:
-    r"""A variable's name in mathematics.
+    r"""Return a variable's name as mathematics.
 
     >>> symbol("T_1"), symbol("phi")
     ('$T_{1}$', '$\\phi$')
@@ -349,7 +345,7 @@ def symbol(name: str) -> str:
 
 
 def unit_text(unit: str) -> str:
-    """A CF unit with its powers raised.
+    """Return a CF unit with superscript powers.
 
     >>> unit_text("W m-2 K-1")
     'W m⁻² K⁻¹'
@@ -358,7 +354,7 @@ def unit_text(unit: str) -> str:
 
 
 def prefixed(unit: str, values: Array) -> tuple[str, float]:
-    """The unit with the prefix that suits the largest of the values, as text, and how large it is.
+    """Return the unit with the prefix that suits the largest of the values, as text, and its size.
 
     >>> prefixed("Pa", np.array([0.0, 3e6])), prefixed("m s-1", np.array([-2e-8])), prefixed("K", np.array([3e4]))
     (('MPa', 1000000.0), ('nm s⁻¹', 1e-09), ('K', 1.0))
@@ -372,12 +368,12 @@ def prefixed(unit: str, values: Array) -> tuple[str, float]:
 
 
 def largest(values: Array) -> float:
-    """The largest magnitude of those that are finite; 0 where none is."""
+    """Return the largest magnitude of the finite values; 0 if there are none."""
     return float(np.max(np.abs(values), initial=0.0, where=np.isfinite(values)))
 
 
 def over_decades(values: Array) -> bool:
-    """True for values of a parameter that want a logarithmic axis: positive, over decades and not evenly spaced.
+    """True for values of a parameter that need a logarithmic axis: positive, over decades and not evenly spaced.
 
     >>> over_decades(np.array([1e-12, 1e-10, 1e-9])), over_decades(np.linspace(1, 1e4, 9))
     (True, False)
@@ -389,8 +385,8 @@ def over_decades(values: Array) -> bool:
 
 
 def draw_parameter(axis: XAxis | YAxis, values: xarray.DataArray, decades: bool | None = None) -> None:
-    """The axis of a swept parameter: its meaning, or its name where that tells more, and unit; over decades where the
-    values want that, or where it is said.
+    """Label the axis of a swept parameter with its meaning, or its name if that says more, and unit; logarithmic if the
+    values need it, or if ``decades`` is True.
     """
     whole, place = axis.axes.get_figure(root=True), axis.axes.get_subplotspec()
     assert whole is not None
@@ -408,13 +404,15 @@ def draw_parameter(axis: XAxis | YAxis, values: xarray.DataArray, decades: bool 
 
 
 def _middle_of_decades(values: Array) -> Array:
-    """The middle of decades, which a prefix has to suit: at their upper end, nobody reads 100 pN/s in nN/s."""
+    """Return the geometric middle of the values, to which a prefix is fitted: at the upper end 100 pN/s would be in
+    nN/s.
+    """
     sizes = np.abs(values[np.isfinite(values) & (values != 0)])
     return np.sqrt(sizes.min(keepdims=True) * sizes.max(keepdims=True)) if len(sizes) else np.zeros(1)
 
 
 def parameter_words(values: xarray.DataArray) -> str:
-    """Words for a swept parameter, with its owner.
+    """Return words for a swept parameter, with its owner.
 
     >>> said = {"long_name": "rate of change (loading.f.ramp.rate)", "units": "N s-1"}
     >>> parameter_words(xarray.DataArray(1e-9, name="rate", attrs=said))
@@ -434,7 +432,7 @@ def parameter_words(values: xarray.DataArray) -> str:
 
 
 def owner(values: xarray.DataArray) -> str:
-    """Owner of a swept parameter, by the path that its long name ends with; '' where its own name tells that.
+    """Return the owner of a swept parameter, by the path at the end of its long name; '' if its own name contains it.
 
     >>> owner(xarray.DataArray(1.0, name="C", attrs={"long_name": "heat capacity per area (bodies.upper.C)"}))
     ' (upper)'
@@ -444,7 +442,7 @@ def owner(values: xarray.DataArray) -> str:
 
 
 def parameter_name(name: str) -> str:
-    r"""The name of a swept parameter: a symbol with its subscript, or words.
+    r"""Return the name of a swept parameter: a symbol with its subscript, or words.
 
     >>> parameter_name("K_0"), parameter_name("mu"), parameter_name("bond_energy"), parameter_name("loading_f")
     ('$K_{0}$', '$\\mu$', 'bond energy', '$f$')
@@ -455,8 +453,7 @@ def parameter_name(name: str) -> str:
 
 
 def value_label(values: xarray.DataArray, place: int) -> str:
-    """A value of a swept parameter with its name and unit, whose prefix is that of all values where these read well in
-    it.
+    """Label a value of a swept parameter with name and unit, in the prefix of all values if it is readable in that.
 
     >>> rates = xarray.DataArray([0, -1e-10, 2e-9], name="rate", attrs={"units": "N s-1"})
     >>> [value_label(rates, k) for k in range(3)]
@@ -470,7 +467,7 @@ def value_label(values: xarray.DataArray, place: int) -> str:
 
 
 def minus(text: str) -> str:
-    """Text whose numbers have a minus, as those at axes, for a hyphen.
+    """Replace hyphens before numbers by minus signs, as at axes.
 
     >>> minus("rate-and-state-aging at -3e-12 N, x = -.5")
     'rate-and-state-aging at −3e−12 N, x = −.5'
@@ -479,12 +476,12 @@ def minus(text: str) -> str:
 
 
 def member_name(dataset: xarray.Dataset, place: Sequence[int]) -> str:
-    """The parameters of a run of a sweep, by its place along each of them."""
+    """Return the parameters of a run of a sweep, by its index along each of them."""
     return ", ".join(value_label(dataset[str(name)], k) for name, k in zip(dataset["status"].dims, place, strict=True))
 
 
 def curves_by_second(dataset: xarray.Dataset, values: Array) -> list[tuple[Array, str]]:
-    """Values of a sweep over the first parameter, a curve for each value of the second, or for some of many."""
+    """Return values of a sweep over the first parameter, one curve per value of the second, or for some of many."""
     if values.ndim == 1:
         return [(values, "")]
     second = dataset[str(dataset["status"].dims[1])]
@@ -494,7 +491,7 @@ def curves_by_second(dataset: xarray.Dataset, values: Array) -> list[tuple[Array
 
 
 class _Powers(LogFormatterSciNotation):
-    """Powers of ten of a unit of some size as plain text, which is set in a tenth of the time of mathematics."""
+    """Powers of ten in a unit of some size as plain text, which is set in a tenth of the time of mathematics."""
 
     def __init__(self, size: float, **settings: Any) -> None:
         super().__init__(**settings)
@@ -506,14 +503,14 @@ class _Powers(LogFormatterSciNotation):
 
 
 class _FewDecades(LogLocator):
-    """Ticks inside decades, where these are few; each tick takes as long to draw as a curve."""
+    """Ticks inside decades, if these are few; each tick takes as long to draw as a curve."""
 
     def tick_values(self, vmin: float, vmax: float) -> Any:
         return super().tick_values(vmin, vmax) if vmax <= MOST_TICKED_RATIO * vmin else np.empty(0)
 
 
 def make_logarithmic(*axes: XAxis | YAxis, size: float = 1.0) -> None:
-    """Make axes logarithmic, with labels of ticks in a unit of this size."""
+    """Make axes logarithmic, with tick labels in a unit of this size."""
     for axis in axes:
         axis.axes.set(**{f"{axis.axis_name}scale": "log"})
         axis.set_major_formatter(_Powers(size))
@@ -526,7 +523,7 @@ def label(axis: XAxis | YAxis, words: str, unit: str, values: Array, between: st
     text, size = prefixed(unit, values)
     power = math.floor(math.log10(largest(values) or 1.0))
     if size == 1.0 and not POWERS[0] <= power < POWERS[1]:
-        # As a factor at the end of the axis it would be read as that of another panel.
+        # As a factor at the end of the axis it could be taken for that of another panel.
         text, size = raised(f"10^{power} {text}").removesuffix(" 1"), 10.0**power
     axis.set_label_text(f"{words}{between}[{text}]")
     if size == 1.0:
@@ -536,12 +533,12 @@ def label(axis: XAxis | YAxis, words: str, unit: str, values: Array, between: st
 
 
 def label_variable(axis: XAxis | YAxis, values: xarray.DataArray) -> None:
-    """A variable along a linear axis: its meaning, symbol and unit."""
+    """Label a linear axis with meaning, symbol and unit of a variable."""
     label(axis, variable_words(values), unit(values), values.values)
 
 
 def varies(values: Array) -> bool:
-    """True for a curve that is more than a constant with rounding."""
+    """True for a curve that is not constant up to rounding."""
     finite = values[np.isfinite(values)]
     if len(finite) < 2:
         return len(finite) == 1

@@ -1,4 +1,4 @@
-"""Figures of sweeps: ruptures under a growing load, many runs, and final values over the swept parameter."""
+"""Figures of sweeps: rupture under a growing load, many runs, and final values over the swept parameter."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from surfacechem.plots import members, rupture, style
 from surfacechem.plots.run import PANELS, Panel, of_kind
 from surfacechem.plots.style import MOST_CURVES, symbol, unit, varies
 
-# Parameters of a grid that are drawn.
+# Largest number of parameters of a grid for curves.
 MOST_DRAWN = 2
 
 
 def figure(dataset: xarray.Dataset, variables: Sequence[str] | None = None, against: str | None = None) -> Figure:
-    """The figure of a sweep: the load at rupture, else final values; each run over ``against`` where that is given."""
+    """Draw a sweep: the load at rupture, else final values; with ``against`` each run over this variable."""
     plan, axes = plan_of(dataset), axes_of(dataset)
     if against:
         return members.trajectories(dataset, axes, variables, against)
@@ -38,7 +38,7 @@ def figure(dataset: xarray.Dataset, variables: Sequence[str] | None = None, agai
 
 
 def _final_values(dataset: xarray.Dataset, axis: str, shown: Sequence[Panel]) -> Figure:
-    """Values at the ends of the runs over the first parameter, in panels."""
+    """Draw values at the ends of the runs over the first parameter, in panels."""
     height = 0.9 + (2.8 if len(shown) == 1 else 1.7) * len(shown)
     with style.panels(6.4, height, len(shown), sharex=True) as (plot, grid):
         for ax, panel in zip(grid[:, 0], shown, strict=True):
@@ -52,7 +52,7 @@ def _final_values(dataset: xarray.Dataset, axis: str, shown: Sequence[Panel]) ->
 
 
 def plan_of(dataset: xarray.Dataset) -> Plan:
-    """Plan of the sweep that a dataset records; InputError where it does not hold its parameters."""
+    """Return the plan of the sweep that a dataset records; InputError if it does not hold its parameters."""
     axes = axes_of(dataset)
     style.check_variables(dataset, {}, {"status": tuple(axes)})
     plan = recorded_plan(dataset.attrs["sweep"])
@@ -63,35 +63,37 @@ def plan_of(dataset: xarray.Dataset) -> Plan:
 
 
 def hides_runs(dataset: xarray.Dataset, axes: Sequence[str]) -> bool:
-    """Whether curves over the first parameter, one for each value of another, do not show the runs."""
+    """True if curves over the first parameter, one for each value of a second one, cannot show the runs."""
     spectral = any(str(name).endswith("_mode") for name in dataset)
     curves = len(axes) == MOST_DRAWN and dataset.sizes[axes[1]] > MOST_CURVES
     return not spectral and (RUN_DIMENSION in axes or len(axes) > MOST_DRAWN or curves)
 
 
 def axes_of(dataset: xarray.Dataset) -> list[str]:
-    """Dimensions of the swept parameters."""
+    """Return the dimensions of the swept parameters."""
     return [str(name) for name in dataset["status"].dims] if "status" in dataset else []
 
 
 def _numbers(dataset: xarray.Dataset) -> list[str]:
-    """Names of the numbers that curves over what is swept show; coverages also have names of their own."""
+    """Return the names of variables that curves over the swept parameter show; coverages also have their own names."""
     lists = {"event", "species"}
     return [name for name in members.number_names(dataset, axes_of(dataset)) if lists.isdisjoint(dataset[name].dims)]
 
 
 def panels(dataset: xarray.Dataset, variables: Sequence[str] | None) -> list[Panel]:
-    """Panels of the variables, else of the most probable load at rupture, else of what depends on the sweep."""
+    """Return panels of the variables, else of the most probable load at rupture, else of variables that depend on the
+    sweep.
+    """
     known, load = _numbers(dataset), rupture.load_of(dataset)
     refuse_unknown(variables or (), known, "no variable '{}' in the sweep", style.place_of(dataset))
     names = [[name] for name in dict.fromkeys(variables or ())] or ([[f"{load}_mode"]] if load else _dependent(dataset))
-    # A store may have numbers of each run alone.
+    # A store may have only one number per run.
     names = names or [[name] for name in members.varying_numbers(dataset, axes_of(dataset), known)]
     return [Panel("", unit(dataset[group[0]]), group) for group in names]
 
 
 def _dependent(dataset: xarray.Dataset) -> list[list[str]]:
-    """Temperatures and bonds whose final values depend on what is swept; each alone where that has several axes."""
+    """Return temperatures and bonds whose final values depend on the sweep; with several parameters one per panel."""
     axes, found = axes_of(dataset), []
     along = [name for name in _numbers(dataset) if dataset[name].ndim > len(axes)]
     for _, *kind in PANELS[:2]:
@@ -101,12 +103,12 @@ def _dependent(dataset: xarray.Dataset) -> list[list[str]]:
 
 
 def _draw_final(ax: Axes, dataset: xarray.Dataset, names: Sequence[str]) -> None:
-    """Values at the end of each run."""
+    """Draw the values at the end of each run."""
     x = dataset[axes_of(dataset)[0]].values
     ends = {name: members.final_values(dataset, name) for name in names}
     at_end = any(dataset[name].ndim > len(axes_of(dataset)) for name in names)
     for name, end in ends.items():
-        own = symbol(name) if at_end or len(names) > 1 else ""  # what a number of each run is its axis says
+        own = symbol(name) if at_end or len(names) > 1 else ""  # the axis names a single number per run
         for values, label in style.curves_by_second(dataset, end):
             words = label or own if len(names) == 1 else f"{own} {label}".strip()
             look: Any = {"linestyle": "none"} if style.is_mode(dataset[name]) else {}
