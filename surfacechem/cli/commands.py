@@ -1,4 +1,4 @@
-"""Parts that the commands share: options, exit codes, errors that are one message, runs that can be interrupted."""
+"""Common parts of the commands: options, exit codes, errors as one message, and interruptible runs."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ if TYPE_CHECKING:
 R = TypeVar("R")
 
 RARE_COLLECTION = (100_000, 20, 20)
-"""Thresholds of Python's garbage collection: objects made between two, and how many of those between larger ones."""
+"""Thresholds of Python's garbage collection: new objects between two of them, and ratios for older generations."""
 
-# Exit code of each way in which a run ends.
+# Exit code of each status of a run.
 STATUS_CODES = {"finished": 0, "stopped": 3, "failed": 4}
 
 DIFFERENT, BAD_INPUT, NOT_WRITTEN, SIGNALLED = 1, 2, 5, 128
@@ -46,7 +46,7 @@ CODES = {
 
 
 def exit_codes(own: Mapping[int, str]) -> str:
-    """The exit codes of a command for its help: its own, and those that every command has."""
+    """Return the exit codes of a command for its help: its own, and those of every command."""
     every = {code: CODES[code] for code in (BAD_INPUT, NOT_WRITTEN, SIGNALLED + 2)} | dict(own)
     return "\b\nExit codes:\n" + "".join(f"  {code:<4} {every[code]}\n" for code in sorted(every))
 
@@ -58,11 +58,11 @@ STABILITY_CODES = exit_codes({0: "finished; what failed or is wrong is in the re
 
 
 class SignalledError(BaseException):
-    """A signal asks the process to end."""
+    """A signal has asked the process to end."""
 
 
 class _TrialEndError(Exception):
-    """Ends the trial of an output."""
+    """End of the trial of an output."""
 
 
 def _raise_signal(number: int, _frame: object) -> None:
@@ -71,12 +71,12 @@ def _raise_signal(number: int, _frame: object) -> None:
 
 @contextmanager
 def _signals_raised() -> Iterator[None]:
-    """Raise signals that end the process as exceptions meanwhile, so that files that are not finished are removed.
+    """Raise signals that end the process as exceptions inside this context, so that unfinished files are removed.
 
-    What the process was told to ignore, as by nohup, it ignores; a handler that is not Python's stays, since it could
-    not be put back.
+    Signals that the process ignores, by nohup for instance, stay ignored; a handler that is not Python's stays, since
+    it could not be restored.
     """
-    # Python handles signals in its main thread only.
+    # Python handles signals only in its main thread.
     in_main = threading.current_thread() is threading.main_thread()
     wanted = [getattr(signal, name, None) for name in ("SIGINT", "SIGTERM", "SIGHUP") if in_main]
     usual = {number: signal.getsignal(number) for number in wanted if number}
@@ -91,15 +91,15 @@ def _signals_raised() -> Iterator[None]:
 
 
 def end_by_signal(error: SignalledError, kept: str) -> NoReturn:
-    """End the process as a signal asks, with what is left of the work."""
+    """End the process as a signal asks, with a message on what is kept of the work."""
     (number,) = error.args
     word = "interrupted" if number == signal.SIGINT else f"ended by {signal.Signals(number).name}"
     _print_error(f"{word}; {kept}")
-    os._exit(SIGNALLED + number)  # at once: compiled code may run on in another thread, and would be waited for
+    os._exit(SIGNALLED + number)  # at once, without waiting for compiled code that runs in another thread
 
 
 def _print_error(message: object) -> None:
-    """Print a line on stderr; where nothing can be written there the exit code says it."""
+    """Print a line on stderr; if that fails the exit code is all there is."""
     with suppress(OSError):
         typer.echo(f"surfacechem: {message}", err=True)
 
@@ -108,13 +108,13 @@ class Commands(TyperGroup):
     """Commands whose errors are one message on stderr and an exit code."""
 
     def list_commands(self, ctx: Any) -> list[str]:
-        """Names of the commands, in the order in which one uses them."""
+        """Return the names of the commands in the usual order of use."""
         names = super().list_commands(ctx)
         return sorted(names, key=lambda name: ORDER.index(name) if name in ORDER else len(ORDER))
 
     def main(self, *arguments: Any, **options: Any) -> Any:
-        """Run the command line, with fewer collections of garbage: at the usual rate they are a tenth of a command,
-        for what imports make is never garbage.
+        """Run the command line, with rarer garbage collections: at the usual rate they take a tenth of a command,
+        although imports create no garbage.
         """
         usual = gc.get_threshold()
         gc.set_threshold(*RARE_COLLECTION)
@@ -134,9 +134,9 @@ class Commands(TyperGroup):
         except SignalledError as error:
             end_by_signal(error, "nothing was written.")
         except BrokenPipeError:
-            raise  # the reader has enough
+            raise  # the reader of the pipe has closed it
         except OSError as error:
-            # Every file is written by what says so itself: this is the standard output, which Python would try again.
+            # Errors of files have their own messages: this one is of the standard output, which Python would try again.
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             what = f"{error.filename}: cannot be used" if error.filename else "standard output: cannot be written"
             _print_error(f"{what}: {error.strerror or error}.")
@@ -144,7 +144,7 @@ class Commands(TyperGroup):
 
 
 def written_to(text: str) -> Any:
-    """The option that names the file of a command's output."""
+    """Return the option for the file of a command's output."""
     return Option("--output", "-o", help=text)
 
 
@@ -152,11 +152,11 @@ ORDER = (
     *("new", "cases", "laws", "check", "run", "plot", "report", "sweep", "evaluate", "equations", "mechanism"),
     *("steady", "rerun", "precision", "stability", "figures", "schema"),
 )
-"""Commands in the order in which one uses them; others follow."""
+"""Commands in the usual order of use; others follow."""
 
 
 def case_names(incomplete: str) -> list[str]:
-    """Shipped cases and case files that begin so, for the completion of shells."""
+    """Return shipped cases and case files with this beginning, for shell completion."""
     from surfacechem.format import names
 
     files = [str(path) for path in Path().glob("*.yaml")]
@@ -164,14 +164,14 @@ def case_names(incomplete: str) -> list[str]:
 
 
 def law_names(incomplete: str) -> list[str]:
-    """Laws that begin so."""
+    """Return laws with this beginning."""
     from surfacechem.laws import FAMILIES, laws
 
     return [name for contract in FAMILIES for name in laws(contract) if name.startswith(incomplete)]
 
 
 def paths(ctx: typer.Context, incomplete: str) -> list[str]:
-    """Paths of the parameters and initial values of the case on the line, for what is changed."""
+    """Return the paths of parameters and initial values of the given case, for shell completion of changes."""
     from surfacechem.runs.simulation import load
 
     with suppress(SurfacechemError):
@@ -205,14 +205,16 @@ Verbose = Annotated[
 
 
 def load_case(case: str, changes: Sequence[str] | None) -> Simulation:
-    """A case with its changes; what runs cases is imported when this is called."""
+    """Load a case with its changes; the modules for runs are imported only here."""
     from surfacechem.runs.simulation import load
 
     return load(case, changes or ())
 
 
 def run_settings(simulation: Simulation, solver: str | None, rtol: float | None, accuracy: float | None = None) -> Run:
-    """Run settings of the case, changed by the command line; a tolerance given there replaces an automatic choice."""
+    """Return the run settings of the case with the options of the command line; a tolerance replaces an automatic
+    choice.
+    """
     from surfacechem.results.accuracy import check_tolerance, first_tolerance
     from surfacechem.solve import AUTO, names
     from surfacechem.solve.run import OWN
@@ -230,13 +232,13 @@ def run_settings(simulation: Simulation, solver: str | None, rtol: float | None,
     run = replace(run, solver=solver or run.solver)
     if rtol is None:
         return run
-    # The choice of a solver needs an accuracy to choose for.
+    # The automatic choice of a solver needs an accuracy.
     return replace(run, solver=OWN if run.solver == AUTO else run.solver, rtol=rtol, accuracy=None)
 
 
 def wait_for(work: Callable[[], R], tick: Callable[[], None] = lambda: None) -> R:
-    """Do the work in another thread, as compiled code does not look at signals: an interrupt is answered meanwhile, and
-    each half a second ``tick`` is called.
+    """Do the work in another thread and call ``tick`` every half second: compiled code does not check signals, so that
+    only the main thread can answer an interrupt.
 
     >>> wait_for(lambda: 42)
     42
@@ -247,7 +249,7 @@ def wait_for(work: Callable[[], R], tick: Callable[[], None] = lambda: None) -> 
     try:
         future = pool.submit(work)
         while not future.done():
-            wait([future], 0.5)  # without a limit, no signal would be answered in between
+            wait([future], 0.5)  # without a timeout signals would not be answered
             tick()
         return future.result()
     finally:
@@ -255,16 +257,17 @@ def wait_for(work: Callable[[], R], tick: Callable[[], None] = lambda: None) -> 
 
 
 def solve(run: Callable[[], R], talk: bool | None, brief: bool = False, waits: bool = False) -> R:
-    """The solution, its dataset's columns and audit included, so that what follows only writes; ``talk`` as the command
-    line says, ``brief`` where the stepper is called a few times only, ``waits`` where more than it has to be compiled.
-    A terminal shows a bar after a while.
+    """Return the solution with its columns and audit computed, so that only writing is left.
+
+    ``talk`` is the option of the command line, ``brief`` True if the stepper is called only a few times, ``waits`` True
+    if more than the stepper has to be compiled. A terminal shows a progress bar after a while.
     """
     from surfacechem.cli.terminal import progress_bar
     from surfacechem.solve.radau import stepper
 
     def whole() -> R:
         found = run()
-        getattr(found, "columns", None)  # as they are asked for the first time
+        getattr(found, "columns", None)  # computed on first access
         return found
 
     if brief:
@@ -277,33 +280,33 @@ def solve(run: Callable[[], R], talk: bool | None, brief: bool = False, waits: b
 
 
 def refuse_unwritable(*targets: Path, read: Sequence[str | Path] = ()) -> None:
-    """Raise InputError where a file could not be written, or is one of those that are read, so that nothing is computed
-    in vain; leaves no trace.
+    """Raise InputError if a file cannot be written, or is one of the files that are read, before anything is computed;
+    leaves no trace.
     """
     from surfacechem.results.netcdf import replacing
 
     for target in targets:
         if target.exists() and any(Path(source).exists() and target.samefile(source) for source in read):
             raise InputError("is what is read; give another file.", Place(str(target)))
-        # As a dataset is written, but for its content.
+        # The same steps as in writing a dataset, without content.
         with suppress(_TrialEndError), replacing(target):
             raise _TrialEndError
 
 
 def check_picture(target: Path) -> None:
-    """Raise InputError where a file name asks for no kind of picture, or the file could not be written."""
+    """Raise InputError if the suffix is no format of pictures, or if the file cannot be written."""
     kind = target.suffix.lower().removeprefix(".")
     refuse_unknown([kind], ("png", "svg", "pdf"), "no format '{}'", Place(path=str(target)))
     refuse_unwritable(target)
 
 
 def split_list(text: str | None) -> list[str] | None:
-    """Words with commas between; None where nothing is given."""
+    """Split words at commas; None stays None."""
     return None if text is None else [part.strip() for part in text.split(",") if part.strip()]
 
 
 def leave_with(status: str, reason: str = "") -> None:
-    """End with the exit code of a status, which a reason explains on stderr."""
+    """Exit with the code of a status; a reason is printed on stderr."""
     if code := STATUS_CODES[status]:
         if reason:
             _print_error(f"{status}: {reason}")

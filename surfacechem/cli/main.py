@@ -1,4 +1,4 @@
-"""The command line. Every command imports what it needs when it is called."""
+"""The command line. Every command imports its modules when it is called."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ def run(
     target = output or Path(f"{simulation.case.name}.nc")
     refuse_unwritable(dataset_path(target), read=[simulation.case.file])
     solution = solve(lambda: simulation.run(run=settings, error=error), talk, brief=True)
-    solution.write(target)  # also of a run that failed: what it reached tells why
+    solution.write(target)  # also if the run failed: its partial result helps to find the reason
     if talk is not False:
         show(run_summary(solution, target, details=talk is True))
     for warning in solution.warnings if talk is False else ():
@@ -249,7 +249,7 @@ def equations(
 
     read = cases.load(case, changes or ())
     title = read.title
-    # Thousands of equations of cells read alike.
+    # The equations of thousands of cells have the same form.
     if spatial.is_divided(read.scene):
         read, title = replace(read, scene=spatial.few(read.scene)), f"{title}, written out for {spatial.FEW} cells"
     if form == "text":
@@ -406,7 +406,7 @@ def plot(
     """Plot runs over time or a variable, or sweeps over parameters."""
     from surfacechem.results.netcdf import RUN_SUFFIXES, begin_reading
 
-    # By its suffix, as a dataset that is missing must not be taken for the name of a case.
+    # By the suffix: a missing dataset must not be taken for the name of a case.
     cases = [source for source in sources if not source.rstrip("/").endswith((*RUN_SUFFIXES, ".zarr"))]
     if changes and not cases:
         raise InputError("a dataset is plotted as it is; give a case to change values of.", Place(path="--set"))
@@ -570,7 +570,7 @@ def stability(
 
 
 def _run_study(study: Callable[..., Study], settings: Mapping[str, Any], target: Path, talk: bool | None) -> None:
-    """Run a study, which takes minutes, with those settings that are given; write and print it."""
+    """Run a study, which takes minutes, with the given settings; write and print it."""
     from surfacechem.studies.report import targets
 
     files = targets(target).values()
@@ -585,7 +585,7 @@ def _run_study(study: Callable[..., Study], settings: Mapping[str, Any], target:
 
 
 def _tolerances(text: str) -> list[float]:
-    """Numbers with commas between, or all decades of a range.
+    """Parse numbers separated by commas, or all decades of a range.
 
     >>> _tolerances("1e-4..1e-6"), _tolerances("1e-3, 1e-7")
     ([0.0001, 1e-05, 1e-06], [0.001, 1e-07])
@@ -603,5 +603,5 @@ def _tolerances(text: str) -> list[float]:
     if not 0 < last <= first:
         raise InputError(f"'{text}' is no range of tolerances, for example 1e-4..1e-12.", place)
     count = min(round(math.log10(first / last)), MOST_DECADES)
-    # Twelve digits, so that a decade is 1e-5 and not 9.999999999999999e-06.
+    # Rounded to twelve digits, so that a decade is 1e-5 and not 9.999999999999999e-06.
     return [float(f"{first * 10.0**-k:.12g}") for k in range(count + 1)]

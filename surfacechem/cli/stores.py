@@ -1,4 +1,4 @@
-"""Sweeps into a store on the command line: progress, ends of runs, and resuming after an interrupt."""
+"""Sweeps into a store from the command line: progress, ends of runs, and resuming after an interrupt."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ log = logging.getLogger(__name__)
 
 
 def goes_to_store(output: Path | None, options: dict[str, object]) -> bool:
-    """Whether a sweep goes into a store; InputError at an option that belongs to one only."""
+    """True if a sweep goes into a store; InputError for an option that is only for stores."""
     if output is not None and output.suffix == ".zarr":
         return True
     for name, value in options.items():
@@ -46,8 +46,8 @@ def write(
     cluster: str | None,
     only: str | None,
 ) -> None:
-    """Run a sweep into a store; an interrupt says how to go on. ``only`` is how the runs of a store ended that are run
-    again, beside it.
+    """Run a sweep into a store; after an interrupt the message says how to resume. With ``only`` the runs of a store
+    with this status are repeated, into another store next to it.
     """
     from surfacechem.runs.summaries import store_summary
 
@@ -59,7 +59,7 @@ def write(
             store = solve(lambda: stream.run(None, client, progress()), talk, brief=True, waits=stream.chunks.waits)
             errors = solve(stream.check, talk)
         except SignalledError as error:
-            # A chunk without its mark does not count.
+            # A chunk without its mark counts as missing.
             end_by_signal(error, "what is stored is kept: go on with --resume.")
     status, sheet = store_summary(stream, store, errors)
     if talk is not False:
@@ -68,8 +68,8 @@ def write(
 
 
 def plan_of_runs(source: Path, status: str, goes_on: bool) -> tuple[Plan, Path]:
-    """The plan of the runs of a store that ended in one way, and the store beside it that they go into: a new one, or
-    the last where that goes on.
+    """Return the plan of the runs of a store with this status, and the path of the store next to it for them: a new
+    one, or the last one if ``goes_on``.
     """
     from surfacechem.runs.streaming import failed_runs
 
@@ -81,7 +81,7 @@ def plan_of_runs(source: Path, status: str, goes_on: bool) -> tuple[Plan, Path]:
 
 
 def write_file(simulation: Simulation, plan: Plan, target: Path, talk: bool | None) -> None:
-    """Run a sweep into a store that becomes one file, netCDF or a table, when it is whole."""
+    """Run a sweep into a temporary store, and convert the complete store to one file, netCDF or a table."""
     from surfacechem.results.netcdf import save_kept
     from surfacechem.runs.summaries import store_summary
 
@@ -97,7 +97,7 @@ def write_file(simulation: Simulation, plan: Plan, target: Path, talk: bool | No
 
 
 def part_of(text: str | None) -> tuple[int, int]:
-    """Number of a part, and number of parts.
+    """Parse the number of a part, and the number of parts.
 
     >>> part_of("3/16"), part_of(None)
     ((3, 16), (1, 1))
@@ -112,7 +112,7 @@ def part_of(text: str | None) -> tuple[int, int]:
 
 @contextmanager
 def client_at(address: str | None) -> Iterator[Any]:
-    """The client of a scheduler; None without one."""
+    """Open the client of a scheduler; None without an address."""
     if address is None:
         yield None
         return
@@ -131,11 +131,11 @@ def client_at(address: str | None) -> Iterator[Any]:
 
 
 def progress() -> Callable[[Progress], None]:
-    """Callback that logs the progress of a sweep with its speed."""
+    """Return a callback that logs the progress of a sweep with its speed."""
     begun = time.monotonic()
 
     def told(now: Progress) -> None:
-        # What was there before says nothing about the speed now.
+        # Runs that were stored before do not count for the speed.
         rate = (now.done - now.resumed) / max(time.monotonic() - begun, BAR_DELAY)
         log.info("%.0f runs/s, %d failed", rate, now.failed, extra={"done": now.done, "total": now.runs})
 

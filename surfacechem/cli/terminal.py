@@ -1,6 +1,6 @@
-"""Terminal output: sheets with colours and columns that fit it, and bars of what takes longer than two seconds.
+"""Terminal output: sheets with colours and fitting columns, and progress bars after two seconds.
 
-Files and pipes get plain text and no bars. Rich is imported where a terminal shows something, never else.
+Files and pipes get plain text and no bars. Rich is imported only when a terminal shows something.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ if TYPE_CHECKING:
     from surfacechem.studies.report import Page, PageTable
 
 BAR_DELAY = 2.0
-"""Seconds after which a bar tells how far a command is."""
+"""Seconds after which a progress bar appears."""
 
 COLOURS = {"finished": "green", "stopped": "yellow", "failed": "red", "warning": "yellow", "refused": "yellow"}
 """Colours of labels; others are cyan."""
 
 NAME = 40
-"""Number of letters from which on the first cell of a row is no name, and may be broken."""
+"""Number of letters from which on the first cell of a row may be broken, as it is no name."""
 
 ALARM = "ENTROPY DESTROYED"
 
@@ -37,7 +37,7 @@ LOGGER = "surfacechem"
 
 
 def is_terminal(stream: TextIO) -> bool:
-    """Whether a stream is a terminal that can do more than letters."""
+    """True if a stream is a terminal with more than plain text."""
     return stream.isatty() and os.environ.get("TERM") != "dumb"
 
 
@@ -54,7 +54,7 @@ def show(*sheets: Sheet) -> None:
 
 
 def show_page(page: Page) -> None:
-    """Print a report: on a terminal its tables in columns that fit it, with what failed in red."""
+    """Print a report; on a terminal its tables have fitting columns, and failures are red."""
     if not is_terminal(sys.stdout):
         typer.echo(page.text())
         return
@@ -85,7 +85,7 @@ def _table(table: PageTable) -> RenderableType:
 
 
 def _rendered(sheet: Sheet) -> Iterator[RenderableType]:
-    """A sheet for rich: texts are wrapped beside their labels."""
+    """Yield the parts of a sheet for rich; texts are wrapped next to their labels."""
     from rich.text import Text
 
     if sheet.title:
@@ -105,7 +105,7 @@ def _rendered(sheet: Sheet) -> Iterator[RenderableType]:
 
 
 def _grid(rows: Iterable[Sequence[Text]], indent: int) -> RenderableType:
-    """Rows in columns, so many letters from the left."""
+    """Return rows in columns, indented by so many letters."""
     from rich.padding import Padding
     from rich.table import Table
 
@@ -116,8 +116,8 @@ def _grid(rows: Iterable[Sequence[Text]], indent: int) -> RenderableType:
 
 
 class ProgressBar(logging.Handler):
-    """Progress bar of a command, from the numbers ``done`` and ``total`` of messages that the package logs: on a
-    terminal, once it has taken some time; nothing elsewhere.
+    """Progress bar of a command, from the numbers ``done`` and ``total`` of the package's log messages; only on a
+    terminal, and after some time.
     """
 
     def __init__(self, talk: bool | None) -> None:
@@ -128,7 +128,7 @@ class ProgressBar(logging.Handler):
         self.shown: Any = None
 
     def tell(self, words: str, done: int = 0, total: int = 0) -> None:
-        """Set what is being done, and how much of it is; nothing is drawn before :meth:`tick`."""
+        """Set the current activity and its progress; nothing is drawn before :meth:`tick`."""
         self.words, self.done, self.total = words, done, total
         if self.verbose:
             counted = f" ({done}/{total})" if total else ""
@@ -138,10 +138,10 @@ class ProgressBar(logging.Handler):
         self.tell(record.getMessage(), getattr(record, "done", 0), getattr(record, "total", 0))
 
     def tick(self) -> None:
-        """Draw what was told last."""
+        """Draw the last progress."""
         if not self.wanted or time.monotonic() - self.begun < BAR_DELAY:
             return
-        # Rich is imported now, so that what is over sooner does not wait for it.
+        # Rich is imported only now, so that brief commands do not wait for it.
         if self.shown is None:
             from rich.console import Console
             from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
@@ -156,7 +156,7 @@ class ProgressBar(logging.Handler):
         self.shown.update(task, description=self.words, completed=self.done, total=self.total or None, counted=counted)
 
     def close(self) -> None:
-        """Remove it."""
+        """Remove the bar."""
         if self.shown is not None:
             self.shown.stop()
             self.shown = None
@@ -165,13 +165,13 @@ class ProgressBar(logging.Handler):
 
 @contextmanager
 def progress_bar(talk: bool | None) -> Iterator[ProgressBar]:
-    """A bar that shows what the package logs meanwhile; each message with its time as a line on stderr where ``talk``
-    is true, and nothing where it is false.
+    """Show log messages of the package as a progress bar inside this context; with ``talk`` True as lines with times on
+    stderr, with False not at all.
     """
     bar, logger = ProgressBar(talk), logging.getLogger(LOGGER)
     level = logger.level
     logger.addHandler(bar)
-    # Where nobody listens messages are not even put together.
+    # Without a listener messages are not even formatted.
     if bar.wanted or bar.verbose:
         logger.setLevel(logging.INFO)
     try:
