@@ -32,7 +32,7 @@ Overrides = str | Sequence[str] | Mapping[str, object]
 
 @dataclass(frozen=True)
 class Case:
-    """A case as read; ``text`` (with ``mechanism_text``) is all that is needed to read it again."""
+    """A case as read; ``text`` (with ``mechanism_text``) is sufficient to read it again."""
 
     name: str
     title: str
@@ -40,7 +40,7 @@ class Case:
     description: str
     scene: Scene
     own_run: Run | None
-    """Run settings; None for a case that is only evaluated and gives none."""
+    """Run settings; None if the case gives none, since it is only evaluated."""
     reference: ExactSolution | None
     sweep: SweepSection | None
     text: str
@@ -48,11 +48,11 @@ class Case:
     places: Mapping[str, Place]
     file: str
     unused: str = ""
-    """Reason why the exact solution that the case names does not count after a change; empty where it does."""
+    """Reason why the exact solution of the case does not apply after a change; empty if it does."""
 
     @property
     def run(self) -> Run:
-        """Run settings; InputError where the case gives none."""
+        """Run settings; InputError if the case gives none."""
         if self.own_run is None:
             self.refuse_nothing()
             message = "the case needs `run`: times, accuracy, solver, for example `run: {until: 5 s}`."
@@ -64,21 +64,21 @@ class Case:
         return assemble(with_surrogates(self.scene))
 
     def refuse_nothing(self) -> None:
-        """Raise InputError where the scene has no state; no integral is made for it."""
+        """Raise InputError if the scene has no state, without computing integrals over surfaces."""
         try:
             refuse_static(self._surrogate_system, self.file or "CASE")
         except InputError as error:
             raise self.located(error) from None
 
     def system(self) -> System:
-        """The assembled scene; errors have their place in the case file."""
+        """Assemble the scene; errors get their place in the case file."""
         try:
             return assemble(self.scene)
         except InputError as error:
             raise self.located(error) from None
 
     def located(self, error: InputError) -> InputError:
-        """The error with file and line of the path that it carries, or of the innermost section around it."""
+        """Return the error with file and line of its path, or of the innermost section around that."""
         if error.place is not None and error.place.file:
             return error
         path = error.place.path if error.place is not None else ""
@@ -94,8 +94,8 @@ Source = str | Path | Mapping[str, object] | TextIOBase | BufferedIOBase
 def load(source: Source, overrides: Overrides = ()) -> Case:
     """Read a case from a file, a text of several lines, a mapping or an open file, or a shipped one by its name.
 
-    ``overrides`` are a text "path=value", several of them, or a mapping from path to value, put into the document
-    before it is read.
+    ``overrides`` are a text "path=value", several of them, or a mapping from path to value; they are applied to the
+    document before it is read.
     """
     if isinstance(source, Mapping):
         return load_text(document.dump(document.from_plain(dict(source), Place())), overrides=overrides)
@@ -123,9 +123,9 @@ def load_text(
     file: str = "",
     allow_code: bool = False,
 ) -> Case:
-    """Read a case from its text; mechanisms are looked for in ``base`` unless their text is given.
+    """Read a case from its text; mechanisms are searched for in ``base`` unless their text is given.
 
-    With ``allow_code`` laws whose source stands in the text, as in that of a dataset, are run.
+    With ``allow_code`` the source of laws in the text, as in that of a dataset, is executed.
     """
     tree = document.parse(text, file or f"{name}.yaml")
     unused = ""
@@ -133,7 +133,7 @@ def load_text(
         before, tree = tree, changes.apply(tree, overrides)
         tree, unused = _without_stale_reference(before, tree)
         text = document.dump(tree)
-    # With the text of its tables a case can be read again without their files.
+    # With the contents of its files in the text, a case can be read again without them.
     whole = csvtable.embedded(tree, str(base))
     if isinstance(tree.value, dict) and "surface" in tree.value:
         whole = height_files.embedded(whole, str(base))
@@ -164,7 +164,7 @@ def load_text(
 
 
 def _without_stale_reference(before: Tree, after: Tree) -> tuple[Tree, str]:
-    """The document without an exact solution whose parameters were given for another scene, and why."""
+    """Return the document without an exact solution whose parameters were given for another scene, and the reason."""
     old, new = ({key: child.plain() for key, child in (tree.value or {}).items()} for tree in (before, after))
     scene = {*old, *new} - {"title", "source", "description", "run", "sweep", "reference"}
     if all(old.get(key) == new.get(key) for key in scene) or old.get("reference") != new.get("reference"):
@@ -176,19 +176,19 @@ def _without_stale_reference(before: Tree, after: Tree) -> tuple[Tree, str]:
 
 
 def names() -> list[str]:
-    """Names of the cases that come with surfacechem."""
+    """Return the names of the cases that come with surfacechem."""
     return sorted(path.stem for path in shipped.cases().glob("*.yaml"))
 
 
 def _find(name: str) -> tuple[Path, str]:
-    """The file of a case, and how messages call it."""
+    """Return the file of a case, and its name in messages."""
     path = Path(name)
     if document.is_file(path):
         return path, name
     if name in names():
         return shipped.cases() / f"{name}.yaml", f"cases/{name}.yaml"
     beside: list[str] = []
-    with suppress(OSError, ValueError):  # no name is too odd to be looked for
+    with suppress(OSError, ValueError):  # a name may be invalid as a path
         if path.exists():
             return path, name
         if path.is_symlink():

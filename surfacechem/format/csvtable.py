@@ -1,4 +1,4 @@
-"""Histories from files: a table whose columns have names and units, read as strictly as a case."""
+"""Histories from files: tables whose columns have names and units, checked as strictly as a case."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ EXAMPLE = '"t [s], w_n [um]"'
 
 
 def embedded(tree: Tree, base: str) -> Tree:
-    """The tree with the text of every file that a table names, so that it can be read again without the file."""
+    """Insert the text of every table file into the tree, so that it can be read again without the file."""
     if isinstance(tree.value, list):
         return replace(tree, value=[embedded(child, base) for child in tree.value])
     if not isinstance(tree.value, dict):
@@ -41,9 +41,10 @@ def embedded(tree: Tree, base: str) -> Tree:
 
 
 def table(tree: Tree, unit: str) -> Table | None:
-    """The history of a column; times are in the column ``t``, values in the one named, or after the variable.
+    """Return the history of a column: times are in column ``t``, values in the named one, by default that of the
+    variable.
 
-    None where the tree is no table that is given as text.
+    None if the tree is no table in text form.
     """
     given = tree.value.get("table") if isinstance(tree.value, dict) else None
     if given is None or not isinstance(given.value, dict) or "csv" not in given.value:
@@ -60,11 +61,11 @@ def table(tree: Tree, unit: str) -> Table | None:
 
 
 class CSVText:
-    """A table as text: a heading of names and units, and rows; lines that are empty or comments do not count.
+    """A table as text: a heading of names and units, and rows; empty lines and comments are skipped.
 
-    A name without a unit is that of a dimensionless quantity. Messages quote a heading only where the user has named
-    the file, since a case may come from anywhere. Where another column may be named in place of one (``renamed``),
-    they say so.
+    A name without a unit belongs to a dimensionless quantity. Messages quote a heading only if the user has named the
+    file (``quoted``), since a case may come from anywhere. With ``renamed`` they mention that another column may be
+    chosen.
     """
 
     def __init__(self, content: Tree, quoted: bool = False, renamed: bool = False) -> None:
@@ -83,7 +84,7 @@ class CSVText:
                 raise self.error(line, f"{len(row)} values for {len(self.columns)} columns.")
 
     def _columns(self, quoted: bool) -> list[tuple[str, str]]:
-        """Names and units of the columns; a unit may be empty."""
+        """Return names and units of the columns; a unit may be empty."""
         line, cells = self.heading
         found = [COLUMN_HEADING.fullmatch(cell) for cell in cells]
         if None in found:
@@ -93,13 +94,13 @@ class CSVText:
         return [(match["name"], (match["unit"] or "").strip()) for match in found if match]
 
     def error(self, line: int, message: str) -> InputError:
-        """An input error at a line, of the file or of the text that stands in the case itself."""
+        """Return an input error at a line of the file, or of the text in the case itself."""
         if self.place.line or self.place.path:
             return InputError(f"line {line} of the table: {message}", self.place)
         return InputError(message, replace(self.place, line=line))
 
     def column(self, name: str, unit: str, variable: str) -> list[float]:
-        """The numbers of a column, which are values of a variable, in SI."""
+        """Return the numbers of a column, values of a variable, in SI."""
         index, found = self._index(name), []
         given = self.columns[index][1] or "1"
         if not self.columns[index][1] and unit != "1":
@@ -107,7 +108,7 @@ class CSVText:
         whose = name if name == variable else f"{variable}, from the column {name},"
         for line, row in self.rows:
             try:
-                float(row[index])  # a unit beside the number would be a second one
+                float(row[index])  # a unit after the number would be a second one
             except ValueError:
                 raise self.error(line, f"{whose} is no number there.") from None
             try:
@@ -117,14 +118,14 @@ class CSVText:
         return found
 
     def _index(self, name: str) -> int:
-        """The place of a column."""
+        """Return the index of a column."""
         names = [known for known, _ in self.columns]
         if names.count(name) > 1:
             raise self.error(self.heading[0], f"the column {name} is there {names.count(name)} times.")
         if name not in names:
             others = [other for other in names if other != "t"]
             other = others[0] if len(others) == 1 else "NAME"
-            # A column of another name is never meant by itself.
+            # A column of another name is never chosen automatically.
             remedy = (
                 f" To take one of another name, write `column: {other}`."
                 if self.renamed and others and name != "t"

@@ -1,7 +1,7 @@
-"""Declaration of a section of the case format: its keys, the content of each, and the meaning of a key left out.
+"""Declaration of a section of the case format: its keys, the content of each, and the default of a key left out.
 
-A section is a class whose fields are its keys; a law is one too, by its parameters and options. From what the keys
-hold follow the reader, the strict checks of keys and values, the JSON Schema and the tables of the documentation.
+A section is a class whose fields are its keys; a law is one, too, by its parameters and options. Reader, strict checks
+of keys and values, JSON Schema and the tables of the documentation follow from the contents of the keys.
 
 >>> from surfacechem.documents.document import parse
 >>> class Oven(Section):
@@ -40,16 +40,16 @@ Schema = dict[str, Any]
 # A number, with or without a unit.
 QUANTITY = r"^\s*[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?\s*(\S.*)?$"
 
-# Default of a key that must be given.
+# Default of a required key.
 REQUIRED = MISSING
 
-# Names of temperatures start with T, so that they never clash with another quantity.
+# Names of temperatures start with T, so that they never coincide with another quantity.
 NODE_NAME = re.compile(r"T[A-Za-z0-9_]*")
 
-# Entries of a list. Of laws each may be the same again, and names are numbered up to a thousand.
+# Largest number of laws in a list: all may have the same name, and names are numbered up to a thousand.
 MOST_LAWS = 500
 
-# Parameters that are a change of their variable, so that degrees Celsius have no meaning for them.
+# Parameters that are differences of their variable, for which degrees Celsius have no zero.
 DIFFERENCES = ("amplitude",)
 
 UNITS = {name: variable.unit for name, variable in VARIABLES.items() if name not in INTERNAL}
@@ -57,58 +57,56 @@ UNITS = {name: variable.unit for name, variable in VARIABLES.items() if name not
 
 @dataclass(frozen=True)
 class Context:
-    """Names that a case has given, of which its other sections may speak."""
+    """Names that a case has given, to which its other sections may refer."""
 
     units: Mapping[str, str] = field(default_factory=lambda: UNITS)
     """Unit of each variable."""
     temperatures: Sequence[str] = ()
     bodies: Sequence[str] = ()
     x: str = "1"
-    """The unit that "[x]" stands for."""
+    """Unit for which "[x]" stands."""
     whole: bool = False
-    """Whether what is per area elsewhere is that of the whole pair of bodies."""
+    """True if quantities per area elsewhere are those of the whole pair of bodies."""
 
 
-# -- what a key holds -------------------------------------------------------------------------------------------------
+# -- contents of keys -------------------------------------------------------------------------------------------------
 
 
 class Content(ABC):
     """Content of a key: how it is read and how it is described."""
 
     words: str = ""
-    """Description of the content, for the documentation."""
+    """Description of the content for the documentation."""
 
     @abstractmethod
     def read(self, tree: Tree, name: str, context: Context) -> Any:
-        """The value; InputError with its place where it is none."""
+        """Return the value; InputError with its place if it is invalid."""
 
     definition: ClassVar[str] = ""
-    """Name of its own definition in the schema."""
+    """Name of its definition in the schema."""
 
     def schema(self) -> Schema:
-        """JSON Schema of what may stand there."""
+        """Return the JSON Schema of valid values."""
         return reference(self.definition)
 
 
 @dataclass(frozen=True)
 class Number(Content):
-    """A number with a unit, in a range, or the one word that may stand in its place; one that varies is its value
-    times factors.
-    """
+    """A number with a unit, in a range, or a word instead of it; a varying number is a value times factors."""
 
     spec: Spec
     difference: bool = False
     word: str = ""
     wanted: str = ""
-    """Description of the expected content, for the message where there is a mapping."""
+    """Description of the expected content, for the message about a mapping."""
 
     @property
     def words(self) -> str:  # type: ignore[override]
-        """The word beside a quantity."""
+        """Description: a quantity, and the word instead of it, if any."""
         return f"quantity or `{self.word}`" if self.word else "quantity"
 
     def read(self, tree: Tree, name: str, context: Context) -> float | Varying | str:
-        """The value in SI, or the word."""
+        """Return the value in SI, or the word."""
         if self.word and tree.value == self.word:
             return self.word
         if self.wanted and isinstance(tree.value, dict):
@@ -126,7 +124,7 @@ class Number(Content):
         return value if factors is None else Varying(value, factors)
 
     def schema(self) -> Schema:
-        """A number in its range, or a text with a unit; else the value and its factors, or the word."""
+        """Return the schema: a number in its range or a text with a unit; a value with factors; the word."""
         spec = self.spec
         bare = _bounded({"type": "number"}, exclusiveMinimum=spec.above, minimum=spec.at_least, maximum=spec.at_most)
         kinds: list[Schema] = [bare, {"type": "string", "pattern": QUANTITY}]
@@ -138,7 +136,7 @@ class Number(Content):
 
 
 def number(tree: Tree, spec: Spec, name: str, *, difference: bool = False) -> float:
-    """A number in SI, in the range of its specification."""
+    """Return a number in SI, in the range of its specification."""
     value = si(tree.plain(), spec.unit, tree.place, name, difference=difference)
     with placed(tree.place):
         spec.check(name, value)
@@ -147,22 +145,22 @@ def number(tree: Tree, spec: Spec, name: str, *, difference: bool = False) -> fl
 
 @dataclass(frozen=True)
 class Integer(Content):
-    """A whole number in a range, or the one word that may stand in its place."""
+    """A whole number in a range, or a word instead of it."""
 
     at_least: int
     at_most: float = math.inf
     step: int = 1
     word: str = ""
     wanted: str = ""
-    """Description of the expected content, for the message where it is no number."""
+    """Description of the expected content, for the message if it is no number."""
 
     @property
     def words(self) -> str:  # type: ignore[override]
-        """The word beside a number."""
+        """Description: a number, and the word instead of it, if any."""
         return f"number or `{self.word}`" if self.word else "number"
 
     def read(self, tree: Tree, name: str, context: Context) -> int | str:
-        """The number, which may be written with an exponent."""
+        """Return the number, which may be written with an exponent, or the word."""
         if self.word and isinstance(tree.value, str) and not tree.value.isdigit():
             return tree.choice(f"choice of {name}", [self.word])
         if self.wanted and not str(tree.value).strip("+-. ")[:1].isdigit():
@@ -173,7 +171,7 @@ class Integer(Content):
         return int(value)
 
     def schema(self) -> Schema:
-        """An integer, or its digits as text."""
+        """Return the schema: an integer, or its digits as text."""
         whole = _bounded({"type": "integer"}, minimum=self.at_least, maximum=self.at_most)
         whole |= {"multipleOf": self.step} if self.step > 1 else {}
         word = [{"const": self.word}] if self.word else []
@@ -191,22 +189,22 @@ class Text(Content):
     words: str = "text"
 
     def read(self, tree: Tree, name: str, context: Context) -> str:
-        """The text without white space around it."""
+        """Return the text without surrounding white space."""
         return tree.text(name).strip()
 
     def schema(self) -> Schema:
-        """A string that is not empty."""
+        """Return the schema: a string that is not empty."""
         return {"type": "string", "pattern": r"\S"}
 
 
 @dataclass(frozen=True)
 class OneOf(Content):
-    """One of some names, which are asked for when they are needed."""
+    """One of some names, which are computed when needed."""
 
     what: str
     names: Callable[[], Iterable[str]]
     has: Callable[[str], bool] | None = None
-    """Tells one name without all of them, where listing them takes long."""
+    """Test of a single name, if listing all of them takes long."""
 
     @property
     def words(self) -> str:  # type: ignore[override]
@@ -218,11 +216,11 @@ class OneOf(Content):
         return isinstance(value, str) and (self.has(value) if self.has else value in self.names())
 
     def read(self, tree: Tree, name: str, context: Context) -> str:
-        """The name."""
+        """Return the name."""
         return str(tree.value) if self.knows(tree.value) else tree.choice(self.what, self.names())
 
     def schema(self) -> Schema:
-        """An enumeration."""
+        """Return an enumeration."""
         return {"enum": list(self.names())}
 
 
@@ -234,7 +232,7 @@ class ListOf(Content):
     example: str = ""
     count: int | None = None
     at_least: int = 0
-    """Entries that the schema asks for; the reader says what they are needed for."""
+    """Least number of entries in the schema; the reader gives the reason when they are missing."""
 
     @property
     def words(self) -> str:  # type: ignore[override]
@@ -242,7 +240,7 @@ class ListOf(Content):
         return f"list of {self.content.words}" if self.content.words else "list"
 
     def read(self, tree: Tree, name: str, context: Context) -> tuple[Any, ...]:
-        """Its entries."""
+        """Return its entries."""
         law = self.content if isinstance(self.content, OneLaw) else None
         entries = tree.items(law.example if law and not isinstance(tree.value, list) else self.example)
         if self.count is not None and len(entries) != self.count:
@@ -252,7 +250,7 @@ class ListOf(Content):
         return tuple(self.content.read(entry, f"an entry of {name}", context) for entry in entries)
 
     def schema(self) -> Schema:
-        """An array; one that may be empty may be left out."""
+        """Return the schema of an array; one that may be empty may be left out."""
         least = self.count or self.at_least
         limits = {"minItems": least} if least else {}
         limits |= {"maxItems": self.count} if self.count else {}
@@ -261,7 +259,7 @@ class ListOf(Content):
 
 @dataclass(frozen=True)
 class OneLaw(Content):
-    """A law of a contract, ``name: {parameters}``, or its name alone where it needs none."""
+    """A law of a contract, ``name: {parameters}``, or its name alone if it needs none."""
 
     contract: type[Law]
 
@@ -272,14 +270,14 @@ class OneLaw(Content):
 
     @property
     def example(self) -> str:
-        """A law of this contract as it stands in a list, with what it needs, or its first parameter."""
+        """A law of this contract as in a list, with its required parameters, or with its first one."""
         first = next(iter(laws.laws(self.contract).values()))
         needed = [name for name, declared in law_keys(first).items() if declared.required]
         needed = needed or [name for name, _ in first.specs()][:1]
         return f"- {first.name()}: {{{', '.join(f'{name}: ...' for name in needed)}}}"
 
     def read(self, tree: Tree, name: str, context: Context) -> Any:
-        """The law, which knows its place."""
+        """Return the law, with its place."""
         if isinstance(tree.value, dict) and len(tree.value) == 1:
             ((law, parameters),) = tree.value.items()
         elif isinstance(tree.value, str) and tree.value:
@@ -296,7 +294,7 @@ class OneLaw(Content):
         return read_law(found, parameters, context)
 
     def schema(self) -> Schema:
-        """The definition of the contract."""
+        """Return a reference to the definition of the contract."""
         return reference(self.contract.contract)
 
 
@@ -310,7 +308,7 @@ class Prescribed(Content):
     definition: ClassVar[str] = "history"
 
     def read(self, tree: Tree, name: str, context: Context) -> Load:
-        """The load."""
+        """Return the load."""
         unit = resolved_unit(self.unit, context.x)
         load: Load | None = csvtable.table(tree, unit)
         if load is None and isinstance(tree.value, dict):
@@ -319,7 +317,7 @@ class Prescribed(Content):
             try:
                 level = number(tree, Spec(unit, name), name)
             except InputError as error:
-                with suppress(InputError):  # who gives a rate means a ramp
+                with suppress(InputError):  # a rate instead of a value means a ramp
                     si(tree.plain(), quotient(unit, "s"))
                     hint = f"To change it in time, write `{{ramp: {{rate: {tree.value}}}}}`."
                     error = InputError(f"{error.message} {hint}", tree.place)
@@ -334,13 +332,13 @@ class Prescribed(Content):
 
 @dataclass(frozen=True)
 class Temperature(Content):
-    """The name of a temperature that is solved for, or its history."""
+    """The name of a temperature that is solved for, or a history."""
 
     words: str = "name or history"
     definition: ClassVar[str] = "temperature"
 
     def read(self, tree: Tree, name: str, context: Context) -> str | Load:
-        """The name or the load."""
+        """Return the name or the load."""
         value = tree.value
         if not is_name(tree):
             return Prescribed("K", above_zero=True).read(tree, name, context)
@@ -351,7 +349,7 @@ class Temperature(Content):
 
 
 def is_name(tree: Tree | None) -> bool:
-    """Whether a temperature is given by name."""
+    """True if a temperature is given by name."""
     return tree is not None and isinstance(tree.value, str) and tree.value.isidentifier()
 
 
@@ -361,16 +359,16 @@ class Nested(Content):
 
     cls: type[Section] | type[Law]
     per_area: bool = False
-    """Whether what is per area in it is so in every scene."""
+    """True if its quantities per area are so in every scene."""
     words: str = "mapping"
 
     def read(self, tree: Tree, name: str, context: Context) -> Any:
-        """The section or the law."""
+        """Return the section or the law."""
         context = replace(context, whole=False) if self.per_area else context
         return read(self.cls, tree, context) if issubclass(self.cls, Section) else read_law(self.cls, tree, context)
 
     def schema(self) -> Schema:
-        """Its keys."""
+        """Return the schema of its keys."""
         return schema_of(self.cls)
 
 
@@ -378,28 +376,28 @@ class Nested(Content):
 class Entries(Content):
     """A mapping whose keys are names: of bodies, variables, species, stages.
 
-    ``each`` holds the keys that are known beforehand, ``others`` what stands under a name of the case, which ``names``
-    lists. A quantity in "[x]" is in the unit of the variable that is its key.
+    ``each`` has the keys known beforehand, ``others`` the content under a name of the case, which ``names`` lists. A
+    quantity in "[x]" is in the unit of the variable that is its key.
     """
 
     each: Mapping[str, Key] = field(default_factory=dict)
     others: Content | None = None
     names: Callable[[Context], Iterable[str]] | None = None
     pattern: str | Callable[[], str] = ""
-    """Regular expression of those other names."""
+    """Regular expression of these other names."""
     units: Mapping[str, str] = field(default_factory=dict)
     """Units of names that are no variables of the case."""
     what: str = "keys"
     by_scene: bool = False
-    """Whether the scene refuses what is not known, as it can tell which names it has."""
+    """True if the scene refuses unknown names, as it knows which ones it has."""
     at_most: int | None = None
-    """Largest number of entries; where it is given, there is at least one."""
+    """Largest number of entries; if it is given, at least one is needed."""
     wanted: str = ""
-    """Description of the expected entries, for the message where there are none or too many."""
+    """Description of the expected entries, for the message if there are none or too many."""
     words: str = "mapping"
 
     def read(self, tree: Tree, name: str, context: Context) -> dict[str, Any]:
-        """The values by name."""
+        """Return the values by name."""
         if self.wanted:
             self._check_count(tree)
         known = [*self.each, *self.names(context)] if self.names else None if self.others else [*self.each]
@@ -407,7 +405,7 @@ class Entries(Content):
         for key, child in tree.mapping(None if self.by_scene else known, self.what).items():
             content = self.each[key].content if key in self.each else self.others
             if content is None or (known is not None and key not in known):
-                found[key] = math.nan  # refused by the scene, which knows better what it has
+                found[key] = math.nan  # the scene refuses it with a better message
             else:
                 found[key] = content.read(child, key, replace(context, x=units.get(key, "1")))
         return found
@@ -419,7 +417,7 @@ class Entries(Content):
             raise tree.error(f"{self.wanted}{got}.")
 
     def schema(self) -> Schema:
-        """An object with these names."""
+        """Return the schema of an object with these names."""
         found = closed({name: key.schema() for name, key in self.each.items()})
         if self.others is not None and self.pattern:
             pattern = self.pattern if isinstance(self.pattern, str) else self.pattern()
@@ -431,17 +429,17 @@ class Entries(Content):
 
 @dataclass(frozen=True)
 class ByShape(Content):
-    """Content that is read by its shape: a mapping, a list, or a value."""
+    """Content that depends on its shape: a mapping, a list, or a value."""
 
     value: Content | None = None
     mapping: Content | None = None
     items: Content | None = None
     wanted: str = ""
-    """Description of the expected content, for the message where it has none of these shapes."""
+    """Description of the expected content, for the message if it has none of these shapes."""
 
     @property
     def words(self) -> str:  # type: ignore[override]
-        """Each shape."""
+        """Description of all shapes."""
         return " or ".join(content.words for content in self._contents if content.words)
 
     @property
@@ -449,19 +447,19 @@ class ByShape(Content):
         return [content for content in (self.value, self.items, self.mapping) if content is not None]
 
     def read(self, tree: Tree, name: str, context: Context) -> Any:
-        """The value of its shape."""
+        """Return the value, read by its shape."""
         shape = self.mapping if isinstance(tree.value, dict) else self.items if isinstance(tree.value, list) else None
         content = shape or self.value or self.items
         assert content is not None
         if self.wanted and isinstance(content, OneOf) and not content.knows(tree.value):
-            # Among several names the nearest is a better hint than the shapes.
+            # With several names the nearest one is a better hint than the shapes.
             misspelt = isinstance(tree.value, str) and len(list(content.names())) > 1
             if not misspelt:
                 raise tree.error(f"{self.wanted}, not {tree.shown}.")
         return content.read(tree, name, context)
 
     def schema(self) -> Schema:
-        """Any of the shapes."""
+        """Return the schema of any of the shapes."""
         return {"anyOf": [content.schema() for content in self._contents]}
 
 
@@ -472,11 +470,11 @@ class Deferred(Content):
     content: Content
 
     def read(self, tree: Tree, name: str, context: Context) -> Tree:
-        """The tree as it stands."""
+        """Return the tree unchanged."""
         return tree
 
     def schema(self) -> Schema:
-        """Schema of what it will be."""
+        """Return the schema of the final content."""
         return self.content.schema()
 
 
@@ -485,14 +483,14 @@ class Deferred(Content):
 
 @dataclass(eq=False)
 class Key:
-    """A key of a section: what it holds, what it means, and what is meant where it is left out."""
+    """A key of a section: its content, its meaning, and its default."""
 
     content: Content
     text: str = ""
     default: Any = None
     name: str = ""
     attribute: str = field(default="", init=False)
-    """Field of its class; empty for a key that a section has beside them."""
+    """Field of its class; empty for a key that is no field."""
 
     def __post_init__(self) -> None:
         """Take over the description of the parameter or the section if no other is given."""
@@ -502,40 +500,40 @@ class Key:
             self.text = _first_line(self.content.cls)
 
     def __set_name__(self, owner: type, attribute: str) -> None:
-        """A key goes by the name of its field unless it has another."""
+        """Take the name of the field unless another one is given."""
         self.name, self.attribute = self.name or attribute, attribute
 
     @property
     def required(self) -> bool:
-        """Whether it must be given."""
+        """True if the key must be given."""
         return self.default is REQUIRED
 
     @property
     def unit(self) -> str:
-        """Unit of a number; empty where it is none."""
+        """Unit of a number; empty for other contents."""
         return self.content.spec.unit if isinstance(self.content, Number) else ""
 
     def meaning(self, x: str = "x") -> str:
-        """The meaning, with the unit of a number, in which "[x]" stands for that of another variable."""
+        """Return the meaning with the unit of a number; ``x`` replaces "[x]", the unit of another variable."""
         return f"{self.text} [{resolved_unit(self.unit, x)}]" if self.unit else self.text
 
     def schema(self) -> Schema:
-        """JSON Schema of the value, with meaning and default."""
+        """Return the JSON Schema of the value, with meaning and default."""
         found = {**self.content.schema(), "description": self.meaning()}
         return {**found, "default": self.default} if isinstance(self.default, str | float | int) else found
 
 
-# A key as the value of its field, whose type is that of what it holds.
+# A key as the default of its field; the annotation of the field has the type of its content.
 key: Any = Key
 
 
 def amount(unit: str, text: str = "", **limits: float) -> Number:
-    """A number with a unit, in a range; ``limits`` are those of :class:`Spec`."""
+    """Return a number with a unit, in a range; ``limits`` are those of :class:`Spec`."""
     return Number(Spec(unit, text, varies=False, **limits))  # type: ignore[arg-type]
 
 
 def quantity(unit: str, text: str, default: Any = None, *, name: str = "", **limits: float) -> Any:
-    """A key that holds a number with a unit, in a range."""
+    """Return a key for a number with a unit, in a range."""
     return Key(amount(unit, text, **limits), text, default, name)
 
 
@@ -543,12 +541,12 @@ class Section:
     """A section of a case, whose fields are its keys."""
 
     called: ClassVar[str] = ""
-    """Subject of messages; else the key under which the section stands."""
+    """Subject of messages; by default the key of the section."""
 
     tree = Tree(None, Place())
-    """The section as it stands."""
+    """The section as a tree."""
     more: Mapping[str, Any] = MappingProxyType({})
-    """Values of the keys beside those that the class declares."""
+    """Values of keys other than those that the class declares."""
 
     def __init__(self, **values: Any) -> None:
         for declared in keys(type(self)).values():
@@ -556,16 +554,16 @@ class Section:
 
     @classmethod
     def more_keys(cls, tree: Tree | None) -> Mapping[str, Key]:
-        """Keys beside those of the class, of a section as it stands, or all there may be."""
+        """Return keys in addition to those of the class: for the tree of a section, or all possible ones."""
         return {}
 
     def has(self, *names: str) -> bool:
-        """Whether any of these keys is given."""
+        """True if any of these keys is given."""
         return isinstance(self.tree.value, dict) and any(name in self.tree.value for name in names)
 
     def error(self, message: str, *names: str) -> InputError:
-        """An input error at a key, of several that do not go together at one that is set from outside, else the first;
-        at the section where none is given.
+        """Return an input error at one of the given keys, preferably one set from outside, else the first; without any
+        at the section.
         """
         given: list[Tree] = [self.tree.value[name] for name in names if self.has(name)]
         return min([*given, self.tree][: len(given) or 1], key=lambda tree: tree.place.file != OVERRIDE).error(message)
@@ -576,13 +574,13 @@ L = TypeVar("L", bound=Law)
 
 
 def keys(cls: type[Section]) -> Mapping[str, Key]:
-    """The keys that a section declares, by name."""
+    """Return the keys that a section declares, by name."""
     return {declared.name: declared for declared in vars(cls).values() if isinstance(declared, Key)}
 
 
 @cache
 def law_keys(law: type[Law]) -> Mapping[str, Key]:
-    """The keys of a law by name: its options, then its parameters."""
+    """Return the keys of a law by name: its options, then its parameters."""
     hints, defaults = typing.get_type_hints(law), {item.name: item.default for item in dataclasses.fields(law)}
     found = {}
     for name, meaning in law.options():
@@ -593,7 +591,7 @@ def law_keys(law: type[Law]) -> Mapping[str, Key]:
 
 
 def _content_of(declared: Any, name: str, meaning: str) -> Content:
-    """The content of an option of a law, by the type of its field; the unit of numbers stands behind their meaning."""
+    """Return the content of an option of a law, by the type of its field; the unit of numbers follows its meaning."""
     origin, arguments = typing.get_origin(declared), typing.get_args(declared)
     if declared is str:
         return Text()
@@ -609,7 +607,7 @@ def _content_of(declared: Any, name: str, meaning: str) -> Content:
 
 
 def read(cls: type[S], tree: Tree, context: Context) -> S:
-    """A section from the mapping of its keys."""
+    """Read a section from the mapping of its keys."""
     own, more = keys(cls), cls.more_keys(tree)
     found = _values({**own, **more}, tree, context, cls.called)
     section = cls(**{own[name].attribute: value for name, value in found.items() if name in own})
@@ -619,7 +617,7 @@ def read(cls: type[S], tree: Tree, context: Context) -> S:
 
 
 def read_law(law: type[L], tree: Tree, context: Context) -> L:
-    """A law from the mapping of its parameters."""
+    """Read a law from the mapping of its parameters."""
     if issubclass(law, Factor):
         of = tree.mapping().get("of", Tree(law_keys(law)["of"].default, tree.place))
         context = replace(context, x=context.units[of.choice("variable", context.units)])
@@ -628,7 +626,7 @@ def read_law(law: type[L], tree: Tree, context: Context) -> L:
 
 
 def _values(declared: Mapping[str, Key], tree: Tree, context: Context, called: str) -> dict[str, Any]:
-    """The values of the keys that are given, each known and none missing."""
+    """Return the values of the given keys; all of them must be known, and no required one missing."""
     given = tree.mapping(declared)
     for name, item in declared.items():
         if item.required and name not in given:
@@ -641,7 +639,7 @@ def _values(declared: Mapping[str, Key], tree: Tree, context: Context, called: s
 
 
 def schema_of(cls: type[Section] | type[Law]) -> Schema:
-    """JSON Schema of a section or of the parameters of a law."""
+    """Return the JSON Schema of a section or of the parameters of a law."""
     declared = {**keys(cls), **cls.more_keys(None)} if issubclass(cls, Section) else law_keys(cls)
     properties = {name: item.schema() for name, item in declared.items()}
     found = closed(properties, [name for name, item in declared.items() if item.required])
@@ -653,11 +651,11 @@ def _first_line(cls: type) -> str:
 
 
 def closed(properties: Mapping[str, Schema], required: Sequence[str] = ()) -> Schema:
-    """An object with these keys and no others."""
+    """Return the schema of an object with these keys and no others."""
     found: Schema = {"type": "object", "properties": dict(properties), "additionalProperties": False}
     return {**found, "required": list(required)} if required else found
 
 
 def reference(name: str) -> Schema:
-    """A definition by its name."""
+    """Return a reference to a definition."""
     return {"$ref": f"#/$defs/{name}"}

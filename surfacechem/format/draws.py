@@ -1,4 +1,4 @@
-"""Samples of uncertain parameters: their distributions, and the numbers that each run draws, from its index alone."""
+"""Samples of uncertain parameters: their distributions, and the draws of each run as functions of its index."""
 
 from __future__ import annotations
 
@@ -14,30 +14,30 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 HALF_SPACING = 2.0**-53
-"""Offset of numbers in [0, 1), so that none is zero, where the quantile of a normal distribution is infinite."""
+"""Offset of numbers in [0, 1), so that none is zero: there the quantile of a normal distribution is infinite."""
 
 FEISTEL_ROUNDS = 6
-"""Rounds of a permutation: four make one that cannot be told from a random one, two more cost nothing."""
+"""Rounds of a permutation: four make it indistinguishable from a random one, two more cost little."""
 
 
 class Distribution(ABC):
     """Probability distribution of the value of a parameter."""
 
     source: str = ""
-    """Name of the random number that all parameters with this source share; empty where each has its own."""
+    """Name of a random number shared by all parameters with this source; empty if each has its own."""
 
     @abstractmethod
     def at(self, u: Array) -> Array:
-        """Quantiles: values below which the parts ``u`` of all draws lie."""
+        """Return quantiles: the values below which the fractions ``u`` of all draws lie."""
 
     @property
     def over_decades(self) -> bool:
-        """Whether ratios of its values are what is even."""
+        """True if the distribution is one of ratios of values."""
         return False
 
     @property
     def record(self) -> dict[str, Any]:
-        """Entries from which the distribution can be made again."""
+        """Entries from which the distribution can be restored."""
         return {"kind": type(self).__name__, **asdict(self)}  # type: ignore[call-overload]
 
 
@@ -107,7 +107,7 @@ def _standard_normal(u: Array) -> Array:
 
 @dataclass(frozen=True)
 class Sample:
-    """So many draws of parameters by path: a function from the index of a run, the method and the seed."""
+    """A number of draws of parameters by path, as functions of the index of a run, the method and the seed."""
 
     draws: Mapping[str, Distribution]
     runs: int
@@ -115,26 +115,26 @@ class Sample:
     seed: int = 0
 
     def at(self, index: Index) -> dict[str, Array]:
-        """The values of the runs of these numbers, by path."""
-        # Columns of one table are one dimension, so that they are taken from the same row.
+        """Return the values of the runs with these numbers, by path."""
+        # Columns of one table share a dimension, so that they are taken from the same row.
         sources = list(dict.fromkeys(draw.source or path for path, draw in self.draws.items()))
         own, where = np.unique(index, return_inverse=True)
         u = SAMPLERS[self.method](own, self.runs, len(sources), self.seed)[where] + HALF_SPACING
         return {path: draw.at(u[:, sources.index(draw.source or path)]) for path, draw in self.draws.items()}
 
     def of(self, path: str, index: Index) -> Array:
-        """The values of one parameter."""
+        """Return the values of one parameter."""
         return self.at(index)[path]
 
     @property
     def record(self) -> dict[str, Any]:
-        """Entries from which the sample can be made again."""
+        """Entries from which the sample can be restored."""
         draws = {path: draw.record for path, draw in self.draws.items()}
         return {"draws": draws, "runs": self.runs, "method": self.method, "seed": self.seed}
 
 
 def recorded_sample(content: Mapping[str, Any]) -> Sample:
-    """The sample of a record; a LookupError, TypeError or ValueError where that is none."""
+    """Restore a sample from its record; LookupError, TypeError or ValueError if that is invalid."""
     draws = {}
     for path, record in content["draws"].items():
         given = {name: tuple(value) if isinstance(value, list) else value for name, value in record.items()}
@@ -143,11 +143,11 @@ def recorded_sample(content: Mapping[str, Any]) -> Sample:
     return Sample(draws, runs, [*SAMPLERS][[*SAMPLERS].index(content["method"])], seed)
 
 
-# -- numbers in [0, 1), a row for each of increasing indices and a column for each of some dimensions ------------------
+# -- numbers in [0, 1), one row for each of the increasing indices and one column per dimension ------------------------
 
 
 def _blocks(index: Index) -> Iterator[tuple[int, int]]:
-    """Start and length of each run of consecutive indices."""
+    """Yield start and length of each block of consecutive indices."""
     starts = np.flatnonzero(np.diff(index, prepend=-2) != 1)
     yield from zip(index[starts].tolist(), np.diff(starts, append=len(index)).tolist(), strict=True)
 
@@ -157,14 +157,14 @@ def _random(index: Index, runs: int, dimensions: int, seed: int) -> Array:
     for first, count in _blocks(index):
         bits = np.random.Philox(key=seed)
         before = first * dimensions
-        bits.advance(before // 4)  # a step of this generator makes four numbers; what is over is left out below
+        bits.advance(before // 4)  # a step of this generator makes four numbers; the surplus is dropped below
         numbers = np.random.Generator(bits).random(before % 4 + count * dimensions)
         rows.append(numbers[before % 4 :].reshape(count, dimensions))
     return np.concatenate(rows)
 
 
 def _sobol(index: Index, runs: int, dimensions: int, seed: int) -> Array:
-    """Scrambled Sobol' points, of which each stretch of 2^k is evenly spread.
+    """Return scrambled Sobol' points, of which each block of 2^k is evenly spread.
 
     Source: Owen (1998), J. Complexity 14, 466-489; as in SciPy.
     """
@@ -175,7 +175,7 @@ def _sobol(index: Index, runs: int, dimensions: int, seed: int) -> Array:
     for first, count in _blocks(index):
         if first > done:
             engine.fast_forward(first - done)
-        # By itself, as the library warns of a first number of points that is no power of two.
+        # The first point separately, as the library warns if the first call is not for a power of two.
         rows += [engine.random(1)] if first == 0 else []
         rows += [engine.random(left)] if (left := count - (first == 0)) else []
         done = first + count
@@ -183,7 +183,7 @@ def _sobol(index: Index, runs: int, dimensions: int, seed: int) -> Array:
 
 
 def _latin(index: Index, runs: int, dimensions: int, seed: int) -> Array:
-    """A Latin hypercube: of each parameter one draw lies in each of as many equal parts as there are runs."""
+    """Return a Latin hypercube: each of as many equal parts of a parameter's range as there are runs has one draw."""
     places = np.column_stack([permuted(index, runs, 1000 * seed + k) for k in range(dimensions)])
     return (places + _random(index, runs, dimensions, seed)) / runs
 
@@ -196,18 +196,18 @@ SAMPLERS: Mapping[str, Callable[[Index, int, int, int], Array]] = {
 
 
 def permuted(index: Index, count: int, key: int) -> Index:
-    """Images of these numbers under a pseudorandom permutation of those below ``count``, without a table of it.
+    """Return the images of these numbers under a pseudorandom permutation of those below ``count``, without a table.
 
-    A Feistel network permutes the numbers below a power of four, and is walked until it is back below the count.
+    A Feistel network permutes the numbers below a power of four, and is repeated until the result is below the count.
     Source: Black & Rogaway (2002), Ciphers with arbitrary finite domains, doi 10.1007/3-540-45760-7_9.
     """
     half = max(1, ((count - 1).bit_length() + 1) // 2)
     mask, shift = np.uint64((1 << half) - 1), np.uint64(half)
     x = index.astype(np.uint64)
     walking = np.ones(len(x), dtype=bool)
-    # At most three quarters of the numbers lead outside, so that this ends after few rounds.
+    # At most three quarters of the numbers lie outside, so that this ends after few rounds.
     while walking.any():
-        # Each turn changes one half by a function of the other, which can be undone: so no two numbers meet.
+        # Each turn changes one half by a function of the other and is invertible: the map is a permutation.
         left, right = x[walking] >> shift, x[walking] & mask
         for turn in range(FEISTEL_ROUNDS):
             left, right = right, left ^ (hashed(right, key * FEISTEL_ROUNDS + turn) & mask)
@@ -217,7 +217,7 @@ def permuted(index: Index, count: int, key: int) -> Index:
 
 
 def hashed(x: NDArray[np.uint64], key: int) -> NDArray[np.uint64]:
-    """Hash of numbers: its bits all depend on all bits of x and the key.
+    """Hash numbers: every bit of the result depends on all bits of x and of the key.
 
     Source: Steele, Lea & Flood (2014), Fast splittable pseudorandom number generators, doi 10.1145/2714064.2660195.
     """

@@ -1,4 +1,4 @@
-"""Heights of a surface from files: a CSV file with the columns x, y and z, or a netCDF file with z over x and y."""
+"""Surface heights from files: a CSV file with columns x, y and z, or a netCDF file with z over x and y."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from surfacechem.format.csvtable import CSVText
 
 AXES = "xyz"
 MISSING_HEIGHTS = ("", "nan", "na", "inf", "-inf")
-"""Entries of tables of instruments for a height that is missing."""
+"""Entries for missing heights in tables of instruments."""
 
 NETCDF = ".nc"
 
 Numbers = dict[str, list[float]]
-"""Places along x and y, increasing, and heights, all along y for the first x, then for the next [m]."""
+"""Increasing coordinates x and y, and heights, along y for the first x, then for the next [m]."""
 
 
 def embedded(tree: Tree, base: str) -> Tree:
-    """A case with the numbers of the files that heights name; InputError, with file and place, for holes."""
+    """Insert the numbers of height files into a case; InputError, with file and place, for missing heights."""
     if not isinstance(tree.value, dict):
         return tree
     read = {key: (_numbers if key == "heights" else embedded)(child, base) for key, child in tree.value.items()}
@@ -32,19 +32,19 @@ def embedded(tree: Tree, base: str) -> Tree:
 
 
 def _numbers(tree: Tree, base: str) -> Tree:
-    """The parameters of heights, from their file if they name one."""
+    """Return the parameters of a law of heights, from their file if one is named."""
     if not (isinstance(tree.value, dict) and "file" in tree.value):
         return tree
     path = document.named(tree.mapping(("file",))["file"], base, "the file of heights")
     place = Place(str(path))
     numbers = from_netcdf(path) if path.suffix == NETCDF else from_csv(Tree(document.read(path), place))
-    # Errors of the numbers, as of places that do not increase, are errors of the file.
+    # Errors of the numbers, coordinates that do not increase for instance, are reported for the file.
     found = {axis: Tree([Tree(value, place) for value in values], place) for axis, values in numbers.items()}
     return replace(tree, value=found)
 
 
 def from_csv(content: Tree) -> Numbers:
-    """Heights of a table with a row for each place, in any order."""
+    """Read heights from a table with one row per place, in any order."""
     table = CSVText(content)
     for line, row in table.rows:
         if any(cell.lower() in MISSING_HEIGHTS for cell in row):
@@ -55,7 +55,7 @@ def from_csv(content: Tree) -> Numbers:
         if place in heights:
             raise table.error(line, f"a second height at x = {place[0]:g} m, y = {place[1]:g} m.")
         heights[place] = height
-    # Equal places are equal texts, so that no tolerance is needed to find the grid.
+    # Equal coordinates are equal texts, so the grid needs no tolerance.
     along = sorted(set(x)), sorted(set(y))
     for place in product(*along):
         if place not in heights:
@@ -67,7 +67,7 @@ def from_csv(content: Tree) -> Numbers:
 
 
 def from_netcdf(path: Path) -> Numbers:
-    """Heights of a variable z over the coordinates x and y, each with its unit."""
+    """Read heights from a variable z over the coordinates x and y, each with its unit."""
     import xarray
 
     place = Place(str(path))

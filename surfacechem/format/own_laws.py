@@ -1,6 +1,6 @@
-"""Laws of a case's own: Python files that it names, with their checksums; a dataset keeps their source.
+"""User-defined laws of a case: Python files that it names, with checksums; a dataset contains their source.
 
-Code runs only where a line of a case names its file, or where one says so: never because a dataset is opened.
+Code runs only if a line of the case names its file, or if the user allows it, never because a dataset is opened.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ from surfacechem.errors import InputError, Place, PlacedError
 FILE_KEYS = ("file", "sha256", "python")
 
 _run: dict[str, ModuleType] = {}
-"""Modules whose code this process has run, by checksum: it may be asked for again."""
+"""Modules whose code this process has run, by checksum; they may be requested again."""
 
 
 def embedded(tree: Tree, base: Path, allow_code: bool = False) -> tuple[Tree, list[type[Law]]]:
-    """The tree with the source and the checksum of every file that it names, and the laws in them.
+    """Insert source and checksum of every law file that the tree names, and return the tree and these laws.
 
-    Source that stands in the tree itself, as in the case of a dataset, is run where ``allow_code`` says so, or where
-    this process has run it before.
+    Source in the tree itself, as in the case of a dataset, is executed only with ``allow_code``, or if this process has
+    executed it before.
     """
     given = tree.value.get("laws") if isinstance(tree.value, dict) else None
     if given is None:
@@ -60,12 +60,12 @@ def embedded(tree: Tree, base: Path, allow_code: bool = False) -> tuple[Tree, li
 
 
 def read(source: str, name: str, place: Place | None = None) -> Sequence[type[Law]]:
-    """The laws that Python source defines; InputError with its line where it fails, or defines none."""
+    """Return the laws that Python source defines; InputError with its line if it fails, or defines none."""
     checksum = hashlib.sha256(source.encode()).hexdigest()
     if checksum not in _run:
         module = ModuleType(f"surfacechem_laws_{checksum[:16]}")
         module.__file__ = name
-        # Dataclasses look for the module of a class, tracebacks and doctests for its lines.
+        # Dataclasses need the module of a class, tracebacks and doctests its lines.
         sys.modules[module.__name__] = module
         linecache.cache[name] = (len(source), None, source.splitlines(keepends=True), name)
         try:
@@ -85,7 +85,7 @@ def read(source: str, name: str, place: Place | None = None) -> Sequence[type[La
 
 
 def _failure(error: BaseException) -> str:
-    """Message of an error that the code of own laws raises."""
+    """Return the message of an error raised by user-defined code."""
     if isinstance(error, PlacedError):
         return error.message
     if isinstance(error, SystemExit):

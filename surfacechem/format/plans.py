@@ -1,7 +1,7 @@
-"""Plans of sweeps: a function from the number of a run to its parameters, and where each run ends.
+"""Plans of sweeps: functions from the number of a run to its parameters and its end.
 
-A plan is a product of dimensions: one for each parameter of a grid, one for parameters that go together, and one for
-the draws of a sample. Nothing of it is a list of its runs, so that a plan of a billion costs no memory.
+A plan is a product of dimensions: one for each parameter of a grid, one for parameters that change together, and one
+for the draws of a sample. It has no list of its runs, so that a plan of a billion runs costs no memory.
 """
 
 from __future__ import annotations
@@ -38,14 +38,14 @@ from surfacechem.format.sections import (
     UniformSection,
 )
 
-# Statistics of the load at rupture, with their words, where runs end at a load.
 SURVIVAL = "survival"
-"""Word in `until`, in place of a load, with which each run ends when so few of its bonds are left."""
+"""Word in `until`, instead of a load: each run ends when its survival falls to the value."""
 
+# Statistics of the load at rupture, with their words, of runs that end at a load.
 STATISTICS = {"mode": "most probable", "median": "median", "mean": "mean"}
 
 INTEGRATED_PATHS = ("surface.bodies.", "surface.laws.", "surface.heat.", "surface.approach.", "surface.accuracy")
-"""Beginnings of the paths of what is in integrals over surfaces."""
+"""Prefixes of the paths of parameters of integrals over surfaces."""
 
 RUN_DIMENSION = "run"
 """The dimension along which several parameters change together."""
@@ -53,7 +53,7 @@ RUN_DIMENSION = "run"
 
 @dataclass(frozen=True)
 class EvenlySpaced:
-    """Values from the first to the last, at equal distances or ratios; none of them is kept."""
+    """Values from the first to the last, at equal distances or ratios; they are not stored."""
 
     first: float
     last: float
@@ -61,16 +61,16 @@ class EvenlySpaced:
     logarithmic: bool = False
 
     def __len__(self) -> int:
-        """Number of values."""
+        """Return the number of values."""
         return self.count
 
     def at(self, index: Index) -> Array:
-        """The values of these numbers, as NumPy's linspace and geomspace have them."""
+        """Return the values with these numbers, as NumPy's linspace and geomspace."""
         first, last = (np.log10(x) if self.logarithmic else x for x in (self.first, self.last))
         step = (last - first) / max(self.count - 1, 1)
         values = np.asarray(index * step + first, dtype=float)
         values = np.power(10.0, values) if self.logarithmic else values
-        # Both ends are as they are given; a power of ten would round them.
+        # Both ends are exact; a power of ten would round them.
         values[index == self.count - 1] = self.last
         values[index == 0] = self.first
         return values
@@ -78,28 +78,28 @@ class EvenlySpaced:
 
 @dataclass(frozen=True)
 class LazyArray:
-    """Array of values by their numbers, evaluated only where a slice is asked for: of many part by part."""
+    """Array of values that are computed only when a slice is read."""
 
     at: Callable[[Index], Array]
     count: int
 
     @property
     def shape(self) -> tuple[int]:
-        """That of the array."""
+        """Shape of the array."""
         return (self.count,)
 
     @property
     def dtype(self) -> np.dtype[Any]:
-        """That of the array."""
+        """Type of the array."""
         return np.dtype(float)
 
     def __getitem__(self, part: slice) -> Array:
-        """The values of a part."""
+        """Return the values of a slice."""
         return self.at(np.arange(*part.indices(self.count)))
 
 
 def name_parts(path: str) -> list[str]:
-    """Components of a path, as parts of a name.
+    """Return the components of a path, as parts of a name.
 
     >>> name_parts("interface.bonding[2].k-off.level")
     ['interface', 'bonding_2', 'k_off']
@@ -116,17 +116,17 @@ class Axis:
     logarithmic: bool = False
 
     def __post_init__(self) -> None:
-        """Values are at least one and finite."""
+        """Check that there are values, and that they are finite."""
         ends = self.at(np.array([0, -1]) % len(self)) if isinstance(self.values, EvenlySpaced) else self.values
         if not len(self) or not np.all(np.isfinite(ends)):
             raise InputError(f"{self.path} needs finite values, at least one.", path="sweep")
 
     def __len__(self) -> int:
-        """Number of values."""
+        """Return the number of values."""
         return len(self.values)
 
     def at(self, index: Index) -> Array:
-        """The values of these numbers."""
+        """Return the values with these numbers."""
         return self.values.at(index) if isinstance(self.values, EvenlySpaced) else self._listed[index]
 
     @cached_property
@@ -135,14 +135,14 @@ class Axis:
 
     @property
     def has_equals(self) -> bool:
-        """Whether a value is there twice."""
+        """True if a value occurs twice."""
         if isinstance(self.values, EvenlySpaced):
             return len(self) > 1 and self.values.first == self.values.last
         return len(set(self.values)) != len(self)
 
     @property
     def record(self) -> dict[str, Any]:
-        """Entries from which the axis can be made again."""
+        """Entries from which the axis can be restored."""
         if isinstance(self.values, EvenlySpaced):
             return {"path": self.path, **vars(self.values)}
         return {"path": self.path, "values": list(self.values), "logarithmic": self.logarithmic}
@@ -150,20 +150,22 @@ class Axis:
 
 @dataclass(frozen=True)
 class Plan:
-    """Plan of a sweep. With ``until`` every run ends where that prescribed variable, a ramp, reaches the value, or
-    where the survival of its bonds has fallen to it.
+    """Plan of a sweep. With ``until`` every run ends when this prescribed variable, a ramp, reaches the value, or when
+    the survival of its bonds has fallen to it.
     """
 
     axes: Sequence[Axis] = ()
     until: tuple[str, float] | None = None
     zipped: bool = False
-    """Whether the values of the axes go together, instead of as a grid."""
+    """True if the values of the axes change together, instead of as a grid."""
     sample: Sample | None = None
     places: Mapping[str, Place] = field(default_factory=dict, compare=False)
-    """Places in the input of the swept parameters, by path, and of the end of the runs."""
+    """Places of the swept parameters and of the end of the runs in the input, by path."""
 
     def __post_init__(self) -> None:
-        """Different parameters, as many as a grid may have; those that go together have as many values."""
+        """Check that parameters are distinct and not too many, and that those changing together have equally many
+        values.
+        """
         if not self.paths or len(self.axes) > MOST_AXES or len(set(self.paths)) != len(self.paths):
             message = f"a sweep has different parameters, {MOST_AXES} at most; not {', '.join(self.paths) or 'none'}."
             raise InputError(message, path="sweep")
@@ -183,7 +185,7 @@ class Plan:
 
     @cached_property
     def shape(self) -> tuple[int, ...]:
-        """Number of values along each dimension: those of the grid, or the one of what goes together; then the draws
+        """Number of values along each dimension: of the grid, or of the parameters that change together; then the draws
         of the sample.
         """
         grid = (len(self.axes[0]),) if self.zipped else tuple(len(axis) for axis in self.axes)
@@ -195,43 +197,43 @@ class Plan:
         return math.prod(self.shape)
 
     def at(self, index: Index) -> dict[str, Array]:
-        """The parameters of the runs of these numbers, by path, the last dimension fastest."""
+        """Return the parameters of the runs with these numbers, by path; the last dimension varies fastest."""
         places = np.unravel_index(np.asarray(index, dtype=np.int64), self.shape)
         grid = [places[0]] * len(self.axes) if self.zipped else places
         values = {axis.path: axis.at(place) for axis, place in zip(self.axes, grid, strict=False)}
         return values | (self.sample.at(places[-1]) if self.sample else {})
 
     def picked(self, index: Index) -> Plan:
-        """The plan of some of the runs alone, whose values go together."""
+        """Return the plan of a subset of the runs, whose values change together."""
         axes = [Axis(path, values.tolist()) for path, values in self.at(index).items()]
         return Plan(axes, self.until, zipped=True)
 
     @property
     def points(self) -> list[dict[str, float]]:
-        """The swept values of each run by path, the last dimension fastest."""
+        """Swept values of each run by path; the last dimension varies fastest."""
         values = self.at(np.arange(self.size))
         return [dict(zip(values, row, strict=True)) for row in zip(*(x.tolist() for x in values.values()), strict=True)]
 
     def located(self, error: InputError) -> InputError:
-        """An error of what is swept with the place where that is given."""
+        """Return an error about a swept parameter with its place in the input, if known."""
         place = self.places.get(error.place.path) if error.place and not error.place.file else None
         return InputError(error.message, place) if place else error
 
     @property
     def load(self) -> str:
-        """The prescribed variable whose value ends every run; '' where there is none."""
+        """Prescribed variable whose value ends every run; '' if there is none."""
         return self.until[0] if self.until and self.until[0] != SURVIVAL else ""
 
     @property
     def record(self) -> str:
-        """The plan as a dataset records it."""
+        """The plan as recorded in a dataset."""
         content = {"axes": [axis.record for axis in self.axes], "until": list(self.until) if self.until else None}
         more = {"zipped": True} if self.zipped else {}
         return json.dumps({**content, **more, **({"sample": self.sample.record} if self.sample else {})})
 
 
 def recorded_plan(record: object) -> Plan:
-    """The plan that a dataset records; InputError where it records none."""
+    """Restore the plan that a dataset records; InputError if it records none."""
 
     def numbers(values: Any) -> tuple[float, ...]:
         if not all(isinstance(value, float | int) for value in values):
@@ -259,8 +261,8 @@ def recorded_plan(record: object) -> Plan:
 
 
 def split_arrays(over: Mapping[str, object]) -> tuple[dict[str, object], dict[str, Array]]:
-    """Values as a case lists them, and apart from these, which are read entry by entry, those that come as arrays of
-    numbers, which may be long.
+    """Return the values as in a case, and separately numerical arrays: lists are read entry by entry, and arrays may be
+    long.
     """
     lists, arrays = dict(over), {}
     for path, values in over.items():
@@ -277,9 +279,9 @@ def plan_of(
     until: Mapping[str, float] | None = None,
     arrays: Mapping[str, Array] | None = None,
 ) -> Plan:
-    """The plan in SI; ``units`` are those of the parameters that may be changed, by path.
+    """Return the plan in SI; ``units`` are those of the changeable parameters, by path.
 
-    ``until`` and ``arrays``, values in SI, go before what the section says of them.
+    ``until`` and ``arrays``, values in SI, override those of the section.
     """
     arrays = arrays or {}
     if not section.over and section.sample is None:
@@ -293,12 +295,12 @@ def plan_of(
         sample = Sample(draws, drawn.runs, drawn.method, drawn.seed)
     ends = until or section.until
     trees["sweep.until"] = Tree(None, Place(OVERRIDE)) if until else section.tree.value.get("until", section.tree)
-    places = {path: replace(tree.place, path="") for path, tree in trees.items()}  # paths are what messages name
+    places = {path: replace(tree.place, path="") for path, tree in trees.items()}  # messages contain the path anyway
     return Plan(axes, next(iter(ends.items())) if ends else None, section.combine != GRID, sample, places)
 
 
 def read_sweep(tree: Tree, usual: SweepSection | None = None) -> SweepSection:
-    """A sweep; keys that are left out are as in the usual one."""
+    """Read a sweep; keys that are left out are taken from ``usual``."""
     section = read(SweepSection, csvtable.embedded(tree, str(Path.cwd())), Context())
     if usual is not None:
         for name in keys(SweepSection):
@@ -309,12 +311,12 @@ def read_sweep(tree: Tree, usual: SweepSection | None = None) -> SweepSection:
 
 
 def read_until(tree: Tree) -> Mapping[str, float]:
-    """A prescribed variable and the value at which each run ends."""
+    """Read a prescribed variable and the value at which each run ends."""
     return SWEEP_END.read(tree, "until", Context())
 
 
 def _known(path: str, tree: Tree, units: Mapping[str, str]) -> str:
-    """The path of a parameter; InputError where there is none."""
+    """Return the path of a parameter; InputError if there is none."""
     path = parameter_path(path, units)
     if path.startswith(INTEGRATED_PATHS):
         text = "shapes and laws of the gap are in integrals that are made once; give each value a run, by --set."
@@ -335,7 +337,7 @@ def _axis(path: str, tree: Tree, units: Mapping[str, str], array: Array | None) 
 
 
 def _as_range(array: Array) -> EvenlySpaced | None:
-    """Equally spaced values as a range, so that neither a plan nor its record keeps each of them."""
+    """Return equally spaced values as a range, so that neither a plan nor its record stores each of them."""
     if not (len(array) and np.isfinite(array).all()):
         return None
     spaced = EvenlySpaced(float(array[0]), float(array[-1]), len(array))
@@ -343,7 +345,7 @@ def _as_range(array: Array) -> EvenlySpaced | None:
 
 
 def _logarithmic(values: RangeSection | UniformSection) -> bool:
-    """Whether a range is spaced by ratios; InputError where its ends have none."""
+    """True if a range is spaced by ratios; InputError if its ends are not positive."""
     if values.spacing != LINEAR and not (values.first > 0 and values.last > 0):
         raise values.error("a logarithmic range needs ends above zero.", "spacing")
     return values.spacing != LINEAR
@@ -369,7 +371,7 @@ def _distribution(path: str, tree: Tree, unit: str) -> Distribution:
 
 
 def _column(table: TableSection, path: str, unit: str) -> Drawn:
-    """A column of a table, whose rows all columns of the same text share."""
+    """Return a column of a table; all columns of the same text are drawn by the same row."""
     if not table.csv:
         raise table.error("the table needs a `file`.")
     variable = path.rpartition(".")[2]

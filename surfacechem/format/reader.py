@@ -1,4 +1,4 @@
-"""Reader from the sections of a case to its scene and its run, with the checks of keys against each other."""
+"""Reader from the sections of a case to its scene and its run, with checks across keys."""
 
 from __future__ import annotations
 
@@ -50,24 +50,24 @@ L = TypeVar("L", bound=Law)
 
 DEFAULT_BODIES = ("lower", "upper")
 SHARED = "T"
-"""Names of bodies that a case leaves out, and of the temperature that they share with the interface."""
+"""Names of bodies that a case omits, and of the temperature that they share with the interface."""
 
-# Names that stand for the temperature of body 1, of body 2 and of the interface.
+# Reserved names for the temperatures of body 1, of body 2 and of the interface.
 OWNERS = {"T_1": 0, "T_2": 1, "T_c": 2}
 
 RESERVED = ("T_a", "T_from", "T_to")
 TAKEN = ("interface", "surroundings", "reference")
 
-# Keys of the interface under which all bonds would be at the least gap of curved surfaces.
+# Keys of the interface that are not allowed with curved surfaces: all bonds would be at their least gap.
 KEYS_OF_FLATS = ("sites", "bonding", "mechanism", "friction")
 
-# Cells of a body before a run has chosen them.
+# Number of cells of a body until a run has chosen it.
 DEFAULT_CELLS = 16
 
 
 @dataclass(frozen=True)
 class ExactSolution:
-    """An exact solution by name, with those of its parameters that the case gives itself."""
+    """An exact solution by name, with the parameters that the case gives for it."""
 
     name: str
     options: Mapping[str, float] = field(default_factory=dict)
@@ -75,7 +75,7 @@ class ExactSolution:
 
     @property
     def fixed(self) -> str:
-        """Reason why it applies to no other scene than that of the case, in words; empty where it follows changes."""
+        """Reason why the solution applies only to the scene of the case, in words; empty if it follows changes."""
         if not self.options:
             return ""
         own = f"it is given with {', '.join(self.options)}, and the scene was changed"
@@ -83,10 +83,10 @@ class ExactSolution:
 
 
 def read_document(tree: Tree, base: str = ".", mechanism_text: str | None = None) -> tuple[Document, Mechanism | None]:
-    """The sections of a case and the mechanism that it names.
+    """Return the sections of a case and the mechanism that it names.
 
-    What the sections may speak of, temperatures and species, comes from the bodies and the interface, so that their
-    names are gathered first.
+    Names of temperatures and species, which other sections may use, are given by the bodies and the interface, so that
+    they are collected first.
     """
     top = tree.mapping(keys(Document))
     nothing = Tree(None, tree.place)
@@ -97,7 +97,7 @@ def read_document(tree: Tree, base: str = ".", mechanism_text: str | None = None
     for name, body in bodies.items():
         if not re.fullmatch(BODY_NAME, name) or name in TAKEN:
             raise body.error(f"'{name}' cannot name a body: use letters, digits, - and _, and none of {TAKEN}.")
-    # A temperature that several owners name is shared: they are in perfect contact.
+    # Owners with the same name of their temperature share it: they are in perfect contact.
     owners = [body.mapping().get("temperature") for body in bodies.values()]
     temperatures = _temperature_names([*owners, interface.get("temperature")])
     whole = "surface" in top
@@ -108,7 +108,7 @@ def read_document(tree: Tree, base: str = ".", mechanism_text: str | None = None
     context = Context(names, temperatures, tuple(bodies) or DEFAULT_BODIES, whole=whole)
     mechanism = None
     if "mechanism" in interface:
-        # Which solver runs decides whether a mechanism may ask Cantera for its rates.
+        # The solver decides whether a mechanism may ask Cantera for its rates.
         run = run_of(read(RunSection, top["run"], context)) if "run" in top else Run(times=(0.0, 1.0))
         named = keys(InterfaceSection)["mechanism"].content.read(interface["mechanism"], "the mechanism", context)
         evaluate = run.solver in (solvers.AUTO, *solvers.CALLING_PYTHON)
@@ -119,8 +119,8 @@ def read_document(tree: Tree, base: str = ".", mechanism_text: str | None = None
 
 
 def _refuse_bonds(interface: Mapping[str, Tree]) -> None:
-    """Raise InputError where an interface of bodies with shapes has bonds or friction of its own."""
-    # Before numbers are read, whose units would be those of a pair.
+    """Raise InputError if an interface of curved bodies has bonds or friction of flat ones."""
+    # Before numbers are read, which would be expected in the units of a pair of bodies.
     for name in KEYS_OF_FLATS:
         if name in interface:
             text = "is of flats. Over curved surfaces bonds may be in equilibrium with the gap: put the law"
@@ -128,7 +128,7 @@ def _refuse_bonds(interface: Mapping[str, Tree]) -> None:
 
 
 def _temperature_names(owners: Sequence[Tree | None]) -> tuple[str, ...]:
-    """Names of the temperatures of body 1, body 2 and the interface; some may only name that of their owner."""
+    """Return the names of the temperatures of body 1, body 2 and the interface; reserved names need the right owner."""
     names = [str(owner.value) if owner is not None and is_name(owner) else "" for owner in owners]
     for name, owner in zip(names, owners, strict=True):
         if owner is not None and (name in RESERVED or (name in OWNERS and names[OWNERS[name]] != name)):
@@ -140,7 +140,7 @@ def _temperature_names(owners: Sequence[Tree | None]) -> tuple[str, ...]:
 
 
 def scene_of(case: Document, mechanism: Mechanism | None) -> Scene:
-    """The scene that the sections state."""
+    """Return the scene that the sections define."""
     interface, surface, heat = _interface(case, mechanism), _surface(case), case.heat
     if surface is not None:
         from surfacechem.surfaces.potential import CurvedConductance
@@ -165,7 +165,7 @@ def scene_of(case: Document, mechanism: Mechanism | None) -> Scene:
     )
     if case.bodies:
         return scene
-    # One history for all three, so that a change of it is one of all.
+    # One history for all three, so that a change of it applies to all.
     given: Load = case.interface.temperature  # type: ignore[assignment]
     return replace(
         scene, interface=replace(scene.interface, temperature=SHARED), loading={SHARED: given, **scene.loading}
@@ -173,7 +173,7 @@ def scene_of(case: Document, mechanism: Mechanism | None) -> Scene:
 
 
 def _bodies(case: Document) -> tuple[Body, Body]:
-    """The two bodies; where a case leaves them out reservoirs at the given temperature of the interface."""
+    """Return the two bodies; if omitted, reservoirs at the given temperature of the interface."""
     if not case.bodies and not isinstance(case.interface.temperature, Load):
         message = "the two bodies, of which the first is body 1, for example `bodies: {lower: {...}, upper: {...}}`"
         raise case.tree.error(f"the case needs `bodies`: {message}; or `interface: {{temperature: 300 K}}`.")
@@ -239,7 +239,7 @@ def _interface(case: Document, mechanism: Mechanism | None) -> Interface:
 
 
 def _surface(case: Document) -> CurvedSurfaces | None:
-    """The free energy of two surfaces of given shapes, a function of their approach."""
+    """Return the free energy of two surfaces of given shapes, a function of their approach."""
     section = case.surface
     if section is None:
         return None
@@ -272,7 +272,7 @@ def _surface(case: Document) -> CurvedSurfaces | None:
 
 
 def _refuse_outside(case: Document, low: float, high: float) -> None:
-    """Raise InputError where the gap is not among the approaches at the start."""
+    """Raise InputError if the initial gap is not among the approaches."""
     history, starts = case.loading.get("g_n"), {"initial": case.initial.get("g_n", low)}
     if history is not None:
         starts["loading"] = history.at_start()
@@ -282,7 +282,7 @@ def _refuse_outside(case: Document, low: float, high: float) -> None:
 
 
 def _partition(case: Document) -> tuple[float, float]:
-    """Fractions of the heat into body 1 and into the surroundings."""
+    """Return the fractions of the heat into body 1 and into the surroundings."""
     section, shares = case.interface, case.interface.partition
     if shares is None:
         return 0.5, 0.0
@@ -299,8 +299,8 @@ def _partition(case: Document) -> tuple[float, float]:
 
 
 def _sites(case: Document) -> Sites | None:
-    """The density of sites; one per square metre for bonds whose density nothing reads: under a given force, without
-    stored energy.
+    """Return the density of sites. It is one per square metre for bonds whose density nothing reads: under a given
+    force, without stored energy.
     """
     section, bodies, sites = case.interface, list(case.bodies or DEFAULT_BODIES), case.interface.sites
     if sites is None:
@@ -348,7 +348,7 @@ def _medium(section: MediumSection) -> Medium:
 
 
 def _normal(case: Document) -> Mounting | None:
-    """The mounting along the normal, with the stiffness of the bodies in series: 1/k = H_1/E_1 + H_2/E_2."""
+    """Return the mounting along the normal, with the stiffness of the bodies in series: 1/k = H_1/E_1 + H_2/E_2."""
     normal = case.mechanics.normal
     given = [k for k in map(_stiffness, case.bodies.values()) if k is not None]
     if not given:
@@ -360,7 +360,7 @@ def _normal(case: Document) -> Mounting | None:
 
 
 def _stiffness(body: BodySection) -> float | None:
-    """Stiffness of a body [Pa/m]; one that gives none is rigid."""
+    """Return the stiffness of a body [Pa/m]; a body without one is rigid."""
     if body.stiffness is not None:
         for name in ("E", "H"):
             if body.has(name):
@@ -382,7 +382,7 @@ def _stages(case: Document) -> tuple[Stage, ...]:
 
 
 def _stage(name: str, section: StageSection) -> Stage:
-    """A stage with its end: after a time, at an event, or where a variable has a value."""
+    """Return a stage with its end: after a time, at an event, or when a variable has a value."""
     stage, until = Stage(name, section.more, place=section.tree.place), section.until
     if section.has("for") and section.has("until"):
         raise section.error("the stage has two ends: give `for` or `until`.", "until", "for")
@@ -398,8 +398,8 @@ def _stage(name: str, section: StageSection) -> Stage:
 
 
 def _initial(case: Document, mechanism: Mechanism | None) -> dict[str, float]:
-    """Initial values by variable, not a number for names that no variable has; whether each evolves, and what its names
-    may be, the assembly decides.
+    """Return the initial values by variable, NaN for unknown names; the assembly decides which names are valid and
+    evolve.
     """
     values = dict(case.initial)
     given = values.pop("coverages", None)
@@ -421,9 +421,9 @@ def _initial(case: Document, mechanism: Mechanism | None) -> dict[str, float]:
 
 
 def _mechanism(named: str | MechanismSection, tree: Tree, base: Path, content: str | None, evaluate: bool) -> Mechanism:
-    """The mechanism of a case; ``content`` is its text where that is already at hand.
+    """Return the mechanism of a case; ``content`` is its text, if known already.
 
-    With ``evaluate`` what is not lowered is left to Cantera.
+    With ``evaluate`` reactions that cannot be lowered are left to Cantera.
     """
     from surfacechem.mechanism import load_mechanism
     from surfacechem.mechanism.evaluated import Neighbour
@@ -453,7 +453,7 @@ def _mechanism(named: str | MechanismSection, tree: Tree, base: Path, content: s
 
 
 def _renumbered(mechanism: Mechanism, species: Tree | None, reactions: Tree | None) -> Mechanism:
-    """The mechanism with other numbers of some species, by name, and of some reactions, by label."""
+    """Return the mechanism with changed parameters of some species, by name, and of some reactions, by label."""
     if species is not None:
         (mixture,) = mechanism.potentials
         given = species.mapping(mechanism.species, "species")
@@ -475,7 +475,7 @@ def _renumbered(mechanism: Mechanism, species: Tree | None, reactions: Tree | No
 
 
 def _species(item: Species, tree: Tree) -> Species:
-    """A species with numbers for its bond and for its thermo, by temperature range where it has several."""
+    """Return a species with parameters for its bond and for its thermo, by temperature range if it has several."""
     ranges = item.gibbs.ranges
     own: list[Law] = [law for law in (item.spring, ranges.get("")) if law is not None]
     keys = {name: law for law in own for name, _ in law.specs()}
@@ -490,7 +490,7 @@ def _species(item: Species, tree: Tree) -> Species:
 
 
 def _changed(law: L, tree: Tree) -> L:
-    """A law with the numbers that a case gives for it."""
+    """Return a law with the parameters that a case gives for it."""
     specs = {name: law.refine(name, spec) for name, spec in law.specs() if spec.varies}
     fields = tree.mapping(specs, "parameters")
     return law.given({name: number(child, specs[name], name) for name, child in fields.items()})
@@ -500,7 +500,7 @@ def _changed(law: L, tree: Tree) -> L:
 
 
 def run_of(section: RunSection) -> Run:
-    """The run that the section states."""
+    """Return the run that the section defines."""
     if section.has("accuracy") and section.has("rtol"):
         raise section.error("the tolerance has two roles: give `accuracy` or `rtol`.", "accuracy", "rtol")
     solver = section.solver or (solvers.AUTO if section.accuracy is not None else OWN)
@@ -508,7 +508,7 @@ def run_of(section: RunSection) -> Run:
         raise section.error(
             "the tolerance has two roles: with `solver: auto` it follows from `accuracy`.", "rtol", "solver"
         )
-    # An accuracy begins with a margin; `solver: auto` repeats a run that misses it, with a tighter tolerance.
+    # The first tolerance for an accuracy has a margin; `solver: auto` repeats a run that misses it at a tighter one.
     usual = DEFAULT_RTOL if section.accuracy is None else first_tolerance(section.accuracy)
     return Run(
         times=_times(section),
@@ -524,14 +524,14 @@ def run_of(section: RunSection) -> Run:
 
 
 def _times(section: RunSection) -> tuple[float, ...]:
-    """Output times [s], listed or spaced; where they follow the run those at which runs are compared."""
+    """Return the output times [s], listed or spaced; if they follow the run, the times at which runs are compared."""
     if (listed := section.times) is not None:
         for name in ("until", "outputs", "spacing", "first"):
             if section.has(name):
                 raise section.error(f"the output times have two roles: give `times` or `{name}`.", name, "times")
         if max(listed, default=0.0) == 0.0:
             raise section.error("at least one time after 0 is needed.", "times")
-        # Every run begins at zero, whether that is an output or not.
+        # Every run begins at zero, even if zero is no output.
         times = tuple(listed) if listed[0] == 0.0 else (0.0, *listed)
     elif section.until is None:
         raise section.error("the run needs an end. Add `until: 1 s`, or a list of `times`.")
@@ -546,7 +546,7 @@ def _times(section: RunSection) -> tuple[float, ...]:
 
 
 def _spaced(section: RunSection, end: float) -> tuple[float, ...]:
-    """Output times [s], evenly or by ratios."""
+    """Return output times [s], spaced evenly or by ratios."""
     count, first = section.outputs or DEFAULT_OUTPUTS, section.first
     if section.spacing == LINEAR:
         if first is not None:
@@ -556,13 +556,13 @@ def _spaced(section: RunSection, end: float) -> tuple[float, ...]:
         raise section.error("logarithmic spacing needs `first`: the first output time after 0.", "spacing")
     if first > end:
         raise section.error(f"first = {first:g} is outside its range: <= {end:g}.", "first", "until")
-    # Differences of logarithms, as the ratio of the ends may overflow; the end itself is exact.
+    # A difference of logarithms, as the ratio of the ends may overflow; the end itself is exact.
     ratio = math.log(end) - math.log(first)
     return (0.0, *(first * math.exp(ratio * i / max(count - 2, 1)) for i in range(count - 2)), end)
 
 
 def exact_solution_of(tree: Tree) -> ExactSolution | None:
-    """The exact solution that a case names; none where the key is left empty."""
+    """Return the exact solution that a case names; None if the key is left empty."""
     if tree.value is None or tree.value == "":
         return None
     named = REFERENCE.read(tree, "reference", Context())

@@ -1,4 +1,4 @@
-"""JSON Schema of the case format, from its declarations: for editors that complete and check YAML."""
+"""JSON Schema of the case format, made from its declarations, for editors that complete and check YAML."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from surfacechem.format.csvtable import KEY_MEANINGS
 from surfacechem.format.declarations import NODE_NAME, QUANTITY, Schema, closed, law_keys, reference, schema_of
 from surfacechem.format.sections import Document
 
-# The parameters of a body's energy stand beside its other keys.
+# The parameters of a body's energy are among its other keys.
 CONTRACTS = [contract for contract in laws.FAMILIES if contract is not BodyEnergy]
 
 
 def schema() -> Schema:
-    """The JSON Schema (draft 2020-12) of a case file."""
+    """Return the JSON Schema (draft 2020-12) of a case file."""
     entries = {name: {"type": "string", "description": meaning} for name, meaning in KEY_MEANINGS.items()}
-    # A table from a file, or from its text.
+    # A table by its file, or by its text.
     tables = [closed({name: entries[name], "column": entries["column"]}, [name]) for name in ("file", "csv")]
     definitions: dict[str, Schema] = {
         "quantity": {
@@ -36,7 +36,7 @@ def schema() -> Schema:
             kind = {} if _is_required(law) else {"type": ["object", "null"]}
             definitions[f"{contract.contract}.{name}"] = {**schema_of(law), **kind}
         definitions[contract.contract] = _any_law(contract)
-    # Heights from a file become the numbers of the law before it is read.
+    # Heights from a file replace the parameters of the law before it is read.
     heights = f"{Shape.contract}.heights"
     measured = {"type": "string", "description": "a CSV or netCDF file of x, y and z beside the case"}
     definitions[heights] = {"anyOf": [definitions[heights], closed({"file": measured}, ["file"])]}
@@ -52,12 +52,12 @@ def schema() -> Schema:
 
 
 def text() -> str:
-    """The schema as JSON."""
+    """Return the schema as JSON text."""
     return json.dumps(schema(), indent=2, ensure_ascii=False) + "\n"
 
 
 def _any_law(contract: type[Law]) -> Schema:
-    """One law: ``name: {...}``, or the bare name where nothing is required."""
+    """Return the schema of one law: ``name: {...}``, or the bare name if nothing is required."""
     found = laws.laws(contract)
     properties = {name: reference(f"{contract.contract}.{name}") for name in found}
     one = {**closed(properties), "minProperties": 1, "maxProperties": 1}
@@ -66,5 +66,5 @@ def _any_law(contract: type[Law]) -> Schema:
 
 
 def _is_required(law: type[Law]) -> bool:
-    """Whether the law has a parameter that must be given."""
+    """True if the law has a required parameter."""
     return any(declared.required for declared in law_keys(law).values())

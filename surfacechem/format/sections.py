@@ -1,7 +1,7 @@
-"""The sections of a case file: every key, what it holds, its range and what is meant where it is left out.
+"""The sections of a case file: every key with its content, range and default.
 
-Reader, JSON Schema, defaults and the tables of the documentation follow from these declarations. What sections make
-of each other, and what contradicts itself across keys, is in :mod:`surfacechem.format.reader`.
+Reader, JSON Schema, defaults and the tables of the documentation follow from these declarations. Relations between
+sections, and contradictions across keys, are in :mod:`surfacechem.format.reader`.
 """
 
 from __future__ import annotations
@@ -65,12 +65,12 @@ from surfacechem.tolerances import DEFAULT_RTOL, ERROR_FLOOR, MAX_RTOL, MIN_RTOL
 
 BODY_NAME = r"[A-Za-z][A-Za-z0-9_-]*"
 
-# Variables beside temperatures and bonds that some scenes evolve; whether this one does, its assembly decides.
+# Variables other than temperatures and bonds that some scenes evolve; the assembly decides for each scene.
 EVOLVING = ("g_n", "v_n", "u_t", "u_t2", "v_t", "v", "v_2", "g_t", "w_n", "w_t", "w_t2", "F_n", "F_t", "F_t2", "p")
 
 LUMP, INSULATED, QUADRATIC = "lump", "insulated", "quadratic"
 STEADY = "steady"
-"""Word for the end of a run that ends in a steady state."""
+"""Word for the end of a run at its steady state."""
 
 LINEAR, LOGARITHMIC = SPACINGS = ("linear", "logarithmic")
 GRID = "grid"
@@ -78,15 +78,15 @@ GRID = "grid"
 DEFAULT_OUTPUTS = 201
 MOST_OUTPUTS = MOST_RUNS = 1_000_000
 
-# Parameters of a grid, and values of one or draws of a sample: of Sobol' points there are no more.
+# Largest numbers of parameters of a grid, and of values of one or draws of a sample, the limit of Sobol' points.
 MOST_AXES, MOST_POINTS = 32, 2**30
 
-# Ratio of the widths of the first and the last cell at most, so that they keep their order in doubles.
+# Largest ratio of the widths of the last and the first cell, so that their order is resolved by doubles.
 STEEPEST = 1e6
 
 
 def _variables(names: Sequence[str], content: Content) -> dict[str, Key]:
-    """Keys that are variables, in their units."""
+    """Return keys that are variables, in their units."""
     return {name: Key(content, f"{VARIABLES[name].long_name} [{UNITS[name]}]") for name in names}
 
 
@@ -153,7 +153,7 @@ class BodySection(Section):
 
     @staticmethod
     def energy(tree: Tree) -> type[BodyEnergy]:
-        """The law of the energy, whose parameters stand beside the other keys."""
+        """Return the law of the energy, whose parameters are among the other keys."""
         capacity = tree.mapping().get("capacity")
         name = capacity.value if capacity else QUADRATIC
         if capacity and not (isinstance(name, str) and laws.knows(BodyEnergy, name)):
@@ -162,7 +162,7 @@ class BodySection(Section):
 
     @classmethod
     def more_keys(cls, tree: Tree | None) -> Mapping[str, Key]:
-        """The parameters of the energy, which a body without one leaves out."""
+        """Return the parameters of the energy, which a body without energy omits."""
         kinds = list(laws.laws(BodyEnergy).values()) if tree is None else [cls.energy(tree)]
         found = {name: declared for kind in kinds for name, declared in law_keys(kind).items()}
         if tree is not None and any(name in tree.mapping() for name in ("capacity", *found)):
@@ -289,7 +289,7 @@ class SurfaceSection(Section):
     laws: Sequence[Potential] = key(ListOf(OneLaw(Potential)), "laws of the gap, integrated over it", ())
     heat: Sequence[HeatTransfer] = key(ListOf(OneLaw(HeatTransfer)), "conductances over the gap, integrated", ())
     approach: ApproachSection = key(Nested(ApproachSection), default=REQUIRED)
-    # Three digits more than the default are still above RUN_EPS, below which no integral is known.
+    # Three digits more than the default are still above RUN_EPS, the limit for integrals.
     accuracy: float = quantity(
         "1", "relative accuracy of the force", ERROR_FLOOR, above=ERROR_FLOOR / 1000, at_most=0.1
     )
@@ -344,7 +344,7 @@ class StageSection(Section):
 
     @classmethod
     def more_keys(cls, tree: Tree | None) -> Mapping[str, Key]:
-        """Rates of the variables that may be moved."""
+        """Return the rates of the variables that can be moved."""
         units = {name: quotient(UNITS[name], "s") for name in LOADABLE}
         return {name: Key(amount(unit, f"rate of the {VARIABLES[name].long_name}")) for name, unit in units.items()}
 
@@ -439,7 +439,7 @@ class ReferenceSection(Section):
 
     @classmethod
     def more_keys(cls, tree: Tree | None) -> Mapping[str, Key]:
-        """The parameters of the solution that is named; their ranges differ from one to another."""
+        """Return the parameters of the named solution; their ranges differ from one solution to another."""
         if tree is None:
             return {name: Key(amount(spec.unit, spec.text)) for name, spec in _parameters(*references.names())}
         name = tree.mapping().get("name")
@@ -454,7 +454,7 @@ def _parameters(*solutions: str) -> Iterator[tuple[str, Spec]]:
         yield from ((item.name, item.metadata["spec"]) for item in dataclasses.fields(references.get(name)))  # type: ignore[arg-type]
 
 
-# An exact solution, by name or with its parameters.
+# An exact solution by name, or with its parameters.
 REFERENCE = ByShape(
     EXACT_SOLUTION,
     Nested(ReferenceSection),
@@ -476,7 +476,7 @@ class RangeSection(Section):
 
 OVER = "over: {loading.f.ramp.rate: {from: 1 pN/s, to: 1 nN/s, points: 31}}"
 
-# Values of a swept parameter, in its unit.
+# Values of a swept parameter, in its unit: a list or a range.
 SWEPT = ByShape(items=ListOf(amount("[x]"), "[1, 2, 3]", at_least=1), mapping=Nested(RangeSection))
 
 
