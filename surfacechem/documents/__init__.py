@@ -1,1 +1,1 @@
-"""YAML documents whose values know their place, and the files that come with the package."""
+"""YAML documents whose values know their places, and the files that come with the package."""

@@ -1,8 +1,8 @@
-"""The user's cache folder, for what takes long to compute: fits of properties, integrals over surfaces, machine code.
+"""The user's cache folder for expensive results: fits of properties, integrals over surfaces, machine code.
 
-A file is named by a digest of all that it follows from, so that it is never used where it does not hold, and is read
-where its SHA-256 is right and no other user could have written it. What cannot be written, read or trusted costs time,
-never a result.
+The name of a file is a digest of all its inputs, so that it is never used for other ones. A file is read only if its
+SHA-256 is right and no other user could have written it. A file that cannot be written, read or trusted costs time,
+never a wrong result.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ import numpy as np
 PACKAGE = Path(__file__).parents[1]
 
 WRITABLE_BY_OTHERS = stat.S_IWGRP | stat.S_IWOTH
-"""Permission of others to write."""
+"""Write permissions of others."""
 
 MOST_FILES = 4096
-"""Largest number of files of one kind that are kept; at 5 to 100 kB some 100 MB."""
+"""Largest number of files of one kind; at 5 to 100 kB each some 100 MB."""
 
 
 def cache_root() -> Path:
-    """SURFACECHEM_CACHE, else NUMBA_CACHE_DIR, else the user's cache folder."""
+    """Return SURFACECHEM_CACHE, else NUMBA_CACHE_DIR, else the user's cache folder."""
     for variable in ("SURFACECHEM_CACHE", "NUMBA_CACHE_DIR"):
         if os.environ.get(variable):
             return Path(os.environ[variable])
@@ -50,24 +50,24 @@ def cache_root() -> Path:
 
 
 def sealed(content: bytes) -> bytes:
-    """Content behind its SHA-256, so that it is known when it is damaged."""
+    """Return content preceded by its SHA-256, so that damage is detected."""
     return hashlib.sha256(content).hexdigest().encode() + b"\n" + content
 
 
 def unsealed(data: bytes) -> bytes | None:
-    """The content of sealed data; None where it is damaged."""
+    """Return the content of sealed data; None if it is damaged."""
     content = data[2 * hashlib.sha256().digest_size + 1 :]
     return content if sealed(content) == data else None
 
 
 def make_folder(folder: Path) -> None:
-    """A folder of the cache, writable to oneself alone from the start."""
+    """Create a folder of the cache, writable only for its user from the start."""
     for path in (cache_root(), folder):
         path.mkdir(mode=0o755, parents=True, exist_ok=True)
 
 
 def keep_file(path: Path, data: bytes) -> None:
-    """Write a file whole or not at all, even where the machine stops meanwhile."""
+    """Write a file whole or not at all, even if the machine stops meanwhile."""
     handle, name = tempfile.mkstemp(dir=path.parent)
     try:
         with os.fdopen(handle, "wb") as file:
@@ -82,19 +82,19 @@ def keep_file(path: Path, data: bytes) -> None:
 
 
 def untrusted(paths: Iterable[Path]) -> str | None:
-    """Reason why files at paths of the cache could be another user's; None where they cannot be, or do not exist."""
+    """Return the reason why files of the cache could be another user's; None if they cannot be, or do not exist."""
     if not hasattr(os, "getuid"):
         return None  # on Windows a user's folder is writable to that user alone
     root = cache_root()
     for path in (root, *paths):
-        # What another process removes meanwhile is passed over.
+        # A file that another process removes meanwhile is skipped.
         try:
             found = path.stat() if path == root else path.lstat()
         except OSError:
             continue
         if found.st_uid not in (os.getuid(), 0):
             return f"{path} belongs to another user"
-        shared = path == root and found.st_mode & stat.S_ISVTX  # there others cannot replace what is ours
+        shared = path == root and found.st_mode & stat.S_ISVTX  # in a sticky folder others cannot replace our files
         if stat.S_ISLNK(found.st_mode) or (found.st_mode & WRITABLE_BY_OTHERS and not shared):
             return f"{path} can be written by other users"
     return None
@@ -105,11 +105,11 @@ def untrusted(paths: Iterable[Path]) -> str | None:
 
 @dataclass(frozen=True)
 class Fingerprint:
-    """A digest of what things hold; equal only where they hold the same."""
+    """A digest of the contents of objects; equal only if the contents are."""
 
     digest: str
     is_lasting: bool
-    """Whether it is the same in every process: laws of one's own may use anything, which nobody can compare."""
+    """True if it is the same in every process; user-defined laws may depend on anything, which cannot be compared."""
 
 
 _CLASS_NUMBERS: WeakKeyDictionary[type, int] = WeakKeyDictionary()
@@ -117,7 +117,7 @@ _COUNTER = count()
 
 
 def fingerprint(*things: Any) -> Fingerprint:
-    """The fingerprint of numbers, texts, arrays, and of laws and other records of them.
+    """Return the fingerprint of numbers, texts, arrays, and of laws and other records of them.
 
     >>> fingerprint([1.0, 2.0]) == fingerprint((1.0, 2.0)), fingerprint(0.1) == fingerprint(0.1 + 1e-18)
     (True, True)
@@ -133,7 +133,7 @@ def fingerprint(*things: Any) -> Fingerprint:
 
 
 def _parts(thing: Any) -> Iterator[tuple[bytes, bool]]:
-    """All that a thing holds, each with whether it is the same in every process."""
+    """Yield all contents of an object, each with True if it is the same in every process."""
     if isinstance(thing, float):
         yield float(thing).hex().encode(), True
     elif thing is None or isinstance(thing, bool | int | str):
@@ -152,12 +152,12 @@ def _parts(thing: Any) -> Iterator[tuple[bytes, bool]]:
         yield _code(type(thing))
         for name in (item.name for item in fields(thing) if item.repr):
             yield from _parts((name, getattr(thing, name)))
-    else:  # equal to nothing
+    else:  # unknown: different from everything
         yield str(next(_COUNTER)).encode(), False
 
 
 def _code(kind: type) -> tuple[bytes, bool]:
-    """A class by its name and source; one that is not of the package by a number of its own."""
+    """Return a class as its name and source; a class outside the package gets a unique number."""
     source = getattr(sys.modules.get(kind.__module__), "__file__", None)
     if source is None or not Path(source).is_relative_to(PACKAGE):
         return f"{_CLASS_NUMBERS.setdefault(kind, next(_COUNTER))}".encode(), False
@@ -166,15 +166,15 @@ def _code(kind: type) -> tuple[bytes, bool]:
 
 @cache
 def source_digest(file: str) -> str:
-    """The SHA-256 of a file with code that something follows from."""
+    """Return the SHA-256 of a file of source code."""
     return hashlib.sha256(Path(file).read_bytes()).hexdigest()
 
 
 def cached(mark: Fingerprint, code: Iterable[Path], find: Callable[[], Any]) -> Any:
-    """Result of ``find``, made of numbers, texts and lists; read from its file in the cache where that exists.
+    """Return the result of ``find``, made of numbers, texts and lists; read from its file in the cache if that exists.
 
-    ``code`` are the files, beside those of the classes in ``mark``, that it follows from; versions of libraries other
-    than NumPy, SciPy and SymEngine belong into the mark.
+    ``code`` are the source files on which it depends, in addition to those of the classes in ``mark``; versions of
+    libraries other than NumPy, SciPy and SymEngine belong into the mark.
     """
     if not mark.is_lasting:
         return find()
@@ -185,7 +185,7 @@ def cached(mark: Fingerprint, code: Iterable[Path], find: Callable[[], Any]) -> 
 
 
 def from_file(path: Path, find: Callable[[], Any], read: Callable[[bytes], Any], write: Callable[[Any], bytes]) -> Any:
-    """Result of ``find``, read from its file in the cache where that exists, else computed and written there."""
+    """Return the result of ``find``, read from its file in the cache if that exists, else computed and stored."""
     folder = path.parent
     with suppress(OSError, ValueError):
         if untrusted((folder, path)) is None and (content := unsealed(path.read_bytes())) is not None:
@@ -196,7 +196,7 @@ def from_file(path: Path, find: Callable[[], Any], read: Callable[[bytes], Any],
         keep_file(path, sealed(write(found)))
         with os.scandir(folder) as entries:
             files = [entry.path for entry in entries]
-        # Of too many files the older half goes.
+        # If there are too many files the older half is removed.
         for old in sorted(files, key=os.path.getmtime)[: len(files) // 2] if len(files) > MOST_FILES else ():
             Path(old).unlink(missing_ok=True)
     return found

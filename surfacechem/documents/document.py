@@ -1,6 +1,6 @@
-"""A YAML document as a tree in which every value knows its place: file, line and dotted path.
+"""YAML documents as trees in which every value knows its place: file, line and dotted path.
 
-Documents are data from outside: size, depth and number of nodes are limited, tags and repeated keys are refused, and
+Documents are external data: size, depth and number of nodes are limited, tags and repeated keys are refused, and
 nothing is evaluated. In a list of laws an item's path is its name, ``interface.friction.coulomb``, and
 ``interface.friction.coulomb[2]`` for the second of that name.
 """
@@ -18,7 +18,7 @@ from typing import Any, cast
 
 from surfacechem.errors import InputError, Place, suggestion
 
-# Mappings and lists inside each other.
+# Largest depth of nested mappings and lists.
 MOST_NESTED = 24
 
 
@@ -27,15 +27,15 @@ class Limits:
     """Limits on the size of a document."""
 
     largest: int = 1_000_000
-    """Size in bytes."""
+    """Largest size in bytes."""
     most: int = 20_000
-    """Number of values, with what aliases repeat; they are read in some 2 s."""
+    """Largest number of values, with those that aliases repeat; reading them takes some 2 s."""
 
 
-# Of a case; longer tables belong into files of their own.
+# Limits of a case; longer tables belong into separate files.
 LIMITS = Limits()
 
-# What stands for the file in messages about a value that the user has set from outside the document.
+# Name of the file in messages about a value that the user has set from outside the document.
 OVERRIDE = "override"
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9]*([-_][A-Za-z0-9]+)*")
@@ -53,7 +53,7 @@ class Tree:
     place: Place
 
     def plain(self) -> Any:
-        """The value without places."""
+        """Return the value without places."""
         if isinstance(self.value, dict):
             return {key: tree.plain() for key, tree in self.value.items()}
         if isinstance(self.value, list):
@@ -61,23 +61,23 @@ class Tree:
         return self.value
 
     def error(self, message: str) -> InputError:
-        """An input error at this place."""
+        """Return an input error at this place."""
         return InputError(message, self.place)
 
     @property
     def blamed_place(self) -> Place:
-        """Place to blame when it is wrong as a whole: that of an entry set from outside, else its own."""
+        """Place for errors of the value as a whole: that of an entry set from outside, else its own."""
         entries = self.value.values() if isinstance(self.value, dict) else ()
         return next((entry.place for entry in entries if entry.place.file == OVERRIDE), self.place)
 
     @property
     def shown(self) -> str:
-        """The value as it stands in a message."""
+        """The value as written in messages."""
         kinds = {dict: "a mapping", list: "a list", type(None): "nothing", bool: str(self.value).lower()}
         return kinds.get(type(self.value)) or f"'{str(self.value)[:40]}'"
 
     def mapping(self, known: Iterable[str] | None = None, what: str = "keys") -> dict[str, Tree]:
-        """The entries of a mapping, which may be empty; InputError for keys that are not known."""
+        """Return the entries of a mapping, which may be empty; InputError for unknown keys."""
         if self.value is None:
             return {}
         allowed = None if known is None else list(known)
@@ -91,7 +91,7 @@ class Tree:
         return dict(self.value)
 
     def items(self, example: str = "") -> list[Tree]:
-        """The items of a list, which may be empty."""
+        """Return the items of a list, which may be empty."""
         if self.value is None:
             return []
         if not isinstance(self.value, list):
@@ -100,7 +100,7 @@ class Tree:
         return list(self.value)
 
     def text(self, what: str) -> str:
-        """A text that is not empty."""
+        """Return a text that is not empty."""
         if self.value is None or (isinstance(self.value, str) and not self.value.strip()):
             raise self.error(f"{what} is empty; give a text, or leave the key out.")
         if not isinstance(self.value, str):
@@ -108,7 +108,7 @@ class Tree:
         return self.value
 
     def choice(self, what: str, known: Iterable[str]) -> str:
-        """One of some names."""
+        """Return one of some names."""
         options = list(known)
         if self.value is None or isinstance(self.value, dict | list):
             raise self.error(f"the {what} must be a name, not {self.shown}.{suggestion('', options)}")
@@ -117,7 +117,7 @@ class Tree:
         return self.value
 
     def places(self) -> Iterator[tuple[str, Place]]:
-        """The place of every path below and including this one."""
+        """Yield the path and place of this value and of every value below it."""
         yield self.place.path, self.place
         children = self.value.values() if isinstance(self.value, dict) else self.value
         for child in children if isinstance(self.value, dict | list) else ():
@@ -125,7 +125,7 @@ class Tree:
 
 
 def read(path: Path, name: str = "", limits: Limits = LIMITS) -> str:
-    """The text of a file; ``name`` stands for it in messages."""
+    """Read the text of a file; ``name`` replaces its path in messages."""
     place = Place(name or str(path))
     try:
         if not path.is_file():
@@ -141,7 +141,7 @@ def read(path: Path, name: str = "", limits: Limits = LIMITS) -> str:
 
 
 def decoded(data: bytes, place: Place) -> str:
-    """The text of bytes in UTF-8."""
+    """Decode a text in UTF-8."""
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -150,7 +150,7 @@ def decoded(data: bytes, place: Place) -> str:
 
 
 def is_file(path: Path) -> bool:
-    """Whether there is a file; no path is too odd to ask."""
+    """True if there is a file; also for paths that are invalid."""
     try:
         return path.is_file()
     except (OSError, ValueError):
@@ -158,10 +158,10 @@ def is_file(path: Path) -> bool:
 
 
 def file_in(folder: Path, name: str, place: Place) -> Path | None:
-    """The file of a name in a folder, None where there is none.
+    """Return the file of a name in a folder, None if there is none.
 
-    A document may come from elsewhere, so that what it names is read only where it lies beside or below it; a file in
-    another place is for the user to name.
+    A document may come from an untrusted source, so that a file that it names is read only from its folder or below; a
+    file elsewhere must be named by the user.
     """
     path = folder / name
     if not is_file(path):
@@ -175,7 +175,9 @@ def file_in(folder: Path, name: str, place: Place) -> Path | None:
 
 
 def named(tree: Tree, base: str | Path, what: str) -> Path:
-    """The file in a folder that a value names; InputError, which says ``what`` it should be, where there is none."""
+    """Return the file in a folder that a value names; InputError, in which ``what`` describes the file, if there is
+    none.
+    """
     name = tree.text(what)
     path = file_in(Path(base), name, tree.place)
     if path is None:
@@ -184,7 +186,7 @@ def named(tree: Tree, base: str | Path, what: str) -> Path:
 
 
 def parse(text: str, file: str = "") -> Tree:
-    """The tree of a YAML document.
+    """Parse a YAML document into a tree.
 
     >>> parse("bodies: {lower: {C: 1e3}}").plain()
     {'bodies': {'lower': {'C': 1000.0}}}
@@ -193,21 +195,21 @@ def parse(text: str, file: str = "") -> Tree:
 
 
 def build(text: str, file: str = "", limits: Limits = LIMITS) -> Tree:
-    """The tree of a YAML document without paths."""
+    """Build the tree of a YAML document without paths."""
     if len(text) > limits.largest:
         raise InputError(f"larger than {limits.largest} bytes.", Place(file))
     return _Builder(text, file, limits).document()
 
 
 def dump(tree: Tree) -> str:
-    """The tree as YAML text."""
+    """Return the tree as YAML text."""
     from ruamel.yaml import YAML
 
     yaml = YAML(typ="safe", pure=True)
     yaml.default_flow_style = None
     yaml.allow_unicode = True
     plain = tree.plain()
-    # ruamel breaks long texts of several lines, of source code for instance, so that some come back with a space more.
+    # ruamel breaks long lines of multi-line texts, of source code for instance, and some come back with an extra space.
     yaml.width = sys.maxsize if "\\n" in repr(plain) else 120
     yaml.sort_base_mapping_type_on_output = False  # type: ignore[assignment]
     stream = StringIO()
@@ -216,7 +218,7 @@ def dump(tree: Tree) -> str:
 
 
 def scalar(text: str) -> Any:
-    """The value of an unquoted scalar by the core schema of YAML 1.2.
+    """Return the value of an unquoted scalar by the core schema of YAML 1.2.
 
     >>> scalar("1e18"), scalar("no"), scalar("3 m")
     (1e+18, 'no', '3 m')
@@ -232,7 +234,7 @@ def scalar(text: str) -> Any:
 
 
 class _Builder:
-    """Builds a tree from the events of the parser, so that limits hold before anything is expanded."""
+    """Builder of a tree from the events of the parser, so that limits apply before anything is expanded."""
 
     def __init__(self, text: str, file: str, limits: Limits) -> None:
         self.file, self.most = file, limits.most
@@ -255,12 +257,12 @@ class _Builder:
             message = " ".join(", ".join(part for part in (error.context, error.problem) if part).split())
             place = Place(self.file, mark.line + 1 if mark else 0)
             raise InputError(f"not YAML: {message.rstrip('.')}.", place) from None
-        except Exception as error:  # only the parser runs in here, and it also fails by assertions
+        except Exception as error:  # only the parser runs here, and it may also fail by assertions
             message = " ".join(str(error).split())
             raise InputError(f"not YAML: {message.rstrip('.')}.", Place(self.file)) from None
 
     def document(self) -> Tree:
-        """The only document of the text."""
+        """Return the only document of the text."""
         next(self.events)
         if type(next(self.events)).__name__ == "StreamEndEvent":
             raise InputError("the file is empty.", Place(self.file))
@@ -288,7 +290,7 @@ class _Builder:
             if event.anchor not in self.anchors:
                 raise InputError(f"the alias *{event.anchor} has no anchor before it.", place)
             known, size = self.anchors[event.anchor]
-            self.count += size  # what it repeats counts as if it were written out
+            self.count += size  # repeated values count like written ones
             if self.count > self.most:
                 raise InputError(f"aliases repeat more than {self.most} values.", place)
             return replace(known, place=place)
@@ -300,12 +302,12 @@ class _Builder:
                 tree.value.append(self._value(item, depth + 1))
         else:
             tree = Tree(self._mapping(depth), place)
-        if event.anchor is not None:  # only now, so that nothing contains itself
+        if event.anchor is not None:  # registered only now, so that nothing contains itself
             self.anchors[event.anchor] = tree, self.count - before
         return tree
 
     def _mapping(self, depth: int) -> dict[str, Tree]:
-        """The entries of a mapping; the place of a value is that of its key."""
+        """Return the entries of a mapping; the place of a value is that of its key."""
         result: dict[str, Tree] = {}
         while type(event := next(self.events)).__name__ != "MappingEndEvent":
             place = self._place(event)
@@ -319,7 +321,9 @@ class _Builder:
 
 
 def labels(items: Iterable[Tree]) -> list[str | None]:
-    """Name of each item of a list in paths: that of a law, numbered if it is not the first of this name; else None."""
+    """Return the name of each list item in paths: that of a law, numbered if it is not the first of this name; else
+    None.
+    """
     seen: dict[str, int] = {}
     result: list[str | None] = []
     for item in items:
@@ -334,7 +338,7 @@ def labels(items: Iterable[Tree]) -> list[str | None]:
 
 
 def with_paths(tree: Tree, path: str = "") -> Tree:
-    """The tree with the path of every value."""
+    """Return the tree with the path of every value."""
     place = replace(tree.place, path=path)
     if isinstance(tree.value, dict):
         return Tree({key: with_paths(child, join(path, key)) for key, child in tree.value.items()}, place)
@@ -352,12 +356,12 @@ def with_paths(tree: Tree, path: str = "") -> Tree:
 
 
 def join(path: str, key: str) -> str:
-    """The path of a key below a path."""
+    """Return the path of a key below a path."""
     return path + key if key.startswith("[") or not path else f"{path}.{key}"
 
 
 def from_plain(value: object, place: Place) -> Tree:
-    """A tree of plain Python data, all at one place."""
+    """Return a tree of plain Python data, all at one place."""
     if getattr(value, "ndim", None) == 0:  # a number, or a text, of NumPy or xarray
         value = cast("Any", value).item()
     if isinstance(value, Mapping):

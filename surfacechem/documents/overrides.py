@@ -1,4 +1,4 @@
-"""Values set from outside, ``bodies.lower.C=2 kJ/m^2/K``, put into a document before it is read."""
+"""Overrides such as ``bodies.lower.C=2 kJ/m^2/K``, applied to a document before it is read."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from dataclasses import replace
 from surfacechem.documents.document import OVERRIDE, Tree, from_plain, labels, parse, with_paths
 from surfacechem.errors import InputError, Place, refuse_unknown, suggestion
 
-# Keys of a value that may also stand by itself.
+# Keys of a value that may also be given without its key.
 VALUE_KEYS = ("level", "value", "rises-to")
 
-# What removes a key or a law.
+# Values that remove a key or a law.
 EMPTY_VALUES = (None, "")
 
-# Sections that may be one value, and the key that it is short for.
+# Sections that may be a single value, and the key for which that stands.
 SHORTHAND_KEYS = {"interface.mechanism": "file"}
 
 
 def apply(tree: Tree, overrides: str | Sequence[str] | Mapping[str, object]) -> Tree:
-    """The tree with the given values; texts are "path=value" with the value in YAML.
+    """Return the tree with the given values; texts are "path=value" with the value in YAML.
 
-    A number for a parameter that varies replaces its value and keeps its factors. No value, or null, removes the key
+    A number for a varying parameter replaces its value and keeps its factors. An empty value, or null, removes the key
     or the law.
 
     >>> apply(parse("run: {until: 5 s, rtol: 1e-6}"), ["run.until=7 s", "run.rtol="]).plain()
@@ -35,7 +35,7 @@ def apply(tree: Tree, overrides: str | Sequence[str] | Mapping[str, object]) -> 
 
 
 def assignments(texts: Sequence[str]) -> dict[str, object]:
-    """Texts "path=value" as plain values; InputError where a path is given twice.
+    """Return texts "path=value" as plain values; InputError if a path is given twice.
 
     >>> assignments(["f=3 pN", "g=[1, 2]"])
     {'f': '3 pN', 'g': [1, 2]}
@@ -49,20 +49,20 @@ def assignments(texts: Sequence[str]) -> dict[str, object]:
 
 
 def as_texts(overrides: str | Sequence[str] | Mapping[str, object]) -> list[str]:
-    """Given values as texts "path=value" that give the same values again.
+    """Return overrides as texts "path=value" with the same effect.
 
     >>> as_texts({"f": 3e-12, "reference": None, "loading.v": {"level": "3 nm/s"}})
     ['f=3e-12', 'reference=null', 'loading.v={"level": "3 nm/s"}']
     """
     if not isinstance(overrides, Mapping):
         return [overrides] if isinstance(overrides, str) else list(overrides)
-    # Texts are read as YAML, of which JSON is a part; from_plain turns numbers of NumPy into plain ones.
+    # Texts are read as YAML, of which JSON is a subset; from_plain converts NumPy's numbers to plain ones.
     plain = {p: v if isinstance(v, str) else json.dumps(from_plain(v, Place()).plain()) for p, v in overrides.items()}
     return [f"{path}={text}" for path, text in plain.items()]
 
 
 def parameter_path(path: str, known: Container[str]) -> str:
-    """The known path of a parameter whose value may stand in the case by itself or be written out.
+    """Return the known path of a parameter, whose value may be given with or without its key.
 
     >>> parameter_path("loading.v", {"loading.v.level"}), parameter_path("friction.mu.value", {"friction.mu"})
     ('loading.v.level', 'friction.mu')
@@ -91,8 +91,8 @@ def _pairs(overrides: str | Sequence[str] | Mapping[str, object]) -> Iterator[tu
 
 
 def _set(tree: Tree, keys: Sequence[str], new: Tree, place: Place) -> Tree:
-    """The tree with a new value below it, or without one where that is none."""
-    if not keys:  # a number in place of one that varies keeps its factors
+    """Return the tree with a new value below it, or with the value removed if the new one is empty."""
+    if not keys:  # a number for a varying parameter keeps its factors
         varies = isinstance(tree.value, dict) and {"value", "times"} >= set(tree.value) >= {"value"}
         bare = not isinstance(new.value, dict | list)
         return replace(tree, value={**tree.value, "value": new}) if varies and bare else new
@@ -100,7 +100,7 @@ def _set(tree: Tree, keys: Sequence[str], new: Tree, place: Place) -> Tree:
         return _set_item(tree, keys, new, place)
     (first, *rest), removes = keys, len(keys) == 1 and new.value in EMPTY_VALUES
     if not rest and first in VALUE_KEYS and not (isinstance(tree.value, dict) or removes):
-        return new  # a bare value is, for example, the level of a constant history
+        return new  # a value without key is, for example, the level of a constant history
     known = _entries(tree, place)
     if not removes:
         return replace(tree, value={**known, first: _set(known.get(first, Tree(None, place)), rest, new, place)})
@@ -111,7 +111,7 @@ def _set(tree: Tree, keys: Sequence[str], new: Tree, place: Place) -> Tree:
 
 
 def _entries(tree: Tree, place: Place) -> Mapping[str, Tree]:
-    """The keys of a mapping, also of one that its only value stands for, or of none."""
+    """Return the keys of a mapping, also of a single value that stands for one, or of nothing."""
     if isinstance(tree.value, str) and tree.place.path in SHORTHAND_KEYS:
         return {SHORTHAND_KEYS[tree.place.path]: tree}
     if tree.value is not None and not isinstance(tree.value, dict):
@@ -120,7 +120,7 @@ def _entries(tree: Tree, place: Place) -> Mapping[str, Tree]:
 
 
 def _set_item(tree: Tree, keys: Sequence[str], new: Tree, place: Place) -> Tree:
-    """A value below an item ``name: {...}`` or a bare name of a list, which is found by its label."""
+    """Set a value below an item ``name: {...}`` or a bare name of a list, which is found by its label."""
     known = labels(tree.value)
     wanted = keys[0].removesuffix("[1]")
     if wanted not in known:

@@ -4,7 +4,7 @@ from pathlib import Path
 
 
 def cases() -> Path:
-    """The folder of the case files.
+    """Return the folder of the case files.
 
     >>> cases().name
     'cases'
@@ -13,7 +13,7 @@ def cases() -> Path:
 
 
 def mechanisms() -> Path:
-    """The folder of the Cantera surface mechanisms.
+    """Return the folder of the Cantera surface mechanisms.
 
     >>> mechanisms().name
     'mechanisms'
