@@ -1,6 +1,6 @@
-"""Exact solutions, a family of them in a file, for verifying every solver to rounding.
+"""Exact solutions, one family per file, for verifying every solver to rounding.
 
-`get("endothermic-bonding")` gives one class and imports the file of bonding only; `all()` gives every class by name.
+`get("endothermic-bonding")` imports the file of bonding only and returns one class; `all()` returns all by name.
 """
 
 from __future__ import annotations
@@ -16,22 +16,22 @@ from surfacechem.references.base import Reference
 __all__ = ["Reference", "all", "get", "known", "names"]
 
 NO_SOLUTIONS = ("base", "scene_view")
-"""Modules without an exact solution, beside those that begin with an underscore."""
+"""Modules without an exact solution, in addition to those that begin with an underscore."""
 
 
 def names() -> list[str]:
-    """Names of all exact solutions."""
+    """Return the names of all exact solutions."""
     return sorted(all())
 
 
 def known(name: str) -> bool:
-    """True if there is an exact solution of this name; imports the file of its family only."""
+    """True if there is an exact solution of this name; imports only the file of its family."""
     return name in _family(name)
 
 
 @cache
 def get(name: str) -> type[Reference]:
-    """The exact solution of a name.
+    """Return the exact solution of a name.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ def get(name: str) -> type[Reference]:
     Raises
     ------
     InputError
-        Where there is none of that name; the message has the nearest.
+        If there is none of that name; the message has the nearest.
 
     Examples
     --------
@@ -59,25 +59,25 @@ def get(name: str) -> type[Reference]:
 
 
 def all() -> dict[str, type[Reference]]:
-    """Every exact solution by name."""
+    """Return every exact solution by name."""
     return {name: kind for family in _families() for name, kind in _members(family).items()}
 
 
 @cache
 def _family(name: str) -> dict[str, type[Reference]]:
-    """The exact solutions of the file whose name is the longest that is part of this one."""
+    """Return the exact solutions of the file with the longest name that is part of this one."""
     families = [family for family in _families() if family.replace("_", "-") in name]
     return _members(max(families, key=len)) if families else {}
 
 
 def _families() -> list[str]:
-    """Names of the files with exact solutions."""
+    """Return the names of the files with exact solutions."""
     files = (module.name for module in pkgutil.iter_modules(__path__))
     return [file for file in files if file not in NO_SOLUTIONS and not file.startswith("_")]
 
 
 def _members(family: str) -> dict[str, type[Reference]]:
-    """The exact solutions of a file by name."""
+    """Return the exact solutions of a file by name."""
     module = import_module(f"{__name__}.{family}")
     kinds = [kind for kind in vars(module).values() if isinstance(kind, type) and kind.__module__ == module.__name__]
     return {kind.name: kind for kind in kinds if issubclass(kind, Reference) and not isabstract(kind)}

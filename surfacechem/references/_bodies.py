@@ -1,6 +1,6 @@
-r"""Heat in the bodies: the two energy models and what shares one temperature.
+r"""Heat in the bodies: the two energy models, and bodies that share one temperature.
 
-The models are written in the excess temperature :math:`\theta=T-T_0`, so that nothing cancels close to the reference
+The models are written in the excess temperature :math:`\theta=T-T_0`, to avoid cancellation close to the reference
 temperature. Source: Sauer, Duong & Mandadapu (2021), quadratic model; Callen (1985), Thermodynamics, constant capacity.
 """
 
@@ -20,16 +20,16 @@ class QuadraticEnergy:
     r""":math:`U=\frac{C}{2T_0}(T^2-T_0^2)`, :math:`S=C\,(T/T_0-1)`, capacity :math:`C\,T/T_0`; both zero at T_0."""
 
     def rise(self, energy: Array, C: float, T_0: float, T_i: float) -> Array:
-        """Temperature rise above `T_i` when `energy` is added."""
+        """Return the temperature rise above `T_i` when `energy` is added."""
         difference_of_squares = 2.0 * T_0 * energy / C
         return np.asarray(difference_of_squares / (T_i + np.sqrt(T_i**2 + difference_of_squares)))
 
     def energy(self, excess: Array, C: float, T_0: float) -> Array:
-        """Energy at the temperature `T_0 + excess`."""
+        """Return the energy at the temperature `T_0 + excess`."""
         return C * excess * (1.0 + excess / (2.0 * T_0))
 
     def entropy(self, excess: Array, C: float, T_0: float) -> Array:
-        """Entropy at the temperature `T_0 + excess`."""
+        """Return the entropy at the temperature `T_0 + excess`."""
         return C * excess / T_0
 
 
@@ -37,20 +37,20 @@ class ConstantCapacity:
     r""":math:`U=C\,(T-T_0)`, :math:`S=C\ln(T/T_0)`."""
 
     def rise(self, energy: Array, C: float, T_0: float, T_i: float) -> Array:
-        """Temperature rise above `T_i` when `energy` is added."""
+        """Return the temperature rise above `T_i` when `energy` is added."""
         return energy / C
 
     def energy(self, excess: Array, C: float, T_0: float) -> Array:
-        """Energy at the temperature `T_0 + excess`."""
+        """Return the energy at the temperature `T_0 + excess`."""
         return C * excess
 
     def entropy(self, excess: Array, C: float, T_0: float) -> Array:
-        """Entropy at the temperature `T_0 + excess`."""
+        """Return the entropy at the temperature `T_0 + excess`."""
         return np.asarray(C * np.log1p(excess / T_0))
 
 
 class PerfectContact(Reference):
-    """The capacities that share one temperature."""
+    """Capacities that share one temperature."""
 
     C_1: float = parameter("J/(m^2 K)", "heat capacity of body 1 at T_0", above=0)
     C_2: float = parameter("J/(m^2 K)", "heat capacity of body 2 at T_0", above=0)
@@ -71,7 +71,7 @@ class PerfectContact(Reference):
 
 
 class UniformBody(Reference):
-    """Bodies and interface at one temperature; quadratic energies, if a subclass has no other model."""
+    """Bodies and interface at one temperature, with quadratic energies unless a subclass has another model."""
 
     model: ClassVar[QuadraticEnergy] = QuadraticEnergy()
 
@@ -82,12 +82,12 @@ class UniformBody(Reference):
     readings = read(constant="T_0", capacity="C", temperature="T_i")
 
     def heated(self, heat: Array) -> Array:
-        """Temperature [K] after a supply of heat [J/m^2]."""
+        """Return the temperature [K] after a supply of heat [J/m^2]."""
         return self.T_i + self.model.rise(heat, self.C, self.T_0, self.T_i)
 
 
 class FrictionallyHeated(UniformBody):
-    """A body and the dissipation it would see at the reference temperature."""
+    """A body and the dissipation that it would have at the reference temperature."""
 
     D_0: float = parameter("W/m^2", "dissipation at T_0", at_least=0)
 

@@ -1,6 +1,6 @@
-r"""Numerics to rounding: roots, integrals, autonomous equations, and special functions in forms that do not cancel.
+r"""Numerical methods accurate to rounding: roots, integrals, autonomous equations, and special functions.
 
-Divided differences of the exponential are what the response of a linear system to an exponential source is made of:
+The response of a linear system to an exponential source consists of divided differences of the exponential:
 :math:`\int_0^t e^{-\lambda(t-s)}e^{-\gamma s}\,ds = t\,\exp[-\lambda t,-\gamma t]`, and its integral over time is
 :math:`t^2\exp[0,-\lambda t,-\gamma t]`. No difference of nearly equal exponentials is ever formed.
 
@@ -21,36 +21,37 @@ from surfacechem.references.base import Array
 from surfacechem.tolerances import FEW_EPS, SQRT_EPS
 
 MOST_ITERATIONS = 400
-"""At most: halving alone takes 52 to the last digit, and one for each factor of two between the ends of a bracket."""
+"""Largest number of iterations: bisection alone takes 52, and one for each factor of two between the bracket's ends."""
 
 GAUSS_POINTS = 18
 """Gauss points of a panel: a singularity a panel's length away leaves an error of 5.8^-36 = 3e-28."""
 
 END_HALVINGS = 800
-"""Panels towards each end: the smallest is 2^-801 of the path."""
+"""Number of panels towards each end: the smallest is 2^-801 of the path."""
 
 LEAST_TIME = 1e-300
 """Times [s] below this count as zero."""
 
 INNER_HALVINGS = 60
-"""Halvings towards a point inside; below 2^-60 of the span it is no longer resolved."""
+"""Halvings towards a point inside; distances below 2^-60 of the span are not resolved."""
 
 Rate = Callable[[Array, Array], Array]
-"""Rate at which the distance covered grows, from the distances to the start and to the end; positive between them."""
+"""Rate of the covered distance, as a function of the distances to the start and to the end; positive between them."""
 
 
 gauss = cache(np.polynomial.legendre.leggauss)
-"""Points and weights of Gauss on [-1, 1], so many; nothing writes to them."""
+"""Gauss points and weights on [-1, 1], by their number; they must not be written to."""
 
 
 def increasing_root(
     function: Callable[[Array], tuple[Array, Array]], target: Array, low: Array, high: Array, start: Array | None = None
 ) -> Array:
-    """Arguments at which `function`, which gives value and slope and increases on [low, high], reaches `target`.
+    """Return the arguments at which an increasing `function`, given as value and slope, reaches `target` in [low,
+    high].
 
-    Newton's method, kept inside a shrinking bracket, from `low` unless a better guess is given. It ends where its next
-    step, by the two before it as it converges quadratically, would be less than the last digit: where one is, rounding
-    makes many more.
+    Newton's method inside a shrinking bracket, from `low` unless a better guess is given. It ends when the next step,
+    predicted from the last two by quadratic convergence, is below the last digit, since rounding causes such steps
+    without end.
 
     >>> increasing_root(lambda x: (x**2, 2 * x), np.array([2.0]), np.array([1.0]), np.array([2.0]))
     array([1.41421356])
@@ -77,7 +78,7 @@ def increasing_root(
 
 
 def short_integral(function: Callable[[Array], Array], upper: Array) -> Array:
-    """Integral from zero to `upper` by ten Gauss points: exact where closed forms cancel to nothing.
+    """Return the integral from zero to `upper` by ten Gauss points, accurate where closed forms cancel.
 
     >>> f"{float(short_integral(np.exp, np.array(1e-20))):.14e}"
     '1.00000000000000e-20'
@@ -87,11 +88,11 @@ def short_integral(function: Callable[[Array], Array], upper: Array) -> Array:
 
 
 class AutonomousODE:
-    """An autonomous equation of one variable: times along a path of given length, by quadrature, and their inverse.
+    """An autonomous equation of one variable: times along a path of given length by quadrature, and their inverse.
 
-    The variable runs from a start to an end that it may reach or only approach. It is known by its distances from both,
-    so that neither end loses digits. Gauss panels shrink geometrically towards both ends and towards any point at which
-    the rate nearly vanishes (``hard``), so that no singularity is closer to a panel than its length.
+    The variable runs from a start to an end that it may reach or only approach. It is represented by its distances from
+    both, so that no digits are lost at either end. Gauss panels shrink geometrically towards both ends and towards any
+    point at which the rate nearly vanishes (``hard``), so that no singularity is closer to a panel than its length.
     """
 
     def __init__(self, rate: Rate, length: float, hard: Sequence[float] = ()) -> None:
@@ -105,15 +106,15 @@ class AutonomousODE:
             points = np.array([0.0, *half * 0.5 ** np.arange(END_HALVINGS + 1.0), *near])
             edges.append(np.unique(points[(points >= 0.0) & (points <= half)]))
         early, late = edges
-        # Distances of a panel are from the nearer end: from the start in the first half, from the end in the second.
+        # Distances of a panel are measured from the nearer end: the start in the first half, the end in the second.
         self.first, self.last = np.append(early[:-1], late[:0:-1]), np.append(early[1:], late[-2::-1])
         self.from_end = np.arange(len(self.first)) >= len(early) - 1
         self.times = np.append(0.0, np.cumsum(self._elapsed(self.first, self.last, self.from_end)))
 
     def _elapsed(self, first: Array, last: Array, from_end: NDArray[np.bool_]) -> Array:
-        """Time between two points of one panel."""
+        """Return the time between two points of one panel."""
         middle, half = 0.5 * (first + last)[:, None], 0.5 * (last - first)[:, None]
-        with np.errstate(all="ignore"):  # where the rate overflows no time passes
+        with np.errstate(all="ignore"):  # zero time where the rate overflows
             times = np.abs(half) / self._rate(middle + half * self.nodes, from_end[:, None]) @ self.weights
         return np.where(first == last, 0.0, times)
 
@@ -127,7 +128,7 @@ class AutonomousODE:
         return float(self.times[-1])
 
     def position(self, t: Array) -> tuple[Array, Array]:
-        """Distances from the start and from the end at the times t."""
+        """Return the distances from the start and from the end at the times t."""
         t = np.where(t < LEAST_TIME, 0.0, t)
         j = np.clip(np.searchsorted(self.times, t, side="right") - 1, 0, len(self.first) - 1)
         start, stop, from_end = self.first[j], self.last[j], self.from_end[j]
@@ -146,14 +147,14 @@ class AutonomousODE:
 
 
 INVERSE_FACTORIALS = [1.0 / math.factorial(k) for k in range(2, 21)]
-"""1/2!, 1/3!, ...: within [-1, 1] the first of those left out is 1/21! = 2e-20."""
+"""1/2!, 1/3!, ...: within [-1, 1] the first omitted term is 1/21! = 2e-20."""
 
 SERIES_TERMS = 22
-"""Of the second difference for arguments within [-1, 0]; those left out begin with 23 / 24! = 4e-23."""
+"""Terms of the second difference for arguments within [-1, 0]; the first omitted one is 23 / 24! = 4e-23."""
 
 ASYMPTOTIC_TERMS = 38
 ASYMPTOTIC_EN, ASYMPTOTIC_EI = 50.0, 40.0
-"""Arguments of E_n and Ei from which on asymptotic series reach rounding before they diverge: 38! / 40^38 = 7e-17."""
+"""Arguments of E_n and Ei above which asymptotic series reach rounding before they diverge: 38! / 40^38 = 7e-17."""
 
 
 def first_difference(a: Array, b: Array) -> Array:
@@ -176,7 +177,7 @@ def second_difference(a: Array, b: Array) -> Array:
     low, middle = np.minimum(a, b), np.maximum(a, b)
     far = np.where(low < -1.0, low, -1.0)
     apart = (first_difference(middle, np.zeros_like(middle)) - first_difference(low, middle)) / -far
-    # Within [-1, 0] the differences cancel: Taylor series in the complete homogeneous symmetric polynomials of both.
+    # Within [-1, 0] the differences cancel: a Taylor series in the complete homogeneous symmetric polynomials of both.
     near_low, near_middle = np.maximum(low, -1.0), np.maximum(middle, -1.0)
     polynomial, power, factorial = np.ones_like(near_low), np.ones_like(near_low), 2.0
     series = polynomial / factorial
@@ -227,17 +228,17 @@ def scaled_Ei(x: Array) -> Array:
 
 
 def _by_range(x: Array, edge: float, near: Callable[[Array], Array], far: Callable[[Array], Array]) -> Array:
-    """Two formulas, below an edge and from there on, each evaluated where it holds alone."""
+    """Evaluate two formulas, below an edge and from there on, each only where it is valid."""
     x = np.asarray(x)
     found, below = np.empty(x.shape), x < edge
     for formula, own in ((near, below), (far, ~below)):
-        if own.any():  # to form nothing takes as long as to form a few
+        if own.any():  # an evaluation of no values takes as long as one of a few
             found[own] = formula(x[own])
     return found
 
 
 def _asymptotic(n: int, x: Array) -> Array:
-    r"""Asymptotic series of :math:`e^xE_n(x)`."""
+    r"""Return the asymptotic series of :math:`e^xE_n(x)`."""
     term, total = 1.0 / x, 1.0 / x
     for k in range(n, n + ASYMPTOTIC_TERMS):
         term = -term * k / x

@@ -22,8 +22,8 @@ class AdiabaticArrhenius(Reference):
 
     .. math:: At=e^{s_f}[{\rm Ei}(s_i-s_f)-{\rm Ei}(s-s_f)]-[{\rm Ei}(s_i)-{\rm Ei}(s)]
 
-    is inverted to rounding for :math:`-\ln(1-\phi)`. Everything is scaled by :math:`e^{-s_i}`, so that no activation
-    energy overflows. Any t >= 0. During the runaway the temperature follows the rounding of t times its own slope.
+    is inverted to rounding for :math:`-\ln(1-\phi)`. All terms are scaled by :math:`e^{-s_i}`, so that no activation
+    energy overflows. Any t >= 0. During the runaway the error of the temperature is the rounding of t times its slope.
 
     Source: Abramowitz & Stegun (1964), 5.1 (exponential integral), adiabatic reaction integrated.
 
@@ -41,7 +41,7 @@ class AdiabaticArrhenius(Reference):
 
     @property
     def initial_rate(self) -> float:
-        """Rate constant [1/s] at the initial temperature; the exponent's rounding would cost s_i roundings of t."""
+        """Initial rate constant [1/s], corrected for the rounding of the exponent, which s_i would amplify."""
         exponent = self._initial_exponent
         exact = Fraction(self.E_a) / (Fraction(str(GAS_CONSTANT)) * Fraction(self.T_i))
         half = math.exp(-0.5 * exponent)
@@ -57,11 +57,11 @@ class AdiabaticArrhenius(Reference):
         return {"phi": phi, "T": self.T_i + self.delta_T * phi}
 
     def time(self, phi: Array) -> Array:
-        """The time [s] at which the bonding state is phi."""
+        """Return the time [s] at which the bonding state is phi."""
         return self._scaled_time(-np.log1p(-phi))[0] / self.initial_rate
 
     def _scaled_time(self, unreacted: Array) -> tuple[Array, Array]:
-        r""":math:`Ae^{-s_i}t` as a function of :math:`-\ln(1-\phi)`, and its slope :math:`e^{s-s_i}`."""
+        r"""Return :math:`Ae^{-s_i}t` as a function of :math:`-\ln(1-\phi)`, and its slope :math:`e^{s-s_i}`."""
         left, final, s_i = self.delta_T * np.exp(-unreacted), self.T_i + self.delta_T, self._initial_exponent
 
         def slope(unreacted: Array) -> Array:
@@ -71,6 +71,6 @@ class AdiabaticArrhenius(Reference):
         T = self.T_i - self.delta_T * np.expm1(-unreacted)
         at_start = scaled_Ei(np.array([s_i * self.delta_T / final])) - scaled_Ei(np.array([s_i]))
         now = scaled_Ei(s_i * self.T_i / T * left / final) - scaled_Ei(s_i * self.T_i / T)
-        early = unreacted * max(1.0, self.delta_T / self.T_i * max(1.0, s_i)) < 0.25  # there the integrals cancel
+        early = unreacted * max(1.0, self.delta_T / self.T_i * max(1.0, s_i)) < 0.25  # the integrals would cancel
         steepness = slope(unreacted)
         return np.where(early, short_integral(slope, unreacted), at_start - steepness * now), steepness

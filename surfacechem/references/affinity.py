@@ -51,8 +51,8 @@ class ExponentialAffinitySolution(Reference):
 
     .. math:: \dot\phi=\frac\lambda a(1-e^{-y}),\qquad e^y-1=(e^{y_i}-1)e^{-\lambda t}
 
-    Evaluated in logarithms, so that :math:`|y|` may be 1e6 and more. Any t >= 0; only the rate at t = 0 itself is
-    beyond double precision (minus infinity) for debonding from :math:`y_i<-745`.
+    Evaluated in logarithms, so that :math:`|y|` may be 1e6 and more. Any t >= 0; only the rate at t = 0 is beyond the
+    range of doubles (minus infinity) for debonding from :math:`y_i<-745`.
 
     Source: Sauer, Duong & Mandadapu (2021), section 5.7 (bonding reactions), exponential law with the Boltzmann
     constant, integrated.
@@ -86,7 +86,7 @@ class ExponentialAffinitySolution(Reference):
 
 
 def _bonding(y_i: float, decay: Array) -> tuple[Array, Array, Array]:
-    r"""Affinity spent :math:`y_i-y`, affinity left y, and :math:`1-e^{-y}` for :math:`y_i\ge0`."""
+    r"""Return the affinity spent :math:`y_i-y`, the affinity left y, and :math:`1-e^{-y}`, for :math:`y_i\ge0`."""
     log_gone = np.log(-np.expm1(-decay))
     product = np.expm1(-y_i) * np.expm1(-decay)
     spent = np.where(product < 0.5, -np.log1p(-product), -np.logaddexp(-decay, log_gone - y_i))
@@ -95,7 +95,7 @@ def _bonding(y_i: float, decay: Array) -> tuple[Array, Array, Array]:
 
 
 def _debonding(y_i: float, decay: Array) -> tuple[Array, Array, Array]:
-    r"""Affinity spent :math:`y_i-y`, affinity left y, and :math:`1-e^{-y}` for :math:`y_i<0`."""
+    r"""Return the affinity spent :math:`y_i-y`, the affinity left y, and :math:`1-e^{-y}`, for :math:`y_i<0`."""
     gone, excess = -np.expm1(-decay), np.expm1(y_i) * np.exp(-decay)  # excess = e^y - 1
     power = gone + np.exp(y_i - decay)  # e^y as a sum of positive numbers
     log_factor = -y_i + np.log(-np.expm1(y_i))  # ln(e^-y_i - 1)

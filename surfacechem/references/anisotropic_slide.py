@@ -1,4 +1,4 @@
-"""A free slider that direction-dependent dry friction brings to rest."""
+"""Free slider brought to rest by direction-dependent dry friction."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from surfacechem.references.base import Array, Quantities, read
 
 
 class AnisotropicSlide(UniformBody):
-    r"""A free mass slides on dry friction with a coefficient along each axis, and turns towards the smoother one.
+    r"""A free mass slides on dry friction with a coefficient for each axis, and turns towards the smoother one.
 
     .. math:: \frac{v_2}{v_{2i}} = \Big(\frac v{v_i}\Big)^r, \quad r = \frac{\mu_2}{\mu_1} \ge 1, \quad
         t_{stop} - t = \frac m{\mu_1 p} I_1(v), \quad u_{stop} - u = \frac m{\mu_1 p} I_2(v)
 
     .. math:: I_k(v) = \int_0^v x^{k-1} \sqrt{1 + c^2 x^{2 (r - 1)}}\,dx, \quad c = v_{2i} / v_i^r,
 
-    which is a hypergeometric function; across, :math:`c\,I_{1+r}` stands for :math:`I_2`. All kinetic energy becomes
-    heat. Quadratic energies, perfect thermal contact. Any t >= 0: the velocity is exactly zero from `stop_time` on.
+    which is a hypergeometric function; for the other axis :math:`c\,I_{1+r}` replaces :math:`I_2`. All kinetic energy
+    becomes heat. Quadratic energies, perfect thermal contact. Any t >= 0: from `stop_time` on v is exactly zero.
 
     Source: Sauer, Duong & Mandadapu (2021), eq. e:dry_fric with a tensor of coefficients, with Newton's law: the
     quotient of its components separates.
@@ -42,11 +42,11 @@ class AnisotropicSlide(UniformBody):
 
     @property
     def stop_time(self) -> float:
-        """Time [s] from which on the mass rests."""
+        """Time [s] at which the mass comes to rest."""
         return float(self._integral(1.0, np.array(1.0)) * self.v_i * self.m / (self.mu_1 * self.p))
 
     def _integral(self, k: float, x: Array) -> Array:
-        """I_k of the velocity relative to the initial one."""
+        """Return I_k of the velocity relative to the initial one."""
         from scipy.special import hyp2f1
 
         z, e = (self.v_2_i / self.v_i) ** 2, 2 * (self.mu_2 / self.mu_1 - 1)
@@ -61,7 +61,7 @@ class AnisotropicSlide(UniformBody):
         def passed(x: Array) -> tuple[Array, Array]:
             return self._integral(1.0, x), np.sqrt(1 + slope**2 * x ** (2 * (ratio - 1)))
 
-        # Velocity along the first axis relative to the initial one, which is none from the stop on.
+        # Velocity along the first axis relative to the initial one, zero from the stop on.
         x = increasing_root(passed, left, np.zeros_like(t), np.ones_like(t), np.sign(left))
         v, v_2 = self.v_i * x, self.v_2_i * x**ratio
         path, across = (self._integral(k, np.array(1.0)) - self._integral(k, x) for k in (2.0, 1.0 + ratio))

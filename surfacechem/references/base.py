@@ -1,7 +1,7 @@
 r"""Exact solutions: parameters in SI, and exact values of named quantities at any time.
 
-A reference is one frozen dataclass; its name is that of the class. Its file carries a part of the name, such as what a
-family has in common, so that asking for one reference imports one file; to add one, add its file.
+A reference is a frozen dataclass, named by its class. The name of its file is a part of that name, common to a family,
+so that looking up one reference imports one file; to add a reference, add its file.
 """
 
 from __future__ import annotations
@@ -24,15 +24,15 @@ __all__ = ["Array", "Parameters", "Quantities", "Reference", "SceneView", "read"
 
 Array: TypeAlias = NDArray[np.float64]
 Parameters: TypeAlias = Mapping[str, float | None]
-"""Parameters of an exact solution by name; None, or nothing, where a scene does not tell one."""
+"""Parameters of an exact solution by name; None, or missing, if a scene does not determine one."""
 
 Quantities: TypeAlias = Mapping[str, Array | float]
-"""Exact values by the names of the dataset; what does not change in time may be one number."""
+"""Exact values by the names of the dataset; a constant may be a single number."""
 
 
 def read(**readings: str) -> dict[str, tuple[str, str]]:
-    """Table for reading parameters off a scene: for each the reading of the :class:`SceneView` and its name there,
-    with a minus sign before that where its sign is reversed.
+    """Return the table for reading parameters off a scene: for each the reading of the :class:`SceneView` and its name
+    there, with a preceding minus if its sign is reversed.
 
     >>> read(friction="mu", initial="p phi_i=phi", temperature="T_i")["phi_i"]
     ('initial', 'phi')
@@ -51,14 +51,14 @@ class Reference(ABC):
     """An exact solution. Subclasses become frozen, keyword-only dataclasses and state `quantities`."""
 
     name: ClassVar[str]
-    """Name of the class in kebab-case; a last "Solution", which tells it from a law, is left out."""
+    """Name of the class in kebab-case, without a final "Solution", which distinguishes it from a law."""
     continuous: ClassVar[bool] = False
-    """True if it solves for bodies without cells: a scene then meets it but for the error of its cells, and
-    `from_scene` alone tells whether it is the scene's."""
+    """True if it is for bodies without cells: a scene then satisfies it except for the error of its cells, and only
+    `from_scene` decides whether it is the scene's."""
     readings: ClassVar[Mapping[str, tuple[str, str]]] = {}
-    """Readings of its parameters from a scene, those of its bases among them."""
+    """Readings of its parameters from a scene, including those of its bases."""
     statistics: ClassVar[tuple[str, ...]] = ()
-    """Names of its properties that a sweep tells of each run."""
+    """Names of its properties that a sweep compares with the statistics of each run."""
 
     def __init_subclass__(cls, **keywords: Any) -> None:
         super().__init_subclass__(**keywords)
@@ -73,9 +73,9 @@ class Reference(ABC):
 
     @classmethod
     def from_scene(cls, scene: SceneView) -> Parameters:
-        """The parameters that the solution has in a scene; InputError, which says why, if it cannot be the scene's.
+        """Return the parameters of the solution in a scene; InputError, with the reason, if it cannot be the scene's.
 
-        That it is the scene's is then tested on the scene's equations. What takes several readings is added here.
+        A test on the scene's equations follows. Subclasses add parameters that need several readings.
         """
         return {name: scene.read(*how) for name, how in cls.readings.items()}
 
@@ -85,7 +85,7 @@ class Reference(ABC):
         return math.inf
 
     def solution(self, t: ArrayLike) -> dict[str, Array]:
-        """Exact values of the named quantities.
+        """Return exact values of the named quantities.
 
         Parameters
         ----------
@@ -100,12 +100,12 @@ class Reference(ABC):
         Raises
         ------
         InputError
-            Where a time is before the start or after the time up to which the solution holds.
+            If a time is before the start or after the end of the solution.
         """
         times = np.asarray(t, dtype=np.float64)
         if not np.all((times >= 0.0) & (times <= self.end_time)):
             raise InputError(f"{self.name}: exact for 0 <= t <= {self.end_time!r} s only.")
-        # Formulas hold branches side by side; what is not a number is told below.
+        # Formulas evaluate all their branches; NaN is reported below.
         with np.errstate(all="ignore"):
             values = self.quantities(times.reshape(-1))
         table = np.empty((len(values), times.size))
@@ -117,9 +117,11 @@ class Reference(ABC):
         return dict(zip(values, table.reshape(len(values), *times.shape), strict=True))
 
     def profile(self, number: int, x: Array, t: Array) -> Array:
-        """Temperatures of body 1 or 2 at distances from the contact [m], shape (times, places), if it is continuous."""
+        """Return temperatures of body 1 or 2 at distances from the contact [m], shape (times, places), if
+        continuous.
+        """
         raise NotImplementedError(f"{self.name} knows no temperatures inside bodies.")
 
     @abstractmethod
     def quantities(self, t: Array) -> Quantities:
-        """The exact solution at a vector of times."""
+        """Return the exact solution at a vector of times."""

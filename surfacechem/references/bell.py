@@ -1,4 +1,4 @@
-"""Rupture of bonds by Bell's law: under a constant force, and under one that grows at a constant rate."""
+"""Rupture of bonds by Bell's law: under a constant force, and under a force that grows at a constant rate."""
 
 from __future__ import annotations
 
@@ -13,9 +13,7 @@ from surfacechem.references.base import Array, Quantities, Reference, read
 
 
 class BellBond(Reference):
-    """Bonds that break at a rate exponential in the force they carry: an unstressed rate and a distance over which the
-    force does work.
-    """
+    """Bonds with a rupture rate exponential in their force, by a rate without force and a transition distance."""
 
     k_off: float = parameter("1/s", "rupture rate without force", above=0)
     x_off: float = parameter("m", "distance to the transition state", above=0)
@@ -26,7 +24,7 @@ class BellBond(Reference):
 
     @property
     def force_scale(self) -> float:
-        """Force [N] that speeds rupture up by a factor e: k_B T / x_off."""
+        """Force [N] that increases the rupture rate by a factor e: k_B T / x_off."""
         return BOLTZMANN * self.T / self.x_off
 
 
@@ -35,8 +33,8 @@ class BellConstantForce(BellBond):
 
     .. math:: \phi=\phi_ie^{-kt},\qquad \ln k=\ln k_{off}+\frac{fx_{off}}{k_BT}
 
-    The rate is kept as its logarithm, so that no force overflows; :math:`\ln\phi` is exact where :math:`\phi` itself is
-    zero in double precision.
+    The rate is kept as its logarithm, so that no force overflows; :math:`\ln\phi` is exact even if :math:`\phi`
+    underflows to zero.
 
     Source: Bell (1978), Science 200, 618-627, doi 10.1126/science.347575.
 
@@ -78,7 +76,7 @@ class BellRamp(BellBond):
         f_{mode}=f_\beta\max\Big(\ln\frac1b,0\Big),\quad f_{mean}=f_\beta e^bE_1(b),\quad
         f_{median}=f_\beta\ln\Big(1+\frac{\ln2}b\Big)
 
-    Any loading rate; :math:`\ln\phi` is exact where :math:`\phi` itself is zero in double precision.
+    Any loading rate; :math:`\ln\phi` is exact even if :math:`\phi` underflows to zero.
 
     Source: Evans & Ritchie (1997), Biophys. J. 72, 1541-1555, doi 10.1016/S0006-3495(97)78802-7; the mean is the
     integral of their distribution, Abramowitz & Stegun (1964), 5.1.1.
@@ -95,7 +93,7 @@ class BellRamp(BellBond):
 
     @property
     def severity(self) -> float:
-        """Rupture rate without force times the time in which the force grows by the force scale: b."""
+        """Rupture rate without force, times the time in which the force grows by the force scale: b."""
         return self.k_off * self.force_scale / self.rate
 
     @property
@@ -114,7 +112,7 @@ class BellRamp(BellBond):
         return self.force_scale * math.log1p(math.log(2.0) / self.severity)
 
     def log_density(self, f: Array) -> Array:
-        """Logarithm of the probability density [1/N] of rupture at the force f."""
+        """Return the logarithm of the probability density [1/N] of rupture at the force f."""
         scaled = f / self.force_scale
         return math.log(self.k_off / self.rate) + scaled - self.severity * np.expm1(scaled)
 

@@ -1,4 +1,4 @@
-"""Bonding: relaxing with its heat, between unequal surfaces, and ignited by friction."""
+"""Bonding: relaxation with its heat, between unequal surfaces, and ignited by friction."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ class Bonding(PerfectContact):
         \sigma_{chem}=\frac{xK}{\tau T}
 
     The kinetics are linear in the affinity with :math:`c_r=n_c/(\tau K(T))`. K_1 drives the reaction and produces
-    entropy but leaves the temperature alone; :math:`K_0<0<K_1` is an endothermic reaction driven by entropy.
-    Valid while :math:`\kappa_2x_0<1` and the energy suffices for T > 0; accurate for :math:`1-\kappa_2x_0` down to
+    entropy but has no effect on the temperature; :math:`K_0<0<K_1` is an endothermic reaction driven by entropy.
+    Valid while :math:`\kappa_2x_0<1` and the energy is sufficient for T > 0; accurate for :math:`1-\kappa_2x_0` down to
     rounding and for any ratio of t to tau.
 
     Source: Sauer, Duong & Mandadapu (2021), sections 6.1 and 6.2, generalised to unequal bodies, an interface capacity,
@@ -59,7 +59,7 @@ class Bonding(PerfectContact):
     )
 
     def __post_init__(self) -> None:
-        """Refuse what has no positive heat capacity to begin with."""
+        """Refuse parameters without a positive initial heat capacity."""
         super().__post_init__()
         if self.free_capacity <= 0.0:
             raise InputError(
@@ -69,20 +69,20 @@ class Bonding(PerfectContact):
 
     @property
     def free_capacity(self) -> float:
-        r"""Share of the initial capacity that the unformed bonds leave, :math:`1-\kappa_2x_0`.
+        r"""Fraction of the initial capacity that the unformed bonds leave, :math:`1-\kappa_2x_0`.
 
-        It may be 2^-52, so it comes from exact arithmetic.
+        It may be 2^-52, so it is computed in exact arithmetic.
         """
         taken = Fraction(self.K_2) * (1 - Fraction(self.phi_i)) ** 2
         return float(1 - taken / (Fraction(self.T_0) * self.exact_capacity))
 
     def unbonded_squared(self, t: Array) -> tuple[Array, Array]:
-        """The square x of the unbonded fraction, and how much of it is gone, to rounding however short the time."""
+        """Return the square x of the unbonded fraction, and its decrease, accurate to rounding at any time."""
         initial = (1.0 - self.phi_i) ** 2
         return initial * np.exp(-2.0 * t / self.tau), -initial * np.expm1(-2.0 * t / self.tau)
 
     def heated(self, t: Array) -> tuple[Array, Array, Array]:
-        """Temperature, its rise above the initial one, and the capacity by which heat set free is shared."""
+        """Return temperature, its rise above the initial one, and the capacity over which released heat is shared."""
         x, gone = self.unbonded_squared(t)
         kappa_0, kappa_2 = (K / (self.T_0 * self.C) for K in (self.K_0, self.K_2))
         # 1 - kappa_2 x as a sum of positive numbers
@@ -111,7 +111,7 @@ class Bonding(PerfectContact):
 
 
 class ExothermicBonding(PerfectContact):
-    r"""Bonding that sets a constant energy free, perfect thermal contact, quadratic energies.
+    r"""Bonding that releases a constant energy, perfect thermal contact, quadratic energies.
 
     .. math:: \phi=1-e^{-t/\tau},\quad T=T_0\sqrt{1+\kappa(1-e^{-2t/\tau})},\quad
         q_k=\frac{C_k}{C}\frac{K_0}\tau e^{-2t/\tau},\quad \kappa=\frac{K_0}{T_0C}
@@ -163,7 +163,7 @@ class EndothermicBonding(PerfectContact):
     readings = read(potential="K_2", relaxation_time="tau")
 
     def __post_init__(self) -> None:
-        """Refuse what has no positive heat capacity to begin with."""
+        """Refuse parameters without a positive initial heat capacity."""
         super().__post_init__()
         if Fraction(self.K_2) >= Fraction(self.T_0) * self.exact_capacity:
             raise InputError(f"{self.name}: K_2 must be below T_0 (C_1 + C_2 + C_c), the capacity it takes away.")
@@ -175,13 +175,13 @@ class EndothermicBonding(PerfectContact):
 
 
 class BimolecularBonding(Reference):
-    r"""Partners of both surfaces that find each other, and bonds that break, constant temperature.
+    r"""Bonds between sites of both surfaces that form in pairs and break, constant temperature.
 
     .. math:: \dot\phi=k_fn_c\Big(\frac{n_1}{n_c}-\phi\Big)\Big(\frac{n_2}{n_c}-\phi\Big)-k_r\phi,\qquad
         \frac{\phi-\phi_{eq}}{\phi-\phi_2}=\frac{\phi_i-\phi_{eq}}{\phi_i-\phi_2}e^{-k_fn_c(\phi_2-\phi_{eq})t}
 
-    :math:`\phi_{eq}<\phi_2` are the zeros of the rate. Both are found, and the solution is written, without
-    cancellation, also where they coincide: equal densities and no rupture, :math:`1-\phi=1/(1+k_fn_ct)`. Any t >= 0.
+    :math:`\phi_{eq}<\phi_2` are the zeros of the rate. Zeros and solution are evaluated without cancellation, also if
+    they coincide: equal densities and no rupture, :math:`1-\phi=1/(1+k_fn_ct)`. Any t >= 0.
 
     Source: second-order kinetics with reversal, integrated; e.g. Lauffenburger & Linderman (1993), Receptors.
 
@@ -212,7 +212,7 @@ class BimolecularBonding(Reference):
         return 2.0 * p * q / (p + q + loss + distance)
 
     def _scaled(self) -> tuple[float, float, float, float]:
-        """Both densities and the rupture rate in units of the reference sites, and the distance of the zeros."""
+        """Return both densities and the rupture rate in units of the reference sites, and the distance of the zeros."""
         p, q, loss = self.n_1 / self.n_c, self.n_2 / self.n_c, self.k_r / (self.k_f * self.n_c)
         return p, q, loss, math.sqrt((p - q) ** 2 + loss * (loss + 2.0 * (p + q)))
 
@@ -224,7 +224,7 @@ class BimolecularBonding(Reference):
 
 
 class FrictionIgnitedBonding(Reference):
-    r"""First-order Arrhenius bonding without heat of its own while friction heats a constant capacity.
+    r"""First-order Arrhenius bonding without heat of reaction while friction heats a constant capacity.
 
     .. math:: T=T_i+\frac DCt,\qquad
         \ln\frac{1-\phi}{1-\phi_i}=-\frac{AC}D\big[TE_2(s)-T_iE_2(s_i)\big],\quad s=\frac{E_a}{R_gT}
@@ -260,7 +260,7 @@ class FrictionIgnitedBonding(Reference):
 
         apart = self.A / heating * (antiderivative(T) - antiderivative(self.T_i))
         exponent = T_E / self.T_i * rise / T
-        early = (exponent < 0.5) & (rise < 0.5 * self.T_i)  # there the difference cancels
+        early = (exponent < 0.5) & (rise < 0.5 * self.T_i)  # the difference would cancel
         soon = short_integral(lambda t: self.A * np.exp(-T_E / (self.T_i + heating * t)), t)
         reacted = np.where(early, soon, apart)
         return {

@@ -1,4 +1,4 @@
-"""A body that bounces on a rigid one under a dead load, and comes to rest after infinitely many rebounds."""
+"""Body that bounces on a rigid one under a dead load, and comes to rest after infinitely many rebounds."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from surfacechem.references.base import Array, Quantities, read
 
 
 class BouncingBody(UniformBody):
-    r"""A mass falls under a constant load and rebounds with a part e of its velocity; what it loses is heat.
+    r"""A mass falls under a constant load and rebounds with the fraction e of its velocity; the lost energy is heat.
 
     .. math:: a=-F/m,\quad V=\sqrt{v_i^2+2ag_i},\quad t_1=\frac{v_i+V}a,\quad t_{n+1}-t_n=\frac{2Ve^n}a,\quad
         t_\infty=t_1+\frac{2V}a\,\frac e{1-e},\quad T_n^2=T_i^2+\frac{T_0}Cm V^2\,(1-e^{2n})
@@ -36,7 +36,7 @@ class BouncingBody(UniformBody):
 
     @property
     def _fall(self) -> tuple[float, float]:
-        """Acceleration towards contact, and the speed of the first impact."""
+        """Acceleration towards contact, and speed of the first impact."""
         acceleration = -self.F_n / self.m
         return acceleration, math.sqrt(self.v_n_i**2 + 2 * acceleration * self.g_n_i)
 
@@ -50,7 +50,7 @@ class BouncingBody(UniformBody):
 
     @property
     def rest_time(self) -> float:
-        """Time [s] from which on it rests."""
+        """Time [s] at which it comes to rest."""
         a, speed = self._fall
         if self.e == 1 or not a:
             return self.first if self.e == 0 else math.inf
@@ -59,18 +59,18 @@ class BouncingBody(UniformBody):
     def quantities(self, t: Array) -> Quantities:
         a, speed = self._fall
         e, first = self.e, self.first
-        flight = 2 * speed / a if a else math.inf  # lasts a flight that begins with the speed of the first impact
+        flight = 2 * speed / a if a else math.inf  # time of flight from the speed of the first impact
 
         def flown(n: Array) -> Array:
-            """Duration of n flights after the first impact, in units of ``flight``."""
+            """Return the duration of n flights after the first impact, in units of ``flight``."""
             return n if e == 1 else e * (1 - e**n) / (1 - e)
 
-        n = np.where(t < first, 0.0, 1.0)  # impacts by the times
+        n = np.where(t < first, 0.0, 1.0)  # number of impacts at the times
         if a and e:
             flights = np.maximum((t - first) / flight, 0.0)
             left = np.maximum(1 - flights * (1 - e) / e, np.finfo(float).tiny)
             whole = np.floor(flights if e == 1 else np.log(left) / math.log(e))
-            # The logarithm rounds: it may be in the flight before, or beyond.
+            # The logarithm is rounded, so that the number may be one too small or too large.
             whole += np.where(flights >= flown(whole + 1), 1.0, 0.0) - np.where(flights < flown(whole), 1.0, 0.0)
             n = np.where(t < first, 0.0, whole + 1)
         since = np.where(n > 0, t - (first + (flight * flown(n - 1) if a else 0.0)), t)

@@ -1,4 +1,4 @@
-"""Parallel bonds that share a constant load: their rupture, and with rebinding the critical load."""
+"""Parallel bonds that share a constant load: their rupture, and the critical load with rebinding."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from surfacechem.references.base import Array, Quantities, read
 from surfacechem.references.bell import BellBond
 
 FAR = 0.1
-"""Growth of F/phi beyond its critical value from which the two terms of the rate no longer cancel."""
+"""Excess of F/phi over its critical value above which the two terms of the rate no longer cancel."""
 
 
 class Cluster(BellBond):
-    """Bell bonds whose number per area decides on the force of each."""
+    """Bell bonds whose number per area determines the force on each."""
 
     n_c: float = parameter("1/m^2", "density of bonding sites", above=0)
     t_n: float = parameter("Pa", "tensile traction", above=0)
@@ -33,14 +33,14 @@ class Cluster(BellBond):
 
 
 class SharedLoadCluster(Cluster):
-    r"""Bonds that share a constant traction and do not form again: the fewer are left, the faster they break.
+    r"""Bonds that share a constant traction and do not form again: the fewer remain, the faster they break.
 
     .. math:: \dot\phi=-k_{off}\phi e^{F/\phi},\quad F=\frac{t_nx_{off}}{n_ck_BT},\qquad
         E_1\Big(\frac F\phi\Big)=E_1\Big(\frac F{\phi_i}\Big)-k_{off}t
 
     All bonds are broken, with infinite slope, at :math:`t^*=E_1(F/\phi_i)/k_{off}`; before,
-    :math:`\phi\simeq F/W_0\big(1/k_{off}(t^*-t)\big)`. Everything is scaled by :math:`e^{-F/\phi_i}`, so that no load
-    overflows. Close to rupture the state follows the rounding of t times its own slope.
+    :math:`\phi\simeq F/W_0\big(1/k_{off}(t^*-t)\big)`. All terms are scaled by :math:`e^{-F/\phi_i}`, so that no load
+    overflows. Close to rupture the error of the state is the rounding of t times its slope.
 
     Source: Erdmann & Schwarz (2004), J. Chem. Phys. 121, 8997, doi 10.1063/1.1805496, deterministic equation without
     rebinding, integrated.
@@ -58,8 +58,8 @@ class SharedLoadCluster(Cluster):
         return float(np.exp(-start) * scaled_expint(1, np.array(start))) / self.k_off
 
     def quantities(self, t: Array) -> Quantities:
-        # The growth w of F/phi from its start x_0 solves e^x_0 [E_1(x_0) - E_1(x_0 + w)] = k_off t e^x_0: as it stands
-        # in the first half of the time, by logarithms of what is left in the second.
+        # The growth w of F/phi from its start x_0 solves e^x_0 [E_1(x_0) - E_1(x_0 + w)] = k_off t e^x_0: directly in
+        # the first half of the time, by logarithms of the remaining time in the second.
         x_0 = self.load / self.phi_i
         scaled, whole = np.exp(x_0 + np.log(self.k_off * t)), float(scaled_expint(1, np.array(x_0)))
 
@@ -68,7 +68,7 @@ class SharedLoadCluster(Cluster):
 
         def elapsed(w: Array) -> tuple[Array, Array]:
             apart = scaled_expint(1, np.array(x_0)) - np.exp(-w) * scaled_expint(1, x_0 + w)
-            near = w < 0.25 * min(1.0, x_0)  # there the integrals cancel
+            near = w < 0.25 * min(1.0, x_0)  # the integrals would cancel
             return np.where(near, short_integral(slope, w), apart), slope(w)
 
         def log_left(w: Array) -> tuple[Array, Array]:
@@ -76,8 +76,8 @@ class SharedLoadCluster(Cluster):
             return w - np.log(left), 1.0 / (left * (x_0 + w))
 
         early, exponent = scaled < 0.5 * whole, np.full_like(scaled, x_0)
-        # Both searches start close below their roots: of the first, what has gone is less than (1 - e^-w)/x_0, and half
-        # of the whole less than 1/(2 x_0); of the second, e^x E_1(x) is more than 1/(x + 1), and w + 1 at most `most`.
+        # Both searches start close below their roots. In the first, the elapsed time is less than (1 - e^-w)/x_0, and
+        # half of the total less than 1/(2 x_0); in the second, e^x E_1(x) > 1/(x + 1), and w + 1 is at most `most`.
         gone = scaled[early]
         nothing = np.zeros_like(gone)
         exponent[early] += increasing_root(
@@ -92,7 +92,7 @@ class SharedLoadCluster(Cluster):
 
 @dataclass(frozen=True)
 class Expansion:
-    r"""The rate r about a bonding state, in units of :math:`e^{1+F_*}`: value, slope and all the rest.
+    r"""The rate r about a bonding state, in units of :math:`e^{1+F_*}`: value, slope and remainder.
 
     .. math:: r(a+\delta)=r(a)+r'(a)\,\delta+e^{x_a}(a+\delta)(e^{-q}-1+q),\quad x_a=\frac Fa,\quad
         q=\frac{x_a\delta}{a+\delta}
@@ -106,13 +106,13 @@ class Expansion:
     slope: float
 
     def rate(self, delta: Array | float, phi: Array | float) -> Array:
-        """Rate at phi, which is ``delta`` away from the state."""
+        """Return the rate at phi, which is ``delta`` away from the state."""
         q = (self.critical_exponent - self.apart) * delta / phi
         rest = math.exp(-self.apart) * phi * remainder(np.asarray(q))
         return np.asarray(self.value + self.slope * delta + rest)
 
     def derivative(self, delta: Array) -> Array:
-        """Derivative of the rate."""
+        """Return the derivative of the rate."""
         exponent = self.critical_exponent - self.apart
         q = exponent * delta / (self.state + delta)
         curved = remainder(np.asarray(q)) - np.expm1(-q) * exponent * self.state / (self.state + delta)
@@ -120,16 +120,16 @@ class Expansion:
 
 
 class RebindingCluster(Cluster):
-    r"""Bonds that share a constant traction and form again where no load acts.
+    r"""Bonds that share a constant traction and form again at free sites, which carry no load.
 
     .. math:: \dot\phi=-k_{off}\,r(\phi),\quad r=\phi e^{F/\phi}-\gamma(1-\phi),\quad F=\frac{t_nx_{off}}{n_ck_BT},\quad
         \gamma=\frac{k_{on}}{k_{off}}
 
     A steady state exists up to the critical load :math:`F_*=W_0(\gamma/e)`, where
     :math:`\phi_*=\frac{F_*}{1+F_*}`. Above it the cluster breaks; just above, after
-    :math:`\pi\sqrt{2/(e^{F_*/\phi_*}(F-F_*)r''(\phi_*))}/k_{off}`. The way to the steady state and that to rupture are
-    quadratures, inverted to rounding. The rate is written about the critical state in terms that do not cancel, so that
-    a lifetime is known to the rounding of F over its distance from :math:`F_*`.
+    :math:`\pi\sqrt{2/(e^{F_*/\phi_*}(F-F_*)r''(\phi_*))}/k_{off}`. The paths to the steady state and to rupture are
+    quadratures, inverted to rounding. The rate is expanded about the critical state in terms that do not cancel, so
+    that the relative error of a lifetime is the rounding of F over its distance from :math:`F_*`.
 
     Source: Erdmann & Schwarz (2004), J. Chem. Phys. 121, 8997, doi 10.1063/1.1805496; Bell (1978), Science 200, 618.
 
@@ -145,14 +145,14 @@ class RebindingCluster(Cluster):
 
     @property
     def critical_load(self) -> float:
-        """Largest force per site, in units of the force scale, that has a steady state: F_*."""
+        """Largest force per site, in units of the force scale, with a steady state: F_*."""
         from scipy.special import wrightomega  # W_0 of an exponential, which may overflow
 
         return float(wrightomega(math.log(self.k_on / self.k_off) - 1.0))
 
     @property
     def critical_traction(self) -> float:
-        """Largest traction [Pa] that has a steady state."""
+        """Largest traction [Pa] with a steady state."""
         return self.critical_load * self.n_c * self.force_scale
 
     @property
@@ -162,7 +162,7 @@ class RebindingCluster(Cluster):
 
     @property
     def breaks(self) -> bool:
-        """True if the cluster goes to rupture, not to its steady state."""
+        """True if the cluster ruptures instead of reaching its steady state."""
         below = self.phi_i < self.critical_state and bool(
             self._about(0.0).rate(self.phi_i - self.critical_state, self.phi_i) > 0.0
         )
@@ -170,24 +170,24 @@ class RebindingCluster(Cluster):
 
     @property
     def end_time(self) -> float:
-        """Time [s] at which the last bond breaks; infinite where there is a steady state."""
+        """Time [s] at which the last bond breaks; infinite if a steady state is reached."""
         return self._path.duration / self.k_off if self.breaks else math.inf
 
     @property
     def steady_state(self) -> float:
-        """The stable bonding state below the critical load; InputError above it."""
+        """Stable bonding state below the critical load; InputError above it."""
         return self.critical_state + self._above_critical
 
     @property
     def passage_time(self) -> float:
-        """Asymptotic lifetime [s] just above the critical load, from where the cluster is slowest."""
+        """Asymptotic lifetime [s] just above the critical load, from the bottleneck at the slowest state."""
         exponent = 1.0 + self.critical_load
         curvature = math.exp(exponent) * exponent**2 / self.critical_state
         distance = math.exp(exponent) * (self.load - self.critical_load)
         return math.pi * math.sqrt(2.0 / (distance * curvature)) / self.k_off
 
     def _about(self, d: float) -> Expansion:
-        """The rate about the state that is ``d`` above the critical one."""
+        """Return the expansion of the rate about the state that is ``d`` above the critical one."""
         state, exponent, below = self.critical_state + d, 1.0 + self.critical_load, self.critical_load - self.load
         apart = (exponent * d + below) / state  # critical exponent minus that of this state
         slope = -self.critical_load * math.expm1(-apart) + apart * math.exp(-apart)
@@ -212,12 +212,12 @@ class RebindingCluster(Cluster):
 
     @cached_property
     def _path(self) -> AutonomousODE:
-        """The way from the start to rupture or to the steady state, in units of 1/k_off."""
+        """Path from the start to rupture or to the steady state, in units of 1/k_off."""
         scale, critical = math.exp(1.0 + self.critical_load), self._about(0.0)
         if self.breaks:
 
             def rupture(gone: Array, left: Array) -> Array:
-                if self.load > self.critical_load + FAR * self.critical_state:  # there the two terms do not cancel
+                if self.load > self.critical_load + FAR * self.critical_state:  # the two terms do not cancel
                     return left * np.exp(self.load / left) - self.k_on / self.k_off * (1.0 - left)
                 delta = np.where(gone < left, self.phi_i - self.critical_state - gone, left - self.critical_state)
                 return scale * critical.rate(delta, left)

@@ -1,6 +1,6 @@
-"""Two bodies that conduct heat, brought into contact.
+"""Two heat-conducting bodies brought into contact.
 
-By Laplace transformation: what the bodies answer to heat at their contact, and the way back.
+By Laplace transformation: the responses of the bodies to heat at their contact, and a numerical inversion.
 Source: Carslaw & Jaeger (1959), Conduction of Heat in Solids, chapter XII; Weideman & Trefethen (2007), Parabolic and
 hyperbolic contours for computing the Bromwich integral, Math. Comp. 76, and Trefethen, Weideman & Schmelzer (2006),
 Talbot quadratures and rational approximations, BIT 46, for the contour.
@@ -26,14 +26,14 @@ Complex: TypeAlias = NDArray[Any]
 """Complex values."""
 
 NODES = 24
-"""Points on the contour: each gains a factor of 3.9, until rounding is reached."""
+"""Points on the contour: each reduces the error by a factor of 3.9, until rounding is reached."""
 
 HELD_CONDUCTANCE = 1e300
 """Conductance at a far side that is held at a temperature."""
 
 
 def inverse_laplace(image: Callable[[Complex], Complex], t: Array) -> Array:
-    """The function of times t > 0 whose Laplace transform is ``image``, which may have more axes beside those of t.
+    """Return the function of times t > 0 whose Laplace transform is ``image``, which may have further axes.
 
     >>> bool(abs(inverse_laplace(lambda s: 1 / (s + 2), np.array([0.5]))[0] - np.exp(-1)) < 1e-12)
     True
@@ -50,9 +50,9 @@ def inverse_laplace(image: Callable[[Complex], Complex], t: Array) -> Array:
 
 @dataclass(frozen=True)
 class ConductingSlab:
-    """A body of capacity C and conductivity k over its thickness, both per area; a lump without conductivity.
+    """A body of capacity C and conductivity k over its thickness, both per area; a lump if it has no conductivity.
 
-    Beyond the far side is ``T_far`` behind a conductance; without a capacity the body keeps its temperature.
+    Beyond the far side is the temperature ``T_far`` behind a conductance; without capacity the temperature is constant.
     """
 
     T: float
@@ -63,12 +63,14 @@ class ConductingSlab:
     T_far: float = 0.0
 
     def answer(self, s: Complex, x: Array | float = 0.0) -> tuple[Complex, Complex]:
-        """Temperature at x per heat flux into the contact, and less the initial one where nothing enters there."""
+        """Return the temperature at x per heat flux into the contact, and the temperature minus its initial value
+        without any flux there.
+        """
         if not self.C:
             return np.zeros_like(s), np.zeros_like(s)
         if not self.conductivity:
             return 1 / (self.C * s), np.zeros_like(s)
-        # Decay of a wave per length, k times it, and what is left of it across the slab and back.
+        # Decay of a wave per length, k times it, and the fraction left after a path across the slab and back.
         p = np.sqrt(s * self.C / (self.conductivity * self.thickness))
         kp, E = self.conductivity * p, np.exp(-2 * p * self.thickness)
         back = (kp - self.h_far) / (kp + self.h_far)
@@ -84,10 +86,10 @@ class ConductingSlabs(Reference):
 
     .. math:: \frac{C_k}{L_k}\dot T_k=k_k\,T_{k,xx},\qquad q=\frac{T_1-T_2}{R}=-k_k T_{k,x}\Big|_{x=0}
 
-    In Laplace transforms, with :math:`p=\sqrt{sC/(kL)}` and the wave that comes back from the far side, each body
-    answers to a flux by :math:`Z=(1+rE)/(kp\,(1-rE))`, :math:`E=e^{-2pL}`, :math:`r=(kp-h)/(kp+h)`, and
-    :math:`q=\Delta T/(s\,(Z_1+Z_2+R))`. The way back is a quadrature on Talbot's contour, good to 1e-11 of the
-    differences of temperature. A body without conductivity is a lump, one without capacity keeps its temperature.
+    In Laplace transforms, with :math:`p=\sqrt{sC/(kL)}` and the wave reflected at the far side, the response of each
+    body to a flux is :math:`Z=(1+rE)/(kp\,(1-rE))`, :math:`E=e^{-2pL}`, :math:`r=(kp-h)/(kp+h)`, and
+    :math:`q=\Delta T/(s\,(Z_1+Z_2+R))`. The inversion is a quadrature on Talbot's contour, accurate to 1e-11 of the
+    temperature differences. A body without conductivity is a lump, one without capacity has a constant temperature.
 
     Any t >= 0. Source: Carslaw & Jaeger (1959), Conduction of Heat in Solids, section 12.8.
 
@@ -123,7 +125,7 @@ class ConductingSlabs(Reference):
             raise InputError(f"it holds for conduction between two bodies alone, and {reason}.")
         values, h = dict(super().from_scene(scene)), scene.total_conductance
         values["R"] = 1.0 / h if h else None
-        for k in "12":  # what starts from a profile has no temperature at the contact of its own
+        for k in "12":  # a body with an initial profile has no separate temperature at the contact
             values[f"T_{k}"] = scene.run.values.get(f"initial.profile_{k}", values[f"T_{k}"])
             if values[f"T_far_{k}"] is not None and values[f"h_far_{k}"] is None:
                 values[f"h_far_{k}"] = HELD_CONDUCTANCE
@@ -139,13 +141,13 @@ class ConductingSlabs(Reference):
         return first, second
 
     def _flux(self, s: Complex) -> Complex:
-        """Transform of the heat flux from the first to the second body."""
+        """Return the transform of the heat flux from the first to the second body."""
         first, second = self.bodies
         (heated_1, open_1), (heated_2, open_2) = first.answer(s), second.answer(s)
         return ((first.T - second.T) / s + open_1 - open_2) / (heated_1 + heated_2 + self.R)
 
     def quantities(self, t: Array) -> Quantities:
-        """Temperatures at the contact; through a resistance also the heat fluxes, which begin finite."""
+        """Return temperatures at the contact; through a resistance also the heat fluxes, which start finite."""
         T_1, T_2 = (self.profile(number, np.zeros(1), t)[:, 0] for number in (1, 2))
         if not self.R:
             return {"T_1": T_1, "T_2": T_2, "T": T_1}
@@ -154,7 +156,7 @@ class ConductingSlabs(Reference):
         return {"T_1": T_1, "T_2": T_2, "q_1": -q, "q_2": q}
 
     def profile(self, number: int, x: Array, t: Array) -> Array:
-        """Temperatures of a body at distances from the contact [m], shape (times, places)."""
+        """Return temperatures of a body at distances from the contact [m], shape (times, places)."""
         body, sign = self.bodies[number - 1], 1.0 if number == 2 else -1.0
         values = np.full((t.size, x.size), body.T)
 
@@ -167,7 +169,7 @@ class ConductingSlabs(Reference):
 
 
 def _beside_conduction(scene: Scene) -> Iterator[str]:
-    """The contents of a scene beside conduction, in words."""
+    """Yield the contents of a scene other than conduction, in words."""
     interface, bodies = scene.interface, {body.name for body in scene.bodies}
     laws = (interface.potentials, interface.frictions, interface.reactions, interface.limits, interface.variables)
     if any(laws):
@@ -184,7 +186,7 @@ def _beside_conduction(scene: Scene) -> Iterator[str]:
 
 
 def _not_constant(body: Body) -> Iterator[str]:
-    """The contents of a body that are not constant, in words."""
+    """Yield the properties of a body that are not constant, in words."""
     energy, conduction = body.energy, body.conduction
     if energy is not None and (energy.name() != "constant" or energy.varying):
         yield f"the heat capacity of {body.name} varies"

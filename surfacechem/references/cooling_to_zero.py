@@ -14,7 +14,7 @@ class CoolingToZero(UniformBody):
 
     .. math:: T=T_i\sqrt{1-t/t_0},\qquad t_0=\frac{CT_i^2}{2T_0Q}
 
-    Exact for 0 <= t <= t_0, which is `end_time`; the relative accuracy holds up to there.
+    Exact for 0 <= t <= t_0, which is `end_time`, with full relative accuracy up to there.
 
     Source: Sauer, Duong & Mandadapu (2021), quadratic energy, integrated.
 

@@ -1,4 +1,4 @@
-"""A free slider that dry friction brings to rest."""
+"""Free slider brought to rest by dry friction."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class CoulombStop(UniformBody):
 
     @property
     def stop_time(self) -> float:
-        """Time [s] from which on the mass rests."""
+        """Time [s] at which the mass comes to rest."""
         return self.m * self.v_i / (self.mu * self.p)
 
     @property

@@ -13,12 +13,12 @@ from surfacechem.references.base import Array, Parameters, Quantities, Reference
 
 
 class SuddenDebonding(UniformBody):
-    r"""Temperature after sudden debonding under a traction, quadratic energies, uniform temperature, and its verdict.
+    r"""Sudden debonding under a traction, quadratic energies: the uniform temperature afterwards and its verdict.
 
     .. math:: \frac C{2T_0}(T_f^2-T_i^2)=E:=\frac{t_n^2}2\Big(\frac1k+\frac1{E_n}\Big)-\frac{K_0}2\phi_i(2-\phi_i)
 
-    What springs release, less what the bonds take, ends as heat. Admissible iff :math:`E\ge0`: below, energy is
-    conserved with :math:`T_f<T_i` but entropy falls by :math:`C(T_i-T_f)/T_0`; at :math:`E\le-CT_i^2/2T_0` no
+    The energy that springs release, less that of the bonds, becomes heat. Admissible iff :math:`E\ge0`: below, energy
+    is conserved with :math:`T_f<T_i` but entropy falls by :math:`C(T_i-T_f)/T_0`; at :math:`E\le-CT_i^2/2T_0` no
     temperature conserves energy. The paper has :math:`\phi_i=1`, :math:`T_i=T_0`, a rigid interface, and
     :math:`T_f=T_0\sqrt{1-\kappa+(t_n/t_0)^2}` with :math:`\kappa=K_0/(T_0C)`, :math:`t_0^2=T_0Ck`; its cooling branch
     violates its own second law.
@@ -50,26 +50,26 @@ class SuddenDebonding(UniformBody):
 
     @property
     def released_energy(self) -> float:
-        """Energy [J/m^2] that ends as heat."""
+        """Energy [J/m^2] that becomes heat."""
         elastic = 0.5 * self.traction**2 * (1.0 / self.k + self.compliance)
         return elastic - 0.5 * self.K_0 * self.phi_i * (2.0 - self.phi_i)
 
     @property
     def final_temperature(self) -> float:
-        """Temperature [K] after; nan if there is none."""
+        """Temperature [K] after debonding; NaN if there is none."""
         if self.verdict == "impossible":
             return math.nan
         return float(self.heated(np.array(self.released_energy)))
 
     @property
     def entropy_change(self) -> float:
-        """Entropy [J/(m^2 K)] that the event produces; nan if it is impossible."""
+        """Entropy [J/(m^2 K)] that the event produces; NaN if it is impossible."""
         before, after = self.model.entropy(np.array([self.T_i, self.final_temperature]) - self.T_0, self.C, self.T_0)
         return float(after - before)
 
     @property
     def verdict(self) -> str:
-        """admissible, entropy-violating or impossible."""
+        """'admissible', 'entropy-violating' or 'impossible'."""
         if self.released_energy >= 0.0:
             return "admissible"
         none, before = self.model.energy(np.array([0.0, self.T_i]) - self.T_0, self.C, self.T_0)
@@ -85,7 +85,7 @@ class PulledToDebonding(SuddenDebonding):
     .. math:: t_n=kw<t_0\,\phi_i\,T_0/T_i,\qquad w=\dot wt;\quad\text{then }\phi=0,\ t_n=0,\ g_n=w,\ T=T_f
 
     with the final temperature of sudden debonding, whose parameter :math:`t_n` is here the strength
-    :math:`t_0` of complete bonding at :math:`T_0`. There is no solution where debonding is impossible.
+    :math:`t_0` of complete bonding at :math:`T_0`. There is no solution if debonding is impossible.
 
     Source: Sauer, Duong & Mandadapu (2021), section 6.3 with eq. e:debond.
 
@@ -122,15 +122,15 @@ class PulledToDebonding(SuddenDebonding):
 
 
 class BilinearDebonding(Reference):
-    r"""Bonds that break along a falling line of traction as the gap opens, is closed, and opens again for good.
+    r"""Bonds that break along a falling line of traction as the gap opens, closes, and opens again.
 
     .. math:: t_n=\phi E_bg_n,\qquad
         \phi=\frac{g_c}{\hat g}\,\frac{g_f-\hat g}{g_f-g_c},\quad g_c=\frac{t_{max}}{E_b}\le\hat g\le g_f,\qquad
         D=\tfrac12(t_{max}\hat g-\hat tg_c)-H_r(1-\phi)
 
-    with the largest gap so far :math:`\hat g`, and what is dissipated until then, D: the area that loading and
-    unloading enclose less what the broken bonds keep. In all it is :math:`\tfrac12t_{max}g_f-H_r`. The gap
-    opens at a constant speed to :math:`g_1`, closes at the same speed, and opens again. Any t >= 0.
+    with the largest gap so far :math:`\hat g`, and the energy dissipated so far, D: the area between loading and
+    unloading less the energy stored by the broken bonds. Its total is :math:`\tfrac12t_{max}g_f-H_r`. The gap opens at
+    a constant speed to :math:`g_1`, closes at the same speed, and opens again. Any t >= 0.
 
     Source: bilinear law as in Camanho & Davila (2002), NASA/TM-2002-211737, integrated.
 

@@ -11,9 +11,9 @@ class ElasticContact(Reference):
 
     .. math:: g_n=\frac{kw}{k+E_n},\quad t_n=E_ng_n,\quad\tfrac12E_ng_n^2=\frac{t_n^2}{2E_n}
 
-    For :math:`E_n\to\infty` the traction tends to k w and the energy of the contact to nothing.
-    Here :math:`w=w_i+\dot wt`; with a unilateral penalty w <= 0. Any stiffness: the energies are good to rounding over
-    all decades.
+    For :math:`E_n\to\infty` the traction tends to k w and the energy of the contact to zero.
+    Here :math:`w=w_i+\dot wt`; with a unilateral penalty w <= 0. The energies are accurate to rounding for any
+    stiffness.
 
     Source: Sauer, Duong & Mandadapu (2021), eq. ex:psi_c, in series with a spring.
 

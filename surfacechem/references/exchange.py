@@ -56,7 +56,7 @@ class PairExchange(Reference):
     def quantities(self, t: Array) -> Quantities:
         equilibrium, ratio = self.equilibrium_temperature, math.sqrt(self.C_2 / self.C_1)
         skew = 1.0 / ratio - ratio
-        # The angle u on the ellipse is known by the tangent of its half, which decays as exp(-s).
+        # The angle u on the ellipse is represented by the tangent of its half, which decays as exp(-s).
         start = math.tan(0.5 * math.atan2(self.T_2 - self.T_1, self.T_1 / ratio + self.T_2 * ratio))
 
         def circle(s: Array) -> tuple[Array, Array, Array]:
@@ -65,7 +65,7 @@ class PairExchange(Reference):
             return tangent, 2.0 * tangent / square, (1.0 - tangent**2) / square
 
         def scaled_time(s: Array) -> tuple[Array, Array]:
-            """The right-hand side of the implicit solution and its slope, T_1 T_2 / T_eq^2."""
+            """Return the right-hand side of the implicit solution and its slope, T_1 T_2 / T_eq^2."""
             tangent, sine, cosine = circle(s)
             scale = 2.0 / ((1.0 + tangent**2) * (1.0 + start**2))
             cosines = scale * start**2 * np.expm1(-2.0 * s)
@@ -73,7 +73,7 @@ class PairExchange(Reference):
             return s + 2.0 * cosines + skew * sines, 1.0 - 2.0 * sine**2 + skew * sine * cosine
 
         scaled = t * self.h * self.T_0 / equilibrium * (1.0 / self.C_1 + 1.0 / self.C_2)
-        # The slope lies within bounds known beforehand, and so does s.
+        # Bounds of the slope are known, and thus bounds of s.
         most, least = 0.5 * (1.0 / ratio + ratio), min(1.0, self.T_1 * self.T_2 / equilibrium**2)
         _, sine, cosine = circle(increasing_root(scaled_time, scaled, scaled / most, scaled / least))
         q = self.h * equilibrium * (ratio + 1.0 / ratio) * sine
@@ -92,8 +92,8 @@ class ReservoirExchange(UniformBody):
         T=T_a\big\{1+W_0\big(y_0e^{y_0-\lambda t}\big)\big\},\quad y_0=\frac{T_i}{T_a}-1,\quad
         \lambda=\frac{hT_0}{CT_a}
 
-    The Lambert function loses digits for a cold body and overflows for a hot one. What is solved instead, to rounding,
-    is the same equation for :math:`s=\ln\frac{T_i-T_a}{T-T_a}`, namely :math:`s+y_0(1-e^{-s})=\lambda t`. Any t >= 0.
+    The Lambert function loses digits for a cold body and overflows for a hot one. Instead, the same equation is solved
+    to rounding for :math:`s=\ln\frac{T_i-T_a}{T-T_a}`, namely :math:`s+y_0(1-e^{-s})=\lambda t`. Any t >= 0.
 
     Source: quadratic energy of Sauer, Duong & Mandadapu (2021), integrated; Corless et al. (1996) for W.
 
@@ -112,7 +112,7 @@ class ReservoirExchange(UniformBody):
         offset = -distance / self.T_a
 
         def scaled_time(s: Array) -> tuple[Array, Array]:
-            """The left-hand side of the implicit solution, a sum of positive numbers for a cold body, and its slope."""
+            """Return the left-hand side of the implicit solution, positive terms for a cold body, and its slope."""
             curved = -offset * s**2 * second_difference(np.zeros_like(s), -s)
             return s * relative + curved, relative + offset * np.expm1(-s)
 

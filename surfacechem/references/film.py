@@ -1,4 +1,4 @@
-"""Viscous films that heat bodies: one that thins with temperature, and one that closes at constant speed."""
+"""Viscous films that heat bodies: a film that thins with temperature, and one that closes at constant speed."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ class ThinningFilm(FrictionallyHeated):
     .. math:: \frac C{T_0}T\dot T=D_0e^{-\beta(T-T_0)},\qquad
         T=\frac1\beta\Big\{1+W_0\Big[(\beta T_i-1)e^{\beta T_i-1}+\frac{\beta^2D_0T_0t}Ce^{\beta T_0-1}\Big]\Big\}
 
-    The Lambert function loses digits for small :math:`\beta T` and overflows for large. What is solved instead, to
-    rounding, is the same equation for the rise :math:`\theta=T-T_i`,
+    The Lambert function loses digits for small :math:`\beta T` and overflows for large. Instead, the same equation is
+    solved to rounding for the rise :math:`\theta=T-T_i`,
     :math:`T_i\theta\exp[0,\beta\theta]+\theta^2\exp[0,\beta\theta,\beta\theta]=D_0e^{-\beta(T_i-T_0)}T_0t/C`.
     Any t >= 0, beta >= 0; beta = 0 is steady sliding.
 
@@ -43,7 +43,7 @@ class ThinningFilm(FrictionallyHeated):
         return {"T": self.T_i + rise, "D": initial * np.exp(-self.beta * rise)}
 
     def _heat(self, rise: Array) -> tuple[Array, Array]:
-        """Energy in units of C/T_0 that heats against the thinning, and its slope."""
+        """Return the energy, in units of C/T_0, that heats against the thinning, and its slope."""
         exponent = self.beta * rise
         linear = self.T_i * first_difference(np.zeros_like(exponent), exponent)
         quadratic = rise * np.exp(exponent) * second_difference(np.zeros_like(exponent), -exponent)
@@ -55,8 +55,8 @@ class ClosingFilm(UniformBody):
 
     .. math:: g_n=g_i-at,\qquad T^2=T_i^2+\frac{2T_0\eta v^2}{Ca}\ln\frac{g_i}{g_n}
 
-    Quadratic energies, perfect thermal contact. Before `end_time` :math:`g_i/a`, at which dissipation and temperature
-    are infinite.
+    Quadratic energies, perfect thermal contact. Valid before `end_time` :math:`g_i/a`, at which dissipation and
+    temperature are infinite.
 
     Source: Sauer, Duong & Mandadapu (2021), eq. e:visc_fric and section 6.1, integrated.
 
@@ -74,14 +74,14 @@ class ClosingFilm(UniformBody):
 
     @property
     def end_time(self) -> float:
-        """Time [s] at which the gap is closed."""
+        """Time [s] at which the gap closes."""
         return self.g_i / self.a
 
     def quantities(self, t: Array) -> Quantities:
         return self.at_gap(self.g_i * (self.end_time - t) / self.end_time)
 
     def at_gap(self, g: Array) -> Quantities:
-        """The state when the gap is g; better than by time where that is rounded close to the end."""
+        """Return the state at the gap g; more accurate than by time, which is rounded close to the end."""
         heat = self.eta * self.v**2 / self.a * np.log(self.g_i / g)
-        T = np.sqrt(self.T_i**2 + 2.0 * self.T_0 * heat / self.C)  # not by the rise: it is infinite at the end
+        T = np.sqrt(self.T_i**2 + 2.0 * self.T_0 * heat / self.C)  # not by the rise, which is infinite at the end
         return {"g_n": g, "T": T, "D": self.eta * self.v**2 / g, "heat": heat}

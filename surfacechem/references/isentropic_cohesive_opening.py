@@ -16,8 +16,8 @@ class IsentropicCohesiveOpening(UniformBody):
     .. math:: T^3-BT^2-a(g_n)=0,\quad a=\frac{t_{max}T_0^2}C(g_n+g_0)e^{1-g_n/g_0},\quad B=T_i-\frac{a(g_i)}{T_i^2}
 
     for a strength :math:`t_{max}T_0/T`. The entropy
-    :math:`C(T/T_0-1)-t_{max}\frac{T_0}{T^2}(g_n+g_0)e^{1-g_n/g_0}` of bodies and zone stays what it is; fully open,
-    T = B. Quadratic energies; :math:`g_n=g_i+\dot gt\ge0`. If B <= 0 the temperature goes to zero as it opens.
+    :math:`C(T/T_0-1)-t_{max}\frac{T_0}{T^2}(g_n+g_0)e^{1-g_n/g_0}` of bodies and zone is constant; fully open, T = B.
+    Quadratic energies; :math:`g_n=g_i+\dot gt\ge0`. If B <= 0 the temperature goes to zero as the zone opens.
 
     Source: Sauer, Duong & Mandadapu (2021), eq. ex:psi_czm and quadratic energy, at constant entropy.
 

@@ -42,13 +42,13 @@ class KamalCureConstantCapacity(Reference):
     readings = read(reaction="A_1 E_1 A_2 E_2 m n", initial="phi_i=phi", temperature="T_i", adiabatic_rise="delta_T")
 
     def __post_init__(self) -> None:
-        """Refuse what cannot start."""
+        """Refuse parameters with which the reaction cannot start."""
         super().__post_init__()
         if self.A_1 == 0.0 and (self.phi_i == 0.0 or self.A_2 == 0.0):
             raise InputError(f"{self.name}: nothing starts the reaction; A_1 or phi_i and A_2 must be above zero.")
 
     def rate(self, cured: Array, left: Array) -> Array:
-        """Rate of phi [1/s] when it has grown by ``cured`` and is short of one by ``left``."""
+        """Return the rate of phi [1/s] when phi has grown by ``cured`` and is below one by ``left``."""
         RT = GAS_CONSTANT * (self.T_i + self.delta_T * cured)
         k_1, k_2 = self.A_1 * np.exp(-self.E_1 / RT), self.A_2 * np.exp(-self.E_2 / RT)
         return np.asarray((k_1 + k_2 * (self.phi_i + cured) ** self.m) * left**self.n)

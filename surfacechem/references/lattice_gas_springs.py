@@ -47,15 +47,15 @@ class LatticeGasSprings(Reference):
         return {**values, "k_i": None if phi is None or rate is None or phi == 1.0 else rate / (1.0 - phi)}
 
     def exponent(self, gap: ArrayLike) -> Array:
-        """Free energy of a bond in units of k_B T."""
+        """Return the free energy of a bond in units of k_B T."""
         return (0.5 * self.k_b * np.asarray(gap) ** 2 - self.epsilon) / (BOLTZMANN * self.T)
 
     def equilibrium(self, gap: ArrayLike) -> Array:
-        """Bonding state in equilibrium at a gap [m]."""
+        """Return the bonding state in equilibrium at a gap [m]."""
         return np.asarray(np.exp(-np.logaddexp(0.0, self.exponent(gap))))
 
     def traction(self, gap: ArrayLike) -> Array:
-        """Traction [Pa] in equilibrium at a gap [m]."""
+        """Return the traction [Pa] in equilibrium at a gap [m]."""
         return self.n_c * self.k_b * np.asarray(gap) * self.equilibrium(gap)
 
     @property

@@ -1,4 +1,4 @@
-"""Pull-off from an exponential cohesive zone: by a snap, what that heats, and slowly past the fold of a damped gap."""
+"""Pull-off from an exponential cohesive zone: by a jump, its heating, and slow passage of the fold of a damped gap."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from surfacechem.references.base import Array, Parameters, Quantities, Reference
 from surfacechem.references.semenov_fold import log_remainder, scaled_rise
 
 PANEL_LENGTH = 0.25
-"""Length of a panel in arsinh of the distance from the fold; the poles of 1 / cosh are pi / 2 away, so that
-16 Gauss points leave 25^-32."""
+"""Length of a panel in arsinh of the distance from the fold; the poles of 1 / cosh are pi / 2 away, so that the error
+of 16 Gauss points is 25^-32."""
 
 
 @dataclass(frozen=True)
 class PullOffFold:
-    """A state in which the quasi-static gap is lost, and the one it jumps to at the same displacement."""
+    """A state at which the quasi-static gap loses its equilibrium, and the gap after the jump."""
 
     g: float
     w: float
@@ -33,7 +33,7 @@ class PullOffFold:
 
 
 class CohesiveZoneOnSpring(Reference):
-    """An exponential cohesive zone in series with a spring: its branches, and where they end."""
+    """An exponential cohesive zone in series with a spring: its branches and folds."""
 
     t_max: float = parameter("Pa", "strength", above=0)
     g_0: float = parameter("m", "gap at the strength", above=0)
@@ -43,20 +43,20 @@ class CohesiveZoneOnSpring(Reference):
 
     @property
     def severity(self) -> float:
-        """Stiffness over the steepest softening; from one on every displacement has one gap."""
+        """Ratio of the stiffness to the steepest softening; from one on, every displacement has a unique gap."""
         return math.e * self.k * self.g_0 / self.t_max
 
     def traction(self, g: Array) -> Array:
-        """Traction [Pa] of the zone."""
+        """Return the traction [Pa] of the zone."""
         return np.asarray(self.t_max * g / self.g_0 * np.exp(1.0 - g / self.g_0))
 
     def energy(self, g: float, w: float) -> float:
-        """Energy [J/m^2] of spring and zone."""
+        """Return the energy [J/m^2] of spring and zone."""
         u = g / self.g_0
         return 0.5 * self.k * (w - g) ** 2 - self.t_max * self.g_0 * (1.0 + u) * math.exp(1.0 - u)
 
     def gap(self, w: Array, low: float, high: float) -> Array:
-        """The gap [m] at displacements w, on a stable branch between two gaps."""
+        """Return the gap [m] at displacements w, on a stable branch between two gaps."""
         lower = np.minimum(np.full_like(w, low), w)
 
         def displacement(g: Array) -> tuple[Array, Array]:
@@ -67,7 +67,7 @@ class CohesiveZoneOnSpring(Reference):
 
     @cached_property
     def folds(self) -> tuple[PullOffFold, PullOffFold]:
-        """The snap apart and the snap together: at both x with x exp(-x) = k g_0 / t_max, g = g_0 (1 + x)."""
+        """The folds of pull-off and of snap-in: at both x with x exp(-x) = k g_0 / t_max, g = g_0 (1 + x)."""
         if self.severity >= 1.0:
             raise InputError(f"{self.name}: stable for every displacement; there is no jump.")
         distance = np.array([-math.log(self.severity)])
@@ -77,7 +77,7 @@ class CohesiveZoneOnSpring(Reference):
         return self._fold(smaller, larger, math.inf), self._fold(larger, -1.0, smaller)
 
     def _fold(self, x: float, low: float, high: float) -> PullOffFold:
-        """The jump from the gap at x to the branch between two others."""
+        """Return the jump from the gap at x to the branch between two others."""
         g, t = self.g_0 * (1.0 + x), self.t_max * (1.0 + x) * math.exp(-x)
         w = g + t / self.k
         after = float(self.gap(np.array([w]), self.g_0 * (1.0 + low), self.g_0 * (1.0 + high))[0])
@@ -94,8 +94,8 @@ class CohesivePullOff(CohesiveZoneOnSpring):
 
     Stable for every w iff :math:`kg_0/t_{max}\ge1/e`; otherwise the gap jumps, on opening from :math:`g_{off}`, on
     closing from :math:`g_{on}`, to the other branch at the same w. The heat is the drop of
-    :math:`\tfrac12k(w-g_n)^2+\Psi`. Here :math:`w=w_i+\dot wt`, opening, from the closed branch. Both folds are good to
-    rounding also where they meet.
+    :math:`\tfrac12k(w-g_n)^2+\Psi`. Here :math:`w=w_i+\dot wt`, opening, from the closed branch. Both folds are
+    accurate to rounding, also where they meet.
 
     Source: Sauer, Duong & Mandadapu (2021), eq. ex:bt_czm with the sign of tension, with an elastic body.
 
@@ -111,7 +111,7 @@ class CohesivePullOff(CohesiveZoneOnSpring):
     readings = read(initial="w_i=w_n", ramp="w_dot=w_n")
 
     def __post_init__(self) -> None:
-        """Refuse what starts beyond the closed branch."""
+        """Refuse a start beyond the closed branch."""
         super().__post_init__()
         if self.severity < 1.0 and self.w_i > self.folds[0].w:
             raise InputError(f"{self.name}: w_i must not be above the fold at {self.folds[0].w!r} m.")
@@ -129,12 +129,12 @@ class CohesivePullOff(CohesiveZoneOnSpring):
 
 
 class CohesivePullOffHeating(CohesivePullOff, UniformBody):
-    r"""Cohesive pull-off in perfect thermal contact: what the jump releases heats the bodies.
+    r"""Cohesive pull-off in perfect thermal contact: the energy that the jump releases heats the bodies.
 
     .. math:: T^2=T_i^2+\frac{2T_0}C\,\big[\tfrac12k(w-g_n)^2+\Psi\big]_{after}^{before}
 
     Quadratic energies; a strength that does not depend on temperature, so that the gap is that of the pull-off without
-    heat and the temperature changes at the jump only.
+    heat and the temperature changes only at the jump.
 
     Source: Sauer, Duong & Mandadapu (2021), eq. ex:bt_czm with the sign of tension, and the quadratic energy.
 
@@ -149,14 +149,14 @@ class CohesivePullOffHeating(CohesivePullOff, UniformBody):
 
 
 class OverdampedPullOff(CohesiveZoneOnSpring):
-    r"""Overdamped opening of a cohesive zone at a far-field displacement a little beyond its fold.
+    r"""Overdamped opening of a cohesive zone at a far-field displacement slightly beyond its fold.
 
     .. math:: c\,\dot g_n=k(w_{off}+\delta w-g_n)-t_n(g_n),\qquad
         t\simeq\pi c\sqrt{\frac2{a\,k\,\delta w}},\quad a=-t_n''(g_{off})
 
     The time is an integral over the gap whose peak of width :math:`\sqrt{2k\delta w/a}` at the fold is resolved by
-    :math:`g_n-g_{off}\propto\sinh`; the force is summed without cancellation, so that any :math:`\delta w` is met to
-    rounding. Exact until half the way from the fold to the open gap, at `end_time`.
+    :math:`g_n-g_{off}\propto\sinh`; the force is summed without cancellation, so that the result is accurate to
+    rounding for any :math:`\delta w`. Exact until half way from the fold to the open gap, at `end_time`.
 
     Source: Sauer, Duong & Mandadapu (2021), eq. ex:bt_czm with the sign of tension; passage time of Strogatz, Nonlinear
     Dynamics and Chaos (1994), section 4.3.
@@ -177,7 +177,7 @@ class OverdampedPullOff(CohesiveZoneOnSpring):
 
     @property
     def fold(self) -> PullOffFold:
-        """The fold that is passed."""
+        """Fold that is passed."""
         return self.folds[0]
 
     @property
@@ -205,11 +205,11 @@ class OverdampedPullOff(CohesiveZoneOnSpring):
 
     @property
     def end_time(self) -> float:
-        """Time [s] until which the solution is stated."""
+        """End of the solution [s]."""
         return self.time(self.end_gap)
 
     def time(self, g: float) -> float:
-        """The time [s] at which the gap is g."""
+        """Return the time [s] at which the gap is g."""
         return float(self._times(np.array([g]))[0])
 
     def quantities(self, t: Array) -> Quantities:
@@ -220,7 +220,7 @@ class OverdampedPullOff(CohesiveZoneOnSpring):
         return {"g_n": g, "t_n": self.traction(g), "v_n": self._force(g - self.fold.g) / self.c}
 
     def _times(self, g: Array) -> Array:
-        """Integral of c dg / force, over the panels that end before and over a part of the next."""
+        """Return the integral of c dg / force, over whole panels and a part of the next one."""
         edges, times = self._panels
         ends = np.arcsinh((g - self.fold.g) / self.width)
         j = np.clip(np.searchsorted(edges, ends, side="right") - 1, 0, len(edges) - 1)
@@ -234,16 +234,16 @@ class OverdampedPullOff(CohesiveZoneOnSpring):
         return edges, np.append(0.0, np.cumsum(self._elapsed(edges[:-1], edges[1:])))
 
     def _elapsed(self, first: Array, last: Array) -> Array:
-        """Time between two points of a panel."""
+        """Return the time between two points of a panel."""
         nodes, weights = gauss(16)
         half = 0.5 * (last - first)[:, None]
         u = first[:, None] + half * (1.0 + nodes)
         return np.asarray(half * self.c * self.width * np.cosh(u) / self._force(self.width * np.sinh(u)) @ weights)
 
     def _force(self, distance: Array) -> Array:
-        """Driving traction [Pa] at a distance from the gap of the fold."""
+        """Return the driving traction [Pa] at a distance from the gap of the fold."""
         y, x = distance / self.g_0, self.fold.g / self.g_0 - 1.0
-        # Up to 0.5 a series of 18 terms is exact where the terms would cancel: the next is 0.5^20 19 / 20! = 7e-24.
+        # The terms cancel for small y: up to 0.5 a series of 18 terms is exact, the next is 0.5^20 19 / 20! = 7e-24.
         near = np.where(np.abs(y) < 0.5, y, 0.0)
         coefficients = [0.0, 0.0, *((-1) ** n * (n - 1 - x) / math.factorial(n) for n in range(2, 20))]
         series = np.polynomial.polynomial.polyval(near, coefficients)

@@ -1,4 +1,4 @@
-"""A view of a scene and of the start of its run, from which exact solutions read their parameters."""
+"""View of a scene and of the start of its run, from which exact solutions read their parameters."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 class SceneView:
     """A scene as it was run: constants of its laws by contract, loads, supports, capacities and initial values, in SI.
 
-    It is only read. What the scene does not have, or has more than once, is None.
+    Read only. A value that the scene does not have, or has more than once, is None.
     """
 
     def __init__(self, scene: Scene, run: Trajectory) -> None:
@@ -35,7 +35,7 @@ class SceneView:
         return dict(zip(self._system.output_columns, self.run.outputs[0].tolist(), strict=True))
 
     def read(self, reading: str, name: str) -> float | None:
-        """Value of one of the readings below, of a name if it needs one; a minus sign before that reverses the sign."""
+        """Return one of the readings below, by name if it needs one; a preceding minus reverses the sign."""
         found = getattr(self, reading)
         value: float | None = found(name.removeprefix("-")) if callable(found) else found
         return -value if value is not None and name.startswith("-") else value
@@ -43,23 +43,23 @@ class SceneView:
     # -- laws, loads, supports -----------------------------------------------------------------------------------------
 
     def potential(self, name: str) -> float | None:
-        """A constant of the interface's potentials."""
+        """Return a constant of the interface's potentials."""
         return self._constant(self.scene.interface.potentials, name)
 
     def friction(self, name: str) -> float | None:
-        """A constant of the friction laws."""
+        """Return a constant of the friction laws."""
         return self._constant(self.scene.interface.frictions, name)
 
     def reaction(self, name: str) -> float | None:
-        """A constant of the rate laws."""
+        """Return a constant of the rate laws."""
         return self._constant(self.scene.interface.reactions, name)
 
     def limit(self, name: str) -> float | None:
-        """A constant of the limits of traction."""
+        """Return a constant of the limits of traction."""
         return self._constant(self.scene.interface.limits, name)
 
     def _constant(self, laws: Iterable[Law], name: str) -> float | None:
-        """A constant of one law, as its own or as that of a factor of one of its parameters."""
+        """Return a constant of one of the laws, or of a factor of one of its parameters."""
         paths = []
         for law in laws:
             paths += [law.path, *(factor.path for factor in law.factors)]
@@ -67,16 +67,16 @@ class SceneView:
         return found[0] if len(found) == 1 else None
 
     def surface(self, name: str) -> float | None:
-        """A parameter of the shapes of two bodies, or of a law between them."""
+        """Return a parameter of the shapes of two bodies, or of a law between them."""
         laws: list[Law] = [*self.surfaces.shapes, *self.surfaces.gap_laws]
         found = {own: getattr(law, own) for law in laws for own, _ in law.specs()}
-        # Those of pairs of points may have been changed for this run alone.
+        # Parameters of pairs of points may have been changed for this run.
         found |= {path.rpartition(".")[2]: x for path, x in self.run.values.items() if path.startswith("surface.pair.")}
         return found.get(name)
 
     @property
     def surfaces(self) -> CurvedSurfaces:
-        """The two surfaces; InputError where the scene has none."""
+        """The two surfaces; InputError if the scene has none."""
         from surfacechem.surfaces.potential import CurvedSurfaces
 
         if not isinstance(self.scene.surface, CurvedSurfaces):
@@ -84,19 +84,19 @@ class SceneView:
         return self.scene.surface
 
     def ramp(self, name: str) -> float | None:
-        """The constant rate at which a variable is driven, in its unit per second."""
+        """Return the constant rate at which a variable is driven, in its unit per second."""
         return self.run.values.get(f"loading.{name}.ramp.rate")
 
     def normal(self, name: str) -> float | None:
-        """A constant of what supports the bodies along the normal."""
+        """Return a constant of the support of the bodies along the normal."""
         return self.run.values.get(f"mechanics.normal.{name}")
 
     def tangential(self, name: str) -> float | None:
-        """A constant of what supports the bodies along the interface."""
+        """Return a constant of the support of the bodies along the interface."""
         return self.run.values.get(f"mechanics.tangential.{name}")
 
     def conductance(self, into: str) -> float | None:
-        """Sum of the conductances between the interface and body '1' or '2' [W/(m^2 K)]."""
+        """Return the sum of the conductances between the interface and body '1' or '2' [W/(m^2 K)]."""
         ends = {"interface", self.scene.bodies[int(into) - 1].name}
         return self._sum([law for law in self.scene.heat if set(law.between) == ends])
 
@@ -106,14 +106,14 @@ class SceneView:
         return self._sum(self.scene.heat)
 
     def _sum(self, paths: Sequence[Law]) -> float | None:
-        """Sum of the conductances of heat paths; None if there is no path, or one has no constant h."""
+        """Return the sum of the conductances of heat paths; None if there is no path, or one has no constant h."""
         found = [self.run.values.get(f"{law.path}.h") for law in paths]
         return sum(h for h in found if h is not None) if found and None not in found else None
 
     # -- bodies and sites ----------------------------------------------------------------------------------------------
 
     def constant(self, name: str) -> float | None:
-        """A constant of bodies or sites by its symbol: C_1, C_2, C_c, T_0, N_c, N_1, N_2, thickness_1, ..."""
+        """Return a constant of bodies or sites by its symbol: C_1, C_2, C_c, T_0, N_c, N_1, N_2, thickness_1, ..."""
         path = self._system.paths_by_symbol.get(name)
         return None if path is None else self.run.values[path]
 
@@ -124,26 +124,26 @@ class SceneView:
 
     @property
     def temperature(self) -> float | None:
-        """The first temperature that evolves, or that of the interface [K]."""
-        # A scene without bodies has one temperature, T.
+        """First evolved temperature, or that of the interface [K]."""
+        # A scene without bodies has a single temperature, T.
         own = [state.name for state in self._system.states if state.is_temperature]
         return next((T for name in (*own[:1], "T_c", "T") if (T := self.initial(name)) is not None), None)
 
     @property
     def surroundings_temperature(self) -> float | None:
-        """Temperature of the surroundings, else of a body that is held at one [K]."""
+        """Temperature of the surroundings, else of a body with a prescribed one [K]."""
         return next((self._outputs[name] for name in ("T_a", "T_2", "T_1") if name in self._outputs), None)
 
     @property
     def adiabatic_rise(self) -> float | None:
-        """Temperature rise [K] by the heat of all bonds; none in reservoirs."""
+        """Temperature rise [K] by the heat of all bonds; zero in reservoirs."""
         heat = self.potential("H_r")
         return None if heat is None else heat / self.capacity if self.capacity else 0.0
 
     # -- the start -----------------------------------------------------------------------------------------------------
 
     def initial(self, name: str) -> float | None:
-        """Initial value of a state, or of a named quantity: a load for instance."""
+        """Return the initial value of a state, or of a named quantity, a load for instance."""
         return self._states[name] if name in self._states else self._outputs.get(name)
 
     @property
@@ -154,8 +154,8 @@ class SceneView:
 
     @property
     def relaxation_time(self) -> float | None:
-        """Time [s] in which bonds form, if their rate is their distance from equilibrium over it; where nothing forms
-        no rate tells it, but a law may.
+        """Relaxation time [s] of bonding, if its rate is proportional to the distance from equilibrium; without an
+        initial rate it may be a parameter of a law.
         """
         if not self.bonding_rate:
             return self.reaction("tau")

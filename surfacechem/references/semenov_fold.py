@@ -1,4 +1,4 @@
-"""An interface without capacity whose dissipation grows exponentially with its temperature."""
+"""Interface without capacity whose dissipation grows exponentially with its temperature."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from surfacechem.references._numerics import increasing_root
 from surfacechem.references.base import Array, Quantities, Reference, read
 
 SERIES_LIMIT = 0.1
-"""Up to here a series of 16 terms is exact: the next is 0.1^18 / 18 against 0.1^2 / 2."""
+"""Largest argument for which a series of 16 terms is exact: the next term is 0.1^18 / 18, the first 0.1^2 / 2."""
 
 
 class SemenovFold(Reference):
@@ -23,7 +23,7 @@ class SemenovFold(Reference):
 
     Both branches meet at :math:`T_0+1/\beta`; beyond :math:`D_{crit}` no solution exists (ignition). Close to the fold
     W loses half the digits; v = 1 - beta (T_c - T_0) is found to rounding from :math:`-v-\ln(1-v)=-\ln(D_0/D_{crit})`.
-    What then remains is that D_0 itself is rounded: T_c is known to about
+    The remaining error is due to the rounding of D_0: T_c is known to about
     :math:`10^{-16}/(\beta\sqrt{1-D_0/D_{crit}})`.
 
     Source: Semenov (1928), Z. Phys. 48, 571-582, thermal explosion; interface without capacity of Sauer, Duong &
@@ -39,18 +39,18 @@ class SemenovFold(Reference):
     H: float = parameter("W/(m^2 K)", "sum of the conductances to the bodies", above=0)
     D_0: float = parameter("W/m^2", "dissipation at T_0", at_least=0)
 
-    # The factor of a law has what decays per kelvin; here what grows is counted.
+    # The factor of a law has the decay per kelvin; beta is the growth.
     readings = read(constant="T_0", total_conductance="H", heating_at_T_0="D_0", friction="beta=-beta")
 
     def __post_init__(self) -> None:
-        """Refuse what has ignited."""
+        """Refuse parameters beyond ignition."""
         super().__post_init__()
         if self.critical_dissipation < self.D_0:
             raise InputError(f"{self.name}: no solution above D_0 = {self.critical_dissipation!r} W/m^2 (ignition).")
 
     @property
     def critical_dissipation(self) -> float:
-        """Largest D_0 [W/m^2] that has a solution."""
+        """Largest D_0 [W/m^2] with a solution."""
         return self.H / (math.e * self.beta)
 
     @property
@@ -64,7 +64,7 @@ class SemenovFold(Reference):
 
 
 def scaled_rise(severity: Array) -> Array:
-    r"""The smaller x with :math:`xe^{1-x}=D_0/D_{crit}`, as 1 - v; not above one."""
+    r"""Return the smaller x with :math:`xe^{1-x}=D_0/D_{crit}`, as 1 - v; not above one."""
     almost_one = np.nextafter(1.0, 0.0)
     with np.errstate(divide="ignore"):
         distance = np.abs(np.log1p(severity - 1.0))
@@ -75,7 +75,7 @@ def scaled_rise(severity: Array) -> Array:
 
 
 def log_remainder(x: Array) -> tuple[Array, Array]:
-    r""":math:`x-\ln(1+x)`, by its series where the two would cancel, and the size of its slope."""
+    r"""Return :math:`x-\ln(1+x)`, by its series where the two would cancel, and the size of its slope."""
     near = np.clip(x, -SERIES_LIMIT, SERIES_LIMIT)
     series = sum((-1) ** n * near**n / n for n in range(2, 18))
     return np.where(np.abs(x) < SERIES_LIMIT, series, x - np.log1p(x)), np.abs(x) / (1.0 + x)

@@ -15,7 +15,7 @@ class Sliding(PerfectContact):
     .. math:: T=\sqrt{T_i^2+2T_0Dt/C},\quad q_k=\frac{C_k}{C}D,\quad S=C\,(T/T_0-1),\quad C=C_1+C_2+C_c
 
     With :math:`T_i=T_0` this is :math:`T_0\sqrt{1+2t/\tau_s}`, :math:`\tau_s=CT_0/D`. Any t >= 0; D = mu p v (dry) or
-    eta v^2/g_n (viscous) as long as it does not change.
+    eta v^2/g_n (viscous) as long as it is constant.
 
     Source: Sauer, Duong & Mandadapu (2021), section 6.1.
 

@@ -1,4 +1,4 @@
-"""A sphere that attracts or sticks: over a plane on a spring, with snap-in and pull-off, and in a cavity."""
+"""Sphere with attraction or adhesion: over a plane on a spring, with snap-in and pull-off, and in a cavity."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from surfacechem.references._numerics import increasing_root
 from surfacechem.references.base import Array, Parameters, Quantities, Reference, SceneView, read
 
 SEARCH_POINTS = 4001
-"""Approaches among which the steepest attraction is looked for before it is found to rounding."""
+"""Number of approaches in the search for the steepest attraction, on either side of which the folds are bisected."""
 
 LEAST_APPROACH, LARGEST_APPROACH = 1e-2, 1e3
-"""Approaches over the range of the interaction between which it is looked for."""
+"""Bounds of this search, in units of the range of the interaction."""
 
 PAIR_POWERS = {10: 1 / 45, 4: -1 / 3}
-"""Powers of a pair energy of Lennard-Jones type, eq. e:psi12ex."""
+"""Coefficients of a pair energy of Lennard-Jones type by power, eq. e:psi12ex."""
 
 
 @dataclass(frozen=True)
 class SphereJump:
-    """An approach at which equilibrium is lost, the far-field displacement, and the energy [J] that the jump frees."""
+    """An approach at which equilibrium is lost, the far-field displacement, and the released energy [J]."""
 
     g: float
     w: float
@@ -35,7 +35,7 @@ class SphereJump:
 
 
 class SphereOnSpring(Reference):
-    """A sphere on a spring is brought to something that attracts it and is drawn off again, slowly."""
+    """A sphere on a spring that is brought slowly to an attracting body and withdrawn again."""
 
     k: float = parameter("N/m", "stiffness of the spring", above=0)
     g_0: float = parameter("m", "range of the interaction", above=0)
@@ -58,42 +58,42 @@ class SphereOnSpring(Reference):
 
     @abstractmethod
     def derivative(self, g: Array, order: int) -> Array:
-        """A derivative of the energy [J] over the approach."""
+        """Return a derivative of the energy [J] over the approach."""
 
     def energy(self, g: Array) -> Array:
-        """Energy [J] at an approach."""
+        """Return the energy [J] at an approach."""
         return self.derivative(g, 0)
 
     def force(self, g: Array) -> Array:
-        """Force [N] at an approach, tension positive: the slope of the energy."""
+        """Return the force [N] at an approach, tension positive: the slope of the energy."""
         return self.derivative(g, 1)
 
     def slope(self, g: Array) -> Array:
-        """Slope of the force [N/m]."""
+        """Return the slope of the force [N/m]."""
         return self.derivative(g, 2)
 
     @property
     def end_time(self) -> float:
-        """Time [s] at which it is back at its start."""
+        """Time [s] of the return to the initial displacement."""
         return 2 * (self.w_i - self.w_turn) / self.speed
 
     def displacement(self, g: Array) -> tuple[Array, Array]:
-        """Displacement [m] at which an approach is in equilibrium, and its slope."""
+        """Return the displacement [m] at which an approach is in equilibrium, and its slope."""
         return g + self.force(g) / self.k, 1 + self.slope(g) / self.k
 
     def gap(self, w: Array, low: float, high: float) -> Array:
-        """Approach [m] in equilibrium at displacements on a stable branch between two approaches."""
+        """Return the approach [m] in equilibrium at displacements, on a stable branch between two approaches."""
         return increasing_root(self.displacement, w, np.full_like(w, low), np.full_like(w, high))
 
     @property
     def ends(self) -> tuple[float, float]:
-        """Approaches far beyond all that is met [m]."""
+        """Approaches beyond all that occur [m]."""
         return self.lowest, self.w_i + LARGEST_APPROACH * self.g_0
 
     @property
     @abstractmethod
     def lowest(self) -> float:
-        """An approach that is less than any that is met [m]."""
+        """An approach below all that occur [m]."""
 
     @cached_property
     def folds(self) -> tuple[float, float]:
@@ -107,7 +107,7 @@ class SphereOnSpring(Reference):
 
     # The slope falls and rises once, so that it passes -k once on either side of its lowest value.
     def _fold(self, low: float, high: float, sign: float) -> float:
-        """Approach [m] at which the slope of the force is minus the spring's stiffness, by bisection."""
+        """Return the approach [m] at which the slope of the force is minus the spring's stiffness, by bisection."""
         for _ in range(200):
             middle = (low + high) / 2
             held = sign * (float(self.slope(np.array([middle]))[0]) + self.k)
@@ -130,7 +130,7 @@ class SphereOnSpring(Reference):
         before = self.w_i - self.w_turn - self.speed * t
         w, (off, on), (near, far) = self.w_turn + np.abs(before), self.folds, self.ends
         w_off, w_on = self.displacement(np.array([off, on]))[0]
-        # On the way in the open branch ends at its own fold, on the way out the closed one at the other.
+        # On approach the open branch ends at the snap-in fold, on withdrawal the closed one at the pull-off fold.
         apart = np.where(before > 0, w >= w_on, (w > w_off) | (self.w_turn > w_on))
         open_gap, closed = self.gap(np.maximum(w, w_on), on, far), self.gap(np.minimum(w, w_off), near, off)
         g = np.where(apart, open_gap, closed)
@@ -138,13 +138,13 @@ class SphereOnSpring(Reference):
 
 
 class AttractingSphereOnSpring(SphereOnSpring):
-    r"""A sphere on a spring whose points attract those of a plane, and repel them when near: snap-in and pull-off.
+    r"""A sphere on a spring whose points attract those of a plane, with repulsion at short range: snap-in and pull-off.
 
     .. math:: k (w - g) = F, \quad F = -\sum_m \frac{4 \pi^2 R\,a_m}{m - 2} \left[ g^{2-m} - (g + 2R)^{2-m} \right]
 
     with the energy of a pair, :math:`\psi = \sum_m a_m r^{-m}`, of Lennard-Jones type: over a plane the integral of
     :math:`r^{-m}` is :math:`2 \pi g^{2-m} / (m - 2)`, and over a sphere :math:`dA = 2 \pi R\,dz`. Equilibrium is lost
-    where the slope of F is -k, and what the jump frees is the drop of :math:`\tfrac12 k (w - g)^2 + E`.
+    where the slope of F is -k, and the jump releases the drop of :math:`\tfrac12 k (w - g)^2 + E`.
 
     Source: Hamaker (1937), doi 10.1016/S0031-8914(37)80203-7, for a pair energy like Sauer, Duong & Mandadapu (2021),
     eq. e:psi12ex, of points on both surfaces.
@@ -163,13 +163,13 @@ class AttractingSphereOnSpring(SphereOnSpring):
 
     @property
     def lowest(self) -> float:
-        """Well within the repulsion [m]."""
+        """An approach well within the repulsion [m]."""
         return LEAST_APPROACH * self.g_0
 
     def derivative(self, g: Array, order: int) -> Array:
         whole = np.zeros_like(g)
         for m, a in PAIR_POWERS.items():
-            # In units of the range, so that no power is out of the range of numbers.
+            # In units of the range of the interaction, so that no power overflows.
             near, far = g / self.g_0, (g + 2 * self.R) / self.g_0
             factor = math.prod(3 - m - k for k in range(order)) / ((m - 2) * (m - 3))
             whole += a * factor * (near ** (3 - m - order) - far ** (3 - m - order))
@@ -178,7 +178,7 @@ class AttractingSphereOnSpring(SphereOnSpring):
 
 
 class CohesiveSphereOnSpring(SphereOnSpring):
-    r"""A sphere on a spring that sticks to a plane by an exponential cohesive zone: snap-in and pull-off.
+    r"""A sphere on a spring that adheres to a plane by an exponential cohesive zone: snap-in and pull-off.
 
     .. math:: k (w - g) = F, \quad F = 2 \pi R \left[ \Psi(g + 2R) - \Psi(g) \right], \quad
               A = 2 \pi R \langle -g \rangle
@@ -203,12 +203,12 @@ class CohesiveSphereOnSpring(SphereOnSpring):
     def lowest(self) -> float:
         """An overlap that bears more than adhesion and spring can press [m]."""
         adhesion = math.e * self.t_max * self.g_0
-        # Twice and four times what both can be at most.
+        # Twice and four times the largest possible values of the two.
         pressed = 2 * adhesion + 4 * self.k * (self.w_i - self.w_turn) / (2 * math.pi * self.R)
         return -math.sqrt(2 * pressed / self.E_n)
 
     def flats(self, g: Array, order: int) -> Array:
-        """Energy between flats [J/m^2] integrated over the gap (order -1), itself (0), and its slope (1)."""
+        """Return the energy between flats [J/m^2] integrated over the gap (order -1), itself (0), or its slope (1)."""
         apart, pressed = np.maximum(g, 0) / self.g_0, np.minimum(g, 0)
         zone = {-1: (apart + 2), 0: -(apart + 1), 1: apart}[order] * np.exp(1 - apart)
         depth = self.t_max * self.g_0
@@ -224,13 +224,13 @@ class CohesiveSphereOnSpring(SphereOnSpring):
 
 
 class AttractingSphereInCavity(Reference):
-    r"""A sphere in a hollow sphere whose points attract each other: the force while it moves at a given speed.
+    r"""A sphere in a hollow sphere whose points attract each other: the force during motion at a given speed.
 
     .. math:: E = \sum_m \frac{4 \pi^2 R H a_m}{c (m-2)(m-3)} \left[ (H-R-c)^{3-m} - (H-R+c)^{3-m}
               - (H+R-c)^{3-m} + (H+R+c)^{3-m} \right], \quad F = -\frac{dE}{dc}
 
     with the distance of the centres :math:`c = H - R - g` and the energy of a pair :math:`\sum_m a_m r^{-m}` of
-    Lennard-Jones type. Off the centre only, where the terms cancel.
+    Lennard-Jones type. Only off the centre, where the terms would cancel.
 
     Source: elementary, by rings of equal distance on both spheres; Hamaker (1937), doi 10.1016/S0031-8914(37)80203-7.
     The pair energy is that of Sauer, Duong & Mandadapu (2021), eq. e:psi12ex.
@@ -270,7 +270,7 @@ class AttractingSphereInCavity(Reference):
         for m, a in PAIR_POWERS.items():
             p, terms, slopes = 3 - m, np.zeros_like(g), np.zeros_like(g)
             for sign, (minus, plus) in ends.items():
-                # Lengths in units of the range, as above.
+                # Lengths in units of the range of the interaction.
                 near, far = (minus - c) / self.g_0, (plus + c) / self.g_0
                 terms += sign * (near**p + far**p)
                 slopes += sign * p * (far ** (p - 1) - near ** (p - 1)) / self.g_0

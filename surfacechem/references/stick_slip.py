@@ -16,12 +16,12 @@ from surfacechem.references._numerics import increasing_root
 from surfacechem.references.base import Array, Parameters, Quantities, Reference, SceneView, read
 
 MOST_CYCLES = 1_000_000
-"""Cycles at most, so that a time far beyond them is refused and not waited for."""
+"""Largest number of cycles, so that a time far beyond them is refused at once."""
 
 
 @dataclass(frozen=True)
 class Slip:
-    """A slip that begins at rest with the spring pulling by `drop` [Pa] more than sliding friction resists."""
+    """A slip from rest, at which the spring traction exceeds sliding friction by `drop` [Pa]."""
 
     m: float
     k: float
@@ -35,12 +35,12 @@ class Slip:
 
     @property
     def stretch(self) -> float:
-        """Elongation [m] of the spring above that of steady sliding, at the start."""
+        """Initial elongation [m] of the spring above that of steady sliding."""
         return self.drop / self.k
 
     @property
     def duration(self) -> float:
-        """Time [s] until the mass rests again."""
+        """Time [s] until the mass is at rest again."""
         return (math.pi + 2.0 * math.atan2(self.V, self.stretch * self.omega)) / self.omega
 
     @property
@@ -54,7 +54,7 @@ class Slip:
         return self.V + math.hypot(self.V, self.stretch * self.omega)
 
     def motion(self, t: Array) -> tuple[Array, Array, Array]:
-        """Slip [m], velocity [m/s] and spring traction above sliding friction [Pa] at times since the start."""
+        """Return slip [m], velocity [m/s] and spring traction above sliding friction [Pa] at times since the start."""
         angle = self.omega * t
         swing = 2.0 * np.sin(0.5 * angle) ** 2  # 1 - cos
         away = self.V / self.omega
@@ -81,7 +81,7 @@ class StickSlip(Slider):
 
     The slip is :math:`Vt_{slip}+2\Delta`, the heat of a cycle :math:`t_k` times that, the mean traction exactly
     :math:`t_k`. Sliding begins at :math:`t_s/(kV)`. With :math:`t_s=t_k` it never rests again. Any t >= 0 and V > 0:
-    the period is good to rounding over all decades of V.
+    the period is accurate to rounding over all decades of V.
 
     Source: Sauer, Duong & Mandadapu (2021), eqs. e:tt_max and e:dry_fric, with an oscillator, integrated.
 
@@ -107,7 +107,7 @@ class StickSlip(Slider):
 
     @property
     def slip(self) -> Slip:
-        """The slip of every cycle."""
+        """Slip of every cycle."""
         return Slip(self.m, self.k, self.V, self.t_s - self.t_k)
 
     @property
@@ -158,14 +158,14 @@ class Cycle:
 
     @property
     def duration(self) -> float:
-        """Stick and slip [s]."""
+        """Duration of stick and slip [s]."""
         return self.stick_time + self.slip.duration
 
 
 class BondedSlider(Slider):
-    """A mass on a driven spring whose contact sticks the better the more bonds it has; sliding breaks all of them.
+    """A mass on a driven spring whose sticking limit grows with its bonds; sliding breaks all of them.
 
-    It starts at rest with a relaxed spring. A subclass states its cycles, and its bonds during a stick.
+    It starts at rest with a relaxed spring. Subclasses define its cycles, and its bonds during a stick.
     """
 
     p: float = parameter("Pa", "contact pressure", above=0)
@@ -182,18 +182,18 @@ class BondedSlider(Slider):
         return {name: x * cooler if x and name in ("mu_b", "mu_ub") else x for name, x in values.items()}
 
     def __post_init__(self) -> None:
-        """Refuse what sticks less than it slides, and limits so far apart that the contact slips back."""
+        """Refuse a sticking limit below sliding friction, and limits so far apart that the contact would slip back."""
         super().__post_init__()
         if not self.mu_k <= self.mu_ub <= self.mu_b <= 2.0 * self.mu_k + self.mu_ub:
             raise InputError(f"{self.name}: exact for mu_k <= mu_ub <= mu_b <= 2 mu_k + mu_ub only.")
 
     @abstractmethod
     def cycles(self) -> Iterator[Cycle]:
-        """The cycles from the start on."""
+        """Yield the cycles from the start on."""
 
     @abstractmethod
     def bonds(self, cycle: Cycle, t: Array) -> Array:
-        """Bonding state at times since the beginning of the stick of a cycle."""
+        """Return the bonding state at times since the beginning of the stick of a cycle."""
 
     def quantities(self, t: Array) -> Quantities:
         values = np.zeros((5, len(t)))
@@ -216,7 +216,7 @@ class BondedSlider(Slider):
 
 
 class StickSlipDebonding(BondedSlider):
-    r"""Stick-slip that begins bonded: sticking bears :math:`\mu_bp` once and :math:`\mu_{ub}p` ever after.
+    r"""Stick-slip that begins bonded: the sticking limit is :math:`\mu_bp` once and :math:`\mu_{ub}p` from then on.
 
     The first slip begins at :math:`t_1=\mu_bp/(kV)` and drops the traction of the spring to :math:`(2\mu_k-\mu_b)p`,
     which may push. From then on it is stick-slip without bonds,
@@ -224,7 +224,7 @@ class StickSlipDebonding(BondedSlider):
     .. math:: t_2=t_1+t_{slip}(\mu_b)+\frac{(\mu_{ub}+\mu_b-2\mu_k)p}{kV},\quad
         t_{j+1}=t_j+t_{slip}(\mu_{ub})+\frac{2(\mu_{ub}-\mu_k)p}{kV}
 
-    for the beginnings of slips. The contact starts complete in its bonds. Any t >= 0.
+    for the beginnings of slips. The contact starts completely bonded. Any t >= 0.
 
     Source: sticking limit of Sauer, Duong & Mandadapu (2021), eq. e:mu0, at T_0, with an oscillator, integrated.
 
@@ -254,8 +254,8 @@ class StickSlipRebonding(BondedSlider):
     is the duration of a stick that begins with the traction :math:`t_b`, with :math:`\alpha=(p\mu_b-t_b)/(kV)`,
     :math:`\beta=p(\mu_b-\mu_{ub})/(kV)`; the next begins with :math:`2t_k-t_s`. In the steady cycle
     :math:`\alpha=2p(\mu_b-\mu_k)/(kV)`, :math:`\beta=2p(\mu_b-\mu_{ub})/(kV)`. For :math:`\mu_{ub}=\mu_k` there is none
-    above :math:`V_c=2p(\mu_b-\mu_{ub})/(k\tau)`. Near there the Lambert function loses all digits; what is solved, to
-    rounding, is the equation without it. The contact starts without bonds.
+    above :math:`V_c=2p(\mu_b-\mu_{ub})/(k\tau)`. Near there the Lambert function loses all digits; the equation without
+    it is solved to rounding. The contact starts without bonds.
 
     Source: sticking limit of Sauer, Duong & Mandadapu (2021), eq. e:mu0, at T_0, with an oscillator, integrated.
 
@@ -270,12 +270,12 @@ class StickSlipRebonding(BondedSlider):
 
     @property
     def critical_speed(self) -> float:
-        """Speed [m/s] above which a contact with mu_ub = mu_k slides without rest."""
+        """Speed [m/s] above which a contact with mu_ub = mu_k never sticks again."""
         return 2.0 * self.p * (self.mu_b - self.mu_ub) / (self.k * self.tau)
 
     @property
     def steady(self) -> Cycle:
-        """The cycle that repeats."""
+        """Steady cycle."""
         excess = 2.0 * self.p * (self.mu_ub - self.mu_k)
         if excess == 0.0 and self.critical_speed <= self.V:
             raise InputError(f"{self.name}: no stick-slip above V = {self.critical_speed!r} m/s.")
@@ -283,7 +283,7 @@ class StickSlipRebonding(BondedSlider):
         return Cycle(2.0 * self.p * self.mu_k - cycle.limit, cycle.stick_time, cycle.phi, cycle.limit, cycle.slip)
 
     def cycles(self) -> Iterator[Cycle]:
-        """The cycles from the start on."""
+        """Yield the cycles from the start on."""
         start = 0.0
         while True:
             cycle = self._cycle(start, self.p * self.mu_ub - start, 1.0)
@@ -291,11 +291,13 @@ class StickSlipRebonding(BondedSlider):
             start = 2.0 * self.p * self.mu_k - cycle.limit
 
     def _cycle(self, start: float, missing: float, weight: float) -> Cycle:
-        """The stick after which the spring has pulled by `missing` more than `weight` times what bonds have added."""
+        """Return the cycle whose stick ends when the spring's pull exceeds `weight` times the bonds' effect by
+        `missing`.
+        """
         scale = self.k * self.V * self.tau
         ratio = weight * self.p * (self.mu_b - self.mu_ub) / scale
 
-        # x, the stick time over tau, solves x + ratio (exp(-x) - 1) = missing / scale, which rises beyond ln(ratio).
+        # x, the stick time over tau, solves x + ratio (exp(-x) - 1) = missing / scale, increasing beyond ln(ratio).
         def pulled(x: Array) -> tuple[Array, Array]:
             return x + ratio * np.expm1(-x), 1.0 - ratio * np.exp(-x)
 

@@ -33,9 +33,9 @@ class ThreeTemperatures(HeatedMedium):
     .. math:: C_k\dot T_k=q_k=h_k(T_c-T_k),\qquad C_c\dot T_c=D_0+D_1e^{-\gamma t}-q_1-q_2
 
     In :math:`y_k=\sqrt{h_k}(T_c-T_k)` the matrix is symmetric and positive,
-    :math:`S_{kl}=\delta_{kl}\frac{h_k}{C_k}+\frac{\sqrt{h_kh_l}}{C_c}`. Each of its two modes answers to the source by
-    divided differences of the exponential, and so do the integrals of :math:`q_k` that give the temperatures; the
-    response to a steady source, :math:`q_k=D\,C_k/C`, is used to drive the modes. The slow rate is
+    :math:`S_{kl}=\delta_{kl}\frac{h_k}{C_k}+\frac{\sqrt{h_kh_l}}{C_c}`. The response of each of its two modes to the
+    source consists of divided differences of the exponential, and so do the integrals of :math:`q_k` that give the
+    temperatures; the response to a steady source, :math:`q_k=D\,C_k/C`, is used to drive the modes. The slow rate is
     :math:`h_1h_2C/(C_1C_2C_c)` over the fast one. No step loses digits for :math:`C_c\to0` or :math:`h_k\to0,\infty`.
 
     Any t >= 0. Source: Sauer, Duong & Mandadapu (2021), section 5.6 (heat transfer) with constant capacities, solved
@@ -54,7 +54,7 @@ class ThreeTemperatures(HeatedMedium):
 
     def quantities(self, t: Array) -> Quantities:
         zero, decay, total = np.zeros_like(t), -self.gamma * t, self.C_1 + self.C_2 + self.C_c
-        # Flux and heat into each body, and the sizes of the terms that they are sums of, as temperatures [K].
+        # Flux and heat into each body, and the sizes of their terms as temperatures [K].
         q, heat, by, off = np.zeros((4, 2, t.size))
         for rate, mode, initial in self.modes():
             # Amplitude of the mode and its integral over time: free decay and both parts of the source.
@@ -72,7 +72,7 @@ class ThreeTemperatures(HeatedMedium):
         given = self.D_0 * t + self.D_1 * t * first_difference(zero, decay)
         by_c = self.T_c + (np.abs(given) + by[0] * self.C_1 + by[1] * self.C_2) / self.C_c
         bodies, to = (self.T_1 + heat[0] / self.C_1, self.T_2 + heat[1] / self.C_2), (q[0] / self.h_1, q[1] / self.h_2)
-        # Each temperature by the way on which the least is lost: its own heat, or that of another and the flux between.
+        # Each temperature in the way with the least cancellation: from its own heat, or from another one and the flux.
         ways = (self.T_1 + by[0] + off[0], self.T_2 + by[1] + off[1], by_c)
         own = self.T_c + (given - heat[0] - heat[1]) / self.C_c
         T_c = np.choose(np.argmin(ways, axis=0), (bodies[0] + to[0], bodies[1] + to[1], own))
@@ -83,13 +83,13 @@ class ThreeTemperatures(HeatedMedium):
 
     @property
     def _paths(self) -> tuple[tuple[float, float], ...]:
-        """Capacities of the bodies, conductances to them, and the roots of these."""
+        """Capacities of the bodies, conductances to them, and square roots of the conductances."""
         return (self.C_1, self.C_2), (self.h_1, self.h_2), (float(np.sqrt(self.h_1)), float(np.sqrt(self.h_2)))
 
     def modes(self) -> Iterator[tuple[float, tuple[float, float], float]]:
-        """Decay rate [1/s], unit vector and initial amplitude of the fast and of the slow mode.
+        """Yield decay rate [1/s], unit vector and initial amplitude of the fast and of the slow mode.
 
-        The eigenvalues of S and the eigenvector of the larger one by a Jacobi rotation, accurate entry by entry.
+        The eigenvalues of S, and the eigenvector of the larger one, follow from a Jacobi rotation, accurate by entry.
         """
         _, _, (root_1, root_2) = self._paths
         own_1, own_2 = self.h_1 / self.C_1, self.h_2 / self.C_2

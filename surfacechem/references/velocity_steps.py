@@ -1,4 +1,4 @@
-"""Rate-and-state friction at a velocity that steps up or down and back again, by the aging and by the slip law."""
+"""Rate-and-state friction at a velocity that steps up or down and back again, with the aging and the slip law."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from surfacechem.references.base import Array, Quantities, Reference, read
 
 
 class VelocitySteps(Reference):
-    """A velocity that steps, and friction as a function of velocity and age; the law of the age is a subclass's."""
+    """A velocity that steps, with friction as a function of velocity and age; subclasses have the law of the age."""
 
     law: ClassVar[str]
 
@@ -39,7 +39,7 @@ class VelocitySteps(Reference):
 
     @abstractmethod
     def relaxed(self, ln_age: Array, slip: Array) -> Array:
-        r"""Logarithm of :math:`v\theta/L` after a slip [in units of L] at a constant velocity."""
+        r"""Return the logarithm of :math:`v\theta/L` after a slip [in units of L] at a constant velocity."""
 
     def quantities(self, t: Array) -> Quantities:
         def ln_theta(start: Array, v: Array | float, duration: Array | float) -> Array:
@@ -52,7 +52,7 @@ class VelocitySteps(Reference):
         ln_2 = ln_theta(ln_1, self.v_step, self.t_2 - self.t_1)
         begun = np.where(after_2, self.t_2, np.where(after_1, self.t_1, 0.0))
         now = ln_theta(np.where(after_2, ln_2, np.where(after_1, ln_1, ln_0)), v, t - begun)
-        # Traction by the logarithm of a hyperbolic sine that may overflow.
+        # Traction from the logarithm of the hyperbolic sine, which may overflow.
         ln_sinh = np.log(v / (2.0 * self.v_0)) + (self.mu_0 + self.b * (np.log(self.v_0 / self.L) + now)) / self.a
         traction = self.a * self.p * (ln_sinh + np.log1p(np.sqrt(1.0 + np.exp(-2.0 * ln_sinh))))
         return {"ln_theta": now, "theta": np.exp(now), "v": v, f"t_{self.law}": traction}
@@ -87,7 +87,7 @@ class SlipVelocitySteps(VelocitySteps):
         t_t=a\,p\,\operatorname{arsinh}\Big[\frac v{2v_0}\exp\frac{\mu_0+b\ln(v_0\theta/L)}a\Big]
 
     at each velocity, t counted from its beginning. Any ages and positive velocities. Friction approaches its steady
-    value exponentially with slip, alike after a step up and a step down.
+    value exponentially with slip, in the same way after a step up and a step down.
 
     Source: Ruina (1983), doi 10.1029/JB088iB12p10359, integrated.
 

@@ -71,7 +71,7 @@ class WeakeningFrictionWithLoss(FrictionallyHeated):
         return {"T": T, "D": self.D_0 * self.T_0 / T}
 
     def time(self, T: Array) -> Array:
-        """The time [s] at which the temperature is T, between T_i and the steady state."""
+        """Return the time [s] at which the temperature is T, between T_i and the steady state."""
         approach = -np.log1p((T - self.T_i) / (self.T_i - self.steady_temperature))
         return self._scaled_time(approach)[0] * self.C / (self.H * self.T_0)
 
@@ -80,7 +80,7 @@ class WeakeningFrictionWithLoss(FrictionallyHeated):
         return -self.D_0 * self.T_0 / self.H / self.steady_temperature
 
     def _scaled_time(self, s: Array) -> tuple[Array, Array]:
-        """The right-hand side of the implicit solution and its slope."""
+        """Return the right-hand side of the implicit solution and its slope."""
         steady, other = self.steady_temperature, self._other_root
 
         def slope(s: Array) -> Array:
@@ -89,5 +89,5 @@ class WeakeningFrictionWithLoss(FrictionallyHeated):
 
         rise = (self.T_i - steady) * np.expm1(-s)
         logarithms = steady**2 * s + other**2 * np.log1p(rise / (self.T_i - other))
-        weak_loss = 4.0 * (self.T_i + rise) < -other  # far below both roots the logarithms cancel
+        weak_loss = 4.0 * (self.T_i + rise) < -other  # far from both roots the logarithms would cancel
         return np.where(weak_loss, short_integral(slope, s), logarithms / (steady - other) - rise), slope(s)
