@@ -212,9 +212,7 @@ def load_case(case: str, changes: Sequence[str] | None) -> Simulation:
 
 
 def run_settings(simulation: Simulation, solver: str | None, rtol: float | None, accuracy: float | None = None) -> Run:
-    """Return the run settings of the case with the options of the command line; a tolerance replaces an automatic
-    choice.
-    """
+    """Return the run settings of the case with the options of the command line; a tolerance switches off `auto`."""
     from surfacechem.results.accuracy import check_tolerance, first_tolerance
     from surfacechem.solve import AUTO, names
     from surfacechem.solve.run import OWN
@@ -280,9 +278,7 @@ def solve(run: Callable[[], R], talk: bool | None, brief: bool = False, waits: b
 
 
 def refuse_unwritable(*targets: Path, read: Sequence[str | Path] = ()) -> None:
-    """Raise InputError if a file cannot be written, or is one of the files that are read, before anything is computed;
-    leaves no trace.
-    """
+    """Raise InputError if a file cannot be written, or is one of those that are read; leave no trace of the test."""
     from surfacechem.results.netcdf import replacing
 
     for target in targets:

@@ -1,8 +1,7 @@
 """The user's cache folder for expensive results: fits of properties, integrals over surfaces, machine code.
 
 The name of a file is a digest of all its inputs, so that it is never used for other ones. A file is read only if its
-SHA-256 is right and no other user could have written it. A file that cannot be written, read or trusted costs time,
-never a wrong result.
+SHA-256 is right and no other user could have written it. Files that cannot be written, read or trusted cost time only.
 """
 
 from __future__ import annotations

@@ -175,9 +175,7 @@ def file_in(folder: Path, name: str, place: Place) -> Path | None:
 
 
 def named(tree: Tree, base: str | Path, what: str) -> Path:
-    """Return the file in a folder that a value names; InputError, in which ``what`` describes the file, if there is
-    none.
-    """
+    """Return the file in a folder that a value names; InputError, with the description ``what``, if there is none."""
     name = tree.text(what)
     path = file_in(Path(base), name, tree.place)
     if path is None:
@@ -321,9 +319,7 @@ class _Builder:
 
 
 def labels(items: Iterable[Tree]) -> list[str | None]:
-    """Return the name of each list item in paths: that of a law, numbered if it is not the first of this name; else
-    None.
-    """
+    """Return the name of each list item in paths: that of a law, numbered from the second of a name on; else None."""
     seen: dict[str, int] = {}
     result: list[str | None] = []
     for item in items:

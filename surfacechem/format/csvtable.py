@@ -41,8 +41,7 @@ def embedded(tree: Tree, base: str) -> Tree:
 
 
 def table(tree: Tree, unit: str) -> Table | None:
-    """Return the history of a column: times are in column ``t``, values in the named one, by default that of the
-    variable.
+    """Return the history of a column: times from column ``t``, values from the named one, or from the variable's.
 
     None if the tree is no table in text form.
     """

@@ -163,9 +163,7 @@ class Plan:
     """Places of the swept parameters and of the end of the runs in the input, by path."""
 
     def __post_init__(self) -> None:
-        """Check that parameters are distinct and not too many, and that those changing together have equally many
-        values.
-        """
+        """Check that parameters are distinct and not too many, and that zipped ones have equally many values."""
         if not self.paths or len(self.axes) > MOST_AXES or len(set(self.paths)) != len(self.paths):
             message = f"a sweep has different parameters, {MOST_AXES} at most; not {', '.join(self.paths) or 'none'}."
             raise InputError(message, path="sweep")
@@ -261,9 +259,7 @@ def recorded_plan(record: object) -> Plan:
 
 
 def split_arrays(over: Mapping[str, object]) -> tuple[dict[str, object], dict[str, Array]]:
-    """Return the values as in a case, and separately numerical arrays: lists are read entry by entry, and arrays may be
-    long.
-    """
+    """Return the values as in a case, and separately the numerical arrays, which are not read entry by entry."""
     lists, arrays = dict(over), {}
     for path, values in over.items():
         if isinstance(values, np.ndarray):

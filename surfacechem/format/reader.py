@@ -398,9 +398,7 @@ def _stage(name: str, section: StageSection) -> Stage:
 
 
 def _initial(case: Document, mechanism: Mechanism | None) -> dict[str, float]:
-    """Return the initial values by variable, NaN for unknown names; the assembly decides which names are valid and
-    evolve.
-    """
+    """Return the initial values by variable, NaN for unknown names; the assembly decides which names are valid."""
     values = dict(case.initial)
     given = values.pop("coverages", None)
     if mechanism is not None and given is not None:

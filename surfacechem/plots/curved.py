@@ -72,9 +72,7 @@ def _is_axisymmetric(dataset: xarray.Dataset) -> bool:
 
 
 def _is_facing(dataset: xarray.Dataset) -> NDArray[np.bool_]:
-    """Return the mask of points on the side that is nearest to the other body: seen from above a closed body hides
-    itself.
-    """
+    """Return the mask of points on the side nearest to the other body: from above a closed body hides itself."""
     from scipy.ndimage import label
 
     x, y = (dataset[f"surface_{axis}"].values for axis in "xy")

@@ -34,9 +34,7 @@ NAME_ORDER = (
     *(r"lifetime", r"(phi|theta).*_last", r"T.*_max", r"(phi|T).*(?<!_m..)"),
     *(r"time_to.*", r"time.*", r".*(?<!_m..)", r".*"),
 )
-"""Order in which variables are shown: lifetimes, bonds at the end, largest temperatures, other final values, other
-extremes.
-"""
+"""Order of variables: lifetimes, bonds at the end, largest temperatures, other final values, other extremes."""
 
 BINS, PARAMETER_BINS = 40, 12
 """Numbers of bins of a distribution, and of bins of a parameter in an effect plot."""
@@ -231,9 +229,7 @@ def line_style(dataset: xarray.Dataset, axes: Sequence[str], member: int) -> dic
 def effects(
     dataset: xarray.Dataset, plan: Plan, axes: Sequence[str], parameters: Sequence[str], names: Sequence[str]
 ) -> Figure:
-    """Draw the distribution of each variable, and its median and band over each parameter, over all values of the
-    others.
-    """
+    """Draw the distribution of each variable, and its median and band over each parameter, for all values of others."""
     drawn = plan.sample.draws if plan.sample else {}
     ratios = {axis.path: axis.logarithmic for axis in plan.axes}
     ratios |= {path: draw.over_decades for path, draw in drawn.items()}

@@ -436,9 +436,7 @@ def _draw_events(
 
 
 def _merge_close_events(ax: Axes, events: Sequence[tuple[float, str]]) -> list[tuple[float, str]]:
-    """Return times and names of events, with those that a figure cannot separate as one: a slip, and the stop that ends
-    it.
-    """
+    """Return times and names of events; those that a figure cannot separate, a slip and its stop say, are merged."""
     found: list[tuple[float, list[str]]] = []
     last = -np.inf
     for t, at, name in _positions_across_panel(ax, events):
@@ -451,9 +449,7 @@ def _merge_close_events(ax: Axes, events: Sequence[tuple[float, str]]) -> list[t
 
 
 def _positions_across_panel(ax: Axes, items: Sequence[tuple[float, str]]) -> list[tuple[float, float, str]]:
-    """Return values of x and their positions, from 0 at the left to 1 at the right of a panel, with their texts, in
-    order.
-    """
+    """Return values of x, their positions from 0 at the left to 1 at the right of a panel, and their texts, sorted."""
     ax.get_xlim()  # this call computes the limits from the drawn curves
     items = sorted(items)
     points = np.array([(x, 0.0) for x, _ in items]).reshape(-1, 2)

@@ -36,9 +36,7 @@ MOST_LARGE_MARKERS = 30
 
 
 def figure(dataset: xarray.Dataset, load: str, variables: Sequence[str] | None = None) -> Figure:
-    """Draw the spectrum, the distribution p(f) for some runs and the lifetime over the load; or ``variables`` over the
-    load.
-    """
+    """Draw the spectrum, the distribution p(f) for some runs, and the lifetime; or ``variables`` over the load."""
     series = (f"density_{load}", "lifetime")
     held = all(name in dataset and load in dataset[name].dims for name in series)  # series over the load are there
     names = variables or ("", *(series if held else ()))

@@ -81,9 +81,7 @@ def _numbers(dataset: xarray.Dataset) -> list[str]:
 
 
 def panels(dataset: xarray.Dataset, variables: Sequence[str] | None) -> list[Panel]:
-    """Return panels of the variables, else of the most probable load at rupture, else of variables that depend on the
-    sweep.
-    """
+    """Return panels of the variables, else of the most probable load at rupture, else of those that vary."""
     known, load = _numbers(dataset), rupture.load_of(dataset)
     refuse_unknown(variables or (), known, "no variable '{}' in the sweep", style.place_of(dataset))
     names = [[name] for name in dict.fromkeys(variables or ())] or ([[f"{load}_mode"]] if load else _dependent(dataset))

@@ -60,8 +60,7 @@ def second_tolerance(rtol: float) -> float:
 
 
 def relative_errors(values: Array, exact: Array, floor: float | Array) -> Array:
-    """Return errors relative to the exact value at the same time, or to ``floor`` if that is larger; absolute if both
-    are zero.
+    """Return errors relative to the exact value, or to ``floor`` if that is larger; absolute if both are zero.
 
     >>> relative_errors(np.array([1.5, 2.0, 1e-9]), np.array([1.0, 2.0, 0.0]), 1e-6).tolist()
     [0.5, 0.0, 0.001]

@@ -85,15 +85,15 @@ class Audit:
 
     @property
     def energy_error(self) -> float:
-        """Largest energy residual relative to the exchanged energy, or to the stored energy if the exchange is within
-        its rounding.
+        """Largest energy residual relative to the exchanged energy, or to the stored one if that is lost in its
+        rounding.
         """
         return float(resolved(self.energy, self.energy_scale, self.energy_stored, self.energy_rounding))
 
     @property
     def entropy_error(self) -> float:
-        """Largest entropy residual relative to the entropy exchanged or produced, or to the stored entropy if that is
-        within its rounding.
+        """Largest entropy residual relative to the entropy exchanged or produced, or to the stored one if that is lost
+        in its rounding.
         """
         return float(resolved(self.entropy, self.entropy_scale, self.entropy_stored, self.entropy_rounding))
 
@@ -236,8 +236,8 @@ def _least(trajectory: Trajectory) -> dict[str, float]:
 def _is_past_its_end(trajectory: Trajectory, value: float) -> bool:
     """True if the last point does not count for a law's production, since the run stopped at the end of the law.
 
-    There the production has no value, or the point is at the same instant as the one before, with roundoff deciding the
-    side of the end.
+    There the production has no value, or the point is at the same instant as the one before it, by roundoff on either
+    side.
     """
     steps = trajectory.result.steps
     at_once = ERROR_MARGIN * trajectory.run.rtol
@@ -253,8 +253,7 @@ def _losses(trajectory: Trajectory, least: Mapping[str, float], stored: float) -
 
 
 def _destroyed(trajectory: Trajectory, laws: list[str], stored: float) -> float:
-    """Return the fraction of the entropy turned over by the laws that they destroy, by the ledger or at the ends of
-    steps.
+    """Return the fraction of the entropy turned over by laws that they destroy, by the ledger or at the ends of steps.
 
     Zero if the amount is less than the last digit of the total, which it then does not change.
     """
@@ -343,8 +342,7 @@ def _rounding_of(
 
 
 def losses_of(booked: Array, seen: Array, rounded: Array | float = 0.0) -> tuple[Any, Any]:
-    """Return the amounts destroyed and turned over along the last axis: by the ledger, or at the ends of the steps if
-    that is more.
+    """Return the amounts destroyed and turned over along the last axis, by the ledger or by the ends of steps if more.
 
     >>> [float(x) for x in losses_of(np.array([1.0, -0.25]), np.array([0.75, -0.5]), 0.125)]
     [0.375, 1.25]

@@ -88,9 +88,7 @@ def quantity_columns(
 
 
 def coverage_columns(system: System, columns: Iterable[Column]) -> list[Column]:
-    """Return columns of all coverages, along the names of the species in the mechanism, which may not be valid names of
-    variables.
-    """
+    """Return columns of all coverages, along the names of species in the mechanism, which need not suit variables."""
     species = {state.name: state.quantity.species for state in system.states if state.quantity.species}
     found = {column.name: column for column in columns if column.name in species}
     if not found:

@@ -52,8 +52,7 @@ ENDED_EARLIER = "ended earlier"
 """Note on a second run that ended before the first one."""
 
 WAYS = ("auto", "estimate", "balances")
-"""Sources of the error: an exact solution if there is one, else a second run; always a second run; the balances, at no
-cost.
+"""Sources of the error: an exact solution if there is one, else a second run; always a second run; the balances only.
 """
 
 MOST_TIMES = 400
@@ -85,8 +84,7 @@ def accuracy(
     cells: Callable[[], CellErrors] = CellErrors,
     estimate: Accuracy | None = None,
 ) -> Accuracy:
-    """Return the error of a run in one of the WAYS; ``exact`` names the exact solution of its case, with its
-    parameters.
+    """Return the error of a run in one of the WAYS; ``exact`` has name and parameters of the exact solution.
 
     ``cells`` finds the errors of the cells across bodies, which a second run at another tolerance does not see;
     ``estimate`` is the estimate from a second run, if there was one.
@@ -336,9 +334,7 @@ def _changes(trajectory: Trajectory, columns: list[int]) -> Array:
 
 
 def _compared(trajectory: Trajectory, also: Collection[str]) -> dict[str, Array]:
-    """Return the states at the output times, and some named quantities; for a scene without states the exchanged
-    amounts.
-    """
+    """Return the states at the output times, and some named quantities; without states the exchanged amounts."""
     own = states(trajectory) or exchanged(trajectory)
     return own | {name: each for name, each in computed(trajectory).items() if name in also} if also else own
 
@@ -362,10 +358,10 @@ def _cubic(places: Sequence[float], rows: Array, wanted: Sequence[float]) -> Arr
 
 
 def agree_at_jumps(times: Array, first: Trajectory, second: Trajectory) -> Mask:
-    """Return the mask of times at which two runs with the same events have made the same jumps; event times are
-    compared separately.
+    """Return the mask of times at which two runs with the same events have made the same jumps.
 
-    One run may have made one more jump at the end, where roundoff decides whether it still happens.
+    Event times are compared separately. One run may have made one more jump at the end, where roundoff decides whether
+    it still happens.
     """
     both = min(len(first.jumps), len(second.jumps))
     pairs = [(one.t, other.t) for one, other in zip(first.jumps[:both], second.jumps[:both], strict=True)]
@@ -550,8 +546,8 @@ def asked_accuracy(run: Run) -> float:
 
 
 def verified(first: Trajectory) -> tuple[Trajectory, Accuracy]:
-    """Return the loosest of a sequence of runs, each tighter by a hundred, that differs from the next by at most the
-    requested accuracy.
+    """Return the first of a sequence of runs, each tighter by a hundred, that agrees with the next as accurately as
+    asked.
 
     The tolerance of the first is a hundredth of the accuracy. Most runs are confirmed by the second, so the cost is
     that of two runs, the second at a hundredth of the tolerance.

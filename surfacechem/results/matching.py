@@ -66,8 +66,7 @@ def _in_range() -> Iterator[None]:
 def exact_values(
     name: str, options: Mapping[str, float], scene: Scene, run: Trajectory, to_the_end: bool = False, side: float = SIDE
 ) -> dict[str, Array]:
-    """Return exact values at the output times by the names of the scene's variables; InputError if the solution is
-    another scene's.
+    """Return exact values at the output times by the names of the scene; InputError for another scene's solution.
 
     With ``to_the_end`` the outputs of a run may lie beyond the end of the solution by the error of its own end. Jumps
     of run and solution are the same if their times differ by less than the fraction ``side``.
@@ -143,8 +142,7 @@ def _take_nearer(exact: dict[str, Array], others: Mapping[str, Array], run: Traj
 
 
 def match(kind: type[Reference], options: Mapping[str, float], view: SceneView) -> Reference:
-    """Return the reference with the parameters of the scene, and ``options`` for those that the scene does not
-    determine.
+    """Return the reference with the parameters of the scene, and ``options`` for those not in the scene.
 
     InputError if an option differs from the value of the scene, as after a change of the scene alone.
     """

@@ -116,8 +116,8 @@ def versions() -> str:
 
 
 def as_dataset(columns: Sequence[Column], attributes: Mapping[str, str | float | int]) -> xarray.Dataset:
-    """Return the xarray Dataset of columns. Coordinates are columns along themselves, time, and those that an attribute
-    names.
+    """Return the xarray Dataset of columns; columns along themselves, time, and those in an attribute are
+    coordinates.
     """
     import xarray
 
@@ -183,9 +183,7 @@ def replacing(target: Path) -> Iterator[Path]:
 
 
 def _reason(path: Path, error: OSError) -> str:
-    """Return the reason why a file could not be written. HDF5 does not give it; plain writing fails for the same
-    reason.
-    """
+    """Return the reason why a file could not be written: HDF5 gives none, but plain writing fails for the same."""
     if error.strerror:
         return error.strerror
     try:
@@ -198,8 +196,8 @@ def _reason(path: Path, error: OSError) -> str:
 
 
 def save(target: Path, columns: Sequence[Column], attributes: Mapping[str, str | float | int]) -> None:
-    """Write a netCDF file, whole or not at all. If it cannot be written the data goes to a temporary folder, which the
-    OutputError names.
+    """Write a netCDF file, whole or not at all; on failure the data goes to a temporary folder named in the
+    OutputError.
     """
     try:
         with replacing(target) as temporary:
@@ -274,8 +272,7 @@ def save_kept(dataset: xarray.Dataset, target: Path) -> Path:
 
 
 def save_table(target: Path, dataset: xarray.Dataset) -> None:
-    """Write one row per output, whole or not at all. Each column is headed by its name and unit, ``v [m s-1]``, text by
-    its name.
+    """Write one row per output, whole or not at all; columns are headed by name and unit, ``v [m s-1]``, texts by name.
 
     Variables with other dimensions than the first one, events and profiles for instance, are in netCDF only.
     """

@@ -45,8 +45,7 @@ def _two_sided(t: Array) -> tuple[Array, Mask]:
 
 
 def needed_rows(t: Array, values: Array, allowed: Array, kept: Mask) -> Mask:
-    """Return the mask of rows between which straight lines, over time and over its logarithm, miss no value by more
-    than is allowed.
+    """Return the mask of rows whose connecting lines, over time and its logarithm, miss no value by more than allowed.
 
     ``values`` has shape (times, quantities), ``allowed`` one entry for each quantity; rows that are ``kept`` stay.
     """
@@ -89,9 +88,7 @@ def _missed(ways: Sequence[Array], values: Array, left: Index, rows: Index, righ
 
 
 def _edges(values: Array) -> Mask:
-    """Return the mask of rows with an extreme of a quantity, and of those next to which a quantity becomes or ceases to
-    be finite.
-    """
+    """Return the mask of rows with an extreme of a quantity, and next to a change between finite and not finite."""
     number = np.isfinite(values)
     found = np.zeros(len(values), bool)
     changes = np.any(number[1:] != number[:-1], axis=1)
@@ -192,9 +189,7 @@ def _beside(trajectory: Trajectory) -> Mask:
 
 
 def _steps(trajectory: Trajectory) -> Array:
-    """Return the times on both sides of breakpoints at which a load steps; the output at a breakpoint is before the
-    step.
-    """
+    """Return the times on both sides of breakpoints at which a load steps; an output there is before the step."""
     t, breaks = trajectory.result.times, trajectory.result.problem.segments[1:-1]
     breaks = breaks[
         np.isin(breaks, t) & np.isin(np.nextafter(breaks, -1.0), t) & ~np.isin(breaks, _event_times(trajectory))

@@ -33,9 +33,7 @@ from surfacechem.tolerances import RUN_EPS
 FEW = 4
 
 CELLS_PER_E_FOLD = 8
-"""Initial number of cells over which the distance from a face grows by e: errors are then some 0.4 % of a rise in
-temperature.
-"""
+"""Initial number of cells per growth of the distance from a face by e: errors are some 0.4 % of a temperature rise."""
 
 THINNEST_LAYER = 2.0**-30
 """Least thickness of a layer relative to the body: it is of atomic size, and the width of a cell at the far side still
@@ -130,9 +128,7 @@ def layer_starts(system: System, end: float) -> Array:
 
 
 def unresolved(system: System, end: float, t: Array) -> NDArray[np.bool_]:
-    """Return a mask of the times at which a layer has just begun that cells do not resolve yet; all False without
-    cells.
-    """
+    """Return the mask of times at which a layer has just begun that cells do not resolve; all False without cells."""
     if not system.profiles:
         return np.zeros(len(t), bool)
     starts = layer_starts(system, end)
@@ -142,9 +138,7 @@ def unresolved(system: System, end: float, t: Array) -> NDArray[np.bool_]:
 
 
 def looked_at(system: System, run: Run) -> Run:
-    """Return the run with the times at which errors of cells are estimated; they depend on the case, not on its
-    outputs.
-    """
+    """Return the run with the times at which errors of cells are estimated, whatever the outputs of the case are."""
     end = run.times[-1]
     after = first_look(system, end)
     times = [end * (i / UNRESOLVED_START) for i in range(UNRESOLVED_START)]
@@ -156,8 +150,7 @@ def looked_at(system: System, run: Run) -> Run:
 
 
 def shortest(system: System, run: Run, values: Mapping[str, float], events: Iterable[float] = ()) -> float:
-    """Return the shortest time [s] from the start of a layer, by a load or an event, to an output of the run or an
-    event.
+    """Return the shortest time [s] from the start of a layer, a load or an event, to an output or an event.
 
     Events within the tolerance of the start are at the same instant.
     """
@@ -171,8 +164,7 @@ def shortest(system: System, run: Run, values: Mapping[str, float], events: Iter
 
 
 def layers(system: System, points: Sequence[Mapping[str, float]], times: Sequence[float]) -> dict[str, float]:
-    """Return by body the thinnest layer that heat has reached after a time [s], relative to its thickness and rounded
-    to a power of two.
+    """Return by body the thinnest layer that heat has reached, as a fraction of the body rounded to a power of two.
 
     ``points`` are values of runs by path, each with one of the ``times``. Properties are those at the start.
     """
@@ -249,8 +241,7 @@ def resolves(scene: Scene, parts: Mapping[str, float]) -> bool:
 
 
 def cell_errors(near: Mapping[str, float], far: Mapping[str, float], rtol: float) -> CellErrors:
-    """Return errors from the differences between a run and one with half of its cells, and between that and one with a
-    quarter.
+    """Return errors from the differences of a run to one with half of its cells, and of that to one with a quarter.
 
     >>> cell_errors({"T": 3e-6}, {"T": 1.2e-5}, 1e-11).variables["T"]
     1e-06

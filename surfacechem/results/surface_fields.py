@@ -27,9 +27,7 @@ TIME = "surface_time"
 
 
 def surface_columns(trajectory: Trajectory, surface: CurvedSurfaces) -> tuple[list[Column], float]:
-    """Return columns over the times of the surfaces and over the surface of body 1, and the time of their integrals
-    [s].
-    """
+    """Return columns over the times of the surfaces and over body 1, and the time spent on their integrals [s]."""
     from surfacechem.surfaces.potential import INTEGRATION_TIME, integrating
 
     before, times = INTEGRATION_TIME.seconds, trajectory.result.times

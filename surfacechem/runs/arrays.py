@@ -56,8 +56,8 @@ class Ends:
     times: Array
 
     def inputs(self, owner: Index, t: Array, y: Array, ydot: Array, after: bool = False) -> Array:
-        """Return the arguments of compiled functions at points of the runs ``owner``; at a breakpoint before it or
-        after.
+        """Return the arguments of compiled functions at points of the runs ``owner``; ``after`` means behind
+        breakpoints.
         """
         breaks = self.segments[np.minimum(owner, len(self.segments) - 1), 1:-1]
         segment = (t[:, None] >= breaks if after else t[:, None] > breaks).sum(axis=1)

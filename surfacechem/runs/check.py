@@ -240,7 +240,7 @@ def laws_of(scene: Scene) -> list[Law]:
 
 @dataclass(frozen=True)
 class Lumping:
-    """Biot and Fourier numbers of a body: h L / k at its contact, infinite in perfect contact, and k t / (C L) of the
+    """Biot number h L / k of a body at its contact, infinite in perfect contact, and Fourier number k t / (C L) of the
     run.
 
     A slab insulated at its back, cooled through a conductance h at its face, relaxes at the rate zeta^2 alpha / L^2

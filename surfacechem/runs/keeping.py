@@ -115,9 +115,7 @@ def keep_of(section: KeepSection | None, system: System) -> Keep:
 
 
 def event_names(system: System) -> list[str]:
-    """Return the names of events after which a run goes on: kinks and edges. A terminal event is the reason for the
-    end.
-    """
+    """Return the names of events after which a run goes on: kinks and edges. Terminal events are reasons of ends."""
     kinks = [margin.name for margin in system.moving_margins if not (margin.terminal or margin.peak)]
     return list(dict.fromkeys([*kinks, *(edge.name for edge in system.edges)]))
 

@@ -121,8 +121,8 @@ class Argument:
         return np.exp(table[:, self.column]) if self.is_log else table[:, self.column]
 
     def put(self, table: Array, values: Array) -> None:
-        """Write values of the quantity into the table; where the logarithm does not exist the argument is NaN, so that
-        no law is valid.
+        """Write values of the quantity into the table; NaN where the logarithm does not exist, so that no law is
+        valid.
         """
         with np.errstate(invalid="ignore"):
             table[:, self.column] = np.log(np.where(values > 0, values, np.nan)) if self.is_log else values
@@ -221,15 +221,13 @@ class Evaluator:
         return np.array([0.0, *states, *np.zeros(len(states)), *parameters[0]])
 
     def _sought(self, asked: Mapping[str, Argument]) -> list[int]:
-        """Return the indices of the balances to be solved: of unknowns that points neither give nor carry along with a
-        gap.
-        """
+        """Return the indices of balances to be solved: of unknowns that points neither give nor move with a gap."""
         led = [name for item in self.quasi_static if item.state in asked for name in item.along]
         known = [item.column for item in (*asked.values(), *(self.given[name] for name in led))]
         return np.flatnonzero(~np.isin(self.unknown, known)).tolist()
 
     def _settle(self, table: Array, asked: Collection[str]) -> NDArray[np.bool_]:
-        """Equilibrate the gaps that points do not give, as at the start of a run; return the mask of points without any
+        """Equilibrate gaps that points do not give, as at the start of a run; return the mask of points without
         equilibrium.
         """
         lost = np.zeros(len(table), dtype=bool)

@@ -69,9 +69,7 @@ def states(system: System) -> str:
 
 
 def run_summary(solution: Solution, written: Path | None, details: bool = False) -> Sheet:
-    """Summarise a run: states and solver, end, accuracy, speed and file; with ``details`` all errors, counts and
-    events.
-    """
+    """Summarise a run: states, solver, end, accuracy, speed and file; with ``details`` errors, counts and events."""
     from surfacechem.solve import solver
 
     trajectory, books, counters = solution.trajectory, solution.audit, solution.trajectory.result.counters

@@ -267,8 +267,7 @@ def _second(done: SweepSolution, threads: int | None) -> SweepSolution:
 
 
 def _against_exact(case: Case, done: SweepSolution, name: str, second: Callable[[], SweepSolution]) -> SweepAccuracy:
-    """Return the errors of the load at rupture, else of all quantities; InputError if the solution does not fit every
-    run.
+    """Return errors of the load at rupture, else of all quantities; InputError if the solution does not fit all runs.
 
     For loads at rupture the fit is tested on the outermost runs. A run that ended at its start has no error.
     """

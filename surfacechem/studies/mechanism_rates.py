@@ -142,9 +142,7 @@ class Curves:
         return total - log(min(self._amounts[name] for name in change))
 
     def _log_equilibrium(self, change: Mapping[str, int | float], paired: bool) -> Expression:
-        """Return the logarithm of the equilibrium constant; for ``paired`` reactions with the work of a prescribed
-        force.
-        """
+        """Return the logarithm of the equilibrium constant; ``paired`` reactions include the work of a given force."""
         total: Expression = 0
         for name, nu in change.items():
             total += nu * derivative(self._psi, self._coverages[name]) / self._amounts[name]

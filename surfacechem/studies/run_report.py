@@ -174,9 +174,7 @@ def _scene(case: cases.Case, attributes: Mapping[str, Any]) -> Iterator[PageSect
 
 
 def _numbers(system: System, symbols: Mapping[str, str], attributes: Mapping[str, Any]) -> PageTable:
-    """Return the table of parameters and initial values of a run; values that differ from the case, and swept ones, are
-    marked.
-    """
+    """Return the table of parameters and initial values of a run, with values of the case that differ, and sweeps."""
     own, changes, units = values_of(system), _values(attributes), system.changeable
     values = {path: f"{value:.6g}" for path, value in values_of(system, changes).items()}
     values |= dict.fromkeys(recorded_plan(attributes["sweep"]).paths if "sweep" in attributes else (), "swept")

@@ -308,8 +308,7 @@ def answer_floor(values: Array | float) -> float:
 
 
 def _slopes(answer: Callable[[Data], Answer], base: Answer, data: Data, name: str) -> Answer:
-    """Return the relative change of the answer over that of one of the data, for the largest step that the next one
-    confirms.
+    """Return the relative change of the answer over that of one of the data, by the first step that the next confirms.
 
     If there is no answer in one direction the step is taken in the other.
     """
@@ -334,8 +333,8 @@ def _slopes(answer: Callable[[Data], Answer], base: Answer, data: Data, name: st
 
 
 def worst_corner(regime: Regime, rounds: int = SEARCH_ROUNDS, rtol: float = STUDY_RTOL, seed: int = SEED) -> Corner:
-    """Search for the worst point of the regime's space by differential evolution of decimal logarithms; deterministic
-    for a given seed.
+    """Search for the worst point of the regime's space by differential evolution of decimal logarithms; ``seed`` fixes
+    the result.
 
     Source: Storn & Price (1997), Differential evolution, J. Global Optim. 11, 341 (rand/1/bin), as in SciPy.
     """

@@ -215,9 +215,7 @@ class _Rest:
         self.wanted = dict(item for item, made in kept if made)
 
     def response(self, paths: Sequence[str]) -> Array:
-        """Return the change of the quantities, including that of the steady state, per relative change of these
-        parameters.
-        """
+        """Return the change of the quantities, including that of the state, per relative change of these parameters."""
         parameters, columns = self.evaluation.parameters, [self._place[path] for path in paths]
         first = parameters[columns].copy()
         ends = []
@@ -232,9 +230,7 @@ class _Rest:
         return np.asarray((out_up - out_down) / (2 * CBRT_EPS) + following)
 
     def _root(self, x: Array) -> Array | None:
-        """Return the steady state near x, by Newton's method among states with the same conserved sums; None if it
-        fails.
-        """
+        """Return the steady state near x by Newton's method, with the same conserved sums; None if it fails."""
         for _ in range(20):
             step = self._solve(self._slopes(x), -self.rates(x), x)
             x = x + step

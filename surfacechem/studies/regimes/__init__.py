@@ -1,5 +1,4 @@
-"""Regimes of the stability matrix: a case, a parameter varied over decades until the problem breaks, and the expected
-result.
+"""Regimes of the stability matrix: a case, a parameter that varies until the problem breaks, and the expected result.
 
 A function marked `regime` in any file of this folder is a regime and is found without registration.
 
@@ -31,8 +30,7 @@ FOLDER = Path(__file__).parent
 
 @dataclass(frozen=True)
 class Exact:
-    """Expectation that the run finishes with these values at its output times [s], by name, and with so many events, if
-    stated.
+    """Expectation that the run finishes with these values at its output times [s], by name, and with so many events.
 
     States are compared, and the named quantities in ``also``; errors are relative to each value.
     """

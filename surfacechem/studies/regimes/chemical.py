@@ -49,9 +49,7 @@ def endothermic(value: float) -> Trial:
 def bonding_while_sliding(
     tau: float, C_1: float = 1.5, K_0: float = 120.0, D: float = 1e-3, T_i: float = 320.0
 ) -> Trial:
-    """Return the problem with capacities, energies, heating and times of any size; the interface takes all the heat it
-    may.
-    """
+    """Return the problem with parameters of any size; the interface takes as much heat as it may."""
     given = {"C_1": C_1, "K_0": K_0, "T_i": T_i, "tau": tau, "D": D}
     exact = Bonding(C_2=0.7, C_c=0.3, T_0=300.0, phi_i=0.1, K_1=60.0, K_2=240.0, **given)
     changes = {
@@ -116,9 +114,7 @@ def affinity(a: float, T: float = 310.0, rate: float = 1.0) -> Trial:
 
 @regime("Thermal runaway of an activated reaction", "E_a / (R_g T)", (1.0, 5.0, 10.0, 24.0, 50.0, 100.0, 200.0))
 def runaway(value: float) -> Trial:
-    """Thermal explosion by self-heating: the higher the activation, the later and steeper, and the less well
-    conditioned.
-    """
+    """Thermal explosion by self-heating: with the activation it becomes later, steeper, and less well conditioned."""
     E_a, A = value * GAS_CONSTANT * 300.0, math.exp(value)
     exact = AdiabaticArrhenius(A=A, E_a=E_a, T_i=300.0, delta_T=80.0)
     changes = {"interface.bonding.arrhenius.A": A, "interface.bonding.arrhenius.E_a": E_a}
@@ -127,9 +123,7 @@ def runaway(value: float) -> Trial:
     speeds = (1 - phi) * np.exp(value - E_a / (GAS_CONSTANT * (300.0 + 80.0 * phi)))
 
     def again(data: Mapping[str, float], t: Array) -> Mapping[str, Array]:
-        """Return the bonds for other data to first order, from the times at which they are reached, which needs no root
-        of a runaway.
-        """
+        """Return the bonds for other data to first order, from the times at which they are reached; needs no root."""
         other = AdiabaticArrhenius(**data)
         bonds = phi + speeds * (t - other.time(phi))
         return {"phi": bonds, "T": other.T_i + other.delta_T * bonds}
@@ -194,9 +188,7 @@ def rupture(value: float) -> Trial:
     (1e-12, 1e-6, 1e-3, 0.1, 0.9, 1.2, 1.2499999, 1.26, 1e6),
 )
 def debonding(value: float) -> Trial:
-    """All bonds break at once, and heat pays for the part of their energy that springs do not: ever less is left, then
-    none.
-    """
+    """All bonds break at once, and heat pays for the energy that springs do not: ever less is left, then none."""
     K_0 = value * 600.0
     changes = {"interface.potential.bond-energy.K_0": K_0}
     strength = 38.72983346207417e6

@@ -71,9 +71,7 @@ def stiffness(value: float) -> Trial:
     (1e-1, 1e-4, 1e-8, 1e-12, 1e-15, -1e-15, -1e-8, -1e-1),
 )
 def lost_capacity(value: float) -> Trial:
-    """Bonds that take 0.8 J/(m^2 K) from a medium with slightly more, which settles, or slightly less, which is
-    refused.
-    """
+    """Bonds that take 0.8 J/(m^2 K) from a medium with slightly more, which settles, or with less, which is refused."""
     changes = {"interface.potential.interface-capacity.C_c": 0.8 + value}
     if value < 0:
         return Trial(MEDIUM_CASE, [1.0], Refused("heat capacity at T_c was lost"), changes)
