@@ -27,7 +27,9 @@ if TYPE_CHECKING:
 R = TypeVar("R")
 
 RARE_COLLECTION = (100_000, 20, 20)
-"""Thresholds of Python's garbage collection: new objects between two of them, and ratios for older generations."""
+"""Thresholds of Python's garbage collection: new objects between two collections, and collections of a generation
+between two of the next older one.
+"""
 
 # Exit code of each status of a run.
 STATUS_CODES = {"finished": 0, "stopped": 3, "failed": 4}

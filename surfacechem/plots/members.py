@@ -90,8 +90,8 @@ def _distinct(dataset: xarray.Dataset, names: Sequence[str]) -> list[str]:
 
 
 def with_final_bonds(dataset: xarray.Dataset, axes: Sequence[str]) -> xarray.Dataset:
-    """Return the dataset with bonds at the end of each run; with all other final values if neither bonds nor
-    temperatures vary. It is unchanged if it holds such numbers already.
+    """Return the dataset with bonds at the end of each run; with all final values if neither bonds nor temperatures
+    vary. It is unchanged if it holds such numbers already.
     """
     series = [name for name in series_names(dataset, axes) if name in dataset.data_vars]
     if not series or any(str(name).endswith("_last") for name in dataset):

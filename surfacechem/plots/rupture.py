@@ -38,7 +38,7 @@ MOST_LARGE_MARKERS = 30
 def figure(dataset: xarray.Dataset, load: str, variables: Sequence[str] | None = None) -> Figure:
     """Draw the spectrum, the distribution p(f) for some runs, and the lifetime; or ``variables`` over the load."""
     series = (f"density_{load}", "lifetime")
-    held = all(name in dataset and load in dataset[name].dims for name in series)  # series over the load are there
+    held = all(name in dataset and load in dataset[name].dims for name in series)  # a store may keep no series
     names = variables or ("", *(series if held else ()))
     with style.panels(6.4, 0.7 + PANEL_HEIGHT * len(names), len(names)) as (plot, grid):
         for ax, name in zip(grid[:, 0], names, strict=True):

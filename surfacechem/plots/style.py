@@ -404,7 +404,9 @@ def draw_parameter(axis: XAxis | YAxis, values: xarray.DataArray, decades: bool 
 
 
 def _middle_of_decades(values: Array) -> Array:
-    """Return the geometric middle of the values, which determines their prefix: 100 pN/s are not 0.1 nN/s."""
+    """Return the geometric middle of the values, by which their prefix is chosen: by the largest, 100 pN/s might be 0.1
+    nN/s.
+    """
     sizes = np.abs(values[np.isfinite(values) & (values != 0)])
     return np.sqrt(sizes.min(keepdims=True) * sizes.max(keepdims=True)) if len(sizes) else np.zeros(1)
 

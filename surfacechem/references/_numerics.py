@@ -228,7 +228,7 @@ def scaled_Ei(x: Array) -> Array:
 
 
 def _by_range(x: Array, edge: float, near: Callable[[Array], Array], far: Callable[[Array], Array]) -> Array:
-    """Evaluate two formulas, below an edge and from there on, each only where it is valid."""
+    """Evaluate two formulas, below an edge and from there on, each only in its range."""
     x = np.asarray(x)
     found, below = np.empty(x.shape), x < edge
     for formula, own in ((near, below), (far, ~below)):

@@ -183,7 +183,7 @@ def replacing(target: Path) -> Iterator[Path]:
 
 
 def _reason(path: Path, error: OSError) -> str:
-    """Return the reason why a file could not be written: HDF5 gives none, but plain writing fails for the same."""
+    """Return the reason why a file could not be written: HDF5 gives none, but plain writing meets the same error."""
     if error.strerror:
         return error.strerror
     try:

@@ -114,7 +114,7 @@ def _differs(law: Law, values: dict[str, float]) -> str:
 
 
 def second_law_violation(law: Law, values: dict[str, float]) -> str:
-    """Return a violation of the second law in words: a law drives what it must resist. Empty if there is none."""
+    """Return a violation of the second law in words, of a law that drives instead of resisting; empty if none."""
     if isinstance(law, Friction) and "v" in values:
         for v in (0.7, -0.7):
             own = values | {"v": v} | ({"direction": math.copysign(1.0, v)} if "direction" in values else {})
