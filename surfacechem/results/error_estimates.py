@@ -508,6 +508,7 @@ def _driven(trajectory: Trajectory) -> Array:
     others, found = np.abs(result.outputs), np.zeros(program.n)
     for length in trajectory.run.times[-1] * DRIVING_TIMES:
         with suppress(np.linalg.LinAlgError):
+            # The propagator of an implicit Euler step of this length.
             kept = np.linalg.solve(by_rate + length * by_state, by_rate)
             coupled = np.abs(kept) * (1 - np.eye(program.n))
             found = np.fmax(found, np.einsum("tij,tj->ti", coupled, others).max(axis=0, initial=0.0))

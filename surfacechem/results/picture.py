@@ -117,6 +117,7 @@ def _bends(trajectory: Trajectory, allowed: Array, seen: Mask) -> list[States]:
     left = np.flatnonzero((np.diff(t) > 0) & (np.diff(segment) == 0) & (t[:-1] > 0))
     right, length, parameters = left + 1, np.diff(t)[left], problem.parameters[segment[left]]
     middle = t[left] + length / 2
+    # The middle of the cubic Hermite interpolant.
     states = (y[left] + y[right]) / 2 + length[:, None] / 8 * (rates[left] - rates[right])
     # Quantities may be small differences of algebraic states, so these have to be consistent.
     states = consistent(problem.program, middle, states, rates[left], parameters).y

@@ -189,7 +189,7 @@ class ArrayRuns:
         segments = self.problem.segments[None]
         if self.ramp is not None:
             segments = np.column_stack([np.zeros(len(own)), ends[own]])
-        # The spacing of checks against the equations scales with the run; outputs serve only what is kept of it.
+        # The spacing of checks against the equations scales with the run; outputs serve only the kept columns.
         problem = replace(self.problem, times=times[0], record_steps=self.keeps_steps, picture=0.0)
         spacing = segments[:, -1] / self.run.samples
         clear, columns = self._columns(self._solved(problem, y0[own], table[own], spacing, peaks, segments, times))
@@ -239,6 +239,7 @@ class ArrayRuns:
             return np.full(len(rows), self.problem.segments[-1]), self.shape[None]
         assert self.plan.until is not None
         value, slope = self.ramp(rows).T
+        # A load that does not move gives an infinite end, and such runs are left to be refused one by one.
         with np.errstate(all="ignore"):
             ends = (self.plan.until[1] - value) / slope
         return ends, np.asarray(self.shape / self.shape[-1]) * ends[:, None]

@@ -48,7 +48,7 @@ def load(source: Source, overrides: Overrides = ()) -> Simulation:
     ----------
     source
         The path of a case file or the name of a shipped case; a text of several lines, a mapping of the keys of a case,
-        or an open file. Files that a text or a mapping names are looked for in the working directory.
+        or an open file. Files that a text or a mapping names are searched for in the working directory.
     overrides
         Changes of the case before it is read: a text "path=value", a list of them, or a mapping from path to value, as
         numbers in SI or as texts with units.
@@ -511,7 +511,7 @@ class Simulation:
         Parameters
         ----------
         plan
-            What is swept, from :meth:`plan`.
+            The plan of the sweep, from :meth:`plan`.
         path
             The store, a folder whose name ends with .zarr.
         changes

@@ -253,6 +253,7 @@ class _Rest:
         """Return the change of the state that changes the rates by ``right`` and keeps the conserved sums unchanged."""
         sizes = np.abs(x) + TRACE_COVERAGE
         matrix = np.vstack((slopes, self._conserved * sizes))
+        # Rows are scaled, since rates and conserved sums differ by many decades.
         rows = np.maximum(np.abs(matrix).max(axis=1), TINY)
         found, *_ = np.linalg.lstsq(
             matrix / rows[:, None], np.append(right, np.zeros(len(self._conserved))) / rows, rcond=None
