@@ -53,11 +53,6 @@ class SemenovFold(Reference):
         """Largest D_0 [W/m^2] with a solution."""
         return self.H / (math.e * self.beta)
 
-    @property
-    def fold_temperature(self) -> float:
-        """Interface temperature [K] at the largest D_0."""
-        return self.T_0 + 1.0 / self.beta
-
     def quantities(self, t: Array) -> Quantities:
         scaled = scaled_rise(np.array([self.D_0 / self.critical_dissipation]))[0]
         return {"T_c": self.T_0 + scaled / self.beta, "D": self.H * scaled / self.beta}

@@ -250,7 +250,7 @@ def test_semenov_fold():
         rounding = 4e-16 / math.sqrt(max(1.0 - share, 1e-16)) / beta
         assert_exact(interface.solution(0.0)["T_c"], T_c, absolute=rounding)
     assert_exact(interface.critical_dissipation, data.expect["D_crit"])
-    assert_exact(interface.fold_temperature, data.expect["T_fold"])
+    assert_exact(interface.T_0 + 1.0 / interface.beta, data.expect["T_fold"])
     with pytest.raises(InputError, match="ignition"):
         build("semenov-fold", data.parameters, D_0=data.expect["D_crit"] * (1 + 1e-12))
 
