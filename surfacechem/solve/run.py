@@ -80,10 +80,8 @@ class Run:
     """True if it ends where nothing changes any more; the times are then those of a run of any length."""
     rest: float | None = None
     """Time at which it comes to rest [s], if that was found before."""
-    perturbed: bool = False
-    """True if loads are perturbed in their last digits, so that two runs differ where the result depends on these."""
-    samples: float = LOOKS_PER_RUN
-    """Number of parts of the run in each of which steps are checked at least once against the equations inside."""
+    closer: int = 0
+    """Number of looser runs before it in a chain of error estimates: 0 for a run, 1 for its second run."""
 
     def __post_init__(self) -> None:
         """Check the tolerances, and that output times start at zero, where the initial values hold, and increase."""
@@ -94,11 +92,17 @@ class Run:
                 f"rtol must lie in (0, 1), and atol must be finite and not negative: {self.rtol:g}, {self.atol}."
             )
 
+    @property
+    def samples(self) -> float:
+        """Number of parts of the run in each of which steps are checked at least once against the equations inside."""
+        return LOOKS_PER_RUN * CLOSER**self.closer
+
     def second(self, rtol: float, **others: Any) -> Run:
         """Return the run that estimates the error of this one.
 
         It has another relative tolerance, an absolute one in proportion, and more checks inside steps, at other times.
-        Explicit steps are compared with implicit ones, which do not miss the same features.
+        The last digits of loads are perturbed, and load segments are cut in two, as steps fill short ones at any
+        tolerance. Explicit steps are compared with implicit ones, which do not miss the same features.
 
         Parameters
         ----------
@@ -114,8 +118,8 @@ class Run:
         """
         atol = None if self.atol is None else self.atol * rtol / self.rtol
         used = OWN if self.solver == EXPLICIT else self.solver
-        others |= {"perturbed": not self.perturbed, "samples": CLOSER * self.samples}
-        return replace(self, rtol=rtol, atol=atol, solver=used, **others)
+        steps = 2 * self.max_steps
+        return replace(self, rtol=rtol, atol=atol, solver=used, max_steps=steps, closer=self.closer + 1, **others)
 
 
 class Discontinuities(NamedTuple):
@@ -433,10 +437,12 @@ class Model:
         if passing:
             fastest = max((values[path] for path in system.cycles), default=0.0)
             segments, parameters = self.passing.pieces(segments, parameters, fastest, run.max_steps)
+        for _ in range(run.closer):
+            segments, parameters = pieces.cut(segments, parameters)
         pieces.start_modes(system, parameters, values)
         y = np.array([state.from_given(values) for state in system.states])
         self._limits.check(y, parameters[0])
-        if run.perturbed:
+        if run.closer % 2:  # where a result depends on the last digits, two runs of the same numbers would agree
             pieces.perturb_histories(system, parameters)
         if system.equilibria:
             y, parameters = self._equilibrated(y, parameters)

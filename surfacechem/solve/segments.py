@@ -25,6 +25,9 @@ PARTS_OF_A_PERIOD, MOST_PARTS = 8.17, 20_000
 which periods are not cut.
 """
 
+GOLDEN_PART = 0.5 * (math.sqrt(5) - 1)
+"""Part of a piece of time at which it is cut: of a load that is symmetric nothing happens there."""
+
 BETWEEN_POINTS, LARGEST_SLACK = 1e3, NEGLIGIBLE
 """Slack of bonding beyond its bounds between two points of a step, in tolerances, and its largest value."""
 
@@ -52,6 +55,16 @@ def segment_parameters(system: System, starts: Array, rtol: float, values: Mappi
         elif parameter.path == RTOL_PATH:
             rows[:, j] = rtol
     return rows
+
+
+def cut(segments: Array, parameters: Array) -> tuple[Array, Array]:
+    """Each piece of time in two: steps that are as long as pieces, whatever the tolerance is, are others then.
+
+    >>> cut(np.array([0.0, 1.0]), np.array([[300.0]]))[0].round(3).tolist()
+    [0.0, 0.618, 1.0]
+    """
+    inside = segments[:-1] + GOLDEN_PART * np.diff(segments)
+    return np.sort(np.concatenate([segments, inside])), np.repeat(parameters, 2, axis=0)
 
 
 def perturb_histories(system: System, parameters: Array) -> None:

@@ -166,6 +166,26 @@ run: {{times: [0, 1, {time!r}, 5], rtol: 1e-6}}
     assert run.accuracy.error < 1e-7
 
 
+def test_an_estimate_is_not_blind_where_steps_are_as_long_as_the_pieces_of_a_load():
+    """A spring and a damper on a contact follow a load that turns ten times."""
+    n, tau, rates = 10, 0.3, 1e-2 * (-1.0) ** np.arange(10)
+    times, values = np.arange(n + 1) / n, 1e-3 * (np.arange(n + 1) % 2)
+    text = on_a_spring(
+        f"k: 1 MPa/m, c_b: {2 * tau} MPa s/m",
+        f"{{table: {{times: {times.tolist()}, values: {values.tolist()}}}}}",
+        "interface: {potential: [normal-stiffness: {E_n: 1 MPa/m}]}",
+    )
+    found = surfacechem.run(f"{text}initial: {{g_n: 0 m}}\nrun: {{until: 1 s, rtol: 1e-7}}")
+    gaps, gap, misses = found.trajectory.looked, 0.0, []
+    for start, load, rate in zip(times, values, rates, strict=False):
+        inside = (gaps.result.times > start) & (gaps.result.times <= start + 1 / n)
+        into, steady = np.append(gaps.result.times[inside] - start, 1 / n), load / 2 + rate * tau / 2
+        exact = steady + rate * into / 2 + (gap - steady) * np.exp(-into / tau)
+        misses += (np.abs(gaps.result.outputs[inside, 0] - exact[:-1]) / exact.max()).tolist()
+        gap = exact[-1]
+    assert 1e-13 < max(misses) < 3 * found.accuracy.error
+
+
 @pytest.mark.parametrize("reference", [{}, {"reference": ""}])
 def test_a_run_that_ends_before_its_second_output_knows_its_error(reference):
     """It reaches zero temperature at 300 s."""
