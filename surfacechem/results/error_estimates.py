@@ -149,7 +149,7 @@ def against_exact(
     # Exact solutions have no list of events: the times of events are compared with a second run.
     if late is None and (found := event_times(trajectory)):
         expected = event_times(second or _second(trajectory))
-        late = {} if difference(found, expected) else event_errors(found, expected, trajectory.run.times[-1])
+        late = event_errors(found, expected, trajectory.run.times[-1])
     late = dict(late or {})
     latest = max(late.values(), default=0.0)
     # With cells, whose layers are unresolved at first, errors are taken at the requested times.
@@ -237,9 +237,10 @@ def estimated(trajectory: Trajectory, second: Trajectory) -> Accuracy:
     errors, note = state_differences(trajectory.looked, second)
     if not errors:
         return unknown(NOTHING_EVOLVES if len(trajectory.result.times) > 1 else ENDED_AT_START)
-    if note:  # the two runs took different events
+    if note and stated(errors) > RUN_ERROR * trajectory.run.rtol:  # the two runs went different ways
         return unknown(f"a second run at rtol {other:.0e}, which had {note}")
-    return Accuracy(stated(errors), second_run(second.run), errors, named=partial(of_named, trajectory.looked, second))
+    source = f"{second_run(second.run)}, which had {note}" if note else second_run(second.run)
+    return Accuracy(stated(errors), source, errors, named=partial(of_named, trajectory.looked, second))
 
 
 def unknown(why: str) -> Accuracy:
@@ -271,7 +272,7 @@ def state_differences(
     times, rows = times[first:], [own[first:] for own in rows]
     errors: dict[str, float] = {}
     if first + len(times) > 1:
-        alike = np.full(len(times), True) if note else agree_at_jumps(times, ours, theirs)
+        alike = clear_of(times, _pairs(found, expected)) if note else agree_at_jumps(times, ours, theirs)
         points = [{profile.name: profile.points for profile in run.model.system.profiles} for run in (ours, theirs)]
         values, true = (
             {name: each[own[alike]] for name, each in _compared(run, also).items()}
@@ -282,23 +283,21 @@ def state_differences(
         known = sizes(theirs, named=values.keys() - states(theirs).keys())
         known = {name: size[rows[1][alike]] for name, size in known.items()}
         errors = largest_errors(values, {name: true[name] for name in true if name in values}, known)
-    if found and not note:
+    if found:
         errors |= event_errors(found, expected, ours.run.times[-1])
     return errors, note
 
 
 def of_named(ours: Trajectory, theirs: Trajectory) -> dict[str, float]:
-    """Return the largest differences of two runs in each named quantity; empty if their events differ.
+    """Return the largest differences of two runs in each named quantity.
 
     Differences within roundoff count as zero. Next to events and breakpoints times are compared instead of values.
     """
     found, expected = event_times(ours), event_times(theirs)
-    if difference(found, expected):
-        return {}
     times, *rows = np.intersect1d(ours.result.times, theirs.result.times, assume_unique=True, return_indices=True)
-    pairs = [pair for name, each in found.items() for pair in zip(each, expected.get(name, ()), strict=False)]
-    pairs += [(t, t) for t in ours.result.problem.segments]
-    alike = agree_at_jumps(times, ours, theirs) & clear_of(times, pairs)
+    alike = clear_of(times, _pairs(found, expected) + [(t, t) for t in ours.result.problem.segments])
+    if not difference(found, expected):
+        alike &= agree_at_jumps(times, ours, theirs)
     first, second = (run.picked(own[alike]) for run, own in zip((ours, theirs), rows, strict=True))
     names, true = second.model.system.output_columns, second.outputs
     rounded = RUN_ERROR * np.array(list(second.some.roundings.values()))
@@ -528,17 +527,35 @@ def difference(found: Mapping[str, Array], expected: Mapping[str, Array]) -> str
 
 
 def event_errors(found: Mapping[str, Array], expected: Mapping[str, Array], end: float) -> dict[str, float]:
-    """Return the largest error of event times, each relative to its own time, or to ERROR_FLOOR of the run if that is
-    more.
-
-    Kinks of which one of the two runs has more are left out; empty if no time is compared.
+    """Return the largest error of the times of shared events, each relative to its own time, or to ERROR_FLOOR of the
+    run if that is more; empty if no time is compared.
     """
-    errors = [
-        np.abs(found[name] - times) / np.maximum(times, ERROR_FLOOR * end)
-        for name, times in expected.items()
-        if len(times) == len(found.get(name, ())) > 0
-    ]
+    errors = [np.abs(ours - true) / np.maximum(true, ERROR_FLOOR * end) for ours, true in shared_times(found, expected)]
     return {EVENTS: float(max(error.max() for error in errors))} if errors else {}
+
+
+def shared_times(found: Mapping[str, Array], expected: Mapping[str, Array]) -> list[tuple[Array, Array]]:
+    """Return the times of the events that two runs share, a pair of arrays for each name: all in order, or only those
+    that are nearest to each other if one run has more of them.
+
+    >>> shared_times({"slip": np.array([0.1, 0.2])}, {"slip": np.array([0.19]), "stop": np.array([0.3])})
+    [(array([0.2]), array([0.19]))]
+    """
+    pairs = []
+    for name in expected.keys() & found.keys():
+        ours, theirs = found[name], expected[name]
+        if len(ours) != len(theirs):
+            if name.startswith(KINK):
+                continue
+            nearest, back = (np.searchsorted((x[1:] + x[:-1]) / 2, y) for x, y in ((theirs, ours), (ours, theirs)))
+            mutual = back[nearest] == np.arange(len(ours))
+            ours, theirs = ours[mutual], theirs[nearest[mutual]]
+        pairs.append((ours, theirs))
+    return pairs
+
+
+def _pairs(found: Mapping[str, Array], expected: Mapping[str, Array]) -> list[tuple[float, float]]:
+    return [pair for both in shared_times(found, expected) for pair in zip(*both, strict=True)]
 
 
 def asked_accuracy(run: Run) -> float:

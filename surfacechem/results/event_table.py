@@ -13,7 +13,7 @@ from surfacechem.results.netcdf import Column
 from surfacechem.solve.contract import Array
 from surfacechem.solve.jumps import ADMISSIBLE, VIOLATES, Jump
 from surfacechem.solve.run import Trajectory
-from surfacechem.tolerances import NEGLIGIBLE, RUN_EPS
+from surfacechem.tolerances import NEGLIGIBLE, RUN_EPS, TIME_EPS
 
 SIDE = RUN_EPS / 8
 """Relative distance from a jump within which a time is equal to that of the jump, 1.1e-13: times are sums over some 1e5
@@ -118,12 +118,16 @@ def event_times(trajectory: Trajectory) -> dict[str, Any]:
 
     Impacts slower than a thousandth of the fastest so far are left out, with all events at their time except rest: the
     number of rebounds in a Zeno sequence depends on the tolerance. Events at the very end of the run are left out, as
-    roundoff decides whether they happen, and so is the time of a steady state, which depends on the tolerance.
+    roundoff decides whether they happen; so are events that others undo at the same time, as where a gap touches zero
+    and opens again, and the time of a steady state, which depends on the tolerance.
     """
     columns = trajectory.model.system.state_columns
     end, fastest, slow = trajectory.run.times[-1] * (1 - SIDE), 0.0, -np.inf
     times: dict[str, list[float]] = {}
+    undone = {id(jump) for jump in _undone(trajectory)}
     for event in events_of(trajectory):
+        if id(event.jump) in undone:
+            continue
         if event.jump and event.jump.edge.is_impact:
             speed = abs(float(event.before[columns["v_n"]]))
             fastest = max(fastest, speed)
@@ -135,6 +139,24 @@ def event_times(trajectory: Trajectory) -> dict[str, Any]:
     found = {name: np.array(values) for name, values in times.items()}
     ended = {"end": np.array([trajectory.result.t])} if trajectory.status == "stopped" else {}
     return found | ended
+
+
+def _undone(trajectory: Trajectory) -> list[Jump]:
+    """Return the jumps that others at the same time undo: modes and states are equal before and after them."""
+    problem, symbols = trajectory.result.problem, {mode.symbol for mode in trajectory.model.system.modes}
+    modes = [j for j, parameter in enumerate(trajectory.model.system.parameters) if parameter.symbol in symbols]
+    moments: list[list[Jump]] = []
+    for jump in trajectory.jumps:
+        if not moments or jump.since > TIME_EPS * jump.t:
+            moments.append([])
+        moments[-1].append(jump)
+    found = []
+    for jumps in moments:
+        before, after = jumps[0].before, jumps[-1].after
+        same = np.abs(after.y - before.y) <= problem.rtol * np.abs(before.y) + problem.atol
+        if same.all() and np.array_equal(before.parameters[modes], after.parameters[modes]):
+            found += jumps
+    return found
 
 
 def entropy_destroyed(jumps: Sequence[Jump]) -> float:

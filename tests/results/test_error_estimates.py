@@ -14,6 +14,7 @@ from surfacechem.errors import InputError
 from surfacechem.results.accuracy import NOTHING_EVOLVES, CellErrors
 from surfacechem.results.error_estimates import (
     EVENTS,
+    against_exact,
     against_tighter,
     estimated,
     event_errors,
@@ -104,12 +105,25 @@ def test_an_estimate_looks_at_the_times_of_events(stick_slip):
 
 def test_other_events_in_the_second_run_are_said(stick_slip):
     trajectory = stick_slip.model.solve(stick_slip.case.run)
-    accuracy = estimated(trajectory, replace(trajectory, jumps=trajectory.jumps[:-1]))
+    second = replace(trajectory, jumps=trajectory.jumps[:-1])
+    found = estimated(trajectory, second)
     last = trajectory.jumps[-1].edge.name
     count = len(event_times(trajectory)[last])
-    assert f"which had other events: {count - 1} {last} instead of {count}" in accuracy.source
-    assert EVENTS not in accuracy.variables
-    assert math.isnan(accuracy.error)  # one of the two went another way
+    assert f"which had other events: {count - 1} {last} instead of {count}" in found.source
+    assert (found.error, found.variables[EVENTS]) == (EPS, 0.0)  # the states agree, and events that both have
+    away = replace(second, result=replace(second.result, outputs=2 * second.result.outputs))
+    assert math.isnan(estimated(trajectory, away).error)  # one of the two went another way
+    late = against_exact(trajectory, stick_slip.case.scene, "stick-slip", {}, away)
+    assert late.variables[EVENTS] == 0.0
+
+
+@pytest.mark.parametrize("rtol", [1e-5, 1e-7, 1e-9])
+def test_a_gap_that_touches_zero_for_a_moment_has_a_known_error(rtol):
+    """A plate on a spring with a damper touches another one as its load turns, and rounding decides whether it does."""
+    load = "{table: {times: [0, 0.2, 0.4, 0.6, 0.8, 1.1], values: [0, 1 mm, 0, 1 mm, 0, 1 mm]}}"
+    text = on_a_spring("k: 1 MPa/m, c_b: 0.6 MPa s/m", load, "interface: {potential: [penalty: {E_n: 1 MPa/m}]}")
+    found = surfacechem.run(f"{text}initial: {{g_n: 0 m}}\nrun: {{until: 1 s, rtol: {rtol}}}")
+    assert found.accuracy.error < 1e-13
 
 
 def test_a_second_run_that_ends_earlier_leaves_the_error_unknown():
