@@ -334,6 +334,17 @@ def test_a_velocity_at_which_friction_falls_faster_than_a_damper_resists_ends_a_
     assert "no steady sliding velocity" in found.reason
 
 
+@pytest.mark.parametrize("across", ["", "w_t2: {harmonic: {amplitude: 0.3 mm, frequency: 0.7 Hz}}, "])
+@pytest.mark.parametrize(("delta", "damper"), [(0.5, "2e8 Pa s/m"), (2, "1e8 Pa s/m")])
+def test_sliding_that_slows_down_to_a_fold_of_the_velocity_does_not_stop_there(delta, damper, across):
+    case = STRIBECK.replace("DELTA", str(delta)).replace("MU_S", "0.7").replace("1e3 Pa s/m", damper)
+    case = case.replace("p: 1 MPa, ", f"p: 1 MPa, {across}")
+    found = surfacechem.run(case, "loading.w_t={harmonic: {amplitude: 3 mm, frequency: 1 Hz}}")
+    assert "no steady sliding velocity" in found.reason
+    assert [jump.edge.name.split()[0] for jump in found.trajectory.jumps] == ["slip"]
+    assert found.dataset["v"][-1] > 1e-4  # m/s
+
+
 def test_a_run_that_ends_at_its_start_has_the_state_there(tmp_path):
     text = STRIBECK.replace("DELTA", "0.7").replace("MU_S", "0.7").replace(", c_b: 1e3 Pa s/m", "")
     found = surfacechem.run(text, "loading.w_t=-1 mm")

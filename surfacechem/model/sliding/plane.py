@@ -29,7 +29,7 @@ from typing import Any
 import symengine
 
 from surfacechem.errors import InputError
-from surfacechem.expressions import Expression, cos, depends, derivative, norm, sin, sqrt, where
+from surfacechem.expressions import Expression, absolute, cos, depends, derivative, norm, sin, sqrt, where
 from surfacechem.model.automaton import ZERO, Constraint, Mode, Register
 from surfacechem.model.build import Build, Record
 from surfacechem.model.components.mounting import ACROSS, Direction, FarField, far_field
@@ -136,16 +136,15 @@ def motion(build: Build, kinds: Sequence[Formulation]) -> Iterator[Record]:
     if kinds[0].inertial:
         still = _inertial(build, sides, largest)
     else:
-        still, slope = _steady(build, sides, largest)
+        still, ahead = _steady(build, sides, largest)
         if a != b:
             # Without inertia, friction along one direction only leaves the onset of slip undetermined.
             reason = "dry friction acts along one of two directions: the way of slip is undetermined"
             ratio = where(largest > 0, where(a > b, b, a) / where(largest > 0, largest, 1) - SQRT_EPS, 1)
             remedy = "Give the mounting a mass `m`, or friction along the other direction, too."
             yield Margin("friction in both directions", ratio, reason, remedy=remedy)
-        # The slope at rest is the limit from positive speeds.
-        ahead = growth(slope.subs({SPEED: SPEED + TINY}), sum(side.far.c_b + side.far.c_g for side in sides))
-        yield Margin(f"{STABLE_PREFIX}speed", ahead, kinds[0].unstable, when={SLIP: (1,)}, stability="speed")
+        stable = growth(ahead, sum(side.far.c_b + side.far.c_g for side in sides))
+        yield Margin(f"{STABLE_PREFIX}speed", stable, kinds[0].unstable, when={SLIP: (1,)}, stability="speed")
     pull = _scaled(sides, largest)
     # Slip begins in the direction of the pull, or, with a limit of zero, in that of the rate of the drive.
     drive = [build.total_derivative(side.far.force(ZERO, ZERO) - side.t_a) for side in sides]
@@ -187,8 +186,7 @@ def _steady(build: Build, sides: Sequence[Component], largest: Expression) -> tu
     (a, b), (n_x, n_y) = sizes, _unit_vector()
     ahead, aside = _turned(pull)
     along, across = ahead - (a + (b - a) * n_y**2), aside - (b - a) * n_x * n_y
-    # The roundoff of the balance in which slip begins must not stop it.
-    still = along.subs({SPEED: 0}) + TRACTION_EPS * largest
+    still = along.subs({SPEED: 0})
     if a != b:
         dry = sum((part.subs({SPEED: 0}) for part in sizes), ZERO)
         along, across = (where(dry > 0, *pair) for pair in zip(_elliptic(pull, sizes), (along, across), strict=True))
@@ -197,7 +195,12 @@ def _steady(build: Build, sides: Sequence[Component], largest: Expression) -> tu
     build.rows.switched("speed", SLIP, -along.subs({SPEED: 0}) / slope - SPEED if linear else along, SPEED)
     build.rows.switched("turn", SLIP * norm(*pull), across, TURN)  # without a pull there is no direction
     build.motion.slides_by |= {"speed": SPEED, "turn": TURN}
-    return still, -derivative(build.expanded(along), SPEED)
+    # The slope at rest is the limit from positive speeds; it changes sign at a fold.
+    ahead = -derivative(build.expanded(along), SPEED).subs({SPEED: SPEED + TINY})
+    if any(depends(derivative(size, SPEED), SPEED) for size in sizes):
+        still = absolute(ahead) * SPEED
+    # The roundoff of the balance in which slip begins must not stop it.
+    return still + TRACTION_EPS * largest, ahead
 
 
 def _unit_vector() -> tuple[Expression, Expression]:

@@ -307,13 +307,14 @@ def _sliding_row(
 ) -> Generator[Margin, None, Expression]:
     """Set the row of a slip velocity without inertia; slip is stable if the resistance grows with it.
 
-    Returns a balance that is zero at rest: that of the tractions [Pa], or the velocity from their slope.
+    Returns a balance that is zero at rest: that of the tractions [Pa], or the velocity times the size of their slope,
+    which changes sign at a fold.
     """
     v = build.motion.slides_by[kind.d.velocity]
     slope, balance = -derivative(build.expanded(driving), v), driving
     # The slope at rest is the limit from the slip direction.
     ahead = slope.subs({v: v + SLIP * TINY}) if kind.sticks else slope
-    rest, stable = ahead * v, growth(ahead, damping)
+    rest, stable = absolute(ahead) * v, growth(ahead, damping)
     if slope != 0 and not depends(slope, v):
         # Solved for the velocity, which is pure roundoff of the tractions as slip begins.
         rest = (driving if derivative(driving, v) == -slope else build.expanded(driving)).subs({v: 0})
