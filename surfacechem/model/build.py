@@ -359,6 +359,8 @@ class Build:
             if name not in law.least or name in met:  # else the law ends there
                 reason = f"{law.name()} bends at this {name}"
                 self.margins.append(Margin(name, self._read(law, name, own) - bend, reason, False))
+        for name in met:  # beyond its bound the law is given that
+            self._narrow(law, name, self._read(law, name, own), (law.least.get(name, 0),))
         for name, tops in {**dict.fromkeys(law.positive, ()), **law.peaks}.items():
             if name not in own and not self.variables.has(name) and name in optional(law.statement):
                 continue

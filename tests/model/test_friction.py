@@ -377,6 +377,22 @@ def test_friction_that_grows_with_velocity_from_rest_on_slides_as_fast_as_is_pul
     assert found["t_stribeck"][-1] == pytest.approx(1e6 * (0.5 - 0.1 / np.e), rel=1e-6)
 
 
+def test_a_step_ends_where_no_pressure_is_left():
+    """Friction bends there: a contact that pulls as well as it presses does not rub while it pulls."""
+    case = """
+bodies: {lower: {temperature: 300 K}, upper: {temperature: 300 K}}
+interface:
+  temperature: 300 K
+  potential: [normal-stiffness: {E_n: 1 MPa/um}]
+  friction: [coulomb: {mu: 0.3}]
+mechanics: {normal: {k: 1 MPa/um}, tangential: {k: 1 MPa/um, m: 1e4 kg/m^2}}
+loading: {w_n: {harmonic: {amplitude: 2 um, frequency: 300 Hz}}, w_t: 0 m}
+initial: {v: 50 mm/s}
+run: {until: 9 ms, rtol: 1e-8}
+"""
+    assert surfacechem.run(case).accuracy.error < 1e-7
+
+
 TURNING = """
 bodies: {lower: {temperature: 300 K}, upper: {temperature: 300 K}}
 interface:
