@@ -323,6 +323,15 @@ def test_friction_that_falls_as_soon_as_sliding_begins_has_no_velocity(delta):
     assert found.trajectory.result.t == pytest.approx(0.7, rel=1e-5)
 
 
+@pytest.mark.parametrize("v", [1e-15, 0.0, -1e-15])
+def test_a_velocity_that_rounding_has_against_the_sliding_is_as_unstable_as_rest(v):
+    model = surfacechem.load(STRIBECK.replace("DELTA", "0.5").replace("MU_S", "0.7")).model
+    values = model.values()
+    parameters = [values[p.path] if p.path != "mode.slip" else 1.0 for p in model.system.parameters]
+    (stable,) = [j for j, margin in enumerate(model.margins) if margin.name == "stable v"]
+    assert model.program.margins(np.array([0.0, 0.0, v, 0.0, 0.0, *parameters]))[stable] < 0
+
+
 @pytest.mark.parametrize("across", ["", "w_t2: {ramp: {rate: 0.1 mm/s}}, "])
 @pytest.mark.parametrize(("damper", "rate"), [("1e8 Pa s/m", 1), ("1e7 Pa s/m", 3)])
 def test_a_velocity_at_which_friction_falls_faster_than_a_damper_resists_ends_a_run(damper, rate, across):

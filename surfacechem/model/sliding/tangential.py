@@ -312,9 +312,9 @@ def _sliding_row(
     """
     v = build.motion.slides_by[kind.d.velocity]
     slope, balance = -derivative(build.expanded(driving), v), driving
-    # The slope at rest is the limit from the slip direction.
-    ahead = slope.subs({v: v + SLIP * TINY}) if kind.sticks else slope
-    rest, stable = absolute(ahead) * v, growth(ahead, damping)
+    # The slope at rest is the limit from the slip direction, also where roundoff gives v the other sign.
+    ahead, onward = (slope.subs({v: x + SLIP * TINY}) if kind.sticks else slope for x in (v, where(SLIP * v > 0, v, 0)))
+    rest, stable = absolute(ahead) * v, growth(onward, damping)
     if slope != 0 and not depends(slope, v):
         # Solved for the velocity, which is pure roundoff of the tractions as slip begins.
         rest = (driving if derivative(driving, v) == -slope else build.expanded(driving)).subs({v: 0})
