@@ -9,15 +9,16 @@ quantities bend between two known states, the run is repeated from one to the ot
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
 
 import numpy as np
 
 from surfacechem.results.spatial import layer_starts, unresolved
 from surfacechem.solve import solver
-from surfacechem.solve.contract import Array, Index, Mask, States
+from surfacechem.solve.contract import Array, Index, Mask, States, among
 from surfacechem.solve.radau.solver import consistent
-from surfacechem.solve.run import Trajectory
+from surfacechem.solve.run import ROWS_AT_ONCE, Trajectory
 from surfacechem.tolerances import EPS, FINER_BY, RUN_ERROR
 
 LONG_INTERVAL = 64
@@ -27,7 +28,7 @@ SHARED_DENSITY = 2
 """Ratio of the density of shared outputs of many runs to that of the run with the densest outputs."""
 
 MOST_REFINED, PARTS_REFINED, REFINEMENT_ROUNDS = 100, 16, 2
-"""Largest numbers of intervals that are refined, of parts of each, and of rounds."""
+"""Largest numbers of intervals of a block that are refined, of parts of each, and of rounds."""
 
 
 def _two_sided(t: Array) -> tuple[Array, Mask]:
@@ -101,14 +102,45 @@ def _edges(values: Array) -> Mask:
     return found
 
 
-def _chosen(rows: States, which: Mask | Index) -> States:
-    """Return some of the rows."""
-    assert rows.segment is not None
-    return States(rows.t[which], rows.y[which], rows.ledger[which], rows.segment[which])
+@dataclass
+class _Shown:
+    """Quantities over time (states, accounts, named quantities): their ranges so far, and the allowed error of lines."""
+
+    reach: Array = field(default_factory=lambda: np.array(-np.inf))
+    """Largest values with either sign, of all outputs and of those that count for ranges, shape (4, quantities)."""
+    noise: Array = field(default_factory=lambda: np.array(0.0))
+    """Change of each quantity by the last bit or the absolute tolerance of a state."""
+
+    def see(self, block: Trajectory) -> None:
+        """Update ranges and allowed errors with the outputs of a block."""
+        values, some, part = _shown(block)[1], block.some, block.run.picture or 0.0
+        unknown = [*some.felt(EPS * np.abs(some.result.outputs) + some.result.problem.atol).values()]
+        self.noise = np.maximum(self.noise, np.pad(RUN_ERROR * np.array(unknown), (values.shape[1] - len(unknown), 0)))
+        # Early rows, whose layers are unresolved, do not count for the ranges.
+        late = values[~unresolved(block.model.system, block.run.times[-1], block.result.times)]
+        sides = [each.max(axis=0, initial=-np.inf) for each in (-values, values, -late, late)]
+        self.reach = np.maximum(self.reach, sides)
+        every, known = self.reach[:2].sum(axis=0), self.reach[2:].sum(axis=0)
+        # Errors of the run need not be resolved, but they are at most this part of a value at any tolerance. The rest
+        # of the part is the error of known states for the states between them.
+        error = min(RUN_ERROR * block.run.rtol, part) * self.reach[:2].max(axis=0)
+        self.allowed = (1 - 1 / FINER_BY) * part * np.where(known < 0, every, known) + error + self.noise
+        self.seen = every > self.allowed
+
+    def needed(self, block: Trajectory, moments: Array) -> Mask:
+        """Return the mask of outputs that resolve a block, with both sides of events at these ``moments``."""
+        t, (table, values) = block.result.times, (each[:, self.seen] for each in _shown(block))
+        return needed_rows(t, values, self.allowed[self.seen], _beside(t, moments) | _edges(table))
 
 
-def _bends(trajectory: Trajectory, allowed: Array, seen: Mask) -> list[States]:
-    """Return states between outputs where lines miss the named quantities that are ``seen`` by more than is allowed.
+def _shown(block: Trajectory) -> tuple[Array, Array]:
+    """Return the quantities over time, shape (times, quantities), and the same with zeros for NaN and infinity."""
+    table = np.hstack([block.result.outputs, block.result.ledger_outputs, block.outputs])
+    return table, np.where(np.isfinite(table), table, 0.0)
+
+
+def _bends(trajectory: Trajectory, shown: _Shown) -> list[States]:
+    """Return states between outputs where lines miss named quantities by more than is allowed.
 
     Named quantities may bend where states do not. Only there the run is repeated, from the output before.
     """
@@ -119,12 +151,13 @@ def _bends(trajectory: Trajectory, allowed: Array, seen: Mask) -> list[States]:
     middle = t[left] + length / 2
     # The middle of the cubic Hermite interpolant.
     states = (y[left] + y[right]) / 2 + length[:, None] / 8 * (rates[left] - rates[right])
-    # Quantities may be small differences of algebraic states, so these have to be consistent.
-    states = consistent(problem.program, middle, states, rates[left], parameters).y
+    if problem.program.algebraic_mask.any():  # quantities may be small differences of algebraic states
+        states = consistent(problem.program, middle, states, rates[left], parameters).y
     between = trajectory.at(States(middle, states, result.ledger_outputs[left], segment[left]))
     lines = (trajectory.outputs[left] + trajectory.outputs[right]) / 2
     with np.errstate(invalid="ignore"):  # quantities may be infinite
         apart = np.abs(between.outputs - lines)
+    allowed, seen = (each[len(each) - apart.shape[1] :] for each in (shown.allowed, shown.seen))
     missed = np.divide(apart, allowed, out=np.zeros_like(apart), where=seen).max(axis=1, initial=0.0)
     rows = np.sort(np.argsort(-missed, kind="stable")[:MOST_REFINED])
     rows = rows[missed[rows] > 1]
@@ -144,14 +177,35 @@ def _bends(trajectory: Trajectory, allowed: Array, seen: Mask) -> list[States]:
 
 def pictured(trajectory: Trajectory) -> Trajectory:
     """Return the trajectory with outputs that resolve it, instead of the times at which runs are compared."""
-    part, rows = trajectory.run.picture, trajectory.result.known or trajectory.result.states()
-    if part is None or len(rows.t) < 2:
+    rows = trajectory.result.known or trajectory.result.states()
+    if trajectory.run.picture is None or len(rows.t) < 2:
         return trajectory
     t, sides = _two_sided(rows.t)
     # Times at which cells do not yet resolve a thermal layer are left out, except its start.
     system, end = trajectory.model.system, trajectory.run.times[-1]
     sides &= ~unresolved(system, end, t) | np.isin(t, layer_starts(system, end))
-    return _pictured(trajectory, part, _chosen(rows._replace(t=t), sides), REFINEMENT_ROUNDS)
+    rows, which, moments = rows._replace(t=t), np.flatnonzero(sides), _event_times(trajectory)
+    # Each block begins with the last row of the one before.
+    blocks, shown, found = range(0, max(len(which) - 1, 1), ROWS_AT_ONCE - 1), _Shown(), []
+
+    @lru_cache(maxsize=1)  # what is but one block is evaluated once
+    def block(first: int) -> Trajectory:
+        return trajectory.at(rows.picked(which[first : first + ROWS_AT_ONCE]))
+
+    for first in blocks:
+        shown.see(block(first))
+    for first in blocks:
+        whole = block(first)
+        for _ in range(REFINEMENT_ROUNDS):
+            if not (bends := _bends(whole, shown)):
+                break
+            more = States(*map(np.concatenate, zip(whole.written, *bends, strict=True)))
+            whole = trajectory.at(more.picked(np.argsort(more.t, kind="stable")))
+            shown.see(whole)
+        kept = shown.needed(whole, moments)
+        kept[-1] = first == blocks[-1]
+        found.append(whole.written.picked(kept))
+    return trajectory.at(States(*map(np.concatenate, zip(*found, strict=True))))
 
 
 def shared_times(runs: Sequence[Trajectory], most: int) -> tuple[float, ...]:
@@ -172,21 +226,19 @@ def shared_times(runs: Sequence[Trajectory], most: int) -> tuple[float, ...]:
     count = np.append(0.0, np.cumsum(SHARED_DENSITY * density * lengths))
     parts = min(int(np.ceil(count[-1])) + 1, most)
     times = [np.interp(np.linspace(0, count[-1], parts), count, every), every[[0, -1]]]
-    marked = np.unique(
-        np.concatenate([np.append(p.result.times[_beside(p) | _edges(p.result.outputs)], _steps(p)) for p in pictures])
-    )
+    sides = [p.result.times[_beside(p.result.times, _event_times(p)) | _edges(p.result.outputs)] for p in pictures]
+    marked = np.unique(np.concatenate([*sides, *map(_steps, pictures)]))
     return tuple(np.unique(np.concatenate([*times, marked if len(marked) <= most else []])).tolist())
 
 
 def _event_times(trajectory: Trajectory) -> Array:
-    """Return the times of events."""
-    return np.array([*trajectory.result.events.t, *(jump.t for jump in trajectory.jumps)])
+    """Return the times of events, in order."""
+    return np.unique([*trajectory.result.events.t, *(jump.t for jump in trajectory.jumps)])
 
 
-def _beside(trajectory: Trajectory) -> Mask:
-    """Return the mask of outputs on either side of an event."""
-    t, moments = trajectory.result.times, _event_times(trajectory)
-    return np.isin(t, moments) | np.isin(np.nextafter(t, np.inf), moments)
+def _beside(t: Array, moments: Array) -> Mask:
+    """Return the mask of times on either side of one of these moments, which are in order."""
+    return among(t, moments) | among(np.nextafter(t, np.inf), moments)
 
 
 def _steps(trajectory: Trajectory) -> Array:
@@ -196,31 +248,3 @@ def _steps(trajectory: Trajectory) -> Array:
         np.isin(breaks, t) & np.isin(np.nextafter(breaks, -1.0), t) & ~np.isin(breaks, _event_times(trajectory))
     ]
     return np.concatenate((breaks, np.nextafter(breaks, np.inf)))
-
-
-def _pictured(trajectory: Trajectory, part: float, rows: States, rounds: int) -> Trajectory:
-    """Return the trajectory with the rows that resolve it, and with further rows where it bends between them."""
-    while True:
-        whole = trajectory.at(rows)
-        result = whole.result
-        early = unresolved(whole.model.system, whole.run.times[-1], result.times)
-        # Quantities over time, shape (times, quantities), and their change by the last bit or the absolute tolerance
-        # of a state.
-        quantities = np.hstack([result.outputs, result.ledger_outputs, whole.outputs])
-        some, first = whole.some, quantities.shape[1] - whole.outputs.shape[1]
-        unknown = some.felt(EPS * np.abs(some.result.outputs) + result.problem.atol)
-        noise = np.pad(RUN_ERROR * np.array([*unknown.values()]), (first, 0))
-        # Errors of the run need not be resolved, but they are at most this part of a value at any tolerance. Early
-        # rows, whose layers are unresolved, do not count for the ranges.
-        values = np.where(np.isfinite(quantities), quantities, 0.0)
-        known, error = values if early.all() else values[~early], min(RUN_ERROR * whole.run.rtol, part)
-        # The rest of the part is the error of known states for the states between them.
-        allowed = (1 - 1 / FINER_BY) * part * np.ptp(known, axis=0) + error * np.abs(values).max(axis=0) + noise
-        seen = np.ptp(values, axis=0) > allowed
-        if not rounds or not (bends := _bends(whole, allowed[first:], seen[first:])):
-            break
-        more, rounds = States(*map(np.concatenate, zip(rows, *bends, strict=True))), rounds - 1
-        rows = _chosen(more, np.argsort(more.t, kind="stable"))
-    # Both sides of events are kept.
-    kept = _beside(whole) | _edges(quantities[:, seen])
-    return whole.picked(needed_rows(result.times, values[:, seen], allowed[seen], kept))

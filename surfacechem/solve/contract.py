@@ -247,6 +247,11 @@ class States(NamedTuple):
     ledger: Array
     segment: Index | None = None
 
+    def picked(self, rows: "Index | Mask | slice") -> "States":
+        """Some of the rows."""
+        assert self.segment is not None
+        return States(self.t[rows], self.y[rows], self.ledger[rows], self.segment[rows])
+
 
 @dataclass(frozen=True)
 class Points:

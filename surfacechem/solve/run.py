@@ -180,11 +180,16 @@ class Trajectory:
         kept = self.picked(np.isin(self.result.times, times))
         return replace(kept, run=replace(self.run, times=tuple(times)))
 
-    def picked(self, rows: Index | Mask) -> Trajectory:
-        """Return the trajectory with some of its outputs."""
+    @property
+    def written(self) -> States:
+        """States, ledgers and segments at the outputs."""
         result = self.result
         segment = result.segments_at(result.times, result.segment)
-        return self.at(States(result.times[rows], result.outputs[rows], result.ledger_outputs[rows], segment[rows]))
+        return States(result.times, result.outputs, result.ledger_outputs, segment)
+
+    def picked(self, rows: Index | Mask | slice) -> Trajectory:
+        """Return the trajectory with some of its outputs."""
+        return self.at(self.written.picked(rows))
 
     @property
     def some(self) -> Trajectory:
@@ -294,7 +299,14 @@ class Trajectory:
     @cached_property
     def outputs(self) -> Array:
         """Named quantities at the output times, shape (times, outputs)."""
-        return self.model.named(self._inputs.copy() if self.model.program.external else self._inputs)
+        count = len(self.result.times)
+        if count <= ROWS_AT_ONCE:
+            return self.model.named(self._inputs.copy() if self.model.program.external else self._inputs)
+        found, rows = np.empty((count, self.model.output_function.n_out)), self.written
+        for first in range(0, count, ROWS_AT_ONCE):
+            block = slice(first, first + ROWS_AT_ONCE)
+            found[block] = self.at(rows.picked(block)).outputs
+        return found
 
 
 def values_of(system: System, changes: Mapping[str, float] | None = None) -> dict[str, float]:

@@ -1,5 +1,6 @@
 """Outputs that follow a run."""
 
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 from case_runs import load, solved
 
 import surfacechem
+from surfacechem.results import picture
 from surfacechem.results.event_table import events_of
 from surfacechem.results.picture import needed_rows
 from surfacechem.tolerances import LINE_ERROR
@@ -49,6 +51,31 @@ def test_lines_between_outputs_show_the_run(name):
             at, known_at = dense.time.values[smooth][later], data.time.values[begun:]
             missed = np.interp(over(at), over(known_at), known[begun:]) - found[later]
             assert np.abs(missed).max() <= LINE_ERROR * np.ptp(known), shown
+
+
+def test_a_long_run_is_shown_as_closely_as_a_brief_one():
+    """Its last slips are, whose energy bends where no state does, block by block."""
+    case = surfacechem.load("stick-slip", ["run.until=60 s"])
+    run, data = case.case.run, case.run(error="balances").dataset
+    slips = data.event_time.values[-40:].reshape(-1, 2)
+    times = np.unique([0.0, *np.linspace(*slips.T, 40)[1:-1].ravel(), run.times[-1]])
+    dense = case.run(run=replace(run, times=tuple(times.tolist()), picture=None), error="balances").dataset
+    for name in ("v", "E_kinetic_t", "E_spring_t", "D_coulomb"):
+        missed = np.interp(times, data.time, data[name]) - dense[name].values
+        assert np.abs(missed).max() <= LINE_ERROR * np.ptp(data[name].values), name
+
+
+def test_a_picture_takes_little_more_memory_than_what_is_known(monkeypatch):
+    """Rows are looked at in blocks, whose ends are outputs, too."""
+    run = surfacechem.load("stick-slip", ["run.until=12 s"]).run(error="balances").trajectory
+    whole, known = picture.pictured(run), run.result.known
+    monkeypatch.setattr(picture, "ROWS_AT_ONCE", 400)
+    tracemalloc.start()
+    shown = picture.pictured(run)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 4 * sum(column.nbytes for column in known)
+    assert len(shown.result.times) < 1.1 * len(whole.result.times)
 
 
 @pytest.mark.parametrize("rtol", [1e-4, 1e-2])
