@@ -193,10 +193,10 @@ def audit(trajectory: Trajectory) -> Audit:
         roundings += len(steps.t)
         if system.energy_has_histories:  # a steep one is known only to within the last digits of time
             later = model.evaluate(result, steps.t * (1 + EPS), steps.y, steps.ydot, steps.segment)
-            untimed = largest(later[:, column["E_total"]] - trajectory.everywhere["E_total"][len(result.times) :])
+            untimed = largest(later[:, column["E_total"]] - trajectory.everywhere("E_total")[len(result.times) :])
     sites = np.zeros(len(ledger))
     for j in system.account_columns.get("bonds", ()):
-        bonds = trajectory.everywhere[system.ledger[j].law][: len(ledger)]
+        bonds = trajectory.everywhere(system.ledger[j].law)[: len(ledger)]
         sites = np.maximum(sites, np.abs(bonds - bonds[:1] - ledger[:, j]))
     rounding = EPS * energy_stored * roundings + untimed
     left = largest(energy)
@@ -224,9 +224,9 @@ def audit(trajectory: Trajectory) -> Audit:
 
 def _least(trajectory: Trajectory) -> dict[str, float]:
     """Return the least entropy production of each law over outputs and steps."""
-    values, least, system = trajectory.within_bounds, {}, trajectory.model.system
+    least, system = {}, trajectory.model.system
     for j in system.account_columns.get("entropy production", ()):
-        rates = values.get(f"sigma_{system.ledger[j].law}", np.empty(0))
+        rates = trajectory.within_bounds.everywhere(f"sigma_{system.ledger[j].law}")
         if len(rates):
             past = _is_past_its_end(trajectory, rates[-1]) and len(rates) > 1
             least[system.ledger[j].law] = float((rates[:-1] if past else rates).min())
@@ -259,7 +259,8 @@ def _destroyed(trajectory: Trajectory, laws: list[str], stored: float) -> float:
     """
     result, accounts, points = trajectory.result, trajectory.model.system.ledger, _steps(trajectory)
     ledger = points.ledger.copy()
-    rates = np.array([trajectory.within_bounds[f"sigma_{law}"][-len(points.t) :] for law in laws]).sum(axis=0)
+    made = [trajectory.within_bounds.everywhere(f"sigma_{law}")[-len(points.t) :] for law in laws]
+    rates = np.array(made).sum(axis=0)
     if len(rates) > 1 and _is_past_its_end(trajectory, rates[-1] + ledger[-1].sum()):
         rates[-1], ledger[-1] = 0.0, ledger[-2]
     columns = [j for j, a in enumerate(accounts) if a.kind == "entropy production" and a.law in laws]

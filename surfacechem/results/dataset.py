@@ -73,17 +73,16 @@ def quantity_columns(
     """
     system = runs[0].model.system
     kept = [j for j, state in enumerate(system.states) if state.name not in system.inside]
-    most = max(len(run.result.problem.times if axes else run.result.times) for run in runs)
     found = quantities(system)
-    # One table for all quantities; a column is a view of it.
-    table = np.full((len(runs), most, len(found)), np.nan)
-    for rows, run in zip(table, runs, strict=True):
-        reached = len(run.result.times)
-        rows[:reached, : len(kept)], rows[:reached, len(kept) :] = run.result.outputs[:, kept], run.outputs
-    table = table.reshape(*(axes or {}).values(), most, len(found))
+    values: Iterable[Array] = (*runs[0].result.outputs[:, kept].T, *runs[0].outputs.T)
+    if axes:  # one table for all runs; a column is a view of it
+        table = np.full((len(found), len(runs), len(runs[0].result.problem.times)), np.nan)
+        for i, run in enumerate(runs):
+            table[:, i, : len(run.result.times)] = [*run.result.outputs[:, kept].T, *run.outputs.T]
+        values = table.reshape(len(found), *axes.values(), -1)
     return [
-        Column(DATASET_NAMES.get(name, name), (*(axes or {}), inner), table[..., j], q.unit, q.long_name, q.tag)
-        for j, (name, q) in enumerate(found.items())
+        Column(DATASET_NAMES.get(name, name), (*(axes or {}), inner), each, q.unit, q.long_name, q.tag)
+        for each, (name, q) in zip(values, found.items(), strict=True)
     ]
 
 
@@ -104,7 +103,7 @@ def coverage_columns(system: System, columns: Iterable[Column]) -> list[Column]:
 def profile_values(trajectory: Trajectory, profile: Profile) -> Array:
     """Return the temperatures across a body at the output times, shape (times, points)."""
     names = [profile.surface, *profile.states, *([profile.far] if profile.far else [])]
-    return np.stack([trajectory.everywhere[name][: len(trajectory.result.times)] for name in names], axis=1)
+    return np.stack([trajectory.everywhere(name)[: len(trajectory.result.times)] for name in names], axis=1)
 
 
 def profile_columns(trajectory: Trajectory) -> list[Column]:

@@ -148,8 +148,10 @@ def against_exact(
 
     # Exact solutions have no list of events: the times of events are compared with a second run.
     if late is None and (found := event_times(trajectory)):
-        expected = event_times(second or _second(trajectory))
-        late = event_errors(found, expected, trajectory.run.times[-1])
+        run = trajectory.run
+        closer = run.second(second_tolerance(run.rtol), picture=None, looks=0.0)
+        expected = event_times(second or trajectory.model.solve_values(closer, trajectory.values))
+        late = event_errors(found, expected, run.times[-1])
     late = dict(late or {})
     latest = max(late.values(), default=0.0)
     # With cells, whose layers are unresolved at first, errors are taken at the requested times.
@@ -234,13 +236,14 @@ def estimated(trajectory: Trajectory, second: Trajectory) -> Accuracy:
     if second.status == "failed" or (second.status == "finished" and second.result.t < trajectory.result.t):
         fate = "failed later" if ends_late else ENDED_EARLIER
         return unknown(f"a second run at rtol {other:.0e} {fate}: {second.reason}")
-    errors, note = state_differences(trajectory.looked, second)
+    seen = trajectory.looked
+    errors, note = state_differences(seen, second)
     if not errors:
         return unknown(NOTHING_EVOLVES if len(trajectory.result.times) > 1 else ENDED_AT_START)
     if note and stated(errors) > RUN_ERROR * trajectory.run.rtol:  # the two runs went different ways
         return unknown(f"a second run at rtol {other:.0e}, which had {note}")
     source = f"{second_run(second.run)}, which had {note}" if note else second_run(second.run)
-    return Accuracy(stated(errors), source, errors, named=partial(of_named, trajectory.looked, second))
+    return Accuracy(stated(errors), source, errors, named=partial(of_named, seen, second))
 
 
 def unknown(why: str) -> Accuracy:
@@ -593,12 +596,13 @@ def compared(first: Trajectory, second: Trajectory) -> Accuracy:
     source = second_run(second.run)
     if first.status != second.status:
         return Accuracy(math.inf, f"{source}, which {second.status}: {second.reason}")
-    errors, others = state_differences(first.looked, second)
+    seen = first.looked
+    errors, others = state_differences(seen, second)
     if others and first.run.rtol > MIN_RTOL:  # at MIN_RTOL roundoff decides on events without effect
         return Accuracy(math.inf, f"{source}, which had {others}")
     if not errors:
         return unknown(ENDED_AT_START)
-    return Accuracy(stated(errors), source, errors, named=partial(of_named, first.looked, second))
+    return Accuracy(stated(errors), source, errors, named=partial(of_named, seen, second))
 
 
 def rounding_of_time(trajectory: Trajectory) -> float:

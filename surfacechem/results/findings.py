@@ -81,7 +81,7 @@ def verdicts(trajectory: Trajectory, audit: Audit) -> tuple[BalanceVerdict, ...]
     """Return the verdict on each pair of rates, over all outputs and steps."""
     found = []
     for pair in trajectory.model.system.noted(RatePair):
-        values = trajectory.everywhere[pair.departure]
+        values = trajectory.everywhere(pair.departure)
         if len(values):  # a run that ends at its start has none
             low, high = float(np.min(values)), float(np.max(values))
             found.append(BalanceVerdict(pair.title, low, high, pair.law not in audit.violations))
@@ -147,10 +147,10 @@ def _lost_fluxes(trajectory: Trajectory) -> list[str]:
     """Return a warning about fluxes through conductances so large that the temperature difference is roundoff."""
     fluxes = {name: size for name, size in trajectory.roundings.items() if name.startswith("q_")}
     everywhere, duration = trajectory.everywhere, trajectory.result.t
-    most = max((largest(everywhere[name]) for name in fluxes), default=0.0)
+    most = max((largest(everywhere(name)) for name in fluxes), default=0.0)
     # Heat that roundoff carries over the whole run is compared with the heat content, independent of its zero.
     content = trajectory.roundings.get("E_total", 0.0) / EPS
-    felt = ERROR_FLOOR * max(largest(everywhere["E_total"]), content)
+    felt = ERROR_FLOOR * max(largest(everywhere("E_total")), content)
     lost = [name for name, size in fluxes.items() if size > LOST_FLUX * most and size * duration > felt]
     advice = "let the two share one temperature, or use the heat_into variables, which are exact"
     return [f"{', '.join(lost)}: lost to rounding, as the conductance is very large; {advice}"] if lost else []
@@ -160,7 +160,7 @@ def _extrapolations(trajectory: Trajectory) -> list[str]:
     """Return warnings about laws that the run has used outside their range."""
     found = []
     for limit in trajectory.model.system.noted(Range):
-        values = trajectory.everywhere[limit.variable]
+        values = trajectory.everywhere(limit.variable)
         low, high = float(np.min(values, initial=math.inf)), float(np.max(values, initial=-math.inf))
         rounding = RUN_EPS * max(abs(low), abs(high))
         if low < limit.low - rounding or high > limit.high + rounding:

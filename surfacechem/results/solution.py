@@ -206,8 +206,8 @@ class Solution(Results):
 
     def _reaction(self) -> dict[str, str]:
         """Return the class of the reactions, if they have a heat; heat within the tolerance counts as zero."""
-        heat = self.trajectory.everywhere.get("q_reaction")
-        if heat is None:
+        heat = self.trajectory.everywhere("q_reaction")
+        if not len(heat):
             return {}
         felt = self.trajectory.run.rtol * float(np.max(np.abs(heat), initial=0.0))
         found = [name for name, sign in REACTION_CLASSES.items() if np.any(sign * heat > felt)]

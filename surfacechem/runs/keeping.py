@@ -187,7 +187,7 @@ def at_end(run: Trajectory) -> dict[str, float]:
 
 def extreme(run: Trajectory, name: str, which: str) -> float:
     """Return the largest or smallest value of a quantity over outputs and steps of a run, and after its jumps."""
-    seen = np.concatenate([run.everywhere[name], run.leaps.after[name][run.leaps.lasts]])
+    seen = np.concatenate([run.everywhere(name), run.leaps.after[name][run.leaps.lasts]])
     with np.errstate(invalid="ignore"):
         return float(EXTREMES[which][0].reduce(seen, initial=np.nan))
 
@@ -233,7 +233,7 @@ class RunByRun:
         row |= {f"{name}_{which}": extreme(run, name, which) for which in EXTREMES for name in getattr(keep, which)}
         reached = len(result.times)
         for name in keep.series:
-            row[name] = np.append(run.everywhere[name][:reached], np.full(times - reached, np.nan))
+            row[name] = np.append(run.everywhere(name)[:reached], np.full(times - reached, np.nan))
         return row | self._events(run)
 
     def _events(self, run: Trajectory) -> dict[str, float]:

@@ -322,7 +322,7 @@ def with_arc_segments(problem: Problem, result: Result) -> Result:
         kept = in_order(t, segment)
         ends = np.append(arcs[1:, 0], result.t)[segment[kept]]
         known = States(np.minimum(t[kept], ends), y[kept], ledger[kept], segment[kept])
-    return replace(result, problem=problem, segment=outputs.segment, steps=steps, known=known)
+    return replace(result, problem=problem, segment=outputs.segment, steps=steps, inside=None, known=known)
 
 
 def ended_at_start(problem: Problem, status: Status, end: float, ledger: Array) -> Result:

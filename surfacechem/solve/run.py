@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import operator
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -191,13 +191,19 @@ class Trajectory:
         """Return the trajectory with some of its outputs."""
         return self.at(self.written.picked(rows))
 
+    def _blocks(self) -> Iterator[Trajectory]:
+        """Yield the trajectory, in blocks of outputs if these are many."""
+        count, rows = len(self.result.times), self.written
+        pieces = (slice(first, first + ROWS_AT_ONCE) for first in range(0, count, ROWS_AT_ONCE))
+        yield from (self.at(rows.picked(piece)) for piece in pieces) if count > ROWS_AT_ONCE else [self]
+
     @property
     def some(self) -> Trajectory:
         """The trajectory with a sample of its outputs, enough to estimate roundoff."""
         count = len(self.result.times)
         return self.picked(np.arange(0, count, max(count // SAMPLED_OUTPUTS, 1)))
 
-    @cached_property
+    @property
     def looked(self) -> Trajectory:
         """The trajectory with outputs at which runs are compared, whatever outputs were requested.
 
@@ -210,10 +216,8 @@ class Trajectory:
         kept = np.diff(t, prepend=-1.0) > 0  # of the two sides of a moment keep the first, as an output does
         if (result.known or result.inside) is not None and result.steps is not None:
             kept &= among(rows.t, result.steps.t) | ~among(rows.t, result.times)
-        assert rows.segment is not None
-        if kept.all():
-            return self.at(rows._replace(t=t))
-        return self.at(States(t[kept], rows.y[kept], rows.ledger[kept], rows.segment[kept]))
+        rows = rows._replace(t=t)
+        return self.at(rows if kept.all() else rows.picked(kept))
 
     @cached_property
     def _inputs(self) -> Array:
@@ -239,7 +243,8 @@ class Trajectory:
     @cached_property
     def roundings(self) -> dict[str, float]:
         """Largest change of each named quantity by one rounding of a state."""
-        return self.felt(EPS * self.result.outputs)
+        found = [[*block.felt(EPS * block.result.outputs).values()] for block in self._blocks()]
+        return dict(zip(self.model.system.output_columns, np.fmax.reduce(found), strict=True))
 
     def felt(self, changes: Array) -> dict[str, float]:
         """Return the largest change of each named quantity by ``changes`` of one state, shape (times, states)."""
@@ -258,17 +263,20 @@ class Trajectory:
                 worst = np.fmax(worst, np.fmax.reduce(apart.max(axis=1, initial=0.0)))
         return dict(zip(system.output_columns, worst, strict=True))
 
+    def everywhere(self, name: str) -> Array:
+        """Return a state or a named quantity at the output times and at every step; empty if the name is unknown."""
+        return np.concatenate(self._columns.get(name, (np.empty(0),)))
+
     @cached_property
-    def everywhere(self) -> dict[str, Array]:
-        """States and named quantities at the output times and at every step."""
-        result, steps = self.result, self.result.steps
-        states, named = result.outputs, self.outputs
+    def _columns(self) -> dict[str, tuple[Array, ...]]:
+        """States and named quantities, each at the output times and at every step."""
+        result, steps, system = self.result, self.result.steps, self.model.system
+        tables = [(*result.outputs.T, *self.outputs.T)]
         if steps is not None and len(steps.t):
-            states = np.concatenate([states, steps.y])
-            named = np.concatenate([named, self.model.evaluate(result, steps.t, steps.y, steps.ydot, steps.segment)])
-        system = self.model.system
+            named = self.model.evaluate(result, steps.t, steps.y, steps.ydot, steps.segment)
+            tables.append((*steps.y.T, *named.T))
         names = [*(state.name for state in system.states), *system.output_columns]
-        return dict(zip(names, (*states.T, *named.T), strict=True))
+        return dict(zip(names, zip(*tables, strict=True), strict=True))
 
     @cached_property
     def leaps(self) -> Discontinuities:
@@ -285,28 +293,23 @@ class Trajectory:
         return Discontinuities.of(model, np.zeros(len(before), np.int64), before, after)
 
     @cached_property
-    def within_bounds(self) -> dict[str, Array]:
-        """As :attr:`everywhere`, with bonding states that roundoff has made negative set to zero."""
+    def within_bounds(self) -> Trajectory:
+        """The trajectory with bonding states that roundoff has made negative set to zero."""
         result, steps = self.result, self.result.steps
         bonds = {account.law for account in self.model.system.ledger if account.kind == "bonds"}
         least = np.array([0.0 if state.name in bonds else -np.inf for state in self.model.system.states])
         if np.all(result.outputs >= least) and (steps is None or np.all(steps.y >= least)):
-            return self.everywhere
+            return self
         steps = steps and replace(steps, y=np.maximum(steps.y, least))
         clipped = replace(result, outputs=np.maximum(result.outputs, least), steps=steps)
-        return replace(self, result=clipped).everywhere
+        return replace(self, result=clipped)
 
     @cached_property
     def outputs(self) -> Array:
         """Named quantities at the output times, shape (times, outputs)."""
-        count = len(self.result.times)
-        if count <= ROWS_AT_ONCE:
-            return self.model.named(self._inputs.copy() if self.model.program.external else self._inputs)
-        found, rows = np.empty((count, self.model.output_function.n_out)), self.written
-        for first in range(0, count, ROWS_AT_ONCE):
-            block = slice(first, first + ROWS_AT_ONCE)
-            found[block] = self.at(rows.picked(block)).outputs
-        return found
+        if len(self.result.times) > ROWS_AT_ONCE:
+            return np.concatenate([block.outputs for block in self._blocks()])
+        return self.model.named(self._inputs.copy() if self.model.program.external else self._inputs)
 
 
 def values_of(system: System, changes: Mapping[str, float] | None = None) -> dict[str, float]:

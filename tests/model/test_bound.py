@@ -67,7 +67,7 @@ def test_bonds_are_gone_until_the_law_forms_them_again():
     assert unbonded.t == pytest.approx(brentq(free, 0.3, 1.0, xtol=1e-15), rel=1e-10)
     assert rebond.t == pytest.approx(2 - math.sqrt(2 * K / E) / TOP, rel=1e-12)
     assert unbonded.released == rebond.released == 0.0
-    phi = trajectory.everywhere["phi"]
+    phi = trajectory.everywhere("phi")
     assert phi.min() > -1e-15
     assert phi[-1] > 0.5
 
@@ -75,7 +75,7 @@ def test_bonds_are_gone_until_the_law_forms_them_again():
 def test_no_bond_at_the_start_under_a_load_that_allows_none():
     trajectory = closed(damage(phi=0.0, gaps=(TOP, TOP)), 1.0)
     assert [(jump.edge.name, jump.t) for jump in trajectory.jumps] == [("unbonded", 0.0)]
-    assert np.all(trajectory.everywhere["phi"] == 0.0)
+    assert np.all(trajectory.everywhere("phi") == 0.0)
 
 
 def test_a_limit_frees_complete_bonding():
@@ -153,7 +153,7 @@ def test_mixing_entropy_yields_to_stretched_springs():
         outputs=81,
     )
     assert trajectory.events == ["unbonded", "rebond"]
-    assert trajectory.everywhere["phi"].min() > -1e-14
+    assert trajectory.everywhere("phi").min() > -1e-14
     gap = math.sqrt(2 * (6e-20 - BOLTZMANN * 300.0 * math.log(1e-15)) / 1e-3)
     assert trajectory.jumps[1].t == pytest.approx(2 - gap / 1e-7, rel=1e-4)
     assert trajectory.end("phi") > 1e-6

@@ -40,7 +40,7 @@ def solved(item, until, outputs=81):
 
 
 def velocity(trajectory):
-    return trajectory.everywhere["v"][: len(trajectory.result.times)]
+    return trajectory.everywhere("v")[: len(trajectory.result.times)]
 
 
 def forward(law, pull, m, times, y, mu_0=0.6, a=0.01, b=0.014, L=5e-5, v_0=1e-6):
@@ -62,7 +62,7 @@ def forward(law, pull, m, times, y, mu_0=0.6, a=0.01, b=0.014, L=5e-5, v_0=1e-6)
 
 
 def reversals(trajectory):
-    v = trajectory.everywhere["v"][len(trajectory.result.times) :]
+    v = trajectory.everywhere("v")[len(trajectory.result.times) :]
     return int(np.sum(np.diff(np.sign(v[v != 0])) != 0))
 
 
@@ -75,7 +75,7 @@ def test_stick_slip_is_that_of_the_plain_equations():
     trajectory = solved(scene(law, Mounting(k=k, m=M), loading, WEAKENING, {"theta": theta, "v": V}), 2e-3 / V)
     times = trajectory.result.times
     u, v, ln_theta = forward(law, lambda t, u: k * (start + V * t - u), M, times, [0.0, V, np.log(theta)])
-    found = trajectory.everywhere["v"]
+    found = trajectory.everywhere("v")
     assert found.max() > 20 * V
     assert found.min() < 0.1 * V
     np.testing.assert_allclose(trajectory["u_t"], u, rtol=0, atol=1e-8 * np.max(u))
@@ -89,7 +89,7 @@ def test_pressure_that_vanishes_frees_what_creeps():
     fall = {"times": [0.0, 1.0, 1.001, 1.002, 3.0], "values": [P, 0.0, 0.0, P, P]}
     item = scene(RateAndStateSlip, Mounting(k=K, m=1e4), {"w_t": Hold(level=1e-3)}, WEAKENING, p=Table(**fall))
     trajectory = solved(item, 3.0)
-    assert np.max(np.abs(trajectory.everywhere["v"])) > 1e-3
+    assert np.max(np.abs(trajectory.everywhere("v"))) > 1e-3
     assert abs(velocity(trajectory)[-1]) < 1e-20
 
 

@@ -243,8 +243,8 @@ def test_fluxes_where_a_shared_temperature_is_prescribed():
     scene = Scene(pair, interface, heat, loading | {"T_1": Ramp(start=300.0, rate=1.0)}, None, 300.0, {"T_2": 290.0})
     trajectory = run(scene, 2.0)
     values = trajectory.everywhere
-    stored = 3.0 / 300.0 * values["T_1"] * 1.0
-    assert values["q_1"] + values["q_2"] == pytest.approx(values["D_coulomb"] - stored, rel=1e-12)
+    stored = 3.0 / 300.0 * values("T_1") * 1.0
+    assert values("q_1") + values("q_2") == pytest.approx(values("D_coulomb") - stored, rel=1e-12)
 
 
 @pytest.mark.parametrize("ramp", [True, False])

@@ -11,6 +11,7 @@ import surfacechem
 from surfacechem.results import picture
 from surfacechem.results.event_table import events_of
 from surfacechem.results.picture import needed_rows
+from surfacechem.solve import run
 from surfacechem.tolerances import LINE_ERROR
 
 FOLLOWED = ("stick-slip", "press-hold-pull", "dna-adhesive", "debonding")
@@ -65,17 +66,18 @@ def test_a_long_run_is_shown_as_closely_as_a_brief_one():
         assert np.abs(missed).max() <= LINE_ERROR * np.ptp(data[name].values), name
 
 
-def test_a_picture_takes_little_more_memory_than_what_is_known(monkeypatch):
+def test_a_dataset_takes_little_more_memory_than_it_has(monkeypatch):
     """Rows are looked at in blocks, whose ends are outputs, too."""
-    run = surfacechem.load("stick-slip", ["run.until=12 s"]).run(error="balances").trajectory
-    whole, known = picture.pictured(run), run.result.known
-    monkeypatch.setattr(picture, "ROWS_AT_ONCE", 400)
+    case = surfacechem.load("stick-slip", ["run.until=12 s"])
+    whole, solution = case.run(error="balances").dataset, case.run(error="balances")
+    for module in (picture, run):
+        monkeypatch.setattr(module, "ROWS_AT_ONCE", 400)
     tracemalloc.start()
-    shown = picture.pictured(run)
+    dataset = solution.dataset
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
-    assert peak < 4 * sum(column.nbytes for column in known)
-    assert len(shown.result.times) < 1.1 * len(whole.result.times)
+    assert peak < 4 * dataset.nbytes
+    assert len(whole.time) < len(dataset.time) < 1.1 * len(whole.time)
 
 
 @pytest.mark.parametrize("rtol", [1e-4, 1e-2])

@@ -161,7 +161,7 @@ def test_outputs_beside_a_corner_are_on_their_own_sides_where_the_time_of_an_arc
     run = replace(simulation.case.run, times=(0.0, *beside, 1.2), picture=None, looks=0.0)
     pairs = [both(monkeypatch, simulation.model, run, {MU_K: 0.3 + part / 500}) for part in range(8)]
     for each in (run for pair in pairs for run in pair):
-        before, at, after = each.everywhere["v"][1:4]
+        before, at, after = each.everywhere("v")[1:4]
         assert before == pytest.approx(at, rel=1e-9)
         assert after > 0.5 * at  # the damper leaps with the far field
     starts = [compiled.jumps[2].t for compiled, _ in pairs]

@@ -31,8 +31,8 @@ def test_a_traction_that_touches_the_limit_moves_nothing(amplitude, mean, freque
     loading = {"p": Hold(level=100.0), "F_t": Harmonic(amplitude=amplitude, frequency=frequency, mean=mean)}
     trajectory = solve(together([], [Coulomb(mu=0.3)], loading, tangential=Mounting(m=5.0)), 3.0, rtol=rtol)
     assert (trajectory.status, trajectory.events) == ("finished", [])
-    assert np.all(trajectory.everywhere["v"] == 0)
-    assert np.all(trajectory.everywhere["u_t"] == 0)
+    assert np.all(trajectory.everywhere("v") == 0)
+    assert np.all(trajectory.everywhere("u_t") == 0)
 
 
 @pytest.mark.parametrize("name", ["lsoda", "ida"])

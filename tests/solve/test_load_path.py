@@ -299,7 +299,7 @@ def test_what_creeps_is_carried_along():
     loading = {"p": Hold(level=1e6), "w_t": Hold(level=0.0), "F_t": steps}
     given = {"initial": {"theta": 1.0}, "pair": LIGHT, "tangential": Mounting(k=k)}
     found = closed(together([TangentialStiffness(E_t=E)], [friction], loading, **given), 40.0, outputs=9)
-    u, theta, t_t, v = (found.everywhere[name][1:9:2] for name in ("u_t", "theta", "t_t", "v"))
+    u, theta, t_t, v = (found.everywhere(name)[1:9:2] for name in ("u_t", "theta", "t_t", "v"))
     np.testing.assert_allclose(u, levels / (k + E), rtol=1e-12)
     strength = (0.6 + 0.014 * np.log(1e-6 / 5e-6 * theta)) / 0.008
     np.testing.assert_allclose(v, 2e-6 * np.sinh(t_t / 8e3) * np.exp(-strength), rtol=1e-11)
