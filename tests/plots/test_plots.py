@@ -290,3 +290,15 @@ def test_a_jump_is_dotted_from_the_value_before_to_that_after():
     assert solid.get_ydata() == pytest.approx([1, 2, np.nan, 5, 4], nan_ok=True)
     assert dotted.get_ydata() == pytest.approx([np.nan, 2, 5, np.nan], nan_ok=True)
     assert dotted.get_linestyle() == ":"
+
+
+def test_a_jump_between_outputs_is_dotted_from_the_one_to_the_next():
+    """At an output that has its time, from there; a kink is none, and where both sides are outputs it is between them."""
+    t = np.array([0.0, 1.0, 2.0, 3.0, 4.0, np.nextafter(5.0, 0.0), 5.0, 6.0])
+    run = dataset(t, p=("Pa", np.array([1.0, 2.0, 3.0, 4.0, 1.0, 2.0, 5.0, 4.0])))
+    run["event_time"] = "event", [0.5, 3.0, 4.5, 5.0, 6.0]
+    run["event_verdict"] = "event", np.array(["admissible", "admissible", "", "admissible", "admissible"], object)
+    solid, dotted = figure(run, ["p"], "T_1").axes[0].get_lines()
+    nothing = np.nan
+    assert solid.get_ydata() == pytest.approx([1, nothing, 2, 3, 4, nothing, 1, 2, nothing, 5, 4], nan_ok=True)
+    assert dotted.get_ydata() == pytest.approx([1, 2, nothing, 4, 1, 2, 5, nothing], nan_ok=True)
