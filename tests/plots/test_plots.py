@@ -293,7 +293,7 @@ def test_a_jump_is_dotted_from_the_value_before_to_that_after():
 
 
 def test_a_jump_between_outputs_is_dotted_from_the_one_to_the_next():
-    """At an output that has its time, from there; a kink is none, and where both sides are outputs it is between them."""
+    """From an output at its very time; a kink is none, and where both sides are outputs it is between them."""
     t = np.array([0.0, 1.0, 2.0, 3.0, 4.0, np.nextafter(5.0, 0.0), 5.0, 6.0])
     run = dataset(t, p=("Pa", np.array([1.0, 2.0, 3.0, 4.0, 1.0, 2.0, 5.0, 4.0])))
     run["event_time"] = "event", [0.5, 3.0, 4.5, 5.0, 6.0]
