@@ -104,7 +104,7 @@ def _edges(values: Array) -> Mask:
 
 @dataclass
 class _Shown:
-    """Quantities over time (states, accounts, named quantities): their ranges so far, and the allowed error of lines."""
+    """Quantities over time, states and accounts included: their ranges so far, and the allowed error of lines."""
 
     reach: Array = field(default_factory=lambda: np.array(-np.inf))
     """Largest values with either sign, of all outputs and of those that count for ranges, shape (4, quantities)."""
