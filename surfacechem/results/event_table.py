@@ -124,10 +124,7 @@ def event_times(trajectory: Trajectory) -> dict[str, Any]:
     columns = trajectory.model.system.state_columns
     end, fastest, slow = trajectory.run.times[-1] * (1 - SIDE), 0.0, -np.inf
     times: dict[str, list[float]] = {}
-    undone = {id(jump) for jump in _undone(trajectory)}
-    for event in events_of(trajectory):
-        if id(event.jump) in undone:
-            continue
+    for event in _lasting(trajectory):
         if event.jump and event.jump.edge.is_impact:
             speed = abs(float(event.before[columns["v_n"]]))
             fastest = max(fastest, speed)
@@ -141,8 +138,8 @@ def event_times(trajectory: Trajectory) -> dict[str, Any]:
     return found | ended
 
 
-def _undone(trajectory: Trajectory) -> list[Jump]:
-    """Return the jumps that others at the same time undo: modes and states are equal before and after them."""
+def _lasting(trajectory: Trajectory) -> list[EventRow]:
+    """Return the events without those that others at the same time undo: modes and states are equal around them."""
     problem, symbols = trajectory.result.problem, {mode.symbol for mode in trajectory.model.system.modes}
     modes = [j for j, parameter in enumerate(trajectory.model.system.parameters) if parameter.symbol in symbols]
     moments: list[list[Jump]] = []
@@ -150,13 +147,13 @@ def _undone(trajectory: Trajectory) -> list[Jump]:
         if not moments or jump.since > TIME_EPS * jump.t:
             moments.append([])
         moments[-1].append(jump)
-    found = []
+    undone: set[int] = set()
     for jumps in moments:
         before, after = jumps[0].before, jumps[-1].after
         same = np.abs(after.y - before.y) <= problem.rtol * np.abs(before.y) + problem.atol
         if same.all() and np.array_equal(before.parameters[modes], after.parameters[modes]):
-            found += jumps
-    return found
+            undone.update(map(id, jumps))
+    return [event for event in events_of(trajectory) if id(event.jump) not in undone]
 
 
 def entropy_destroyed(jumps: Sequence[Jump]) -> float:
