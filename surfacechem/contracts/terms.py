@@ -34,7 +34,7 @@ import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self, dataclass_transform
 
 from surfacechem.contracts.units import quotient
@@ -151,6 +151,7 @@ class Law(ABC):
                 spec.check(name, value)
 
     @classmethod
+    @cache
     def name(cls) -> str:
         """The name of the law in a case file."""
         return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "-", cls.__name__).lower()
@@ -210,11 +211,10 @@ class Law(ABC):
         return f"the law {self.name()}"
 
     @classmethod
-    def specs(cls) -> Iterator[tuple[str, Spec]]:
-        """Yield names and specifications of the numeric parameters."""
-        for item in dataclasses.fields(cls):
-            if "spec" in item.metadata:
-                yield item.name, item.metadata["spec"]
+    @cache
+    def specs(cls) -> tuple[tuple[str, Spec], ...]:
+        """Return names and specifications of the numeric parameters."""
+        return tuple((item.name, item.metadata["spec"]) for item in dataclasses.fields(cls) if "spec" in item.metadata)
 
     @classmethod
     def options(cls) -> Iterator[tuple[str, str]]:

@@ -186,8 +186,8 @@ def _off_events(trajectory: Trajectory, late: float) -> Mask:
     The times of these may err by the relative amount ``late``, and near them the side of an exact solution, and its
     slope, depend on the time. Outputs are also left out within a brief part of the time to the next jump.
     """
-    result, end = trajectory.result, trajectory.run.times[-1]
-    moments = np.unique([jump.t for jump in trajectory.jumps] + [result.t] * (trajectory.status == "stopped"))
+    result, end, stopped = trajectory.result, trajectory.run.times[-1], trajectory.status == "stopped"
+    moments = np.array(sorted({*(jump.t for jump in trajectory.jumps), *[result.t] * stopped}))
     brief = BRIEF_PART * np.diff(moments, prepend=0.0, append=max([end, *moments[-1:]]))
     ways = moments - np.maximum(brief[:-1], 2 * late * moments), moments + np.maximum(brief[1:], 2 * late * moments)
     return clear_of(result.times, np.transpose(ways))

@@ -26,7 +26,7 @@ from surfacechem.solve.choice import EXPLICIT, IMPLICIT
 from surfacechem.solve.contract import Array, Index, Mask, Problem, Status
 from surfacechem.solve.diagnose import are_led_back
 from surfacechem.solve.lanes.lane_batch import solve_batch
-from surfacechem.solve.radau.solver import Room, consistent, rates_at, solve_arrays
+from surfacechem.solve.radau.solver import Room, consistent, put_rates, solve_arrays
 from surfacechem.solve.radau.stepper import ARCS, END, EVENTS, FIRST_COUNTER, JUMPS, OUTPUTS, RECORDS
 from surfacechem.solve.run import Discontinuities, Model, Run
 from surfacechem.tolerances import EPS, GUARD_EPS, MICROMETRE, PICOMETRE
@@ -280,9 +280,7 @@ class ArrayRuns:
         whole = np.flatnonzero(counts[:, END] == Status.FINISHED)  # rates from the equations, as at outputs
         if self.keep.last and len(whole):
             rows = last[whole]
-            rows[:, 1 + n : 1 + 2 * n] = rates_at(
-                self.model.program, rows[:, 0], rows[:, 1 : 1 + n], rows[:, 1 + 2 * n :]
-            )
+            put_rates(self.model.program, rows)
             last[whole] = rows
         status, reason, clear = self._verdicts(found, last)
         # A run that overflows its tables, or ends before its first output, is solved by itself.
@@ -345,7 +343,7 @@ class ArrayRuns:
         owner, k = np.nonzero(reached)
         t, y = times[np.minimum(owner, len(times) - 1), k], batch.outputs[owner, k, :n]
         rows = found.inputs(owner, t, y, np.zeros_like(y))
-        rows[:, 1 + n : 1 + 2 * n] = rates_at(self.model.program, t, y, rows[:, 1 + 2 * n :])
+        put_rates(self.model.program, rows)
         table, values = self._values(rows)
         columns: Columns = {}
         for name in keep.series:

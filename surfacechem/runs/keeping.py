@@ -18,7 +18,7 @@ from surfacechem.results.audit import Audit, audit
 from surfacechem.results.dataset import quantities
 from surfacechem.results.event_table import entropy_destroyed, events_of
 from surfacechem.solve.contract import REASONS, Status
-from surfacechem.solve.radau.solver import rates_at
+from surfacechem.solve.radau.solver import put_rates
 from surfacechem.solve.run import Model, Trajectory
 
 Columns = dict[str, NDArray[Any]]
@@ -180,9 +180,10 @@ def at_end(run: Trajectory) -> dict[str, float]:
     result, model = run.result, run.model
     names = [state.name for state in model.system.states] + [*model.system.output_columns]
     t, y, ydot = np.array([result.t]), result.y[None], result.ydot[None]
+    rows = model.inputs(result, t, y, ydot)
     if result.status is Status.FINISHED:  # rates from the equations, as at outputs
-        ydot = rates_at(model.program, t, y, result.problem.parameters[-1:])
-    return dict(zip(names, [*result.y, *model.evaluate(result, t, y, ydot)[0]], strict=True))
+        put_rates(model.program, rows)
+    return dict(zip(names, [*result.y, *model.named(rows)[0]], strict=True))
 
 
 def extreme(run: Trajectory, name: str, which: str) -> float:

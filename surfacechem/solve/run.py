@@ -5,7 +5,6 @@ from __future__ import annotations
 import operator
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -27,7 +26,7 @@ from surfacechem.solve.diagnose import ROUNDED_BACK, are_led_back, termination
 from surfacechem.solve.equilibria import NO_BALANCE, Equilibria, Point
 from surfacechem.solve.hybrid import Flow, Hybrid, carried, solve_together, with_start, without_stall
 from surfacechem.solve.jumps import Jump, Jumper
-from surfacechem.solve.radau.solver import consistent, output_rates
+from surfacechem.solve.radau.solver import consistent, put_rates
 from surfacechem.solve.segments import Passing
 from surfacechem.tolerances import ATOL_OF_SCALE, DEFAULT_RTOL, EPS, FINER_BY, LINE_ERROR, SQRT_EPS
 
@@ -171,9 +170,7 @@ class Trajectory:
     def at(self, rows: States) -> Trajectory:
         """Return the trajectory with these states as outputs."""
         t, y, ledger, segment = rows
-        result = copy(self.result)
-        result.times, result.outputs, result.ledger_outputs, result.segment = t, y, ledger, segment
-        return replace(self, result=result)
+        return replace(self, result=replace(self.result, times=t, outputs=y, ledger_outputs=ledger, segment=segment))
 
     def at_times(self, times: Sequence[float] | Array) -> Trajectory:
         """Return the trajectory with only the outputs at these times."""
@@ -222,8 +219,10 @@ class Trajectory:
     @cached_property
     def _inputs(self) -> Array:
         """Arguments of compiled functions at the output times."""
-        result = self.result
-        return self.model.inputs(result, result.times, result.outputs, output_rates(result), result.segment)
+        result, y = self.result, self.result.outputs
+        rows = self.model.inputs(result, result.times, y, np.zeros_like(y), result.segment)
+        put_rates(self.model.program, rows)
+        return rows
 
     @cached_property
     def rates(self) -> Array:
@@ -231,12 +230,12 @@ class Trajectory:
 
         Those of algebraic states, which no equation gives, are difference quotients; zero at t = 0.
         """
-        program, n = self.model.program, len(self.model.system.states)
-        t, y, rates, parameters = np.split(self._inputs, [1, 1 + n, 1 + 2 * n], axis=1)
+        program, n, rows, y = self.model.program, self.model.program.n, self._inputs, self.result.outputs
+        t, rates = rows[:, :1], rows[:, 1 + n : 1 + 2 * n]
         algebraic = program.algebraic_mask & (t > 0)
         if algebraic.any():
             passed = SQRT_EPS * t
-            later = consistent(program, (t + passed)[:, 0], y + passed * rates, 0.0, parameters)
+            later = consistent(program, (t + passed)[:, 0], y + passed * rates, 0.0, rows[:, 1 + 2 * n :])
             rates = np.divide(later.y - y, passed, out=rates.copy(), where=algebraic & later.valid[:, None])
         return rates
 

@@ -41,7 +41,7 @@ def segments(system: System, end: float, values: Mapping[str, float]) -> Array:
         count = math.floor(PARTS_OF_A_PERIOD * values[path] * end)
         if count <= MOST_PARTS:
             inside += [k / (PARTS_OF_A_PERIOD * values[path]) for k in range(1, count + 1)]
-    return np.unique([0.0, *(t for t in inside if t < end), end])
+    return np.array(sorted({0.0, *(t for t in inside if t < end), end}))
 
 
 def segment_parameters(system: System, starts: Array, rtol: float, values: Mapping[str, float]) -> Array:

@@ -365,19 +365,15 @@ def consistent(program: Program, t: ArrayLike, y: ArrayLike, ydot: ArrayLike, pa
     return Consistent(ends[:, 1 : 1 + n].reshape(shape), ends[:, 1 + n :].reshape(shape), valid)
 
 
-def output_rates(result: Result) -> Array:
-    """Return the derivatives at the outputs from the equations: those of the polynomial are of one order less."""
-    problem = result.problem
-    if not len(result.times):
-        return np.empty_like(result.outputs)
-    parameters = problem.parameters[result.segments_at(result.times, result.segment)]
-    return rates_at(problem.program, result.times, result.outputs, parameters)
-
-
-def rates_at(program: Program, t: Array, y: Array, parameters: Array) -> Array:
-    """Return the derivatives of states, shape (rows, n), at times and with parameters of each row."""
-    guess = np.zeros_like(y)
+def put_rates(program: Program, rows: Array) -> None:
+    """Write the derivatives of the states, from the equations, into rows of arguments of compiled functions; those of
+    the dense output are of one order less.
+    """
+    n = program.n
+    rates = rows[:, 1 + n : 1 + 2 * n]
+    rates[:] = 0.0
     # A formula is much faster than a linear system for each row.
-    if program.external is None and program.n <= MOST_RATE_STATES and program.rates is not None:
-        return program.rates(np.concatenate([t[:, None], y, guess, parameters], axis=1))
-    return consistent(program, t, y, guess, parameters).ydot
+    if program.external is None and n <= MOST_RATE_STATES and program.rates is not None:
+        rates[:] = program.rates(rows)
+    else:
+        rates[:] = consistent(program, rows[:, 0], rows[:, 1 : 1 + n], rates, rows[:, 1 + 2 * n :]).ydot
