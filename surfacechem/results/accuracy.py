@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -104,8 +103,8 @@ class Accuracy:
     source: str
     """The exact solution's name, the second run and its tolerance, or the balances, in words."""
     variables: Mapping[str, float] = field(default_factory=dict)
-    exact: Mapping[str, Any] = field(default_factory=dict, compare=False)
-    """Exact values at the output times, by variable, if an exact solution was named."""
+    exact: Callable[..., Mapping[str, Array]] | None = field(default=None, compare=False)
+    """Function for the exact values at the outputs of a run, by variable, if an exact solution was named."""
     asked: float | None = None
     """Requested accuracy, if the tolerance was chosen from it."""
     named: Callable[[], Mapping[str, float]] = field(default=dict, compare=False)

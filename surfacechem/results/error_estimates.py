@@ -144,7 +144,8 @@ def against_exact(
     Event times are compared with a second run. It is made if ``second`` is not given and the errors ``late`` of event
     times are unknown. InputError if the exact solution is another scene's.
     """
-    from surfacechem.results.matching import exact_values
+    from surfacechem.references.base import SceneView
+    from surfacechem.results.matching import exact_values, match
 
     # Exact solutions have no list of events: the times of events are compared with a second run.
     if late is None and (found := event_times(trajectory)):
@@ -156,7 +157,8 @@ def against_exact(
     latest = max(late.values(), default=0.0)
     # With cells, whose layers are unresolved at first, errors are taken at the requested times.
     seen = trajectory if trajectory.model.system.profiles else fewer(trajectory.looked, latest)
-    exact = exact_values(name, options, scene, seen, to_the_end=True, side=max([SIDE, *late.values()]))
+    reference = match(name, options, SceneView(scene, seen))
+    exact = exact_values(reference, scene, seen, to_the_end=True, side=max(SIDE, latest))
     alike = _off_events(seen, latest)
     for values in exact.values():  # a solution that ends with an infinite slope has no value at its last moment
         alike &= np.isfinite(values.reshape(len(values), -1)).all(axis=1)
@@ -165,19 +167,9 @@ def against_exact(
         ours, known = ({key: each[key][alike] for key in exact} for each in (ours, known))
     true = exact if alike.all() else {key: values[alike] for key, values in exact.items()}
     errors = largest_errors(ours, true, known) | late
-    return Accuracy(stated(errors), f"exact solution {name}", errors, exact)
-
-
-def exact_outputs(
-    found: Accuracy, exact: tuple[str, Mapping[str, float]] | None, scene: Scene
-) -> Callable[[Trajectory], dict[str, Array]] | None:
-    """Return a function for the exact values at the outputs of a run; None if its accuracy has another source."""
-    if exact is None or not found.exact:
-        return None
-    from surfacechem.results.matching import exact_values
-
-    side = max(SIDE, found.error)
-    return partial(exact_values, *exact, scene, to_the_end=True, side=side)
+    error = stated(errors)
+    at = partial(exact_values, reference, scene, to_the_end=True, side=max(SIDE, error), tested=False)
+    return Accuracy(error, f"exact solution {name}", errors, at)
 
 
 def _off_events(trajectory: Trajectory, late: float) -> Mask:

@@ -64,20 +64,26 @@ def _in_range() -> Iterator[None]:
 
 @_in_range()
 def exact_values(
-    name: str, options: Mapping[str, float], scene: Scene, run: Trajectory, to_the_end: bool = False, side: float = SIDE
+    reference: Reference,
+    scene: Scene,
+    run: Trajectory,
+    to_the_end: bool = False,
+    side: float = SIDE,
+    tested: bool = True,
 ) -> dict[str, Array]:
-    """Return exact values at the output times by the names of the scene; InputError for another scene's solution.
+    """Return exact values at the output times by the names of the scene.
+
+    InputError if the solution is that of another scene, unless it was ``tested`` before.
 
     With ``to_the_end`` the outputs of a run may lie beyond the end of the solution by the error of its own end. Jumps
     of run and solution are the same if their times differ by less than the fraction ``side``.
     """
-    view = SceneView(scene, run)
-    reference = match(references.get(name), options, view)
-    solution = partial(_solution, reference, view)
+    solution = partial(_solution, reference, SceneView(scene, run))
     times = np.minimum(run.result.times, reference.end_time) if to_the_end else run.result.times
     before_end = times[-1] * (1 - SIDE * np.array([2.0, 4.0]))
-    tested = len(times) > 1 and not reference.continuous  # a run that ends at its start meets no equation
-    probes, since = _probes(*_edges(run)) if tested else (np.empty(0), np.empty(0))
+    # A run that ends at its start meets no equation.
+    probed = tested and len(times) > 1 and not reference.continuous
+    probes, since = _probes(*_edges(run)) if probed else (np.empty(0), np.empty(0))
     step = DIFFERENCE_STEP * since
     around = [probes + k * step for k in (-2, -1, 0, 1, 2)]
     # All times in one call, as the cost of an exact solution is per call.
@@ -93,8 +99,9 @@ def exact_values(
     )
     if reference.continuous:
         return _with_profiles(reference, exact, scene, run)
-    _check_start(exact, run)
     if tested:
+        _check_start(exact, run)
+    if probed:
         near = {each: values[first:].reshape(5, -1) for each, values in every.items()}
         _check_equations(near, run, probes, step)
     return exact
@@ -141,12 +148,14 @@ def _take_nearer(exact: dict[str, Array], others: Mapping[str, Array], run: Traj
         exact[name][at] = np.where(nearer, other, exact[name][at])
 
 
-def match(kind: type[Reference], options: Mapping[str, float], view: SceneView) -> Reference:
-    """Return the reference with the parameters of the scene, and ``options`` for those not in the scene.
+@_in_range()
+def match(name: str, options: Mapping[str, float], view: SceneView) -> Reference:
+    """Return the named reference with the parameters of the scene, and ``options`` for those not in the scene.
 
     InputError if an option differs from the value of the scene, as after a change of the scene alone.
     """
     # Options supply parameters that the scene does not determine; others must agree with the scene.
+    kind = references.get(name)
     values, told = dict(options), kind.from_scene(view)
     for item in dataclasses.fields(kind):  # type: ignore[arg-type]
         found, spec = told.get(item.name), item.metadata["spec"]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -18,7 +18,7 @@ from surfacechem.results.findings import BalanceVerdict, findings, verdicts
 from surfacechem.results.netcdf import Column, versions
 from surfacechem.results.picture import pictured
 from surfacechem.solve import solver
-from surfacechem.solve.contract import Array, Status
+from surfacechem.solve.contract import Status
 from surfacechem.solve.run import Run, Trajectory
 
 RECORDED_SETTINGS = ("times", "picture", "atol", "max_steps")
@@ -33,8 +33,6 @@ class Judgement:
     """Error of a run, as far as known."""
 
     accuracy: Accuracy | None = None
-    exact: Callable[[Trajectory], Mapping[str, Array]] | None = None
-    """Function for the exact values at the outputs of a run, by variable, if the case has any."""
     notes: tuple[str, ...] = ()
     """Further notes for readers of the results."""
 
@@ -142,11 +140,11 @@ class Solution(Results):
         for law, low in books.least.items():
             text = f"least entropy production of {law.replace('_', ' ')}"
             columns.append(Column(f"least_sigma_{law}", (), np.float64(low), "W/(m^2 K)", text))
-        computed, exact = {column.name: column for column in along}, self.judgement.exact
-        for name, values in (exact(trajectory) if exact else {}).items():
+        computed, accuracy = {column.name: column for column in along}, self.accuracy or Accuracy(np.nan, "")
+        for name, values in (accuracy.exact(trajectory) if accuracy.exact else {}).items():
             c = computed[name]
             columns.append(Column(f"{name}_exact", c.dimensions, values, c.unit, f"exact {c.long_name}"))
-        errors = self.accuracy.everywhere if self.accuracy else {}
+        errors = accuracy.everywhere
         known = {DATASET_NAMES.get(name, name): error for name, error in errors.items()}
         columns = [replace(column, error=known.get(column.name)) for column in columns]
         columns += event_columns([trajectory])

@@ -23,7 +23,7 @@ from surfacechem.model.assemble import perturbed
 from surfacechem.model.system import System
 from surfacechem.results import spatial
 from surfacechem.results.accuracy import Accuracy, CellErrors
-from surfacechem.results.error_estimates import accuracy, check_way, exact_outputs, inexact, law_errors, verified
+from surfacechem.results.error_estimates import accuracy, check_way, inexact, law_errors, verified
 from surfacechem.results.event_table import event_times
 from surfacechem.results.solution import Judgement, Solution
 from surfacechem.scene import Scene
@@ -297,7 +297,7 @@ class Simulation:
         if unused and way == "auto":
             found = replace(found, source=f"{found.source}; {unused}")
         notes = spatial.unmet_accuracy(case.scene, (errors or [CellErrors()])[0], found)
-        return Judgement(found, exact_outputs(found, exact, case.scene), notes)
+        return Judgement(found, notes)
 
     def _origin(self, changes: Mapping[str, float]) -> dict[str, Any]:
         """Return the origin of results: texts of the case, changes, and time spent before the run."""

@@ -279,9 +279,9 @@ def _against_exact(case: Case, done: SweepSolution, name: str, second: Callable[
     for i in begun:
         run = done.runs[i]
         if exact:
+            reference = match(name, {}, SceneView(case.scene, run))
             if i in (begun[0], begun[-1]):
-                exact_values(name, {}, case.scene, run)
-            reference = match(references.get(name), {}, SceneView(case.scene, run))
+                exact_values(reference, case.scene, run)
             errors[i] = _of_statistics(done.statistics[i], reference)
             for which, values in exact.items():
                 values[i] = getattr(reference, which)

@@ -19,10 +19,11 @@ import numpy as np
 
 from surfacechem.errors import InputError
 from surfacechem.format import Case
+from surfacechem.references.base import SceneView
 from surfacechem.results.accuracy import errors_over_time
 from surfacechem.results.error_estimates import clear_of, computed, difference, event_errors, fewer, floors, sizes
 from surfacechem.results.event_table import event_times
-from surfacechem.results.matching import exact_values
+from surfacechem.results.matching import exact_values, match
 from surfacechem.solve import CALLING_PYTHON, solver
 from surfacechem.solve.contract import Array
 from surfacechem.solve.run import Model, Trajectory
@@ -214,13 +215,14 @@ def establish(subject: Subject, variables: Sequence[str]) -> Truth:
     reference = subject.case.reference
     if reference is None:
         return numerical(subject, variables)
-    trajectory = subject.tight(subject.methods()[0], MIN_RTOL)
+    trajectory, scene = subject.tight(subject.methods()[0], MIN_RTOL), subject.case.scene
     result = trajectory.result
     # A second evaluation at times one rounding earlier gives the effect of rounding on the exact values.
     perturbed = replace(trajectory, result=replace(result, times=result.times * (1 - EPS)))
     try:
+        named = reference.name, reference.options
         exact, moved = (
-            exact_values(reference.name, reference.options, subject.case.scene, run) for run in (trajectory, perturbed)
+            exact_values(match(*named, SceneView(scene, run)), scene, run) for run in (trajectory, perturbed)
         )
     except InputError as error:
         found = numerical(subject, variables)

@@ -12,7 +12,6 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, linprog
 
 import surfacechem
-from surfacechem import references
 from surfacechem.errors import InputError, Place
 from surfacechem.expressions import derivative, exp
 from surfacechem.laws.bonding import EquilibriumBonds
@@ -189,7 +188,7 @@ def test_snap_in_and_pull_off_free_the_energy_that_closed_forms_say(name):
     found = solved(name).dataset
     case = load(name).case
     view = SceneView(case.scene, solved(name).trajectory)
-    off, on = match(references.get(case.reference.name), {}, view).jumps
+    off, on = match(case.reference.name, {}, view).jumps
     assert found.event_released.values == pytest.approx([on.release, off.release], rel=1e-8)
     assert found.g_n_after.values == pytest.approx([on.g_after, off.g_after], rel=1e-7)
 
