@@ -22,7 +22,7 @@ from surfacechem.compile.program import compile_function, compile_program
 from surfacechem.expressions import derivative, magnitude
 from surfacechem.format import names
 from surfacechem.format.plans import Axis, Plan
-from surfacechem.runs.keeping import EXTREMES, SINGLE_COLUMNS, at_end, extreme
+from surfacechem.runs.keeping import EXTREMES, SINGLE_COLUMNS, at_end, extremes
 from surfacechem.tolerances import ULPS
 
 ROOT = Path(__file__).parents[1]
@@ -263,7 +263,7 @@ def test_a_case_is_the_same_as_a_sweep_of_one(name):
     alone |= {"steps": alone["count_steps"], "destroys_entropy": alone["entropy_violations"] != "none"}
     ends = at_end(solution.trajectory)
     for state in simulation.system.rows.keys() - simulation.system.inside:
-        alone |= {f"{state}_{which}": extreme(solution.trajectory, state, which) for which in EXTREMES}
+        alone |= {f"{state}_{which}": extremes(solution.trajectory)[which][state] for which in EXTREMES}
         alone[f"{state}_last"] = ends[state]
     single = tuple(f"_{which}" for which in SINGLE_COLUMNS)
     left = {"entropy_destroyed", *(name for name in one.keys() - alone.keys() if name.endswith(single))}

@@ -78,8 +78,7 @@ def errors_over_time(
     found = {}
     for name, exact in true.items():
         n = min(len(values[name]), len(exact))
-        floor = np.broadcast_to(floors[name], np.shape(exact))
-        found[name] = relative_errors(values[name][:n], np.asarray(exact)[:n], floor[:n])
+        found[name] = relative_errors(values[name][:n], np.asarray(exact)[:n], np.atleast_1d(floors[name])[:n])
     return found
 
 

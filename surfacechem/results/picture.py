@@ -158,9 +158,11 @@ def _bends(trajectory: Trajectory, shown: _Shown) -> list[States]:
     with np.errstate(invalid="ignore"):  # quantities may be infinite
         apart = np.abs(between.outputs - lines)
     allowed, seen = (each[len(each) - apart.shape[1] :] for each in (shown.allowed, shown.seen))
-    missed = np.divide(apart, allowed, out=np.zeros_like(apart), where=seen).max(axis=1, initial=0.0)
+    missed = (apart[:, seen] / allowed[seen]).max(axis=1, initial=0.0)
     rows = np.sort(np.argsort(-missed, kind="stable")[:MOST_REFINED])
     rows = rows[missed[rows] > 1]
+    if not len(rows):
+        return []
     bent, parts = left[rows], np.minimum(np.ceil(missed[rows]), PARTS_REFINED).astype(int)
     # No event lies between two outputs.
     calm = replace(problem, record_steps=False, picture=0.0, max_seconds=None, in_play=(False,) * len(problem.margins))
@@ -168,7 +170,7 @@ def _bends(trajectory: Trajectory, shown: _Shown) -> list[States]:
         replace(calm, y0=y[i], times=np.linspace(*ends, n + 1)[1:-1], segments=np.array(ends), parameters=p[None])
         for i, n, p, ends in zip(bent, parts, parameters[rows], zip(t[bent], t[bent + 1], strict=True), strict=True)
     ]
-    found = solver(trajectory.run.solver).solve_all(problems) if problems else []
+    found = solver(trajectory.run.solver).solve_all(problems)
     return [
         States(each.times, each.outputs, result.ledger_outputs[i] + each.ledger_outputs, segment[[i] * len(each.times)])
         for i, each in zip(bent, found, strict=True)
@@ -233,7 +235,7 @@ def shared_times(runs: Sequence[Trajectory], most: int) -> tuple[float, ...]:
 
 def _event_times(trajectory: Trajectory) -> Array:
     """Return the times of events, in order."""
-    return np.unique([*trajectory.result.events.t, *(jump.t for jump in trajectory.jumps)])
+    return np.array(sorted([*trajectory.result.events.t, *(jump.t for jump in trajectory.jumps)]))
 
 
 def _beside(t: Array, moments: Array) -> Mask:

@@ -186,11 +186,16 @@ def at_end(run: Trajectory) -> dict[str, float]:
     return dict(zip(names, [*result.y, *model.named(rows)[0]], strict=True))
 
 
-def extreme(run: Trajectory, name: str, which: str) -> float:
-    """Return the largest or smallest value of a quantity over outputs and steps of a run, and after its jumps."""
-    seen = np.concatenate([run.everywhere(name), run.leaps.after[name][run.leaps.lasts]])
+def extremes(run: Trajectory) -> dict[str, dict[str, float]]:
+    """Return the largest and smallest value of each quantity over outputs and steps of a run, and after its jumps."""
+    leaps, system = run.leaps, run.model.system
+    names = [*(state.name for state in system.states), *system.output_columns]
+    seen = np.array([np.append(run.everywhere(name), leaps.after[name][leaps.lasts]) for name in names])
     with np.errstate(invalid="ignore"):
-        return float(EXTREMES[which][0].reduce(seen, initial=np.nan))
+        return {
+            which: dict(zip(names, best.reduce(seen, axis=1, initial=np.nan).tolist(), strict=True))
+            for which, (best, _) in EXTREMES.items()
+        }
 
 
 def crossed(before: NDArray[Any], after: NDArray[Any], level: float) -> NDArray[np.bool_]:
@@ -231,7 +236,8 @@ class RunByRun:
         row |= balances_of(run, books) if books else {}
         last = at_end(run) if keep.last else {}
         row |= {f"{name}_last": last[name] for name in keep.last}
-        row |= {f"{name}_{which}": extreme(run, name, which) for which in EXTREMES for name in getattr(keep, which)}
+        found = extremes(run) if keep.max or keep.min else {}
+        row |= {f"{name}_{which}": of[name] for which, of in found.items() for name in getattr(keep, which)}
         reached = len(result.times)
         for name in keep.series:
             row[name] = np.append(run.everywhere(name)[:reached], np.full(times - reached, np.nan))

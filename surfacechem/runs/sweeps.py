@@ -37,7 +37,7 @@ from surfacechem.runs.keeping import (
     balances_of,
     described,
     end_of,
-    extreme,
+    extremes,
     keep_of,
 )
 from surfacechem.runs.sheet import counted
@@ -475,13 +475,11 @@ class SweepSolution(Results):
 
     def _single(self) -> Iterator[Column]:
         """Yield the last, largest and smallest values of each run, which may lie between the shared output times."""
-        ends = [at_end(run) for run in self.runs]
+        found = [{"last": at_end(run), **extremes(run)} for run in self.runs]
         for name, q in quantities(self.system).items():
-            found = {which: [extreme(run, name, which) for run in self.runs] for which in EXTREMES}
-            found["last"] = [end[name] for end in ends]
             for which, words in SINGLE_COLUMNS.items():
                 own = f"{DATASET_NAMES.get(name, name)}_{which}"
-                yield self._of_each(own, found[which], q.unit, f"{q.long_name} {words}")
+                yield self._of_each(own, [run[which][name] for run in found], q.unit, f"{q.long_name} {words}")
 
     def _lifetime(self, columns: Sequence[Column]) -> Column:
         """Return lifetimes over the load, which grows at a constant rate along each run."""

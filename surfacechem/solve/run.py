@@ -284,8 +284,8 @@ class Trajectory:
         sides = [(jump.before.inputs(), jump.after.inputs()) for jump in self.jumps if not jump.stops]
         before, after = np.array(sides).reshape(-1, 2, model.program.n_inputs).swapaxes(0, 1)
         if steps is not None:
-            at = np.isin(steps.t, result.problem.segments[1:-1]) & (steps.t < result.t)
-            at &= ~np.isin(steps.t, [jump.t for jump in self.jumps])
+            at = among(steps.t, result.problem.segments[1:-1]) & (steps.t < result.t)
+            at &= ~among(steps.t, np.array([jump.t for jump in self.jumps]))
             known, segment = (steps.t[at], steps.y[at], steps.ydot[at]), result.segments_at(steps.t[at])
             before = np.concatenate((before, model.inputs(result, *known, segment)))
             after = np.concatenate((after, model.inputs(result, *known, segment + 1)))

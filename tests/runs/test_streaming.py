@@ -23,7 +23,7 @@ from surfacechem.results import store
 from surfacechem.results.store import Layout, StoredArray, opened
 from surfacechem.runs import checking, streaming
 from surfacechem.runs.checking import check
-from surfacechem.runs.keeping import STATUSES, Keep, extreme
+from surfacechem.runs.keeping import STATUSES, Keep, extremes
 from surfacechem.runs.summaries import store_summary
 from surfacechem.solve.run import Run
 
@@ -97,7 +97,7 @@ def test_what_is_kept_of_a_run_is_that_of_the_run_by_itself(name, tmp_path):
         for key in data.data_vars:
             variable, _, which = key.rpartition("_")
             if which in ("max", "min"):
-                assert one[key] == extreme(run, variable, which)
+                assert one[key] == extremes(run)[which][variable]
             if which == "last" and variable in run.model.system.state_columns:
                 assert one[key] == run.result.y[run.model.system.state_columns[variable]]
         events = alone.dataset["event_name"].values if "event_name" in alone.dataset else ()

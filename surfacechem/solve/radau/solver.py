@@ -231,10 +231,12 @@ def _solved(problems: Sequence[Problem]) -> list[Result]:
     y0, parameters, spacing, peaks = (np.array(values, float) for values in zip(*own, strict=True))
     max_steps = np.array([each.max_steps for each in problems])
     most = max(len(each.times) for each in problems)
-    # Pad the outputs with infinite times, which no run reaches.
-    times = shared([np.pad(each.times, (0, most - len(each.times)), constant_values=np.inf) for each in problems])
+    # Outputs are padded with infinite times, which no run reaches.
+    times = np.full((len(problems), most), np.inf)
+    for row, each in zip(times, problems, strict=True):
+        row[: len(each.times)] = each.times
     segments = shared([each.segments for each in problems])
-    batch = batch_of(problems[0], (y0, parameters, spacing, max_steps, peaks, segments, times))
+    batch = batch_of(problems[0], (y0, parameters, spacing, max_steps, peaks, segments, shared(times)))
     stepper.run(batch)
     return [_whole(problem, batch, i) for i, problem in enumerate(problems)]
 
