@@ -119,9 +119,16 @@ def as_dataset(columns: Sequence[Column], attributes: Mapping[str, str | float |
     """Return the xarray Dataset of columns; columns along themselves, time, and those in an attribute are
     coordinates.
     """
+    import pandas
     import xarray
 
-    data = {c.name: (c.dimensions, c.values, c.attributes) for c in columns}
+    def variable(c: Column) -> xarray.Variable:
+        """Return a variable without checks of its array, which import Dask and Pint if installed, for a second."""
+        values = np.asarray(c.values)
+        own = pandas.Index(values, dtype=values.dtype) if c.dimensions == (c.name,) else values
+        return xarray.Variable(c.dimensions, own, c.attributes, fastpath=True)
+
+    data = {c.name: variable(c) for c in columns}
     attributes = dict(attributes)
     said = [*str(attributes.pop(COORDINATES, "")).split(), "time"]
     names = [c.name for c in columns if c.dimensions == (c.name,) or c.name in said]

@@ -343,8 +343,8 @@ class Result:
 def in_order(t: Array, segment: Index) -> Index:
     """Return indices that sort points by segment and by time within it, each time once."""
     order = np.lexsort((t, segment))
-    new = np.ones(len(order), dtype=bool)
-    new[1:] = (np.diff(t[order]) != 0) | (np.diff(segment[order]) != 0)
+    t, segment, new = t[order], segment[order], np.ones(len(order), dtype=bool)
+    new[1:] = (t[1:] != t[:-1]) | (segment[1:] != segment[:-1])
     return order[new]
 
 

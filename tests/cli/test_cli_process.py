@@ -79,6 +79,7 @@ def test_run_imports_only_what_it_needs(tmp_path):
     assert not found & {"numba", "pint", "rich", "scipy.interpolate", "scipy.optimize", "scipy.special", *HEAVY}
     drawn = imported("from surfacechem.cli.main import app; app(['plot', 'sliding-dry.nc'])", tmp_path)
     assert not drawn & {"surfacechem.format", "surfacechem.model", "surfacechem.solve", "symengine"}
+    assert not imported("import surfacechem; surfacechem.run('sliding-dry').dataset", tmp_path) & {"dask.array", "pint"}
 
 
 def test_the_command_line_itself_imports_little(tmp_path):

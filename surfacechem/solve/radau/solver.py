@@ -222,7 +222,7 @@ class Dop853(Radau):
 def _solved(problems: Sequence[Problem]) -> list[Result]:
     """Solve problems of one model and one shape."""
 
-    def shared(rows: Sequence[Array]) -> Array:
+    def shared(rows: Sequence[Array] | Array) -> Array:
         """Return a single row if all problems have the same, else a row for each."""
         alike = all(np.array_equal(values, rows[0]) for values in rows[1:])
         return _contiguous(rows[0])[None] if alike else np.array(rows, dtype=float)
