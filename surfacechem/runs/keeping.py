@@ -192,10 +192,8 @@ def extremes(run: Trajectory) -> dict[str, dict[str, float]]:
     names = [*(state.name for state in system.states), *system.output_columns]
     seen = np.array([np.append(run.everywhere(name), leaps.after[name][leaps.lasts]) for name in names])
     with np.errstate(invalid="ignore"):
-        return {
-            which: dict(zip(names, best.reduce(seen, axis=1, initial=np.nan).tolist(), strict=True))
-            for which, (best, _) in EXTREMES.items()
-        }
+        found = {which: best.reduce(seen, axis=1, initial=np.nan) for which, (best, _) in EXTREMES.items()}
+    return {which: dict(zip(names, values.tolist(), strict=True)) for which, values in found.items()}
 
 
 def crossed(before: NDArray[Any], after: NDArray[Any], level: float) -> NDArray[np.bool_]:

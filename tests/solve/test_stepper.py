@@ -84,26 +84,15 @@ def test_explicit_steps_go_on_implicitly_from_where_a_problem_is_stiff() -> None
     np.testing.assert_allclose(mild.outputs, exothermic_exact(smooth.times), rtol=1e-10)
 
 
-def rates(result) -> np.ndarray:
-    """Rates of the equations at the outputs, whatever stood in their place."""
-    y, parameters = result.outputs, np.tile(result.problem.parameters[0], (len(result.times), 1))
-    rows = np.hstack([result.times[:, None], y, np.full_like(y, np.nan), parameters])
-    put_rates(result.problem.program, rows)
-    return rows[:, 1 + y.shape[1] : 1 + 2 * y.shape[1]]
-
-
 def test_rates_by_their_formula_are_those_of_the_linear_systems(monkeypatch) -> None:
-    result = radau.solve(exothermic_problem(1e-8))
-    program, times, y = result.problem.program, result.times, result.outputs
-    assert program.rates is not None
-    solved = consistent(program, times, y, np.zeros_like(y), result.problem.parameters[0])
-    monkeypatch.delattr("surfacechem.solve.radau.stepper.run")  # nothing is solved
-    np.testing.assert_allclose(rates(result), solved.ydot, rtol=4e-15)
-
-
-def test_output_rates_come_from_the_equations() -> None:
     result = radau.solve(exothermic_problem(1e-10))
-    np.testing.assert_allclose(rates(result)[:, 1], 2.0 * np.exp(-2.0 * result.times), rtol=1e-7)
+    program, times, y, parameters = result.problem.program, result.times, result.outputs, result.problem.parameters[0]
+    solved = consistent(program, times, y, np.zeros_like(y), parameters)
+    rows = np.hstack([times[:, None], y, np.full_like(y, np.nan), np.tile(parameters, (len(times), 1))])
+    monkeypatch.delattr("surfacechem.solve.radau.stepper.run")  # nothing is solved
+    put_rates(program, rows)
+    np.testing.assert_allclose(rows[:, 3:5], solved.ydot, rtol=4e-15)
+    np.testing.assert_allclose(rows[:, 4], 2.0 * np.exp(-2.0 * times), rtol=1e-7)
 
 
 def follower(times) -> Problem:
