@@ -164,15 +164,6 @@ class ArrayRuns:
         line = spectrum.history(system, self.plan.load)
         return compile_function(system.inputs, [line, derivative(line, system.t)])
 
-    @cached_property
-    def modes(self) -> tuple[list[int], Function]:
-        """Columns of the modes that follow from the initial state, and their values there."""
-        system = self.model.system
-        found = {mode.symbol: system.expand(mode.start) for mode in system.modes if mode.start is not None}
-        columns = [j for j, parameter in enumerate(system.parameters) if parameter.symbol in found]
-        starts = [found[system.parameters[j].symbol] for j in columns]
-        return columns, compile_function(system.inputs, starts)
-
     # -- from values to arrays ----------------------------------------------------------------------------------------
 
     def solve(self, values: Mapping[str, Array]) -> tuple[Mask, Columns]:
@@ -211,10 +202,9 @@ class ArrayRuns:
         with np.errstate(invalid="ignore", divide="ignore"):
             for column, state in self.state_columns:
                 y0[:, column] = values[state.path] if state.given is None else np.log(values[state.path])
-        columns, started = self.modes
-        if columns:
-            rows = np.concatenate([np.zeros((count, 1)), y0, np.zeros_like(y0), table[:, 0]], axis=1)
-            table[:, :, columns] = started(rows)[:, None]
+        columns, begun = self.model.starts
+        rows = np.concatenate([np.zeros((count, 1)), y0, np.zeros_like(y0), table[:, 0]], axis=1)
+        table[:, :, columns] = begun(rows)[:, None]
         return table, y0
 
     def _admissible(self, values: Mapping[str, Array], rows: Array) -> Mask:

@@ -36,7 +36,7 @@ from surfacechem.scene import Scene
 from surfacechem.solve.contract import Array
 from surfacechem.solve.equilibria import NO_BALANCE, Equilibria, Point
 from surfacechem.solve.run import values_of
-from surfacechem.solve.segments import start_registers
+from surfacechem.solve.segments import mode_starts, start_registers
 from surfacechem.tolerances import GUARD_EPS, RUN_EPS, TINY
 
 Points = Mapping[str, ArrayLike]
@@ -150,7 +150,6 @@ class Evaluator:
         by = sorted({*self.unknown, *(item.column for item in self.given.values())})
         expressions = [*system.rows.values(), *balances.values(), *(row.expression for row in self.rows)]
         self.slopes = Slopes(system, expressions, by, self.conditions.margins)
-        self.modes = [mode for mode in system.modes if mode.start is not None]
 
     def at(self, points: Points) -> tuple[list[Column], list[Column], list[str]]:
         """Return columns of given quantities, of those that follow and of derivatives, and the reason at each point
@@ -187,8 +186,8 @@ class Evaluator:
             if not item.is_made:
                 item.put(table, x)
         # A point has no history: its modes, contact and sliding, follow from its state.
-        if self.modes:
-            table[:, [self.system.inputs.index(mode.symbol) for mode in self.modes]] = self._start(table)
+        started, begun = self._starts
+        table[:, started] = begun(table)
         return table, {item.quantity.name: item for item in asked}
 
     def _given(self, points: Points) -> tuple[list[Argument], Array]:
@@ -260,9 +259,9 @@ class Evaluator:
         return [items[k] for k in Equilibria(self.system).free(start)] if items else []
 
     @cached_property
-    def _start(self) -> Function:
-        """Modes in which a run would start from a state."""
-        return compile_function(self.system.inputs, [self.system.expand(mode.start) for mode in self.modes])
+    def _starts(self) -> tuple[list[int], Function]:
+        """Columns of the modes in which a run would start from a state, and the function for their values."""
+        return mode_starts(self.system)
 
     def _solved(self, table: Array, rows: Sequence[int], unknown: Sequence[int]) -> tuple[Array, Array, Array]:
         """Solve the balances; return balances and rows at the points, their derivatives, and the margins."""

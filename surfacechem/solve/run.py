@@ -440,6 +440,11 @@ class Model:
         """Search for the times at which prescribed variables pass narrow features."""
         return Passing(self.system)
 
+    @cached_property
+    def starts(self) -> tuple[list[int], Function]:
+        """Columns of the modes that follow from the initial state, and the function for their values."""
+        return pieces.mode_starts(self.system)
+
     def problem(self, run: Run, values: Mapping[str, float], *, passing: bool = True) -> Problem:
         """Return the initial value problem; raise InputError if the initial state is not admissible.
 
@@ -453,8 +458,10 @@ class Model:
             segments, parameters = self.passing.pieces(segments, parameters, fastest, run.max_steps)
         for _ in range(run.closer):
             segments, parameters = pieces.cut(segments, parameters)
-        pieces.start_modes(system, parameters, values)
         y = np.array([state.from_given(values) for state in system.states])
+        columns, begun = self.starts
+        parameters[:, columns] = begun(np.concatenate([[0.0], y, np.zeros_like(y), parameters[0]]))
+        pieces.start_registers(system, parameters, values)
         self._limits.check(y, parameters[0])
         if run.closer % 2:  # where a result depends on the last digits, two runs of the same numbers would agree
             pieces.perturb_histories(system, parameters)

@@ -76,15 +76,14 @@ def perturb_histories(system: System, parameters: Array) -> None:
     parameters[:, loads] *= 1 + FEW_EPS * (-1.0) ** np.arange(len(loads))
 
 
-def start_modes(system: System, parameters: Array, values: Mapping[str, float]) -> None:
-    """Set the modes and registers that follow from the initial state."""
-    symbols = [p.symbol for p in system.parameters]
-    if started := [mode for mode in system.modes if mode.start is not None]:
-        initial = {state.symbol: state.from_given(values) for state in system.states}
-        initial |= dict(zip(symbols, parameters[0].tolist(), strict=True)) | {system.t: 0}
-        for mode in started:
-            parameters[:, symbols.index(mode.symbol)] = float(system.expand(mode.start).subs(initial))
-    start_registers(system, parameters, values)
+def mode_starts(system: System) -> tuple[list[int], Function]:
+    """Return the columns of the modes that follow from the initial state, and the function for their values.
+
+    Columns are counted from the end of the arguments of compiled functions, which is that of the parameters.
+    """
+    started = [mode for mode in system.modes if mode.start is not None]
+    columns = [system.inputs.index(mode.symbol) - len(system.inputs) for mode in started]
+    return columns, compile_function(system.inputs, [system.expand(mode.start) for mode in started])
 
 
 def start_registers(system: System, parameters: Array, values: Mapping[str, float]) -> None:
