@@ -12,12 +12,11 @@ import tempfile
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -68,8 +67,7 @@ RUN_SUFFIXES = (*SUFFIXES, *TABLES)
 """Suffixes of files to which a run can be written."""
 
 
-@dataclass(frozen=True)
-class Column:
+class Column(NamedTuple):
     """A variable of the dataset."""
 
     name: str

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -146,11 +146,11 @@ class Solution(Results):
             columns.append(Column(f"{name}_exact", c.dimensions, values, c.unit, f"exact {c.long_name}"))
         errors = accuracy.everywhere
         known = {DATASET_NAMES.get(name, name): error for name, error in errors.items()}
-        columns = [replace(c, error=known[c.name]) if c.name in known else c for c in columns]
+        columns = [column._replace(error=known.get(column.name)) for column in columns]
         columns += event_columns([trajectory])
         if not trajectory.model.system.whole:
             return tuple(columns)
-        named = (replace(column, unit=trajectory.model.system.unit(column.unit)) for column in columns)
+        named = (column._replace(unit=trajectory.model.system.unit(column.unit)) for column in columns)
         return (*named, *self._surface_columns[0])
 
     @cached_property

@@ -493,7 +493,7 @@ class SweepSolution(Results):
     def _coordinates(self, load: Column | None) -> list[Column]:
         """Return the swept parameters, and the times or, if a load ends the runs, the values of this load."""
         swept = parameter_columns(self.system, self.plan, self.parameters)
-        columns = [replace(column, values=column.values[:]) for column in swept]
+        columns = [column._replace(values=column.values[:]) for column in swept]
         times = np.array([run.result.problem.times for run in self.runs])
         if self.plan.until is None or not self.plan.load or load is None:
             return [*columns, Column("time", ("time",), times[0], "s", "time since the start")]
