@@ -177,12 +177,19 @@ class EmbeddedScene:
     ) -> None:
         self.case = case
         self.loads = {f"loading.{name}.level": function for name, function in loads.items()}
+        self._asks = False
+        """Whether loads are asked for their values."""
         try:
             scene = coupling.with_heat(coupling.with_reactors(case.scene, reactors), heated)
             scene = coupling.with_loads(scene, {name: float(function(0.0)) for name, function in loads.items()})
             scene = coupling.with_neighbours(scene, neighbours or {})
             system = assemble(scene).with_multipliers()
             _refuse_folds(system)
+            self.places = {parameter.path: j for j, parameter in enumerate(system.parameters)}
+            """Indices of the parameters, by path."""
+            unread = [name for name, path in zip(loads, self.loads, strict=True) if path not in self.places]
+            if unread:
+                raise InputError(f"nothing of the scene reads the load {unread[0]}.")
             self.reactions = system.reactions
             self.model = Model(system)
             self.values = self.model.values()
@@ -194,8 +201,6 @@ class EmbeddedScene:
         self.begin_piece(0.0, DIFFERENCE_STEPS)
         self.moments = InstantEvents(self.model, self.problem, self.evaluation) if self.model.jumper else None
         self._terminal = np.array([margin.terminal for margin in self.model.margins], dtype=bool)
-        self.places = {parameter.path: j for j, parameter in enumerate(system.parameters)}
-        """Indices of the parameters, by path."""
         self.states = tuple(system.states[j].name for j in self.evaluation.free)
         self.beside = [self._beside(scene.interface.engine, *item) for item in (neighbours or {}).items()]
         """The reactors next to the surface."""
@@ -249,8 +254,14 @@ class EmbeddedScene:
 
     def put(self, t: float, x: Array) -> bool:
         """Set time, variables and the loads of that time; return whether a consistent state was found."""
-        for path, function in self.loads.items():
-            self.evaluation.parameters[self.places[path]] = float(function(t))
+        if self._asks:
+            raise InputError("a load asks for what follows from the loads. Let it read states only.")
+        self._asks = True
+        try:
+            for path, function in self.loads.items():
+                self.evaluation.parameters[self.places[path]] = float(function(t))
+        finally:
+            self._asks = False
         return self.evaluation.put(t, x[: len(self.states)])
 
     def rates(self, t: float, x: Array) -> Array:
@@ -285,6 +296,8 @@ class EmbeddedScene:
 
     def quantity(self, name: str, t: float, x: Array) -> float:
         """Return a state or a named quantity in SI units."""
+        if name in self.states:  # which a load may read
+            return float(x[self.states.index(name)])
         evaluation, system = self.evaluation, self.model.system
         self.put(t, x)
         found = dict(zip((state.name for state in system.states), evaluation.y, strict=True))

@@ -610,6 +610,21 @@ def test_a_load_that_does_not_change():
         InterfaceReactor(PISTON).load("F_n", None)
 
 
+def test_loads_may_read_states_of_their_own_and_of_one_another():
+    """A conductance between two interfaces; what follows from loads depends on them."""
+    first, second = (InterfaceReactor("dna-adhesive", [f"initial.T_1={T} K"]) for T in (290, 330))
+    first.load("Q_1", lambda _: 100 * (second["T_1"] - first["T_1"]))
+    second.load("Q_1", lambda _: 100 * (first["T_1"] - second["T_1"]))
+    before = first["E_total"] + second["E_total"]
+    ReactorNet([first, second]).advance(1.0)
+    assert first["E_total"] + second["E_total"] == pytest.approx(before, rel=1e-12)
+    assert 0 < second["T_1"] - first["T_1"] < 40
+    looped = InterfaceReactor("dna-adhesive")
+    looped.load("Q_1", lambda _: looped["q_1"])
+    with pytest.raises(InputError, match="a load asks for what follows from the loads"):
+        ReactorNet([looped]).advance(1.0)
+
+
 def test_a_load_is_given_once():
     pressed, loaded = (InterfaceReactor(PISTON) for _ in range(2))
     gas, outside = stirred(300.0), stirred(300.0)
@@ -659,6 +674,7 @@ def test_what_a_gas_loses_on_a_piston_is_work_on_the_interface_and_outside():
         ("w_n", lambda t: t, "Its rate takes part; prescribe its history under `loading`"),
         ("F_m", lambda t: t, "'F_m' is no load that a network can give. Did you mean 'F_n'"),
         ("F_m", 1.0, "'F_m' is no load that a network can give. Did you mean 'F_n'"),
+        ("F_t2", 1.0, "nothing of the scene reads the load F_t2"),
     ],
 )
 def test_what_is_no_load_of_a_network_is_refused(name, load, message):
