@@ -42,6 +42,9 @@ ELEMENTARY_CHARGE = float(ELECTRON_VOLT)
 FARADAY = ELEMENTARY_CHARGE * MOLECULAR
 """Charge of a kmol of elementary charges [C/kmol]."""
 
+TRACE = 1e-300
+"""Mole fraction at which a species that a neighbour lacks is counted, as in most models of Cantera: some have none."""
+
 SUM_TOLERANCE = 1e-6
 """Tolerance of the sum of mole fractions, which has to be one."""
 
@@ -188,7 +191,7 @@ class HeldPhase:
             self._parts, self._all[self.species] = parts, parts
             if self.rest is not None:
                 self._all[self.rest] = max(1.0 - sum(parts), 0.0)
-        self.phase.TPX = T, pressure, self._all
+        self.phase.TPX = T, pressure, np.maximum(self._all, TRACE)
 
     def limits(self, values: Mapping[str, Expression]) -> Iterator[tuple[str, Expression, str]]:
         """Yield margins of the histories: a name, an expression that must stay positive, and the reason if it fails."""
@@ -232,7 +235,7 @@ def missing_species(surface: Any) -> tuple[str, ...]:
         for phase in surface.adjacent.values()
         for item in zip(phase.species_names, phase.X, indices(surface, phase), strict=True)
     )
-    found = [name for name, part, index in there if part == 0 and made[index] > 0]
+    found = [name for name, part, index in there if part <= TRACE and made[index] > 0]
     names = ", ".join(found[:6]) + (f" and {len(found) - 6} more" if len(found) > 6 else "")
     text = (
         f"the neighbours hold no {names}, which reactions make: what they release is diluted without end, and its "

@@ -655,6 +655,14 @@ def test_a_surface_comes_to_rest_whose_sites_drift_over_years(tmp_path):
     assert float(solution.dataset["production_CO2"][-1]) == pytest.approx(rest.rates["production_CO2"], rel=1e-7)
 
 
+def test_a_tabulated_solution_may_lack_a_species():
+    """The table's entropy is no number there: it counts as the trace that other models make of it."""
+    composition = 'interface.mechanism.neighbours.anode={composition: {"Li[anode]": 0}, rest: "V[anode]"}'
+    solution = surfacechem.load("lithium-charging", [composition]).run(error="balances")
+    assert solution.status == "finished"
+    assert np.isfinite(solution.dataset["R_R1"]).all()
+
+
 def test_a_rate_beyond_all_numbers_is_named(tmp_path):
     """It was said of algebraic variables, of which there are none."""
     solution = surfacechem.run(small(tmp_path, {CONSTANT: CONSTANT.replace("Ea: 5", "Ea: -5000")}))

@@ -319,6 +319,15 @@ def graphite(x=0.5, **options):
     return phase, ReactingSolid(phase, **options)
 
 
+@pytest.mark.parametrize(("volts", "rest"), [(-2.0, (0, 1)), (-3.6, (1, 0))])
+def test_a_particle_is_used_up(volts, rest):
+    """The tabulated thermo of graphite is no number where one of its species is missing."""
+    _, solid = graphite(mass="1 mg")
+    cell = InterfaceReactor(ELECTRODE.replace("-3.2 V", f"{volts} V"), neighbours={"anode": solid})
+    network(solid, cell).advance(10.0)
+    np.testing.assert_allclose(solid.x, rest, atol=1e-12)
+
+
 def test_particles_of_one_phase_have_each_their_own():
     phase, large = graphite(0.1, mass="20 g")
     small = ReactingSolid(phase, mass=0.002)
