@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -72,9 +72,8 @@ def _looked(model: Model, run: Run, values: Mapping[str, float], end: float) -> 
     return model.solve_values(replace(run, times=(0.0, end), picture=LINE_ERROR, accuracy=None), values)
 
 
-def all_to_rest(model: Model, run: Run, points: Iterable[Mapping[str, float]]) -> list[Run]:
-    """Return the runs with these values, all with the end time of the last one to reach its steady state."""
-    found = [to_rest(model, run, values) for values in points]
+def together(found: Sequence[Run]) -> list[Run]:
+    """Return these runs, all with the end time of the last one to reach its steady state."""
     last = max(each.times[-1] for each in found)
     return [replace(each, times=_until(each, last)) for each in found]
 

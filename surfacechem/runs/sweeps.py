@@ -93,9 +93,16 @@ def solve(
     run = model.chosen(run, values[0])
     runs = settings(model.system, plan, following(model, plan, run, changes, threads), values)
     if run.steady:
-        from surfacechem.runs.at_rest import all_to_rest
+        from surfacechem.runs.at_rest import refuse_histories, to_rest, together
 
-        runs = all_to_rest(model, runs[0], values)
+        refuse_histories(model.system)
+        found = []
+        for at, point in zip(values, plan.points, strict=True):
+            try:
+                found.append(to_rest(model, runs[0], at))
+            except InputError as error:
+                raise _of_run(point, error) from None
+        runs = together(found)
     pairs = list(zip(runs, values, strict=True))
     done: list[Trajectory] = []
     for start in range(0, len(pairs), RUNS_AT_A_TIME):
@@ -141,7 +148,7 @@ def _with_values(
 def _of_run(point: Mapping[str, float], error: InputError, path: str = "") -> InputError:
     """Return the error with the swept values of its run."""
     given = ", ".join(f"{path} = {value:g}" for path, value in point.items())
-    more = f"This is the run with {given}; a store, -o NAME.zarr, counts such runs as refused and goes on."
+    more = f"This is the run with {given}; a store, -o NAME.zarr, marks such runs and goes on."
     return InputError(f"{error.message} {more}", error.place, path=path)
 
 

@@ -61,6 +61,14 @@ def test_runs_of_a_sweep_end_where_the_last_is_at_rest():
     assert float(data["time"][-1]) == data["event_time"].values.max()
 
 
+def test_a_sweep_says_which_run_comes_to_no_rest():
+    simulation = surfacechem.load("reservoir-exchange", [*STEADY, "run.rtol=1e-6", "run.atol=1e-7"])
+    with pytest.raises(
+        InputError, match=r"run\.until: .*steady state within 1e.* with bodies\.body\.C = 1e\+13; a store"
+    ):
+        simulation.sweep({"bodies.body.C": [1e3, 1e13]})
+
+
 def test_runs_of_a_store_end_where_each_is_at_rest(tmp_path):
     """And those that come to none fail, whatever is beside them."""
     path = "interface.bonding.linear-affinity.c_r"
