@@ -226,7 +226,8 @@ class Source:
             )
         surfaces = surfaces or list(phases)
         if name is None and len(surfaces) > 1:
-            raise InputError(f"the mechanism has several phases, name one.{suggestion('', surfaces)}", place)
+            several = "the mechanism has several phases, name one: `phase` in a case, `--phase` of the command."
+            raise InputError(f"{several}{suggestion('', surfaces)}", place)
         name = surfaces[0] if name is None else name
         refuse_unknown([name], phases, f"{self.file} has no phase '{{}}'", place)
         return phases[name]

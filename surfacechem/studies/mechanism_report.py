@@ -95,7 +95,7 @@ def mechanism_sheet(curves: Curves, temperatures: Span, forces: Span) -> str:
         if curves.loaded
         else [],
         "Rate types": types,
-        "Remarks": list(remarks(curves)),
+        "Remarks": list(remarks(curves, temperatures)),
     }
     head = f"phase {curves.mechanism.phase}, {curves.site_density:.6g} sites/m^2"
     parts = ["\n  ".join([heading, *lines]) for heading, lines in sections.items() if lines]
@@ -173,9 +173,12 @@ def power_of_ten(logarithm: float) -> str:
     return f"{math.exp(logarithm - exponent * math.log(10)):.3g}e{exponent:+03d}"
 
 
-def remarks(curves: Curves) -> Iterator[str]:
-    """Yield peculiarities of a mechanism that are not errors."""
+def remarks(curves: Curves, temperatures: Span) -> Iterator[str]:
+    """Yield peculiarities of a mechanism, and of what is shown of it, that are not errors."""
     yield from curves.mechanism.remarks
+    low, high = curves.mechanism.temperatures
+    if not low <= temperatures.low <= temperatures.high <= high:
+        yield f"The thermo holds from {low:g} to {high:g} K: what is outside is an extrapolation."
     idle = set(curves.mechanism.species.values())
     around = [name for name, item in curves.species.items() if item.interactions]
     if around:

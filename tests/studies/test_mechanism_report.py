@@ -2,6 +2,7 @@
 
 import math
 import re
+from pathlib import Path
 
 import cantera as ct
 import numpy as np
@@ -174,7 +175,7 @@ def test_the_figure_shows_every_reaction_once(call, tmp_path):
             ("KOH",),
             "no phase that is a surface (ideal-surface or coverage-dependent-surface), only KOH_plasma, K_solid",
         ),
-        (("sofc",), "several phases, name one. Known: metal_surface, oxide_surface."),
+        (("sofc",), "name one: `phase` in a case, `--phase` of the command. Known: metal_surface, oxide_surface."),
         (("selectin", "--phase", "contatc"), "has no phase 'contatc'. Did you mean 'contact'?"),
         (("selectin", "-T", "360..280 K"), "--temperature: '360..280 K' is no range upwards"),
         (("selectin", "-T", "0 K"), "--temperature: '0 K' is no range upwards"),
@@ -205,13 +206,20 @@ def test_numbers_of_any_size_are_shown(exponent, text):
     assert power_of_ten(exponent).endswith(text)
 
 
+@pytest.mark.parametrize(("temperatures", "told"), [((299, 400), True), ((300, 3000), False), ((400, 3001), True)])
+def test_temperatures_beyond_the_thermo_are_remarked(temperatures, told):
+    curves = Curves(load_mechanism(Path("co-platinum.yaml"), evaluate=True))
+    found = any("holds from 300 to 3000 K" in text for text in remarks(curves, Span(*temperatures)))
+    assert found is told
+
+
 def test_what_is_odd_is_remarked(tmp_path):
     text = load("dna-film.yaml").text.replace("A(s) + B(s) <=> AB(s)", "2 A(s) => AB(s)")
     (tmp_path / "odd.yaml").write_text(
         text.replace("  rate-constant: {A: 5.13e8 m^2/mol/s", "  orders: {A(s): 0}\n  rate-constant: {A: 1 mol/m^2/s")
     )
     curves = Curves(load_mechanism(tmp_path / "odd.yaml"))
-    first, second = remarks(curves)
+    first, second = remarks(curves, Span(280, 360))
     assert "goes on where nothing is left to react" in first
     assert second == "B(s) takes part in no reaction: its coverage stays as it is."
     assert verdict(curves, "R1", T, F).startswith("runs one way only")
