@@ -308,6 +308,8 @@ class SurfaceEngine:
         open_ones = [i for i, law in enumerate(reactions) if isinstance(law, NeighbourReaction)]
         energies = [f"{reactions[i].path}.{name}" for name in ("enthalpy", "gibbs") for i in open_ones]
         self.gives = (*(f"{reactions[i].path}.value" for i in self.positions), *energies)
+        # Motz and Wise's correction reverses a rate above a sticking coefficient of two, where it has no meaning.
+        self._corrected = any(getattr(item.rate, "motz_wise_correction", False) for item in surface.reactions())
         # Rates may depend on a neighbour by an order, without a reaction that takes from it.
         beside = surface.adjacent.items() if len(self.positions) else ()
         self.held = [HeldPhase(phase, neighbours.get(name, Neighbour())) for name, phase in beside]
@@ -404,6 +406,8 @@ class SurfaceEngine:
                 except RuntimeError:  # a CanteraError
                     self.surface.set_unnormalized_coverages(np.maximum(values[2:end], 0.0))
                 rates = self.surface.net_rates_of_progress.take(self.positions) * MOLECULAR
+                if self._corrected:
+                    rates[self.surface.forward_rate_constants.take(self.positions) < 0] = math.nan
                 found = np.concatenate((rates, self._energies))
             else:
                 found = np.full(len(self.gives), math.nan)

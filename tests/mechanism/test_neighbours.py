@@ -663,7 +663,10 @@ def test_a_tabulated_solution_may_lack_a_species():
     assert np.isfinite(solution.dataset["R_R1"]).all()
 
 
-def test_a_rate_beyond_all_numbers_is_named(tmp_path):
-    """It was said of algebraic variables, of which there are none."""
-    solution = surfacechem.run(small(tmp_path, {CONSTANT: CONSTANT.replace("Ea: 5", "Ea: -5000")}))
+@pytest.mark.parametrize(
+    "rate", [CONSTANT.replace("Ea: 5", "Ea: -5000"), "Motz-Wise: true, sticking-coefficient: {A: 9, b: 0, Ea: 5}"]
+)
+def test_a_rate_beyond_all_numbers_is_named(rate, tmp_path):
+    """It was said of algebraic variables, of which there are none; and a rate whose sign Motz and Wise turn ran on."""
+    solution = surfacechem.run(small(tmp_path, {CONSTANT: rate}))
     assert (solution.status, solution.reason) == ("stopped", "R_R1 is no finite number near t = 0 s")
