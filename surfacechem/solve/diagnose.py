@@ -76,7 +76,8 @@ def termination(
     ends = filter(None, (runaway(system.states, result), beyond_numbers(system, result, inputs, named)))
     if (end := next(ends, None)) is not None:
         return "stopped", f"{end} near {where}"
-    return "failed", f"{REASONS[result.status]} at {where}{_spent(result)}{too_fast(system, result, values)}"
+    cause = too_fast(system, result, values) or swiftest(system.states, result)
+    return "failed", f"{REASONS[result.status]} at {where}{_spent(result)}{cause}"
 
 
 def _unbalanced(system: System, algebraic: Sequence[State], inputs: Array) -> str:
@@ -158,13 +159,11 @@ def runaway(states: Sequence[State], result: Result) -> str | None:
     """Describe the state that changes too fast for time to resolve, if that is why a run could not go on."""
     if result.status not in (Status.STEP_UNDERFLOW, Status.NOT_FINITE, Status.SINGULAR):
         return None
-    scales = np.array([state.scale for state in states])
-    beyond = np.abs(result.y) / scales
+    beyond = np.abs(result.y) / np.array([state.scale for state in states])
     if np.max(beyond) > RUNAWAY:
         j = int(np.argmax(beyond))
         return f"{states[j].name} grows beyond all bounds, to {result.y[j]:.3g} {states[j].quantity.unit}"
-    with np.errstate(over="ignore", invalid="ignore"):
-        speed = np.nan_to_num(np.abs(result.ydot) / (np.abs(result.y) + ATOL_OF_SCALE * scales))
+    speed = _speeds(states, result)
     j = int(np.argmax(speed))
     if not (speed[j] * result.t > 1 / IDLE and _is_faster(result, j)):
         return None
@@ -174,6 +173,22 @@ def runaway(states: Sequence[State], result: Result) -> str | None:
         return f"{names[0]} runs away, faster and faster"
     unit = states[j].quantity.unit
     return f"{states[j].name} runs away: it changes by {result.ydot[j]:.3g} {unit}/s, faster and faster"
+
+
+def swiftest(states: Sequence[State], result: Result) -> str:
+    """The state that changes fastest beside its size, where that makes steps too short, in words; else empty."""
+    if result.status is not Status.STEP_UNDERFLOW:
+        return ""
+    j = int(np.argmax(_speeds(states, result)))
+    unit, value, rate = states[j].quantity.unit, result.y[j], result.ydot[j]
+    return f": {states[j].name} = {value:.3g} {unit}".removesuffix(" 1") + f" changes by {rate:.3g} {unit}/s"
+
+
+def _speeds(states: Sequence[State], result: Result) -> Array:
+    """Rates of the states beside their sizes [1/s]."""
+    scales = np.array([state.scale for state in states])
+    with np.errstate(over="ignore", invalid="ignore"):
+        return np.nan_to_num(np.abs(result.ydot) / (np.abs(result.y) + ATOL_OF_SCALE * scales))
 
 
 def beyond_numbers(system: System, result: Result, inputs: Array, named: Callable[[Array], Array]) -> str | None:

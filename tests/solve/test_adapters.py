@@ -18,7 +18,7 @@ from surfacechem.solve import names, solver
 from surfacechem.solve.adapters import stepping
 from surfacechem.solve.adapters.evaluation import Evaluation
 from surfacechem.solve.contract import Problem, Status
-from surfacechem.solve.diagnose import runaway
+from surfacechem.solve.diagnose import runaway, swiftest
 
 pytestmark = pytest.mark.around
 
@@ -84,9 +84,11 @@ def test_steps_are_counted_while_the_clock_stands(name: str) -> None:
 
 @pytest.mark.parametrize(("row", "start", "reason"), [(DY + 0.5 / Y, 0.0, "phi runs away"), (LAYER, 1.0, "None")])
 def test_only_what_gets_faster_runs_away(row, start, reason):
-    result = steep("cantera", row, start, 2.0)
+    """What is too fast is named all the same."""
+    result, states = steep("cantera", row, start, 2.0), [State(VARIABLES["phi"], 1.0, 1.0)]
     assert result.status is Status.STEP_UNDERFLOW
-    assert str(runaway([State(VARIABLES["phi"], 1.0, 1.0)], result)).startswith(reason)
+    assert str(runaway(states, result)).startswith(reason)
+    assert swiftest(states, result) == f": phi = {result.y[0]:.3g} changes by {result.ydot[0]:.3g} 1/s"
 
 
 @pytest.mark.parametrize("name", names)
