@@ -197,6 +197,11 @@ class Electrode:
     current: Load | None = None
     """Electric current into it from outside [A/m^2]; None if zero."""
 
+    @property
+    def drive(self) -> Quantity:
+        """The current from outside as a quantity."""
+        return Quantity(f"j_{self.phase}", "A/m^2", f"current into {self.title} from outside, per reference area")
+
 
 class Engine(Protocol):
     """External evaluator of some parameters of the scene during a run, as functions of its variables."""
@@ -276,6 +281,11 @@ class Interface:
     """Engine that evaluates the rates that are not formulas."""
     remarks: Sequence[str] = ()
     """Remarks on the source of the laws, for readers of the results."""
+
+    @property
+    def electrodes(self) -> Sequence[Electrode]:
+        """Phases beside it whose potential follows from their charge."""
+        return self.engine.electrodes if self.engine else ()
 
 
 @dataclass(frozen=True)

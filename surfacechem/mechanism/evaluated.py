@@ -306,8 +306,8 @@ class SurfaceEngine:
         self.surface = surface
         self.positions = np.array([i for i, law in enumerate(reactions) if isinstance(law, EvaluatedReaction)])
         open_ones = [i for i, law in enumerate(reactions) if isinstance(law, NeighbourReaction)]
-        energies = [f"{reactions[i].path}.{name}" for name in ("enthalpy", "gibbs") for i in open_ones]
-        self.gives = (*(f"{reactions[i].path}.value" for i in self.positions), *energies)
+        given = ("value", self.positions), ("enthalpy", open_ones), ("gibbs", open_ones)
+        self.gives = tuple(f"{reactions[i].path}.{name}" for name, numbers in given for i in numbers)
         # Motz and Wise's correction reverses a rate above a sticking coefficient of two, where it has no meaning.
         self._corrected = any(getattr(item.rate, "motz_wise_correction", False) for item in surface.reactions())
         # Rates may depend on a neighbour by an order, without a reaction that takes from it.
@@ -325,14 +325,22 @@ class SurfaceEngine:
 
     def beside(self, neighbours: Mapping[str, Neighbour]) -> SurfaceEngine:
         """Return a copy with other states of neighbours; InputError if no reaction has a neighbour of that name."""
-        known = {held.phase.name: held for held in self.held}
+        known = {held.phase.name: held.given for held in self.held}
         refuse_unknown(neighbours, known, f"no reaction of the surface {self.surface.name} has a neighbour '{{}}'")
-        for name, state in neighbours.items():
-            given = known[name].given
-            electric = {key: getattr(given, key) for key in ("electric_potential", "capacitance", "current")}
-            known[name] = HeldPhase(known[name].phase, replace(state, **electric))
+        electric = "electric_potential", "capacitance", "current"
+        kept = {name: {key: getattr(known[name], key) for key in electric} for name in neighbours}
+        return self._holding({name: replace(state, **kept[name]) for name, state in neighbours.items()})
+
+    def driven(self, loads: Mapping[str, Load]) -> SurfaceEngine:
+        """Return a copy with other external currents into electrodes, by their names."""
+        names = {held.phase.name: held.electrode.drive.name for held in self.held if held.electrode}
+        given = {held.phase.name: held.given for held in self.held}
+        return self._holding({x: replace(given[x], current=loads[j]) for x, j in names.items() if j in loads})
+
+    def _holding(self, states: Mapping[str, Neighbour]) -> SurfaceEngine:
+        """Return a copy with other states of some neighbours."""
         made = copy.copy(self)
-        made.held = list(known.values())
+        made.held = [HeldPhase(x.phase, states[x.phase.name]) if x.phase.name in states else x for x in self.held]
         made._lay_out()
         return made
 

@@ -75,21 +75,32 @@ def with_heat(scene: Scene, names: Iterable[str]) -> Scene:
     return replace(scene, loading=loading)
 
 
+def load_units(scene: Scene) -> dict[str, str]:
+    """Return the units of the loads that a network can give, by name: those that act by their present value."""
+    units = {name: VARIABLES[name].unit for name in LOADABLE}
+    currents = {drive.name: drive.unit for drive in (electrode.drive for electrode in scene.interface.electrodes)}
+    return {name: unit for name, unit in units.items() if unit in LOAD_UNITS} | currents
+
+
 def with_loads(scene: Scene, values: Mapping[str, float]) -> Scene:
     """Return the scene with loads whose values are set during a run, in place of those that the case prescribes."""
-    forces = [name for name in LOADABLE if VARIABLES[name].unit in LOAD_UNITS]
+    known, engine = load_units(scene), scene.interface.engine
     for name in values:
-        if name not in forces:
+        if name not in known:
             reason = "" if name not in LOADABLE else " Its rate takes part; prescribe its history under `loading`."
-            raise InputError(f"'{name}' is no load that a network can give.{suggestion(name, forces)}{reason}")
-    return replace(scene, loading={**scene.loading, **{name: Hold(level=value) for name, value in values.items()}})
+            raise InputError(f"'{name}' is no load that a network can give.{suggestion(name, known)}{reason}")
+    given: dict[str, Load] = {name: Hold(level=value) for name, value in values.items()}
+    if isinstance(engine, SurfaceEngine):
+        scene = replace(scene, interface=replace(scene.interface, engine=engine.driven(given)))
+    return replace(scene, loading={**scene.loading, **{name: given[name] for name in given if name in LOADABLE}})
 
 
-def function_of(name: str, load: Callable[[float], float] | float | str) -> Callable[[float], float]:
+def function_of(scene: Scene, name: str, load: Callable[[float], float] | float | str) -> Callable[[float], float]:
     """Return a load as a function of time; InputError unless it is a function, a number or a text with a unit."""
     if callable(load):
         return load
-    level = parse(load, VARIABLES[name].unit, name=name) if name in VARIABLES else 0.0  # reported later
+    unit = load_units(scene).get(name)
+    level = parse(load, unit, name=name) if unit else 0.0  # reported later
     return lambda _: level
 
 

@@ -256,7 +256,8 @@ class InterfaceReactor(StateVectorReactor):
         Parameters
         ----------
         name
-            Any load that acts by its present value: ``p``, ``F_n``, ``F_t``, ``f``, ``Q_1`` and the like.
+            Any load that acts by its present value: ``p``, ``F_n``, ``F_t``, ``f``, ``Q_1`` and the like, and the
+            current into an electrode that holds charge, ``j_electron``.
         function
             Its value in SI at a time [s]; or a number in SI or a text with a unit, at all times.
 
@@ -265,7 +266,7 @@ class InterfaceReactor(StateVectorReactor):
         InputError
             For any other name or a load given already, or after the network has run.
         """
-        given = function_of(name, function)
+        given = function_of(self.scene.case.scene, name, function)
         self._take_up(self._loaded(name, given))
         self.loads[name] = given
 

@@ -176,7 +176,7 @@ def runaway(states: Sequence[State], result: Result) -> str | None:
 
 
 def swiftest(states: Sequence[State], result: Result) -> str:
-    """The state that changes fastest beside its size, where that makes steps too short, in words; else empty."""
+    """Describe the state with the fastest relative change if the step size underflowed; otherwise empty."""
     if result.status is not Status.STEP_UNDERFLOW:
         return ""
     j = int(np.argmax(_speeds(states, result)))
@@ -185,7 +185,7 @@ def swiftest(states: Sequence[State], result: Result) -> str:
 
 
 def _speeds(states: Sequence[State], result: Result) -> Array:
-    """Rates of the states beside their sizes [1/s]."""
+    """Return the relative rates of change of the states [1/s]."""
     scales = np.array([state.scale for state in states])
     with np.errstate(over="ignore", invalid="ignore"):
         return np.nan_to_num(np.abs(result.ydot) / (np.abs(result.y) + ATOL_OF_SCALE * scales))

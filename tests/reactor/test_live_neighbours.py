@@ -328,6 +328,43 @@ def test_a_particle_is_used_up(volts, rest):
     np.testing.assert_allclose(solid.x, rest, atol=1e-12)
 
 
+def test_two_electrodes_of_a_cell_discharge_through_a_resistor():
+    """What charge the double layers gain, lithium has brought; at rest they are at one potential."""
+    charged = ELECTRODE.replace("-3.2 V", "-2.9 V, capacitance: 20 uF/cm^2")
+    phases = [ct.Solution("lithium_ion_battery.yaml", name) for name in ("anode", "cathode", "electrolyte")]
+    for phase, parts in zip(phases, ((0.7, 0.3), (0.4, 0.6), (0.48, 0.37, 0.08, 0.07)), strict=True):
+        phase.TPX = 300, ct.one_atm, parts
+    solids = [ReactingSolid(phase, mass="20 mg", name=phase.name) for phase in phases]
+    anode, cathode = (
+        InterfaceReactor(
+            charged.replace("anode", solid.name).replace("-2.9 V", volts),
+            area=area,
+            neighbours={solid.name: solid, "electrolyte": solids[2]},
+        )
+        for solid, volts, area in zip(solids, ("-2.9 V", "1 V"), (1.0, 2.0), strict=False)
+    )
+
+    def current(_):
+        return (cathode["V_electron"] - anode["V_electron"]) / 2.0
+
+    def charge():
+        return sum(0.2 * each.area * each["V_electron"] for each in (anode, cathode))
+
+    anode.load("j_electron", lambda t: current(t) / anode.area)
+    cathode.load("j_electron", lambda t: -current(t) / cathode.area)
+    net = network(anode, cathode, *solids)
+    before, lithium = charge(), [solid.amounts[k] for solid, k in zip(solids, (0, 0, 2), strict=True)]
+    net.advance(1.0)
+    assert anode["i_electron"] == pytest.approx(-current(1.0), rel=1e-2)
+    dissolved = solids[2].amounts[2] - lithium[2]
+    assert charge() - before == pytest.approx(-dissolved * ct.faraday, rel=1e-7)
+    net.advance(1e3)
+    assert current(1e3) == pytest.approx(0, abs=1e-9)
+    assert solids[0].amounts[0] + solids[1].amounts[0] + solids[2].amounts[2] == pytest.approx(sum(lithium), rel=1e-12)
+    with pytest.raises(InputError, match="1 A is an electric current; j_electron needs"):
+        InterfaceReactor(charged).load("j_electron", "1 A")
+
+
 def test_particles_of_one_phase_have_each_their_own():
     phase, large = graphite(0.1, mass="20 g")
     small = ReactingSolid(phase, mass=0.002)

@@ -29,7 +29,7 @@ THERMAL_VOLTAGE = 0.025
 
 def variables(build: Build) -> Iterator[State]:
     """Yield the potentials as states."""
-    for electrode in _electrodes(build):
+    for electrode in build.interface.electrodes:
         V = electrode.potential
         build.variables.define(V.name, symengine.Symbol(V.name), "evolved", _path(electrode))
         yield State(V, electrode.start, THERMAL_VOLTAGE)
@@ -37,15 +37,14 @@ def variables(build: Build) -> Iterator[State]:
 
 def laws(build: Build) -> Iterator[Power]:
     """Set the charging of capacitances by currents; yield the work of the charge."""
-    for electrode in _electrodes(build):
+    for electrode in build.interface.electrodes:
         name, title, V = electrode.phase, electrode.title, symengine.Symbol(electrode.potential.name)
         spec = Spec("F/m^2", "capacitance", above=0)
         c = build.constant(f"c_{name}", f"{_path(electrode)}.capacitance", spec, electrode.capacitance)
         made = f"i_{name}"
         current = symengine.Symbol(made) if build.is_named(made) else symengine.Integer(0)
         if electrode.current is not None:
-            quantity = Quantity(f"j_{name}", "A/m^2", f"current into {title} from outside, per reference area")
-            current = current + build.prescribe(quantity, electrode.current)
+            current = current + build.prescribe(electrode.drive, electrode.current)
         if current == 0:
             message = f"no reaction brings charge to {title}, and no `current` does, so its potential stays as it is."
             raise InputError(f"{message} Remove `capacitance`.", path=_path(electrode))
@@ -54,11 +53,6 @@ def laws(build: Build) -> Iterator[Power]:
         build.store(Quantity(f"E_{name}", "J/m^2", f"energy of the charge of {title}"), energy)
         work = balances.power(energy, V, rate)
         yield Power(WORK, OUTSIDE, ELECTRODE, work, f"W_{name}", f"work of the charge that enters {title}")
-
-
-def _electrodes(build: Build) -> tuple[Electrode, ...]:
-    engine = build.interface.engine
-    return tuple(engine.electrodes) if engine else ()
 
 
 def _path(electrode: Electrode) -> str:
