@@ -177,7 +177,9 @@ def paths(ctx: typer.Context, incomplete: str) -> list[str]:
     from surfacechem.runs.simulation import load
 
     with suppress(SurfacechemError):
-        return [f"{path}=" for path in load(ctx.params["case"]).model.values() if path.startswith(incomplete)]
+        # The option that is being completed has no value, so that nothing on the line has been told apart yet.
+        values = [path for case in ctx.args[:1] for path in load(case).model.values()]
+        return [f"{path}=" for path in values if path.startswith(incomplete)]
     return []
 
 

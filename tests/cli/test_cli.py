@@ -5,7 +5,6 @@ import json
 import re
 import signal
 from importlib.metadata import version
-from types import SimpleNamespace
 
 import netCDF4
 import numpy as np
@@ -308,13 +307,19 @@ def test_a_case_of_ones_own_begins_with_a_shipped_one(call, tmp_path):
     assert "a case is YAML: give other.yaml" in call("new", "other.txt").stderr
 
 
-def test_shells_complete_cases_laws_and_paths(call):
+def test_shells_complete_cases_laws_and_paths(call, monkeypatch, capsys):
     assert commands.case_names("stick-slip-r") == ["stick-slip-rebonding"]
     assert commands.case_names("bond") == ["bond-constant-force", "bond-lifetimes", "bonding.yaml"]
     assert commands.law_names("coul") == ["coulomb"]
-    on_the_line = SimpleNamespace(params={"case": "bonding.yaml"})
-    assert commands.paths(on_the_line, "initial.p") == ["initial.phi="]
-    assert commands.paths(SimpleNamespace(params={"case": "nowhere"}), "") == []
+    for line in ("bonding.yaml", "bonding.yaml -q", "nowhere", ""):
+        words = f"surfacechem run {line} --set initial.p".split()
+        monkeypatch.setenv("COMP_WORDS", " ".join(words))
+        monkeypatch.setenv("COMP_CWORD", str(len(words) - 1))
+        monkeypatch.setenv("_SURFACECHEM_COMPLETE", "complete_bash")
+        with pytest.raises(SystemExit):
+            app(prog_name="surfacechem")
+        assert capsys.readouterr().out.strip() == ("initial.phi=" if "bonding" in line else "")
+    monkeypatch.delenv("_SURFACECHEM_COMPLETE")
     listed = re.findall(r"^  (\w+)", call("--help").stdout.partition("Commands:")[2], re.MULTILINE)
     assert listed[: len(commands.ORDER)] == list(commands.ORDER)
 
