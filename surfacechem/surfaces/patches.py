@@ -382,7 +382,8 @@ def _expected(met: Sequence[tuple[float, float]], rtol: float) -> float:
     points, error = met[-1]
     fewer, before = next(item for item in met[::-1] if item[0] <= points / JUDGED_PART or item is met[0])
     gain, more = math.log(max(before / error, 1.0)), math.log(points / fewer) if points > fewer else 1.0
-    return points * (error / rtol) ** (more / gain) if gain > NEGLIGIBLE else points
+    falls = more / gain * math.log(error / rtol) if gain > NEGLIGIBLE else 0.0
+    return points * math.exp(min(falls, math.log(MOST_POINTS)))
 
 
 def _start(rules: Rules, patches: Patches, level: Levels, inside: Levels, nested: bool) -> PatchResults:

@@ -7,6 +7,7 @@ import pytest
 from scipy.integrate import quad
 
 from surfacechem.laws.contact import Penalty
+from surfacechem.surfaces import patches
 from surfacechem.surfaces.curved_gap import density, level_approaches, over_gap
 from surfacechem.surfaces.nearest_places import near_places
 from surfacechem.surfaces.pair_laws import LennardJonesPair
@@ -147,3 +148,9 @@ def test_the_least_gap_of_plates_through_each_other_is_not_that_beyond_an_edge(s
     lower, upper = Surface(plate()), Surface(plate(), True, draw.uniform(0, 1.5))
     at = np.stack(np.meshgrid(*(np.linspace(*ends, 161) for ends in lower.shape.span), indexing="ij"), axis=-1)
     assert near_places(lower, upper, 4.0, (False, False)).gap[0] <= upper.nearest(lower.derivatives(at, 3)[0]).gap.min()
+
+
+@pytest.mark.parametrize("error", [1.0, 1.0 - 1e-2, 0.1])
+def test_an_error_that_hardly_falls_is_beyond_every_budget(error):
+    expected = patches._expected([(1e6, 1.0), (1e7, error)], 1e-9)
+    assert (expected <= 1e7) if error == 1 else (expected > patches.MOST_POINTS)
