@@ -118,6 +118,8 @@ class Edge:
     """True if nothing happens to the interface: a stage of the loading ends."""
     strict: bool = False
     """True if the guard has to become negative, not only touch zero."""
+    rests: bool = False
+    """True if the guard is a rate, for which a stay at zero counts as crossing."""
     measure: str = ""
     """The state that its guard measures, if edges in other modes measure the same state."""
     times: tuple[float, ...] = ()

@@ -123,7 +123,7 @@ class EdgeTables:
     each reset; zero if not compiled yet.
     """
     edges: Index
-    """A row (measured state, taker of the heat, refuses, index among the rebounding edges) for each edge."""
+    """A row (measured state, taker of the heat, refuses, index among the rebounding edges, rests) for each edge."""
     when: Index
     """Rows (guard, parameter, value): a guard is active where each of its parameters has one of its values."""
     held: Index

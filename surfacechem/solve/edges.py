@@ -20,6 +20,7 @@ from surfacechem.solve.radau.stepper import (
     PRODUCED,
     REFUSES,
     RELEASED,
+    RESTS,
     RETURNS,
     TAKER,
     WORK,
@@ -104,7 +105,8 @@ def _closing(w: Any, m: int) -> int:
     value, size, small = w.margin_probe[m], w.magnitude[m], GUARD_EPS * w.magnitude[m]
     if w.playing[m] == 0 or value > small:
         return OPEN
-    if value < -max(min(DRIFT * w.rtol, MOST_DRIFT) * size, small):
+    rests = w.edges[m - w.n_margins + w.edges.shape[0], RESTS] == 1
+    if rests or value < -max(min(DRIFT * w.rtol, MOST_DRIFT) * size, small):
         return CLOSED
     return NEAR if w.kinds[m, 3] == 0 else OPEN
 

@@ -93,6 +93,7 @@ class Instant:
         self.start, self.end = float(problem.segments[0]), float(problem.segments[-1])
         """Start and end of the run [s], the scale for brief times."""
         self.strict = np.array([kind.strict for kind in problem.margins], dtype=bool)
+        self.rests = np.array([edge.rests for edge in system.edges], dtype=bool)
         self.terminal = np.array([kind.terminal for kind in problem.margins], dtype=bool)
         self.scales = velocity_scales(system)
         self.peaks = self.scales.copy()
@@ -216,7 +217,7 @@ class Instant:
     def _due(self, now: Array, playing: Mask, sizes: Array, point: Point) -> int | None:
         """Return the edge whose guard is below zero by more than the integration's drift, or is zero and closing."""
         small = GUARD_EPS * sizes
-        closed = playing & (now < -np.maximum(drift_of(self.rtol) * sizes, small))
+        closed = playing & ((self.rests & (now <= small)) | (now < -np.maximum(drift_of(self.rtol) * sizes, small)))
         near = playing & ~closed & (now <= small) & ~self.strict[self.first :]
         if near.any():
             near &= self.jumper.guard_rates(self.consistent(point).inputs()) < 0

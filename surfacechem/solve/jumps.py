@@ -144,9 +144,11 @@ class Jumper:
         """Running error bounds of limits and guards, as functions of inputs and peaks of the states; one a model."""
         system = self.system
         peaks = {state.symbol: symengine.Symbol(f"peak of {state.name}") for state in system.states}
+        # A rate is known to the roundoff of its state, divided by the time that has passed.
+        peaks |= {state.dot: peaks[state.symbol] / system.t for state in system.states}
         guards = [m.expression for m in system.moving_margins] + [edge.guard for edge in system.edges]
         bounds = [magnitude(system.expand(guard), peaks) for guard in guards]
-        return compile_function([*system.inputs, *peaks.values()], bounds)
+        return compile_function([*system.inputs, *(peaks[state.symbol] for state in system.states)], bounds)
 
     @cached_property
     def times_of_return(self) -> Function:
@@ -255,7 +257,7 @@ class Jumper:
         return EdgeTables(
             sizes=integers(sizes, 3),
             code=integers([(f.address, f.user) if f else (0, 0) for f in functions], -1, 2),
-            edges=integers([self._row(edge) for edge in system.edges], -1, 4),
+            edges=integers([self._row(edge) for edge in system.edges], -1, 5),
             when=integers(system.rules, -1, 3),
             held=integers(self.mode_columns, -1),
             clocks=integers([*starts, *system.origins], -1),
@@ -264,7 +266,7 @@ class Jumper:
             least_peaks=velocity_scales(system),
         )
 
-    def _row(self, edge: Edge) -> tuple[int, int, bool, int]:
+    def _row(self, edge: Edge) -> tuple[int, int, bool, int, bool]:
         """Return a row of the table of edges."""
         returns = [item for item in self.system.edges if item.returns is not None]
         taker = self._first_maker(edge)
@@ -273,6 +275,7 @@ class Jumper:
             list(self.system.sinks).index(INTERFACE) if taker < 0 else taker,
             edge.violation == "refuse",
             next((k for k, item in enumerate(returns) if item is edge), -1),
+            edge.rests,
         )
 
     def expect_jumps(self) -> bool:

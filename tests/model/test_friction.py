@@ -422,3 +422,42 @@ def test_rounding_of_a_velocity_from_balances_neither_ends_sliding_as_it_begins_
     assert found.accuracy.error < 1e-7
     events = [jump.edge.name for jump in found.trajectory.jumps]
     assert events == ["slip forward", "stop", "slip backward", "stop", "slip forward"]
+
+
+HELD = {"times": [0.0, 3.0, 6.0, 9.0], "values": [0.0, 1e-3, 1e-3, 2e-3]}
+DROP = {
+    "p": {"table": {"times": [0.0, 4.0, 4.0, 9.0], "values": [1e6, 1e6, 5e5, 5e5]}},
+    "w_t": {"table": HELD | {"values": [0.0, 4e-4, 4e-4, 1.4e-3]}},
+}
+"""A load that drops lets it slip, and it rests at once."""
+
+
+@pytest.mark.parametrize(
+    ("changes", "expected"),
+    [
+        ({"p": 1e6}, {"slip forward": [1.5, 6.6], "stop": [3.0]}),
+        ({"p": 1e6, "E_t": 3e9}, {"slip forward": [2.0, 6.8], "stop": [3.0]}),
+        ({"w_n": -1e-6, "E_n": 9e12}, {"slip forward": [1.35, 6.54], "stop": [3.0]}),
+        (DROP, {"slip forward": [4.0, 6.3], "stop": [4.0]}),
+    ],
+)
+def test_what_a_drive_that_rests_has_left_sticks(changes, expected):
+    """Slide, hold, slide: each slide begins at the static limit."""
+    laws = {name: changes[name] for name in ("E_t", "E_n") if name in changes}
+    kinds = {"E_t": "tangential-stiffness", "E_n": "penalty"}
+    case = {
+        "bodies": {"slider": {"temperature": 300}, "base": {"temperature": 300}},
+        "interface": {
+            "potential": [{kinds[name]: {name: value}} for name, value in laws.items()],
+            "friction": [{"coulomb": {"mu": 0.3, "mu_s": 0.5}}],
+        },
+        "mechanics": {"tangential": {"k": 1e9}} | ({"normal": {"k": 1e12}} if "E_n" in laws else {}),
+        "loading": {"w_t": {"table": HELD}} | {name: load for name, load in changes.items() if name not in laws},
+        "run": {"until": 9.0},
+    }
+    run = surfacechem.run(case)
+    names, times = run.dataset.event_name.values, run.dataset.event_time.values
+    assert {name: times[names == name].tolist() for name in np.unique(names) if name != "load"} == {
+        name: pytest.approx(each, rel=1e-12) for name, each in expected.items()
+    }
+    assert run.accuracy.error < 1e-12

@@ -52,13 +52,15 @@ def set_valued(
     end: Mapping[Expression, Expression],
     *,
     equilibrates: bool = False,
+    rests: bool = False,
 ) -> Constraint:
     """Return the edges between stick and slip, in both directions along a line or in any direction of the plane.
 
     By the slip mode that is entered, ``bears`` is the reserve of sticking (limit less need); by the mode that is left,
     ``back`` is the guard of the stop. When slip begins, the registers of its direction become ``aim`` and the states
     ``begin`` are reset. When it stops, the states ``end`` are reset and the modes become ``onward``: it may slip on if
-    sticking cannot bear the pull. If the edge ``equilibrates``, quasi-static gaps find their equilibrium.
+    sticking cannot bear the pull. If the edge ``equilibrates``, quasi-static gaps find their equilibrium. If ``back``
+    is a rate, slip also stops if it ``rests`` at zero.
     """
     edges = []
     for s, guard in bears.items():
@@ -68,7 +70,8 @@ def set_valued(
         edges.append(begins)
     for s, guard in back.items():
         reason = "sliding comes to a stop"
-        edges.append(Edge("stop", guard, reason, onward, end, heat="local", strict=True, when={SLIP: (s,)}))
+        stops = Edge("stop", guard, reason, onward, end, heat="local", strict=True, rests=rests, when={SLIP: (s,)})
+        edges.append(stops)
     return Constraint(edges=tuple(edges))
 
 

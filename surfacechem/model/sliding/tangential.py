@@ -37,7 +37,7 @@ from surfacechem.model.sliding.formulation import (
 from surfacechem.model.sliding.rate_and_state import DRIVE, stands_for_velocity
 from surfacechem.model.system import STABLE_PREFIX, Margin
 from surfacechem.quantities import VARIABLES
-from surfacechem.tolerances import TINY, TRACTION_EPS
+from surfacechem.tolerances import PICOMETRE, TINY, TRACTION_EPS
 
 SLIP_WORDS = {-1.0: "slides backward", 0.0: "sticks", 1.0: "slides forward"}
 
@@ -205,18 +205,20 @@ def _friction(
         slack = TRACTION_EPS * (size + absolute(t_f) + beside)
     limit = _limit(build, kind)
     back = {s: build.expanded(s * still + slack).subs({SLIP: s}) for s in (1, -1)}
-    if not (kind.slides_inertially or kind.rate_dependent):
-        # While the limit is zero and does not grow, both slip directions are equivalent, and slip does not end.
+    follows = not (kind.slides_inertially or kind.rate_dependent)
+    if follows:
+        # While the limit is zero and does not grow, both slip directions are equivalent, and slip does not end, not
+        # even at rest.
         grows = build.total_derivative(limit)
-        back = {s: where(limit > 0, at, where(grows > 0, at, absolute(at))) for s, at in back.items()}
+        back = {s: where(limit > 0, at, where(grows > 0, at, absolute(at) + PICOMETRE)) for s, at in back.items()}
     # Beyond touch a contact law may go on to negative pressure; there slip needs a pull to begin.
     bears = {s: where(limit > 0, limit, 0) - s * needed for s in (1, -1)}
     # Without inertia the traction is at its limit as slip stops, and roundoff must not restart it.
     onward = where(absolute(needed) <= limit, 0, sign(needed)) if stops else ZERO
     breaks, end = breaks_bonds(build), dict.fromkeys(stops, ZERO)
     # Rate-independent slip finds its equilibrium at once; in other cases only lost bonds and their heat require one.
-    equilibrates = bool(breaks) or not (kind.slides_inertially or kind.rate_dependent)
-    return set_valued(bears, back, {}, {SLIP: onward}, breaks, end, equilibrates=equilibrates)
+    equilibrates = bool(breaks) or follows
+    return set_valued(bears, back, {}, {SLIP: onward}, breaks, end, equilibrates=equilibrates, rests=follows)
 
 
 def _limit(build: Build, kind: Formulation) -> Expression:

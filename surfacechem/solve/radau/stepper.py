@@ -89,7 +89,7 @@ END, OUTPUTS, EVENTS, RECORDS, INSIDE, FIRST_COUNTER, STOP, ARCS, JUMPS, COLUMNS
 counters, a flag that is set from outside to end the run, arcs and jumps.
 """
 
-MEASURE, TAKER, REFUSES, RETURNS = range(4)
+MEASURE, TAKER, REFUSES, RETURNS, RESTS = range(5)
 """Columns of the table of edges."""
 
 BONDS, WORK, RELEASED, PRODUCED, HEAT_OUT, ENTROPY_OUT, NOT_BOOKED = range(7)
