@@ -182,15 +182,26 @@ def event_findings(jumps: Sequence[Jump], unit: str = "J/(m^2 K)") -> list[str]:
 
 
 def event_waits(trajectory: Trajectory) -> list[str]:
-    """Describe transitions for which a run that reached its end was still waiting."""
+    """Describe transitions for which a run that reached its end was still waiting, except those that end with it."""
     parameters, last = trajectory.model.system.parameters, trajectory.jumps[-1:]
     findings = []
     for mode in trajectory.model.system.modes:
         j = next(j for j, parameter in enumerate(parameters) if parameter.symbol == mode.symbol)
         value = float(last[0].after.parameters[j]) if last else mode.initial
-        if trajectory.status == "finished" and value in mode.waits:
+        if trajectory.status == "finished" and value in mode.waits and not _ends(trajectory, mode.symbol, value):
             findings.append(f"the {mode.name} {mode.words[value]} did not end: it goes on until {mode.waits[value]}")
     return findings
+
+
+def _ends(trajectory: Trajectory, mode: Any, value: float) -> bool:
+    """True if the stage that a mode has at the end of a run ends with it, within the roundoff of time."""
+    model, result = trajectory.model, trajectory.result
+    edges = [j for j, edge in enumerate(model.system.edges) if edge.passes and edge.when.get(mode) == (value,)]
+    if not edges or model.jumper is None or model.program.margins is None:
+        return False
+    row = model.inputs(result, np.array([result.t]), result.y[None], result.ydot[None], np.array([-1]))
+    left, rates = model.program.margins(row)[0, len(model.margins) :], model.jumper.guard_rates(row)[0]
+    return bool(np.any((left + SIDE * result.t * rates)[edges] <= 0))
 
 
 def event_violations(jumps: Sequence[Jump]) -> list[str]:

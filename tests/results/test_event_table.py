@@ -118,6 +118,12 @@ def test_what_is_known_is_told_once_and_can_be_written(end, message, monkeypatch
     assert not {"slack", "f_m", "gamma_m", "T_from", "M", "E_spring_n"} & set(known)
 
 
+def test_events_that_a_stage_may_wait_for_are_told_once():
+    changes = ["loading.w_t=", "programme=[{pull: {w_t: 1 mm/s, until: sliip}}]"]
+    with pytest.raises(InputError, match=r"Known: slip backward, slip forward, stop\."):
+        surfacechem.load("stick-slip", changes).case.system()
+
+
 def test_rates_are_told_in_a_unit_without_brackets():
     with pytest.raises(InputError, match=r"programme\.press\.w_n: 3 nm is a length; w_n needs a velocity \[m/s\]\."):
         load_text(HEATS.replace("-1 nm/s", "3 nm"))

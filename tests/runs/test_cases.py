@@ -44,6 +44,9 @@ def test_a_stage_that_does_not_end_is_reported():
     assert surfacechem.run("press-hold-pull", changes).warnings == (
         "the stage pull did not end: it goes on until the event 'release'",
     )
+    # The sum 0.1 + 0.2 is above 0.3 by its rounding.
+    changes = ["programme=[{approach: {w_n: -1 nm/s, for: 0.1 s}}, {hold: {for: 0.2 s}}]", "run.until=0.3 s"]
+    assert surfacechem.run("press-hold-pull", changes).warnings == ()
 
 
 def test_only_the_families_of_laws_that_a_case_names_are_imported():

@@ -97,7 +97,7 @@ def stages(build: Build) -> Iterator[Constraint]:
 def _refuse_unknown_event(build: Build, i: int, item: Stage) -> None:
     """Raise InputError unless a stage waits for an edge of the interface, or for the end of an earlier stage."""
     before = [f"end of {stage.name}" for stage in build.scene.programme[:i] if not stage.event]
-    known = [*(edge.name for edge in build.edges), *before]
+    known = {*(edge.name for edge in build.edges), *before}
     if not any(name.startswith(item.event) for name in known):
         message = f"the stage {item.name} waits for '{item.event}'.{suggestion(item.event, known)}"
         raise InputError(message, item.place)
