@@ -148,7 +148,7 @@ def _lasting(trajectory: Trajectory) -> list[EventRow]:
             moments.append([])
         moments[-1].append(jump)
     undone: set[int] = set()
-    for jumps in moments:
+    for jumps in (each for each in moments if len(each) > 1):
         before, after = jumps[0].before, jumps[-1].after
         same = np.abs(after.y - before.y) <= problem.rtol * np.abs(before.y) + problem.atol
         if same.all() and np.array_equal(before.parameters[modes], after.parameters[modes]):
