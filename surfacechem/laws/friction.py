@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 from surfacechem.contracts.terms import Friction, UnderPressure, parameter
-from surfacechem.expressions import Expression, absolute, asinh_exp, decay, exp, log, positive, power, sinh_exp, where
+from surfacechem.expressions import Expression, absolute, asinh_exp, decay, exp, log, power, sinh_exp, where
 from surfacechem.tolerances import TINY
 
 
@@ -75,11 +75,15 @@ class MohrCoulomb(UnderPressure, Friction):
 
     def traction(self, p: Expression, direction: Expression) -> Expression:
         """Tangential traction [Pa]."""
-        return (self.mu * positive(p + self.t_n_max) + self.c) * direction
+        return (self.mu * self._pressed(p) + self.c) * direction
 
     def limit(self, p: Expression) -> Expression:
         """Largest tangential traction [Pa] that sticking bears."""
-        return (self.mu if self.mu_s is None else self.mu_s) * positive(p + self.t_n_max) + self.c
+        return (self.mu if self.mu_s is None else self.mu_s) * self._pressed(p) + self.c
+
+    def _pressed(self, p: Expression) -> Expression:
+        """Pressure beyond the adhesive strength [Pa]; one at zero grows or falls, as a contact begins."""
+        return where(p < -self.t_n_max, 0 * p, p + self.t_n_max)
 
 
 class Stribeck(UnderPressure, Friction):

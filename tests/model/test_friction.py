@@ -386,6 +386,27 @@ def test_friction_that_grows_with_velocity_from_rest_on_slides_as_fast_as_is_pul
     assert found["t_stribeck"][-1] == pytest.approx(1e6 * (0.5 - 0.1 / np.e), rel=1e-6)
 
 
+@pytest.mark.parametrize("friction", ["coulomb", "mohr-coulomb"])
+def test_a_contact_that_lands_while_it_is_pulled_the_other_way_slides_on(friction):
+    """It slid backward as it was let go; a bond still pulls, so that the net pressure is below that of the contact."""
+    found = surfacechem.run(f"""
+bodies: {{a: {{temperature: 300 K}}, b: {{temperature: 300 K}}}}
+interface:
+  temperature: 300 K
+  potential: [exponential-cohesive-zone: {{t_max: 0.1 MPa, g_0: 1 um, E_n: 1 MPa/um, shear: none}}]
+  friction: [{friction}: {{mu: 0.3, pressure: contact}}]
+mechanics: {{normal: {{k: 1 MPa/um, c_g: 1 kPa s/um}}, tangential: {{k: 1 MPa/um}}}}
+loading:
+  w_n: {{table: {{times: [0, 10 ms, 20 ms], values: [-2 um, 2 um, -2 um]}}}}
+  w_t: {{table: {{times: [0, 7 ms, 20 ms], values: [0, -2 um, 3 um]}}}}
+initial: {{g_n: -1 um}}
+run: {{until: 20 ms}}
+""")
+    assert found.status == "finished"
+    assert [jump.edge.name for jump in found.trajectory.jumps][-1] == "slip forward"
+    assert found.accuracy.error < 1e-10
+
+
 def test_a_step_ends_where_no_pressure_is_left():
     """Friction bends there: a contact that pulls as well as it presses does not rub while it pulls."""
     case = """

@@ -15,7 +15,7 @@ import symengine
 
 from surfacechem.contracts.terms import Load, Potential, Spec, UnderPressure
 from surfacechem.errors import InputError, suggestion
-from surfacechem.expressions import Expression, depends, derivative, positive, where
+from surfacechem.expressions import Expression, depends, derivative, where
 from surfacechem.model.automaton import Constraint, Edge, Mode
 from surfacechem.model.balances import INTERFACE
 from surfacechem.model.build import Build
@@ -230,9 +230,12 @@ def _contact_pressure(
     sides = {} if build.mode("side") is None else BY_SIDE
 
     def contact() -> Expression:
-        """Return the sum of the pressures of the potentials, per current area."""
-        pressed = (positive(-derivative(symengine.sympify(F).xreplace(sides), GAP)) for F in borne)
-        return build.name(VARIABLES["p_contact"], symengine.Add(*pressed) / build.stretch)
+        """Return the sum of the pressures of the potentials, per current area.
+
+        At zero its derivative is that of a growing pressure: a contact begins so.
+        """
+        each = (-derivative(symengine.sympify(F).xreplace(sides), GAP) for F in borne)
+        return build.name(VARIABLES["p_contact"], symengine.Add(*(where(p < 0, 0, p) for p in each)) / build.stretch)
 
     build.variables.define("p_contact", contact, "derived", "the repulsive part of the potentials")
 
