@@ -16,6 +16,7 @@ from surfacechem.laws.friction import BondedCoulomb, Coulomb
 from surfacechem.laws.loading import Harmonic, Hold, Ramp
 from surfacechem.model.assemble import assemble
 from surfacechem.scene import Mounting
+from surfacechem.solve.radau.solver import consistent
 
 MU, C, W, B, E_N = 0.3, 1e12, 1.0, 0.01, 1e15
 OVERLAP = 2e-9
@@ -405,6 +406,27 @@ run: {{until: 20 ms}}
     assert found.status == "finished"
     assert [jump.edge.name for jump in found.trajectory.jumps][-1] == "slip forward"
     assert found.accuracy.error < 1e-10
+
+
+def test_an_elastic_slip_is_at_rest_where_the_bodies_have_come_apart():
+    """The bond pulls harder as the gap opens, and no pressure falls with it."""
+    found = surfacechem.run("""
+bodies: {a: {temperature: 300 K}, b: {temperature: 300 K}}
+interface:
+  temperature: 300 K
+  potential:
+    - exponential-cohesive-zone: {t_max: 0.1 MPa, g_0: 1 um, E_n: 1 MPa/um, shear: none}
+    - tangential-stiffness: {E_t: 1 MPa/um}
+  friction: [coulomb: {mu: 0.3}]
+mechanics: {normal: {k: 1 MPa/um}, tangential: {k: 1 MPa/um, m: 1e3 kg/m^2}}
+loading: {w_n: {table: {times: [0, 10 ms], values: [-2 um, 2 um]}}, w_t: {ramp: {rate: 0.3 mm/s}}}
+run: {until: 6 ms}
+""").trajectory
+    model, (*_, release) = found.model, found.jumps
+    assert release.edge.name == "release"
+    after, column = release.after, model.system.state_columns["g_t"]
+    rates = consistent(model.program, np.array([after.t]), after.y[None], 0.0, after.parameters[None]).ydot[0]
+    assert rates[column] == 0
 
 
 def test_a_step_ends_where_no_pressure_is_left():

@@ -20,6 +20,7 @@ from surfacechem.model.components.mounting import ACROSS, ALONG
 from surfacechem.model.sliding.formulation import displacement, in_parallel, resist, resistance, stick_limit
 from surfacechem.model.system import Given, Margin, State
 from surfacechem.quantities import VARIABLES, Quantity
+from surfacechem.tolerances import TINY
 
 
 def laws(build: Build) -> Iterator[Power | State | Margin]:
@@ -69,12 +70,14 @@ def _magnitude(build: Build, tractions: Mapping[str, Expression]) -> Expression:
 def pressed(build: Build, law: Friction) -> dict[str, Expression]:
     """Return the pressure, zero in an open gap, for a law that needs it: an open contact has no friction.
 
-    At p = 0 the derivative is that of the pressed side: a contact starts to press there as the pressure grows.
+    At p = 0 the derivative is that of the pressed side: a contact starts and ends to press there. In an open gap it is
+    zero.
     """
     if "p" not in law.nonnegative or "p" in build.scene.loading:
         return {}
     p, least = build.variables.get("p", law), build.bound(law).least.get("p")
-    return {"p": where(p < 0, 0 * p, p) if least is None else where(p < least, least, p)}
+    apart = 0 if (side := build.mode("side")) is None else where(side > 0, TINY, 0)
+    return {"p": where(p < apart, 0 * p, p) if least is None else where(p < least, least, p)}
 
 
 def memory(build: Build, law: Friction, bound: Friction) -> Iterator[State]:
