@@ -34,7 +34,7 @@ from surfacechem.results.event_table import KINK, SIDE, event_times
 from surfacechem.scene import Scene
 from surfacechem.solve import AUTO
 from surfacechem.solve.choice import method
-from surfacechem.solve.contract import Array, Mask, Problem, States
+from surfacechem.solve.contract import Array, Mask, Problem, States, Status
 from surfacechem.solve.run import Run, Trajectory
 from surfacechem.tolerances import (
     ATOL_OF_SCALE,
@@ -63,6 +63,9 @@ DRIVING_TIMES = 10.0 ** np.arange(-15, 1)
 
 ENERGY_UNIT, ENTROPY_UNIT = "J/m^2", "J/(m^2 K)"
 """Units of accounts that are compared with each other."""
+
+SPENT = (Status.MAX_STEPS, Status.STOPPED)
+"""Outcomes of runs that have used up their steps or their time."""
 
 EVENTS = "event times"
 """Name of the event times among the compared variables."""
@@ -148,7 +151,7 @@ def against_exact(
     from surfacechem.results.matching import exact_values, match
 
     # Exact solutions have no list of events: the times of events are compared with a second run.
-    if late is None and (found := event_times(trajectory)):
+    if late is None and trajectory.result.status not in SPENT and (found := event_times(trajectory)):
         run = trajectory.run
         closer = run.second(second_tolerance(run.rtol), picture=None, looks=0.0)
         expected = event_times(second or trajectory.model.solve_values(closer, trajectory.values))
@@ -213,7 +216,9 @@ def _second(trajectory: Trajectory, known: bool = False) -> Trajectory:
 
 
 def against_tighter(trajectory: Trajectory) -> Accuracy:
-    """Estimate the errors from a second run."""
+    """Estimate the errors from a second run; unknown if the first has used up its budget, as the second would, too."""
+    if trajectory.result.status in SPENT:
+        return unknown(f"the run failed: {trajectory.reason}")
     return estimated(trajectory, _second(trajectory))
 
 
@@ -566,6 +571,8 @@ def verified(first: Trajectory) -> tuple[Trajectory, Accuracy]:
     that of two runs, the second at a hundredth of the tolerance.
     """
     wanted = asked_accuracy(first.run)
+    if first.result.status in SPENT:
+        return first, against_tighter(first)
     while True:
         last = first.run.rtol <= MIN_RTOL  # a tighter run would not be more accurate
         second = _second(first, known=True)

@@ -142,6 +142,13 @@ def test_a_second_run_that_fails_later_than_the_first_did_not_end_earlier():
     assert estimated(first, second).source.startswith("unknown: a second run at rtol 1e-11 failed later")
 
 
+@pytest.mark.parametrize("more", ["accuracy: 1e-6", "rtol: 1e-6"])
+def test_a_run_that_has_used_up_its_budget_is_not_made_again(more, monkeypatch):
+    found = surfacechem.run("stick-slip", [f"run={{until: 3 s, max-steps: 10, {more}}}", "reference="])
+    monkeypatch.setattr(type(found.trajectory.model), "solve_all", None)
+    assert found.accuracy.source.startswith("unknown: the run failed: the number of steps allowed was used up")
+
+
 @pytest.mark.parametrize("strength", [20, 55])
 def test_an_output_at_the_time_of_a_jump_is_compared_on_the_side_on_which_it_lies(strength):
     """The strength is reached at a whole multiple of the spacing of the outputs, but for the last digits."""
