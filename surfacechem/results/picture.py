@@ -53,19 +53,19 @@ def needed_rows(t: Array, values: Array, allowed: Array, kept: Mask) -> Mask:
     kept = kept.copy()
     kept[[0, -1]] = True
     scaled = np.divide(values.T, allowed[:, None], out=np.zeros(values.shape[::-1]), where=allowed[:, None] > 0)
-    ways = t, np.log(np.maximum(t, t[t > 0].min(initial=1.0)))
+    ways = np.array([t, np.log(np.maximum(t, t[t > 0].min(initial=1.0)))])
     rows = np.flatnonzero(~kept)
     while len(rows):
         ends = np.flatnonzero(kept)
-        right = np.searchsorted(ends, rows)
-        left, right = ends[right - 1], ends[right]
-        missed = _missed(ways, scaled, left, rows, right)
-        begins = np.flatnonzero(np.diff(left, prepend=-1))
-        most, counts = np.maximum.reduceat(missed, begins), np.diff(begins, append=len(rows))
+        interval = np.searchsorted(ends, rows)
+        left, right, counts = ends[interval - 1], ends[interval], np.bincount(interval)
+        missed, counts = _missed(ways, scaled, left, rows, right), counts[counts > 0]
+        most = np.repeat(np.maximum.reduceat(missed, np.cumsum(counts) - counts), counts)
         # The worst row of each interval that a line misses; rows in other intervals are done.
-        again = np.repeat(most > 1, counts)
-        worst = np.flatnonzero(again & (missed == np.repeat(most, counts)))
-        kept[rows[worst[np.diff(left[worst], append=len(t)) > 0]]] = True
+        again, last = most > 1, np.zeros(len(ends), np.int64)
+        worst = np.flatnonzero(again & (missed == most))
+        last[interval[worst]] = rows[worst]
+        kept[last] = True
         # In a periodic signal the worst row is next to an end each time; bisection ends sooner.
         middle = (rows == (left + right) // 2) & (right - left > LONG_INTERVAL)
         kept[rows[again & middle]] = True
@@ -73,15 +73,15 @@ def needed_rows(t: Array, values: Array, allowed: Array, kept: Mask) -> Mask:
     return kept
 
 
-def _missed(ways: Sequence[Array], values: Array, left: Index, rows: Index, right: Index) -> Array:
+def _missed(ways: Array, values: Array, left: Index, rows: Index, right: Index) -> Array:
     """Return the larger error of lines over time and over its logarithm, from one row to another, at rows between them;
     ``values`` has shape (quantities, times).
     """
     start, missed = values.take(left, axis=1), np.zeros(len(rows))
     rise, risen = values.take(right, axis=1) - start, values.take(rows, axis=1) - start
-    for over in ways:
-        length = over[right] - over[left]
-        part = np.divide(over[rows] - over[left], length, out=np.zeros_like(length), where=length > 0)
+    begun = ways.take(left, axis=1)
+    length, passed = ways.take(right, axis=1) - begun, ways.take(rows, axis=1) - begun
+    for part in np.divide(passed, length, out=np.zeros_like(length), where=length > 0):
         apart = part * rise
         np.abs(np.subtract(risen, apart, out=apart), out=apart)
         missed = np.fmax(missed, apart.max(axis=0, initial=0.0))
