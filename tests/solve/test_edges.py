@@ -117,9 +117,13 @@ def test_explicit_steps_go_along_edges_too_and_what_has_no_room_is_solved_once_m
     model, run = (simulation := case_runs.load("stick-slip")).model, simulation.case.run
     assert_same(*both(monkeypatch, model, replace(run, solver="dop853")))
     whole = model.solve(run)
-    monkeypatch.setattr(radau, "EVENT_ROWS", 1)
-    monkeypatch.setattr(radau, "STEP_ROWS", 10)
+    monkeypatch.setattr(radau, "ALONE_ROWS", 10)
     assert_same(model.solve(run), whole)
+
+
+def test_a_run_of_many_jumps_has_room_for_them_at_once(monkeypatch):
+    monkeypatch.setattr(radau, "_run_one", lambda problem, *, once=radau._run_one: once(problem))  # none with more room
+    assert len(case_runs.load("bouncing-plate").run().trajectory.jumps) == 79
 
 
 def test_a_run_whose_time_is_up_is_made_again_with_the_steps_that_it_took():

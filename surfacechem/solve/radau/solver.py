@@ -41,9 +41,10 @@ from surfacechem.solve.radau.stepper import (
     Batch,
 )
 
-EVENT_ROWS = 64
-STEP_ROWS = 512
-INSIDE_ROWS = 4096
+STEP_ROWS, EVENT_ROWS, INSIDE_ROWS = 512, 64, 4096
+"""Room for steps, events and states inside steps of each of many runs, whose tables lie far apart in memory."""
+ALONE_ROWS = 1024
+"""Room for the steps, and as many events, of a run that is alone: what it does not write to costs nothing."""
 Room: TypeAlias = tuple[int, int, int, int]
 """Numbers of steps, events, stored states inside steps, and jumps for which a run has memory."""
 CHUNK = 256
@@ -116,9 +117,10 @@ def batch_of(
     """
     program, times = problem.program, runs[-1]
     explicit = tables is None and problem.explicit and program.rates is not None
-    steps, filled = STEP_ROWS if problem.record_steps else 0, INSIDE_ROWS if problem.picture else 0
-    step_rows, event_rows, rows, jump_rows = room or (steps, EVENT_ROWS if problem.margins else 0, filled, EVENT_ROWS)
     n, q, m, count = program.n, program.n_ledger, program.n_margins, len(runs[0])
+    steps, events = (STEP_ROWS, EVENT_ROWS) if count > 1 else (ALONE_ROWS, ALONE_ROWS)
+    usual = steps * problem.record_steps, events * bool(problem.margins), INSIDE_ROWS * bool(problem.picture), events
+    step_rows, event_rows, rows, jump_rows = room or usual
     return Batch(
         *_with_edges(tables or (program.explicit_tables if explicit else program.tables), problem.edges),
         problem.rtol,
