@@ -25,7 +25,7 @@ from surfacechem.reactor import coupling
 from surfacechem.results.solution import Solution
 from surfacechem.solve.adapters.evaluation import Evaluation
 from surfacechem.solve.contract import Array, Counters, Events, Problem, Result, Status
-from surfacechem.solve.diagnose import STALLED
+from surfacechem.solve.diagnose import STALLED, no_number
 from surfacechem.solve.equilibria import Point
 from surfacechem.solve.instant import Instant
 from surfacechem.solve.jumps import Jump
@@ -268,7 +268,8 @@ class EmbeddedScene:
         """Return the time derivatives of the variables; EndError if there are none, or if a limit is passed."""
         evaluation = self.evaluation
         if not self.put(t, x):
-            raise EndError("no state satisfies the equations")
+            odd = no_number(self.model.system, self.model.output_function(evaluation.inputs))
+            raise EndError(odd or "no state satisfies the equations")
         self._refuse_ended(evaluation.margins()[: len(self._terminal)])
         return evaluation.rates()
 

@@ -246,6 +246,7 @@ class InterfaceReactor(StateVectorReactor):
             self.ports[name] = port
             self._take_up(scene)
             self.put(self.start())
+            self._dated = True
         return self.ports[name].reservoir
 
     def load(self, name: str, function: Callable[[float], float] | float | str) -> None:

@@ -191,13 +191,19 @@ def _speeds(states: Sequence[State], result: Result) -> Array:
         return np.nan_to_num(np.abs(result.ydot) / (np.abs(result.y) + ATOL_OF_SCALE * scales))
 
 
+def no_number(system: System, outputs: Array) -> str:
+    """Describe the first of the outputs that is not finite; otherwise empty."""
+    finite = np.isfinite(outputs)
+    return "" if finite.all() else f"{list(system.output_columns)[int(np.argmin(finite))]} is no finite number"
+
+
 def beyond_numbers(system: System, result: Result, inputs: Array, named: Callable[[Array], Array]) -> str | None:
     """Describe the first named quantity that becomes infinite or NaN as the states continue, if that ended the run.
 
     Of several the first in the list is taken, on which the others depend.
     """
-    if result.status is Status.NO_CONSISTENT_STATE and not np.all(number := np.isfinite(named(inputs[None])[0])):
-        return f"{list(system.output_columns)[int(np.argmin(number))]} is no finite number"
+    if result.status is Status.NO_CONSISTENT_STATE and (odd := no_number(system, named(inputs[None])[0])):
+        return odd
     if result.status is not Status.NOT_FINITE or result.steps is None or len(result.steps.t) < 2:
         return None
     n, ahead = len(result.y), np.append(0.0, LOOKS_AHEAD) * np.diff(result.steps.t)[-1]

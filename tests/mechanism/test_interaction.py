@@ -15,7 +15,7 @@ from mechanisms import mechanism_texts, number, states
 from surfacechem.errors import InputError
 from surfacechem.mechanism import load_mechanism
 from surfacechem.studies.mechanism_rates import Curves
-from surfacechem.studies.mechanism_report import remarks
+from surfacechem.studies.mechanism_report import Span, remarks
 
 TEXT = """
 units: {length: m, quantity: mol, activation-energy: kJ/mol}
@@ -191,4 +191,4 @@ def test_the_sheet_shows_constants_without_interactions(case):
     T = np.array([300.0, 340.0])
     without = -(5e3 - 10 * T) / (8.31446261815324 * T)  # dh - T ds from CO(s) to O(s)
     np.testing.assert_allclose(curves.log_equilibrium("R3", T, np.zeros(1)), without, rtol=1e-8)
-    assert any("depends on coverages" in remark for remark in remarks(curves))
+    assert any("depends on coverages" in remark for remark in remarks(curves, Span(300, 340)))

@@ -18,7 +18,7 @@ from surfacechem.documents.shipped import mechanisms
 from surfacechem.errors import InputError
 from surfacechem.laws.loading import Hold
 from surfacechem.mechanism.mixture import word
-from surfacechem.reactor import InterfaceReactor, ReactingGas, ReactorNet
+from surfacechem.reactor import InterfaceReactor, InterfaceStopped, ReactingGas, ReactorNet
 from surfacechem.runs import rerun
 
 pytestmark = pytest.mark.around
@@ -668,5 +668,8 @@ def test_a_tabulated_solution_may_lack_a_species():
 )
 def test_a_rate_beyond_all_numbers_is_named(rate, tmp_path):
     """It was said of algebraic variables, of which there are none; and a rate whose sign Motz and Wise turn ran on."""
-    solution = surfacechem.run(small(tmp_path, {CONSTANT: rate}))
+    case = small(tmp_path, {CONSTANT: rate})
+    solution = surfacechem.run(case)
     assert (solution.status, solution.reason) == ("stopped", "R_R1 is no finite number near t = 0 s")
+    with pytest.raises(InterfaceStopped, match="R_R1 is no finite number at t = 0 s"):
+        ReactorNet([InterfaceReactor(case)]).advance(1e-6)

@@ -118,6 +118,12 @@ def test_an_ordinary_net_tells_no_time():
     assert steady["R_linear_affinity"] > 0
 
 
+def test_the_time_is_known_before_a_network_with_a_wall_runs():
+    interface = InterfaceReactor("stick-slip")
+    interface.body("lower")
+    assert interface["w_t"] == 0.0
+
+
 def test_the_end_of_a_scene_is_found_and_said(capfd):
     solution = surfacechem.run("cooling-to-zero")
     interface, net = network("cooling-to-zero")
