@@ -183,7 +183,7 @@ def _off_events(trajectory: Trajectory, late: float) -> Mask:
     """
     result, end, stopped = trajectory.result, trajectory.run.times[-1], trajectory.status == "stopped"
     moments = np.array(sorted({*(jump.t for jump in trajectory.jumps), *[result.t] * stopped}))
-    brief = BRIEF_PART * np.diff(moments, prepend=0.0, append=max([end, *moments[-1:]]))
+    brief = BRIEF_PART * np.diff([0.0, *moments, max([end, *moments[-1:]])])
     ways = moments - np.maximum(brief[:-1], 2 * late * moments), moments + np.maximum(brief[1:], 2 * late * moments)
     return clear_of(result.times, np.transpose(ways))
 
