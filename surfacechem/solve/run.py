@@ -190,9 +190,12 @@ class Trajectory:
 
     def _blocks(self) -> Iterator[Trajectory]:
         """Yield the trajectory, in blocks of outputs if these are many."""
-        count, rows = len(self.result.times), self.written
-        pieces = (slice(first, first + ROWS_AT_ONCE) for first in range(0, count, ROWS_AT_ONCE))
-        yield from (self.at(rows.picked(piece)) for piece in pieces) if count > ROWS_AT_ONCE else [self]
+        count = len(self.result.times)
+        if count <= ROWS_AT_ONCE:
+            yield self
+        else:
+            rows, firsts = self.written, range(0, count, ROWS_AT_ONCE)
+            yield from (self.at(rows.picked(slice(first, first + ROWS_AT_ONCE))) for first in firsts)
 
     @property
     def some(self) -> Trajectory:
@@ -220,7 +223,7 @@ class Trajectory:
     def _inputs(self) -> Array:
         """Arguments of compiled functions at the output times."""
         result, y = self.result, self.result.outputs
-        rows = self.model.inputs(result, result.times, y, np.zeros_like(y), result.segment)
+        rows = self.model.inputs(result, result.times, y, y, result.segment)  # in place of the rates, put next
         put_rates(self.model.program, rows)
         return rows
 
@@ -264,7 +267,7 @@ class Trajectory:
 
     def everywhere(self, name: str) -> Array:
         """Return a state or a named quantity at the output times and at every step; empty if the name is unknown."""
-        return np.concatenate(self._columns.get(name, (np.empty(0),)))
+        return np.concatenate(self._columns.get(name, ((),)))
 
     @cached_property
     def _columns(self) -> dict[str, tuple[Array, ...]]:
