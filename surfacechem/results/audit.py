@@ -193,10 +193,10 @@ def audit(trajectory: Trajectory) -> Audit:
         roundings += len(steps.t)
         if system.energy_has_histories:  # a steep one is known only to within the last digits of time
             later = model.evaluate(result, steps.t * (1 + EPS), steps.y, steps.ydot, steps.segment)
-            untimed = largest(later[:, column["E_total"]] - trajectory.everywhere("E_total")[len(result.times) :])
+            untimed = largest(later[:, column["E_total"]] - trajectory.columns["E_total"][1])
     sites = np.zeros(len(ledger))
     for j in system.account_columns.get("bonds", ()):
-        bonds = trajectory.everywhere(system.ledger[j].law)[: len(ledger)]
+        bonds = trajectory.columns[system.ledger[j].law][0]
         sites = np.maximum(sites, np.abs(bonds - bonds[:1] - ledger[:, j]))
     rounding = EPS * energy_stored * roundings + untimed
     left = largest(energy)

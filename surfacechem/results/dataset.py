@@ -103,7 +103,7 @@ def coverage_columns(system: System, columns: Iterable[Column]) -> list[Column]:
 def profile_values(trajectory: Trajectory, profile: Profile) -> Array:
     """Return the temperatures across a body at the output times, shape (times, points)."""
     names = [profile.surface, *profile.states, *([profile.far] if profile.far else [])]
-    return np.stack([trajectory.everywhere(name)[: len(trajectory.result.times)] for name in names], axis=1)
+    return np.stack([trajectory.columns[name][0] for name in names], axis=1)
 
 
 def profile_columns(trajectory: Trajectory) -> list[Column]:

@@ -34,11 +34,11 @@ def surface_columns(trajectory: Trajectory, surface: CurvedSurfaces) -> tuple[li
     chosen = np.unique(np.linspace(0, len(times) - 1, MOST_SURFACE_TIMES).round().astype(int))
     columns = [Column(TIME, (TIME,), times[chosen], "s", "times at which the surfaces are looked at")]
     with integrating():
-        surface, gaps = surface.of_run(trajectory.values), trajectory.everywhere("g_n")[: len(times)][chosen]
+        surface, gaps = surface.of_run(trajectory.values), trajectory.columns["g_n"][0][chosen]
         # A run may end a rounding beyond the range of tabulated approaches.
         approaches, stretches = np.clip(gaps, *surface.approach), np.ones_like(gaps)
-        if len(stretched := trajectory.everywhere("J_c")):
-            stretches = stretched[: len(times)][chosen]
+        if "J_c" in trajectory.columns:
+            stretches = trajectory.columns["J_c"][0][chosen]
         columns += [*_totals(surface, approaches, stretches), *_fields(surface, approaches, stretches)]
     return columns, INTEGRATION_TIME.seconds - before
 

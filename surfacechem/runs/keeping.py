@@ -188,9 +188,8 @@ def at_end(run: Trajectory) -> dict[str, float]:
 
 def extremes(run: Trajectory) -> dict[str, dict[str, float]]:
     """Return the largest and smallest value of each quantity over outputs and steps of a run, and after its jumps."""
-    leaps, system = run.leaps, run.model.system
-    names = [*(state.name for state in system.states), *system.output_columns]
-    seen = np.array([np.append(run.everywhere(name), leaps.after[name][leaps.lasts]) for name in names])
+    leaps, names = run.leaps, list(run.columns)
+    seen = np.array([np.concatenate([*run.columns[name], leaps.after[name][leaps.lasts]]) for name in names])
     with np.errstate(invalid="ignore"):
         found = {which: best.reduce(seen, axis=1, initial=np.nan) for which, (best, _) in EXTREMES.items()}
     return {which: dict(zip(names, values.tolist(), strict=True)) for which, values in found.items()}
@@ -236,9 +235,8 @@ class RunByRun:
         row |= {f"{name}_last": last[name] for name in keep.last}
         found = extremes(run) if keep.max or keep.min else {}
         row |= {f"{name}_{which}": of[name] for which, of in found.items() for name in getattr(keep, which)}
-        reached = len(result.times)
         for name in keep.series:
-            row[name] = np.append(run.everywhere(name)[:reached], np.full(times - reached, np.nan))
+            row[name] = np.append(run.columns[name][0], np.full(times - len(result.times), np.nan))
         return row | self._events(run)
 
     def _events(self, run: Trajectory) -> dict[str, float]:

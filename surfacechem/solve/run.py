@@ -203,7 +203,7 @@ class Trajectory:
         count = len(self.result.times)
         return self.picked(np.arange(0, count, max(count // SAMPLED_OUTPUTS, 1)))
 
-    @property
+    @cached_property
     def looked(self) -> Trajectory:
         """The trajectory with outputs at which runs are compared, whatever outputs were requested.
 
@@ -267,10 +267,10 @@ class Trajectory:
 
     def everywhere(self, name: str) -> Array:
         """Return a state or a named quantity at the output times and at every step; empty if the name is unknown."""
-        return np.concatenate(self._columns.get(name, ((),)))
+        return np.concatenate(self.columns.get(name, ((),)))
 
     @cached_property
-    def _columns(self) -> dict[str, tuple[Array, ...]]:
+    def columns(self) -> dict[str, tuple[Array, ...]]:
         """States and named quantities, each at the output times and at every step."""
         result, steps, system = self.result, self.result.steps, self.model.system
         tables = [(*result.outputs.T, *self.outputs.T)]
