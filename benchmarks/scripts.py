@@ -56,7 +56,7 @@ def seconds(call: Callable[[], object]) -> float:
 def obstacle(simulation: Simulation, solution: Solution) -> str:
     """Reason why LSODA alone cannot solve a case; empty where it can."""
     system, program = simulation.system, simulation.model.program
-    if system.outside is not None:
+    if system.external_rates is not None:
         return "rates come from Cantera itself"
     if any(program.algebraic):
         return "some states are algebraic"

@@ -32,7 +32,7 @@ def parts(system: System) -> Iterator[tuple[str, Any]]:
         ("size", ((e.state, e.size) for e in system.equilibria)),
         ("transition", ((edge.name, edge.masked) for edge in system.edges)),
         ("start of mode", ((m.name, m.start) for m in system.modes if m.start is not None)),
-        ("given", system.given.items()),
+        ("given", system.far_work.items()),
     ):
         yield from ((f"{kind} {name}", expression) for name, expression in items)
     for edge in system.edges:

@@ -270,7 +270,7 @@ def test_a_case_is_the_same_as_a_sweep_of_one(name):
     if simulation.case.reference and simulation.case.reference.options:
         left |= {"error"}  # an exact solution with values of its own is of the case alone
     told = {"status", "reason", "energy_error", "site_error", "error", *simulation.system.rows}
-    assert told <= one.keys() | set(simulation.system.inside)
+    assert told <= one.keys() | set(simulation.system.interior)
     for variable in one.keys() - left:
         expected = np.asarray(alone[variable])
         ours = np.asarray(one[variable])[tuple(slice(size) for size in expected.shape)]

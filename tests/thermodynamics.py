@@ -83,7 +83,7 @@ def consistent_point(system: System, seed: int, modes: Mapping[str, float] | Non
     held = {state.name: state.symbol for state in system.states}
     for e in system.equilibria:
         residual = system.expand(e.residual)
-        felt = (held[name] for name in (e.state, *e.along))
+        felt = (held[name] for name in (e.state, *e.coupled))
         moved = next((gap for gap in felt if number(symengine.diff(residual, gap), point) != 0), None)
         if moved is not None:
             rows, free = [*rows, residual], [*free, moved]

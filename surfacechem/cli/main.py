@@ -179,7 +179,7 @@ def check(
 
     simulation = load_case(case, changes)
     system, scene = simulation.system, simulation.case.scene
-    if system.rests:
+    if system.is_static:
         show(check_summary(simulation.case.title, system, scene, None, [], warnings(system)))
         return
     settings = run_settings(simulation, solver, rtol, accuracy)
@@ -192,7 +192,7 @@ def check(
     start, end = consistent_start(model, values), settings.times[-1]
     numbers = groups(model, scene, values, start, end)
     found = [*warnings(system), *start_warnings(model, problem, start, end)]
-    why = reasons(problem, settings, system.moves) if settings.solver == AUTO else ()
+    why = reasons(problem, settings, system.has_moving_gap) if settings.solver == AUTO else ()
     settings = model.chosen(settings, values)
     show(check_summary(simulation.case.title, system, scene, settings, numbers, found, why))
 

@@ -87,7 +87,7 @@ def write_file(simulation: Simulation, plan: Plan, target: Path, talk: bool | No
 
     with TemporaryDirectory(prefix=f".{target.stem}-", dir=target.parent) as folder:
         stream = simulation.stream(plan, Path(folder) / "sweep.zarr")
-        store = solve(lambda: stream.run(told=progress()), talk, brief=True, waits=stream.chunks.waits)
+        store = solve(lambda: stream.run(on_progress=progress()), talk, brief=True, waits=stream.chunks.waits)
         status, sheet = store_summary(stream, store, solve(stream.check, talk), target)
         with store.dataset as data:
             save_kept(data, target)
@@ -134,9 +134,9 @@ def progress() -> Callable[[Progress], None]:
     """Return a callback that logs the progress of a sweep with its speed."""
     begun = time.monotonic()
 
-    def told(now: Progress) -> None:
+    def report(now: Progress) -> None:
         # Runs that were stored before do not count for the speed.
         rate = (now.done - now.resumed) / max(time.monotonic() - begun, BAR_DELAY)
         log.info("%.0f runs/s, %d failed", rate, now.failed, extra={"done": now.done, "total": now.runs})
 
-    return told
+    return report

@@ -129,7 +129,7 @@ def _functions(system: System) -> dict[str, tuple[str, list[Row]]]:
     ledger = [
         Row(f"rate_of_{a.quantity.name}", a.rate, f"rate of: {_described(a.quantity)}; {a.kind}") for a in system.ledger
     ]
-    watched = [(m.masked, f"{m.name}, else {m.reason}") for m in system.moving_margins]
+    watched = [(m.masked, f"{m.name}, else {m.reason}") for m in system.event_margins]
     watched += [(item.masked, f"else {item.name}: {item.reason}") for item in system.edges]
     margins = [Row(f"margin_{i}", expression, text) for i, (expression, text) in enumerate(watched)]
     functions = {

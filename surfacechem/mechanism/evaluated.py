@@ -271,12 +271,12 @@ class NeighbourReaction(EvaluatedReaction):
 
     enthalpy: float = parameter("J", "enthalpy taken from neighbours, evaluated by Cantera", varies=False)
     gibbs: float = parameter("J", "Gibbs energy taken from neighbours, evaluated by Cantera", varies=False)
-    beside: Mapping[str, float] = option("molecules of each species that it makes in neighbours")
+    in_neighbours: Mapping[str, float] = option("molecules of each species that it makes in neighbours")
 
     @property
     def made(self) -> Mapping[str, float]:
         """Molecules that one reaction produces in neighbours, by species."""
-        return self.beside
+        return self.in_neighbours
 
     @property
     def taken(self) -> tuple[Formula, Formula]:
@@ -323,7 +323,7 @@ class SurfaceEngine:
         self._brought: list[tuple[object, ...]] = [()]
         """Engine, temperature, amount and states set last on the surface, since several engines may share it."""
 
-    def beside(self, neighbours: Mapping[str, Neighbour]) -> SurfaceEngine:
+    def with_neighbours(self, neighbours: Mapping[str, Neighbour]) -> SurfaceEngine:
         """Return a copy with other states of neighbours; InputError if no reaction has a neighbour of that name."""
         known = {held.phase.name: held.given for held in self.held}
         refuse_unknown(neighbours, known, f"no reaction of the surface {self.surface.name} has a neighbour '{{}}'")

@@ -132,15 +132,15 @@ def _is_foreign(entry: Any) -> bool:
     return "equation" in entry and not known
 
 
-def is_evaluated(entry: Any, names: Iterable[str], beside: bool) -> bool:
+def is_evaluated(entry: Any, names: Iterable[str], neighbours: bool) -> bool:
     """True if only Cantera can evaluate a reaction's rate.
 
-    ``names`` are the species of the surface, ``beside`` is true if the surface has neighbours.
+    ``names`` are the species of the surface, ``neighbours`` is true if the surface has neighbours.
     """
     if "equation" not in entry:
         return False
     reactants, products, _ = sides(str(entry["equation"]))
-    outside = beside and not {*reactants, *products, *(entry.get("orders") or {})} <= set(names)
+    outside = neighbours and not {*reactants, *products, *(entry.get("orders") or {})} <= set(names)
     special, kind = any(key in entry for key in (*STICKING, *CHARGED)), str(entry.get("type", ""))
     return outside or special or _is_foreign(entry) or _is_masel(kind) or bool(_needs_neighbour(kind))
 
@@ -165,7 +165,7 @@ class PhaseCheck:
         self.source = source
         self.phase = phase
         self.evaluate = evaluate
-        self.beside = evaluate and has_neighbours(phase)
+        self.has_neighbours = evaluate and has_neighbours(phase)
         self.names: list[str] = []
         """The species of the phase."""
 
@@ -186,7 +186,7 @@ class PhaseCheck:
             if (kind := str(entry.get("type"))) in GAS_TYPES:
                 problem = f"rate type '{kind}' depends on pressure, which belongs to gases; give a `rate-constant`."
                 raise source.error(f"reaction {entry.get('equation')}: {problem}", entry, "type")
-            if self.evaluate and is_evaluated(entry, self.names, self.beside):
+            if self.evaluate and is_evaluated(entry, self.names, self.has_neighbours):
                 self._evaluated(entry)
             else:
                 self._reaction(entry)
@@ -196,7 +196,7 @@ class PhaseCheck:
         title, model = f"phase {phase.get('name')}", str(phase.get("thermo"))
         if model in OTHER_MODELS:
             raise error(f"{title}: thermo '{model}' is not lowered: {OTHER_MODELS[model]}", phase, "thermo")
-        known = set(PHASE) - (set() if self.beside else NEIGHBOUR_KEYS)
+        known = set(PHASE) - (set() if self.has_neighbours else NEIGHBOUR_KEYS)
         self._keys(phase, known - (set() if model == DEPENDENT else {"reference-state-coverage"}), title)
         if model not in SURFACES:
             raise error(f"{title}: thermo '{model}' is not lowered: use `ideal-surface`.", phase, "thermo")
@@ -207,7 +207,7 @@ class PhaseCheck:
             message = "the phase has no `site-density`. Give one, for instance `site-density: 1e-9 mol/cm^2`."
             raise error(message, phase)
         self._numbers(phase, ("site-density",), title)
-        if self.beside:
+        if self.has_neighbours:
             self._neighbours(phase, ())
 
     def _neighbours(self, phase: Any, before: tuple[str, ...]) -> None:
@@ -230,11 +230,11 @@ class PhaseCheck:
         self.names = chosen(self.phase.get("species", "all"), there)
         own = [entry for entry in entries if entry.get("name") in self.names]
         for entry in entries:
-            if not self.beside or "name" not in entry or entry in own:
+            if not self.has_neighbours or "name" not in entry or entry in own:
                 self._species(entry)
         place = self.source.place(self.phase, "species")
         refuse_unknown(self.names, there, "species: no species '{}'", place)
-        self._composition(own if self.beside else entries)
+        self._composition(own if self.has_neighbours else entries)
         for entry in own:
             self._dependence(entry)
 
@@ -379,7 +379,7 @@ class PhaseCheck:
             self._keys(entry, {*REACTION, *inner}, title)
             self._inside(entry, inner, self.names, title)
             self._coefficients(entry, title)
-        self._equation(entry, [] if self.beside else self.names, title)
+        self._equation(entry, [] if self.has_neighbours else self.names, title)
 
     def _equation(self, entry: Any, known: list[str], title: str) -> list[str]:
         """Check an equation and return the species that the reaction may name.

@@ -257,7 +257,7 @@ def _reaction(
         raise InputError(f"{message}Write two one-way reactions.", place)
     given |= {"whole": whole, "value": 0.0}
     if beside := _outside(whole, variables):
-        return NeighbourReaction(enthalpy=0.0, gibbs=0.0, beside=beside, **given)
+        return NeighbourReaction(enthalpy=0.0, gibbs=0.0, in_neighbours=beside, **given)
     return EvaluatedReaction(**given)
 
 

@@ -136,7 +136,7 @@ def _built(scene: Scene) -> Build:
         for phase in phases:
             for component in found:
                 for record in getattr(component, phase, lambda _: None)(build) or ():
-                    ledger.take(build, record)
+                    ledger.add_record(build, record)
         follow(build)
     return build
 
@@ -178,11 +178,11 @@ def _system(build: Build) -> System:
         edges=tuple(build.edges),
         equilibria=tuple(build.equilibria),
         sinks=sinks,
-        follows={str(x): value for x, value in build.motion.follows.items()},
-        given={f"W_{axis}": far.F * far.gap for axis, far in far_fields.items() if far.F != 0},
-        pulls={f"W_{axis}": (far.k, far.w, far.F, far.gap) for axis, far in far_fields.items() if far.works},
+        followers={str(x): value for x, value in build.motion.followers.items()},
+        far_work={f"W_{axis}": far.F * far.gap for axis, far in far_fields.items() if far.F != 0},
+        far_fields={f"W_{axis}": (far.k, far.w, far.F, far.gap) for axis, far in far_fields.items() if far.does_work},
         warnings=(*build.interface.remarks, *build.warnings),
-        outside=_outside(build),
+        external_rates=_outside(build),
         origin=partial(assemble, build.scene),
     )
 
@@ -207,7 +207,7 @@ def _of_pair(system: System) -> System:
             item if item.path.startswith(AREAL_PATH) else replace(item, spec=spec(item.spec))
             for item in system.parameters
         ),
-        whole=True,
+        in_totals=True,
     )
 
 

@@ -114,7 +114,7 @@ class Edge:
     In a 'snap' the interface, which has given way, dissipates everything."""
     fold: Fold | None = None
     """The fold that the edge stands for, if any."""
-    passes: bool = False
+    ends_stage: bool = False
     """True if nothing happens to the interface: a stage of the loading ends."""
     strict: bool = False
     """True if the guard has to become negative, not only touch zero."""
@@ -124,7 +124,7 @@ class Edge:
     """The state that its guard measures, if edges in other modes measure the same state."""
     times: tuple[float, ...] = ()
     """Prescribed times [s] of the edge, if any."""
-    returns: Expression | None = None
+    return_time: Expression | None = None
     """Time of flight until it may occur again [s], zero if unknown; its guard restarts from an exact zero."""
     violation: str = "warn"
     """Response to a jump that would destroy entropy: refuse, warn or accept."""
@@ -134,7 +134,7 @@ class Edge:
     @property
     def is_impact(self) -> bool:
         """True for an impact: an instantaneous impulse, which may recur ever faster (Zeno behaviour)."""
-        return self.returns is not None
+        return self.return_time is not None
 
     @property
     def masked(self) -> Expression:
@@ -156,7 +156,7 @@ class Constraint:
     """Reaction traction while it holds [Pa]."""
     at_once: bool = False
     """True if its edges precede other edges that are due at the same time."""
-    beside: Callable[[Edge], Mapping[Any, Expression]] = lambda edge: {}
+    resets: Callable[[Edge], Mapping[Any, Expression]] = lambda edge: {}
     """New values of its modes and registers along an edge of another constraint."""
 
 
@@ -171,13 +171,13 @@ class Equilibrium:
     # tractions at one time share.
     size: Expression
     """Size of the tractions that balance [Pa]."""
-    along: Mapping[str, Expression] = field(default_factory=dict)
+    coupled: Mapping[str, Expression] = field(default_factory=dict)
     """Gaps that move with it, and by how much: in elastic sticking the elastic gap follows the displacement."""
     active: Expression = 1
     """Zero in modes in which the gap is held."""
-    slides: int = 0
+    slip: int = 0
     """Slip direction that opens the gap, 1 or -1; 0 if it is in equilibrium in every mode."""
-    bears: Expression = 1
+    limit: Expression = 1
     """Friction limit [Pa] during slip; if it is zero, the gap may move either way in a jump."""
 
     @property

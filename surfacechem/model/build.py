@@ -43,15 +43,15 @@ class Motion:
     """Rates of the variables that a programme moves."""
     slips: tuple[Any, ...] = ()
     """Formulation of the tangential motion in each direction that moves by a balance."""
-    slides_by: dict[str, Any] = field(default_factory=dict)
+    slip_unknowns: dict[str, Any] = field(default_factory=dict)
     """Unknowns of the tangential balances if sliding has no inertia, by velocity."""
-    creeping: Any = None
+    creep_law: Any = None
     """The friction law whose traction is the unknown of sliding, if the velocity is not."""
     sliding_tractions: dict[str, Expression] = field(default_factory=dict)
     """Traction that resists sliding, by axis."""
     stick_limits: dict[str, Expression] = field(default_factory=dict)
     """Tangential traction up to which the interface sticks, by axis."""
-    follows: dict[Any, Expression] = field(default_factory=dict)
+    followers: dict[Any, Expression] = field(default_factory=dict)
     """Reset map of states that follow the normal gap when it jumps."""
     gap_rates: dict[str, Expression] = field(default_factory=dict)
     """Rates of the gaps that move by a balance."""
@@ -72,7 +72,7 @@ class Build:
     thermal: Thermal = NO_NODES
     bonding: dict[str, Bond] = field(default_factory=dict)
     energy: Energy = NO_ENERGY
-    reclosing: Mapping[Expression, Expression] = field(default_factory=dict)
+    closing_modes: Mapping[Expression, Expression] = field(default_factory=dict)
     """New values of modes when a rigid contact closes again."""
     rates: dict[Any, Expression] = field(default_factory=dict)
     """Time derivatives of the variables of the interface's free energy other than temperature."""
@@ -93,7 +93,7 @@ class Build:
     """Histories in use, by variable."""
     constraints: list[Constraint] = field(default_factory=list)
     """Constraints in the order in which they were stated."""
-    balanced: list[Equilibrium] = field(default_factory=list)
+    quasi_static: list[Equilibrium] = field(default_factory=list)
     """Quasi-static gaps in the order in which they were stated."""
     motion: Motion = field(default_factory=Motion)
     notes: list[Note] = field(default_factory=list)
@@ -119,7 +119,7 @@ class Build:
         return self.energy.psi
 
     @property
-    def about(self) -> dict[Any, Expression]:
+    def expansion_points(self) -> dict[Any, Expression]:
         """Initial values of the bonding variables, the points about which capacities are expanded."""
         return {bond.symbol: bond.initial for bond in self.bonding.values()}
 
@@ -142,7 +142,7 @@ class Build:
                     State: self.states,
                     Account: self.ledger,
                     Margin: self.margins,
-                    Equilibrium: self.balanced,
+                    Equilibrium: self.quasi_static,
                     Power: self.powers,
                     str: self.warnings,
                 }
@@ -151,11 +151,11 @@ class Build:
     @property
     def equilibria(self) -> list[Equilibrium]:
         """Quasi-static gaps; an elastic gap that slides reaches equilibrium before the displacement that pulls it."""
-        return sorted(self.balanced, key=lambda item: item.slides)
+        return sorted(self.quasi_static, key=lambda item: item.slip)
 
     def energy_row(self, node: Node) -> Expression:
         """Return the energy balance of a node as a residual."""
-        return balances.node_row(node, self.inflow.get(node.name, ()), self.rates, self.about)
+        return balances.node_row(node, self.inflow.get(node.name, ()), self.rates, self.expansion_points)
 
     def name(self, quantity: Quantity, expression: Expression, *, output: bool = True) -> Expression:
         """Add a named quantity and return its symbol."""
@@ -254,7 +254,7 @@ class Build:
         """The edges of all constraints, each with its resets of the other constraints; those due at once come first."""
         edges = [edge for item in sorted(self.constraints, key=lambda item: not item.at_once) for edge in item.edges]
         for item in self.constraints:
-            edges = [replace(edge, modes={**edge.modes, **item.beside(edge)}) for edge in edges]
+            edges = [replace(edge, modes={**edge.modes, **item.resets(edge)}) for edge in edges]
         return edges
 
     @property

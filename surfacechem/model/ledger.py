@@ -17,7 +17,7 @@ from surfacechem.model import balances
 from surfacechem.model.automaton import Sink
 from surfacechem.model.balances import DISSIPATION, INTERFACE, MECHANICS, OUTSIDE, WORK, Node, Power
 from surfacechem.model.build import Build, Record
-from surfacechem.model.components.heat import takers
+from surfacechem.model.components.heat import receivers
 from surfacechem.model.system import Account
 from surfacechem.quantities import VARIABLES, Quantity
 from surfacechem.scene import Body
@@ -50,7 +50,7 @@ def energy_flows(build: Build) -> Iterator[Flow]:
                 yield Flow(power.source, place, share * power.amount, power.channels)
 
 
-def take(build: Build, record: Record) -> None:
+def add_record(build: Build, record: Record) -> None:
     """Keep a record; of a power also its accounts, except those of dissipation, which follow in `flows`."""
     build.add(record)
     if isinstance(record, Power) and record.kind != DISSIPATION:
@@ -69,7 +69,7 @@ def flows(build: Build) -> None:
             label, text = f"W_{name}", f"work done on the gap {name}"
             if name == "J_c":
                 label, text = "W_J", "work done in stretching the surface"
-            take(build, Power(WORK, origin, INTERFACE, work, label, text))
+            add_record(build, Power(WORK, origin, INTERFACE, work, label, text))
     for power in build.powers:
         if power.kind == DISSIPATION:
             _account(build, power)
@@ -269,8 +269,8 @@ def sinks(build: Build) -> dict[str, tuple[Sink, ...]]:
                     "and a capacity, or use `release: joint`, in which the bodies do."
                 )
                 raise InputError(message, law.place)
-    supports = {axis: _merged(build, far.takers(build)) for axis, far in build.motion.far_fields.items()}
-    return {INTERFACE: _merged(build, takers(build)), **supports}
+    supports = {axis: _merged(build, far.receivers(build)) for axis, far in build.motion.far_fields.items()}
+    return {INTERFACE: _merged(build, receivers(build)), **supports}
 
 
 def _merged(build: Build, shares: Mapping[str, Expression]) -> tuple[Sink, ...]:

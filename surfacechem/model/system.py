@@ -324,19 +324,19 @@ class System:
     equilibria: tuple[Equilibrium, ...] = ()
     sinks: Mapping[str, tuple[Sink, ...]] = field(default_factory=dict)
     """Sinks of the heat of a jump, by its origin: the interface, or the support of an axis."""
-    follows: Mapping[str, Expression] = field(default_factory=dict)
+    followers: Mapping[str, Expression] = field(default_factory=dict)
     """Reset map of states that follow the normal gap when it jumps: new values, by name."""
-    given: Mapping[str, Expression] = field(default_factory=dict)
+    far_work: Mapping[str, Expression] = field(default_factory=dict)
     """Tractions of the far field times their gaps [J/m^2], by account of the work."""
-    pulls: Mapping[str, tuple[Expression, ...]] = field(default_factory=dict)
+    far_fields: Mapping[str, tuple[Expression, ...]] = field(default_factory=dict)
     """Stiffness [Pa/m], displacement [m] and traction [Pa] of the far field, and the gap [m], by account of the
     work."""
     notes: tuple[Note, ...] = ()
     """Records that a run monitors and reports if they matter; no equation depends on them."""
     conductances: Mapping[tuple[str, str], Sequence[Expression]] = field(default_factory=dict)
     """Conductances in parallel between two ends [W/(m^2 K)]."""
-    outside: ExternalRates | None = None
-    whole: bool = False
+    external_rates: ExternalRates | None = None
+    in_totals: bool = False
     """True if quantities that are otherwise per area are totals of a pair of bodies."""
     constants: Mapping[str, tuple[Spec, float]] = field(default_factory=dict)
     """Parameters of laws that have their default values, by path. They are numbers in the equations, so a run can
@@ -359,23 +359,23 @@ class System:
         """Return the expression in terms of t, states, derivatives and parameters only."""
         return without(expression, self.definitions)
 
-    def noted(self, kind: type[N]) -> tuple[N, ...]:
+    def notes_of(self, kind: type[N]) -> tuple[N, ...]:
         """Return the notes of one kind."""
         return tuple(note for note in self.notes if isinstance(note, kind))
 
     @cached_property
     def profiles(self) -> tuple[Profile, ...]:
         """Temperature profiles of bodies; their states come after all other states, profile by profile."""
-        return self.noted(Profile)
+        return self.notes_of(Profile)
 
     def unit(self, unit: str) -> str:
         """Return the unit, or that of the corresponding total if the system is a pair of bodies."""
-        return TOTAL_UNITS.get(unit, unit) if self.whole else unit
+        return TOTAL_UNITS.get(unit, unit) if self.in_totals else unit
 
     @cached_property
     def changeable(self) -> dict[str, str]:
         """Units of everything that a run may change, by path: parameters and initial values."""
-        given = set(self.outside.engine.gives) if self.outside else set()
+        given = set(self.external_rates.engine.gives) if self.external_rates else set()
         units = {p.path: p.spec.unit for p in self.parameters if p.changeable and p.path not in given}
         return units | {state.path: state.at_start[0].unit for state in self.states}
 
@@ -386,23 +386,23 @@ class System:
         return [self.t, *states, *(parameter.symbol for parameter in self.parameters)]
 
     @cached_property
-    def inside(self) -> frozenset[str]:
+    def interior(self) -> frozenset[str]:
         """Names of the states inside bodies, which the profiles present together, and of the dummy state."""
         return frozenset([DUMMY_STATE, *(name for profile in self.profiles for name in profile.states)])
 
     @cached_property
-    def of_cells(self) -> frozenset[Any]:
+    def cell_symbols(self) -> frozenset[Any]:
         """Symbols of the states inside bodies and of their rates; each belongs to one cell."""
-        cells = self.inside - {DUMMY_STATE}
+        cells = self.interior - {DUMMY_STATE}
         states = (state for state in self.states if state.name in cells)
         return frozenset(symbol for state in states for symbol in (state.symbol, state.dot))
 
     @property
-    def rests(self) -> bool:
+    def is_static(self) -> bool:
         """True if nothing changes with time: there are no states, and no named quantity reads a history."""
         return not self.states and not any(depends(item.expression, self.t) for item in self.named)
 
-    def with_state(self) -> System:
+    def with_dummy_state(self) -> System:
         """Return the system, with a dummy state if it has none."""
         if self.states:
             return self
@@ -482,7 +482,7 @@ class System:
         """Return the residuals, expanded, in the order of the rows."""
         return [self.expand(row) for row in self.rows.values()]
 
-    def local(self, expressions: Sequence[Expression]) -> list[Expression]:
+    def local_time(self, expressions: Sequence[Expression]) -> list[Expression]:
         """Return expressions in the local time of an arc, so that late events are located as sharply as early ones."""
         start = sum((p.symbol for p in self.parameters if p.path == START), symengine.Integer(0))
         origins = [self.parameters[j].symbol for j in self.origins]
@@ -499,19 +499,19 @@ class System:
         return [j for j, p in enumerate(self.parameters) if p.load is not None and p.field == "origin"]
 
     @cached_property
-    def sliding(self) -> NDArray[np.bool_]:
+    def slip_velocities(self) -> NDArray[np.bool_]:
         """Mask of the states that are velocities without inertia, shape (states,)."""
         return np.array([state.algebraic and state.name in VELOCITIES for state in self.states], dtype=bool)
 
     @property
-    def memory(self) -> tuple[Mode | Register, ...]:
+    def discrete(self) -> tuple[Mode | Register, ...]:
         """Modes and registers, the discrete variables that change along edges only."""
         return (*self.modes, *self.registers)
 
     @cached_property
-    def moving_margins(self) -> tuple[Margin, ...]:
+    def event_margins(self) -> tuple[Margin, ...]:
         """The margins that can close during a run; a peak in time alone is left out, as it is known beforehand."""
-        evolved = {x for state in self.states for x in (state.symbol, state.dot)} | {x.symbol for x in self.memory}
+        evolved = {x for state in self.states for x in (state.symbol, state.dot)} | {x.symbol for x in self.discrete}
         moving = {True: evolved, False: evolved | {self.t}}
         margins = [m for m in self.margins if not m.at_start]
         return tuple(m for m in margins if self.expand(m.masked).free_symbols & moving[m.peak])
@@ -524,30 +524,30 @@ class System:
     @cached_property
     def _when(self) -> list[list[tuple[int, Collection[int]]]]:
         columns = {parameter.symbol: j for j, parameter in enumerate(self.parameters)}
-        items: tuple[Margin | Edge, ...] = (*self.moving_margins, *self.edges)
+        items: tuple[Margin | Edge, ...] = (*self.event_margins, *self.edges)
         return [[(columns[mode], values) for mode, values in item.when.items()] for item in items]
 
-    def in_play(self, parameters: Array) -> tuple[bool, ...]:
+    def active_guards(self, parameters: Array) -> tuple[bool, ...]:
         """Return a flag for each guard, moving margins and then edges: active in the modes among the parameters."""
         return tuple(all(parameters[j] in values for j, values in when) for when in self._when)
 
     @property
-    def rules(self) -> list[tuple[int, int, float]]:
+    def guard_conditions(self) -> list[tuple[int, int, float]]:
         """Rows (guard, parameter, value) of active modes: each parameter listed must have one of its values."""
         return [(k, j, value) for k, when in enumerate(self._when) for j, values in when for value in values]
 
     @property
-    def moves(self) -> bool:
+    def has_moving_gap(self) -> bool:
         """True if a gap moves by a balance."""
         return not GAPS.isdisjoint(self.state_columns)
 
     @property
-    def in_stretches(self) -> bool:
+    def has_arcs(self) -> bool:
         """True if a run consists of arcs, each with a local time."""
         return any(parameter.path == START for parameter in self.parameters)
 
     @property
-    def searches(self) -> bool:
+    def solves_jumps(self) -> bool:
         """True if the state after an edge has to be solved for: equilibria of gaps, or responses to jumps of loads."""
         return bool(self.equilibria) or any(edge.times for edge in self.edges)
 
@@ -558,10 +558,10 @@ class System:
         Heat contents that depend on temperatures alone are left out: they take up the jump of the rest.
         """
         moving = {state.symbol for state in self.states if not state.is_temperature}
-        moving |= {self.t, *(item.symbol for item in self.memory)}
+        moving |= {self.t, *(item.symbol for item in self.discrete)}
         members = symengine.sympify(self.find("E_total").expression).free_symbols
         moved = [member for member in members if self.expand(member).free_symbols & moving]
-        return symengine.Add(*moved, *(-work for work in self.given.values()))
+        return symengine.Add(*moved, *(-work for work in self.far_work.values()))
 
     def find(self, name: str) -> Named:
         """Return the named quantity of that name."""

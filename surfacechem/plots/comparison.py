@@ -178,9 +178,9 @@ def _draw(
                 values = members.final_values(dataset, name) if "sweep" in dataset.attrs else dataset[name].values
                 drawn.append(values if begin is None else values[dataset[over].values >= begin])
                 points = "sweep" in dataset.attrs or len(values) < 3
-                look: Any = {"marker": style.marker(ax, len(values)), "markersize": style.MARKER_SIZE} if points else {}
-                look["drawstyle"] = style.drawn_as(dataset[name])
-                style.draw_curve(ax, dataset, over, values, color=colour, linestyle=dash, linewidth=1.3, **look)
+                kw: Any = {"marker": style.marker(ax, len(values)), "markersize": style.MARKER_SIZE} if points else {}
+                kw["drawstyle"] = style.drawn_as(dataset[name])
+                style.draw_curve(ax, dataset, over, values, color=colour, linestyle=dash, linewidth=1.3, **kw)
     words = panel.title or ", ".join(map(symbol, panel.names[:2]))
     style.label(ax.yaxis, words, panel.unit, np.concatenate(drawn))
     several = panel.names if len(panel.names) > 1 else ()

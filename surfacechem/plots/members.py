@@ -190,10 +190,10 @@ def curves(dataset: xarray.Dataset, axes: Sequence[str], names: Sequence[str], a
             parameter = dataset[axes[0]]
             style.label(bar.ax.yaxis, style.parameter_words(parameter), unit(parameter), parameter.values)
         others = ", ".join(style.parameter_words(dataset[name]) for name in axes[1:]) if many else ""
-        told = [f"curves of one colour differ in {others}"] if others else []
-        told += filter(None, (_peaks_between_outputs(dataset, name) for name in names))
-        told += [f"{len(members)} of {count} runs"] if len(members) < count else []
-        style.headings(plot, grid[0, 0], dataset, more="   ".join(told))
+        notes = [f"curves of one colour differ in {others}"] if others else []
+        notes += filter(None, (_peaks_between_outputs(dataset, name) for name in names))
+        notes += [f"{len(members)} of {count} runs"] if len(members) < count else []
+        style.headings(plot, grid[0, 0], dataset, more="   ".join(notes))
     return plot
 
 

@@ -322,16 +322,16 @@ def _draw_curves(ax: Axes, dataset: xarray.Dataset, panel: Panel, over: str) -> 
         groups, rest = groups[:MOST_COLOURED], groups[MOST_COLOURED:]
     for names in groups:
         label = " = ".join([*map(symbol, names[:MOST_NAMES]), *(["..."] if len(names) > MOST_NAMES else [])])
-        look = style.drawn_as(dataset[names[0]])
-        style.draw_curve(ax, dataset, over, dataset[names[0]].values, label=label, marker=marker, drawstyle=look)
+        drawstyle = style.drawn_as(dataset[names[0]])
+        style.draw_curve(ax, dataset, over, dataset[names[0]].values, label=label, marker=marker, drawstyle=drawstyle)
     for k, names in enumerate(rest):
         label = "_" if k else f"{len(rest)} smaller"
-        look = {"label": label, "marker": marker, "color": "0.75", "linewidth": 0.8, "zorder": 1}
-        style.draw_curve(ax, dataset, over, dataset[names[0]].values, **look)
+        kw = {"label": label, "marker": marker, "color": "0.75", "linewidth": 0.8, "zorder": 1}
+        style.draw_curve(ax, dataset, over, dataset[names[0]].values, **kw)
     exact = [f"{name}_exact" for name in panel.names if f"{name}_exact" in curves(dataset)]
     for k, name in enumerate(exact):
-        look = {"label": "_" if k else "exact", "linestyle": DASHES, "color": "black", "linewidth": 0.9}
-        style.draw_curve(ax, dataset, over, dataset[name].values, **look)
+        kw = {"label": "_" if k else "exact", "linestyle": DASHES, "color": "black", "linewidth": 0.9}
+        style.draw_curve(ax, dataset, over, dataset[name].values, **kw)
 
 
 def group_coinciding(dataset: xarray.Dataset, names: Sequence[str]) -> list[list[str]]:

@@ -109,25 +109,25 @@ def _draw_series(ax: Axes, dataset: xarray.Dataset, load: str, name: str) -> Non
         style.label(ax.yaxis, symbol(name), unit(dataset[name]), values)
 
 
-def _draw_statistics(ax: Axes, dataset: xarray.Dataset, told: Mapping[str, str], size: float) -> None:
+def _draw_statistics(ax: Axes, dataset: xarray.Dataset, words: Mapping[str, str], size: float) -> None:
     """Draw results of each run over the swept parameter, by name with their labels in the legend, in one colour for
     each or for each value of a second parameter; exact values as lines.
     """
     parameter = dataset[str(dataset["status"].dims[0])]
     style.draw_parameter(ax.xaxis, parameter)
     x, large = parameter.values, 3.5 if len(parameter) < MOST_LARGE_MARKERS else 2.0
-    seconds = [label for _, label in style.curves_by_second(dataset, dataset[next(iter(told))].values)]
-    for k, (name, marker) in enumerate(zip(told, MARKERS, strict=False)):
-        for look, end in ((marker, ""), ("-", "_exact")):
+    seconds = [label for _, label in style.curves_by_second(dataset, dataset[next(iter(words))].values)]
+    for k, (name, marker) in enumerate(zip(words, MARKERS, strict=False)):
+        for fmt, end in ((marker, ""), ("-", "_exact")):
             if name + end in dataset:
                 for j, (values, _) in enumerate(style.curves_by_second(dataset, final_values(dataset, name + end))):
                     colour = COLOURS[j if len(seconds) > 1 else k]
-                    ax.plot(x, values / size, look, color=colour, markersize=large, linewidth=0.9, label="_")
+                    ax.plot(x, values / size, fmt, color=colour, markersize=large, linewidth=0.9, label="_")
     for label, colour in zip(seconds if len(seconds) > 1 else (), COLOURS, strict=False):
         ax.plot([], [], color=colour, label=label)
-    for word, marker, colour in zip(told.values(), MARKERS, COLOURS, strict=False):
+    for word, marker, colour in zip(words.values(), MARKERS, COLOURS, strict=False):
         ax.plot([], [], marker, color="black" if len(seconds) > 1 else colour, markersize=large, label=word)
-    ax.plot([], [], color="black", linewidth=0.9, label="exact" if any(f"{n}_exact" in dataset for n in told) else "_")
+    ax.plot([], [], color="black", linewidth=0.9, label="exact" if any(f"{n}_exact" in dataset for n in words) else "_")
 
 
 def lifetimes(dataset: xarray.Dataset) -> Figure:

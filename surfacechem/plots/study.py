@@ -61,7 +61,7 @@ def precision(dataset: xarray.Dataset) -> Figure:
     """
     style.check_variables(dataset, NUMBER_DIMENSIONS, TEXT_DIMENSIONS)
     drawn = [name for name in ERRORS if bool((dataset[name] > 0).any())] or ["energy_error"]
-    rows, looks = dataset.sizes["case"], list(zip(cycle(COLOURS), "osD^vPX" * dataset.sizes["solver"], strict=False))
+    rows, markers = dataset.sizes["case"], list(zip(cycle(COLOURS), "osD^vPX" * dataset.sizes["solver"], strict=False))
     with style.panels(0.6 + 3.2 * len(drawn), 0.7 + 2.6 * rows, rows, len(drawn), sharey="row") as (plot, grid):
         for i in range(rows):
             case = dataset.isel(case=i)
@@ -71,7 +71,7 @@ def precision(dataset: xarray.Dataset) -> Figure:
                     axis.set_minor_formatter(NullFormatter())  # labels within a decade would overlap
                 limit = float(case[name.replace("error_", "uncertainty_")]) if name.startswith("error_") else np.nan
                 for k in range(dataset.sizes["solver"]):
-                    _draw_solver(ax, case.isel(solver=k), name, limit, *looks[k])
+                    _draw_solver(ax, case.isel(solver=k), name, limit, *markers[k])
                 if np.isfinite(limit):
                     ax.axvspan(LEAST_ERROR, max(limit, LEAST_ERROR), color="0.5", alpha=0.12, linewidth=0)
                     finite = case[name].values[np.isfinite(case[name].values)]
@@ -79,7 +79,7 @@ def precision(dataset: xarray.Dataset) -> Figure:
                 ax.set_xlabel(ERRORS[name] if i == rows - 1 else "")
             grid[i, 0].set_ylabel("run time [s]")
             grid[i, 0].set_title(str(case["case_name"].values), loc="left")
-        plot.legend(handles=_legend(dataset, looks), loc="outside lower center", ncols=4)
+        plot.legend(handles=_legend(dataset, markers), loc="outside lower center", ncols=4)
     return plot
 
 
@@ -100,9 +100,9 @@ def _draw_solver(ax: Axes, cells: xarray.Dataset, name: str, limit: float, colou
     ax.plot(np.full(len(lost), 0.985), lost, "x", color=colour, markersize=5, transform=ax.get_yaxis_transform())
 
 
-def _legend(dataset: xarray.Dataset, looks: list[tuple[str, str]]) -> list[Line2D]:
+def _legend(dataset: xarray.Dataset, markers: list[tuple[str, str]]) -> list[Line2D]:
     status, handles = dataset["status"], []
-    for k, (colour, marker) in enumerate(looks[: dataset.sizes["solver"]]):
+    for k, (colour, marker) in enumerate(markers[: dataset.sizes["solver"]]):
         out = " (left out)" if bool((status.isel(solver=k) == "omitted").all()) else ""
         label = f"{dataset['solver_name'].values[k]}{out}"
         handles.append(Line2D([], [], color=colour, marker=marker, markersize=4.5, linewidth=1.0, label=label))
@@ -168,6 +168,6 @@ def stability(dataset: xarray.Dataset) -> Figure:
         nothing: Any = {"facecolor": "none", "edgecolor": "none"}
         handles = [Patch(label=f"{OUTCOME_MARKS[name]}  {text}", **nothing) for name, text in OUTCOMES.items()]
         columns = min(4, max(1, int(size[0] / 1.9)))  # the longest of the texts takes 1.9 inches
-        look: Any = {"ncols": columns, "handlelength": 0, "frameon": False, "fontsize": 8}
-        plot.legend(handles=handles, loc="outside lower center", **look)
+        kw: Any = {"ncols": columns, "handlelength": 0, "frameon": False, "fontsize": 8}
+        plot.legend(handles=handles, loc="outside lower center", **kw)
     return plot

@@ -250,9 +250,9 @@ def mark_without_end(axes: Sequence[Axes], dataset: xarray.Dataset) -> None:
 def mark(axes: Sequence[Axes], x: NDArray[np.float64], word: str) -> None:
     """Mark points with one of these statuses on the axis, with a legend, if there are any."""
     for k, ax in enumerate(axes if len(x) else ()):
-        look: Any = {"color": "0.4", "markerfacecolor": "white", "clip_on": False, "zorder": 3}
+        kw: Any = {"color": "0.4", "markerfacecolor": "white", "clip_on": False, "zorder": 3}
         across, label = ax.get_xaxis_transform(), "_" if k else word
-        ax.plot(x, np.zeros(len(x)), STATUS_MARKERS[word], markersize=5, transform=across, label=label, **look)
+        ax.plot(x, np.zeros(len(x)), STATUS_MARKERS[word], markersize=5, transform=across, label=label, **kw)
         legend(ax)
 
 

@@ -109,9 +109,9 @@ def _draw_final(ax: Axes, dataset: xarray.Dataset, names: Sequence[str]) -> None
         own = symbol(name) if at_end or len(names) > 1 else ""  # the axis names a single number per run
         for values, label in style.curves_by_second(dataset, end):
             words = label or own if len(names) == 1 else f"{own} {label}".strip()
-            look: Any = {"linestyle": "none"} if style.is_mode(dataset[name]) else {}
-            marker = style.marker(ax, 0 if look else len(x))
-            ax.plot(x, values, marker=marker, markersize=style.MARKER_SIZE, label=words, **look)
+            kw: Any = {"linestyle": "none"} if style.is_mode(dataset[name]) else {}
+            marker = style.marker(ax, 0 if kw else len(x))
+            ax.plot(x, values, marker=marker, markersize=style.MARKER_SIZE, label=words, **kw)
     which = ("Final " if members.ends_are_known(dataset, names) else "Last output ") if at_end else ""
     said = f"{which}{style.quantity_words(dataset[names[0]]) if len(names) == 1 else 'value'}"
     style.label(ax.yaxis, said, unit(dataset[names[0]]), np.stack(list(ends.values())))

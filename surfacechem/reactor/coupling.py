@@ -122,7 +122,7 @@ def with_neighbours(scene: Scene, reactors: Mapping[str, Any]) -> Scene:
         if name in reactors:
             _refuse_other_phase(name, own, reactors[name].phase)
     states = {name: _state(reactor.phase) for name, reactor in reactors.items()}
-    return replace(scene, interface=replace(scene.interface, engine=engine.beside(states)))
+    return replace(scene, interface=replace(scene.interface, engine=engine.with_neighbours(states)))
 
 
 def _refuse_other_phase(name: str, own: Any, given: Any) -> None:

@@ -97,7 +97,7 @@ class InstantEvents:
         """Set the end of the next integration, relative to which times are brief, and the tolerance."""
         self.instant.end, self.instant.rtol = goal, GLOBAL_ERROR * rtol
 
-    def begin_piece(self, parameters: Array) -> None:
+    def begin_segment(self, parameters: Array) -> None:
         """Set the parameters of a new load segment; the modes stay."""
         own, columns = self.evaluation.parameters, self.jumper.mode_columns
         modes, self.loads = own[columns].copy(), own.copy()
@@ -111,9 +111,9 @@ class InstantEvents:
 
     def margins(self) -> Array:
         """Return the guards of the edges at the state set last, infinite if not active."""
-        now, playing = self.evaluation.margins(), self.instant.in_play(self.here())
-        self.instant.see(self.evaluation.y)
-        return np.where(playing, now, np.inf)[self.instant.first :]
+        now, active = self.evaluation.margins(), self.instant.active_guards(self.here())
+        self.instant.update_peaks(self.evaluation.y)
+        return np.where(active, now, np.inf)[self.instant.first :]
 
     def soonest(self) -> float:
         """Return the time [s] in which a guard would reach zero at its present rate."""
@@ -124,7 +124,7 @@ class InstantEvents:
 
     def resolve(self) -> Array | None:
         """Carry out the due edges at the state set last; return what they add to the ledger, None if the scene ends."""
-        before, here, loads = self.instant.booked.copy(), self.here(), self.loads
+        before, here, loads = self.instant.ledger.copy(), self.here(), self.loads
         begun: Point | None = here
         if loads is not None:
             histories = [parameter.load is not None for parameter in self.system.parameters]
@@ -134,7 +134,7 @@ class InstantEvents:
 
     def fire(self, index: int) -> Array | None:
         """Carry out an edge at the state set last, and the edges that are due after it."""
-        before = self.instant.booked.copy()
+        before = self.instant.ledger.copy()
         point = self.instant.apply(index, self.here())
         return self._taken(self.instant.resolve(point) if point is not None else None, before)
 
@@ -144,7 +144,7 @@ class InstantEvents:
             return None
         self.evaluation.parameters[:] = point.parameters
         self.evaluation.restart(point.y)
-        return self.instant.booked - before
+        return self.instant.ledger - before
 
 
 class EndError(Exception):
@@ -197,15 +197,15 @@ class EmbeddedScene:
         except InputError as error:
             raise case.located(error) from None
         self.evaluation = Evaluation(self.problem.program, self.problem.y0, self.problem.parameters[0])
-        self.moments: InstantEvents | None = None
-        self.begin_piece(0.0, DIFFERENCE_STEPS)
-        self.moments = InstantEvents(self.model, self.problem, self.evaluation) if self.model.jumper else None
+        self.events: InstantEvents | None = None
+        self.begin_segment(0.0, DIFFERENCE_STEPS)
+        self.events = InstantEvents(self.model, self.problem, self.evaluation) if self.model.jumper else None
         self._terminal = np.array([margin.terminal for margin in self.model.margins], dtype=bool)
         self.states = tuple(system.states[j].name for j in self.evaluation.free)
-        self.beside = [self._beside(scene.interface.engine, *item) for item in (neighbours or {}).items()]
+        self.neighbours = [self._neighbour(scene.interface.engine, *item) for item in (neighbours or {}).items()]
         """The reactors next to the surface."""
 
-    def _beside(self, engine: Any, name: str, reactor: Any) -> NeighbourReactor:
+    def _neighbour(self, engine: Any, name: str, reactor: Any) -> NeighbourReactor:
         held = next(held for held in engine.held if held.phase.name == name)
         made = {species: f"made_{part}" for species, part in engine.made_in(held.phase).items()}
         return NeighbourReactor(
@@ -278,7 +278,7 @@ class EmbeddedScene:
             return
         closed = self._terminal & ~(margins >= 0)
         if closed.any():
-            closed &= self.model.system.in_play(self.evaluation.parameters)[: len(closed)]
+            closed &= self.model.system.active_guards(self.evaluation.parameters)[: len(closed)]
         if closed.any():
             raise EndError(self.model.margins[int(closed.argmax())].reason)
 
@@ -313,21 +313,21 @@ class EmbeddedScene:
         """Times [s] at which a history or its slope jumps."""
         return tuple(float(t) for t in self.problem.segments[1:-1])
 
-    def begin_piece(self, t: float, rtol: float) -> None:
+    def begin_segment(self, t: float, rtol: float) -> None:
         """Set the load segments that begin at time t [s]; bounds get slack for the tolerance."""
         run = Run(times=(0.0, NO_END), rtol=max(rtol, DIFFERENCE_STEPS))
         table = self.model.problem(run, self.values, passing=False).parameters
         parameters = table[bisect_right(self.breakpoints, t)]
-        if self.moments:
-            self.moments.begin_piece(parameters)
+        if self.events:
+            self.events.begin_segment(parameters)
         else:
             self.evaluation.parameters[:] = parameters
 
     def transitions(self, t: float, x: Array) -> Array:
         """Return the guards of the transitions at a time and variables."""
-        assert self.moments is not None
+        assert self.events is not None
         self.put(t, x)
-        return self.moments.margins()
+        return self.events.margins()
 
     def ledger_rates(self, t: float, x: Array) -> Array:
         """Return the rates of the ledger."""
@@ -339,11 +339,11 @@ class EmbeddedScene:
 
         EndError if the scene ends with it.
         """
-        assert self.moments is not None
+        assert self.events is not None
         self.put(t, x)
-        booked = self.moments.resolve() if index is None else self.moments.fire(index)
+        booked = self.events.resolve() if index is None else self.events.fire(index)
         if booked is None:
-            raise EndError(self.moments.instant.reason)
+            raise EndError(self.events.instant.reason)
         states = self.evaluation.y[self.evaluation.free]
         return np.concatenate((states, x[len(self.states) :] + booked)), booked
 
@@ -378,8 +378,8 @@ class History:
         reason = stop or f"reached the end at t = {self.times[-1]:.9g} s"
         status = "stopped" if stop else "finished"
         result = self._result(Status.EVENT if stop else Status.FINISHED)
-        case, moments = self.scene.case, self.scene.moments
-        jumps = tuple(moments.jumps) if moments else ()
+        case, events = self.scene.case, self.scene.events
+        jumps = tuple(events.jumps) if events else ()
         return Solution(
             Trajectory(self.scene.model, run, result, self.scene.values, status, reason, seconds, jumps),
             title=case.title,

@@ -108,12 +108,12 @@ class InterfaceReactor(StateVectorReactor):
         """Time of the start or of the last jump, after which steps begin at the rounding of the time."""
         self._connecting = False
         """True while a wall is created between a body and the reactor in its place."""
-        self._varied = False
+        self._is_perturbed = False
         """True if Cantera perturbs multipliers between evaluations of rates."""
-        self._put, self._told = False, 0.0
+        self._is_set, self._asked_at = False, 0.0
         """Whether variables were set since other reactors asked for rates, and the time of that request [s]."""
         self.evaluations, self.seconds = 0, 0.0
-        self._take_up(self.scene)
+        self._set_scene(self.scene)
         for body, reactor in self.bodies.items():
             self._connect(reactor, body)
         for k, neighbour in enumerate(self.neighbours.values()):
@@ -137,7 +137,7 @@ class InterfaceReactor(StateVectorReactor):
         for wall in self._walls:
             wall.area = area
 
-    def _take_up(self, scene: EmbeddedScene) -> None:
+    def _set_scene(self, scene: EmbeddedScene) -> None:
         self.scene = scene
         self.names = (*scene.states, *(f"{account} / {LEDGER_UNIT:g}" for account in scene.accounts))
         self.unit = np.array([1.0] * len(scene.states) + [LEDGER_UNIT] * len(scene.accounts))
@@ -149,9 +149,9 @@ class InterfaceReactor(StateVectorReactor):
         """Time, variables and rates of the last evaluation."""
         self._current = False
         """True if the rates are those of the variables set last."""
-        self._asked: object = None
+        self._last_inputs: object = None
         """All inputs of those rates; None if they may depend on more."""
-        self._heard = np.array([*self._paths()], dtype=np.int64)
+        self._input_columns = np.array([*self._paths()], dtype=np.int64)
         self._accounts = {body: scene.account(body) for body in self.bodies}
         """Indices of the variables that hold the heat of the bodies that reactors replace."""
         self.history = History(scene)
@@ -165,7 +165,7 @@ class InterfaceReactor(StateVectorReactor):
 
     def _given(self, k: int, t: float) -> tuple[Array, float]:
         """Return species [kmol/s] and enthalpy [W] that reactions give to a neighbour at a time [s]."""
-        return self.scene.beside[k].given(self._rates_for_others(t), self.area)
+        return self.scene.neighbours[k].given(self._rates_for_others(t), self.area)
 
     def _add_wall(self, wall: Any) -> None:
         """Refuse a wall on this reactor, which consists of two bodies; Cantera calls it."""
@@ -190,7 +190,7 @@ class InterfaceReactor(StateVectorReactor):
         the rate of a reactor only when it evaluates that reactor.
         """
         super().add_sensitivity_reaction(m)
-        self._varied = True
+        self._is_perturbed = True
 
     def add_sensitivity_species_enthalpy(self, species: Any) -> None:
         """Refuse: the thermo of species is in the formulas of the scene, where Cantera does not change it."""
@@ -244,7 +244,7 @@ class InterfaceReactor(StateVectorReactor):
             port = BodyPort(name, node, f"Q_{suffix_of(case.scene, name)}")
             scene = EmbeddedScene(case, self.bodies, [*self.ports, name], self.loads, self.neighbours)
             self.ports[name] = port
-            self._take_up(scene)
+            self._set_scene(scene)
             self.put(self.start())
             self._dated = True
         return self.ports[name].reservoir
@@ -268,7 +268,7 @@ class InterfaceReactor(StateVectorReactor):
             For any other name or a load given already, or after the network has run.
         """
         given = function_of(self.scene.case.scene, name, function)
-        self._take_up(self._loaded(name, given))
+        self._set_scene(self._loaded(name, given))
         self.loads[name] = given
 
     def _loaded(self, name: str, function: Callable[[float], float]) -> EmbeddedScene:
@@ -305,7 +305,7 @@ class InterfaceReactor(StateVectorReactor):
             raise InputError(
                 f"{read[0]} depends on the load of the gap, which a reactor gives at the ends of steps. Prescribe F_n."
             )
-        self._take_up(scene)
+        self._set_scene(scene)
         self.loads["F_n"], self.pressing = push, (gas, outside)
         gap = scene.states.index("g_n")
         rate = lambda t: float(self._rates_for_others(t)[gap])  # noqa: E731
@@ -321,25 +321,25 @@ class InterfaceReactor(StateVectorReactor):
         super().replace_initialize(start)
         self._restarted = start
         if start != self.t:
-            self.begin_piece(start, 0.0)
+            self.begin_segment(start, 0.0)
 
     def start(self) -> Array:
         return np.asarray(self.x / self.unit)
 
     def put(self, x: Array) -> None:
-        self.x, self._current, self._dated, self._put = x * self.unit, False, False, True
+        self.x, self._current, self._dated, self._is_set = x * self.unit, False, False, True
         for port in self.ports.values():
             port.warm(float(self.x[self.scene.states.index(port.node)]))
 
     def rates(self, t: float) -> Array:
         began = time.perf_counter()
-        if self._varied and self._current:
+        if self._is_perturbed and self._current:
             raise InputError(
                 f"others have asked {self.name} for rates before Cantera has told it which of them it varies, so "
                 f"sensitivities would be wrong. Give {self.name} to the network before the reactors that take from it."
             )
         if not self.passes_breakpoints:
-            self._check_piece(t)
+            self._check_segment(t)
         rates = np.asarray(self._rates(t) / self.unit)
         if not self.passes_breakpoints:
             self._refuse_passed()
@@ -352,9 +352,9 @@ class InterfaceReactor(StateVectorReactor):
         # All reactors of a network are set before it asks for rates.
         if self._current and self._last is not None and self._last[0] == t:
             return self._last[2]
-        asked = t, self.x[: len(self.scene.states)].tobytes(), self.heard(t)
+        asked = t, self.x[: len(self.scene.states)].tobytes(), self.inputs_at(t)
         # The integrator differentiates by every variable, and most of them are lines of the ledger.
-        if asked == self._asked and self._last is not None:
+        if asked == self._last_inputs and self._last is not None:
             self._current = True
             return self._last[2]
         if self._stands_still(t) and self._last is not None:
@@ -366,14 +366,14 @@ class InterfaceReactor(StateVectorReactor):
             if self._last is None or abs(t - self._last[0]) <= RUN_EPS * abs(t):
                 raise self._stopped(stop) from None
             raise self.error or BackOffError(stop) from None
-        self._last, self._asked, self._current = (t, self.x, rates), asked, True
+        self._last, self._last_inputs, self._current = (t, self.x, rates), asked, True
         return rates
 
     def _rates_for_others(self, t: float) -> Array:
         """Return the rates for another reactor; InputError if this one is not in the network, so has no variables."""
-        if not self._put and t != self._told:
+        if not self._is_set and t != self._asked_at:
             raise InputError(self.left_out("a reactor"))
-        self._put, self._told = False, t
+        self._is_set, self._asked_at = False, t
         return self.attempt(self._rates, t)
 
     def others(self) -> Iterator[tuple[str, Any]]:
@@ -406,31 +406,31 @@ class InterfaceReactor(StateVectorReactor):
         step = t - self._last[0] if self._last is not None else 0.0
         return 0 < step <= 2 * FEW_EPS * t and t - self._restarted > RUN_EPS * t
 
-    def heard(self, t: float) -> object:
+    def inputs_at(self, t: float) -> object:
         """Return everything that the rates at a time [s] depend on besides the variables."""
-        return self.area, self._listen(), [f(t) for f in self.loads.values()]
+        return self.area, self._read_network(), [f(t) for f in self.loads.values()]
 
-    def _listen(self) -> bytes:
+    def _read_network(self) -> bytes:
         """Read temperatures, heats, multipliers and compositions from the network, and return them as bytes."""
         around = [reactor.T for reactor in self.bodies.values()]
         around += [port.heat() / self.area for port in self.ports.values()]
         multipliers = self.surface.forward_rate_constants[: len(self.scene.reactions)]
-        beside = [item.state() for item in self.scene.beside]
-        heard = np.concatenate([around, multipliers, *beside] if around else [multipliers, *beside])
-        self.scene.evaluation.parameters[self._heard] = heard
-        return heard.tobytes()
+        neighbours = [item.state() for item in self.scene.neighbours]
+        inputs = np.concatenate([around, multipliers, *neighbours] if around else [multipliers, *neighbours])
+        self.scene.evaluation.parameters[self._input_columns] = inputs
+        return inputs.tobytes()
 
     def _paths(self) -> Iterator[int]:
-        """Yield the indices of these values among the scene's parameters, in the order of ``_listen``."""
+        """Yield the indices of these values among the scene's parameters, in the order of ``_read_network``."""
         names = [f"T_{suffix_of(self.scene.case.scene, name)}" for name in self.bodies]
         names += [port.heat_name for port in self.ports.values()]
         paths = [f"loading.{name}.level" for name in names]
         paths += [f"multiplier.{label}" for label in self.scene.reactions]
         yield from (self.scene.places[path] for path in paths)
-        for item in self.scene.beside:
+        for item in self.scene.neighbours:
             yield from item.places
 
-    def _check_piece(self, t: float) -> None:
+    def _check_segment(self, t: float) -> None:
         breakpoints = self.scene.breakpoints
         following = bisect_right(breakpoints, self.t)
         if following < len(breakpoints) and t > breakpoints[following]:
@@ -441,10 +441,10 @@ class InterfaceReactor(StateVectorReactor):
 
     def _refuse_passed(self) -> None:
         """Refuse a state beyond an edge that no network has carried out."""
-        if self.scene.moments is None:
+        if self.scene.events is None:
             return
         edges = self.scene.model.system.edges
-        passed = [edges[i].reason for i in np.flatnonzero(self.scene.moments.margins() < 0)]
+        passed = [edges[i].reason for i in np.flatnonzero(self.scene.events.margins() < 0)]
         if passed:
             reasons = "; ".join(dict.fromkeys(passed))
             raise InputError(
@@ -454,14 +454,14 @@ class InterfaceReactor(StateVectorReactor):
 
     def ledger_rates(self, t: float, x: Array) -> Array:
         """Return the rates of the ledger [SI per s] at given variables."""
-        self._asked, self._current = None, False
-        self._listen()
+        self._last_inputs, self._current = None, False
+        self._read_network()
         return self.scene.ledger_rates(t, x)
 
-    def begin_piece(self, t: float, rtol: float) -> None:
+    def begin_segment(self, t: float, rtol: float) -> None:
         """Set the load segments that begin at time t [s], at a relative tolerance."""
-        self.t, self._asked, self._current, self._dated = t, None, False, True
-        self.scene.begin_piece(t, rtol)
+        self.t, self._last_inputs, self._current, self._dated = t, None, False, True
+        self.scene.begin_segment(t, rtol)
 
     def jump(self, t: float, index: int | None = None) -> None:
         """Carry out a transition at time t [s], or the due ones if None, and keep the new state."""
@@ -471,12 +471,12 @@ class InterfaceReactor(StateVectorReactor):
             self.ledger = self.ledger + booked
         except EndError as end:
             raise self._stopped(f"{end} at t = {t:.9g} s") from None
-        self._last, self._asked, self._current, self._restarted = None, None, False, t
+        self._last, self._last_inputs, self._current, self._restarted = None, None, False, t
         for port in self.ports.values():
             port.warm(float(self.x[self.scene.states.index(port.node)]))
 
     def _refuse_sudden_heat(self, t: float) -> None:
-        jumps = self.scene.moments.jumps if self.scene.moments else []
+        jumps = self.scene.events.jumps if self.scene.events else []
         if self.bodies and any(jump.heat_out for jump in jumps if jump.t == t):
             names = ", ".join(self.bodies)
             raise InputError(
@@ -504,7 +504,7 @@ class InterfaceReactor(StateVectorReactor):
                 f"an ordinary ReactorNet does not say at what time {name} is wanted, and histories of the scene vary. "
                 "Call `interface.record(net.time)` first, or use surfacechem.reactor.ReactorNet."
             )
-        self._listen()
+        self._read_network()
         return self.scene.quantity(name, self.t, self.x)
 
     @property
@@ -526,9 +526,9 @@ class InterfaceReactor(StateVectorReactor):
             Time [s].
         """
         self.t, self._dated = t, True
-        self._listen()
+        self._read_network()
         x = self.x
-        if self.scene.moments and not self.coupled:
+        if self.scene.events and not self.coupled:
             x = np.concatenate((x[: len(self.scene.states)], self.ledger))
         self.history.append(t, x)
 

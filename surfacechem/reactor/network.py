@@ -15,7 +15,7 @@ import numpy as np
 from surfacechem.errors import InputError
 from surfacechem.reactor.coupling import HeatWall
 from surfacechem.reactor.interface import InterfaceReactor
-from surfacechem.reactor.watch import LATER_LOOK, StepWatcher
+from surfacechem.reactor.watch import LATER_AHEAD, StepWatcher
 from surfacechem.solve.adapters.cantera_network import StateVectorReactor, last_step
 from surfacechem.solve.adapters.dense_step import Guards, first_crossing
 from surfacechem.solve.contract import Array, Counters, Guard
@@ -59,7 +59,7 @@ class ReactorNet(cantera.ReactorNet):
         self._steps = 0
         self._fresh = True
         self._started = -np.inf
-        self._around: list[object] = []
+        self._last_surroundings: list[object] = []
         """Quantities besides the variables on which rates depend, at the present time."""
         super().__init__(reactors)
         self.interfaces += [reactor for reactor in reactors if isinstance(reactor, InterfaceReactor)]
@@ -91,8 +91,8 @@ class ReactorNet(cantera.ReactorNet):
         cantera.CanteraError
             For a time that is past.
         """
-        self._take_up()
-        if self.time - t > LATER_LOOK * np.spacing(abs(self.time)):
+        self._begin_or_restart()
+        if self.time - t > LATER_AHEAD * np.spacing(abs(self.time)):
             raise cantera.CanteraError(f"Cannot integrate backwards in time: {t:.17g} s < {self.time:.17g} s.")
         return self._advance(t, apply_limit)
 
@@ -102,7 +102,7 @@ class ReactorNet(cantera.ReactorNet):
             with self._guarded():
                 if self._watch.interfaces:
                     self._reach(goal, apply_limit)
-                elif not self._there(goal):
+                elif not self._is_reached(goal):
                     super().advance(goal, apply_limit)
             self._arrive(float(self.time))
             if self.time >= t or self.time < goal:
@@ -112,28 +112,28 @@ class ReactorNet(cantera.ReactorNet):
         """Advance to a time, through the events of scenes before it."""
         watch = self._watch
         for interface in watch.interfaces:
-            interface.scene.moments.until(goal, self.rtol)  # type: ignore[union-attr]
+            interface.scene.events.until(goal, self.rtol)  # type: ignore[union-attr]
         start = np.array(self.get_state()) if apply_limit and np.any(self.advance_limits >= 0) else None
-        while not self._there(goal):
+        while not self._is_reached(goal):
             if self.time >= watch.known:
-                self._look(goal)
+                self._locate_event(goal)
             event, now = watch.event, float(self.time)
             end = min(goal, watch.known if event is None else max(event.t, now))
             reached = end if start is None else self._limited(now, end, start)
             super().advance(reached, False)
-            watch.book(now, self.time)
+            watch.integrate_ledgers(now, self.time)
             if reached < end:
                 return
             if event is not None and self.time >= event.t:
                 event.interface.jump(self.time, event.index)
-                self._anew(f"the event at t = {self.time:g} s")
+                self._restart(f"the event at t = {self.time:g} s")
 
-    def _there(self, goal: float) -> bool:
+    def _is_reached(self, goal: float) -> bool:
         """True if a time is reached.
 
         Just after a start, a time within rounding is reached by setting the clock, since CVODE takes no step as short.
         """
-        if self.time == self._started and 0 < goal - self.time <= LATER_LOOK * np.spacing(goal):
+        if self.time == self._started and 0 < goal - self.time <= LATER_AHEAD * np.spacing(goal):
             self.initial_time = self._started = goal
         return bool(self.time >= goal)
 
@@ -155,14 +155,14 @@ class ReactorNet(cantera.ReactorNet):
         guards.start(room(now, step.y(now)))
         return first_crossing(step, guards, np.ones(int(limited.sum()), dtype=bool), 0.0)[0]
 
-    def _look(self, goal: float) -> None:
+    def _locate_event(self, goal: float) -> None:
         """Make the integrator take a step, advance a little into it, and locate its first event."""
         before = self.time
         super().advance(self._watch.ahead(goal), False)
-        self._watch.look()
-        self._watch.book(before, self.time)
+        self._watch.locate_event()
+        self._watch.integrate_ledgers(before, self.time)
 
-    def _anew(self, where: str) -> None:
+    def _restart(self, where: str) -> None:
         """Restart the integration from the present state."""
         if self.n_sensitivity_params:
             raise InputError(f"sensitivities end at {where}, where the integration starts anew.")
@@ -194,7 +194,7 @@ class ReactorNet(cantera.ReactorNet):
         InterfaceStopped
             Where a scene ends, with the reason.
         """
-        self._take_up()
+        self._begin_or_restart()
         following = self._breakpoints()
         if self._watch.interfaces:
             return self._watched_step(following)
@@ -265,21 +265,21 @@ class ReactorNet(cantera.ReactorNet):
     def _watched_step(self, following: Sequence[float]) -> float:
         """Go to the end of the integrator's next step, or to the event or breakpoint in it."""
         watch, ahead = self._watch, min(following, default=np.inf)
-        if self._there(ahead):
+        if self._is_reached(ahead):
             return self._advance(ahead)
         if self.time >= watch.known:
             with self._guarded():
-                self._look(min(ahead, self.time + ASSUMED_LENGTH))
+                self._locate_event(min(ahead, self.time + ASSUMED_LENGTH))
         event = watch.event
         return self._advance(min(ahead, watch.known if event is None else event.t))
 
-    def _take_up(self) -> None:
+    def _begin_or_restart(self) -> None:
         """Begin, or restart if a script has changed anything."""
         if self._fresh:
             self._begin()
-        elif self._surroundings() != self._around:  # the integrator has passed this time with the old values
-            self._anew(f"what a script has changed at t = {self.time:g} s")
-            self._around = self._surroundings()
+        elif self._surroundings() != self._last_surroundings:  # the integrator has passed this time with the old values
+            self._restart(f"what a script has changed at t = {self.time:g} s")
+            self._last_surroundings = self._surroundings()
 
     def _breakpoints(self) -> list[float]:
         """Return the breakpoints ahead, in order."""
@@ -294,15 +294,15 @@ class ReactorNet(cantera.ReactorNet):
         # First, since reactors may share a phase, which must be left in the state of a reactor of the network.
         outside = [end.phase.state.tobytes() for end in ends if end is not None and end not in self.reactors]
         settings = [getattr(item, name, None) for item in (*own, *around) for name in SETTINGS]
-        heard = [interface.heard(float(self.time)) for interface in self.interfaces]
-        return [*outside, *map(_contents, own), *settings, *heard]
+        inputs = [interface.inputs_at(float(self.time)) for interface in self.interfaces]
+        return [*outside, *map(_contents, own), *settings, *inputs]
 
     def _begin(self) -> None:
         self._refuse_strangers()
         self._fresh, self._started = False, self.time
         for interface in self.interfaces:
-            interface.begin_piece(self.time, self.rtol)
-            if interface.scene.moments:
+            interface.begin_segment(self.time, self.rtol)
+            if interface.scene.events:
                 interface.jump(self.time)
             interface.record(self.time)
         if self._watch.interfaces:
@@ -329,10 +329,10 @@ class ReactorNet(cantera.ReactorNet):
         for interface in self.interfaces:
             self._record(interface, t)
         for interface in pieces:
-            interface.begin_piece(t, self.rtol)
+            interface.begin_segment(t, self.rtol)
         if pieces:
-            self._anew(f"the breakpoint t = {t:g} s")
-        self._around = self._surroundings()
+            self._restart(f"the breakpoint t = {t:g} s")
+        self._last_surroundings = self._surroundings()
 
     def _record(self, interface: InterfaceReactor, t: float) -> None:
         stats = self.solver_stats

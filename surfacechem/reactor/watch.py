@@ -20,17 +20,17 @@ from surfacechem.solve.adapters.dense_step import DenseStep, Guards, first_cross
 from surfacechem.solve.contract import Array, Guard
 from surfacechem.tolerances import NEGLIGIBLE
 
-FIRST_LOOK = NEGLIGIBLE**3
+FIRST_AHEAD = NEGLIGIBLE**3
 """Time of the first request after a start, as a fraction of the integration; first steps are shorter."""
 
-SHORTEST_LOOK, LATER_LOOK = 1e4, 4.0
+MIN_AHEAD, LATER_AHEAD = 1e4, 4.0
 """The shortest first request and all later ones, in roundings of the time."""
 
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(6)
 """Nodes and weights of Gauss's quadrature from -1 to 1."""
 
-PANELS_OF_A_PERIOD = 8
+PANELS_PER_CYCLE = 8
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class StepWatcher:
 
     def __init__(self, net: Any, interfaces: Sequence[InterfaceReactor]) -> None:
         self.net = net
-        self.interfaces = [item for item in interfaces if item.scene.moments]
+        self.interfaces = [item for item in interfaces if item.scene.events]
         self.started = False
         self.known = -np.inf
         """Time up to which the next event is known [s]."""
@@ -64,11 +64,11 @@ class StepWatcher:
         now = float(self.net.time)
         self._before = [item.scene.transitions(now, item.x) for item in self.interfaces]
         if self.started:
-            return min(goal, now + LATER_LOOK * float(np.spacing(now)))
-        soonest = min(item.scene.moments.soonest() for item in self.interfaces if item.scene.moments)
-        return min(goal, now + max(min(FIRST_LOOK * (goal - now), soonest / 2), SHORTEST_LOOK * float(np.spacing(now))))
+            return min(goal, now + LATER_AHEAD * float(np.spacing(now)))
+        soonest = min(item.scene.events.soonest() for item in self.interfaces if item.scene.events)
+        return min(goal, now + max(min(FIRST_AHEAD * (goal - now), soonest / 2), MIN_AHEAD * float(np.spacing(now))))
 
-    def look(self) -> None:
+    def locate_event(self) -> None:
         """Locate the first event in the step that the integrator has just taken."""
         now = float(self.net.time)
         self.started, self.event = True, None
@@ -85,7 +85,7 @@ class StepWatcher:
             if fired and (self.event is None or t < self.event.t):
                 self.event = InterfaceEvent(t, item, fired[0])
 
-    def book(self, start: float, end: float) -> None:
+    def integrate_ledgers(self, start: float, end: float) -> None:
         """Integrate the ledgers over a part of the step.
 
         The integrator may step over their changes while nothing else moves. Values from the network are known at the
@@ -95,7 +95,7 @@ class StepWatcher:
             if item.coupled:
                 continue
             frequency = max((item.scene.values[path] for path in item.scene.model.system.cycles), default=0.0)
-            panels = 1 + int(PANELS_OF_A_PERIOD * frequency * (end - start))
+            panels = 1 + int(PANELS_PER_CYCLE * frequency * (end - start))
             edges = np.linspace(start, end, panels + 1)
             for low, high in pairwise(edges):
                 times = (low + high) / 2 + (high - low) / 2 * NODES

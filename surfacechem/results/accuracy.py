@@ -140,7 +140,7 @@ class CellErrors:
         total = {name: self.variables.get(name, 0.0) + other.variables.get(name, 0.0) for name in names}
         return replace(other, variables=total, converged=self.converged and other.converged)
 
-    def beside(self, other: CellErrors) -> CellErrors:
+    def combined(self, other: CellErrors) -> CellErrors:
         """Return the sum of errors of two kinds, with the sources of both."""
         kinds = [found.source for found in (other, self) if found.variables]
         return replace(self.added_to(other), source=", ".join(kinds), in_noise=self.in_noise or other.in_noise)

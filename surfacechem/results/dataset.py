@@ -61,7 +61,7 @@ def changes_of(attributes: Mapping[str, Any]) -> dict[str, tuple[float, str]]:
 
 def quantities(system: System) -> dict[str, Quantity]:
     """Return the states, except those inside bodies, and the named quantities, by name."""
-    states = {state.name: state.quantity for state in system.states if state.name not in system.inside}
+    states = {state.name: state.quantity for state in system.states if state.name not in system.interior}
     return states | {item.name: item.quantity for item in system.outputs}
 
 
@@ -72,7 +72,7 @@ def quantity_columns(
     name and size; in a sweep a quantity is NaN at times that a run did not reach.
     """
     system = runs[0].model.system
-    kept = [j for j, state in enumerate(system.states) if state.name not in system.inside]
+    kept = [j for j, state in enumerate(system.states) if state.name not in system.interior]
     found = quantities(system)
     values: Iterable[Array] = (*runs[0].result.outputs[:, kept].T, *runs[0].outputs.T)
     if axes:  # one table for all runs; a column is a view of it
@@ -149,8 +149,8 @@ class Results(ABC):
     def _changed(self, system: System) -> dict[str, object]:
         """Return the entries of `departures` for the changes; empty if there are none."""
         units = system.changeable
-        told = {"changes": dict(self.changes), "units": {path: units[path] for path in self.changes}}
-        return told if self.changes else {}
+        known = {"changes": dict(self.changes), "units": {path: units[path] for path in self.changes}}
+        return known if self.changes else {}
 
     def _origin(self, made: str, how: str) -> dict[str, str | float | int]:
         """Return attributes with the origin of the dataset, which is ``made``, or evaluated."""

@@ -51,7 +51,7 @@ from surfacechem.tolerances import (
 ENDED_EARLIER = "ended earlier"
 """Note on a second run that ended before the first one."""
 
-WAYS = ("auto", "estimate", "balances")
+ERROR_SOURCES = ("auto", "estimate", "balances")
 """Sources of the error: an exact solution if there is one, else a second run; always a second run; the balances only.
 """
 
@@ -71,10 +71,10 @@ EVENTS = "event times"
 """Name of the event times among the compared variables."""
 
 
-def check_way(way: str, run: Run) -> None:
+def check_source(option: str, run: Run) -> None:
     """Raise InputError for an unknown way, and for one that leaves out the second run needed to verify an accuracy."""
-    refuse_unknown([way], WAYS, "no source '{}' of an error", Place(path="--error"))
-    if way == "balances" and run.solver == AUTO:
+    refuse_unknown([option], ERROR_SOURCES, "no source '{}' of an error", Place(path="--error"))
+    if option == "balances" and run.solver == AUTO:
         text = f"the accuracy {asked_accuracy(run):g} is verified by a second run, which `balances` leaves out"
         raise InputError(f"{text}: give a tolerance, `rtol`, instead of it, or another source.", Place(path="--error"))
 
@@ -83,26 +83,26 @@ def accuracy(
     trajectory: Trajectory,
     scene: Scene,
     exact: tuple[str, Mapping[str, float]] | None,
-    way: str,
+    option: str,
     cells: Callable[[], CellErrors] = CellErrors,
     estimate: Accuracy | None = None,
 ) -> Accuracy:
-    """Return the error of a run in one of the WAYS; ``exact`` has name and parameters of the exact solution.
+    """Return the error of a run by one of the ERROR_SOURCES; ``exact`` has name and parameters of the exact solution.
 
     ``cells`` finds the errors of the cells across bodies, which a second run at another tolerance does not see;
     ``estimate`` is the estimate from a second run, if there was one.
     """
     if ended_at_start(trajectory):
         return unknown(ENDED_AT_START)
-    if way == "balances":
+    if option == "balances":
         if len(trajectory.result.times) < 2:
             return unknown("the run ended before its second output")
-        books = audit(trajectory)
-        errors = {"energy": books.energy_error, "entropy": books.entropy_error, "sites": books.site_error}
+        balances = audit(trajectory)
+        errors = {"energy": balances.energy_error, "entropy": balances.entropy_error, "sites": balances.site_error}
         errors |= {law.path: law.error for law in inexact(scene)}
         return Accuracy(stated(errors), "balances only: what they miss is not seen", errors)
     unused = ""
-    if exact is not None and way != "estimate":
+    if exact is not None and option != "estimate":
         try:
             known = {EVENTS: estimate.variables[EVENTS]} if estimate and EVENTS in estimate.variables else None
             found = against_exact(trajectory, scene, *exact, late=known)
@@ -159,7 +159,7 @@ def against_exact(
     late = dict(late or {})
     latest = max(late.values(), default=0.0)
     # With cells, whose layers are unresolved at first, errors are taken at the requested times.
-    seen = trajectory if trajectory.model.system.profiles else fewer(trajectory.looked, latest)
+    seen = trajectory if trajectory.model.system.profiles else fewer(trajectory.stored, latest)
     reference = match(name, options, SceneView(scene, seen))
     exact = exact_values(reference, scene, seen, to_the_end=True, side=max(SIDE, latest))
     alike = _off_events(seen, latest)
@@ -204,7 +204,7 @@ def second_settings(trajectory: Trajectory, known: bool = False) -> Run:
     outputs also at the times of comparison. With ``known`` it records states inside its steps, too, as it may become
     the result.
     """
-    run, seen = trajectory.run, trajectory.looked.result.times
+    run, seen = trajectory.run, trajectory.stored.result.times
     times = tuple(np.union1d(run.times, seen).tolist())
     inside = {} if known else {"picture": None, "looks": 0.0}
     return run.second(second_tolerance(run.rtol), times=times, **inside)
@@ -233,7 +233,7 @@ def estimated(trajectory: Trajectory, second: Trajectory) -> Accuracy:
     if second.status == "failed" or (second.status == "finished" and second.result.t < trajectory.result.t):
         fate = "failed later" if ends_late else ENDED_EARLIER
         return unknown(f"a second run at rtol {other:.0e} {fate}: {second.reason}")
-    seen = trajectory.looked
+    seen = trajectory.stored
     errors, note = state_differences(seen, second)
     if not errors:
         return unknown(NOTHING_EVOLVES if len(trajectory.result.times) > 1 else ENDED_AT_START)
@@ -300,12 +300,12 @@ def of_named(ours: Trajectory, theirs: Trajectory) -> dict[str, float]:
         alike &= agree_at_jumps(times, ours, theirs)
     first, second = (run.picked(own[alike]) for run, own in zip((ours, theirs), rows, strict=True))
     names, true = second.model.system.output_columns, second.outputs
-    rounded = RUN_ERROR * np.array(list(second.some.roundings.values()))
+    rounded = RUN_ERROR * np.array(list(second.sample.roundings.values()))
     size = np.transpose(list(map(sizes(second, named=names).__getitem__, names)))
     with np.errstate(invalid="ignore"):  # infinite values of both are equal
         missed = np.fmax(np.abs(first.outputs - true) - rounded, 0.0)
     errors = np.fmax.reduce(np.divide(missed, size, out=np.zeros_like(missed), where=size > 0), initial=0.0)
-    nothing = _squares(ours.run.rtol, second.some, state_floors(theirs)) if errors.max(initial=0) > NEGLIGIBLE else ()
+    nothing = _squares(ours.run.rtol, second.sample, state_floors(theirs)) if errors.max(initial=0) > NEGLIGIBLE else ()
     return {name: error for name, error in zip(names, errors.tolist(), strict=True) if name not in nothing}
 
 
@@ -316,7 +316,7 @@ def _squares(rtol: float, trajectory: Trajectory, least: Array) -> list[str]:
     The energy of a spring at zero extension is an example: no digit of such a zero is known, and none is missed.
     """
     changes = rtol * np.maximum(np.abs(trajectory.result.outputs), least)
-    made, by_less = (np.array(list(trajectory.felt(each).values())) for each in (changes, changes / FINER_BY))
+    made, by_less = (np.array(list(trajectory.sensitivities(each).values())) for each in (changes, changes / FINER_BY))
     largest = np.abs(trajectory.outputs).max(axis=0, initial=0.0)
     squares = (largest <= made) & (2 * FINER_BY * by_less <= made)
     return [name for name, is_one in zip(trajectory.model.system.output_columns, squares, strict=True) if is_one]
@@ -401,7 +401,7 @@ def with_cells(estimate: Accuracy, cells: CellErrors) -> Accuracy:
 def states(trajectory: Trajectory) -> dict[str, Array]:
     """Return the states at the output times, by name; those inside a body as one profile."""
     system, outputs = trajectory.model.system, trajectory.result.outputs
-    found = {name: outputs[:, j] for name, j in system.state_columns.items() if name not in system.inside}
+    found = {name: outputs[:, j] for name, j in system.state_columns.items() if name not in system.interior}
     return found | {profile.name: profile_values(trajectory, profile) for profile in system.profiles}
 
 
@@ -595,7 +595,7 @@ def compared(first: Trajectory, second: Trajectory) -> Accuracy:
     source = second_run(second.run)
     if first.status != second.status:
         return Accuracy(math.inf, f"{source}, which {second.status}: {second.reason}")
-    seen = first.looked
+    seen = first.stored
     errors, others = state_differences(seen, second)
     if others and first.run.rtol > MIN_RTOL:  # at MIN_RTOL roundoff decides on events without effect
         return Accuracy(math.inf, f"{source}, which had {others}")
@@ -609,7 +609,7 @@ def rounding_of_time(trajectory: Trajectory) -> float:
 
     It is large where a state runs towards a singular end.
     """
-    seen = trajectory.looked
+    seen = trajectory.stored
     known = sizes(seen)
     size = np.transpose([known[name] for name in seen.model.system.state_columns])
     change = EPS * np.abs(seen.rates) * seen.result.times[:, None]

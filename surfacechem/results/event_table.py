@@ -60,11 +60,11 @@ def events_of(trajectory: Trajectory) -> list[EventRow]:
     if trajectory.run.rest is not None:
         y = trajectory.result.y
         found.append(EventRow(trajectory.run.rest, 0.0, STEADY, "came to rest, a steady state", y, y))
-    last, told = 0.0, []
+    last, rows = 0.0, []
     for event in sorted(found, key=lambda event: event.t):
-        told.append(event if event.jump else replace(event, since=event.t - last))
+        rows.append(event if event.jump else replace(event, since=event.t - last))
         last = event.t if event.jump else last
-    return told
+    return rows
 
 
 def event_columns(runs: Sequence[Trajectory], axes: Mapping[str, int] | None = None) -> list[Column]:
@@ -102,7 +102,7 @@ def event_columns(runs: Sequence[Trajectory], axes: Mapping[str, int] | None = N
         column("event_verdict", "1", verdict, attrgetter("verdict"), ""),
     ]
     for k, state in enumerate(system.states):
-        if state.name not in system.inside:
+        if state.name not in system.interior:
             q = state.quantity
             for side in ("before", "after"):
                 text, read = f"{q.long_name} {side}", lambda event, side=side, k=k: float(getattr(event, side)[k])
@@ -196,7 +196,7 @@ def event_waits(trajectory: Trajectory) -> list[str]:
 def _ends(trajectory: Trajectory, mode: Any, value: float) -> bool:
     """True if the stage that a mode has at the end of a run ends with it, within the roundoff of time."""
     model, result = trajectory.model, trajectory.result
-    edges = [j for j, edge in enumerate(model.system.edges) if edge.passes and edge.when.get(mode) == (value,)]
+    edges = [j for j, edge in enumerate(model.system.edges) if edge.ends_stage and edge.when.get(mode) == (value,)]
     if not edges or model.jumper is None or model.program.margins is None:
         return False
     row = model.inputs(result, np.array([result.t]), result.y[None], result.ydot[None], np.array([-1]))

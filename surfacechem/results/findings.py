@@ -80,7 +80,7 @@ def in_words(low: float, high: float) -> str:
 def verdicts(trajectory: Trajectory, audit: Audit) -> tuple[BalanceVerdict, ...]:
     """Return the verdict on each pair of rates, over all outputs and steps."""
     found = []
-    for pair in trajectory.model.system.noted(RatePair):
+    for pair in trajectory.model.system.notes_of(RatePair):
         values = trajectory.everywhere(pair.departure)
         if len(values):  # a run that ends at its start has none
             low, high = float(np.min(values)), float(np.max(values))
@@ -91,7 +91,7 @@ def verdicts(trajectory: Trajectory, audit: Audit) -> tuple[BalanceVerdict, ...]
 def findings(trajectory: Trajectory, accuracy: Accuracy | None) -> list[str]:
     """Return all findings except the verdicts, in words."""
     system, rows = trajectory.model.system, np.empty((0, 0))
-    if [*system.noted(CappedLaw), *system.noted(Caution)]:  # arguments of compiled functions at the outputs and steps
+    if [*system.notes_of(CappedLaw), *system.notes_of(Caution)]:  # arguments of compiled functions at outputs and steps
         model, result, steps = trajectory.model, trajectory.result, trajectory.result.steps
         rows = model.inputs(result, result.times, result.outputs, trajectory.rates, result.segment)
         if steps is not None:
@@ -108,7 +108,7 @@ def findings(trajectory: Trajectory, accuracy: Accuracy | None) -> list[str]:
 def _capped_rates(system: System, rows: NDArray[np.float64]) -> list[str]:
     """Return warnings about laws whose rate exceeded exp(EXPONENT_CAP) at one of the states."""
     found = []
-    for law in system.noted(CappedLaw) if len(rows) else ():
+    for law in system.notes_of(CappedLaw) if len(rows) else ():
         # Interpreted rather than compiled, since they are needed once.
         exponents = [system.expand(expression) for expression in law.exponents]
         values = symengine.Lambdify(system.inputs, exponents, backend="lambda")(rows)
@@ -123,7 +123,7 @@ def _capped_rates(system: System, rows: NDArray[np.float64]) -> list[str]:
 
 def active_cautions(system: System, rows: NDArray[np.float64]) -> list[str]:
     """Return the cautions that apply at one of the states, given as arguments of compiled functions."""
-    cautions = system.noted(Caution)
+    cautions = system.notes_of(Caution)
     if not (cautions and len(rows)):
         return []
     expressions = [system.expand(item.expression) for item in cautions]
@@ -150,8 +150,8 @@ def _lost_fluxes(trajectory: Trajectory) -> list[str]:
     most = max((largest(everywhere(name)) for name in fluxes), default=0.0)
     # Heat that roundoff carries over the whole run is compared with the heat content, independent of its zero.
     content = trajectory.roundings.get("E_total", 0.0) / EPS
-    felt = ERROR_FLOOR * max(largest(everywhere("E_total")), content)
-    lost = [name for name, size in fluxes.items() if size > LOST_FLUX * most and size * duration > felt]
+    sensitivities = ERROR_FLOOR * max(largest(everywhere("E_total")), content)
+    lost = [name for name, size in fluxes.items() if size > LOST_FLUX * most and size * duration > sensitivities]
     advice = "let the two share one temperature, or use the heat_into variables, which are exact"
     return [f"{', '.join(lost)}: lost to rounding, as the conductance is very large; {advice}"] if lost else []
 
@@ -159,7 +159,7 @@ def _lost_fluxes(trajectory: Trajectory) -> list[str]:
 def _extrapolations(trajectory: Trajectory) -> list[str]:
     """Return warnings about laws that the run has used outside their range."""
     found = []
-    for limit in trajectory.model.system.noted(Range):
+    for limit in trajectory.model.system.notes_of(Range):
         values = trajectory.everywhere(limit.variable)
         low, high = float(np.min(values, initial=math.inf)), float(np.max(values, initial=-math.inf))
         rounding = RUN_EPS * max(abs(low), abs(high))

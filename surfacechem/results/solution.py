@@ -16,7 +16,7 @@ from surfacechem.results.dataset import DATASET_NAMES, Results, coverage_columns
 from surfacechem.results.event_table import event_columns, event_findings, event_violations, event_waits
 from surfacechem.results.findings import BalanceVerdict, findings, verdicts
 from surfacechem.results.netcdf import Column, versions
-from surfacechem.results.picture import pictured
+from surfacechem.results.refinement import refined
 from surfacechem.solve import solver
 from surfacechem.solve.contract import Status
 from surfacechem.solve.run import Run, Trajectory
@@ -92,7 +92,7 @@ class Solution(Results):
     @cached_property
     def shown(self) -> Trajectory:
         """The run with states at the times of the dataset, which resolve it if no times were asked for."""
-        return pictured(self.trajectory)
+        return refined(self.trajectory)
 
     @cached_property
     def audit(self) -> Audit:
@@ -122,7 +122,7 @@ class Solution(Results):
     def columns(self) -> tuple[Column, ...]:
         """Every variable of the dataset, the time coordinate first."""
         trajectory, accounts = self.shown, self.trajectory.model.system.ledger
-        books = self.audit if trajectory is self.trajectory else audit(trajectory)
+        balances = self.audit if trajectory is self.trajectory else audit(trajectory)
         own = quantity_columns([trajectory])
         along = [*own, *profile_columns(trajectory), *coverage_columns(trajectory.model.system, own)]
         columns = [Column("time", ("time",), trajectory.result.times, "s", "time since the start"), *along]
@@ -131,13 +131,13 @@ class Solution(Results):
             columns.append(Column(DATASET_NAMES.get(q.name, q.name), ("time",), values, q.unit, q.long_name))
         entropy = "total entropy minus the entropy supplied and produced"
         columns += [
-            Column("energy_residual", ("time",), books.energy, "J/m^2", "total energy minus the energy supplied"),
-            Column("entropy_residual", ("time",), books.entropy, "J/(m^2 K)", entropy),
+            Column("energy_residual", ("time",), balances.energy, "J/m^2", "total energy minus the energy supplied"),
+            Column("entropy_residual", ("time",), balances.entropy, "J/(m^2 K)", entropy),
         ]
         if any(account.kind == "bonds" for account in accounts):
             text = "largest residual of the site balances"
-            columns.append(Column("site_residual", ("time",), books.sites, "1", text))
-        for law, low in books.least.items():
+            columns.append(Column("site_residual", ("time",), balances.sites, "1", text))
+        for law, low in balances.least.items():
             text = f"least entropy production of {law.replace('_', ' ')}"
             columns.append(Column(f"least_sigma_{law}", (), np.float64(low), "W/(m^2 K)", text))
         computed, accuracy = {column.name: column for column in along}, self.accuracy or Accuracy(np.nan, "")
@@ -148,7 +148,7 @@ class Solution(Results):
         known = {DATASET_NAMES.get(name, name): error for name, error in errors.items()}
         columns = [column._replace(error=known.get(column.name)) for column in columns]
         columns += event_columns([trajectory])
-        if not trajectory.model.system.whole:
+        if not trajectory.model.system.in_totals:
             return tuple(columns)
         named = (column._replace(unit=trajectory.model.system.unit(column.unit)) for column in columns)
         return (*named, *self._surface_columns[0])
@@ -168,11 +168,11 @@ class Solution(Results):
     @cached_property
     def attributes(self) -> dict[str, str | float | int]:
         """Global attributes: scalars and strings only."""
-        run, result, books = self.trajectory.run, self.trajectory.result, self.audit
+        run, result, balances = self.trajectory.run, self.trajectory.result, self.audit
         system = self.trajectory.model.system
-        told = result.counters._asdict()
+        counts = result.counters._asdict()
         if not solver(run.solver).counts_rejected:
-            del told["rejected"]
+            del counts["rejected"]
         error: dict[str, str | float] = {}
         if found := self.accuracy:
             error = {"error": float(found.error), "error_source": found.source}
@@ -188,16 +188,16 @@ class Solution(Results):
             "solver": run.solver,
             "rtol": float(run.rtol),
             **{f"cells_{p.number}": len(p.points) - 1 for p in system.profiles},
-            **{f"count_{name}": int(value) for name, value in told.items()},
+            **{f"count_{name}": int(value) for name, value in counts.items()},
             "time_reached": float(result.t),
             "run_seconds": float(self.trajectory.seconds),
             "compile_seconds": float(self.trajectory.model.compile_seconds),
-            **({"integrals_seconds": self.integrals_seconds} if system.whole else {}),
+            **({"integrals_seconds": self.integrals_seconds} if system.in_totals else {}),
             **error,
-            "energy_error": books.energy_error,
-            "entropy_error": books.entropy_error,
-            "site_error": books.site_error,
-            "entropy_violations": ", ".join((*books.violations, *event_violations(self.trajectory.jumps))) or "none",
+            "energy_error": balances.energy_error,
+            "entropy_error": balances.entropy_error,
+            "site_error": balances.site_error,
+            "entropy_violations": ", ".join((*balances.violations, *event_violations(self.trajectory.jumps))) or "none",
             **({"detailed_balance": "; ".join(map(str, self.verdicts))} if self.verdicts else {}),
             "versions": versions(),
         }

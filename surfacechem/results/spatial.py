@@ -117,7 +117,7 @@ def grid(scene: Scene) -> tuple[object, ...]:
     return tuple((law.cells, law.layer, law.accuracy) for _, law in _laws(scene))
 
 
-def first_look(system: System, end: float) -> float:
+def resolved_after(system: System, end: float) -> float:
     """Return the time [s] after a sudden change from which on cells resolve it, in a run of this length [s]."""
     return min([p.after for p in system.profiles if p.after is not None], default=end / UNRESOLVED_START)
 
@@ -134,13 +134,13 @@ def unresolved(system: System, end: float, t: Array) -> NDArray[np.bool_]:
     starts = layer_starts(system, end)
     since = t - starts[np.searchsorted(starts, t, side="right") - 1]
     # The margin is the rounding of times and their differences.
-    return np.asarray(since < first_look(system, end) - RUN_EPS * t)
+    return np.asarray(since < resolved_after(system, end) - RUN_EPS * t)
 
 
-def looked_at(system: System, run: Run) -> Run:
+def with_check_times(system: System, run: Run) -> Run:
     """Return the run with the times at which errors of cells are estimated, whatever the outputs of the case are."""
     end = run.times[-1]
-    after = first_look(system, end)
+    after = resolved_after(system, end)
     times = [end * (i / UNRESOLVED_START) for i in range(UNRESOLVED_START)]
     for start in layer_starts(system, end).tolist():
         doublings = range(max(math.ceil(math.log2(end / (UNRESOLVED_START * after))), 0))
@@ -170,7 +170,7 @@ def layers(system: System, points: Sequence[Mapping[str, float]], times: Sequenc
     """
     paths = {p.symbol: p.path for p in system.parameters} | {s.symbol: s.path for s in system.states}
     found = {}
-    for conductor in system.noted(Conductor):
+    for conductor in system.notes_of(Conductor):
         slow = system.expand(conductor.resistance * conductor.capacity).subs({system.t: 0.0})
         symbols = [symbol for symbol in slow.free_symbols if symbol in paths]
         table = np.array([[point[paths[symbol]] for symbol in symbols] for point in points]).reshape(len(points), -1)

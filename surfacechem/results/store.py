@@ -75,7 +75,7 @@ class Layout:
     """Dimensions of the runs."""
     variables: Mapping[str, StoredArray]
     """Arrays along the runs."""
-    beside: Mapping[str, StoredArray]
+    unchunked: Mapping[str, StoredArray]
     """Arrays that do not belong to chunks."""
     coordinates: Sequence[Column]
     attributes: Mapping[str, Any]
@@ -148,7 +148,7 @@ class Store:
                 self._array(name)[region] = values.reshape(*shape, *values.shape[1:])
             self.mark(str(number), self.checksum(number))
 
-    def write_beside(self, columns: Mapping[str, NDArray[Any]]) -> None:
+    def write_unchunked(self, columns: Mapping[str, NDArray[Any]]) -> None:
         """Write whole arrays that do not belong to chunks."""
         with self.writing():
             for name, values in columns.items():
@@ -291,7 +291,7 @@ def _make(path: Path, layout: Layout) -> None:
     """Create all arrays, without values except those of the coordinates."""
     zarr = _zarr()
     group = zarr.create_group(path, zarr_format=3, attributes=dict(layout.attributes))
-    for name, item in {**layout.variables, **layout.beside}.items():
+    for name, item in {**layout.variables, **layout.unchunked}.items():
         shape = tuple(layout.sizes[dimension] for dimension in item.dimensions)
         part = (*layout.chunk, *shape[len(layout.chunk) :]) if name in layout.variables else shape
         attributes, along = dict(item.attributes), item.dimensions

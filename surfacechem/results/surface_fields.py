@@ -80,14 +80,14 @@ def _fields(surface: CurvedSurfaces, approaches: Array, stretches: Array) -> Seq
     size = length(lower, upper)
     patches, _ = outer_patches(lower, upper, size, size, Budget(surface.accuracy))
     lower = patches.surface
-    counts = [POINTS_ALONG, POINTS_AROUND] if patches.alike[1] else [POINTS_ACROSS, POINTS_ACROSS]
+    counts = [POINTS_ALONG, POINTS_AROUND] if patches.uniform[1] else [POINTS_ACROSS, POINTS_ACROSS]
     at = np.stack(np.meshgrid(*map(patches.line, (0, 1), counts), indexing="ij"), axis=-1)
     D = lower.derivatives(lower.off_pole(at), FIRST_ORDER)
     x, normals = D[0], lower.normals(D)
     near = [replace(upper, approach=d).nearest(x) for d in approaches.tolist()]
     gap, opposite = np.array([one.gap for one in near]), np.array([one.point for one in near])
     # With an axis of symmetry all columns around it are equal.
-    some = slice(0, 1 if patches.alike[1] else None)
+    some = slice(0, 1 if patches.uniform[1] else None)
     points, directions = (part[:, some].reshape(-1, 3) for part in (x, normals))
     gaps = gap[:, :, some].reshape(len(gap), -1)
     felt, summed = surface.tractions(points, directions, gaps, approaches, stretches)

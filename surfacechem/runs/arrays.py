@@ -68,7 +68,7 @@ def is_array(model: Model, plan: Plan, run: Run, problem: Problem) -> bool:
     """True if the runs of a plan differ only in values of states and parameters, so that arrays can solve them."""
     system = model.system
     # A load that ends the runs must be one ramp without breakpoints.
-    jumps = system.searches or (plan.load and len(problem.segments) > 2)
+    jumps = system.solves_jumps or (plan.load and len(problem.segments) > 2)
     own = (
         run.solver in (IMPLICIT, EXPLICIT)
         and run.max_seconds is None
@@ -126,7 +126,7 @@ class ArrayRuns:
         self.keeps_steps = self.keeps_extremes or bool(keep.reach and len(self.breaks))
         self.impacts = [len(model.margins) + j for j, edge in enumerate(system.edges) if edge.is_impact]
         """Columns of the guards of impacts."""
-        self.unseen = np.zeros((1, model.program.n_ledger + model.program.n_margins))
+        self.no_peaks = np.zeros((1, model.program.n_ledger + model.program.n_margins))
         """Largest accounts and guards before any evaluation: zero."""
         every = self.keeps_extremes or bool(keep.series)
         self.keeps_course = every or keep.balances
@@ -170,22 +170,22 @@ class ArrayRuns:
         """Solve runs with these values; return the mask of runs with a certain result, and their columns."""
         table, y0 = self.starts(values)
         rows = np.concatenate([np.zeros((len(y0), 1)), y0, np.zeros_like(y0), table[:, 0]], axis=1)
-        peaks, quiet = self.guards(rows)
+        peaks, none_due = self.guards(rows)
         ends, times = self.ends(rows)
-        told = self._admissible(values, rows) & quiet & np.isfinite(ends) & (ends > 0)
-        own = np.flatnonzero(told)
+        solved = self._admissible(values, rows) & none_due & np.isfinite(ends) & (ends > 0)
+        own = np.flatnonzero(solved)
         if not len(own):
-            return told, {}
+            return solved, {}
         peaks, times = (shared if len(shared) == 1 else shared[own] for shared in (peaks, times))
         segments = self.problem.segments[None]
         if self.ramp is not None:
             segments = np.column_stack([np.zeros(len(own)), ends[own]])
         # The spacing of checks against the equations scales with the run; outputs serve only the kept columns.
-        problem = replace(self.problem, times=times[0], record_steps=self.keeps_steps, picture=0.0)
+        problem = replace(self.problem, times=times[0], record_steps=self.keeps_steps, line_error=0.0)
         spacing = segments[:, -1] / self.run.samples
         clear, columns = self._columns(self._solved(problem, y0[own], table[own], spacing, peaks, segments, times))
-        told[own[~clear]] = False
-        return told, {name: column[clear] for name, column in columns.items()}
+        solved[own[~clear]] = False
+        return solved, {name: column[clear] for name, column in columns.items()}
 
     def _solved(self, problem: Problem, y0: Array, table: Array, *others: Array) -> Ends:
         """Solve the runs; ``others`` are spacing, peaks, segments and times as the stepper takes them."""
@@ -209,19 +209,19 @@ class ArrayRuns:
 
     def _admissible(self, values: Mapping[str, Array], rows: Array) -> Mask:
         """Return the mask of starts that are within all ranges, and by more than roundoff within all limits."""
-        told: Mask = np.all(np.isfinite(rows), axis=1)
+        solved: Mask = np.all(np.isfinite(rows), axis=1)
         system = self.model.system
         specs = {parameter.path: parameter.spec for parameter in system.parameters}
         for path, column in values.items():
             spec = specs.get(path)
             if spec is not None:
-                told &= (column > spec.above) & (column >= spec.at_least) & (column <= spec.at_most)
+                solved &= (column > spec.above) & (column >= spec.at_least) & (column <= spec.at_most)
         if self.limits is not None:
             # Margins that may be zero within roundoff are decided in exact numbers, run by run.
             with np.errstate(all="ignore"):
                 limits, sizes = np.split(self.limits(rows), 2, axis=1)
-                told &= np.all(limits > GUARD_EPS * sizes, axis=1)
-        return told
+                solved &= np.all(limits > GUARD_EPS * sizes, axis=1)
+        return solved
 
     def ends(self, rows: Array) -> tuple[Array, Array]:
         """Return the end time of each run, and the output times: of each run if a load ends them, else of all."""
@@ -241,7 +241,7 @@ class ArrayRuns:
         model, count = self.model, len(rows)
         program, jumper = model.program, model.jumper
         if jumper is None or program.margins is None:
-            return self.unseen, np.ones(count, dtype=bool)
+            return self.no_peaks, np.ones(count, dtype=bool)
         # The same magnitudes as at the start of a single run, where nothing has been evaluated before.
         first, scales = (
             len(model.margins),
@@ -254,10 +254,10 @@ class ArrayRuns:
             point = consistent(program, np.zeros(count), y, np.zeros_like(y), rows[:, 1 + 2 * self.n :])
             seen = np.concatenate([rows[:, :1], point.y, point.ydot, rows[:, 1 + 2 * self.n :]], axis=1)
         now = program.margins(seen)
-        playing = np.array(model.system.in_play(self.problem.parameters[0]))
-        quiet: Mask = np.all(((now > GUARD_EPS * sizes) | ~playing)[:, first:], axis=1)
+        active = np.array(model.system.active_guards(self.problem.parameters[0]))
+        none_due: Mask = np.all(((now > GUARD_EPS * sizes) | ~active)[:, first:], axis=1)
         sizes[:, self.impacts] = np.maximum(sizes[:, self.impacts], MICROMETRE)
-        return np.concatenate([np.zeros((count, program.n_ledger)), sizes], axis=1), quiet
+        return np.concatenate([np.zeros((count, program.n_ledger)), sizes], axis=1), none_due
 
     # -- from arrays to columns ---------------------------------------------------------------------------------------
 
@@ -354,15 +354,15 @@ class ArrayRuns:
         steps = batch.records[step_owner, m]
         inputs = found.inputs(step_owner, steps[:, 0], steps[:, 1 : 1 + n], steps[:, 1 + n : 1 + 2 * n])
         parts = [(owner, outputs), (step_owner, self._values(inputs)[0])]
-        leaps = self._leaps(found)
-        parts.append((leaps.owner[leaps.lasts], np.column_stack([leaps.after[name][leaps.lasts] for name in names])))
+        leaps = self._discontinuities(found)
+        parts.append((leaps.owner[leaps.last], np.column_stack([leaps.after[name][leaps.last] for name in names])))
         columns: Columns = {}
         for which, chosen, best in (("max", self.keep.max, np.fmax), ("min", self.keep.min, np.fmin)):
             extreme = best.reduce([of_each(best, runs, table, len(clear)) for runs, table in parts])
             columns |= {f"{name}_{which}": extreme[:, names.index(name)] for name in chosen}
         return columns
 
-    def _leaps(self, found: Ends) -> Discontinuities:
+    def _discontinuities(self, found: Ends) -> Discontinuities:
         """Return the jumps of the runs, and the breakpoints of loads that they have passed between jumps."""
         batch, n, width = found.batch, self.n, self.model.program.n_inputs
         # These tables are empty if runs end at their edges, or if nothing along the runs is kept.
@@ -433,20 +433,20 @@ class ArrayRuns:
         columns: Columns = {}
         names = [*((name, f"time_{variable(name)}") for name in keep.events)]
         names += [(f"{REACHES}{name}", f"time_to_{name}") for name in keep.reach or {}]
-        happened = np.arange(batch.events.shape[1]) < batch.counts[:, EVENTS, None]
+        recorded = np.arange(batch.events.shape[1]) < batch.counts[:, EVENTS, None]
         for name, column in names:
             wanted = [j for j, each in enumerate(named) if each == name]
-            owner, row = np.nonzero(happened & np.isin(batch.events[..., 0], wanted))
+            owner, row = np.nonzero(recorded & np.isin(batch.events[..., 0], wanted))
             owner, first = np.unique(owner, return_index=True)
-            rows = np.full((len(happened), 2 + self.n), np.nan)
+            rows = np.full((len(recorded), 2 + self.n), np.nan)
             rows[owner] = batch.events[owner, row[first], : 2 + self.n]
             columns[column] = rows[:, 1]
             for state in keep.at_events if name in keep.events else ():
                 columns[f"{state}_at_{variable(name)}"] = rows[:, 2 + self.model.system.state_columns[state]]
         if keep.reach:
-            leaps = self._leaps(found)
+            leaps = self._discontinuities(found)
             for name, level in keep.reach.items():
-                first, leapt = np.full(len(happened), np.inf), crossed(leaps.before[name], leaps.after[name], level)
+                first, leapt = np.full(len(recorded), np.inf), crossed(leaps.before[name], leaps.after[name], level)
                 np.minimum.at(first, leaps.owner[leapt], leaps.t[leapt])
                 columns[f"time_to_{name}"] = np.fmin(
                     columns[f"time_to_{name}"], np.where(first < np.inf, first, np.nan)
@@ -463,24 +463,24 @@ class JumpingRuns(ArrayRuns):
 
     def guards(self, rows: Array) -> tuple[Array, Mask]:
         """Return zero accounts and guards; edges may be due in all runs."""
-        return self.unseen, np.ones(len(rows), dtype=bool)
+        return self.no_peaks, np.ones(len(rows), dtype=bool)
 
     def _solved(self, problem: Problem, y0: Array, table: Array, *others: Array) -> Ends:
         """Solve runs along their edges; repeat them if their tables were too small."""
-        jumper, looks = self.model.jumper, self.keeps_steps or bool(self.keep.reach)
+        jumper, keeps_inside = self.model.jumper, self.keeps_steps or bool(self.keep.reach)
         assert jumper is not None
         jumper.expect_jumps()
         problem, columns = replace(problem, edges=jumper.edge_tables), (y0, table, *others)
         # A few pilot runs give the table sizes of the others.
-        some = np.arange(0, len(y0), max(len(y0) // PILOT_RUNS, 1))
-        few = [column[some] if len(column) == len(y0) else column for column in columns]
+        pilots = np.arange(0, len(y0), max(len(y0) // PILOT_RUNS, 1))
+        few = [column[pilots] if len(column) == len(y0) else column for column in columns]
         for given in (few, columns):
             fits = False
             while not fits:
                 room = self.room
                 batch = solve_arrays(problem, *given, room=room)
                 steps, events = np.minimum(batch.counts[:, [RECORDS, EVENTS]].max(axis=0), MOST_ROWS).tolist()
-                needed = steps * self.keeps_steps, events, 0, events * looks
+                needed = steps * self.keeps_steps, events, 0, events * keeps_inside
                 fits = all(each <= had for each, had in zip(needed, room, strict=True))
                 if not fits:
                     self.room = tuple(max(each + each // 4, had) for each, had in zip(needed, room, strict=True))

@@ -30,7 +30,7 @@ number of sites drifts.
 PATH = "run.until"
 
 
-class UnrestError(InputError):
+class NoSteadyStateError(InputError):
     """A run that reaches no steady state."""
 
 
@@ -41,7 +41,7 @@ def refuse_histories(system: System) -> None:
         raise InputError(f"{moving[0]} changes in time, so there is no steady state: give it one value.", path=PATH)
 
 
-def to_rest(model: Model, run: Run, values: Mapping[str, float]) -> Run:
+def to_steady_state(model: Model, run: Run, values: Mapping[str, float]) -> Run:
     """Return the run that ends at its steady state; InputError if none is found.
 
     The end is the first time after which all states stay within their tolerances of a value that they keep for ten
@@ -50,7 +50,7 @@ def to_rest(model: Model, run: Run, values: Mapping[str, float]) -> Run:
     """
     refuse_histories(model.system)
     # A shorter search would miss slow changes, and those that set in after a long time of rest.
-    far = _looked(model, run, values, HORIZON)
+    far = _solved_until(model, run, values, HORIZON)
     if far.status == "stopped":
         return replace(run, times=_until(run, min(2 * far.result.t, HORIZON) or HORIZON))
     mover, states = _rest_of(far)[1], model.system.states
@@ -58,17 +58,17 @@ def to_rest(model: Model, run: Run, values: Mapping[str, float]) -> Run:
     lost = abs(np.sum((far.result.y - far.result.outputs[0]) * sites))
     drifting = lost > run.rtol * abs(far.result.y[mover]) and _rest_of(far, RUN_ERROR)[0] * REST_RATIO <= HORIZON
     for end in (HORIZON, *(SHORTER_TIMES if drifting or audit(far).site_error > run.rtol else ())):
-        near = far if end == HORIZON else _looked(model, run, values, end)
+        near = far if end == HORIZON else _solved_until(model, run, values, end)
         last, change = _rest_of(near)[0], np.abs(near.result.y - far.result.y)
         # Both end states agree to a thousandth of their size; of traces, to a thousandth of their scale.
         alike = np.all(change <= NEGLIGIBLE * np.maximum(np.abs(near.result.y), scales))
         if near.status == "finished" and last * REST_RATIO <= end and alike:
             return replace(run, times=_until(run, last), rest=last)
     text = f"the case did not reach a steady state within {HORIZON:.3g} s: {states[mover].name} still changes."
-    raise UnrestError(text, path=PATH)
+    raise NoSteadyStateError(text, path=PATH)
 
 
-def _looked(model: Model, run: Run, values: Mapping[str, float], end: float) -> Trajectory:
+def _solved_until(model: Model, run: Run, values: Mapping[str, float], end: float) -> Trajectory:
     return model.solve_values(replace(run, times=(0.0, end), picture=LINE_ERROR, accuracy=None), values)
 
 

@@ -200,14 +200,14 @@ def warnings(system: System) -> list[str]:
         if p.symbol not in read and not p.internal and not p.path.startswith("initial.")
     ]
     # Between curved bodies a conductance is known over a range of approaches only, and grows under load.
-    at_touch = () if system.whole else conductance_warnings(system)
+    at_touch = () if system.in_totals else conductance_warnings(system)
     return [*system.warnings, *at_touch, *idle]
 
 
 def _evaluated(system: System) -> list[Expression]:
     """Return the formulas that a run evaluates in addition to the equations."""
     formulas = [*[a.rate for a in system.ledger], *[m.masked for m in system.margins]]
-    formulas += [*[i.expression for i in system.outputs], *[c.resistance for c in system.noted(Conductor)]]
+    formulas += [*[i.expression for i in system.outputs], *[c.resistance for c in system.notes_of(Conductor)]]
     formulas += [x for item in system.edges for x in (item.masked, *item.modes.values(), *item.reset.values())]
     return [*formulas, *_heat_shares(system)]
 
@@ -310,7 +310,7 @@ def first_root(biot: float) -> float:
 def lumpings(system: System, start: Start, end: float) -> list[Lumping]:
     """Return the numbers at the start of each body that states how it conducts."""
     found = []
-    for c in system.noted(Conductor):
+    for c in system.notes_of(Conductor):
         expressions = [system.expand(item) for item in (c.resistance, c.capacity, c.conductance or 0)]
         resistance, capacity, h = compile_function(system.inputs, expressions)(start.inputs).tolist()
         biot = h * resistance if c.conductance is not None else math.inf

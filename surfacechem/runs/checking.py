@@ -80,12 +80,12 @@ def check(stream: Stream, threads: int | None = None) -> Checked | None:
     chosen = {"checked": np.sort(permuted(np.arange(sizes["checked"]), plan.size, 0)), "hardest": _hardest(stream)}
     # A fixed permutation of the plan spreads the sample evenly and is the same for every writer.
     found: dict[str, Array] = {}
-    told: list[SweepAccuracy] = []
+    every: list[SweepAccuracy] = []
     for which, index in chosen.items():
         columns, accuracies = _columns(stream, index, sizes[which], threads)
         found |= {f"{which}_{key}": values for key, values in columns.items()}
-        told += accuracies
-    store.write_beside(found)
+        every += accuracies
+    store.write_unchunked(found)
 
     def both(key: str) -> Array:
         return np.concatenate([found[f"{which}_{key}"] for which in chosen])
@@ -95,8 +95,8 @@ def check(stream: Stream, threads: int | None = None) -> Checked | None:
     errors, destroys = both("error")[once], np.nansum(both("destroys_entropy")[once])
     worst = float(np.fmax.reduce(errors, initial=-np.inf))
     # One source per method: the reason against an exact solution, after the semicolon, differs from run to run.
-    sources = {each.source.partition(";")[0]: each.source for each in sorted(told, key=lambda each: len(each.source))}
-    why = next((each.why for each in told if each.why), "")
+    sources = {each.source.partition(";")[0]: each.source for each in sorted(every, key=lambda each: len(each.source))}
+    why = next((each.why for each in every if each.why), "")
     return Checked(worst, int(np.isnan(errors).sum()), len(errors), int(destroys), "; ".join(sources.values()), why)
 
 
@@ -104,13 +104,13 @@ def _columns(
     stream: Stream, index: Index, size: int, threads: int | None
 ) -> tuple[dict[str, Array], list[SweepAccuracy]]:
     """Return the arrays of the runs with these numbers, and the accuracies of their portions."""
-    columns, told = {key: np.full(size, np.nan) for key in CHECKED_COLUMNS}, []
+    columns, every = {key: np.full(size, np.nan) for key in CHECKED_COLUMNS}, []
     columns["run"] = np.append(index, np.full(size - len(index), -1))
     for first, part, errors, accuracy in _errors(stream, index, threads):
         for key, values in errors.items():
             columns[key][first : first + len(part)] = values
-        told.append(accuracy)
-    return columns, told
+        every.append(accuracy)
+    return columns, every
 
 
 def _hardest(stream: Stream) -> Index:
@@ -168,7 +168,7 @@ def _apart(stream: Stream, part: Index, done: SweepSolution) -> Array:
     if chunks.run.steady:
         scales = {f"{state.name}_last": state.scale for state in chunks.model.system.states}
         least = {name: scales[name] for name in scales if name in least}
-    rounded = [run.some.roundings for run in done.runs]
+    rounded = [run.sample.roundings for run in done.runs]
     for name, floor in least.items():
         size = np.maximum(np.abs(ends[name]), floor)
         known = RUN_ERROR * np.array([each.get(name.removesuffix("_last"), 0.0) for each in rounded])

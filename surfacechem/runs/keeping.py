@@ -29,7 +29,7 @@ STATUSES = ("finished", "stopped", "failed", "refused")
 
 INADMISSIBLE, OTHER_REASON = "the values are not admissible at the start", "another reason"
 
-CAME_TO_REST, NOT_AT_REST = "came to rest", "it does not come to rest"
+STEADY_STATE, NO_STEADY_STATE = "came to rest", "it does not come to rest"
 """Reasons for the end of a run to a steady state, and for its failure."""
 
 END_COLUMNS = {
@@ -87,15 +87,15 @@ def end_of(run: Trajectory) -> dict[str, Any]:
     return {"status": run.status, "reason": run.reason, "time_reached": run.result.t, "steps": steps}
 
 
-def balances_of(run: Trajectory, books: Audit) -> dict[str, Any]:
+def balances_of(run: Trajectory, balances: Audit) -> dict[str, Any]:
     """Return the entries of END_COLUMNS for the balances of a run."""
-    destroys = books.destroys or entropy_destroyed(run.jumps) > 0
-    return {**{name: getattr(books, name) for name in BALANCES}, "destroys_entropy": destroys}
+    destroys = balances.destroys or entropy_destroyed(run.jumps) > 0
+    return {**{name: getattr(balances, name) for name in BALANCES}, "destroys_entropy": destroys}
 
 
 def keep_of(section: KeepSection | None, system: System) -> Keep:
     """Return the selection of a section, by default all ends, extremes and events; InputError for an unknown name."""
-    states = [state.name for state in system.states if state.name not in system.inside]
+    states = [state.name for state in system.states if state.name not in system.interior]
     known = {"quantities": [*quantities(system)], "events": event_names(system), "states": states}
     if section is None:
         every = tuple(known["quantities"])
@@ -116,7 +116,7 @@ def keep_of(section: KeepSection | None, system: System) -> Keep:
 
 def event_names(system: System) -> list[str]:
     """Return the names of events after which a run goes on: kinks and edges. Terminal events are reasons of ends."""
-    kinks = [margin.name for margin in system.moving_margins if not (margin.terminal or margin.peak)]
+    kinks = [margin.name for margin in system.event_margins if not (margin.terminal or margin.peak)]
     return list(dict.fromkeys([*kinks, *(edge.name for edge in system.edges)]))
 
 
@@ -135,7 +135,7 @@ def reaching(system: System, keep: Keep) -> System:
 
 def reason_table(system: System) -> list[str]:
     """Return the reasons for the ends of runs, in the order of their codes."""
-    margins = system.moving_margins
+    margins = system.event_margins
     ends = [text for margin in margins for text in (margin.reason, *(margin.below or ("", ""))[1:]) if text]
     failures = [text for status, text in REASONS.items() if not status.success]
     edges = [edge.reason for edge in system.edges]
@@ -188,8 +188,8 @@ def at_end(run: Trajectory) -> dict[str, float]:
 
 def extremes(run: Trajectory) -> dict[str, dict[str, float]]:
     """Return the largest and smallest value of each quantity over outputs and steps of a run, and after its jumps."""
-    leaps, names = run.leaps, list(run.columns)
-    seen = np.array([np.concatenate([*run.columns[name], leaps.after[name][leaps.lasts]]) for name in names])
+    leaps, names = run.discontinuities, list(run.columns)
+    seen = np.array([np.concatenate([*run.columns[name], leaps.after[name][leaps.last]]) for name in names])
     with np.errstate(invalid="ignore"):
         found = {which: best.reduce(seen, axis=1, initial=np.nan) for which, (best, _) in EXTREMES.items()}
     return {which: dict(zip(names, values.tolist(), strict=True)) for which, values in found.items()}
@@ -205,19 +205,19 @@ class RunByRun:
 
     def __init__(self, model: Model, keep: Keep, steady: bool = False) -> None:
         self.model, self.keep = model, keep
-        self.reasons = [*reason_table(model.system), *((CAME_TO_REST, NOT_AT_REST) if steady else ())]
+        self.reasons = [*reason_table(model.system), *((STEADY_STATE, NO_STEADY_STATE) if steady else ())]
 
     def columns(self, runs: Sequence[Trajectory | str], times: int, audits: Sequence[Audit] = ()) -> Columns:
         """Return the kept columns of runs with ``times`` output times; ``audits`` saves a second audit. A failed or
         refused run is given by its reason.
         """
         found = [run for run in runs if not isinstance(run, str)]
-        books = iter(audits or map(audit, found) if self.keep.balances else [None] * len(found))
+        balances = iter(audits or map(audit, found) if self.keep.balances else [None] * len(found))
         codes = {reason: STATUSES.index("refused" if reason == INADMISSIBLE else "failed") for reason in self.reasons}
         rows = [
             {"status": codes[run], "reason": self.reasons.index(run), "steps": 0}
             if isinstance(run, str)
-            else self._kept(run, next(books), times)
+            else self._kept(run, next(balances), times)
             for run in runs
         ]
         kinds = {name: kind for name, (kind, _, _) in described(self.model.system, self.keep).items()}
@@ -227,10 +227,10 @@ class RunByRun:
             kept[name] = np.array([row.get(name, nothing) for row in rows])
         return kept
 
-    def _kept(self, run: Trajectory, books: Audit | None, times: int) -> dict[str, Any]:
+    def _kept(self, run: Trajectory, balances: Audit | None, times: int) -> dict[str, Any]:
         result, keep = run.result, self.keep
         row = end_of(run) | {"status": STATUSES.index(run.status), "reason": self._code(run.reason)}
-        row |= balances_of(run, books) if books else {}
+        row |= balances_of(run, balances) if balances else {}
         last = at_end(run) if keep.last else {}
         row |= {f"{name}_last": last[name] for name in keep.last}
         found = extremes(run) if keep.max or keep.min else {}
@@ -252,10 +252,10 @@ class RunByRun:
                 row[f"time_{name}"] = event.t
                 row |= {f"{state}_at_{name}": event.before[columns[state]] for state in self.keep.at_events}
         for name, level in (self.keep.reach or {}).items():
-            where = np.flatnonzero(crossed(run.leaps.before[name], run.leaps.after[name], level))
+            where = np.flatnonzero(crossed(run.discontinuities.before[name], run.discontinuities.after[name], level))
             if len(where):
                 column = f"time_to_{name}"
-                row[column] = min(row.get(column, np.inf), float(run.leaps.t[where[0]]))
+                row[column] = min(row.get(column, np.inf), float(run.discontinuities.t[where[0]]))
         return row
 
     def _code(self, reason: str) -> int:

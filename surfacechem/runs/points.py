@@ -133,7 +133,7 @@ class Evaluator:
 
     def __init__(self, scene: Scene) -> None:
         self.system = system = assemble(with_histories_held(scene))
-        if system.outside is not None:
+        if system.external_rates is not None:
             message = "rates of the mechanism come from Cantera itself, which gives no derivatives."
             raise InputError(message, path="interface.mechanism")
         n = len(system.states)
@@ -221,7 +221,7 @@ class Evaluator:
 
     def _sought(self, asked: Mapping[str, Argument]) -> list[int]:
         """Return the indices of balances to be solved: of unknowns that points neither give nor move with a gap."""
-        led = [name for item in self.quasi_static if item.state in asked for name in item.along]
+        led = [name for item in self.quasi_static if item.state in asked for name in item.coupled]
         known = [item.column for item in (*asked.values(), *(self.given[name] for name in led))]
         return np.flatnonzero(~np.isin(self.unknown, known)).tolist()
 
@@ -231,8 +231,8 @@ class Evaluator:
         """
         lost = np.zeros(len(table), dtype=bool)
         free = [item for item in self.quasi_static if item.state not in asked]
-        moves = [{name: far for name, far in item.along.items() if name not in asked} for item in free]
-        items = tuple(replace(item, along=along) for item, along in zip(free, moves, strict=True))
+        moves = [{name: far for name, far in item.coupled.items() if name not in asked} for item in free]
+        items = tuple(replace(item, coupled=along) for item, along in zip(free, moves, strict=True))
         equilibria = Equilibria(replace(self.system, equilibria=items))
         gaps = [1 + self.system.state_columns[item.state] for item in items]
         for k, row in enumerate(table if items else ()):
@@ -279,7 +279,7 @@ class Conditions:
 
     def __init__(self, system: System) -> None:
         self._limits = [margin for margin, _ in system.limits if not margin.stability]
-        self._edges = [edge for edge in system.edges if not (edge.passes or edge.fold)]
+        self._edges = [edge for edge in system.edges if not (edge.ends_stage or edge.fold)]
 
     @property
     def margins(self) -> list[Any]:
@@ -291,10 +291,10 @@ class Conditions:
         """Return the reason why no run could be at a point with these arguments and margins; empty where one could."""
         limits, guards, sizes = np.split(margins, np.cumsum([len(self._limits), len(self._edges)]), axis=1)
         unsolved, due = np.isnan(table).any(axis=1), guards < -GUARD_EPS * np.nan_to_num(sizes)
-        told = [limit.reason for limit in self._limits] + [edge.reason for edge in self._edges]
+        words = [limit.reason for limit in self._limits] + [edge.reason for edge in self._edges]
         # The first true column gives the reason; the last one, always true, gives none.
         found = np.column_stack([unsolved, ~(limits > 0), due, np.ones(len(table), dtype=bool)])
-        return [(UNSOLVED, *told, "")[first] for first in found.argmax(axis=1)]
+        return [(UNSOLVED, *words, "")[first] for first in found.argmax(axis=1)]
 
 
 FLUX_UNITS = ("Pa", "W/m^2", "N", "W")
@@ -315,7 +315,7 @@ class Slopes:
         self._entries = np.array([*found], dtype=np.int64).reshape(-1, 2).T
         self.pattern[self._entries[0], self._entries[1]] = True
         whole = expanded(names, [*rows, *found.values(), *margins])
-        self._function = compile_function(inputs, whole, system.of_cells)
+        self._function = compile_function(inputs, whole, system.cell_symbols)
 
     def __call__(self, table: Array) -> tuple[Array, Array, Array]:
         """Return values, derivatives of shape (points, rows, arguments), and margins."""
@@ -354,7 +354,7 @@ def _states(system: System) -> dict[str, Argument]:
         is_log = state.given is not None and state.given.state is None
         quantity = state.given.quantity if state.given and is_log else state.quantity
         found.append(Argument(column, quantity, state.path, is_log))
-    inside = system.inside
+    inside = system.interior
     return {item.quantity.name: item for item in found if item.quantity.name not in inside}
 
 
@@ -377,7 +377,7 @@ def _balances(system: System, gaps: Sequence[Equilibrium]) -> dict[str, Any]:
     found = {item.state: system.expand(item.residual) for item in gaps}
     moved = {state.name: state.symbol - state.initial for state in system.states}
     for item in gaps:
-        found |= {name: moved[name] - system.expand(far) * moved[item.state] for name, far in item.along.items()}
+        found |= {name: moved[name] - system.expand(far) * moved[item.state] for name, far in item.coupled.items()}
     return found
 
 
@@ -386,7 +386,7 @@ def _rates(system: System, balances: Collection[str]) -> Iterator[Named]:
     for state in system.states:
         if state.algebraic or state.name in balances:
             yield Named(state.quantity, state.symbol)
-        if not state.algebraic and state.name not in system.inside:
+        if not state.algebraic and state.name not in system.interior:
             text = f"rate of change of the {state.quantity.long_name}"
             yield Named(Quantity(f"d{state.name}_dt", quotient(state.quantity.unit, "s"), text), state.dot)
 

@@ -23,7 +23,7 @@ from surfacechem.model.assemble import perturbed
 from surfacechem.model.system import System
 from surfacechem.results import spatial
 from surfacechem.results.accuracy import Accuracy, CellErrors
-from surfacechem.results.error_estimates import accuracy, check_way, inexact, law_errors, verified
+from surfacechem.results.error_estimates import accuracy, check_source, inexact, law_errors, verified
 from surfacechem.results.event_table import event_times
 from surfacechem.results.solution import Judgement, Solution
 from surfacechem.scene import Scene
@@ -183,7 +183,7 @@ class Simulation:
     @cached_property
     def model(self) -> Model:
         """The compiled system."""
-        if self.system.rests:
+        if self.system.is_static:
             self.case.refuse_nothing()
         try:
             return Model(self.system)
@@ -255,7 +255,7 @@ class Simulation:
             Where there is no parameter of a path, or a value is outside its range.
         """
         settings = run or self.case.run
-        check_way(error, settings)  # before anything is computed
+        check_source(error, settings)  # before anything is computed
         if self.case.scene.surface is not None:
             self.case.refuse_nothing()
         freed, values = self._ready(changes or {})
@@ -280,7 +280,7 @@ class Simulation:
         )
 
     def _judged(
-        self, trajectory: Trajectory, unused: str, way: str, estimate: Accuracy | None, errors: list[CellErrors]
+        self, trajectory: Trajectory, unused: str, option: str, estimate: Accuracy | None, errors: list[CellErrors]
     ) -> Judgement:
         """Return the error of a run by one of the ways, from an existing second run or from a new one; ``unused`` is
         the reason why the exact solution does not apply, ``errors`` are those of the cells if they are known.
@@ -291,10 +291,10 @@ class Simulation:
         def added() -> CellErrors:
             if not errors:
                 errors.append(self._cell_errors(trajectory))
-            return errors[0].beside(self._law_errors(trajectory))
+            return errors[0].combined(self._law_errors(trajectory))
 
-        found = accuracy(trajectory, case.scene, exact, way, added, estimate)
-        if unused and way == "auto":
+        found = accuracy(trajectory, case.scene, exact, option, added, estimate)
+        if unused and option == "auto":
             found = replace(found, source=f"{found.source}; {unused}")
         notes = spatial.unmet_accuracy(case.scene, (errors or [CellErrors()])[0], found)
         return Judgement(found, notes)
@@ -335,8 +335,8 @@ class Simulation:
         from surfacechem.runs import sweeps
 
         points = [values_of(system, {**values, **point}) for point in (plan.points if plan else [{}])]
-        looked = spatial.looked_at(system, settings)
-        runs = sweeps.settings(system, plan, looked, points) if plan else [looked]
+        check = spatial.with_check_times(system, settings)
+        runs = sweeps.settings(system, plan, check, points) if plan else [check]
         # All runs of a sweep share the cells of the run that needs the most.
         times = [spatial.shortest(system, *pair) for pair in zip(runs, points, strict=True)]
         cells: Scene | None = spatial.with_resolved_layers(scene, spatial.layers(system, points, times))
@@ -344,13 +344,13 @@ class Simulation:
             if cells is None:
                 break
             chosen = self._with(cells)
-            done = chosen._solved(looked, values, plan, threads)
+            done = chosen._solved(check, values, plan, threads)
             errors = [chosen._halved(run, given=False) for run in done]
             cells = spatial.refined(cells, spatial.worst_errors(errors), chosen._layers(*done))
-        if settings.times != looked.times or settings.picture is not None:
+        if settings.times != check.times or settings.picture is not None:
             done = chosen._solved(settings, values, plan, threads)
         # Errors at given output times are estimated at these times.
-        known = not spatial.with_given_cells(scene) and (settings.picture is not None or settings.times == looked.times)
+        known = not spatial.with_given_cells(scene) and (settings.picture is not None or settings.times == check.times)
         return chosen, done, errors if known else []
 
     def _solved(
@@ -360,9 +360,9 @@ class Simulation:
         try:
             if plan is None:
                 if settings.steady:
-                    from surfacechem.runs.at_rest import to_rest
+                    from surfacechem.runs.at_rest import to_steady_state
 
-                    settings = to_rest(self.model, settings, self.model.values(values))
+                    settings = to_steady_state(self.model, settings, self.model.values(values))
                 return [self.model.solve(settings, values)]
             from surfacechem.runs import sweeps
 
@@ -491,7 +491,7 @@ class Simulation:
         @cache
         def added() -> list[CellErrors]:
             of_cells = errors or [chosen._cell_errors(run) for run in done]
-            return [found.beside(chosen._law_errors(run)) for found, run in zip(of_cells, done, strict=True)]
+            return [found.combined(chosen._law_errors(run)) for found, run in zip(of_cells, done, strict=True)]
 
         unchecked = self.case.sweep is not None and self.case.sweep.checked == 0
         judge = None if unchecked else partial(sweeps.accuracy, chosen.case, threads=threads, cells=added)

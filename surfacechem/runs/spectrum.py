@@ -159,8 +159,8 @@ def statistics(trajectory: Trajectory, variable: str) -> Statistics:
     model, result = trajectory.model, trajectory.result
     columns = model.system.output_columns
     column, density = columns[variable], columns[f"density_{variable}"]
-    told = [*(margin.reason for margin in model.margins), *(item.reason for item in model.system.edges)]
-    reasons = np.array(told)[result.events.index]
+    words = [*(margin.reason for margin in model.margins), *(item.reason for item in model.system.edges)]
+    reasons = np.array(words)[result.events.index]
     at = model.evaluate(result, result.events.t, result.events.y, result.events.ydot)
     halves, peaks = at[reasons == MEDIAN_REASON], np.concatenate([trajectory.outputs[:1], at[reasons == MODE_REASON]])
     survivors, integral = _at_end(trajectory, f"mean_{variable}")

@@ -23,9 +23,9 @@ from surfacechem.results.netcdf import CONVENTIONS, COORDINATES, Column, cf_unit
 from surfacechem.results.store import CHUNK_BYTES, Layout, Store, StoredArray, begin, opened, store_path
 from surfacechem.runs import checking, keeping, sweeps
 from surfacechem.runs.arrays import ArrayRuns, JumpingRuns, cannot_jump, is_array
-from surfacechem.runs.at_rest import UnrestError, refuse_histories, to_rest
+from surfacechem.runs.at_rest import NoSteadyStateError, refuse_histories, to_steady_state
 from surfacechem.runs.checking import Checked, checked_arrays
-from surfacechem.runs.keeping import INADMISSIBLE, NOT_AT_REST, STATUSES, Columns, Keep, RunByRun, keep_of, variable
+from surfacechem.runs.keeping import INADMISSIBLE, NO_STEADY_STATE, STATUSES, Columns, Keep, RunByRun, keep_of, variable
 from surfacechem.solve import AUTO
 from surfacechem.solve.contract import Index
 from surfacechem.solve.lanes import lane_batch
@@ -75,25 +75,25 @@ class ChunkRuns:
         self.run = sweeps.following(self.model, plan, chosen, changes) if keep.series and run is None else chosen
         self.one_by_one = RunByRun(self.model, keep, chosen.steady)
         arrays = ArrayRuns(self.model, plan, self.run, changes, keep)
-        told = is_array(self.model, plan, self.run, arrays.problem)
-        self.ways = [arrays] if told and cannot_jump(self.model, arrays.problem) else []
-        if told and self.model.system.edges:
-            self.ways.append(JumpingRuns(self.model, plan, self.run, changes, keep))
+        is_vector = is_array(self.model, plan, self.run, arrays.problem)
+        self.solvers = [arrays] if is_vector and cannot_jump(self.model, arrays.problem) else []
+        if is_vector and self.model.system.edges:
+            self.solvers.append(JumpingRuns(self.model, plan, self.run, changes, keep))
         """Ways to compute runs as arrays, in the order in which they are tried; the rest is solved run by run."""
-        self.arrays = arrays if self.ways else None
+        self.arrays = arrays if self.solvers else None
 
     @property
     def explicit(self) -> bool:
         """True if runs take explicit steps and do not jump."""
-        return any(way.problem.explicit and not way.jumps for way in self.ways)
+        return any(solver.problem.explicit and not solver.jumps for solver in self.solvers)
 
     @property
     def at_once(self) -> int:
         """Largest number of runs in a chunk."""
         if self.explicit:
             return EXPLICIT_RUNS
-        if all(way.jumps for way in self.ways):
-            return JUMPING_RUNS if self.ways else SLOW_RUNS
+        if all(solver.jumps for solver in self.solvers):
+            return JUMPING_RUNS if self.solvers else SLOW_RUNS
         return IMPLICIT_RUNS
 
     @property
@@ -124,10 +124,10 @@ class ChunkRuns:
         times = len(self.run.times)
         columns: Columns = {}
         left = np.arange(len(index))
-        for way in self.ways:
-            told, found = way.solve({path: column[left] for path, column in values.items()})
-            _put(columns, left[told], found, len(index))
-            left = left[~told]
+        for solver in self.solvers:
+            done, found = solver.solve({path: column[left] for path, column in values.items()})
+            _put(columns, left[done], found, len(index))
+            left = left[~done]
             if not len(left):
                 return columns
         # Runs that arrays leave open are solved run by run; results do not depend on the other runs of a chunk.
@@ -141,11 +141,11 @@ class ChunkRuns:
             full = [self.model.values({**self.changes, **point}) for point in points]
             runs = sweeps.settings(self.model.system, self.plan, self.run, full)
             if self.run.steady:  # each to its steady state, whatever the other runs are
-                runs = [to_rest(self.model, run, at) for run, at in zip(runs, full, strict=True)]
+                runs = [to_steady_state(self.model, run, at) for run, at in zip(runs, full, strict=True)]
             return [*self.model.solve_all(list(zip(runs, full, strict=True)))]
         except InputError as error:
             if len(chosen) == 1:
-                return [NOT_AT_REST if isinstance(error, UnrestError) else INADMISSIBLE]
+                return [NO_STEADY_STATE if isinstance(error, NoSteadyStateError) else INADMISSIBLE]
         return [run for i in chosen.tolist() for run in self._solved(values, np.array([i]))]
 
 
@@ -214,7 +214,7 @@ class Stream:
         return range(k - 1, self.store.layout.chunks, count)
 
     def run(
-        self, threads: int | None = None, client: Any = None, told: Callable[[Progress], None] = lambda _: None
+        self, threads: int | None = None, client: Any = None, on_progress: Callable[[Progress], None] = lambda _: None
     ) -> Store:
         """Compute the missing chunks and store them. With the ``client`` of a dask.distributed cluster its workers
         compute, while this process writes.
@@ -227,13 +227,13 @@ class Stream:
                 sum(len(layout.index(number)) for number in some) for some in (numbers, set(numbers) - set(missing))
             )
             done, failed = resumed, 0
-            told(Progress(runs, done, failed, resumed))
+            on_progress(Progress(runs, done, failed, resumed))
             for number, columns in self._computed(missing, threads or processors(), client):
                 # Only this thread writes, so that chunks and their marks are written in order.
                 self.store.write(number, columns)
                 done += len(columns["status"])
                 failed += int(np.sum(columns["status"] >= STATUSES.index("failed")))
-                told(Progress(runs, done, failed, resumed))
+                on_progress(Progress(runs, done, failed, resumed))
         return self.store
 
     def check(self, threads: int | None = None) -> Checked | None:

@@ -62,7 +62,7 @@ def duration(seconds: float) -> str:
 
 def states(system: System) -> str:
     """List the states by name; algebraic ones are marked."""
-    lone = [state for state in system.states if state.name not in system.inside]
+    lone = [state for state in system.states if state.name not in system.interior]
     names = [f"{state.name} (algebraic)" if state.algebraic else state.name for state in lone]
     names += [f"{profile.name} ({len(profile.points) - 1} cells)" for profile in system.profiles]
     return ", ".join(names) or "nothing: everything is prescribed"
@@ -72,12 +72,12 @@ def run_summary(solution: Solution, written: Path | None, details: bool = False)
     """Summarise a run: states, solver, end, accuracy, speed and file; with ``details`` errors, counts and events."""
     from surfacechem.solve import solver
 
-    trajectory, books, counters = solution.trajectory, solution.audit, solution.trajectory.result.counters
+    trajectory, audit, counters = solution.trajectory, solution.audit, solution.trajectory.result.counters
     run, model = trajectory.run, trajectory.model
     speed = f"run {duration(trajectory.seconds)}, compile {duration(model.compile_seconds)}"
-    if model.system.whole:
+    if model.system.in_totals:
         speed = f"surfaces {duration(solution.integrals_seconds)}, {speed}"
-    jumped = event_summary(trajectory.jumps, books.energy_scale, model.system.unit("J/m^2"))
+    jumped = event_summary(trajectory.jumps, audit.energy_scale, model.system.unit("J/m^2"))
     rejected = f", {counters.rejected} rejected" if solver(run.solver).counts_rejected else ""
     facts = [
         ("solved", _solved(model.system, run)),
@@ -85,7 +85,7 @@ def run_summary(solution: Solution, written: Path | None, details: bool = False)
         *([("error", _accuracy(solution.accuracy))] if solution.accuracy else []),
         ("time", f"{speed}; {counters.steps} steps{rejected}, {counters.residuals} residuals"),
         *([("events", jumped)] if trajectory.jumps else []),
-        ("balances", _balances(books, model.system.unit("W/(m^2 K)"))),
+        ("balances", _balances(audit, model.system.unit("W/(m^2 K)"))),
         *(("pair", str(verdict)) for verdict in solution.verdicts if verdict.consistent),
         *(("warning", warning) for warning in solution.warnings),
         *([("written", str(written))] if written else []),
@@ -121,16 +121,16 @@ def _accuracy(accuracy: Accuracy) -> str:
     return accuracy.source if math.isnan(accuracy.error) else f"{accuracy.error:.2g}{where}{asked} ({accuracy.source})"
 
 
-def _balances(books: Audit, unit: str) -> str:
-    residuals = f"energy {books.energy_error:.1e}, entropy {books.entropy_error:.1e}, sites {books.site_error:.1e}"
-    if not books.least:
+def _balances(audit: Audit, unit: str) -> str:
+    residuals = f"energy {audit.energy_error:.1e}, entropy {audit.entropy_error:.1e}, sites {audit.site_error:.1e}"
+    if not audit.least:
         return f"{residuals}; nothing dissipates"
-    if books.violations:
-        worst = ", ".join(f"{law} ({books.least[law]:.3g} {unit})" for law in books.violations)
+    if audit.violations:
+        worst = ", ".join(f"{law} ({audit.least[law]:.3g} {unit})" for law in audit.violations)
         return f"{residuals}; ENTROPY DESTROYED by {worst}"
-    if books.destroys:
+    if audit.destroys:
         return f"{residuals}; ENTROPY DESTROYED by all laws together"
-    least = min(books.least.values())
+    least = min(audit.least.values())
     error = ", within the error of the run" if least < 0 else ""
     return f"{residuals}; every law dissipates (least {least:.2g} {unit}{error})"
 
@@ -143,10 +143,10 @@ def sweep_summary(solution: SweepSolution, written: Path | None, details: bool =
         error = f"{known.max():.2g} ({accuracy.source})" if len(known) else f"unknown ({accuracy.source})"
         error = "; ".join(filter(None, (error, accuracy.unknown)))
     speed = f"run {duration(solution.seconds)}, compile {duration(solution.model.compile_seconds)}"
-    if solution.system.whole:
+    if solution.system.in_totals:
         speed = f"surfaces {duration(solution.before_seconds)}, {speed}"
     energy, entropy, sites = (f"{solution.worst(balance):.1e}" for balance in ("energy", "entropy", "site"))
-    count = sum(books.destroys for books in solution.audits)
+    count = sum(audit.destroys for audit in solution.audits)
     verdict = f"ENTROPY DESTROYED in {counted(count, 'run')}" if count else "no law destroys entropy"
     every = [
         ("swept", swept_in_words(solution.plan, solution.parameters, solution.system.changeable)),
@@ -307,7 +307,7 @@ def _compiled(system: System, run: Run) -> str:
         return "the equations; Cantera makes the steps, and asks Python for every right-hand side"
     if run.solver not in (*OWN, AUTO):
         return f"the equations; {run.solver} is called from Python for every step, which looks for events"
-    if system.searches:
+    if system.solves_jumps:
         return "equations, steps and events; what follows at a transition is searched for in Python"
     return "all of the run; Python prepares it and looks at its results"
 
@@ -317,7 +317,7 @@ def _state_rows(system: System) -> list[tuple[str, ...]]:
     starts = {state.name: state.initial for state in system.states}
     rows: list[tuple[str, ...]] = []
     for s in system.states:
-        if s.name not in system.inside:
+        if s.name not in system.interior:
             kind, start = ("algebraic", "guess") if s.algebraic else ("evolved", "from")
             rows.append((s.name, f"[{s.quantity.unit}]", kind, f"{start} {s.initial:g}", s.quantity.long_name))
     for p in system.profiles:

@@ -27,7 +27,7 @@ from surfacechem.results.error_estimates import against_exact, estimated, second
 from surfacechem.results.event_table import entropy_destroyed, event_columns, event_times
 from surfacechem.results.matching import exact_values, match
 from surfacechem.results.netcdf import COORDINATES, Column, versions
-from surfacechem.results.picture import shared_times
+from surfacechem.results.refinement import shared_times
 from surfacechem.runs import spectrum
 from surfacechem.runs.keeping import (
     END_COLUMNS,
@@ -93,13 +93,13 @@ def solve(
     run = model.chosen(run, values[0])
     runs = settings(model.system, plan, following(model, plan, run, changes, threads), values)
     if run.steady:
-        from surfacechem.runs.at_rest import refuse_histories, to_rest, together
+        from surfacechem.runs.at_rest import refuse_histories, to_steady_state, together
 
         refuse_histories(model.system)
         found = []
         for at, point in zip(values, plan.points, strict=True):
             try:
-                found.append(to_rest(model, runs[0], at))
+                found.append(to_steady_state(model, runs[0], at))
             except InputError as error:
                 raise _of_run(point, error) from None
         runs = together(found)
@@ -278,11 +278,11 @@ def _against_exact(case: Case, done: SweepSolution, name: str, second: Callable[
 
     For loads at rupture the fit is tested on the outermost runs. A run that ended at its start has no error.
     """
-    begun = [i for i, run in enumerate(done.runs) if len(run.looked.result.times) > 1]
+    begun = [i for i, run in enumerate(done.runs) if len(run.stored.result.times) > 1]
     if not begun:
         raise InputError("all runs ended at their start.")
     errors, why = np.full(len(done.runs), np.nan), ENDED_AT_START
-    exact = {which: errors.copy() for which in done.told if which in references.get(name).statistics}
+    exact = {which: errors.copy() for which in done.statistic_names if which in references.get(name).statistics}
     for i in begun:
         run = done.runs[i]
         if exact:
@@ -328,7 +328,7 @@ def _column_names(system: System) -> set[str]:
     stored = described(system, replace(kept, at_events=kept.last, reach=dict.fromkeys(kept.last, 0.0)))
     more = [f"{name}_{which}" for name in shown for which in (*EXTREMES, *STATISTICS, "before", "after")]
     exact = [f"{name}_exact" for name in (*more, "lifetime")]
-    return {*kept.last, *shown, *system.inside, *stored, *END_COLUMNS, *more, *exact, *RESERVED_COLUMNS}
+    return {*kept.last, *shown, *system.interior, *stored, *END_COLUMNS, *more, *exact, *RESERVED_COLUMNS}
 
 
 def dimensions(plan: Plan, names: Mapping[str, str]) -> dict[str, int]:
@@ -403,11 +403,11 @@ class SweepSolution(Results):
     @cached_property
     def run_ends(self) -> list[dict[str, Any]]:
         """Entries of END_COLUMNS for each run."""
-        return [end_of(run) | balances_of(run, books) for run, books in zip(self.runs, self.audits, strict=True)]
+        return [end_of(run) | balances_of(run, balances) for run, balances in zip(self.runs, self.audits, strict=True)]
 
     def worst(self, balance: str) -> float:
         """Return the largest error over all runs of the balance of energy, entropy or site."""
-        return float(np.max([getattr(books, f"{balance}_error") for books in self.audits]))
+        return float(np.max([getattr(balances, f"{balance}_error") for balances in self.audits]))
 
     @cached_property
     def statistics(self) -> Sequence[Rupture]:
@@ -419,7 +419,7 @@ class SweepSolution(Results):
         return [spectrum.statistics(run, self.plan.load) for run in self.runs]
 
     @cached_property
-    def told(self) -> list[str]:
+    def statistic_names(self) -> list[str]:
         """Names of the statistics."""
         return [each.name for each in fields(self.statistics[0])] if self.statistics else []
 
@@ -464,14 +464,14 @@ class SweepSolution(Results):
         columns = [*self._coordinates(load), *along.values(), *species, *self._of_runs()]
         columns += event_columns(self.runs, shape)
         columns += self._single() if load is None else []
-        for which in self.told:
+        for which in self.statistic_names:
             name, unit, text = self._statistic(which)
             found = [getattr(statistics, which) for statistics in self.statistics]
             columns.append(self._of_each(name, found, unit, text))
             if self.accuracy and which in self.accuracy.exact:
                 exact = self.accuracy.exact[which]
                 columns.append(self._of_each(f"{name}_exact", exact, unit, f"exact {text}"))
-        return (*columns, *([self._lifetime(columns)] if self.told and self.plan.load else []))
+        return (*columns, *([self._lifetime(columns)] if self.statistic_names and self.plan.load else []))
 
     def _statistic(self, which: str) -> tuple[str, str, str]:
         """Return name, unit and meaning of a statistic in the dataset."""
@@ -551,7 +551,7 @@ class SweepSolution(Results):
             "count_steps": self.steps,
             "run_seconds": float(self.seconds),
             "compile_seconds": float(self.model.compile_seconds),
-            **({"integrals_seconds": self.before_seconds} if self.system.whole else {}),
+            **({"integrals_seconds": self.before_seconds} if self.system.in_totals else {}),
             **error,
             **{f"{balance}_error": self.worst(balance) for balance in ("energy", "entropy", "site")},
             "versions": versions(),

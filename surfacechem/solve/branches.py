@@ -44,7 +44,7 @@ def steps_ahead(start: float, direction: float) -> Array:
     return np.asarray(start + direction * size * (STEP_GROWTH ** np.arange(MOST_STEPS) - 1) / (STEP_GROWTH - 1))
 
 
-def push_ahead(driving: Curve, start: float, direction: float, least: Curve, *, lost: bool) -> float | None:
+def first_driven_gap(driving: Curve, start: float, direction: float, least: Curve, *, lost: bool) -> float | None:
     """Return the first gap in a direction at which the driving traction points onward by more than ``least``.
 
     None if there is none, or if the traction opposes the motion before it and the equilibrium is not known to be
@@ -91,7 +91,7 @@ MOTION_STEPS = 20_000
 """Number of steps after which the motion is taken not to come to rest."""
 
 
-FIRST_PUSH = 10 * CBRT_EPS
+FIRST_OFFSET = 10 * CBRT_EPS
 """Least first displacement from an unstable equilibrium, relative to the gap: the difference quotient taken there must
 not reach back to the equilibrium, where laws may have a kink. Ten times CBRT_EPS is a choice; twice would do too.
 """
@@ -114,29 +114,29 @@ def unstable_direction(change: Array) -> Array | None:
     fastest = int(np.argmax(growth.real))
     if not growth[fastest].real > 0:
         return None
-    way: Array = ways[:, fastest].real
-    return np.asarray(way / way[np.abs(way).argmax()])
+    direction: Array = ways[:, fastest].real
+    return np.asarray(direction / direction[np.abs(direction).argmax()])
 
 
-def come_to_rest(driving: Field, scale: Array, onward: Array, begins: Array) -> Array | None:
+def come_to_rest(driving: Field, scale: Array, sliding: Array, begins: Array) -> Array | None:
     """Return the displacements at which damped motion comes to rest from a first displacement; None if it does not.
 
-    A gap with a nonzero ``onward`` slides in that direction: friction resists its motion and never pulls it back.
+    A gap with a nonzero ``sliding`` slides in that direction: friction resists its motion and never pulls it back.
     """
     with PREPARATION:
         from scipy.integrate import Radau
 
     def velocity(_: float, ways: Array) -> Array:
-        return _resisted(driving(ways.T), onward).T
+        return _resisted(driving(ways.T), sliding).T
 
     def change(_: float, ways: Array) -> Array:
-        return np.nan_to_num(stiffness(lambda at: _resisted(driving(at), onward), scale, ways))
+        return np.nan_to_num(stiffness(lambda at: _resisted(driving(at), sliding), scale, ways))
 
     start = velocity(0.0, begins[:, None])[:, 0]
     if not np.all(np.isfinite(start)):
         return None
     least = 0.0 if begins.any() else MOTION_RTOL  # a point close to an unstable equilibrium is not at rest
-    rest = _at_rest(driving, scale, onward, begins, least)
+    rest = _at_rest(driving, scale, sliding, begins, least)
     if rest is not None:
         return rest
     finest = START_PART * (float(np.max(np.abs(begins))) or MOTION_RTOL * float(scale.min()))
@@ -145,7 +145,7 @@ def come_to_rest(driving: Field, scale: Array, onward: Array, begins: Array) -> 
     for _ in range(MOTION_STEPS):
         with np.errstate(all="ignore"):  # trial values far ahead may not be finite
             motion.step()
-        rest = _at_rest(driving, scale, onward, motion.y, least)
+        rest = _at_rest(driving, scale, sliding, motion.y, least)
         if rest is not None or motion.status != "running":
             return rest
         if np.any(np.abs(motion.y) > SEARCH_REACH * scale):  # no equilibrium within reach
@@ -153,22 +153,22 @@ def come_to_rest(driving: Field, scale: Array, onward: Array, begins: Array) -> 
     return None
 
 
-def _resisted(pushes: Array, onward: Array) -> Array:
+def _resisted(tractions: Array, sliding: Array) -> Array:
     """Return the driving tractions with friction: a sliding gap is driven in its own direction only."""
-    return np.where(onward != 0, onward * np.maximum(onward * pushes, 0.0), pushes)
+    return np.where(sliding != 0, sliding * np.maximum(sliding * tractions, 0.0), tractions)
 
 
-def _at_rest(driving: Field, scale: Array, onward: Array, at: Array, least: float) -> Array | None:
+def _at_rest(driving: Field, scale: Array, sliding: Array, at: Array, least: float) -> Array | None:
     """Return the stable equilibrium that is reached up to roundoff; None if there is none.
 
     A gap that has slid is then in balance or held by friction. A gap without a driving traction, as under symmetry,
     stays.
     """
     everything = np.arange(len(at))
-    moved = np.nonzero(_resisted(driving(at[None]), onward)[0])[0]
+    moved = np.nonzero(_resisted(driving(at[None]), sliding)[0])[0]
     for free in (everything, moved) if len(moved) < len(at) else (everything,):
         rest = equilibrium(driving, scale, free, at, least)
-        if rest is not None and np.all(onward * rest >= 0):
+        if rest is not None and np.all(sliding * rest >= 0):
             return rest
     return None
 

@@ -183,21 +183,21 @@ class Problem:
     record_steps: bool = False
     exchanged: Array | None = None
     """Largest magnitude of each quadrature so far, if the problem continues another."""
-    seen: Array | None = None
+    margin_peaks: Array | None = None
     """Largest magnitude of each margin so far, if the problem continues another."""
     spacing: float = np.inf
     """Longest time [s] of a step without a check against the equations inside; shorter features may be missed."""
-    in_play: tuple[bool, ...] | None = None
+    active: tuple[bool, ...] | None = None
     """Flags of the margins that are active in the modes of this problem; None if all are. Others may have any value."""
-    picture: float = 0.0
+    line_error: float = 0.0
     """Largest error of linear interpolation between stored states, as a part of the range of each state; 0 if only
     outputs and ends of steps are stored.
     """
-    before: float = 0.0
+    elapsed: float = 0.0
     """Time [s] from the start of the run to that of the problem; stored states also resolve the logarithm of time."""
     extremes: Array | None = None
     """Least and largest states of the part that the problem continues, shape (2, states)."""
-    goes_on: bool = False
+    continued: bool = False
     """True if another problem continues this one: a kink at its very end then counts, as between segments."""
     explicit: bool = False
     """True if steps may be explicit where the equations give their rates and are not stiff."""

@@ -21,7 +21,7 @@ FEWEST, SHARP = 100.0, RUN_EPS
 def time_scales(system: System, values: Mapping[str, float]) -> list[tuple[TimeScale, float]]:
     """Return the characteristic times of free motions of the gaps [s], the shortest first."""
     point = {parameter.symbol: values[parameter.path] for parameter in system.parameters}
-    found = [(pace, float(system.expand(pace.time).subs(point))) for pace in system.noted(TimeScale)]
+    found = [(scale, float(system.expand(scale.time).subs(point))) for scale in system.notes_of(TimeScale)]
     return sorted(found, key=lambda item: item[1])
 
 
@@ -29,9 +29,9 @@ def too_fast(system: System, result: Result, values: Mapping[str, float]) -> str
     """Describe motion too fast to be resolved, with advice; empty if that is not why a run could not go on."""
     end = float(result.problem.segments[-1])
     shortest = {Status.MAX_STEPS: FEWEST * end / result.problem.max_steps, Status.STEP_UNDERFLOW: SHARP * result.t}
-    for pace, time in time_scales(system, values):
+    for scale, time in time_scales(system, values):
         if time < shortest.get(result.status, 0.0):
-            return f": the {pace.text}, {time:.3g} s, is too short for a run of {end:.3g} s; {pace.remedy}"
+            return f": the {scale.text}, {time:.3g} s, is too short for a run of {end:.3g} s; {scale.remedy}"
     return ""
 
 
@@ -51,7 +51,7 @@ ROUNDED_BACK = (
 )
 
 
-LOOKS_AHEAD = np.ldexp(1.0, np.arange(-4, 3))
+EXTRAPOLATIONS = np.ldexp(1.0, np.arange(-4, 3))
 """Lengths of the extrapolation beyond the end of a run, in units of the last step."""
 
 
@@ -151,8 +151,8 @@ def _values(
     segment = np.searchsorted(result.problem.segments[1:-1], steps.t, side=side)
     inputs = [steps.t[:, None], steps.y, steps.ydot, result.problem.parameters[segment]]
     values = np.atleast_2d(program.margins(program.filled(np.concatenate(inputs, axis=1))))
-    playing = np.array([system.in_play(row) for row in result.problem.parameters])[segment]
-    return np.where(playing, values, np.nan)
+    active = np.array([system.active_guards(row) for row in result.problem.parameters])[segment]
+    return np.where(active, values, np.nan)
 
 
 def runaway(states: Sequence[State], result: Result) -> str | None:
@@ -206,7 +206,7 @@ def beyond_numbers(system: System, result: Result, inputs: Array, named: Callabl
         return odd
     if result.status is not Status.NOT_FINITE or result.steps is None or len(result.steps.t) < 2:
         return None
-    n, ahead = len(result.y), np.append(0.0, LOOKS_AHEAD) * np.diff(result.steps.t)[-1]
+    n, ahead = len(result.y), np.append(0.0, EXTRAPOLATIONS) * np.diff(result.steps.t)[-1]
     rows = np.tile(inputs, (len(ahead), 1))
     rows[:, 0] += ahead
     rows[:, 1 : 1 + n] += ahead[:, None] * result.ydot

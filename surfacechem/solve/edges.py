@@ -15,6 +15,7 @@ from surfacechem.solve.radau.stepper import (
     ENTROPY_OUT,
     EVENTS,
     HEAT_OUT,
+    HEAT_SOURCE,
     JUMPS,
     MEASURE,
     PRODUCED,
@@ -22,17 +23,16 @@ from surfacechem.solve.radau.stepper import (
     RELEASED,
     RESTS,
     RETURNS,
-    TAKER,
     WORK,
 )
 from surfacechem.solve.radau.work import (
-    BOOKS,
     GUARD_RATES,
     MAGNITUDES,
     MARGINS,
     NODES,
     RESETS,
     TIMES_OF_RETURN,
+    TOTALS,
     compiled,
     copy,
     evaluate,
@@ -50,10 +50,10 @@ OPEN, CLOSED, NEAR = range(3)
 
 
 @compiled
-def find_playing(w: Any) -> None:
+def find_active(w: Any) -> None:
     """Mark the guards that are active in the present modes."""
     for m in range(w.n_margins):
-        w.playing[m] = 1
+        w.active[m] = 1
     k, rules = 0, w.when.shape[0]
     while k < rules:
         guard, column, holds = w.when[k, 0], w.when[k, 1], False
@@ -61,14 +61,14 @@ def find_playing(w: Any) -> None:
             holds = holds or w.moment[1 + 2 * w.n + column] == w.when[k, 2]
             k += 1
         if not holds:
-            w.playing[guard] = 0
+            w.active[guard] = 0
 
 
 @compiled
 def find_magnitudes(w: Any) -> None:
     """Evaluate the magnitudes of the guards at the peaks of the states; their roundoff is proportional to these."""
     for j in range(w.n):
-        w.sized[j] = max(w.peaks_seen[j], abs(w.moment[1 + j]))
+        w.state_sizes[j] = max(w.peaks_seen[j], abs(w.moment[1 + j]))
     if w.n_margins == 0:
         return
     evaluate_at(w, MAGNITUDES, w.moment, w.magnitude)
@@ -95,7 +95,7 @@ def _is_beyond(w: Any, first: int) -> bool:
     beyond = False
     for m in range(first):
         slack = 0.0 if w.kinds[m, 5] == 1 else GUARD_EPS * w.magnitude[m]
-        beyond = beyond or (w.kinds[m, 0] == 1 and w.playing[m] == 1 and w.margin_probe[m] < -slack)
+        beyond = beyond or (w.kinds[m, 0] == 1 and w.active[m] == 1 and w.margin_probe[m] < -slack)
     return beyond
 
 
@@ -103,7 +103,7 @@ def _is_beyond(w: Any, first: int) -> bool:
 def _closing(w: Any, m: int) -> int:
     """Return CLOSED if an edge's guard is below zero by more than the integration's drift, NEAR if it is zero."""
     value, size, small = w.margin_probe[m], w.magnitude[m], GUARD_EPS * w.magnitude[m]
-    if w.playing[m] == 0 or value > small:
+    if w.active[m] == 0 or value > small:
         return OPEN
     rests = w.edges[m - w.n_margins + w.edges.shape[0], RESTS] == 1
     if rests or value < -max(min(DRIFT * w.rtol, MOST_DRIFT) * size, small):
@@ -125,7 +125,7 @@ def _due(w: Any, first: int) -> int:
     for m in range(w.n_margins - 1, first - 1, -1):
         closes = w.fired[m] == NEAR and w.margin_slope[m - first] < 0.0
         # After a jump at this moment roundoff must not trigger the way back.
-        if closes and w.jumped[-1] == w.moment[0]:
+        if closes and w.jump_times[-1] == w.moment[0]:
             return UNDECIDED
         if closes or w.fired[m] == CLOSED:
             due = m - first
@@ -138,12 +138,12 @@ def resolve(w: Any, i: int, end: float) -> bool:
     first = w.n_margins - w.edges.shape[0]
     while True:
         t = w.moment[0]
-        if w.jumped[0] >= t - NEWTON_EPS * max(t, BRIEF_PART * end):  # chatter, including arcs of no duration
+        if w.jump_times[0] >= t - NEWTON_EPS * max(t, BRIEF_PART * end):  # chatter, including arcs of no duration
             return False
         find_magnitudes(w)
-        find_playing(w)
+        find_active(w)
         _find_guards(w)
-        if w.jumped[-1] >= 0.0 and _is_beyond(w, first):
+        if w.jump_times[-1] >= 0.0 and _is_beyond(w, first):
             return False
         due = _due(w, first)
         if due == NO_EDGE:
@@ -153,16 +153,16 @@ def resolve(w: Any, i: int, end: float) -> bool:
 
 
 @compiled
-def _look(w: Any, row: Any, books: Any) -> None:
+def _evaluate_totals(w: Any, row: Any, totals: Any) -> None:
     """Evaluate the totals of a jump; a magnitude that is not finite, as at a bound, counts as zero."""
-    evaluate_at(w, BOOKS, row, books)
-    for k in range(books.shape[0] - 2, books.shape[0]):
-        if not abs(books[k]) < np.inf:
-            books[k] = 0.0
+    evaluate_at(w, TOTALS, row, totals)
+    for k in range(totals.shape[0] - 2, totals.shape[0]):
+        if not abs(totals[k]) < np.inf:
+            totals[k] = 0.0
 
 
 @compiled
-def _warm(w: Any, taker: int, made: float) -> tuple[float, float]:
+def _distribute_heat(w: Any, source: int, released: float) -> tuple[float, float]:
     """Distribute the heat of a jump to the nodes; return the heat and entropy that reservoirs take.
 
     Each node's temperature is that at which its energy has risen by its share.
@@ -173,7 +173,7 @@ def _warm(w: Any, taker: int, made: float) -> tuple[float, float]:
     width = w.nodal.shape[0] // nodes
     evaluate_at(w, NODES, row, w.nodal)
     for k in range(nodes):
-        taken = w.nodal[k * width + 3 + taker] * made
+        taken = w.nodal[k * width + 3 + source] * released
         w.targets[k] = w.nodal[k * width + 1] + taken
         if w.nodes[k] < 0:
             heat += taken
@@ -210,16 +210,16 @@ def _is_admissible(w: Any, gain: float, small: float, heat: float) -> bool:
 
 
 @compiled
-def _book(w: Any, made: float, gain: float, heat: float, entropy: float) -> None:
+def _add_to_ledger(w: Any, released: float, gain: float, heat: float, entropy: float) -> None:
     """Add the amounts of the jump to the accounts of the ledger."""
     for m in range(w.n_ledger):
         kind, place = w.accounts[m, 0], w.accounts[m, 1]
         if kind == BONDS:
             w.booked[m] += w.after[1 + place] - w.moment[1 + place]
         elif kind == WORK:
-            w.booked[m] += w.books_after[place] - w.books_before[place]
+            w.booked[m] += w.totals_after[place] - w.totals_before[place]
         elif kind == RELEASED:
-            w.booked[m] += made
+            w.booked[m] += released
         elif kind == PRODUCED:
             w.booked[m] += gain
         elif kind == HEAT_OUT:
@@ -241,15 +241,13 @@ def _write_event(w: Any, i: int, e: int) -> None:
 
 
 @compiled
-def _write_jump(
-    w: Any, i: int, e: int, made: float, gain: float, heat: float, entropy: float, admissible: bool
-) -> None:
-    counts, given = w.counts[i], w.books_before.shape[0] - 4
+def _write_jump(w: Any, i: int, e: int, released: float, gain: float, heat: float, entropy: float, valid: bool) -> None:
+    counts, given = w.counts[i], w.totals_before.shape[0] - 4
     if counts[JUMPS] < w.jumps.shape[1]:
         row = w.jumps[i, counts[JUMPS]]
-        row[0], row[1], row[2], row[3], row[4], row[5], row[6] = e, counts[ARCS], made, gain, heat, entropy, admissible
+        row[0], row[1], row[2], row[3], row[4], row[5], row[6] = e, counts[ARCS], released, gain, heat, entropy, valid
         for k in range(given):
-            row[7 + k] = w.books_after[2 + k] - w.books_before[2 + k]
+            row[7 + k] = w.totals_after[2 + k] - w.totals_before[2 + k]
         copy(w.moment, row[7 + given :])
         copy(w.after, row[7 + given + w.moment.shape[0] :])
     counts[JUMPS] += 1
@@ -258,9 +256,9 @@ def _write_jump(
 @compiled
 def jump(w: Any, i: int, e: int) -> bool:
     """Carry out an edge: reset, distribute heat, test the second law, update the ledger. False if left to Instant."""
-    n, t, taker, measure = w.n, w.moment[0], w.edges[e, TAKER], w.edges[e, MEASURE]
+    n, t, source, measure = w.n, w.moment[0], w.edges[e, HEAT_SOURCE], w.edges[e, MEASURE]
     rounding = GUARD_EPS * w.magnitude[w.n_margins - w.edges.shape[0] + e]
-    if w.code[BOOKS, 0] == 0:
+    if w.code[TOTALS, 0] == 0:
         return False
     copy(w.moment, w.after)
     evaluate_at(w, RESETS + e, w.moment, w.reset)
@@ -268,36 +266,36 @@ def jump(w: Any, i: int, e: int) -> bool:
         w.after[1 + j], w.after[1 + n + j] = w.reset[j], 0.0
     for k in range(w.held.shape[0]):
         w.after[1 + 2 * n + w.held[k]] = w.reset[n + k]
-    before, now, varied = w.books_before, w.books_after, w.books_perturbed
-    _look(w, w.moment, before)
-    _look(w, w.after, now)
-    made, heat, entropy = before[0] - now[0], 0.0, 0.0
+    before, now, varied = w.totals_before, w.totals_after, w.totals_perturbed
+    _evaluate_totals(w, w.moment, before)
+    _evaluate_totals(w, w.after, now)
+    released, heat, entropy = before[0] - now[0], 0.0, 0.0
     if not finite(now[:1]):
         return False
-    if abs(made) <= FEW_EPS * max(now[-2], abs(before[0])):
-        made = 0.0
+    if abs(released) <= FEW_EPS * max(now[-2], abs(before[0])):
+        released = 0.0
     else:
-        heat, entropy = _warm(w, taker, made)
-        _look(w, w.after, now)
+        heat, entropy = _distribute_heat(w, source, released)
+        _evaluate_totals(w, w.after, now)
     copy(w.moment, w.perturbed)
     if measure >= 0:
         w.perturbed[1 + measure] += rounding
-    _look(w, w.perturbed, varied)
+    _evaluate_totals(w, w.perturbed, varied)
     gain = now[1] - before[1] + entropy
     small = RUN_EPS * max(abs(before[1]), abs(now[1]), abs(entropy)) + FEW_EPS * before[-1] + abs(varied[1] - before[1])
     admissible = _is_admissible(w, gain, small, abs(varied[0] - before[0]))
     if not finite(w.after) or (w.edges[e, REFUSES] == 1 and not admissible):
         return False
     _write_event(w, i, e)
-    _write_jump(w, i, e, made, gain, heat, entropy, admissible)
-    _book(w, made, gain, heat, entropy)
+    _write_jump(w, i, e, released, gain, heat, entropy, admissible)
+    _add_to_ledger(w, released, gain, heat, entropy)
     copy(w.after, w.moment)
-    for k in range(w.jumped.shape[0] - 1):
-        w.jumped[k] = w.jumped[k + 1]
-    w.jumped[-1] = t
+    for k in range(w.jump_times.shape[0] - 1):
+        w.jump_times[k] = w.jump_times[k + 1]
+    w.jump_times[-1] = t
     if w.edges[e, RETURNS] >= 0:
         evaluate_at(w, TIMES_OF_RETURN, w.after, w.margin_slope)
-        w.rebounded, w.flight_time = t, -np.inf
+        w.rebound_time, w.flight_time = t, -np.inf
         for k in range(w.edges.shape[0]):
             if w.edges[k, RETURNS] >= 0:
                 w.flight_time = max(w.flight_time, w.margin_slope[w.edges[k, RETURNS]])

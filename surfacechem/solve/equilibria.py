@@ -13,15 +13,15 @@ from surfacechem.expressions import Expression, derivative
 from surfacechem.model.automaton import FOLD_STIFFNESS, SIDE_PATH, SLIP_PATH
 from surfacechem.model.system import System
 from surfacechem.solve.branches import (
-    FIRST_PUSH,
+    FIRST_OFFSET,
     Curve,
     Field,
     Indices,
     come_to_rest,
     equilibrium,
+    first_driven_gap,
     march,
     next_root,
-    push_ahead,
     stiffness,
     unstable_direction,
 )
@@ -83,11 +83,11 @@ def compiled(system: System, expressions: Iterable[Expression]) -> Function:
 class GapDirection:
     """A direction in the space of the gaps, the gap that measures the distance, and the weights of the tractions."""
 
-    moves: Array
+    changes: Array
     """Change of each state, shape (states,)."""
     column: int
     """The state that changes by one."""
-    pulls: Array
+    weights: Array
     """Weights of the driving tractions, shape (equilibria,)."""
 
 
@@ -96,8 +96,8 @@ class FoldPoint:
     """A fold: its point, the direction in the space of the gaps in which equilibrium is lost, and the sign along it."""
 
     point: Point
-    way: GapDirection
-    direction: float
+    direction: GapDirection
+    sign: float
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,7 @@ class FreeGaps:
     which: Indices
     columns: Array
     """Columns of the states that are the gaps."""
-    moves: Array
+    changes: Array
     """Change of the states with each gap, shape (gaps, states)."""
     driving: Field
     scale: Array
@@ -122,11 +122,11 @@ class Equilibria:
         self.states = [state.name for state in system.states]
         self.items = system.equilibria
         paths = [parameter.path for parameter in system.parameters]
-        self.slip = paths.index(SLIP_PATH) if SLIP_PATH in paths and any(e.slides for e in self.items) else None
+        self.slip = paths.index(SLIP_PATH) if SLIP_PATH in paths and any(e.slip for e in self.items) else None
         """Column of the sliding mode among the parameters, if gaps in equilibrium stick or slide."""
         sided = SIDE_PATH in paths and "g_n" in self.states
         self._side = 1 + 2 * len(self.states) + paths.index(SIDE_PATH) if sided else None
-        self.followers = [1 + self.states.index(name) for name in system.follows]
+        self.followers = [1 + self.states.index(name) for name in system.followers]
         """Columns among the inputs of the states that follow the normal gap where it jumps."""
 
     @cached_property
@@ -137,13 +137,13 @@ class Equilibria:
     @cached_property
     def _moving(self) -> Function:
         """For each gap: zero if it is held, and the change of each state with it."""
-        rows = ([e.active, *(e.along.get(name, int(name == e.state)) for name in self.states)] for e in self.items)
+        rows = ([e.active, *(e.coupled.get(name, int(name == e.state)) for name in self.states)] for e in self.items)
         return compiled(self.system, (item for row in rows for item in row))
 
     @cached_property
-    def _bears(self) -> Function:
+    def _friction_limits(self) -> Function:
         """Friction limit of each gap [Pa]."""
-        return compiled(self.system, (e.bears for e in self.items))
+        return compiled(self.system, (e.limit for e in self.items))
 
     @cached_property
     def _tangents(self) -> Function:
@@ -151,7 +151,7 @@ class Equilibria:
         symbols, found = {state.name: state.symbol for state in self.system.states}, []
         for e in self.items:
             residual = self.system.expand(e.residual)
-            with_it = (self.system.expand(w) * derivative(residual, symbols[x]) for x, w in e.along.items())
+            with_it = (self.system.expand(w) * derivative(residual, symbols[x]) for x, w in e.coupled.items())
             slope = derivative(residual, symbols[e.state]) + sum(with_it)
             found += [residual, slope, derivative(residual, self.system.t)]
         return compiled(self.system, found)
@@ -159,36 +159,36 @@ class Equilibria:
     @cached_property
     def _follow(self) -> Function:
         """States that follow the normal gap where it jumps."""
-        return compiled(self.system, self.system.follows.values())
+        return compiled(self.system, self.system.followers.values())
 
-    # -- gaps along a way -----------------------------------------------------------------------------------------
+    # -- gaps along a line ----------------------------------------------------------------------------------------
 
     def free(self, point: Point) -> Indices:
         """Return the indices of the gaps that are not held."""
         return np.nonzero(self._moving(point.inputs())[:: 1 + len(self.states)])[0]
 
-    def ways(self, point: Point) -> list[GapDirection]:
+    def directions(self, point: Point) -> list[GapDirection]:
         """Return the direction of each gap by itself."""
-        moves = self._moving(point.inputs()).reshape(len(self.items), 1 + len(self.states))[:, 1:]
+        changes = self._moving(point.inputs()).reshape(len(self.items), 1 + len(self.states))[:, 1:]
         alone = np.eye(len(self.items))
-        return [GapDirection(moves[j], self.states.index(e.state), alone[j]) for j, e in enumerate(self.items)]
+        return [GapDirection(changes[j], self.states.index(e.state), alone[j]) for j, e in enumerate(self.items)]
 
     def together(self, point: Point, weights: Array) -> GapDirection:
         """Return the common direction of several gaps, measured by the gap that moves the most, whose weight is 1."""
-        ways = self.ways(point)
-        moves = sum((w * way.moves for w, way in zip(weights, ways, strict=True)), np.zeros(len(self.states)))
-        return GapDirection(moves, ways[int(np.abs(weights).argmax())].column, weights)
+        lines = self.directions(point)
+        changes = sum((w * line.changes for w, line in zip(weights, lines, strict=True)), np.zeros(len(self.states)))
+        return GapDirection(changes, lines[int(np.abs(weights).argmax())].column, weights)
 
     def _free(self, point: Point, heat: Heat | None) -> FreeGaps:
-        which, ways = self.free(point), self.ways(point)
-        moves, columns = np.array([ways[j].moves for j in which]), np.array([ways[j].column for j in which])
+        which, lines = self.free(point), self.directions(point)
+        changes, columns = np.array([lines[j].changes for j in which]), np.array([lines[j].column for j in which])
 
         def driving(moved: Array) -> Array:
             rows = np.repeat(point.inputs()[None], len(moved), axis=0)
-            rows[:, 1 : 1 + len(point.y)] += moved @ moves
-            return self.pushes(self._arrived(rows, jumps=heat is not None), heat)[:, which]
+            rows[:, 1 : 1 + len(point.y)] += moved @ changes
+            return self.driving(self._arrived(rows, jumps=heat is not None), heat)[:, which]
 
-        return FreeGaps(which, columns, moves, driving, np.maximum(np.abs(point.y[columns]), NANOMETRE))
+        return FreeGaps(which, columns, changes, driving, np.maximum(np.abs(point.y[columns]), NANOMETRE))
 
     def _arrived(self, rows: Array, *, jumps: bool) -> Array:
         """Update the mode of touch in inputs whose gaps have moved; in a jump the following states too."""
@@ -200,11 +200,11 @@ class Equilibria:
             rows[:, self.followers] = self._follow(rows)
         return rows
 
-    def along(self, point: Point, way: GapDirection, gaps: Sequence[float] | Array, *, jumps: bool = False) -> Array:
+    def along(self, point: Point, line: GapDirection, gaps: Sequence[float] | Array, *, jumps: bool = False) -> Array:
         """Return inputs with these gaps along a direction."""
         rows = np.repeat(point.inputs()[None], len(gaps), axis=0)
-        rows[:, 1 : 1 + len(point.y)] += np.outer(np.asarray(gaps) - point.y[way.column], way.moves)
-        rows[:, 1 + way.column] = gaps
+        rows[:, 1 : 1 + len(point.y)] += np.outer(np.asarray(gaps) - point.y[line.column], line.changes)
+        rows[:, 1 + line.column] = gaps
         return self._arrived(rows, jumps=jumps)
 
     def moved(self, point: Point, rows: Array) -> Point:
@@ -212,17 +212,17 @@ class Equilibria:
         n = len(point.y)
         return replace(point, y=rows[0, 1 : 1 + n], parameters=rows[0, 1 + 2 * n :])
 
-    def _curves(self, point: Point, way: GapDirection, heat: Heat | None) -> tuple[Curve, Curve]:
+    def _curves(self, point: Point, line: GapDirection, heat: Heat | None) -> tuple[Curve, Curve]:
         """Return the driving traction along a direction and its roundoff, as functions of the measuring gap."""
-        pulled, jumps = way.pulls != 0, heat is not None
+        pulled, jumps = line.weights != 0, heat is not None
 
         def driving(gaps: Sequence[float] | Array) -> Array:
-            pushes = self.pushes(self.along(point, way, gaps, jumps=jumps), heat)
-            return np.asarray(np.where(pulled, pushes, 0.0) @ way.pulls)
+            tractions = self.driving(self.along(point, line, gaps, jumps=jumps), heat)
+            return np.asarray(np.where(pulled, tractions, 0.0) @ line.weights)
 
         def noise(gaps: Sequence[float] | Array) -> Array:
-            sizes = np.atleast_2d(self._balance(self.along(point, way, gaps, jumps=jumps)))[:, 1::2]
-            return np.asarray(NEWTON_EPS * np.where(pulled, sizes, 0.0) @ np.abs(way.pulls))
+            sizes = np.atleast_2d(self._balance(self.along(point, line, gaps, jumps=jumps)))[:, 1::2]
+            return np.asarray(NEWTON_EPS * np.where(pulled, sizes, 0.0) @ np.abs(line.weights))
 
         return driving, noise
 
@@ -231,7 +231,7 @@ class Equilibria:
         values = self._balance(point.inputs())
         return values[::2], values[1::2]
 
-    def pushes(self, rows: Array, heat: Heat | None = None) -> Array:
+    def driving(self, rows: Array, heat: Heat | None = None) -> Array:
         """Return driving tractions, shape (rows, equilibria), with the temperatures that a jump to the rows gives."""
         return np.asarray(np.atleast_2d(self._balance(_warmed(rows, heat)))[:, ::2])
 
@@ -264,10 +264,10 @@ class Equilibria:
             return point
         free = self._free(point, heat)
         n, sizes = len(free.which), np.maximum(free.scale, span[free.columns])
-        way = equilibrium(free.driving, sizes, np.arange(n), np.zeros(n), 1.0)
-        if way is None:
+        line = equilibrium(free.driving, sizes, np.arange(n), np.zeros(n), 1.0)
+        if line is None:
             return self.equilibrate(point, heat)
-        there = replace(point, y=point.y + way @ free.moves)
+        there = replace(point, y=point.y + line @ free.changes)
         return self.moved(point, self._arrived(there.inputs()[None], jumps=True))
 
     def _released(self, point: Point, heat: Heat | None, lost: FoldPoint | None) -> Point | None:
@@ -277,31 +277,31 @@ class Equilibria:
             return self._damped(point, heat, lost)
         if len(free) == 0:
             return point
-        way, direction = (lost.way, lost.direction) if lost else (self.ways(point)[free[0]], 0.0)
-        onward = self.onward_along(point, way)
-        driving, noise = self._curves(point, way, heat)
-        start = float(point.y[way.column])
-        if onward and not direction:
-            gap = self._slid(point, way, onward, driving, noise)
+        line, sign = (lost.direction, lost.sign) if lost else (self.directions(point)[free[0]], 0.0)
+        sliding = self.slip_sign(point, line)
+        driving, noise = self._curves(point, line, heat)
+        start = float(point.y[line.column])
+        if sliding and not sign:
+            gap = self._slid(point, line, sliding, driving, noise)
         else:
-            gap = march(driving, start, direction, noise)
+            gap = march(driving, start, sign, noise)
             if gap is not None and abs(gap) < GAP_EPS and abs(driving([0.0])) <= noise([0.0]):
                 gap = 0.0  # exact, for laws that end at touch
-        if gap is None or (onward and gap == start):
+        if gap is None or (sliding and gap == start):
             return None if gap is None else point
-        return self.moved(point, self.along(point, way, [gap], jumps=heat is not None))
+        return self.moved(point, self.along(point, line, [gap], jumps=heat is not None))
 
-    def _slid(self, point: Point, way: GapDirection, onward: float, driving: Curve, noise: Curve) -> float | None:
+    def _slid(self, point: Point, line: GapDirection, sliding: float, driving: Curve, noise: Curve) -> float | None:
         """Return the gap at which sliding comes to balance; friction never pulls it back.
 
         Sliding has begun because the driving traction exceeded the friction limit by at least roundoff. If the
         stiffness is almost zero, as at a fold that is reached by the change of loads alone, this makes a visible
         distance.
         """
-        start = float(point.y[way.column])
-        now, least = onward * float(driving([start])[0]), float(noise([start])[0])
-        beyond = march(lambda gaps: driving(gaps) + onward * least, start, onward, noise) if now > -least else start
-        slope = float(np.abs(way.pulls) @ np.abs(self._tangents(point.inputs())[1::3]))
+        start = float(point.y[line.column])
+        now, least = sliding * float(driving([start])[0]), float(noise([start])[0])
+        beyond = march(lambda gaps: driving(gaps) + sliding * least, start, sliding, noise) if now > -least else start
+        slope = float(np.abs(line.weights) @ np.abs(self._tangents(point.inputs())[1::3]))
         if beyond is None or abs(beyond - start) * slope > BALANCED / NEWTON_EPS * least:
             return beyond
         return march(driving, start, 0.0, noise) if now > 0 else start
@@ -311,18 +311,18 @@ class Equilibria:
         free = self._free(point, heat)
         begins = np.zeros(len(free.which))
         if lost is not None:
-            along, noise = self._curves(point, lost.way, heat)
-            start = float(point.y[lost.way.column])
-            gap = push_ahead(along, start, lost.direction, noise, lost=True)
+            along, noise = self._curves(point, lost.direction, heat)
+            start = float(point.y[lost.direction.column])
+            gap = first_driven_gap(along, start, lost.sign, noise, lost=True)
             if gap is None:
                 return None
-            way = lost.direction * lost.way.pulls[free.which]
+            line = lost.sign * lost.direction.weights[free.which]
             # A smaller displacement is lost in the roundoff of the other gaps.
-            begins = way * max(abs(gap - start), FIRST_PUSH / float(np.max(np.abs(way) / free.scale)))
-        rest = come_to_rest(free.driving, free.scale, self._onward(point)[free.which], begins)
+            begins = line * max(abs(gap - start), FIRST_OFFSET / float(np.max(np.abs(line) / free.scale)))
+        rest = come_to_rest(free.driving, free.scale, self._slip_directions(point)[free.which], begins)
         if rest is None:
             return None
-        y, columns = point.y + rest @ free.moves, free.columns
+        y, columns = point.y + rest @ free.changes, free.columns
         y[columns] = np.where(np.abs(y[columns]) < GAP_EPS, 0.0, y[columns])  # exact, for laws that end at touch
         return self.moved(point, self._arrived(replace(point, y=y).inputs()[None], jumps=heat is not None))
 
@@ -332,39 +332,39 @@ class Equilibria:
         If friction falls with its own heat, steady sliding is impossible on a spring softer than this fall. A gap
         without a driving traction yet, as under symmetry, gets the sign of the next change of the loads.
         """
-        onward, free = self._onward(point), self._free(point, heat)
-        pushes = onward if onward.any() else self._tangents(point.inputs())[2::3]
-        if not pushes[free.which].any():
+        sliding, free = self._slip_directions(point), self._free(point, heat)
+        tractions = sliding if sliding.any() else self._tangents(point.inputs())[2::3]
+        if not tractions[free.which].any():
             return None
         change = stiffness(free.driving, free.scale, np.zeros(len(free.which)))
         found = unstable_direction(change) if np.all(np.isfinite(change)) else None
-        weights = np.zeros(len(onward))
+        weights = np.zeros(len(sliding))
         weights[free.which] = 0.0 if found is None else found
-        direction = float(np.sign(weights @ pushes))
-        if not direction:
+        sign = float(np.sign(weights @ tractions))
+        if not sign:
             return None
-        way = self.together(point, weights)
-        driving, noise = self._curves(point, way, heat)
-        start = float(point.y[way.column])
+        line = self.together(point, weights)
+        driving, noise = self._curves(point, line, heat)
+        start = float(point.y[line.column])
         left = np.abs(driving([start]))  # the residual that the integration may have caused
-        begins = push_ahead(driving, start, direction, lambda gaps: noise(gaps) + left, lost=False)
-        return None if begins is None else FoldPoint(point, way, direction)
+        begins = first_driven_gap(driving, start, sign, lambda gaps: noise(gaps) + left, lost=False)
+        return None if begins is None else FoldPoint(point, line, sign)
 
     def corrected(self, point: Point) -> Point:
         """Return the point without the drift that the integration has left in its gaps."""
         for _ in range(CORRECTIONS if self.items else 0):
             values = self._tangents(point.inputs())
             y = point.y.copy()
-            for way, residual, slope in zip(self.ways(point), values[::3], values[1::3], strict=True):
+            for line, residual, slope in zip(self.directions(point), values[::3], values[1::3], strict=True):
                 change = -residual / slope if slope < 0 else 0.0
-                if abs(change) <= NEGLIGIBLE * max(abs(point.y[way.column]), PICOMETRE):  # a larger change is not drift
-                    y += change * way.moves
+                if abs(change) <= NEGLIGIBLE * max(abs(point.y[line.column]), PICOMETRE):  # larger changes are no drift
+                    y += change * line.changes
             point = replace(point, y=y)
         return point
 
     # -- sliding --------------------------------------------------------------------------------------------------
 
-    def _onward(self, point: Point) -> Array:
+    def _slip_directions(self, point: Point) -> Array:
         """Return the sliding direction of each gap; zero for a gap that may move both ways.
 
         A sliding gap may move both ways if its friction limit is zero.
@@ -372,12 +372,12 @@ class Equilibria:
         slip = 0.0 if self.slip is None else point.parameters[self.slip]
         if not slip:
             return np.zeros(len(self.items))
-        directions: Array = slip * np.array([e.slides for e in self.items])
-        return np.where(self._bears(point.inputs()) > 0, directions, 0.0)
+        directions: Array = slip * np.array([e.slip for e in self.items])
+        return np.where(self._friction_limits(point.inputs()) > 0, directions, 0.0)
 
-    def onward_along(self, point: Point, way: GapDirection) -> float:
+    def slip_sign(self, point: Point, line: GapDirection) -> float:
         """Return the sign of a direction in which the interface slides; zero if nothing slides along it."""
-        return float(np.sign(self._onward(point) @ way.pulls))
+        return float(np.sign(self._slip_directions(point) @ line.weights))
 
     def with_slip(self, point: Point, slip: float) -> Point:
         """Return the point with another mode of sliding."""
@@ -386,19 +386,19 @@ class Equilibria:
             parameters[self.slip] = slip
         return replace(point, parameters=parameters)
 
-    def is_pushed_back(self, point: Point, drift: float, noise: float = 0.0, heat: Heat | None = None) -> bool:
+    def would_reverse(self, point: Point, drift: float, noise: float = 0.0, heat: Heat | None = None) -> bool:
         """True if the tractions would pull a sliding gap back, by more than ``drift``, relative to the terms of the
         balance, and more than ``noise`` [Pa].
         """
-        onward = self._onward(point)
-        if not onward.any():
+        sliding = self._slip_directions(point)
+        if not sliding.any():
             return False
-        j = int(np.abs(onward).argmax())
+        j = int(np.abs(sliding).argmax())
         inputs = _warmed(point.inputs()[None], heat)[0]
         residual, slope = self._tangents(inputs)[3 * j : 3 * j + 2]
         size = self._balance(inputs)[2 * j + 1]
         # Without elastic support (slope >= 0) it cannot stick.
-        return bool(slope < 0 and onward[j] * residual < -max(drift * size, noise))
+        return bool(slope < 0 and sliding[j] * residual < -max(drift * size, noise))
 
 
 def _warmed(rows: Array, heat: Heat | None) -> Array:
@@ -452,8 +452,8 @@ class Folds:
         free, weights = self.equilibria.free(point), np.zeros(n)
         weights[free] = np.linalg.svd(entries.reshape(n, n)[np.ix_(free, free)])[2][-1] if len(free) > 1 else 1.0
         weights /= weights[np.abs(weights).argmax()]
-        way = self.equilibria.together(point, weights)
-        return falls, way, way.moves + warming.reshape(n, -1).T @ way.pulls
+        line = self.equilibria.together(point, weights)
+        return falls, line, line.changes + warming.reshape(n, -1).T @ line.weights
 
     def at(self, index: int, point: Point) -> FoldPoint | None:
         """Return the fold near a point; None if it is out of reach, or the edge is not a fold.
@@ -464,28 +464,28 @@ class Folds:
         """
         if index not in self.items or not len(self.equilibria.free(point)):
             return None
-        falls, way, moves = self._shape(index, point)
-        direction, onward = float(np.sign(falls @ way.pulls)), self.equilibria.onward_along(point, way)
-        if onward and direction != onward:
+        falls, line, changes = self._shape(index, point)
+        sign, sliding = float(np.sign(falls @ line.weights)), self.equilibria.slip_sign(point, line)
+        if sliding and sign != sliding:
             return None
 
-        there = replace(way, moves=moves)
+        there = replace(line, changes=changes)
 
         def ahead(gaps: Sequence[float] | Array) -> Array:
             return np.asarray(self._tangents[index](self.equilibria.along(point, there, gaps))).reshape(-1)
 
-        at = next_root(ahead, float(point.y[way.column]), direction, 1.0)
+        at = next_root(ahead, float(point.y[line.column]), sign, 1.0)
         if at is None:
             return None
-        return FoldPoint(self.equilibria.moved(point, self.equilibria.along(point, there, [at])), way, direction)
+        return FoldPoint(self.equilibria.moved(point, self.equilibria.along(point, there, [at])), line, sign)
 
     def held_at(self, index: int, lost: FoldPoint) -> FoldPoint | None:
         """Return the same fold with sliding gaps stuck; None if sticking preserves the equilibrium."""
         point = self.equilibria.with_slip(lost.point, 0.0)
         if self._tangents[index](point.inputs())[0] > FOLD_STIFFNESS:
             return None
-        falls, way, _ = self._shape(index, point)
-        return FoldPoint(point, way, float(np.sign(falls @ way.pulls)))
+        falls, line, _ = self._shape(index, point)
+        return FoldPoint(point, line, float(np.sign(falls @ line.weights)))
 
     def reached(self, point: Point, rtol: float) -> int:
         """Return the fold so close to a point that the run's tolerance cannot tell them apart; -1 if there is none."""
@@ -507,8 +507,8 @@ class Folds:
         lost = self.at(index, point)
         if lost is None:
             return point
-        beside = point.ydot - point.ydot[lost.way.column] * self._shape(index, point)[2]
+        beside = point.ydot - point.ydot[lost.direction.column] * self._shape(index, point)[2]
         values = self._approach(replace(lost.point, ydot=beside).inputs())
-        push, change = (lost.direction * float(lost.way.pulls @ part) for part in (values[::2], values[1::2]))
+        push, change = (lost.sign * float(lost.direction.weights @ part) for part in (values[::2], values[1::2]))
         left = -push / change if push < 0 < change else 0.0
         return replace(point, t=point.t + left) if left < min(IDLE * point.t, end - point.t) else point

@@ -111,13 +111,13 @@ class Arc:
     status: Status
     times: Array
     """Output times reached [s]."""
-    booked: Array
+    ledger_start: Array
     """Ledger at its start."""
 
     @property
     def is_whole(self) -> bool:
         """True if it begins at time zero and no jump comes before it."""
-        return not (self.start.t or self.booked.any())
+        return not (self.start.t or self.ledger_start.any())
 
 
 class Hybrid:
@@ -130,7 +130,7 @@ class Hybrid:
         self.exchanged = np.zeros(problem.program.n_ledger)
         self.extremes = np.array([problem.y0, problem.y0])
         self.deadline = None if problem.max_seconds is None else time.monotonic() + problem.max_seconds
-        self._steps = self._written = 0
+        self._steps = self._outputs_written = 0
         """Steps taken and outputs written."""
         self._gaps = np.array([state.name in GAPS for state in system.states])
         """Mask of the states that are gaps."""
@@ -150,7 +150,7 @@ class Hybrid:
             while point is not None and point.t < end:
                 point = instant.resolve(point)
                 arc = (yield from self._flow(point, float(end))) if point is not None else None
-                point = self._after(arc, float(end)) if arc is not None else None
+                point = self._next_start(arc, float(end)) if arc is not None else None
             if point is None:
                 break
             last, y, modes = point, point.y, point.parameters[columns]
@@ -160,10 +160,10 @@ class Hybrid:
         # A jump may lie beyond the last arc, at the time of a fold.
         t = max(reached, instant.jumps[-1].t) if instant.reason and instant.jumps else reached
         if not self.arcs:
-            return ended_at_start(problem, instant.status, t, instant.booked)
-        return merged(problem, self.arcs, instant.status, t, instant.booked)
+            return ended_at_start(problem, instant.status, t, instant.ledger)
+        return merged(problem, self.arcs, instant.status, t, instant.ledger)
 
-    def _after(self, arc: Arc, end: float) -> Point | None:
+    def _next_start(self, arc: Arc, end: float) -> Point | None:
         """Return the point from which a run goes on after an arc; None if the run ends with it."""
         point = Point(arc.end, arc.result.y, arc.result.ydot, arc.start.parameters)
         if arc.status is Status.FINISHED:
@@ -179,19 +179,19 @@ class Hybrid:
             index = self.jumper.folds.reached(point, self.problem.rtol)
         if index >= 0:
             reached = self.jumper.folds.in_time(index, point, end)
-            self._show_until(reached, end)
+            self._complete_outputs(reached, end)
             return self.instant.apply(index, reached, point)
         beyond = self._beyond(arc, point) if lost and not self._is_limited(arc) else None
         if beyond is None:
             self.instant.status = arc.status
         return beyond
 
-    def _show_until(self, reached: Point, end: float) -> None:
+    def _complete_outputs(self, reached: Point, end: float) -> None:
         """Give outputs between the end of the integration and a fold the state of the fold.
 
         If ``end`` cannot be told from the event in time, its output is included, since no arc may follow.
         """
-        times = self.problem.times[self._written :]
+        times = self.problem.times[self._outputs_written :]
         times = times[times <= reached.t] if reached.t >= end else times[times < reached.t]
         if len(times):
             arc, count = self.arcs[-1], (len(times), 1)
@@ -200,7 +200,7 @@ class Hybrid:
             shown = np.append(arc.result.times, times - arc.start.t)
             result = replace(arc.result, times=shown, outputs=outputs, ledger_outputs=ledger)
             self.arcs[-1] = replace(arc, result=result, times=np.append(arc.times, times))
-            self._written += len(times)
+            self._outputs_written += len(times)
 
     def _beyond(self, arc: Arc, point: Point) -> Point | None:
         """Return the point from which a run may go on after a solver has failed; None if there is none."""
@@ -219,9 +219,9 @@ class Hybrid:
             return False
         limits = np.array([m.terminal and not m.strict for m in self.problem.margins[:count]], dtype=bool)
         zero = np.abs(arc.result.margins[:count]) <= FORMULA_EPS * np.abs(guards(arc.start.inputs())[:count])
-        return bool(np.any(limits & zero & self.instant.in_play(arc.start)[:count]))
+        return bool(np.any(limits & zero & self.instant.active_guards(arc.start)[:count]))
 
-    def _last_of(self, start: float, end: float) -> float:
+    def _arc_end(self, start: float, end: float) -> float:
         """Return the end of an arc: just before a breakpoint without a change of loads.
 
         Formulas at the breakpoint are those of the next segment.
@@ -239,11 +239,11 @@ class Hybrid:
         if self._steps >= problem.max_steps or (seconds is not None and seconds <= 0):
             instant.status = Status.MAX_STEPS if self._steps >= problem.max_steps else Status.STOPPED
             return None
-        times = problem.times[self._written : int(np.searchsorted(problem.times, end, side="right"))]
+        times = problem.times[self._outputs_written : int(np.searchsorted(problem.times, end, side="right"))]
         local = start.parameters.copy()
         local[self._start] = start.t
         local[self.system.origins] -= start.t
-        segments = instant.rebounds.pieces(start.t, self._last_of(start.t, end))
+        segments = instant.rebounds.segments(start.t, self._arc_end(start.t, end))
         problem = replace(
             problem,
             y0=start.y,
@@ -253,29 +253,29 @@ class Hybrid:
             max_steps=problem.max_steps - self._steps,
             max_seconds=seconds,
             exchanged=self.exchanged,
-            goes_on=end < problem.segments[-1],
-            seen=instant.rebounds.seen(start.t, instant.sizes(start)),
-            in_play=self.system.in_play(local),
+            continued=end < problem.segments[-1],
+            margin_peaks=instant.rebounds.margin_peaks(start.t, instant.sizes(start)),
+            active=self.system.active_guards(local),
             extremes=self.extremes,
-            before=start.t,
+            elapsed=start.t,
         )
-        result = yield from without_stall(problem, self.system.sliding)
+        result = yield from without_stall(problem, self.system.slip_velocities)
         reached, status = min(start.t + result.t, end), result.status
         if status is Status.FINISHED or (status in LOST_STATUSES and end - reached <= SAME_MOMENT * end):
             # Where a gap closes at the very end, the remaining time is roundoff.
             reached, status = end, Status.FINISHED
-        arc = Arc(result, start, reached, status, times[: len(result.times)], instant.booked)
+        arc = Arc(result, start, reached, status, times[: len(result.times)], instant.ledger)
         self.arcs.append(arc)
-        instant.booked = instant.booked + result.ledger
-        instant.flowed = (start.t, result.t, reached)
-        self.exchanged = np.maximum(self.exchanged, np.abs(instant.booked))
+        instant.ledger = instant.ledger + result.ledger
+        instant.last_flow = (start.t, result.t, reached)
+        self.exchanged = np.maximum(self.exchanged, np.abs(instant.ledger))
         self._steps += result.counters.steps
-        self._written += len(result.times)
+        self._outputs_written += len(result.times)
         seen = np.vstack((start.y, result.y, *(() if result.steps is None else (result.steps.y,))))
         least, largest = self.extremes
         self.extremes = np.array([np.minimum(least, seen.min(axis=0)), np.maximum(largest, seen.max(axis=0))])
-        instant.see(seen)
-        if instant.rebounds.missed(result):
+        instant.update_peaks(seen)
+        if instant.rebounds.passed_guard(result):
             instant.status, instant.reason = Status.FAILED, MISSED_CLOSING
             return None
         return arc
@@ -294,7 +294,7 @@ def carried(problem: Problem, jumper: Jumper) -> Flow[tuple[Result, list[Jump], 
     start, end = problem.segments[[0, -1]].tolist()
     jumps = jumper.carried_out(*result.course, start, end)
     result = with_arc_segments(problem, result)
-    if result.status is Status.MAX_STEPS and sum(jump.edge.returns is not None for jump in jumps) > MANY_REBOUNDS:
+    if result.status is Status.MAX_STEPS and sum(jump.edge.return_time is not None for jump in jumps) > MANY_REBOUNDS:
         return replace(result, status=Status.FAILED), jumps, ENDLESS
     return result, jumps, ""
 
@@ -369,7 +369,7 @@ def merged(problem: Problem, arcs: Sequence[Arc], status: Status, end: float, le
         margins=last.margins,
         times=np.concatenate([arc.times for arc in arcs]),
         outputs=np.concatenate([result.outputs for result in results]),
-        ledger_outputs=np.concatenate([arc.booked + arc.result.ledger_outputs for arc in arcs]),
+        ledger_outputs=np.concatenate([arc.ledger_start + arc.result.ledger_outputs for arc in arcs]),
         events=Events(*events, index=np.concatenate([result.events.index for result in results])),
         counters=Counters(*map(sum, zip(*(result.counters for result in results), strict=True))),
         steps=_steps(arcs),
@@ -381,7 +381,7 @@ def merged(problem: Problem, arcs: Sequence[Arc], status: Status, end: float, le
 
 def _known(arcs: Sequence[Arc]) -> States | None:
     """Return all stored states of the arcs, in the run's time and ledger; None if interpolation needs none."""
-    if not arcs[0].result.problem.picture:
+    if not arcs[0].result.problem.line_error:
         return None
     found = [arc.result.scattered()[:3] for arc in arcs]
     # Outputs come first, at exactly the requested times.
@@ -390,10 +390,10 @@ def _known(arcs: Sequence[Arc]) -> States | None:
     )
     y, ledger = (np.concatenate([rows[k] for rows in found]) for k in (1, 2))
     number = np.repeat(np.arange(len(arcs)), [len(rows[0]) for rows in found])
-    end, booked = np.array([arc.end for arc in arcs]), np.array([arc.booked for arc in arcs])
+    end, ledger_start = np.array([arc.end for arc in arcs]), np.array([arc.ledger_start for arc in arcs])
     kept = in_order(t, number)
     number = number[kept]
-    return States(np.minimum(t[kept], end[number]), y[kept], booked[number] + ledger[kept], number)
+    return States(np.minimum(t[kept], end[number]), y[kept], ledger_start[number] + ledger[kept], number)
 
 
 def _steps(arcs: Sequence[Arc]) -> Points | None:
@@ -410,7 +410,7 @@ def _steps(arcs: Sequence[Arc]) -> Points | None:
 def _rows(found: Sequence[tuple[Arc, Points, slice | NDArray[np.bool_]]]) -> tuple[Array, Array, Array, Array]:
     """Return times, states, rates and ledgers of the kept points of each arc, in the time and ledger of the run."""
     rows = [
-        (arc.start.t + points.t[keep], points.y[keep], points.ydot[keep], arc.booked + points.ledger[keep])
+        (arc.start.t + points.t[keep], points.y[keep], points.ydot[keep], arc.ledger_start + points.ledger[keep])
         for arc, points, keep in found
     ]
     t, y, ydot, ledger = map(np.concatenate, zip(*rows, strict=True))

@@ -23,7 +23,7 @@ from surfacechem.tolerances import BRIEF_PART, GUARD_EPS, IDLE, MICROMETRE, NEWT
 SAME_MOMENT = NEWTON_EPS
 """Relative difference of times that count as one moment: the step onto an event solves for its time."""
 
-NO_PUSH = "nothing pushes it off where it rests; with a mass or a damper any disturbance would"
+UNDRIVEN = "nothing pushes it off where it rests; with a mass or a damper any disturbance would"
 
 MANY_REBOUNDS = 1000
 """Number of rebounds above which they explain that a run has used up its steps."""
@@ -44,24 +44,24 @@ class Rebounds:
 
     def __init__(self, jumper: Jumper, first: int) -> None:
         self.jumper = jumper
-        self.margins = [first + j for j, item in enumerate(jumper.system.edges) if item.returns is not None]
+        self.margins = [first + j for j, item in enumerate(jumper.system.edges) if item.return_time is not None]
         self.count = 0
         self.last = (0.0, 0.0)
         """Time of the last rebound, and its time of flight [s]; zero if unknown."""
 
-    def see(self, jump: Jump) -> None:
+    def record(self, jump: Jump) -> None:
         """Record a jump if it is a rebound."""
-        if jump.edge.returns is not None:
+        if jump.edge.return_time is not None:
             self.count += 1
             self.last = jump.t, float(np.max(self.jumper.times_of_return(jump.after.inputs())))
 
-    def pieces(self, start: float, end: float) -> Array:
+    def segments(self, start: float, end: float) -> Array:
         """Return the segments of an arc in its own time, with a separate one for a return that a step might miss."""
         soon = RETURN_FACTOR * self._flight_time(start)
         inside = [soon] if 0 < soon < FITTED_PART * (end - start) else []
         return np.array([0.0, *inside, end - start])
 
-    def seen(self, start: float, sizes: Array) -> Array:
+    def margin_peaks(self, start: float, sizes: Array) -> Array:
         """Return the sizes of the margins to which their roundoff is proportional."""
         if not self.margins:
             return sizes
@@ -69,11 +69,11 @@ class Rebounds:
         own[self.margins] = 0.0 if self._flight_time(start) else np.maximum(sizes[self.margins], MICROMETRE)
         return own
 
-    def missed(self, result: Result) -> bool:
+    def passed_guard(self, result: Result) -> bool:
         """True if an arc has ended beyond a guard it should have stopped at, by more than a picometre."""
         ended = result.events.index if result.status is Status.EVENT else ()
-        playing = result.problem.in_play
-        found = [j for j in self.margins if playing is None or playing[j]] if len(result.margins) else []
+        active = result.problem.active
+        found = [j for j in self.margins if active is None or active[j]] if len(result.margins) else []
         return any(result.margins[j] < -PICOMETRE and j not in ended for j in found)
 
     def _flight_time(self, start: float) -> float:
@@ -100,25 +100,25 @@ class Instant:
         """Largest states so far; their roundoff remains when the states become small. A velocity sums the impulses of
         forces and is roundoff where small against its scale; a gap may be exactly zero, at touch.
         """
-        self.booked = np.zeros(problem.program.n_ledger)
+        self.ledger = np.zeros(problem.program.n_ledger)
         """Ledger now."""
         self.rebounds = Rebounds(jumper, first)
         slip = {p.symbol for p in system.parameters if p.path == SLIP_PATH}
         ends = [any(edge.when.get(mode) == (0,) for mode in slip) for edge in system.edges]
-        self._sticking = first + np.flatnonzero(ends)
+        self._slip_guards = first + np.flatnonzero(ends)
         """Indices of the guards that end sticking."""
         self.jumps: list[Jump] = []
         self.limits: list[int] = []
         """Limits that were reached together with the last edge."""
         self.step: LoadStep | None = None
         """Last jump of the loads."""
-        self.flowed = (np.nan, 0.0, np.nan)
+        self.last_flow = (np.nan, 0.0, np.nan)
         """Start, length and end of the last flow [s]; the length is more accurate than the difference of the others."""
-        self._sized: tuple[Point | None, Array, Array] = None, self.peaks, self.peaks
+        self._cached_sizes: tuple[Point | None, Array, Array] = None, self.peaks, self.peaks
         """A point, the peaks used there, and the sizes of the guards."""
-        self._resolved = 0
+        self._jumps_resolved = 0
         """Number of edges before the last chatter that was resolved."""
-        self._sharpened = -np.inf
+        self._peaks_reset = -np.inf
         """Time [s] at which the peaks of the states were last reset."""
         self.status = Status.FINISHED
         self.reason = ""
@@ -126,11 +126,11 @@ class Instant:
 
     # -- sizes of the guards --------------------------------------------------------------------------------------
 
-    def in_play(self, point: Point) -> Mask:
+    def active_guards(self, point: Point) -> Mask:
         """Return a mask of the guards that are active in the modes of a point."""
-        return np.array(self.system.in_play(point.parameters), dtype=bool)
+        return np.array(self.system.active_guards(point.parameters), dtype=bool)
 
-    def see(self, y: Array) -> None:
+    def update_peaks(self, y: Array) -> None:
         """Update the largest states, from states of shape (..., states)."""
         self.peaks = np.fmax(self.peaks, np.fmax.reduce(np.abs(y.reshape(-1, len(self.peaks))), axis=0, initial=0.0))
 
@@ -141,11 +141,11 @@ class Instant:
         """
         if self.program.margins is None:
             return np.zeros(0)
-        if self._sized[0] is point and self._sized[1] is self.peaks:
-            return self._sized[2]
+        if self._cached_sizes[0] is point and self._cached_sizes[1] is self.peaks:
+            return self._cached_sizes[2]
         found = self.jumper.magnitudes(np.concatenate((point.inputs(), np.maximum(self.peaks, np.abs(point.y)))))
-        self._sized = point, self.peaks, np.where(np.isfinite(found), found, 0.0)
-        return self._sized[2]
+        self._cached_sizes = point, self.peaks, np.where(np.isfinite(found), found, 0.0)
+        return self._cached_sizes[2]
 
     def consistent(self, point: Point) -> Point:
         """Return the point with consistent rates and algebraic variables."""
@@ -171,11 +171,11 @@ class Instant:
             return point
         while self._may_go_on(point):
             seen = self.consistent(point) if self.jumper.guards_read_rates else point
-            now, playing, sizes = guards(seen.inputs()), self.in_play(point), self.sizes(point)
-            due = self._due(now[self.first :], playing[self.first :], sizes[self.first :], point)
-            closed = self._closed(now, playing, sizes, due is not None) if self.jumps else []
+            now, active, sizes = guards(seen.inputs()), self.active_guards(point), self.sizes(point)
+            due = self._due(now[self.first :], active[self.first :], sizes[self.first :], point)
+            closed = self._closed(now, active, sizes, due is not None) if self.jumps else []
             if closed:
-                margin = self.system.moving_margins[closed[0]]
+                margin = self.system.event_margins[closed[0]]
                 self.status, self.reason = Status.EVENT, self.system.reason(margin, self.jumps[-1].after.inputs())
                 return None
             if due is None:
@@ -193,7 +193,7 @@ class Instant:
         # A fold that fires repeatedly without moving the gap counts once, and ends the run.
         while self.jumps[-2:-1] and self.jumps[-2].edge is last.edge and self.jumps[-2].t == last.t:
             self.jumps.pop()
-        self.status, self.reason = Status.EVENT, f"{last.edge.reason}, but {NO_PUSH}"
+        self.status, self.reason = Status.EVENT, f"{last.edge.reason}, but {UNDRIVEN}"
         return None
 
     def _may_go_on(self, point: Point) -> bool:
@@ -202,23 +202,23 @@ class Instant:
         Chatter may be apparent, where a motion is the roundoff of earlier, larger states: their peaks are reset first.
         Rebounds that follow each other faster than time can resolve have come to rest.
         """
-        t, recent = point.t, len(self.jumps) - self._resolved
+        t, recent = point.t, len(self.jumps) - self._jumps_resolved
         if recent < CHATTER or self.jumps[-CHATTER].t < t - SAME_MOMENT * max(t, BRIEF_PART * self.end):
             return True
-        if t > self._sharpened + IDLE * self.end:
-            self._sharpened, self._resolved, self.peaks = t, len(self.jumps), self.scales.copy()
+        if t > self._peaks_reset + IDLE * self.end:
+            self._peaks_reset, self._jumps_resolved, self.peaks = t, len(self.jumps), self.scales.copy()
             return True
-        rests = next((j for j, p in enumerate(self.system.parameters) if p.path == REST_TIME_PATH), None)
-        if rests is None or self.jumps[-1].edge.returns is None or point.parameters[rests] == t:
+        column = next((j for j, p in enumerate(self.system.parameters) if p.path == REST_TIME_PATH), None)
+        if column is None or self.jumps[-1].edge.return_time is None or point.parameters[column] == t:
             return False
-        point.parameters[rests], self._resolved = t, len(self.jumps)
+        point.parameters[column], self._jumps_resolved = t, len(self.jumps)
         return True
 
-    def _due(self, now: Array, playing: Mask, sizes: Array, point: Point) -> int | None:
+    def _due(self, now: Array, active: Mask, sizes: Array, point: Point) -> int | None:
         """Return the edge whose guard is below zero by more than the integration's drift, or is zero and closing."""
         small = GUARD_EPS * sizes
-        closed = playing & ((self.rests & (now <= small)) | (now < -np.maximum(drift_of(self.rtol) * sizes, small)))
-        near = playing & ~closed & (now <= small) & ~self.strict[self.first :]
+        closed = active & ((self.rests & (now <= small)) | (now < -np.maximum(drift_of(self.rtol) * sizes, small)))
+        near = active & ~closed & (now <= small) & ~self.strict[self.first :]
         if near.any():
             near &= self.jumper.guard_rates(self.consistent(point).inputs()) < 0
             # Roundoff must not undo an edge: no edge leads back to modes that were left at this moment.
@@ -227,41 +227,41 @@ class Instant:
                 closed[j] = not any(np.array_equal(self.jumper.modes_after(j, point), modes) for modes in left)
         return int(closed.argmax()) if closed.any() else None
 
-    def _closed(self, now: Array, playing: Mask, sizes: Array, due: bool) -> list[int]:
+    def _closed(self, now: Array, active: Mask, sizes: Array, due: bool) -> list[int]:
         """Return the limits beyond which a jump has carried the state, except those of modes left at this moment."""
         # Beyond the domain of a law, even by roundoff, its values have no meaning.
-        margins = self.system.moving_margins[: self.first]
+        margins = self.system.event_margins[: self.first]
         least = [0.0 if m.domain else -GUARD_EPS * size for m, size in zip(margins, sizes, strict=False)]
-        closed = [i for i in range(self.first) if self.terminal[i] and playing[i] and now[i] < least[i]]
-        closed += [i for i in self.limits if playing[i] and now[i] <= GUARD_EPS * sizes[i]]
+        closed = [i for i in range(self.first) if self.terminal[i] and active[i] and now[i] < least[i]]
+        closed += [i for i in self.limits if active[i] and now[i] <= GUARD_EPS * sizes[i]]
         if not (due and closed):
             return closed
-        return [i for i in closed if i not in self._found_anew]
+        return [i for i in closed if i not in self._algebraic_limits]
 
     @cached_property
-    def _found_anew(self) -> set[int]:
+    def _algebraic_limits(self) -> set[int]:
         """Limits that read algebraic states, which are found anew as modes change."""
         found = {state.symbol for state in self.system.states if state.algebraic}
-        read = [self.system.expand(m.expression).free_symbols for m in self.system.moving_margins[: self.first]]
+        read = [self.system.expand(m.expression).free_symbols for m in self.system.event_margins[: self.first]]
         return {i for i, symbols in enumerate(read) if symbols & found}
 
-    def _borne(self, index: int, point: Point) -> float:
+    def _friction_noise(self, index: int, point: Point) -> float:
         """Return the roundoff of the margin of sticking [Pa], the larger of both sides of an edge."""
-        if not (len(self._sticking) and self.system.edges[index].equilibrates):
+        if not (len(self._slip_guards) and self.system.edges[index].equilibrates):
             return 0.0
         parameters = point.parameters.copy()
         parameters[self.jumper.mode_columns] = self.jumper.modes_after(index, point)
-        both = [self.sizes(at)[self._sticking] for at in (replace(point, parameters=parameters), point)]
+        both = [self.sizes(at)[self._slip_guards] for at in (replace(point, parameters=parameters), point)]
         return GUARD_EPS * float(np.max(both))
 
     def apply(self, index: int, point: Point, last: Point | None = None) -> Point | None:
         """Carry out an edge and add it to the ledger; None if the run ends with it."""
-        largest, drift = float(self.sizes(point)[self.first + index]), drift_of(self.rtol)
+        size, drift = float(self.sizes(point)[self.first + index]), drift_of(self.rtol)
         balanced = BALANCED if self.system.edges[index].times else drift
-        slack = EdgeUncertainty(GUARD_EPS * largest, drift * largest, balanced, self._borne(index, point), self.rtol)
+        slack = EdgeUncertainty(GUARD_EPS * size, drift * size, balanced, self._friction_noise(index, point), self.rtol)
         step = self.step if self.step is not None and self.step.before.t == point.t else None
         before = self.jumps[-1].t if self.jumps else self.start
-        begun, length, reached = self.flowed
+        begun, length, reached = self.last_flow
         since = length + (point.t - reached) if begun == before else point.t - before
         jump = self.jumper.make(index, point, since, slack, last, step)
         self.jumps.append(jump)
@@ -269,6 +269,6 @@ class Instant:
             word = f"is impossible: {jump.obstacle}" if jump.obstacle else jump.verdict
             self.status, self.reason = Status.EVENT, f"{jump.edge.reason}, which {word}"
             return None
-        self.rebounds.see(jump)
-        self.booked = self.booked + self.jumper.booked(jump)
+        self.rebounds.record(jump)
+        self.ledger = self.ledger + self.jumper.ledger_change(jump)
         return jump.after

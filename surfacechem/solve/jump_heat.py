@@ -66,7 +66,7 @@ class JumpHeat:
         return [1 + self.states.index(sink.node) for sink in self.nodes.values() if not sink.prescribed]
 
     @cached_property
-    def asked(self) -> Function:
+    def node_values(self) -> Function:
         """Temperature, energy and capacity of each node, and its share of the heat from each source."""
         shares = [{s.node: s.share for s in sinks} for sinks in self.system.sinks.values()]
         columns = [
@@ -78,28 +78,28 @@ class JumpHeat:
 
     def at(self, rows: Array) -> tuple[Array, Array, Array, Array]:
         """Return temperature, energy and capacity of each node, shape (rows, nodes), and its shares by source."""
-        values = self.asked(rows).reshape(len(rows), len(self.nodes), -1)
+        values = self.node_values(rows).reshape(len(rows), len(self.nodes), -1)
         return values[:, :, 0], values[:, :, 1], values[:, :, 2], values[:, :, 3:]
 
     @cached_property
-    def passed(self) -> Mask:
+    def reservoirs(self) -> Mask:
         """Mask of the nodes that pass on the heat that they take."""
         return np.array([node.prescribed for node in self.nodes.values()], dtype=bool)
 
-    def given(self, rows: Array, made: Array, shares: Array | None) -> tuple[Array, Array, Array]:
+    def distributed(self, rows: Array, by_source: Array, shares: Array | None) -> tuple[Array, Array, Array]:
         """Return inputs after the nodes have taken the heat, the heat that each takes, and its temperature before.
 
-        The last two have shape (rows, nodes). ``made`` has a column for each source, friction last: its heat is
+        The last two have shape (rows, nodes). ``by_source`` has a column for each source, friction last: its heat is
         distributed by the ``shares`` along the path if these are known, else as the interface shares it at the end.
         """
         T, U, C, parts = self.at(rows)
         rubbed = parts[:, :, self.interface] if shares is None else shares
-        taken = np.einsum("ijk,ik->ij", parts, made[:, :-1]) + rubbed * made[:, -1:]
+        taken = np.einsum("ijk,ik->ij", parts, by_source[:, :-1]) + rubbed * by_source[:, -1:]
         return self._with_energy(rows, U + taken, U, C), taken, T
 
-    def warmed(self, rows: Array, made: Array, shares: Array | None) -> Array:
+    def warmed(self, rows: Array, by_source: Array, shares: Array | None) -> Array:
         """Return inputs with the temperatures of the nodes after they have taken the heat."""
-        return self.given(rows, made, shares)[0]
+        return self.distributed(rows, by_source, shares)[0]
 
     def with_heat(self, rows: Array, taken: Array) -> Array:
         """Return inputs with the temperatures of the nodes after each has taken its heat, shape (rows, nodes)."""
@@ -112,16 +112,16 @@ class JumpHeat:
         rows, left = rows.copy(), np.arange(len(rows))
         # Each row stops when it has converged, so that its result does not depend on the others.
         for _ in range(HEAT_STEPS if free else 0):
-            moves = np.zeros(len(left), dtype=bool)
+            changes = np.zeros(len(left), dtype=bool)
             for j, column in free:
                 T = rows[left, column]
                 with np.errstate(over="ignore", invalid="ignore"):  # trial values far away may not be finite
                     change = (target[left, j] - U[:, j]) / C[:, j]
                 moved = T + change
-                moves |= np.abs(change) > ULPS * np.abs(T)
+                changes |= np.abs(change) > ULPS * np.abs(T)
                 # A body without a minimum of energy above T = 0 lets Newton's method run out below it.
                 rows[left, column] = np.where(moved > 0, moved, np.nan)
-            left = left[moves]
+            left = left[changes]
             if not len(left):
                 break
             _, U, C, _ = self.at(rows[left])
@@ -175,26 +175,26 @@ def _panel(degree: int) -> tuple[Array, Array]:
     return points, integrals
 
 
-def shared_heat(moments: Moments, takers: int, small: float, *, feeds_back: bool) -> Array:
-    """Return the heat that each node has taken along a path from 0 to 1, shape (takers,).
+def shared_heat(moments: Moments, n_nodes: int, small: float, *, feeds_back: bool) -> Array:
+    """Return the heat that each node has taken along a path from 0 to 1, shape (n_nodes,).
 
     Panels are halved until the integrals of their polynomials and those of half the degree agree within the heat
     ``small``. Shares that add up to one conserve the heat on any panels.
     """
     (points, integrals), (_, coarse) = _panel(PANEL_DEGREE), _panel(PANEL_DEGREE // 2)
-    taken, begin, width, panels = np.zeros(takers), 0.0, 1.0, 0
+    taken, begin, width, panels = np.zeros(n_nodes), 0.0, 1.0, 0
     while begin < 1.0:
         panels += 1
         up_to = np.repeat(taken[None], len(points), axis=0)
         for _ in range(PICARD_ROUNDS if feeds_back else 1):
-            made, shares = moments(begin + width * points, up_to)
-            last, up_to = up_to, taken + np.einsum("ifg,fk,g->ik", integrals, shares, made)
+            heat, shares = moments(begin + width * points, up_to)
+            last, up_to = up_to, taken + np.einsum("ifg,fk,g->ik", integrals, shares, heat)
             agrees = not feeds_back or np.max(np.abs(up_to - last)) <= PICARD_PART * small
             if agrees:
                 break
         if not np.all(np.isfinite(up_to)):
-            return np.full(takers, np.nan)
-        half = np.einsum("fg,fk,g->k", coarse[-1], shares[::2], made[::2])
+            return np.full(n_nodes, np.nan)
+        half = np.einsum("fg,fk,g->k", coarse[-1], shares[::2], heat[::2])
         close = agrees and np.max(np.abs(up_to[-1] - taken - half)) <= small
         if close or width <= NARROWEST or panels > QUADRATURE_PANELS:
             taken, begin = up_to[-1], begin + width
@@ -238,8 +238,8 @@ class LoadPath:
     def warms_itself(self) -> bool:
         """True if friction or the shares of its heat depend on the temperatures that this heat raises."""
         hot = {symengine.Symbol(name) for name in self.heat.nodes}
-        felt = [e.residual for e in self.equilibria.items] + [s.share for s in self.system.sinks[INTERFACE]]
-        return any(self.system.expand(x).free_symbols & hot for x in felt)
+        expressions = [e.residual for e in self.equilibria.items] + [s.share for s in self.system.sinks[INTERFACE]]
+        return any(self.system.expand(x).free_symbols & hot for x in expressions)
 
     @cached_property
     def _guards(self) -> Function:
@@ -266,7 +266,7 @@ class LoadPath:
         everything else in equilibrium at that part.
         """
         change = step.levels(self.system, after)
-        j, way, length = self._way(start, after)
+        j, line, length = self._slip_direction(start, after)
         slip = 0.0 if self.equilibria.slip is None else float(after.parameters[self.equilibria.slip])
         span = np.abs(after.y - step.before.y)
         columns, onward = np.array(self.moved) - 1, float(np.sign(length))
@@ -274,7 +274,7 @@ class LoadPath:
         def moment(place: float, floor: float, taken: Array) -> tuple[float, float, Array]:
             """Return the part of the load path at a place, at least that before it, and energy and shares there."""
             y = start.y.copy()
-            y[columns] += place * length * way.moves[columns]
+            y[columns] += place * length * line.changes[columns]
             there = replace(start, y=y, parameters=after.parameters)
 
             hot = self.heat.with_heat(start.inputs()[None], taken[None])[0, self.heat.free]
@@ -291,7 +291,7 @@ class LoadPath:
                 return warm(self.equilibria.with_slip(held, slip).inputs()[None])
 
             def resists(part: float) -> float:
-                return -onward * float(self.equilibria.pushes(at(part))[0, j])
+                return -onward * float(self.equilibria.driving(at(part))[0, j])
 
             part = _first(resists, floor)
             row, here = at(part), after.inputs()
@@ -321,11 +321,11 @@ class LoadPath:
         stuck = self.equilibria.with_slip(point, 0.0)
         return self.equilibria.equilibrate_near(stuck, warm, span) or stuck
 
-    def _way(self, start: Point, after: Point) -> tuple[int, GapDirection, float]:
+    def _slip_direction(self, start: Point, after: Point) -> tuple[int, GapDirection, float]:
         """Return the index of the sliding gap, its direction when it slides by itself, and the distance along that."""
-        ways = self.equilibria.ways(self.equilibria.with_slip(after, 0.0))
-        j = next(j for j, e in enumerate(self.equilibria.items) if e.slides)
-        along = [ways[j], *(way for way in ways if way is not ways[j] and 1 + way.column in self.moved)]
+        lines = self.equilibria.directions(self.equilibria.with_slip(after, 0.0))
+        j = next(j for j, e in enumerate(self.equilibria.items) if e.slip)
+        along = [lines[j], *(line for line in lines if line is not lines[j] and 1 + line.column in self.moved)]
         columns = np.array(self.moved) - 1
-        moves = np.array([way.moves[columns] for way in along]).T
-        return j, ways[j], float(np.linalg.lstsq(moves, (after.y - start.y)[columns], rcond=None)[0][0])
+        changes = np.array([line.changes[columns] for line in along]).T
+        return j, lines[j], float(np.linalg.lstsq(changes, (after.y - start.y)[columns], rcond=None)[0][0])

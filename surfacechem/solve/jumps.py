@@ -59,7 +59,7 @@ class EdgeUncertainty:
     """Drift of its guard that the integration may have caused."""
     balanced: float = BALANCED
     """Residual of the tractions that the integration may leave, relative to their terms."""
-    borne: float = 0.0
+    friction_noise: float = 0.0
     """Roundoff of the margin between friction limit and traction [Pa]."""
     rtol: float = 0.0
     """Relative tolerance of the run, for what is found along the path of a jump."""
@@ -133,7 +133,7 @@ class Jumper:
         self._jumps = False
         """True if jumps are expected, so that the functions only they need are worth compiling."""
         self._tables: EdgeTables | None = None
-        memory = {item.symbol for item in system.memory}
+        memory = {item.symbol for item in system.discrete}
         kept = [p.symbol in memory or p.path == REST_TIME_PATH for p in system.parameters]
         self.mode_columns = [j for j, keep in enumerate(kept) if keep]
 
@@ -146,14 +146,14 @@ class Jumper:
         peaks = {state.symbol: symengine.Symbol(f"peak of {state.name}") for state in system.states}
         # A rate is known to the roundoff of its state, divided by the time that has passed.
         peaks |= {state.dot: peaks[state.symbol] / system.t for state in system.states}
-        guards = [m.expression for m in system.moving_margins] + [edge.guard for edge in system.edges]
+        guards = [m.expression for m in system.event_margins] + [edge.guard for edge in system.edges]
         bounds = [magnitude(system.expand(guard), peaks) for guard in guards]
         return compile_function([*system.inputs, *(peaks[state.symbol] for state in system.states)], bounds)
 
     @cached_property
     def times_of_return(self) -> Function:
         """Times of flight [s] of rebounds."""
-        return compiled(self.system, (edge.returns for edge in self.system.edges if edge.returns is not None))
+        return compiled(self.system, (edge.return_time for edge in self.system.edges if edge.return_time is not None))
 
     @cached_property
     def _resets(self) -> list[Function]:
@@ -182,17 +182,17 @@ class Jumper:
         return compiled(self.system, rates)
 
     @cached_property
-    def _totals(self) -> Function:
+    def _total_functions(self) -> Function:
         """Energy that a jump conserves, total entropy, and potentials of the far-field tractions; then the magnitudes
         of the first two. A call costs more than the evaluation, so all are in one function.
         """
         system = self.system
         totals = [system.jump_energy, system.find("S_total").expression]
-        return compiled(system, [*totals, *system.given.values(), *(magnitude(system.expand(x)) for x in totals)])
+        return compiled(system, [*totals, *system.far_work.values(), *(magnitude(system.expand(x)) for x in totals)])
 
-    def _books(self, rows: Array) -> Array:
+    def _totals(self, rows: Array) -> Array:
         """Return the totals at arguments of compiled functions; infinite magnitudes, as at a bound, count as zero."""
-        found = self._totals(rows)
+        found = self._total_functions(rows)
         found[..., -2:] = np.where(np.isfinite(found[..., -2:]), found[..., -2:], 0.0)
         return found
 
@@ -202,13 +202,13 @@ class Jumper:
         return compiled(self.system, [self.system.jump_energy])
 
     @cached_property
-    def _pulls(self) -> Function:
+    def _far_fields(self) -> Function:
         """Stiffness, displacement and traction of the far field, and the gap, for each direction."""
-        return compiled(self.system, (item for pull in self.system.pulls.values() for item in pull))
+        return compiled(self.system, (item for pull in self.system.far_fields.values() for item in pull))
 
     def _far_field(self, point: Point) -> Array:
         """Return stiffness, displacement, traction and gap, each by direction, shape (4, directions)."""
-        return np.asarray(self._pulls(point.inputs()).reshape(-1, 4).T)
+        return np.asarray(self._far_fields(point.inputs()).reshape(-1, 4).T)
 
     @cached_property
     def _ends(self) -> list[tuple[str, Function]]:
@@ -231,9 +231,9 @@ class Jumper:
         """Axes along which gaps move in a jump, the normal first, and the columns of their states."""
         moved: dict[str, set[str]] = {}
         for e in sorted(self.system.equilibria, key=lambda e: e.axis):
-            moved.setdefault(e.axis, set()).update((e.state, *e.along))
+            moved.setdefault(e.axis, set()).update((e.state, *e.coupled))
         if "n" in moved:
-            moved["n"].update(self.system.follows)
+            moved["n"].update(self.system.followers)
         return [(axis, [1 + self.states.index(name) for name in names]) for axis, names in moved.items()]
 
     # -- tables for the compiled loop -----------------------------------------------------------------------------
@@ -246,19 +246,19 @@ class Jumper:
             return self._tables
 
     def _edge_tables(self) -> EdgeTables:
-        system, given = self.system, list(self.system.given)
+        system, given = self.system, list(self.system.far_work)
         nodes = list(self._heat.nodes.values()) if system.edges else []
         functions: list[Function | None] = [self.magnitudes, *[None] * (4 + len(system.edges))]
         if self._jumps and system.edges:
-            asked = self._heat.asked if nodes else None
-            functions[1:] = self.guard_rates, self._totals, asked, self.times_of_return, *self._resets
+            node_values = self._heat.node_values if nodes else None
+            functions[1:] = self.guard_rates, self._total_functions, node_values, self.times_of_return, *self._resets
         starts = [j for j, p in enumerate(system.parameters) if p.path == START]
         sizes = 4 + len(given), len(nodes) * (3 + len(system.sinks)), len(self.states) + len(self.mode_columns)
         return EdgeTables(
             sizes=integers(sizes, 3),
             code=integers([(f.address, f.user) if f else (0, 0) for f in functions], -1, 2),
             edges=integers([self._row(edge) for edge in system.edges], -1, 5),
-            when=integers(system.rules, -1, 3),
+            when=integers(system.guard_conditions, -1, 3),
             held=integers(self.mode_columns, -1),
             clocks=integers([*starts, *system.origins], -1),
             nodes=integers([-1 if node.prescribed else self.states.index(node.node) for node in nodes], -1),
@@ -268,11 +268,11 @@ class Jumper:
 
     def _row(self, edge: Edge) -> tuple[int, int, bool, int, bool]:
         """Return a row of the table of edges."""
-        returns = [item for item in self.system.edges if item.returns is not None]
-        taker = self._first_maker(edge)
+        returns = [item for item in self.system.edges if item.return_time is not None]
+        source = self._first_source(edge)
         return (
             self.states.index(edge.measure) if edge.measure else -1,
-            list(self.system.sinks).index(INTERFACE) if taker < 0 else taker,
+            list(self.system.sinks).index(INTERFACE) if source < 0 else source,
             edge.violation == "refuse",
             next((k for k, item in enumerate(returns) if item is edge), -1),
             edge.rests,
@@ -288,7 +288,7 @@ class Jumper:
     @cached_property
     def _accounts(self) -> list[tuple[int, int]]:
         """Kind of each account in jumps, and its index among states or totals."""
-        given, found = list(self.system.given), []
+        given, found = list(self.system.far_work), []
         sums = {"dissipation": RELEASED, "entropy production": PRODUCED, "energy supply": HEAT_OUT}
         for account in self.system.ledger:
             name = account.quantity.name
@@ -300,7 +300,7 @@ class Jumper:
                 found.append((WORK, 2 + given.index(name)) if name in given else (NOT_BOOKED, 0))
         return found
 
-    def booked(self, jump: Jump) -> Array:
+    def ledger_change(self, jump: Jump) -> Array:
         """Return the amounts that a jump adds to the accounts of the ledger."""
         changes = jump.after.y - jump.before.y
         sums = {
@@ -318,7 +318,7 @@ class Jumper:
 
     def carried_out(self, arcs: Array, rows: Array, start: float, end: float) -> list[Jump]:
         """Return the jumps that the compiled loop has carried out between these times, from its rows."""
-        edges, given, found, last = self.system.edges, list(self.system.given), [], start
+        edges, given, found, last = self.system.edges, list(self.system.far_work), [], start
         columns = 7 + len(given)
         width = (rows.shape[1] - columns) // 2
         for row, numbers in zip(rows, rows[:, :columns].tolist(), strict=True):
@@ -346,7 +346,7 @@ class Jumper:
             (last, sizes), (now, _) = self.equilibria.balance(before), self.equilibria.balance(point)
             if np.any(np.abs(now - last) > BALANCED * sizes):
                 return True
-        if not self.system.pulls:
+        if not self.system.far_fields:
             return False
         old, new = self._far_field(before), self._far_field(point)
         return not np.allclose(old[[1, 3]], new[[1, 3]], rtol=BALANCED, atol=GAP_EPS)
@@ -370,23 +370,23 @@ class Jumper:
         edge, fold = self.system.edges[index], self.folds.at(index, before)
         before, start = self._reset(index, before if fold is None else fold.point, fold)
         jump = Jump(before.t, edge, before, start, 0.0, 0.0, IMPOSSIBLE, since)
-        level = float(self._books(start.inputs())[0])
+        level = float(self._totals(start.inputs())[0])
         if not np.isfinite(level):
             return replace(jump, obstacle=NO_ENERGY)
-        books, lift = self._opened(edge, before, last)
-        release = PendingJump(index, edge, start, float(books[0]), level, fold, slack, step)
+        totals, lift = self._totals_before(edge, before, last)
+        pending = PendingJump(index, edge, start, float(totals[0]), level, fold, slack, step)
         if step is not None:
             self._load_path.reach(index, step, before)
         try:
-            rest, shares = self._equilibrated(release) if edge.equilibrates else (start, None)
-            after, released, heat_out, entropy_out = self._heated(rest, release, shares)
+            rest, shares = self._equilibrated(pending) if edge.equilibrates else (start, None)
+            after, released, heat_out, entropy_out = self._heated(rest, pending, shares)
         except ImpossibleError as obstacle:
             return replace(jump, obstacle=str(obstacle))
         # Friction never pulls a gap back: it sticks.
-        if edge.equilibrates and self.equilibria.is_pushed_back(after, slack.balanced, slack.borne):
+        if edge.equilibrates and self.equilibria.would_reverse(after, slack.balanced, slack.friction_noise):
             after = self.equilibria.with_slip(after, 0.0)
         gain, admissible, done = self._judged(
-            edge, before.inputs()[None], after.inputs()[None], books[None], np.array([slack.noise]), entropy_out
+            edge, before.inputs()[None], after.inputs()[None], totals[None], np.array([slack.noise]), entropy_out
         )
         verdict, gained = ADMISSIBLE if admissible[0] else VIOLATES, float(gain[0])
         work = lift | {name: lift.get(name, 0.0) + float(more[0]) for name, more in done.items()}
@@ -406,44 +406,44 @@ class Jumper:
             parameters[slip] = 0.0  # no steady sliding, and nothing drives it
         return before, Point(before.t, values[:n], np.zeros(n), parameters)
 
-    def _opened(self, edge: Edge, before: Point, last: Point | None) -> tuple[Array, dict[str, float]]:
+    def _totals_before(self, edge: Edge, before: Point, last: Point | None) -> tuple[Array, dict[str, float]]:
         """Return the totals before a jump, and the work up to there that the integration does not include.
 
         It is the work of far-field displacements that jump before anything moves, and that between the end of the
         integration and a fold.
         """
         if last is None or not (edge.times or edge.fold):
-            return self._books(before.inputs()), {}
-        books = self._books((last if edge.times else before).inputs())
+            return self._totals(before.inputs()), {}
+        totals = self._totals((last if edge.times else before).inputs())
         # The heat of the jump counts from the end of the integration. Free nodes are already at the fold, with the heat
         # of the last part in their temperatures; reservoirs have not received theirs yet.
-        unseen = edge.fold and not self._heat.free
-        if unseen:
-            books[:2] = self._books(last.inputs())[:2]
-        if not self.system.pulls:
-            return books, {}
+        missing_heat = edge.fold and not self._heat.free
+        if missing_heat:
+            totals[:2] = self._totals(last.inputs())[:2]
+        if not self.system.far_fields:
+            return totals, {}
         (k, w, F, g), (_, w_new, F_new, g_new) = self._far_field(last), self._far_field(before)
         if edge.fold:
             middle = (g_new + g) / 2
             lift = elastic_energy(k, w_new, middle) - elastic_energy(k, w, middle)
-            books[0] += unseen * np.sum(lift + (F - F_new) * middle)
-            way = lift + (F_new + F) / 2 * (g_new - g)
-            return books, dict(zip(self.system.pulls, way.tolist(), strict=True))
+            totals[0] += missing_heat * np.sum(lift + (F - F_new) * middle)
+            pull_work = lift + (F_new + F) / 2 * (g_new - g)
+            return totals, dict(zip(self.system.far_fields, pull_work.tolist(), strict=True))
         lift = elastic_energy(k, w_new, g) - elastic_energy(k, w, g)
-        books[0] += np.sum(lift) + np.sum((F - F_new) * g)
-        accounts = list(self.system.pulls)
-        for j, name in enumerate(self.system.given, start=2):
-            books[j] = (F_new * g)[accounts.index(name)] if name in accounts else books[j]
-        return books, dict(zip(accounts, lift.tolist(), strict=True))
+        totals[0] += np.sum(lift) + np.sum((F - F_new) * g)
+        accounts = list(self.system.far_fields)
+        for j, name in enumerate(self.system.far_work, start=2):
+            totals[j] = (F_new * g)[accounts.index(name)] if name in accounts else totals[j]
+        return totals, dict(zip(accounts, lift.tolist(), strict=True))
 
-    def _equilibrated(self, release: PendingJump) -> tuple[Point, Array | None]:
+    def _equilibrated(self, pending: PendingJump) -> tuple[Point, Array | None]:
         """Return the point at which the gaps come to rest, and the shares of frictional heat if its path matters."""
         shares: Array | None = None
         for _ in range(SHARE_ROUNDS):
-            after = self._kept(release, self._rested(release, shares))
-            found = self._path_shares(release, after)
+            after = self._kept(pending, self._gaps_at_rest(pending, shares))
+            found = self._path_shares(pending, after)
             agreed = found is None or (
-                shares is not None and np.allclose(found, shares, rtol=0.0, atol=release.slack.rtol)
+                shares is not None and np.allclose(found, shares, rtol=0.0, atol=pending.slack.rtol)
             )
             shares = found
             if agreed or not self._load_path.warms_itself:
@@ -451,71 +451,71 @@ class Jumper:
         else:
             raise ImpossibleError(NO_SHARES)
         # Touch does not move gaps; any other jump may leave the domain of a law.
-        closed = [] if release.edge.measure else [why for why, end in self._ends if not end(after.inputs())[0] > 0]
+        closed = [] if pending.edge.measure else [why for why, end in self._ends if not end(after.inputs())[0] > 0]
         if closed:
             raise ImpossibleError(f"{NO_DOMAIN}: {closed[0]}")
         return after, shares
 
-    def _kept(self, release: PendingJump, after: Point | None) -> Point:
+    def _kept(self, pending: PendingJump, after: Point | None) -> Point:
         """Return the end of a jump, with the modes set by the edge if its measured state has not moved."""
         if after is None:
             raise ImpossibleError(NO_REST)
-        edge, slack, slip = release.edge, release.slack, self.equilibria.slip
-        if not edge.measure or release.fold is not None:
+        edge, slack, slip = pending.edge, pending.slack, self.equilibria.slip
+        if not edge.measure or pending.fold is not None:
             return after
         if abs(after.y[self.states.index(edge.measure)]) > max(slack.noise, slack.drift):
             return after
         sliding = 0.0 if slip is None else after.parameters[slip]
-        return self.equilibria.with_slip(replace(after, parameters=release.start.parameters), sliding)
+        return self.equilibria.with_slip(replace(after, parameters=pending.start.parameters), sliding)
 
-    def _rested(self, release: PendingJump, shares: Array | None) -> Point | None:
+    def _gaps_at_rest(self, pending: PendingJump, shares: Array | None) -> Point | None:
         """Return the point at which the gaps come to rest, sliding or sticking: friction never pulls sliding back."""
 
         def heat(rows: Array) -> Array:
-            return self._heat.warmed(rows, self._made(rows, release), shares)
+            return self._heat.warmed(rows, self._heat_by_source(rows, pending), shares)
 
-        found, start, fold = self.equilibria, release.start, release.fold
+        found, start, fold = self.equilibria, pending.start, pending.fold
         slip = 0.0 if found.slip is None else start.parameters[found.slip]
         if not slip:
             return found.equilibrate(start, heat, lost=fold)
-        stuck = None if fold is None else self.folds.held_at(release.index, fold)
+        stuck = None if fold is None else self.folds.held_at(pending.index, fold)
         trial = found.equilibrate(found.with_slip(start, 0.0), heat, lost=stuck)
         if trial is None:
             return None
         onward = found.with_slip(trial, slip)
-        if found.is_pushed_back(onward, release.slack.balanced, release.slack.borne, heat):
+        if found.would_reverse(onward, pending.slack.balanced, pending.slack.friction_noise, heat):
             return trial
         # Where sticking preserves the equilibrium, only that of sliding is lost.
-        return found.equilibrate(onward, heat, release.slack.balanced, lost=fold if stuck is None else None)
+        return found.equilibrate(onward, heat, pending.slack.balanced, lost=fold if stuck is None else None)
 
-    def _path_shares(self, release: PendingJump, after: Point) -> Array | None:
+    def _path_shares(self, pending: PendingJump, after: Point) -> Array | None:
         """Return the shares of the frictional heat along the path of jumping loads; None if it does not matter."""
-        step, edge = release.step, release.edge
+        step, edge = pending.step, pending.edge
         slip, path = self.equilibria.slip, self._load_path
         if step is None or edge.heat == "snap" or slip is None or not after.parameters[slip] or not path.varies:
             return None
-        made = float(self._made(after.inputs()[None], release)[0, -1])
-        small = FEW_EPS * max(float(self._books(after.inputs())[-2]), abs(release.energy))
-        if not made > small:
+        frictional = float(self._heat_by_source(after.inputs()[None], pending)[0, -1])
+        small = FEW_EPS * max(float(self._totals(after.inputs())[-2]), abs(pending.energy))
+        if not frictional > small:
             return None
-        broken = release.energy - release.level if edge.heat == "local" else 0.0
-        return path.shares(step, release.start, after, broken, release.slack.rtol * made + small)
+        broken = pending.energy - pending.level if edge.heat == "local" else 0.0
+        return path.shares(step, pending.start, after, broken, pending.slack.rtol * frictional + small)
 
-    def _made(self, rows: Array, release: PendingJump) -> Array:
+    def _heat_by_source(self, rows: Array, pending: PendingJump) -> Array:
         """Return the heat of a jump to each of the rows [J/m^2] by source, shape (rows, sources + 1).
 
         Friction is last, with the bonds that it breaks. The energy falls in the reset, then as gaps follow, axis by
         axis: friction prevents sliding until the normal gap has arrived.
         """
-        edge, start = release.edge, release.start
-        made = np.zeros((len(rows), len(self.system.sinks) + 1))
+        edge, start = pending.edge, pending.start
+        by_source = np.zeros((len(rows), len(self.system.sinks) + 1))
 
-        made[:, self._first_maker(edge)] += release.energy - release.level
+        by_source[:, self._first_source(edge)] += pending.energy - pending.level
         parameters = 1 + 2 * len(start.y)
         here = np.repeat(start.inputs()[None], len(rows), axis=0)
         here[:, parameters:] = rows[:, parameters:]
         slip, lost = self.equilibria.slip, self.equilibria.followers
-        level = np.full(len(rows), release.level)
+        level = np.full(len(rows), pending.level)
         for axis, columns in self._stages:
             here[:, columns] = rows[:, columns]
             now = self._energy(here)[:, 0]
@@ -525,50 +525,50 @@ class Jumper:
                 gives = rows[:, parameters + slip] != 0 if slip is not None else np.zeros(len(rows), dtype=bool)
             with np.errstate(invalid="ignore"):  # trial values far away may not be finite
                 fall = level - now
-            made[~gives, self._maker(edge, axis)] += fall[~gives]
-            made[gives, self._maker(edge, INTERFACE) if axis == "n" else -1] += fall[gives]
+            by_source[~gives, self._source(edge, axis)] += fall[~gives]
+            by_source[gives, self._source(edge, INTERFACE) if axis == "n" else -1] += fall[gives]
             level = now
-        return made
+        return by_source
 
-    def _maker(self, edge: Edge, axis: str) -> int:
+    def _source(self, edge: Edge, axis: str) -> int:
         """Return the column of the source that makes the heat along an axis."""
-        makers = list(self.system.sinks)
-        return makers.index(axis if axis in makers and edge.heat != "snap" else INTERFACE)
+        sources = list(self.system.sinks)
+        return sources.index(axis if axis in sources and edge.heat != "snap" else INTERFACE)
 
-    def _first_maker(self, edge: Edge) -> int:
+    def _first_source(self, edge: Edge) -> int:
         """Return the source of the energy released before gaps move; the last one, friction, if it is local."""
-        return -1 if edge.heat == "local" else self._maker(edge, "n" if edge.heat == "joint" else INTERFACE)
+        return -1 if edge.heat == "local" else self._source(edge, "n" if edge.heat == "joint" else INTERFACE)
 
-    def _heated(self, point: Point, release: PendingJump, shares: Array | None) -> tuple[Point, float, float, float]:
+    def _heated(self, point: Point, pending: PendingJump, shares: Array | None) -> tuple[Point, float, float, float]:
         """Return the point with the heat in its nodes; energy released, heat and entropy passed to reservoirs."""
         rows = point.inputs()[None]
-        heated, *amounts = self._warmed(rows, self._made(rows, release), np.array([release.energy]), shares)
+        heated, *amounts = self._warmed(rows, self._heat_by_source(rows, pending), np.array([pending.energy]), shares)
         if not np.all(np.isfinite(heated)):
             raise ImpossibleError(NO_HEAT)
         released, heat, entropy = (float(amount[0]) for amount in amounts)
         return replace(point, y=heated[0, 1 : 1 + len(point.y)]), released, heat, entropy
 
     def _warmed(
-        self, rows: Array, made: Array, energy: Array, shares: Array | None = None
+        self, rows: Array, by_source: Array, energy: Array, shares: Array | None = None
     ) -> tuple[Array, Array, Array, Array]:
         """Return inputs with the heat in their nodes; energy released, heat and entropy passed to reservoirs.
 
         The inputs are NaN where nodes cannot take the heat. Heat that is negligible compared with ``energy`` counts as
         zero.
         """
-        small = FEW_EPS * np.maximum(self._books(rows)[:, -2], np.abs(energy))
-        made = np.where(np.abs(made) <= small[:, None], 0.0, made)
-        released, warmed = made.sum(axis=1), rows.copy()
+        small = FEW_EPS * np.maximum(self._totals(rows)[:, -2], np.abs(energy))
+        by_source = np.where(np.abs(by_source) <= small[:, None], 0.0, by_source)
+        released, warmed = by_source.sum(axis=1), rows.copy()
         heat, entropy = np.zeros(len(rows)), np.zeros(len(rows))
-        hot = made.any(axis=1)
+        hot = by_source.any(axis=1)
         if hot.any():
-            warmed[hot], taken, T = self._heat.given(rows[hot], made[hot], shares)
-            passed = self._heat.passed
-            heat[hot], entropy[hot] = taken[:, passed].sum(axis=1), (taken / T)[:, passed].sum(axis=1)
+            warmed[hot], taken, T = self._heat.distributed(rows[hot], by_source[hot], shares)
+            reservoirs = self._heat.reservoirs
+            heat[hot], entropy[hot] = taken[:, reservoirs].sum(axis=1), (taken / T)[:, reservoirs].sum(axis=1)
         return warmed, released, heat, entropy
 
     def _judged(
-        self, edge: Edge, before: Array, after: Array, books: Array, noise: Array, entropy_out: Array | float
+        self, edge: Edge, before: Array, after: Array, totals: Array, noise: Array, entropy_out: Array | float
     ) -> tuple[Array, Mask, dict[str, Array]]:
         """Return the entropy that jumps between these rows produce, the second law's verdict, and the work done.
 
@@ -578,10 +578,10 @@ class Jumper:
         perturbed = before.copy()
         if edge.measure:
             perturbed[:, 1 + self.states.index(edge.measure)] += noise
-        now, still, moved = self._books(np.concatenate([after, before, perturbed])).reshape(3, len(before), -1)
-        gain = now[:, 1] - books[:, 1] + entropy_out
-        small = RUN_EPS * np.maximum(np.maximum(np.abs(books[:, 1]), np.abs(now[:, 1])), np.abs(entropy_out))
+        now, still, moved = self._totals(np.concatenate([after, before, perturbed])).reshape(3, len(before), -1)
+        gain = now[:, 1] - totals[:, 1] + entropy_out
+        small = RUN_EPS * np.maximum(np.maximum(np.abs(totals[:, 1]), np.abs(now[:, 1])), np.abs(entropy_out))
         small += FEW_EPS * still[:, -1] + np.abs(moved[:, 1] - still[:, 1])
         if self._heat.nodes:
             small += np.abs(moved[:, 0] - still[:, 0]) / self._heat.at(before)[0].min(axis=1)
-        return gain, gain >= -small, dict(zip(self.system.given, (now[:, 2:-2] - books[:, 2:-2]).T, strict=True))
+        return gain, gain >= -small, dict(zip(self.system.far_work, (now[:, 2:-2] - totals[:, 2:-2]).T, strict=True))

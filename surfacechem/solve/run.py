@@ -33,7 +33,7 @@ from surfacechem.tolerances import ATOL_OF_SCALE, DEFAULT_RTOL, EPS, FINER_BY, L
 GROUPS = {"energy supply": 0, "dissipation": 0, "heat": 0, "entropy supply": 1, "entropy production": 1, "bonds": 2}
 """Groups of accounts whose quadrature errors are compared with a common scale."""
 
-LOOKS_PER_RUN, CLOSER = 60.0, 7.3
+CHECKS_PER_RUN, SECOND_RUN_CHECKS = 60.0, 7.3
 """Least number of checks of steps against the equations inside in a run, and the factor for the second run, which must
 not miss the same features. Choices: a check costs an evaluation, and 7.3 is not an integer, so that the checks of the
 two runs are at different times. Features that both miss last less than 1/438 of the run, as every estimate says.
@@ -94,7 +94,7 @@ class Run:
     @property
     def samples(self) -> float:
         """Number of parts of the run in each of which steps are checked at least once against the equations inside."""
-        return LOOKS_PER_RUN * CLOSER**self.closer
+        return CHECKS_PER_RUN * SECOND_RUN_CHECKS**self.closer
 
     def second(self, rtol: float, **others: Any) -> Run:
         """Return the run that estimates the error of this one.
@@ -131,7 +131,7 @@ class Discontinuities(NamedTuple):
     """States and named quantities right before."""
     after: dict[str, Array]
     """The same right after."""
-    lasts: Mask
+    last: Mask
     """Mask of the last one at each time."""
 
     @classmethod
@@ -145,8 +145,8 @@ class Discontinuities(NamedTuple):
             after[found.valid, y], after[found.valid, ydot] = found.y[found.valid], found.ydot[found.valid]
         names = [*(state.name for state in model.system.states), *model.system.output_columns]
         sides = [np.hstack((rows[:, y], model.named(rows.copy()))).T for rows in (before, after)]
-        lasts = (np.diff(owner, append=-1) != 0) | (np.diff(t, append=np.inf) > 0)
-        return cls(owner, t, dict(zip(names, sides[0], strict=True)), dict(zip(names, sides[1], strict=True)), lasts)
+        last = (np.diff(owner, append=-1) != 0) | (np.diff(t, append=np.inf) > 0)
+        return cls(owner, t, dict(zip(names, sides[0], strict=True)), dict(zip(names, sides[1], strict=True)), last)
 
 
 @dataclass(frozen=True)
@@ -198,13 +198,13 @@ class Trajectory:
             yield from (self.at(rows.picked(slice(first, first + ROWS_AT_ONCE))) for first in firsts)
 
     @property
-    def some(self) -> Trajectory:
+    def sample(self) -> Trajectory:
         """The trajectory with a sample of its outputs, enough to estimate roundoff."""
         count = len(self.result.times)
         return self.picked(np.arange(0, count, max(count // SAMPLED_OUTPUTS, 1)))
 
     @cached_property
-    def looked(self) -> Trajectory:
+    def stored(self) -> Trajectory:
         """The trajectory with outputs at which runs are compared, whatever outputs were requested.
 
         They are the ends of its steps and the stored states inside them; the requested outputs are included if no
@@ -245,23 +245,23 @@ class Trajectory:
     @cached_property
     def roundings(self) -> dict[str, float]:
         """Largest change of each named quantity by one rounding of a state."""
-        found = [[*block.felt(EPS * block.result.outputs).values()] for block in self._blocks()]
+        found = [[*block.sensitivities(EPS * block.result.outputs).values()] for block in self._blocks()]
         return dict(zip(self.model.system.output_columns, np.fmax.reduce(found), strict=True))
 
-    def felt(self, changes: Array) -> dict[str, float]:
+    def sensitivities(self, changes: Array) -> dict[str, float]:
         """Return the largest change of each named quantity by ``changes`` of one state, shape (times, states)."""
         model, system, times = self.model, self.model.system, self.result.times
         # Of the states inside bodies only the first enters a flux; the others are not named.
-        own = [j for j, state in enumerate(system.states) if state.name not in system.inside]
+        own = [j for j, state in enumerate(system.states) if state.name not in system.interior]
         together = max(1, ROWS_AT_ONCE // max(len(times), 1))
         worst = np.zeros(self.outputs.shape[1])
-        for some in (own[first : first + together] for first in range(0, len(own), together)):
-            rows = np.array([self._inputs] * len(some))
-            for perturbed, j in zip(rows, some, strict=True):
+        for chunk in (own[first : first + together] for first in range(0, len(own), together)):
+            rows = np.array([self._inputs] * len(chunk))
+            for perturbed, j in zip(rows, chunk, strict=True):
                 perturbed[:, 1 + j] += changes[:, j]
-            values = model.named(rows.reshape(len(some) * len(times), rows.shape[-1]))
+            values = model.named(rows.reshape(len(chunk) * len(times), rows.shape[-1]))
             with np.errstate(invalid="ignore"):  # quantities may be infinite
-                apart = np.abs(values.reshape(len(some), *self.outputs.shape) - self.outputs)
+                apart = np.abs(values.reshape(len(chunk), *self.outputs.shape) - self.outputs)
                 worst = np.fmax(worst, np.fmax.reduce(apart.max(axis=1, initial=0.0)))
         return dict(zip(system.output_columns, worst, strict=True))
 
@@ -281,7 +281,7 @@ class Trajectory:
         return dict(zip(names, zip(*tables, strict=True), strict=True))
 
     @cached_property
-    def leaps(self) -> Discontinuities:
+    def discontinuities(self) -> Discontinuities:
         """Jumps from which the run goes on, and the breakpoints of loads, apart from jumps, that it has passed."""
         model, result, steps = self.model, self.result, self.result.steps
         sides = [(jump.before.inputs(), jump.after.inputs()) for jump in self.jumps if not jump.stops]
@@ -333,7 +333,7 @@ def values_of(system: System, changes: Mapping[str, float] | None = None) -> dic
 
 def refuse_static(system: System, case: str = "CASE") -> None:
     """Raise InputError if nothing in a scene changes."""
-    if system.rests:
+    if system.is_static:
         command = f"`surfacechem evaluate {case}` gives its quantities"
         remedy = f"Let a temperature or bonds evolve, or a history change; {command}."
         raise InputError(f"there is nothing to solve: everything is prescribed. {remedy}", path="bodies")
@@ -364,8 +364,8 @@ def stable_guess(system: System, program: Program, y: Array, parameters: Array) 
 
 def _are_stable(system: System, program: Program, y: Array, parameters: Array) -> NDArray[np.bool_]:
     """Return a mask of the first guesses that lead to states in which all stability limits are positive."""
-    playing = system.in_play(parameters)
-    checks = [i for i, m in enumerate(system.moving_margins) if m.stability and playing[i]]
+    active = system.active_guards(parameters)
+    checks = [i for i, m in enumerate(system.event_margins) if m.stability and active[i]]
     if not checks or program.margins is None:
         return np.ones(len(y), dtype=bool)
     found = consistent(program, 0.0, y, np.zeros_like(y), parameters)
@@ -378,34 +378,34 @@ class Model:
 
     def __init__(self, system: System) -> None:
         refuse_static(system)
-        system = system.with_state()
+        system = system.with_dummy_state()
         start = time.perf_counter()
         n, inputs = len(system.states), system.inputs
-        external, outside = None, system.outside
+        external, outside = None, system.external_rates
         if outside is not None:
             paths = [parameter.path for parameter in system.parameters]
             positions = np.array([1 + 2 * n + paths.index(path) for path in outside.engine.gives], dtype=np.int64)
             reads = compile_function(inputs, [system.expand(expression) for expression in outside.reads])
             external = ExternalInputs(reads, positions, outside.engine)
         self.system = system
-        self.margins = system.moving_margins
+        self.margins = system.event_margins
         """Margins that can close during the run; the others are checked at the start only."""
         program = compile_program(
             system.t,
             inputs[1 : n + 1],
             inputs[n + 1 : 2 * n + 1],
             inputs[2 * n + 1 :],
-            system.local(list(system.rows.values())),
-            system.local([account.rate for account in system.ledger]),
-            system.local([m.expression for m in self.margins] + [edge.guard for edge in system.edges]),
+            system.local_time(list(system.rows.values())),
+            system.local_time([account.rate for account in system.ledger]),
+            system.local_time([m.expression for m in self.margins] + [edge.guard for edge in system.edges]),
             external=external,
             chains=[Chain(*chain) for chain in system.chains],
-            named=list(zip(system.definitions, system.local([item.expression for item in system.named]), strict=True)),
+            named=list(zip(system.definitions, system.local_time([x.expression for x in system.named]), strict=True)),
         )
         self.program = replace(program, groups=tuple(GROUPS.get(account.kind, -1) for account in system.ledger))
-        self.jumper = Jumper(system, self.program) if system.in_stretches else None
+        self.jumper = Jumper(system, self.program) if system.has_arcs else None
         outputs = [system.expand(item.expression) for item in system.outputs]
-        self.output_function: Function = compile_function(inputs, outputs, system.of_cells)
+        self.output_function: Function = compile_function(inputs, outputs, system.cell_symbols)
         self.compile_seconds = time.perf_counter() - start
         """Time to compile the equations, and the functions first needed in a run: gaps, guards and jumps."""
 
@@ -485,9 +485,9 @@ class Model:
             max_steps=run.max_steps,
             max_seconds=run.max_seconds,
             record_steps=True,
-            picture=(run.picture or run.looks) / FINER_BY,
+            line_error=(run.picture or run.looks) / FINER_BY,
             spacing=end / run.samples,
-            in_play=system.in_play(parameters[0]),
+            active=system.active_guards(parameters[0]),
         )
 
     def _equilibrated(self, y: Array, parameters: Array) -> tuple[Array, Array]:
@@ -546,7 +546,7 @@ class Model:
             return replace(run, solver=OWN)
 
     def _with_method(self, run: Run, problem: Problem) -> Run:
-        return replace(run, solver=method(problem, self.system.moves)[0]) if run.solver == AUTO else run
+        return replace(run, solver=method(problem, self.system.has_moving_gap)[0]) if run.solver == AUTO else run
 
     def solve_values(self, run: Run, values: Mapping[str, float]) -> Trajectory:
         """Run with every value given, without a check of parameter ranges."""
@@ -595,8 +595,8 @@ class Model:
         ``crosses`` is True if the method can carry out edges by itself.
         """
         if self.jumper is None:
-            return (yield from without_stall(problem, self.system.sliding)), (), None
-        crosses = crosses and not self.system.searches and self.program.external is None
+            return (yield from without_stall(problem, self.system.slip_velocities)), (), None
+        crosses = crosses and not self.system.solves_jumps and self.program.external is None
         told = (yield from carried(problem, self.jumper)) if crosses else None
         if told is None:
             hybrid = Hybrid(self.system, self.jumper, problem, len(self.margins))

@@ -20,7 +20,7 @@ from surfacechem.model.system import RTOL_PATH, System
 from surfacechem.solve.contract import Array
 from surfacechem.tolerances import FEW_EPS, GUARD_EPS, NEGLIGIBLE
 
-PARTS_OF_A_PERIOD, MOST_PARTS = 8.17, 20_000
+SEGMENTS_PER_CYCLE, MOST_SEGMENTS = 8.17, 20_000
 """Parts of the period of a load, a number such that no cut falls on a reversal, and the number of parts in a run above
 which periods are not cut.
 """
@@ -38,9 +38,9 @@ def segments(system: System, end: float, values: Mapping[str, float]) -> Array:
     """
     inside = [t for t in system.breakpoints if 0 < t < end]
     for path in system.cycles:
-        count = math.floor(PARTS_OF_A_PERIOD * values[path] * end)
-        if count <= MOST_PARTS:
-            inside += [k / (PARTS_OF_A_PERIOD * values[path]) for k in range(1, count + 1)]
+        count = math.floor(SEGMENTS_PER_CYCLE * values[path] * end)
+        if count <= MOST_SEGMENTS:
+            inside += [k / (SEGMENTS_PER_CYCLE * values[path]) for k in range(1, count + 1)]
     return np.array(sorted({0.0, *(t for t in inside if t < end), end}))
 
 
@@ -97,7 +97,7 @@ def start_registers(system: System, parameters: Array, values: Mapping[str, floa
 COMPARISONS = (symengine.StrictLessThan, symengine.LessThan)
 """SymEngine reverses the other comparisons."""
 
-TURN_PARTS, LOOKS_IN_A_PERIOD = 64, 8
+TURN_PARTS, PARTS_PER_CYCLE = 64, 8
 """Parts of a run, and of the period of a cyclic load, in each of which a prescribed variable is assumed to turn at most
 once; a sine turns once in four parts. A choice: two turns within a part are not found, and more parts cost evaluations
 of functions of time alone.
@@ -142,11 +142,11 @@ class Passing:
         """
         if self._function is None:
             return segments, table
-        parts = max(TURN_PARTS / (segments[-1] - segments[0]), LOOKS_IN_A_PERIOD * frequency)
-        looked_at = np.minimum(segments, segments[0] + PARTS_PER_STEP * max_steps / parts)
-        found = self._found(looked_at.tobytes(), table[:, self._columns].tobytes(), parts)
-        beside = np.searchsorted(segments, found)
-        gaps = np.minimum(found - segments[beside - 1], segments[beside] - found)
+        parts = max(TURN_PARTS / (segments[-1] - segments[0]), PARTS_PER_CYCLE * frequency)
+        searched = np.minimum(segments, segments[0] + PARTS_PER_STEP * max_steps / parts)
+        found = self._found(searched.tobytes(), table[:, self._columns].tobytes(), parts)
+        right = np.searchsorted(segments, found)
+        gaps = np.minimum(found - segments[right - 1], segments[right] - found)
         found = found[gaps > GUARD_EPS * found]
         apart = np.diff(found, prepend=0.0) > GUARD_EPS * found
         found = found[apart]

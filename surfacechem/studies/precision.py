@@ -22,7 +22,7 @@ from surfacechem.solve import names as known_solvers
 from surfacechem.solve.run import Trajectory
 from surfacechem.studies.grid import BRIEF_RUN, ROUND_SECONDS, Cell, attempt, check_options, filled
 from surfacechem.studies.report import PageSection, PageTable, Study, Variable
-from surfacechem.studies.truth import MEANING, NORMS, TOLERANCES, Errors, Subject, Truth, establish, looked_at
+from surfacechem.studies.truth import MEANING, NORMS, TOLERANCES, Errors, Subject, Truth, establish, with_stored_times
 
 log = logging.getLogger(__name__)
 
@@ -189,7 +189,7 @@ def _compared(
     variables = tuple(name for name in wanted if name in known) or tuple(subject.states)
     log.info("%s: its reference", name)
     truth: Truth | None = None
-    subject = looked_at(subject)
+    subject = with_stored_times(subject)
     try:
         truth = establish(subject, variables)
         reference = truth.source

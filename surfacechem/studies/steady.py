@@ -101,7 +101,7 @@ def steady(source: Source, of: Sequence[str] = (), overrides: Overrides = ()) ->
     system = simulation.system.with_multipliers()
     labels = system.reactions
     refuse_histories(system)
-    if system.in_stretches:
+    if system.has_arcs:
         raise InputError("the scene has jumps, so that a steady state is not the root of one set of equations.")
     rest = _Rest(Model(system), simulation.case.run, _wanted(system, of), _conserved(simulation.case.scene.interface))
     if not of:

@@ -104,7 +104,7 @@ class Subject:
     def states(self) -> list[str]:
         """Names of the states."""
         system = self.model.system
-        return [state.name for state in system.states if state.name not in system.inside]
+        return [state.name for state in system.states if state.name not in system.interior]
 
     @property
     def names(self) -> list[str]:
@@ -196,13 +196,13 @@ class Truth:
         return difference(event_times(trajectory), self.events)
 
 
-def looked_at(subject: Subject) -> Subject:
+def with_stored_times(subject: Subject) -> Subject:
     """Return the subject with outputs at the known states of a tight run; unchanged if that run fails."""
     try:
         found = subject.tight(subject.methods()[0], MIN_RTOL)
     except InputError:
         return subject
-    run, times = subject.case.run, fewer(found.looked).result.times
+    run, times = subject.case.run, fewer(found.stored).result.times
     # Towards an event states may change like a square root, so that next to it errors are those of rounding in time.
     moments = np.concatenate([[0.0], *event_times(found).values()])
     times = times[np.all(np.abs(times[:, None] - moments) > SQRT_EPS * moments, axis=1)]

@@ -86,7 +86,7 @@ def between_flats(law: PairEnergy) -> Density:
             return np.stack([whole, -amount * gaps * psi(gaps)[..., 0]], axis=-1)
 
         return summed
-    ends, last = np.array([bend for extent in laws_by_extent([law]) for bend in extent.bends]), law.cutoff
+    ends, last = np.array([kink for extent in laws_by_extent([law]) for kink in extent.kinks]), law.cutoff
 
     def at(gaps: Array) -> Array:
         # Pieces of r = g exp(t) up to the cutoff or, without one, to exp(8) g, cut at kinks.
@@ -105,7 +105,7 @@ def between_flats(law: PairEnergy) -> Density:
     return at
 
 
-def bends(laws: Iterable[Potential | HeatTransfer]) -> list[float]:
+def kinks(laws: Iterable[Potential | HeatTransfer]) -> list[float]:
     """Return the gaps at which laws have kinks or narrow peaks, and zero."""
     found = {0.0}
     for law in laws:

@@ -25,7 +25,7 @@ from surfacechem.tolerances import NEGLIGIBLE, TINY
 TRUNCATION_PART = 0.01
 """Truncation error of a sum as a fraction of the accuracy: distant parts of a surface are omitted."""
 
-BEND_SEARCH_COST = 4
+KINK_SEARCH_COST = 4
 """Points evaluated for each node on a ray, in the search for kinks along it."""
 
 CHEBYSHEV_NODES, TABLE_CHECKS = np.cos(np.pi * (np.arange(24) + 0.5) / 24), np.array([-0.97, -0.52, 0.14, 0.71])
@@ -72,14 +72,14 @@ def laws_by_extent(laws: Sequence[PairEnergy]) -> dict[Extent, list[int]]:
     """Group the laws that share nodes by extent: one for each set of kinks and cutoff, one for all laws without."""
     found: dict[tuple[float, ...], list[int]] = {}
     for k, law in enumerate(laws):
-        bends = law.kinks.get("r", ())
-        places = {float(r) for r in (bends if isinstance(bends, Sequence) else (bends,))}
+        kinks = law.kinks.get("r", ())
+        places = {float(r) for r in (kinks if isinstance(kinks, Sequence) else (kinks,))}
         if math.isfinite(law.cutoff):
             places = {r for r in places if r < law.cutoff} | {law.cutoff}
         found.setdefault((law.cutoff, *sorted(places)), []).append(k)
     return {
-        Extent(min(laws[k].decay for k in which), cutoff, tuple(bends)): which
-        for (cutoff, *bends), which in found.items()
+        Extent(min(laws[k].decay for k in which), cutoff, tuple(kinks)): which
+        for (cutoff, *kinks), which in found.items()
     }
 
 
@@ -110,9 +110,9 @@ def _sums_of(
     farther = (rtol * TRUNCATION_PART) ** (-1 / (extent.decay - 2))
     if not is_round(surface.shape):
         reach = np.minimum(near.gap * farther, extent.cutoff)
-        if extent.bends:
+        if extent.kinks:
             nodes = ray_grid(surface, x, near, reach, extent, level)
-            return [nodes.sums(kernel(law)) for law in laws], BEND_SEARCH_COST * nodes.area.size
+            return [nodes.sums(kernel(law)) for law in laws], KINK_SEARCH_COST * nodes.area.size
         nodes = tensor_grid(surface, x, near, reach, level)
         return [nodes.sums(kernel(law)) for law in laws], nodes.area.size
     found, pairs = tabulated(SumsByGap(surface.shape, tuple(laws), extent, farther, level, rtol), near.gap)
@@ -149,9 +149,9 @@ class SumsByGap:
         bent = self.shape.bulge / self.shape.R if isinstance(self.shape, Sphere) else 0.0
         last = math.pi / abs(bent) if bent else math.inf
         ends = [np.zeros_like(gap)]
-        for bend in self.extent.bends:
+        for kink in self.extent.kinks:
             # The circle on which the distance is that of a kink, from the law of cosines.
-            chord = np.sqrt(np.maximum(bend - gap, 0.0) * (bend + gap) / np.maximum(1 + bent * gap, TINY))
+            chord = np.sqrt(np.maximum(kink - gap, 0.0) * (kink + gap) / np.maximum(1 + bent * gap, TINY))
             ends.append(2 / abs(bent) * np.arcsin(np.minimum(chord * abs(bent) / 2, 1)) if bent else chord)
         if math.isinf(self.extent.cutoff):
             ends.append(np.minimum(gap * self.farther, last))
@@ -191,7 +191,7 @@ def tabulated(profile: SumsByGap, gaps: Array) -> tuple[Array, int]:
     """
     at, parts = np.log(gaps), []
     low, high = float(at.min()), float(at.max())
-    if profile.extent.bends:
+    if profile.extent.kinks:
         # Next to a cutoff the sums nearly vanish, and a table across it would have a large relative error.
         levels = [math.log(gap) for gap in profile.extent.levels(profile.shape)]
         inside = [level for level in levels if low < level < high]
@@ -204,7 +204,7 @@ def tabulated(profile: SumsByGap, gaps: Array) -> tuple[Array, int]:
     while waiting:
         which, low, high = waiting.pop()
         few = len(which) < FEWEST_TABULATED
-        fit, more = table(profile, float(low), float(high)) if not (few and profile.extent.bends) else (None, 0)
+        fit, more = table(profile, float(low), float(high)) if not (few and profile.extent.kinks) else (None, 0)
         pairs += more
         middle, half = (low + high) / 2, max((high - low) / 2, TINY)
         if fit is not None:

@@ -61,12 +61,12 @@ class LevelPatches(Patches):
     """Coordinates across that direction where the level leaves each patch at its ends (n, 2); NaN if unknown."""
 
     @property
-    def fewest(self) -> int:
+    def first_level(self) -> int:
         """Level of the first rule of patches: a cut may be curved between the lines on which it is located."""
-        return FIRST_LEVEL if self.other.search == 1 else super().fewest
+        return FIRST_LEVEL if self.other.search == 1 else super().first_level
 
     @property
-    def kinds(self) -> Levels:
+    def rule_kinds(self) -> Levels:
         """Direction of the level of each patch."""
         return self.along
 
@@ -92,7 +92,7 @@ class LevelPatches(Patches):
             ]
         )
         steepness = np.stack([np.abs(step).mean(axis=(1, 2)) for step in steps])
-        along = np.argmax(np.where(np.array(self.alike)[:, None], -1.0, np.where(turns, 0.0, steepness)), axis=0)
+        along = np.argmax(np.where(np.array(self.uniform)[:, None], -1.0, np.where(turns, 0.0, steepness)), axis=0)
         # Two edges never coincide; where a gap jumps its level is on the edge. Far from the body edges do not matter.
         edges = np.arange(heights.shape[-1]) < len(self.other.edges)
         alike = np.mean((heights > 0) == (over > 0), axis=(1, 2))
@@ -117,9 +117,9 @@ class LevelPatches(Patches):
         at = (here, np.broadcast_to(there[..., None], here.shape))
         return self.points(np.stack(at if k == 0 else at[::-1], axis=-1), length * thickness[..., None])
 
-    def most(self, order: int) -> int:
+    def point_count(self, order: int) -> int:
         """Return a rule's points on each patch: on two sides of the level, in several parts across."""
-        return super().most(order) * (2 * SIDE_PARTS if self.along[0] >= 0 else 1)
+        return super().point_count(order) * (2 * SIDE_PARTS if self.along[0] >= 0 else 1)
 
     def cost(self, order: int) -> int:
         """Return the cost of the searches for the level on each line of nodes."""
@@ -127,7 +127,7 @@ class LevelPatches(Patches):
 
     def _across(self, j: int, order: int) -> tuple[Array, Array]:
         """Return nodes and weights (n, m) across the direction of the level, cut where it leaves the patch."""
-        if self.alike[j]:
+        if self.uniform[j]:
             return self.rule(j, order)
         edges = np.column_stack([self.low[:, j], self.leaves, self.high[:, j]])
         return gauss_rule(np.sort(edges, axis=1), order)
@@ -137,7 +137,7 @@ class LevelPatches(Patches):
         leaves = self.leaves.copy()
         for k in range(2):
             chosen = self.along == k
-            if self.alike[1 - k] or not chosen.any():
+            if self.uniform[1 - k] or not chosen.any():
                 continue
             passed = self[chosen]
             ends = np.concatenate([passed.low[:, k], passed.high[:, k]])
@@ -176,11 +176,11 @@ class LevelPatches(Patches):
 def with_levels(patches: Patches, other: Surface, levels: Sequence[float], noise: float, rtol: float) -> LevelPatches:
     """Return patches of a surface with the gap levels and edges of the other surface that divide them."""
     for k in range(2):
-        if not patches.alike[k]:
+        if not patches.uniform[k]:
             # Points of least gap, towards which patches are graded, must be at corners of patches.
             around = (patches.low[:, k] < 0) & (patches.high[:, k] > 0)
             patches = patches[~around].joined(patches[around].cut(k, 0.0))
-    parts = {name: getattr(patches, name) for name in ("surface", "alike", *Patches.arrays)}
+    parts = {name: getattr(patches, name) for name in ("surface", "uniform", *Patches.arrays)}
     none = np.zeros(len(patches), dtype=int)
     found = LevelPatches(
         **parts,
@@ -194,11 +194,11 @@ def with_levels(patches: Patches, other: Surface, levels: Sequence[float], noise
         leaves=np.zeros((len(patches), 2)),
     )
     found = found.marked()
-    if any(found.alike):
+    if any(found.uniform):
         for _ in range(len(levels) + len(other.edges)):
             if np.all(found.along < 0):
                 break
-            found = found.divided(found.alike.index(False)).marked()
+            found = found.divided(found.uniform.index(False)).marked()
         return found
     for _ in range(CUT_HALVINGS - math.floor(math.log2(rtol) / 2)):
         slight = (found.along >= 0) & (found.share < SLIGHT_CUT)

@@ -54,7 +54,7 @@ def near_places(
     outer: Surface,
     inner: Surface,
     size: float,
-    alike: tuple[bool, bool],
+    uniform: tuple[bool, bool],
     grain: float = math.inf,
     take: Callable[[int], None] = lambda _: None,
 ) -> NearPlaces:
@@ -73,13 +73,13 @@ def near_places(
     wide = min(grain, extents.max() / COARSE_STEPS * STEPS_PER_GRAIN)
     # A surface without a grain needs only the coarsest grid.
     halvings = np.ceil(np.log2(np.maximum(STEPS_PER_GRAIN * extents / grain / COARSE_STEPS, 1))).astype(int)
-    steps = np.where(alike, 1, COARSE_STEPS * 2**halvings)
+    steps = np.where(uniform, 1, COARSE_STEPS * 2**halvings)
     if math.prod(int(n) for n in steps) > MOST_PLACES:
         text = f"the {outer.shape.name()} has details of {grain:.3g} m on {extents[0]:.3g} by {extents[1]:.3g} m"
         raise InputError(f"{text}, too many to look at: give it a smaller extent, or fewer and coarser details.")
 
     def parameters(nodes: Indices) -> Array:
-        return outer.off_pole(low + (high - low) * np.where(alike, 0.5, nodes / steps))
+        return outer.off_pole(low + (high - low) * np.where(uniform, 0.5, nodes / steps))
 
     def gap(at: Array) -> Array:
         take((len(at) + CALL_COST) * inner.search)
@@ -89,11 +89,11 @@ def near_places(
     gaps = _near_grid(lambda nodes: gap(parameters(nodes)), steps, halvings, extents, wide)
     chosen = _lowest(gaps, outer.shape.closed, FORMULA_EPS * size)
     chosen = chosen[gaps[tuple(chosen.T)] <= gaps.min() + wide]
-    poles = (chosen[:, 0] == 0) & (outer.shape.about_axis and low[0] == 0 and not alike[1])
+    poles = (chosen[:, 0] == 0) & (outer.shape.about_axis and low[0] == 0 and not uniform[1])
     if poles.any():
         # At a pole all directions are degenerate: start the search next to it, where the gap is least.
         chosen, poles = np.concatenate([chosen, [[1, int(np.argmin(gaps[1]))]]]), np.append(poles, False)
-    apart, noise = np.where(alike, 0.0, (high - low) / steps), FORMULA_EPS * size
+    apart, noise = np.where(uniform, 0.0, (high - low) / steps), FORMULA_EPS * size
     at, gaps = _refined(outer, inner, gap, parameters(chosen), apart, extents.max(), noise)
     # Drop a pole that is not nearer than the point found from there.
     kept = ~poles | (gaps < gaps[-1] - noise)

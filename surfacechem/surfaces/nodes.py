@@ -80,13 +80,13 @@ class Extent:
 
     decay: float
     cutoff: float
-    bends: tuple[float, ...]
+    kinks: tuple[float, ...]
 
     def levels(self, shape: Shape) -> list[float]:
         """Return the gaps to a shape [m] at which its nearest or farthest point is at a kink: sums have kinks there."""
-        found = set(self.bends)
+        found = set(self.kinks)
         if isinstance(shape, Sphere) and is_round(shape):
-            found |= {shape.bulge * (bend - 2 * shape.R) for bend in self.bends}
+            found |= {shape.bulge * (kink - 2 * shape.R) for kink in self.kinks}
         return sorted(gap for gap in found if gap > 0)
 
 

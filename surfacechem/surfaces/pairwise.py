@@ -144,8 +144,8 @@ def pair_traction(
     """
     found = np.zeros(len(x))
     for part in slices_of(len(x), inner):
-        pushes = _forces_per_area(x[part], inner, laws, rtol, budget)
-        found[part] = np.einsum("nc,nc->n", pushes, normals[part])
+        forces = _forces_per_area(x[part], inner, laws, rtol, budget)
+        found[part] = np.einsum("nc,nc->n", forces, normals[part])
         budget.done += 1
     return found
 
@@ -162,11 +162,11 @@ def _forces_per_area(x: Array, inner: Surface, laws: Sequence[PairEnergy], rtol:
     for level in range(1, LAST_LEVEL + 1):
         sums, pairs = inner_sums(inner, x, laws, level, rtol)
         budget.take(pairs)
-        pushes = np.array([law.n_1 * law.n_2 * push for law, (_, push) in zip(laws, sums, strict=True)])
-        if before is not None and np.all(np.abs(pushes - before) <= rtol * np.linalg.norm(pushes, axis=-1)[..., None]):
+        forces = np.array([law.n_1 * law.n_2 * push for law, (_, push) in zip(laws, sums, strict=True)])
+        if before is not None and np.all(np.abs(forces - before) <= rtol * np.linalg.norm(forces, axis=-1)[..., None]):
             break
-        before = pushes
-    return np.asarray(pushes.sum(axis=0))
+        before = forces
+    return np.asarray(forces.sum(axis=0))
 
 
 def check_finite(lower: Surface, upper: Surface) -> None:

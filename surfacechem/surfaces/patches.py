@@ -63,7 +63,7 @@ Integrand = Callable[[Array, int], tuple[Array, int]]
 class Patches:
     """Patches of a surface between substituted parameters ``low`` and ``high``, around ``at`` with ``scale``.
 
-    All four have shape (n, 2). Directions in which nothing varies (``alike``) have two nodes.
+    All four have shape (n, 2). Directions in which nothing varies (``uniform``) have two nodes.
     """
 
     surface: Surface
@@ -71,20 +71,20 @@ class Patches:
     scale: Array
     low: Array
     high: Array
-    alike: tuple[bool, bool]
+    uniform: tuple[bool, bool]
 
     arrays: ClassVar[Sequence[str]] = ("at", "scale", "low", "high")
     """Names of the arrays with an entry for each patch."""
 
     @property
-    def kinds(self) -> Levels:
+    def rule_kinds(self) -> Levels:
         """Kind of each patch (n,): patches of one kind have rules with equally many points."""
         return np.zeros(len(self), dtype=int)
 
     @property
-    def fewest(self) -> int:
+    def first_level(self) -> int:
         """Level of the first rule: with few patches two rules may agree while both are wrong."""
-        return FIRST_LEVEL if any(self.alike) else 1
+        return FIRST_LEVEL if any(self.uniform) else 1
 
     def __getitem__(self, chosen: NDArray[Any] | slice) -> Self:
         """Return some of the patches."""
@@ -100,7 +100,7 @@ class Patches:
         u, v = np.broadcast_arrays(u[:, :, None], v[:, None, :])
         return self.points(np.stack([u, v], axis=-1), du[:, :, None] * dv[:, None, :])
 
-    def most(self, order: int) -> int:
+    def point_count(self, order: int) -> int:
         """Return the largest number of points of a rule on each patch; all patches are of one kind."""
         return order**2
 
@@ -116,7 +116,7 @@ class Patches:
     def rule(self, k: int, order: int) -> tuple[Array, Array]:
         """Return nodes and weights (n, m) along a direction."""
         ends = np.stack([self.low[:, k], self.high[:, k]], axis=1)
-        if not self.alike[k]:
+        if not self.uniform[k]:
             return gauss_rule(ends, order)
         middle, half = ends.mean(axis=1)[:, None], np.diff(ends) / 2
         # Around a closed direction tangential components cancel; along a length it is the Gauss rule of two points.
@@ -127,7 +127,7 @@ class Patches:
         """Return parameters (n, ...) from substituted ones along a direction, and weights transformed with them."""
         shape = -1, *[1] * (t.ndim - 1)
         at, scale = self.at[:, k].reshape(shape), self.scale[:, k].reshape(shape)
-        if self.alike[k]:
+        if self.uniform[k]:
             return at + scale * t, scale * w
         return at + scale * np.sinh(t), scale * np.cosh(t) * w
 
@@ -135,7 +135,7 @@ class Patches:
         """Return parameters along a direction from end to end of all patches; graded if they are around one point."""
         ends = [self.parameters(k, edge[:, k, None])[0] for edge in (self.low, self.high)]
         low, high = float(ends[0].min()), float(ends[1].max())
-        if self.alike[k] or np.ptp(self.at[:, k]):
+        if self.uniform[k] or np.ptp(self.at[:, k]):
             return np.linspace(low, high, count)
         t = np.arcsinh((np.array([low, high]) - self.at[0, k]) / self.scale[0, k])
         return np.asarray(self.at[0, k] + self.scale[0, k] * np.sinh(np.linspace(t[0], t[1], count)))
@@ -144,7 +144,7 @@ class Patches:
         """Return the halves of the patches in each direction in which something varies."""
         found = self
         for k in range(2):
-            if not self.alike[k]:
+            if not self.uniform[k]:
                 found = found.cut(k, (found.low[:, k] + found.high[:, k]) / 2)
         return found
 
@@ -173,9 +173,9 @@ def outer_patches(
         # Polar coordinates, in which nothing may vary around an axis.
         polar = Surface(Disc(), outer.upper, outer.approach)
         outer = polar if alike_around(polar, inner) else outer
-    alike = alike_along(outer, inner), alike_around(outer, inner)
+    uniform = alike_along(outer, inner), alike_around(outer, inner)
     grain = min(outer.shape.grain, inner.shape.grain)
-    near = near_places(outer, inner, size, alike, grain, budget.take)
+    near = near_places(outer, inner, size, uniform, grain, budget.take)
     tangents = outer.derivatives(near.at, FIRST_ORDER)[1:]
     lengths = np.maximum(np.linalg.norm(tangents, axis=-1).T, POLE)
     first, low, high = near.at[0], *np.transpose(outer.shape.span)
@@ -192,10 +192,10 @@ def outer_patches(
     at = np.clip(at, low, high)
     scales = np.maximum(np.abs(near.gap), size * CONTACT_GAP)[:, None] / lengths
     # In a direction in which nothing varies the scale is one.
-    scales = np.where(alike, 1.0, scales)
+    scales = np.where(uniform, 1.0, scales)
     rectangles = around_each(at, low, high, lengths[0])
     patches = [
-        _patches(outer, at[k], scales[k], box, np.where(alike, math.inf, grain / lengths[k]), alike)
+        _patches(outer, at[k], scales[k], box, np.where(uniform, math.inf, grain / lengths[k]), uniform)
         for k, box in rectangles
     ]
     return patches[0].joined(*patches[1:]), near
@@ -220,20 +220,20 @@ def around_each(at: Array, low: Array, high: Array, lengths: Array) -> list[tupl
 
 
 def _patches(
-    outer: Surface, at: Array, scale: Array, box: tuple[Array, Array], grain: Array, alike: tuple[bool, bool]
+    outer: Surface, at: Array, scale: Array, box: tuple[Array, Array], grain: Array, uniform: tuple[bool, bool]
 ) -> Patches:
     """Return the patches of one rectangle of parameters."""
     pairs = []
     for k in range(2):
         ends = (np.stack(box)[:, k] - at[k]) / scale[k]
-        if alike[k]:
+        if uniform[k]:
             edges = ends
         else:
             ends = np.arcsinh(ends)
             edges = piece_edges(ends[:1], ends[1:], grain[k] / scale[k])[0]
         pairs.append(list(pairwise(edges)))
     low, high = np.moveaxis(np.array([(a, b) for a in pairs[0] for b in pairs[1]]), 2, 0)
-    return Patches(outer, np.tile(at, (len(low), 1)), np.tile(scale, (len(low), 1)), low, high, alike)
+    return Patches(outer, np.tile(at, (len(low), 1)), np.tile(scale, (len(low), 1)), low, high, uniform)
 
 
 class OutOfReachError(InputError):
@@ -247,7 +247,7 @@ class Budget:
         """Begin a budget for an accuracy that messages name."""
         self.rtol, self.integrals, self.done, self.spent = rtol, 1, 0, 0.0
 
-    def whole(self, ahead: float) -> float:
+    def projected(self, ahead: float) -> float:
         """Return the least cost of all integrals, if those done and the next one cost this much."""
         return ahead * max(1.0, self.integrals / max(self.done + 1, FIRST_INTEGRALS))
 
@@ -258,11 +258,11 @@ class Budget:
 
     def refuse_beyond(self, ahead: float) -> None:
         """Raise OutOfReachError if this cost is too large."""
-        if self.whole(ahead) > MOST_POINTS:
+        if self.projected(ahead) > MOST_POINTS:
             text = f"the accuracy {self.rtol:.2g} of an integral over the surfaces is out of reach"
             what = f"{self.integrals} of them take" if self.integrals > 1 else "it takes"
             raise OutOfReachError(
-                f"{text}: {what} {self.whole(ahead):.1g} pairs of points; ask for less, or smaller surfaces."
+                f"{text}: {what} {self.projected(ahead):.1g} pairs of points; ask for less, or smaller surfaces."
             )
 
 
@@ -277,7 +277,7 @@ class Rules:
     def __call__(self, patches: Patches, levels: Levels, inside: Levels) -> Array:
         """Return integrals (n, ...) over each patch, with the orders of its level and of its level inside."""
         found: dict[int, Array] = {}
-        ranks = np.stack([levels, inside, patches.kinds], axis=1)
+        ranks = np.stack([levels, inside, patches.rule_kinds], axis=1)
         for rank in np.unique(ranks, axis=0):
             where = np.flatnonzero((ranks == rank).all(axis=1))
             values = self._of_order(patches[where], ORDERS[rank[0]], int(rank[1]))
@@ -289,7 +289,7 @@ class Rules:
         found, begin = [], 0
         while begin < len(patches):
             # One patch at first: the number of pairs of its points is not known yet.
-            each = self.each.get(inside, PAIRS_AT_ONCE) * patches.most(order)
+            each = self.each.get(inside, PAIRS_AT_ONCE) * patches.point_count(order)
             part = patches[begin : begin + max(1, int(PAIRS_AT_ONCE / each))]
             x, area = part.nodes(order)
             values, together = self.integrand(x.reshape(-1, 3), inside)
@@ -317,9 +317,9 @@ class PatchResults:
     value: Array
     over: Array
     within: Array
-    stuck: NDArray[np.bool_]
+    stalled: NDArray[np.bool_]
 
-    def but(self, gone: NDArray[np.bool_], others: PatchResults) -> PatchResults:
+    def replaced(self, gone: NDArray[np.bool_], others: PatchResults) -> PatchResults:
         """Return the results without those of some patches, and with others."""
         kept = {
             item.name: np.concatenate([getattr(self, item.name)[~gone], getattr(others, item.name)])
@@ -343,7 +343,7 @@ def integral(
     projection onto the other surface that costs as much as ``search`` points. InputError if it takes more than its
     budget.
     """
-    first = patches.fewest if not any(patches.alike) else FIRST_LEVEL + sum(left < goal for goal in HIGHER_START)
+    first = patches.first_level if not any(patches.uniform) else FIRST_LEVEL + sum(left < goal for goal in HIGHER_START)
     rules, begin, before = Rules(integrand, search, budget), np.full(len(patches), first), budget.spent
     known, met = _start(rules, patches, begin, begin, nested), list[tuple[float, float]]()
     while True:
@@ -355,26 +355,26 @@ def integral(
             budget.done += 1
             return whole, error, rules.points
         met.append((budget.spent - before, error))
-        if budget.whole(budget.spent) > MOST_POINTS / JUDGED_PART and met[-1][0] > JUDGED_PART * met[0][0]:
+        if budget.projected(budget.spent) > MOST_POINTS / JUDGED_PART and met[-1][0] > JUDGED_PART * met[0][0]:
             budget.refuse_beyond(before + _expected(met, left))
         rank = np.argsort(over + within)
         worst = np.zeros(len(over), dtype=bool)
         worst[rank[~(np.cumsum((over + within)[rank]) <= left / 2)]] = True
         deeper = worst & (within > over)
-        halved = worst & ~deeper & (known.stuck | (known.level == LAST_LEVEL))
+        halved = worst & ~deeper & (known.stalled | (known.level == LAST_LEVEL))
         raised = worst & ~deeper & ~halved
         for mask, steps in ((deeper, (0, 1)), (raised, (1, 0))):
             if mask.any():
                 _raise_level(rules, known, mask, steps)
-        known.stuck[raised] = (known.level[raised] > FIRST_LEVEL) & (
+        known.stalled[raised] = (known.level[raised] > FIRST_LEVEL) & (
             _largest(known.over[raised], size) * LEAST_GAIN > over[raised]
         )
         if halved.any():
             halves = known.patches[halved].halved()
             # On half of a patch a rule is as accurate as one of higher order on the whole.
             times = len(halves) // int(halved.sum())
-            start, inside = np.maximum(known.level[halved] - 1, patches.fewest), known.inside[halved]
-            known = known.but(halved, _start(rules, halves, np.tile(start, times), np.tile(inside, times), nested))
+            start, inside = np.maximum(known.level[halved] - 1, patches.first_level), known.inside[halved]
+            known = known.replaced(halved, _start(rules, halves, np.tile(start, times), np.tile(inside, times), nested))
 
 
 def _expected(met: Sequence[tuple[float, float]], rtol: float) -> float:
@@ -389,7 +389,7 @@ def _expected(met: Sequence[tuple[float, float]], rtol: float) -> float:
 def _start(rules: Rules, patches: Patches, level: Levels, inside: Levels, nested: bool) -> PatchResults:
     """Return results on patches by rules of some levels and of those before."""
     value = rules(patches, level, inside)
-    steps = range(1, patches.fewest + 1)
+    steps = range(1, patches.first_level + 1)
     over = _changes(value, *(rules(patches, level - k, inside) for k in steps))
     within = np.zeros_like(over)
     if nested:
@@ -408,7 +408,7 @@ def _raise_level(rules: Rules, known: PatchResults, mask: NDArray[np.bool_], ste
     known.inside[mask] += steps[1]
     finer = rules(known.patches[mask], known.level[mask], known.inside[mask])
     changes = known.over if steps[0] else known.within
-    if known.patches.fewest == FIRST_LEVEL:
+    if known.patches.first_level == FIRST_LEVEL:
         changes[mask, 1] = changes[mask, 0]
     changes[mask, 0] = finer - known.value[mask]
     known.value[mask] = finer

@@ -23,7 +23,7 @@ from surfacechem.documents.cache_folder import PACKAGE, Fingerprint, cached, fin
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, derivative
 from surfacechem.surfaces.approach import ApproachEnergy, fitted, straight
-from surfacechem.surfaces.curved_gap import GAP, Contact, bends, between_flats, density, level_approaches, over_gap
+from surfacechem.surfaces.curved_gap import GAP, Contact, between_flats, density, kinks, level_approaches, over_gap
 from surfacechem.surfaces.inner_sums import kernel, laws_by_extent
 from surfacechem.surfaces.pairwise import PairForces, interaction, length, pair_traction, slices_of
 from surfacechem.surfaces.patches import Budget, OutOfReachError
@@ -190,7 +190,7 @@ class CurvedSurfaces(Potential):
             # Raise an error for an infinite conductance before any force is integrated.
             with self.at_approach(self.approach[0]):
                 heat = [density(law) for law in self.heat_laws]
-                over_gap(*self.surfaces(self.approach[0]), [], bends(self.heat_laws), heat, NEGLIGIBLE)
+                over_gap(*self.surfaces(self.approach[0]), [], kinks(self.heat_laws), heat, NEGLIGIBLE)
         # Errors of the samples must not be taken for errors of a polynomial.
         rtol, finer = self.accuracy, max(self.accuracy / 64, RUN_EPS)
 
@@ -207,7 +207,7 @@ class CurvedSurfaces(Potential):
         found = [fitted(partial(of_pairs, k), *self.approach, rtol, ends, budget=budget) for k in range(len(parts))]
         if not self.gap_laws:
             return found
-        laws, levels = [density(law) for law in self.gap_laws], bends(self.gap_laws)
+        laws, levels = [density(law) for law in self.gap_laws], kinks(self.gap_laws)
         cuts = level_approaches(*self.surfaces(0.0), levels)
         floor, spent = (0.0, 0.0), Budget(rtol)
 
@@ -267,8 +267,8 @@ class CurvedSurfaces(Potential):
 
     def _levels(self, pairs: bool, heat: Sequence[HeatTransfer] = ()) -> list[float]:
         """Return the gaps at which local laws have kinks; for pair laws these are the distances of their kinks."""
-        found = [bend for extent in laws_by_extent(self.pairs) for bend in extent.bends] if pairs else []
-        return sorted({*bends((*self.gap_laws, *heat)), *found})
+        found = [kink for extent in laws_by_extent(self.pairs) for kink in extent.kinks] if pairs else []
+        return sorted({*kinks((*self.gap_laws, *heat)), *found})
 
     def totals(self, approaches: Array, stretches: Array) -> Array:
         """Return results for each approach at its stretch of the area, shape (8, n).
@@ -382,7 +382,7 @@ class CurvedConductance(HeatTransfer):
     @cached_property
     def curve(self) -> ApproachEnergy:
         """The conductance over the approach."""
-        pair, law, levels = self.pair, density(self.law), bends([self.law])
+        pair, law, levels = self.pair, density(self.law), kinks([self.law])
         mark = fingerprint(pair.shapes, self.law, pair.approach, pair.accuracy)
         budget = Budget(pair.accuracy)
 

@@ -70,7 +70,7 @@ class Projection:
 
     ``at`` are the parameters (..., 2), ``gap`` is the distance along ``direction``, negative inside the body [m],
     ``beyond`` the distance of the points beyond each edge along the surface (..., edges) [m]. The direction is the
-    normal, but at an edge or a tip that from the closest point. After a search, ``rivals`` are the indices (m,) of the
+    normal, but at an edge or a tip that from the closest point. After a search, ``minima`` are the indices (m,) of the
     points of all searches, in one flat row, and the parameters (m, 2) that these have found.
     """
 
@@ -81,7 +81,7 @@ class Projection:
     direction: Array
     gap: Array
     beyond: Array
-    rivals: tuple[Indices, Array] | None
+    minima: tuple[Indices, Array] | None
 
     @cached_property
     def tied(self) -> NDArray[np.bool_]:
@@ -94,8 +94,8 @@ class Projection:
             # For a point on the axis all points around it are equally close.
             own, around = (x - [0.0, 0.0, self.surface.approach]) @ self.surface.axes, np.linalg.norm(D[2], axis=-1)
             found |= (np.hypot(own[..., 0], own[..., 1]) < EQUAL * around) & (around > EQUAL * size)
-        if self.rivals is not None:
-            which, places = self.rivals
+        if self.minima is not None:
+            which, places = self.minima
             rival, size = self.surface.derivatives(places, FIRST_ORDER)[0], size.reshape(-1)[which]
             x, nearest = (points.reshape(-1, 3)[which] for points in (x, self.point))
             near = np.linalg.norm(x - rival, axis=-1) <= size * (1 + EQUAL)
@@ -177,7 +177,7 @@ class Surface:
         """Project points (..., 3)."""
         x = np.asarray(x, dtype=float)
         own = (x - [0.0, 0.0, self.approach]) @ self.axes
-        rivals = None
+        minima = None
         if self.shape.foot is not None:
             at = self.shape.foot(own)
         else:
@@ -185,7 +185,7 @@ class Surface:
             places = x.reshape(-1, 3)[which]
             found = self._search(places, starts)
             distances = np.linalg.norm(places - self.derivatives(found, FIRST_ORDER)[0], axis=-1)
-            order, rivals = np.lexsort((distances, which)), (which, found)
+            order, minima = np.lexsort((distances, which)), (which, found)
             at = found[order[np.unique(which[order], return_index=True)[1]]].reshape(*x.shape[:-1], 2)
         at = self.off_pole(at)
         D = self.derivatives(at, FIRST_ORDER)
@@ -198,7 +198,7 @@ class Surface:
         gap = np.where((side < 0) & ~np.any(beyond > 0, axis=-1), -size, size)
         off = (at_edge & (size > 0))[..., None]
         direction = np.where(off, np.divide(away, gap[..., None], out=np.zeros_like(away), where=off), normal)
-        return Projection(self, at, D[0], normal, direction, gap, beyond, rivals)
+        return Projection(self, at, D[0], normal, direction, gap, beyond, minima)
 
     @cached_property
     def bounds(self) -> tuple[Array, Array]:

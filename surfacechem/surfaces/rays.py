@@ -19,7 +19,7 @@ from surfacechem.surfaces.projection import POLE, Array, Projection, Surface
 from surfacechem.surfaces.shapes import Indices, Sphere
 from surfacechem.tolerances import TINY
 
-BEND_SAMPLES = 4
+KINK_SAMPLES = 4
 """Parts of a piece between whose ends it is tested if the distance passes that of a kink."""
 
 
@@ -105,18 +105,18 @@ def _pieces(rays: Rays, extent: Extent, level: int) -> tuple[Indices, Array]:
     whole = np.arcsinh(1 / scale)
     edges = divided(np.stack([np.zeros_like(whole), whole], axis=1), level)
     count = edges.shape[1] - 1
-    looks = whole[:, None] * np.arange(count * BEND_SAMPLES + 1) / (count * BEND_SAMPLES)
-    r = rays.distances(scale[:, None] * np.sinh(looks))
+    samples = whole[:, None] * np.arange(count * KINK_SAMPLES + 1) / (count * KINK_SAMPLES)
+    r = rays.distances(scale[:, None] * np.sinh(samples))
     rank, t = [np.repeat(np.arange(len(whole)), count + 1)], [edges.ravel()]
-    for bend in extent.bends:
-        ray, k = np.nonzero((r[:, :-1] < bend) != (r[:, 1:] < bend))
+    for kink in extent.kinks:
+        ray, k = np.nonzero((r[:, :-1] < kink) != (r[:, 1:] < kink))
 
-        def above(t: Array, which: Indices, bend: float = bend) -> Array:
-            return rays.chosen(which).distances(scale[which] * np.sinh(t)) - bend
+        def above(t: Array, which: Indices, kink: float = kink) -> Array:
+            return rays.chosen(which).distances(scale[which] * np.sinh(t)) - kink
 
         if not len(ray):
             continue
-        found: Any = find_root(above, (looks[ray, k], looks[ray, k + 1]), args=(ray,))
+        found: Any = find_root(above, (samples[ray, k], samples[ray, k + 1]), args=(ray,))
         rank.append(ray)
         t.append(found.x)
     ray, places = np.concatenate(rank), np.concatenate(t)

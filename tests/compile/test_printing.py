@@ -39,7 +39,7 @@ def functions_of(model):
         "residual": (program.residual, list(system.rows.values())),
         "outputs": (model.output_function, [item.expression for item in system.outputs]),
         "ledger": (program.ledger, [account.rate for account in system.ledger]),
-        "margins": (program.margins, [each.masked for each in (*system.moving_margins, *system.edges)]),
+        "margins": (program.margins, [each.masked for each in (*system.event_margins, *system.edges)]),
     }
     return {name: (f, [system.expand(e) for e in rows]) for name, (f, rows) in functions.items() if f is not None}
 
@@ -73,7 +73,7 @@ def test_printed_equations_agree_with_machine_code_and_are_short_enough_to_read(
         for name, (function, expressions) in functions.items():
             exact = function(inputs)
             if name == "margins":  # what is not in play is printed as open
-                exact = np.where(system.in_play(parameters), exact, 1.0)
+                exact = np.where(system.active_guards(parameters), exact, 1.0)
             error = np.abs(np.array(getattr(module, name)(t, y, ydot, parameters)) - exact)
             for i in np.flatnonzero(~(error <= FORMULA_EPS * np.abs(exact))):
                 assert error[i] <= FORMULA_EPS * float(magnitude(expressions[i]).subs(point).n(53, real=True)), name

@@ -124,7 +124,7 @@ def test_the_choice_explains_itself(case, words):
     simulation = surfacechem.load(case)
     run = replace(simulation.case.run, solver="auto", accuracy=1e-8, rtol=first_tolerance(1e-8))
     problem = simulation.model.problem(run, simulation.model.values())
-    told = "\n".join(" ".join(row) for row in error_estimates.reasons(problem, run, simulation.system.moves))
+    told = "\n".join(" ".join(row) for row in error_estimates.reasons(problem, run, simulation.system.has_moving_gap))
     assert told.startswith(words)
     assert "a hundredth of the accuracy 1e-08" in told
     assert "a second run must agree" in told

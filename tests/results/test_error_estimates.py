@@ -197,7 +197,7 @@ def test_an_estimate_is_not_blind_where_steps_are_as_long_as_the_pieces_of_a_loa
         "interface: {potential: [normal-stiffness: {E_n: 1 MPa/m}]}",
     )
     found = surfacechem.run(f"{text}initial: {{g_n: 0 m}}\nrun: {{until: 1 s, rtol: 1e-7}}")
-    gaps, gap, misses = found.trajectory.looked, 0.0, []
+    gaps, gap, misses = found.trajectory.stored, 0.0, []
     for start, load, rate in zip(times, values, rates, strict=False):
         inside = (gaps.result.times > start) & (gaps.result.times <= start + 1 / n)
         into, steady = np.append(gaps.result.times[inside] - start, 1 / n), load / 2 + rate * tau / 2

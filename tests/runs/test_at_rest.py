@@ -6,7 +6,7 @@ import pytest
 import surfacechem
 from surfacechem.errors import InputError
 from surfacechem.runs.checking import check
-from surfacechem.runs.keeping import CAME_TO_REST, NOT_AT_REST, STATUSES
+from surfacechem.runs.keeping import NO_STEADY_STATE, STATUSES, STEADY_STATE
 from surfacechem.runs.summaries import store_summary
 
 STEADY = ["run.until=steady"]
@@ -79,7 +79,7 @@ def test_runs_of_a_store_end_where_each_is_at_rest(tmp_path):
     with stream.run().dataset as data:
         assert [STATUSES[code] for code in data["status"].values] == ["failed", "finished", "finished"]
         words = data.attrs["reasons"]
-        assert [words[code] for code in data["reason"].values] == [NOT_AT_REST, CAME_TO_REST, CAME_TO_REST]
+        assert [words[code] for code in data["reason"].values] == [NO_STEADY_STATE, STEADY_STATE, STEADY_STATE]
         for i, rate in enumerate(rates[1:], start=1):
             alone = simulation.run({path: rate}, error="balances").trajectory.result
             assert float(data["time_reached"][i]) == alone.t

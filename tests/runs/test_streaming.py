@@ -278,7 +278,7 @@ def test_a_killed_writer_loses_at_most_a_chunk_and_no_byte(whole, tmp_path):
     marks = sorted(file.name for file in (path / ".marks").iterdir())
     assert {"0", "1"} <= set(marks) < {"0", "1", "2", "3", "writer-1-of-1"}
     told = []
-    stored(path, resume=True, told=told.append)
+    stored(path, resume=True, on_progress=told.append)
     assert told[0].resumed == 16 * (len(marks) - 1)
     assert told[-1].done == told[-1].runs == 60
     assert digest(path) == digest(whole)
@@ -309,7 +309,7 @@ def test_a_damaged_chunk_is_computed_again(whole, tmp_path):
     (path / "T_last/c/2").write_bytes(b"damaged")
     (path / "phi_last/c/1").unlink()
     told = []
-    stored(path, resume=True, told=told.append)
+    stored(path, resume=True, on_progress=told.append)
     assert told[0].resumed == 60 - 2 * 16
     assert digest(path) == digest(whole)
 
@@ -371,7 +371,7 @@ def test_a_killed_worker_of_a_cluster_changes_no_byte(whole, tmp_path):
                 os.kill(victim, signal.SIGKILL)
             told.append(progress)
 
-        stored(tmp_path / "o.zarr", client=client, told=kill)
+        stored(tmp_path / "o.zarr", client=client, on_progress=kill)
     assert told[-1].done == 60
     assert digest(tmp_path / "o.zarr") == digest(whole)
 
@@ -507,7 +507,7 @@ def test_an_error_that_is_unknown_and_an_end_that_is_no_number_count_for_no_smal
     done = SimpleNamespace(
         accuracy=SimpleNamespace(errors=np.array([np.nan, 1e-9, 1e-9, 1e-9]), source="", why=""),
         run_ends=[dict.fromkeys(checking.BALANCE_COLUMNS, 0.0)] * 4,
-        runs=[SimpleNamespace(some=SimpleNamespace(roundings={}))] * 4,
+        runs=[SimpleNamespace(sample=SimpleNamespace(roundings={}))] * 4,
         audits=[],
     )
     simulation, plan = (SimpleNamespace(**{name: lambda *_: done}) for name in ("sweep_plan", "picked"))

@@ -54,8 +54,8 @@ def test_the_stepper_finds_the_same(clock, seed):
     directions = rng.integers(-1, 2, GUARDS).tolist()
     rows = np.array([polynomial(rng, d) for d in directions])
     kinds = tuple(Guard(True, d, strict=d == -1 and bool(rng.integers(2))) for d in directions)
-    in_play = tuple(bool(flag) for flag in rng.random(GUARDS) < 0.8)
-    case = problem(clock, [0.0], [0.0, 1.0], 1e-9, parameters=rows.ravel(), margins=kinds, in_play=in_play)
+    active = tuple(bool(flag) for flag in rng.random(GUARDS) < 0.8)
+    case = problem(clock, [0.0], [0.0, 1.0], 1e-9, parameters=rows.ravel(), margins=kinds, active=active)
     found = solver("radau").solve(case).events
 
     def values(_t: float, x: np.ndarray) -> np.ndarray:
@@ -66,7 +66,7 @@ def test_the_stepper_finds_the_same(clock, seed):
     step = DenseStep(0.0, 1.0, lambda t: np.array([t]))
     for each in (guards, at_once):
         each.start(values(0.0, np.zeros(1)))
-        t, fired = first_crossing(step, each, np.array(in_play), 1e-10)
+        t, fired = first_crossing(step, each, np.array(active), 1e-10)
         assert fired == found.index.tolist()
         assert t == pytest.approx(found.t[0] if fired else 1.0, rel=1e-9)
     state = [[vars(each)[name].tolist() for name in ("sides", "largest", "now", "due")] for each in (guards, at_once)]

@@ -180,7 +180,7 @@ def test_guards_are_in_play_by_the_rules_of_the_compiled_loop(member):
         values = np.array([parameter.value for parameter in system.parameters], dtype=float)
         for path, value in modes.items():
             values[paths.index(path) if path in paths else 0] = value
-        asked = {(k, j) for k, j, _ in system.rules}
-        held = {(k, j) for k, j, value in system.rules if values[j] == value}
-        playing = [all(pair in held for pair in asked if pair[0] == k) for k in range(len(system.in_play(values)))]
-        assert tuple(playing) == system.in_play(values)
+        asked = {(k, j) for k, j, _ in system.guard_conditions}
+        held = {(k, j) for k, j, value in system.guard_conditions if values[j] == value}
+        active = [all(pair in held for pair in asked if pair[0] == k) for k in range(len(system.active_guards(values)))]
+        assert tuple(active) == system.active_guards(values)

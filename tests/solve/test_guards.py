@@ -302,7 +302,7 @@ def test_coincident_events_have_one_time():
 def test_what_is_not_in_play_is_not_looked_at(name):
     """A limit that is crossed, one that starts at zero and falls, one that is no number there: none ends the run."""
     program = clock(0.3 - X, -X, se.log(X - 2.0), 0.7 - X)
-    case = problem(program, [0.0], [0.0, 1.0], 1e-8, margins=STOP * 4, in_play=(False, False, False, True))
+    case = problem(program, [0.0], [0.0, 1.0], 1e-8, margins=STOP * 4, active=(False, False, False, True))
     result = solver(name).solve(case)
     assert (result.status, result.t) == (Status.EVENT, pytest.approx(0.7))
     assert list(result.events.index) == [3]

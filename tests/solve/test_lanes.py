@@ -35,7 +35,7 @@ def arrays_of(simulation, runs=RUNS):
     """A problem, and columns of runs whose laws differ by a thousandth."""
     model = simulation.model
     run = replace(simulation.case.run, solver="dop853", rtol=1e-9)
-    problem = replace(model.problem(run, model.values({})), explicit=True, picture=0.0, record_steps=True)
+    problem = replace(model.problem(run, model.values({})), explicit=True, line_error=0.0, record_steps=True)
     system, program = simulation.model.system, problem.program
     held = {item.symbol for item in (*system.modes, *system.registers)}
     free = [each.symbol not in held and any(part in each.path for part in LAWS) for each in system.parameters]

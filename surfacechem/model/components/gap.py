@@ -84,7 +84,7 @@ def _moving(build: Build, mount: Support) -> Iterator[State]:
 
         def yielding() -> Expression:
             """Return the rate from the state rather than a derivative, so that power is linear in rates."""
-            rate = far_field(build, mount).yielding(G, derivative(build.psi, G))
+            rate = far_field(build, mount).damped_rate(G, derivative(build.psi, G))
             return build.name(VARIABLES["v_n"], build.constraint("closed").active * rate)
 
         build.variables.define("v_n", yielding, "derived", mount.by)
@@ -117,7 +117,7 @@ def laws(build: Build) -> Iterator[Record]:
         return
     g, far = build.variables.get("g_n", "the mechanics", "mechanics"), far_field(build, mount)
     if "g_n" not in build.motion.gap_rates:
-        yield from far.book(build, g, build.total_derivative(g))
+        yield from far.powers(build, g, build.total_derivative(g))
         return
     rate, t_n, closed = build.motion.gap_rates["g_n"], derivative(build.psi, g), build.constraint("closed")
     if not mount.quasi_static:
@@ -125,6 +125,6 @@ def laws(build: Build) -> Iterator[Record]:
     if not closed.modes:
         yield from closing(build, g)
     moves = symengine.Symbol("dg_n_dt") if mount.damped and not mount.inertial else None
-    yield from far.book(build, g, rate, moves)
+    yield from far.powers(build, g, rate, moves)
     yield from far.balance(build, rate, [t_n], velocity="v_n", active=closed.active if mount.inertial else 1)
     yield from impacts(build)

@@ -59,7 +59,7 @@ def _external(build: Build) -> Iterator[Power]:
             yield Power(HEAT, OUTSIDE, member, heat, f"H_{Q[2:]}", text, entropy=heat / T)
 
 
-def takers(build: Build) -> dict[str, Expression]:
+def receivers(build: Build) -> dict[str, Expression]:
     """Return the places that receive the heat that the interface makes in a jump, with their shares.
 
     The interface if it stores heat; without a medium the ends of its heat. If its temperature is algebraic, the ends of
@@ -71,14 +71,14 @@ def takers(build: Build) -> dict[str, Expression]:
     if centre.takes_heat:
         return {INTERFACE: symengine.Integer(1)}
     bodies = tuple(body.name for body in build.scene.bodies)
-    ways: dict[str, Expression] = {}
+    by_end: dict[str, Expression] = {}
     for pair, channels in build.conductances.items():
         for end in bodies if pair == BOTH_BODIES else set(pair) - {INTERFACE} if INTERFACE in pair else ():
-            ways[end] = ways.get(end, 0) + symengine.Add(*(_area(build, pair) * h for h in channels))
-    whole = symengine.Add(*ways.values())
+            by_end[end] = by_end.get(end, 0) + symengine.Add(*(_area(build, pair) * h for h in channels))
+    whole = symengine.Add(*by_end.values())
     # While no path conducts the shares are equal, so that they still sum to one.
     conducts = where(whole > 0, whole, 1)
-    return {end: where(whole > 0, h / conducts, symengine.Rational(1, len(ways))) for end, h in ways.items()}
+    return {end: where(whole > 0, h / conducts, symengine.Rational(1, len(by_end))) for end, h in by_end.items()}
 
 
 def _area(build: Build, ends: Collection[str]) -> Expression:

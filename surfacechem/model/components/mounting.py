@@ -63,12 +63,12 @@ class Support:
     law: Mounting
     axis: str
     by: str
-    beside: Support | None = None
+    first_axis: Support | None = None
     """The other tangential mounting, which shares the mass, and everything else if one is given for both."""
 
     @property
     def inertial(self) -> bool:
-        return self.beside.inertial if self.beside else self.law.m > 0
+        return self.first_axis.inertial if self.first_axis else self.law.m > 0
 
     @property
     def damped(self) -> bool:
@@ -149,28 +149,28 @@ class FarField:
         return symengine.Symbol(GAP_ALONG[self.mount.axis])
 
     @property
-    def works(self) -> bool:
+    def does_work(self) -> bool:
         """True if the far field does work."""
         return bool(self.w_dot != 0 or self.F != 0)
 
-    def stored(self, g: Expression) -> Expression:
+    def energy(self, g: Expression) -> Expression:
         """Return the elastic energy of the bodies [J/m^2]."""
         return elastic_energy(self.k, self.w, g)
 
-    def carried(self, g: Expression) -> Expression:
+    def elastic_traction(self, g: Expression) -> Expression:
         """Return the elastic traction of the bodies [Pa], the decrease of their energy with the gap."""
         slot = symengine.Symbol("opening")
-        return -derivative(self.stored(slot), slot).subs({slot: g})
+        return -derivative(self.energy(slot), slot).subs({slot: g})
 
     def force(self, g: Expression, rate: Expression) -> Expression:
         """Return the traction with which the far field opens the gap [Pa]."""
-        return self.carried(g) + self.c_b * (self.w_dot - rate) + self.F
+        return self.elastic_traction(g) + self.c_b * (self.w_dot - rate) + self.F
 
     def size(self, g: Expression) -> Expression:
         """Return the size of the tractions that balance in the far field [Pa]."""
         return self.k * (absolute(self.w) + absolute(g)) + absolute(self.F)
 
-    def paces(self, text: str) -> list[TimeScale]:
+    def time_scales(self, text: str) -> list[TimeScale]:
         """Return the period of a mass on the bodies' stiffness, or the relaxation time of a damper in parallel."""
         if self.k == 0:
             return []
@@ -182,16 +182,16 @@ class FarField:
             return [TimeScale(f"relaxation of the {text}", (self.c_b + self.c_g) / self.k, remedy)]
         return []
 
-    def takers(self, build: Build) -> dict[str, Expression]:
+    def receivers(self, build: Build) -> dict[str, Expression]:
         """Return the shares of places in the bodies in the dissipation of the support."""
         shares = zip((body.name for body in build.scene.bodies), (self.beta_1, 1 - self.beta_1), strict=True)
         return {place: share * part for body, share in shares for place, part in build.thermal.volume(body).items()}
 
-    def yielding(self, g: Expression, traction: Expression) -> Expression:
+    def damped_rate(self, g: Expression, traction: Expression) -> Expression:
         """Return the rate of the gap at which the dampers alone balance the driving traction [m/s]."""
         return (self.force(g, symengine.Integer(0)) - traction) / (self.c_b + self.c_g)
 
-    def book(
+    def powers(
         self, build: Build, g: Expression, rate: Expression, moves: Expression | None = None
     ) -> Iterator[Power | TimeScale]:
         """Yield the work of the far field and the dissipation of the dampers; store the energies of the bodies.
@@ -202,23 +202,23 @@ class FarField:
         moves = rate if moves is None else moves
         axis = self.mount.axis
         text = AXIS_WORDS[axis]
-        yield from self.paces(text)
+        yield from self.time_scales(text)
         for name, energy, what in (
-            ("spring", self.stored(g), "elastic energy of the bodies"),
+            ("spring", self.energy(g), "elastic energy of the bodies"),
             ("kinetic", self.m * rate**2 / 2, "kinetic energy"),
         ):
             if energy != 0:
                 build.store(Quantity(f"E_{name}_{axis}", "J/m^2", f"{what}, {text}"), energy)
         bulk = self.w_dot - rate
-        power = (self.carried(g) + self.c_b * bulk) * self.w_dot + self.F * moves
+        power = (self.elastic_traction(g) + self.c_b * bulk) * self.w_dot + self.F * moves
         if power != 0:
             yield Power(WORK, OUTSIDE, MECHANICS, power, f"W_{axis}", f"work of the far field on the {text}")
         if self.c_b != 0:
             damped = self.c_b * bulk * (self.w_dot - moves)
             label, what = f"bulk_damper_{axis}", f"the damper of the bodies, {text}"
-            symbol, takers = symengine.Symbol(f"D_{label}"), self.takers(build)
-            produced = symengine.Add(*(share * symbol / build.thermal.places[at].T for at, share in takers.items()))
-            yield Power(DISSIPATION, MECHANICS, takers, damped, label, what, entropy=produced)
+            symbol, receivers = symengine.Symbol(f"D_{label}"), self.receivers(build)
+            produced = symengine.Add(*(share * symbol / build.thermal.places[at].T for at, share in receivers.items()))
+            yield Power(DISSIPATION, MECHANICS, receivers, damped, label, what, entropy=produced)
         if self.c_g != 0:
             label = build.unique(f"contact_damper_{axis}")
             yield Power(DISSIPATION, MECHANICS, INTERFACE, self.c_g * rate * moves, label)
@@ -233,9 +233,9 @@ class FarField:
         inertia: Expression | None = None,
         active: Expression = 1,
         held: Expression | None = None,
-        along: Mapping[str, Expression] | None = None,
-        slides: int = 0,
-        bears: Expression = 1,
+        coupled: Mapping[str, Expression] | None = None,
+        slip: int = 0,
+        limit: Expression = 1,
     ) -> Iterator[Equilibrium]:
         """Set the rows of a gap that moves against ``tractions`` [Pa] by Newton's law, by dampers, or in equilibrium.
 
@@ -257,7 +257,7 @@ class FarField:
             residual = symengine.Add(self.force(self.gap, symengine.Integer(0)), *resisted)
             rows.equilibrium(name, build.total_derivative(residual), active, held)
             size = self.size(self.gap) + symengine.Add(*(absolute(part) for part in tractions))
-            yield Equilibrium(name, active * residual, size, along or {}, active, slides, bears)
+            yield Equilibrium(name, active * residual, size, coupled or {}, active, slip, limit)
 
 
 def far_field(build: Build, mount: Support) -> FarField:
@@ -286,7 +286,7 @@ def far_field(build: Build, mount: Support) -> FarField:
 
 def _bound(build: Build, mount: Support) -> Mounting | FarField:
     """Return the parameters of a mounting as symbols; two axes share the mass, or the whole mounting."""
-    if mount.beside is None:
+    if mount.first_axis is None:
         law = build.variables.bind(mount.law, f"mechanics.{SECTIONS[mount.axis]}", f"_{mount.axis}")
         # The parameter that makes a gap inertial, overdamped or quasi-static may change, but not vanish.
         dampers = [name for name in ("c_b", "c_g") if getattr(mount.law, name) > 0]
@@ -297,8 +297,8 @@ def _bound(build: Build, mount: Support) -> Mounting | FarField:
             if item.path == path and item.value > 0:
                 items[i] = replace(item, spec=replace(item.spec, above=0.0, at_least=-math.inf))
         return law
-    first = far_field(build, mount.beside)
-    if mount.law is mount.beside.law:
+    first = far_field(build, mount.first_axis)
+    if mount.law is mount.first_axis.law:
         return first
     law = build.variables.bind(mount.law, f"mechanics.{SECTIONS[mount.axis]}", f"_{mount.axis}")
     return replace(first, k=law.k, c_b=law.c_b, c_g=law.c_g, beta_1=law.beta_1)
@@ -306,9 +306,9 @@ def _bound(build: Build, mount: Support) -> Mounting | FarField:
 
 def jumps(build: Build) -> Iterator[Constraint]:
     """Yield the edge at the times of jumps of loads that act on a gap in equilibrium or on a spring."""
-    springs = [far.stored(far.gap) for far in build.motion.far_fields.values() if far.works]
-    felt = set().union(*(build.expanded(x).free_symbols for x in [*(e.residual for e in build.equilibria), *springs]))
-    paths = {item.path for item in build.parameters.items if item.symbol in felt}
+    springs = [far.energy(far.gap) for far in build.motion.far_fields.values() if far.does_work]
+    read = set().union(*(build.expanded(x).free_symbols for x in [*(e.residual for e in build.equilibria), *springs]))
+    paths = {item.path for item in build.parameters.items if item.symbol in read}
     steps = {
         name: load
         for name, load in build.loads.items()

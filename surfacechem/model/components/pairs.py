@@ -61,7 +61,7 @@ class Opposed:
         return "_".join(self.labels)
 
     @property
-    def told(self) -> tuple[Mapping[str, int | float], Expression] | None:
+    def known_length(self) -> tuple[Mapping[str, int | float], Expression] | None:
         """Change of species and of length, for a pair of single reactions with distances along the force; else None."""
         forward, backward = list(self.forward.values()), list(self.backward.values())
         x_f, x_r = forward[0].distance, backward[0].distance
@@ -175,7 +175,7 @@ def by_affinity(law: RateLaw) -> bool:
 
 def lengths(laws: Mapping[str, RateLaw], pairs: Sequence[Opposed]) -> dict[str, Expression]:
     """Return the displacement of the load on formation of a bond of each species [m], as far as pairs determine it."""
-    known = [pair.told for pair in pairs if pair.told is not None]
+    known = [pair.known_length for pair in pairs if pair.known_length is not None]
     known += [(law.stoichiometry(), law.length) for law in laws.values() if law.length is not None]
     names = list(dict.fromkeys(name for change, _ in known for name in change))
     both_ways = [law.stoichiometry() for law in laws.values() if law.balanced and not by_affinity(law)]

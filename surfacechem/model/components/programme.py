@@ -21,7 +21,7 @@ from surfacechem.quantities import INTERNAL, VARIABLES
 from surfacechem.scene import Stage
 
 STAGE = symengine.Symbol("stage")
-BEGUN = Register("stage_begun", "time at which the stage began")
+STAGE_START = Register("stage_begun", "time at which the stage began")
 STATE_SCALES = {"m": LENGTH_SCALE, "m/s": LENGTH_SCALE}
 
 
@@ -72,7 +72,7 @@ def _during(i: int) -> Expression:
 
 def stages(build: Build) -> Iterator[Constraint]:
     """Yield the edge at the end of each stage: after a time, at a value of a variable, or along another edge."""
-    begun, edges = BEGUN.symbol, []
+    begun, edges = STAGE_START.symbol, []
     waiting = [(i, item) for i, item in enumerate(build.scene.programme) if item.event and item.duration is None]
     for i, item in waiting:
         _refuse_unknown_event(build, i, item)
@@ -80,18 +80,18 @@ def stages(build: Build) -> Iterator[Constraint]:
         if item.duration is not None or (item.variable and not item.event):
             modes, reason = {STAGE: symengine.Integer(i + 1), begun: build.t}, f"the stage {item.name} ends"
             guard = _left(build, item)
-            edges.append(Edge(f"end of {item.name}", guard, reason, modes, passes=True, when={STAGE: (i,)}))
+            edges.append(Edge(f"end of {item.name}", guard, reason, modes, ends_stage=True, when={STAGE: (i,)}))
 
     def advancing(edge: Edge) -> dict[Expression, Expression]:
         """Return the new stage and its start time along an edge that stages wait for."""
         modes: dict[Expression, Expression] = {}
         for i, item in waiting:
-            if edge.name.startswith(item.event) and not edge.passes:
+            if edge.name.startswith(item.event) and not edge.ends_stage:
                 modes[STAGE] = where(_during(i), i + 1, modes.get(STAGE, STAGE))
                 modes[begun] = where(_during(i), build.t, modes.get(begun, begun))
         return modes
 
-    yield Constraint(registers=(BEGUN,), edges=tuple(edges), beside=advancing)
+    yield Constraint(registers=(STAGE_START,), edges=tuple(edges), resets=advancing)
 
 
 def _refuse_unknown_event(build: Build, i: int, item: Stage) -> None:
@@ -108,7 +108,7 @@ def _left(build: Build, item: Stage) -> Expression:
     path = f"programme.{item.name}"
     if item.duration is not None:
         spec = Spec("s", f"length of the stage {item.name}", above=0)
-        return BEGUN.symbol + build.parameters.add("length", f"{path}.for", spec, item.duration) - build.t
+        return STAGE_START.symbol + build.parameters.add("length", f"{path}.for", spec, item.duration) - build.t
     x, name, traction = _variable(build, item), item.variable, item.variable in SLIDING_TRACTIONS
     spec = Spec("Pa" if traction else unit_of(name), f"end of the stage {item.name}")
     path = f"{path}.until.{name}{'' if item.rising else '.falls-to'}"

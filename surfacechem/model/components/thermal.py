@@ -112,7 +112,7 @@ def rows(build: Build) -> Iterator[Power | State | Margin]:
         elif balances.second(node.free_energy, node.T) == 0:
             yield _fold_margin(build, node, own_rows[node.name])
         elif INTERFACE in node.energies and balances.second(build.psi, node.T) != 0:
-            capacity = balances.conditioned(node.capacity(), build.about)
+            capacity = balances.conditioned(node.capacity(), build.expansion_points)
             quantity = Quantity(f"C_{node.name}", "J/(m^2 K)", f"heat capacity of {thermal.owners(node)}")
             symbol = build.name(quantity, capacity)
             reason = f"the heat capacity at {node.name} was lost"
@@ -193,7 +193,7 @@ def _fold_margin(build: Build, node: Node, row: Expression) -> Margin:
 
 def _with_velocity(build: Build, heat: Expression, T: Expression) -> Expression:
     """Return the slope of a heat balance with temperature, including the response of sliding without inertia."""
-    following, slope = list(build.motion.slides_by.values()), derivative(heat, T)
+    following, slope = list(build.motion.slip_unknowns.values()), derivative(heat, T)
     if not any(depends(heat, x) for x in following):
         return slope
     tractions = [build.expanded(build.rows[str(x)]) for x in following]

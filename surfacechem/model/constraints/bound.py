@@ -62,7 +62,7 @@ def bound(build: Build, rate: Expression) -> Constraint:
         """Return the new mode along an edge at which bonds break at once: a bound no longer holds the bonding state."""
         return {held: symengine.Integer(0)} if PHI in edge.reset and held not in edge.modes else {}
 
-    return Constraint((mode,), edges=tuple(edges), active=1 - held**2, beside=breaking)
+    return Constraint((mode,), edges=tuple(edges), active=1 - held**2, resets=breaking)
 
 
 def _may_leave_the_range(build: Build) -> bool:

@@ -100,7 +100,7 @@ def softening(
     keeps, loses, parted = {MODE: (0,)}, {MODE: (1,)}, {MODE: (-1,)}
     remains = where(left < phi, where(left > 0, left, 0), phi)
     if "g_n" in build.motion.gap_rates and not build.variables.has("v_n"):
-        build.motion.follows[phi] = remains
+        build.motion.followers[phi] = remains
     fewer = "a jump leaves fewer bonds than there were"
     edges = [
         Edge("yield", beyond, fewer, reset={phi: remains}, equilibrates=True, heat="snap", when=keeps),
@@ -123,7 +123,7 @@ def softening(
         """Return the mode after an edge at which the normal gap jumps: phi leaves the envelope for the time being."""
         return {MODE: where(MODE > 0, 0, MODE)} if edge.equilibrates and MODE not in edge.modes else {}
 
-    stated: list[Constraint | Margin] = [*agrees, within, Constraint(modes, edges=tuple(edges), beside=apart)]
+    stated: list[Constraint | Margin] = [*agrees, within, Constraint(modes, edges=tuple(edges), resets=apart)]
     return stated, build.variables.call(law, law.statement, {"overshoot": overshoot})
 
 

@@ -39,7 +39,7 @@ def jumps(build: Build) -> Iterator[Constraint]:
     A = _tangent(gaps, residuals, rises)
     relative = _relative(build, A)
     tangent, whole = determinant(relative), determinant(A)
-    moved = {symengine.Symbol(x) for gap in gaps for x in (gap.state, *gap.along)}.union(*rises)
+    moved = {symengine.Symbol(x) for gap in gaps for x in (gap.state, *gap.coupled)}.union(*rises)
     if all(gap.state != "g_n" for gap in gaps) and not tangent.free_symbols & moved:
         return  # a constant stiffness cannot vanish
     falling = tuple(-_along(whole, gap, rise) for gap, rise in zip(gaps, rises, strict=True))
@@ -76,7 +76,7 @@ def _relative(build: Build, A: Matrix) -> tuple[tuple[Expression, ...], ...]:
 
 def _along(expression: Expression, gap: Equilibrium, rise: Rise) -> Expression:
     """Return the derivative along a gap, including the gaps that move with it and the temperatures that follow."""
-    moving = {gap.state: symengine.Integer(1), **gap.along}
+    moving = {gap.state: symengine.Integer(1), **gap.coupled}
     slope = sum((w * derivative(expression, symengine.Symbol(x)) for x, w in moving.items()), symengine.Integer(0))
     return slope + sum((warmer * derivative(expression, T) for T, warmer in rise.items()), 0)
 
@@ -87,36 +87,36 @@ def _rises(build: Build, gap: Equilibrium, residuals: Sequence[Expression]) -> R
     It follows from the energy balances for a motion that is faster than heat conduction.
     """
     free = build.thermal.free
-    felt = _felt(build, residuals)
-    motion = {symengine.Symbol(f"d{x}_dt"): w for x, w in ((gap.state, symengine.Integer(1)), *gap.along.items())}
+    nodes = _coupled_nodes(build, residuals)
+    motion = {symengine.Symbol(f"d{x}_dt"): w for x, w in ((gap.state, symengine.Integer(1)), *gap.coupled.items())}
     rest = {state.dot: symengine.Integer(0) for state in build.states}
     rows = {node.name: build.expanded(build.energy_row(node)) for node in free}
-    made = {
+    heats = {
         name: -sum((w * derivative(row, dot) for dot, w in motion.items()), symengine.Integer(0))
         for name, row in rows.items()
     }
     # A node without capacity passes its heat on.
-    passing = {x.T: made[x.name] / derivative(rows[x.name], x.T).subs(rest) for x in free if x.capacity() == 0}
+    passing = {x.T: heats[x.name] / derivative(rows[x.name], x.T).subs(rest) for x in free if x.capacity() == 0}
     rises = {}
-    for node in felt:
+    for node in nodes:
         passed = sum((derivative(rows[node.name], T).subs(rest) * warmer for T, warmer in passing.items()), 0)
-        heat = made[node.name] - passed
+        heat = heats[node.name] - passed
         if heat != 0:
             rises[node.T] = heat / node.capacity()
     return rises
 
 
-def _felt(build: Build, residuals: Sequence[Expression]) -> list[Node]:
+def _coupled_nodes(build: Build, residuals: Sequence[Expression]) -> list[Node]:
     """Return the nodes on whose temperatures the balances of tractions depend."""
-    felt = [node for node in build.thermal.free if any(depends(residual, node.T) for residual in residuals)]
-    for node in felt:
+    nodes = [node for node in build.thermal.free if any(depends(residual, node.T) for residual in residuals)]
+    for node in nodes:
         if node.capacity() == 0:
             raise InputError(
                 f"the traction of a quasi-static gap varies with {node.name}, which has no capacity. Give the "
                 "interface one, or mount the bodies with a damper or a mass.",
                 Place(path="interface.temperature"),
             )
-    return felt
+    return nodes
 
 
 def _size(build: Build, gap: Equilibrium, own: Expression) -> Expression:

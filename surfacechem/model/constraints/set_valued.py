@@ -44,7 +44,7 @@ SOFTEN = "Let a potential bear the bodies, such as `penalty`."
 
 
 def set_valued(
-    bears: Mapping[int, Expression],
+    reserves: Mapping[int, Expression],
     back: Mapping[int, Expression],
     aim: Mapping[Expression, Expression],
     onward: Mapping[Expression, Expression],
@@ -56,15 +56,15 @@ def set_valued(
 ) -> Constraint:
     """Return the edges between stick and slip, in both directions along a line or in any direction of the plane.
 
-    By the slip mode that is entered, ``bears`` is the reserve of sticking (limit less need); by the mode that is left,
+    By the slip mode that is entered, ``reserves`` are those of sticking (limit less need); by the mode that is left,
     ``back`` is the guard of the stop. When slip begins, the registers of its direction become ``aim`` and the states
     ``begin`` are reset. When it stops, the states ``end`` are reset and the modes become ``onward``: it may slip on if
     sticking cannot bear the pull. If the edge ``equilibrates``, quasi-static gaps find their equilibrium. If ``back``
     is a rate, slip also stops if it ``rests`` at zero.
     """
     edges = []
-    for s, guard in bears.items():
-        word = {1: " forward", -1: " backward"}[s] if len(bears) > 1 else ""
+    for s, guard in reserves.items():
+        word = {1: " forward", -1: " backward"}[s] if len(reserves) > 1 else ""
         reason, modes = f"sticking gives way and the interface slides{word}", {SLIP: symengine.Integer(s), **aim}
         begins = Edge(f"slip{word}", guard, reason, modes, begin, equilibrates, "local", strict=True, when={SLIP: (0,)})
         edges.append(begins)
@@ -96,7 +96,7 @@ def friction_impulse(build: Build, impulse: Expression) -> Iterator[Constraint]:
     rub = Edge("rub", due, reason, {exerted: ZERO, **stops}, left, heat="local")
     pressed = {exerted: where(absolute(v) > 0, impulse, ZERO)}
     # Before the rest: friction responds to each impact separately.
-    yield Constraint((), (IMPULSE,), (rub,), at_once=True, beside=lambda edge: pressed if edge.is_impact else {})
+    yield Constraint((), (IMPULSE,), (rub,), at_once=True, resets=lambda edge: pressed if edge.is_impact else {})
 
 
 def _impulse_ratio(build: Build, law: Friction, v: Expression) -> Expression:

@@ -66,11 +66,11 @@ def laws(build: Build) -> Iterator[Constraint]:
         bound = build.variables.bind(law, f"interface.limits.{law.name()}")
         strength = build.variables.call(bound, bound.statement)
         yield from _limit(build, law, strength, closed)
-        felt = build.expanded(strength).free_symbols
-        reclosing.append(any(symengine.Symbol(name) in felt for name in ("phi", *build.interface.bonds)))
+        symbols = build.expanded(strength).free_symbols
+        reclosing.append(any(symengine.Symbol(name) in symbols for name in ("phi", *build.interface.bonds)))
     again = {build.variables.get("bonded", "the limit"): ONE} if reclosing and all(reclosing) else {}
     if closed is not None:
-        build.reclosing = {closed: ONE, **again}
+        build.closing_modes = {closed: ONE, **again}
     elif again and "g_n" in build.motion.gap_rates:
         # An elastic interface whose strength depends on its bonds can bond again once the gap has closed.
         gap = build.variables.get("g_n", "the limit", "interface")

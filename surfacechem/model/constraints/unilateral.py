@@ -85,13 +85,13 @@ def laws(build: Build) -> Iterator[Constraint]:
         yield Constraint(edges=(opens,))
     gap = build.variables.get("g_n", "the rigid interface", "interface")
     if "g_n" not in build.motion.gap_rates:
-        yield _closing(Edge("touch", gap, "the gap closes", build.reclosing, when={closed: (0,)}))
+        yield _closing(Edge("touch", gap, "the gap closes", build.closing_modes, when={closed: (0,)}))
 
 
 def _closing(touch: Edge) -> Constraint:
     """Return the constraint of a closing edge; a jump of loads that presses the bodies together closes it too."""
     pressed = {mode: where(touch.masked < 0, value, mode) for mode, value in touch.modes.items()}
-    return Constraint(edges=(touch,), beside=lambda edge: pressed if edge.times else {})
+    return Constraint(edges=(touch,), resets=lambda edge: pressed if edge.times else {})
 
 
 def impacts(build: Build) -> Iterator[Constraint]:
@@ -103,28 +103,28 @@ def impacts(build: Build) -> Iterator[Constraint]:
     assert mount is not None
     shut, apart = {G: ZERO}, {closed: (0,)}
     if not mount.inertial:
-        yield _closing(Edge("touch", G, "the gap closes", build.reclosing, shut, equilibrates=True, when=apart))
+        yield _closing(Edge("touch", G, "the gap closes", build.closing_modes, shut, equilibrates=True, when=apart))
         return
     far = far_field(build, mount)
     speed, pressing = absolute(V), -far.force(ZERO, ZERO) / far.m
-    rests, remembered = _rests(build, far, speed, pressing)
+    at_rest, remembered = _rest_condition(build, far, speed, pressing)
     yield from friction_impulse(build, (1 + far.e) * far.m * speed)
     hits = Edge(
         "impact",
         G,
         "the bodies hit each other",
-        {LANDED.symbol: rests, **remembered},
-        {**shut, V: where(rests > 0, ZERO, far.e * speed)},
-        returns=where(pressing > 0, 2 * V / pressing, ZERO),
+        {LANDED.symbol: at_rest, **remembered},
+        {**shut, V: where(at_rest > 0, ZERO, far.e * speed)},
+        return_time=where(pressing > 0, 2 * V / pressing, ZERO),
         when=apart,
     )
-    calm, reason = {LANDED.symbol: ZERO, **build.reclosing}, "the bodies rest on each other"
-    rest = Edge("rest", -ONE, reason, calm, equilibrates=True, when={LANDED.symbol: (1,)})
+    modes_at_rest, reason = {LANDED.symbol: ZERO, **build.closing_modes}, "the bodies rest on each other"
+    rest = Edge("rest", -ONE, reason, modes_at_rest, equilibrates=True, when={LANDED.symbol: (1,)})
     # These edges are due at the same time as slip that would begin while the contact is still open, and go first.
     yield Constraint((), (LANDED, FASTEST) if remembered else (LANDED,), (hits, rest), at_once=True)
 
 
-def _rests(
+def _rest_condition(
     build: Build, far: FarField, speed: Expression, pressing: Expression
 ) -> tuple[Expression, dict[Expression, Expression]]:
     """Return an indicator, one if the bodies do not rebound, else zero, and new values of the registers it reads."""

@@ -223,7 +223,7 @@ def resistance(
     """Return the tractions of a law [Pa] by direction of slip."""
     both = directions(build)
     if len(both) == 1:
-        formula = bound.driven if law is build.motion.creeping else bound.statement
+        formula = bound.driven if law is build.motion.creep_law else bound.statement
         traction = build.variables.call(bound, formula, own)
         if any(slip.sticks for slip in build.motion.slips):
             # |v| has no sign: roundoff that moves the interface the wrong way as slip begins would be driven on.

@@ -129,7 +129,7 @@ def motion(build: Build, kinds: Sequence[Formulation]) -> Iterator[Record]:
         side = Component(d, far, u, rate, t_a, resisted, limit)
         sides.append(side)
         build.rows.kinematics(d.displacement, rate)
-        yield from far.book(build, u, rate)
+        yield from far.powers(build, u, rate)
         name_traction(build, d, SLIP, t_a + resisted, t_a + side.needed)
     a, b = (side.limit for side in sides)
     largest = a if a == b else where(a > b, a, b)
@@ -194,7 +194,7 @@ def _steady(build: Build, sides: Sequence[Component], largest: Expression) -> tu
     linear = slope != 0 and not depends(slope, SPEED)
     build.rows.switched("speed", SLIP, -along.subs({SPEED: 0}) / slope - SPEED if linear else along, SPEED)
     build.rows.switched("turn", SLIP * norm(*pull), across, TURN)  # without a pull there is no direction
-    build.motion.slides_by |= {"speed": SPEED, "turn": TURN}
+    build.motion.slip_unknowns |= {"speed": SPEED, "turn": TURN}
     # The slope at rest is the limit from positive speeds; it changes sign at a fold.
     ahead = -derivative(build.expanded(along), SPEED).subs({SPEED: SPEED + TINY})
     if any(depends(derivative(size, SPEED), SPEED) for size in sizes):

@@ -47,7 +47,7 @@ def evolve_drive(build: Build, *, inertial: bool) -> Expression | None:
         symbols = {parameter.path: parameter.symbol for parameter in build.parameters.items}
         bound = bound.bind({name: symbols[f"{bound.path}.{name}"] for name in varying})
     if not (inertial and varying):
-        build.motion.creeping = law
+        build.motion.creep_law = law
     # The internal variables of the law are read here before they are defined as states.
     own = {name: symengine.Symbol(name) for name in law.internal}
 

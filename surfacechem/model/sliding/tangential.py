@@ -115,7 +115,7 @@ def _states(build: Build, kind: Formulation) -> Iterator[Constraint]:
     if kind.rate_dependent and not kind.slides_inertially:
         drive = rate_and_state.evolve_drive(build, inertial=False) if alone else None
         by = "balance of the tangential tractions"
-        build.motion.slides_by[v] = evolve(build, v, by, algebraic=True) if drive is None else drive
+        build.motion.slip_unknowns[v] = evolve(build, v, by, algebraic=True) if drive is None else drive
         if not kind.elastic:
             rates[u] = symengine.Symbol(v)
     elif not kind.slides_inertially:
@@ -149,7 +149,7 @@ def _displacement(build: Build, kind: Formulation, alone: bool) -> None:
         def yielding() -> Expression:
             """Return the velocity at which the dampers bear the unbalanced traction."""
             traction = derivative(build.psi, symengine.Symbol("g_t")) + derivative(build.psi, u)
-            return build.name(VARIABLES["v_t"], far_field(build, mount).yielding(u, traction))
+            return build.name(VARIABLES["v_t"], far_field(build, mount).damped_rate(u, traction))
 
         rates[name] = symengine.Symbol("v_t")
         build.variables.define("v_t", yielding, "derived", place)
@@ -179,7 +179,7 @@ def _motion(build: Build, kind: Formulation) -> Iterator[Record]:
         yield Power(WORK, OUTSIDE, MECHANICS, (carried + t_a) * rate, "W_t", text)
     else:
         derived = rate == symengine.Symbol("v_t") and not kind.inertial
-        yield from far.book(build, u, rate, symengine.Symbol("du_t_dt") if derived else None)
+        yield from far.powers(build, u, rate, symengine.Symbol("du_t_dt") if derived else None)
         rest = yield from _balance(build, kind, far, slides, carried, t_a)
     if kind.elastic:
         rest = yield from _elastic_rows(build, kind, slides, t_f, needed, v)
@@ -196,7 +196,7 @@ def _friction(
     if kind.slides_inertially:
         still = symengine.Symbol(_velocity_state(build, kind))
         stops = [still]
-    elif rest is not None and build.motion.creeping is None:
+    elif rest is not None and build.motion.creep_law is None:
         # The velocity follows from tractions: as slip begins their balance at rest is roundoff and must not stop it.
         still = rest
         far = build.motion.far_fields.get(kind.d.axis)
@@ -212,13 +212,13 @@ def _friction(
         grows = build.total_derivative(limit)
         back = {s: where(limit > 0, at, where(grows > 0, at, absolute(at) + PICOMETRE)) for s, at in back.items()}
     # Beyond touch a contact law may go on to negative pressure; there slip needs a pull to begin.
-    bears = {s: where(limit > 0, limit, 0) - s * needed for s in (1, -1)}
+    reserves = {s: where(limit > 0, limit, 0) - s * needed for s in (1, -1)}
     # Without inertia the traction is at its limit as slip stops, and roundoff must not restart it.
     onward = where(absolute(needed) <= limit, 0, sign(needed)) if stops else ZERO
     breaks, end = breaks_bonds(build), dict.fromkeys(stops, ZERO)
     # Rate-independent slip finds its equilibrium at once; in other cases only lost bonds and their heat require one.
     equilibrates = bool(breaks) or follows
-    return set_valued(bears, back, {}, {SLIP: onward}, breaks, end, equilibrates=equilibrates, rests=follows)
+    return set_valued(reserves, back, {}, {SLIP: onward}, breaks, end, equilibrates=equilibrates, rests=follows)
 
 
 def _limit(build: Build, kind: Formulation) -> Expression:
@@ -245,8 +245,8 @@ def _balance(
         yield from far.balance(build, rate, tractions, velocity=state, inertia=inertia, active=active)
     elif kind.elastic:
         # The body's spring in series with the elastic gap, which follows at once while it cannot slide.
-        along = {"g_t": ONE if kind.rate_dependent else 1 - slides}
-        yield from far.balance(build, rate, tractions, along=along)
+        coupled = {"g_t": ONE if kind.rate_dependent else 1 - slides}
+        yield from far.balance(build, rate, tractions, coupled=coupled)
     elif kind.rate_dependent:
         v = symengine.Symbol(kind.d.velocity)
         build.rows.kinematics(name, v)
@@ -260,20 +260,20 @@ def _balance(
             raise InputError(message, PLACE)
         yield from _sticks(build, limit, far.force(u, ZERO) - t_a - carried)
     else:
-        stiffness, bears = far.k if far.k != 0 else 1, _limit(build, kind)
-        yield from far.balance(build, rate, tractions, active=slides, held=stiffness * du, slides=1, bears=bears)
+        stiffness, limit = far.k if far.k != 0 else 1, _limit(build, kind)
+        yield from far.balance(build, rate, tractions, active=slides, held=stiffness * du, slip=1, limit=limit)
     return None
 
 
 def _sticks(build: Build, limit: Expression, needed: Expression) -> Iterator[Margin | Constraint]:
     """Yield the limit of sticking under a dead load, with bonds or after they have broken.
 
-    If it bears more without bonds, they break and it keeps sticking.
+    If it reserves more without bonds, they break and it keeps sticking.
     """
     breaks = breaks_bonds(build)
     limit = build.expanded(limit)
     without = limit.subs(breaks)
-    reason = "the dead load exceeds what sticking bears, and nothing holds what slides; a mass or a stiffness would"
+    reason = "the dead load exceeds what sticking reserves, and nothing holds what slides; a mass or a stiffness would"
     spare = where(without > limit, without, limit) - absolute(needed)
     yield Margin("sticks", where(absolute(needed) > 0, spare, 1), reason)
     if without != limit:
@@ -296,7 +296,7 @@ def _elastic_rows(
     build.rows.equilibrium("g_t", build.total_derivative(residual), slides, dg - rate)
     size = absolute(t_e) + absolute(t_f)
     # Opposed to the displacement in series with it: the elastic gap grows by the part that does not slide.
-    yield Equilibrium("g_t", slides * residual, size, active=slides, slides=-1, bears=_limit(build, kind))
+    yield Equilibrium("g_t", slides * residual, size, active=slides, slip=-1, limit=_limit(build, kind))
     stiffness = derivative(t_e, symengine.Symbol("g_t"))
     if stiffness.free_symbols & {bond.symbol for bond in build.bonding.values()}:
         reason = "nothing carries the friction of the sliding interface: its tangential stiffness went with its bonds"
@@ -312,7 +312,7 @@ def _sliding_row(
     Returns a balance that is zero at rest: that of the tractions [Pa], or the velocity times the size of their slope,
     which changes sign at a fold.
     """
-    v = build.motion.slides_by[kind.d.velocity]
+    v = build.motion.slip_unknowns[kind.d.velocity]
     slope, balance = -derivative(build.expanded(driving), v), driving
     # The slope at rest is the limit from the slip direction, also where roundoff gives v the other sign.
     ahead, onward = (slope.subs({v: x + SLIP * TINY}) if kind.sticks else slope for x in (v, where(SLIP * v > 0, v, 0)))
@@ -326,7 +326,7 @@ def _sliding_row(
         build.rows.switched(str(v), slides, balance, v)
     else:
         build.rows.balance(str(v), balance)
-    if build.motion.creeping is not None and len(build.interface.frictions) == 1 and damping != 0:
+    if build.motion.creep_law is not None and len(build.interface.frictions) == 1 and damping != 0:
         return rest  # both friction and damper grow with the velocity
     if slope == 0:
         raise InputError(

@@ -236,8 +236,8 @@ def _bottom(value: Callable[[float], float], a: float, b: float, c: float) -> fl
     at_a, at_b, at_c = value(a), value(b), value(c)
     while at_b > 0.0 and c - a > SQRT_EPS * (abs(b) + (c - a)):
         left, right = (b - a) * (at_b - at_c), (b - c) * (at_b - at_a)
-        bend = left - right  # zero if the values underflow
-        x = b - 0.5 * ((b - a) * left - (b - c) * right) / bend if bend else b
+        curvature = left - right  # zero if the values underflow
+        x = b - 0.5 * ((b - a) * left - (b - c) * right) / curvature if curvature else b
         if not (a < x < c and abs(x - b) > 0.01 * (c - a)):  # no progress: into the larger part
             x = b + 0.1 * (c - b) if c - b > b - a else b - 0.1 * (b - a)
         at_x = value(x)

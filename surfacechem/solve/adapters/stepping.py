@@ -18,7 +18,7 @@ from surfacechem.tolerances import NEGLIGIBLE, SQRT_EPS, ULPS
 ENTROPY_GROUP = 1
 """Group of the ledger's entropy accounts."""
 
-MISSED_ERROR = 100.0
+MAX_DEFECT = 100.0
 """Defect, in tolerances, above which a step has missed something before an event."""
 
 FIRST_TOGETHER, TOGETHER_GROWTH, MOST_TOGETHER = 8, 16, 256
@@ -217,12 +217,12 @@ class _Run:
         self.ledger, self.ledger_rates = np.zeros(program.n_ledger), np.zeros(program.n_ledger)
         self.margins = np.zeros(0)
         self.entropic = np.array(program.groups) == ENTROPY_GROUP
-        self.guards = Guards.of(problem.margins, self._guards, problem.seen)
+        self.guards = Guards.of(problem.margins, self._guards, problem.margin_peaks)
         self.plain = program.plain_margins and not program.algebraic_mask.any()
         """True if margins depend only on variables that the library integrates."""
         if self.plain:
             self.guards.rows = lambda times, x: self.view.many.margins(times, x)
-        self.in_play = np.array((True,) * program.n_margins if problem.in_play is None else problem.in_play, bool)
+        self.active = np.array((True,) * program.n_margins if problem.active is None else problem.active, bool)
         self.outputs: list[Array] = []
         self.fired: list[int] = []
         self.events: list[tuple[Array, Array, Array, Array]] = []
@@ -301,7 +301,7 @@ class _Run:
             first, count = 0, len(steps.times) - 1
             while first < count:
                 margins = inside.margins.rows[first:]
-                far = self.guards.far(margins, self.in_play) if self.problem.margins else count - first
+                far = self.guards.far(margins, self.active) if self.problem.margins else count - first
                 if far:
                     self._accept(steps.since(first), inside.part(first, first + far))
                 else:
@@ -316,9 +316,9 @@ class _Run:
         within = replace(step, start=self.t, end=min(step.end, end))
         # Simultaneous zeros differ by the error of the library's polynomial.
         resolution = min(self.problem.rtol, SQRT_EPS) * (within.end - self.t) + ULPS * abs(within.end)
-        reached, fired = first_crossing(within, self.guards, self.in_play, resolution)
+        reached, fired = first_crossing(within, self.guards, self.active, resolution)
         inside = self._inside(Steps.of([step]), reached)
-        if fired and self.aim is None and not self._adds_up(inside, MISSED_ERROR)[0]:
+        if fired and self.aim is None and not self._adds_up(inside, MAX_DEFECT)[0]:
             self.aim = reached
             return []
         self._accept(lambda _: step, inside, fired)
@@ -333,7 +333,7 @@ class _Run:
         for k in np.flatnonzero(~relied).tolist():
             gains[k] = self._gained(step(k), float(times[k]), float(times[k + 1]), gains[k])
         ledgers = np.cumsum(np.concatenate((self.ledger[None], gains)), axis=0)
-        self._put_out(step, inside, ledgers, relied)
+        self._write_outputs(step, inside, ledgers, relied)
         if not all(np.all(np.isfinite(rows)) for rows in (y, ydot, ledgers)):
             raise StepError("a state is not finite")
         if self.aim is not None and self.aim <= self.t:
@@ -348,7 +348,7 @@ class _Run:
             self.fired.append(i)
             self.events.append((times[-1:], y[-1:], ydot[-1:], ledgers[-1:]))
 
-    def _put_out(
+    def _write_outputs(
         self, step: Callable[[int], DenseStep], inside: _Inside, ledgers: Array, relied: NDArray[np.bool_]
     ) -> None:
         """Store the outputs within steps, from the ledger at their ends and its rates inside."""

@@ -78,7 +78,7 @@ def _put_margins(w: Any) -> None:
 
 
 @compiled
-def may_meet(w: Any, good: Any) -> Any:
+def may_cross(w: Any, good: Any) -> Any:
     """Mask of lanes whose guards need a scan of the step.
 
     A guard does if it is at zero at a quarter point of the step, or nearer to zero than twice its second difference
@@ -90,7 +90,7 @@ def may_meet(w: Any, good: Any) -> Any:
     for m in range(w.n_margins):
         put(w.margin[m], lanes(w.margin_first[m]))
         put(w.nearest[m], lanes(w.side[m]) * lanes(w.margin_first[m]))
-        put(w.bend[m], 0.0)
+        put(w.curvature[m], 0.0)
     for quarter in range(1, 5):
         if quarter < 4:
             put_roughly(w, 0.25 * quarter)
@@ -101,12 +101,12 @@ def may_meet(w: Any, good: Any) -> Any:
             value = lanes(w.margin[m])
             put(w.nearest[m], smaller(lanes(w.nearest[m]), lanes(w.side[m]) * value))
             if quarter > 1:
-                bend = absolute(value - 2.0 * lanes(w.margin_before[m]) + lanes(w.margin_earlier[m]))
-                put(w.bend[m], larger(lanes(w.bend[m]), bend))
+                curvature = absolute(value - 2.0 * lanes(w.margin_before[m]) + lanes(w.margin_earlier[m]))
+                put(w.curvature[m], larger(lanes(w.curvature[m]), curvature))
     close = same(0.0)
     for m in range(w.n_margins):
         if w.kinds[m, 4] != 0:
-            close = where(lanes(w.nearest[m]) > 2.0 * lanes(w.bend[m]), close, 1.0)
+            close = where(lanes(w.nearest[m]) > 2.0 * lanes(w.curvature[m]), close, 1.0)
         put(w.margin_end[m], lanes(w.margin[m]))
     return good & (lanes(w.onto) < 0.5) & (close > 0.5)
 
@@ -164,7 +164,7 @@ def _nearest_inside(w: Any, x: Any) -> Any:
 
 
 @compiled
-def _locate(w: Any, met: Any) -> None:
+def _locate(w: Any, crossing: Any) -> None:
     """Locate the zeros of guards on the dense output, and their slopes there (Illinois: Dowell & Jarratt 1971, BIT
     11).
     """
@@ -174,7 +174,7 @@ def _locate(w: Any, met: Any) -> None:
     at_low = where(at_low > 0.0, at_low, TINY)
     kept = same(0.0)
     for iteration in range(60):
-        wide = met & (high - low > NEWTON_EPS * high) & (at_high < 0.0)
+        wide = crossing & (high - low > NEWTON_EPS * high) & (at_high < 0.0)
         if not any_lane(wide):
             break
         x = low + (high - low) * (at_low / (at_low - at_high))
@@ -190,15 +190,15 @@ def _locate(w: Any, met: Any) -> None:
         low, high = where(wide & ~across, x, low), where(wide & across, x, high)
     width = CBRT_EPS * larger(high, RUN_EPS)
     rise = _nearest_inside(w, high + width) - _nearest_inside(w, high - width)
-    put(w.slope, where(met, rise / (2.0 * width * lanes(w.h)), lanes(w.slope)))
-    put(w.met, where(met, high, 1.0))
+    put(w.slope, where(crossing, rise / (2.0 * width * lanes(w.h)), lanes(w.slope)))
+    put(w.crossing, where(crossing, high, 1.0))
 
 
 @compiled
-def meet(w: Any, good: Any, close: Any) -> None:
+def find_crossings(w: Any, good: Any, close: Any) -> None:
     """Find the guards that are crossed in accepted steps, and where; for a step onto a guard, its value at the end.
 
-    ``close`` is the mask of :func:`may_meet`, whose lanes have dense output.
+    ``close`` is the mask of :func:`may_cross`, whose lanes have dense output.
     """
     landing, whole = good & (lanes(w.onto) > 0.5), good & (lanes(w.onto) < 0.5)
     for m in range(w.n_margins):
@@ -209,10 +209,10 @@ def meet(w: Any, good: Any, close: Any) -> None:
     put(w.high, 0.0)
     if any_lane(close):
         _scan(w, close)
-    met = whole & (lanes(w.high) > 0.0)
-    put(w.met, 1.0)
-    if any_lane(met):
-        _locate(w, met)
+    crossing = whole & (lanes(w.high) > 0.0)
+    put(w.crossing, 1.0)
+    if any_lane(crossing):
+        _locate(w, crossing)
     for m in range(w.n_margins):
         put(w.margin[m], lanes(w.margin_end[m]))
     put(w.value, where(landing, _nearest(w), lanes(w.value)))
@@ -228,7 +228,7 @@ def _kink(w: Any, lane: int) -> bool:
 
 
 @compiled
-def lands(w: Any, lane: int) -> bool:
+def ends_on_guard(w: Any, lane: int) -> bool:
     """True if a step onto a guard may end where it does; otherwise set the next trial, and mark it unclear after too
     many.
 

@@ -10,17 +10,17 @@ import numpy as np
 
 from surfacechem.compile.vectors import LANES
 from surfacechem.solve.contract import Status
-from surfacechem.solve.lanes.lane_guards import lands, may_meet, meet, start_margins
+from surfacechem.solve.lanes.lane_guards import ends_on_guard, find_crossings, may_cross, start_margins
 from surfacechem.solve.lanes.lane_step import (
     END_STAGE,
     ORDER,
     WORK,
+    check_inside,
     eighth_root,
     find_stiff,
-    has_points,
     interpolate,
     larger,
-    look,
+    needs_checks,
     norm_of,
     propose,
     put_start,
@@ -29,8 +29,8 @@ from surfacechem.solve.lanes.lane_step import (
     try_step,
 )
 from surfacechem.solve.lanes.vector import absolute, any_lane, lanes, put, same, where
-from surfacechem.solve.radau.driver import FEWEST_LOOKS, LEAST_NORM
-from surfacechem.solve.radau.explicit import FALLS, STIFF_STEPS
+from surfacechem.solve.radau.driver import FEWEST_CHECKS, LEAST_NORM
+from surfacechem.solve.radau.explicit import MAX_ERROR_RATIO, STIFF_STEPS
 from surfacechem.solve.radau.record import laying_out
 from surfacechem.solve.radau.step import loosening
 from surfacechem.solve.radau.stepper import END, EVENTS, FIRST_COUNTER, OUTPUTS, RECORDS
@@ -104,7 +104,7 @@ def _enter(w: Any, lane: int) -> None:
     w.t[lane], w.end[lane] = segments[segment], segments[segment + 1]
     for j in range(w.parameters.shape[2]):
         w.inputs[1 + 2 * w.n + j, lane] = w.parameters[i, segment, j]
-    w.spacing_of[lane] = min(spacing, (w.end[lane] - w.t[lane]) / FEWEST_LOOKS)
+    w.spacing_of[lane] = min(spacing, (w.end[lane] - w.t[lane]) / FEWEST_CHECKS)
     w.fresh[lane] = 1.0
 
 
@@ -138,9 +138,9 @@ def _first_sizes(w: Any) -> Any:
         put(w.rates[m], lanes(w.rates[m]) - lanes(w.k[0, m]))
     change = norm_of(w, w.rates) / w.loose / speed
     scale = trial / change
-    felt = smaller(scale * smaller(1.0 / eighth_root(speed * scale), 1.0), 0.05 * span)
-    felt = where(change * span > SQRT_EPS * trial, felt, 0.05 * span)
-    return where((speed > 0.0) & (speed < np.inf), felt, NEGLIGIBLE * span)
+    first = smaller(scale * smaller(1.0 / eighth_root(speed * scale), 1.0), 0.05 * span)
+    first = where(change * span > SQRT_EPS * trial, first, 0.05 * span)
+    return where((speed > 0.0) & (speed < np.inf), first, NEGLIGIBLE * span)
 
 
 @compiled
@@ -306,7 +306,7 @@ def _go_on(w: Any, lane: int) -> None:
 def _conclude(w: Any, lane: int) -> None:
     """Decide about a trial step: repeat it, shorter or onto a guard, or accept it."""
     h = w.h[lane]
-    if w.again[lane] > 0.5 and w.norm[lane] > FALLS * w.norm_tried[lane] * (h / w.h_tried[lane]) ** 8:
+    if w.again[lane] > 0.5 and w.norm[lane] > MAX_ERROR_RATIO * w.norm_tried[lane] * (h / w.h_tried[lane]) ** 8:
         # The error of the repeated step has not fallen with its size: noise, or stiffness.
         w.stiff_steps[lane] += STIFF_STEPS
     if not w.norm[lane] < 1.0:
@@ -314,16 +314,16 @@ def _conclude(w: Any, lane: int) -> None:
         w.proposed[lane], w.again[lane] = w.following[lane], 1.0
         w.failed[lane] += 1
         w.rejected[lane] += 1
-    elif w.missed[lane] < 1.0:
+    elif w.defect_at[lane] < 1.0:
         # End a step there, so that its last stage sees what the other stages have missed.
-        w.aim[lane], w.proposed[lane] = w.t[lane] + w.missed[lane] * h, w.missed[lane] * h
+        w.aim[lane], w.proposed[lane] = w.t[lane] + w.defect_at[lane] * h, w.defect_at[lane] * h
         w.failed[lane] += 1
         w.rejected[lane] += 1
-    elif w.n_margins > 0 and w.landing[lane] == 0 and w.met[lane] < 1.0:
+    elif w.n_margins > 0 and w.landing[lane] == 0 and w.crossing[lane] < 1.0:
         w.landing[lane], w.nudge[lane], w.longest[lane] = 1, 0.0, 1.25 * h
-        w.proposed[lane] = w.met[lane] * h
+        w.proposed[lane] = w.crossing[lane] * h
         w.rejected[lane] += 1
-    elif w.landing[lane] == 0 or lands(w, lane):
+    elif w.landing[lane] == 0 or ends_on_guard(w, lane):
         w.taken[lane] = 1.0
         if w.next_output[lane] <= w.t_new[lane]:
             _write_outputs(w, lane)
@@ -373,16 +373,16 @@ def _step(w: Any) -> None:
     put(w.unclear, 0.0)
     if any_lane(good):
         find_stiff(w)
-        put(w.missed, 1.0)
-        close = may_meet(w, good)
-        seen, shown = has_points(w, good), any_lane(lanes(w.next_output) < lanes(w.t_new))
+        put(w.defect_at, 1.0)
+        close = may_cross(w, good)
+        seen, shown = needs_checks(w, good), any_lane(lanes(w.next_output) < lanes(w.t_new))
         if seen or shown:
             interpolate(w, w.columns)
         elif any_lane(close):
             interpolate(w, w.n)
         if seen:
-            look(w, good)
-        meet(w, good & (lanes(w.missed) == 1.0), close)
+            check_inside(w, good)
+        find_crossings(w, good & (lanes(w.defect_at) == 1.0), close)
     put(w.taken, 0.0)
     for lane in range(LANES):
         if w.run[lane] >= 0:

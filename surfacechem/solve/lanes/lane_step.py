@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from surfacechem.compile.vectors import LANES
 from surfacechem.solve.lanes.layout import MEMORY, SIZES
 from surfacechem.solve.lanes.vector import absolute, any_lane, floor, lanes, put, same, square_root, where
-from surfacechem.solve.radau.dense import FORESEEN_PART, N_GROUPS, booked
-from surfacechem.solve.radau.explicit import DENSEST, ERROR_PART, FELT, FOLLOWED, STIFF_STEP
+from surfacechem.solve.radau.dense import FORESEEN_PART, N_GROUPS, ledger_rtol
+from surfacechem.solve.radau.explicit import DENSEST, ERROR_PART, FOLLOWED_PART, STABILITY_LIMIT, STIFF_STEP
 from surfacechem.solve.radau.record import StepperRecord
-from surfacechem.solve.radau.step import END_LOOKS, LOOK_PART, MAX_GROWTH, MIN_GROWTH, SAFETY, UNSEEN_ERROR
+from surfacechem.solve.radau.step import CHECK_PART, END_CHECKS, MAX_DEFECT, MAX_GROWTH, MIN_GROWTH, SAFETY
 from surfacechem.solve.radau.tables import (
     DENSE_FACTORS,
     EXPLICIT,
@@ -131,7 +131,7 @@ def _ledger_norms(w: Any) -> Any:
                 second = larger(second, absolute(lanes(w.fine[w.n + m])))
                 scale = larger(scale, lanes(w.q_scale[m]))
         norm = larger(norm, h * miss * miss / (square_root(miss * miss + 0.01 * second * second) + TINY) / scale)
-    return where(h < LOOSE_RTOL * lanes(w.t), 0.0, norm / booked(w.rtol))
+    return where(h < LOOSE_RTOL * lanes(w.t), 0.0, norm / ledger_rtol(w.rtol))
 
 
 @compiled
@@ -186,8 +186,8 @@ def find_stiff(w: Any) -> None:
         fastest = where(most, apart / (moved + TINY), fastest)
         speed = larger(speed, absolute(end) * unit)
         change = larger(change, absolute(end - lanes(w.k[0, m])) * unit)
-    outrun = (fastest > FELT) & (change < FOLLOWED * fastest * speed)
-    put(w.stiff, where((fastest > STIFF_STEP) | outrun, 1.0, 0.0))
+    is_limited = (fastest > STABILITY_LIMIT) & (change < FOLLOWED_PART * fastest * speed)
+    put(w.stiff, where((fastest > STIFF_STEP) | is_limited, 1.0, 0.0))
 
 
 @compiled
@@ -218,8 +218,8 @@ def put_roughly(w: Any, x: float) -> None:
     put(w.inputs[0], lanes(w.t) + x * h)
     for m in range(w.n):
         mean, first, last = lanes(w.change[m]), lanes(w.k[0, m]), lanes(w.k[END_STAGE, m])
-        bend = 3.0 * mean - 2.0 * first - last + x * (first + last - 2.0 * mean)
-        put(w.inputs[1 + m], lanes(w.y[m]) + h * x * (first + x * bend))
+        curvature = 3.0 * mean - 2.0 * first - last + x * (first + last - 2.0 * mean)
+        put(w.inputs[1 + m], lanes(w.y[m]) + h * x * (first + x * curvature))
 
 
 @compiled
@@ -231,12 +231,12 @@ def put_end(w: Any) -> None:
 
 
 @compiled
-def _prepare_looks(w: Any) -> None:
+def _prepare_checks(w: Any) -> None:
     """Set the allowed defect of the rate of each column, and the coefficients of the slope of the dense output."""
     h = lanes(w.h)
     for m in range(w.n):
         size = larger(absolute(lanes(w.y[m])), absolute(lanes(w.y_new[m])))
-        put(w.allowed[m], UNSEEN_ERROR * GAMMA[DENSEST] * w.loose * larger(w.rtol * size + w.atol[m], TINY) / h)
+        put(w.allowed[m], MAX_DEFECT * GAMMA[DENSEST] * w.loose * larger(w.rtol * size + w.atol[m], TINY) / h)
     for m in range(w.n_ledger):
         put(w.allowed[w.n + m], same(np.inf))  # an account without a group only has to be finite
     for group in range(N_GROUPS):
@@ -246,7 +246,7 @@ def _prepare_looks(w: Any) -> None:
                 scale = larger(scale, lanes(w.q_scale[m]))
         for m in range(w.n_ledger):
             if w.groups[m] == group:
-                put(w.allowed[w.n + m], UNSEEN_ERROR * booked(w.rtol) * scale / h)
+                put(w.allowed[w.n + m], MAX_DEFECT * ledger_rtol(w.rtol) * scale / h)
     for d in range(ORDER):
         for m in range(w.columns):
             put(w.slope_of[d, m], float(d + 1) * lanes(w.polynomial[d, m]))
@@ -275,42 +275,42 @@ def _agrees(w: Any, x: Any) -> Any:
 
 
 @compiled
-def _miss(w: Any, x: Any, looks: Any) -> None:
-    """Store x in the lanes in ``looks`` whose rates first disagree with the dense output there."""
-    missed = lanes(w.missed)
-    put(w.missed, where((looks > 0.5) & (missed == 1.0) & ~_agrees(w, x), x, missed))
+def _mark_defects(w: Any, x: Any, checked: Any) -> None:
+    """Store x in the lanes in ``checked`` whose rates first disagree with the dense output there."""
+    defect_at = lanes(w.defect_at)
+    put(w.defect_at, where((checked > 0.5) & (defect_at == 1.0) & ~_agrees(w, x), x, defect_at))
 
 
 @compiled
-def has_points(w: Any, good: Any) -> bool:
+def needs_checks(w: Any, good: Any) -> bool:
     """True if the equations are to be checked somewhere inside a step."""
     h, spacing = lanes(w.h), lanes(w.spacing_of)
-    beside = lanes(w.begins) + lanes(w.last) + lanes(w.onto) > 0.5
-    return bool(any_lane(good & (h > LOOK_PART * spacing) & (beside | (h >= spacing))))
+    at_ends = lanes(w.begins) + lanes(w.last) + lanes(w.onto) > 0.5
+    return bool(any_lane(good & (h > CHECK_PART * spacing) & (at_ends | (h >= spacing))))
 
 
 @compiled
-def look(w: Any, good: Any) -> None:
+def check_inside(w: Any, good: Any) -> None:
     """Check the equations inside each step; keep the fraction where the dense output first misses them, one if nowhere.
 
     Checks are denser next to the ends of a load segment and of a step that an event has cut short: a feature there may
     be narrow.
     """
     h, spacing = lanes(w.h), lanes(w.spacing_of)
-    looks = good & (h > LOOK_PART * spacing)
-    _prepare_looks(w)
-    begins, ends = where(looks, lanes(w.begins), 0.0), where(looks, larger(lanes(w.last), lanes(w.onto)), 0.0)
+    checked = good & (h > CHECK_PART * spacing)
+    _prepare_checks(w)
+    begins, ends = where(checked, lanes(w.begins), 0.0), where(checked, larger(lanes(w.last), lanes(w.onto)), 0.0)
     if any_lane(begins > 0.5):
         # From the narrowest outwards: the first disagreement tells how short the step has to be.
-        for k in range(END_LOOKS, 0, -1):
-            _miss(w, same(10.0**-k), begins)
-    points = where(looks, h / spacing, 0.0)
+        for k in range(END_CHECKS, 0, -1):
+            _mark_defects(w, same(10.0**-k), begins)
+    points = where(checked, h / spacing, 0.0)
     i = 0.0
     while any_lane(points >= i + 1.0):
         # One check in the middle of each whole spacing.
         most = floor(points)
-        _miss(w, (i + 0.5) / larger(most, 1.0), where(most >= i + 1.0, 1.0, 0.0))
+        _mark_defects(w, (i + 0.5) / larger(most, 1.0), where(most >= i + 1.0, 1.0, 0.0))
         i += 1.0
     if any_lane(ends > 0.5):
-        for k in range(1, END_LOOKS + 1):
-            _miss(w, same(1.0 - 10.0**-k), ends)
+        for k in range(1, END_CHECKS + 1):
+            _mark_defects(w, same(1.0 - 10.0**-k), ends)

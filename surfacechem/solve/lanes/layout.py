@@ -30,7 +30,7 @@ MEMORY = {
     # near to zero and how much it bends; largest value so far; side of zero, 0 where it is not known yet;
     # whether each is met in the step
     **_arrays("margin margin_before margin_earlier margin_first margin_end", "n_margins"),
-    **_arrays("nearest bend margin_largest side fired", "n_margins"),
+    **_arrays("nearest curvature margin_largest side fired", "n_margins"),
     # the time, now and at the end of the step; the end of the segment, a time at which a step has to end, and the time
     # of the next output
     **_arrays("t t_new end aim next_output"),
@@ -38,7 +38,7 @@ MEMORY = {
     # equations are
     **_arrays("h h_last h_tried norm norm_last norm_tried proposed following spacing_of"),
     # the fraction of the step at which it has missed something, and at which it meets a guard, with the bracket of that
-    **_arrays("missed met low high"),
+    **_arrays("defect_at crossing low high"),
     # a step onto a guard: its value at the end, its slope, the longest step to try, the last push across
     **_arrays("value slope longest nudge"),
     # flags: a start or restart; the first step of a segment, the last one; a step onto a guard; one that is repeated;

@@ -172,7 +172,7 @@ def defect_norm(w: Any, defects: Any, h: float, remaining: float) -> float:
     stages, the quadrature 2s - 1: for a smooth rate its error, relative to the amount exchanged in the step, is that
     power of the defect.
     """
-    largest, rates = w.q_turned, w.rates
+    largest, rates = w.q_turnover, w.rates
     for m in range(w.n_ledger):
         largest[m] = abs(rates[7, m])
     for i in range(stage_count(w.member)):
@@ -182,14 +182,14 @@ def defect_norm(w: Any, defects: Any, h: float, remaining: float) -> float:
         rate, miss = largest[m], abs(defects[m])
         if miss > 0.0:
             rate = max(rate, miss / h)
-        w.q_miss[m], w.q_turned[m], w.q_excused[m] = miss, h * rate, 0.0
+        w.q_error[m], w.q_turnover[m], w.q_explained[m] = miss, h * rate, 0.0
         w.q_largest[m] = max(w.q_largest[m], abs(w.q[m]))
         w.q_scale[m] = w.q_largest[m] + max(h, FORESEEN_PART * remaining) * rate
     return _group_norm(w)
 
 
 @compiled
-def booked(rtol: float) -> float:
+def ledger_rtol(rtol: float) -> float:
     """Quadrature error that a tolerance of the states allows, relative to the amount exchanged; bounded, however loose
     the tolerance, so that the balances close.
     """
@@ -200,22 +200,22 @@ def booked(rtol: float) -> float:
 def _group_norm(w: Any) -> float:
     """Largest quadrature error in units of the allowed error of its group."""
     # Accounts of one kind are summed: the error of one counts relative to the largest.
-    norm, allowed, power = 0.0, booked(w.rtol), 1.0 - 1.0 / stage_count(w.member)
+    norm, allowed, power = 0.0, ledger_rtol(w.rtol), 1.0 - 1.0 / stage_count(w.member)
     for group in range(N_GROUPS):
         miss, scale = 0.0, TINY
         for m in range(w.n_ledger):
             if w.groups[m] == group:
                 scale = max(scale, w.q_scale[m])
                 # An error is less than its defect: its power, the costliest part, only where it may be the largest.
-                if w.q_miss[m] - w.q_excused[m] > miss:
-                    part = w.q_miss[m] / w.q_turned[m]
-                    miss = max(miss, w.q_miss[m] * part**power - w.q_excused[m])
+                if w.q_error[m] - w.q_explained[m] > miss:
+                    part = w.q_error[m] / w.q_turnover[m]
+                    miss = max(miss, w.q_error[m] * part**power - w.q_explained[m])
         norm = max(norm, miss / scale)
     return norm / allowed
 
 
 @compiled
-def excused_norm(w: Any, h: float) -> float:
+def explained_norm(w: Any, h: float) -> float:
     """The last norm without the part that an error of the states within their tolerance causes in an account."""
     n, last = w.n, stage_count(w.member) - 1
     set_stage(w, last, h)
@@ -224,9 +224,9 @@ def excused_norm(w: Any, h: float) -> float:
         change = (1 + j % 3) * (1 - 2 * (j % 2)) * w.weight[j]
         w.inputs[1 + j] += change
         w.inputs[1 + n + j] += change / h
-    evaluate(w, LEDGER, w.q_excused)
+    evaluate(w, LEDGER, w.q_explained)
     for m in range(w.n_ledger):
-        w.q_excused[m] = h * abs(w.q_excused[m] - w.rates[last, m])
+        w.q_explained[m] = h * abs(w.q_explained[m] - w.rates[last, m])
     return _group_norm(w)
 
 
@@ -239,4 +239,4 @@ def ledger_norm(w: Any, h: float, remaining: float) -> float:
         return 0.0
     if not finite(w.q_stage[stage_count(w.member) - 1]):
         return np.inf
-    return excused_norm(w, h) if defect_norm(w, w.q_correction, h, remaining) > NEGLIGIBLE else 0.0
+    return explained_norm(w, h) if defect_norm(w, w.q_correction, h, remaining) > NEGLIGIBLE else 0.0

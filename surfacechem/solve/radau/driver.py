@@ -11,19 +11,19 @@ from surfacechem.solve.radau.dense import finish_step, hold_rates, ledger_norm
 from surfacechem.solve.radau.guards import AT_START, find_event, keep_sides, mark_at_end, restore_sides, start_margins
 from surfacechem.solve.radau.linear import LARGE_MATRIX
 from surfacechem.solve.radau.newton import stage_count
-from surfacechem.solve.radau.outputs import is_within, write_now, write_outputs, write_picture
+from surfacechem.solve.radau.outputs import is_within, write_interior, write_now, write_outputs
 from surfacechem.solve.radau.step import (
+    CHECK_PART,
     GOOD,
-    LOOK_PART,
     accept,
     advance,
+    first_defect,
     first_size,
     growing_size,
     keep_matrices,
     loosening,
     restart,
     store_polynomial,
-    unseen,
 )
 from surfacechem.solve.radau.stepper import (
     ARCS,
@@ -58,7 +58,7 @@ MOST_REFUSED = 40
 """Steps that the ledger may reject since the last restart, in addition to half of all: its error may be noise, which
 must not end a run.
 """
-FEWEST_LOOKS = 4
+FEWEST_CHECKS = 4
 """Fewest checks of the steps against the equations inside in a segment, however short: a choice. Each costs an
 evaluation in every segment; a feature that lasts less than a fourth of a segment may be missed.
 """
@@ -69,7 +69,7 @@ root, as in ideal diffusion; the error of a logarithm is of order one.
 LEAST_NORM = 1e-2
 """Error norm of the last step below which it tells the controller nothing more (Hairer & Wanner II, IV.8)."""
 
-TAKEN, AGAIN, MISSED, ENDED = range(4)
+TAKEN, REPEAT, DEFECTIVE, ENDED = range(4)
 """Verdicts on a step."""
 
 
@@ -88,7 +88,7 @@ def _write_state(w: Any, row: Any, t: float) -> None:
 @compiled
 def _now(w: Any) -> float:
     """Return the time of the run."""
-    return float(w.origin + (w.base + w.tau))
+    return float(w.arc_start + (w.base + w.tau))
 
 
 @compiled
@@ -107,9 +107,9 @@ def _write_events(w: Any, events: Any, counts: Any) -> bool:
         k = min(counts[EVENTS], events.shape[0]) - 1
         if w.kinds[m, 0] == 0:
             # A step ends just short of a kink and the next one passes it: count one event.
-            while k >= w.first_event and now - (events[k, 1] - w.origin) <= RUN_EPS * now and events[k, 0] != m:
+            while k >= w.first_event and now - (events[k, 1] - w.arc_start) <= RUN_EPS * now and events[k, 0] != m:
                 k -= 1
-            if k >= w.first_event and now - (events[k, 1] - w.origin) <= RUN_EPS * now:
+            if k >= w.first_event and now - (events[k, 1] - w.arc_start) <= RUN_EPS * now:
                 continue
         if counts[EVENTS] < events.shape[0]:
             row = events[counts[EVENTS]]
@@ -123,7 +123,7 @@ def _write_events(w: Any, events: Any, counts: Any) -> bool:
 @compiled
 def _record(w: Any, records: Any, counts: Any) -> None:
     # A step too short to change the time repeats the event that ended the last arc.
-    if counts[RECORDS] > 0 and w.clocks.shape[0] > 0 and _now(w) == w.origin:
+    if counts[RECORDS] > 0 and w.clocks.shape[0] > 0 and _now(w) == w.arc_start:
         return
     if counts[RECORDS] < records.shape[0]:
         _write_state(w, records[counts[RECORDS]], _now(w))
@@ -154,10 +154,10 @@ def _start(w: Any, i: int) -> int:
     _write_up_to(w, i, w.base)
     if counts[RECORDS] == 0:
         _record(w, w.records[i], counts)
-    elif w.picture > 0.0 and w.tau == 0.0:
+    elif w.line_error > 0.0 and w.tau == 0.0:
         # Store the state on the other side of the breakpoint.
         if counts[INSIDE] < w.inside_times.shape[1]:
-            w.inside_times[i, counts[INSIDE]] = w.origin + w.base
+            w.inside_times[i, counts[INSIDE]] = w.arc_start + w.base
             write_now(w, w.inside[i, counts[INSIDE]])
         counts[INSIDE] += 1
     return GOOD
@@ -186,9 +186,9 @@ def _ledger_limit(w: Any, h: float, remaining: float) -> float:
     limit = h * max(least, 0.9 * max(norm, NEGLIGIBLE) ** (-1.0 / power))
     if norm <= 1.0:
         return max(limit, h)
-    if w.refused > MOST_REFUSED + (w.steps - w.steps_before) // 2:
+    if w.ledger_rejections > MOST_REFUSED + (w.steps - w.steps_before) // 2:
         return np.inf
-    w.refused += 1
+    w.ledger_rejections += 1
     w.h_refused, w.norm_refused = h, norm
     return limit
 
@@ -198,10 +198,10 @@ def _judge(w: Any, h: float, limit: float, left: float, spacing: float) -> tuple
     """Return a verdict on a converged step, and a size: up to where it is TAKEN, or that of the next trial.
 
     An event may shorten it. It is repeated if the ledger allows less (``limit``), if a guard may be passed at its
-    start, and, MISSED, up to a feature between its stages.
+    start, and, DEFECTIVE, up to a feature between its stages.
     """
     if limit < h:
-        return AGAIN, limit
+        return REPEAT, limit
     size = h
     if w.n_margins > 0:
         keep_sides(w)
@@ -209,54 +209,54 @@ def _judge(w: Any, h: float, limit: float, left: float, spacing: float) -> tuple
     if size == AT_START:
         return ENDED, h
     if size == 0.0:
-        return AGAIN, 0.25 * h
+        return REPEAT, 0.25 * h
     if size != h:
         # The step onto an event may end where a rate is singular, unlike the longer step. The ledger approaches it
         # in ever shorter steps, and holds the rates at the start over the last one.
         limit = _ledger_limit(w, size, left)
         if limit < size:
             restore_sides(w)
-            return AGAIN, limit
+            return REPEAT, limit
         if _is_brief(w, size) and ledger_norm(w, size, left) > 1.0:
             hold_rates(w, size)
-    if size > LOOK_PART * spacing:
+    if size > CHECK_PART * spacing:
         # Next to the ends of a segment and to events there may be narrow features.
-        seen = unseen(w, size, spacing, left, w.tau == 0.0, size == left or any_true(w.fired))
-        if seen < 1.0:
+        defect_at = first_defect(w, size, spacing, left, w.tau == 0.0, size == left or any_true(w.fired))
+        if defect_at < 1.0:
             restore_sides(w)
-            return MISSED, seen * size
+            return DEFECTIVE, defect_at * size
     return TAKEN, size
 
 
 @compiled
-def _accept(w: Any, i: int, size: float, end: float, goes_on: bool) -> None:
+def _accept(w: Any, i: int, size: float, end: float, continued: bool) -> None:
     """Move on by a step of this size and write its outputs; up to roundoff to the exact end of the segment."""
     counts = w.counts[i]
     reached = w.base + (w.tau + size)
     whole = size == (end - w.base) - w.tau or reached >= end
     times = w.times[row_of(w.times, i)]
     # The last outputs of an arc are those up to the end of its segment.
-    shown = w.shown - w.origin if whole and end == w.arc_end else end if whole else reached
+    shown = w.outputs_end - w.arc_start if whole and end == w.arc_end else end if whole else reached
     counts[OUTPUTS] = write_outputs(w, times, w.outputs[i], counts[OUTPUTS], size, shown)
-    if w.picture > 0.0:
-        counts[INSIDE] = write_picture(w, w.inside_times[i], w.inside[i], counts[INSIDE], size)
+    if w.line_error > 0.0:
+        counts[INSIDE] = write_interior(w, w.inside_times[i], w.inside[i], counts[INSIDE], size)
     store_polynomial(w, size, 1.0)
     accept(w, size)
     keep_largest(w.y, w.peaks_seen)
     _record(w, w.records[i], counts)
     if whole:
         w.tau = end - w.base
-        if w.n_margins > 0 and goes_on:
+        if w.n_margins > 0 and continued:
             mark_at_end(w)
 
 
 @compiled
-def _run_segment(w: Any, i: int, end: float, goes_on: bool) -> int:
+def _run_segment(w: Any, i: int, end: float, continued: bool) -> int:
     """Integrate to the end of a segment; return GOOD, or the status that ends the run."""
     h, size_last, norm_last, aim = 0.0, 0.0, 1.0, np.inf
     spacing = w.spacing[row_of(w.spacing, i)]
     if spacing < np.inf:
-        spacing = min(spacing, (end - w.base) / FEWEST_LOOKS)
+        spacing = min(spacing, (end - w.base) / FEWEST_CHECKS)
     while end - w.base - w.tau > 0.0:
         if h == 0.0:
             outcome = _start(w, i)
@@ -280,7 +280,7 @@ def _run_segment(w: Any, i: int, end: float, goes_on: bool) -> int:
             _write_events(w, w.events[i], w.counts[i])
             return EVENT
         if verdict != TAKEN:
-            if verdict == MISSED:
+            if verdict == DEFECTIVE:
                 # End a step there, so that its last stage sees what the other stages have missed.
                 aim = w.tau + size
             w.rejected += 1
@@ -289,7 +289,7 @@ def _run_segment(w: Any, i: int, end: float, goes_on: bool) -> int:
             continue
         if size == remaining:
             aim = np.inf
-        _accept(w, i, size, end, goes_on)
+        _accept(w, i, size, end, continued)
         # The controller compares the steps whose error was estimated, even if an event has shortened them.
         size_last, norm_last = h, max(norm, LEAST_NORM)
         h = min(keep_matrices(w, h, min(proposed, limit)), growing_size(w))
@@ -301,10 +301,10 @@ def _run_segment(w: Any, i: int, end: float, goes_on: bool) -> int:
 
 
 @compiled
-def _forget(w: Any, i: int) -> None:
+def _reset_history(w: Any, i: int) -> None:
     """Reset the history of steps, as at the start of a run or an arc."""
     clear(w.fired)
-    w.member = w.last_member = w.tries = w.calm = w.fresh = w.refused = 0
+    w.member = w.last_member = w.newton_steps = w.easy_steps = w.jacobian_age = w.ledger_rejections = 0
     if w.core >= LARGE_MATRIX:
         for m in range(w.order.shape[0]):
             w.order[m, 3, 0] = -1  # discard the pivot order of another run
@@ -319,7 +319,7 @@ def _forget(w: Any, i: int) -> None:
 def _run_segments(w: Any, i: int) -> int:
     """Run until an event ends it; return GOOD, or the status that ends it."""
     segments, peaks = w.segments[row_of(w.segments, i)], w.peaks[row_of(w.peaks, i)]
-    _forget(w, i)
+    _reset_history(w, i)
     copy(peaks[: w.n_ledger], w.q_largest)
     copy(peaks[w.n_ledger : w.n_ledger + w.n_margins], w.margin_largest)
     extremes = peaks[w.n_ledger + w.n_margins :]
@@ -327,12 +327,12 @@ def _run_segments(w: Any, i: int) -> int:
         w.least[j] = extremes[j] if extremes.shape[0] > 0 else np.inf
         w.largest[j] = extremes[w.n + j] if extremes.shape[0] > 0 else -np.inf
     for m in range(w.n_margins):
-        w.playing[m] = w.kinds[m, 4]
-    w.arc_end = w.shown = np.inf
+        w.active[m] = w.kinds[m, 4]
+    w.arc_end = w.outputs_end = np.inf
     for segment in range(segments.shape[0] - 1):
         w.base, w.tau = segments[segment], 0.0
         copy(w.parameters[i, segment], w.inputs[1 + 2 * w.n :])
-        more = w.goes_on != 0 or segment + 2 < segments.shape[0]
+        more = w.continued != 0 or segment + 2 < segments.shape[0]
         status = _run_segment(w, i, segments[segment + 1], more)
         if status != GOOD:
             return status
@@ -349,8 +349,8 @@ def _begin_arc(w: Any, i: int) -> None:
         row[2], row[3], row[4] = counts[RECORDS], counts[OUTPUTS], counts[INSIDE]
         copy(w.moment[1 + 2 * n :], row[5:])
     counts[ARCS] += 1
-    _forget(w, i)
-    w.origin, w.tau = t, 0.0
+    _reset_history(w, i)
+    w.arc_start, w.tau = t, 0.0
     copy(w.moment[1 : 1 + n], w.y)
     keep_largest(w.y, w.peaks_seen)
     copy(w.exchanged, w.q_largest)
@@ -361,7 +361,7 @@ def _begin_arc(w: Any, i: int) -> None:
 
 
 @compiled
-def _see_guards(w: Any, flight_time: float) -> None:
+def _initialise_peaks(w: Any, flight_time: float) -> None:
     """Initialise the largest sizes of the guards; after a rebound zero for those that return, as for exact values."""
     copy(w.magnitude, w.margin_largest)
     first = w.n_margins - w.edges.shape[0]
@@ -371,29 +371,29 @@ def _see_guards(w: Any, flight_time: float) -> None:
 
 
 @compiled
-def _run_arc(w: Any, i: int, end: float, goes_on: bool) -> int:
+def _run_arc(w: Any, i: int, end: float, continued: bool) -> int:
     """Flow from the moment to an edge, a limit, or the end of a segment; return GOOD, or the status that ends the arc.
 
     The moment is then that of its end.
     """
-    flight_time = w.flight_time if w.rebounded == w.moment[0] else 0.0
+    flight_time = w.flight_time if w.rebound_time == w.moment[0] else 0.0
     _begin_arc(w, i)
-    _see_guards(w, flight_time)
+    _initialise_peaks(w, flight_time)
     # Stop just short of a breakpoint at which no load changes: formulas there are those of the next segment.
-    last = end if w.loads_change else max(end - FEW_EPS * end, 0.5 * (w.origin + end))
-    w.arc_end, w.shown, w.base = last - w.origin, end, 0.0
+    last = end if w.loads_change else max(end - FEW_EPS * end, 0.5 * (w.arc_start + end))
+    w.arc_end, w.outputs_end, w.base = last - w.arc_start, end, 0.0
     status = GOOD
     if 0.0 < RETURN_FACTOR * flight_time < FITTED_PART * w.arc_end:
         # A return so soon that a step might miss it gets a separate segment.
         status = _run_segment(w, i, RETURN_FACTOR * flight_time, True)
         w.base, w.tau = w.base + w.tau, 0.0
     if status == GOOD:
-        status = _run_segment(w, i, w.arc_end, goes_on)
+        status = _run_segment(w, i, w.arc_end, continued)
     if w.counts[i, ARCS] <= w.arcs.shape[1]:
         w.arcs[i, w.counts[i, ARCS] - 1, 1] = w.base + w.tau
     w.moment[0] = end if status == GOOD else min(_now(w), end)
     if status == EVENT and w.moment[0] == end:
-        _write_up_to(w, i, w.shown - w.origin)
+        _write_up_to(w, i, w.outputs_end - w.arc_start)
     for m in range(w.n_ledger):
         w.booked[m] += w.q[m]
     keep_largest(w.booked, w.exchanged)
@@ -406,17 +406,17 @@ def _run_arc(w: Any, i: int, end: float, goes_on: bool) -> int:
 
 
 @compiled
-def _has_missed(w: Any) -> bool:
+def _has_passed_guard(w: Any) -> bool:
     """True if an arc has ended beyond a guard it should have stopped at, by more than a picometre."""
-    first, missed = w.n_margins - w.edges.shape[0], False
+    first, passed = w.n_margins - w.edges.shape[0], False
     if w.edges.shape[0] == 0:
-        return missed
+        return passed
     put(w, 0.0, w.y, w.ydot)
     evaluate(w, MARGINS, w.margin_probe)
     for e in range(w.edges.shape[0]):
-        closed = w.edges[e, RETURNS] >= 0 and w.playing[first + e] == 1 and w.margin_probe[first + e] < -PICOMETRE
-        missed = missed or (closed and w.fired[first + e] == 0)
-    return missed
+        closed = w.edges[e, RETURNS] >= 0 and w.active[first + e] == 1 and w.margin_probe[first + e] < -PICOMETRE
+        passed = passed or (closed and w.fired[first + e] == 0)
+    return passed
 
 
 @compiled
@@ -439,9 +439,9 @@ def _begin_arcs(w: Any, i: int) -> None:
     clear(w.booked)
     clear(w.exchanged)
     copy(w.least_peaks, w.peaks_seen)
-    w.rebounded, w.flight_time = -np.inf, 0.0
-    for k in range(w.jumped.shape[0]):
-        w.jumped[k] = -np.inf
+    w.rebound_time, w.flight_time = -np.inf, 0.0
+    for k in range(w.jump_times.shape[0]):
+        w.jump_times[k] = -np.inf
     for j in range(w.n):
         w.least[j] = w.largest[j] = w.y[j]
         w.moment[1 + j] = w.y[j]
@@ -479,7 +479,7 @@ def _run_arcs(w: Any, i: int) -> int:
             if w.moment[0] >= end:
                 break
             status = _run_arc(w, i, end, segment + 1 < last)
-            if status in (GOOD, EVENT) and _has_missed(w):
+            if status in (GOOD, EVENT) and _has_passed_guard(w):
                 return LEFT
             if status == EVENT:
                 status = _carry_out(w, i)
@@ -495,7 +495,7 @@ def _run(w: Any, i: int) -> None:
     """Run from the initial state to the end."""
     counts, end, segments = w.counts[i], w.ends[i], w.segments[row_of(w.segments, i)]
     w.steps = w.rejected = w.residuals = w.jacobians = w.factorizations = w.iterations = 0
-    w.origin, w.base, w.tau, w.h_factored = 0.0, segments[0], 0.0, 0.0
+    w.arc_start, w.base, w.tau, w.h_factored = 0.0, segments[0], 0.0, 0.0
     clear(w.booked)
     copy(w.y0[i], w.y)
     status = _run_arcs(w, i) if w.clocks.shape[0] > 0 else _run_segments(w, i)

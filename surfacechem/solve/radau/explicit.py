@@ -30,14 +30,14 @@ STIFF_STEP = 3.0
 """Product of step and fastest rate that counts as stiff if it persists: such a mode decays by 1e-19 in fifteen steps,
 and an oscillation is not resolved. The method is stable up to 6.1, less where roundoff limits the steps.
 """
-FELT, FOLLOWED = 0.1, 0.1
+STABILITY_LIMIT, FOLLOWED_PART = 0.1, 0.1
 """Product of step and fastest rate from which on stability may limit steps at tight tolerances too, and the part of it
 by which the rates change in a step once no state follows the fastest mode any more.
 """
 STIFF_STEPS = 15
 """Stiff steps after which the run continues implicitly; two that are not stiff cancel one."""
 
-FALLS = 3.0
+MAX_ERROR_RATIO = 3.0
 """Largest ratio of the error of a repeated step to the one expected from its size; a larger one is noise, which
 implicit steps can measure, or a change of formula.
 """
@@ -118,7 +118,7 @@ def step_explicitly(w: Any, h: float, worst: float) -> float:
 @compiled
 def mark_noise(w: Any, norm: float, expected: float) -> None:
     """Count a repeated step whose error has not fallen with its size as stiff."""
-    if norm > FALLS * expected:
+    if norm > MAX_ERROR_RATIO * expected:
         w.stiff_steps += STIFF_STEPS
 
 
@@ -133,8 +133,8 @@ def is_stiff(w: Any) -> bool:
         if apart * unit > largest:
             largest, fastest = apart * unit, apart / (abs(w.slopes[0, m] - w.slopes[4, m]) + TINY)
         speed, change = max(speed, abs(k[end, m]) * unit), max(change, abs(k[end, m] - k[0, m]) * unit)
-    outrun = fastest > FELT and change < FOLLOWED * fastest * speed
-    w.stiff_steps = w.stiff_steps + 2 if fastest > STIFF_STEP or outrun else max(w.stiff_steps - 1, 0)
+    is_limited = fastest > STABILITY_LIMIT and change < FOLLOWED_PART * fastest * speed
+    w.stiff_steps = w.stiff_steps + 2 if fastest > STIFF_STEP or is_limited else max(w.stiff_steps - 1, 0)
     return bool(w.stiff_steps >= 2 * STIFF_STEPS)
 
 

@@ -17,7 +17,7 @@ from surfacechem.solve.radau.tables import SCAN_EDGE, SCANNED
 from surfacechem.solve.radau.work import MARGINS, any_true, clear, compiled, copy, evaluate, put
 from surfacechem.tolerances import CBRT_EPS, EPS, FORMULA_EPS, LOOSE_RTOL, NEWTON_EPS, RUN_EPS, SQRT_EPS, TINY
 
-LEAVING, AT_ZERO, BEYOND, RISING, FALLING, OUT_OF_PLAY = 0.0, 2.0, -2.0, 3.0, -3.0, 4.0
+LEAVING, AT_ZERO, BEYOND, RISING, FALLING, INACTIVE = 0.0, 2.0, -2.0, 3.0, -3.0, 4.0
 """Sides of zero other than 1 and -1: of a margin that has just fired; of a limit that starts at zero, or beyond it; of
 a limit that leaves zero in this step, upwards or downwards; of a margin that is inactive in the modes of the run.
 """
@@ -51,8 +51,8 @@ def start_margins(w: Any) -> None:
     copy(w.margin, w.margin_before)
     for m in range(w.n_margins):
         value = w.margin[m]
-        if w.playing[m] == 0:
-            w.side[m] = OUT_OF_PLAY
+        if w.active[m] == 0:
+            w.side[m] = INACTIVE
             continue
         w.margin_largest[m] = max(w.margin_largest[m], abs(value))
         if w.fired[m] != 0:

@@ -307,11 +307,11 @@ def solve_stages(w: Any, h: float) -> int:
         w.residuals += s
         norm = _correct(w)
         w.iterations += 1
-        w.tries = iteration + 1
+        w.newton_steps = iteration + 1
         if not norm < np.inf:
             return NOT_FINITE
         if iteration == 0:
-            w.guessed = norm
+            w.guess_error = norm
         else:
             ratio = norm / norm_last
             rate = ratio if iteration == 1 else np.sqrt(ratio * rate_last)
@@ -327,5 +327,5 @@ def solve_stages(w: Any, h: float) -> int:
             return CONVERGED
         norm_last = max(norm, TINY)
     # A stalled iteration may be at roundoff level, where the contraction means nothing.
-    w.guessed = 0.0
+    w.guess_error = 0.0
     return CONVERGED if correction_is_noise(w, s) else DIVERGED

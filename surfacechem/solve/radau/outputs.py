@@ -137,13 +137,13 @@ def _write_inside(w: Any, times: Any, outputs: Any, first: int, last: int, h: fl
         for i in range(first, last, 4):
             write_four(w, times, outputs, i, last, h, origin)
         return
-    theta, contraction, guessed, tries = w.theta, w.contraction, w.guessed, w.tries
+    theta, contraction, guessed, tries = w.theta, w.contraction, w.guess_error, w.newton_steps
     store_polynomial(w, h, 0.0)
     for i in range(first, last):
         _write_by_step(w, ((times[i] - origin) - w.base) - w.tau, h, outputs[i])
     _restore_step(w, h)
     # Restore the state of Newton's method too: the next step must not depend on the requested outputs.
-    w.theta, w.contraction, w.guessed, w.tries = theta, contraction, guessed, tries
+    w.theta, w.contraction, w.guess_error, w.newton_steps = theta, contraction, guessed, tries
 
 
 @compiled
@@ -165,17 +165,17 @@ def write_now(w: Any, row: Any) -> None:
 @compiled
 def is_within(w: Any, t: float, end: float) -> bool:
     """True if an output time is at most this time of the arc, and not after its segment, whose end it may round to."""
-    return bool(t - w.origin <= end and t <= w.shown)
+    return bool(t - w.arc_start <= end and t <= w.outputs_end)
 
 
 @compiled
 def write_outputs(w: Any, times: Any, outputs: Any, first: int, h: float, end: float) -> int:
     """Write the outputs up to the end of the step, at this time of the arc; return the run's number of outputs."""
     last = first
-    while last < times.shape[0] and times[last] - w.origin < end:
+    while last < times.shape[0] and times[last] - w.arc_start < end:
         last += 1
     if last > first:
-        _write_inside(w, times, outputs, first, last, h, w.origin)
+        _write_inside(w, times, outputs, first, last, h, w.arc_start)
     while last < times.shape[0] and is_within(w, times[last], end):  # several if the time of the arc rounds
         end_of_step(w, h, outputs[last], w.trial_dot, outputs[last, w.n :])
         last += 1
@@ -210,18 +210,18 @@ def _parts(w: Any, h: float, growth: float) -> Any:
         by_time, by_ratio = max(by_time, missed / size), max(by_ratio, beside / size)
     # The error of linear interpolation is of second order in its length.
     return (
-        min(int(np.ceil(np.sqrt(by_time / w.picture))), MOST_PARTS),
-        min(int(np.ceil(np.sqrt(by_ratio / w.picture))), MOST_PARTS),
+        min(int(np.ceil(np.sqrt(by_time / w.line_error))), MOST_PARTS),
+        min(int(np.ceil(np.sqrt(by_ratio / w.line_error))), MOST_PARTS),
     )
 
 
 @compiled
-def write_picture(w: Any, times: Any, states: Any, first: int, h: float) -> int:
+def write_interior(w: Any, times: Any, states: Any, first: int, h: float) -> int:
     """Store states inside the step so that linear interpolation over time and its logarithm is accurate enough.
 
     Return the number of the run so far, including those for which there was no memory.
     """
-    start = w.before + (w.origin + (w.base + w.tau))
+    start = w.elapsed + (w.arc_start + (w.base + w.tau))
     growth = h / start if start > 0.0 else 0.0
     parts, ratios = _parts(w, h, growth)
     if ratios > 0 and growth <= parts * np.expm1(np.log1p(growth) / ratios):
@@ -236,5 +236,5 @@ def write_picture(w: Any, times: Any, states: Any, first: int, h: float) -> int:
         _write_inside(w, times, states, first, last, h, 0.0)
         _add_booked(w, states, first, last)
         for i in range(first, last):
-            times[i] += w.origin
+            times[i] += w.arc_start
     return last

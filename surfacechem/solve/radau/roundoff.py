@@ -28,27 +28,27 @@ SINGULAR_NOISE = NEGLIGIBLE**2
 
 
 @compiled
-def _measure_wobble(w: Any, y: Any, ydot: Any) -> None:
+def _measure_differences(w: Any, y: Any, ydot: Any) -> None:
     """Take fifth differences of the equations over neighbouring times: zero for smooth equations, but not for roundoff
     of their loads.
 
     Source: Hamming (1973), Numerical Methods for Scientists and Engineers, noise by differences.
     """
     t, n = w.inputs[0], w.n
-    clear(w.wobble)
+    clear(w.differences)
     for row in range(WINDOWS):
-        clear(w.wobble_sums[row])
+        clear(w.difference_sums[row])
     set_inputs(w, y, ydot)
     for k in range(WINDOWS + FIFTH_DIFFERENCE.shape[0] - 1):
         w.inputs[0] = t + k * TIME_SPACING * w.h_factored
-        evaluate(w, RESIDUAL, w.wobble_now)
+        evaluate(w, RESIDUAL, w.differences_now)
         for row in range(WINDOWS):
             if 0 <= k - row < FIFTH_DIFFERENCE.shape[0]:
                 for i in range(n):
-                    w.wobble_sums[row, i] += FIFTH_DIFFERENCE[k - row] * w.wobble_now[i]
+                    w.difference_sums[row, i] += FIFTH_DIFFERENCE[k - row] * w.differences_now[i]
     for row in range(WINDOWS):
         for i in range(n):
-            w.wobble[i] = max(w.wobble[i], abs(w.wobble_sums[row, i]))
+            w.differences[i] = max(w.differences[i], abs(w.difference_sums[row, i]))
     w.inputs[0] = t
 
 
@@ -63,7 +63,7 @@ def _rounding_of(w: Any, i: int, y: Any, ydot: Any) -> float:
         j = w.chains[c, 0]
         border += abs(w.border_derivatives[0, i, c] * y[j])
         border += abs(w.border_derivatives[1, i, c] * ydot[j])
-    return float(max(ULPS * (total + border), w.wobble[i]))
+    return float(max(ULPS * (total + border), w.differences[i]))
 
 
 @compiled
@@ -73,7 +73,7 @@ def spread_noise(w: Any, y: Any, ydot: Any) -> None:
     The terms of an equation are as large as its derivatives times their variables.
     """
     n, core, column = w.n, w.core, w.delta
-    _measure_wobble(w, y, ydot)
+    _measure_differences(w, y, ydot)
     for j in range(n):
         w.noise[j] = ULPS * abs(y[j])
     for i in range(core if w.links == 0 else core + 1):
@@ -109,7 +109,7 @@ def _bounds_serve(w: Any) -> bool:
 
     True if their effect on the error estimate is negligible compared with the tolerance.
     """
-    _measure_wobble(w, w.y, w.ydot)
+    _measure_differences(w, w.y, w.ydot)
     for i in range(w.n):
         w.delta[i] = _rounding_of(w, i, w.y, w.ydot)
     bound_real(w, w.delta)

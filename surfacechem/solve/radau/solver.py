@@ -53,11 +53,11 @@ _STATUSES = tuple(Status)
 
 
 @lru_cache(maxsize=256)
-def _kinds(margins: tuple[Guard, ...], in_play: tuple[bool, ...] | None = None) -> NDArray[np.int64]:
-    playing = in_play or (True,) * len(margins)
+def _kinds(margins: tuple[Guard, ...], active: tuple[bool, ...] | None = None) -> NDArray[np.int64]:
+    flags = active or (True,) * len(margins)
     rows = [
-        (m.terminal, m.direction, m.smooth, m.strict, plays, m.domain)
-        for m, plays in zip(margins, playing, strict=True)
+        (m.terminal, m.direction, m.smooth, m.strict, is_active, m.domain)
+        for m, is_active in zip(margins, flags, strict=True)
     ]
     return np.array(rows, np.int64).reshape(-1, 6)
 
@@ -75,7 +75,7 @@ def _zeros(count: int) -> Array:
 
 def _peaks(problem: Problem) -> Array:
     """Return the largest accounts and guards, and the extremes, of the part that a problem continues; zeros if none."""
-    accounts, guards = problem.exchanged, problem.seen
+    accounts, guards = problem.exchanged, problem.margin_peaks
     none, unseen = _zeros(problem.program.n_ledger), _zeros(problem.program.n_margins)
     if accounts is None and guards is None:
         return _zeros(len(none) + len(unseen))
@@ -119,24 +119,24 @@ def batch_of(
     explicit = tables is None and problem.explicit and program.rates is not None
     n, q, m, count = program.n, program.n_ledger, program.n_margins, len(runs[0])
     steps, events = (STEP_ROWS, EVENT_ROWS) if count > 1 else (ALONE_ROWS, ALONE_ROWS)
-    usual = steps * problem.record_steps, events * bool(problem.margins), INSIDE_ROWS * bool(problem.picture), events
+    usual = steps * problem.record_steps, events * bool(problem.margins), INSIDE_ROWS * bool(problem.line_error), events
     step_rows, event_rows, rows, jump_rows = room or usual
     return Batch(
         *_with_edges(tables or (program.explicit_tables if explicit else program.tables), problem.edges),
         problem.rtol,
         _contiguous(problem.atol),
         int(explicit),
-        _kinds(problem.margins, problem.in_play),
-        int(problem.goes_on),
-        problem.picture,
-        problem.before,
+        _kinds(problem.margins, problem.active),
+        int(problem.continued),
+        problem.line_error,
+        problem.elapsed,
         *runs,
         np.empty((count, 1 + 2 * n + q + m)),
         np.zeros((count, COLUMNS), np.int64),
         np.empty((count, times.shape[1], n + q)),
         np.empty((count, step_rows, 1 + 2 * n + q)) if step_rows else _no_rows(count),
         np.empty((count, event_rows, 2 + 2 * n + q)) if event_rows else _no_rows(count),
-        np.empty((count, rows, n + q)) if problem.picture else _no_rows(count),
+        np.empty((count, rows, n + q)) if problem.line_error else _no_rows(count),
         np.empty((count, rows)),
         *_edge_rows(problem, count, event_rows + len(problem.parameters), jump_rows),
     )
@@ -190,9 +190,9 @@ class Radau(Solver):
         for i, problem in enumerate(problems):
             # Common to the problems of a batch, in addition to the model and its margins.
             shape = len(problem.segments), problem.atol.tobytes(), problem.rtol
-            picture = problem.picture and (problem.picture, problem.before)
+            interior = problem.line_error and (problem.line_error, problem.elapsed)
             crosses = problem.edges is not NO_EDGES
-            alike.setdefault((*shape, problem.in_play, problem.goes_on, picture, crosses), []).append(i)
+            alike.setdefault((*shape, problem.active, problem.continued, interior, crosses), []).append(i)
         most = min(CHUNK, -(-len(problems) // threads))
         chunks = [group[k : k + most] for group in alike.values() for k in range(0, len(group), most)]
         with ThreadPoolExecutor(threads) as pool:
@@ -288,7 +288,7 @@ def _result(problem: Problem, batch: Any, i: int, counts: Sequence[int]) -> Resu
         counters=Counters(*counts[FIRST_COUNTER:STOP]),
         steps=Points(*_points(written(batch.records, RECORDS), n)) if problem.record_steps else None,
         inside=_inside(written(batch.inside_times, INSIDE), written(batch.inside, INSIDE), n)
-        if problem.picture
+        if problem.line_error
         else None,
         course=EdgeCourse(written(batch.arcs, ARCS), written(batch.jumps, JUMPS)) if counts[ARCS] else None,
     )

@@ -21,7 +21,7 @@ from surfacechem.solve.radau.consistency import CONSISTENT, NO_STATE, SINGULAR_S
 from surfacechem.solve.radau.dense import (
     change_and_slope,
     defect_norm,
-    excused_norm,
+    explained_norm,
     keep_polynomial,
     probe_ledger,
     put_inside,
@@ -164,7 +164,7 @@ def next_size(w: Any, h: float, norm: float, h_last: float, norm_last: float) ->
     """
     k = w.member
     limit = 7 + 2 * k
-    safety = min(SAFETY, SAFETY * (2.0 * limit + 1.0) / (2.0 * limit + w.tries))
+    safety = min(SAFETY, SAFETY * (2.0 * limit + 1.0) / (2.0 * limit + w.newton_steps))
     # The estimate of s stages goes with h^(s+1).
     exponent = 1.0 / (stage_count(k) + 1.0)
     factor = safety * max(norm, RUN_EPS) ** -exponent
@@ -179,7 +179,7 @@ def convergent_size(w: Any, h: float) -> float:
 
     Infinite where the predictor was good or roundoff ended the iteration, as the contraction then means nothing.
     """
-    theta = w.theta if w.guessed > 1.0 else 0.0
+    theta = w.theta if w.guess_error > 1.0 else 0.0
     return h * max(LEAST_CONVERGENT, np.sqrt(CONTRACTING / theta)) if theta > 0.0 else np.inf
 
 
@@ -192,16 +192,16 @@ def choose_member(w: Any, slowest: float) -> bool:
     """
     k = w.member
     if w.theta > slowest:
-        w.calm = 0
+        w.easy_steps = 0
         w.member = max(0, k - 1)
     elif w.theta < 0.05:
-        w.calm += 1
-        if w.calm >= 3:
+        w.easy_steps += 1
+        if w.easy_steps >= 3:
             w.member = min(k + 1, preferred_member(w.rtol))
     else:
-        w.calm = 0
+        w.easy_steps = 0
     if w.member != k:
-        w.calm = 0
+        w.easy_steps = 0
     return bool(w.member != k)
 
 
@@ -213,7 +213,7 @@ def growing_size(w: Any) -> float:
     The method damps a state that grows much faster, and would never leave an unstable equilibrium. A state that is
     exactly zero with zero rate does not grow.
     """
-    if w.fresh == INVALID:
+    if w.jacobian_age == INVALID:
         return np.inf
     mass, stiffness = w.jacobian[1], w.jacobian[0]
     fastest = 0.0
@@ -309,10 +309,10 @@ def start_explicitly(w: Any) -> bool:
 def _go_implicit(w: Any) -> None:
     """Switch to implicit steps."""
     w.explicit = 0
-    w.h_last = w.h_factored = w.theta = w.guessed = 0.0
+    w.h_last = w.h_factored = w.theta = w.guess_error = 0.0
     w.contraction = 1.0
-    w.calm = 0
-    w.fresh = INVALID
+    w.easy_steps = 0
+    w.jacobian_age = INVALID
     w.member = preferred_member(w.rtol)
 
 
@@ -322,9 +322,9 @@ def restart(w: Any) -> int:
     w.base += w.tau
     w.tau = w.h_last = w.h_factored = 0.0
     w.contraction = 1.0
-    w.calm = 0
-    w.refused = min(w.refused, (w.steps - w.steps_before) // 2)
-    w.fresh = INVALID
+    w.easy_steps = 0
+    w.ledger_rejections = min(w.ledger_rejections, (w.steps - w.steps_before) // 2)
+    w.jacobian_age = INVALID
     w.member = preferred_member(w.rtol)
     w.inputs[0] = w.base
     if not start_explicitly(w):
@@ -349,10 +349,10 @@ def _prepare(w: Any, h: float, foresee: bool) -> int:
     if w.h_factored == h:
         return GOOD
     outgrown = w.theta >= NEGLIGIBLE or h > JACOBIAN_GROWTH * w.h_jacobian
-    if w.fresh == INVALID or (w.fresh == OLD and outgrown):
+    if w.jacobian_age == INVALID or (w.jacobian_age == OLD and outgrown):
         if not differentiate_system(w, h, foresee):
             return NONFINITE
-        w.fresh = CURRENT
+        w.jacobian_age = CURRENT
         w.h_jacobian = h
     # Invalid until the factorization succeeds.
     w.h_factored = 0.0
@@ -384,7 +384,7 @@ def _may_try(w: Any, h: float, i: int) -> int:
 def advance_explicitly(w: Any, h: float, i: int, h_last: float, norm_last: float) -> tuple[int, float, float, float]:
     """As :func:`advance_implicitly`, by explicit steps."""
     failed = False
-    w.tries = 1
+    w.newton_steps = 1
     while True:
         outcome = _may_try(w, h, i)
         if outcome != GOOD:
@@ -414,7 +414,7 @@ def advance_implicitly(w: Any, h: float, i: int, size_last: float, norm_last: fl
         if outcome == SINGULAR and singular < SINGULAR_TRIALS:
             # A matrix may be singular for a particular step size.
             singular += 1
-            w.fresh = INVALID
+            w.jacobian_age = INVALID
             failed = True
             h *= 0.37
             continue
@@ -435,8 +435,8 @@ def advance_implicitly(w: Any, h: float, i: int, size_last: float, norm_last: fl
         w.rejected += 1
         w.h_factored = 0.0
         if outcome != CONVERGED:
-            aged = w.fresh == OLD
-            w.fresh = INVALID
+            aged = w.jacobian_age == OLD
+            w.jacobian_age = INVALID
             if aged:
                 continue  # retry with a current Jacobian before shortening the step
         choose_member(w, SLOW_REJECTED)
@@ -476,7 +476,7 @@ def accept(w: Any, h: float) -> None:
     copy(w.rates[last], w.rates[7])
     w.tau += h
     w.steps += 1
-    w.fresh = min(w.fresh, OLD)
+    w.jacobian_age = min(w.jacobian_age, OLD)
     set_weights(w)
     if w.explicit != 0 and is_stiff(w):
         _go_implicit(w)
@@ -485,7 +485,7 @@ def accept(w: Any, h: float) -> None:
 @compiled
 def keep_matrices(w: Any, h: float, proposed: float) -> float:
     """Choose the next step size: unchanged where Newton converged so fast that the factors are worth keeping."""
-    if w.fresh == INVALID:
+    if w.jacobian_age == INVALID:
         return proposed
     proposed = min(proposed, convergent_size(w, h))
     if choose_member(w, SLOW):
@@ -498,17 +498,17 @@ def keep_matrices(w: Any, h: float, proposed: float) -> float:
     return proposed
 
 
-UNSEEN_ERROR = 3.0
+MAX_DEFECT = 3.0
 """Defect between the stages, in units of the one allowed at the start of a step, beyond which a step is too long.
 
 A choice: the polynomial is somewhat worse between the stages than at the ends. A smaller value rejects good steps, a
 larger one accepts features that change the state by so many tolerances.
 """
 
-END_LOOKS = 10
+END_CHECKS = 10
 """Number of checks next to the end of a segment, each ten times closer to it than the one before."""
 
-LOOK_PART = 1e-2
+CHECK_PART = 1e-2
 """Part of the spacing below which a step is not checked: a choice that saves time. Its stages lie closer together than
 the checks; a narrower feature may be missed, as it may between two checks.
 """
@@ -521,9 +521,9 @@ def _differs(w: Any, h: float, x: float, remaining: float) -> bool:
     """
     if not defect_inside(w, h, x):
         return True
-    if not error_norm(w, 0.0) <= UNSEEN_ERROR:
+    if not error_norm(w, 0.0) <= MAX_DEFECT:
         find_noise(w)
-        if not error_norm(w, MAGNIFIED) <= UNSEEN_ERROR:
+        if not error_norm(w, MAGNIFIED) <= MAX_DEFECT:
             return True
     if w.n_ledger == 0:
         return False
@@ -531,11 +531,11 @@ def _differs(w: Any, h: float, x: float, remaining: float) -> bool:
     for m in range(w.n_ledger):
         _, slope = change_and_slope(w.member, x, w.q_polynomial[m])
         w.q_probe[m] = h * w.q_probe[m] - slope
-    return bool(not defect_norm(w, w.q_probe, h, remaining) <= UNSEEN_ERROR and not excused_norm(w, h) <= UNSEEN_ERROR)
+    return bool(not defect_norm(w, w.q_probe, h, remaining) <= MAX_DEFECT and not explained_norm(w, h) <= MAX_DEFECT)
 
 
 @compiled
-def unseen(w: Any, h: float, spacing: float, remaining: float, begins: bool, ends: bool) -> float:
+def first_defect(w: Any, h: float, spacing: float, remaining: float, begins: bool, ends: bool) -> float:
     """Return the fraction of a step at which its polynomial first disagrees with the equations; one if nowhere checked.
 
     ``begins`` and ``ends`` tell whether the step touches an end of a segment or an event, next to which a feature may
@@ -546,7 +546,7 @@ def unseen(w: Any, h: float, spacing: float, remaining: float, begins: bool, end
         keep_polynomial(w)
     if begins:
         # From the narrowest outwards: the first disagreement tells how short the step has to be.
-        for k in range(END_LOOKS, 0, -1):
+        for k in range(END_CHECKS, 0, -1):
             if _differs(w, h, 10.0**-k, remaining):
                 return 10.0**-k
     for i in range(points):
@@ -554,7 +554,7 @@ def unseen(w: Any, h: float, spacing: float, remaining: float, begins: bool, end
         if _differs(w, h, x, remaining):
             return x
     if ends:
-        for k in range(1, END_LOOKS + 1):
+        for k in range(1, END_CHECKS + 1):
             if _differs(w, h, 1.0 - 10.0**-k, remaining):
                 return 1.0 - 10.0**-k
     return 1.0

@@ -48,14 +48,14 @@ BATCH: dict[str, tuple[Any, int]] = {
     "atol": (float, 1),
     # true if steps are explicit as long as the equations are not stiff
     "explicitly": (int, 0),
-    # guards: a row (terminal, direction, smooth, strict, in play, domain) for each
+    # guards: a row (terminal, direction, smooth, strict, active, domain) for each
     "kinds": (np.int64, 2),
     # true if other problems continue the runs
-    "goes_on": (int, 0),
+    "continued": (int, 0),
     # allowed error of linear interpolation between stored states, as a part of their range; 0: none are added
-    "picture": (float, 0),
+    "line_error": (float, 0),
     # time from the start of the run to that of the problem
-    "before": (float, 0),
+    "elapsed": (float, 0),
     # the runs; all but the first two have a single row if it is the same for all runs
     "y0": (float, 2),
     "parameters": (float, 3),
@@ -89,13 +89,13 @@ END, OUTPUTS, EVENTS, RECORDS, INSIDE, FIRST_COUNTER, STOP, ARCS, JUMPS, COLUMNS
 counters, a flag that is set from outside to end the run, arcs and jumps.
 """
 
-MEASURE, TAKER, REFUSES, RETURNS, RESTS = range(5)
+MEASURE, HEAT_SOURCE, REFUSES, RETURNS, RESTS = range(5)
 """Columns of the table of edges."""
 
 BONDS, WORK, RELEASED, PRODUCED, HEAT_OUT, ENTROPY_OUT, NOT_BOOKED = range(7)
 """Kinds of accounts in jumps: the change of a state, the change of a total, four amounts of a jump, none."""
 
-SIZES = ("n", "n_ledger", "n_margins", "n_inputs", "core", "links", "cells", "n_books", "n_nodal", "n_reset")
+SIZES = ("n", "n_ledger", "n_margins", "n_inputs", "core", "links", "cells", "n_totals", "n_nodal", "n_reset")
 """Sizes of a program, in this order. The core are the states in no chain, the links the chains, the cells the states in
 chains; then the numbers of totals of a jump, of values of the nodes and of variables that resets write.
 """
@@ -108,20 +108,20 @@ NUMBERS: dict[str, type] = {
     # Newton: rate of contraction; remaining error after a correction, relative to it; error of the first guess of the
     # stages, and roundoff, in units of the tolerance; factor by which the estimate of low order may exceed the
     # tolerance.
-    **dict.fromkeys(("theta", "contraction", "guessed", "roundoff", "loose"), float),
+    **dict.fromkeys(("theta", "contraction", "guess_error", "roundoff", "loose"), float),
     # Last trial, if the ledger has rejected it: its step, and its error in units of the allowed one.
     **dict.fromkeys(("h_refused", "norm_refused"), float),
     # Counters of a run.
     **dict.fromkeys(("steps", "rejected", "residuals", "jacobians", "factorizations", "iterations"), int),
     # Member of the Radau family, now and in the stored polynomial. Newton iterations of this step; consecutive easy
     # steps; age of the Jacobian; steps that the ledger has rejected.
-    **dict.fromkeys(("member", "last_member", "tries", "calm", "fresh", "refused"), int),
+    **dict.fromkeys(("member", "last_member", "newton_steps", "easy_steps", "jacobian_age", "ledger_rejections"), int),
     # True if steps are explicit now; twice the number of stiff steps.
     **dict.fromkeys(("explicit", "stiff_steps"), int),
     # If edges are carried out: start of the arc, time of the last rebound and its time of flight; latest end of the
     # arc, in its own time, and the end of its outputs. The first event of the
     # arc, and the steps taken and rejected before it; true if loads change at the end of the segment.
-    **dict.fromkeys(("origin", "rebounded", "flight_time", "arc_end", "shown"), float),
+    **dict.fromkeys(("arc_start", "rebound_time", "flight_time", "arc_end", "outputs_end"), float),
     **dict.fromkeys(("first_event", "steps_before", "rejected_before", "loads_change"), int),
 }
 """Scalars of a trajectory that change."""
@@ -148,8 +148,8 @@ MEMORY = {
     # error of the step, correction of its polynomial; right-hand sides and columns of linear systems
     **_arrays("error correction rhs delta columns", "n"),
     # roundoff of the variables; fifth differences of the equations over neighbouring times
-    **_arrays("noise wobble wobble_now", "n"),
-    **_arrays("wobble_sums", 3, "n"),
+    **_arrays("noise differences differences_now", "n"),
+    **_arrays("difference_sums", 3, "n"),
     # stages: increments, those of the stored step, residuals and corrections, rates; corrections in the eigenbasis
     **_arrays("z z_last g slopes parts", ROWS, "n"),
     **_arrays("pairs", 3, "n", kind=complex),
@@ -184,7 +184,7 @@ MEMORY = {
     # ledger: present, trial, correction of its polynomial, probe; errors, turnover of the step, scale of the error
     # norm, largest so far, errors explained by the tolerance of the states; at the stages; rates there and,
     # last, at the start
-    **_arrays("q q_trial q_correction q_probe q_miss q_turned q_scale q_largest q_excused", "n_ledger"),
+    **_arrays("q q_trial q_correction q_probe q_error q_turnover q_scale q_largest q_explained", "n_ledger"),
     **_arrays("q_stage", ROWS, "n_ledger"),
     **_arrays("rates", 8, "n_ledger"),
     # guards: present value, at the last two points, at the start of the step, at a probe; largest so far; slope
@@ -192,19 +192,19 @@ MEMORY = {
     # side of zero, at the start of the step and at the last point; ends of the interval
     # in which it reaches zero; flags of those that have fired and of the active ones
     **_arrays("side side_first side_last low high", "n_margins"),
-    **_arrays("fired playing", "n_margins", kind=int),
+    **_arrays("fired active", "n_margins", kind=int),
     # moment between arcs: t, y, ydot, parameters; peaks of the states; the moment after a jump,
     # and before it with the measured state perturbed by its roundoff; totals there
     **_arrays("moment", "n_inputs"),
-    **_arrays("sized peaks_seen", "n"),
+    **_arrays("state_sizes peaks_seen", "n"),
     **_arrays("after perturbed", "n_inputs"),
-    **_arrays("books_before books_after books_perturbed", "n_books"),
+    **_arrays("totals_before totals_after totals_perturbed", "n_totals"),
     **_arrays("nodal targets", "n_nodal"),
     **_arrays("reset", "n_reset"),
     **_arrays("magnitude", "n_margins"),
     **_arrays("booked exchanged", "n_ledger"),
     # times of the last jumps, in order
-    **_arrays("jumped", CHATTER),
+    **_arrays("jump_times", CHATTER),
 }
 """Arrays that a trajectory writes to: type and shape."""
 

@@ -44,7 +44,7 @@ def compiled(function: Any) -> Any:
     return _njit(error_model="numpy", _nrt=False, no_cpython_wrapper=True, no_cfunc_wrapper=True)(function)
 
 
-RESIDUAL, JACOBIAN, LEDGER, MARGINS, RATES, MAGNITUDES, GUARD_RATES, BOOKS, NODES, TIMES_OF_RETURN, RESETS = np.arange(
+RESIDUAL, JACOBIAN, LEDGER, MARGINS, RATES, MAGNITUDES, GUARD_RATES, TOTALS, NODES, TIMES_OF_RETURN, RESETS = np.arange(
     11
 )
 """Rows of the table of addresses (code, user data); of resets the first. They are NumPy integers, as Numba compiles a

@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from case_runs import load, solved
+from surfacechem.results.picture import needed_rows
 
 import surfacechem
 from surfacechem.results import picture
 from surfacechem.results.event_table import events_of
-from surfacechem.results.picture import needed_rows
 from surfacechem.solve import run
 from surfacechem.tolerances import LINE_ERROR
 

@@ -103,7 +103,7 @@ def _edges(values: Array) -> Mask:
 
 
 @dataclass
-class _Shown:
+class _Resolution:
     """Quantities over time, states and accounts included: their ranges so far, and the allowed error of lines."""
 
     reach: Array = field(default_factory=lambda: np.array(-np.inf))
@@ -113,8 +113,8 @@ class _Shown:
 
     def see(self, block: Trajectory) -> None:
         """Update ranges and allowed errors with the outputs of a block."""
-        values, some, part = _shown(block)[1], block.some, block.run.picture or 0.0
-        unknown = [*some.felt(EPS * np.abs(some.result.outputs) + some.result.problem.atol).values()]
+        values, some, part = _quantities(block)[1], block.sample, block.run.picture or 0.0
+        unknown = [*some.sensitivities(EPS * np.abs(some.result.outputs) + some.result.problem.atol).values()]
         self.noise = np.maximum(self.noise, np.pad(RUN_ERROR * np.array(unknown), (values.shape[1] - len(unknown), 0)))
         # Early rows, whose layers are unresolved, do not count for the ranges.
         late = values[~unresolved(block.model.system, block.run.times[-1], block.result.times)]
@@ -129,17 +129,17 @@ class _Shown:
 
     def needed(self, block: Trajectory, moments: Array) -> Mask:
         """Return the mask of outputs that resolve a block, with both sides of events at these ``moments``."""
-        t, (table, values) = block.result.times, (each[:, self.seen] for each in _shown(block))
-        return needed_rows(t, values, self.allowed[self.seen], _beside(t, moments) | _edges(table))
+        t, (table, values) = block.result.times, (each[:, self.seen] for each in _quantities(block))
+        return needed_rows(t, values, self.allowed[self.seen], _sides(t, moments) | _edges(table))
 
 
-def _shown(block: Trajectory) -> tuple[Array, Array]:
+def _quantities(block: Trajectory) -> tuple[Array, Array]:
     """Return the quantities over time, shape (times, quantities), and the same with zeros for NaN and infinity."""
     table = np.hstack([block.result.outputs, block.result.ledger_outputs, block.outputs])
     return table, np.where(np.isfinite(table), table, 0.0)
 
 
-def _bends(trajectory: Trajectory, shown: _Shown) -> list[States]:
+def _refinements(trajectory: Trajectory, resolution: _Resolution) -> list[States]:
     """Return states between outputs where lines miss named quantities by more than is allowed.
 
     Named quantities may bend where states do not. Only there the run is repeated, from the output before.
@@ -157,7 +157,7 @@ def _bends(trajectory: Trajectory, shown: _Shown) -> list[States]:
     lines = (trajectory.outputs[left] + trajectory.outputs[right]) / 2
     with np.errstate(invalid="ignore"):  # quantities may be infinite
         apart = np.abs(between.outputs - lines)
-    allowed, seen = (each[len(each) - apart.shape[1] :] for each in (shown.allowed, shown.seen))
+    allowed, seen = (each[len(each) - apart.shape[1] :] for each in (resolution.allowed, resolution.seen))
     missed = (apart[:, seen] / allowed[seen]).max(axis=1, initial=0.0)
     rows = np.sort(np.argsort(-missed, kind="stable")[:MOST_REFINED])
     rows = rows[missed[rows] > 1]
@@ -165,9 +165,9 @@ def _bends(trajectory: Trajectory, shown: _Shown) -> list[States]:
         return []
     bent, parts = left[rows], np.minimum(np.ceil(missed[rows]), PARTS_REFINED).astype(int)
     # No event lies between two outputs.
-    calm = replace(problem, record_steps=False, picture=0.0, max_seconds=None, in_play=(False,) * len(problem.margins))
+    arc = replace(problem, record_steps=False, line_error=0.0, max_seconds=None, active=(False,) * len(problem.margins))
     problems = [
-        replace(calm, y0=y[i], times=np.linspace(*ends, n + 1)[1:-1], segments=np.array(ends), parameters=p[None])
+        replace(arc, y0=y[i], times=np.linspace(*ends, n + 1)[1:-1], segments=np.array(ends), parameters=p[None])
         for i, n, p, ends in zip(bent, parts, parameters[rows], zip(t[bent], t[bent + 1], strict=True), strict=True)
     ]
     found = solver(trajectory.run.solver).solve_all(problems)
@@ -177,7 +177,7 @@ def _bends(trajectory: Trajectory, shown: _Shown) -> list[States]:
     ]
 
 
-def pictured(trajectory: Trajectory) -> Trajectory:
+def refined(trajectory: Trajectory) -> Trajectory:
     """Return the trajectory with outputs that resolve it, instead of the times at which runs are compared."""
     rows = trajectory.result.known or trajectory.result.states()
     if trajectory.run.picture is None or len(rows.t) < 2:
@@ -188,23 +188,23 @@ def pictured(trajectory: Trajectory) -> Trajectory:
     sides &= ~unresolved(system, end, t) | np.isin(t, layer_starts(system, end))
     rows, which, moments = rows._replace(t=t), np.flatnonzero(sides), _event_times(trajectory)
     # Each block begins with the last row of the one before.
-    blocks, shown, found = range(0, max(len(which) - 1, 1), ROWS_AT_ONCE - 1), _Shown(), []
+    blocks, resolution, found = range(0, max(len(which) - 1, 1), ROWS_AT_ONCE - 1), _Resolution(), []
 
     @lru_cache(maxsize=1)  # what is but one block is evaluated once
     def block(first: int) -> Trajectory:
         return trajectory.at(rows.picked(which[first : first + ROWS_AT_ONCE]))
 
     for first in blocks:
-        shown.see(block(first))
+        resolution.see(block(first))
     for first in blocks:
         whole = block(first)
         for _ in range(REFINEMENT_ROUNDS):
-            if not (bends := _bends(whole, shown)):
+            if not (bends := _refinements(whole, resolution)):
                 break
             more = States(*map(np.concatenate, zip(whole.written, *bends, strict=True)))
             whole = trajectory.at(more.picked(np.argsort(more.t, kind="stable")))
-            shown.see(whole)
-        kept = shown.needed(whole, moments)
+            resolution.see(whole)
+        kept = resolution.needed(whole, moments)
         kept[-1] = first == blocks[-1]
         found.append(whole.written.picked(kept))
     return trajectory.at(States(*map(np.concatenate, zip(*found, strict=True))))
@@ -214,8 +214,8 @@ def shared_times(runs: Sequence[Trajectory], most: int) -> tuple[float, ...]:
     """Return output times for all runs: everywhere as dense as those of the run with the densest outputs, or as dense
     as ``most`` times can be. If there is room, times that no line may skip in any of the runs are added.
     """
-    pictures = [picture for picture in map(pictured, runs) if len(picture.result.times) > 1]  # others end at once
-    own, usual = [picture.result.times for picture in pictures], runs[0].run.times
+    resolved = [each for each in map(refined, runs) if len(each.result.times) > 1]  # others end at once
+    own, usual = [each.result.times for each in resolved], runs[0].run.times
     every = np.unique(np.concatenate([*own, usual[-1:]]))
     if len(own) < 2:
         return tuple(every.tolist() if own else usual)
@@ -228,8 +228,8 @@ def shared_times(runs: Sequence[Trajectory], most: int) -> tuple[float, ...]:
     count = np.append(0.0, np.cumsum(SHARED_DENSITY * density * lengths))
     parts = min(int(np.ceil(count[-1])) + 1, most)
     times = [np.interp(np.linspace(0, count[-1], parts), count, every), every[[0, -1]]]
-    sides = [p.result.times[_beside(p.result.times, _event_times(p)) | _edges(p.result.outputs)] for p in pictures]
-    marked = np.unique(np.concatenate([*sides, *map(_steps, pictures)]))
+    sides = [p.result.times[_sides(p.result.times, _event_times(p)) | _edges(p.result.outputs)] for p in resolved]
+    marked = np.unique(np.concatenate([*sides, *map(_steps, resolved)]))
     return tuple(np.unique(np.concatenate([*times, marked if len(marked) <= most else []])).tolist())
 
 
@@ -238,7 +238,7 @@ def _event_times(trajectory: Trajectory) -> Array:
     return np.array(sorted([*trajectory.result.events.t, *(jump.t for jump in trajectory.jumps)]))
 
 
-def _beside(t: Array, moments: Array) -> Mask:
+def _sides(t: Array, moments: Array) -> Mask:
     """Return the mask of times on either side of one of these moments, which are in order."""
     return among(t, moments) | among(np.nextafter(t, np.inf), moments)
 
