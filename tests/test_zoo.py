@@ -262,7 +262,7 @@ def test_a_case_is_the_same_as_a_sweep_of_one(name):
     alone = solution.attributes | {c.name: c.values for c in solution.columns}
     alone |= {"steps": alone["count_steps"], "destroys_entropy": alone["entropy_violations"] != "none"}
     ends = at_end(solution.trajectory)
-    for state in simulation.system.rows.keys() - simulation.system.inside:
+    for state in simulation.system.rows.keys() - simulation.system.interior:
         alone |= {f"{state}_{which}": extremes(solution.trajectory)[which][state] for which in EXTREMES}
         alone[f"{state}_last"] = ends[state]
     single = tuple(f"_{which}" for which in SINGLE_COLUMNS)

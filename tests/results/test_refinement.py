@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from case_runs import load, solved
-from surfacechem.results.picture import needed_rows
 
 import surfacechem
-from surfacechem.results import picture
+from surfacechem.results import refinement
 from surfacechem.results.event_table import events_of
+from surfacechem.results.refinement import needed_rows
 from surfacechem.solve import run
 from surfacechem.tolerances import LINE_ERROR
 
@@ -70,7 +70,7 @@ def test_a_dataset_takes_little_more_memory_than_it_has(monkeypatch):
     """Rows are looked at in blocks, whose ends are outputs, too."""
     case = surfacechem.load("stick-slip", ["run.until=12 s"])
     whole, solution = case.run(error="balances").dataset, case.run(error="balances")
-    for module in (picture, run):
+    for module in (refinement, run):
         monkeypatch.setattr(module, "ROWS_AT_ONCE", 400)
     tracemalloc.start()
     dataset = solution.dataset

@@ -273,7 +273,7 @@ def _sticks(build: Build, limit: Expression, needed: Expression) -> Iterator[Mar
     breaks = breaks_bonds(build)
     limit = build.expanded(limit)
     without = limit.subs(breaks)
-    reason = "the dead load exceeds what sticking reserves, and nothing holds what slides; a mass or a stiffness would"
+    reason = "the dead load exceeds what sticking bears, and nothing holds what slides; a mass or a stiffness would"
     spare = where(without > limit, without, limit) - absolute(needed)
     yield Margin("sticks", where(absolute(needed) > 0, spare, 1), reason)
     if without != limit:

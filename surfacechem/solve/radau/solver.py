@@ -107,6 +107,10 @@ def _edge_rows(problem: Problem, count: int, arcs: int, jumps: int) -> tuple[Arr
     return np.empty((count, arcs, 5 + parameters)), np.empty((count, jumps, 3 + problem.edges.sizes[0] + 2 * inputs))
 
 
+def _usual_room(problem: Problem, steps: int, events: int) -> Room:
+    return steps * problem.record_steps, events * bool(problem.margins), INSIDE_ROWS * bool(problem.line_error), events
+
+
 def batch_of(
     problem: Problem, runs: Sequence[Array], room: Room | None = None, tables: Sequence[NDArray[Any]] | None = None
 ) -> Any:
@@ -118,9 +122,7 @@ def batch_of(
     program, times = problem.program, runs[-1]
     explicit = tables is None and problem.explicit and program.rates is not None
     n, q, m, count = program.n, program.n_ledger, program.n_margins, len(runs[0])
-    steps, events = (STEP_ROWS, EVENT_ROWS) if count > 1 else (ALONE_ROWS, ALONE_ROWS)
-    usual = steps * problem.record_steps, events * bool(problem.margins), INSIDE_ROWS * bool(problem.line_error), events
-    step_rows, event_rows, rows, jump_rows = room or usual
+    step_rows, event_rows, rows, jump_rows = room or _usual_room(problem, STEP_ROWS, EVENT_ROWS)
     return Batch(
         *_with_edges(tables or (program.explicit_tables if explicit else program.tables), problem.edges),
         problem.rtol,
@@ -148,7 +150,7 @@ def _run_one(problem: Problem, room: Room | None = None) -> Any:
         _contiguous(values)[None] for values in (problem.y0, problem.parameters, problem.segments, problem.times)
     )
     columns = y0, parameters, np.array((problem.spacing,)), np.array((problem.max_steps,)), _peaks(problem)[None]
-    batch = batch_of(problem, (*columns, segments, times), room)
+    batch = batch_of(problem, (*columns, segments, times), room or _usual_room(problem, ALONE_ROWS, ALONE_ROWS))
     if problem.max_seconds is None:
         stepper.run(batch)
         return batch
