@@ -113,6 +113,8 @@ class InterfaceReactor(StateVectorReactor):
         self._is_set, self._asked_at = False, 0.0
         """Whether variables were set since other reactors asked for rates, and the time of that request [s]."""
         self.evaluations, self.seconds = 0, 0.0
+        self.integrated = False
+        """True if a network integrates the ledger itself, instead of the integrator."""
         self._set_scene(self.scene)
         for body, reactor in self.bodies.items():
             self._connect(reactor, body)
@@ -528,7 +530,7 @@ class InterfaceReactor(StateVectorReactor):
         self.t, self._dated = t, True
         self._read_network()
         x = self.x
-        if self.scene.events and not self.coupled:
+        if self.integrated:
             x = np.concatenate((x[: len(self.scene.states)], self.ledger))
         self.history.append(t, x)
 

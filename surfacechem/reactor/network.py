@@ -112,7 +112,8 @@ class ReactorNet(cantera.ReactorNet):
         """Advance to a time, through the events of scenes before it."""
         watch = self._watch
         for interface in watch.interfaces:
-            interface.scene.events.until(goal, self.rtol)  # type: ignore[union-attr]
+            if interface.scene.events:
+                interface.scene.events.until(goal, self.rtol)
         start = np.array(self.get_state()) if apply_limit and np.any(self.advance_limits >= 0) else None
         while not self._is_reached(goal):
             if self.time >= watch.known:
@@ -167,7 +168,8 @@ class ReactorNet(cantera.ReactorNet):
         if self.n_sensitivity_params:
             raise InputError(f"sensitivities end at {where}, where the integration starts anew.")
         for interface in self._watch.interfaces:
-            interface.jump(self.time)
+            if interface.scene.events:
+                interface.jump(self.time)
             self._record(interface, self.time)
         self.reinitialize()
 
