@@ -51,6 +51,8 @@ class StepWatcher:
 
     def __init__(self, net: Any, interfaces: Sequence[InterfaceReactor]) -> None:
         self.net = net
+        # Scenes that jump, and those with histories, over which the integrator may step: their accounts are integrated
+        # here. Others keep the integrator's speed.
         self.interfaces = [item for item in interfaces if item.scene.events or (item.scene.varies and not item.coupled)]
         for item in self.interfaces:
             item.integrated = not item.coupled
