@@ -320,8 +320,8 @@ def drawn_as(values: xarray.DataArray) -> Any:
 
 
 def draw_curve(ax: Axes, dataset: xarray.Dataset, over: str, values: Array, **look: Any) -> None:
-    """Draw values over a variable, dotted between two outputs at the same time, or with the jump of an event between
-    them: a jump has no values in between.
+    """Draw values over a variable, dotted where they jump between two outputs at the same time, or with the jump of
+    an event between them: a jump has no values in between.
     """
     x, times = dataset[over].values, dataset[dataset[over].dims[0]].values
     leaps = np.abs(np.diff(times)) <= FLAT * np.abs(times[1:])
@@ -329,7 +329,7 @@ def draw_curve(ax: Axes, dataset: xarray.Dataset, over: str, values: Array, **lo
         moments = dataset["event_time"].values[dataset["event_verdict"].values != ""]
         before = np.searchsorted(times[:-1], moments[(moments >= times[0]) & (moments < times[-1])], side="right") - 1
         leaps[before] |= ~np.append(False, leaps)[before]  # unless the output is the other side of the event
-    jumps = 1 + np.flatnonzero(leaps)
+    jumps = 1 + np.flatnonzero(leaps & (values[1:] != values[:-1]))
     (line,) = ax.plot(np.insert(x, jumps, np.nan), np.insert(values, jumps, np.nan), **look)
     if len(jumps):
         sides = np.full(len(x), np.nan)

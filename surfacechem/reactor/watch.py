@@ -31,6 +31,7 @@ NODES, WEIGHTS = np.polynomial.legendre.leggauss(6)
 """Nodes and weights of Gauss's quadrature from -1 to 1."""
 
 PANELS_PER_CYCLE = 8
+"""Panels in a cycle of a load from which halving begins, a choice: two coarser panels could agree by aliasing."""
 
 MOST_HALVINGS = 8
 """Halvings of a panel, a choice: accounts that are roundoff never agree, and 256 panels resolve what a step passes over

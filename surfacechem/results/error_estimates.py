@@ -152,10 +152,7 @@ def against_exact(
 
     # Exact solutions have no list of events: the times of events are compared with a second run.
     if late is None and trajectory.result.status not in SPENT and (found := event_times(trajectory)):
-        run = trajectory.run
-        closer = run.second(second_tolerance(run.rtol), picture=None, looks=0.0)
-        expected = event_times(second or trajectory.model.solve_values(closer, trajectory.values))
-        late = event_errors(found, expected, run.times[-1])
+        late = event_errors(found, event_times(second or _second(trajectory)), trajectory.run.times[-1])
     late = dict(late or {})
     latest = max(late.values(), default=0.0)
     # With cells, whose layers are unresolved at first, errors are taken at the requested times.
@@ -542,7 +539,7 @@ def shared_times(found: Mapping[str, Array], expected: Mapping[str, Array]) -> l
     [(array([0.2]), array([0.19]))]
     """
     pairs = []
-    for name in expected.keys() & found.keys():
+    for name in sorted(expected.keys() & found.keys()):
         ours, theirs = found[name], expected[name]
         if len(ours) != len(theirs):
             if name.startswith(KINK):

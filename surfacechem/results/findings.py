@@ -150,8 +150,8 @@ def _lost_fluxes(trajectory: Trajectory) -> list[str]:
     most = max((largest(everywhere(name)) for name in fluxes), default=0.0)
     # Heat that roundoff carries over the whole run is compared with the heat content, independent of its zero.
     content = trajectory.roundings.get("E_total", 0.0) / EPS
-    sensitivities = ERROR_FLOOR * max(largest(everywhere("E_total")), content)
-    lost = [name for name, size in fluxes.items() if size > LOST_FLUX * most and size * duration > sensitivities]
+    least = ERROR_FLOOR * max(largest(everywhere("E_total")), content)
+    lost = [name for name, size in fluxes.items() if size > LOST_FLUX * most and size * duration > least]
     advice = "let the two share one temperature, or use the heat_into variables, which are exact"
     return [f"{', '.join(lost)}: lost to rounding, as the conductance is very large; {advice}"] if lost else []
 

@@ -111,10 +111,10 @@ class _Resolution:
     noise: Array = field(default_factory=lambda: np.array(0.0))
     """Change of each quantity by the last bit or the absolute tolerance of a state."""
 
-    def see(self, block: Trajectory) -> None:
+    def update(self, block: Trajectory) -> None:
         """Update ranges and allowed errors with the outputs of a block."""
-        values, some, part = _quantities(block)[1], block.sample, block.run.picture or 0.0
-        unknown = [*some.sensitivities(EPS * np.abs(some.result.outputs) + some.result.problem.atol).values()]
+        values, sample, part = _quantities(block)[1], block.sample, block.run.picture or 0.0
+        unknown = [*sample.sensitivities(EPS * np.abs(sample.result.outputs) + sample.result.problem.atol).values()]
         self.noise = np.maximum(self.noise, np.pad(RUN_ERROR * np.array(unknown), (values.shape[1] - len(unknown), 0)))
         # Early rows, whose layers are unresolved, do not count for the ranges.
         late = values[~unresolved(block.model.system, block.run.times[-1], block.result.times)]
@@ -125,12 +125,12 @@ class _Resolution:
         # of the part is the error of known states for the states between them.
         error = min(RUN_ERROR * block.run.rtol, part) * self.reach[:2].max(axis=0)
         self.allowed = (1 - 1 / FINER_BY) * part * np.where(known < 0, every, known) + error + self.noise
-        self.seen = every > self.allowed
+        self.varies = every > self.allowed
 
     def needed(self, block: Trajectory, moments: Array) -> Mask:
         """Return the mask of outputs that resolve a block, with both sides of events at these ``moments``."""
-        t, (table, values) = block.result.times, (each[:, self.seen] for each in _quantities(block))
-        return needed_rows(t, values, self.allowed[self.seen], _sides(t, moments) | _edges(table))
+        t, (table, values) = block.result.times, (each[:, self.varies] for each in _quantities(block))
+        return needed_rows(t, values, self.allowed[self.varies], _sides(t, moments) | _edges(table))
 
 
 def _quantities(block: Trajectory) -> tuple[Array, Array]:
@@ -157,8 +157,8 @@ def _refinements(trajectory: Trajectory, resolution: _Resolution) -> list[States
     lines = (trajectory.outputs[left] + trajectory.outputs[right]) / 2
     with np.errstate(invalid="ignore"):  # quantities may be infinite
         apart = np.abs(between.outputs - lines)
-    allowed, seen = (each[len(each) - apart.shape[1] :] for each in (resolution.allowed, resolution.seen))
-    missed = (apart[:, seen] / allowed[seen]).max(axis=1, initial=0.0)
+    allowed, varies = (each[len(each) - apart.shape[1] :] for each in (resolution.allowed, resolution.varies))
+    missed = (apart[:, varies] / allowed[varies]).max(axis=1, initial=0.0)
     rows = np.sort(np.argsort(-missed, kind="stable")[:MOST_REFINED])
     rows = rows[missed[rows] > 1]
     if not len(rows):
@@ -195,7 +195,7 @@ def refined(trajectory: Trajectory) -> Trajectory:
         return trajectory.at(rows.picked(which[first : first + ROWS_AT_ONCE]))
 
     for first in blocks:
-        resolution.see(block(first))
+        resolution.update(block(first))
     for first in blocks:
         whole = block(first)
         for _ in range(REFINEMENT_ROUNDS):
@@ -203,7 +203,7 @@ def refined(trajectory: Trajectory) -> Trajectory:
                 break
             more = States(*map(np.concatenate, zip(whole.written, *bends, strict=True)))
             whole = trajectory.at(more.picked(np.argsort(more.t, kind="stable")))
-            resolution.see(whole)
+            resolution.update(whole)
         kept = resolution.needed(whole, moments)
         kept[-1] = first == blocks[-1]
         found.append(whole.written.picked(kept))

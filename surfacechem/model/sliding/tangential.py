@@ -208,7 +208,7 @@ def _friction(
     follows = not (kind.slides_inertially or kind.rate_dependent)
     if follows:
         # While the limit is zero and does not grow, both slip directions are equivalent, and slip does not end, not
-        # even at rest.
+        # even at rest: the constant keeps the guard off zero and is below any speed.
         grows = build.total_derivative(limit)
         back = {s: where(limit > 0, at, where(grows > 0, at, absolute(at) + PICOMETRE)) for s, at in back.items()}
     # Beyond touch a contact law may go on to negative pressure; there slip needs a pull to begin.

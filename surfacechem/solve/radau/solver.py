@@ -44,7 +44,7 @@ from surfacechem.solve.radau.stepper import (
 STEP_ROWS, EVENT_ROWS, INSIDE_ROWS = 512, 64, 4096
 """Room for steps, events and states inside steps of each of many runs, whose tables lie far apart in memory."""
 ALONE_ROWS = 1024
-"""Room for the steps, and as many events, of a run that is alone: what it does not write to costs nothing."""
+"""Room for the steps, and as many events, of a run that is alone, a choice: what it does not write to costs nothing."""
 Room: TypeAlias = tuple[int, int, int, int]
 """Numbers of steps, events, stored states inside steps, and jumps for which a run has memory."""
 CHUNK = 256
