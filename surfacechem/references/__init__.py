@@ -1,22 +1,21 @@
 """Exact solutions, one family per file, for verifying every solver to rounding.
 
-`get("endothermic-bonding")` imports the file of bonding only and returns one class; `all()` returns all by name.
+`get("endothermic-bonding")` imports only the file with the class EndothermicBonding, and returns that class; `all()`
+returns all by name.
 """
 
 from __future__ import annotations
 
-import pkgutil
+import re
 from functools import cache
 from importlib import import_module
 from inspect import isabstract
+from pathlib import Path
 
 from surfacechem.errors import InputError, suggestion
-from surfacechem.references.base import Reference
+from surfacechem.references.base import Reference, name_of
 
 __all__ = ["Reference", "all", "get", "known", "names"]
-
-NO_SOLUTIONS = ("base", "scene_view")
-"""Modules without an exact solution, in addition to those that begin with an underscore."""
 
 
 def names() -> list[str]:
@@ -25,8 +24,9 @@ def names() -> list[str]:
 
 
 def known(name: str) -> bool:
-    """True if there is an exact solution of this name; imports only the file of its family."""
-    return name in _family(name)
+    """True if there is an exact solution of this name; imports only the file of its class."""
+    file = _files(tuple(__path__)).get(name)
+    return file is not None and name in _members(file)
 
 
 @cache
@@ -55,29 +55,25 @@ def get(name: str) -> type[Reference]:
     """
     if not known(name):
         raise InputError(f"no exact solution '{name}'.{suggestion(name, names())}")
-    return _family(name)[name]
+    return _members(_files(tuple(__path__))[name])[name]
 
 
 def all() -> dict[str, type[Reference]]:
     """Return every exact solution by name."""
-    return {name: kind for family in _families() for name, kind in _members(family).items()}
+    files = dict.fromkeys(_files(tuple(__path__)).values())
+    return {name: kind for file in files for name, kind in _members(file).items()}
 
 
 @cache
-def _family(name: str) -> dict[str, type[Reference]]:
-    """Return the exact solutions of the file with the longest name that is part of this one."""
-    families = [family for family in _families() if family.replace("_", "-") in name]
-    return _members(max(families, key=len)) if families else {}
+def _files(folders: tuple[str, ...]) -> dict[str, str]:
+    """Return the file of every class by its name as an exact solution, read off the text of the files."""
+    paths = sorted(path for folder in folders for path in Path(folder).glob("[!_]*.py"))
+    texts = {path.stem: path.read_text(encoding="utf-8") for path in paths}
+    return {name_of(kind): stem for stem, text in texts.items() for kind in re.findall(r"^class (\w+)", text, re.M)}
 
 
-def _families() -> list[str]:
-    """Return the names of the files with exact solutions."""
-    files = (module.name for module in pkgutil.iter_modules(__path__))
-    return [file for file in files if file not in NO_SOLUTIONS and not file.startswith("_")]
-
-
-def _members(family: str) -> dict[str, type[Reference]]:
+def _members(file: str) -> dict[str, type[Reference]]:
     """Return the exact solutions of a file by name."""
-    module = import_module(f"{__name__}.{family}")
+    module = import_module(f"{__name__}.{file}")
     kinds = [kind for kind in vars(module).values() if isinstance(kind, type) and kind.__module__ == module.__name__]
     return {kind.name: kind for kind in kinds if issubclass(kind, Reference) and not isabstract(kind)}

@@ -11,8 +11,8 @@ import numpy as np
 
 from surfacechem.contracts.terms import parameter
 from surfacechem.errors import InputError
-from surfacechem.references._numerics import increasing_root
 from surfacechem.references.base import Array, Parameters, Quantities, Reference, SceneView, read
+from surfacechem.references.numerics import increasing_root
 
 SEARCH_POINTS = 4001
 """Number of approaches in the search for the steepest attraction, on either side of which the folds are bisected."""

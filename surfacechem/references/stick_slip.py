@@ -12,8 +12,8 @@ import numpy as np
 
 from surfacechem.contracts.terms import parameter
 from surfacechem.errors import InputError
-from surfacechem.references._numerics import increasing_root
 from surfacechem.references.base import Array, Parameters, Quantities, Reference, SceneView, read
+from surfacechem.references.numerics import increasing_root
 
 MOST_CYCLES = 1_000_000
 """Largest number of cycles, so that a time far beyond them is refused at once."""

@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 
 from surfacechem import references
 from surfacechem.errors import InputError
-from surfacechem.references._bodies import ConstantCapacity, QuadraticEnergy
-from surfacechem.references.base import Reference, SceneView
+from surfacechem.references.base import ConstantCapacity, QuadraticEnergy, Reference, SceneView
 from surfacechem.results.event_table import SIDE
 from surfacechem.scene import Scene
 from surfacechem.solve.contract import Array

@@ -13,7 +13,7 @@ from tables_mechanics import columns, expected, parameters
 from surfacechem.errors import InputError
 from surfacechem.quantities import BOLTZMANN
 from surfacechem.references import Reference, get
-from surfacechem.references.semenov_fold import scaled_rise
+from surfacechem.references.numerics import scaled_rise
 
 FOLDER = Path(__file__).parent
 RELATIVE = 1e-13

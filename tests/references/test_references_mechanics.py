@@ -12,7 +12,7 @@ from test_references import assert_exact, effect_of_rounding
 
 from surfacechem.errors import InputError
 from surfacechem.references import get
-from surfacechem.references._bodies import ConstantCapacity, QuadraticEnergy
+from surfacechem.references.base import ConstantCapacity, QuadraticEnergy
 
 EPS = np.finfo(float).eps
 FRICTION = {"m": 10.0, "k": 1e8, "t_s": 6e4, "t_k": 4e4}

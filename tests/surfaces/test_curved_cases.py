@@ -18,7 +18,7 @@ from surfacechem.laws.bonding import EquilibriumBonds
 from surfacechem.laws.contact import Penalty
 from surfacechem.laws.longrange import LennardJonesSpherePlane
 from surfacechem.model.system import DUMMY_STATE
-from surfacechem.references.scene_view import SceneView
+from surfacechem.references.base import SceneView
 from surfacechem.results.matching import match
 from surfacechem.runs.summaries import run_summary
 from surfacechem.surfaces import patches, potential

@@ -8,13 +8,15 @@ from collections.abc import Mapping
 import numpy as np
 
 from surfacechem.quantities import BOLTZMANN, GAS_CONSTANT
-from surfacechem.references.adiabatic_arrhenius import AdiabaticArrhenius
-from surfacechem.references.affinity import ExponentialAffinitySolution
-from surfacechem.references.bell import BellConstantForce
-from surfacechem.references.bonding import Bonding, EndothermicBonding, ExothermicBonding
-from surfacechem.references.cluster import SharedLoadCluster
-from surfacechem.references.cooling_to_zero import CoolingToZero
-from surfacechem.references.debonding import SuddenDebonding
+from surfacechem.references.bond_rupture import BellConstantForce, SharedLoadCluster, SuddenDebonding
+from surfacechem.references.heat_exchange import CoolingToZero
+from surfacechem.references.reactions import (
+    AdiabaticArrhenius,
+    Bonding,
+    EndothermicBonding,
+    ExothermicBonding,
+    ExponentialAffinitySolution,
+)
 from surfacechem.solve.contract import Array
 from surfacechem.studies.regimes import Exact, Refused, Stops, Trial, regime
 

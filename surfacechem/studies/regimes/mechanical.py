@@ -7,10 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from surfacechem.errors import InputError
-from surfacechem.references.coulomb_stop import CoulombStop
-from surfacechem.references.elastic_contact import ElasticContact
-from surfacechem.references.film import ClosingFilm
-from surfacechem.references.pull_off import OverdampedPullOff
+from surfacechem.references.normal_contact import ElasticContact, OverdampedPullOff
+from surfacechem.references.sliding import ClosingFilm, CoulombStop
 from surfacechem.references.stick_slip import StickSlip
 from surfacechem.solve.contract import Array
 from surfacechem.studies.regimes import FOLDER, Exact, Stops, Trial, regime

@@ -6,8 +6,7 @@ import math
 
 import numpy as np
 
-from surfacechem.references.semenov_fold import SemenovFold
-from surfacechem.references.three_temperatures import ThreeTemperatures
+from surfacechem.references.heat_exchange import SemenovFold, ThreeTemperatures
 from surfacechem.studies.regimes import FOLDER, Exact, Refused, Stops, Trial, regime
 
 # Cases of a medium from which bonds take heat, and of a film heated by friction.

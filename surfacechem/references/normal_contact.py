@@ -1,4 +1,4 @@
-"""Pull-off from an exponential cohesive zone: by a jump, its heating, and slow passage of the fold of a damped gap."""
+"""Normal contact: elastic, impact and rebound, and cohesive zones that open reversibly or pull off by a jump."""
 
 from __future__ import annotations
 
@@ -10,10 +10,157 @@ import numpy as np
 
 from surfacechem.contracts.terms import parameter
 from surfacechem.errors import InputError
-from surfacechem.references._bodies import UniformBody
-from surfacechem.references._numerics import gauss, increasing_root
-from surfacechem.references.base import Array, Parameters, Quantities, Reference, SceneView, read
-from surfacechem.references.semenov_fold import log_remainder, scaled_rise
+from surfacechem.references.base import Array, Parameters, Quantities, Reference, SceneView, UniformBody, read
+from surfacechem.references.numerics import gauss, increasing_root, log_remainder, scaled_rise
+
+
+class ElasticContact(Reference):
+    r"""Elastic bodies pressed or pulled through an elastic interface; the penalty limit is rigid contact.
+
+    .. math:: g_n=\frac{kw}{k+E_n},\quad t_n=E_ng_n,\quad\tfrac12E_ng_n^2=\frac{t_n^2}{2E_n}
+
+    For :math:`E_n\to\infty` the traction tends to k w and the energy of the contact to zero.
+    Here :math:`w=w_i+\dot wt`; with a unilateral penalty w <= 0. The energies are accurate to rounding for any
+    stiffness.
+
+    Source: Sauer, Duong & Mandadapu (2021), eq. ex:psi_c, in series with a spring.
+
+    >>> contact = ElasticContact(k=1e12, E_n=1e15, w_i=-1e-8)
+    >>> f"{contact.solution(0.0)['t_n']:.6f}"
+    '-9990.009990'
+    """
+
+    k: float = parameter("Pa/m", "stiffness of the bodies", above=0)
+    E_n: float = parameter("Pa/m", "contact stiffness", above=0)
+    w_i: float = parameter("m", "initial far-field displacement")
+    w_dot: float = parameter("m/s", "speed of the far field", default=0.0)
+
+    readings = read(normal="k", potential="E_n", initial="w_i=w_n", ramp="w_dot=w_n")
+
+    def quantities(self, t: Array) -> Quantities:
+        w = self.w_i + self.w_dot * t
+        g, delta = self.k / (self.k + self.E_n) * w, self.E_n / (self.k + self.E_n) * w
+        energies = {"E_spring_n": 0.5 * self.k * delta**2, "U_contact": 0.5 * self.E_n * g**2}
+        return {"w_n": w, "g_n": g, "t_n": self.E_n * g, **energies}
+
+
+class BouncingBody(UniformBody):
+    r"""A mass falls under a constant load and rebounds with the fraction e of its velocity; the lost energy is heat.
+
+    .. math:: a=-F/m,\quad V=\sqrt{v_i^2+2ag_i},\quad t_1=\frac{v_i+V}a,\quad t_{n+1}-t_n=\frac{2Ve^n}a,\quad
+        t_\infty=t_1+\frac{2V}a\,\frac e{1-e},\quad T_n^2=T_i^2+\frac{T_0}Cm V^2\,(1-e^{2n})
+
+    Quadratic energies, perfect thermal contact. Any t >= 0: from `rest_time` on the gap and its velocity are zero.
+
+    Source: free fall and Newton's law of impact, summed.
+
+    >>> plate = BouncingBody(m=5.0, e=0.5, F_n=-50.0, g_n_i=0.2, v_n_i=0.0, C=100.0, T_0=300.0, T_i=300.0)
+    >>> plate.first, plate.rest_time, float(plate.solution(0.3)["g_n"])
+    (0.2, 0.6000000000000001, 0.05)
+    """
+
+    m: float = parameter("kg/m^2", "mass", above=0)
+    e: float = parameter("1", "coefficient of restitution", default=0.0, at_least=0, at_most=1)
+    F_n: float = parameter("Pa", "load, negative where it presses", at_most=0)
+    g_n_i: float = parameter("m", "initial gap", at_least=0)
+    v_n_i: float = parameter("m/s", "initial opening velocity")
+
+    readings = read(normal="m e", initial="F_n g_n_i=g_n v_n_i=v_n")
+
+    @property
+    def _fall(self) -> tuple[float, float]:
+        """Acceleration towards contact, and speed of the first impact."""
+        acceleration = -self.F_n / self.m
+        return acceleration, math.sqrt(self.v_n_i**2 + 2 * acceleration * self.g_n_i)
+
+    @property
+    def first(self) -> float:
+        """Time [s] of the first impact."""
+        a, speed = self._fall
+        if not a:
+            return -self.g_n_i / self.v_n_i if self.v_n_i < 0 else math.inf
+        return (self.v_n_i + speed) / a
+
+    @property
+    def rest_time(self) -> float:
+        """Time [s] at which it comes to rest."""
+        a, speed = self._fall
+        if self.e == 1 or not a:
+            return self.first if self.e == 0 else math.inf
+        return self.first + 2 * speed / a * self.e / (1 - self.e)
+
+    def quantities(self, t: Array) -> Quantities:
+        a, speed = self._fall
+        e, first = self.e, self.first
+        flight = 2 * speed / a if a else math.inf  # time of flight from the speed of the first impact
+
+        def flown(n: Array) -> Array:
+            """Return the duration of n flights after the first impact, in units of ``flight``."""
+            return n if e == 1 else e * (1 - e**n) / (1 - e)
+
+        n = np.where(t < first, 0.0, 1.0)  # number of impacts at the times
+        if a and e:
+            flights = np.maximum((t - first) / flight, 0.0)
+            left = np.maximum(1 - flights * (1 - e) / e, np.finfo(float).tiny)
+            whole = np.floor(flights if e == 1 else np.log(left) / math.log(e))
+            # The logarithm is rounded, so that the number may be one too small or too large.
+            whole += np.where(flights >= flown(whole + 1), 1.0, 0.0) - np.where(flights < flown(whole), 1.0, 0.0)
+            n = np.where(t < first, 0.0, whole + 1)
+        since = np.where(n > 0, t - (first + (flight * flown(n - 1) if a else 0.0)), t)
+        v = np.where(n > 0, speed * e**n, self.v_n_i)
+        g = np.where(n > 0, 0.0, self.g_n_i) + v * since - a * since**2 / 2
+        rests = t >= self.rest_time
+        heat = self.m * speed**2 / 2 * np.where(rests, 1.0, 1 - e ** (2 * n))
+        return {
+            "g_n": np.where(rests, 0.0, g),
+            "v_n": np.where(rests, 0.0, v - a * since),
+            "released": heat,
+            "T": self.heated(heat),
+        }
+
+
+class IsentropicCohesiveOpening(UniformBody):
+    r"""Opening of a cohesive zone that weakens with temperature, in perfect contact and without heat supply: it cools.
+
+    .. math:: T^3-BT^2-a(g_n)=0,\quad a=\frac{t_{max}T_0^2}C(g_n+g_0)e^{1-g_n/g_0},\quad B=T_i-\frac{a(g_i)}{T_i^2}
+
+    for a strength :math:`t_{max}T_0/T`. The entropy
+    :math:`C(T/T_0-1)-t_{max}\frac{T_0}{T^2}(g_n+g_0)e^{1-g_n/g_0}` of bodies and zone is constant; fully open, T = B.
+    Quadratic energies; :math:`g_n=g_i+\dot gt\ge0`. If B <= 0 the temperature goes to zero as the zone opens.
+
+    Source: Sauer, Duong & Mandadapu (2021), eq. ex:psi_czm and quadratic energy, at constant entropy.
+
+    >>> zone = IsentropicCohesiveOpening(t_max=5e7, g_0=1e-8, C=0.02, T_0=300.0, T_i=300.0, g_dot=1e-8)
+    >>> f"{zone.solution(1.0)['T']:.9f} {zone.open_temperature:.9f}"
+    '286.764808584 232.042954289'
+    """
+
+    t_max: float = parameter("Pa", "strength at T_0", above=0)
+    g_0: float = parameter("m", "gap at the strength", above=0)
+    g_i: float = parameter("m", "initial gap", default=0.0, at_least=0)
+    g_dot: float = parameter("m/s", "opening speed", at_least=0)
+
+    readings = read(potential="t_max g_0", initial="g_i=g_n", ramp="g_dot=g_n")
+
+    @property
+    def open_temperature(self) -> float:
+        """Temperature [K] of the open bodies."""
+        return self.T_i - float(self._a(np.array(self.g_i))) / self.T_i**2
+
+    def quantities(self, t: Array) -> Quantities:
+        g, B = self.g_i + self.g_dot * t, self.open_temperature
+        a = self._a(g)
+        low = np.full_like(a, max(B, 0.0))
+        T = increasing_root(lambda x: (x**2 * (x - B), x * (3.0 * x - 2.0 * B)), a, low, low + np.cbrt(a))
+        u = g / self.g_0
+        scale = self.C / (2.0 * self.T_0)
+        zone, before = -4.0 * scale * a / T, -4.0 * scale * self._a(np.array(self.g_i)) / self.T_i
+        work = scale * (T - self.T_i) * (T + self.T_i) + zone - before
+        return {"g_n": g, "T": T, "t_n": self.t_max * self.T_0 / T * u * np.exp(1.0 - u), "U_c": zone, "work": work}
+
+    def _a(self, g: Array) -> Array:
+        return np.asarray(self.t_max * self.T_0**2 / self.C * (g + self.g_0) * np.exp(1.0 - g / self.g_0))
+
 
 PANEL_LENGTH = 0.25
 """Length of a panel in arsinh of the distance from the fold; the poles of 1 / cosh are pi / 2 away, so that the error

@@ -244,3 +244,25 @@ def _asymptotic(n: int, x: Array) -> Array:
         term = -term * k / x
         total = total + term
     return total
+
+
+SERIES_LIMIT = 0.1
+"""Largest argument for which a series of 16 terms is exact: the next term is 0.1^18 / 18, the first 0.1^2 / 2."""
+
+
+def scaled_rise(severity: Array) -> Array:
+    r"""Return the smaller x with :math:`xe^{1-x}=D_0/D_{crit}`, as 1 - v; not above one."""
+    almost_one = np.nextafter(1.0, 0.0)
+    with np.errstate(divide="ignore"):
+        distance = np.abs(np.log1p(severity - 1.0))
+        low = np.minimum(2.0 / (1.0 + np.sqrt(1.0 + 2.0 / distance)), almost_one)
+    high = np.minimum(np.sqrt(2.0 * distance), almost_one)
+    v = increasing_root(lambda v: log_remainder(-v), distance, np.minimum(low, high), high)
+    return np.where(v < 0.5, 1.0 - v, severity / math.e * np.exp(1.0 - v))
+
+
+def log_remainder(x: Array) -> tuple[Array, Array]:
+    r"""Return :math:`x-\ln(1+x)`, by its series where the two would cancel, and the size of its slope."""
+    near = np.clip(x, -SERIES_LIMIT, SERIES_LIMIT)
+    series = sum((-1) ** n * near**n / n for n in range(2, 18))
+    return np.where(np.abs(x) < SERIES_LIMIT, series, x - np.log1p(x)), np.abs(x) / (1.0 + x)
