@@ -183,16 +183,23 @@ def cached(mark: Fingerprint, code: Iterable[Path], find: Callable[[], Any]) -> 
     return from_file(cache_root() / "numbers" / f"{name}.json", find, json.loads, lambda x: json.dumps(x).encode())
 
 
-def from_file(path: Path, find: Callable[[], Any], read: Callable[[bytes], Any], write: Callable[[Any], bytes]) -> Any:
-    """Return the result of ``find``, read from its file in the cache if that exists, else computed and stored."""
+def from_file(
+    path: Path, find: Callable[[], Any], read: Callable[[bytes], Any], write: Callable[[Any], bytes | None]
+) -> Any:
+    """Return the result of ``find``, read from its file in the cache if that exists, else computed and stored.
+
+    It is not stored if ``write`` returns None.
+    """
     folder = path.parent
     with suppress(OSError, ValueError):
         if untrusted((folder, path)) is None and (content := unsealed(path.read_bytes())) is not None:
             return read(content)
     found = find()
+    if (content := write(found)) is None:
+        return found
     with suppress(OSError):
         make_folder(folder)
-        keep_file(path, sealed(write(found)))
+        keep_file(path, sealed(content))
         with os.scandir(folder) as entries:
             files = [entry.path for entry in entries]
         # If there are too many files the older half is removed.

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+import pickle
 import re
+import sys
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from importlib.metadata import version
 from itertools import accumulate
 from pathlib import Path
 from typing import Any
@@ -15,6 +18,7 @@ from typing import Any
 from surfacechem.contracts.terms import Potential, RateLaw
 from surfacechem.documents import document
 from surfacechem.documents import shipped as data
+from surfacechem.documents.cache_folder import PACKAGE, cache_root, fingerprint, from_file, source_digest
 from surfacechem.errors import InputError, Place, refuse_unknown, suggestion
 from surfacechem.mechanism.evaluated import EvaluatedReaction, Neighbour, NeighbourReaction, SurfaceEngine, hold
 from surfacechem.mechanism.interaction import KEY, interactions
@@ -27,6 +31,12 @@ from surfacechem.mechanism.thermo import lower
 from surfacechem.quantities import MOLECULAR
 from surfacechem.scene import BondingVariable, Engine, Sites
 from surfacechem.tolerances import NO_AMOUNT
+
+ROOMS = ".", "contracts", "documents", "laws", "mechanism"
+"""Folders of the package whose code determines what a mechanism becomes."""
+
+LIBRARIES = "cantera", "numpy", "ruamel.yaml", "symengine"
+"""Libraries whose code does too."""
 
 REACTIONS_PATH = "interface.mechanism.reactions"
 """Path at which a case changes parameters of reactions."""
@@ -54,6 +64,8 @@ class Mechanism:
     """Engine that evaluates the rates that are not lowered, if any."""
     remarks: tuple[str, ...] = ()
     """Remarks on unusual entries of the file."""
+    follows_from_text: bool = False
+    """True if it depends on no other file, on no code outside the package and on no engine."""
 
     def coverages(self, given: Mapping[str, float], place: Place | None = None) -> dict[str, float]:
         """Return initial values from coverages by species; others are zero, and all must sum to one."""
@@ -80,12 +92,40 @@ def load_mechanism(
     where the case names the mechanism, for errors that are not in the mechanism file. With ``evaluate`` reactions that
     are not lowered are evaluated by Cantera during a run; ``neighbours`` are the prescribed states of the phases next
     to the surface, None leaves them as in the file. ``name`` is the name of the file in errors if not its path,
-    ``text`` its content if it is available already.
+    ``text`` its content if it is available already. What follows from that text alone is read from the cache folder,
+    without Cantera, if it was loaded before.
     """
     if text is None:
         path = find(str(path), Path(), Place(document.OVERRIDE))
         text = document.read(path, name, MECHANISM_LIMITS)
-    source = Source(name or str(path), text)
+    file = name or str(path)
+    load = partial(_loaded, file, text, phase, bonds, place, evaluate, neighbours)
+    if neighbours:
+        return load()
+    sources = [source_digest(str(path)) for room in ROOMS for path in sorted((PACKAGE / room).glob("*.py"))]
+    code = sys.version, *map(version, LIBRARIES), *sources
+    mark = fingerprint(file, text, phase, list(bonds), evaluate, code)
+    path = cache_root() / "mechanisms" / mark.digest[:32]
+    found: Mechanism = from_file(path, load, pickle.loads, _kept_form)
+    return found
+
+
+def _kept_form(mechanism: Mechanism) -> bytes | None:
+    """Return a mechanism as a file of the cache has it; None if it depends on more than its text."""
+    return pickle.dumps(mechanism) if mechanism.follows_from_text else None
+
+
+def _loaded(
+    file: str,
+    text: str,
+    phase: str | None,
+    bonds: Sequence[str],
+    place: Place | None,
+    evaluate: bool,
+    neighbours: Mapping[str, Neighbour] | None,
+) -> Mechanism:
+    """Load one surface phase from the text of a file."""
+    source = Source(file, text)
     entry = source.phase(phase, place)
     # First our check, since Cantera ignores unknown keys.
     PhaseCheck(source, entry, evaluate).run()
@@ -117,7 +157,20 @@ def load_mechanism(
         temperatures=engine.temperatures,
         engine=engine if engine.gives else None,
         remarks=(*said, *odd),
+        follows_from_text=not engine.gives and _is_whole(source, entry) and all(map(_is_shipped, reactions)),
     )
+
+
+def _is_whole(source: Source, phase: Any) -> bool:
+    """True if the phase refers to no other phase or file, which Cantera would read, and to no extension."""
+    declared = [phase.get(key) for key in ("species", "reactions", "elements")]
+    # Cantera takes what is before a slash for the name of a file.
+    return not (phase.get("adjacent-phases") or source.data.get("extensions") or "/" in str(declared))
+
+
+def _is_shipped(law: RateLaw) -> bool:
+    """True if the law is stated in this package; rate types follow from the laws that state them."""
+    return str(getattr(law, "law", type(law)).__module__).startswith(f"{PACKAGE.name}.")
 
 
 def find(name: str, folder: Path, place: Place) -> Path:

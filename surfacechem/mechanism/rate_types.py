@@ -196,8 +196,17 @@ def kinds() -> dict[str, type[InterfaceArrhenius]]:
     known: dict[str, type[InterfaceArrhenius]] = {InterfaceArrhenius.kind: InterfaceArrhenius}
     for law in laws(RateLaw).values():
         assert issubclass(law, RateLaw)
-        known |= {made.kind: made for made in (_made(law, rate_type) for rate_type in law.rate_types)}
+        for made in (_made(law, rate_type) for rate_type in law.rate_types):
+            known.setdefault(made.kind, made)  # laws of the package come first, and keep their names
     return known
+
+
+def __getattr__(name: str) -> type[InterfaceArrhenius]:
+    """Return the class of a rate type by its name, for `pickle`."""
+    for made in kinds().values() if name.startswith("Interface") else ():
+        if made.__name__ == name:
+            return made
+    raise AttributeError(name)
 
 
 def kind_of(name: str) -> type[InterfaceArrhenius] | None:
