@@ -45,7 +45,7 @@ from surfacechem.tolerances import BRIEF_PART, DRIFT, FEW_EPS, GUARD_EPS, MOST_D
 NO_EDGE, UNDECIDED = -1, -2
 """Values instead of the index of the edge that is due: none is; undecided here, and left to Instant."""
 
-OPEN, CLOSED, NEAR = range(3)
+OPEN, CLOSED, NEAR, RESTING = range(4)
 """States of the guard of an edge."""
 
 
@@ -101,14 +101,14 @@ def _is_beyond(w: Any, first: int) -> bool:
 
 @compiled
 def _closing(w: Any, m: int) -> int:
-    """Return CLOSED if an edge's guard is below zero by more than the integration's drift, NEAR if it is zero."""
+    """Return CLOSED if the guard of an edge is below zero by more than the drift, RESTING or NEAR if it is zero."""
     value, size, small = w.margin_probe[m], w.magnitude[m], GUARD_EPS * w.magnitude[m]
     if w.active[m] == 0 or value > small:
         return OPEN
-    rests = w.edges[m - w.n_margins + w.edges.shape[0], RESTS] == 1
-    if rests or value < -max(min(DRIFT * w.rtol, MOST_DRIFT) * size, small):
+    if value < -max(min(DRIFT * w.rtol, MOST_DRIFT) * size, small):
         return CLOSED
-    return NEAR if w.kinds[m, 3] == 0 else OPEN
+    rests = w.edges[m - w.n_margins + w.edges.shape[0], RESTS] == 1
+    return RESTING if rests else NEAR if w.kinds[m, 3] == 0 else OPEN
 
 
 @compiled
@@ -123,7 +123,7 @@ def _due(w: Any, first: int) -> int:
     if near:
         evaluate(w, GUARD_RATES, w.margin_slope)
     for m in range(w.n_margins - 1, first - 1, -1):
-        closes = w.fired[m] == NEAR and w.margin_slope[m - first] < 0.0
+        closes = w.fired[m] == RESTING or (w.fired[m] == NEAR and w.margin_slope[m - first] < 0.0)
         # After a jump at this moment roundoff must not trigger the way back.
         if closes and w.jump_times[-1] == w.moment[0]:
             return UNDECIDED

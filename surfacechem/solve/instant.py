@@ -152,6 +152,10 @@ class Instant:
         found = consistent(self.program, point.t, point.y, np.zeros_like(point.y), point.parameters)
         return Point(point.t, found.y, found.ydot, point.parameters)
 
+    def _moment(self, t: float) -> float:
+        """Return the earliest time [s] that counts as the same moment."""
+        return t - SAME_MOMENT * max(t, BRIEF_PART * self.end)
+
     # -- edges that are due ---------------------------------------------------------------------------------------
 
     def begin(self, point: Point, before: Point | None) -> Point | None:
@@ -203,7 +207,7 @@ class Instant:
         Rebounds that follow each other faster than time can resolve have come to rest.
         """
         t, recent = point.t, len(self.jumps) - self._jumps_resolved
-        if recent < CHATTER or self.jumps[-CHATTER].t < t - SAME_MOMENT * max(t, BRIEF_PART * self.end):
+        if recent < CHATTER or self.jumps[-CHATTER].t < self._moment(t):
             return True
         if t > self._peaks_reset + IDLE * self.end:
             self._peaks_reset, self._jumps_resolved, self.peaks = t, len(self.jumps), self.scales.copy()
@@ -217,7 +221,10 @@ class Instant:
     def _due(self, now: Array, active: Mask, sizes: Array, point: Point) -> int | None:
         """Return the edge whose guard is below zero by more than the integration's drift, or is zero and closing."""
         small = GUARD_EPS * sizes
-        closed = active & ((self.rests & (now <= small)) | (now < -np.maximum(drift_of(self.rtol) * sizes, small)))
+        rests, moment = self.rests & (now <= small), self._moment(point.t)
+        for jump in self.jumps[-CHATTER:]:  # what has rested at this moment and gone on since does not rest again
+            rests &= [jump.t < moment or jump.edge is not edge for edge in self.system.edges]
+        closed = active & (rests | (now < -np.maximum(drift_of(self.rtol) * sizes, small)))
         near = active & ~closed & (now <= small) & ~self.strict[self.first :]
         if near.any():
             near &= self.jumper.guard_rates(self.consistent(point).inputs()) < 0

@@ -13,7 +13,7 @@ from surfacechem.errors import InputError
 from surfacechem.laws.cohesive import AdhesionIntensity, AdhesionLoss, ExponentialCohesiveZone, XuNeedleman
 from surfacechem.laws.contact import Penalty, TangentialStiffness
 from surfacechem.laws.friction import BondedCoulomb, Coulomb
-from surfacechem.laws.loading import Harmonic, Hold, Ramp
+from surfacechem.laws.loading import Harmonic, Hold, Ramp, Table
 from surfacechem.model.assemble import assemble
 from surfacechem.scene import Mounting
 from surfacechem.solve.radau.solver import consistent
@@ -504,3 +504,17 @@ def test_what_a_drive_that_rests_has_left_sticks(changes, expected):
         name: pytest.approx(each, rel=1e-12) for name, each in expected.items()
     }
     assert run.accuracy.error < 1e-12
+
+
+@pytest.mark.parametrize("potentials", [(), (TangentialStiffness(E_t=1e12),)])
+def test_slip_that_stops_with_its_drive_goes_on_as_its_limit_falls(potentials):
+    """The pressure is largest where the drive stops, so that slip is at rest there and goes on at once."""
+    drive, pressure = (
+        Table(times=[0.0, 2.0, 6.0], values=[0.0, 2e-6, 2e-6]),
+        Harmonic(mean=6e4, amplitude=4e4, frequency=0.125),
+    )
+    loading, mount = {"p": pressure, "w_t": drive}, Mounting(k=1e11)
+    found = closed(together(potentials, [Coulomb(mu=0.5)], loading, tangential=mount), 5.5, outputs=12)
+    late = found.result.times >= 2.0
+    left = 0.5 * (6e4 + 4e4 * np.sin(0.25 * np.pi * found.result.times[late])) / 1e11
+    np.testing.assert_allclose(found["u_t"][late], 2e-6 - left, rtol=1e-9)
