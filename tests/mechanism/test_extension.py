@@ -222,12 +222,12 @@ def test_errors_name_file_and_line(old, tmp_path):
 
 
 def test_a_parameter_that_has_no_default_is_asked_for():
-    text = HEAD + entry("Dembo").replace("  stiffness: 2e-3 N/m\n", "")
-    with pytest.raises(ct.CanteraError, match=r"a rate of type Dembo needs `stiffness`: stiffness of the bond"):
-        LoadedInterface(yaml=text, name="contact")
-    text = HEAD + entry("Dembo").replace("2e-3", "-2e-3")
-    with pytest.raises(ct.CanteraError, match=r"stiffness = -0\.002 is outside its range: > 0"):
-        LoadedInterface(yaml=text, name="contact")
+    for old, new, message in (
+        ("  stiffness: 2e-3 N/m\n", "", r"a rate of type Dembo needs `stiffness`: stiffness of the bond"),
+        ("2e-3", "-2e-3", r"stiffness = -0\.002 is outside its range: > 0"),
+    ):
+        with pytest.raises(ct.CanteraError, match=message):
+            LoadedInterface(yaml=HEAD + entry("Dembo").replace(old, new), name="contact")
 
 
 def test_the_reverse_of_an_elastic_bond_is_refused():

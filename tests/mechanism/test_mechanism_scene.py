@@ -9,6 +9,7 @@ import symengine
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from sampling import every
+from scenes import bodies, path
 from scipy.linalg import expm
 
 import surfacechem
@@ -17,13 +18,12 @@ from surfacechem.documents.shipped import mechanisms
 from surfacechem.errors import InputError
 from surfacechem.laws.bulk import Constant
 from surfacechem.laws.contact import ConstantInterfaceCapacity
-from surfacechem.laws.heat import Conductance
 from surfacechem.laws.loading import Hold
 from surfacechem.mechanism import load_mechanism
 from surfacechem.mechanism.mixture import IdealMixture
 from surfacechem.model.assemble import assemble
 from surfacechem.runs.simulation import Simulation
-from surfacechem.scene import Body, Interface, Scene
+from surfacechem.scene import Interface, Scene
 
 UNDER = {"gap": 2e-9, "force": 10e-12}
 """A load that single bonds bear."""
@@ -39,14 +39,10 @@ def scene(mechanism, initial, capacity=None, T_c=None, stretch=None, loading=Non
         bonds=mechanism.bonds,
         sites=mechanism.sites,
     )
-    paths = [
-        Conductance(between=("lower", "interface"), h=2500.0),
-        Conductance(between=("upper", "interface"), h=700.0),
-    ]
     return Scene(
-        (Body("lower", "T_1", Constant(C=2000.0)), Body("upper", "T_2", Constant(C=1000.0))),
+        bodies(energy=Constant, C_1=2000.0, C_2=1000.0),
         interface,
-        heat=paths,
+        heat=[path("lower", "interface", 2500.0), path("upper", "interface", 700.0)],
         loading={**(loading or {}), **({"J_c": Hold(level=stretch)} if stretch else {})},
         T_0=298.15,
         initial={"T_1": 298.15, "T_2": 310.0, "T_c": 302.0, **initial},
