@@ -120,17 +120,23 @@ def as_dataset(columns: Sequence[Column], attributes: Mapping[str, str | float |
     import pandas
     import xarray
 
-    def variable(c: Column) -> xarray.Variable:
-        """Return a variable without checks of its array, which import Dask and Pint if installed, for a second."""
-        values = np.asarray(c.values)
-        own = pandas.Index(values, dtype=values.dtype) if c.dimensions == (c.name,) else values
-        return xarray.Variable(c.dimensions, own, c.attributes, fastpath=True)
-
-    data = {c.name: variable(c) for c in columns}
     attributes = dict(attributes)
     said = [*str(attributes.pop(COORDINATES, "")).split(), "time"]
-    names = [c.name for c in columns if c.dimensions == (c.name,) or c.name in said]
-    return xarray.Dataset(data, coords={name: data.pop(name) for name in names}, attrs=attributes)
+    data: dict[str, Any] = {}
+    coordinates: dict[str, Any] = {}
+    indexes: dict[str, Any] = {}
+    for c in columns:
+        values = np.asarray(c.values)
+        # Checks of an array import Dask and Pint if installed, for a second.
+        variable = xarray.Variable(c.dimensions, values, c.attributes, fastpath=True)
+        if c.dimensions == (c.name,):
+            indexes[c.name] = xarray.indexes.PandasIndex(pandas.Index(values, dtype=values.dtype), c.name)
+            coordinates |= indexes[c.name].create_variables({c.name: variable})
+        else:
+            (coordinates if c.name in said else data)[c.name] = variable
+    # The public constructor merges variable by variable, which takes longer than all else: here nothing differs.
+    variables = {**data, **coordinates}
+    return xarray.Dataset._construct_direct(variables, set(coordinates), attrs=attributes, indexes=indexes)
 
 
 def dataset_path(path: str | Path) -> Path:

@@ -13,7 +13,7 @@ from case_runs import solved
 import surfacechem
 from surfacechem.errors import InputError, OutputError
 from surfacechem.format import names
-from surfacechem.results.netcdf import Column, cf_unit, replacing, save, write_netcdf
+from surfacechem.results.netcdf import COORDINATES, Column, as_dataset, cf_unit, replacing, save, write_netcdf
 
 pytestmark = pytest.mark.around
 
@@ -120,6 +120,23 @@ def test_carries_the_exact_solution_and_the_residuals(solution):
 def test_what_the_scene_does_not_have_is_not_there():
     data = surfacechem.run("sliding-dry").dataset
     assert not [name for name in data.variables if name.startswith(("phi", "g_n", "J_c", "mu", "site", "event"))]
+
+
+@pytest.mark.parametrize("name", OF_EVERY_KIND)
+def test_a_dataset_is_as_the_public_constructor_makes_it(name):
+    columns, attributes = solved(name).columns, solved(name).attributes
+    along = [c.name for c in columns if c.dimensions == (c.name,)]
+    every = {c.name: (c.dimensions, c.values, c.attributes) for c in columns if c.name not in along}
+    public = xarray.Dataset(every, {c.name: (c.dimensions, c.values, c.attributes) for c in columns if c.name in along})
+    found = as_dataset(columns, attributes)
+    xarray.testing.assert_identical(found, public.assign_attrs(attributes))
+    for mine, usual in ((found.variables, public.variables), (found.coords, public.coords)):
+        assert list(mine) == list(usual)
+    assert found.sizes == public.sizes
+    for axis in public.indexes:
+        assert found.indexes[axis].identical(public.indexes[axis])
+        assert found.isel({axis: -1}).identical(public.isel({axis: -1}).assign_attrs(attributes))
+    assert as_dataset(columns, {COORDINATES: columns[-1].name}).coords.keys() == {*along, columns[-1].name}
 
 
 def test_a_file_is_replaced_whole(solution, tmp_path):
