@@ -254,7 +254,7 @@ class RebindingCluster(Cluster):
 
     readings = read(reaction="k_on")
 
-    @property
+    @cached_property
     def critical_load(self) -> float:
         """Largest force per site, in units of the force scale, with a steady state: F_*."""
         from scipy.special import wrightomega  # W_0 of an exponential, which may overflow
@@ -266,12 +266,12 @@ class RebindingCluster(Cluster):
         """Largest traction [Pa] with a steady state."""
         return self.critical_load * self.n_c * self.force_scale
 
-    @property
+    @cached_property
     def critical_state(self) -> float:
         """Bonding state at the critical load."""
         return self.critical_load / (1.0 + self.critical_load)
 
-    @property
+    @cached_property
     def breaks(self) -> bool:
         """True if the cluster ruptures instead of reaching its steady state."""
         below = self.phi_i < self.critical_state and bool(
@@ -279,7 +279,7 @@ class RebindingCluster(Cluster):
         )
         return self.load > self.critical_load or below
 
-    @property
+    @cached_property
     def end_time(self) -> float:
         """Time [s] at which the last bond breaks; infinite if a steady state is reached."""
         return self._path.duration / self.k_off if self.breaks else math.inf

@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from functools import cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,9 +25,9 @@ MOST_ITERATIONS = 400
 """Largest number of iterations: bisection alone takes 52, and one for each factor of two between the bracket's ends."""
 
 GAUSS_POINTS = 18
-"""Gauss points of a panel: a singularity a panel's length away leaves an error of 5.8^-36 = 3e-28."""
+"""Gauss points of a panel: a singularity a third of a panel's length away leaves an error of 3^-36 = 7e-18."""
 
-END_HALVINGS = 800
+END_QUARTERINGS = 400
 """Number of panels towards each end: the smallest is 2^-801 of the path."""
 
 LEAST_TIME = 1e-300
@@ -44,10 +45,15 @@ gauss = cache(np.polynomial.legendre.leggauss)
 
 
 def increasing_root(
-    function: Callable[[Array], tuple[Array, Array]], target: Array, low: Array, high: Array, start: Array | None = None
+    function: Callable[..., tuple[Array, Array]],
+    target: Array,
+    low: Array,
+    high: Array,
+    start: Array | None = None,
+    *along: NDArray[Any],
 ) -> Array:
     """Return the arguments at which an increasing `function`, given as value and slope, reaches `target` in [low,
-    high].
+    high]; ``along`` are its further arguments, an entry for each root.
 
     Newton's method inside a shrinking bracket, from `low` unless a better guess is given. It ends when the next step,
     predicted from the last two by quadratic convergence, is below the last digit, since rounding causes such steps
@@ -57,9 +63,11 @@ def increasing_root(
     array([1.41421356])
     """
     x = low if start is None else np.clip(start, low, high)
-    before, settled = np.zeros_like(x), np.zeros(np.shape(x), dtype=bool)
+    found, left, before = x.copy(), np.arange(len(x)), np.zeros_like(x)
     for _ in range(MOST_ITERATIONS):
-        value, slope = function(x)
+        if not len(left):
+            return found
+        value, slope = function(x, *along)
         error = value - target
         low, high = np.where(error <= 0.0, x, low), np.where(error >= 0.0, x, high)
         with np.errstate(all="ignore"):
@@ -69,11 +77,12 @@ def increasing_root(
         reached = np.abs(error) <= FEW_EPS * np.abs(target)
         step = np.minimum(np.abs(following - x), high - low)
         last = inside & (step <= SQRT_EPS * np.abs(x)) & (step**3 <= FEW_EPS * np.abs(x) * before**2)
-        ends = reached | (step <= FEW_EPS * np.abs(x)) | last
-        x = np.where(settled | (error == 0.0) | (reached & ~inside), x, following)
-        before, settled = step, settled | ends
-        if settled.all():
-            return x
+        goes_on = ~(reached | (step <= FEW_EPS * np.abs(x)) | last)
+        x, before = np.where((error == 0.0) | (reached & ~inside), x, following), step
+        found[left] = x
+        if not goes_on.all():  # most of the time is that of the function
+            left, x, before, low, high, target = (each[goes_on] for each in (left, x, before, low, high, target))
+            along = tuple(each[goes_on] for each in along)
     raise ArithmeticError(f"no root found between {low} and {high}")
 
 
@@ -92,7 +101,7 @@ class AutonomousODE:
 
     The variable runs from a start to an end that it may reach or only approach. It is represented by its distances from
     both, so that no digits are lost at either end. Gauss panels shrink geometrically towards both ends and towards any
-    point at which the rate nearly vanishes (``hard``), so that no singularity is closer to a panel than its length.
+    point at which the rate nearly vanishes (``hard``): no singularity is closer to a panel than a third of its length.
     """
 
     def __init__(self, rate: Rate, length: float, hard: Sequence[float] = ()) -> None:
@@ -103,7 +112,7 @@ class AutonomousODE:
         edges = []
         for found in ([x for x in hard if x < half], [length - x for x in hard if x >= half]):
             near = [x + step for x in found for step in (*-steps, 0.0, *steps)]
-            points = np.array([0.0, *half * 0.5 ** np.arange(END_HALVINGS + 1.0), *near])
+            points = np.array([0.0, *half * 0.25 ** np.arange(END_QUARTERINGS + 1.0), *near])
             edges.append(np.unique(points[(points >= 0.0) & (points <= half)]))
         early, late = edges
         # Distances of a panel are measured from the nearer end: the start in the first half, the end in the second.
@@ -131,16 +140,16 @@ class AutonomousODE:
         """Return the distances from the start and from the end at the times t."""
         t = np.where(t < LEAST_TIME, 0.0, t)
         j = np.clip(np.searchsorted(self.times, t, side="right") - 1, 0, len(self.first) - 1)
-        start, stop, from_end = self.first[j], self.last[j], self.from_end[j]
+        start, stop, from_end = panels = self.first[j], self.last[j], self.from_end[j]
 
-        def elapsed(share: Array) -> tuple[Array, Array]:
+        def elapsed(share: Array, start: Array, stop: Array, from_end: NDArray[np.bool_]) -> tuple[Array, Array]:
             point = start + share * (stop - start)
             return self._elapsed(start, point, from_end), np.abs(stop - start) / self._rate(point, from_end)
 
         target = np.minimum(t, self.duration) - self.times[j]
         with np.errstate(all="ignore"):
             guess = np.nan_to_num(target / (self.times[j + 1] - self.times[j]))
-        share = increasing_root(elapsed, target, np.zeros_like(target), np.ones_like(target), guess)
+        share = increasing_root(elapsed, target, np.zeros_like(target), np.ones_like(target), guess, *panels)
         distance = np.where(t < self.duration, start + share * (stop - start), 0.0)
         rest = self.length - distance
         return np.where(from_end, rest, distance), np.where(from_end, distance, rest)
@@ -195,13 +204,18 @@ def remainder(q: Array) -> Array:
     >>> float(remainder(np.array(1e-9)))
     4.999999998333333e-19
     """
-    near = np.clip(q, -1.0, 1.0)
-    series = np.full(near.shape, INVERSE_FACTORIALS[-1])
-    for coefficient in INVERSE_FACTORIALS[-2::-1]:
-        series = coefficient - near * series
-    with np.errstate(over="ignore"):
-        far = np.where(q < -40.0, np.exp(np.abs(q)), np.expm1(-np.maximum(q, -40.0)) + q)
-    return np.where(np.abs(q) < 1.0, near**2 * series, far)
+
+    def series(near: Array) -> Array:
+        found = np.full(near.shape, INVERSE_FACTORIALS[-1])
+        for coefficient in INVERSE_FACTORIALS[-2::-1]:
+            found = coefficient - near * found
+        return np.asarray(near**2 * found)
+
+    def apart(far: Array) -> Array:
+        with np.errstate(over="ignore"):
+            return np.asarray(np.where(far < -40.0, np.exp(np.abs(far)), np.expm1(-np.maximum(far, -40.0)) + far))
+
+    return _by_range(q, np.abs(q) < 1.0, series, apart)
 
 
 def scaled_expint(n: int, x: Array) -> Array:
@@ -212,7 +226,7 @@ def scaled_expint(n: int, x: Array) -> Array:
     """
     from scipy.special import expn
 
-    return _by_range(x, ASYMPTOTIC_EN, lambda near: np.exp(near) * expn(n, near), lambda far: _asymptotic(n, far))
+    return _by_range(x, x < ASYMPTOTIC_EN, lambda near: np.exp(near) * expn(n, near), lambda far: _asymptotic(n, far))
 
 
 def scaled_Ei(x: Array) -> Array:
@@ -224,13 +238,15 @@ def scaled_Ei(x: Array) -> Array:
     from scipy.special import expi
 
     # Ei(x) = -E_1(-x)
-    return _by_range(x, ASYMPTOTIC_EI, lambda near: np.exp(-near) * expi(near), lambda far: -_asymptotic(1, -far))
+    return _by_range(x, x < ASYMPTOTIC_EI, lambda near: np.exp(-near) * expi(near), lambda far: -_asymptotic(1, -far))
 
 
-def _by_range(x: Array, edge: float, near: Callable[[Array], Array], far: Callable[[Array], Array]) -> Array:
-    """Evaluate two formulas, below an edge and from there on, each only in its range."""
+def _by_range(
+    x: Array, below: NDArray[np.bool_], near: Callable[[Array], Array], far: Callable[[Array], Array]
+) -> Array:
+    """Evaluate two formulas, one where the mask is set and one elsewhere, each only in its range."""
     x = np.asarray(x)
-    found, below = np.empty(x.shape), x < edge
+    found = np.empty(x.shape)
     for formula, own in ((near, below), (far, ~below)):
         if own.any():  # an evaluation of no values takes as long as one of a few
             found[own] = formula(x[own])

@@ -10,6 +10,7 @@ import pytest
 
 from surfacechem.errors import InputError
 from surfacechem.references import Reference, get
+from surfacechem.references.numerics import AutonomousODE, increasing_root
 
 TIMES = np.array([0.0, 1e-17, 1e-9, 1e-3, 0.1, 0.7, 3.0, 20.0, 1e3, 1e6])
 BODIES = {"C_1": 1.5, "C_2": 0.7, "C_c": 0.3, "T_0": 300.0}
@@ -234,3 +235,29 @@ def test_stick_slip_debonding_without_stronger_bonds_is_stick_slip():
 def test_what_has_no_solution_is_refused(name, given, message):
     with pytest.raises(InputError, match=message):
         get(name)(**given)
+
+
+def test_a_root_that_is_settled_is_not_evaluated_again():
+    evaluated = []
+
+    def square(x, part):
+        evaluated.append(part.tolist())
+        return x**2, 2 * x
+
+    target = np.array([1.0, 2.0, 1e9])
+    found = increasing_root(square, target, np.ones(3), np.full(3, 1e5), None, np.arange(3))
+    assert found == pytest.approx(np.sqrt(target), rel=2e-16)
+    assert evaluated[0] == [0, 1, 2]
+    assert evaluated[1] == [1, 2]
+    assert evaluated[-1] == [2]
+
+
+@pytest.mark.parametrize("power", [0.05, 0.5, 0.9])
+def test_a_path_from_and_to_a_singular_rate_is_known_to_rounding(power):
+    """Of a rate x^p (1 - x)^p with p below one, from zero to one: its time is a beta function."""
+    path = AutonomousODE(lambda gone, left: (gone * left) ** power, 1.0)
+    assert path.duration == pytest.approx(float(mpmath.beta(1 - power, 1 - power)), rel=1e-15)
+    gone, left = path.position(np.array([path.duration / 2, path.duration / 1e3]))
+    assert gone[0] == pytest.approx(left[0], rel=1e-13)
+    elapsed = mpmath.betainc(1 - power, 1 - power, 0, mpmath.mpf(gone[1]))
+    assert path.duration / 1e3 == pytest.approx(float(elapsed), rel=1e-14)
