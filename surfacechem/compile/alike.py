@@ -7,6 +7,7 @@ cell reads. So the compile time does not grow with the number of cells, and anot
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -200,26 +201,40 @@ def _terms(expression: Any) -> Sequence[Any]:
 
 
 class LoopCode:
-    """The code of loops with their tables, and the code of the rest."""
+    """The code of loops with their tables, and the code of the rest.
+
+    ``left`` are the positions of the rest among the results; of each loop ``tables`` are the number of cases and those
+    of :meth:`FormLoop.tables`.
+    """
 
     def __init__(
-        self, inputs: Sequence[Any], loops: Sequence[FormLoop], rest: Sequence[Any], code: Function | None
+        self, n_out: int, left: NDArray[np.int64], tables: Sequence[tuple[Any, ...]], rest: Function | None, code: bytes
     ) -> None:
+        head = [n_out, len(left), *((rest.address, rest.user) if rest else (0, 0)), left.ctypes.data]
+        words = [word for count, *arrays in tables for word in (count, *(array.ctypes.data for array in arrays))]
+        self.table = np.array([*head, *words], np.int64)
+        self._given = n_out, left, tables, rest, code
+        self._engine = _engine(code)
+        self._n_out = n_out
+        self._call: Any = C_FUNCTION(int(self._engine.get_function_address("f")))
+
+    def __reduce__(self) -> tuple[type[LoopCode], tuple[Any, ...]]:
+        """Pickle the code and the tables, without addresses."""
+        return type(self), self._given
+
+    @classmethod
+    def of(
+        cls, inputs: Sequence[Any], loops: Sequence[FormLoop], rest: Sequence[Any], code: Function | None
+    ) -> LoopCode:
+        """Return the code of loops and of the ``rest`` of each expression, of which ``code`` gives those not zero."""
         left = np.array([place for place, expression in enumerate(rest) if expression != 0], np.int64)
         places = {symbol: place for place, symbol in enumerate(inputs)}
-        tables = [loop.tables(places) for loop in loops]
-        head = [len(rest), len(left), *((code.address, code.user) if code else (0, 0)), left.ctypes.data]
-        words = [
-            word
-            for loop, own in zip(loops, tables, strict=True)
-            for word in (loop.count, *(table.ctypes.data for table in own))
-        ]
-        self.table = np.array([*head, *words], np.int64)
-        self._engine = _code_of(tuple(loop.form for loop in loops))
-        self._keep = code, left, tables
-        self.address = int(self._engine.get_function_address("f"))
-        self._n_out = len(rest)
-        self._call: Any = C_FUNCTION(self.address)
+        tables = [(loop.count, *loop.tables(places)) for loop in loops]
+        return cls(len(rest), left, tables, code, _code_of(tuple(loop.form for loop in loops)))
+
+    def as_ctypes(self) -> tuple[Any, Any]:
+        """Return the function and its user data, as SymEngine does for its code."""
+        return self._call, ctypes.c_void_p(self.table.ctypes.data)
 
     def __call__(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the results for rows of inputs."""
@@ -232,7 +247,7 @@ class LoopCode:
 
 @lru_cache(maxsize=64)
 @PREPARATION
-def _code_of(forms: tuple[Form, ...]) -> Any:
+def _code_of(forms: tuple[Form, ...]) -> bytes:
     """Return the code of loops over these forms, which also calls that of the rest.
 
     Its signature is ``void f(double *out, const double *inputs, void *user)``, with the words of the table as user
@@ -250,7 +265,11 @@ def _code_of(forms: tuple[Form, ...]) -> Any:
 
     sources = map(source_digest, (__file__, vectors.__file__))  # the sources that generate the code
     origins = (str((form.expressions, form.shared, form.own, form.numbers)) for form in forms)
-    return engine(from_file(code_file([*sources, *origins]), made, bytes, bytes))
+    return bytes(from_file(code_file([*sources, *origins]), made, bytes, bytes))
+
+
+_engine = lru_cache(maxsize=64)(PREPARATION(engine))
+"""Engine of an object code: functions with the same loops share one."""
 
 
 class _Loops:

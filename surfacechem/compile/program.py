@@ -12,7 +12,7 @@ import threading
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache, partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 import symengine
@@ -21,12 +21,14 @@ from numpy.typing import ArrayLike, NDArray
 from surfacechem import expressions as calculus
 from surfacechem.compile.cache import code_file
 from surfacechem.compile.preparing import PREPARATION
-from surfacechem.documents.cache_folder import from_file, source_digest
+from surfacechem.documents.cache_folder import PACKAGE, from_file, source_digest
 from surfacechem.expressions import derivative, gradient
 
 if TYPE_CHECKING:
     from surfacechem.compile.alike import FormLoop
     from surfacechem.compile.vectors import LaneFunction
+
+T = TypeVar("T")
 
 C_FUNCTION = ctypes.PYFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
 """C signature of machine code, for calls from Python with addresses."""
@@ -62,6 +64,16 @@ class Function:
             code(found, row.from_buffer(values), self.user)
             return np.frombuffer(found)
         return np.asarray(self.keep(values))
+
+    @classmethod
+    def of(cls, code: Any, n_in: int, n_out: int) -> "Function":
+        """Return the function of code by SymEngine, or of loops."""
+        function, user = code.as_ctypes()
+        return cls(int(ctypes.cast(function, ctypes.c_void_p).value or 0), int(user.value), n_in, n_out, code)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle the code, without addresses."""
+        return Function.of, (self.keep, self.n_in, self.n_out)
 
     @cached_property
     def _called(self) -> tuple[Any, Any, Any]:
@@ -148,8 +160,14 @@ class Program:
     """Compile the rates in explicit form; None if the equations cannot be solved for them one by one."""
     laned: Callable[[], Lanes | None] = lambda: None
     """Compile the code for eight cases at once; None if that is not possible."""
-    plain_margins: bool = False
-    """True if margins depend neither on derivatives nor on external parameters."""
+    margin_inputs: frozenset[int] = frozenset()
+    """Positions of the inputs that margins read."""
+
+    @cached_property
+    def plain_margins(self) -> bool:
+        """True if margins depend neither on derivatives nor on external parameters."""
+        outside = self.external.positions.tolist() if self.external else ()
+        return self.margin_inputs.isdisjoint((*range(1 + self.n, 1 + 2 * self.n), *outside))
 
     def filled(self, inputs: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the inputs, one row or many, with the external parameters filled in."""
@@ -262,8 +280,8 @@ def _looped(inputs: Sequence[Any], loops: Sequence["FormLoop"], rest: Sequence[A
     from surfacechem.compile.alike import LoopCode
 
     left = tuple(expression for expression in rest if expression != 0)
-    code = LoopCode(inputs, loops, rest, _machine_code(tuple(inputs), left) if left else None)
-    return Function(code.address, code.table.ctypes.data, len(inputs), len(rest), code)
+    code = LoopCode.of(inputs, loops, rest, _machine_code(tuple(inputs), left) if left else None)
+    return Function.of(code, len(inputs), len(rest))
 
 
 @dataclass(frozen=True)
@@ -303,9 +321,41 @@ def _machine_code(
     # Loading code takes a tenth of the time of generating it.
     origins = expressions.origins() if isinstance(expressions, _Derivatives) else serialised(expressions)
     code = from_file(code_file([str(opt_level), _digest(inputs), *origins]), make, pickle.loads, pickle.dumps)
-    function, user = code.as_ctypes()
-    address = ctypes.cast(function, ctypes.c_void_p).value
-    return Function(int(address or 0), int(user.value), len(inputs), len(expressions), code)
+    return Function.of(code, len(inputs), len(expressions))
+
+
+@dataclass(frozen=True)
+class _Compilation:
+    """A compilation, which equals another one of the same digest of everything that determines its result."""
+
+    digest: str
+    make: Callable[[], Any] = field(compare=False)
+
+
+def kept(make: Callable[[], T], origin: Any, expressions: Iterable[Any]) -> T:
+    """Return what is compiled from expressions, read from the cache if it has been before, in any process.
+
+    The key is the ``origin`` of the expressions, which gives them in this order to the last bit, the code that forms
+    and compiles them, and a hash of each of them. So nothing has to be expanded, differentiated or compared on the way
+    to code that is there. What has no origin, or one that no other process knows, is compiled from its parts.
+    """
+    if origin is None:
+        return make()
+    try:
+        scene = pickle.dumps(origin)
+    except (pickle.PicklingError, AttributeError, TypeError):
+        return make()
+    sources = [source_digest(str(path)) for path in sorted(PACKAGE.rglob("*.py"))]
+    hashes = [hash(symengine.sympify(expression)) for expression in expressions]
+    digest = hashlib.sha256(repr((scene, sources, hashes)).encode()).hexdigest()
+    found: T = _compiled(_Compilation(digest, make))
+    return found
+
+
+@lru_cache(maxsize=128)
+@PREPARATION
+def _compiled(compilation: _Compilation) -> Any:
+    return from_file(code_file([compilation.digest]), compilation.make, pickle.loads, pickle.dumps)
 
 
 @lru_cache(maxsize=8)
@@ -487,20 +537,45 @@ def compile_program(
     residual: Sequence[Any],
     ledger: Sequence[Any] = (),
     margins: Sequence[Any] = (),
-    external: ExternalInputs | None = None,
     chains: Sequence[Chain] = (),
     named: Named = (),
+    origin: Any = None,
 ) -> Program:
     """Compile a system, with Jacobians differentiated from its residual; expressions may contain ``named`` symbols.
 
-    States and equations of chains come after the others, chain by chain.
+    States and equations of chains come after the others, chain by chain. With an ``origin`` of the expressions the
+    result is :func:`kept`.
     """
     if not len(states) == len(derivatives) == len(residual):
         counts = f"{len(states)} states, {len(derivatives)} derivatives and {len(residual)} equations"
         raise ValueError(f"{counts}: a system needs as many equations as states, and one derivative a state.")
     inputs = [t, *states, *derivatives, *parameters]
-    n, core = len(states), chains[0].first if chains else len(states)
-    own, variables = cell_inputs(inputs, core, n), [*states, *derivatives]
+    parts = inputs, len(states), residual, ledger, margins, chains, named
+    every = *inputs, *residual, *ledger, *margins, *(part for pair in named for part in pair)
+    return Program(
+        n=len(states),
+        n_parameters=len(parameters),
+        n_ledger=len(ledger),
+        n_margins=len(margins),
+        chains=tuple(chains),
+        solved=partial(_compiled_rates, inputs, residual, derivatives, chains, named),
+        laned=partial(_compiled_lanes, inputs, residual, derivatives, chains, (ledger, margins), named),
+        **kept(partial(_compiled_parts, *parts), (origin, chains) if origin else None, every),
+    )
+
+
+def _compiled_parts(
+    inputs: Sequence[Any],
+    n: int,
+    residual: Sequence[Any],
+    ledger: Sequence[Any],
+    margins: Sequence[Any],
+    chains: Sequence[Chain],
+    named: Named,
+) -> dict[str, Any]:
+    """Return the parts of a program that follow from its expressions."""
+    variables, core = inputs[1 : 1 + 2 * n], chains[0].first if chains else n
+    own, derivatives = cell_inputs(inputs, core, n), variables[n:]
     if chains:
         equations, slopes, nonzeros = _chained(inputs, residual, variables, chains, named)
     else:
@@ -509,32 +584,23 @@ def compile_program(
     residual, ledger, margins = (expanded(named, rows) for rows in (residual[:core], ledger, margins))
     known = {symbol for row in residual for symbol in row.free_symbols}
     read = {symbol for margin in margins for symbol in margin.free_symbols}
-    outside = {inputs[j] for j in external.positions} if external else set()
-    return Program(
-        n=n,
-        n_parameters=len(parameters),
-        n_ledger=len(ledger),
-        n_margins=len(margins),
-        residual=equations,
-        jacobian=slopes,
-        ledger=compile_function(inputs, ledger, own, steps=True) if ledger else None,
-        margins=compile_function(inputs, margins, own, steps=True) if margins else None,
-        algebraic=tuple(rate not in known for rate in derivatives[:core]) + (False,) * (n - core),
-        external=external,
-        chains=tuple(chains),
-        nonzeros=nonzeros,
-        solved=partial(_compiled_rates, inputs, residual, derivatives, chains),
-        laned=partial(_compiled_lanes, inputs, residual, derivatives, chains, (ledger, margins)),
-        plain_margins=not read & {*derivatives, *outside},
-    )
+    return {
+        "residual": equations,
+        "jacobian": slopes,
+        "ledger": compile_function(inputs, ledger, own, steps=True) if ledger else None,
+        "margins": compile_function(inputs, margins, own, steps=True) if margins else None,
+        "algebraic": tuple(rate not in known for rate in derivatives[:core]) + (False,) * (n - core),
+        "nonzeros": nonzeros,
+        "margin_inputs": frozenset(j for j, symbol in enumerate(inputs) if symbol in read),
+    }
 
 
 @PREPARATION
 def _compiled_rates(
-    inputs: Sequence[Any], residual: Sequence[Any], derivatives: Sequence[Any], chains: Sequence[Chain]
+    inputs: Sequence[Any], residual: Sequence[Any], derivatives: Sequence[Any], chains: Sequence[Chain], named: Named
 ) -> Function | None:
     """Return the code of the rates; None if there are chains."""
-    rates = None if chains else solved_rates(residual, derivatives)
+    rates = None if chains else solved_rates(expanded(named, residual), derivatives)
     return compile_function(inputs, rates, steps=True) if rates else None
 
 
@@ -544,14 +610,16 @@ def _compiled_lanes(
     derivatives: Sequence[Any],
     chains: Sequence[Chain],
     others: Sequence[Sequence[Any]],
+    named: Named,
 ) -> Lanes | None:
     """Return the code for eight cases at once; None if the equations do not give their rates explicitly."""
     from surfacechem.compile.vectors import compile_lanes
 
-    rates = None if chains else solved_rates(residual, derivatives)
+    rates = None if chains else solved_rates(expanded(named, residual), derivatives)
     if not rates:
         return None
     known = list(zip(derivatives, rates, strict=True))
+    others = [expanded(named, rows) for rows in others]
     ledger, margins = (expanded(known, rows) for rows in others)
     try:
         return Lanes(compile_lanes(inputs, [*rates, *ledger]), compile_lanes(inputs, margins))

@@ -130,12 +130,17 @@ class Named:
         """Name in the dataset and in the printed source."""
         return self.quantity.name
 
+    @property
+    def symbol(self) -> Any:
+        """Symbol of the quantity in the expressions of later ones."""
+        return symengine.Symbol(self.name)
+
 
 def definitions(named: Sequence[Named]) -> dict[Any, Expression]:
     """Return the named expressions by name, expanded so that none contains another of these names."""
     result: dict[Any, Expression] = {}
     for item in named:
-        result[symengine.Symbol(item.name)] = without(item.expression, result)
+        result[item.symbol] = without(item.expression, result)
     return result
 
 
@@ -357,7 +362,13 @@ class System:
 
     def expand(self, expression: Expression) -> Expression:
         """Return the expression in terms of t, states, derivatives and parameters only."""
-        return without(expression, self.definitions)
+        whole = symengine.sympify(expression)
+        return whole if self._names.isdisjoint(whole.free_symbols) else without(whole, self.definitions)
+
+    @cached_property
+    def _names(self) -> frozenset[Any]:
+        """Symbols of the named quantities."""
+        return frozenset(item.symbol for item in self.named)
 
     def notes_of(self, kind: type[N]) -> tuple[N, ...]:
         """Return the notes of one kind."""

@@ -13,7 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem.compile.preparing import PREPARATION
-from surfacechem.compile.program import Chain, ExternalInputs, Function, Program, compile_function, compile_program
+from surfacechem.compile.program import (
+    Chain,
+    ExternalInputs,
+    Function,
+    Program,
+    compile_function,
+    compile_program,
+    kept,
+)
 from surfacechem.contracts.terms import Spec
 from surfacechem.errors import PATHS, InputError, suggestion
 from surfacechem.model.checks import StartLimits
@@ -390,6 +398,7 @@ class Model:
         self.system = system
         self.margins = system.event_margins
         """Margins that can close during the run; the others are checked at the start only."""
+        names = [item.symbol for item in system.named]
         program = compile_program(
             system.t,
             inputs[1 : n + 1],
@@ -398,16 +407,25 @@ class Model:
             system.local_time(list(system.rows.values())),
             system.local_time([account.rate for account in system.ledger]),
             system.local_time([m.expression for m in self.margins] + [edge.guard for edge in system.edges]),
-            external=external,
             chains=[Chain(*chain) for chain in system.chains],
-            named=list(zip(system.definitions, system.local_time([x.expression for x in system.named]), strict=True)),
+            named=list(zip(names, system.local_time([x.expression for x in system.named]), strict=True)),
+            origin=system.origin,
         )
-        self.program = replace(program, groups=tuple(GROUPS.get(account.kind, -1) for account in system.ledger))
+        self.program = replace(
+            program, external=external, groups=tuple(GROUPS.get(account.kind, -1) for account in system.ledger)
+        )
         self.jumper = Jumper(system, self.program) if system.has_arcs else None
-        outputs = [system.expand(item.expression) for item in system.outputs]
-        self.output_function: Function = compile_function(inputs, outputs, system.cell_symbols)
+        origin = system.origin and (system.origin, [item.name for item in system.outputs])
+        expressions = *inputs, *(part for item in system.named for part in (item.symbol, item.expression))
+        self.output_function: Function = kept(self._compiled_outputs, origin, expressions)
         self.compile_seconds = time.perf_counter() - start
         """Time to compile the equations, and the functions first needed in a run: gaps, guards and jumps."""
+
+    def _compiled_outputs(self) -> Function:
+        """Compile the outputs."""
+        system = self.system
+        outputs = [system.expand(item.expression) for item in system.outputs]
+        return compile_function(system.inputs, outputs, system.cell_symbols)
 
     def __reduce__(self) -> tuple[type[Model], tuple[System]]:
         """Pickle the system only; its machine code is compiled again."""

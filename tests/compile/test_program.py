@@ -1,5 +1,6 @@
 """Machine code from expressions."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -9,6 +10,8 @@ import symengine as se
 import surfacechem
 from surfacechem.compile import program
 from surfacechem.compile.program import compile_function, compile_program, expanded, jacobian
+from surfacechem.solve.radau.stepper import LOOP
+from surfacechem.solve.run import Model
 
 
 def test_derivatives_and_layout() -> None:
@@ -61,6 +64,58 @@ def test_the_code_of_a_jacobian_is_loaded_without_differentiating(tmp_path, monk
         patch.setattr(program, "_entries", lambda *_: pytest.fail("differentiated again"))
         assert made(2) == [6.0, 1.0]
     assert made(3) == [27.0, 1.0]
+
+
+CELLS = "sudden-contact", ["bodies.epoxy.conduction.cells=20"]
+
+
+@pytest.mark.parametrize("case", [("dna-adhesive", []), ("stick-slip", []), CELLS])
+def test_a_scene_that_was_compiled_before_is_read_and_gives_the_same_bits(case, tmp_path, monkeypatch) -> None:
+    LOOP.load()  # from the usual folder
+    monkeypatch.setenv("SURFACECHEM_CACHE", str(tmp_path))
+
+    def run() -> list[bytes]:
+        for cache in (program._compiled, program._machine_code):
+            cache.cache_clear()  # as in another process
+        found = surfacechem.load(*case).run().trajectory.result
+        return [table.tobytes() for table in (found.times, found.y, found.outputs, found.ledger_outputs)]
+
+    first = run()
+    with monkeypatch.context() as patch:
+        patch.setattr(program, "_compiled_parts", lambda *_: pytest.fail("compiled again"))
+        patch.setattr(Model, "_compiled_outputs", lambda *_: pytest.fail("compiled again"))
+        assert run() == first
+    for file in (tmp_path / "code").iterdir():
+        file.write_bytes(file.read_bytes()[:-1])
+    assert run() == first
+
+
+def test_code_is_kept_by_origin_expressions_and_sources(tmp_path, monkeypatch) -> None:
+    monkeypatch.setenv("SURFACECHEM_CACHE", str(tmp_path))
+    x, made = se.Symbol("x"), []
+
+    def count(origin: object, *expressions: se.Basic) -> int:
+        program._compiled.cache_clear()  # as in another process
+        program.kept(lambda: made.append(0), origin, expressions)
+        return len(made)
+
+    assert [count("scene", x, x + 0.1) for _ in range(2)] == [1, 1]
+    assert count("another scene", x, x + 0.1) == 2
+    assert count("scene", x, x + np.nextafter(0.1, 1)) == 3
+    assert count("scene", x) == 4
+    with monkeypatch.context() as patch:
+        patch.setattr(program, "source_digest", lambda _: "another")
+        assert count("scene", x) == 5
+    assert count("scene", x) == 5
+    for nobody_else_knows in (None, lambda: None):
+        assert count(nobody_else_knows, x) + 1 == count(nobody_else_knows, x)
+
+
+def test_a_system_with_less_in_it_is_another_one() -> None:
+    system = surfacechem.load("dna-adhesive").system
+    whole, bare = Model(system), Model(replace(system, ledger=(), named=system.named[:-1]))
+    assert (bare.program.n_ledger, bare.program.ledger) == (0, None)
+    assert bare.output_function.n_out == whole.output_function.n_out - system.named[-1].output
 
 
 def test_unused_inputs_and_constants() -> None:
