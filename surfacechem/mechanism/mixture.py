@@ -6,6 +6,7 @@ import inspect
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from itertools import chain, count
 from typing import Self
 
@@ -22,12 +23,17 @@ class Formula:
 
     def __init__(self, names: Iterable[str], evaluate: Callable[[Mapping[str, Expression]], Expression]) -> None:
         self.evaluate = evaluate
-        keyword = inspect.Parameter.KEYWORD_ONLY
-        self.__signature__ = inspect.Signature([inspect.Parameter(name, keyword) for name in dict.fromkeys(names)])
+        self.__signature__ = _signature(tuple(dict.fromkeys(names)))
 
     def __call__(self, **values: Expression) -> Expression:
         """Evaluate at the named values."""
         return self.evaluate(values)
+
+
+@lru_cache(maxsize=1024)  # a reaction states several formulas of the same variables
+def _signature(names: tuple[str, ...]) -> inspect.Signature:
+    keyword = inspect.Parameter.KEYWORD_ONLY
+    return inspect.Signature([inspect.Parameter(name, keyword) for name in names])
 
 
 SPECIES_PATH = "interface.mechanism.species"
@@ -113,7 +119,7 @@ class IdealMixture(Potential):
 
     def with_parts(self, bind: Bind) -> Self:
         """Return the mixture with symbols for the parameters of its species."""
-        return self.bind({"species": tuple(item.bound(bind) for item in self.species)})
+        return self.bind({"species": tuple(bind(item, item.path, "") for item in self.species)})
 
     @property
     def ranges(self) -> Mapping[str, tuple[float, float]]:

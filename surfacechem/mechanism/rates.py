@@ -144,7 +144,7 @@ class InterfaceArrhenius(MechanismReaction):
 
     def with_parts(self, bind: Bind) -> Self:
         """Return the reaction with symbols for the parameters of its species."""
-        return self.bind({"species": tuple(item.bound(bind) for item in self.species)})
+        return self.bind({"species": tuple(bind(item, item.path, "") for item in self.species)})
 
     def refine(self, name: str, spec: Spec) -> Spec:
         """Return the specification; the unit of A follows from the order of this reaction."""

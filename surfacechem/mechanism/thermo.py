@@ -15,8 +15,9 @@ from surfacechem.contracts.terms import Law, option, parameter
 from surfacechem.expressions import Expression, log, where
 from surfacechem.quantities import GAS_CONSTANT, KILO
 
-Bind = Callable[[Law, str, str], Any]
-"""Function that binds a law: it gets the law, its path in a case and the suffix of its parameters' names."""
+Bind = Callable[[Any, str, str], Any]
+"""Function that binds a law, or a species, once: it gets it, its path in a case and the suffix of its parameters'
+names."""
 
 
 class GibbsForm(Law):

@@ -172,7 +172,8 @@ class Build:
 
     def bound(self, law: Friction) -> Friction:
         """Return a friction law with its parameters as symbols; it is bound once."""
-        return self.variables.shared(law, f"interface.friction.{law.name()}")
+        bound: Friction = self.variables.shared(law, f"interface.friction.{law.name()}")
+        return bound
 
     def unique(self, base: str) -> str:
         """Return the name, with a number if it is taken."""
@@ -417,4 +418,9 @@ class Build:
 
     def expanded(self, expression: Expression) -> Expression:
         """Return the expression with the names of quantities replaced by their definitions."""
-        return without(expression, definitions(self.named))
+        read, needed = set(symengine.sympify(expression).free_symbols), list[Named]()
+        for item in reversed(self.named):  # an expression contains earlier names only
+            if item.symbol in read:
+                read |= symengine.sympify(item.expression).free_symbols
+                needed.append(item)
+        return without(expression, definitions(needed[::-1]))

@@ -110,8 +110,8 @@ class Variables:
 
     def define(self, name: str, make: Callable[[], Expression] | Expression, role: str, by: str) -> None:
         """Give a name its role and its expression, or a function that makes it; a second role is an error."""
-        taken = next((r for r in self.roles if r.variable == name), None)
-        if taken is not None:
+        if name in self._makers:
+            taken = next(r for r in self.roles if r.variable == name)
             raise InputError(
                 f"{name} has two roles: {taken.role} ({taken.by}) and {role} ({by}). Remove one of them.",
                 path=f"loading.{name}" if "loading" in (taken.by, by) else "",
@@ -182,12 +182,11 @@ class Variables:
                 values[name] = self.parameters.add(name, f"{law.path}.{name}", spec, 0.0, law, name)
         return law.bind(values)
 
-    def shared(self, law: L, path: str, suffix: str = "") -> L:
-        """Bind a law that has several readers once, and return it."""
+    def shared(self, law: Any, path: str, suffix: str = "") -> Any:
+        """Bind a law that has several readers, or what consists of such laws, once, and return it."""
         if law not in self._bound:
-            self._bound[law] = self.bind(law, path, suffix)
-        found: L = self._bound[law]
-        return found
+            self._bound[law] = self.bind(law, path, suffix) if isinstance(law, Law) else law.bound(self.shared)
+        return self._bound[law]
 
     def _parameter(self, law: Law, name: str, spec: Spec, suffix: str) -> Expression:
         """Return the symbol of a parameter for its formula, scaled by the area stretch if the parameter requires it."""

@@ -114,7 +114,7 @@ def _departure(build: Build, label: str, title: str, log_ratio: Expression, affi
     T = build.variables.get("T_c", "the equilibrium of a reaction")
     value = build.expanded(log_ratio + affinity / (BOLTZMANN * T))
     inside = {}  # coverages kept inside the bounds at which their logarithms exist
-    for bond in build.bonding.values():
+    for bond in (bond for bond in build.bonding.values() if depends(value, bond.symbol)):
         below = where(bond.symbol < LARGEST_COVERAGE, bond.symbol, LARGEST_COVERAGE)
         inside[bond.symbol] = where(bond.symbol > LEAST_COVERAGE, below, LEAST_COVERAGE)
     quantity = Quantity(f"departure_{label}", "1", f"ln(k_f/k_r) - ln K(g, T) of {title}")
