@@ -23,7 +23,7 @@ from surfacechem.model.system import System
 from surfacechem.quantities import MOLECULAR
 from surfacechem.reactor import coupling
 from surfacechem.results.solution import Solution
-from surfacechem.solve.adapters.evaluation import Evaluation
+from surfacechem.solve.adapters.evaluation import Evaluation, Evaluations
 from surfacechem.solve.contract import Array, Counters, Events, Problem, Result, Status
 from surfacechem.solve.diagnose import STALLED, no_number
 from surfacechem.solve.equilibria import Point
@@ -238,6 +238,11 @@ class EmbeddedScene:
         """Names of the ledger's lines."""
         return tuple(account.quantity.name for account in self.model.system.ledger)
 
+    @cached_property
+    def entropic(self) -> NDArray[np.bool_]:
+        """A mask of the ledger's lines that are entropies."""
+        return np.array([account.kind.startswith("entropy") for account in self.model.system.ledger], dtype=bool)
+
     def account(self, name: str) -> int:
         """Return the index among the variables of the heat that a replaced body needs to keep its temperature."""
         wanted = f"H_T_{coupling.suffix_of(self.case.scene, name)}"
@@ -330,10 +335,18 @@ class EmbeddedScene:
         self.put(t, x)
         return self.events.margins()
 
-    def ledger_rates(self, t: float, x: Array) -> Array:
-        """Return the rates of the ledger."""
+    def rates_inside(self, t: float, x: Array) -> Array:
+        """Return the time derivatives of the variables inside a step, whatever limits are passed there."""
         self.put(t, x)
-        return self.evaluation.rates()[len(self.states) :]
+        return self.evaluation.rates()
+
+    def many_rates(self, times: Array, x: Array) -> Array:
+        """Return the time derivatives of the variables at several times, a row each, at the present parameters."""
+        evaluation = self.evaluation
+        y = np.repeat(evaluation.y[None], len(times), axis=0)  # algebraic variables are searched from the last ones
+        y[:, evaluation.free] = x[:, : len(self.states)]
+        _, ydot, ledger, _ = Evaluations(evaluation.program, evaluation.parameters)(times, y)
+        return np.hstack((ydot[:, evaluation.free], ledger))
 
     def moved(self, t: float, x: Array, index: int | None) -> tuple[Array, Array]:
         """Return the variables after a transition, or after the due ones if None, and the additions to the ledger.

@@ -104,7 +104,7 @@ class InterfaceReactor(StateVectorReactor):
         self.t = 0.0
         self._dated = True
         """True if ``t`` is the time of the variables set last."""
-        self._restarted = 0.0
+        self.restarted = 0.0
         """Time of the start or of the last jump, after which steps begin at the rounding of the time."""
         self._connecting = False
         """True while a wall is created between a body and the reactor in its place."""
@@ -321,7 +321,7 @@ class InterfaceReactor(StateVectorReactor):
 
     def replace_initialize(self, start: float) -> None:
         super().replace_initialize(start)
-        self._restarted = start
+        self.restarted = start
         if start != self.t:
             self.begin_segment(start, 0.0)
 
@@ -406,7 +406,7 @@ class InterfaceReactor(StateVectorReactor):
     def _stands_still(self, t: float) -> bool:
         """True if steps are as short as the rounding of the time, other than after a start."""
         step = t - self._last[0] if self._last is not None else 0.0
-        return 0 < step <= 2 * FEW_EPS * t and t - self._restarted > RUN_EPS * t
+        return 0 < step <= 2 * FEW_EPS * t and t - self.restarted > RUN_EPS * t
 
     def inputs_at(self, t: float) -> object:
         """Return everything that the rates at a time [s] depend on besides the variables."""
@@ -454,11 +454,11 @@ class InterfaceReactor(StateVectorReactor):
                 "surfacechem.reactor.ReactorNet."
             )
 
-    def ledger_rates(self, t: float, x: Array) -> Array:
-        """Return the rates of the ledger [SI per s] at given variables."""
+    def rates_inside(self, t: float) -> Array:
+        """Return the rates [SI per s] for the values set last, inside a step."""
         self._last_inputs, self._current = None, False
         self._read_network()
-        return self.scene.ledger_rates(t, x)
+        return self.scene.rates_inside(t, self.x)
 
     def begin_segment(self, t: float, rtol: float) -> None:
         """Set the load segments that begin at time t [s], at a relative tolerance."""
@@ -473,7 +473,7 @@ class InterfaceReactor(StateVectorReactor):
             self.ledger = self.ledger + booked
         except EndError as end:
             raise self._stopped(f"{end} at t = {t:.9g} s") from None
-        self._last, self._last_inputs, self._current, self._restarted = None, None, False, t
+        self._last, self._last_inputs, self._current = None, None, False
         for port in self.ports.values():
             port.warm(float(self.x[self.scene.states.index(port.node)]))
 

@@ -88,9 +88,13 @@ class ReactorNet(cantera.ReactorNet):
         ------
         InterfaceStopped
             Where a scene ends, with the reason.
+        InputError
+            For a time that is not finite.
         cantera.CanteraError
             For a time that is past.
         """
+        if not np.isfinite(t):
+            raise InputError(f"a network advances to a finite time, not to {t} s; try `advance_to_steady_state`.")
         self._begin_or_restart()
         if self.time - t > LATER_AHEAD * np.spacing(abs(self.time)):
             raise cantera.CanteraError(f"Cannot integrate backwards in time: {t:.17g} s < {self.time:.17g} s.")
@@ -121,8 +125,8 @@ class ReactorNet(cantera.ReactorNet):
             event, now = watch.event, float(self.time)
             end = min(goal, watch.known if event is None else max(event.t, now))
             reached = end if start is None else self._limited(now, end, start)
+            watch.integrate_ledgers(reached)
             super().advance(reached, False)
-            watch.integrate_ledgers(now, self.time)
             if reached < end:
                 return
             if event is not None and self.time >= event.t:
@@ -158,10 +162,9 @@ class ReactorNet(cantera.ReactorNet):
 
     def _locate_event(self, goal: float) -> None:
         """Make the integrator take a step, advance a little into it, and locate its first event."""
-        before = self.time
         super().advance(self._watch.ahead(goal), False)
         self._watch.locate_event()
-        self._watch.integrate_ledgers(before, self.time)
+        super().advance(self.time, False)
 
     def _restart(self, where: str) -> None:
         """Restart the integration from the present state."""
@@ -181,6 +184,8 @@ class ReactorNet(cantera.ReactorNet):
         super().reinitialize()
         if not self._fresh:
             self._watch.restart()
+            for interface in self.interfaces:
+                interface.restarted = self.time
             self._steps, self._started = 0, self.time
 
     def step(self) -> float:

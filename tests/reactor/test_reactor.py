@@ -456,6 +456,12 @@ def test_no_network_goes_back(kind, case):
         assert net.advance(0.2) == 0.2
 
 
+@pytest.mark.parametrize("t", [math.inf, math.nan])
+def test_a_time_that_is_not_finite_is_refused(t):
+    with pytest.raises(InputError, match=f"advances to a finite time, not to {t} s"):
+        ReactorNet([InterfaceReactor("exothermic")]).advance(t)
+
+
 def test_accounts_of_a_history_over_which_no_state_moves():
     """The integrator passes over the whole history in a few steps; the network integrates what is exchanged."""
     run, interface = surfacechem.load("lithium-polarisation").run(), InterfaceReactor("lithium-polarisation")

@@ -33,6 +33,42 @@ def compare(interface, solution, within):
         assert interface[state] == pytest.approx(column[-1], abs=within * np.abs(column).max(), rel=0)
 
 
+CLOCK = """
+title: A plate that is heated at a constant power
+T_0: 300 K
+bodies:
+  plate: {temperature: T, C: 1 J/m^2/K, capacity: constant}
+  block: {temperature: T, C: 1 J/m^2/K, capacity: constant}
+interface: {temperature: T}
+loading: {Q_1: 2 W/m^2}
+initial: {T: 300 K}
+run: {until: 1 s}
+"""
+
+
+def test_events_that_depend_on_another_interface():
+    """Its state is that of the time at which a guard is wanted, and its step may be short after a jump of the other."""
+    block, clock = InterfaceReactor("stick-slip"), InterfaceReactor(CLOCK)
+    block.load("p", lambda _: 1e5 * (clock["T"] - 299.5))
+    net = ReactorNet([clock, block])
+    net.rtol, net.atol = 1e-10, 1e-14
+    net.advance(0.9)
+    data = block.dataset  # the spring pulls with 1e5 t, and the static friction is 0.6 p
+    assert list(data["event_name"].values) == ["slip forward", "stop"]
+    assert float(data["event_time"][0]) == pytest.approx(0.75, rel=1e-9)
+
+
+@pytest.mark.parametrize(("name", "end", "within"), [("stick-slip", 2.0, 1e-7), ("dna-adhesive", 10.0, 1e-8)])
+def test_balances_of_an_interface_with_a_load_from_the_network(name, end, within):
+    """The integrator steps over the work at rest, and its first steps are too long for the entropy of first bonds."""
+    interface = InterfaceReactor(name)
+    interface.load("Q_1", 0.0)
+    net = ReactorNet([interface])
+    net.rtol = 1e-9
+    net.advance(end)
+    assert max(interface.dataset.attrs[f"{kind}_error"] for kind in ("energy", "entropy", "site")) < within
+
+
 @pytest.mark.parametrize("name", CASES)
 def test_events_and_states_of_the_compiled_path(name):
     solution = surfacechem.load(name, ["run.outputs=41"]).run()
