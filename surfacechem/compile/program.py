@@ -99,10 +99,13 @@ class ExternalInputs:
 
 @dataclass(frozen=True)
 class Lanes:
-    """Code for eight cases at once: rates of states and accounts, and margins, from time, state and parameters."""
+    """Code for eight cases at once: rates of states and accounts, and margins, from time, state, parameters and
+    constants, which are formed from the parameters.
+    """
 
     rates: "LaneFunction"
     margins: "LaneFunction"
+    constants: "LaneFunction"
 
 
 @dataclass(frozen=True)
@@ -205,12 +208,13 @@ class Program:
 
     @cached_property
     def lane_tables(self) -> tuple[NDArray[Any], ...]:
-        """Tables of a program for steps of eight cases at once: its sizes (states, accounts, margins, inputs,
-        integrated columns); otherwise as the other tables.
+        """Tables of a program for steps of eight cases at once: its sizes (states, accounts, margins, inputs with
+        constants, integrated columns); otherwise as the other tables, with a row for the constants.
         """
         assert self.lanes is not None
-        sizes = self.n, self.n_ledger, self.n_margins, self.n_inputs, self.n + self.n_ledger
-        functions = None, None, None, self.lanes.margins, self.lanes.rates
+        n_inputs = self.n_inputs + self.lanes.constants.n_out
+        sizes = self.n, self.n_ledger, self.n_margins, n_inputs, self.n + self.n_ledger
+        functions = None, None, None, self.lanes.margins, self.lanes.rates, self.lanes.constants
         code = [(f.address if f else 0, 0) for f in functions]
         return np.array(sizes, np.int64), np.array(code, np.int64), *self.tables[2:]
 
@@ -613,7 +617,7 @@ def _compiled_lanes(
     named: Named,
 ) -> Lanes | None:
     """Return the code for eight cases at once; None if the equations do not give their rates explicitly."""
-    from surfacechem.compile.vectors import compile_lanes
+    from surfacechem.compile.vectors import compile_lanes, constants_apart
 
     rates = None if chains else solved_rates(expanded(named, residual), derivatives)
     if not rates:
@@ -621,8 +625,14 @@ def _compiled_lanes(
     known = list(zip(derivatives, rates, strict=True))
     others = [expanded(named, rows) for rows in others]
     ledger, margins = (expanded(known, rows) for rows in others)
+    constants, formed = constants_apart([*rates, *ledger, *margins], inputs[1 + 2 * len(rates) :])
+    columns, given = len(rates) + len(ledger), [*inputs, *constants]
     try:
-        return Lanes(compile_lanes(inputs, [*rates, *ledger]), compile_lanes(inputs, margins))
+        return Lanes(
+            compile_lanes(given, formed[:columns]),
+            compile_lanes(given, formed[columns:]),
+            compile_lanes(inputs, list(constants.values())),
+        )
     except NotImplementedError:  # a function without vector code
         return None
 

@@ -82,6 +82,51 @@ def compile_lanes(inputs: Sequence[Any], expressions: Sequence[Any]) -> LaneFunc
     return LaneFunction(int(held.get_function_address("f")), len(expressions), held)
 
 
+def constants_apart(expressions: Sequence[Any], constants: Iterable[Any]) -> tuple[dict[Any, Any], list[Any]]:
+    """Return new symbols with the parts of expressions that read only ``constants``, and the expressions in terms of
+    them.
+
+    What does not change along a run is formed once for each, above all divisions and exponentials.
+
+    >>> p, q, x = symengine.symbols("p q x")
+    >>> constants_apart([x / (p * q), symengine.exp(p) + x], [p, q])
+    ({constant_0: p**(-1)*q**(-1), constant_1: exp(p)}, [constant_0*x, constant_1 + x])
+    """
+    known: dict[Any, Any] = dict.fromkeys(constants)
+    """Each part in terms of new symbols; None for one that is constant."""
+    symbols: dict[Any, Any] = {}
+
+    def formed(part: Any) -> Any:
+        if not part.args or type(part).__name__ in _CONDITIONS:  # nothing to be formed, or no number
+            return part
+        return symbols.setdefault(part, symengine.Symbol(f"constant_{len(symbols)}"))
+
+    def replaced(part: Any) -> Any:
+        kind = type(part).__name__
+        if not part.args:
+            return None if part.is_Number or kind in {*_CONSTANTS, *_BOOLEANS} else part
+        fixed = [each for each in part.args if known[each] is None]
+        if len(fixed) == len(part.args):
+            return None
+        if kind in ("Add", "Mul"):
+            others = [known[each] for each in part.args if known[each] is not None]
+            return part.func(formed(part.func(*fixed)), *others) if fixed else part.func(*others)
+        if kind == "Piecewise":
+            args = [_with_symbols(known, each, formed) for each in part.args]
+            return symengine.Piecewise(*zip(args[::2], args[1::2], strict=True))
+        return (_CONDITIONS.get(kind) or part.func)(*(_with_symbols(known, each, formed) for each in part.args))
+
+    for expression in expressions:
+        for part in _arguments_first(expression, lambda each: each.args, known):
+            known[part] = replaced(part)
+    found = [_with_symbols(known, expression, formed) for expression in expressions]
+    return {symbol: part for part, symbol in symbols.items()}, found
+
+
+def _with_symbols(known: Mapping[Any, Any], part: Any, formed: Callable[[Any], Any]) -> Any:
+    return formed(part) if known[part] is None else known[part]
+
+
 def _entry(builder: Any, argument: Any, place: int) -> Any:
     pointer = builder.gep(argument, [ir.IntType(64)(8 * LANES * place)])
     return builder.bitcast(pointer, VECTOR.as_pointer())
@@ -258,6 +303,15 @@ class Code:
         return gathered(self.builder, (self.builder.call(function, own) for own in given))
 
 
+_CONDITIONS: dict[str, Any] = {
+    "LessThan": symengine.Le,
+    "StrictLessThan": symengine.Lt,
+    "Equality": symengine.Eq,
+    "Unequality": symengine.Ne,
+    "And": symengine.And,
+    "Or": symengine.Or,
+}
+"""What makes a condition, by the kind of its node."""
 _CONSTANTS = {"Pi", "Exp1"}
 _BOOLEANS = {"BooleanTrue", "BooleanFalse"}
 _RELATIONS = {"LessThan": "<=", "StrictLessThan": "<", "Equality": "==", "Unequality": "!="}

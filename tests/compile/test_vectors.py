@@ -104,12 +104,13 @@ def test_rates_and_guards_of_a_case_are_those_of_its_scalar_code(member):
     rates = program.rates(rows)
     rows[:, 1 + program.n : 1 + 2 * program.n] = rates
     wanted = [rates, *(code(rows) for code in (program.ledger,) if code)]
-    found = program.lanes.rates(rows.T)
+    inputs = np.concatenate([rows.T, program.lanes.constants(rows.T)])
+    found = program.lanes.rates(inputs)
     for ours, theirs in zip(np.split(found, [program.n]), (part.T for part in wanted), strict=False):
         assert ours == pytest.approx(theirs, rel=1e-9, abs=1e-13 * np.abs(theirs).max(initial=1e-300), nan_ok=True)
     if program.margins is not None:
         guards = program.margins(rows).T
-        assert program.lanes.margins(rows.T) == pytest.approx(guards, rel=1e-9, abs=1e-12 * np.abs(guards).max())
+        assert program.lanes.margins(inputs) == pytest.approx(guards, rel=1e-9, abs=1e-12 * np.abs(guards).max())
 
 
 @pytest.mark.parametrize(("code", "maker"), [("lanes", "laned"), ("rates", "solved")])

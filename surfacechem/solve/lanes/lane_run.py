@@ -43,6 +43,8 @@ _lay_out = laying_out(WORK)
 FINISHED, EVENT, LEFT = int(Status.FINISHED), int(Status.EVENT), int(Status.LEFT)
 MOST_TRIALS = 12
 """Rejected trials in a row, each at most half as long as the last, after which the cause is noise or stiffness."""
+CONSTANTS = RATES + 1
+"""Row of the constants in the table of addresses."""
 FREE_LANES = 4
 """Number of free lanes at which new runs begin: a choice. A smaller one fills the lanes better, a larger one shares the
 cost of starts and ends among more runs.
@@ -149,6 +151,7 @@ def _start(w: Any) -> None:
     unchanged.
     """
     fresh = lanes(w.fresh) > 0.5
+    evaluate(w, CONSTANTS, w.inputs[1 + 2 * w.n + w.parameters.shape[2]])
     put_start(w)
     evaluate(w, RATES, w.rates)
     for m in range(w.columns):

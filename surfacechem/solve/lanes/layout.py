@@ -14,7 +14,7 @@ def _arrays(names: str, *shape: str | int, kind: type = float) -> dict[str, tupl
 
 
 MEMORY = {
-    # t, y, ydot, parameters: the argument of every function of the program
+    # t, y, ydot, parameters, and what is formed from them: the argument of every function of the program
     **_arrays("inputs", "n_inputs"),
     # states and accounts at the start and at the end of the step, their changes per time at its last two stages, the
     # two estimates of their error, their rates at a point inside and how far they may be from the slopes there
