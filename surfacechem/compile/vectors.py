@@ -365,13 +365,13 @@ def _bits(value: float) -> int:
     return int(np.float64(value).view(np.int64))
 
 
-def by_vector(builder: Any, function: str, value: Any) -> Any:
+def by_vector(builder: Any, function: str, *values: Any) -> Any:
     """Call a function that LLVM provides for vectors, such as `sqrt`."""
     name = f"llvm.{function}.v{LANES}f64"
     declared = builder.module.globals.get(name)
     if declared is None:
-        declared = ir.Function(builder.module, ir.FunctionType(VECTOR, [VECTOR]), name=name)
-    return builder.call(declared, [value])
+        declared = ir.Function(builder.module, ir.FunctionType(VECTOR, [VECTOR] * len(values)), name=name)
+    return builder.call(declared, values)
 
 
 def _polynomial(builder: Any, x: Any, coefficients: Sequence[float]) -> Any:

@@ -13,7 +13,6 @@ from surfacechem.solve.contract import Status
 from surfacechem.solve.lanes.lane_guards import ends_on_guard, find_crossings, may_cross, start_margins
 from surfacechem.solve.lanes.lane_step import (
     END_STAGE,
-    ORDER,
     WORK,
     check_inside,
     eighth_root,
@@ -28,6 +27,7 @@ from surfacechem.solve.lanes.lane_step import (
     smaller,
     try_step,
 )
+from surfacechem.solve.lanes.layout import ORDER
 from surfacechem.solve.lanes.vector import absolute, any_lane, lanes, put, same, where
 from surfacechem.solve.radau.driver import FEWEST_CHECKS, LEAST_NORM
 from surfacechem.solve.radau.explicit import MAX_ERROR_RATIO, STIFF_STEPS
@@ -384,7 +384,7 @@ def _step(w: Any) -> None:
         elif any_lane(close):
             interpolate(w, w.n)
         if seen:
-            check_inside(w, good)
+            check_inside(w)
         find_crossings(w, good & (lanes(w.defect_at) == 1.0), close)
     put(w.taken, 0.0)
     for lane in range(LANES):

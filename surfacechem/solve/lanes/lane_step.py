@@ -13,8 +13,19 @@ from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
 from surfacechem.compile.vectors import LANES
-from surfacechem.solve.lanes.layout import MEMORY, SIZES
-from surfacechem.solve.lanes.vector import absolute, any_lane, floor, lanes, put, same, square_root, where
+from surfacechem.solve.lanes.layout import MEMORY, ORDER, SIZES
+from surfacechem.solve.lanes.vector import (
+    absolute,
+    any_lane,
+    floor,
+    lanes,
+    polynomial,
+    polynomial_of,
+    put,
+    same,
+    square_root,
+    where,
+)
 from surfacechem.solve.radau.dense import FORESEEN_PART, N_GROUPS, ledger_rtol
 from surfacechem.solve.radau.explicit import DENSEST, ERROR_PART, FOLLOWED_PART, STABILITY_LIMIT, STIFF_STEP
 from surfacechem.solve.radau.record import StepperRecord
@@ -28,12 +39,18 @@ from surfacechem.solve.radau.tables import (
     LAST_STAGE,
     STAGES_OF_DENSE,
 )
-from surfacechem.solve.radau.work import RATES, compiled, evaluate, weighted_sums
+from surfacechem.solve.radau.work import RATES, compiled, evaluate, evaluate_at, weighted_sums
 from surfacechem.tolerances import LOOSE_RTOL, RUN_EPS, TINY
 
 WORK = StepperRecord("LaneWork", SIZES, {"loose": float}, MEMORY)
 END_STAGE = STAGES_OF_DENSE - 1
 """The last stage, at the end of the step."""
+COUNT = np.arange(LANES, dtype=float)
+_NARROWING = 10.0 ** -np.arange(1, END_CHECKS + 1)
+NEAR_START = np.concatenate([_NARROWING[::-1], np.ones(LANES)])
+"""Fractions of a step for looks next to its start, with room for the last vector."""
+NEAR_END = np.concatenate([np.ones(LANES), 1.0 - _NARROWING, np.ones(LANES)])
+"""The same next to its end, with room before the first of them, too."""
 
 
 def _polynomial_table() -> NDArray[np.float64]:
@@ -50,10 +67,9 @@ def _polynomial_table() -> NDArray[np.float64]:
     return table[1:]
 
 
-_change = weighted_sums(EXPLICIT)
-_errors = weighted_sums(EXPLICIT_ERRORS)
-_coefficients = weighted_sums(_polynomial_table())
-ORDER = len(DENSE_FACTORS)
+_change = weighted_sums(EXPLICIT, LANES)
+_errors = weighted_sums(EXPLICIT_ERRORS, LANES)
+_coefficients = weighted_sums(_polynomial_table(), LANES)
 
 
 @compiled
@@ -205,10 +221,7 @@ def put_inside(w: Any, x: Any) -> None:
     h = lanes(w.h)
     put(w.inputs[0], lanes(w.t) + x * h)
     for m in range(w.n):
-        total = lanes(w.polynomial[ORDER - 1, m])
-        for d in range(ORDER - 2, -1, -1):
-            total = total * x + lanes(w.polynomial[d, m])
-        put(w.inputs[1 + m], lanes(w.y[m]) + h * x * total)
+        put(w.inputs[1 + m], lanes(w.y[m]) + h * x * polynomial(w.polynomial, m, x))
 
 
 @compiled
@@ -253,21 +266,23 @@ def _prepare_checks(w: Any) -> None:
 
 
 @compiled
-def _agrees(w: Any, x: Any) -> Any:
-    """Mask of lanes whose rates at the fraction x of the step agree with the slope of the dense output."""
-    put_inside(w, x)
-    evaluate(w, RATES, w.rates)
+def _agrees(w: Any, lane: int, x: Any) -> Any:
+    """Mask of the fractions x of the step of a lane at which the rates agree with the slope of the dense output."""
+    h = w.h[lane]
+    put(w.inputs_inside[0], w.t[lane] + x * h)
+    for m in range(w.n):
+        change = h * x * polynomial_of(w.polynomial, m, lane, x)
+        put(w.inputs_inside[1 + m], w.y[m, lane] + change)
+    evaluate_at(w, RATES, w.inputs_inside, w.rates)
     agrees = x >= 0.0
     for m in range(w.columns):
-        total = lanes(w.slope_of[ORDER - 1, m])
-        for d in range(ORDER - 2, -1, -1):
-            total = total * x + lanes(w.slope_of[d, m])
-        defect, allowed = absolute(lanes(w.rates[m]) - total), lanes(w.allowed[m])
-        close = defect <= allowed  # False for NaN
+        allowed = w.allowed[m, lane]
+        defect = absolute(lanes(w.rates[m]) - polynomial_of(w.slope_of, m, lane, x))
+        close = defect <= same(allowed)  # False for NaN
         if m >= w.n and any_lane(~close):
             # The quadrature of a smooth rate is better than its polynomial of order 7, by 6/7 of that power; 3/4 is
             # what products give.
-            part = defect / larger(larger(lanes(w.q_rate[m - w.n]), defect), TINY)
+            part = defect / larger(larger(same(w.q_rate[m - w.n, lane]), defect), TINY)
             squared = (defect / allowed) * (defect / allowed)
             close = squared * squared * (part * part * part) <= 1.0
         agrees = agrees & close
@@ -275,42 +290,50 @@ def _agrees(w: Any, x: Any) -> Any:
 
 
 @compiled
-def _mark_defects(w: Any, x: Any, checked: Any) -> None:
-    """Store x in the lanes in ``checked`` whose rates first disagree with the dense output there."""
-    defect_at = lanes(w.defect_at)
-    put(w.defect_at, where((checked > 0.5) & (defect_at == 1.0) & ~_agrees(w, x), x, defect_at))
-
-
-@compiled
 def needs_checks(w: Any, good: Any) -> bool:
-    """True if the equations are to be checked somewhere inside a step."""
+    """Set the whole spacings of each step; True if the equations are to be checked somewhere inside one."""
     h, spacing = lanes(w.h), lanes(w.spacing_of)
+    put(w.spacings, where(good & (h > CHECK_PART * spacing), floor(h / spacing), -1.0))
     at_ends = lanes(w.begins) + lanes(w.last) + lanes(w.onto) > 0.5
-    return bool(any_lane(good & (h > CHECK_PART * spacing) & (at_ends | (h >= spacing))))
+    return bool(any_lane((lanes(w.spacings) >= 0.0) & (at_ends | (lanes(w.spacings) > 0.5))))
 
 
 @compiled
-def check_inside(w: Any, good: Any) -> None:
+def _first_defect(w: Any, lane: int) -> float:
+    """The fraction of the step of a lane where the dense output first misses the equations; one if nowhere.
+
+    Looks are denser next to the ends of a load segment and of a step that an event has cut short: a feature there may
+    be narrow. They go from the narrowest outwards: the first disagreement tells how short the step has to be.
+    """
+    spacings = w.spacings[lane]  # one look in the middle of each
+    near_start = END_CHECKS if w.begins[lane] > 0.5 else 0
+    inside = near_start + int(spacings)
+    every = inside + (END_CHECKS if w.last[lane] + w.onto[lane] > 0.5 else 0)
+    for r in range(1 + 2 * w.n, w.n_inputs if every > 0 else 0):
+        put(w.inputs_inside[r], w.inputs[r, lane])
+    for first in range(0, every, LANES):
+        k = lanes(COUNT) + float(first)
+        x = (k - (near_start - 0.5)) / spacings
+        if first < near_start:
+            x = where(k < float(near_start), lanes(NEAR_START[first:]), x)
+        if first + LANES > inside:
+            x = where(k >= float(inside), lanes(NEAR_END[LANES + first - inside :]), x)
+        misses = (k < float(every)) & ~_agrees(w, lane, x)
+        if any_lane(misses):
+            put(w.at, where(misses, x, -1.0))
+            for j in range(LANES):
+                if w.at[j] >= 0.0:
+                    return float(w.at[j])
+    return 1.0
+
+
+@compiled
+def check_inside(w: Any) -> None:
     """Check the equations inside each step; keep the fraction where the dense output first misses them, one if nowhere.
 
-    Checks are denser next to the ends of a load segment and of a step that an event has cut short: a feature there may
-    be narrow.
+    Of one lane after another, at eight points at once: steps differ in the number of looks that they need.
     """
-    h, spacing = lanes(w.h), lanes(w.spacing_of)
-    checked = good & (h > CHECK_PART * spacing)
     _prepare_checks(w)
-    begins, ends = where(checked, lanes(w.begins), 0.0), where(checked, larger(lanes(w.last), lanes(w.onto)), 0.0)
-    if any_lane(begins > 0.5):
-        # From the narrowest outwards: the first disagreement tells how short the step has to be.
-        for k in range(END_CHECKS, 0, -1):
-            _mark_defects(w, same(10.0**-k), begins)
-    points = where(checked, h / spacing, 0.0)
-    i = 0.0
-    while any_lane(points >= i + 1.0):
-        # One check in the middle of each whole spacing.
-        most = floor(points)
-        _mark_defects(w, (i + 0.5) / larger(most, 1.0), where(most >= i + 1.0, 1.0, 0.0))
-        i += 1.0
-    if any_lane(ends > 0.5):
-        for k in range(1, END_CHECKS + 1):
-            _mark_defects(w, same(1.0 - 10.0**-k), ends)
+    for lane in range(LANES):
+        if w.spacings[lane] >= 0.0:
+            w.defect_at[lane] = _first_defect(w, lane)

@@ -7,6 +7,8 @@ from surfacechem.compile.vectors import LANES
 
 SIZES = ("n", "n_ledger", "n_margins", "n_inputs", "columns")
 """Sizes of a program, in the order of its table; columns are what is integrated, states and ledger accounts."""
+ORDER = 7
+"""Order of the dense output of a step, and number of coefficients of its polynomial."""
 
 
 def _arrays(names: str, *shape: str | int, kind: type = float) -> dict[str, tuple[type, tuple[str | int, ...]]]:
@@ -14,14 +16,15 @@ def _arrays(names: str, *shape: str | int, kind: type = float) -> dict[str, tupl
 
 
 MEMORY = {
-    # t, y, ydot, parameters, and what is formed from them: the argument of every function of the program
-    **_arrays("inputs", "n_inputs"),
+    # t, y, ydot, parameters, and what is formed from them: the argument of every function of the program; the
+    # same of a single run, at eight points of its step
+    **_arrays("inputs inputs_inside", "n_inputs"),
     # states and accounts at the start and at the end of the step, their changes per time at its last two stages, the
     # two estimates of their error, their rates at a point inside and how far they may be from the slopes there
     **_arrays("y y_new change change_before coarse fine rates allowed", "columns"),
     # rates at the stages, and the coefficients of the polynomial of the step and of its slope
     **_arrays("k", 16, "columns"),
-    **_arrays("polynomial slope_of", 7, "columns"),
+    **_arrays("polynomial slope_of", ORDER, "columns"),
     # weights of the error norm; of each account the largest value, and in this step the largest rate and what its error
     # is held against
     **_arrays("weight", "n"),
@@ -37,8 +40,9 @@ MEMORY = {
     # this step, the last one and one that failed, the norms of their errors, the next step; how far apart looks at the
     # equations are
     **_arrays("h h_last h_tried norm norm_last norm_tried proposed following spacing_of"),
-    # the fraction of the step at which it has missed something, and at which it meets a guard, with the bracket of that
-    **_arrays("defect_at crossing low high"),
+    # whole spacings of looks in the step, -1 if it has no looks, and where these are; the fraction of the step at
+    # which it has missed something, and at which it meets a guard, with the bracket of that
+    **_arrays("spacings at defect_at crossing low high"),
     # a step onto a guard: its value at the end, its slope, the longest step to try, the last push across
     **_arrays("value slope longest nudge"),
     # flags: a start or restart; the first step of a segment, the last one; a step onto a guard; one that is repeated;

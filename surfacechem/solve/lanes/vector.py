@@ -15,11 +15,15 @@ from numba import types
 from numba.extending import intrinsic, lower_builtin, models, register_model, type_callable
 
 from surfacechem.compile.vectors import INTEGERS, LANES, VECTOR, by_vector
+from surfacechem.solve.lanes.layout import ORDER
 
 _Constant: Any = ir.Constant
 _intrinsic: Any = intrinsic
 _lower: Any = lower_builtin
 _typed: Any = type_callable
+
+
+_BYTES = ir.IntType(8).as_pointer()
 
 
 class _Lanes(types.Type):
@@ -143,6 +147,46 @@ def same(_context: Any, value: Any) -> Any:
         return _spread(builder, args[0])
 
     return LANE(value), generate
+
+
+def _polynomial(context: Any, builder: Any, kind: Any, table: Any, x: Any, load: Callable[[Any], Any]) -> Any:
+    """Evaluate a polynomial by Horner's scheme without a loop; ``load`` takes the first entry of a row of the table."""
+    array = context.make_array(kind)(context, builder, table)
+    rows, stride, total = builder.bitcast(array.data, _BYTES), builder.extract_value(array.strides, 0), None
+    for term in range(ORDER - 1, -1, -1):
+        row = builder.gep(rows, [builder.mul(stride, stride.type(term))])
+        coefficient = load(builder.bitcast(row, array.data.type))
+        # One operation where the processor has it.
+        total = by_vector(builder, "fmuladd", total, x, coefficient) if total else coefficient
+    return total
+
+
+@_intrinsic
+def polynomial(_context: Any, table: Any, column: Any, x: Any) -> Any:
+    """Evaluate the polynomials of a column of a table [power, column, lane] at a point of each lane."""
+
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        def load(first: Any) -> Any:
+            place = builder.gep(first, [builder.mul(args[1], args[1].type(LANES))])
+            return builder.load(builder.bitcast(place, VECTOR.as_pointer()), align=8)
+
+        return _polynomial(context, builder, signature.args[0], args[0], args[2], load)
+
+    return LANE(table, column, x), generate
+
+
+@_intrinsic
+def polynomial_of(_context: Any, table: Any, column: Any, lane: Any, x: Any) -> Any:
+    """Evaluate the polynomial of one lane at eight points, as :func:`polynomial`."""
+
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        def load(first: Any) -> Any:
+            place = builder.add(builder.mul(args[1], args[1].type(LANES)), args[2])
+            return _spread(builder, builder.load(builder.gep(first, [place])))
+
+        return _polynomial(context, builder, signature.args[0], args[0], args[3], load)
+
+    return LANE(table, column, lane, x), generate
 
 
 @_intrinsic

@@ -220,12 +220,14 @@ def combine(
     return signature, generate
 
 
-def weighted_sums(table: Any) -> Any:
+def weighted_sums(table: Any, at_once: int = WIDTH) -> Any:
     """Return a function that multiplies a row of this table and the rows of a matrix, given by its address.
 
-    It takes the first columns of a matrix of any width. The factors are constants in the code and zeros are skipped, so
-    it takes half the time of :func:`combine`.
+    It takes the first columns of a matrix of any width, so many ``at_once``. The factors are constants in the code and
+    zeros are skipped, so it takes half the time of :func:`combine`.
     """
+    kind = ir.VectorType(_NUMBER, at_once)
+    fused = ("contract",) if at_once > WIDTH else ()  # runs in lanes may round a product and its sum at once
 
     @_intrinsic
     def sums(_context: Any, _row: Any, _values: Any, _width: Any, _columns: Any, _out: Any) -> Any:
@@ -244,16 +246,15 @@ def weighted_sums(table: Any) -> Any:
                 block = builder.append_basic_block()
                 cases.add_case(_WORD(i), block)
                 builder.position_at_end(block)
-                with _strided_loop(builder, _WORD(0), columns, _WORD(WIDTH), inc=True) as (first, _):
+                with _strided_loop(builder, _WORD(0), columns, _WORD(at_once), inc=True) as (first, _):
                     # Two independent sums, so that neither waits for the other.
-                    totals = [_Constant(_VECTOR, [0.0] * WIDTH)] * 2
+                    totals = [_Constant(kind, [0.0] * at_once)] * 2
                     for k, j in enumerate(np.flatnonzero(factors)):
-                        pointer = builder.bitcast(place(values, int(j), first), _VECTOR.as_pointer())
-                        term = builder.fmul(
-                            _Constant(_VECTOR, [float(factors[j])] * WIDTH), builder.load(pointer, align=8)
-                        )
-                        totals[k % 2] = builder.fadd(totals[k % 2], term)
-                    result = builder.bitcast(place(out, 0, first), _VECTOR.as_pointer())
+                        pointer = builder.bitcast(place(values, int(j), first), kind.as_pointer())
+                        factor = _Constant(kind, [float(factors[j])] * at_once)
+                        term = builder.fmul(factor, builder.load(pointer, align=8), flags=fused)
+                        totals[k % 2] = builder.fadd(totals[k % 2], term, flags=fused)
+                    result = builder.bitcast(place(out, 0, first), kind.as_pointer())
                     builder.store(builder.fadd(*totals), result, align=8)
                 builder.branch(done)
             builder.position_at_end(done)
