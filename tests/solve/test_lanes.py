@@ -104,6 +104,18 @@ def test_accounts_of_no_group_shorten_no_step(left):
     assert found.ends[:, 1:3] == pytest.approx(accounted.ends[:, 1:3], rel=1e-7)
 
 
+def test_a_step_onto_a_guard_may_be_shorter_than_time_resolves(left):
+    """Close to rupture the coverage falls to zero within the last digit of the time."""
+    simulation = case_runs.load("shared-load-rupture")
+    problem, (y0, table, *others) = arrays_of(simulation, 64)
+    load = [parameter.path for parameter in simulation.model.system.parameters].index("loading.t_n.level")
+    table[:, :, load] = np.linspace(860.0, 900.0, 64)[:, None]
+    problem = replace(problem, rtol=1e-6, record_steps=False)
+    found = lane_batch.solve_batch(problem, y0, table, *others)
+    assert left[0] == 0
+    assert_alike(found, solve_arrays(problem, y0, table, *others), problem.program.n, 1e-5)
+
+
 def test_runs_without_guards(left):
     problem = replace(exothermic_problem(1e-9), explicit=True)
     one = problem.y0, problem.parameters, np.array(0.1), np.zeros(0), problem.segments, problem.times

@@ -341,7 +341,9 @@ def _continue(w: Any, lane: int) -> None:
         _go_on(w, lane)
     doubtful = w.unclear[lane] + (w.failed[lane] > MOST_TRIALS) + (w.stiff_steps[lane] >= 2 * STIFF_STEPS) > 0
     spent = w.steps[lane] + w.rejected[lane] >= w.max_steps[row_of(w.max_steps, i)]
-    if w.run[lane] >= 0 and (doubtful or spent or not w.proposed[lane] > ULPS * w.t[lane]):
+    # A step onto a guard may be shorter than time resolves: near rupture the state changes by much within it.
+    stuck = w.landing[lane] == 0 and not w.proposed[lane] > ULPS * w.t[lane]
+    if w.run[lane] >= 0 and (doubtful or spent or stuck):
         _give_up(w, lane)
 
 
