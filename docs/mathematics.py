@@ -5,7 +5,7 @@ import logging
 import re
 from typing import Any
 
-from surfacechem.studies.mathml import mathml
+from surfacechem.studies.report import mathml
 
 MARKED = re.compile(r'<(span|div) class="arithmatex">\\([(\[])(.+?)\\[)\]]</\1>', re.DOTALL)
 """Formulas that Markdown has marked."""

@@ -352,13 +352,12 @@ def mechanism(
     """Print species, reactions and rates of a mechanism, and check their consistency."""
     from surfacechem.mechanism import load_mechanism
     from surfacechem.studies import mechanism_report as report
-    from surfacechem.studies.mechanism_rates import Curves
 
     temperatures = report.span(temperature, "K", "--temperature", above=0.0)
     forces = report.span(force, "N", "--force")
     if output:
         check_picture(output)
-    curves = Curves(load_mechanism(Path(file if Path(file).suffix else f"{file}.yaml"), phase, evaluate=True))
+    curves = report.Curves(load_mechanism(Path(file if Path(file).suffix else f"{file}.yaml"), phase, evaluate=True))
     typer.echo(report.mechanism_sheet(curves, temperatures, forces))
     if output:
         from surfacechem import plots

@@ -36,8 +36,7 @@ from surfacechem.runs.summaries import REGIMES, duration, points_summary, run_su
 from surfacechem.runs.sweeps import SweepSolution
 from surfacechem.scene import Scene
 from surfacechem.solve.run import values_of
-from surfacechem.studies.mathml import Typeset
-from surfacechem.studies.report import Page, PageSection, PageTable
+from surfacechem.studies.report import Page, PageSection, PageTable, Typeset
 
 if TYPE_CHECKING:
     import xarray

@@ -22,7 +22,7 @@ from surfacechem.scene import Interface
 from surfacechem.solve.adapters.evaluation import Evaluation
 from surfacechem.solve.contract import Array
 from surfacechem.solve.run import Model, Run
-from surfacechem.studies.mechanism_rates import null_space
+from surfacechem.studies.mechanism_report import null_space
 from surfacechem.tolerances import CBRT_EPS, EPS, LINE_ERROR, LOOSE_RTOL, NEGLIGIBLE, RUN_EPS, TINY
 
 LONGER_BY, MOST_ATTEMPTS = 10.0, 16

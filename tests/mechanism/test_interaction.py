@@ -14,8 +14,7 @@ import surfacechem
 from mechanisms import mechanism_texts, number, states
 from surfacechem.errors import InputError
 from surfacechem.mechanism import load_mechanism
-from surfacechem.studies.mechanism_rates import Curves
-from surfacechem.studies.mechanism_report import Span, remarks
+from surfacechem.studies.mechanism_report import Curves, Span, remarks
 
 TEXT = """
 units: {length: m, quantity: mol, activation-energy: kJ/mol}

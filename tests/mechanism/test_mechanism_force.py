@@ -8,8 +8,7 @@ import pytest
 import surfacechem
 from surfacechem.mechanism import load_mechanism
 from surfacechem.quantities import BOLTZMANN
-from surfacechem.studies.mechanism_rates import Curves
-from surfacechem.studies.mechanism_report import Span, figure, mechanism_sheet, verdict
+from surfacechem.studies.mechanism_report import Curves, Span, figure, mechanism_sheet, verdict
 
 T, K_0, STIFFNESS, REST = 300.0, 10.0, 5e-3, 10e-9
 KT = BOLTZMANN * T

@@ -16,7 +16,8 @@ from surfacechem.compile.typeset import equations
 from surfacechem.errors import InputError
 from surfacechem.format.plans import recorded_plan
 from surfacechem.results import spatial
-from surfacechem.studies import mathml, run_report
+from surfacechem.studies import run_report
+from surfacechem.studies.report import typeset_equation
 
 BROWSER = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 PHONE = 390
@@ -75,7 +76,7 @@ def test_long_equations_fit_into_the_lines_of_a_phone(name):
     """In its smallest letters, of 8 px, a piece between which a line may break has 44 em."""
     lines = equations(surfacechem.load(name).case.system())[0]
     for line in lines:
-        widths = re.findall(r"--w:(\d+)", mathml.equation(line))
+        widths = re.findall(r"--w:(\d+)", typeset_equation(line))
         assert max(map(int, widths)) <= 44, line.text
         text = " ".join([line.left, *line.pieces])
         assert text.count("(") == text.count(")")

@@ -1,6 +1,6 @@
 """Formulas as MathML."""
 
-from surfacechem.studies.mathml import mathml
+from surfacechem.studies.report import mathml
 
 
 def test_lines_stand_below_each_other_and_align():
