@@ -15,7 +15,7 @@ from pathlib import Path
 
 from surfacechem.contracts.terms import Shape
 from surfacechem.errors import InputError
-from surfacechem.laws.bonding import EquilibriumBonds
+from surfacechem.laws.free_energy import EquilibriumBonds
 from surfacechem.surfaces import nodes, patches
 from surfacechem.surfaces.inner_sums import table
 from surfacechem.surfaces.pair_laws import InversePower, LennardJonesPair

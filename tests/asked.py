@@ -14,7 +14,7 @@ from tables_mechanics import columns, expected, parameters, rows
 
 import surfacechem
 from surfacechem.documents import shipped
-from surfacechem.laws.bulk import Constant, Quadratic
+from surfacechem.laws.free_energy import Constant, Quadratic
 from surfacechem.model.assemble import assemble
 from surfacechem.results import error_estimates
 from surfacechem.results.accuracy import first_tolerance

@@ -20,10 +20,10 @@ from surfacechem.contracts.terms import (
 )
 from surfacechem.documents.shipped import mechanisms
 from surfacechem.laws.cohesive import AdhesionIntensity, AdhesionLoss, CompliantDebonding
-from surfacechem.laws.contact import BondStiffness, ConstantInterfaceCapacity, InterfaceCapacity
+from surfacechem.laws.coolprop import CoolPropFluid
+from surfacechem.laws.free_energy import BondStiffness, ConstantInterfaceCapacity, InterfaceCapacity
 from surfacechem.laws.loading import Hold
 from surfacechem.mechanism import load_mechanism
-from surfacechem.media.coolprop import CoolPropFluid
 from surfacechem.scene import Body, Interface, Medium, Mounting, Scene, Sites, Stage
 
 MEDIUM = ("k_m", "eta_m", "rho_m", "cp_m", "gamma_m", "p_m", "d_m", "f_m")

@@ -1,18 +1,7 @@
 """Scenes built in Python: one for each thermal regime and coupling."""
 
 from surfacechem.contracts.terms import Varying, parameter  # noqa: F401 - scenes may define laws
-from surfacechem.laws.bonding import BondEnergy, BondSprings, LatticeGas, LinearEnthalpy
-from surfacechem.laws.bonds import ReversibleBell
-from surfacechem.laws.bulk import Constant, Quadratic
 from surfacechem.laws.cohesive import AdhesionIntensity, AdhesionLoss, ExponentialCohesiveZone, XuNeedleman
-from surfacechem.laws.contact import (
-    BondStiffness,
-    ConstantInterfaceCapacity,
-    InterfaceCapacity,
-    NormalStiffness,
-    Penalty,
-    TangentialStiffness,
-)
 from surfacechem.laws.factors import (
     Activated,
     Exponential,
@@ -22,9 +11,23 @@ from surfacechem.laws.factors import (
     Power,
     Proportional,
 )
+from surfacechem.laws.free_energy import (
+    BondEnergy,
+    BondSprings,
+    BondStiffness,
+    Constant,
+    ConstantInterfaceCapacity,
+    InterfaceCapacity,
+    LatticeGas,
+    LinearEnthalpy,
+    NormalStiffness,
+    Penalty,
+    Quadratic,
+    TangentialStiffness,
+)
 from surfacechem.laws.friction import AnisotropicCoulomb, Coulomb, MohrCoulomb, Viscous
-from surfacechem.laws.heat import Conductance, Radiation
-from surfacechem.laws.kinetics import Arrhenius, ExponentialAffinity, LinearAffinity, Relaxation
+from surfacechem.laws.heat_transfer import Conductance, Radiation
+from surfacechem.laws.kinetics import Arrhenius, ExponentialAffinity, LinearAffinity, Relaxation, ReversibleBell
 from surfacechem.laws.loading import Harmonic, Hold, Ramp, Table
 from surfacechem.laws.longrange import VanDerWaalsFlatFlat, VanDerWaalsSpherePlane
 from surfacechem.scene import Body, Interface, Scene, Sites

@@ -5,8 +5,6 @@ from dataclasses import dataclass
 
 from scenes import SITES, bodies, path, together, varying
 
-from surfacechem.laws.bonding import BondEnergy
-from surfacechem.laws.bulk import Constant
 from surfacechem.laws.cohesive import (
     AdhesionIntensity,
     AdhesionLoss,
@@ -14,14 +12,16 @@ from surfacechem.laws.cohesive import (
     TensileStrength,
     XuNeedleman,
 )
-from surfacechem.laws.contact import (
+from surfacechem.laws.factors import Exponential, Linear, LinearInTemperature, Power, Proportional
+from surfacechem.laws.free_energy import (
     BondedContact,
+    BondEnergy,
     BondStiffness,
+    Constant,
     InterfaceCapacity,
     NormalStiffness,
     TangentialStiffness,
 )
-from surfacechem.laws.factors import Exponential, Linear, LinearInTemperature, Power, Proportional
 from surfacechem.laws.friction import (
     AnisotropicCoulomb,
     AnisotropicViscous,

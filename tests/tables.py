@@ -8,11 +8,16 @@ import scenes
 from scenes import bodies, path, perfect_contact, varying
 from tables_mechanics import FOLDER, columns, parameters
 
-from surfacechem.laws.bonding import BondEnergy, LinearEnthalpy
-from surfacechem.laws.bulk import Constant, Quadratic
 from surfacechem.laws.cohesive import ExponentialCohesiveZone
-from surfacechem.laws.contact import ConstantInterfaceCapacity, InterfaceCapacity
 from surfacechem.laws.factors import Exponential, Power
+from surfacechem.laws.free_energy import (
+    BondEnergy,
+    Constant,
+    ConstantInterfaceCapacity,
+    InterfaceCapacity,
+    LinearEnthalpy,
+    Quadratic,
+)
 from surfacechem.laws.friction import Coulomb, Viscous
 from surfacechem.laws.kinetics import Arrhenius, ExponentialAffinity, LinearAffinity, Relaxation
 from surfacechem.laws.loading import Hold, Ramp

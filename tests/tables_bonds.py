@@ -6,11 +6,9 @@ import numpy as np
 from scenes import perfect_contact
 from tables import Table, read
 
-from surfacechem.laws.bonding import BondSprings, LatticeGas, LinearEnthalpy
-from surfacechem.laws.bonds import Bell, ReversibleBell
-from surfacechem.laws.bulk import Constant, Quadratic
+from surfacechem.laws.free_energy import BondSprings, Constant, LatticeGas, LinearEnthalpy, Quadratic
 from surfacechem.laws.friction import Coulomb
-from surfacechem.laws.kinetics import Arrhenius, KamalSourour
+from surfacechem.laws.kinetics import Arrhenius, Bell, KamalSourour, ReversibleBell
 from surfacechem.laws.loading import Hold, Ramp
 from surfacechem.quantities import BOLTZMANN
 from surfacechem.scene import Body, Interface, Scene, Sites

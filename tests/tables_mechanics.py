@@ -8,11 +8,17 @@ import numpy as np
 from scenes import SITES, bodies, path, perfect_contact, together, varying
 from solved import Solved, solve
 
-from surfacechem.laws.bonding import BondEnergy
-from surfacechem.laws.bulk import Constant, Quadratic
 from surfacechem.laws.cohesive import ExponentialCohesiveZone, TensileStrength
-from surfacechem.laws.contact import BondedContact, BondStiffness, InterfaceCapacity, NormalStiffness
 from surfacechem.laws.factors import Linear, Power
+from surfacechem.laws.free_energy import (
+    BondedContact,
+    BondEnergy,
+    BondStiffness,
+    Constant,
+    InterfaceCapacity,
+    NormalStiffness,
+    Quadratic,
+)
 from surfacechem.laws.friction import BondedCoulomb, Coulomb, Viscous
 from surfacechem.laws.kinetics import Arrhenius, LinearAffinity
 from surfacechem.laws.loading import Hold, Ramp, Table

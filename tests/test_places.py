@@ -158,7 +158,7 @@ PLACES = {
         {"v": V_I * math.exp(-5e3 * 1e-3 / M)},
     ),
     "a rate type": Place(
-        {"laws/bonds.py": ("", FACTOR)}, {}, {"rate": 1.5 * math.exp(2e-12 * 1e-9 / (1.380649e-23 * 300.0))}, RATE
+        {"laws/kinetics.py": ("", FACTOR)}, {}, {"rate": 1.5 * math.exp(2e-12 * 1e-9 / (1.380649e-23 * 300.0))}, RATE
     ),
     "an exact solution": Place(
         {"references/early_braking.py": ("", SOLUTION)},

@@ -335,7 +335,7 @@ def _medium(section: MediumSection) -> Medium:
     elif section.pressure is None:
         raise section.error("the fluid needs a `pressure`, for example `pressure: 1 atm`.")
     else:
-        from surfacechem.media.coolprop import CoolPropFluid
+        from surfacechem.laws.coolprop import CoolPropFluid
 
         fluid = CoolPropFluid(section.fluid, section.pressure)
         try:

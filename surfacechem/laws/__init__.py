@@ -31,13 +31,13 @@ from surfacechem.errors import LAWS, InputError, suggestion
 L = TypeVar("L", bound=type[Law])
 
 FAMILIES: dict[type[Law], tuple[str, ...]] = {
-    BodyEnergy: ("bulk",),
-    Potential: ("bonding", "contact", "cohesive", "longrange", "films"),
-    RateLaw: ("kinetics", "bonds", "cohesive"),
+    BodyEnergy: ("free_energy",),
+    Potential: ("free_energy", "cohesive", "longrange", "films"),
+    RateLaw: ("kinetics", "cohesive"),
     Friction: ("friction", "films"),
-    HeatTransfer: ("heat", "contact_conductance", "films"),
+    HeatTransfer: ("heat_transfer", "films"),
     Limit: ("cohesive",),
-    Property: ("media",),
+    Property: ("films",),
     Load: ("loading",),
     Factor: ("factors",),
     Shape: ("shapes",),

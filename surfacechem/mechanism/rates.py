@@ -1,7 +1,7 @@
 """Rates of surface reactions: mass action whose reverse follows from the thermo, and Cantera's Arrhenius coefficient.
 
 The other rate types are in :mod:`surfacechem.mechanism.rate_types`. A load factor of a law of
-:mod:`surfacechem.laws.bonds` becomes a rate type by the law's ``rate_types``; any other rate type is a subclass with
+:mod:`surfacechem.laws.kinetics` becomes a rate type by the law's ``rate_types``; any other rate type is a subclass with
 Cantera's name as ``kind`` and a ``coefficient``.
 """
 

@@ -10,8 +10,8 @@ from surfacechem.contracts import fits
 from surfacechem.documents import cache_folder
 from surfacechem.documents.cache_folder import cached, fingerprint
 from surfacechem.errors import Place
-from surfacechem.laws.contact import NormalStiffness
-from surfacechem.media import coolprop
+from surfacechem.laws import coolprop
+from surfacechem.laws.free_energy import NormalStiffness
 from surfacechem.surfaces.shapes import Heights
 
 NUMBERS = [[0.1, float("inf"), 1e-300], None, "a text"]

@@ -8,8 +8,8 @@ from surfacechem.documents import document
 from surfacechem.documents.shipped import cases, mechanisms
 from surfacechem.errors import InputError
 from surfacechem.format import load, load_text
-from surfacechem.laws.bonding import BondEnergy
 from surfacechem.laws.factors import Linear, Power
+from surfacechem.laws.free_energy import BondEnergy
 from surfacechem.laws.friction import Coulomb
 from surfacechem.laws.kinetics import LinearAffinity
 from surfacechem.laws.loading import Harmonic, Hold, Ramp, Table

@@ -14,8 +14,8 @@ from surfacechem.contracts.terms import Friction, Potential, reads
 from surfacechem.expressions import EXPONENT_CAP, derivative
 from surfacechem.format.schema import schema
 from surfacechem.laws import laws
-from surfacechem.laws.bulk import Quadratic
 from surfacechem.laws.cohesive import ExponentialCohesiveZone, XuNeedleman
+from surfacechem.laws.free_energy import Quadratic
 from surfacechem.laws.friction import Coulomb, Stribeck
 from surfacechem.laws.loading import Hold
 from surfacechem.laws.longrange import REPULSION_WALL, LennardJonesFlatFlat, VanDerWaalsSpherePlane

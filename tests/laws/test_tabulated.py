@@ -6,7 +6,7 @@ import symengine
 from scipy.interpolate import PchipInterpolator
 
 from surfacechem.errors import InputError
-from surfacechem.laws.heat import GapTable
+from surfacechem.laws.heat_transfer import GapTable
 
 AT, VALUES = (1.0, 2.5, 3.0, 5.0, 6.0), (4.0, 7.0, 7.5, 9.0, 9.8)
 CUBICS = PchipInterpolator(AT, VALUES)

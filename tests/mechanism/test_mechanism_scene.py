@@ -16,8 +16,7 @@ import surfacechem
 from mechanisms import KMOL, SHIPPED, load, loading_read, loads, mechanism_texts, pulled, states
 from surfacechem.documents.shipped import mechanisms
 from surfacechem.errors import InputError
-from surfacechem.laws.bulk import Constant
-from surfacechem.laws.contact import ConstantInterfaceCapacity
+from surfacechem.laws.free_energy import Constant, ConstantInterfaceCapacity
 from surfacechem.laws.loading import Hold
 from surfacechem.mechanism import load_mechanism
 from surfacechem.mechanism.mixture import IdealMixture

@@ -11,9 +11,17 @@ from hypothesis import strategies as st
 
 from mechanisms import KMOL, call, mechanism_texts, states, values
 from surfacechem.errors import InputError
-from surfacechem.laws.bonding import LatticeGas
-from surfacechem.laws.bonds import Bell, DemboSpring, DudkoHummerSzabo, GapAttachment, TwoPathway
-from surfacechem.laws.kinetics import ExponentialAffinity, KamalSourour, LinearAffinity
+from surfacechem.laws.free_energy import LatticeGas
+from surfacechem.laws.kinetics import (
+    Bell,
+    DemboSpring,
+    DudkoHummerSzabo,
+    ExponentialAffinity,
+    GapAttachment,
+    KamalSourour,
+    LinearAffinity,
+    TwoPathway,
+)
 from surfacechem.laws.loading import Hold, Ramp
 from surfacechem.mechanism import load_mechanism
 from surfacechem.mechanism.rate_types import LoadedReaction, names

@@ -11,12 +11,18 @@ from solved import solve
 from surfacechem.contracts.terms import BodyEnergy, Friction, HeatTransfer, Potential, RateLaw, Varying, reads
 from surfacechem.errors import InputError
 from surfacechem.laws import laws
-from surfacechem.laws.bonding import BondEnergy, LatticeGas, LinearEnthalpy, PartnerMixing
-from surfacechem.laws.bulk import Constant
 from surfacechem.laws.cohesive import CompliantDebonding, ExponentialCohesiveZone, TensileStrength
-from surfacechem.laws.contact import BondStiffness, ConstantInterfaceCapacity
 from surfacechem.laws.factors import Linear
-from surfacechem.laws.heat import Conductance
+from surfacechem.laws.free_energy import (
+    BondEnergy,
+    BondStiffness,
+    Constant,
+    ConstantInterfaceCapacity,
+    LatticeGas,
+    LinearEnthalpy,
+    PartnerMixing,
+)
+from surfacechem.laws.heat_transfer import Conductance
 from surfacechem.laws.kinetics import Bimolecular
 from surfacechem.laws.loading import Hold, Ramp, Table
 from surfacechem.laws.longrange import LennardJonesFlatFlat

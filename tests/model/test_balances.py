@@ -8,7 +8,7 @@ import scenes
 import symengine
 import thermodynamics as laws
 
-from surfacechem.laws.bulk import Constant
+from surfacechem.laws.free_energy import Constant
 from surfacechem.laws.loading import Ramp
 from surfacechem.laws.longrange import LennardJonesFlatFlat, LennardJonesSpherePlane
 from surfacechem.model.assemble import assemble

@@ -10,18 +10,27 @@ from scipy.optimize import brentq
 from solved import closed
 
 from surfacechem.errors import InputError
-from surfacechem.laws.bonding import BondEnergy, BondSprings, LatticeGas, LinearEnthalpy, PartnerMixing
-from surfacechem.laws.bonds import Bell, DudkoHummerSzabo, ReversibleBell
 from surfacechem.laws.cohesive import ExponentialCohesiveZone, TensileStrength
-from surfacechem.laws.contact import BondedContact, BondStiffness
 from surfacechem.laws.factors import LinearInTemperature, Proportional
+from surfacechem.laws.free_energy import (
+    BondedContact,
+    BondEnergy,
+    BondSprings,
+    BondStiffness,
+    LatticeGas,
+    LinearEnthalpy,
+    PartnerMixing,
+)
 from surfacechem.laws.kinetics import (
     Arrhenius,
+    Bell,
     Bimolecular,
+    DudkoHummerSzabo,
     ExponentialAffinity,
     KamalSourour,
     LinearAffinity,
     MassAction,
+    ReversibleBell,
 )
 from surfacechem.laws.loading import Hold, Table
 from surfacechem.model.assemble import assemble

@@ -12,9 +12,8 @@ from tables_bonds import SITES, isothermal
 
 import surfacechem
 from surfacechem.errors import InputError
-from surfacechem.laws.bonding import BondSprings, LatticeGas
-from surfacechem.laws.bonds import Bell, DemboSpring, DudkoHummerSzabo, ReversibleBell, TwoPathway
-from surfacechem.laws.contact import NormalStiffness
+from surfacechem.laws.free_energy import BondSprings, LatticeGas, NormalStiffness
+from surfacechem.laws.kinetics import Bell, DemboSpring, DudkoHummerSzabo, ReversibleBell, TwoPathway
 from surfacechem.laws.loading import Harmonic, Hold, Ramp, Table
 from surfacechem.model.assemble import assemble
 from surfacechem.quantities import BOLTZMANN

@@ -9,10 +9,17 @@ from solved import solve
 
 from surfacechem.contracts.terms import Potential, parameter
 from surfacechem.errors import InputError
-from surfacechem.laws.bonding import BondEnergy, BondSprings, LinearEnthalpy
 from surfacechem.laws.cohesive import CompliantDebonding, TensileStrength
-from surfacechem.laws.contact import BondedContact, BondStiffness, NormalStiffness, Penalty
 from surfacechem.laws.factors import Proportional
+from surfacechem.laws.free_energy import (
+    BondedContact,
+    BondEnergy,
+    BondSprings,
+    BondStiffness,
+    LinearEnthalpy,
+    NormalStiffness,
+    Penalty,
+)
 from surfacechem.laws.friction import Viscous
 from surfacechem.laws.kinetics import LinearAffinity
 from surfacechem.laws.loading import Hold, Ramp, Table

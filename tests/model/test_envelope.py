@@ -11,10 +11,9 @@ from solved import closed, solve
 
 from surfacechem.errors import InputError
 from surfacechem.format import load_text
-from surfacechem.laws.bulk import Constant
 from surfacechem.laws.cohesive import CompliantDebonding
-from surfacechem.laws.contact import BondStiffness
 from surfacechem.laws.factors import Power
+from surfacechem.laws.free_energy import BondStiffness, Constant
 from surfacechem.laws.friction import MohrCoulomb
 from surfacechem.laws.kinetics import MassAction
 from surfacechem.laws.loading import Harmonic, Ramp, Table

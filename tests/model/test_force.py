@@ -9,12 +9,11 @@ from scenes import SITES, bodies, together
 from solved import solve
 
 from surfacechem.contracts.terms import Varying
-from surfacechem.laws.bonding import BondEnergy
 from surfacechem.laws.cohesive import ExponentialCohesiveZone
-from surfacechem.laws.contact import NormalStiffness, Penalty
-from surfacechem.laws.contact_conductance import PressureConductance
 from surfacechem.laws.factors import Linear
+from surfacechem.laws.free_energy import BondEnergy, NormalStiffness, Penalty
 from surfacechem.laws.friction import BondedCoulomb, Coulomb, MohrCoulomb, Stribeck
+from surfacechem.laws.heat_transfer import PressureConductance
 from surfacechem.laws.kinetics import LinearAffinity
 from surfacechem.laws.loading import Hold, Ramp
 from surfacechem.laws.longrange import ElectrostaticFlatFlat, LennardJonesFlatFlat, VanDerWaalsFlatFlat

@@ -11,7 +11,7 @@ from solved import closed
 import surfacechem
 from surfacechem.errors import InputError
 from surfacechem.laws.cohesive import AdhesionIntensity, AdhesionLoss, ExponentialCohesiveZone, XuNeedleman
-from surfacechem.laws.contact import Penalty, TangentialStiffness
+from surfacechem.laws.free_energy import Penalty, TangentialStiffness
 from surfacechem.laws.friction import BondedCoulomb, Coulomb
 from surfacechem.laws.loading import Harmonic, Hold, Ramp, Table
 from surfacechem.model.assemble import assemble

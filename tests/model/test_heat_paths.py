@@ -13,13 +13,25 @@ from solved import closed, solve
 
 from surfacechem.errors import InputError
 from surfacechem.format import load_text
-from surfacechem.laws.bonding import BondEnergy
-from surfacechem.laws.bulk import Constant
-from surfacechem.laws.contact import ConstantInterfaceCapacity, InterfaceCapacity, NormalStiffness
-from surfacechem.laws.contact_conductance import CooperMikicYovanovich, PressureConductance, PressureTable
 from surfacechem.laws.factors import Proportional
+from surfacechem.laws.free_energy import (
+    BondEnergy,
+    Constant,
+    ConstantInterfaceCapacity,
+    InterfaceCapacity,
+    NormalStiffness,
+)
 from surfacechem.laws.friction import Coulomb, Stribeck
-from surfacechem.laws.heat import Conductance, GapConductance, GapTable, GasGap, Radiation
+from surfacechem.laws.heat_transfer import (
+    Conductance,
+    CooperMikicYovanovich,
+    GapConductance,
+    GapTable,
+    GasGap,
+    PressureConductance,
+    PressureTable,
+    Radiation,
+)
 from surfacechem.laws.kinetics import Relaxation
 from surfacechem.laws.loading import Hold, Ramp, Table
 from surfacechem.model.assemble import assemble

@@ -11,8 +11,8 @@ from solved import Solved, closed, solve
 
 from surfacechem.contracts.terms import Load
 from surfacechem.errors import InputError
-from surfacechem.laws.contact import TangentialStiffness
 from surfacechem.laws.factors import Linear
+from surfacechem.laws.free_energy import TangentialStiffness
 from surfacechem.laws.friction import (
     AnisotropicCoulomb,
     AnisotropicViscous,

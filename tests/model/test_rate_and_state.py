@@ -11,8 +11,8 @@ from solved import solve
 import surfacechem
 from surfacechem.contracts.terms import Varying
 from surfacechem.errors import InputError
-from surfacechem.laws.contact import TangentialStiffness
 from surfacechem.laws.factors import LinearInTemperature
+from surfacechem.laws.free_energy import TangentialStiffness
 from surfacechem.laws.friction import Coulomb, RateAndStateAging, RateAndStateSlip
 from surfacechem.laws.loading import Harmonic, Hold, Ramp, Table
 from surfacechem.runs.check import consistent_start, rates

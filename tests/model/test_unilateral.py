@@ -10,12 +10,11 @@ from solved import closed, solve
 import surfacechem
 from surfacechem.contracts.terms import Friction, parameter
 from surfacechem.errors import InputError
-from surfacechem.laws.bonding import BondEnergy
 from surfacechem.laws.cohesive import TensileStrength
-from surfacechem.laws.contact import Penalty, TangentialStiffness
-from surfacechem.laws.contact_conductance import PressureConductance
 from surfacechem.laws.factors import Linear, Proportional
+from surfacechem.laws.free_energy import BondEnergy, Penalty, TangentialStiffness
 from surfacechem.laws.friction import AnisotropicCoulomb, Coulomb, MohrCoulomb, Stribeck
+from surfacechem.laws.heat_transfer import PressureConductance
 from surfacechem.laws.kinetics import LinearAffinity
 from surfacechem.laws.loading import Harmonic, Hold, Ramp, Table
 from surfacechem.model.assemble import assemble

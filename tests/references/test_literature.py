@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 from scipy.special import erfc, erfcinv
 
-from surfacechem.laws.contact_conductance import CooperMikicYovanovich, MikicElastic, SongYovanovich
-from surfacechem.laws.films import RarefiedFilm
+from surfacechem.laws.films import RarefiedFilm, Roelands
 from surfacechem.laws.friction import RateAndStateAging, RateAndStateSlip
-from surfacechem.laws.media import Roelands
+from surfacechem.laws.heat_transfer import CooperMikicYovanovich, MikicElastic, SongYovanovich
 
 SURFACE = {"between": ("lower", "upper"), "k": 20.0, "m": 0.1, "sigma": 1e-6}
 UNIT = SURFACE["k"] * SURFACE["m"] / SURFACE["sigma"]

@@ -14,9 +14,8 @@ from scenes import bodies, path, varying
 
 from surfacechem.contracts.terms import Friction, Load, RateLaw, option, parameter
 from surfacechem.expressions import Expression
-from surfacechem.laws.bonding import BondEnergy
-from surfacechem.laws.contact import InterfaceCapacity, NormalStiffness
 from surfacechem.laws.factors import Activated, Exponential, Linear, LinearInTemperature, Polynomial
+from surfacechem.laws.free_energy import BondEnergy, InterfaceCapacity, NormalStiffness
 from surfacechem.laws.kinetics import LinearAffinity
 from surfacechem.laws.loading import Hold
 from surfacechem.model.assemble import assemble

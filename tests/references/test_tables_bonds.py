@@ -9,7 +9,7 @@ import tables_bonds as tables
 from tables import read
 from test_tables import errors, solved
 
-from surfacechem.laws.bonds import Bell
+from surfacechem.laws.kinetics import Bell
 from surfacechem.laws.loading import Hold
 from surfacechem.model.assemble import assemble
 from surfacechem.quantities import BOLTZMANN

@@ -11,10 +11,15 @@ from scenes import SITES, bodies, path, varying
 from scipy.special import lambertw
 
 from surfacechem.errors import InputError
-from surfacechem.laws.bonding import BondEnergy, LinearEnthalpy
-from surfacechem.laws.bulk import Constant, Quadratic
-from surfacechem.laws.contact import InterfaceCapacity, NormalStiffness
 from surfacechem.laws.factors import Exponential, Linear, LinearInTemperature, Power
+from surfacechem.laws.free_energy import (
+    BondEnergy,
+    Constant,
+    InterfaceCapacity,
+    LinearEnthalpy,
+    NormalStiffness,
+    Quadratic,
+)
 from surfacechem.laws.friction import Coulomb, Viscous
 from surfacechem.laws.kinetics import Arrhenius, LinearAffinity, Relaxation
 from surfacechem.laws.loading import Hold, Ramp, Table

@@ -8,16 +8,13 @@ from scenes import SITES, bodies, path, perfect_contact, varying
 from solved import solve
 
 from surfacechem.errors import InputError
-from surfacechem.laws.bonding import LatticeGas, LinearEnthalpy
-from surfacechem.laws.bonds import DudkoHummerSzabo
-from surfacechem.laws.bulk import Constant
 from surfacechem.laws.cohesive import AdhesionIntensity
-from surfacechem.laws.contact_conductance import PressureConductance
 from surfacechem.laws.factors import Linear
 from surfacechem.laws.films import FilmCapacity
+from surfacechem.laws.free_energy import Constant, LatticeGas, LinearEnthalpy
 from surfacechem.laws.friction import Coulomb
-from surfacechem.laws.heat import GasGap
-from surfacechem.laws.kinetics import LinearAffinity, Relaxation
+from surfacechem.laws.heat_transfer import GasGap, PressureConductance
+from surfacechem.laws.kinetics import DudkoHummerSzabo, LinearAffinity, Relaxation
 from surfacechem.laws.loading import Harmonic, Hold, Ramp
 from surfacechem.model.assemble import assemble
 from surfacechem.results.solution import Solution

@@ -11,7 +11,7 @@ from solver_problems import problem
 
 from surfacechem.compile.program import compile_program
 from surfacechem.format import load_text
-from surfacechem.laws.contact import Penalty, TangentialStiffness
+from surfacechem.laws.free_energy import Penalty, TangentialStiffness
 from surfacechem.laws.friction import Coulomb, Stribeck
 from surfacechem.laws.loading import Harmonic, Hold, Ramp, Table
 from surfacechem.runs.simulation import Simulation

@@ -9,11 +9,9 @@ from scenes import bodies, perfect_contact, together, varying
 from solved import Solved, closed, solve
 
 from surfacechem.format import load_text
-from surfacechem.laws.bonding import BondEnergy
-from surfacechem.laws.bulk import Constant
 from surfacechem.laws.cohesive import TensileStrength
-from surfacechem.laws.contact import Penalty, TangentialStiffness
 from surfacechem.laws.factors import LinearInTemperature
+from surfacechem.laws.free_energy import BondEnergy, Constant, Penalty, TangentialStiffness
 from surfacechem.laws.friction import Coulomb
 from surfacechem.laws.loading import Hold, Ramp, Table
 from surfacechem.runs.simulation import Simulation

@@ -10,12 +10,10 @@ from solved import Solved, solve
 import surfacechem
 from surfacechem.contracts.terms import Friction, parameter
 from surfacechem.errors import InputError
-from surfacechem.laws.bonding import BondEnergy
-from surfacechem.laws.bulk import Constant
 from surfacechem.laws.cohesive import ExponentialCohesiveZone, TensileStrength, XuNeedleman
-from surfacechem.laws.contact import BondStiffness, Penalty
 from surfacechem.laws.factors import Proportional
 from surfacechem.laws.films import Film
+from surfacechem.laws.free_energy import BondEnergy, BondStiffness, Constant, Penalty
 from surfacechem.laws.kinetics import LinearAffinity, Relaxation
 from surfacechem.laws.loading import Harmonic, Hold, Ramp
 from surfacechem.laws.longrange import VanDerWaalsFlatFlat

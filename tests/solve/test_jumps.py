@@ -7,10 +7,9 @@ from solved import closed, solve
 
 from surfacechem.errors import InputError
 from surfacechem.format import load_text
-from surfacechem.laws.bonding import BondEnergy
 from surfacechem.laws.cohesive import ExponentialCohesiveZone, TensileStrength
-from surfacechem.laws.contact import NormalStiffness
 from surfacechem.laws.factors import Linear, LinearInTemperature
+from surfacechem.laws.free_energy import BondEnergy, NormalStiffness
 from surfacechem.laws.friction import BondedCoulomb, Coulomb
 from surfacechem.laws.kinetics import LinearAffinity
 from surfacechem.laws.loading import Hold, Ramp, Table

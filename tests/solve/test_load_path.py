@@ -7,7 +7,7 @@ from solved import closed, solve
 
 from surfacechem.errors import InputError
 from surfacechem.format import load_text
-from surfacechem.laws.contact import Penalty, TangentialStiffness
+from surfacechem.laws.free_energy import Penalty, TangentialStiffness
 from surfacechem.laws.friction import RateAndStateAging
 from surfacechem.laws.loading import Hold, Table
 from surfacechem.reactor import InterfaceReactor, ReactorNet

@@ -13,7 +13,7 @@ import pytest
 from sampling import every
 from scipy.interpolate import PchipInterpolator
 
-from surfacechem.laws.contact import Penalty
+from surfacechem.laws.free_energy import Penalty
 from surfacechem.surfaces.curved_gap import density, over_gap
 from surfacechem.surfaces.pair_laws import InversePower, LennardJonesPair, PairTable, PenaltyPair
 from surfacechem.surfaces.pairwise import interaction

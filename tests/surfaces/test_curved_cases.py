@@ -14,8 +14,7 @@ from scipy.optimize import brentq, linprog
 import surfacechem
 from surfacechem.errors import InputError, Place
 from surfacechem.expressions import derivative, exp
-from surfacechem.laws.bonding import EquilibriumBonds
-from surfacechem.laws.contact import Penalty
+from surfacechem.laws.free_energy import EquilibriumBonds, Penalty
 from surfacechem.laws.longrange import LennardJonesSpherePlane
 from surfacechem.model.system import DUMMY_STATE
 from surfacechem.references.base import SceneView

@@ -12,9 +12,8 @@ from sampling import every
 from scipy.optimize import minimize_scalar
 
 from surfacechem.errors import InputError
-from surfacechem.laws.bonding import EquilibriumBonds
-from surfacechem.laws.contact import BondedContact, Penalty
-from surfacechem.laws.heat import GasGap
+from surfacechem.laws.free_energy import BondedContact, EquilibriumBonds, Penalty
+from surfacechem.laws.heat_transfer import GasGap
 from surfacechem.laws.longrange import LennardJonesSpherePlane
 from surfacechem.quantities import BOLTZMANN
 from surfacechem.surfaces import nodes, patches

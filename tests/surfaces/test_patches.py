@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from surfacechem.laws.contact import Penalty
+from surfacechem.laws.free_energy import Penalty
 from surfacechem.surfaces import patches
 from surfacechem.surfaces.curved_gap import density, level_approaches, over_gap
 from surfacechem.surfaces.nearest_places import near_places

@@ -11,13 +11,11 @@ import surfacechem
 from surfacechem import format as case
 from surfacechem.contracts import fits
 from surfacechem.errors import InputError
-from surfacechem.laws.bulk import Constant
-from surfacechem.laws.contact import ConstantInterfaceCapacity
-from surfacechem.laws.films import Film, FilmCapacity, FilmShear, FilmWear, RarefiedFilm
+from surfacechem.laws.coolprop import PROPERTIES, CoolPropFluid
+from surfacechem.laws.films import Film, FilmCapacity, FilmShear, FilmWear, RarefiedFilm, Roelands, Vogel
+from surfacechem.laws.free_energy import Constant, ConstantInterfaceCapacity
 from surfacechem.laws.friction import Viscous
 from surfacechem.laws.loading import Hold
-from surfacechem.laws.media import Roelands, Vogel
-from surfacechem.media.coolprop import PROPERTIES, CoolPropFluid
 from surfacechem.model.assemble import assemble
 from surfacechem.quantities import BOLTZMANN
 from surfacechem.results.audit import audit

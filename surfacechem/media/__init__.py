@@ -1,1 +1,0 @@
-"""Media between the bodies, with properties from other packages."""
