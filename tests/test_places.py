@@ -167,7 +167,7 @@ PLACES = {
     ),
     "an output": Place(
         {
-            "model/components/friction.py": (
+            "model/components/sliding_friction.py": (
                 "        yield Power(DISSIPATION, MECHANICS, INTERFACE, power, label)\n",
                 '        build.name(Quantity("rubbed", "W/m^2", "power of friction"), power)\n',
             )

@@ -1,8 +1,8 @@
 """Assembly of a scene into a system: components state their parts phase by phase, and the balances follow from these.
 
-A component is a module of the folders ``components``, ``constraints`` and ``sliding``. Its functions are named after
-the phases. Each reads the build and yields records: nodes, bonds and energies, powers, states, margins, constraints,
-notes, warnings.
+A component is a module of the folders ``components`` and ``constraints``. Its functions are named after the phases.
+Each reads the build and yields records: nodes, bonds and energies, powers, states, margins, constraints, notes,
+warnings.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from typing import Any
 from surfacechem.contracts.terms import Spec
 from surfacechem.contracts.units import TOTAL_UNITS
 from surfacechem.errors import InputError, Place
-from surfacechem.model import components, constraints, ledger, sliding
+from surfacechem.model import components, constraints, ledger
 from surfacechem.model.build import Build
 from surfacechem.model.checks import refuse_idle_initial_values
-from surfacechem.model.sliding.rate_and_state import stands_for_velocity
+from surfacechem.model.components.sliding_friction import stands_for_velocity
 from surfacechem.model.system import START, ExternalRates, System
 from surfacechem.quantities import Quantity
 from surfacechem.scene import Scene
@@ -46,7 +46,7 @@ ORDER = (
     "unilateral",
     "chemistry",
     "force",
-    "friction",
+    "sliding_friction",
     "gap",
     "tangential",
     "medium",
@@ -77,10 +77,8 @@ OPTIONAL: dict[str, Callable[[Scene], object]] = {
 @cache
 def _places() -> dict[str, str]:
     """Return the module of each component by its file's name."""
-    folders = (components, constraints, sliding)
-    found = {
-        file.name: f"{room.__name__}.{file.name}" for room in folders for file in pkgutil.iter_modules(room.__path__)
-    }
+    rooms = (components, constraints)
+    found = {file.name: f"{r.__name__}.{file.name}" for r in rooms for file in pkgutil.iter_modules(r.__path__)}
     return {name: found[name] for name in (*ORDER, *sorted(found.keys() - {*ORDER}))}
 
 

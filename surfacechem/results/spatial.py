@@ -20,12 +20,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem.compile.program import compile_function
-from surfacechem.contracts import grids
 from surfacechem.model.system import Conductor, System
 from surfacechem.results.accuracy import CELLS_UNKNOWN, RTOL_PART, Accuracy, CellErrors
 from surfacechem.results.error_estimates import EVENTS, state_differences
 from surfacechem.results.findings import MISSED_BY
-from surfacechem.scene import Body, Conduction, Scene
+from surfacechem.scene import Body, Conduction, Scene, e_folds
 from surfacechem.solve.contract import Array
 from surfacechem.solve.run import Run, Trajectory
 from surfacechem.tolerances import RUN_EPS
@@ -191,7 +190,7 @@ def with_resolved_layers(scene: Scene, parts: Mapping[str, float], given: bool =
         if (law.accuracy is None) is not given:
             return law
         layer = min(parts[name], 1 / (law.grading - 1) if law.grading > 2 else 1.0)
-        return replace(law, layer=layer, cells=_cells(CELLS_PER_E_FOLD * grids.e_folds(layer, law.far is not None)))
+        return replace(law, layer=layer, cells=_cells(CELLS_PER_E_FOLD * e_folds(layer, law.far is not None)))
 
     return _changed(scene, change)
 
@@ -223,7 +222,7 @@ def refined(scene: Scene, found: CellErrors, parts: Mapping[str, float]) -> Scen
         if name not in laws:
             return law
         both = law.far is not None
-        more = factor * law.cells * grids.e_folds(now[name], both) / grids.e_folds(law.layer, both)
+        more = factor * law.cells * e_folds(now[name], both) / e_folds(law.layer, both)
         return replace(law, layer=now[name], cells=_cells(more))
 
     changed = _changed(scene, change)

@@ -12,13 +12,13 @@ from scipy.special import erfc, erfcx
 
 import surfacechem
 from surfacechem import plots
-from surfacechem.contracts.grids import graded
 from surfacechem.errors import InputError
 from surfacechem.format import load_text
 from surfacechem.results import spatial
 from surfacechem.results.error_estimates import against_tighter, with_cells
 from surfacechem.results.spatial import cell_errors
 from surfacechem.runs.simulation import Simulation
+from surfacechem.scene import graded
 
 TWO = """
 title: two slabs

@@ -1,1 +1,1 @@
-"""Components of a scene: temperatures, bonds, gaps, heat paths, loads."""
+"""Components of a scene: temperatures, bonds, gaps, motion along the surfaces, heat paths, loads."""

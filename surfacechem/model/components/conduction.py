@@ -12,17 +12,15 @@ from itertools import pairwise
 
 import symengine
 
-from surfacechem.contracts import grids
 from surfacechem.contracts.terms import Varying, reads
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression
 from surfacechem.model import balances
 from surfacechem.model.balances import HEAT, SURROUNDINGS, Node, Power
-from surfacechem.model.build import BOTH_BODIES, Build
-from surfacechem.model.parts import Slab, Thermal
+from surfacechem.model.build import BOTH_BODIES, Build, Slab, Thermal
 from surfacechem.model.system import Conductor, Profile, State
 from surfacechem.quantities import Quantity
-from surfacechem.scene import Body, Conduction
+from surfacechem.scene import Body, Conduction, volume_shares
 
 
 def variables(build: Build) -> Iterator[Power | Thermal]:
@@ -57,7 +55,7 @@ def _check(build: Build, body: Body, law: Conduction) -> None:
 
 def _divided(build: Build, thermal: Thermal, number: int, body: Body, law: Conduction) -> tuple[Slab, Thermal]:
     """Share the body's energy among the nodes of its cells."""
-    surface, shares = thermal.node_of[body.name], grids.volume_shares(law.points)
+    surface, shares = thermal.node_of[body.name], volume_shares(law.points)
     whole = surface.energies[body.name]
     nodes = dict(thermal.nodes)
     behind = []

@@ -19,8 +19,7 @@ from surfacechem.contracts.terms import HeatTransfer
 from surfacechem.errors import InputError, Place, suggestion
 from surfacechem.expressions import Expression, where
 from surfacechem.model.balances import HEAT, INTERFACE, OUTSIDE, Node, Power
-from surfacechem.model.build import BOTH_BODIES, Build, Record
-from surfacechem.model.parts import HeatPath
+from surfacechem.model.build import BOTH_BODIES, Build, HeatPath, Record
 from surfacechem.model.system import Margin
 from surfacechem.quantities import Quantity
 from surfacechem.tolerances import NO_AMOUNT

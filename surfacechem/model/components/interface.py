@@ -18,10 +18,9 @@ from surfacechem.errors import InputError, suggestion
 from surfacechem.expressions import Expression, depends, derivative, where
 from surfacechem.model.automaton import Constraint, Edge, Mode
 from surfacechem.model.balances import INTERFACE
-from surfacechem.model.build import Build
+from surfacechem.model.build import Bond, Build, Energy, Thermal
+from surfacechem.model.components.formulation import arrangement, displacement, in_parallel, in_series
 from surfacechem.model.components.mounting import law_reads, support
-from surfacechem.model.parts import Bond, Energy, Thermal
-from surfacechem.model.sliding.formulation import arrangement, displacement, in_parallel, in_series
 from surfacechem.model.system import Margin, Named, State
 from surfacechem.quantities import VARIABLES, Quantity
 from surfacechem.scene import BondingVariable, Sites

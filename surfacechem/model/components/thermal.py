@@ -13,9 +13,8 @@ from surfacechem.errors import InputError, Place
 from surfacechem.expressions import Expression, depends, derivative
 from surfacechem.model import balances
 from surfacechem.model.balances import HEAT, INTERFACE, OUTSIDE, SURROUNDINGS, Node, Power
-from surfacechem.model.build import Build
+from surfacechem.model.build import Build, Thermal
 from surfacechem.model.constraints.fold import determinant
-from surfacechem.model.parts import Thermal
 from surfacechem.model.system import STABLE_PREFIX, Margin, State
 from surfacechem.quantities import VARIABLES, Quantity
 from surfacechem.tolerances import NO_AMOUNT

@@ -32,9 +32,9 @@ from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, absolute, cos, depends, derivative, norm, sin, sqrt, where
 from surfacechem.model.automaton import ZERO, Constraint, Mode, Register
 from surfacechem.model.build import Build, Record
+from surfacechem.model.components.formulation import PLACE, Formulation, evolve, growth, name_traction
 from surfacechem.model.components.mounting import ACROSS, Direction, FarField, far_field
 from surfacechem.model.constraints.set_valued import SLIP, breaks_bonds, set_valued
-from surfacechem.model.sliding.formulation import PLACE, Formulation, evolve, growth, name_traction
 from surfacechem.model.system import STABLE_PREFIX, Given, Margin
 from surfacechem.quantities import VARIABLES
 from surfacechem.tolerances import PICOMETRE, RUN_EPS, SQRT_EPS, TIME_EPS, TINY, TRACTION_EPS

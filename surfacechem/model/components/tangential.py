@@ -19,10 +19,8 @@ from surfacechem.expressions import Expression, absolute, depends, derivative, n
 from surfacechem.model.automaton import ONE, ZERO, Constraint, Edge, Equilibrium, Mode, When
 from surfacechem.model.balances import MECHANICS, OUTSIDE, WORK, Power
 from surfacechem.model.build import Build, Record
-from surfacechem.model.components.mounting import ACROSS, ALONG, SECTIONS, FarField, far_field
-from surfacechem.model.constraints.set_valued import SLIP, breaks_bonds, set_valued
-from surfacechem.model.sliding import plane, rate_and_state
-from surfacechem.model.sliding.formulation import (
+from surfacechem.model.components import sliding_friction
+from surfacechem.model.components.formulation import (
     PLACE,
     Formulation,
     directions,
@@ -34,7 +32,10 @@ from surfacechem.model.sliding.formulation import (
     in_series,
     name_traction,
 )
-from surfacechem.model.sliding.rate_and_state import DRIVE, stands_for_velocity
+from surfacechem.model.components.mounting import ACROSS, ALONG, SECTIONS, FarField, far_field
+from surfacechem.model.components.sliding_friction import DRIVE, stands_for_velocity
+from surfacechem.model.constraints import plane
+from surfacechem.model.constraints.set_valued import SLIP, breaks_bonds, set_valued
 from surfacechem.model.system import STABLE_PREFIX, Margin
 from surfacechem.quantities import VARIABLES
 from surfacechem.tolerances import PICOMETRE, TINY, TRACTION_EPS
@@ -113,7 +114,7 @@ def _states(build: Build, kind: Formulation) -> Iterator[Constraint]:
             build.variables.get("u_t", "the elastic gap")
             rates["u_t"] = build.rate_of("u_t")
     if kind.rate_dependent and not kind.slides_inertially:
-        drive = rate_and_state.evolve_drive(build, inertial=False) if alone else None
+        drive = sliding_friction.evolve_drive(build, inertial=False) if alone else None
         by = "balance of the tangential tractions"
         build.motion.slip_unknowns[v] = evolve(build, v, by, algebraic=True) if drive is None else drive
         if not kind.elastic:
@@ -141,7 +142,7 @@ def _displacement(build: Build, kind: Formulation, alone: bool) -> None:
     rates[name] = symengine.Symbol(f"d{name}_dt")
     if kind.inertial:
         rates[name] = symengine.Symbol(v)
-        drive = rate_and_state.evolve_drive(build, inertial=True) if v == "v" and alone else None
+        drive = sliding_friction.evolve_drive(build, inertial=True) if v == "v" and alone else None
         if drive is None:
             evolve(build, v, place)
     elif kind.elastic and mount.damped:
@@ -240,7 +241,7 @@ def _balance(
     rate, tractions = build.motion.gap_rates[name], (carried, t_a)
     if kind.inertial:
         state = _velocity_state(build, kind)
-        inertia = rate_and_state.inertia(build, far.m) if state == DRIVE else None
+        inertia = sliding_friction.inertia(build, far.m) if state == DRIVE else None
         active = ONE if kind.elastic else slides
         yield from far.balance(build, rate, tractions, velocity=state, inertia=inertia, active=active)
     elif kind.elastic:

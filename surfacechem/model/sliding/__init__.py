@@ -1,1 +1,0 @@
-"""Tangential motion: springs, masses and friction that sticks and slides, in one direction or two."""
