@@ -28,6 +28,7 @@ from surfacechem.cli.commands import (
     Verbose,
     case_names,
     check_picture,
+    goes_to_store,
     law_names,
     leave_with,
     load_case,
@@ -35,6 +36,8 @@ from surfacechem.cli.commands import (
     run_settings,
     solve,
     split_list,
+    write_file,
+    write_store,
     written_to,
 )
 from surfacechem.cli.terminal import show, show_page
@@ -141,21 +144,20 @@ def sweep(
 
     A store (.zarr) may be of any size, is resumed where it was interrupted, and may be computed in parts.
     """
-    from surfacechem.cli import stores
-    from surfacechem.documents.overrides import assignments
+    from surfacechem.documents.document import assignments
     from surfacechem.results.netcdf import dataset_path
     from surfacechem.runs.summaries import sweep_summary
 
     simulation = load_case(case, changes)
     values, end = assignments(over or ()) or None, assignments([until] if until else ()) or None
-    if stores.goes_to_store(output, {"--resume": resume, "--part": part, "--cluster": cluster, "--only": only}):
+    if goes_to_store(output, {"--resume": resume, "--part": part, "--cluster": cluster, "--only": only}):
         assert output is not None
         plan = partial(simulation.plan, values, end)
-        return stores.write(simulation, plan, output, talk, resume=resume, part=part, cluster=cluster, only=only)
+        return write_store(simulation, plan, output, talk, resume=resume, part=part, cluster=cluster, only=only)
     target = dataset_path(output or f"{simulation.case.name}-sweep.nc")
     refuse_unwritable(target, read=[simulation.case.file])
     if simulation.case.sweep is not None and simulation.case.sweep.keep is not None:
-        return stores.write_file(simulation, simulation.plan(values, end), target, talk)
+        return write_file(simulation, simulation.plan(values, end), target, talk)
     solution = solve(lambda: simulation.sweep(values, end), talk)
     solution.write(target)
     if talk is not False:

@@ -16,7 +16,6 @@ from pathlib import Path
 
 from surfacechem import laws
 from surfacechem.documents import document, shipped
-from surfacechem.documents import overrides as changes
 from surfacechem.documents.document import Tree
 from surfacechem.errors import InputError, Place, nearest
 from surfacechem.format import csvtable, height_files, own_laws
@@ -130,7 +129,7 @@ def load_text(
     tree = document.parse(text, file or f"{name}.yaml")
     unused = ""
     if overrides:
-        before, tree = tree, changes.apply(tree, overrides)
+        before, tree = tree, document.overridden(tree, overrides)
         tree, unused = _without_stale_reference(before, tree)
         text = document.dump(tree)
     # With the contents of its files in the text, a case can be read again without them.

@@ -17,8 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from surfacechem.documents.document import OVERRIDE, Tree
-from surfacechem.documents.overrides import parameter_path
+from surfacechem.documents.document import OVERRIDE, Tree, parameter_path
 from surfacechem.errors import PATHS, InputError, Place, refuse_unknown
 from surfacechem.format import csvtable
 from surfacechem.format.declarations import Context, keys, read

@@ -18,8 +18,8 @@ import numpy as np
 import symengine
 from numpy.typing import NDArray
 
-from surfacechem.contracts.si_units import ELECTRON_VOLT
 from surfacechem.contracts.terms import Load, RateLaw, option, parameter
+from surfacechem.contracts.units import ELECTRON_VOLT
 from surfacechem.errors import InputError, Place, refuse_unknown, suggestion
 from surfacechem.expressions import Expression, absolute
 from surfacechem.mechanism.mixture import Formula, Species, identifiers, word

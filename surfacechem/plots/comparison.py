@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from surfacechem.documents import document
-from surfacechem.documents.overrides import parameter_path
+from surfacechem.documents.document import parameter_path
 from surfacechem.errors import InputError
 from surfacechem.plots import members, run, style, sweep
 from surfacechem.plots.run import Panel

@@ -23,7 +23,7 @@ from matplotlib.rcsetup import cycler
 from matplotlib.ticker import Formatter, LogFormatterSciNotation, LogLocator
 from numpy.typing import NDArray
 
-from surfacechem.contracts.si_units import ZERO_CELSIUS
+from surfacechem.contracts.units import ZERO_CELSIUS
 from surfacechem.errors import InputError, Place
 from surfacechem.quantities import GREEK, SUPERSCRIPTS, VARIABLES, raised, spelled
 from surfacechem.results.netcdf import read_netcdf, reading, replacing

@@ -14,9 +14,8 @@ import numpy as np
 
 from surfacechem import format as cases
 from surfacechem.contracts.units import parse
-from surfacechem.documents.document import OVERRIDE, from_plain
+from surfacechem.documents.document import OVERRIDE, assignments, from_plain, overridden, parameter_path
 from surfacechem.documents.document import parse as parse_document
-from surfacechem.documents.overrides import apply, assignments, parameter_path
 from surfacechem.errors import PATHS, InputError, Place, suggestion
 from surfacechem.format import Case, Overrides, Source
 from surfacechem.model.assemble import perturbed
@@ -631,7 +630,7 @@ class Simulation:
         if not case.text or path.startswith("initial."):
             return False
         try:
-            apply(parse_document(case.text), {path: value})
+            overridden(parse_document(case.text), {path: value})
         except InputError:
             return False  # there is no such section
         try:

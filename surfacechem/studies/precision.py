@@ -11,7 +11,7 @@ from itertools import count
 from pathlib import Path
 from statistics import median
 
-from surfacechem.documents.overrides import as_texts
+from surfacechem.documents.document import as_texts
 from surfacechem.errors import InputError, Place, refuse_unknown
 from surfacechem.results.audit import audit
 from surfacechem.results.error_estimates import computed

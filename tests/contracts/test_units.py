@@ -1,8 +1,10 @@
-"""Quantities with units become SI, or an error that says what is needed."""
+"""Quantities with units become SI, as Pint does it to the last digit, or an error that says what is needed."""
 
+import random
 import subprocess
 import sys
 from contextlib import suppress
+from decimal import Decimal
 
 import cantera
 import pytest
@@ -163,3 +165,53 @@ def test_an_angular_velocity_is_no_frequency(given):
         units.parse(given, "1/s", name="frequency")
     assert units.parse("60 Hz", "1/s") == 60.0
     assert units.parse("180 deg", "rad") == pytest.approx(3.141592653589793)
+
+
+pytestmark = pytest.mark.around
+
+
+def by_pint(number, given, unit):
+    try:
+        return units._by_pint(number, given, unit, "the value", False)
+    except InputError as error:
+        return str(error)
+
+
+def as_unit(powers):
+    return " ".join(f"{name}^{power}" for name, power in powers.items()) or "1"
+
+
+def random_unit(source):
+    """Names, powers, quotients and parentheses; many of them are no units."""
+    text = source.choice(["", "1/", "1/(", "("]) + source.choice(list(units.KNOWN))
+    for _ in range(source.randrange(4)):
+        text += source.choice(["/", " ", "*", "^2", "^-1 ", "**2", " / ", "/("]) + source.choice(list(units.KNOWN))
+    return text + ")" * (text.count("(") - text.count(")"))
+
+
+@pytest.mark.parametrize("name", units.KNOWN)
+def test_every_name_of_the_table(name):
+    unit = as_unit(units.KNOWN[name][1])
+    assert units.parse(f"3.7 {name}", unit) == by_pint("3.7", name, unit)
+
+
+def test_random_units():
+    source, seen = random.Random(5), 0
+    for text in (random_unit(source) for _ in range(700)):
+        try:
+            _, powers = units._parsed(text)
+        except units._LeftToPintError:
+            continue
+        number = source.choice(["1", "-2.5e-3", "1e18", "123456.789"])
+        assert float(Decimal(number) * units.si_factor(text, as_unit(powers))) == by_pint(
+            number, text, as_unit(powers)
+        ), text
+        seen += 1
+    assert seen > 150
+
+
+@pytest.mark.parametrize(
+    "text", ["", "m)", "(m", "m^", "m^9^9", "2 m", "J/m^2 K", "m^(2)", "/m", "kJo", "m^1.5", "1 2", "1^2 m"]
+)
+def test_what_is_unusual_is_left_to_pint(text):
+    assert units.si_factor(text, "m") is None
