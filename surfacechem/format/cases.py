@@ -18,7 +18,7 @@ from surfacechem import laws
 from surfacechem.documents import document, shipped
 from surfacechem.documents.document import Tree
 from surfacechem.errors import InputError, Place, nearest
-from surfacechem.format import csvtable, height_files, own_laws
+from surfacechem.format import data_files, own_laws
 from surfacechem.format.reader import ExactSolution, exact_solution_of, read_document, run_of, scene_of
 from surfacechem.format.sections import NOTHING_SWEPT, SweepSection
 from surfacechem.model.assemble import assemble, with_surrogates
@@ -133,9 +133,9 @@ def load_text(
         tree, unused = _without_stale_reference(before, tree)
         text = document.dump(tree)
     # With the contents of its files in the text, a case can be read again without them.
-    whole = csvtable.embedded(tree, str(base))
+    whole = data_files.with_tables(tree, str(base))
     if isinstance(tree.value, dict) and "surface" in tree.value:
-        whole = height_files.embedded(whole, str(base))
+        whole = data_files.with_heights(whole, str(base))
     whole, own = own_laws.embedded(whole, Path(base), allow_code)
     if whole != tree:
         tree, text = whole, document.dump(whole)

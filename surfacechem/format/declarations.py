@@ -32,7 +32,7 @@ from surfacechem.contracts.units import TOTAL_UNITS, quotient
 from surfacechem.contracts.units import parse as si
 from surfacechem.documents.document import OVERRIDE, Tree
 from surfacechem.errors import InputError, Place, placed
-from surfacechem.format import csvtable
+from surfacechem.format import data_files
 from surfacechem.quantities import INTERNAL, VARIABLES
 
 Schema = dict[str, Any]
@@ -310,7 +310,7 @@ class Prescribed(Content):
     def read(self, tree: Tree, name: str, context: Context) -> Load:
         """Return the load."""
         unit = resolved_unit(self.unit, context.x)
-        load: Load | None = csvtable.table(tree, unit)
+        load: Load | None = data_files.table(tree, unit)
         if load is None and isinstance(tree.value, dict):
             load = OneLaw(Load).read(tree, name, replace(context, x=unit))
         elif load is None:

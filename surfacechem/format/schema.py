@@ -6,7 +6,7 @@ import json
 
 from surfacechem import laws
 from surfacechem.contracts.terms import BodyEnergy, Law, Load, Shape
-from surfacechem.format.csvtable import KEY_MEANINGS
+from surfacechem.format.data_files import KEY_MEANINGS
 from surfacechem.format.declarations import NODE_NAME, QUANTITY, Schema, closed, law_keys, reference, schema_of
 from surfacechem.format.sections import Document
 

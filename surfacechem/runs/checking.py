@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem.errors import InputError
-from surfacechem.format.draws import permuted
+from surfacechem.format.plans import permuted
 from surfacechem.results.store import StoredArray
 from surfacechem.runs.keeping import BALANCES, END_COLUMNS, STATUSES, Keep, RunByRun
 from surfacechem.runs.sweeps import SweepAccuracy, SweepSolution, unknown_in

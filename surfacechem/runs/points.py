@@ -24,7 +24,7 @@ from surfacechem.documents import document
 from surfacechem.documents.document import Tree
 from surfacechem.errors import InputError, Place, suggestion
 from surfacechem.expressions import derivative, magnitude
-from surfacechem.format.csvtable import CSVText
+from surfacechem.format.data_files import CSVText
 from surfacechem.laws.loading import Hold
 from surfacechem.model.assemble import assemble
 from surfacechem.model.automaton import Equilibrium

@@ -20,7 +20,7 @@ from surfacechem.contracts.units import parse as si
 from surfacechem.documents import document, shipped
 from surfacechem.documents.document import Tree
 from surfacechem.errors import InputError, Place, suggestion
-from surfacechem.format.csvtable import CSVText
+from surfacechem.format.data_files import CSVText
 from surfacechem.format.declarations import (
     REQUIRED,
     Content,

@@ -9,8 +9,18 @@ from scipy import stats
 
 import surfacechem
 from surfacechem.errors import InputError
-from surfacechem.format.draws import SAMPLERS, Lognormal, Normal, Sample, Uniform, permuted
-from surfacechem.format.plans import Axis, EvenlySpaced, Plan, recorded_plan
+from surfacechem.format.plans import (
+    SAMPLERS,
+    Axis,
+    EvenlySpaced,
+    Lognormal,
+    Normal,
+    Plan,
+    Sample,
+    Uniform,
+    permuted,
+    recorded_plan,
+)
 
 K_0, C_R = "interface.potential.bond-energy.K_0", "interface.bonding.linear-affinity.c_r"
 GIVEN = {"a": Uniform(1.0, 3.0), "b": Normal(-1.0, 2.0), "c": Lognormal(2.0, 0.5), "d": Uniform(1e-3, 10.0, True)}
