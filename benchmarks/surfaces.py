@@ -16,7 +16,7 @@ from pathlib import Path
 from surfacechem.contracts.terms import Shape
 from surfacechem.errors import InputError
 from surfacechem.laws.free_energy import EquilibriumBonds
-from surfacechem.surfaces import nodes, patches
+from surfacechem.surfaces import inner_sums, patches
 from surfacechem.surfaces.inner_sums import table
 from surfacechem.surfaces.pair_laws import InversePower, LennardJonesPair
 from surfacechem.surfaces.pairwise import PairForces, interaction
@@ -72,15 +72,15 @@ def rows() -> Iterator[tuple[str, float, str, float, int, float]]:
 
 def rules() -> Iterator[tuple[str, float, str, float, int, float]]:
     """The error of each rule of Gauss alone, against the closed form."""
-    usual = nodes.ORDERS
+    usual = inner_sums.ORDERS
     for order in usual:
         # A rule that is asked for twice agrees with itself.
-        nodes.ORDERS = patches.ORDERS = (order,) * len(usual)
+        inner_sums.ORDERS = patches.ORDERS = (order,) * len(usual)
         table.cache_clear()
         found, cost = measured(ROUND["sphere, plane"], 0.01, 1e-12)
         error = abs(float(found.energy[0]) / sphere_over_plane(0.01) - 1)
         yield "sphere, plane", 0.01, f"{order} points", error, found.pairs, cost
-    nodes.ORDERS = patches.ORDERS = usual
+    inner_sums.ORDERS = patches.ORDERS = usual
     table.cache_clear()
 
 

@@ -70,11 +70,11 @@ def figure(
         from surfacechem.plots import sweep
 
         return sweep.figure(dataset, variables, against)
-    from surfacechem.plots import run
+    from surfacechem.plots import time_series
 
     if "time" not in dataset and "point" in dataset.dims:
-        return run.at_states(dataset, variables, against)
-    return run.figure(dataset, variables, against)
+        return time_series.at_states(dataset, variables, against)
+    return time_series.figure(dataset, variables, against)
 
 
 def _check_choice(variables: Sequence[str] | None, against: str | None) -> None:

@@ -19,9 +19,9 @@ from matplotlib.lines import Line2D
 from surfacechem.documents import document
 from surfacechem.documents.document import parameter_path
 from surfacechem.errors import InputError
-from surfacechem.plots import members, run, style, sweep
-from surfacechem.plots.run import Panel
+from surfacechem.plots import style, sweep, time_series
 from surfacechem.plots.style import COLOURS, symbol, unit
+from surfacechem.plots.time_series import Panel
 from surfacechem.results.dataset import changes_of
 
 LINE_STYLES = ("-", "--", ":", "-.")
@@ -48,7 +48,7 @@ def figure(
         raise InputError("there is nothing to plot: none of the variables varies.")
     shown = [over, *(name for panel in panels for name in panel.names)]
     names, colours = _labels_with_coincidences(datasets, shown), colours_of(len(datasets))
-    starts = [run.first_shown(dataset, panels) for dataset in datasets] if over == "time" else []
+    starts = [time_series.first_shown(dataset, panels) for dataset in datasets] if over == "time" else []
     # A dataset that needs a logarithmic axis is unreadable on a linear one; others can be read on both.
     begin = min((start for start in starts if start is not None), default=None)
     with style.panels(6.4, 1.2 + 0.17 * len(datasets) + 1.7 * len(panels), len(panels), sharex=True) as (plot, grid):
@@ -71,7 +71,7 @@ def _content(
     if any("study" in dataset.attrs for dataset in datasets) or any(sweeps) != all(sweeps):
         raise InputError("a figure takes runs or sweeps, not both.")
     if not any(sweeps):
-        return against or "time", _merge_panels([run.panels(each, variables, against) for each in datasets])
+        return against or "time", _merge_panels([time_series.panels(each, variables, against) for each in datasets])
     axes = [*dict.fromkeys(tuple(sweep.axes_of(each)) for each in datasets)]
     if len(axes) > 1 or len(axes[0]) > 1:
         given = ", and over ".join(" by ".join(names) for names in axes)
@@ -175,7 +175,7 @@ def _draw(
     for dataset, colour in zip(datasets, colours, strict=False):
         for name, dash in zip(panel.names, cycle(LINE_STYLES), strict=False):
             if name in dataset:
-                values = members.final_values(dataset, name) if "sweep" in dataset.attrs else dataset[name].values
+                values = sweep.final_values(dataset, name) if "sweep" in dataset.attrs else dataset[name].values
                 drawn.append(values if begin is None else values[dataset[over].values >= begin])
                 points = "sweep" in dataset.attrs or len(values) < 3
                 kw: Any = {"marker": style.marker(ax, len(values)), "markersize": style.MARKER_SIZE} if points else {}
@@ -193,7 +193,7 @@ def _label_axis(axes: Sequence[Axes], datasets: Sequence[xarray.Dataset], over: 
     """Label the shared axis: time, over decades from ``begin`` on, a variable, or the swept parameter."""
     first, values = datasets[0][over], np.concatenate([dataset[over].values for dataset in datasets])
     if over == "time":
-        run.label_time(axes, values, unit(first), begin)
+        time_series.label_time(axes, values, unit(first), begin)
     elif "sweep" in datasets[0].attrs:
         style.draw_parameter(axes[-1].xaxis, first)
     else:

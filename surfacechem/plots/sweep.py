@@ -1,20 +1,440 @@
-"""Figures of sweeps: rupture under a growing load, many runs, and final values over the swept parameter."""
+"""Figures of sweeps: many runs as maps, distributions, effects, curves; rupture under a growing load; final values."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import xarray
 from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 
 from surfacechem.errors import InputError, refuse_unknown
-from surfacechem.format.plans import RUN_DIMENSION, Plan, recorded_plan
-from surfacechem.plots import members, rupture, style
-from surfacechem.plots.run import PANELS, Panel, of_kind
-from surfacechem.plots.style import MOST_CURVES, symbol, unit, varies
+from surfacechem.format.plans import RUN_DIMENSION, STATISTICS, Plan, name_parts, recorded_plan
+from surfacechem.plots import style
+from surfacechem.plots.style import COLOURS, MOST_CURVES, Array, symbol, unit, unit_text, varies
+from surfacechem.plots.time_series import PANELS, Panel, of_kind, wants_log_axis
+
+MOST_MEMBERS = 100
+"""Largest number of curves of a sample; of more runs an evenly spread subset is drawn."""
+
+MOST_POINTS = 2**20
+"""Largest number of runs whose values are drawn; of more an evenly spread subset."""
+
+MOST_PANELS = 3
+
+COUNTED = ("steps", "destroys_entropy")
+"""Variables about the solver or the laws instead of the physics."""
+
+NAME_ORDER = (
+    *(r"lifetime", r"(phi|theta).*_last", r"T.*_max", r"(phi|T).*(?<!_m..)"),
+    *(r"time_to.*", r"time.*", r".*(?<!_m..)", r".*"),
+)
+"""Order of variables: lifetimes, bonds at the end, largest temperatures, other final values, other extremes."""
+
+BINS, PARAMETER_BINS = 40, 12
+"""Numbers of bins of a distribution, and of bins of a parameter in an effect plot."""
+
+PERCENTILES = (5.0, 50.0, 95.0)
+"""Percentiles of a distribution that are drawn."""
+
+SEEN_PART = 0.99
+"""Fraction of the largest value of a variable that some output must reach; otherwise a note is written."""
+
+
+def figure_of_members(
+    dataset: xarray.Dataset, plan: Plan, axes: Sequence[str], variables: Sequence[str] | None = None
+) -> Figure:
+    """Draw a grid of two parameters, a sample, or a grid of more parameters."""
+    dataset = with_final_bonds(dataset, axes)
+    parameters = [str(name) for name, x in dataset.coords.items() if len(x.dims) == 1 and x.dims[0] in axes]
+    names = chosen(dataset, axes, variables)
+    if dataset[names[0]].ndim > len(axes):
+        return curves(dataset, axes, names)
+    if len(axes) == 2 and RUN_DIMENSION not in axes:
+        return heat_maps(dataset, plan, axes, names)
+    parameters.sort(key=lambda name: [*plan.paths, ""].index(path_of(name, plan)))
+    return effects(dataset, plan, axes, parameters, names)
+
+
+def chosen(dataset: xarray.Dataset, axes: Sequence[str], variables: Sequence[str] | None) -> list[str]:
+    """Return the variables to be drawn: those asked for, else final values that differ between runs."""
+    known = number_names(dataset, axes)
+    refuse_unknown(variables or (), known, "no variable '{}' in the sweep", style.place_of(dataset))
+    return list(dict.fromkeys(variables)) if variables else varying_numbers(dataset, axes, known)
+
+
+def number_names(dataset: xarray.Dataset, axes: Sequence[str]) -> list[str]:
+    """Return the names of numbers of every run, not only of checked ones, at its end or along it."""
+    return [str(n) for n, x in dataset.data_vars.items() if x.dtype.kind == "f" and x.dims[: len(axes)] == tuple(axes)]
+
+
+def varying_numbers(dataset: xarray.Dataset, axes: Sequence[str], known: Sequence[str]) -> list[str]:
+    """Return the numbers that differ between runs: of bonds and temperatures, else of events."""
+    found = sorted(known, key=lambda name: next(k for k, rank in enumerate(NAME_ORDER) if re.fullmatch(rank, name)))
+    ends = [name for name in found if dataset[name].ndim == len(axes) and "error" not in name and name not in COUNTED]
+    shown = _distinct(dataset, [name for name in ends if varies(subsample(dataset, name))])
+    telling = [name for name in shown if any(re.fullmatch(rank, name) for rank in NAME_ORDER[:-1])]
+    return (telling or shown or ["time_reached"])[:MOST_PANELS]
+
+
+def _distinct(dataset: xarray.Dataset, names: Sequence[str]) -> list[str]:
+    """Return the names without those of equal values, such as a maximum that is the final value."""
+    shown: list[str] = []
+    for name in names:
+        values = subsample(dataset, name)
+        shown += [] if any(np.array_equal(values, subsample(dataset, n), equal_nan=True) for n in shown) else [name]
+    return shown
+
+
+def with_final_bonds(dataset: xarray.Dataset, axes: Sequence[str]) -> xarray.Dataset:
+    """Return the dataset with bonds at the end of each run; with all final values if neither bonds nor temperatures
+    vary. It is unchanged if it holds such numbers already.
+    """
+    series = [name for name in series_names(dataset, axes) if name in dataset.data_vars]
+    if not series or any(str(name).endswith("_last") for name in dataset):
+        return dataset
+    temperatures, bonds = (of_kind(dataset, series, *kind) for _, *kind in PANELS[:2])
+    moving = [name for name in (*bonds, *temperatures) if varies(subsample(dataset, name))]
+    last = [name for name in series if not name.endswith(("_exact", "_residual"))] if not moving else bonds
+    ends = {f"{n}_last": xarray.Variable(axes, final_values(dataset, n), dataset[n].attrs) for n in last}
+    return dataset.assign(ends)
+
+
+def final_values(dataset: xarray.Dataset, name: str) -> Array:
+    """Return the value at the end of each run, or at the last output if that is all there is; NaN if the run failed or
+    was refused.
+    """
+    ended = f"{name}_last"
+    values: Array = dataset[ended if ended in dataset else name].values
+    if values.ndim > dataset["status"].ndim:
+        last = values.shape[-1] - 1 - np.argmax(np.isfinite(values)[..., ::-1], axis=-1)
+        values = np.take_along_axis(values, last[..., None], axis=-1)[..., 0]
+    return np.where(style.has_no_end(dataset, *style.WITHOUT_END), np.nan, values)
+
+
+def ends_are_known(dataset: xarray.Dataset, names: Sequence[str]) -> bool:
+    """True if the last values are those at the ends of all runs, none of which stopped after its last output."""
+    return all(f"{name}_last" in dataset for name in names) or not style.has_no_end(dataset, style.STOPPED).any()
+
+
+def subsample(dataset: xarray.Dataset, name: str) -> Array:
+    """Return the values of a variable, of an evenly spread subset if there are many runs."""
+    series = dataset[name].ndim > dataset["status"].ndim
+    values = (dataset[name].values if series else final_values(dataset, name)).ravel()
+    return np.asarray(values[:: -(-values.size // MOST_POINTS)], dtype=float)
+
+
+def quantity_label(values: xarray.DataArray) -> str:
+    """Return symbol or words for a variable, and its unit."""
+    return f"{style.quantity_words(values)} [{unit_text(unit(values))}]"
+
+
+def heat_maps(dataset: xarray.Dataset, plan: Plan, axes: Sequence[str], names: Sequence[str]) -> Figure:
+    """Draw colours over two parameters, one map per variable; white where a run has no value."""
+    x, y = (dataset[name] for name in axes)
+    with style.panels(5.6, 0.6 + 3.3 * len(names), len(names), sharex=True) as (plot, grid):
+        for ax, name in zip(grid[:, 0], names, strict=True):
+            values = np.ma.masked_invalid(final_values(dataset, name))
+            image = ax.pcolormesh(x.values, y.values, values.T, shading="nearest", cmap="viridis", rasterized=True)
+            plot.colorbar(image, ax=ax, label=quantity_label(dataset[name]))
+            style.draw_parameter(ax.yaxis, y, plan.axes[1].logarithmic)
+        style.draw_parameter(grid[-1, 0].xaxis, x, plan.axes[0].logarithmic)
+        style.headings(plot, grid[0, 0], dataset)
+    return plot
+
+
+def trajectories(dataset: xarray.Dataset, axes: Sequence[str], variables: Sequence[str] | None, against: str) -> Figure:
+    """Draw each run of a sweep over one of its variables, or over time."""
+    series = series_names(dataset, axes)
+    # The dimension along the runs is time or, if a load ends them, the load.
+    inner = [str(dim) for name in series for dim in dataset[name].dims if dim not in axes]
+    known = [*series, *dict.fromkeys(inner)]
+    asked = (*(variables or ()), against)
+    if single := next(filter((dataset.variables.keys() - known).__contains__, asked), ""):
+        message = f"{single} does not go along the runs. Leave `against` out: the figure is over what is swept."
+        raise InputError(message, style.place_of(dataset))
+    refuse_unknown(asked, known, "no variable '{}' along the runs of the sweep", style.place_of(dataset))
+    usual = [name for _, *kind in PANELS[:2] for name in of_kind(dataset, series, *kind)]
+    moving = [name for name in usual if name != against and varies(subsample(dataset, name))]
+    if not (names := list(dict.fromkeys(variables or moving[:MOST_PANELS]))):
+        raise InputError(f"neither bonds nor temperatures change: name variables to show over {against}.")
+    return curves(dataset, axes, names, against)
+
+
+def series_names(dataset: xarray.Dataset, axes: Sequence[str]) -> list[str]:
+    """Return the names of numbers along the runs of a sweep."""
+    many = [str(n) for n, x in dataset.variables.items() if x.dtype.kind == "f" and x.ndim == len(axes) + 1]
+    return [name for name in many if "event" not in dataset[name].dims]
+
+
+def curves(dataset: xarray.Dataset, axes: Sequence[str], names: Sequence[str], against: str | None = None) -> Figure:
+    """Draw series of all runs, or of an evenly spread subset, whose size is noted; over ``against`` instead of time."""
+    count = int(np.prod([dataset.sizes[name] for name in axes]))
+    members = style.evenly_spread(count, MOST_MEMBERS)
+    over = dataset[against or str(dataset[names[0]].dims[-1])]
+    x = np.broadcast_to(over.values, dataset[names[0]].shape).reshape(count, -1)[members]
+    with style.panels(6.4, 0.9 + 2.2 * len(names), len(names), sharex=True) as (plot, grid):
+        for ax, name in zip(grid[:, 0], names, strict=True):
+            values = dataset[name].values.reshape(count, -1)[members]
+            for line, run, k in zip(values, x, members, strict=True):
+                ax.plot(run, line, drawstyle=style.drawn_as(dataset[name]), **line_style(dataset, axes, k))
+            style.label(ax.yaxis, style.quantity_words(dataset[name]), unit(dataset[name]), values)
+            style.legend(ax)
+        style.label(grid[-1, 0].xaxis, "Time" if against in (None, "time") else symbol(against), unit(over), x)
+        many = RUN_DIMENSION not in axes and count > style.MOST_CURVES
+        if many:
+            bar = plot.colorbar(colours(dataset, axes), ax=grid[:, 0].tolist())
+            parameter = dataset[axes[0]]
+            style.label(bar.ax.yaxis, style.parameter_words(parameter), unit(parameter), parameter.values)
+        others = ", ".join(style.parameter_words(dataset[name]) for name in axes[1:]) if many else ""
+        notes = [f"curves of one colour differ in {others}"] if others else []
+        notes += filter(None, (_peaks_between_outputs(dataset, name) for name in names))
+        notes += [f"{len(members)} of {count} runs"] if len(members) < count else []
+        style.headings(plot, grid[0, 0], dataset, more="   ".join(notes))
+    return plot
+
+
+def _peaks_between_outputs(dataset: xarray.Dataset, name: str) -> str:
+    """Describe the largest magnitude of a variable if no output of any run comes near it, as in a brief slip."""
+    ends = [dataset[key].values for key in (f"{name}_max", f"{name}_min") if key in dataset]
+    reached, shown = max(map(style.largest, ends), default=0.0), style.largest(dataset[name].values)
+    if shown >= SEEN_PART * reached:
+        return ""
+    text, size = style.prefixed(unit(dataset[name]), np.array([reached]))
+    return style.minus(f"between outputs, {symbol(name)} reaches {reached / size:.3g} {text}")
+
+
+def colours(dataset: xarray.Dataset, axes: Sequence[str]) -> ScalarMappable:
+    """Return the colour map of the values of a parameter."""
+    values = dataset[axes[0]].values
+    scale = LogNorm if style.over_decades(values) else Normalize
+    return ScalarMappable(scale(values.min(), values.max()), "viridis")
+
+
+def line_style(dataset: xarray.Dataset, axes: Sequence[str], member: int) -> dict[str, Any]:
+    """Return the style of the curve of a run: coloured by its parameter if there is one, with a legend for few runs."""
+    shape = dataset["status"].shape
+    if RUN_DIMENSION not in axes and np.prod(shape) <= style.MOST_CURVES:
+        place = [int(k) for k in np.unravel_index(member, shape)]
+        return {"color": COLOURS[member], "linewidth": 1.3, "label": style.member_name(dataset, place)}
+    if RUN_DIMENSION in axes:
+        return {"color": COLOURS[0], "linewidth": 0.7, "alpha": 0.35}
+    value = dataset[axes[0]].values[np.unravel_index(member, shape)[0]]
+    return {"color": colours(dataset, axes).to_rgba(value), "linewidth": 0.9}
+
+
+def effects(
+    dataset: xarray.Dataset, plan: Plan, axes: Sequence[str], parameters: Sequence[str], names: Sequence[str]
+) -> Figure:
+    """Draw the distribution of each variable, and its median and band over each parameter, for all values of others."""
+    drawn = plan.sample.draws if plan.sample else {}
+    ratios = {axis.path: axis.logarithmic for axis in plan.axes}
+    ratios |= {path: draw.over_decades for path, draw in drawn.items()}
+    decades = {parameter: ratios.get(path_of(parameter, plan)) for parameter in parameters}
+    with style.panels(
+        2.2 + 2.0 * len(parameters), 0.8 + 2.1 * len(names), len(names), 1 + len(parameters), sharey="row"
+    ) as (plot, grid):
+        for row, name in zip(grid, names, strict=True):
+            whole = dataset[name]
+            values = subsample(dataset, name)
+            distribution(row[0], values)
+            row[0].set_ylabel(quantity_label(whole))
+            for ax, parameter in zip(row[1:], parameters, strict=True):
+                over = dataset[parameter].broadcast_like(whole).transpose(*axes).values.ravel()
+                effect(ax, over[:: -(-over.size // MOST_POINTS)], values)
+        for column, parameter in zip(grid.T[1:], parameters, strict=True):
+            for ax in column:
+                style.draw_parameter(ax.xaxis, dataset[parameter], decades[parameter])
+                ax.xaxis.label.set(fontsize=8, visible=ax is column[-1])
+        grid[-1, 0].set_xlabel("runs")
+        style.headings(plot, grid[0, 0], dataset, more="5, 50 and 95 % of the runs")
+    return plot
+
+
+def path_of(parameter: str, plan: Plan) -> str:
+    """Return the path of a swept parameter by its name in the dataset, a tail of the path; '' if none fits."""
+    wanted = parameter.removesuffix("_swept")
+    parts = {path: name_parts(path) for path in plan.paths}
+    return next((path for path, p in parts.items() if wanted in ("_".join(p[k:]) for k in range(len(p)))), "")
+
+
+def distribution(ax: Axes, values: Array) -> None:
+    """Draw a histogram along the axis of the values, with the median and the band."""
+    known = values[np.isfinite(values)]
+    if len(known):
+        ax.hist(known, bins=BINS, orientation="horizontal", color=COLOURS[0], alpha=0.6)
+        for level, width in zip(np.percentile(known, PERCENTILES), (0.8, 1.6, 0.8), strict=True):
+            ax.axhline(level, color="black", linewidth=width)
+
+
+def effect(ax: Axes, over: Array, values: Array) -> None:
+    """Draw median and band of the values in bins of a parameter with equal numbers of runs, or at each value."""
+    known = np.isfinite(values) & np.isfinite(over)
+    over, values = over[known], values[known]
+    if not len(over):
+        return
+    if len(places := np.unique(over)) > PARAMETER_BINS:
+        ends = np.unique(np.quantile(over, np.linspace(0, 1, PARAMETER_BINS + 1)))
+        part = np.clip(np.searchsorted(ends, over, side="right") - 1, 0, len(ends) - 2)
+        places = np.array([np.median(over[part == k]) for k in range(len(ends) - 1)])
+    else:
+        part = np.searchsorted(places, over)
+    low, middle, high = np.array([np.percentile(values[part == k], PERCENTILES) for k in range(len(places))]).T
+    ax.fill_between(places, low, high, color=COLOURS[1], alpha=0.25, linewidth=0)
+    ax.plot(places, middle, color=COLOURS[1], marker="o", markersize=2.5)
+
+
+def load_of(dataset: xarray.Dataset) -> str:
+    """Return the load under whose growth the bonds of a sweep rupture; '' for other sweeps."""
+    names = (str(name).removesuffix("_mode") for name in dataset.data_vars if str(name).endswith("_mode"))
+    loads = [load for load in names if all(f"{load}_{which}" in dataset for which in STATISTICS)]
+    return loads[0] if loads else ""
+
+
+MARKERS = "osD"
+
+NEGLIGIBLE_LIFETIME = 0.01
+"""Fraction of the shortest lifetime within which hardly a bond breaks."""
+
+PANEL_HEIGHT, LINE_WIDTH = 2.3, 1.2
+"""Height of a panel [inch], and width of a curve over the load [points]."""
+
+MOST_LARGE_MARKERS = 30
+"""Number of points from which on large markers would hide each other."""
+
+
+def figure_of_rupture(dataset: xarray.Dataset, load: str, variables: Sequence[str] | None = None) -> Figure:
+    """Draw the spectrum, the distribution p(f) for some runs, and the lifetime; or ``variables`` over the load."""
+    series = (f"density_{load}", "lifetime")
+    held = all(name in dataset and load in dataset[name].dims for name in series)  # a store may keep no series
+    names = variables or ("", *(series if held else ()))
+    with style.panels(6.4, 0.7 + PANEL_HEIGHT * len(names), len(names)) as (plot, grid):
+        for ax, name in zip(grid[:, 0], names, strict=True):
+            if name:
+                _draw_series(ax, dataset, load, name)
+            else:
+                # Most probable, median and mean load at rupture, the exact ones as lines.
+                mean = dataset[f"{load}_mean"]
+                text, size = style.prefixed(unit(mean), mean.values)
+                _draw_statistics(ax, dataset, {f"{load}_{which}": word for which, word in STATISTICS.items()}, size)
+                ax.set_ylabel(f"{symbol(load)} at rupture [{text}]")
+            style.legend(ax)
+        for ax in grid[2:, 0] if not variables else ():
+            ax.sharex(grid[1, 0])
+            if legend := ax.get_legend():
+                legend.remove()  # the colours are those of the distributions
+        style.headings(plot, grid[0, 0], dataset)
+    return plot
+
+
+def _members(dataset: xarray.Dataset, load: str) -> list[tuple[tuple[int, ...], str]]:
+    """Return indices and names of some runs, evenly spread over those whose most probable load is positive."""
+    modes = dataset[f"{load}_mode"].values
+    # At low loading rates most bonds break before the load grows, and their peak at zero would dwarf all others.
+    inside = np.argwhere(modes > dataset[load].values[0])
+    places = inside if len(inside) else np.argwhere(np.isfinite(modes))
+    chosen = places[style.evenly_spread(len(places), MOST_CURVES)]
+    return [(tuple(at), style.member_name(dataset, at)) for at in chosen.tolist()]
+
+
+def _draw_over(
+    ax: Axes, dataset: xarray.Dataset, load: str, values: Array, scale: Callable[[Array], Array] = np.asarray
+) -> None:
+    """Draw values of some runs over the load; as one curve if they coincide on this scale."""
+    members = _members(dataset, load)
+    notes = [f"{len(members)} of {dataset['status'].size} runs"] if len(members) < dataset["status"].size else []
+    shown = np.array([values[place] for place, _ in members])
+    if len(members) > 1 and _coincide(scale(shown)):
+        ax.plot(dataset[load].values, np.fmin.reduce(shown), color="black", linewidth=LINE_WIDTH)
+        notes.append("their curves coincide" if notes else "the curves of all runs coincide")
+    else:
+        for (place, label), colour in zip(members, COLOURS, strict=False):
+            ax.plot(dataset[load].values, values[place], color=colour, linewidth=LINE_WIDTH, label=label)
+    style.label_variable(ax.xaxis, dataset[load])
+    ax.set_title(", ".join(notes), loc="right", **style.NOTE_STYLE)
+
+
+def _coincide(curves: Array) -> bool:
+    """True if curves nowhere differ by more than the width of their line, where they are known."""
+    low, high = np.fmin.reduce(curves), np.fmax.reduce(curves)
+    apart, range_ = np.fmax.reduce(high - low), np.fmax.reduce(high) - np.fmin.reduce(low)
+    return bool(apart * 72 * PANEL_HEIGHT <= LINE_WIDTH * range_)
+
+
+def _draw_series(ax: Axes, dataset: xarray.Dataset, load: str, name: str) -> None:
+    """Draw a variable over the load; the distribution of the load at rupture is drawn until all bonds are broken."""
+    values = dataset[name].values
+    if name == f"density_{load}":
+        text, size = style.prefixed(unit(dataset[load]), dataset[load].values)
+        _draw_over(ax, dataset, load, np.maximum(values * size, 0.0))
+        ax.set_ylabel(f"$p$({symbol(load)}) [1/{text}]")
+    elif name == "lifetime":
+        _draw_over(ax, dataset, load, values, np.log)
+        ax.set_ylabel(rf"Lifetime $\tau$({symbol(load)}) [s]")
+        style.make_logarithmic(ax.yaxis)
+    else:
+        _draw_over(ax, dataset, load, values)
+        style.label(ax.yaxis, symbol(name), unit(dataset[name]), values)
+
+
+def _draw_statistics(ax: Axes, dataset: xarray.Dataset, words: Mapping[str, str], size: float) -> None:
+    """Draw results of each run over the swept parameter, by name with their labels in the legend, in one colour for
+    each or for each value of a second parameter; exact values as lines.
+    """
+    parameter = dataset[str(dataset["status"].dims[0])]
+    style.draw_parameter(ax.xaxis, parameter)
+    x, large = parameter.values, 3.5 if len(parameter) < MOST_LARGE_MARKERS else 2.0
+    seconds = [label for _, label in style.curves_by_second(dataset, dataset[next(iter(words))].values)]
+    for k, (name, marker) in enumerate(zip(words, MARKERS, strict=False)):
+        for fmt, end in ((marker, ""), ("-", "_exact")):
+            if name + end in dataset:
+                for j, (values, _) in enumerate(style.curves_by_second(dataset, final_values(dataset, name + end))):
+                    colour = COLOURS[j if len(seconds) > 1 else k]
+                    ax.plot(x, values / size, fmt, color=colour, markersize=large, linewidth=0.9, label="_")
+    for label, colour in zip(seconds if len(seconds) > 1 else (), COLOURS, strict=False):
+        ax.plot([], [], color=colour, label=label)
+    for word, marker, colour in zip(words.values(), MARKERS, COLOURS, strict=False):
+        ax.plot([], [], marker, color="black" if len(seconds) > 1 else colour, markersize=large, label=word)
+    ax.plot([], [], color="black", linewidth=0.9, label="exact" if any(f"{n}_exact" in dataset for n in words) else "_")
+
+
+def lifetimes(dataset: xarray.Dataset) -> Figure:
+    """Draw the lifetime over the swept parameter, the exact one as a line, and the survival over time of some runs."""
+    with style.panels(6.4, 5.3, 2) as (plot, grid):
+        above, below = grid[:, 0]
+        _draw_statistics(above, dataset, {"lifetime": "runs"}, 1.0)
+        above.set_ylabel(r"Lifetime $\tau$ [s]")
+        style.make_logarithmic(above.yaxis)
+        _draw_survival(below, dataset)
+        for ax in (above, below):
+            style.legend(ax)
+        style.headings(plot, above, dataset)
+    return plot
+
+
+def _draw_survival(ax: Axes, dataset: xarray.Dataset) -> None:
+    """Draw the survival over time of runs evenly spread over those with a known lifetime."""
+    known = np.argwhere(np.isfinite(dataset["lifetime"].values))
+    chosen = style.evenly_spread(len(known), MOST_CURVES)
+    times, survival = dataset["time"].values, dataset["survival"].values
+    for place, colour in zip(known[chosen], COLOURS, strict=False):
+        # A run ends when all bonds have broken: NaN after its end is a survival of zero.
+        values = np.nan_to_num(survival[tuple(place)])
+        ax.plot(times, values, color=colour, label=style.member_name(dataset, place))
+    lifetimes = np.sort(dataset["lifetime"].values[tuple(known.T)])
+    if wants_log_axis(times) or style.over_decades(lifetimes):
+        style.make_logarithmic(ax.xaxis)
+        begin = max(times[times > 0][0], NEGLIGIBLE_LIFETIME * lifetimes[0])
+        ax.set_xlim(begin, dataset["time_reached"].values.max())
+    else:
+        ax.set(xlim=(0, dataset["time_reached"].values.max()))
+    ax.set(xlabel="Time [s]", ylabel="Survival $S$ [1]")
+
 
 # Largest number of parameters of a grid for curves.
 MOST_DRAWN = 2
@@ -24,16 +444,16 @@ def figure(dataset: xarray.Dataset, variables: Sequence[str] | None = None, agai
     """Draw a sweep: the load at rupture, else final values; with ``against`` each run over this variable."""
     plan, axes = plan_of(dataset), axes_of(dataset)
     if against:
-        return members.trajectories(dataset, axes, variables, against)
+        return trajectories(dataset, axes, variables, against)
     if hides_runs(dataset, axes):
-        return members.figure(dataset, plan, axes, variables)
+        return figure_of_members(dataset, plan, axes, variables)
     style.check_variables(dataset, {"time_reached": tuple(axes), **{name: (name,) for name in axes}})
-    shown, load = panels(dataset, variables), rupture.load_of(dataset)
+    shown, load = panels(dataset, variables), load_of(dataset)
     chosen = [name for panel in shown for name in panel.names]
     if load and (not variables or all(load in dataset[name].dims for name in chosen)):
-        return rupture.figure(dataset, load, variables)
+        return figure_of_rupture(dataset, load, variables)
     if not variables and "lifetime" in dataset and dataset["lifetime"].dims == tuple(axes):
-        return rupture.lifetimes(dataset)
+        return lifetimes(dataset)
     return _final_values(dataset, axes[0], shown)
 
 
@@ -77,16 +497,16 @@ def axes_of(dataset: xarray.Dataset) -> list[str]:
 def _numbers(dataset: xarray.Dataset) -> list[str]:
     """Return the names of variables that curves over the swept parameter show; coverages also have their own names."""
     lists = {"event", "species"}
-    return [name for name in members.number_names(dataset, axes_of(dataset)) if lists.isdisjoint(dataset[name].dims)]
+    return [name for name in number_names(dataset, axes_of(dataset)) if lists.isdisjoint(dataset[name].dims)]
 
 
 def panels(dataset: xarray.Dataset, variables: Sequence[str] | None) -> list[Panel]:
     """Return panels of the variables, else of the most probable load at rupture, else of those that vary."""
-    known, load = _numbers(dataset), rupture.load_of(dataset)
+    known, load = _numbers(dataset), load_of(dataset)
     refuse_unknown(variables or (), known, "no variable '{}' in the sweep", style.place_of(dataset))
     names = [[name] for name in dict.fromkeys(variables or ())] or ([[f"{load}_mode"]] if load else _dependent(dataset))
     # A store may have only one number per run.
-    names = names or [[name] for name in members.varying_numbers(dataset, axes_of(dataset), known)]
+    names = names or [[name] for name in varying_numbers(dataset, axes_of(dataset), known)]
     return [Panel("", unit(dataset[group[0]]), group) for group in names]
 
 
@@ -95,7 +515,7 @@ def _dependent(dataset: xarray.Dataset) -> list[list[str]]:
     axes, found = axes_of(dataset), []
     along = [name for name in _numbers(dataset) if dataset[name].ndim > len(axes)]
     for _, *kind in PANELS[:2]:
-        names = [name for name in of_kind(dataset, along, *kind) if varies(members.final_values(dataset, name).ravel())]
+        names = [name for name in of_kind(dataset, along, *kind) if varies(final_values(dataset, name).ravel())]
         found += [[name] for name in names] if len(axes) > 1 else [names] if names else []
     return found
 
@@ -103,7 +523,7 @@ def _dependent(dataset: xarray.Dataset) -> list[list[str]]:
 def _draw_final(ax: Axes, dataset: xarray.Dataset, names: Sequence[str]) -> None:
     """Draw the values at the end of each run."""
     x = dataset[axes_of(dataset)[0]].values
-    ends = {name: members.final_values(dataset, name) for name in names}
+    ends = {name: final_values(dataset, name) for name in names}
     at_end = any(dataset[name].ndim > len(axes_of(dataset)) for name in names)
     for name, end in ends.items():
         own = symbol(name) if at_end or len(names) > 1 else ""  # the axis names a single number per run
@@ -112,6 +532,6 @@ def _draw_final(ax: Axes, dataset: xarray.Dataset, names: Sequence[str]) -> None
             kw: Any = {"linestyle": "none"} if style.is_mode(dataset[name]) else {}
             marker = style.marker(ax, 0 if kw else len(x))
             ax.plot(x, values, marker=marker, markersize=style.MARKER_SIZE, label=words, **kw)
-    which = ("Final " if members.ends_are_known(dataset, names) else "Last output ") if at_end else ""
+    which = ("Final " if ends_are_known(dataset, names) else "Last output ") if at_end else ""
     said = f"{which}{style.quantity_words(dataset[names[0]]) if len(names) == 1 else 'value'}"
     style.label(ax.yaxis, said, unit(dataset[names[0]]), np.stack(list(ends.values())))

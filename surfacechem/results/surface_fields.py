@@ -45,7 +45,7 @@ def surface_columns(trajectory: Trajectory, surface: CurvedSurfaces) -> tuple[li
 
 def _totals(surface: CurvedSurfaces, approaches: Array, stretches: Array) -> list[Column]:
     """Return moment, area of contact, conductance, and the deviation of the local law."""
-    from surfacechem.surfaces.nodes import alike_around
+    from surfacechem.surfaces.inner_sums import alike_around
 
     force, moment_x, moment_y, local, least, places, area, across = surface.totals(approaches, stretches)
     columns = []

@@ -15,7 +15,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from surfacechem.surfaces.nodes import gauss_rule
+from surfacechem.surfaces.inner_sums import gauss_rule
 from surfacechem.surfaces.patches import FIRST_LEVEL, Levels, Patches
 from surfacechem.surfaces.projection import FIRST_ORDER, Array, Projection, Surface
 

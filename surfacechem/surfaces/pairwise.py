@@ -18,10 +18,17 @@ import numpy as np
 
 from surfacechem.contracts.terms import PairEnergy
 from surfacechem.errors import InputError
-from surfacechem.surfaces.inner_sums import TRUNCATION_PART, inner_sums, kernel, laws_by_extent
+from surfacechem.surfaces.inner_sums import (
+    LAST_LEVEL,
+    TRUNCATION_PART,
+    Extent,
+    inner_sums,
+    is_round,
+    kernel,
+    laws_by_extent,
+)
 from surfacechem.surfaces.level_cuts import with_levels
 from surfacechem.surfaces.nearest_places import NearPlaces
-from surfacechem.surfaces.nodes import LAST_LEVEL, Extent, is_round
 from surfacechem.surfaces.patches import Budget, Patches, integral, outer_patches
 from surfacechem.surfaces.projection import FIRST_ORDER, Array, Surface, cross
 from surfacechem.surfaces.shapes import Plane

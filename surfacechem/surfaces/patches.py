@@ -20,8 +20,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem.errors import InputError
+from surfacechem.surfaces.inner_sums import (
+    LAST_LEVEL,
+    ORDERS,
+    alike_along,
+    alike_around,
+    gauss_rule,
+    is_round,
+    piece_edges,
+)
 from surfacechem.surfaces.nearest_places import NearPlaces, near_places
-from surfacechem.surfaces.nodes import LAST_LEVEL, ORDERS, alike_along, alike_around, gauss_rule, is_round, piece_edges
 from surfacechem.surfaces.projection import FIRST_ORDER, POLE, Array, Surface
 from surfacechem.surfaces.shapes import Disc, Plane
 from surfacechem.tolerances import NEGLIGIBLE

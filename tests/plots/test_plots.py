@@ -10,7 +10,7 @@ import xarray
 import surfacechem
 from surfacechem.errors import InputError
 from surfacechem.plots import figure, save
-from surfacechem.plots.run import group_coinciding, wants_log_axis
+from surfacechem.plots.time_series import group_coinciding, wants_log_axis
 
 pytestmark = pytest.mark.around
 

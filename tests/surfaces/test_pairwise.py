@@ -16,9 +16,9 @@ from surfacechem.laws.free_energy import BondedContact, EquilibriumBonds, Penalt
 from surfacechem.laws.heat_transfer import GasGap
 from surfacechem.laws.longrange import LennardJonesSpherePlane
 from surfacechem.quantities import BOLTZMANN
-from surfacechem.surfaces import nodes, patches
+from surfacechem.surfaces import patches
 from surfacechem.surfaces.curved_gap import between_flats, density, over_gap
-from surfacechem.surfaces.inner_sums import inner_sums, table
+from surfacechem.surfaces.inner_sums import LAST_LEVEL, inner_sums, table
 from surfacechem.surfaces.pair_laws import InversePower, LennardJonesPair, PairTable, PenaltyPair
 from surfacechem.surfaces.pairwise import interaction
 from surfacechem.surfaces.potential import CurvedSurfaces
@@ -100,7 +100,7 @@ def test_both_half_passes_have_one_energy_and_opposite_forces_where_densities_di
         u = (low + high) / 2 + (high - low) / 2 * x
         points, areas = own.elements(np.stack([u, np.zeros_like(u)], axis=-1))
         area = math.pi * (high - low) * w * areas
-        ((energy, push),), _ = inner_sums(other, points, [law], nodes.LAST_LEVEL, 1e-12)
+        ((energy, push),), _ = inner_sums(other, points, [law], LAST_LEVEL, 1e-12)
         halves.append((law.n_1 * law.n_2 * area @ energy, law.n_1 * law.n_2 * area @ push[:, 2]))
     (energy, force), (same, opposite) = halves
     assert energy == pytest.approx(same, rel=1e-10)
@@ -169,7 +169,7 @@ def test_the_force_is_the_slope_of_the_energy_and_the_moment_of_its_tilt():
 def test_each_rule_of_higher_order_gains_the_digits_that_it_should(monkeypatch):
     exact, errors = float(closed(3.01, 1, 2, 6)), []
     for order in (4, 6, 9, 13):
-        monkeypatch.setattr(nodes, "ORDERS", (order,) * 6)
+        monkeypatch.setattr("surfacechem.surfaces.inner_sums.ORDERS", (order,) * 6)
         monkeypatch.setattr(patches, "ORDERS", (order,) * 6)
         table.cache_clear()
         errors.append(abs(pair(Sphere(R=1.0), Sphere(R=2.0), 0.01, [power(6)], 1e-13).energy[0] / exact - 1))
