@@ -5,13 +5,13 @@ import sys
 from pathlib import Path
 
 import pytest
-from surfacechem.laws.bonds import Bell, RateType
 
 import surfacechem
 from mechanisms import SHIPPED
 from surfacechem.documents.shipped import mechanisms
 from surfacechem.errors import InputError
 from surfacechem.laws import _registered, register
+from surfacechem.laws.kinetics import Bell, RateType
 from surfacechem.mechanism import load, load_mechanism, rate_types
 from surfacechem.solve.radau.stepper import LOOP
 
