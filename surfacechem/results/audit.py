@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -175,13 +175,32 @@ def accounts(system: System, ledger: Array, *kinds: str) -> Array:
     return ledger[..., [j for kind in kinds for j in system.account_columns.get(kind, ())]]
 
 
+class Balances(NamedTuple):
+    """Residuals of the balances at the output times of a run, each with its largest amount exchanged up to then."""
+
+    energy: tuple[Array, Any]
+    entropy: tuple[Array, Any]
+    sites: Array
+
+    @classmethod
+    def of(cls, trajectory: Trajectory) -> Balances:
+        """Return the residuals along a trajectory."""
+        system, ledger, outputs = trajectory.model.system, trajectory.result.ledger_outputs, trajectory.outputs
+        names = [name for total, parts in TOTALS for name in (total, *parts) if name in system.output_columns]
+        sites = np.zeros(len(ledger))
+        for j in system.account_columns.get("bonds", ()):
+            bonds = trajectory.columns[system.ledger[j].law][0]
+            sites = np.maximum(sites, np.abs(bonds - bonds[:1] - (ledger[:, j] - ledger[:1, j])))
+        known = {name: outputs[:, system.output_columns[name]] for name in names}
+        energy, entropy = residuals(system, known, ledger)
+        return cls(energy, entropy, sites)
+
+
 def audit(trajectory: Trajectory) -> Audit:
     """Audit a trajectory."""
     model, result, outputs, steps = trajectory.model, trajectory.result, trajectory.outputs, trajectory.result.steps
     system, column = model.system, model.system.output_columns
-    ledger = result.ledger_outputs - result.ledger_outputs[:1]
-    known = {name: outputs[:, column[name]] for total, parts in TOTALS for name in (total, *parts) if name in column}
-    (energy, exchanged), (entropy, turned) = residuals(system, known, result.ledger_outputs)
+    (energy, exchanged), (entropy, turned), sites = Balances.of(trajectory)
     energy_scale, entropy_scale = float(exchanged), float(turned)
     if steps:  # a brief load may come and go between outputs; the ends of steps resolve it
         energy_scale = max(energy_scale, largest(accounts(system, steps.ledger, "energy supply", "dissipation")))
@@ -194,10 +213,6 @@ def audit(trajectory: Trajectory) -> Audit:
         if system.energy_has_histories:  # a steep one is known only to within the last digits of time
             later = model.evaluate(result, steps.t * (1 + EPS), steps.y, steps.ydot, steps.segment)
             untimed = largest(later[:, column["E_total"]] - trajectory.columns["E_total"][1])
-    sites = np.zeros(len(ledger))
-    for j in system.account_columns.get("bonds", ()):
-        bonds = trajectory.columns[system.ledger[j].law][0]
-        sites = np.maximum(sites, np.abs(bonds - bonds[:1] - ledger[:, j]))
     rounding = EPS * energy_stored * roundings + untimed
     left = largest(energy)
     if left > rounding + OPEN_BALANCE * TIGHTEST_JUDGED * energy_scale:
@@ -205,7 +220,7 @@ def audit(trajectory: Trajectory) -> Audit:
         errors = _exchanged_by_errors(trajectory)
         if left <= errors and ROUNDED_PART * energy_scale <= errors:
             rounding, energy_stored = errors, max(energy_stored, errors / (ERROR_MARGIN * trajectory.run.rtol))
-    least = _least(trajectory)
+    least = least_productions(trajectory)
     return Audit(
         energy=energy,
         entropy=entropy,
@@ -222,7 +237,7 @@ def audit(trajectory: Trajectory) -> Audit:
     )
 
 
-def _least(trajectory: Trajectory) -> dict[str, float]:
+def least_productions(trajectory: Trajectory) -> dict[str, float]:
     """Return the least entropy production of each law over outputs and steps."""
     least, system = {}, trajectory.model.system
     for j in system.account_columns.get("entropy production", ()):

@@ -57,13 +57,12 @@ def needed_rows(t: Array, values: Array, allowed: Array, kept: Mask) -> Mask:
     rows = np.flatnonzero(~kept)
     while len(rows):
         ends = np.flatnonzero(kept)
-        interval = np.searchsorted(ends, rows)
-        left, right, counts = ends[interval - 1], ends[interval], np.bincount(interval)
-        missed, counts = _missed(ways, scaled, left, rows, right), counts[counts > 0]
-        most = np.repeat(np.maximum.reduceat(missed, np.cumsum(counts) - counts), counts)
+        interval = ends.searchsorted(rows)
+        left, right, most, last = ends[interval - 1], ends[interval], np.zeros(len(ends)), np.zeros(len(ends), np.int64)
+        missed = _missed(ways, scaled, left, rows, right)
+        np.maximum.at(most, interval, missed)
         # The worst row of each interval that a line misses; rows in other intervals are done.
-        again, last = most > 1, np.zeros(len(ends), np.int64)
-        worst = np.flatnonzero(again & (missed == most))
+        again, worst = most[interval] > 1, np.flatnonzero((missed > 1) & (missed == most[interval]))
         last[interval[worst]] = rows[worst]
         kept[last] = True
         # In a periodic signal the worst row is next to an end each time; bisection ends sooner.
@@ -90,15 +89,17 @@ def _missed(ways: Array, values: Array, left: Index, rows: Index, right: Index) 
 
 def _edges(values: Array) -> Mask:
     """Return the mask of rows with an extreme of a quantity, and next to a change between finite and not finite."""
-    number = np.isfinite(values)
-    found = np.zeros(len(values), bool)
-    changes = np.any(number[1:] != number[:-1], axis=1)
-    found[1:] |= changes
-    found[:-1] |= changes
+    found, number = np.zeros(len(values), bool), np.isfinite(values)
     if not values.size:
         return found
-    found[np.argmax(np.where(number, values, -np.inf), axis=0)] = True
-    found[np.argmin(np.where(number, values, np.inf), axis=0)] = True
+    low = high = values
+    if not number.all():
+        changes = np.any(number[1:] != number[:-1], axis=1)
+        found[1:] |= changes
+        found[:-1] |= changes
+        low, high = np.where(number, values, np.inf), np.where(number, values, -np.inf)
+    found[high.argmax(axis=0)] = True
+    found[low.argmin(axis=0)] = True
     return found
 
 
@@ -117,9 +118,10 @@ class _Resolution:
         unknown = [*sample.sensitivities(EPS * np.abs(sample.result.outputs) + sample.result.problem.atol).values()]
         self.noise = np.maximum(self.noise, np.pad(RUN_ERROR * np.array(unknown), (values.shape[1] - len(unknown), 0)))
         # Early rows, whose layers are unresolved, do not count for the ranges.
-        late = values[~unresolved(block.model.system, block.run.times[-1], block.result.times)]
-        sides = [each.max(axis=0, initial=-np.inf) for each in (-values, values, -late, late)]
-        self.reach = np.maximum(self.reach, sides)
+        late = ~unresolved(block.model.system, block.run.times[-1], block.result.times)
+        parts = values, values if late.all() else values[late]
+        sides = [(-part.min(axis=0, initial=np.inf), part.max(axis=0, initial=-np.inf)) for part in parts]
+        self.reach = np.maximum(self.reach, np.concatenate(sides))
         every, known = self.reach[:2].sum(axis=0), self.reach[2:].sum(axis=0)
         # Errors of the run need not be resolved, but they are at most this part of a value at any tolerance. The rest
         # of the part is the error of known states for the states between them.
@@ -135,8 +137,10 @@ class _Resolution:
 
 def _quantities(block: Trajectory) -> tuple[Array, Array]:
     """Return the quantities over time, shape (times, quantities), and the same with zeros for NaN and infinity."""
-    table = np.hstack([block.result.outputs, block.result.ledger_outputs, block.outputs])
-    return table, np.where(np.isfinite(table), table, 0.0)
+    result = block.result
+    table = np.concatenate([result.outputs.T, result.ledger_outputs.T, block.outputs.T]).T  # of each the times together
+    number = np.isfinite(table)
+    return table, table if number.all() else np.where(number, table, 0.0)
 
 
 def _refinements(trajectory: Trajectory, resolution: _Resolution) -> list[States]:
@@ -206,8 +210,10 @@ def refined(trajectory: Trajectory) -> Trajectory:
             resolution.update(whole)
         kept = resolution.needed(whole, moments)
         kept[-1] = first == blocks[-1]
-        found.append(whole.written.picked(kept))
-    return trajectory.at(States(*map(np.concatenate, zip(*found, strict=True))))
+        found.append(whole.picked(kept))
+    if len(found) == 1:
+        return found[0]
+    return trajectory.at(States(*map(np.concatenate, zip(*(each.written for each in found), strict=True))))
 
 
 def shared_times(runs: Sequence[Trajectory], most: int) -> tuple[float, ...]:

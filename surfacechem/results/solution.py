@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from surfacechem.results.accuracy import Accuracy
-from surfacechem.results.audit import Audit, audit
+from surfacechem.results.audit import Audit, Balances, audit, least_productions
 from surfacechem.results.dataset import DATASET_NAMES, Results, coverage_columns, profile_columns, quantity_columns
 from surfacechem.results.event_table import event_columns, event_findings, event_violations, event_waits
 from surfacechem.results.findings import BalanceVerdict, findings, verdicts
@@ -122,22 +122,22 @@ class Solution(Results):
     def columns(self) -> tuple[Column, ...]:
         """Every variable of the dataset, the time coordinate first."""
         trajectory, accounts = self.shown, self.trajectory.model.system.ledger
-        balances = self.audit if trajectory is self.trajectory else audit(trajectory)
+        (energy, _), (entropy, _), sites = Balances.of(trajectory)
         own = quantity_columns([trajectory])
         along = [*own, *profile_columns(trajectory), *coverage_columns(trajectory.model.system, own)]
         columns = [Column("time", ("time",), trajectory.result.times, "s", "time since the start"), *along]
         for account, values in zip(accounts, trajectory.result.ledger_outputs.T, strict=True):
             q = account.quantity
             columns.append(Column(DATASET_NAMES.get(q.name, q.name), ("time",), values, q.unit, q.long_name))
-        entropy = "total entropy minus the entropy supplied and produced"
+        text = "total entropy minus the entropy supplied and produced"
         columns += [
-            Column("energy_residual", ("time",), balances.energy, "J/m^2", "total energy minus the energy supplied"),
-            Column("entropy_residual", ("time",), balances.entropy, "J/(m^2 K)", entropy),
+            Column("energy_residual", ("time",), energy, "J/m^2", "total energy minus the energy supplied"),
+            Column("entropy_residual", ("time",), entropy, "J/(m^2 K)", text),
         ]
         if any(account.kind == "bonds" for account in accounts):
             text = "largest residual of the site balances"
-            columns.append(Column("site_residual", ("time",), balances.sites, "1", text))
-        for law, low in balances.least.items():
+            columns.append(Column("site_residual", ("time",), sites, "1", text))
+        for law, low in least_productions(trajectory).items():
             text = f"least entropy production of {law.replace('_', ' ')}"
             columns.append(Column(f"least_sigma_{law}", (), np.float64(low), "W/(m^2 K)", text))
         computed, accuracy = {column.name: column for column in along}, self.accuracy or Accuracy(np.nan, "")

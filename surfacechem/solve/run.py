@@ -178,7 +178,9 @@ class Trajectory:
     def at(self, rows: States) -> Trajectory:
         """Return the trajectory with these states as outputs."""
         t, y, ledger, segment = rows
-        return replace(self, result=replace(self.result, times=t, outputs=y, ledger_outputs=ledger, segment=segment))
+        found = replace(self, result=replace(self.result, times=t, outputs=y, ledger_outputs=ledger, segment=segment))
+        vars(found).update({name: known for name, known in vars(self).items() if name == "_at_steps"})
+        return found
 
     def at_times(self, times: Sequence[float] | Array) -> Trajectory:
         """Return the trajectory with only the outputs at these times."""
@@ -193,8 +195,10 @@ class Trajectory:
         return States(result.times, result.outputs, result.ledger_outputs, segment)
 
     def picked(self, rows: Index | Mask | slice) -> Trajectory:
-        """Return the trajectory with some of its outputs."""
-        return self.at(self.written.picked(rows))
+        """Return the trajectory with some of its outputs; what is known of them is not evaluated again."""
+        found, known = self.at(self.written.picked(rows)), vars(self)
+        vars(found).update({name: known[name][rows] for name in ("_inputs", "outputs", "rates") if name in known})
+        return found
 
     def _blocks(self) -> Iterator[Trajectory]:
         """Yield the trajectory, in blocks of outputs if these are many."""
@@ -280,13 +284,17 @@ class Trajectory:
     @cached_property
     def columns(self) -> dict[str, tuple[Array, ...]]:
         """States and named quantities, each at the output times and at every step."""
-        result, steps, system = self.result, self.result.steps, self.model.system
-        tables = [(*result.outputs.T, *self.outputs.T)]
-        if steps is not None and len(steps.t):
-            named = self.model.evaluate(result, steps.t, steps.y, steps.ydot, steps.segment)
-            tables.append((*steps.y.T, *named.T))
-        names = [*(state.name for state in system.states), *system.output_columns]
+        names = [*(state.name for state in self.model.system.states), *self.model.system.output_columns]
+        tables = [(*self.result.outputs.T, *self.outputs.T), *([self._at_steps] if self._at_steps else [])]
         return dict(zip(names, zip(*tables, strict=True), strict=True))
+
+    @cached_property
+    def _at_steps(self) -> tuple[Array, ...]:
+        """States and named quantities at every step, which do not depend on the outputs; empty if none is recorded."""
+        steps = self.result.steps
+        if steps is None or not len(steps.t):
+            return ()
+        return *steps.y.T, *self.model.evaluate(self.result, steps.t, steps.y, steps.ydot, steps.segment).T
 
     @cached_property
     def discontinuities(self) -> Discontinuities:
