@@ -59,8 +59,10 @@ class Ends:
         """Return the arguments of compiled functions at points of the runs ``owner``; ``after`` means behind
         breakpoints.
         """
-        breaks = self.segments[np.minimum(owner, len(self.segments) - 1), 1:-1]
-        segment = (t[:, None] >= breaks if after else t[:, None] > breaks).sum(axis=1)
+        segment: Any = 0
+        if self.segments.shape[1] > 2:
+            breaks = self.segments[np.minimum(owner, len(self.segments) - 1), 1:-1]
+            segment = (t[:, None] >= breaks if after else t[:, None] > breaks).sum(axis=1)
         return np.concatenate([t[:, None], y, ydot, self.table[owner, segment]], axis=1)
 
 
@@ -168,23 +170,26 @@ class ArrayRuns:
 
     def solve(self, values: Mapping[str, Array]) -> tuple[Mask, Columns]:
         """Solve runs with these values; return the mask of runs with a certain result, and their columns."""
-        table, y0 = self.starts(values)
-        rows = np.concatenate([np.zeros((len(y0), 1)), y0, np.zeros_like(y0), table[:, 0]], axis=1)
+        table, y0, rows = self.starts(values)
         peaks, none_due = self.guards(rows)
         ends, times = self.ends(rows)
         solved = self._admissible(values, rows) & none_due & np.isfinite(ends) & (ends > 0)
-        own = np.flatnonzero(solved)
-        if not len(own):
+        # What is chosen is copied.
+        own: Any = slice(None) if solved.all() else np.flatnonzero(solved)
+        y0, table, ends = y0[own], table[own], ends[own]
+        if not len(y0):
             return solved, {}
         peaks, times = (shared if len(shared) == 1 else shared[own] for shared in (peaks, times))
         segments = self.problem.segments[None]
         if self.ramp is not None:
-            segments = np.column_stack([np.zeros(len(own)), ends[own]])
+            segments = np.column_stack([np.zeros(len(ends)), ends])
         # The spacing of checks against the equations scales with the run; outputs serve only the kept columns.
         problem = replace(self.problem, times=times[0], record_steps=self.keeps_steps, line_error=0.0)
         spacing = segments[:, -1] / self.run.samples
-        clear, columns = self._columns(self._solved(problem, y0[own], table[own], spacing, peaks, segments, times))
-        solved[own[~clear]] = False
+        clear, columns = self._columns(self._solved(problem, y0, table, spacing, peaks, segments, times))
+        if clear.all():
+            return solved, columns
+        solved[solved] = clear
         return solved, {name: column[clear] for name, column in columns.items()}
 
     def _solved(self, problem: Problem, y0: Array, table: Array, *others: Array) -> Ends:
@@ -192,8 +197,8 @@ class ArrayRuns:
         *_, segments, times = others
         return Ends(solve_batch(problem, y0, table, *others), table, segments, times)
 
-    def starts(self, values: Mapping[str, Array]) -> tuple[Array, Array]:
-        """Return parameters [run, segment, parameter] and initial states [run, state]."""
+    def starts(self, values: Mapping[str, Array]) -> tuple[Array, Array, Array]:
+        """Return parameters [run, segment, parameter], initial states [run, state] and both as rows of arguments."""
         count, states = len(next(iter(values.values()))), self.model.system.states
         table = np.repeat(self.problem.parameters[None], count, axis=0)
         y0 = np.repeat(np.array([state.from_given(self.values) for state in states])[None], count, axis=0)
@@ -204,12 +209,14 @@ class ArrayRuns:
                 y0[:, column] = values[state.path] if state.given is None else np.log(values[state.path])
         columns, begun = self.model.starts
         rows = np.concatenate([np.zeros((count, 1)), y0, np.zeros_like(y0), table[:, 0]], axis=1)
-        table[:, :, columns] = begun(rows)[:, None]
-        return table, y0
+        if columns:
+            modes = begun(rows)
+            table[:, :, columns], rows[:, [1 + 2 * self.n + column for column in columns]] = modes[:, None], modes
+        return table, y0, rows
 
     def _admissible(self, values: Mapping[str, Array], rows: Array) -> Mask:
         """Return the mask of starts that are within all ranges, and by more than roundoff within all limits."""
-        solved: Mask = np.all(np.isfinite(rows), axis=1)
+        solved: Mask = np.isfinite(rows @ np.zeros(rows.shape[1]))  # zero times infinity is not a number
         system = self.model.system
         specs = {parameter.path: parameter.spec for parameter in system.parameters}
         for path, column in values.items():
@@ -267,8 +274,10 @@ class ArrayRuns:
         counts, count = batch.counts, len(batch.counts)
         end, every = batch.ends, np.arange(count)
         last = found.inputs(every, end[:, 0], end[:, 1 : 1 + n], end[:, 1 + n : 1 + 2 * n])
-        whole = np.flatnonzero(counts[:, END] == Status.FINISHED)  # rates from the equations, as at outputs
-        if self.keep.last and len(whole):
+        whole = counts[:, END] == Status.FINISHED  # rates from the equations, as at outputs
+        if self.keep.last and whole.all():
+            put_rates(self.model.program, last)
+        elif self.keep.last and whole.any():
             rows = last[whole]
             put_rates(self.model.program, rows)
             last[whole] = rows
@@ -433,6 +442,8 @@ class ArrayRuns:
         columns: Columns = {}
         names = [*((name, f"time_{variable(name)}") for name in keep.events)]
         names += [(f"{REACHES}{name}", f"time_to_{name}") for name in keep.reach or {}]
+        if not names:
+            return columns
         recorded = np.arange(batch.events.shape[1]) < batch.counts[:, EVENTS, None]
         for name, column in names:
             wanted = [j for j, each in enumerate(named) if each == name]

@@ -41,6 +41,7 @@ from surfacechem.tolerances import NEGLIGIBLE, SQRT_EPS, ULPS
 _lay_out = laying_out(WORK)
 
 FINISHED, EVENT, LEFT = int(Status.FINISHED), int(Status.EVENT), int(Status.LEFT)
+LEAST_ROOT = LEAST_NORM**0.125
 MOST_TRIALS = 12
 """Rejected trials in a row, each at most half as long as the last, after which the cause is noise or stiffness."""
 CONSTANTS = RATES + 1
@@ -167,6 +168,8 @@ def _start(w: Any) -> None:
         i = w.run[lane]
         if w.fresh[lane] < 0.5 or i < 0:
             continue
+        for r in range(1 + 2 * w.n, w.n_inputs):
+            put(w.inside[lane, r], w.inputs[r, lane])
         w.fresh[lane], w.begins[lane], w.again[lane], w.failed[lane] = 0.0, 1.0, 0.0, 0
         for m in range(w.n_margins):
             w.fired[m, lane] = 0.0
@@ -274,7 +277,7 @@ def _move_on(w: Any) -> None:
         _take(w, flag, same(0.0))
     # An error far below the tolerance tells the controller nothing more.
     _take(w, w.h_last, lanes(w.h))
-    _take(w, w.norm_last, larger(lanes(w.norm), LEAST_NORM))
+    _take(w, w.root_last, larger(lanes(w.root), LEAST_ROOT))
     _take(w, w.proposed, lanes(w.following))
     _take(w, w.aim, where(t_new >= lanes(w.aim), np.inf, lanes(w.aim)))
 

@@ -180,9 +180,10 @@ def propose(w: Any) -> None:
     """Propose the size of the next step (Gustafsson 1994), or of the repetition of one that fails."""
     h, h_last, given = lanes(w.h), lanes(w.h_last), lanes(w.norm)
     norm = larger(where(given < 1e30, given, 1e30), RUN_EPS)
-    factor = SAFETY / eighth_root(norm)
-    passes = norm < 1.0
-    predicted = factor * h / h_last * eighth_root(lanes(w.norm_last) / norm)
+    root = eighth_root(norm)
+    put(w.root, root)
+    factor, passes = SAFETY / root, norm < 1.0
+    predicted = factor * h / h_last * (lanes(w.root_last) / root)
     factor = where(passes & (h_last > 0.0), smaller(factor, predicted), factor)
     factor = smaller(larger(factor, MIN_GROWTH), MAX_GROWTH)
     put(w.following, h * where(passes & (lanes(w.again) > 0.5), smaller(factor, 1.0), factor))
@@ -268,12 +269,11 @@ def _prepare_checks(w: Any) -> None:
 @compiled
 def _agrees(w: Any, lane: int, x: Any) -> Any:
     """Mask of the fractions x of the step of a lane at which the rates agree with the slope of the dense output."""
-    h = w.h[lane]
-    put(w.inputs_inside[0], w.t[lane] + x * h)
+    h, inputs = w.h[lane], w.inside[lane]
+    put(inputs[0], w.t[lane] + x * h)
     for m in range(w.n):
-        change = h * x * polynomial_of(w.polynomial, m, lane, x)
-        put(w.inputs_inside[1 + m], w.y[m, lane] + change)
-    evaluate_at(w, RATES, w.inputs_inside, w.rates)
+        put(inputs[1 + m], w.y[m, lane] + h * x * polynomial_of(w.polynomial, m, lane, x))
+    evaluate_at(w, RATES, inputs, w.rates)
     agrees = x >= 0.0
     for m in range(w.columns):
         allowed = w.allowed[m, lane]
@@ -305,15 +305,13 @@ def _first_defect(w: Any, lane: int) -> float:
     Looks are denser next to the ends of a load segment and of a step that an event has cut short: a feature there may
     be narrow. They go from the narrowest outwards: the first disagreement tells how short the step has to be.
     """
-    spacings = w.spacings[lane]  # one look in the middle of each
+    spacing = 1.0 / w.spacings[lane]  # one look in the middle of each
     near_start = END_CHECKS if w.begins[lane] > 0.5 else 0
-    inside = near_start + int(spacings)
+    inside = near_start + int(w.spacings[lane])
     every = inside + (END_CHECKS if w.last[lane] + w.onto[lane] > 0.5 else 0)
-    for r in range(1 + 2 * w.n, w.n_inputs if every > 0 else 0):
-        put(w.inputs_inside[r], w.inputs[r, lane])
     for first in range(0, every, LANES):
         k = lanes(COUNT) + float(first)
-        x = (k - (near_start - 0.5)) / spacings
+        x = (k - (near_start - 0.5)) * spacing
         if first < near_start:
             x = where(k < float(near_start), lanes(NEAR_START[first:]), x)
         if first + LANES > inside:

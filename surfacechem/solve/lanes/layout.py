@@ -17,8 +17,9 @@ def _arrays(names: str, *shape: str | int, kind: type = float) -> dict[str, tupl
 
 MEMORY = {
     # t, y, ydot, parameters, and what is formed from them: the argument of every function of the program; the
-    # same of a single run, at eight points of its step
-    **_arrays("inputs inputs_inside", "n_inputs"),
+    # same of each lane by itself, at eight points of its step
+    **_arrays("inputs", "n_inputs"),
+    **_arrays("inside", LANES, "n_inputs"),
     # states and accounts at the start and at the end of the step, their changes per time at its last two stages, the
     # two estimates of their error, their rates at a point inside and how far they may be from the slopes there
     **_arrays("y y_new change change_before coarse fine rates allowed", "columns"),
@@ -37,9 +38,9 @@ MEMORY = {
     # the time, now and at the end of the step; the end of the segment, a time at which a step has to end, and the time
     # of the next output
     **_arrays("t t_new end aim next_output"),
-    # this step, the last one and one that failed, the norms of their errors, the next step; how far apart looks at the
-    # equations are
-    **_arrays("h h_last h_tried norm norm_last norm_tried proposed following spacing_of"),
+    # this step, the last one and one that failed, the norms of their errors, eighth roots of the first two of these,
+    # the next step; how far apart looks at the equations are
+    **_arrays("h h_last h_tried norm norm_tried root root_last proposed following spacing_of"),
     # whole spacings of looks in the step, -1 if it has no looks, and where these are; the fraction of the step at
     # which it has missed something, and at which it meets a guard, with the bracket of that
     **_arrays("spacings at defect_at crossing low high"),
