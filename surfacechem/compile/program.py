@@ -412,7 +412,7 @@ def expanded(named: Named, expressions: Sequence[Any]) -> list[Any]:
         parts = {symbol: known[symbol] for symbol in whole.free_symbols if symbol in known}
         return whole.xreplace(parts) if parts else whole
 
-    for symbol, expression in named:
+    for symbol, expression in needed(named, expressions):
         known[symbol] = replaced(expression)
     return [replaced(expression) for expression in expressions]
 
