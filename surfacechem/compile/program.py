@@ -347,7 +347,7 @@ def kept(make: Callable[[], T], origin: Any, expressions: Iterable[Any]) -> T:
         return make()
     try:
         scene = pickle.dumps(origin)
-    except (pickle.PicklingError, AttributeError, TypeError):
+    except Exception:  # a scene may contain objects of other libraries, which raise anything
         return make()
     sources = [source_digest(str(path)) for path in sorted(PACKAGE.rglob("*.py"))]
     hashes = [hash(symengine.sympify(expression)) for expression in expressions]

@@ -107,7 +107,14 @@ def test_code_is_kept_by_origin_expressions_and_sources(tmp_path, monkeypatch) -
         patch.setattr(program, "source_digest", lambda _: "another")
         assert count("scene", x) == 5
     assert count("scene", x) == 5
-    for nobody_else_knows in (None, lambda: None):
+
+    class Surface:
+        """An object of another library, which may not be pickled, as Cantera's interfaces with neighbours."""
+
+        def __reduce__(self) -> str:
+            raise NotImplementedError
+
+    for nobody_else_knows in (None, lambda: None, Surface()):
         assert count(nobody_else_knows, x) + 1 == count(nobody_else_knows, x)
 
 
