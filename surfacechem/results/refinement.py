@@ -183,7 +183,7 @@ def _refinements(trajectory: Trajectory, resolution: _Resolution) -> list[States
 
 def refined(trajectory: Trajectory) -> Trajectory:
     """Return the trajectory with outputs that resolve it, instead of the times at which runs are compared."""
-    rows = trajectory.result.known or trajectory.result.states()
+    rows = trajectory.known
     if trajectory.run.picture is None or len(rows.t) < 2:
         return trajectory
     t, sides = _two_sided(rows.t)

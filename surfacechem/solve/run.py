@@ -216,14 +216,18 @@ class Trajectory:
         return self.picked(np.arange(0, count, max(count // SAMPLED_OUTPUTS, 1)))
 
     @cached_property
+    def known(self) -> States:
+        """All stored states, in order of time."""
+        return self.result.known or self.result.states()
+
+    @cached_property
     def stored(self) -> Trajectory:
         """The trajectory with outputs at which runs are compared, whatever outputs were requested.
 
         They are the ends of its steps and the stored states inside them; the requested outputs are included if no
         states inside are stored.
         """
-        result = self.result
-        rows = result.known or result.states()
+        result, rows = self.result, self.known
         t = np.minimum(rows.t, self.run.times[-1])  # the last step may end beyond it by rounding
         kept = np.diff(t, prepend=-1.0) > 0  # of the two sides of a moment keep the first, as an output does
         if (result.known or result.inside) is not None and result.steps is not None:

@@ -19,6 +19,7 @@ from surfacechem.results.error_estimates import (
     estimated,
     event_errors,
     floors,
+    second_settings,
     state_differences,
     unknown,
     with_cells,
@@ -39,6 +40,18 @@ def test_what_rounding_leaves_of_an_end_is_compared_with_what_the_exact_solution
     late = found.dataset.isel(time=slice(-6, None))
     assert np.all(np.isfinite(found.dataset["f_exact"]))
     np.testing.assert_allclose(late["phi_exact"], late["phi"], rtol=0.1)
+
+
+@pytest.mark.parametrize("name", ["stick-slip", "shared-load-rupture"])
+def test_events_of_the_second_run_are_those_of_one_with_outputs_where_states_are_compared(name):
+    """An exact solution takes only event times from it."""
+    case = surfacechem.load(name)
+    found = case.run().trajectory
+    whole = found.model.solve_values(second_settings(found), found.values)
+    late = event_errors(event_times(found), event_times(whole), found.run.times[-1])
+    reference = case.case.reference
+    known = against_exact(found, case.case.scene, reference.name, reference.options)
+    assert known.variables[EVENTS] == late[EVENTS] > 0
 
 
 def test_where_nothing_evolves_the_error_is_that_of_the_laws():
