@@ -1,6 +1,6 @@
 """Scenes built in Python: one for each thermal regime and coupling."""
 
-from surfacechem.contracts.terms import Varying, parameter  # noqa: F401 - scenes may define laws
+from surfacechem.contracts.terms import Varying
 from surfacechem.laws.cohesive import AdhesionIntensity, AdhesionLoss, ExponentialCohesiveZone, XuNeedleman
 from surfacechem.laws.factors import (
     Activated,

@@ -28,6 +28,7 @@ from surfacechem.tolerances import ULPS
 ROOT = Path(__file__).parents[1]
 
 every_case = pytest.mark.parametrize("name", names())
+REFERENCED = [member.name for member in MEMBERS.values() if "exact" in member.tags]
 
 # -- equations --------------------------------------------------------------------------------------------------------
 
@@ -165,6 +166,20 @@ def test_a_case_meets_its_exact_solution(name):
     else:
         assert accuracy.source.startswith("estimate")
         assert accuracy.error < CELLS.get(name, 1e-7)
+
+
+FOLLOWING = {"adhesion-cluster": 500, "van-der-waals-sphere": 300}
+FOLLOWING |= {"stick-slip": 1000, "stick-slip-debonding": 1000, "stick-slip-rebonding": 1000}
+"""Errors over tolerances: close to a fold, with tractions that are integrated, and of velocities within brief slips."""
+
+
+@pytest.mark.parametrize("name", [name for name in REFERENCED if name not in CELLS])
+def test_the_error_of_a_case_follows_its_tolerance_in_few_steps(name):
+    simulation = load(name)
+    for rtol in 10.0 ** -np.arange(3.0, 14.0, 2.0):
+        solution = simulation.run(run=replace(simulation.case.run, rtol=rtol, accuracy=None))
+        assert solution.accuracy.error < FOLLOWING.get(name, 100) * rtol
+        assert solution.trajectory.result.counters.steps < 400
 
 
 @every_case

@@ -65,8 +65,9 @@ def _members() -> Iterator[Member]:
                 f"{moving.__name__} {list(modes.values())}", moving.scene, modes, frozenset({"scene", "moving"})
             )
     for path in sorted(cases().glob("*.yaml")):
-        mechanism = {"mechanism"} if "  mechanism:" in path.read_text() else set()
-        yield Member(path.stem, OfCase(path.stem), {}, frozenset({"case", *mechanism}))
+        text, found = path.read_text(), {"  mechanism:": "mechanism", "\nreference:": "exact"}
+        tags = {tag for words, tag in found.items() if words in text}
+        yield Member(path.stem, OfCase(path.stem), {}, frozenset({"case", *tags}))
 
 
 MEMBERS = {(member.name if "scene" in member.tags else f"case {member.name}"): member for member in _members()}

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 import symengine
 from solved import solve
-from tables_bonds import SITES, isothermal
 
 import surfacechem
 from surfacechem.errors import InputError
@@ -18,13 +17,21 @@ from surfacechem.laws.loading import Harmonic, Hold, Ramp, Table
 from surfacechem.model.assemble import assemble
 from surfacechem.quantities import BOLTZMANN
 from surfacechem.results.audit import audit
-from surfacechem.scene import Scene
+from surfacechem.scene import Body, Interface, Scene, Sites
 
 THERMAL = BOLTZMANN * 300.0
 X = 4e-10
 UNIT = THERMAL / X
 """Force at which Bell's exponent is one [N]."""
 SLIP = Bell(k_off=1.0, x_off=X)
+SITES = 1e16
+
+
+def isothermal(law, loading, phi=1.0, potentials=()) -> Scene:
+    """Bonds between two reservoirs of one temperature."""
+    kept = Hold(level=300.0)
+    interface = Interface(kept, potentials, reactions=[law], sites=Sites(SITES, SITES))
+    return Scene((Body("lower", kept), Body("upper", kept)), interface, loading=loading, initial={"phi": phi})
 
 
 def solved(scene, *times, **settings):

@@ -6,8 +6,8 @@ from operator import attrgetter
 
 import numpy as np
 import pytest
-import tables_mechanics as tables
-from tables_mechanics import rows
+import tables
+from tables import rows
 from test_references import assert_exact, effect_of_rounding
 
 from surfacechem.errors import InputError

@@ -14,9 +14,9 @@ from surfacechem.solve.run import Run
 WITHIN = 10.0
 
 QUICK = [
-    *("case endothermic-kappa-0p99", "case force-spectroscopy", "case stick-slip"),
-    *("a_linear_equilibrium", "d_cluster_no_rebinding", "g_coulomb_stop", "g_stickslip_V-10000.0"),
-    *("h_pulloff_k-0.367", "x01_endothermic_kappa_1m2e-40", "x05_closing_film"),
+    *("case endothermic-kappa-0p99", "case force-spectroscopy", "case stick-slip", "case two-way-linear"),
+    *("case shared-load-rupture", "case cohesive-pull-off", "chatter 1000", "stop 1e+06", "cold 0.0001"),
+    *("endothermic 9.09495e-13", "film 1e-09"),
 ]
 """Some that are easy and those that are hardest."""
 

@@ -16,6 +16,8 @@ from solver_problems import (
     exothermic_problem,
     linear_decay,
     problem,
+    robertson,
+    robertson_dae,
     robertson_sums,
     solved_as_arrays,
 )
@@ -48,6 +50,8 @@ from surfacechem.solve.radau.tables import (
 from surfacechem.solve.radau.work import combine
 
 radau = Radau()
+ROBERTSON = [2.083340149701255e-08, 8.333360770334713e-14]
+"""Hairer & Wanner II, IV.10, at t = 1e11."""
 
 
 @pytest.mark.parametrize("k", range(3))
@@ -93,6 +97,20 @@ def test_rates_by_their_formula_are_those_of_the_linear_systems(monkeypatch) -> 
     put_rates(program, rows)
     np.testing.assert_allclose(rows[:, 3:5], solved.ydot, rtol=4e-15)
     np.testing.assert_allclose(rows[:, 4], 2.0 * np.exp(-2.0 * times), rtol=1e-7)
+
+
+@pytest.mark.parametrize("rtol", [10.0**-digits for digits in range(3, 14)])
+@pytest.mark.parametrize(
+    ("make", "digits"),
+    # Cancelling rates of 1e-9, known to 1e-25, integrated over 1e11 s: no method finds more digits of the first two.
+    [(robertson, 1e-7), (robertson_dae, 1e-7), (robertson_sums, 1e-13)],
+)
+def test_robertson(make, digits: float, rtol: float) -> None:
+    result = radau.solve(problem(make(), [1.0, 0.0, 0.0], [0.0, 1e11], rtol, atol=rtol * 1e-10))
+    assert result.status == Status.FINISHED
+    assert np.max(np.abs(result.y[:2] / ROBERTSON - 1)) < 10 * rtol + digits
+    assert result.counters.steps < 400
+    assert result.counters.rejected < 0.15 * result.counters.steps
 
 
 def follower(times) -> Problem:

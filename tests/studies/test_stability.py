@@ -73,6 +73,19 @@ def test_what_is_expected_of_a_regime_holds_everywhere(name, value):
     assert_kept(name, value)
 
 
+BEYOND = [("chatter", 1e3), ("stop", 1e-15), *(cell for cell in CELLS if cell[0] == "rupture")]
+"""Slips as close as events can be told, a way below the absolute tolerance, and bonds that run away before they rupture."""
+OTHERS = [(*cell, solver) for solver in names if solver != "radau" for cell in CELLS if cell not in BEYOND]
+
+
+@pytest.mark.parametrize(("name", "value", "solver"), every(13, OTHERS))
+def test_another_solver_is_right_or_no_success(name, value, solver):
+    cell = prepared(regimes()[name].problem(value), rtol=1e-8)(solver)
+    assert cell.outcome in (SOLVED, REFUSED, SENSITIVE, FAILED), cell
+    if cell.outcome == SOLVED:
+        assert cell.digits > min(5.0, digits_left(max(cell.condition, 1.0), 1e-8) - 1.5), cell
+
+
 @pytest.mark.parametrize("name", every(6, [name for name, regime in regimes().items() if regime.space]))
 def test_random_corners_are_solved(name):
     corner = worst_corner(regimes()[name], rounds=1)
