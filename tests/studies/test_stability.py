@@ -74,7 +74,7 @@ def test_what_is_expected_of_a_regime_holds_everywhere(name, value):
 
 
 BEYOND = [("chatter", 1e3), ("stop", 1e-15), *(cell for cell in CELLS if cell[0] == "rupture")]
-"""Slips as close as events can be told, a way below the absolute tolerance, and bonds that run away before they rupture."""
+"""Slips as close as events can be told, a way below the absolute tolerance, bonds that run away before they rupture."""
 OTHERS = [(*cell, solver) for solver in names if solver != "radau" for cell in CELLS if cell not in BEYOND]
 
 
