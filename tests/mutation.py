@@ -40,14 +40,14 @@ OF_BALANCES = [
     ["heat_paths", "force", "plane", "softening_friction", "breaking", "pulled", "area_stretch", "load_path", "media"],
     ["rate_and_state"],
     ["zoo::test_both_laws_of_thermodynamics_hold_on_the_equations", "zoo::test_a_case_gives_what_it_gave"],
-    ["tables", "tables_bonds", "tables_mechanics", "assemble", "start", "instant", "hybrid", "findings", "event_table"],
+    ["tables", "assemble", "start", "instant", "hybrid", "findings", "event_table"],
     ["references_mechanics", "references_limits", "bad_input", "case", "guards", "rupture", "conduction"],
     ["reactor", "evaluated", "neighbours", "mechanism_scene", "stability", "cases"],
 ]
 OF_LAWS = [
     ["laws", "tabulated", "contact_laws", "zoo::test_every_expression_keeps_its_approved_value", *OF_CASES],
     ["chemistry", "rate_and_state", "plane", "heat_paths", "media", "segments", "rates", "units", "bad_input"],
-    ["tables_bonds", "tables_mechanics", "zoo::test_a_case_gives_what_it_gave", "references_mechanics", "pulled"],
+    ["tables", "zoo::test_a_case_gives_what_it_gave", "references_mechanics", "pulled"],
 ]
 """Files of tests, or one test of a file, by what they notice for what they cost; the first few seconds notice most."""
 
