@@ -10,8 +10,14 @@ from surfacechem.compile.program import Program, compile_program
 from surfacechem.solve.contract import Guard, Problem
 from surfacechem.solve.radau.solver import solve_arrays
 
+T, Y, DY = se.symbols("t y dy")
 CONDUCTANCE = (1e3, 1e12, 1e20)
 PARAMETERS = np.array([2.0, 300.0, 300.0, 1.0, 0.5])
+
+
+def scalar(row, *ledger, margins=()) -> Program:
+    """One equation for y' at t."""
+    return compile_program(T, [Y], [DY], [], [row], ledger=ledger, margins=margins)
 
 
 def problem(
@@ -116,5 +122,4 @@ def coupled_nodes(conductance: float) -> Program:
 
 @cache
 def linear_decay() -> Program:
-    t, y, dy = se.symbols("t y dy")
-    return compile_program(t, [y], [dy], [], [dy + y], margins=[y - 0.5])
+    return scalar(DY + Y, margins=[Y - 0.5])

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import symengine as se
 from sampling import every
-from solver_problems import problem
+from solver_problems import DY, T, Y, problem, scalar
 
 from surfacechem import load
 from surfacechem.compile.program import compile_program
@@ -28,7 +28,7 @@ def test_unknown_name() -> None:
         solver("cvodes")
 
 
-T, Y, Z, DY, DZ = se.symbols("t y z dy dz")
+Z, DZ = se.symbols("z dz")
 HOPELESS = [
     ([DY + se.sqrt(Y) + 1], 0.7),  # no real rate below y = 0
     ([DY - Y**2], 1.0 + 1e-5),  # it blows up at t = 1
@@ -49,7 +49,7 @@ def test_what_cannot_go_on_is_no_success(name, rows, last):
 
 def steep(name: str, row, start: float, end: float, **more):
     """A run of y from 1 on, of which a library keeps the steps."""
-    program = compile_program(T, [Y], [DY], [], [row], [2 * Y * DY])
+    program = scalar(row, 2 * Y * DY)
     more |= {"times": [start, end], "record_steps": True}
     return solver(name).solve(problem(program, [1.0], [start, end], 1e-8, **more))
 
@@ -93,31 +93,27 @@ def test_only_what_gets_faster_runs_away(row, start, reason):
 
 @pytest.mark.parametrize("name", names)
 def test_outputs_right_after_the_start(name: str) -> None:
-    t, y, dy = se.symbols("t y dy")
-    program = compile_program(t, [y], [dy], [], [dy + y])
-    result = solver(name).solve(problem(program, [1.0], [0.0, 1.0], 1e-10, times=[2e-10, 1.0]))
+    result = solver(name).solve(problem(scalar(DY + Y), [1.0], [0.0, 1.0], 1e-10, times=[2e-10, 1.0]))
     np.testing.assert_allclose(1.0 - result.outputs[0], 2e-10, rtol=1e-4)
 
 
 def test_problem_is_checked() -> None:
-    t, y, dy = se.symbols("t y dy")
-    program = compile_program(t, [y], [dy], [], [dy + y])
     with pytest.raises(ValueError, match="the program has 1 states, 0 parameters and 0 margins"):
-        Problem(program, np.ones(1), np.zeros(0), np.array([0.0, 1.0]), np.zeros((1, 2)), 1e-6, np.ones(1))
+        Problem(scalar(DY + Y), np.ones(1), np.zeros(0), np.array([0.0, 1.0]), np.zeros((1, 2)), 1e-6, np.ones(1))
 
 
 @pytest.mark.parametrize("name", ["bdf", "scipy-radau"])
 def test_factorizations_are_counted_where_the_library_tells(name: str) -> None:
-    t, y, dy = se.symbols("t y dy")
-    program = compile_program(t, [y], [dy], [], [dy + 1e4 * (y - se.cos(t))])
-    assert solver(name).solve(problem(program, [1.0], [0.0, 1.0], 1e-6)).counters.factorizations > 1
+    assert (
+        solver(name).solve(problem(scalar(DY + 1e4 * (Y - se.cos(T))), [1.0], [0.0, 1.0], 1e-6)).counters.factorizations
+        > 1
+    )
 
 
 @pytest.mark.parametrize("name", names)
 def test_a_state_at_rest_may_do_work(name: str) -> None:
     """Nothing asks for short steps; what is booked on the way is exact all the same."""
-    t, y, dy = se.symbols("t y dy")
-    program = compile_program(t, [y], [dy], [], [dy], [2 * t * y, 5 * t**4])
+    program = scalar(DY, 2 * T * Y, 5 * T**4)
     result = solver(name).solve(problem(program, [3.0], [0.0, 2.0], 1e-6, times=[0.0, 0.1, 0.7, 2.0]))
     times = result.times
     np.testing.assert_allclose(
@@ -128,8 +124,7 @@ def test_a_state_at_rest_may_do_work(name: str) -> None:
 
 @pytest.mark.parametrize("name", names)
 def test_what_is_booked_is_as_accurate_as_the_state(name: str) -> None:
-    t, y, dy = se.symbols("t y dy")
-    program = compile_program(t, [y], [dy], [], [dy + y], [y, -2 * y * dy])
+    program = scalar(DY + Y, Y, -2 * Y * DY)
     result = solver(name).solve(problem(program, [1.0], [0.0, 5.0], 1e-8, times=[0.0, 1.0, 5.0]))
     exact = np.exp(-result.times)
     found = result.ledger_outputs

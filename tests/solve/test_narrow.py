@@ -8,9 +8,8 @@ import symengine as se
 from narrow_scenes import scene
 from scipy.integrate import solve_ivp
 from scipy.special import erf
-from solver_problems import problem
+from solver_problems import DY, T, Y, problem, scalar
 
-from surfacechem.compile.program import compile_program
 from surfacechem.contracts.terms import HeatTransfer, parameter
 from surfacechem.format import load, load_text
 from surfacechem.runs.simulation import Simulation
@@ -181,8 +180,7 @@ def test_a_sweep_ends_pieces_where_each_run_needs_it():
 @pytest.mark.parametrize("h", [0.02])
 def test_a_step_is_held_against_the_equations_between_its_stages(h):
     """y' = a bell of time; without a look the first step is the whole run."""
-    t, y, dy = se.symbols("t y dy")
-    program = compile_program(t, [y], [dy], [], [dy - se.exp(-(((t - 0.437) / h) ** 2))], [y * dy])
+    program = scalar(DY - se.exp(-(((T - 0.437) / h) ** 2)), Y * DY)
     asked = problem(program, [1.0], [0.0, 1.0], 1e-9)
     exact = 1.0 + h * np.sqrt(np.pi) / 2 * (erf(0.563 / h) + erf(0.437 / h))
     found = solver("radau").solve(replace(asked, spacing=1 / 60))

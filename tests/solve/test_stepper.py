@@ -10,6 +10,9 @@ import symengine as se
 from scipy.special import spence
 from solver_problems import (
     CONDUCTANCE,
+    DY,
+    T,
+    Y,
     coupled_nodes,
     exothermic,
     exothermic_exact,
@@ -19,6 +22,7 @@ from solver_problems import (
     robertson,
     robertson_dae,
     robertson_sums,
+    scalar,
     solved_as_arrays,
 )
 
@@ -141,8 +145,7 @@ def test_sum_row_keeps_the_mean_temperature(conductance: float) -> None:
 
 def test_initial_layer_far_below_rounding() -> None:
     """y' = -(y - cos t) / 1e-200: the first step is of the layer's own size."""
-    t, y, dy = se.symbols("t y dy")
-    program = compile_program(t, [y], [dy], [], [dy + 1e200 * (y - se.cos(t))])
+    program = scalar(DY + 1e200 * (Y - se.cos(T)))
     result = radau.solve(problem(program, [2.0], [0.0, 1.0], 1e-8, record_steps=True))
     assert result.status == Status.FINISHED
     assert result.steps is not None
@@ -165,8 +168,7 @@ def test_a_kink_that_no_margin_tells_of_is_stepped_through_to_the_tolerance(rtol
 
 def test_what_grows_from_below_the_tolerance_is_not_damped() -> None:
     """y' = 1e30 y (1 - y) + 1e-3 from y = 0: a long implicit step would rest on the unstable equilibrium."""
-    t, y, dy = se.symbols("t y dy")
-    program = compile_program(t, [y], [dy], [], [dy - 1e30 * y * (1 - y) - 1e-3])
+    program = scalar(DY - 1e30 * Y * (1 - Y) - 1e-3)
     end = 7.6e-29
     result = radau.solve(problem(program, [0.0], [0.0, 1.0], 1e-8, atol=1e-14, times=[end, 1.0]))
     assert result.status == Status.FINISHED
