@@ -385,7 +385,10 @@ run: {{until: {end!r}, outputs: {outputs}{spacing}}}
     return Simulation(load_text(text)), asked, exact
 
 
-def assert_known(seed: int, scenes: int) -> None:
+@pytest.mark.parametrize(
+    ("seed", "scenes"), [(1, 3), *(pytest.param(seed, 60, marks=pytest.mark.slow) for seed in range(2, 8))]
+)
+def test_random_slabs_are_as_accurate_as_they_say(seed, scenes):
     random = np.random.default_rng(seed)
     for i in range(scenes):
         simulation, asked, exact = random_slab(random)
@@ -395,16 +398,6 @@ def assert_known(seed: int, scenes: int) -> None:
         assert true <= asked, (seed, i, true)
         assert true < 1.4 * stated, (seed, i, true, stated)
         assert stated < 20 * true + 1e-9, (seed, i, true, stated)
-
-
-def test_random_slabs_are_as_accurate_as_they_say():
-    assert_known(seed=1, scenes=3)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(2, 8))
-def test_many_random_slabs_are_as_accurate_as_they_say(seed):
-    assert_known(seed, scenes=60)
 
 
 def test_a_very_good_conductor_is_a_lump():

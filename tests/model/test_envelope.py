@@ -163,14 +163,13 @@ def differing(seeds):
     return found
 
 
-def test_random_scenes_follow_the_lesser_of_others_and_the_envelope():
-    """Every mounting, and every law beside, in turn."""
-    assert differing([seed for seed in range(24) if (seed - seed // 4) % 4 == 0]) == {}
+EACH_KIND = [seed for seed in range(24) if (seed - seed // 4) % 4 == 0]
+"""Every mounting, and every law beside, in turn."""
 
 
-@pytest.mark.slow
-def test_more_random_scenes_follow_the_lesser_of_others_and_the_envelope():
-    assert differing(range(1000, 1240)) == {}
+@pytest.mark.parametrize("seeds", [EACH_KIND, pytest.param(range(1000, 1240), marks=pytest.mark.slow)], ids=len)
+def test_random_scenes_follow_the_lesser_of_others_and_the_envelope(seeds):
+    assert differing(seeds) == {}
 
 
 # -- closed forms -----------------------------------------------------------------------------------------------------

@@ -21,23 +21,19 @@ QUICK = [
 """Some that are easy and those that are hardest."""
 
 
-def assert_achieved(name: str, accuracy: float) -> None:
+EVERYWHERE = [(name, accuracy) for accuracy in ACCURACIES for name in exact(accuracy)]
+
+
+@pytest.mark.parametrize(
+    ("name", "accuracy"),
+    [
+        *((name, accuracy) for name in QUICK for accuracy in ACCURACIES[::2]),
+        *(pytest.param(*each, marks=pytest.mark.slow) for each in EVERYWHERE),
+    ],
+)
+def test_accuracy_is_achieved(name, accuracy):
     found = EXACT[name](accuracy)
     assert found.ratio(accuracy) < WITHIN, found
-
-
-@pytest.mark.parametrize("accuracy", ACCURACIES[::2])
-@pytest.mark.parametrize("name", QUICK)
-def test_accuracy_is_achieved(name, accuracy):
-    assert_achieved(name, accuracy)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("name", "accuracy"), [(name, accuracy) for accuracy in ACCURACIES for name in exact(accuracy)]
-)
-def test_accuracy_is_achieved_everywhere(name, accuracy):
-    assert_achieved(name, accuracy)
 
 
 SLIPS = [{"outputs": 4}, {"first": "1 ms", "spacing": "logarithmic", "outputs": 50}, {}]

@@ -120,7 +120,14 @@ TOLD = ("compliant-debonding", "debonding-cooling", "endothermic-kappa-0p1", "st
 """Cases whose exact solutions were once compared with other scenes."""
 
 
-def assert_no_false_error(name, factors=(1.1, 1.001), instead_of_zero=(1e-2, 1e-4, 1e-6, 1e-8, 1e-10)):
+MANY = (1.1, 1.001), (1e-2, 1e-4, 1e-6, 1e-8, 1e-10)
+ANY = [pytest.param(name, *MANY, marks=pytest.mark.slow) for name in names() if name not in CELLS]
+
+
+@pytest.mark.parametrize(
+    ("name", "factors", "instead_of_zero"), [*((name, (1.001,), (1e-4, 1e-9)) for name in TOLD), *ANY]
+)
+def test_no_error_against_another_scene(name, factors, instead_of_zero):
     """Whatever is changed, the exact solution follows it, or says that it is of another scene."""
     simulation = load(name)
     model, reference = simulation.model, simulation.case.reference
@@ -133,17 +140,6 @@ def assert_no_false_error(name, factors=(1.1, 1.001), instead_of_zero=(1e-2, 1e-
                 trajectory = model.solve(run, {path: value})
                 found = against_exact(trajectory, simulation.case.scene, reference.name, reference.options)
                 assert found.error < 1e-6, (path, value, found.variables)
-
-
-@pytest.mark.parametrize("name", TOLD)
-def test_no_error_against_another_scene(name):
-    assert_no_false_error(name, (1.001,), (1e-4, 1e-9))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", [name for name in names() if name not in CELLS])
-def test_no_error_against_another_scene_in_any_case(name):
-    assert_no_false_error(name)
 
 
 def test_a_single_bond_needs_a_bond_a_force_and_a_temperature():

@@ -114,7 +114,10 @@ HONEST = [("exothermic", ("phi", "T")), ("coulomb-stop", ("T",)), ("sliding-dry"
 SLOW = [("cooling-to-zero", ("T",)), ("adiabatic-arrhenius", ("T",)), ("stick-slip", ("T",))]
 
 
-def check_reference(name, variables):
+@pytest.mark.parametrize(
+    ("name", "variables"), [*HONEST, *(pytest.param(*each, marks=pytest.mark.slow) for each in (*HONEST, *SLOW))]
+)
+def test_a_computed_reference_is_as_good_as_it_says(name, variables):
     subject = subject_of(name)
     exact, found = establish(subject, variables), numerical(subject, variables)
     assert found.status == exact.status
@@ -125,17 +128,6 @@ def check_reference(name, variables):
         limit = found.uncertainty.by_kind["max"][variable] + exact.uncertainty.by_kind["max"][variable]
         assert error.max() <= 3 * limit
         assert limit < 1e-8
-
-
-@pytest.mark.parametrize(("name", "variables"), HONEST)
-def test_a_computed_reference_is_as_good_as_it_says(name, variables):
-    check_reference(name, variables)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("name", "variables"), [*HONEST, *SLOW])
-def test_a_reference_of_all_methods_is_as_good_as_it_says(name, variables):
-    check_reference(name, variables)
 
 
 @pytest.mark.parametrize(

@@ -50,7 +50,10 @@ CELLS = [(name, value) for name, regime in regimes().items() for value in thinne
 ALL = [(name, value) for name, regime in regimes().items() for value in regime.values]
 
 
-def assert_kept(name: str, value: float) -> None:
+@pytest.mark.parametrize(
+    ("name", "value"), [*CELLS, *(pytest.param(*cell, marks=pytest.mark.slow) for cell in ALL if cell not in CELLS)]
+)
+def test_what_is_expected_of_a_regime_holds(name, value):
     cell = prepared(regimes()[name].problem(value))("radau")
     expected = regimes()[name].problem(value).expected
     right = SOLVED if isinstance(expected, Exact) else REFUSED
@@ -60,17 +63,6 @@ def assert_kept(name: str, value: float) -> None:
         assert cell.digits > min(LEAST.get(name, 9.5), digits_left(cell.condition, np.finfo(float).eps)), cell
     if cell.outcome != FAILED and np.isfinite(cell.condition):
         assert cell.digits > digits_left(max(cell.condition, 1.0), STUDY_RTOL) - 0.5, cell
-
-
-@pytest.mark.parametrize(("name", "value"), CELLS)
-def test_what_is_expected_of_a_regime_holds(name, value):
-    assert_kept(name, value)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("name", "value"), ALL)
-def test_what_is_expected_of_a_regime_holds_everywhere(name, value):
-    assert_kept(name, value)
 
 
 BEYOND = [("chatter", 1e3), ("stop", 1e-15), *(cell for cell in CELLS if cell[0] == "rupture")]
