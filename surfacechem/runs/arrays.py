@@ -55,6 +55,12 @@ class Ends:
     segments: Array
     times: Array
 
+    @cached_property
+    def last(self) -> Array:
+        """The arguments of compiled functions at the ends of the runs."""
+        n, end = self.batch.y0.shape[1], self.batch.ends
+        return self.inputs(np.arange(len(end)), end[:, 0], end[:, 1 : 1 + n], end[:, 1 + n : 1 + 2 * n])
+
     def inputs(self, owner: Index, t: Array, y: Array, ydot: Array, after: bool = False) -> Array:
         """Return the arguments of compiled functions at points of the runs ``owner``; ``after`` means behind
         breakpoints.
@@ -250,19 +256,17 @@ class ArrayRuns:
         if jumper is None or program.margins is None:
             return self.no_peaks, np.ones(count, dtype=bool)
         # The same magnitudes as at the start of a single run, where nothing has been evaluated before.
-        first, scales = (
-            len(model.margins),
-            np.array([(s.finest or s.scale) * (s.name in VELOCITIES) for s in model.system.states]),
-        )
+        first = len(model.margins)
+        scales = np.array([(s.finest or s.scale) * (s.name in VELOCITIES) for s in model.system.states])
         y = rows[:, 1 : 1 + self.n]
         sizes = np.nan_to_num(jumper.magnitudes(np.concatenate([rows, np.maximum(scales, np.abs(y))], axis=1)))
         seen = rows
         if jumper.guards_read_rates:
             point = consistent(program, np.zeros(count), y, np.zeros_like(y), rows[:, 1 + 2 * self.n :])
             seen = np.concatenate([rows[:, :1], point.y, point.ydot, rows[:, 1 + 2 * self.n :]], axis=1)
-        now = program.margins(seen)
-        active = np.array(model.system.active_guards(self.problem.parameters[0]))
-        none_due: Mask = np.all(((now > GUARD_EPS * sizes) | ~active)[:, first:], axis=1)
+        now = program.margins(seen)[:, first:]
+        active = np.array(model.system.active_guards(self.problem.parameters[0]))[first:]
+        none_due: Mask = np.all((now > GUARD_EPS * sizes[:, first:])[:, active], axis=1)
         sizes[:, self.impacts] = np.maximum(sizes[:, self.impacts], MICROMETRE)
         return np.concatenate([np.zeros((count, program.n_ledger)), sizes], axis=1), none_due
 
@@ -270,33 +274,35 @@ class ArrayRuns:
 
     def _columns(self, found: Ends) -> tuple[Mask, Columns]:
         """Return the mask of runs with a certain result, and their columns."""
-        batch, n = found.batch, self.n
-        counts, count = batch.counts, len(batch.counts)
-        end, every = batch.ends, np.arange(count)
-        last = found.inputs(every, end[:, 0], end[:, 1 : 1 + n], end[:, 1 + n : 1 + 2 * n])
-        whole = counts[:, END] == Status.FINISHED  # rates from the equations, as at outputs
-        if self.keep.last and whole.all():
-            put_rates(self.model.program, last)
-        elif self.keep.last and whole.any():
-            rows = last[whole]
-            put_rates(self.model.program, rows)
-            last[whole] = rows
-        status, reason, clear = self._verdicts(found, last)
+        batch, counts = found.batch, found.batch.counts
+        status, reason, clear = self._verdicts(found)
         # A run that overflows its tables, or ends before its first output, is solved by itself.
         clear &= (counts[:, EVENTS] <= batch.events.shape[1]) & (counts[:, OUTPUTS] > 0)
         clear &= (counts[:, RECORDS] <= batch.records.shape[1]) | (not self.keeps_steps)
         columns: Columns = {
             "status": status,
             "reason": reason,
-            "time_reached": end[:, 0].copy(),
+            "time_reached": batch.ends[:, 0].copy(),
             "steps": counts[:, FIRST_COUNTER].astype(np.int32),
         }
-        values = self._values(last)[1]
+        values = self._last_values(found)
         columns |= {f"{name}_last": values[name] for name in self.keep.last}
         columns |= self.along(found, clear) if self.keeps_course else {}
         return clear, columns | self._event_columns(found)
 
-    def _verdicts(self, found: Ends, last: Array) -> tuple[Any, Any, Mask]:
+    def _last_values(self, found: Ends) -> Mapping[str, Array]:
+        """Return the kept quantities at the ends of the runs by name; those of states alone without an evaluation."""
+        states = {state.name: 1 + j for j, state in enumerate(self.model.system.states)}
+        if set(self.keep.last) <= set(states):
+            return {name: found.batch.ends[:, states[name]].copy() for name in self.keep.last}
+        last, whole = found.last, found.batch.counts[:, END] == Status.FINISHED
+        if whole.any():  # rates from the equations, as at outputs
+            rows = last[whole]
+            put_rates(self.model.program, rows)
+            last[whole] = rows
+        return self._values(last)[1]
+
+    def _verdicts(self, found: Ends) -> tuple[Any, Any, Mask]:
         """Return codes of status and reason, and the mask of runs for which both are certain."""
         model, batch = self.model, found.batch
         outcome = batch.counts[:, END]
@@ -305,15 +311,15 @@ class ArrayRuns:
         whole = model.jumper is None or self.jumps
         clear = ended | (stopped & whole)
         if whole and stopped.any():
-            self._stops(found, last, stopped, reason, clear)
+            self._stops(found, stopped, reason, clear)
         elif not whole:  # a gap may have closed without an event
             gaps = batch.ends[:, -model.program.n_margins :]
             clear &= ~(gaps[:, self.impacts] < -PICOMETRE).any(axis=1)
         return np.where(stopped, STATUSES.index("stopped"), 0).astype(np.int8), reason, clear
 
-    def _stops(self, found: Ends, last: Array, stopped: Mask, reason: Any, clear: Mask) -> None:
+    def _stops(self, found: Ends, stopped: Mask, reason: Any, clear: Mask) -> None:
         """Set the reasons of runs stopped by a limit; a run that its own rates lead back from it is not certain."""
-        model, batch, n = self.model, found.batch, self.n
+        model, batch, n, last = self.model, found.batch, self.n, found.last
         newest = np.clip(batch.counts[:, EVENTS], 1, batch.events.shape[1]) - 1
         index = batch.events[np.arange(len(stopped)), newest, 0]
         for j, margin in enumerate(model.margins):

@@ -126,6 +126,8 @@ class ChunkRuns:
         left = np.arange(len(index))
         for solver in self.solvers:
             done, found = solver.solve({path: column[left] for path, column in values.items()})
+            if len(left) == len(index) and done.all():
+                return found
             _put(columns, left[done], found, len(index))
             left = left[~done]
             if not len(left):
