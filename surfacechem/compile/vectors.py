@@ -90,41 +90,49 @@ def constants_apart(expressions: Sequence[Any], constants: Iterable[Any]) -> tup
 
     >>> p, q, x = symengine.symbols("p q x")
     >>> constants_apart([x / (p * q), symengine.exp(p) + x], [p, q])
-    ({constant_0: p**(-1)*q**(-1), constant_1: exp(p)}, [constant_0*x, constant_1 + x])
+    ({constant_0: 1/(p*q), constant_1: exp(p)}, [x*constant_0, constant_1 + x])
     """
-    known: dict[Any, Any] = dict.fromkeys(constants)
-    """Each part in terms of new symbols; None for one that is constant."""
-    symbols: dict[Any, Any] = {}
+    parts = _Parts(constants)
+    for expression in expressions:
+        for part in _arguments_first(expression, lambda each: each.args, parts.known):
+            parts.known[part] = parts.replaced(part)
+    found = [parts.with_symbols(expression) for expression in expressions]
+    return {symbol: part for part, symbol in parts.symbols.items()}, found
 
-    def formed(part: Any) -> Any:
-        if not part.args or type(part).__name__ in _CONDITIONS:  # nothing to be formed, or no number
+
+class _Parts:
+    """Parts of expressions in terms of symbols for what is constant."""
+
+    def __init__(self, constants: Iterable[Any]) -> None:
+        self.known: dict[Any, Any] = dict.fromkeys(constants)
+        """Each part in terms of the symbols; None for one that is constant."""
+        self.symbols: dict[Any, Any] = {}
+
+    def _symbol(self, part: Any) -> Any:
+        """Return the symbol of a constant part; itself if nothing is to be formed, or if it is no number."""
+        if not part.args or type(part).__name__ in _CONDITIONS:
             return part
-        return symbols.setdefault(part, symengine.Symbol(f"constant_{len(symbols)}"))
+        return self.symbols.setdefault(part, symengine.Symbol(f"constant_{len(self.symbols)}"))
 
-    def replaced(part: Any) -> Any:
+    def with_symbols(self, part: Any) -> Any:
+        """Return a known part in terms of the symbols."""
+        return self._symbol(part) if self.known[part] is None else self.known[part]
+
+    def replaced(self, part: Any) -> Any:
+        """Return a part whose arguments are known in terms of the symbols; None if it is constant."""
         kind = type(part).__name__
         if not part.args:
             return None if part.is_Number or kind in {*_CONSTANTS, *_BOOLEANS} else part
-        fixed = [each for each in part.args if known[each] is None]
+        fixed = [each for each in part.args if self.known[each] is None]
         if len(fixed) == len(part.args):
             return None
-        if kind in ("Add", "Mul"):
-            others = [known[each] for each in part.args if known[each] is not None]
-            return part.func(formed(part.func(*fixed)), *others) if fixed else part.func(*others)
+        if kind in ("Add", "Mul") and fixed:  # one constant for all of them
+            others = [self.known[each] for each in part.args if self.known[each] is not None]
+            return part.func(self._symbol(part.func(*fixed)), *others)
+        args = [self.with_symbols(each) for each in part.args]
         if kind == "Piecewise":
-            args = [_with_symbols(known, each, formed) for each in part.args]
             return symengine.Piecewise(*zip(args[::2], args[1::2], strict=True))
-        return (_CONDITIONS.get(kind) or part.func)(*(_with_symbols(known, each, formed) for each in part.args))
-
-    for expression in expressions:
-        for part in _arguments_first(expression, lambda each: each.args, known):
-            known[part] = replaced(part)
-    found = [_with_symbols(known, expression, formed) for expression in expressions]
-    return {symbol: part for part, symbol in symbols.items()}, found
-
-
-def _with_symbols(known: Mapping[Any, Any], part: Any, formed: Callable[[Any], Any]) -> Any:
-    return formed(part) if known[part] is None else known[part]
+        return (_CONDITIONS.get(kind) or part.func)(*args)
 
 
 def _entry(builder: Any, argument: Any, place: int) -> Any:
@@ -380,7 +388,10 @@ def _polynomial(builder: Any, x: Any, coefficients: Sequence[float]) -> Any:
     """
     terms = [number(c) for c in coefficients]
     while len(terms) > 1:
-        pairs = [builder.fadd(low, builder.fmul(high, x)) for low, high in zip(terms[::2], terms[1::2], strict=False)]
+        # Each pair in one operation where the processor has it.
+        pairs = [
+            by_vector(builder, "fmuladd", high, x, low) for low, high in zip(terms[::2], terms[1::2], strict=False)
+        ]
         terms = pairs + terms[2 * len(pairs) :]
         x = builder.fmul(x, x)
     return terms[0]

@@ -405,19 +405,22 @@ class ArrayRuns:
         """Return the errors of the balances of each run over its outputs, as in its audit."""
         system, batch, n = self.model.system, found.batch, self.n
         owner, k = np.nonzero(reached)
+        all_reached = reached.all()
 
         def whole(column: Array) -> Array:
             """Return a table of runs and outputs; beyond the end of a run it repeats the start, with no exchange."""
             # Column-major, since NumPy is slow in finding the largest of a few contiguous outputs.
+            if all_reached:
+                return np.asfortranarray(column.reshape(reached.shape))
             filled = np.zeros(reached.shape, order="F")
             filled[owner, k] = column
-            return filled if reached.all() else np.where(reached, filled, filled[:, :1])
+            return np.where(reached, filled, filled[:, :1])
 
         # The same residuals and roundings as in the audit of one run, over the existing outputs.
         every = [name for total, parts in TOTALS for name in (total, *parts)]
         named = {name: whole(values[name]) for name in every if name in values}
         outputs = np.asfortranarray(batch.outputs[..., n:])
-        ledger = np.where(reached[..., None], outputs, outputs[:, :1])
+        ledger = outputs if all_reached else np.where(reached[..., None], outputs, outputs[:, :1])
         rounded = of_each(np.fmax, owner, self._rounding(rows), len(reached))
         columns: Columns = {}
         left = zip(("energy", "entropy"), TOTALS, residuals(system, named, ledger), strict=True)
