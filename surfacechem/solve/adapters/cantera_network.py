@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from functools import cache, partial
+from functools import cache, cached_property, partial
 from typing import Any, NoReturn, Self
 
 import cantera
@@ -210,17 +210,25 @@ class _SystemReactor(StateVectorReactor):
     def start(self) -> Array:
         return self.scaled
 
-    def put(self, x: Array) -> None:
-        self.scaled = x
+    # Cantera calls these more often than the steps that it takes, so they go no further than to the equations.
 
-    def rates(self, t: float) -> Array:
+    def replace_update_state(self, y: Any) -> None:
+        self.scaled = np.array(y)
+
+    def replace_eval(self, t: float, _lhs: Any, rhs: Any) -> None:
+        if self.error is not None:
+            raise self._failure(self.error)
         self.view.residuals += 1
         evaluation, x = self.evaluation, self.scaled * self.unit
+        try:
+            found = evaluation.reach(t, x[: self.count] if self.counts else x)
+        except Exception as error:
+            self.error = error
+            raise self._failure(error) from None
         # Cantera itself rejects rates that are not finite, as it does this error.
-        if not evaluation.reach(t, x[: self.count] if self.counts else x):
+        if not found:
             raise BackOffError("no consistent state")
-        rates: Array = (evaluation.rates() if self.counts else evaluation.slopes()) / self.unit
-        return rates
+        np.divide(evaluation.rates() if self.counts else evaluation.slopes(), self.unit, out=np.asarray(rhs))
 
 
 def last_step(net: Any, start: float, end: float, unit: Array, columns: slice = slice(None)) -> DenseStep:
@@ -285,18 +293,22 @@ class _Stretch(Method):
         gained = partial(on_step, end, end - start, rows[k][:, n:]) if rows.shape[2] > n else None
         return DenseStep(start, end, y, y, gained)
 
+    @cached_property
+    def _stats(self) -> dict[str, Any]:
+        """Counts of the integrator, for which it is asked once it has taken its last step."""
+        return self.net.solver_stats
+
     @property
     def factorizations(self) -> int:
-        return int(self.net.solver_stats["lin_solve_setups"])
+        return int(self._stats["lin_solve_setups"])
 
     @property
     def own_jacobians(self) -> int:
-        return int(self.net.solver_stats["jac_evals"])
+        return int(self._stats["jac_evals"])
 
     @property
     def rejected(self) -> int:
-        stats = self.net.solver_stats
-        return int(stats["err_test_fails"] + stats["nonlinear_conv_fails"])
+        return int(self._stats["err_test_fails"] + self._stats["nonlinear_conv_fails"])
 
 
 class CanteraSolver(SteppingSolver):

@@ -305,19 +305,20 @@ class _Run:
                 if far:
                     self._accept(steps.since(first), inside.part(first, first + far))
                 else:
-                    far, fired = 1, self._through(steps.step(first), end)
+                    far, fired = 1, self._through(steps.step(first), end, inside.part(first, first + 1))
                     if fired is not None:
                         return fired
                 first += far
         return []
 
-    def _through(self, step: DenseStep, end: float) -> list[int] | None:
+    def _through(self, step: DenseStep, end: float, inside: _Inside) -> list[int] | None:
         """Accept a step that may have an event; return the fired margins if the library has to restart, else None."""
         within = replace(step, start=self.t, end=min(step.end, end))
         # Simultaneous zeros differ by the error of the library's polynomial.
         resolution = min(self.problem.rtol, SQRT_EPS) * (within.end - self.t) + ULPS * abs(within.end)
         reached, fired = first_crossing(within, self.guards, self.active, resolution)
-        inside = self._inside(Steps.of([step]), reached)
+        if reached < within.end:
+            inside = self._inside(Steps.of([step]), reached)
         if fired and self.aim is None and not self._adds_up(inside, MAX_DEFECT)[0]:
             self.aim = reached
             return []
