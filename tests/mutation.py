@@ -41,7 +41,7 @@ OF_BALANCES = [
     ["rate_and_state"],
     ["zoo::test_both_laws_of_thermodynamics_hold_on_the_equations", "zoo::test_a_case_gives_what_it_gave"],
     ["tables", "assemble", "start", "instant", "hybrid", "findings", "event_table"],
-    ["references_mechanics", "references_limits", "bad_input", "case", "guards", "rupture", "conduction"],
+    ["references_mechanics", "references_limits", "bad_input", "case", "guards", "sweeps", "conduction"],
     ["reactor", "evaluated", "neighbours", "mechanism_scene", "stability", "cases"],
 ]
 OF_LAWS = [
