@@ -16,9 +16,9 @@ from pathlib import Path
 from surfacechem.contracts.terms import Shape
 from surfacechem.errors import InputError
 from surfacechem.laws.free_energy import EquilibriumBonds
+from surfacechem.laws.longrange import InversePower, LennardJonesPair
 from surfacechem.surfaces import inner_sums, patches
 from surfacechem.surfaces.inner_sums import table
-from surfacechem.surfaces.pair_laws import InversePower, LennardJonesPair
 from surfacechem.surfaces.pairwise import PairForces, interaction
 from surfacechem.surfaces.potential import CurvedSurfaces
 from surfacechem.surfaces.projection import Surface

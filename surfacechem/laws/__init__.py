@@ -41,13 +41,13 @@ FAMILIES: dict[type[Law], tuple[str, ...]] = {
     Load: ("loading",),
     Factor: ("factors",),
     Shape: ("shapes",),
-    PairEnergy: ("pair_laws",),
+    PairEnergy: ("longrange",),
     FilmGrowth: ("films",),
 }
 """The modules that hold the laws of each contract."""
 
 
-OTHER_ROOMS = {name: f"surfacechem.surfaces.{name}" for name in ("shapes", "pair_laws")}
+OTHER_ROOMS = {"shapes": "surfacechem.surfaces.shapes"}
 """Modules of laws in other subpackages, by family."""
 
 

@@ -16,9 +16,8 @@ from surfacechem.plots.study import LABEL_VARIABLES, figure
 from surfacechem.results.accuracy import relative_errors
 from surfacechem.solve.adapters import sundials
 from surfacechem.studies import precision
-from surfacechem.studies import truth as truths
+from surfacechem.studies.precision import NORMS, Subject, establish, numerical
 from surfacechem.studies.report import LIBRARIES, Study
-from surfacechem.studies.truth import NORMS, Subject, establish, numerical
 
 pytestmark = pytest.mark.around
 
@@ -30,7 +29,7 @@ TIMES = ("seconds", "repetitions")
 def quick_methods(monkeypatch, request):
     """References of the two quicker methods, but in slow tests of all."""
     if "slow" not in request.keywords:
-        monkeypatch.setattr(truths, "REFERENCE_METHODS", ("radau", "lsoda"))
+        monkeypatch.setattr(precision, "REFERENCE_METHODS", ("radau", "lsoda"))
 
 
 @pytest.fixture
@@ -150,9 +149,9 @@ def test_a_case_without_an_exact_solution_says_what_it_is_held_against(rtol, ove
 
 @pytest.mark.usefixtures("blank")
 def test_methods_that_do_not_agree_give_no_reference(monkeypatch, tmp_path):
-    limit = truths._limit
+    limit = precision._limit
     shifts = iter(np.linspace(0.0, 1.0, 1000))
-    monkeypatch.setattr(truths, "_limit", lambda loose, tight: limit(loose, tight) * (1 + next(shifts)))
+    monkeypatch.setattr(precision, "_limit", lambda loose, tight: limit(loose, tight) * (1 + next(shifts)))
     target = tmp_path / "none.nc"
     options = ["--solvers", "radau", "--tolerances", "1e-6", "--repeat", "1", "--set", "reference=", "-o", str(target)]
     done = CliRunner().invoke(app, ["precision", "exothermic", *options])
@@ -165,7 +164,7 @@ def test_methods_that_do_not_agree_give_no_reference(monkeypatch, tmp_path):
 
 
 def test_a_method_that_fails_is_no_reference(monkeypatch):
-    monkeypatch.setattr(truths, "REFERENCE_METHODS", ("radau", "scipy-radau", "lsoda"))
+    monkeypatch.setattr(precision, "REFERENCE_METHODS", ("radau", "scipy-radau", "lsoda"))
     subject = subject_of("exothermic", "reference=")
     original = type(subject.model).solve
 

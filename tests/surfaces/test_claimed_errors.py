@@ -14,8 +14,8 @@ from sampling import every
 from scipy.interpolate import PchipInterpolator
 
 from surfacechem.laws.free_energy import Penalty
+from surfacechem.laws.longrange import InversePower, LennardJonesPair, PairTable, PenaltyPair
 from surfacechem.surfaces.curved_gap import density, over_gap
-from surfacechem.surfaces.pair_laws import InversePower, LennardJonesPair, PairTable, PenaltyPair
 from surfacechem.surfaces.pairwise import interaction
 from surfacechem.surfaces.projection import Surface
 from surfacechem.surfaces.shapes import Cap, Cavity, Cone, Cylinder, Disc, Paraboloid, Plane, Sphere

@@ -15,7 +15,7 @@ import surfacechem
 from surfacechem.errors import InputError, Place
 from surfacechem.expressions import derivative, exp
 from surfacechem.laws.free_energy import EquilibriumBonds, Penalty
-from surfacechem.laws.longrange import LennardJonesSpherePlane
+from surfacechem.laws.longrange import InversePower, LennardJonesSpherePlane
 from surfacechem.model.system import DUMMY_STATE
 from surfacechem.references.base import SceneView
 from surfacechem.results.matching import match
@@ -24,7 +24,6 @@ from surfacechem.surfaces import patches, potential
 from surfacechem.surfaces.approach import fitted
 from surfacechem.surfaces.curved_gap import density, level_approaches, over_gap
 from surfacechem.surfaces.nearest_places import near_places
-from surfacechem.surfaces.pair_laws import InversePower
 from surfacechem.surfaces.pairwise import interaction
 from surfacechem.surfaces.potential import CurvedSurfaces
 from surfacechem.surfaces.projection import Surface

@@ -14,12 +14,11 @@ from scipy.optimize import minimize_scalar
 from surfacechem.errors import InputError
 from surfacechem.laws.free_energy import BondedContact, EquilibriumBonds, Penalty
 from surfacechem.laws.heat_transfer import GasGap
-from surfacechem.laws.longrange import LennardJonesSpherePlane
+from surfacechem.laws.longrange import InversePower, LennardJonesPair, LennardJonesSpherePlane, PairTable, PenaltyPair
 from surfacechem.quantities import BOLTZMANN
 from surfacechem.surfaces import patches
 from surfacechem.surfaces.curved_gap import between_flats, density, over_gap
 from surfacechem.surfaces.inner_sums import LAST_LEVEL, inner_sums, table
-from surfacechem.surfaces.pair_laws import InversePower, LennardJonesPair, PairTable, PenaltyPair
 from surfacechem.surfaces.pairwise import interaction
 from surfacechem.surfaces.potential import CurvedSurfaces
 from surfacechem.surfaces.projection import Surface
