@@ -278,7 +278,7 @@ def laws(
     from surfacechem import laws as every
     from surfacechem.documents import document
     from surfacechem.format.own_laws import read
-    from surfacechem.runs.lawcheck import report
+    from surfacechem.runs.check import report
     from surfacechem.runs.listing import law_list, law_page
 
     own = [*read(document.read(file), str(file))] if file else []

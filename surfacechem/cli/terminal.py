@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
     from rich.text import Text
 
-    from surfacechem.runs.sheet import Sheet
+    from surfacechem.runs.listing import Sheet
     from surfacechem.studies.report import Page, PageTable
 
 BAR_DELAY = 2.0

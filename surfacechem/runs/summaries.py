@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from surfacechem.results.event_table import entropy_destroyed, event_counts, event_summary
-from surfacechem.runs.sheet import Rows, Sheet, counted
+from surfacechem.runs.listing import Rows, Sheet, counted
 from surfacechem.solve import AUTO, CALLING_PYTHON, OWN
 from surfacechem.solve.jumps import ADMISSIBLE
 

@@ -40,7 +40,7 @@ from surfacechem.runs.keeping import (
     extremes,
     keep_of,
 )
-from surfacechem.runs.sheet import counted
+from surfacechem.runs.listing import counted
 from surfacechem.runs.spectrum import Lifetime, Statistics
 from surfacechem.solve.run import Model, Run, Trajectory
 from surfacechem.tolerances import EPS

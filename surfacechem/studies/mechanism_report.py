@@ -35,8 +35,7 @@ from surfacechem.mechanism.source import Source
 from surfacechem.model.components.pairs import Opposed, lengths, opposed
 from surfacechem.quantities import BOLTZMANN, GAS_CONSTANT
 from surfacechem.results.findings import ROUNDED_DEPARTURE, in_words
-from surfacechem.runs.listing import TEXT_WIDTH, source
-from surfacechem.runs.sheet import columns
+from surfacechem.runs.listing import TEXT_WIDTH, columns, source
 from surfacechem.solve.contract import Array
 from surfacechem.tolerances import RUN_EPS
 

@@ -40,8 +40,7 @@ import numpy as np
 from surfacechem.errors import InputError, Place
 from surfacechem.quantities import raised
 from surfacechem.results.netcdf import CONVENTIONS, Column, as_dataset, replacing, save
-from surfacechem.runs.listing import plain
-from surfacechem.runs.sheet import columns
+from surfacechem.runs.listing import columns, plain
 
 if TYPE_CHECKING:
     from xml.etree.ElementTree import Element

@@ -29,8 +29,7 @@ from surfacechem.results import spatial
 from surfacechem.results.dataset import Results, changes_of
 from surfacechem.results.solution import Solution
 from surfacechem.runs.check import laws_of
-from surfacechem.runs.listing import FORMULA, plain, source
-from surfacechem.runs.sheet import Sheet
+from surfacechem.runs.listing import FORMULA, Sheet, plain, source
 from surfacechem.runs.simulation import Simulation
 from surfacechem.runs.summaries import REGIMES, duration, points_summary, run_summary, surface_rows, sweep_summary
 from surfacechem.runs.sweeps import SweepSolution

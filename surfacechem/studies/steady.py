@@ -16,7 +16,7 @@ from surfacechem.format import Overrides, Source
 from surfacechem.model.system import System
 from surfacechem.quantities import GAS_CONSTANT, Quantity
 from surfacechem.runs.at_rest import refuse_histories
-from surfacechem.runs.sheet import Rows, Sheet
+from surfacechem.runs.listing import Rows, Sheet
 from surfacechem.runs.simulation import load
 from surfacechem.scene import Interface
 from surfacechem.solve.adapters.evaluation import Evaluation

@@ -7,7 +7,7 @@ from io import StringIO
 import pytest
 
 from surfacechem.cli import terminal
-from surfacechem.runs.sheet import Sheet
+from surfacechem.runs.listing import Sheet
 from surfacechem.studies.report import Page, PageSection, PageTable
 
 pytestmark = pytest.mark.around

@@ -15,7 +15,7 @@ from surfacechem.errors import InputError
 from surfacechem.format import own_laws
 from surfacechem.results.netcdf import reading
 from surfacechem.runs import rerun
-from surfacechem.runs.lawcheck import problems
+from surfacechem.runs.check import problems
 
 LAW = '''
 from surfacechem.contracts.terms import Friction, parameter
