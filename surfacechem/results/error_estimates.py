@@ -32,8 +32,7 @@ from surfacechem.results.audit import audit
 from surfacechem.results.dataset import profile_values
 from surfacechem.results.event_table import KINK, SIDE, event_times
 from surfacechem.scene import Scene
-from surfacechem.solve import AUTO
-from surfacechem.solve.choice import method
+from surfacechem.solve import AUTO, method
 from surfacechem.solve.contract import Array, Mask, Problem, States, Status
 from surfacechem.solve.run import Run, Trajectory
 from surfacechem.tolerances import (

@@ -22,7 +22,7 @@ from surfacechem.quantities import VELOCITIES
 from surfacechem.results.audit import LAST_DIGITS, TOTALS, residuals, resolved
 from surfacechem.runs import spectrum
 from surfacechem.runs.keeping import REACHES, STATUSES, Columns, Keep, crossed, reason_table, variable
-from surfacechem.solve.choice import EXPLICIT, IMPLICIT
+from surfacechem.solve import EXPLICIT, IMPLICIT
 from surfacechem.solve.contract import Array, Index, Mask, Problem, Status
 from surfacechem.solve.diagnose import are_led_back
 from surfacechem.solve.lanes.lane_batch import solve_batch

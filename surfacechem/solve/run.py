@@ -26,9 +26,8 @@ from surfacechem.contracts.terms import Spec
 from surfacechem.errors import PATHS, InputError, suggestion
 from surfacechem.model.checks import StartLimits
 from surfacechem.model.system import System
-from surfacechem.solve import AUTO, CALLING_PYTHON, solver
+from surfacechem.solve import AUTO, CALLING_PYTHON, EXPLICIT, method, solver
 from surfacechem.solve import segments as pieces
-from surfacechem.solve.choice import EXPLICIT, method
 from surfacechem.solve.contract import Array, Guard, Index, Mask, Problem, Result, Solver, States, Status, among
 from surfacechem.solve.diagnose import ROUNDED_BACK, are_led_back, termination
 from surfacechem.solve.equilibria import NO_BALANCE, Equilibria, Point
