@@ -18,10 +18,10 @@ from typing import Any
 from mkdocs.structure.files import File, Files
 
 import surfacechem
+from surfacechem import documents as data
 from surfacechem import format as cases
 from surfacechem import plots, references
 from surfacechem.contracts.terms import Law, Potential, Spec, reads
-from surfacechem.documents import shipped as data
 from surfacechem.laws import FAMILIES, laws, module
 from surfacechem.quantities import VARIABLES
 from surfacechem.runs import listing

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from ruamel.yaml import YAML
 
 from surfacechem.contracts.terms import reads
-from surfacechem.documents.shipped import mechanisms
+from surfacechem.documents import mechanisms
 from surfacechem.expressions import derivative
 from surfacechem.mechanism import load_mechanism
 from surfacechem.mechanism.rate_types import LoadedReaction, kind_of

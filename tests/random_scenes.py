@@ -18,7 +18,7 @@ from surfacechem.contracts.terms import (
     Varying,
     reads,
 )
-from surfacechem.documents.shipped import mechanisms
+from surfacechem.documents import mechanisms
 from surfacechem.laws.cohesive import AdhesionIntensity, AdhesionLoss, CompliantDebonding
 from surfacechem.laws.coolprop import CoolPropFluid
 from surfacechem.laws.free_energy import BondStiffness, ConstantInterfaceCapacity, InterfaceCapacity

@@ -14,7 +14,7 @@ import pytest
 import scenes
 import scenes_mechanics
 
-from surfacechem.documents.shipped import cases
+from surfacechem.documents import cases
 from surfacechem.model.assemble import assemble
 from surfacechem.model.system import System
 from surfacechem.results import spatial

@@ -14,8 +14,8 @@ from functools import cached_property
 from io import BufferedIOBase, TextIOBase
 from pathlib import Path
 
-from surfacechem import laws
-from surfacechem.documents import document, shipped
+from surfacechem import documents, laws
+from surfacechem.documents import document
 from surfacechem.documents.document import Tree
 from surfacechem.errors import InputError, Place, nearest
 from surfacechem.format import data_files, own_laws
@@ -176,7 +176,7 @@ def _without_stale_reference(before: Tree, after: Tree) -> tuple[Tree, str]:
 
 def names() -> list[str]:
     """Return the names of the cases that come with surfacechem."""
-    return sorted(path.stem for path in shipped.cases().glob("*.yaml"))
+    return sorted(path.stem for path in documents.cases().glob("*.yaml"))
 
 
 def _find(name: str) -> tuple[Path, str]:
@@ -185,7 +185,7 @@ def _find(name: str) -> tuple[Path, str]:
     if document.is_file(path):
         return path, name
     if name in names():
-        return shipped.cases() / f"{name}.yaml", f"cases/{name}.yaml"
+        return documents.cases() / f"{name}.yaml", f"cases/{name}.yaml"
     beside: list[str] = []
     with suppress(OSError, ValueError):  # a name may be invalid as a path
         if path.exists():

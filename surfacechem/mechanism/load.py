@@ -15,9 +15,9 @@ from itertools import accumulate
 from pathlib import Path
 from typing import Any
 
+from surfacechem import documents as data
 from surfacechem.contracts.terms import Potential, RateLaw
 from surfacechem.documents import document
-from surfacechem.documents import shipped as data
 from surfacechem.documents.cache_folder import PACKAGE, cache_root, fingerprint, from_file, source_digest
 from surfacechem.errors import InputError, Place, refuse_unknown, suggestion
 from surfacechem.mechanism.evaluated import EvaluatedReaction, Neighbour, NeighbourReaction, SurfaceEngine, hold

@@ -12,7 +12,14 @@ import numpy as np
 
 from surfacechem.results.accuracy import Accuracy
 from surfacechem.results.audit import Audit, Balances, audit, least_productions
-from surfacechem.results.dataset import DATASET_NAMES, Results, coverage_columns, profile_columns, quantity_columns
+from surfacechem.results.dataset import (
+    DATASET_NAMES,
+    Results,
+    coverage_columns,
+    profile_columns,
+    quantity_columns,
+    surface_columns,
+)
 from surfacechem.results.event_table import event_columns, event_findings, event_violations, event_waits
 from surfacechem.results.findings import BalanceVerdict, findings, verdicts
 from surfacechem.results.netcdf import Column, versions
@@ -156,8 +163,6 @@ class Solution(Results):
     @cached_property
     def _surface_columns(self) -> tuple[list[Column], float]:
         """Columns on two curved surfaces, and the time that they took [s]."""
-        from surfacechem.results.surface_fields import surface_columns
-
         return surface_columns(self.shown, self.surface)
 
     @property

@@ -13,7 +13,7 @@ from dataclasses import MISSING, dataclass, field, fields
 from pathlib import Path
 
 from surfacechem.contracts.terms import Law
-from surfacechem.documents.shipped import cases
+from surfacechem.documents import cases
 from surfacechem.errors import LAWS, InputError, suggestion
 from surfacechem.laws import FAMILIES, laws
 

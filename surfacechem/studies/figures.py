@@ -16,8 +16,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from surfacechem import documents
 from surfacechem.contracts.units import parse as si
-from surfacechem.documents import document, shipped
+from surfacechem.documents import document
 from surfacechem.documents.document import Tree
 from surfacechem.errors import InputError, Place, suggestion
 from surfacechem.format.data_files import CSVText
@@ -221,7 +222,7 @@ class ListFigure:
 
 def lists() -> Path:
     """Return the folder of the lists that come with surfacechem."""
-    return shipped.cases() / "figures"
+    return documents.cases() / "figures"
 
 
 def read_list(name: str) -> ListSection:

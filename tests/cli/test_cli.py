@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from surfacechem import documents as data
 from surfacechem.cli import commands
 from surfacechem.cli.main import app
-from surfacechem.documents import shipped as data
 from surfacechem.laws import FAMILIES, laws
 from surfacechem.runs import listing
 

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from surfacechem.contracts.terms import Varying
-from surfacechem.documents import document
-from surfacechem.documents.shipped import cases, mechanisms
+from surfacechem.documents import cases, document, mechanisms
 from surfacechem.errors import InputError
 from surfacechem.format import load, load_text
 from surfacechem.laws.factors import Linear, Power

@@ -6,9 +6,9 @@ import case_runs
 import jsonschema
 import pytest
 
+from surfacechem import documents as data
 from surfacechem import references
 from surfacechem.documents import document
-from surfacechem.documents import shipped as data
 from surfacechem.format import names, schema
 
 VALIDATOR = jsonschema.Draft202012Validator(schema.schema())

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from surfacechem.documents.shipped import mechanisms
+from surfacechem.documents import mechanisms
 from surfacechem.errors import InputError, Place
 from surfacechem.mechanism import load_mechanism
 

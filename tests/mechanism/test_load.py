@@ -8,7 +8,7 @@ import pytest
 
 import surfacechem
 from mechanisms import SHIPPED
-from surfacechem.documents.shipped import mechanisms
+from surfacechem.documents import mechanisms
 from surfacechem.errors import InputError
 from surfacechem.laws import _registered, register
 from surfacechem.laws.kinetics import Bell, RateType

@@ -12,9 +12,8 @@ from mutants import garbled, mutated
 from ruamel.yaml import YAML
 
 from mechanisms import SHIPPED
-from surfacechem.documents import document
+from surfacechem.documents import document, mechanisms
 from surfacechem.documents.document import Limits
-from surfacechem.documents.shipped import mechanisms
 from surfacechem.errors import InputError, Place
 from surfacechem.format import load_text
 from surfacechem.mechanism import load_mechanism, source

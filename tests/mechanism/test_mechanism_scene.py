@@ -14,7 +14,7 @@ from scipy.linalg import expm
 
 import surfacechem
 from mechanisms import KMOL, SHIPPED, load, loading_read, loads, mechanism_texts, pulled, states
-from surfacechem.documents.shipped import mechanisms
+from surfacechem.documents import mechanisms
 from surfacechem.errors import InputError
 from surfacechem.laws.free_energy import Constant, ConstantInterfaceCapacity
 from surfacechem.laws.loading import Hold

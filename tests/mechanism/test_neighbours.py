@@ -14,7 +14,7 @@ from scipy.interpolate import CubicSpline
 from test_mechanism_cantera import FOLDER, SURFACES
 
 import surfacechem
-from surfacechem.documents.shipped import mechanisms
+from surfacechem.documents import mechanisms
 from surfacechem.errors import InputError
 from surfacechem.laws.loading import Hold
 from surfacechem.mechanism.mixture import word

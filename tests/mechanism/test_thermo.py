@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import surfacechem
-from surfacechem.documents.shipped import cases, mechanisms
+from surfacechem.documents import cases, mechanisms
 from surfacechem.errors import InputError
 from surfacechem.runs import rerun
 from surfacechem.solve.run import Model

@@ -11,7 +11,7 @@ import xarray
 from ruamel.yaml import YAML
 
 import surfacechem
-from surfacechem.documents import shipped
+from surfacechem import documents
 from surfacechem.errors import InputError
 from surfacechem.results.error_estimates import accuracy
 from surfacechem.runs import rerun
@@ -144,7 +144,7 @@ def test_a_dataset_is_written_under_the_name_of_its_format_only(simulation, tmp_
 
 
 def test_a_case_is_a_path_a_text_a_mapping_or_an_open_file(tmp_path):
-    path = shipped.cases() / "exothermic.yaml"
+    path = documents.cases() / "exothermic.yaml"
     text = path.read_text()
     content = YAML(typ="safe").load(text)
     content["initial"]["T"] = np.float64(300)
