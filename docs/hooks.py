@@ -269,7 +269,7 @@ def made_mechanisms() -> str:
 
 def made_rate_types() -> str:
     """Every rate type of a mechanism with its own keys, formula and source."""
-    from surfacechem.mechanism.rate_types import CANTERA_PREFIX, kinds
+    from surfacechem.mechanism.rates import CANTERA_PREFIX, kinds
 
     rows = []
     for kind, law in sorted(kinds().items()):

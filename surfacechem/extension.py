@@ -22,8 +22,7 @@ import symengine
 from surfacechem.compile.program import C_FUNCTION, compile_function
 from surfacechem.errors import InputError, refuse_unknown, suggestion
 from surfacechem.expressions import EXPONENT_CAP
-from surfacechem.mechanism.rate_types import AffinityReaction, kinds
-from surfacechem.mechanism.rates import CoverageTerm, InterfaceArrhenius
+from surfacechem.mechanism.rates import AffinityReaction, CoverageTerm, InterfaceArrhenius, kinds
 from surfacechem.mechanism.source import REACTION, converted, own_parameters, sides
 from surfacechem.quantities import BOLTZMANN, KILO, MOLECULAR, VARIABLES
 from surfacechem.tolerances import TINY

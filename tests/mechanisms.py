@@ -14,7 +14,7 @@ from surfacechem.contracts.terms import reads
 from surfacechem.documents import mechanisms
 from surfacechem.expressions import derivative
 from surfacechem.mechanism import load_mechanism
-from surfacechem.mechanism.rate_types import LoadedReaction, kind_of
+from surfacechem.mechanism.rates import LoadedReaction, kind_of
 from surfacechem.quantities import AVOGADRO
 
 KMOL = 1000 * AVOGADRO

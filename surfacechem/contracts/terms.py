@@ -415,7 +415,7 @@ class RateType:
     """Name in a mechanism."""
     method: str
     """Method of the law: the logarithm of a factor of the coefficient, or a method that REACTIONS in
-    :mod:`surfacechem.mechanism.rate_types` requires."""
+    :mod:`surfacechem.mechanism.rates` requires."""
     constants: Mapping[str, float] = field(default_factory=dict)
     """Rate constants of the law: one for the constant that the Arrhenius coefficient replaces, zero for its reverse."""
     names: tuple[str, ...] = ()

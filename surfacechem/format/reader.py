@@ -43,7 +43,7 @@ from surfacechem.tolerances import DEFAULT_RTOL, LINE_ERROR, NO_AMOUNT
 
 if TYPE_CHECKING:
     from surfacechem.mechanism import Mechanism
-    from surfacechem.mechanism.mixture import Species
+    from surfacechem.mechanism.thermo import Species
     from surfacechem.surfaces.potential import CurvedSurfaces
 
 L = TypeVar("L", bound=Law)

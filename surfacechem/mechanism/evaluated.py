@@ -22,8 +22,8 @@ from surfacechem.contracts.terms import Load, RateLaw, option, parameter
 from surfacechem.contracts.units import ELECTRON_VOLT
 from surfacechem.errors import InputError, Place, refuse_unknown, suggestion
 from surfacechem.expressions import Expression, absolute
-from surfacechem.mechanism.mixture import Formula, Species, identifiers, word
 from surfacechem.mechanism.rates import MechanismReaction
+from surfacechem.mechanism.thermo import Formula, Species, identifiers, word
 from surfacechem.quantities import MOLECULAR, Quantity
 from surfacechem.scene import Electrode
 from surfacechem.tolerances import TINY

@@ -12,9 +12,7 @@ from typing import Any
 
 from surfacechem.errors import InputError, Place, refuse_unknown, suggestion
 from surfacechem.mechanism.evaluated import GASES
-from surfacechem.mechanism.interaction import CAPACITY_KEYS, COEFFICIENTS, KEY, MODEL_KEYS, PAIRED_KEYS
-from surfacechem.mechanism.rate_types import kind_of, kinds, names
-from surfacechem.mechanism.rates import InterfaceArrhenius
+from surfacechem.mechanism.rates import InterfaceArrhenius, kind_of, kinds, names
 from surfacechem.mechanism.source import (
     DEPENDENT,
     ENERGY,
@@ -29,6 +27,7 @@ from surfacechem.mechanism.source import (
     sides,
     unitless,
 )
+from surfacechem.mechanism.thermo import CAPACITY_KEYS, COEFFICIENTS, KEY, MODEL_KEYS, PAIRED_KEYS
 
 _words = str.split
 

@@ -21,13 +21,19 @@ from surfacechem.documents import document
 from surfacechem.documents.cache_folder import PACKAGE, cache_root, fingerprint, from_file, source_digest
 from surfacechem.errors import InputError, Place, refuse_unknown, suggestion
 from surfacechem.mechanism.evaluated import EvaluatedReaction, Neighbour, NeighbourReaction, SurfaceEngine, hold
-from surfacechem.mechanism.interaction import KEY, interactions
 from surfacechem.mechanism.keys import PhaseCheck, has_neighbours, is_evaluated
-from surfacechem.mechanism.mixture import BondSpring, IdealMixture, Species, identifiers, unpaired_dependence
-from surfacechem.mechanism.rate_types import kind_of
-from surfacechem.mechanism.rates import plain
+from surfacechem.mechanism.rates import kind_of, plain
 from surfacechem.mechanism.source import MECHANISM_LIMITS, Source, own_parameters, sides
-from surfacechem.mechanism.thermo import lower
+from surfacechem.mechanism.thermo import (
+    KEY,
+    BondSpring,
+    IdealMixture,
+    Species,
+    identifiers,
+    interactions,
+    lower,
+    unpaired_dependence,
+)
 from surfacechem.quantities import MOLECULAR
 from surfacechem.scene import BondingVariable, Engine, Sites
 from surfacechem.tolerances import NO_AMOUNT

@@ -29,9 +29,9 @@ from surfacechem.errors import InputError, Place
 from surfacechem.expressions import Expression, depends, derivative, log, log_sum
 from surfacechem.mechanism import Mechanism
 from surfacechem.mechanism.evaluated import EvaluatedReaction
-from surfacechem.mechanism.mixture import IdealMixture, Species
 from surfacechem.mechanism.rates import InterfaceArrhenius
 from surfacechem.mechanism.source import Source
+from surfacechem.mechanism.thermo import IdealMixture, Species
 from surfacechem.model.components.pairs import Opposed, lengths, opposed
 from surfacechem.quantities import BOLTZMANN, GAS_CONSTANT
 from surfacechem.results.findings import ROUNDED_DEPARTURE, in_words

@@ -13,7 +13,7 @@ from mechanisms import KMOL, call, values
 from surfacechem.errors import InputError
 from surfacechem.extension import LoadedInterface
 from surfacechem.mechanism import load_mechanism
-from surfacechem.mechanism.rate_types import AffinityReaction, kinds
+from surfacechem.mechanism.rates import AffinityReaction, kinds
 from surfacechem.quantities import BOLTZMANN
 
 pytestmark = pytest.mark.around

@@ -12,7 +12,7 @@ from surfacechem.documents import mechanisms
 from surfacechem.errors import InputError
 from surfacechem.laws import _registered, register
 from surfacechem.laws.kinetics import Bell, RateType
-from surfacechem.mechanism import load, load_mechanism, rate_types
+from surfacechem.mechanism import load, load_mechanism, rates
 from surfacechem.solve.radau.stepper import LOOP
 
 PAIR = """
@@ -117,13 +117,13 @@ def test_a_rate_type_of_ones_own_is_not_kept(folder):
         rate_types = (RateType("steep", "log_off", {"k_off": 1.0}, renamed={"x_beta": "x_off"}),)
 
     register(Steep)
-    rate_types.kinds.cache_clear()
+    rates.kinds.cache_clear()
     try:
         text = PAIR.replace("bond => free,", "bond => free, type: steep, x-beta: 1 nm,")
         assert pair(text).reactions[0].law is Steep
     finally:
         del _registered[Steep.name()]
-        rate_types.kinds.cache_clear()
+        rates.kinds.cache_clear()
     assert not folder.exists()
 
 

@@ -17,7 +17,7 @@ from surfacechem.documents.document import Limits
 from surfacechem.errors import InputError, Place
 from surfacechem.format import load_text
 from surfacechem.mechanism import load_mechanism, source
-from surfacechem.mechanism.rate_types import AffinityReaction, kinds
+from surfacechem.mechanism.rates import AffinityReaction, kinds
 
 pytestmark = pytest.mark.around
 

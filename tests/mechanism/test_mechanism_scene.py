@@ -19,7 +19,7 @@ from surfacechem.errors import InputError
 from surfacechem.laws.free_energy import Constant, ConstantInterfaceCapacity
 from surfacechem.laws.loading import Hold
 from surfacechem.mechanism import load_mechanism
-from surfacechem.mechanism.mixture import IdealMixture
+from surfacechem.mechanism.thermo import IdealMixture
 from surfacechem.model.assemble import assemble
 from surfacechem.runs.simulation import Simulation
 from surfacechem.scene import Interface, Scene

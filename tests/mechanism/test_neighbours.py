@@ -17,7 +17,7 @@ import surfacechem
 from surfacechem.documents import mechanisms
 from surfacechem.errors import InputError
 from surfacechem.laws.loading import Hold
-from surfacechem.mechanism.mixture import word
+from surfacechem.mechanism.thermo import word
 from surfacechem.reactor import InterfaceReactor, InterfaceStopped, ReactingGas, ReactorNet
 from surfacechem.runs import rerun
 

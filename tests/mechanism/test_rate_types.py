@@ -24,7 +24,7 @@ from surfacechem.laws.kinetics import (
 )
 from surfacechem.laws.loading import Hold, Ramp
 from surfacechem.mechanism import load_mechanism
-from surfacechem.mechanism.rate_types import LoadedReaction, names
+from surfacechem.mechanism.rates import LoadedReaction, names
 from surfacechem.model.assemble import assemble
 from surfacechem.quantities import AVOGADRO, BOLTZMANN
 from surfacechem.results.audit import audit
