@@ -14,7 +14,7 @@ import numpy as np
 
 from surfacechem.errors import InputError
 from surfacechem.reactor.coupling import HeatWall
-from surfacechem.reactor.interface import InterfaceReactor
+from surfacechem.reactor.interface_reactor import InterfaceReactor
 from surfacechem.reactor.watch import LATER_AHEAD, StepWatcher
 from surfacechem.solve.adapters.cantera_network import StateVectorReactor, last_step
 from surfacechem.solve.adapters.dense_step import Guards, first_crossing

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from surfacechem.reactor.interface import InterfaceReactor
+from surfacechem.reactor.interface_reactor import InterfaceReactor
 from surfacechem.solve.adapters.cantera_network import StateVectorReactor, last_step
 from surfacechem.solve.adapters.dense_step import DenseStep, Guards, first_crossing
 from surfacechem.solve.contract import Array, Guard

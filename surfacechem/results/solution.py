@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from surfacechem.results.accuracy import Accuracy
-from surfacechem.results.audit import Audit, Balances, audit, least_productions
+from surfacechem.results.audit import Audit, Balances, BalanceVerdict, audit, findings, least_productions, verdicts
 from surfacechem.results.dataset import (
     DATASET_NAMES,
     Results,
@@ -21,7 +21,6 @@ from surfacechem.results.dataset import (
     surface_columns,
 )
 from surfacechem.results.event_table import event_columns, event_findings, event_violations, event_waits
-from surfacechem.results.findings import BalanceVerdict, findings, verdicts
 from surfacechem.results.netcdf import Column, versions
 from surfacechem.results.refinement import refined
 from surfacechem.solve import solver

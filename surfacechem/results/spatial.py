@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 from surfacechem.compile.program import compile_function
 from surfacechem.model.system import Conductor, System
 from surfacechem.results.accuracy import CELLS_UNKNOWN, RTOL_PART, Accuracy, CellErrors
+from surfacechem.results.audit import MISSED_BY
 from surfacechem.results.error_estimates import EVENTS, state_differences
-from surfacechem.results.findings import MISSED_BY
 from surfacechem.scene import Body, Conduction, Scene, e_folds
 from surfacechem.solve.contract import Array
 from surfacechem.solve.run import Run, Trajectory

@@ -27,7 +27,7 @@ from surfacechem.model.automaton import INTERFACE
 from surfacechem.model.checks import conductance_warnings
 from surfacechem.model.system import Conductor, System
 from surfacechem.quantities import BOLTZMANN, GAS_CONSTANT, VARIABLES
-from surfacechem.results.findings import active_cautions
+from surfacechem.results.audit import active_cautions
 from surfacechem.scene import Scene
 from surfacechem.solve.contract import Array, Problem
 from surfacechem.solve.diagnose import time_scales

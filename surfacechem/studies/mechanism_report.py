@@ -34,7 +34,7 @@ from surfacechem.mechanism.source import Source
 from surfacechem.mechanism.thermo import IdealMixture, Species
 from surfacechem.model.components.pairs import Opposed, lengths, opposed
 from surfacechem.quantities import BOLTZMANN, GAS_CONSTANT
-from surfacechem.results.findings import ROUNDED_DEPARTURE, in_words
+from surfacechem.results.audit import ROUNDED_DEPARTURE, in_words
 from surfacechem.runs.listing import TEXT_WIDTH, columns, source
 from surfacechem.solve.contract import Array
 from surfacechem.tolerances import RUN_EPS

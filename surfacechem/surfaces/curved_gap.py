@@ -17,9 +17,8 @@ from numpy.typing import NDArray
 from surfacechem.contracts.terms import HeatTransfer, PairEnergy, Potential, Varying, optional, reads
 from surfacechem.errors import InputError
 from surfacechem.surfaces.inner_sums import gauss_rule, kernel, laws_by_extent, with_slope
-from surfacechem.surfaces.level_cuts import with_levels
 from surfacechem.surfaces.pairwise import ENDLESS_REACH, check_finite, length
-from surfacechem.surfaces.patches import Budget, Patches, Rules, integral, outer_patches
+from surfacechem.surfaces.patches import Budget, Patches, Rules, integral, outer_patches, with_levels
 from surfacechem.surfaces.projection import FIRST_ORDER, MOST_NEWTON_STEPS, Array, Projection, Surface, cross
 from surfacechem.surfaces.shapes import Plane
 from surfacechem.tolerances import FORMULA_EPS, NEGLIGIBLE, SQRT_EPS, SUM_RTOL, TINY

@@ -27,9 +27,8 @@ from surfacechem.surfaces.inner_sums import (
     kernel,
     laws_by_extent,
 )
-from surfacechem.surfaces.level_cuts import with_levels
 from surfacechem.surfaces.nearest_places import NearPlaces
-from surfacechem.surfaces.patches import Budget, Patches, integral, outer_patches
+from surfacechem.surfaces.patches import Budget, Patches, integral, outer_patches, with_levels
 from surfacechem.surfaces.projection import FIRST_ORDER, Array, Surface, cross
 from surfacechem.surfaces.shapes import Plane
 from surfacechem.tolerances import FORMULA_EPS, GAP_EPS, NEGLIGIBLE, SUM_RTOL, TINY, ULPS

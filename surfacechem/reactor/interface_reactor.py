@@ -16,9 +16,8 @@ from surfacechem.contracts.terms import Spec
 from surfacechem.contracts.units import parse
 from surfacechem.errors import InputError
 from surfacechem.format import Case
-from surfacechem.reactor.coupling import BodyPort, HeatWall, function_of, node_of, suffix_of
+from surfacechem.reactor.coupling import BodyPort, HeatWall, Receiver, function_of, node_of, refuse, suffix_of
 from surfacechem.reactor.embedded import EmbeddedScene, EndError, History
-from surfacechem.reactor.gas import Receiver, refuse
 from surfacechem.runs.simulation import Simulation
 from surfacechem.solve.adapters.cantera_network import LEDGER_UNIT, BackOffError, StateVectorReactor, contents
 from surfacechem.solve.contract import Array
