@@ -277,11 +277,11 @@ def laws(
     """List the laws by contract, show one, or check laws of your own."""
     from surfacechem import laws as every
     from surfacechem.documents import document
-    from surfacechem.format.own_laws import read
+    from surfacechem.format.cases import read_laws
     from surfacechem.runs.check import report
     from surfacechem.runs.listing import law_list, law_page
 
-    own = [*read(document.read(file), str(file))] if file else []
+    own = [*read_laws(document.read(file), str(file))] if file else []
     if check and not own:
         raise InputError("gives no file to check: add `--from my_laws.py`.", Place(path="--check"))
     if check:

@@ -20,10 +20,9 @@ import symengine
 from llvmlite import ir
 from numpy.typing import NDArray
 
-from surfacechem.compile import vectors
+from surfacechem.compile import PREPARATION, vectors
 from surfacechem.compile.cache import code_file
 from surfacechem.compile.objectcode import engine
-from surfacechem.compile.preparing import PREPARATION
 from surfacechem.compile.program import C_FUNCTION
 from surfacechem.compile.vectors import LANES, NUMBER, VECTOR, Code, function_body, gathered, object_code
 from surfacechem.documents.cache_folder import from_file, source_digest

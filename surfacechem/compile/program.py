@@ -19,8 +19,8 @@ import symengine
 from numpy.typing import ArrayLike, NDArray
 
 from surfacechem import expressions as calculus
+from surfacechem.compile import PREPARATION
 from surfacechem.compile.cache import code_file
-from surfacechem.compile.preparing import PREPARATION
 from surfacechem.documents.cache_folder import PACKAGE, from_file, source_digest
 from surfacechem.expressions import derivative, gradient
 

@@ -21,8 +21,8 @@ import symengine
 from llvmlite import binding, ir
 from numpy.typing import NDArray
 
+from surfacechem.compile import PREPARATION
 from surfacechem.compile.objectcode import engine
-from surfacechem.compile.preparing import PREPARATION
 
 LANES = 8
 """Cases of a vector: one of the widest vector registers, or two of those of most processors, which hide each other's

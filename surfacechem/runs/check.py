@@ -23,8 +23,8 @@ from surfacechem.contracts.terms import Friction, HeatTransfer, Law, Load, RateL
 from surfacechem.contracts.units import dimension
 from surfacechem.errors import InputError, suggestion
 from surfacechem.expressions import Expression
+from surfacechem.model.assemble import conductance_warnings
 from surfacechem.model.automaton import INTERFACE
-from surfacechem.model.checks import conductance_warnings
 from surfacechem.model.system import Conductor, System
 from surfacechem.quantities import BOLTZMANN, GAS_CONSTANT, VARIABLES
 from surfacechem.results.audit import active_cautions

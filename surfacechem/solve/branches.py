@@ -15,7 +15,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from surfacechem.compile.preparing import PREPARATION
+from surfacechem.compile import PREPARATION
 from surfacechem.solve.contract import Array
 from surfacechem.tolerances import CBRT_EPS, FEW_EPS, NEGLIGIBLE, NO_AMOUNT, PICOMETRE, TINY
 

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from surfacechem.compile.preparing import PREPARATION
+from surfacechem.compile import PREPARATION
 from surfacechem.compile.program import (
     Chain,
     ExternalInputs,
@@ -24,7 +24,7 @@ from surfacechem.compile.program import (
 )
 from surfacechem.contracts.terms import Spec
 from surfacechem.errors import PATHS, InputError, suggestion
-from surfacechem.model.checks import StartLimits
+from surfacechem.model.assemble import StartLimits
 from surfacechem.model.system import System
 from surfacechem.solve import AUTO, CALLING_PYTHON, EXPLICIT, method, solver
 from surfacechem.solve import segments as pieces

@@ -5,15 +5,14 @@ from types import SimpleNamespace
 import pytest
 
 import surfacechem
-from surfacechem.compile import preparing, program
-from surfacechem.compile.preparing import PREPARATION
+from surfacechem.compile import PREPARATION, program
 from surfacechem.format.cases import load_text
 from surfacechem.solve.run import Model
 
 
 def test_a_block_within_another_counts_once(monkeypatch):
     clock = iter([10.0, 17.0])
-    monkeypatch.setattr(preparing, "time", SimpleNamespace(perf_counter=lambda: next(clock)))
+    monkeypatch.setattr("surfacechem.compile.time", SimpleNamespace(perf_counter=lambda: next(clock)))
     before = PREPARATION.seconds
     with PREPARATION:
         with PREPARATION:

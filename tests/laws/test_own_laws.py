@@ -12,7 +12,7 @@ from surfacechem import laws
 from surfacechem.cli.main import app
 from surfacechem.contracts.terms import Friction
 from surfacechem.errors import InputError
-from surfacechem.format import own_laws
+from surfacechem.format import cases
 from surfacechem.results.netcdf import reading
 from surfacechem.runs import rerun
 from surfacechem.runs.check import problems
@@ -61,7 +61,7 @@ def folder(tmp_path, monkeypatch):
     (tmp_path / "slime.py").write_text(LAW)
     (tmp_path / "slime.yaml").write_text(CASE)
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(own_laws, "_run", {})
+    monkeypatch.setattr(cases, "_run", {})
     return tmp_path
 
 
@@ -75,10 +75,10 @@ def test_a_dataset_keeps_the_source_and_runs_it_only_where_that_is_allowed(folde
     path = surfacechem.run("slime.yaml").write("slime.nc")
     (folder / "slime.py").unlink()
     record = rerun.read(path)
-    monkeypatch.setattr(own_laws, "_run", {})
+    monkeypatch.setattr(cases, "_run", {})
     with pytest.raises(InputError, match=r"carries code of its own, slime.py, which runs only where you allow it"):
         rerun.run_again(record)
-    assert own_laws._run == {}
+    assert cases._run == {}
     assert rerun.differences(record, rerun.run_again(record, allow_code=True)) == []
     assert reading(path, lambda: True)
 
@@ -110,7 +110,7 @@ def test_a_file_that_gives_no_law_is_refused(folder, source, message):
 
 
 def test_a_law_is_registered(folder, monkeypatch):
-    (law,) = own_laws.read(LAW, "slime.py")
+    (law,) = cases.read_laws(LAW, "slime.py")
     text = CASE.replace("laws: [slime.py]", "")
     monkeypatch.setattr(laws, "_registered", {})
     with pytest.raises(InputError, match="no friction law 'slime'"):
@@ -191,7 +191,7 @@ def test_what_every_law_keeps_is_tried_on_one_of_ones_own(folder):
 )
 def test_a_law_that_is_wrong_is_told_how(old, new, message):
     source = LAW.replace(old, new).replace(">>> Slime(eta=2.0).traction(v=3.0)\n    6.0", ">>> 1\n    1")
-    (law,) = own_laws.read(source, "slime.py")
+    (law,) = cases.read_laws(source, "slime.py")
     assert message in " ".join(problems(law))
 
 

@@ -34,8 +34,7 @@ from surfacechem.laws.heat_transfer import (
 )
 from surfacechem.laws.kinetics import Relaxation
 from surfacechem.laws.loading import Hold, Ramp, Table
-from surfacechem.model.assemble import assemble
-from surfacechem.model.checks import conductance_warnings
+from surfacechem.model.assemble import assemble, conductance_warnings
 from surfacechem.quantities import STEFAN_BOLTZMANN
 from surfacechem.results.audit import audit
 from surfacechem.results.solution import Solution
