@@ -16,7 +16,7 @@ from surfacechem.contracts.terms import Friction, Law, Load, RateLaw, reads
 from surfacechem.errors import InputError
 from surfacechem.expressions import derivative
 from surfacechem.laws import FAMILIES, find, laws
-from surfacechem.runs.lawcheck import READABLE
+from surfacechem.runs.check import READABLE
 
 EVERY = [law for contract in FAMILIES for law in laws(contract).values()]
 OPTIONS = law_values.OPTIONS | law_values.GRID
