@@ -205,8 +205,7 @@ def refined(trajectory: Trajectory) -> Trajectory:
         for _ in range(REFINEMENT_ROUNDS):
             if not (bends := _refinements(whole, resolution)):
                 break
-            more = States(*map(np.concatenate, zip(whole.written, *bends, strict=True)))
-            whole = trajectory.at(more.picked(np.argsort(more.t, kind="stable")))
+            whole = whole.with_more(bends)
             resolution.update(whole)
         kept = resolution.needed(whole, moments)
         kept[-1] = first == blocks[-1]

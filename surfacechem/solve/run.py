@@ -199,6 +199,16 @@ class Trajectory:
         vars(found).update({name: known[name][rows] for name in ("_inputs", "outputs", "rates") if name in known})
         return found
 
+    def with_more(self, rows: Sequence[States]) -> Trajectory:
+        """Return the trajectory with further outputs, in order of time; those it has are not evaluated again."""
+        more = self.at(States(*map(np.concatenate, zip(*rows, strict=True))))
+        every = States(*map(np.concatenate, zip(self.written, *rows, strict=True)))
+        order = np.argsort(every.t, kind="stable")
+        found = self.at(every.picked(order))
+        vars(found)["_inputs"] = np.concatenate((self._inputs, more._inputs))[order]
+        vars(found)["outputs"] = np.concatenate((self.outputs, more.outputs))[order]
+        return found
+
     def _blocks(self) -> Iterator[Trajectory]:
         """Yield the trajectory, in blocks of outputs if these are many."""
         count = len(self.result.times)
