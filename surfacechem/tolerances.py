@@ -180,6 +180,11 @@ BOUND_EPS = 1e-15
 the nearest that a fraction can be told from one. A closer equilibrium is at the bound.
 """
 
+RELATIVE_INERTIA = 1e-14
+"""Part of the reference velocity of creeping friction below which its drive has a constant inertia: that of velocities
+a thousand times slower is right to DEFAULT_RTOL, that of the reference to NEWTON_EPS, rounded down.
+"""
+
 LEAST_CREEP = 1e-25
 """Least velocity [m/s] that counts in friction with a state: creep at rest is tens of decades slower than sliding."""
 

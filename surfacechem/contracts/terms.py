@@ -394,6 +394,8 @@ class Friction(Law):
     """Inverse of :attr:`drive` [m/s]."""
     driven: ClassVar[Callable[..., Expression]]
     """Traction at a value of :attr:`drive` [Pa]."""
+    reference_velocity: ClassVar[str] = ""
+    """Parameter [m/s] relative to which creep is slow, of a law with :attr:`velocity`."""
     transverse: ClassVar[Callable[..., Expression] | None] = None
     """Traction across v, along the interface [Pa]; None for an isotropic law."""
     transverse_limit: ClassVar[Callable[..., Expression]]

@@ -180,6 +180,7 @@ class RateAndState(UnderPressure, Friction):
 
     nonnegative = ("p",)
     internal: ClassVar[Mapping[str, str]] = {"ln_theta": "theta"}
+    reference_velocity = "v_0"
 
     mu_0: float = parameter("1", "steady friction coefficient at v_0", above=0)
     a: float = parameter("1", "direct effect of velocity", above=0)

@@ -190,3 +190,18 @@ def test_an_extreme_direct_effect_does_not_overflow():
     assert law.traction(p=1e6, v=1e-6, ln_theta=np.log(10.0)) == pytest.approx(6e5, rel=1e-12)
     assert law.traction(p=1e6, v=-1e-6, ln_theta=np.log(10.0)) == pytest.approx(-6e5, rel=1e-12)
     assert law.traction(p=1e6, v=0.0, ln_theta=np.log(10.0)) == 0.0
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_creep_with_a_mass_is_the_same_in_all_units(law):
+    """A heavy block that turns round: lengths, or times, may be smaller or larger by twelve decades."""
+    found = []
+    for length, time in ((1.0, 1.0), (1e-12, 1.0), (1.0, 1e12)):
+        parameters = STEADIED | {"L": STEADIED["L"] * length, "v_0": STEADIED["v_0"] * length / time}
+        load = {"w_t": Harmonic(amplitude=5e-3 * length, frequency=0.05 / time)}
+        mount = Mounting(k=K / length, m=1e7 * time**2 / length)
+        trajectory = solved(scene(law, mount, load, parameters, {"theta": time}), 20.0 * time)
+        found.append((trajectory["u_t"] / length, trajectory["drive"]))
+    for u, drive in found[1:]:
+        np.testing.assert_allclose(u, found[0][0], rtol=0, atol=1e-10 * np.max(np.abs(u)))
+        np.testing.assert_allclose(drive, found[0][1], rtol=0, atol=1e-8)

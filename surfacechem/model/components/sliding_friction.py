@@ -29,7 +29,7 @@ from surfacechem.model.components.formulation import displacement, evolve, in_pa
 from surfacechem.model.components.mounting import ACROSS, ALONG
 from surfacechem.model.system import Given, Margin, State
 from surfacechem.quantities import VARIABLES, Quantity
-from surfacechem.tolerances import PICOMETRE, TINY
+from surfacechem.tolerances import RELATIVE_INERTIA, TINY
 
 
 def laws(build: Build) -> Iterator[Power | State | Margin]:
@@ -110,10 +110,6 @@ DRIVE = "drive"
 DRIVE_SCALE = 1e6
 """Scale of the drive of a mass: its error counts relative to the direct effect, not to its value."""
 
-LEAST_INERTIAL = PICOMETRE / 1e8
-"""Velocity [m/s] below which a mass only delays creep, a picometre in three years: there the drive responds equally
-fast at any velocity, and the row stays regular."""
-
 
 def evolve_drive(build: Build, *, inertial: bool) -> Expression | None:
     """Add the drive as the state for the slip velocity, if a law has a velocity as function of its traction; else None.
@@ -173,5 +169,12 @@ def stands_for_velocity(build: Build) -> bool:
 
 
 def inertia(build: Build, m: Expression) -> Expression:
-    """Return mass times the rate of the velocity [Pa], plus a small inertia of the drive that keeps it regular."""
-    return m * build.total_derivative(symengine.Symbol("v") + LEAST_INERTIAL * symengine.Symbol(DRIVE))
+    """Return mass times the rate of the velocity [Pa], plus a small inertia of the drive that keeps it regular.
+
+    A mass only delays creep that is so slow: there the drive responds equally fast at any velocity.
+    """
+    law = _law(build, inertial=True)
+    assert law is not None
+    path = f"{build.bound(law).path}.{law.reference_velocity}"
+    least = RELATIVE_INERTIA * next(item.symbol for item in build.parameters.items if item.path == path)
+    return m * build.total_derivative(symengine.Symbol("v") + least * symengine.Symbol(DRIVE))
