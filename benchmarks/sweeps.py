@@ -2,7 +2,7 @@
 
 Times are seconds of processors, so that what else a machine does counts as little as can be; each figure is that of a
 process of its own. ``python benchmarks/sweeps.py [RUNS]``; peers that are not installed are left out. What is "bare"
-keeps no balances.
+keeps no balances; "alone" means `solver: radau`, by which the stiff runs of `dna-adhesive` are solved one at a time.
 """
 
 from __future__ import annotations
@@ -20,6 +20,8 @@ SWEPT = {
     "exothermic": (K_0, 1.0, 300.0, ENDS),
     "exothermic, bare": (K_0, 1.0, 300.0, {**ENDS, "balances": "none"}),
     "shared-load-rupture": ("loading.t_n", 600.0, 1000.0, {"last": ["phi"]}),
+    "dna-adhesive": ("heat.conductance.h", 1900.0, 2300.0, {"last": ["T_c", "theta_bond_s"]}),
+    "dna-adhesive, alone": ("heat.conductance.h", 1900.0, 2300.0, {"last": ["T_c", "theta_bond_s"]}),
     "stick-slip": ("interface.friction.coulomb.mu_s", 0.5, 0.7, {"last": ["u_t"], "events": "all"}),
     "debonding": ("interface.limits.tensile-strength.t_max", 2e7, 1e9, {"last": ["T"], "events": "all"}),
 }
@@ -39,7 +41,8 @@ def stored(case: str, runs: int) -> dict[str, float]:
 
     path, low, high, keep = SWEPT[case]
     section = {"over": {path: {"from": low, "to": high, "points": runs}}, "keep": keep}
-    simulation = surfacechem.load(case.partition(",")[0], {"sweep": section})
+    changes = {"sweep": section, **({"run.solver": "radau"} if "alone" in case else {})}
+    simulation = surfacechem.load(case.partition(",")[0], changes)
     inside = [0.0]
 
     def timed(run):
@@ -227,6 +230,8 @@ def main(runs: int) -> None:
         ("exothermic", runs),
         ("exothermic, bare", runs),
         ("shared-load-rupture", runs // 10),
+        ("dna-adhesive", runs // 100),
+        ("dna-adhesive, alone", runs // 100),
         ("stick-slip", runs // 100),
         ("debonding", runs // 100),
     ):

@@ -106,6 +106,10 @@ class Lanes:
     rates: "LaneFunction"
     margins: "LaneFunction"
     constants: "LaneFunction"
+    states: "LaneFunction | None" = None
+    """For implicit steps: rates of the states alone."""
+    slopes: "LaneFunction | None" = None
+    """For implicit steps: derivatives of these rates by the states, row-major."""
 
 
 @dataclass(frozen=True)
@@ -132,6 +136,11 @@ _ONE_THREAD = threading.RLock()
 
 MOST_RATE_STATES = 50
 """Number of states of a network above which a second function, of its rates, costs more time than any run gains."""
+
+MOST_LANE_STATES = 29
+"""Number of states up to which implicit steps of eight cases at once take less than half the time of those of one,
+which skip zeros of matrices from 30 states on.
+"""
 
 
 @dataclass(frozen=True)
@@ -161,8 +170,8 @@ class Program:
     """Group of each quadrature, 0 to 2, whose largest value scales their errors; -1 if its error is not controlled."""
     solved: Callable[[], Function | None] = lambda: None
     """Compile the rates in explicit form; None if the equations cannot be solved for them one by one."""
-    laned: Callable[[], Lanes | None] = lambda: None
-    """Compile the code for eight cases at once; None if that is not possible."""
+    laned: Callable[[bool], Lanes | None] = lambda _: None
+    """Compile the code for eight cases at once, True for implicit steps; None if that is not possible."""
     margin_inputs: frozenset[int] = frozenset()
     """Positions of the inputs that margins read."""
 
@@ -204,17 +213,21 @@ class Program:
     def lanes(self) -> Lanes | None:
         """The code for eight cases at once, compiled on first use, also by one thread only."""
         with _ONE_THREAD:
-            return vars(self).get("lanes") or self.laned()
+            return vars(self).get("lanes") or self.laned(False)
 
     @cached_property
-    def lane_tables(self) -> tuple[NDArray[Any], ...]:
-        """Tables of a program for steps of eight cases at once: its sizes (states, accounts, margins, inputs with
-        constants, integrated columns); otherwise as the other tables, with a row for the constants.
+    def implicit_lanes(self) -> Lanes | None:
+        """The code for implicit steps of eight cases at once, compiled on first use, also by one thread only."""
+        with _ONE_THREAD:
+            return vars(self).get("implicit_lanes") or self.laned(True)
+
+    def lane_tables(self, lanes: Lanes) -> tuple[NDArray[Any], ...]:
+        """Return the tables of a program for steps of eight cases at once: its sizes (states, accounts, margins, inputs
+        with constants, integrated columns); otherwise as the other tables, with a row for the constants.
         """
-        assert self.lanes is not None
-        n_inputs = self.n_inputs + self.lanes.constants.n_out
+        n_inputs = self.n_inputs + lanes.constants.n_out
         sizes = self.n, self.n_ledger, self.n_margins, n_inputs, self.n + self.n_ledger
-        functions = None, None, None, self.lanes.margins, self.lanes.rates, self.lanes.constants
+        functions = lanes.states, lanes.slopes, None, lanes.margins, lanes.rates, lanes.constants
         code = [(f.address if f else 0, 0) for f in functions]
         return np.array(sizes, np.int64), np.array(code, np.int64), *self.tables[2:]
 
@@ -615,23 +628,30 @@ def _compiled_lanes(
     chains: Sequence[Chain],
     others: Sequence[Sequence[Any]],
     named: Named,
+    implicit: bool,
 ) -> Lanes | None:
-    """Return the code for eight cases at once; None if the equations do not give their rates explicitly."""
+    """Return the code for eight cases at once; None if the equations do not give their rates explicitly, or are too
+    many for implicit steps.
+    """
     from surfacechem.compile.vectors import compile_lanes, constants_apart
 
-    rates = None if chains else solved_rates(expanded(named, residual), derivatives)
+    many = implicit and len(derivatives) > MOST_LANE_STATES
+    rates = None if chains or many else solved_rates(expanded(named, residual), derivatives)
     if not rates:
         return None
     known = list(zip(derivatives, rates, strict=True))
     others = [expanded(named, rows) for rows in others]
     ledger, margins = (expanded(known, rows) for rows in others)
-    constants, formed = constants_apart([*rates, *ledger, *margins], inputs[1 + 2 * len(rates) :])
-    columns, given = len(rates) + len(ledger), [*inputs, *constants]
+    states, zero = inputs[1 : 1 + len(rates)], symengine.Integer(0)
+    slopes = [row.get(x, zero) for row in jacobian(rates, states)[0] for x in states] if implicit else []
+    constants, formed = constants_apart([*rates, *ledger, *margins, *slopes], inputs[1 + 2 * len(rates) :])
+    columns, end, given = len(rates) + len(ledger), len(formed) - len(slopes), [*inputs, *constants]
+    parts = {"rates": formed[:columns], "margins": formed[columns:end]}
+    parts |= {"states": formed[: len(rates)], "slopes": formed[end:]} if implicit else {}
     try:
         return Lanes(
-            compile_lanes(given, formed[:columns]),
-            compile_lanes(given, formed[columns:]),
-            compile_lanes(inputs, list(constants.values())),
+            constants=compile_lanes(inputs, list(constants.values())),
+            **{name: compile_lanes(given, part) for name, part in parts.items()},
         )
     except NotImplementedError:  # a function without vector code
         return None

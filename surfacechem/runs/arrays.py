@@ -29,7 +29,7 @@ from surfacechem.solve.lanes.lane_batch import solve_batch
 from surfacechem.solve.radau.solver import Room, consistent, put_rates, solve_arrays
 from surfacechem.solve.radau.stepper import ARCS, END, EVENTS, FIRST_COUNTER, JUMPS, OUTPUTS, RECORDS
 from surfacechem.solve.run import Discontinuities, Model, Run
-from surfacechem.tolerances import EPS, GUARD_EPS, MICROMETRE, PICOMETRE
+from surfacechem.tolerances import EPS, GUARD_EPS, MICROMETRE, MIN_RTOL, PICOMETRE
 
 MOST_ROWS = 4096, 1024
 """Largest numbers of steps and events of a run for which memory is allocated; a run with more is solved by itself."""
@@ -119,10 +119,16 @@ class ArrayRuns:
     jumps = False
     """True if runs go on after their jumps."""
 
-    def __init__(self, model: Model, plan: Plan, run: Run, changes: Mapping[str, float], keep: Keep) -> None:
+    def __init__(
+        self, model: Model, plan: Plan, run: Run, changes: Mapping[str, float], keep: Keep, automatic: bool
+    ) -> None:
+        """Prepare the runs; ``automatic`` is True if their solver was chosen for them, not named."""
         self.model, self.plan, self.run, self.keep = model, plan, run, keep
         self.values = model.values(changes)
-        self.problem = replace(self._first_problem(changes), explicit=run.solver == EXPLICIT)
+        # A solver that is named gives the results of single runs, to the last bit. Of the reasons for implicit steps
+        # those that are not given by the equations alone want single runs, too.
+        stiff = automatic and run.solver == IMPLICIT and run.rtol > MIN_RTOL and not model.system.has_moving_gap
+        self.problem = replace(self._first_problem(changes), explicit=run.solver == EXPLICIT, implicit_lanes=stiff)
         system = model.system
         self.n = len(system.states)
         paths = [parameter.path for parameter in system.parameters]

@@ -71,26 +71,36 @@ class ChunkRuns:
         case = simulation.case
         # If the case names no solver, the one that suits the scene.
         asked = case.run if "run.solver" in case.places else replace(case.run, solver=AUTO)
+        automatic = asked.solver == AUTO
         chosen = run or self.model.chosen(asked, self.model.values(changes))
         self.run = sweeps.following(self.model, plan, chosen, changes) if keep.series and run is None else chosen
         self.one_by_one = RunByRun(self.model, keep, chosen.steady)
-        arrays = ArrayRuns(self.model, plan, self.run, changes, keep)
+        arrays = ArrayRuns(self.model, plan, self.run, changes, keep, automatic)
         is_vector = is_array(self.model, plan, self.run, arrays.problem)
         self.solvers = [arrays] if is_vector and cannot_jump(self.model, arrays.problem) else []
         if is_vector and self.model.system.edges:
-            self.solvers.append(JumpingRuns(self.model, plan, self.run, changes, keep))
+            self.solvers.append(JumpingRuns(self.model, plan, self.run, changes, keep, automatic))
         """Ways to compute runs as arrays, in the order in which they are tried; the rest is solved run by run."""
         self.arrays = arrays if self.solvers else None
 
+    @cached_property
+    def lanes(self) -> lane_batch.Method | None:
+        """The method by which eight runs are stepped at once; None if no runs are."""
+        return next((lane_batch.method_of(solver.problem) for solver in self.solvers if not solver.jumps), None)
+
     @property
-    def explicit(self) -> bool:
-        """True if runs take explicit steps and do not jump."""
-        return any(solver.problem.explicit and not solver.jumps for solver in self.solvers)
+    def steps(self) -> str:
+        """How the runs are stepped, in words."""
+        if self.lanes is not None:
+            return f"eight runs at once, {self.lanes.words}"
+        if self.arrays is None:
+            return f"one run after another, each prepared in Python, by {self.run.solver}"
+        return f"one run after another in the compiled loop, by {self.run.solver}"
 
     @property
     def at_once(self) -> int:
         """Largest number of runs in a chunk."""
-        if self.explicit:
+        if any(solver.problem.explicit and not solver.jumps for solver in self.solvers):
             return EXPLICIT_RUNS
         if all(solver.jumps for solver in self.solvers):
             return JUMPING_RUNS if self.solvers else SLOW_RUNS
@@ -99,7 +109,7 @@ class ChunkRuns:
     @property
     def waits(self) -> bool:
         """True if the loop that steps eight runs at once has to be compiled before the first of them."""
-        return self.explicit and self.model.program.lanes is not None and not lane_batch.LOOP.is_compiled
+        return self.lanes is not None and not self.lanes.loop.is_compiled
 
     @cached_property
     def piece(self) -> int:
@@ -289,6 +299,12 @@ def failed_runs(path: Path, status: str) -> Plan:
     if not len(found):
         raise InputError(f"no run of it is {status}.", Place(str(path)))
     return plan.picked(found)
+
+
+def steps_of(simulation: Simulation) -> str:
+    """Return in words how the runs of the sweep of a case are stepped, if they are written to a store."""
+    plan, section = simulation.plan(), simulation.case.sweep or SweepSection()
+    return ChunkRuns(simulation, plan, keep_of(section.keep, sweeps.prepared(simulation.system, plan)), {}).steps
 
 
 def stream(

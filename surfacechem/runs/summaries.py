@@ -240,8 +240,9 @@ def check_summary(
     groups: Sequence[Group],
     warnings: Sequence[str],
     choices: Sequence[Sequence[str]] = (),
+    sweep: str = "",
 ) -> Sheet:
-    """Describe a scene in words, with its dimensionless numbers and warnings."""
+    """Describe a scene in words, with its dimensionless numbers and warnings; ``sweep`` says how runs are stepped."""
     from surfacechem.runs.check import laws_of
 
     sections: dict[str, Sequence[Sequence[str]]] = {
@@ -260,6 +261,7 @@ def check_summary(
     }
     facts = [("regime", f"{system.regime}: {REGIMES.get(system.regime, '')}"), ("run", _plan(system, run))]
     facts += [("compiled", _compiled(system, run))] if run is not None else []
+    facts += [("sweep", sweep)] if sweep else []
     return Sheet(title or "untitled", facts, sections)
 
 

@@ -201,6 +201,8 @@ class Problem:
     """True if another problem continues this one: a kink at its very end then counts, as between segments."""
     explicit: bool = False
     """True if steps may be explicit where the equations give their rates and are not stiff."""
+    implicit_lanes: bool = False
+    """True if a batch may take implicit steps of several runs at once."""
     edges: EdgeTables = NO_EDGES
     """Edges that the method itself may carry out."""
 

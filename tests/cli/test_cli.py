@@ -222,6 +222,12 @@ class TestCheck:
     def test_what_is_left_to_python(self, call, arguments, told):
         assert re.search(rf"^  compiled +.*{told}", call("check", *arguments).stdout, re.MULTILINE)
 
+    def test_how_a_sweep_steps_is_told(self, call):
+        swept = ["sweep.over={initial.T_2: [300 K, 310 K]}", "sweep.keep={last: [T_c]}"]
+        text = call("check", "dna-adhesive", *(part for change in swept for part in ("--set", change))).stdout
+        assert re.search(r"^  sweep +eight runs at once, by Radau IIA of order 9$", text, re.MULTILINE)
+        assert "eight runs" not in call("check", "dna-adhesive").stdout
+
     def test_algebraic_rows_are_named(self, call, tmp_path):
         heat = "".join(f"  - conductance: {{between: [interface, {b}], h: 10 W/m^2/K}}\n" for b in ("lower", "upper"))
         bodies = BONDING.partition("interface:")[0].replace("T, C", "T_1, C", 1).replace("T, C", "T_2, C", 1)

@@ -108,20 +108,28 @@ def test_rates_and_guards_of_a_case_are_those_of_its_scalar_code(member):
     found = program.lanes.rates(inputs)
     for ours, theirs in zip(np.split(found, [program.n]), (part.T for part in wanted), strict=False):
         assert ours == pytest.approx(theirs, rel=1e-9, abs=1e-13 * np.abs(theirs).max(initial=1e-300), nan_ok=True)
+    code = program.implicit_lanes
+    given = np.concatenate([rows.T, code.constants(rows.T)])
+    stiffness, mass = program.derivatives(rows)
+    slopes = np.linalg.solve(mass, -stiffness)
+    assert code.states(given) == pytest.approx(found[: program.n], rel=1e-12)
+    assert code.slopes(given).T.reshape(slopes.shape) == pytest.approx(
+        slopes, rel=1e-6, abs=1e-9 * np.abs(slopes).max()
+    )
     if program.margins is not None:
         guards = program.margins(rows).T
         assert program.lanes.margins(inputs) == pytest.approx(guards, rel=1e-9, abs=1e-12 * np.abs(guards).max())
 
 
-@pytest.mark.parametrize(("code", "maker"), [("lanes", "laned"), ("rates", "solved")])
+@pytest.mark.parametrize(("code", "maker"), [("lanes", "laned"), ("implicit_lanes", "laned"), ("rates", "solved")])
 def test_threads_share_the_code_of_a_program(code, maker):
     """Tables hold its address: machine code that another thread has made anew would leave them without any."""
     model = case_runs.load("exothermic").model
     made = []
 
-    def slowly():
+    def slowly(*how):
         made.append(time.sleep(0.05))
-        return getattr(model.program, maker)()
+        return getattr(model.program, maker)(*how)
 
     program = replace(model.program, **{maker: slowly})
     with ThreadPoolExecutor(2) as pool:

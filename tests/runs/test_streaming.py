@@ -21,7 +21,7 @@ from surfacechem.cli.main import app
 from surfacechem.errors import InputError, OutputError
 from surfacechem.results import store
 from surfacechem.results.store import Layout, StoredArray, opened
-from surfacechem.runs import checking, streaming
+from surfacechem.runs import checking, keeping, streaming
 from surfacechem.runs.checking import check
 from surfacechem.runs.keeping import STATUSES, Keep, extremes
 from surfacechem.runs.summaries import store_summary
@@ -234,7 +234,7 @@ def test_threads_pieces_and_parts_change_no_byte(whole, tmp_path, monkeypatch):
 
 SCRIPT = """
 import sys, time
-from surfacechem.runs import checking, streaming
+from surfacechem.runs import checking, keeping, streaming
 from surfacechem.runs.checking import check
 streaming.EXPLICIT_RUNS = 16
 import surfacechem
@@ -390,6 +390,33 @@ def test_chunks_are_as_long_as_their_runs_are_brief(name, path, size, monkeypatc
     simulation = surfacechem.load(name)
     chunks = streaming.ChunkRuns(simulation, simulation.plan({path: [300.0]}), Keep(), {})
     assert chunks.at_once == 7
+
+
+@pytest.mark.parametrize(
+    ("name", "solver", "told"),
+    [
+        ("exothermic", None, "eight runs at once, by explicit steps of order 8"),
+        ("dna-adhesive", None, "eight runs at once, by Radau IIA of order 9"),
+        ("dna-adhesive", "radau", "one run after another in the compiled loop, by radau"),
+        ("sticky-sphere", None, "one run after another, each prepared in Python, by radau"),
+    ],
+)
+def test_the_steps_of_runs_follow_from_stiffness(name, solver, told):
+    path = {"dna-adhesive": "initial.T_2", "sticky-sphere": "mechanics.normal.k"}.get(name, "initial.T")
+    section = {"over": {path: [300.0]}, "keep": {"last": "all"}}
+    simulation = surfacechem.load(name, {"sweep": section, **({"run.solver": solver} if solver else {})})
+    assert streaming.steps_of(simulation) == told
+
+
+def test_stiff_runs_at_once_are_those_of_one_at_a_time():
+    path, found = "heat.conductance.h", []
+    section = {"over": {path: {"from": 1900.0, "to": 2300.0, "points": 20}}, "keep": {"last": ["T_1", "theta_bond_s"]}}
+    for solver in ({}, {"run.solver": "radau"}):
+        simulation = surfacechem.load("dna-adhesive", {"sweep": section, **solver})
+        keep = keeping.keep_of(simulation.case.sweep.keep, simulation.system)
+        found.append(streaming.ChunkRuns(simulation, simulation.plan(), keep, {}).columns(np.arange(20)))
+    for name in ("T_1_last", "theta_bond_s_last", "energy_error"):
+        assert found[0][name] == pytest.approx(found[1][name], rel=1e-10, abs=1e-10)
 
 
 def test_chunks_of_a_grid_are_blocks_of_it():

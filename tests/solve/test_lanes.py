@@ -1,5 +1,6 @@
 """Steps of eight runs at once: the results of one run at a time, whatever company a run has."""
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -8,7 +9,7 @@ import narrow_scenes
 import numpy as np
 import pytest
 from sampling import every
-from solver_problems import exothermic_problem
+from solver_problems import exothermic_problem, problem, robertson_sums
 
 import surfacechem
 from surfacechem.solve.lanes import lane_batch
@@ -24,18 +25,29 @@ CASES = (
     ("closing-film", 0), ("epoxy-cure-adiabatic", 0), ("rate-and-state-velocity-steps", 0),
     ("press-conductance", 0), ("squeeze-film", 0),
     ("shared-load-rupture", 0), ("coulomb-stop", 0), ("one-sided-contact", 0), ("snap-in", 0), ("stick-slip", 0),
-    ("three-temperatures", RUNS), ("slow-passage", RUNS), ("cohesive-cycles", None), ("press-hold-pull", RUNS),
+    ("three-temperatures", RUNS), ("slow-passage", 0), ("cohesive-cycles", None), ("press-hold-pull", RUNS),
 )  # fmt: skip
 """Cases of smooth runs, breakpoints, kinks, rupture and stops, and how many runs are left to other steps: stiff ones,
 and those with guards that start at zero; None where roundoff decides whether a guard touches zero."""
+IMPLICIT_CASES = (
+    ("dna-adhesive", 0), ("three-temperatures", 0), ("l-selectin-tether", 0), ("vinculin-catch-bond", 0),
+    ("exothermic", 0), ("endothermic-kappa-0p99", 0), ("force-spectroscopy", 0), ("friction-ignited-bonding", 0),
+    ("closing-film", 0), ("squeeze-film", 0), ("press-conductance", 0), ("rate-and-state-velocity-steps", 0),
+    ("coulomb-stop", 0), ("one-sided-contact", 0), ("slow-passage", 0), ("stick-slip", 0), ("sticky-sphere", 0),
+    ("van-der-waals-sphere", RUNS),
+)  # fmt: skip
+"""The same for implicit steps: the first is stiff, coverages start at zero, and no step is short enough for the last.
+"""
+METHODS = [*((*case, False) for case in CASES), *((*case, True) for case in IMPLICIT_CASES)]
 LAWS = ".bonding", "potential", "friction"
 
 
-def arrays_of(simulation, runs=RUNS):
-    """A problem, and columns of runs whose laws differ by a thousandth."""
+def arrays_of(simulation, runs=RUNS, implicit=False):
+    """A problem for steps in lanes, and columns of runs whose laws differ by a thousandth."""
     model = simulation.model
     run = replace(simulation.case.run, solver="dop853", rtol=1e-9)
-    problem = replace(model.problem(run, model.values({})), explicit=True, line_error=0.0, record_steps=True)
+    problem = replace(model.problem(run, model.values({})), line_error=0.0, record_steps=True)
+    problem = replace(problem, explicit=not implicit, implicit_lanes=implicit)
     system, program = simulation.model.system, problem.program
     held = {item.symbol for item in (*system.modes, *system.registers)}
     free = [each.symbol not in held and any(part in each.path for part in LAWS) for each in system.parameters]
@@ -76,9 +88,9 @@ def assert_alike(found, wanted, n, tolerance):
         assert found.outputs[i, shown, :n] == pytest.approx(wanted.outputs[i, shown, :n], rel=tolerance, abs=tolerance)
 
 
-@pytest.mark.parametrize(("name", "others"), CASES)
-def test_runs_are_those_of_one_at_a_time(name, others, left):
-    problem, columns = arrays_of(case_runs.load(name))
+@pytest.mark.parametrize(("name", "others", "implicit"), METHODS)
+def test_runs_are_those_of_one_at_a_time(name, others, implicit, left):
+    problem, columns = arrays_of(case_runs.load(name), implicit=implicit)
     found = lane_batch.solve_batch(problem, *columns)
     assert others is None or left[0] == others
     wanted = solve_arrays(problem, *columns)
@@ -125,9 +137,38 @@ def test_runs_without_guards(left):
     assert_alike(found, solve_arrays(problem, *columns), 2, 1e-7)
 
 
-@pytest.mark.parametrize("name", ["exothermic", "shared-load-rupture", "closing-film", "three-temperatures"])
-def test_company_order_and_what_is_left_in_the_memory_change_nothing(name, monkeypatch):
-    problem, (y0, table, *others) = arrays_of(case_runs.load(name), 21)
+@pytest.mark.parametrize("rtol", [1e-4, 1e-6, 1e-9, 1e-11])
+def test_robertson(rtol, left):
+    """To 1e11 s at once, beside runs from other starts; its concentrations fall by fourteen decades."""
+    shared = problem(robertson_sums(), [1.0, 0.0, 0.0], [0.0, 1e11], rtol, atol=rtol * 1e-10, implicit_lanes=True)
+    y0 = np.array([[1.0, 0.0, 0.0], [0.5, 0.0, 0.5], [2.0, 0.0, 0.0]] * 4)
+    columns = y0, np.zeros((len(y0), 1, 0)), np.array([shared.spacing]), np.zeros((1, 0)), shared.segments[None]
+    found = lane_batch.solve_batch(shared, *columns, np.zeros((1, 0)))
+    assert left[0] == 0
+    exact = np.array([2.083340149701255e-08, 8.333360770334713e-14])  # Hairer & Wanner II, IV.10
+    assert np.max(np.abs(found.ends[::3, 1:3] / exact - 1)) < 10 * rtol
+
+
+def test_threads_change_nothing():
+    problem, (y0, table, *others) = arrays_of(case_runs.load("dna-adhesive"), 24, implicit=True)
+    whole = lane_batch.solve_batch(problem, y0, table, *others).ends
+    with ThreadPoolExecutor(3) as pool:
+        parts = pool.map(
+            lambda some: lane_batch.solve_batch(problem, y0[some], table[some], *others).ends,
+            np.array_split(np.arange(24), 5),
+        )
+        assert np.array_equal(np.concatenate(list(parts)), whole)
+
+
+@pytest.mark.parametrize(
+    ("name", "implicit"),
+    [
+        *((name, False) for name in ("exothermic", "shared-load-rupture", "closing-film", "three-temperatures")),
+        *((name, True) for name in ("dna-adhesive", "l-selectin-tether", "closing-film", "van-der-waals-sphere")),
+    ],
+)
+def test_company_order_and_what_is_left_in_the_memory_change_nothing(name, implicit, monkeypatch):
+    problem, (y0, table, *others) = arrays_of(case_runs.load(name), 21, implicit)
     whole = lane_batch.solve_batch(problem, y0, table, *others)
     used = SimpleNamespace(**{**vars(np), "zeros": lambda words, kind: np.full(words, -1, kind)})
     for module in (stepper, lane_batch):
@@ -141,13 +182,14 @@ def test_company_order_and_what_is_left_in_the_memory_change_nothing(name, monke
             assert np.array_equal(part.outputs[i, :reached], whole.outputs[some[i], :reached])
 
 
+@pytest.mark.parametrize("implicit", [False, True])
 @pytest.mark.parametrize("seed", every(4, range(80)))
-def test_what_is_narrow_is_seen(seed, left):
+def test_what_is_narrow_is_seen(seed, implicit, left):
     scene = narrow_scenes.scene(seed)
     simulation = surfacechem.load(scene.text)
     if simulation.model.program.lanes is None or simulation.model.jumper is not None:
         pytest.skip("not for these steps")
-    problem, columns = arrays_of(simulation, 1)
+    problem, columns = arrays_of(simulation, 1, implicit)
     y = lane_batch.solve_batch(problem, *columns).ends[0, 1 : 1 + problem.program.n]
     wanted = solve_arrays(problem, *columns).ends[0, 1 : 1 + problem.program.n]
     assert y == pytest.approx(wanted, rel=1e-6, abs=1e-9)

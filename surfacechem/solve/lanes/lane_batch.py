@@ -1,5 +1,7 @@
 """Batches of runs of one model: eight at once in lanes, and one at a time where lanes do not apply."""
 
+from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -8,22 +10,23 @@ import numpy as np
 
 from surfacechem.compile.vectors import LANES
 from surfacechem.solve.contract import Array, Problem, Status
-from surfacechem.solve.lanes.layout import MEMORY, SIZES
+from surfacechem.solve.lanes.layout import EXPLICIT_MEMORY, RADAU_MEMORY, SIZES
 from surfacechem.solve.radau import stepper
 from surfacechem.solve.radau.solver import Room, batch_of, solve_arrays
 from surfacechem.solve.radau.stepper import END
 
 
 def solve_batch(problem: Problem, *columns: Array, room: Room | None = None) -> Any:
-    """Solve a batch as :func:`solve_arrays` does, in lanes where the problem may be solved explicitly and has vector
-    code.
-    """
-    if not problem.explicit or problem.program.lanes is None:
+    """Solve a batch as :func:`solve_arrays` does, in lanes where the problem may be solved so and has vector code."""
+    method = method_of(problem)
+    if method is None:
         return solve_arrays(problem, *columns, room=room)
+    lanes = problem.program.lanes if method is EXPLICIT else problem.program.implicit_lanes
+    assert lanes is not None
     y0, parameters, spacing, *others = map(np.ascontiguousarray, columns)
     runs = y0, parameters, spacing, np.array((problem.max_steps,)), *others
-    batch = batch_of(problem, runs, room, problem.program.lane_tables)
-    run(batch)
+    batch = batch_of(problem, runs, room, problem.program.lane_tables(lanes))
+    run(batch, method)
     left = np.flatnonzero(batch.counts[:, END] == Status.LEFT)
     if len(left):
         own = (rows[left] if len(rows) == len(y0) else rows for rows in columns)
@@ -33,26 +36,44 @@ def solve_batch(problem: Problem, *columns: Array, room: Room | None = None) -> 
     return batch
 
 
-def run(batch: Any) -> None:
+def run(batch: Any, method: "Method") -> None:
     """Run a batch in lanes. Each call has its own memory, so several threads may call it at the same time."""
-    words = _words_of(tuple(batch.sizes.tolist()))
+    words = _words_of(tuple(batch.sizes.tolist()), method)
     memory = np.zeros(words + LANES, np.int64)
     # A vector that lies across two lines of the cache takes twice the time.
     first = -memory.ctypes.data // memory.itemsize % LANES
-    LOOP.load()(0, len(batch.counts), memory[first : first + words], tuple(batch))
+    method.loop.load()(0, len(batch.counts), memory[first : first + words], tuple(batch))
 
 
 @lru_cache(maxsize=64)
-def _words_of(sizes: tuple[int, ...]) -> int:
+def _words_of(sizes: tuple[int, ...], method: "Method") -> int:
     """Return the number of words of memory for a block of lanes of a program of these sizes."""
-    return stepper.words_of(dict(zip(SIZES, sizes, strict=True)), MEMORY)
+    return stepper.words_of(dict(zip(SIZES, sizes, strict=True)), method.memory)
 
 
-def _sources() -> list[Path]:
+@dataclass(frozen=True, eq=False)
+class Method:
+    """A method of the steps in lanes."""
+
+    words: str
+    loop: stepper.Loop
+    """Its compiled loop, which is compiled when it is first needed."""
+    memory: Mapping[str, Any]
+
+
+def _method(words: str, memory: Mapping[str, Any], module: str, function: str, *parts: str) -> Method:
     here = Path(__file__).parent
-    own = [here / f"{name}.py" for name in ("vector", "layout", "lane_step", "lane_guards", "lane_run")]
-    return [*stepper.sources(), here.parent.parent / "compile" / "vectors.py", *own]
+    own = [here / f"{name}.py" for name in ("vector", "layout", "lane_step", "lane_guards", "lane_run", module, *parts)]
+    sources = [*stepper.sources(), here.parent.parent / "compile" / "vectors.py", *own]
+    return Method(words, stepper.Loop(sources, f"{__package__}.{module}", function, brief=True), memory)
 
 
-LOOP = stepper.Loop(_sources(), "surfacechem.solve.lanes.lane_run", "run_lanes", brief=True)
-"""The compiled loop over lanes."""
+EXPLICIT = _method("by explicit steps of order 8", EXPLICIT_MEMORY, "explicit_lanes", "run_explicitly")
+RADAU = _method("by Radau IIA of order 9", RADAU_MEMORY, "radau_lanes", "run_by_radau", "lane_linear")
+
+
+def method_of(problem: Problem) -> Method | None:
+    """Return the method of a batch in lanes; None if its runs are solved one at a time."""
+    if problem.explicit:
+        return EXPLICIT if problem.program.lanes else None
+    return RADAU if problem.implicit_lanes and problem.program.implicit_lanes else None

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from surfacechem.solve.lanes.lane_step import larger, put_end, put_inside, put_roughly, smaller
+from surfacechem.solve.lanes.lane_step import larger, put_end, put_inside, smaller
 from surfacechem.solve.lanes.vector import absolute, any_lane, lanes, put, same, where
 from surfacechem.solve.radau.explicit import DENSEST
 from surfacechem.solve.radau.tables import SCANNED
@@ -18,6 +18,12 @@ SCAN_FRACTIONS = SCANNED[DENSEST]
 """Fractions of a step at which guards are evaluated."""
 MOST_SECANTS = 12
 """Most trial steps onto a guard: secant steps take four, the rounding of the guard a few more."""
+
+
+@compiled
+def _is_limit(w: Any, m: int) -> bool:
+    """True if the run must end where this guard is below zero. It may start at zero, and is unclear if it falls."""
+    return bool(w.kinds[m, 0] == 1 and w.kinds[m, 1] <= 0)
 
 
 @compiled
@@ -35,8 +41,8 @@ def start_margins(w: Any, fresh: Any) -> None:
         put(w.side[m], where(fresh, side, lanes(w.side[m])))
         if w.kinds[m, 4] == 0:
             put(w.side[m], 0.0)
-        elif w.kinds[m, 0] == 1 and w.kinds[m, 1] <= 0:  # the run may not go on below zero
-            unclear = where(side < 0.5, 1.0, unclear)
+        elif _is_limit(w, m):
+            unclear = where(side < -0.5, 1.0, unclear)
         else:
             unclear = where((side == 0.0) & (lanes(w.fired[m]) < 0.5), 1.0, unclear)
     put(w.unclear, unclear)
@@ -93,7 +99,7 @@ def may_cross(w: Any, good: Any) -> Any:
         put(w.curvature[m], 0.0)
     for quarter in range(1, 5):
         if quarter < 4:
-            put_roughly(w, 0.25 * quarter)
+            w.put_roughly(w, 0.25 * quarter)
         else:
             put_end(w)
         _put_margins(w)
@@ -144,6 +150,8 @@ def _scan(w: Any, searched: Any) -> None:
             leaves = searched & (side == 0.0) & (absolute(value) > FORMULA_EPS * largest)
             if w.kinds[m, 4] != 0:
                 put(w.side[m], where(leaves, where(value > 0.0, 1.0, -1.0), side))
+                if _is_limit(w, m):
+                    put(w.unclear, where(leaves & (value < 0.0), 1.0, lanes(w.unclear)))
         earlier, before = before, x
 
 

@@ -12,36 +12,24 @@ from surfacechem.compile.vectors import LANES
 from surfacechem.solve.contract import Status
 from surfacechem.solve.lanes.lane_guards import ends_on_guard, find_crossings, may_cross, start_margins
 from surfacechem.solve.lanes.lane_step import (
-    END_STAGE,
-    WORK,
     check_inside,
-    eighth_root,
-    find_stiff,
-    interpolate,
     larger,
     needs_checks,
     norm_of,
-    propose,
     put_start,
     set_weights,
     smaller,
-    try_step,
 )
 from surfacechem.solve.lanes.layout import ORDER
 from surfacechem.solve.lanes.vector import absolute, any_lane, lanes, put, same, where
-from surfacechem.solve.radau.driver import FEWEST_CHECKS, LEAST_NORM
-from surfacechem.solve.radau.explicit import MAX_ERROR_RATIO, STIFF_STEPS
-from surfacechem.solve.radau.record import laying_out
+from surfacechem.solve.radau.driver import FEWEST_CHECKS
+from surfacechem.solve.radau.explicit import STIFF_STEPS
 from surfacechem.solve.radau.step import loosening
 from surfacechem.solve.radau.stepper import END, EVENTS, FIRST_COUNTER, OUTPUTS, RECORDS
-from surfacechem.solve.radau.tables import LAST_STAGE
 from surfacechem.solve.radau.work import MARGINS, RATES, compiled, evaluate, row_of
 from surfacechem.tolerances import NEGLIGIBLE, SQRT_EPS, ULPS
 
-_lay_out = laying_out(WORK)
-
 FINISHED, EVENT, LEFT = int(Status.FINISHED), int(Status.EVENT), int(Status.LEFT)
-LEAST_ROOT = LEAST_NORM**0.125
 MOST_TRIALS = 12
 """Rejected trials in a row, each at most half as long as the last, after which the cause is noise or stiffness."""
 CONSTANTS = RATES + 1
@@ -80,7 +68,7 @@ def _end(w: Any, lane: int, status: int) -> None:
     counts = w.counts[i]
     counts[END] = status
     _write_state(w, w.ends[i], lane)
-    counters = w.steps[lane], w.rejected[lane], LAST_STAGE * (w.steps[lane] + w.rejected[lane])
+    counters = w.steps[lane], w.rejected[lane], int(w.evaluations[lane])
     for k, counter in enumerate(counters):
         counts[FIRST_COUNTER + k] = counter
     w.over[lane] = i
@@ -116,6 +104,7 @@ def _begin(w: Any, lane: int, i: int) -> None:
     """Begin run i in a lane."""
     w.run[lane] = i
     w.segment[lane] = w.steps[lane] = w.rejected[lane] = w.failed[lane] = w.stiff_steps[lane] = w.landing[lane] = 0
+    w.evaluations[lane] = 0.0
     peaks = w.peaks[row_of(w.peaks, i)]
     for m in range(w.n):
         w.y[m, lane] = w.y0[i, m]
@@ -141,7 +130,7 @@ def _first_sizes(w: Any) -> Any:
         put(w.rates[m], lanes(w.rates[m]) - lanes(w.k[0, m]))
     change = norm_of(w, w.rates) / w.loose / speed
     scale = trial / change
-    first = smaller(scale * smaller(1.0 / eighth_root(speed * scale), 1.0), 0.05 * span)
+    first = smaller(scale * smaller(1.0 / w.root_of(speed * scale), 1.0), 0.05 * span)
     first = where(change * span > SQRT_EPS * trial, first, 0.05 * span)
     return where((speed > 0.0) & (speed < np.inf), first, NEGLIGIBLE * span)
 
@@ -264,10 +253,11 @@ def _take(w: Any, row: Any, values: Any) -> None:
 @compiled
 def _move_on(w: Any) -> None:
     """Move the lanes whose steps are accepted to the ends of these steps."""
+    w.keep_step(w)
     t_new = lanes(w.t_new)
     for m in range(w.columns):
         _take(w, w.y[m], lanes(w.y_new[m]))
-        _take(w, w.k[0, m], lanes(w.k[END_STAGE, m]))
+        _take(w, w.k[0, m], lanes(w.k[w.end_stage, m]))
     for m in range(w.n_margins):
         _take(w, w.margin_first[m], lanes(w.margin_end[m]))
     for m in range(w.n_ledger):
@@ -277,7 +267,7 @@ def _move_on(w: Any) -> None:
         _take(w, flag, same(0.0))
     # An error far below the tolerance tells the controller nothing more.
     _take(w, w.h_last, lanes(w.h))
-    _take(w, w.root_last, larger(lanes(w.root), LEAST_ROOT))
+    _take(w, w.root_last, larger(lanes(w.root), w.least_root))
     _take(w, w.proposed, lanes(w.following))
     _take(w, w.aim, where(t_new >= lanes(w.aim), np.inf, lanes(w.aim)))
 
@@ -312,8 +302,7 @@ def _go_on(w: Any, lane: int) -> None:
 def _conclude(w: Any, lane: int) -> None:
     """Decide about a trial step: repeat it, shorter or onto a guard, or accept it."""
     h = w.h[lane]
-    if w.again[lane] > 0.5 and w.norm[lane] > MAX_ERROR_RATIO * w.norm_tried[lane] * (h / w.h_tried[lane]) ** 8:
-        # The error of the repeated step has not fallen with its size: noise, or stiffness.
+    if w.again[lane] > 0.5 and w.is_noise(w, lane):
         w.stiff_steps[lane] += STIFF_STEPS
     if not w.norm[lane] < 1.0:
         w.h_tried[lane], w.norm_tried[lane] = h, min(w.norm[lane], 1e30)
@@ -375,21 +364,23 @@ def _step(w: Any) -> None:
     _choose_sizes(w)
     put(w.t_new, where(lanes(w.last) > 0.5, lanes(w.end), lanes(w.t) + lanes(w.h)))
     set_weights(w)
-    try_step(w)
-    propose(w)
+    w.try_step(w)
+    w.propose(w)
     good = lanes(w.norm) < 1.0
     put(w.unclear, 0.0)
     if any_lane(good):
-        find_stiff(w)
+        w.find_stiff(w)
         put(w.defect_at, 1.0)
         close = may_cross(w, good)
         seen, shown = needs_checks(w, good), any_lane(lanes(w.next_output) < lanes(w.t_new))
         if seen or shown:
-            interpolate(w, w.columns)
+            w.interpolate(w, w.columns)
         elif any_lane(close):
-            interpolate(w, w.n)
+            w.interpolate(w, w.n)
         if seen:
             check_inside(w)
+        if shown:
+            w.check_outputs(w, good)
         find_crossings(w, good & (lanes(w.defect_at) == 1.0), close)
     put(w.taken, 0.0)
     for lane in range(LANES):
@@ -402,11 +393,11 @@ def _step(w: Any) -> None:
     _write_margins(w)
 
 
-def run_lanes(first: int, last: int, memory: Any, batch: Any) -> None:
+@compiled
+def run_through(w: Any, first: int, last: int) -> None:
     """Solve runs first to last - 1 of a batch. The result of a run depends neither on its neighbours nor on the
     threads.
     """
-    w = _lay_out(batch, memory)
     w.loose = loosening(w.rtol)
     following, busy = first, 0
     for lane in range(LANES):

@@ -13,7 +13,7 @@ from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
 from surfacechem.compile.vectors import LANES
-from surfacechem.solve.lanes.layout import MEMORY, ORDER, SIZES
+from surfacechem.solve.lanes.layout import ORDER
 from surfacechem.solve.lanes.vector import (
     absolute,
     any_lane,
@@ -27,8 +27,14 @@ from surfacechem.solve.lanes.vector import (
     where,
 )
 from surfacechem.solve.radau.dense import FORESEEN_PART, N_GROUPS, ledger_rtol
-from surfacechem.solve.radau.explicit import DENSEST, ERROR_PART, FOLLOWED_PART, STABILITY_LIMIT, STIFF_STEP
-from surfacechem.solve.radau.record import StepperRecord
+from surfacechem.solve.radau.explicit import (
+    DENSEST,
+    ERROR_PART,
+    FOLLOWED_PART,
+    MAX_ERROR_RATIO,
+    STABILITY_LIMIT,
+    STIFF_STEP,
+)
 from surfacechem.solve.radau.step import CHECK_PART, END_CHECKS, MAX_DEFECT, MAX_GROWTH, MIN_GROWTH, SAFETY
 from surfacechem.solve.radau.tables import (
     DENSE_FACTORS,
@@ -42,7 +48,6 @@ from surfacechem.solve.radau.tables import (
 from surfacechem.solve.radau.work import RATES, compiled, evaluate, evaluate_at, weighted_sums
 from surfacechem.tolerances import LOOSE_RTOL, RUN_EPS, TINY
 
-WORK = StepperRecord("LaneWork", SIZES, {"loose": float}, MEMORY)
 END_STAGE = STAGES_OF_DENSE - 1
 """The last stage, at the end of the step."""
 COUNT = np.arange(LANES, dtype=float)
@@ -127,18 +132,24 @@ def _evaluate_stage(w: Any, i: int, columns: int, change: Any) -> None:
 
 
 @compiled
-def _ledger_norms(w: Any) -> Any:
-    """Error norm of the ledger. Accounts of one kind share a scale: the largest amount exchanged so far, or expected
-    soon.
+def scale_ledger(w: Any, stages: int) -> None:
+    """Set the largest rate of each account at these stages, and its scale: the largest amount exchanged so far, or
+    expected soon.
     """
     h, span = lanes(w.h), lanes(w.end) - lanes(w.t)
     for m in range(w.n_ledger):
         rate = same(0.0)
-        for i in range(STAGES_OF_DENSE):
+        for i in range(stages):
             rate = larger(rate, absolute(lanes(w.k[i, w.n + m])))
         put(w.q_rate[m], rate)
         put(w.q_scale[m], lanes(w.q_largest[m]) + larger(h, FORESEEN_PART * span) * rate)
-    norm = same(0.0)
+
+
+@compiled
+def _ledger_norms(w: Any) -> Any:
+    """Error norm of the ledger. Accounts of one kind share a scale."""
+    h, norm = lanes(w.h), same(0.0)
+    scale_ledger(w, STAGES_OF_DENSE)
     for group in range(N_GROUPS):
         miss, second, scale = same(0.0), same(0.0), same(TINY)
         for m in range(w.n_ledger):
@@ -156,6 +167,7 @@ def try_step(w: Any) -> None:
     for i in range(1, END_STAGE):
         _evaluate_stage(w, i, w.n, w.change_before if i == END_STAGE - 1 else w.change)
     _evaluate_stage(w, END_STAGE, w.columns, w.change)
+    put(w.evaluations, lanes(w.evaluations) + float(LAST_STAGE))
     h, every = lanes(w.h), LANES * w.columns
     _errors(0, w.k.ctypes.data, every, every, w.coarse.ctypes.data)
     _errors(1, w.k.ctypes.data, every, every, w.fine.ctypes.data)
@@ -180,7 +192,7 @@ def propose(w: Any) -> None:
     """Propose the size of the next step (Gustafsson 1994), or of the repetition of one that fails."""
     h, h_last, given = lanes(w.h), lanes(w.h_last), lanes(w.norm)
     norm = larger(where(given < 1e30, given, 1e30), RUN_EPS)
-    root = eighth_root(norm)
+    root = w.root_of(norm)
     put(w.root, root)
     factor, passes = SAFETY / root, norm < 1.0
     predicted = factor * h / h_last * (lanes(w.root_last) / root)
@@ -205,6 +217,12 @@ def find_stiff(w: Any) -> None:
         change = larger(change, absolute(end - lanes(w.k[0, m])) * unit)
     is_limited = (fastest > STABILITY_LIMIT) & (change < FOLLOWED_PART * fastest * speed)
     put(w.stiff, where((fastest > STIFF_STEP) | is_limited, 1.0, 0.0))
+
+
+@compiled
+def is_noise(w: Any, lane: int) -> bool:
+    """True if the error of a repeated step has not fallen with its size: noise, or stiffness."""
+    return bool(w.norm[lane] > MAX_ERROR_RATIO * w.norm_tried[lane] * (w.h[lane] / w.h_tried[lane]) ** 8)
 
 
 @compiled
@@ -245,6 +263,14 @@ def put_end(w: Any) -> None:
 
 
 @compiled
+def differentiate_polynomials(w: Any, columns: int) -> None:
+    """Set the coefficients of the slopes of the dense output, of the first so many columns."""
+    for d in range(ORDER):
+        for m in range(columns):
+            put(w.slope_of[d, m], float(d + 1) * lanes(w.polynomial[d, m]))
+
+
+@compiled
 def _prepare_checks(w: Any) -> None:
     """Set the allowed defect of the rate of each column, and the coefficients of the slope of the dense output."""
     h = lanes(w.h)
@@ -261,23 +287,35 @@ def _prepare_checks(w: Any) -> None:
         for m in range(w.n_ledger):
             if w.groups[m] == group:
                 put(w.allowed[w.n + m], MAX_DEFECT * ledger_rtol(w.rtol) * scale / h)
-    for d in range(ORDER):
-        for m in range(w.columns):
-            put(w.slope_of[d, m], float(d + 1) * lanes(w.polynomial[d, m]))
+    differentiate_polynomials(w, w.columns)
+
+
+@compiled
+def put_points(w: Any, lane: int, x: Any) -> None:
+    """Set the inputs inside to time and state of a lane at eight fractions x of its step."""
+    h, inputs = w.h[lane], w.inside[lane]
+    put(inputs[0], w.t[lane] + x * h)
+    for m in range(w.n):
+        put(inputs[1 + m], w.y[m, lane] + h * x * polynomial_of(w.polynomial, m, lane, x))
+
+
+@compiled
+def find_defects(w: Any, lane: int, x: Any) -> None:
+    """The defects of the dense output of a lane at eight fractions x of its step: rates less slopes of all columns."""
+    put_points(w, lane, x)
+    evaluate_at(w, RATES, w.inside[lane], w.rates)
+    for m in range(w.columns):
+        put(w.rates[m], lanes(w.rates[m]) - polynomial_of(w.slope_of, m, lane, x))
 
 
 @compiled
 def _agrees(w: Any, lane: int, x: Any) -> Any:
     """Mask of the fractions x of the step of a lane at which the rates agree with the slope of the dense output."""
-    h, inputs = w.h[lane], w.inside[lane]
-    put(inputs[0], w.t[lane] + x * h)
-    for m in range(w.n):
-        put(inputs[1 + m], w.y[m, lane] + h * x * polynomial_of(w.polynomial, m, lane, x))
-    evaluate_at(w, RATES, inputs, w.rates)
+    w.find_defects(w, lane, x)
     agrees = x >= 0.0
     for m in range(w.columns):
         allowed = w.allowed[m, lane]
-        defect = absolute(lanes(w.rates[m]) - polynomial_of(w.slope_of, m, lane, x))
+        defect = absolute(lanes(w.rates[m]))
         close = defect <= same(allowed)  # False for NaN
         if m >= w.n and any_lane(~close):
             # The quadrature of a smooth rate is better than its polynomial of order 7, by 6/7 of that power; 3/4 is
@@ -335,3 +373,13 @@ def check_inside(w: Any) -> None:
     for lane in range(LANES):
         if w.spacings[lane] >= 0.0:
             w.defect_at[lane] = _first_defect(w, lane)
+
+
+@compiled
+def check_outputs(w: Any, good: Any) -> None:
+    """Nothing: the dense output of an explicit step is as accurate as its end."""
+
+
+@compiled
+def keep_step(w: Any) -> None:
+    """Nothing: an explicit step is not predicted from the last one."""

@@ -10,6 +10,9 @@ SIZES = ("n", "n_ledger", "n_margins", "n_inputs", "columns")
 ORDER = 7
 """Order of the dense output of a step, and number of coefficients of its polynomial."""
 
+NUMBERS = {"loose": float}
+"""Scalars that change."""
+
 
 def _arrays(names: str, *shape: str | int, kind: type = float) -> dict[str, tuple[type, tuple[str | int, ...]]]:
     return dict.fromkeys(names.split(), (kind, (*shape, LANES)))
@@ -23,8 +26,7 @@ MEMORY = {
     # states and accounts at the start and at the end of the step, their changes per time at its last two stages, the
     # two estimates of their error, their rates at a point inside and how far they may be from the slopes there
     **_arrays("y y_new change change_before coarse fine rates allowed", "columns"),
-    # rates at the stages, and the coefficients of the polynomial of the step and of its slope
-    **_arrays("k", 16, "columns"),
+    # the coefficients of the polynomial of the step and of its slope
     **_arrays("polynomial slope_of", ORDER, "columns"),
     # weights of the error norm; of each account the largest value, and in this step the largest rate and what its error
     # is held against
@@ -38,7 +40,7 @@ MEMORY = {
     # the time, now and at the end of the step; the end of the segment, a time at which a step has to end, and the time
     # of the next output
     **_arrays("t t_new end aim next_output"),
-    # this step, the last one and one that failed, the norms of their errors, eighth roots of the first two of these,
+    # this step, the last one and one that failed, the norms of their errors, roots of the first two of these,
     # the next step; how far apart looks at the equations are
     **_arrays("h h_last h_tried norm norm_tried root root_last proposed following spacing_of"),
     # whole spacings of looks in the step, -1 if it has no looks, and where these are; the fraction of the step at
@@ -46,6 +48,8 @@ MEMORY = {
     **_arrays("spacings at defect_at crossing low high"),
     # a step onto a guard: its value at the end, its slope, the longest step to try, the last push across
     **_arrays("value slope longest nudge"),
+    # evaluations of the equations
+    **_arrays("evaluations"),
     # flags: a start or restart; the first step of a segment, the last one; a step onto a guard; one that is repeated;
     # one that is stiff; guards of which it is unclear whether they are met; a step that is taken
     **_arrays("fresh begins last onto again stiff unclear taken"),
@@ -53,4 +57,30 @@ MEMORY = {
     # ones, those in a row; twice the stiff ones; trials of a step onto a guard
     **_arrays("run over segment steps rejected failed stiff_steps landing", kind=int),
 }
-"""Arrays that the loop writes to: type and shape, with a place for each lane."""
+"""Arrays that the loop writes to, whatever the method: type and shape, with a place for each lane."""
+
+EXPLICIT_MEMORY = {
+    **MEMORY,
+    # rates at the stages
+    **_arrays("k", 16, "columns"),
+}
+"""Arrays of the loop with explicit steps."""
+
+RADAU_MEMORY = {
+    **MEMORY,
+    # rates at the start and at the stages, and the correction of the polynomial; of the last step at its stages
+    **_arrays("k", 7, "columns"),
+    **_arrays("k_last", 5, "n"),
+    # increments of the stages, their residuals and corrections, right-hand sides of the decoupled systems with an
+    # imaginary part of the real one; coefficients of the predictor
+    **_arrays("z g parts predictor", 5, "n"),
+    **_arrays("imaginary error rhs", "n"),
+    # derivatives of the rates, in units of the weights; Newton matrices (system, real and imaginary part), overwritten
+    # by their factors, with flags of the rows that are exchanged
+    **_arrays("jacobian", "n", "n"),
+    **_arrays("matrix", 3, 2, "n", "n"),
+    **_arrays("exchanged", 3, "n", "n"),
+    # Newton's method: contraction, now and of the last step; error of the first guess
+    **_arrays("theta contraction guess_error"),
+}
+"""Arrays of the loop with steps of Radau IIA."""

@@ -14,7 +14,7 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic, lower_builtin, models, register_model, type_callable
 
-from surfacechem.compile.vectors import INTEGERS, LANES, VECTOR, by_vector
+from surfacechem.compile.vectors import INTEGERS, LANES, VECTOR, by_vector, exp, log
 from surfacechem.solve.lanes.layout import ORDER
 
 _Constant: Any = ir.Constant
@@ -227,5 +227,25 @@ def square_root(_context: Any, value: Any) -> Any:
 
     def generate(_context: Any, builder: Any, _signature: Any, args: Any) -> Any:
         return by_vector(builder, "sqrt", args[0])
+
+    return LANE(value), generate
+
+
+@_intrinsic
+def logarithm(_context: Any, value: Any) -> Any:
+    """Natural logarithms of eight numbers."""
+
+    def generate(_context: Any, builder: Any, _signature: Any, args: Any) -> Any:
+        return log(builder, args[0])
+
+    return LANE(value), generate
+
+
+@_intrinsic
+def exponential(_context: Any, value: Any) -> Any:
+    """Exponentials of eight numbers."""
+
+    def generate(_context: Any, builder: Any, _signature: Any, args: Any) -> Any:
+        return exp(builder, args[0])
 
     return LANE(value), generate

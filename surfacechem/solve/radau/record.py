@@ -27,6 +27,7 @@ from surfacechem.solve.radau.stepper import BATCH, EDGE_TABLES, EDGE_WORDS
 _intrinsic: Any = intrinsic
 _Constant: Any = ir.Constant
 _alloca: Any = cgutils.alloca_once
+_typeof: Any = numba.typeof
 
 _WORD = ir.IntType(64)
 _POINTER = ir.IntType(8).as_pointer()
@@ -64,11 +65,19 @@ class StepperRecord(types.Type):
     """The type of a record: its inputs (a batch), scalars that change, and work arrays.
 
     ``sizes`` are the names of the entries of the first table of the batch; ``numbers`` and ``memory`` give the type of
-    each scalar, and type and shape of each array, by name.
+    each scalar, and type and shape of each array, by name. ``method`` has compiled functions and numbers of a method
+    by name: code that uses them is compiled for each record with its own, and is one source for several methods.
     """
 
-    def __init__(self, name: str, sizes: Sequence[str], numbers: Mapping[str, type], memory: Mapping[str, Any]) -> None:
-        self.sizes, self.numbers, self.memory = sizes, numbers, memory
+    def __init__(
+        self,
+        name: str,
+        sizes: Sequence[str],
+        numbers: Mapping[str, type],
+        memory: Mapping[str, Any],
+        method: Mapping[str, Any] | None = None,
+    ) -> None:
+        self.sizes, self.numbers, self.memory, self.method = sizes, numbers, memory, method or {}
         self.fields, self.words = _layout(sizes, numbers, memory)
         super().__init__(name=name)
 
@@ -84,7 +93,7 @@ class _RecordFields(AttributeTemplate):
     key = StepperRecord
 
     def generic_resolve(self, record: Any, name: str) -> Any:  # type: ignore[override]
-        return record.fields[name].kind
+        return _typeof(record.method[name]) if name in record.method else record.fields[name].kind
 
 
 def _word(builder: Any, work: Any, place: int, kind: Any) -> Any:
@@ -103,6 +112,9 @@ def _fixed(builder: Any, work: Any, place: int, kind: Any) -> Any:
 
 @lower_getattr_generic(StepperRecord)  # type: ignore[no-untyped-call]
 def _load_field(context: Any, builder: Any, record: Any, work: Any, name: str) -> Any:
+    if name in record.method:
+        part = record.method[name]
+        return context.get_dummy_value() if callable(part) else context.get_constant(_typeof(part), part)
     kind, shape, place = record.fields[name]
     if name in record.numbers:
         return builder.load(_word(builder, work, place, context.get_value_type(kind)))

@@ -1,0 +1,471 @@
+"""The loop over lanes with steps of Radau IIA: five stages, order 9, each lane with its own Newton iteration.
+
+The rules are those of the stepper for single runs: the same stages, estimate of the error and dense output. Here the
+equations are solved for their rates, the Jacobian is evaluated and factored in each step, and the ledger is integrated
+from its rates at the stages.
+
+Source: Hairer & Wanner, Solving Ordinary Differential Equations II, sections IV.5 and IV.8.
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.polynomial import Polynomial
+from numpy.typing import NDArray
+
+from surfacechem.compile.vectors import LANES
+from surfacechem.solve.lanes.lane_linear import differentiate, factor, solve, solve_of
+from surfacechem.solve.lanes.lane_run import run_through
+from surfacechem.solve.lanes.lane_step import (
+    differentiate_polynomials,
+    larger,
+    propose,
+    put_inside,
+    put_points,
+    put_start,
+    scale_ledger,
+    smaller,
+)
+from surfacechem.solve.lanes.layout import NUMBERS, ORDER, RADAU_MEMORY, SIZES
+from surfacechem.solve.lanes.vector import (
+    absolute,
+    any_lane,
+    exponential,
+    lanes,
+    logarithm,
+    polynomial,
+    polynomial_of,
+    put,
+    same,
+    square_root,
+    where,
+)
+from surfacechem.solve.radau.dense import N_GROUPS, ledger_rtol
+from surfacechem.solve.radau.driver import LEAST_NORM
+from surfacechem.solve.radau.explicit import DENSEST
+from surfacechem.solve.radau.newton import NEWTON_PART, PREDICTOR_REACH, SLOWEST_KNOWN
+from surfacechem.solve.radau.outputs import POLYNOMIAL_ERROR
+from surfacechem.solve.radau.record import StepperRecord, laying_out
+from surfacechem.solve.radau.step import CONTRACTING, LEAST_CONVERGENT, MIN_GROWTH, SAFETY
+from surfacechem.solve.radau.tables import (
+    COARSE_RTOL,
+    COLLOCATION,
+    FROM_PARTS,
+    GAMMA,
+    INVERSE,
+    NODES,
+    PAIR_VALUES,
+    PROBE,
+    START_RATE,
+    START_SLOPE,
+    TO_PARTS,
+)
+from surfacechem.solve.radau.work import RATES, RESIDUAL, compiled, evaluate, evaluate_at, weighted_sums
+from surfacechem.tolerances import EPS, LOOSE_RTOL, TINY
+
+MEMBER, STAGES = 1, 5
+"""Member of the family in these steps, and its number of stages."""
+C = NODES[MEMBER, :STAGES]
+POWER = 1.0 / (STAGES + 1.0)
+"""Exponent of the size of a step: the estimate of s stages goes with h^(s+1)."""
+MOST_ITERATIONS = 9
+DIVERGED = (SAFETY / 0.4) ** (1.0 / POWER)
+"""Norm assigned to a step without convergence: the next trial has 0.4 of its size, as in single runs. If that fails
+too, the next ones have a tenth each.
+"""
+EIGENVALUES = np.array([GAMMA[MEMBER], *PAIR_VALUES[MEMBER, :2]])
+
+
+def _polynomials() -> list[Polynomial]:
+    """Return the changes over a fraction x of the step, per unit of the step: by the rate at the start (not used), by
+    the rate at each stage, and by the correction, whose slope vanishes at all stages.
+    """
+    every = [Polynomial([0.0])]
+    for i in range(STAGES):
+        others = np.delete(C, i)
+        every.append((Polynomial.fromroots(others) / np.prod(C[i] - others)).integ())
+    return [*every, (Polynomial.fromroots(C) / np.prod(-C)).integ()]
+
+
+def _coefficients_of(polynomials: list[Polynomial], count: int) -> NDArray[np.float64]:
+    """Return the coefficients of x, x^2, ..., a row for each power."""
+    table = np.zeros((count + 1, len(polynomials)))
+    for j, each in enumerate(polynomials):
+        table[: len(each.coef), j] = each.coef
+    return table[1:]
+
+
+def _from_end() -> NDArray[np.float64]:
+    """Return the coefficients of s, s^2, ... in the extrapolated change after the end of a step, by its stage rates."""
+    end = Polynomial([1.0, 1.0])
+    return _coefficients_of([each(end) for each in _polynomials()[1 : 1 + STAGES]], STAGES)
+
+
+_quarters = weighted_sums(np.array([[each(x) for each in _polynomials()] for x in (0.25, 0.5, 0.75)]), LANES)
+_polynomial = weighted_sums(_coefficients_of(_polynomials(), ORDER), LANES)
+_extrapolated = weighted_sums(_from_end(), LANES)
+_to_slopes = weighted_sums(INVERSE[MEMBER, :STAGES, :STAGES], LANES)
+_to_parts = weighted_sums(TO_PARTS[MEMBER, :STAGES, :STAGES], LANES)
+_from_parts = weighted_sums(FROM_PARTS[MEMBER, :STAGES, :STAGES], LANES)
+_start_slope = weighted_sums(START_SLOPE[MEMBER : MEMBER + 1, :STAGES], LANES)
+_weights = weighted_sums(np.array([[0.0, *COLLOCATION[MEMBER, STAGES - 1, :STAGES]]]), LANES)
+_defect_at_start = weighted_sums(np.array([[1.0, *-START_RATE[MEMBER, :STAGES], 0.0]]), LANES)
+
+
+@compiled
+def sixth_root(a: Any) -> Any:
+    """The sixth root, for step sizes of an estimate of order 5."""
+    return exponential(POWER * logarithm(a))
+
+
+@compiled
+def _predict(w: Any) -> None:
+    """Predict the increments of the stages from the last step; zero where there is none or the step is too long."""
+    h, last = lanes(w.h), lanes(w.h_last)
+    known = (last > 0.0) & (h <= PREDICTOR_REACH * last)
+    ratio = where(known, h / last, 0.0)
+    every = LANES * w.n
+    for d in range(STAGES):
+        _extrapolated(d, w.k_last.ctypes.data, every, every, w.predictor[d].ctypes.data)
+    for i in range(STAGES):
+        s = C[i] * ratio
+        for m in range(w.n):
+            total = lanes(w.predictor[STAGES - 1, m])
+            for d in range(STAGES - 2, -1, -1):
+                total = total * s + lanes(w.predictor[d, m])
+            put(w.z[i, m], where(known, last * s * total, 0.0))
+
+
+@compiled
+def _put_stage(w: Any, i: int) -> None:
+    put(w.inputs[0], lanes(w.t) + C[i] * lanes(w.h))
+    for m in range(w.n):
+        put(w.inputs[1 + m], lanes(w.y[m]) + lanes(w.z[i, m]))
+
+
+@compiled
+def _put_slopes(w: Any, i: int) -> None:
+    """Set the rates of the states at a stage to the slopes of their polynomials."""
+    every, row, rate = LANES * w.n, w.k[1 + i], 1.0 / lanes(w.h)
+    _to_slopes(i, w.z.ctypes.data, every, every, row.ctypes.data)
+    for m in range(w.n):
+        put(row[m], lanes(row[m]) * rate)
+
+
+@compiled
+def _correct(w: Any, active: Any) -> Any:
+    """Correct the stages of the active lanes by one iteration of Newton's method; return the norm of corrections."""
+    every = LANES * w.n
+    for i in range(STAGES):
+        _put_slopes(w, i)
+        _put_stage(w, i)
+        evaluate(w, RESIDUAL, w.g[i])
+        for m in range(w.n):
+            put(w.g[i, m], lanes(w.k[1 + i, m]) - lanes(w.g[i, m]))
+    for i in range(STAGES):
+        _to_parts(i, w.g.ctypes.data, every, every, w.parts[i].ctypes.data)
+    for m in range(w.n):
+        put(w.imaginary[m], 0.0)
+    solve(w, 0, w.parts[0], w.imaginary)
+    solve(w, 1, w.parts[1], w.parts[2])
+    solve(w, 2, w.parts[3], w.parts[4])
+    for i in range(STAGES):
+        _from_parts(i, w.parts.ctypes.data, every, every, w.g[i].ctypes.data)
+    norm = same(0.0)
+    for m in range(w.n):
+        unit = 1.0 / lanes(w.weight[m])
+        for i in range(STAGES):
+            change = lanes(w.g[i, m])
+            put(w.z[i, m], lanes(w.z[i, m]) + where(active, change, 0.0))
+            size = absolute(change) * unit
+            norm = where(size <= norm, norm, size)  # not larger(): NaN must be seen
+    return norm
+
+
+@compiled
+def _roundoff(w: Any) -> Any:
+    """The roundoff of the states, in units of the tolerance."""
+    found = same(0.0)
+    for m in range(w.n):
+        found = larger(found, EPS * absolute(lanes(w.y[m])) / lanes(w.weight[m]))
+    return found
+
+
+@compiled
+def _solve_stages(w: Any) -> Any:
+    """Iterate to the tolerance in each lane; return the mask of lanes in which it is met.
+
+    A lane that is done changes no more, so that it does not depend on its neighbours.
+    """
+    active = lanes(w.h) > 0.0
+    solved = active & ~active
+    resolution, fresh = 8.0 * _roundoff(w), ~(lanes(w.h_last) > 0.0)
+    contraction = exponential(0.8 * logarithm(larger(where(fresh, 1.0, lanes(w.contraction)), same(EPS))))
+    theta, last, rate_last = same(0.0), same(1.0), same(0.0)
+    for iteration in range(MOST_ITERATIONS):
+        norm = _correct(w, active)
+        put(w.evaluations, lanes(w.evaluations) + where(active, float(STAGES), 0.0))
+        goes_on = norm < np.inf
+        if iteration == 0:
+            put(w.guess_error, norm)
+        else:
+            ratio = norm / last
+            rate = ratio if iteration == 1 else square_root(ratio * rate_last)
+            rate_last, expected = ratio, norm * rate / (1.0 - rate)
+            for _ in range(MOST_ITERATIONS - 1 - iteration):
+                expected = expected * rate
+            goes_on = goes_on & (rate < 0.99) & (expected <= NEWTON_PART)
+            theta = where(active, rate, theta)
+            contraction = where(active, larger(rate / (1.0 - rate), same(SLOWEST_KNOWN)), contraction)
+        # At loose tolerances a single correction may hide a layer that the Jacobian does not resolve.
+        met = norm <= resolution
+        if iteration > 0 or w.rtol < COARSE_RTOL:
+            met = met | (goes_on & (contraction * norm <= NEWTON_PART))
+        solved = solved | (active & met)
+        active = active & goes_on & ~met
+        if not any_lane(active):
+            break
+        last = larger(norm, same(TINY))
+    put(w.theta, theta)
+    put(w.contraction, contraction)
+    return solved
+
+
+@compiled
+def _filter(w: Any) -> None:
+    """Overwrite defects of rates by errors of states, through the real Newton matrix.
+
+    Unfiltered, the defect of a stiff component would be as large as its rate (Hairer & Wanner II, IV.8).
+    """
+    for m in range(w.n):
+        put(w.imaginary[m], 0.0)
+    solve(w, 0, w.rhs, w.imaginary)
+
+
+@compiled
+def _estimate(w: Any, rates: Any) -> None:
+    """The error of the step, from the defect of its polynomial against these rates at the start, filtered through the
+    Newton matrix.
+    """
+    every, rate = LANES * w.n, 1.0 / lanes(w.h)
+    _start_slope(0, w.z.ctypes.data, every, every, w.rhs.ctypes.data)
+    for m in range(w.n):
+        put(w.rhs[m], lanes(rates[m]) - rate * lanes(w.rhs[m]))
+    _filter(w)
+
+
+@compiled
+def _norm_of_error(w: Any) -> Any:
+    norm = same(0.0)
+    for m in range(w.n):
+        largest = larger(absolute(lanes(w.y[m])), absolute(lanes(w.y_new[m])))
+        size = absolute(lanes(w.error[m])) / larger(w.rtol * largest + w.atol[m], TINY)
+        norm = where(size <= norm, norm, size)
+    return norm / w.loose
+
+
+@compiled
+def _error_norm(w: Any) -> Any:
+    """The norm of the local error; filtered twice in a stiff transient, where the first estimate is too large."""
+    _estimate(w, w.k[0])
+    for m in range(w.n):
+        put(w.error[m], lanes(w.rhs[m]))
+    norm = _norm_of_error(w)
+    again = (norm >= 1.0) & ((lanes(w.again) > 0.5) | ~(lanes(w.h_last) > 0.0)) & (lanes(w.h) > 0.0)
+    if any_lane(again):
+        put(w.inputs[0], lanes(w.t))
+        for m in range(w.n):
+            put(w.inputs[1 + m], lanes(w.y[m]) + lanes(w.error[m]))
+        evaluate(w, RESIDUAL, w.rates)
+        _estimate(w, w.rates)
+        for m in range(w.n):
+            put(w.error[m], where(again, lanes(w.rhs[m]), lanes(w.error[m])))
+        norm = where(again, smaller(norm, _norm_of_error(w)), norm)
+    return norm
+
+
+@compiled
+def _integrate_ledger(w: Any) -> Any:
+    """Integrate the ledger over the step, and return the norm of its error."""
+    for i in range(STAGES):
+        _put_stage(w, i)
+        evaluate(w, RATES, w.k[1 + i])
+        _put_slopes(w, i)
+    h, every = lanes(w.h), LANES * w.columns
+    _weights(0, w.k.ctypes.data, every, every, w.change.ctypes.data)
+    _defect_at_start(0, w.k.ctypes.data, every, every, w.coarse.ctypes.data)
+    for m in range(w.n, w.columns):
+        put(w.y_new[m], lanes(w.y[m]) + h * lanes(w.change[m]))
+        put(w.k[1 + STAGES, m], lanes(w.coarse[m]))
+    scale_ledger(w, 1 + STAGES)
+    norm = same(0.0)
+    for group in range(N_GROUPS):
+        miss, scale = same(0.0), same(TINY)
+        for m in range(w.n_ledger):
+            if w.groups[m] == group:
+                defect = absolute(lanes(w.coarse[w.n + m]))
+                # The quadrature of a smooth rate is better than its polynomial, by 4/5 of this power; 3/4 is what
+                # products give.
+                part = square_root(defect / larger(larger(lanes(w.q_rate[m]), defect), same(TINY)))
+                miss = larger(miss, h * defect * part * square_root(part))
+                scale = larger(scale, lanes(w.q_scale[m]))
+        norm = larger(norm, miss / scale)
+    blank = same(0.0)
+    for m in range(w.n, w.columns):
+        blank = blank + 0.0 * lanes(w.coarse[m])  # NaN where a rate is, which comparisons would lose
+    return blank + where(h < LOOSE_RTOL * lanes(w.t), 0.0, norm / ledger_rtol(w.rtol))
+
+
+@compiled
+def try_step(w: Any) -> None:
+    """Solve for all stages of a step of each lane, and find the norm of its local error."""
+    put_start(w)
+    differentiate(w)
+    rate = 1.0 / lanes(w.h)
+    for s in range(3):
+        factor(w, s, EIGENVALUES[s].real * rate, EIGENVALUES[s].imag * rate)
+    _predict(w)
+    solved = _solve_stages(w)
+    for m in range(w.n):
+        put(w.y_new[m], lanes(w.y[m]) + lanes(w.z[STAGES - 1, m]))
+    norm = _error_norm(w)
+    if w.n_ledger > 0:
+        ledger = _integrate_ledger(w)
+        norm = where(ledger <= norm, norm, ledger + 0.0 * norm)  # NaN where either is
+    else:
+        for i in range(STAGES):
+            _put_slopes(w, i)
+    for m in range(w.n):
+        put(w.k[1 + STAGES, m], GAMMA[MEMBER] * lanes(w.error[m]) / lanes(w.h))
+    first = (lanes(w.guess_error) < np.inf) & (lanes(w.again) < 0.5)
+    put(w.norm, where(solved, norm, where(first, DIVERGED, np.inf)))
+
+
+@compiled
+def _propose_by_order(w: Any) -> None:
+    """Shorten the repetition of a step that fails again by the order in its size that its error has shown: it is lower
+    than usual in a transient, and where the rate of an account is singular at the start.
+    """
+    norm, before = lanes(w.norm), lanes(w.norm_tried)
+    fails = (lanes(w.again) > 0.5) & (norm >= 1.0) & (norm < before)
+    if any_lane(fails):
+        inverse = logarithm(lanes(w.h_tried) / lanes(w.h)) / logarithm(before / norm)
+        size = lanes(w.h) * larger(SAFETY * exponential(0.0 - inverse * logarithm(norm)), same(MIN_GROWTH))
+        put(w.following, where(fails, smaller(size, lanes(w.following)), lanes(w.following)))
+
+
+@compiled
+def propose_size(w: Any) -> None:
+    """Propose the size of the next step: also such that Newton's method contracts well, and that a state below its
+    tolerance, where no error counts, grows at most e-fold by its own derivative.
+    """
+    propose(w)
+    _propose_by_order(w)
+    h, theta = lanes(w.h), where(lanes(w.guess_error) > 1.0, lanes(w.theta), 0.0)
+    convergent = h * larger(square_root(CONTRACTING / theta), same(LEAST_CONVERGENT))
+    fastest = same(0.0)
+    for m in range(w.n):
+        driven = (lanes(w.y[m]) > 0.0) | (lanes(w.y[m]) < 0.0) | (absolute(lanes(w.k[0, m])) > 0.0)
+        grows = driven & (absolute(lanes(w.y[m])) < w.atol[m])
+        fastest = where(grows, larger(fastest, lanes(w.jacobian[m, m])), fastest)
+    limit = smaller(where(theta > 0.0, convergent, np.inf), where(fastest > 0.0, 1.0 / fastest, np.inf))
+    put(w.following, smaller(lanes(w.following), limit))
+
+
+@compiled
+def is_noise(w: Any, lane: int) -> bool:
+    """False: in a transient the estimate need not fall with the size of the step."""
+    return False
+
+
+@compiled
+def find_stiff(w: Any) -> None:
+    """No step is too stiff."""
+    put(w.stiff, 0.0)
+
+
+@compiled
+def put_roughly(w: Any, x: float) -> None:
+    """Set the inputs to time and state at a quarter point of each step, by its polynomial."""
+    every, h = LANES * w.columns, lanes(w.h)
+    _quarters(int(4.0 * x) - 1, w.k.ctypes.data, every, LANES * w.n, w.rates.ctypes.data)
+    put(w.inputs[0], lanes(w.t) + x * h)
+    for m in range(w.n):
+        put(w.inputs[1 + m], lanes(w.y[m]) + h * lanes(w.rates[m]))
+
+
+@compiled
+def interpolate(w: Any, columns: int) -> None:
+    """The polynomials of the steps, of the first so many columns."""
+    for d in range(ORDER):
+        _polynomial(d, w.k.ctypes.data, LANES * w.columns, LANES * columns, w.polynomial[d].ctypes.data)
+
+
+@compiled
+def find_defects(w: Any, lane: int, x: Any) -> None:
+    """The defects of the dense output of a lane at eight fractions x of its step, of the states as errors; of accounts
+    at the state that is corrected by its error, which a fast rate would magnify.
+    """
+    inputs = w.inside[lane]
+    put_points(w, lane, x)
+    evaluate_at(w, RESIDUAL, inputs, w.rhs)
+    for m in range(w.n):
+        put(w.rhs[m], lanes(w.rhs[m]) - polynomial_of(w.slope_of, m, lane, x))
+    solve_of(w, lane, w.rhs)
+    for m in range(w.n):
+        put(inputs[1 + m], lanes(inputs[1 + m]) + lanes(w.rhs[m]))
+    if w.n_ledger > 0:
+        evaluate_at(w, RATES, inputs, w.rates)
+    for m in range(w.n):
+        put(w.rates[m], GAMMA[DENSEST] / w.h[lane] * lanes(w.rhs[m]))
+    for m in range(w.n, w.columns):
+        put(w.rates[m], lanes(w.rates[m]) - polynomial_of(w.slope_of, m, lane, x))
+
+
+@compiled
+def check_outputs(w: Any, good: Any) -> None:
+    """End a step at its next output where the polynomial between the stages is less accurate than the step."""
+    shown = good & (lanes(w.next_output) < lanes(w.t_new)) & (lanes(w.defect_at) == 1.0)
+    differentiate_polynomials(w, w.n)
+    x = same(PROBE[MEMBER])
+    put_inside(w, x)
+    evaluate(w, RESIDUAL, w.rhs)
+    for m in range(w.n):
+        put(w.rhs[m], lanes(w.rhs[m]) - polynomial(w.slope_of, m, x))
+    _filter(w)
+    serves = shown
+    for m in range(w.n):
+        serves = serves & (absolute(lanes(w.rhs[m])) <= POLYNOMIAL_ERROR * lanes(w.weight[m]))
+    until = (lanes(w.next_output) - lanes(w.t)) / lanes(w.h)
+    put(w.defect_at, where(shown & ~serves, until, lanes(w.defect_at)))
+
+
+@compiled
+def keep_step(w: Any) -> None:
+    """Keep the slopes at the stages of the steps that are taken, from which the next ones are predicted."""
+    taken = lanes(w.taken) > 0.5
+    for i in range(STAGES):
+        for m in range(w.n):
+            put(w.k_last[i, m], where(taken, lanes(w.k[1 + i, m]), lanes(w.k_last[i, m])))
+
+
+_METHOD = {
+    "end_stage": STAGES,
+    "root_of": sixth_root,
+    "least_root": LEAST_NORM**POWER,
+    "try_step": try_step,
+    "propose": propose_size,
+    "is_noise": is_noise,
+    "find_stiff": find_stiff,
+    "put_roughly": put_roughly,
+    "interpolate": interpolate,
+    "find_defects": find_defects,
+    "check_outputs": check_outputs,
+    "keep_step": keep_step,
+}
+_lay_out = laying_out(StepperRecord("RadauLanes", SIZES, NUMBERS, RADAU_MEMORY, _METHOD))
+
+
+def run_by_radau(first: int, last: int, memory: Any, batch: Any) -> None:
+    """Solve runs first to last - 1 of a batch."""
+    run_through(_lay_out(batch, memory), first, last)
