@@ -402,6 +402,18 @@ def _are_stable(system: System, program: Program, y: Array, parameters: Array) -
     return np.asarray(found.valid & np.all(np.atleast_2d(program.margins(rows))[:, checks] > 0, axis=1))
 
 
+def _external_inputs(system: System) -> ExternalInputs | None:
+    """Return the rates that an engine outside the equations gives, with the compiled expressions that it reads."""
+    outside = system.external_rates
+    if outside is None:
+        return None
+    paths = [parameter.path for parameter in system.parameters]
+    first = 1 + 2 * len(system.states)
+    positions = np.array([first + paths.index(path) for path in outside.engine.gives], dtype=np.int64)
+    reads = compile_function(system.inputs, [system.expand(expression) for expression in outside.reads])
+    return ExternalInputs(reads, positions, outside.engine)
+
+
 class Model:
     """A system with its machine code, compiled when it is built."""
 
@@ -410,12 +422,6 @@ class Model:
         system = system.with_dummy_state()
         start = time.perf_counter()
         n, inputs = len(system.states), system.inputs
-        external, outside = None, system.external_rates
-        if outside is not None:
-            paths = [parameter.path for parameter in system.parameters]
-            positions = np.array([1 + 2 * n + paths.index(path) for path in outside.engine.gives], dtype=np.int64)
-            reads = compile_function(inputs, [system.expand(expression) for expression in outside.reads])
-            external = ExternalInputs(reads, positions, outside.engine)
         self.system = system
         self.margins = system.event_margins
         """Margins that can close during the run; the others are checked at the start only."""
@@ -433,7 +439,9 @@ class Model:
             origin=system.origin,
         )
         self.program = replace(
-            program, external=external, groups=tuple(GROUPS.get(account.kind, -1) for account in system.ledger)
+            program,
+            external=_external_inputs(system),
+            groups=tuple(GROUPS.get(account.kind, -1) for account in system.ledger),
         )
         self.jumper = Jumper(system, self.program) if system.has_arcs else None
         origin = system.origin and (system.origin, [item.name for item in system.outputs])
