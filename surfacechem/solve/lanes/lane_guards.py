@@ -93,27 +93,22 @@ def may_cross(w: Any, good: Any) -> Any:
     """
     if w.n_margins == 0:
         return good & ~good  # nowhere
-    for m in range(w.n_margins):
-        put(w.margin[m], lanes(w.margin_first[m]))
-        put(w.nearest[m], lanes(w.side[m]) * lanes(w.margin_first[m]))
-        put(w.curvature[m], 0.0)
-    for quarter in range(1, 5):
-        if quarter < 4:
-            w.put_roughly(w, 0.25 * quarter)
-        else:
-            put_end(w)
-        _put_margins(w)
-        for m in range(w.n_margins):
-            value = lanes(w.margin[m])
-            put(w.nearest[m], smaller(lanes(w.nearest[m]), lanes(w.side[m]) * value))
-            if quarter > 1:
-                curvature = absolute(value - 2.0 * lanes(w.margin_before[m]) + lanes(w.margin_earlier[m]))
-                put(w.curvature[m], larger(lanes(w.curvature[m]), curvature))
+    for quarter in range(3):
+        w.put_roughly(w, 0.25 * (quarter + 1))
+        evaluate(w, MARGINS, w.margin_quarters[quarter])
+    put_end(w)
+    evaluate(w, MARGINS, w.margin_end)
     close = same(0.0)
     for m in range(w.n_margins):
         if w.kinds[m, 4] != 0:
-            close = where(lanes(w.nearest[m]) > 2.0 * lanes(w.curvature[m]), close, 1.0)
-        put(w.margin_end[m], lanes(w.margin[m]))
+            side, before, now = lanes(w.side[m]), lanes(w.margin_first[m]), lanes(w.margin_quarters[0, m])
+            nearest, curvature = smaller(side * before, side * now), same(0.0)
+            for quarter in range(1, 4):
+                after = lanes(w.margin_quarters[quarter, m]) if quarter < 3 else lanes(w.margin_end[m])
+                nearest = smaller(nearest, side * after)
+                curvature = larger(curvature, absolute(after - 2.0 * now + before))
+                before, now = now, after
+            close = where(nearest > 2.0 * curvature, close, 1.0)
     return good & (lanes(w.onto) < 0.5) & (close > 0.5)
 
 

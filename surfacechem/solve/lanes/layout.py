@@ -32,11 +32,11 @@ MEMORY = {
     # is held against
     **_arrays("weight", "n"),
     **_arrays("q_largest q_rate q_scale", "n_ledger"),
-    # guards: value now and at the two points before, at the start and at the end of the step; over its quarters how
-    # near to zero and how much it bends; largest value so far; side of zero, 0 where it is not known yet;
-    # whether each is met in the step
-    **_arrays("margin margin_before margin_earlier margin_first margin_end", "n_margins"),
-    **_arrays("nearest curvature margin_largest side fired", "n_margins"),
+    # guards: value now and at the two points before, at the start, at the quarters and at the end of the step;
+    # largest value so far; side of zero, 0 where it is not known yet; whether each is met in the step
+    **_arrays("margin margin_before margin_earlier margin_first", "n_margins"),
+    **_arrays("margin_quarters", 3, "n_margins"),
+    **_arrays("margin_end margin_largest side fired", "n_margins"),
     # the time, now and at the end of the step; the end of the segment, a time at which a step has to end, and the time
     # of the next output
     **_arrays("t t_new end aim next_output"),
