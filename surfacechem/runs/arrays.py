@@ -410,12 +410,12 @@ class ArrayRuns:
     def balances(self, found: Ends, rows: Array, values: Mapping[str, Array], reached: Mask) -> Columns:
         """Return the errors of the balances of each run over its outputs, as in its audit."""
         system, batch, n = self.model.system, found.batch, self.n
+        # Column-major, since NumPy is slow in finding the largest of a few contiguous outputs.
+        reached, all_reached = np.asfortranarray(reached), reached.all()
         owner, k = np.nonzero(reached)
-        all_reached = reached.all()
 
         def whole(column: Array) -> Array:
             """Return a table of runs and outputs; beyond the end of a run it repeats the start, with no exchange."""
-            # Column-major, since NumPy is slow in finding the largest of a few contiguous outputs.
             if all_reached:
                 return np.asfortranarray(column.reshape(reached.shape))
             filled = np.zeros(reached.shape, order="F")

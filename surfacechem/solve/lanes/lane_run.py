@@ -352,9 +352,13 @@ def _write_margins(w: Any) -> None:
         evaluate(w, MARGINS, w.margin)
     for lane in range(LANES):
         if w.over[lane] >= 0:
-            end = w.ends[w.over[lane]]
+            i = w.over[lane]
+            end = w.ends[i]
             for m in range(w.n_margins):
                 end[end.shape[0] - w.n_margins + m] = w.margin[m, lane]
+            # The lane waits at a start: beyond an end the rates may take a branch that all lanes would pay for.
+            for m in range(w.n):
+                w.y[m, lane] = w.y0[i, m]
             w.over[lane] = -1
 
 
