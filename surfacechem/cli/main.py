@@ -196,11 +196,11 @@ def check(
     found = [*warnings(system), *start_warnings(model, problem, start, end)]
     why = reasons(problem, settings, system.has_moving_gap) if settings.solver == AUTO else ()
     settings = model.chosen(settings, values)
-    sweep = ""
+    sweep = []
     if simulation.case.sweep is not None and simulation.case.sweep.keep is not None:
         from surfacechem.runs.streaming import steps_of
 
-        sweep = steps_of(simulation)
+        sweep = [("sweep", steps_of(simulation))]
     show(check_summary(simulation.case.title, system, scene, settings, numbers, found, why, sweep))
 
 

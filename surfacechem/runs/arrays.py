@@ -113,6 +113,11 @@ def _starts_as_given(system: System, swept: set[str]) -> bool:
     return not (searched or made or registers)
 
 
+def _takes_implicit_lanes(model: Model, run: Run, automatic: bool) -> bool:
+    """True if implicit steps were chosen because the runs are stiff; the other reasons for them ask for single runs."""
+    return automatic and run.solver == IMPLICIT and run.rtol > MIN_RTOL and not model.system.has_moving_gap
+
+
 class ArrayRuns:
     """Runs of a plan that can be solved as arrays, see :func:`is_array`."""
 
@@ -122,12 +127,12 @@ class ArrayRuns:
     def __init__(
         self, model: Model, plan: Plan, run: Run, changes: Mapping[str, float], keep: Keep, automatic: bool
     ) -> None:
-        """Prepare the runs; ``automatic`` is True if their solver was chosen for them, not named."""
+        """Prepare the runs; ``automatic`` is True if their solver was chosen for them. One that is named gives the
+        results of single runs, to the last bit.
+        """
         self.model, self.plan, self.run, self.keep = model, plan, run, keep
         self.values = model.values(changes)
-        # A solver that is named gives the results of single runs, to the last bit. Of the reasons for implicit steps
-        # those that are not given by the equations alone want single runs, too.
-        stiff = automatic and run.solver == IMPLICIT and run.rtol > MIN_RTOL and not model.system.has_moving_gap
+        stiff = _takes_implicit_lanes(model, run, automatic)
         self.problem = replace(self._first_problem(changes), explicit=run.solver == EXPLICIT, implicit_lanes=stiff)
         system = model.system
         self.n = len(system.states)

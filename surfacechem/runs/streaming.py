@@ -84,7 +84,7 @@ class ChunkRuns:
         self.arrays = arrays if self.solvers else None
 
     @cached_property
-    def lanes(self) -> lane_batch.Method | None:
+    def lanes(self) -> lane_batch.LaneMethod | None:
         """The method by which eight runs are stepped at once; None if no runs are."""
         return next((lane_batch.method_of(solver.problem) for solver in self.solvers if not solver.jumps), None)
 

@@ -240,9 +240,9 @@ def check_summary(
     groups: Sequence[Group],
     warnings: Sequence[str],
     choices: Sequence[Sequence[str]] = (),
-    sweep: str = "",
+    sweep: Sequence[tuple[str, str]] = (),
 ) -> Sheet:
-    """Describe a scene in words, with its dimensionless numbers and warnings; ``sweep`` says how runs are stepped."""
+    """Describe a scene in words, with its dimensionless numbers and warnings; ``sweep`` are facts of its sweep."""
     from surfacechem.runs.check import laws_of
 
     sections: dict[str, Sequence[Sequence[str]]] = {
@@ -261,7 +261,7 @@ def check_summary(
     }
     facts = [("regime", f"{system.regime}: {REGIMES.get(system.regime, '')}"), ("run", _plan(system, run))]
     facts += [("compiled", _compiled(system, run))] if run is not None else []
-    facts += [("sweep", sweep)] if sweep else []
+    facts += sweep
     return Sheet(title or "untitled", facts, sections)
 
 

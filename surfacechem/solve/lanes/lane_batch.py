@@ -36,7 +36,7 @@ def solve_batch(problem: Problem, *columns: Array, room: Room | None = None) -> 
     return batch
 
 
-def run(batch: Any, method: "Method") -> None:
+def run(batch: Any, method: "LaneMethod") -> None:
     """Run a batch in lanes. Each call has its own memory, so several threads may call it at the same time."""
     words = _words_of(tuple(batch.sizes.tolist()), method)
     memory = np.zeros(words + LANES, np.int64)
@@ -46,13 +46,13 @@ def run(batch: Any, method: "Method") -> None:
 
 
 @lru_cache(maxsize=64)
-def _words_of(sizes: tuple[int, ...], method: "Method") -> int:
+def _words_of(sizes: tuple[int, ...], method: "LaneMethod") -> int:
     """Return the number of words of memory for a block of lanes of a program of these sizes."""
     return stepper.words_of(dict(zip(SIZES, sizes, strict=True)), method.memory)
 
 
 @dataclass(frozen=True, eq=False)
-class Method:
+class LaneMethod:
     """A method of the steps in lanes."""
 
     words: str
@@ -61,18 +61,18 @@ class Method:
     memory: Mapping[str, Any]
 
 
-def _method(words: str, memory: Mapping[str, Any], module: str, function: str, *parts: str) -> Method:
+def _method(words: str, memory: Mapping[str, Any], module: str, function: str, *parts: str) -> LaneMethod:
     here = Path(__file__).parent
     own = [here / f"{name}.py" for name in ("vector", "layout", "lane_step", "lane_guards", "lane_run", module, *parts)]
     sources = [*stepper.sources(), here.parent.parent / "compile" / "vectors.py", *own]
-    return Method(words, stepper.Loop(sources, f"{__package__}.{module}", function, brief=True), memory)
+    return LaneMethod(words, stepper.Loop(sources, f"{__package__}.{module}", function, brief=True), memory)
 
 
 EXPLICIT = _method("by explicit steps of order 8", EXPLICIT_MEMORY, "explicit_lanes", "run_explicitly")
 RADAU = _method("by Radau IIA of order 9", RADAU_MEMORY, "radau_lanes", "run_by_radau", "lane_linear")
 
 
-def method_of(problem: Problem) -> Method | None:
+def method_of(problem: Problem) -> LaneMethod | None:
     """Return the method of a batch in lanes; None if its runs are solved one at a time."""
     if problem.explicit:
         return EXPLICIT if problem.program.lanes else None
