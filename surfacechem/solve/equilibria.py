@@ -458,7 +458,7 @@ class Folds:
     def at(self, index: int, point: Point) -> FoldPoint | None:
         """Return the fold near a point; None if it is out of reach, or the edge is not a fold.
 
-        Near a fold the gap changes with the square root of time, so a run ends a little before it. If the stiffness
+        Near a fold the gap changes with the square root of time, so a run ends a little before it, or beyond. If the stiffness
         rises as the interface slides on, only the change of loads leads to the fold, and the interface is not driven
         there.
         """
@@ -474,7 +474,9 @@ class Folds:
         def ahead(gaps: Sequence[float] | Array) -> Array:
             return np.asarray(self._tangents[index](self.equilibria.along(point, there, gaps))).reshape(-1)
 
-        at = next_root(ahead, float(point.y[line.column]), sign, 1.0)
+        start = float(point.y[line.column])
+        passed = bool(ahead([start])[0] < 0)  # as a step may, by its tolerance
+        at = next_root(ahead, start, -sign if passed else sign, -1.0 if passed else 1.0)
         if at is None:
             return None
         return FoldPoint(self.equilibria.moved(point, self.equilibria.along(point, there, [at])), line, sign)
