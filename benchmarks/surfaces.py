@@ -18,8 +18,8 @@ from surfacechem.errors import InputError
 from surfacechem.laws.free_energy import EquilibriumBonds
 from surfacechem.laws.longrange import InversePower, LennardJonesPair
 from surfacechem.surfaces import inner_sums, patches
+from surfacechem.surfaces.forces import PairForces, interaction
 from surfacechem.surfaces.inner_sums import table
-from surfacechem.surfaces.pairwise import PairForces, interaction
 from surfacechem.surfaces.potential import CurvedSurfaces
 from surfacechem.surfaces.projection import Surface
 from surfacechem.surfaces.shapes import Cavity, Cylinder, Paraboloid, Plane, Sphere, Torus, Wavy

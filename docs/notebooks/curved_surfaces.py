@@ -13,8 +13,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from surfacechem.laws.longrange import InversePower
-from surfacechem.surfaces.curved_gap import between_flats, over_gap
-from surfacechem.surfaces.pairwise import interaction
+from surfacechem.surfaces.forces import between_flats, interaction, over_gap
 from surfacechem.surfaces.projection import Surface
 from surfacechem.surfaces.shapes import Cavity, Paraboloid, Plane, Sphere
 

@@ -310,7 +310,7 @@ def _totals(surface: CurvedSurfaces, approaches: Array, stretches: Array) -> lis
 
 def _fields(surface: CurvedSurfaces, approaches: Array, stretches: Array) -> Sequence[Column]:
     """Return gap and traction at points of body 1, which are denser where body 2 is nearest."""
-    from surfacechem.surfaces.pairwise import length
+    from surfacechem.surfaces.forces import length
     from surfacechem.surfaces.patches import Budget, outer_patches
     from surfacechem.surfaces.projection import FIRST_ORDER
 

@@ -23,9 +23,21 @@ from surfacechem.documents.cache_folder import PACKAGE, Fingerprint, cached, fin
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, derivative
 from surfacechem.surfaces.approach import ApproachEnergy, fitted, straight
-from surfacechem.surfaces.curved_gap import GAP, Contact, between_flats, density, kinks, level_approaches, over_gap
+from surfacechem.surfaces.forces import (
+    GAP,
+    Contact,
+    PairForces,
+    between_flats,
+    density,
+    interaction,
+    kinks,
+    length,
+    level_approaches,
+    over_gap,
+    pair_traction,
+    slices_of,
+)
 from surfacechem.surfaces.inner_sums import kernel, laws_by_extent
-from surfacechem.surfaces.pairwise import PairForces, interaction, length, pair_traction, slices_of
 from surfacechem.surfaces.patches import Budget, OutOfReachError
 from surfacechem.surfaces.projection import Array, Surface
 from surfacechem.tolerances import ERROR_FLOOR, FORMULA_EPS, GAP_EPS, NEGLIGIBLE, RUN_EPS, SQRT_EPS

@@ -15,8 +15,7 @@ from scipy.interpolate import PchipInterpolator
 
 from surfacechem.laws.free_energy import Penalty
 from surfacechem.laws.longrange import InversePower, LennardJonesPair, PairTable, PenaltyPair
-from surfacechem.surfaces.curved_gap import density, over_gap
-from surfacechem.surfaces.pairwise import interaction
+from surfacechem.surfaces.forces import density, interaction, over_gap
 from surfacechem.surfaces.projection import Surface
 from surfacechem.surfaces.shapes import Cap, Cavity, Cone, Cylinder, Disc, Paraboloid, Plane, Sphere
 

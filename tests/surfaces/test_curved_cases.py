@@ -22,9 +22,8 @@ from surfacechem.results.matching import match
 from surfacechem.runs.summaries import run_summary
 from surfacechem.surfaces import patches, potential
 from surfacechem.surfaces.approach import fitted
-from surfacechem.surfaces.curved_gap import density, level_approaches, over_gap
+from surfacechem.surfaces.forces import density, interaction, level_approaches, over_gap
 from surfacechem.surfaces.nearest_places import near_places
-from surfacechem.surfaces.pairwise import interaction
 from surfacechem.surfaces.potential import CurvedSurfaces
 from surfacechem.surfaces.projection import Surface
 from surfacechem.surfaces.shapes import Cone, Plane, Sphere, Torus

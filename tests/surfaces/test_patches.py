@@ -9,9 +9,8 @@ from scipy.integrate import quad
 from surfacechem.laws.free_energy import Penalty
 from surfacechem.laws.longrange import LennardJonesPair
 from surfacechem.surfaces import patches
-from surfacechem.surfaces.curved_gap import density, level_approaches, over_gap
+from surfacechem.surfaces.forces import density, interaction, level_approaches, over_gap
 from surfacechem.surfaces.nearest_places import near_places
-from surfacechem.surfaces.pairwise import interaction
 from surfacechem.surfaces.projection import Surface
 from surfacechem.surfaces.shapes import Cylinder, Heights, Plane, Sphere, Torus, Wavy
 

@@ -17,9 +17,8 @@ from surfacechem.laws.heat_transfer import GasGap
 from surfacechem.laws.longrange import InversePower, LennardJonesPair, LennardJonesSpherePlane, PairTable, PenaltyPair
 from surfacechem.quantities import BOLTZMANN
 from surfacechem.surfaces import patches
-from surfacechem.surfaces.curved_gap import between_flats, density, over_gap
+from surfacechem.surfaces.forces import between_flats, density, interaction, over_gap
 from surfacechem.surfaces.inner_sums import LAST_LEVEL, inner_sums, table
-from surfacechem.surfaces.pairwise import interaction
 from surfacechem.surfaces.potential import CurvedSurfaces
 from surfacechem.surfaces.projection import Surface
 from surfacechem.surfaces.shapes import Cap, Cavity, Cone, Cylinder, Disc, Paraboloid, Plane, Sphere, Torus
