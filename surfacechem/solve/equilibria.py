@@ -458,9 +458,9 @@ class Folds:
     def at(self, index: int, point: Point) -> FoldPoint | None:
         """Return the fold near a point; None if it is out of reach, or the edge is not a fold.
 
-        Near a fold the gap changes with the square root of time, so a run ends a little before it, or beyond. If the stiffness
-        rises as the interface slides on, only the change of loads leads to the fold, and the interface is not driven
-        there.
+        Near a fold the gap changes with the square root of time, so a run ends a little before it, or beyond. If the
+        stiffness rises as the interface slides on, only the change of loads leads to the fold, and the interface is not
+        driven there.
         """
         if index not in self.items or not len(self.equilibria.free(point)):
             return None
