@@ -352,9 +352,9 @@ class _Compilation:
 def kept(make: Callable[[], T], origin: Any, expressions: Iterable[Any]) -> T:
     """Return what is compiled from expressions, read from the cache if it has been before, in any process.
 
-    The key is the ``origin`` of the expressions, which gives them in this order to the last bit, the code that forms
-    and compiles them, and a hash of each of them. So nothing has to be expanded, differentiated or compared on the way
-    to code that is there. What has no origin, or one that no other process knows, is compiled from its parts.
+    The key is the ``origin`` of the expressions, this package's code, and the expressions themselves, exact to the last
+    bit: laws of a user and data of other libraries determine them too. So nothing has to be expanded or differentiated
+    on the way to code that is there. What has no origin, or one that cannot be pickled, is compiled from its parts.
     """
     if origin is None:
         return make()
@@ -363,8 +363,9 @@ def kept(make: Callable[[], T], origin: Any, expressions: Iterable[Any]) -> T:
     except Exception:  # a scene may contain objects of other libraries, which raise anything
         return make()
     sources = [source_digest(str(path)) for path in sorted(PACKAGE.rglob("*.py"))]
-    hashes = [hash(symengine.sympify(expression)) for expression in expressions]
-    digest = hashlib.sha256(repr((scene, sources, hashes)).encode()).hexdigest()
+    # Not their hashes: SymEngine's are equal for numbers such as 0.1 and 0.2.
+    parts = serialised(tuple(expressions))
+    digest = hashlib.sha256(repr((scene, sources, parts)).encode()).hexdigest()
     found: T = _compiled(_Compilation(digest, make))
     return found
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import cached_property
 from itertools import chain
-from typing import Any
+from typing import Any, SupportsFloat
 
 import cantera
 import numpy as np
@@ -89,12 +89,13 @@ class ReactorNet(cantera.ReactorNet):
         InterfaceStopped
             Where a scene ends, with the reason.
         InputError
-            For a time that is not finite.
+            For a time that is no finite number.
         cantera.CanteraError
             For a time that is past.
         """
-        if not np.isfinite(t):
-            raise InputError(f"a network advances to a finite time, not to {t} s; try `advance_to_steady_state`.")
+        given: Any = t  # a script may give a text
+        if not isinstance(given, SupportsFloat) or not np.isfinite(float(given)):
+            raise InputError(f"a network advances to a finite time in s, not to {t!r}; try `advance_to_steady_state`.")
         self._begin_or_restart()
         if self.time - t > LATER_AHEAD * np.spacing(abs(self.time)):
             raise cantera.CanteraError(f"Cannot integrate backwards in time: {t:.17g} s < {self.time:.17g} s.")
