@@ -96,6 +96,7 @@ class ReactorNet(cantera.ReactorNet):
         given: Any = t  # a script may give a text
         if not isinstance(given, SupportsFloat) or not np.isfinite(float(given)):
             raise InputError(f"a network advances to a finite time in s, not to {t!r}; try `advance_to_steady_state`.")
+        t = float(given)  # of float32, differences would be rounded to its digits
         self._begin_or_restart()
         if self.time - t > LATER_AHEAD * np.spacing(abs(self.time)):
             raise cantera.CanteraError(f"Cannot integrate backwards in time: {t:.17g} s < {self.time:.17g} s.")

@@ -462,6 +462,13 @@ def test_a_time_that_is_no_finite_number_is_refused(t):
         ReactorNet([InterfaceReactor("exothermic")]).advance(t)
 
 
+@pytest.mark.parametrize("t", [np.float32(1.5), np.array(1.5), 1.5])
+def test_a_time_of_any_kind_of_number(t):
+    net = ReactorNet([InterfaceReactor("stick-slip")])
+    net.advance(1.0)
+    assert net.advance(t) == 1.5
+
+
 def test_accounts_of_a_history_over_which_no_state_moves():
     """The integrator passes over the whole history in a few steps; the network integrates what is exchanged."""
     run, interface = surfacechem.load("lithium-polarisation").run(), InterfaceReactor("lithium-polarisation")
