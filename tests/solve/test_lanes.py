@@ -2,16 +2,19 @@
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from functools import cache
 from types import SimpleNamespace
 
 import case_runs
 import narrow_scenes
 import numpy as np
 import pytest
+import symengine as se
 from sampling import every
 from solver_problems import exothermic_problem, problem, robertson_sums
 
 import surfacechem
+from surfacechem.compile.program import compile_program
 from surfacechem.solve.lanes import lane_batch
 from surfacechem.solve.radau import stepper
 from surfacechem.solve.radau.solver import solve_arrays
@@ -149,6 +152,48 @@ def test_robertson(rtol, left):
     assert left[0] == 0
     exact = np.array([2.083340149701255e-08, 8.333360770334713e-14])  # Hairer & Wanner II, IV.10
     assert np.max(np.abs(found.ends[::3, 1:3] / exact - 1)) < 10 * rtol
+
+
+@cache
+def kinetics(n):
+    """A ring of reversible first-order reactions with exchanges of pairs, by mass action, and the heat of each kind."""
+    t, y, rates = se.Symbol("t"), se.symbols(f"y:{n}"), se.symbols(f"r:{n}")
+    forward, backward, exchange = (se.symbols(f"{name}:{n}") for name in "fbx")
+    sources, heats = [0] * n, [0, 0]
+    for i in range(n):
+        following, second, third = ((i + k) % n for k in (1, 2, 3))
+        turned = forward[i] * y[i] - backward[i] * y[following]
+        paired = exchange[i] * y[i] * y[second]
+        for j, change in ((i, -turned - paired), (following, turned + paired), (second, -paired), (third, paired)):
+            sources[j] += change
+        heats = [heats[0] + (i + 1) * turned, heats[1] + (2 * i - 5) * paired]
+    rows = [rate - source for rate, source in zip(rates, sources, strict=True)]
+    program = compile_program(t, y, rates, [*forward, *backward, *exchange], rows, ledger=heats)
+    return replace(program, groups=(0, 0))
+
+
+@pytest.mark.parametrize("n", [4, 7])
+@pytest.mark.parametrize("rtol", [1e-3, 1e-6, 1e-9, 1e-11])
+def test_random_kinetics(rtol, n, left):
+    """Rates over twelve decades, a third of the reactions stopped and half of the species absent at the start."""
+    random = np.random.default_rng(n)
+    rates = 10 ** random.uniform(-6, 6, (64, 1, 3 * n)) * (random.random((64, 1, 3 * n)) < 2 / 3)
+    y0 = 10 ** random.uniform(-3, 0, (64, n)) * (random.random((64, n)) < 0.5)
+    times = [0.01, 0.3, 1.0]
+    shared = problem(kinetics(n), y0[0], [0.0, 1.0], rtol, parameters=rates[0], atol=1e-6 * rtol, times=times)
+    columns = y0, rates, np.array([shared.spacing]), np.zeros((1, 2)), shared.segments[None], shared.times[None]
+    found = lane_batch.solve_batch(replace(shared, implicit_lanes=True), *columns)
+    assert left[0] <= 4
+    single = solve_arrays(shared, *columns)
+    exact = solve_arrays(replace(shared, rtol=max(1e-3 * rtol, 1e-12), atol=1e-3 * shared.atol), *columns)
+    assert not np.any(found.counts[:, END])
+    # What a species had, and what all accounts of a run have exchanged.
+    had = np.maximum(np.abs(exact.outputs[:, :, :n]).max(axis=1), y0)
+    exchanged = 30 * np.repeat(np.abs(exact.outputs[:, :, n:]).max(axis=(1, 2))[:, None], 2, axis=1)
+    unit = rtol * (np.concatenate([had, exchanged], axis=1) + 1e-6)[:, None]
+    missed, expected = (np.max(np.abs(each.outputs - exact.outputs) / unit) for each in (found, single))
+    assert missed <= 10 * max(expected, 1)
+    assert found.counts[:, FIRST_COUNTER].sum() <= 1.2 * single.counts[:, FIRST_COUNTER].sum()
 
 
 def test_threads_change_nothing():
