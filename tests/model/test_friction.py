@@ -12,10 +12,10 @@ import surfacechem
 from surfacechem.errors import InputError
 from surfacechem.laws.cohesive import AdhesionIntensity, AdhesionLoss, ExponentialCohesiveZone, XuNeedleman
 from surfacechem.laws.free_energy import Penalty, TangentialStiffness
-from surfacechem.laws.friction import BondedCoulomb, Coulomb
+from surfacechem.laws.friction import BondedCoulomb, Coulomb, Stribeck
 from surfacechem.laws.loading import Harmonic, Hold, Ramp, Table
 from surfacechem.model.assemble import assemble
-from surfacechem.scene import Mounting
+from surfacechem.scene import Body, Interface, Mounting, Scene
 from surfacechem.solve.radau.solver import consistent
 
 MU, C, W, B, E_N = 0.3, 1e12, 1.0, 0.01, 1e15
@@ -518,3 +518,25 @@ def test_slip_that_stops_with_its_drive_goes_on_as_its_limit_falls(potentials):
     late = found.result.times >= 2.0
     left = 0.5 * (6e4 + 4e4 * np.sin(0.25 * np.pi * found.result.times[late])) / 1e11
     np.testing.assert_allclose(found["u_t"][late], 2e-6 - left, rtol=1e-9)
+
+
+@pytest.mark.parametrize("rtol", [1e-9, 1e-11])
+def test_slip_begins_from_the_roundoff_of_loads_that_cancel(rtol):
+    """Drive and friction are equal there: the velocity is their roundoff over the damping, and grows from it."""
+    k, c_b, c_v, mu, mean, swing, omega, phase = 1e11, 1e10, 2e10, 0.5, 6e4, 4e4, 0.5 * np.pi, -np.pi
+    pressure = Harmonic(mean=mean, amplitude=swing, frequency=0.25, phase=phase)
+    loading = {"p": pressure, "w_t": Table(times=[0.0, 2.0], values=[0.0, 2e-6])}
+    friction = Stribeck(mu_s=mu, mu_k=mu, v_s=1e-6, c_v=c_v)
+    warm, mount = Hold(level=300.0), Mounting(k=k, c_b=c_b)
+    pair, interface = (Body("lower", warm), Body("upper", warm)), Interface(warm, (), [friction])
+    found = closed(Scene(pair, interface, loading=loading, T_0=300.0, tangential=mount), 1.0, rtol=rtol)
+    (begins,) = (jump.t for jump in found.of("slip"))
+
+    def forced(t):
+        wave = np.exp(1j * (omega * t + phase)) / (k + 1j * omega * (c_b + c_v))
+        return 1e-6 * (t - c_v / k) - mu * (mean / k + swing * wave.imag)
+
+    times = found.result.times
+    left = forced(begins) * np.exp(-k * (times - begins) / (c_b + c_v))
+    exact = np.where(times > begins, forced(times) - left, 0.0)
+    np.testing.assert_allclose(found["u_t"], exact, rtol=0, atol=10 * rtol * exact.max())

@@ -12,13 +12,13 @@ import numpy as np
 from surfacechem.solve.radau.linear import LARGE_MATRIX, bound_real, solve_real
 from surfacechem.solve.radau.tables import GAMMA
 from surfacechem.solve.radau.work import RESIDUAL, clear, compiled, evaluate, set_inputs
-from surfacechem.tolerances import NEGLIGIBLE, ULPS
+from surfacechem.tolerances import GUARD_EPS, NEGLIGIBLE, ULPS
 
 FIFTH_DIFFERENCE = np.array([1.0, -5.0, 10.0, -10.0, 5.0, -1.0]) / np.sqrt(252.0)
 """Coefficients of a fifth difference, scaled so that it has the size of independent errors of the values."""
 
 WINDOWS, TIME_SPACING = 3, NEGLIGIBLE
-"""Number of differences, and the spacing of their times as a part of the step."""
+"""Number of differences, and the least spacing of their times as a part of the step."""
 
 MAGNIFIED = 10.0
 """Noise of the error estimate, which extrapolates the noise of every stage, in units of the noise of one residual."""
@@ -32,15 +32,18 @@ def _measure_differences(w: Any, y: Any, ydot: Any) -> None:
     """Take fifth differences of the equations over neighbouring times: zero for smooth equations, but not for roundoff
     of their loads.
 
+    Over times that count as equal, loads change by no more than their roundoff, which steps much shorter do not sample.
+
     Source: Hamming (1973), Numerical Methods for Scientists and Engineers, noise by differences.
     """
     t, n = w.inputs[0], w.n
+    spacing = max(TIME_SPACING * w.h_factored, GUARD_EPS * (w.elapsed + (w.arc_start + t)))
     clear(w.differences)
     for row in range(WINDOWS):
         clear(w.difference_sums[row])
     set_inputs(w, y, ydot)
     for k in range(WINDOWS + FIFTH_DIFFERENCE.shape[0] - 1):
-        w.inputs[0] = t + k * TIME_SPACING * w.h_factored
+        w.inputs[0] = t + k * spacing
         evaluate(w, RESIDUAL, w.differences_now)
         for row in range(WINDOWS):
             if 0 <= k - row < FIFTH_DIFFERENCE.shape[0]:
@@ -141,7 +144,10 @@ def _most_noise(w: Any, j: int) -> float:
 
 @compiled
 def correction_is_noise(w: Any, stages: int) -> bool:
-    """True if Newton's last correction, kept in g, is no larger than the noise, magnified by the method."""
+    """True if Newton's last correction, kept in g, is no larger than the noise, magnified by the method, or negligible.
+
+    Elimination rounds small components in units of large ones, which no noise of the equations explains.
+    """
     magnified = 2.0 * GAMMA[w.member]
     # Usually it exceeds any possible noise, and finding the noise takes a solve for each variable.
     for i in range(stages):
@@ -151,6 +157,6 @@ def correction_is_noise(w: Any, stages: int) -> bool:
     find_noise(w)
     for i in range(stages):
         for j in range(w.n):
-            if not abs(w.g[i, j]) <= magnified * w.noise[j]:
+            if not abs(w.g[i, j]) <= max(magnified * w.noise[j], NEGLIGIBLE * w.weight[j]):
                 return False
     return True
