@@ -184,10 +184,11 @@ def _correct(w: Any, active: Any) -> Any:
 
 @compiled
 def _roundoff(w: Any) -> Any:
-    """The roundoff of the states, in units of the tolerance."""
+    """The roundoff of the states, also of one that grows from zero to its last stage, in units of the tolerance."""
     found = same(0.0)
     for m in range(w.n):
-        found = larger(found, EPS * absolute(lanes(w.y[m])) / lanes(w.weight[m]))
+        size = larger(absolute(lanes(w.z[STAGES - 1, m])), absolute(lanes(w.y[m])))
+        found = larger(found, EPS * size / lanes(w.weight[m]))
     return found
 
 
@@ -199,7 +200,7 @@ def _solve_stages(w: Any) -> Any:
     """
     active = lanes(w.h) > 0.0
     solved = active & ~active
-    resolution, fresh = 8.0 * _roundoff(w), ~(lanes(w.h_last) > 0.0)
+    fresh = ~(lanes(w.h_last) > 0.0)
     contraction = exponential(0.8 * logarithm(larger(where(fresh, 1.0, lanes(w.contraction)), same(EPS))))
     theta, last, rate_last = same(0.0), same(1.0), same(0.0)
     for iteration in range(MOST_ITERATIONS):
@@ -218,7 +219,7 @@ def _solve_stages(w: Any) -> Any:
             theta = where(active, rate, theta)
             contraction = where(active, larger(rate / (1.0 - rate), same(SLOWEST_KNOWN)), contraction)
         # At loose tolerances a single correction may hide a layer that the Jacobian does not resolve.
-        met = norm <= resolution
+        met = norm <= 8.0 * _roundoff(w)
         if iteration > 0 or w.rtol < COARSE_RTOL:
             met = met | (goes_on & (contraction * norm <= NEWTON_PART))
         solved = solved | (active & met)
