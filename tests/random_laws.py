@@ -18,17 +18,19 @@ LEFT_OUT = 0.5
 VARIES = 0.12
 """How often a parameter depends on a variable."""
 
+DRAWN_EARLY = ["bond-energy", "linear-enthalpy", "lattice-gas", "partner-mixing", "bond-springs", "equilibrium-bonds"]
 DRAWN_LATE = [
     *("film-shear", "rate-and-state-aging", "rate-and-state-slip", "anisotropic-coulomb", "anisotropic-viscous"),
     *("gap-conductance", "gas-gap", "gap-table", "film", "rarefied-film"),
 ]
-"""Laws that are drawn last of their contract, in this order, so that a seed keeps its scene wherever a law stands."""
+"""Laws that are drawn first and last of their contract, so that a seed keeps its scene wherever a law stands."""
 
 
 def laws(contract: Any) -> dict[str, Any]:
     """All laws of a contract by name, in the order in which they are drawn."""
-    late = {name: i + 1 for i, name in enumerate(DRAWN_LATE)}
-    return dict(sorted(registry.laws(contract).items(), key=lambda item: late.get(item[0], 0)))
+    places = {name: i + 1 for i, name in enumerate(DRAWN_LATE)}
+    places |= {name: i - len(DRAWN_EARLY) for i, name in enumerate(DRAWN_EARLY)}
+    return dict(sorted(registry.laws(contract).items(), key=lambda item: places.get(item[0], 0)))
 
 
 class Dice:
