@@ -66,7 +66,7 @@ def test_the_code_of_a_jacobian_is_loaded_without_differentiating(tmp_path, monk
     assert made(3) == [27.0, 1.0]
 
 
-CELLS = "sudden-contact", ["bodies.epoxy.conduction.cells=20"]
+CELLS = "sudden-contact", ["bodies.epoxy.conduction.cells=20", "run.rtol=1e-4"]
 
 
 @pytest.mark.parametrize("case", [("dna-adhesive", []), ("stick-slip", []), CELLS])

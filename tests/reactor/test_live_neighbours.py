@@ -329,13 +329,14 @@ def test_two_electrodes_of_a_cell_discharge_through_a_resistor():
     anode.load("j_electron", lambda t: current(t) / anode.area)
     cathode.load("j_electron", lambda t: -current(t) / cathode.area)
     net = network(anode, cathode, *solids)
+    net.rtol = 1e-8
     before, lithium = charge(), [solid.amounts[k] for solid, k in zip(solids, (0, 0, 2), strict=True)]
     net.advance(1.0)
     assert anode["i_electron"] == pytest.approx(-current(1.0), rel=1e-2)
     dissolved = solids[2].amounts[2] - lithium[2]
     assert charge() - before == pytest.approx(-dissolved * ct.faraday, rel=1e-7)
-    net.advance(1e3)
-    assert current(1e3) == pytest.approx(0, abs=1e-9)
+    net.advance(100.0)
+    assert current(100.0) == pytest.approx(0, abs=1e-9)
     assert solids[0].amounts[0] + solids[1].amounts[0] + solids[2].amounts[2] == pytest.approx(sum(lithium), rel=1e-12)
 
 
