@@ -153,15 +153,19 @@ def _errors(
 
 
 def _apart(stream: Stream, part: Index, done: SweepSolution) -> Array:
-    """Return the difference between the stored ends of runs and the ends of the same runs solved by themselves,
-    relative to the latter and beyond roundoff.
+    """Return the difference between the stored ends of runs and the ends of the same runs solved by themselves, beyond
+    roundoff: of states relative to the latter, of other variables, such as fluxes that vanish at rest, relative to
+    their largest values over the run.
 
     For a run stopped by an event only the time counts: there the state may change by any amount within the last digit
     of the time. Runs to a steady state, solved by themselves, all last as long as the slowest of them: only their
     states are compared, relative to their scales at least.
     """
     chunks = stream.chunks
-    ends = RunByRun(chunks.model, Keep(last=chunks.keep.last)).columns(done.runs, 0, done.audits)
+    others = tuple(name for name in chunks.keep.last if name not in chunks.model.system.state_columns)
+    keep = Keep(last=chunks.keep.last, max=others, min=others)
+    ends = RunByRun(chunks.model, keep).columns(done.runs, 0, done.audits)
+    over_run = {f"{name}_last": np.fmax(np.abs(ends[f"{name}_max"]), np.abs(ends[f"{name}_min"])) for name in others}
     stored, largest = chunks.columns(part), np.zeros(len(part))
     names = "time_reached", *(f"{name}_last" for name in chunks.keep.last)
     least = {name: ERROR_FLOOR * np.nanmax(np.abs(ends[name]), initial=TINY) for name in names}
@@ -170,7 +174,7 @@ def _apart(stream: Stream, part: Index, done: SweepSolution) -> Array:
         least = {name: scales[name] for name in scales if name in least}
     rounded = [run.sample.roundings for run in done.runs]
     for name, floor in least.items():
-        size = np.maximum(np.abs(ends[name]), floor)
+        size = np.fmax(np.abs(ends[name]), np.fmax(over_run.get(name, 0.0), floor))
         known = RUN_ERROR * np.array([each.get(name.removesuffix("_last"), 0.0) for each in rounded])
         apart = np.nan_to_num(np.fmax(np.abs(stored[name] - ends[name]) - known, 0.0) / size)
         apart[np.isnan(stored[name]) != np.isnan(ends[name])] = np.inf
