@@ -28,16 +28,17 @@ MIN_AHEAD, LATER_AHEAD = 1e4, 4.0
 """The shortest first request and all later ones, in roundings of the time."""
 
 
-_NODES = np.array([0.434243749346802558, 0.774596669241483377, 0.960491268708020283])
-_WEIGHTS = np.array([0.450916538658474142, 0.401397414775962223, 0.268488089868333441, 0.104656226026467265])
+_GAUSS = np.polynomial.legendre.leggauss(3)
+_BETWEEN = np.polynomial.Polynomial([155 / 891, 0, -10 / 9, 0, 1]).roots()
+"""Nodes that Kronrod adds to three of Gauss: the roots of Stieltjes's polynomial."""
 
-NODES = np.concatenate((-_NODES[::-1], [0.0], _NODES))
+NODES = np.sort(np.concatenate([_GAUSS[0], _BETWEEN]))
 """Nodes of the quadrature of Gauss and Kronrod with seven points, from -1 to 1."""
 
-WEIGHTS = np.concatenate((_WEIGHTS[:0:-1], _WEIGHTS))
+WEIGHTS = np.linalg.solve(np.polynomial.legendre.legvander(NODES, 6).T, [2, 0, 0, 0, 0, 0, 0])
 """Its weights, exact for polynomials up to the eleventh degree: the integrator's have the fifth at most."""
 
-LESS_GAUSS = WEIGHTS - np.array([0, 5, 0, 8, 0, 5, 0]) / 9
+LESS_GAUSS = WEIGHTS - np.insert(_GAUSS[1], [0, 1, 2, 3], 0.0)
 """These less the weights of Gauss for three of the points, which are exact up to the fifth degree."""
 
 PANELS_PER_CYCLE = 8
@@ -46,7 +47,6 @@ PANELS_PER_CYCLE = 8
 MOST_HALVINGS = 8
 """Halvings of a panel, a choice: accounts that are roundoff never agree, and 256 panels resolve what a step passes over
 smoothly."""
-
 
 EXPLAINED = 10.0
 """Ratio of the relative errors of an account and of a state up to which the same is their cause, a choice: between 10
