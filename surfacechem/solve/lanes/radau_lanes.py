@@ -43,7 +43,15 @@ from surfacechem.solve.lanes.vector import (
 from surfacechem.solve.radau.dense import N_GROUPS, ledger_rtol
 from surfacechem.solve.radau.driver import LEAST_NORM
 from surfacechem.solve.radau.explicit import DENSEST
-from surfacechem.solve.radau.newton import NEWTON_PART, PREDICTOR_REACH, SLOWEST_KNOWN
+from surfacechem.solve.radau.newton import (
+    DIVERGENT,
+    NEWTON_PART,
+    PREDICTOR_REACH,
+    ROUNDINGS,
+    SHORTENED,
+    SLOWEST_KNOWN,
+    TRUST,
+)
 from surfacechem.solve.radau.outputs import POLYNOMIAL_ERROR
 from surfacechem.solve.radau.record import StepperRecord, laying_out
 from surfacechem.solve.radau.step import CONTRACTING, LEAST_CONVERGENT, MIN_GROWTH, SAFETY
@@ -69,8 +77,8 @@ C = NODES[MEMBER, :STAGES]
 POWER = 1.0 / (STAGES + 1.0)
 """Exponent of the size of a step: the estimate of s stages goes with h^(s+1)."""
 MOST_ITERATIONS = 9
-DIVERGED = (SAFETY / 0.4) ** (1.0 / POWER)
-"""Norm assigned to a step without convergence: the next trial has 0.4 of its size, as in single runs. If that fails
+DIVERGED = (SAFETY / SHORTENED) ** (1.0 / POWER)
+"""Norm assigned to a step without convergence: the next trial is SHORTENED, as in single runs. If that fails
 too, the next ones have a tenth each.
 """
 EIGENVALUES = np.array([GAMMA[MEMBER], *PAIR_VALUES[MEMBER, :2]])
@@ -201,7 +209,7 @@ def _solve_stages(w: Any) -> Any:
     active = lanes(w.h) > 0.0
     solved = active & ~active
     fresh = ~(lanes(w.h_last) > 0.0)
-    contraction = exponential(0.8 * logarithm(larger(where(fresh, 1.0, lanes(w.contraction)), same(EPS))))
+    contraction = exponential(TRUST * logarithm(larger(where(fresh, 1.0, lanes(w.contraction)), same(EPS))))
     theta, last, rate_last = same(0.0), same(1.0), same(0.0)
     for iteration in range(MOST_ITERATIONS):
         norm = _correct(w, active)
@@ -215,11 +223,11 @@ def _solve_stages(w: Any) -> Any:
             rate_last, expected = ratio, norm * rate / (1.0 - rate)
             for _ in range(MOST_ITERATIONS - 1 - iteration):
                 expected = expected * rate
-            goes_on = goes_on & (rate < 0.99) & (expected <= NEWTON_PART)
+            goes_on = goes_on & (rate < DIVERGENT) & (expected <= NEWTON_PART)
             theta = where(active, rate, theta)
             contraction = where(active, larger(rate / (1.0 - rate), same(SLOWEST_KNOWN)), contraction)
         # At loose tolerances a single correction may hide a layer that the Jacobian does not resolve.
-        met = norm <= 8.0 * _roundoff(w)
+        met = norm <= ROUNDINGS * _roundoff(w)
         if iteration > 0 or w.rtol < COARSE_RTOL:
             met = met | (goes_on & (contraction * norm <= NEWTON_PART))
         solved = solved | (active & met)

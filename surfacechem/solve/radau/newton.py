@@ -64,6 +64,18 @@ STIFFER = 3.0
 SLOWEST_KNOWN = 0.02
 """Least contraction assumed: a component that converges at once hides a slower one behind its first correction."""
 
+TRUST = 0.8
+"""Power that reduces the confidence in a contraction found on another step (Hairer & Wanner II, IV.8)."""
+
+DIVERGENT = 0.99
+"""Rate of contraction from which on the iteration is given up, as in the code RADAU5 of these authors."""
+
+ROUNDINGS = 8.0
+"""Corrections, in roundings of the states, up to which they are roundoff: a choice, some for the sums of the stages."""
+
+SHORTENED = 0.4
+"""Part of a step that is tried again where the iteration did not converge, a choice."""
+
 
 @compiled
 def stage_count(k: int) -> int:
@@ -294,8 +306,7 @@ def solve_stages(w: Any, h: float) -> int:
     allowed iterations will suffice.
     """
     limit = 7 + 2 * w.member
-    # The power reduces the confidence in a rate that was found on another step.
-    contraction = max(w.contraction, EPS) ** 0.8
+    contraction = max(w.contraction, EPS) ** TRUST
     k, s, rate_of_time = w.member, stage_count(w.member), 1.0 / h
     norm_last, rate_last = 0.0, 0.0
     w.theta = 0.0
@@ -316,13 +327,13 @@ def solve_stages(w: Any, h: float) -> int:
             ratio = norm / norm_last
             rate = ratio if iteration == 1 else np.sqrt(ratio * rate_last)
             rate_last = ratio
-            if rate >= 0.99 or rate / (1.0 - rate) * norm * rate ** (limit - 1 - iteration) > NEWTON_PART:
+            if rate >= DIVERGENT or rate / (1.0 - rate) * norm * rate ** (limit - 1 - iteration) > NEWTON_PART:
                 break
             w.theta = rate
             contraction = max(rate / (1.0 - rate), SLOWEST_KNOWN)
         # At loose tolerances a single correction may hide a layer that the Jacobian does not resolve.
         believed = iteration > 0 or w.rtol < COARSE_RTOL
-        if (believed and contraction * norm <= NEWTON_PART) or norm <= 8.0 * w.roundoff:
+        if (believed and contraction * norm <= NEWTON_PART) or norm <= ROUNDINGS * w.roundoff:
             w.contraction = contraction
             return CONVERGED
         norm_last = max(norm, TINY)

@@ -31,6 +31,7 @@ from surfacechem.solve.radau.linear import solve_real
 from surfacechem.solve.radau.newton import (
     CONVERGED,
     NOT_FINITE,
+    SHORTENED,
     differentiate_system,
     divide,
     end_of_step,
@@ -430,7 +431,7 @@ def advance_implicitly(w: Any, h: float, i: int, size_last: float, norm_last: fl
                 return GOOD, h, norm, min(h, proposed) if failed else proposed
             smaller = next_size(w, h, min(norm, 1e30), 0.0, 1.0)
         else:
-            smaller = h * (0.1 if outcome == NOT_FINITE else 0.4)
+            smaller = h * (0.1 if outcome == NOT_FINITE else SHORTENED)
             failed = True
         w.rejected += 1
         w.h_factored = 0.0
