@@ -149,7 +149,8 @@ def dataset_path(path: str | Path) -> Path:
     suffix = target.suffix.lower()
     if suffix and suffix not in RUN_SUFFIXES:
         remedy = f"{', '.join(RUN_SUFFIXES)}. Give {target.with_suffix('.nc').name}, or a name without suffix."
-        raise InputError(f"no dataset is written as '{target.suffix}': {remedy}", Place(str(path)))
+        stores = " Stores (.zarr) are for `sweep`." if suffix == ".zarr" else ""
+        raise InputError(f"no dataset is written as '{target.suffix}': {remedy}{stores}", Place(str(path)))
     if suffix == PARQUET and find_spec("pyarrow") is None:
         message = "Parquet needs PyArrow: `pip install 'surfacechem[parquet]'`. A .csv needs nothing more."
         raise InputError(message, Place(str(path)))

@@ -141,6 +141,7 @@ class TestRun:
             ["run", "bonding.yaml", "-o", "x.txt"],
             "x.txt: no dataset is written as '.txt': .nc, .nc4, .cdf, .csv, .parquet.",
         ),
+        (["run", "bonding.yaml", "-o", "s.zarr"], "Stores (.zarr) are for `sweep`."),
         (["run", "bonding.yaml", "-o", "bonding.yaml"], "no dataset is written as '.yaml'"),
         (["run", "loop.yaml"], "surfacechem: loop.yaml: is a link to loop.yaml, where no file is."),
         (
