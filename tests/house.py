@@ -34,11 +34,11 @@ up."""
 SMALL = 1e-2
 """Positive numbers below this are thresholds, as a rule."""
 
-DATA = {"laws", "references", "mechanism"}
-"""Folders in which small numbers are data of materials."""
+DATA = {"laws", "references", "mechanism", "regimes"}
+"""Folders in which small numbers are data of materials and cases."""
 
-TABLES = {"tolerances", "tables", "quantities", "units", "regimes"}
-"""Modules of small numbers that stand together: tolerances, coefficients of methods, units, and cases."""
+TABLES = {"tolerances", "tables", "quantities", "units"}
+"""Modules of small numbers that stand together: tolerances, coefficients of methods, and units."""
 
 PROSE = re.compile(r"#\s*(?!type:|noqa|pragma|fmt:)")
 

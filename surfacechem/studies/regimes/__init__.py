@@ -42,7 +42,7 @@ Values: TypeAlias = Mapping[str, Array | float]
 R = TypeVar("R", bound=Reference)
 
 # Cases that serve only to show failures of solvers are in the folder of their regimes.
-FOLDER = Path(__file__).parent / "regime_cases"
+FOLDER = Path(__file__).parent
 
 
 @dataclass(frozen=True)
