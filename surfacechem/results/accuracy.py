@@ -102,11 +102,11 @@ class Accuracy:
     source: str
     """The exact solution's name, the second run and its tolerance, or the balances, in words."""
     variables: Mapping[str, float] = field(default_factory=dict)
-    exact: Callable[..., Mapping[str, Array]] | None = field(default=None, compare=False)
+    exact: Callable[..., Mapping[str, Array]] | None = field(default=None, compare=False, repr=False)
     """Function for the exact values at the outputs of a run, by variable, if an exact solution was named."""
     asked: float | None = None
     """Requested accuracy, if the tolerance was chosen from it."""
-    named: Callable[[], Mapping[str, float]] = field(default=dict, compare=False)
+    named: Callable[[], Mapping[str, float]] = field(default=dict, compare=False, repr=False)
     """Function for the errors of quantities that follow from the compared variables, by name, where known."""
 
     @cached_property

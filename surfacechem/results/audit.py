@@ -78,6 +78,10 @@ class Audit:
     losses: Callable[[], tuple[Mapping[str, float], float]]
     """Function for the destroyed fractions; it is slow if the surroundings have to be asked for rates."""
 
+    def __repr__(self) -> str:
+        """Return the three largest residuals in a line."""
+        return f"<Audit: energy {self.energy_error:.1e}, entropy {self.entropy_error:.1e}, sites {self.site_error:.1e}>"
+
     @cached_property
     def _lost(self) -> tuple[Mapping[str, float], float]:
         return self.losses()

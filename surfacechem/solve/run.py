@@ -169,6 +169,11 @@ class Trajectory:
     seconds: float
     jumps: tuple[Jump, ...] = ()
 
+    def __repr__(self) -> str:
+        """Return states, steps and end in a line."""
+        states = ", ".join(state.name for state in self.model.system.states)
+        return f"<Trajectory of {states}: {self.result.counters.steps} steps, {self.status}, {self.reason}>"
+
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Restore the machine code of the problem from the model, which has compiled it again."""
         problem = replace(state["result"].problem, program=state["model"].program)

@@ -237,3 +237,6 @@ def test_a_solution_says_itself_in_a_line(solution):
     assert repr(solution).startswith(
         "<Solution 'Exothermic bonding, kappa = 0.5': finished, reached the end at t = 2.5 s"
     )
+    assert repr(solution.audit).startswith("<Audit: energy ")
+    assert repr(solution.trajectory).startswith("<Trajectory of phi, T: ")
+    assert max(len(repr(part)) for part in (solution.audit, solution.trajectory, solution.accuracy)) < 300
