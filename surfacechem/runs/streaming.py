@@ -35,13 +35,14 @@ if TYPE_CHECKING:
     from surfacechem.runs.simulation import Simulation
 
 
-EXPLICIT_RUNS, IMPLICIT_RUNS, JUMPING_RUNS, SLOW_RUNS = 2**16, 2**14, 2**12, 2**9
+EXPLICIT_RUNS, IMPLICIT_RUNS, JUMPING_RUNS, SLOW_RUNS = 2**18, 2**14, 2**12, 2**9
 """Largest numbers of runs in a chunk, about one or two seconds of work: of runs with explicit steps, with implicit
 steps, with jumps, and of runs that are solved one by one.
 """
 
-RUNS_OF_A_PIECE = 2**12
-"""Largest number of runs that a thread takes at a time; with far fewer, calls of NumPy and waiting threads cost time.
+RUNS_OF_A_PIECE = 2**14
+"""Largest number of runs that a thread takes at a time; with far fewer, calls of NumPy and waiting threads cost time,
+with far more, arrays leave the cache.
 """
 
 
