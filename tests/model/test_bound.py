@@ -8,6 +8,7 @@ import pytest
 from scenes import SITES, bodies, together, varying
 from scipy.optimize import brentq
 from solved import closed
+from zoo import pairwise
 
 from surfacechem.errors import InputError
 from surfacechem.laws.cohesive import ExponentialCohesiveZone, TensileStrength
@@ -114,15 +115,13 @@ def test_fewer_partners_than_sites_bound_what_does_not_read_them():
     assert trajectory.end("phi") == 0.5
 
 
-@pytest.mark.parametrize("solver", ["radau", "lsoda"])
-@pytest.mark.parametrize("epsilon", [2e-19, 6e-19, 1e-18])
-@pytest.mark.parametrize(
-    ("mixing", "sites", "bound"),
-    [(LatticeGas, SITES, 1.0), (partial(PartnerMixing, a=1e-16), Sites(1e16, 5e15), 0.5)],
-    ids=["lattice", "partners"],
-)
-def test_bonds_too_strong_for_an_equilibrium_below_the_bound_are_complete(mixing, sites, bound, epsilon, solver):
+MIXING = (LatticeGas, SITES, 1.0), (partial(PartnerMixing, a=1e-16), Sites(1e16, 5e15), 0.5)
+
+
+@pytest.mark.parametrize(("epsilon", "mixed", "solver"), pairwise([2e-19, 6e-19, 1e-18], MIXING, ["radau", "lsoda"]))
+def test_bonds_too_strong_for_an_equilibrium_below_the_bound_are_complete(epsilon, mixed, solver):
     """Fifty k_B T and more: what is left unbonded is less than the last digit of the bonding state."""
+    mixing, sites, bound = mixed
     law = ReversibleBell(k_off=0.1)
     scene = isothermal(law, sites, 0.01, [mixing(epsilon=epsilon)], {"f": Hold(level=0.0)})
     trajectory = Model(assemble(scene)).solve(Run([0.0, 1.0, 4.0], 1e-8, solver=solver))

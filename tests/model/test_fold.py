@@ -17,7 +17,6 @@ import surfacechem
 from surfacechem.format import load_text
 from surfacechem.laws.cohesive import ExponentialCohesiveZone, XuNeedleman
 from surfacechem.laws.factors import Power
-from surfacechem.laws.friction import MohrCoulomb
 from surfacechem.laws.loading import Hold, Ramp, Table
 from surfacechem.runs.simulation import Simulation
 from surfacechem.scene import Mounting
@@ -283,10 +282,3 @@ def test_motion_that_nothing_bears_is_given_up_soon():
 
     assert come_to_rest(driving, np.full(2, 1e-9), np.zeros(2), np.zeros(2)) is None
     assert 0 < seen < 10_000
-
-
-def test_a_zone_in_shear_beside_friction():
-    loading = {"w_n": Hold(level=-1e-9), "w_t": Ramp(rate=1e-8)}
-    mounts = {"normal": Mounting(k=1e15), "tangential": Mounting(k=0.05 * STIFF)}
-    trajectory = solve(loading, frictions=[MohrCoulomb(mu=0.3, c=1e7)], **mounts)
-    assert trajectory.status == "finished", trajectory.reason

@@ -9,7 +9,6 @@ from scipy.integrate import solve_ivp
 from solved import closed
 
 import surfacechem
-from surfacechem.errors import InputError
 from surfacechem.laws.cohesive import AdhesionIntensity, AdhesionLoss, ExponentialCohesiveZone, XuNeedleman
 from surfacechem.laws.free_energy import Penalty, TangentialStiffness
 from surfacechem.laws.friction import BondedCoulomb, Coulomb, Stribeck
@@ -38,18 +37,6 @@ def scene(potentials, frictions=DRY, loading=DRIVE, mount=STIFF):
 
 def solve(made, times=END):
     return closed(made, times, exact=1e-7, outputs=401)
-
-
-def test_a_damper_bears_what_adhesion_and_what_sticks_leave_of_the_drive():
-    """Half of the interface is bonded; what sticks on the other half is elastic."""
-    k, c, E_t = 1e12, 1e12, 2e11
-    loads, start = {"g_n": Hold(level=-OVERLAP)} | DRIVE, {"phi": 0.5}
-    potentials, loss = [ADHESION, TangentialStiffness(E_t=E_t)], [AdhesionLoss(b=B)]
-    made = together(potentials, DRY, loads, start, loss, sites=SITES, tangential=Mounting(k=k, c_b=c))
-    found = closed(made, 1.0)
-    stiffness = k + C / 4 + E_t / 2
-    steady, slow = k * RATE / stiffness, c / stiffness
-    assert found.end("u_t") == pytest.approx(steady + (RATE - steady) * slow * (1 - math.exp(-1 / slow)), rel=1e-10)
 
 
 # -- Raous, Cangemi & Cocu with friction on the unbonded part: plain models -----------------------------------------
@@ -251,13 +238,6 @@ def test_adhesion_is_the_same_in_all_directions(potential, mount):
         np.testing.assert_allclose(turned[f"t_{axis}"], part * straight["t_t"], rtol=1e-6, atol=1e-1)
 
 
-def test_what_two_directions_do_not_know_is_refused():
-    with pytest.raises(InputError, match="dry friction in two directions does not say how fast"):
-        assemble(at_an_angle([ZONE], (Coulomb(mu=MU),), STIFF))
-    with pytest.raises(InputError, match="elastic gap g_t of its potential has one"):
-        assemble(at_an_angle([Penalty(E_n=E_N), TangentialStiffness(E_t=1e12)], (Coulomb(mu=MU),), HEAVY))
-
-
 def on_an_elastic_gap(loading, friction="coulomb: {mu: 0.5}", more=()):
     """Friction in series with 1 GPa/mm, as is loaded, without anything else that moves along."""
     case = f"""
@@ -274,13 +254,6 @@ def on_an_elastic_gap(loading, friction="coulomb: {mu: 0.5}", more=()):
 
 
 RAMP = "{p: 2 MPa, F_t: {ramp: {start: 0 MPa, rate: 1 MPa/s}}}"
-
-
-def test_a_dead_load_on_an_elastic_gap_ends_where_sticking_gives_way():
-    found = on_an_elastic_gap(RAMP)
-    assert found.status == "stopped"
-    assert "the dead load exceeds what sticking bears" in found.reason
-    assert found.trajectory.result.t == pytest.approx(1.0, rel=1e-9)
 
 
 def test_without_a_load_nothing_has_to_be_borne():
@@ -331,17 +304,6 @@ def test_a_velocity_that_rounding_has_against_the_sliding_is_as_unstable_as_rest
     parameters = [values[p.path] if p.path != "mode.slip" else 1.0 for p in model.system.parameters]
     (stable,) = [j for j, margin in enumerate(model.margins) if margin.name == "stable v"]
     assert model.program.margins(np.array([0.0, 0.0, v, 0.0, 0.0, *parameters]))[stable] < 0
-
-
-@pytest.mark.parametrize("across", ["", "w_t2: {ramp: {rate: 0.1 mm/s}}, "])
-@pytest.mark.parametrize(("damper", "rate"), [("1e8 Pa s/m", 1), ("1e7 Pa s/m", 3)])
-def test_a_velocity_at_which_friction_falls_faster_than_a_damper_resists_ends_a_run(damper, rate, across):
-    """At a fold of the velocity, however large the damper is in its unit."""
-    case = STRIBECK.replace("DELTA", "2").replace("MU_S", "0.7").replace("1e3 Pa s/m", damper)
-    case = case.replace("p: 1 MPa, ", f"p: 1 MPa, {across}").replace("rate: 1 mm/s}}}", f"rate: {rate} mm/s}}}}}}")
-    found = surfacechem.run(case)
-    assert found.status == "stopped"
-    assert "no steady sliding velocity" in found.reason
 
 
 @pytest.mark.parametrize("across", ["", "w_t2: {harmonic: {amplitude: 0.3 mm, frequency: 0.7 Hz}}, "])

@@ -26,7 +26,6 @@ from surfacechem.laws.heat_transfer import (
     Conductance,
     CooperMikicYovanovich,
     GapConductance,
-    GapTable,
     GasGap,
     PressureConductance,
     PressureTable,
@@ -171,13 +170,6 @@ def test_mean_influx_is_of_two_bodies_with_temperatures_of_their_own():
 PRESSURES = {"pressures": [0.0, 1e6, 3e6], "conductances": [500.0, 1500.0, 3000.0]}
 
 
-def test_tables_beyond_their_ends():
-    held, straight = (PressureTable(between=ENDS, extrapolation=way, **PRESSURES) for way in ("hold", "linear"))
-    assert held.conductance(p=6e6) == held.conductance(p=3e6) == 3000.0
-    slope = (straight.conductance(p=3e6) - straight.conductance(p=3e6 - 10.0)) / 10.0
-    assert (straight.conductance(p=6e6) - 3000.0) / 3e6 == pytest.approx(slope, rel=1e-4)
-
-
 def test_a_table_that_refuses_to_be_extrapolated_ends_the_run():
     law = PressureTable(between=ENDS, extrapolation="refuse", **PRESSURES)
     trajectory = solved(direct([law], {"p": Ramp(rate=1e6)}), 0.0, 2.0, 10.0)
@@ -200,11 +192,6 @@ def test_a_correlation_outside_its_range_says_so():
     outside = Solution(solved(direct([law], {"p": Hold(level=1e9)}), 0.0, 1.0))
     assert inside.warnings == ()
     assert outside.warnings[0].startswith("cooper mikic yovanovich is an extrapolation: p ran from 1e+09 to 1e+09")
-
-
-def test_a_table_that_is_none_is_refused():
-    with pytest.raises(InputError, match="must increase"):
-        GapTable(between=ENDS, gaps=[0.0, 0.0], conductances=[1.0, 2.0])
 
 
 # -- touch ------------------------------------------------------------------------------------------------------------

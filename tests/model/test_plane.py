@@ -162,21 +162,6 @@ def test_what_bears_nothing_across_slides_there():
 # -- smooth laws ----------------------------------------------------------------------------------------------------
 
 
-def test_two_oscillators_of_one_mass():
-    """Free vibration with viscous damping, along and across on springs of their own."""
-    m, g, times = 10.0, 1e-6, np.linspace(0, 0.1, 31)
-    along, across = Mounting(k=1e6, m=m, c_g=200.0), Mounting(k=3e6, c_g=50.0)
-    law = AnisotropicViscous(eta_1=1e-4, eta_2=3e-4)
-    solved = closed(scene([law], along, {"v": 1.0, "u_t2": 2e-3}, across, g_n=g, w_t=0.0, w_t2=0.0), times)
-    for u, k, c, u_i, v_i in (("u_t", 1e6, 300.0, 0.0, 1.0), ("u_t2", 3e6, 350.0, 2e-3, 0.0)):
-        decay = c / (2 * m)
-        omega = math.sqrt(k / m - decay**2)
-        wave = u_i * np.cos(omega * times) + (v_i + decay * u_i) / omega * np.sin(omega * times)
-        close(solved[u], np.exp(-decay * times) * wave, 1e-8)
-    assert solved["E_kinetic_t2"][0] == 0
-    assert solved["E_spring_t2"][0] == pytest.approx(0.5 * 3e6 * 4e-6, rel=1e-14)
-
-
 # -- programmes, values, prescribed velocities ----------------------------------------------------------------------
 
 

@@ -8,6 +8,7 @@ import symengine as se
 from scenes import together
 from solved import Solved, closed, solve
 from solver_problems import problem
+from zoo import pairwise
 
 from surfacechem.compile.program import compile_program
 from surfacechem.format import load_text
@@ -156,12 +157,16 @@ def test_what_has_turned_in_the_air_slides_on_as_a_rigid_contact_closes():
 # -- a limit of zero, at which sticking and sliding are the same ------------------------------------------------------
 
 
-@pytest.mark.parametrize("mu_s", [None, 0.7])
-@pytest.mark.parametrize("rate", [1e-6, -0.3e-6])
-@pytest.mark.parametrize("own", [{}, {"c_b": 1e11}, {"m": 1e10}], ids=["spring", "damper", "mass"])
-@pytest.mark.parametrize("normal", [{}, {"c_b": 1e11}, {"m": 1e10, "e": 0.3}], ids=["spring", "damper", "rigid"])
-def test_sliding_asperities_that_are_pulled_apart_let_go_once(normal, own, rate, mu_s):
+OWN = {}, {"c_b": 1e11}, {"m": 1e10}
+NORMAL = {}, {"c_b": 1e11}, {"m": 1e10, "e": 0.3}
+DRIVEN = (1e-6, None), (-0.3e-6, 0.7), (1e-6, 0.7)
+"""Rate [m/s], and static friction."""
+
+
+@pytest.mark.parametrize(("normal", "own", "driven"), pairwise(NORMAL, OWN, DRIVEN))
+def test_sliding_asperities_that_are_pulled_apart_let_go_once(normal, own, driven):
     """From there on nothing holds the slider, which follows its drive."""
+    rate, mu_s = driven
     rigid = "e" in normal
     springs = [TangentialStiffness(E_t=2e12), *([] if rigid else [Penalty(E_n=1e13)])]
     loading = {"w_n": Ramp(start=-4e-7, rate=5e-7), "w_t": Ramp(rate=rate)}

@@ -56,17 +56,6 @@ def test_friction_that_fades_with_temperature():
     assert solved.jumps[0].t == pytest.approx(1.0, rel=1e-9)
 
 
-def test_sliding_that_only_dampers_resist_begins_from_rest():
-    """Its velocity is nothing but rounding of tractions at first; then u relaxes to the drive."""
-    k, c, rate, mu, p = 1e13, 1e9, 1e-6, 0.3, 6559.108123501283
-    onset = (mu * p - c * rate) / (k * rate)
-    solved = closed(slider(Coulomb(mu=mu), Mounting(k=k, c_b=c), Ramp(rate=rate), p), 4.0, outputs=41)
-    assert solved.events == ["slip forward"]
-    assert solved.jumps[0].t == pytest.approx(onset, rel=1e-9)
-    after = np.linspace(0.0, 4.0, 41)[1:] - onset
-    np.testing.assert_allclose(solved["u_t"][1:], rate * (after - c / k * -np.expm1(-k / c * after)), rtol=1e-8)
-
-
 # -- against closed forms worked out by hand --------------------------------------------------------------------------
 
 

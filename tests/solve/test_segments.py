@@ -5,15 +5,14 @@ import math
 import numpy as np
 import pytest
 from scenes import together
-from solved import closed, solve
+from solved import solve
 
 import surfacechem
 from surfacechem.errors import InputError
-from surfacechem.laws.friction import Coulomb, MohrCoulomb, Viscous
+from surfacechem.laws.friction import Coulomb, MohrCoulomb
 from surfacechem.laws.loading import Harmonic, Hold, Ramp, Table
 from surfacechem.laws.longrange import VanDerWaalsFlatFlat
 from surfacechem.results.event_table import event_columns
-from surfacechem.scene import Mounting
 
 CASE = """
 T_0: 300 K
@@ -178,16 +177,3 @@ def test_a_run_ends_where_tension_reaches_the_strength():
     assert trajectory.reason.startswith("p fell below -t_n_max, where the law mohr-coulomb ends")
     assert trajectory.result.t == pytest.approx(1.5, rel=1e-9)
     assert trajectory.booked("W_mohr_coulomb") == pytest.approx(0.3 * 1e-3 * 1.5e5 * 1.5 / 2, rel=1e-10)
-
-
-# -- sliding that begins and ends where large loads cancel: rounding of the loads is no error of the step -------------
-
-
-@pytest.mark.parametrize("rtol", [1e-5, 1e-13])
-def test_a_damped_slider_that_turns_six_times(rtol):
-    """It starts with velocities of 1e-17 m/s, from tractions of 4e4 Pa that cancel."""
-    mount, drive = Mounting(k=1e8, c_b=1e6, c_g=1e5), Harmonic(amplitude=2e-3, frequency=1.0)
-    loading = {"p": Hold(level=1e5), "g_n": Hold(level=1e-6), "w_t": drive}
-    given = together((), [Coulomb(mu=0.4), Viscous(eta=0.1)], loading, tangential=mount)
-    trajectory = closed(given, 3.0, exact=max(100 * rtol, 1e-9), rtol=rtol)
-    assert trajectory.events.count("stop") == 6
